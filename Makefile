@@ -8,12 +8,15 @@ ifneq ($(RECORDINGS),)
 export SPTS_RECORDINGS ?= $(abspath $(RECORDINGS))
 endif
 
-.PHONY: demo test validate readers python browser bench firmware setup clean
+.PHONY: demo install test validate readers python book browser bench firmware setup clean
 
 demo: setup
-	@echo "building (a few minutes the first time), then simulating and scoring (about three minutes on two cores)"
-	cargo build --release --locked --quiet --workspace
-	./target/release/spts reproduce --out "$(OUT)" $(if $(RECORDINGS),--recordings "$(RECORDINGS)")
+	./scripts/demo.sh "$(OUT)" $(if $(RECORDINGS),"$(RECORDINGS)")
+
+# The command line and the MuJoCo library, in PREFIX/bin and PREFIX/lib (docs/install.md).
+PREFIX ?= $(HOME)/.local
+install: setup
+	./scripts/install.sh "$(PREFIX)"
 
 test: setup
 	cargo test --release --locked --workspace
@@ -48,6 +51,17 @@ python: setup
 	"$(PYTHON_SCENES)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	"$(PYTHON)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
 	"$(PYTHON_SCENES)/bin/python" -m pytest --quiet --tb=short -p no:cacheprovider python/tests/test_scenes.py
+
+# The book, out/book/index.html: its links are checked, its commands and its Python are run. BLOCKS="--with slow" runs what takes minutes, too.
+# Where the Python package is not built (`make python`), its examples are left out.
+BOOK ?= out/mkdocs
+BLOCKS ?=
+book: setup
+	./scripts/environment.sh "$(BOOK)" scripts/docs/requirements.txt
+	cargo build --release --locked --quiet --workspace
+	python3 scripts/docs/links.py
+	NO_MKDOCS_2_WARNING=1 "$(BOOK)/bin/mkdocs" build --strict --quiet
+	$(if $(wildcard $(PYTHON)/bin/python),"$(PYTHON)/bin/python" scripts/docs/run_blocks.py,"$(BOOK)/bin/python" scripts/docs/run_blocks.py --without python) $(BLOCKS)
 
 # The pages that people look at, in a real browser: Debian's Chromium. SHOTS=DIR keeps pictures of them.
 BROWSER ?= out/browser

@@ -71,7 +71,7 @@ def recorded(directory, name):
     return np.median((held - idle)[:, 1:], axis=1).reshape(10, 10)
 
 
-# --- contact and taxels ------------------------------------------------------------------------------------------------
+# --- contact and taxels ------------------------------------------------------------------------------------------
 
 CENTRES_M = (np.arange(10 * CELLS) + 0.5) * PITCH_M / CELLS - 5 * PITCH_M
 GRID_X_M, GRID_Y_M = np.meshgrid(CENTRES_M, -CENTRES_M)

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Tries one wheel with every Python that is here and MuJoCo 3.17.0 and 4.0.0 beside it, imported before and after, and without it:
-# python_versions.sh WHEEL PYTHON... . Every environment is fresh; that it takes less than a minute is a part of it.
+# Tries one wheel with every Python that is here and MuJoCo 3.17.0 and 4.0.0 beside it, imported before and after, and
+# without it: python_versions.sh WHEEL PYTHON... . Every environment is fresh; that it takes less than a minute is a
+# part of it.
 set -euo pipefail
 wheel=$1
 shift

@@ -32,8 +32,8 @@ fn twin(dir: &Path, threads: &str) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// What is wanted costs samples, within what a window may take; any number of threads gives the same numbers; tables and
-/// figure are there.
+/// What is wanted costs samples, within what a window may take; any number of threads gives the same numbers; tables
+/// and figure are there.
 #[test]
 fn simulated_sessions_stop_when_they_are_sure() {
     let dir = tempfile::tempdir().unwrap();

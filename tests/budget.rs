@@ -101,7 +101,10 @@ fn wrong_budgets_are_refused_in_one_line() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("bad.toml"), "weights = \"binary\"").unwrap();
     for (arguments, words) in [
-        (&["--objects", "brian"][..], "`brian` is not all or one of brain"),
+        (
+            &["--objects", "brian"][..],
+            "`brian` is neither \"all\" nor one of brain",
+        ),
         (&["--objects", "rec,rec"], "twice"),
         (&["--taxels", "150"], "[100, 1600]"),
         (&["--measurements", "0"], "[1, 1000]"),

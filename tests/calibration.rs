@@ -19,8 +19,8 @@ const REFERENCE: [(&str, &str, f64, f64); 12] = [
     ("resid_isi", "clean_residual", 0.05, 0.0),
     ("resid_robust", "core_residual", 0.03, 0.0),
     ("offset", "offset", 0.0, 0.008),
-    // ours are medians over the presses, theirs means, which a first press of 0.64 of the others and the growth after it
-    // lower by 2 %; ours has the mis-seeded cell of the trig session, 0.33 of 7.2 V
+    // ours are medians over the presses, theirs means, which a first press of 0.64 of the others and the growth after
+    // it lower by 2 %; ours has the mis-seeded cell of the trig session, 0.33 of 7.2 V
     ("sumx_pm", "sum", 0.07, 0.0),
     ("normx", "norm", 0.04, 0.0),
     ("idle_mean", "idle_mean", 0.0, 0.003),
@@ -161,8 +161,8 @@ fn the_twin_s_scores_are_the_skin_s() {
 
 /// Mean over the objects of |twin − real| of the IoU at M = 20, at most: decoder, images, bound. Measured with eight
 /// skins: 0.053 and 0.086 for the twin. One simulated skin scatters about the mean of the others by 0.120 and 0.066; of
-/// the mean of eight, √8 less, 0.04 and 0.02, is added. The skin's own compressive images leave what the electronics do:
-/// 0.009 each, as one draw of the readout (0.012, 0.008), twice which is added.
+/// the mean of eight, √8 less, 0.04 and 0.02, is added. The skin's own compressive images leave what the electronics
+/// do: 0.009 each, as one draw of the readout (0.012, 0.008), twice which is added.
 const DISTANCES: [(&str, &str, f64); 4] = [
     ("matched", "twin", 0.10),
     ("nn_lmmse", "twin", 0.11),
@@ -170,8 +170,8 @@ const DISTANCES: [(&str, &str, f64); 4] = [
     ("nn_lmmse", "skin_compressive", 0.03),
 ];
 
-/// Object by object, errors of opposite sign do not cancel: the twin is as near as was measured, and the electronics are
-/// not what is left.
+/// Object by object, errors of opposite sign do not cancel: the twin is as near as was measured, and the electronics
+/// are not what is left.
 #[test]
 #[ignore = "presses seventeen objects on eight simulated skins, twice: five minutes"]
 fn the_twin_s_objects_are_the_skin_s() {
@@ -241,8 +241,8 @@ fn threads_do_not_show() {
     assert!(told("1") == told("2"), "one and two threads differ");
 }
 
-/// Sessions are new ones to a profile that was fitted to the others: of 35 numbers, nine in ten should lie in the band of
-/// their twins. With four twins 32 do, with 24 twins 29.
+/// Sessions are new ones to a profile that was fitted to the others: of 35 numbers, nine in ten should lie in the band
+/// of their twins. With four twins 32 do, with 24 twins 29.
 #[test]
 #[ignore = "replays the sessions of the real skin many times"]
 fn sessions_are_predicted_by_the_others() {

@@ -45,10 +45,10 @@ fn the_library_is_free_of_what_its_users_do_not_need() {
     assert!(packages("spts", &[]).contains("mujoco-rs"));
 }
 
-/// The example program is built beside the workspace: with other versions it would be built from nothing, and of other
-/// parts than what the tests have seen.
+/// The example programs are built beside the workspace: with other versions they would be built from nothing, and of
+/// other parts than what the tests have seen.
 #[test]
-fn the_example_has_the_versions_of_the_workspace() {
+fn the_examples_have_the_versions_of_the_workspace() {
     let locked = |file: &str| -> BTreeSet<(String, String)> {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
         let lock: toml::Table = toml::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
@@ -58,7 +58,7 @@ fn the_example_has_the_versions_of_the_workspace() {
             .map(|package| (text(package, "name"), text(package, "version")))
             .collect()
     };
-    let (example, workspace) = (locked("../examples/press/Cargo.lock"), locked("../Cargo.lock"));
+    let (example, workspace) = (locked("../examples/Cargo.lock"), locked("../Cargo.lock"));
     let unlike: Vec<_> = example.difference(&workspace).collect();
-    assert_eq!(unlike, [&("press".to_owned(), "0.1.0".to_owned())]);
+    assert_eq!(unlike, [&("examples".to_owned(), "0.1.0".to_owned())]);
 }

@@ -147,7 +147,8 @@ fn ignores_hangups() -> bool {
     u64::from_str_radix(ignored.trim(), 16).unwrap() & 1 == 1
 }
 
-/// A run that is killed ends its programs, and leaves its folder to the next run, which leaves folders alone that it does not know.
+/// A run that is killed ends its programs, and leaves its folder to the next run, which leaves folders alone that it
+/// does not know.
 #[test]
 fn the_next_run_removes_what_a_killed_one_has_left() {
     let Some(recordings) = recordings() else { return };

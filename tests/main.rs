@@ -34,6 +34,8 @@ mod design;
 #[cfg(test)]
 mod determinism;
 #[cfg(test)]
+mod docs;
+#[cfg(test)]
 mod dynamics;
 #[cfg(test)]
 mod evidence;
@@ -47,6 +49,8 @@ mod fidelity;
 mod firmware;
 #[cfg(test)]
 mod firmware_command;
+#[cfg(test)]
+mod folders;
 #[cfg(test)]
 mod foreign_bytes;
 #[cfg(test)]
@@ -79,6 +83,8 @@ mod seeds;
 mod setup;
 #[cfg(test)]
 mod simulation_only;
+#[cfg(test)]
+mod style;
 #[cfg(test)]
 mod unscorable;
 mod unseen;

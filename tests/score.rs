@@ -72,6 +72,33 @@ fn boards_are_reproducible_and_compared() {
     );
 }
 
+/// What an earlier board has and this one has not is named, decoder by decoder; so is what only this one has.
+#[test]
+fn what_a_board_lacks_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |more: &[&str]| {
+        let start = words("score --twin press/T --quick --no-times --json");
+        spts(dir.path(), &[&start[..], more].concat())
+    };
+    let saved = run(&words(
+        "--decoder empty,correlate --measurements 7,20 --save board.json",
+    ));
+    assert!(saved.status.success(), "{}", String::from_utf8_lossy(&saved.stderr));
+    let less = run(&words("--decoder empty,omp --measurements 20 --against board.json"));
+    assert_eq!(less.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&less.stderr).into_owned();
+    for line in [
+        "note: decoders only in board.json: correlate; only in this run: omp",
+        "note: numbers of measurements only in board.json: 7",
+        "correlate at M = 20 from raster: not scored in this run: support, iou, f1",
+        "error: 0 scores fell, ",
+    ] {
+        assert!(said.contains(line), "{line}: {said}");
+    }
+    let board: Value = serde_json::from_slice(&less.stdout).unwrap();
+    assert_eq!(board["differences"][0]["only_before"], serde_json::json!(["correlate"]));
+}
+
 /// A program that calls everything `brain`, fed line by line, is right about brain alone; one that sends nonsense or
 /// dies ends the run.
 #[test]

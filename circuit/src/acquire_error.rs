@@ -1,13 +1,13 @@
-//! What keeps a block from being acquired.
+//! Errors of acquiring a block.
 
 use crate::codes::CodesError;
 use crate::recording_error::RecordingError;
 
-/// A block that cannot be acquired.
+/// Why a block cannot be acquired.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AcquireError {
-    /// A source of another skin.
+    /// The source belongs to another skin.
     #[error("the source has {source_taxels} taxels; the readout {taxels}")]
     Taxels {
         /// Taxels of the source.
@@ -15,7 +15,7 @@ pub enum AcquireError {
         /// Taxels of the readout.
         taxels: usize,
     },
-    /// Nothing, or a broken frame.
+    /// The number of measurements is zero, or not a whole number of frames.
     #[error("{measurements} measurements are not a positive whole number of frames of {frame}")]
     PartialFrame {
         /// Measurements asked for.
@@ -23,10 +23,10 @@ pub enum AcquireError {
         /// Measurements a frame.
         frame: usize,
     },
-    /// A source that hands out a segment which does not hold the time asked for, or one of another skin.
+    /// The source returned a segment that does not contain the requested time, or belongs to another skin.
     #[error("at {time_s} s the source gives {taxels} taxels from {start_s} s to {end_s} s")]
     Segment {
-        /// Time asked for, s since the start of the block.
+        /// Requested time, s since the start of the block.
         time_s: f64,
         /// Start of the segment, s.
         start_s: f64,
@@ -35,10 +35,10 @@ pub enum AcquireError {
         /// Taxels of the segment.
         taxels: usize,
     },
-    /// Cells that put out nothing, or those of another skin.
+    /// The cells have no codes, or belong to another skin.
     #[error("cells: {0}")]
     Codes(#[from] CodesError),
-    /// Blocks that do not make a recording.
+    /// The blocks do not form a valid recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
 }

@@ -5,26 +5,26 @@ use crate::kernels::{Lines, Sums};
 use crate::mode::WeightMode;
 use crate::rows::Rows;
 
-/// A run of consecutive measurements. How a block is cut into runs is up to the readout and must not show in the
-/// result.
+/// A run of consecutive measurements. The readout decides how to divide a block into runs, and the result must not
+/// depend on it.
 ///
 /// All slices have one entry a measurement.
 #[derive(Debug)]
 pub struct Batch<'a> {
     /// Time from one measurement to the next, s.
     pub period_s: f64,
-    /// Rf·Vd, V/S: conductance times this is what a taxel adds to the output at level 1.
+    /// Rf·Vd, V/S: conductance times this is a taxel's contribution to the output at level 1.
     pub volts_per_siemens: f64,
     /// Σx, sum of the taxels' contributions at level 1, V.
     pub sum_v: &'a mut [f64],
     /// √Σ(wᵢ·xᵢ)², V: with weights ±1 this is ‖x‖₂, in raster mode the scanned taxel's own contribution.
     pub norm_v: &'a mut [f64],
-    /// Output so far, V. It starts as Σ wᵢ·xᵢ, and every effect changes it in turn.
+    /// Output so far, V. It starts as Σ wᵢ·xᵢ, and every effect modifies it in turn.
     pub output_v: &'a mut [f64],
     pub(crate) rows: &'a Rows,
     /// Conductance of the taxels, S.
     pub(crate) skin: Lines<'a>,
-    /// Cells that are not as they should be.
+    /// Faulty cells.
     pub(crate) cells: &'a mut Cells,
 }
 
@@ -32,11 +32,11 @@ pub struct Batch<'a> {
 #[derive(Debug, Default)]
 pub(crate) struct Cell {
     pub(crate) taxel: usize,
-    /// Whether a fault decides its level.
+    /// Whether a fault determines the cell's level.
     decided: bool,
-    /// Level at the measurement before the batch, then at each of its own.
+    /// Level at the measurement before the batch, then at each measurement of the batch.
     levels: Vec<f64>,
-    /// Factor of the taxel's contribution, in the same order.
+    /// Factor on the taxel's contribution, in the same order.
     gains: Vec<f64>,
 }
 
@@ -63,7 +63,7 @@ impl Cell {
 /// The cells of a batch that are not as they should be. The buffers of the batch before are used again.
 #[derive(Debug, Default)]
 pub(crate) struct Cells {
-    /// In the order of their taxels.
+    /// In order of taxel.
     used: Vec<Cell>,
     free: Vec<Cell>,
 }
@@ -112,7 +112,7 @@ impl Batch<'_> {
         self.output_v.len()
     }
 
-    /// Whether there is no measurement; the readout makes no such batch.
+    /// Whether the batch is empty. The readout makes no empty batch.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.output_v.is_empty()
@@ -135,7 +135,7 @@ impl Batch<'_> {
         }
     }
 
-    /// Drive level of `taxel` at the measurement before measurement `i`, in O(1); 0 before the first of all.
+    /// Drive level of `taxel` at the measurement before measurement `i`, in O(1); 0 before the first measurement.
     #[must_use]
     #[inline]
     pub fn previous_level(&self, taxel: usize, i: usize) -> f64 {
@@ -153,7 +153,7 @@ impl Batch<'_> {
         gain * self.sound_v(taxel, i)
     }
 
-    /// What the cells put out.
+    /// Kind of the levels that the cells put out.
     #[must_use]
     pub fn mode(&self) -> WeightMode {
         self.rows.weights().mode()

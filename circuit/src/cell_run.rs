@@ -1,15 +1,15 @@
-//! A cell over consecutive measurements.
+//! One cell over consecutive measurements.
 
-/// One cell over consecutive measurements, as its faults leave it.
+/// One cell over consecutive measurements, as modified by its faults.
 #[derive(Debug)]
 pub struct CellRun<'a> {
-    /// Row of the weight matrix at the first entry; the others follow.
+    /// Row of the weight matrix at the first entry; the other entries use the following rows.
     pub first_row: u64,
     /// Time from one measurement to the next, s.
     pub period_s: f64,
     /// Drive level, −1 to 1.
     pub levels: &'a mut [f64],
-    /// What the taxel's contribution is multiplied by, 1 for a sound one.
+    /// Factor on the taxel's contribution; 1 for a fault-free cell.
     pub gains: &'a mut [f64],
 }
 

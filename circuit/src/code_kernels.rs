@@ -1,9 +1,9 @@
-//! Sums over all taxels for many measurements at once, with levels that are given: the order of additions, and so every
-//! bit, is that of [`kernels`](crate::kernels) with the same levels.
+//! Sums over all taxels for many measurements at once, with given levels. The order of additions, and so every bit of
+//! the result, is that of [`kernels`](crate::kernels) with the same levels.
 //!
-//! There a binary term is the value with its sign bit flipped or not, here the product with ±1, which is the same; an
-//! analog term is the same product. Past the last taxel both add zeros, of whatever sign: they do not change a sum that
-//! starts at +0.
+//! In `kernels` a binary term is the value with its sign bit flipped or not; here it is the product with ±1, which is
+//! equal. An analog term is the same product in both. Both add zeros of either sign after the last taxel; zeros do not
+//! change a sum that starts at +0.
 
 use crate::kernels::{Lines, four};
 use multiversion::multiversion;

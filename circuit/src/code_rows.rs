@@ -1,4 +1,4 @@
-//! Consecutive rows of codes that come from outside.
+//! Consecutive rows of codes that are given rather than computed.
 
 use crate::code_kernels::{given_sums, given_sums_and_squares};
 use crate::codes::{FULL_SCALE, NEUTRAL};
@@ -8,11 +8,11 @@ use crate::mode::{ANALOG_SCALE, WeightMode};
 /// What a row is beside those that sound cells put out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// Every level is one that the mode has.
+    /// Every level is valid in the mode.
     Sound,
     /// In raster mode: level 1 of this taxel and 0 of all others.
     Scan(usize),
-    /// Anything else.
+    /// Any other levels.
     Odd,
 }
 
@@ -43,11 +43,11 @@ pub(crate) struct CodeRows {
     len: usize,
     /// Level of every code.
     levels: [f64; 256],
-    /// Row-major: the row before the first, nothing before the first edge of all, and the rows.
+    /// Row-major: the row before the first (nothing before the first edge), then the rows.
     codes: Vec<u8>,
     kinds: Vec<Kind>,
-    /// Levels, in analog mode times 127.5; taxel-major, with zeros up to whole lanes of rows and fours of taxels. None
-    /// in raster mode.
+    /// Levels, times 127.5 in analog mode. Taxel-major, padded with zeros to whole SIMD lanes of rows and to groups of
+    /// four taxels. Empty in raster mode.
     drives: Vec<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! DAC codes that come from outside, in place of the ones that the generator's formula gives.
+//! DAC codes from outside that replace those of the generator's formula.
 
 use crate::mode::{ANALOG_SCALE, WeightMode};
 
@@ -9,8 +9,8 @@ pub(crate) const NEUTRAL: u8 = 126;
 
 impl WeightMode {
     /// Drive level of DAC code k in this mode: (k − 127.5)/127.5, and 0 for the neutral code 126, to which the
-    /// amplifier's bias is trimmed. In analog mode 126 is a level as any other, since the generator's top byte may be
-    /// that.
+    /// amplifier's bias is trimmed. In analog mode 126 is an ordinary level, because the generator's top byte can be
+    /// 126.
     #[must_use]
     pub fn code_level(self, code: u8) -> f64 {
         if code == NEUTRAL && self != Self::Analog {
@@ -30,50 +30,70 @@ pub(crate) fn code_of(level: f64) -> u8 {
     }
 }
 
-/// What the cells of a skin put out, row by row: for a readout that drives the taxels with it
+/// Codes that the cells of a skin put out, row by row. A readout drives its taxels with them
 /// ([`Readout::with_codes`](crate::Readout::with_codes)).
 ///
-/// What a row holds depends on its number alone, not on which rows were asked for before; [`check_codes`] checks this.
+/// The content of a row depends only on its number, not on the rows requested before; [`check_codes`] checks this.
+///
+/// ```
+/// use spts_circuit::{CellCodes, CodesError, check_codes};
+///
+/// /// Cells that all switch between the lowest and the highest code.
+/// struct Blinking;
+///
+/// impl CellCodes for Blinking {
+///     fn taxels(&self) -> usize {
+///         4
+///     }
+///     fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+///         for (row, codes) in (first_row..).zip(out.chunks_exact_mut(4)) {
+///             codes.fill(if row % 2 == 0 { 0 } else { 255 });
+///         }
+///         Ok(())
+///     }
+/// }
+/// check_codes(&|| Box::new(Blinking));
+/// ```
 pub trait CellCodes: Send {
     /// Number of cells: the length of a row.
     fn taxels(&self) -> usize;
 
-    /// Writes the DAC code of every cell as it is when the output is sampled, at as many consecutive rows as `out`
-    /// holds, row-major, starting with `first_row` (0-based, in clock edges since the seeds were loaded). `out` is a
-    /// whole number of rows. The readout asks for rows in increasing order as long as nobody seeks.
+    /// Writes the DAC code of every cell, as it is when the output is sampled, into `out`: consecutive rows from
+    /// `first_row` on, row-major. Rows count clock edges from 0, since loading the seeds. The length of `out` is a
+    /// whole number of rows. Without a seek, the readout requests rows in increasing order.
     ///
     /// # Errors
-    /// [`CodesError`] when the cells cannot be brought there.
+    /// [`CodesError`] if the cells cannot reach these rows.
     fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError>;
 }
 
-/// Codes that cannot be had.
+/// Why codes are not available.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CodesError {
-    /// Cells of another skin.
+    /// The cells belong to another skin.
     #[error("the codes are those of {cells} cells; the readout has {taxels} taxels")]
     Taxels {
-        /// Cells that put out codes.
+        /// Number of cells that put out codes.
         cells: usize,
-        /// Taxels of the readout.
+        /// Number of taxels of the readout.
         taxels: usize,
     },
-    /// Cells that do not put out anything at a row.
+    /// The cells cannot put out a row.
     #[error("no codes from row {row} on: {reason}")]
     Row {
-        /// First row asked for.
+        /// First requested row.
         row: u64,
-        /// What is wrong.
+        /// Cause.
         reason: String,
     },
 }
 
-/// Checks what every source of codes promises: `build` makes a fresh one. Rows are the same in one piece, in pieces of
-/// other lengths, backwards, and entered in the middle.
+/// Checks the property that every source of codes must have: rows are the same when requested at once, in pieces of
+/// other lengths, backwards, or from the middle on. `build` makes a fresh source.
 ///
 /// # Panics
-/// When the promise is broken, or the source gives an error.
+/// If the source lacks the property or returns an error.
 pub fn check_codes(build: &dyn Fn() -> Box<dyn CellCodes>) {
     const ROWS: usize = 700;
     let mut source = build();

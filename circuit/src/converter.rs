@@ -1,13 +1,29 @@
-//! The scale between a converter's codes and recorded volts.
+//! Scale between the codes of a converter and recorded volts.
 
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, within};
 
-/// How the codes of a converter became the volts of a recording. Every volt of the recording is the volt of a code, bit
-/// for bit, so that a file may hold codes in place of volts.
+/// The scale by which the codes of a converter became the volts of a recording. Every voltage of the recording belongs
+/// to a code, bit for bit, so a file may store codes instead of volts.
 ///
-/// y = `offset_v` − s(code); where `subtract_v` is given, y = max(0, `offset_v` − s(code) − `subtract_v`). The range of
-/// codes is [0, `max_code`], and y never rises with the code.
+/// y = `offset_v` − s(code); if `subtract_v` is given, y = max(0, `offset_v` − s(code) − `subtract_v`). Codes range
+/// over [0, `max_code`], and y never rises with the code.
+///
+/// ```
+/// use spts_circuit::{CodeScale, Converter, ConverterConfig};
+///
+/// let converter = Converter::new(ConverterConfig {
+///     offset_v: 11.0,
+///     scale: CodeScale::StepV(0.0215),
+///     max_code: 1023,
+///     subtract_v: None,
+/// })?;
+/// let volts = converter.volts(300);
+/// assert!((volts - 4.55).abs() < 1e-9);
+/// assert_eq!(converter.code(volts), Some(300));
+/// assert_eq!(converter.code(4.56), None, "between two codes");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "ConverterConfig", into = "ConverterConfig")]
 pub struct Converter(ConverterConfig);
@@ -18,30 +34,30 @@ pub struct Converter(ConverterConfig);
 pub struct ConverterConfig {
     /// Output of the amplifier at code 0, V. Range [−1e6, 1e6].
     pub offset_v: f64,
-    /// s: what a code takes off the output.
+    /// s: the voltage that a code subtracts from the output.
     pub scale: CodeScale,
     /// Largest code. Range [1, 2²⁴ − 1].
     pub max_code: u32,
-    /// Constant that was subtracted before negative volts were set to 0, V; none when neither was done. Range [−1e6,
+    /// Constant that was subtracted before negative voltages were set to 0, V; `None` if neither was done. Range [−1e6,
     /// 1e6].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub subtract_v: Option<f64>,
 }
 
-/// What a code takes off the output, V. The two agree but for rounding.
+/// Voltage that a code subtracts from the output, V. The two forms differ only by rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CodeScale {
     /// code · step, V. Range of the step [5e-14, 1e6].
     StepV(f64),
-    /// code / `max_code` · reference · numerator / denominator, evaluated in this order, as the published acquisition
-    /// does it.
+    /// code / `max_code` · reference · numerator / denominator, evaluated in this order, as in the published
+    /// acquisition.
     Divider {
         /// Full scale of the converter, V. Range [1e-3, 1e3].
         reference_v: f64,
-        /// Numerator of the amplifier's output over the voltage at the converter. Range [1e-3, 1e6].
+        /// Numerator of the ratio of the amplifier's output to the voltage at the converter. Range [1e-3, 1e6].
         numerator: f64,
-        /// Its denominator. Range [1e-3, 1e6].
+        /// Denominator of that ratio. Range [1e-3, 1e6].
         denominator: f64,
     },
 }
@@ -60,10 +76,10 @@ impl From<Converter> for ConverterConfig {
 }
 
 impl Converter {
-    /// Converter with these parameters.
+    /// A converter with these parameters.
     ///
     /// # Errors
-    /// [`ConfigError`] for one outside its range.
+    /// [`ConfigError`] for a parameter outside its range.
     pub fn new(config: ConverterConfig) -> Result<Self, ConfigError> {
         within("offset_v", config.offset_v, -1e6, 1e6, "[−1e6, 1e6]")?;
         within(
@@ -102,7 +118,7 @@ impl Converter {
         self.0.subtract_v.unwrap_or(0.0)
     }
 
-    /// Volts that a recording has for `code`.
+    /// Voltage in the recording for `code`.
     #[must_use]
     pub fn volts(&self, code: u32) -> f64 {
         let code = f64::from(code);
@@ -120,7 +136,7 @@ impl Converter {
             .map_or(volts, |subtract_v| (volts - subtract_v).max(0.0))
     }
 
-    /// Smallest code whose volts are `volts`, bit for bit; `None` when there is none, as for NaN.
+    /// Smallest code whose voltage equals `volts` bit for bit; `None` if there is no such code, as for NaN.
     #[must_use]
     pub fn code(&self, volts: f64) -> Option<u32> {
         // volts never rise with the code: the first code that is not above them
@@ -139,7 +155,7 @@ impl Converter {
         (self.volts(not_above).to_bits() == volts.to_bits()).then_some(not_above)
     }
 
-    /// Whether every one of `volts` that is not NaN is the volt of a code.
+    /// Whether each of `volts`, apart from NaN, is the voltage of a code.
     #[must_use]
     pub fn made(&self, volts: &[f64]) -> bool {
         volts.iter().all(|v| v.is_nan() || self.code(*v).is_some())

@@ -1,4 +1,4 @@
-//! The effects, in signal order.
+//! The table of effects, in signal order.
 
 mod adc;
 mod amplifier;
@@ -18,7 +18,7 @@ mod rails;
 pub use adc::Adc;
 
 use crate::converter::Converter;
-use crate::effect::{BlockStart, BuildEffect, Effect, ProfileError, Session, parse};
+use crate::effect::{BlockStart, BuildEffect, Effect, EffectSession, ProfileError, parse};
 use crate::engine::Engine;
 use crate::mode::{Mode, WeightMode};
 use crate::seeding::Seeding;
@@ -26,9 +26,8 @@ use crate::source::Interpolated;
 use crate::weights::Weights;
 use spts_models::{ConductanceMap, Streams, in_section};
 
-/// Every effect by name, in signal order: the cells' digital timing, then the summed analog signal, then the converter,
-/// then what the publication did to the numbers. Faults of single cells come before all of them; see
-/// [`FAULTS`](crate::FAULTS).
+/// Every effect by name, in signal order: the cells' digital timing, the summed analog signal, the converter, and the
+/// processing before publication. Faults of single cells act before all effects; see [`FAULTS`](crate::FAULTS).
 pub const EFFECTS: &[(&str, BuildEffect)] = &[
     ("missed_clocks", missed_clocks::build),
     ("late_updates", late_updates::build),
@@ -44,11 +43,23 @@ pub const EFFECTS: &[(&str, BuildEffect)] = &[
     ("clamp", clamp::build),
 ];
 
-/// Effects named in `chain`, each with its table of parameters, in signal order whatever their order in the file.
+/// Builds the effects named in `chain`, each with its table of parameters, in signal order rather than the order of the
+/// file.
+///
+/// ```
+/// use spts_circuit::{Mode, Profile};
+///
+/// let profile = Profile::named("as_built")?;
+/// assert!(profile.compressive.contains_key("adc"));
+/// let mut without = profile.clone();
+/// without.compressive.remove("adc"); // the ablation of the converter
+/// assert!(without.converter(Mode::Compressive)?.is_none());
+/// # Ok::<(), spts_circuit::ProfileError>(())
+/// ```
 ///
 /// # Errors
-/// [`ProfileError`] for an unknown effect and for parameters that it refuses.
-pub fn build_chain(chain: &toml::Table, session: &Session) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
+/// [`ProfileError`] for an unknown effect, or parameters that it refuses.
+pub fn build_chain(chain: &toml::Table, session: &EffectSession) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
     let mode = session.weights.mode().readout();
     if let Some(name) = chain.keys().find(|k| EFFECTS.iter().all(|(name, _)| name != k)) {
         let known: Vec<&str> = EFFECTS.iter().map(|(name, _)| *name).collect();
@@ -106,17 +117,17 @@ pub(crate) fn rail_v(chain: &toml::Table, mode: Mode) -> Result<Option<f64>, Pro
     Ok(amplifier_v.into_iter().chain(rails_v).reduce(f64::min))
 }
 
-/// Checks what every effect promises. `build` makes a fresh one for a session, from parameters that must be valid for 4
-/// taxels or more.
+/// Checks the properties that every effect must have. `build` makes a fresh effect for a session, with parameters that
+/// are valid for 4 taxels or more.
 ///
-/// Finite measurements stay finite, from 0 to 1 MV; equal sessions and blocks give equal bits; a block that does not
-/// follow on from another one does not depend on it; batches of 1, 7 and 128 measurements give equal bits.
+/// Finite measurements from 0 to 1 MV give finite outputs. Equal sessions and blocks give equal bits. A block that does
+/// not follow directly on another does not depend on it. Batches of 1, 7 and 128 measurements give equal bits.
 ///
 /// # Panics
-/// When a promise is broken, with the numbers.
-pub fn check_effect(build: &dyn Fn(&Session) -> Box<dyn Effect>) {
+/// If the effect lacks a property; the message holds the numbers.
+pub fn check_effect(build: &dyn Fn(&EffectSession) -> Box<dyn Effect>) {
     for mode in [WeightMode::Binary, WeightMode::Analog, WeightMode::Raster] {
-        let session = Session {
+        let session = EffectSession {
             device: Streams::new(2),
             streams: Streams::new(3),
             weights: Weights::new(mode, Seeding::Address, 4),
@@ -144,7 +155,13 @@ pub fn check_effect(build: &dyn Fn(&Session) -> Box<dyn Effect>) {
 }
 
 /// Bits of 1000 measurements of block `block` through `effect`, while 4 taxels change.
-fn block_of(effect: &mut [Box<dyn Effect>; 1], session: &Session, block: u64, scale_s: f64, batch: usize) -> Vec<u64> {
+fn block_of(
+    effect: &mut [Box<dyn Effect>; 1],
+    session: &EffectSession,
+    block: u64,
+    scale_s: f64,
+    batch: usize,
+) -> Vec<u64> {
     let map = |a: f64| {
         let values = vec![0.0, scale_s, 0.5 * scale_s, a * scale_s];
         ConductanceMap::from_values(2, 2, values)

@@ -19,7 +19,7 @@ pub(crate) struct Engine {
     sample_rate_hz: f64,
     batch: usize,
     rows: Rows,
-    /// Where the codes of the rows come from, unless the generator gives the levels.
+    /// Source of the codes; `None` if the generator gives the levels.
     codes: Option<Box<dyn CellCodes>>,
     sums: Sums,
     share: Vec<f64>,

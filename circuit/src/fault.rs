@@ -1,7 +1,7 @@
-//! A cell or taxel that does something else than it should.
+//! Faults of single cells or taxels.
 
 use crate::cell_run::CellRun;
-use crate::effect::{ProfileError, Session};
+use crate::effect::{EffectSession, ProfileError};
 use serde::Deserialize;
 
 /// One fault of a profile's `[[faults]]` list.
@@ -16,16 +16,35 @@ pub struct FaultConfig {
     pub parameters: toml::Table,
 }
 
-/// A fault of one cell. What it makes of a row is a function of the session, the taxel and the row.
+/// A fault of one cell. Its effect on a row is a function of the session, the taxel and the row.
+///
+/// ```
+/// use spts_circuit::{CellRun, Fault};
+///
+/// /// A taxel that conducts half as well as it should.
+/// struct Worn;
+///
+/// impl Fault for Worn {
+///     fn drives(&self) -> bool {
+///         false // the level is still the generator's
+///     }
+///     fn apply(&mut self, run: &mut CellRun<'_>) {
+///         run.gains.iter_mut().for_each(|gain| *gain *= 0.5);
+///     }
+/// }
+/// let (mut levels, mut gains) = ([1.0, -1.0], [1.0, 1.0]);
+/// Worn.apply(&mut CellRun { first_row: 0, period_s: 1.55e-5, levels: &mut levels, gains: &mut gains });
+/// assert_eq!(gains, [0.5, 0.5]);
+/// ```
 pub trait Fault: Send {
-    /// Whether it decides the level of the cell; a cell has at most one such fault.
+    /// Whether the fault determines the level of the cell. A cell has at most one such fault.
     fn drives(&self) -> bool {
         true
     }
 
-    /// Changes level and gain. A run may begin anywhere.
+    /// Modifies levels and gains. A run may begin at any row.
     fn apply(&mut self, run: &mut CellRun<'_>);
 }
 
 /// Builds a fault of a taxel from its parameters.
-pub type BuildFault = fn(toml::Table, u32, &Session) -> Result<Box<dyn Fault>, ProfileError>;
+pub type BuildFault = fn(toml::Table, u32, &EffectSession) -> Result<Box<dyn Fault>, ProfileError>;

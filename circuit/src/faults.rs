@@ -1,4 +1,4 @@
-//! The faults, and the effect that puts them into the signal.
+//! The table of faults, and the effect that applies them to the signal.
 
 mod dead;
 mod detached;
@@ -9,7 +9,7 @@ pub(crate) mod skipping_clocks;
 mod stuck;
 
 use crate::batch::Batch;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use crate::fault::{BuildFault, Fault, FaultConfig};
 use spts_models::in_section;
 
@@ -30,12 +30,13 @@ fn known() -> String {
     names.join(", ")
 }
 
-/// The effect of all faults of `configs`: the first one of the chain, since the faults change what the cells put out.
+/// Builds one effect for all faults in `configs`. It must be the first of the chain, because faults change what the
+/// cells put out.
 ///
 /// # Errors
-/// [`ProfileError`] for an unknown fault, a taxel that the skin does not have, parameters out of range, and a second
-/// fault that decides the level of a cell.
-pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+/// [`ProfileError`] for an unknown fault, a taxel that the skin does not have, parameters outside their range, or a
+/// second fault that determines the level of the same cell.
+pub fn build_faults(configs: &[FaultConfig], session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let mut cells: Vec<FaultyCell> = Vec::new();
     for (index, config) in configs.iter().enumerate() {
         let taxel = config.taxel as usize;
@@ -60,7 +61,7 @@ pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dy
     Ok(Box::new(Faults { cells }))
 }
 
-fn build_fault(index: usize, config: &FaultConfig, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+fn build_fault(index: usize, config: &FaultConfig, session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
     let Some((_, build)) = FAULTS.iter().find(|(name, _)| *name == config.name) else {
         return Err(ProfileError::UnknownFault {
             index,
@@ -100,7 +101,7 @@ impl FaultyCell {
 }
 
 struct Faults {
-    /// In the order of their taxels.
+    /// In order of taxel.
     cells: Vec<FaultyCell>,
 }
 
@@ -125,8 +126,8 @@ mod tests {
     use crate::weights::Weights;
     use spts_models::Streams;
 
-    fn session(mode: WeightMode) -> Session {
-        Session {
+    fn session(mode: WeightMode) -> EffectSession {
+        EffectSession {
             device: Streams::new(4),
             streams: Streams::new(4),
             weights: Weights::new(mode, Seeding::Address, 100),

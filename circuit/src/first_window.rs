@@ -1,10 +1,11 @@
-//! Seeds whose generators put out a wanted first window.
+//! Seeds whose generators put out a given first window.
 
 use crate::lcg::Jump;
 use crate::patterns::Patterns;
 use std::collections::BTreeMap;
 
-/// Most rows of a window. All 2²⁴ windows of so many are in the sequence, the last one 271,551,075 steps behind state 0.
+/// Most rows of a window. All 2²⁴ windows of so many are in the sequence, the last one 271,551,075 steps behind state
+/// 0.
 const MOST_ROWS: usize = 24;
 /// Number of states of a generator, and so of seeds.
 const STATES: u64 = 1 << 32;
@@ -31,9 +32,9 @@ pub enum FirstWindowError {
     },
 }
 
-/// Seeds, one a taxel, with which the cells' generators put out `window` in binary mode, rows 0 to M − 1 after the
-/// seeds were loaded. What follows is pseudorandom. The search is exact: it goes through the states of the generator in
-/// their order and stops when every taxel has its seed.
+/// Seeds, one a taxel, with which the cells' generators put out `window` in binary mode at rows 0 to M − 1 after the
+/// seeds are loaded. Later rows are pseudorandom. The search is exact: it enumerates the states of the generator and
+/// stops when every taxel has a seed.
 ///
 /// ```
 /// use spts_circuit::{WeightMode, Weights, parse_patterns, seeds_of_first_window};
@@ -45,7 +46,7 @@ pub enum FirstWindowError {
 /// ```
 ///
 /// # Errors
-/// [`FirstWindowError`] for more than 24 rows, and levels that are not ±1.
+/// [`FirstWindowError`] for more than 24 rows, or levels other than ±1.
 pub fn seeds_of_first_window(window: &Patterns) -> Result<Vec<u32>, FirstWindowError> {
     let rows = window.period();
     if rows > MOST_ROWS {

@@ -1,8 +1,8 @@
 //! Sums over all taxels for many measurements at once: the inner loops of the readout.
 //!
-//! Lanes are consecutive measurements, so a measurement's own sum has the same order of additions on every machine and
-//! in a run of any length: taxels in fours, (t₀ + t₁) + (t₂ + t₃), one four after the other. No product is fused with a
-//! sum. Results are therefore the same bits whichever instruction set is chosen at run time.
+//! SIMD lanes are consecutive measurements. The sum of one measurement therefore has the same order of additions on
+//! every machine and in a run of any length: taxels in fours, (t₀ + t₁) + (t₂ + t₃), one four after the other. No
+//! product is fused with a sum. Results have the same bits whichever instruction set is chosen at run time.
 
 use crate::lcg::Jump;
 use crate::mode::ANALOG_SCALE;
@@ -159,7 +159,7 @@ pub(crate) struct Sums {
 pub(crate) struct Lines<'a> {
     /// Values at share 0.
     pub(crate) from: &'a [f64],
-    /// Values at share 1, as many; `None` when they stay as they are.
+    /// Values at share 1, as many; `None` if they do not change.
     pub(crate) to: Option<&'a [f64]>,
     /// Share of every measurement.
     pub(crate) share: &'a [f64],

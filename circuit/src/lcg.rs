@@ -1,14 +1,23 @@
-//! The cells' pseudorandom generator and its jump-ahead.
+//! The cells' pseudorandom generator, and jumps ahead.
 
 /// Multiplier of the cells' generator.
 pub const MULTIPLIER: u32 = 1_664_525;
 /// Increment of the cells' generator.
 pub const INCREMENT: u32 = 1_013_904_223;
 
-/// Affine map s ↦ a·s + c mod 2³²: any number of generator steps in one.
+/// Affine map s ↦ a·s + c mod 2³², which performs any number of generator steps at once.
 ///
 /// The generator is s ↦ 1664525·s + 1013904223 mod 2³² (W. H. Press et al., *Numerical Recipes*, §7.1, "quick and
 /// dirty"), as in the device's published firmware.
+///
+/// ```
+/// use spts_circuit::{INCREMENT, Jump, MULTIPLIER};
+///
+/// let step = |state: u32| state.wrapping_mul(MULTIPLIER).wrapping_add(INCREMENT);
+/// let slowly = (0..1000).fold(8, |state, _| step(state));
+/// assert_eq!(Jump::new(1000).apply(8), slowly);
+/// assert_eq!(Jump::new(600).then(Jump::new(400)), Jump::new(1000));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Jump {
     multiplier: u32,
@@ -16,7 +25,7 @@ pub struct Jump {
 }
 
 impl Jump {
-    /// No step at all.
+    /// No step.
     pub const NONE: Self = Self {
         multiplier: 1,
         increment: 0,

@@ -9,9 +9,9 @@ use std::sync::Arc;
 pub enum LevelSource {
     /// The cells' generators, seeded by a rule.
     Seeding(Seeding),
-    /// The cells' generators, seeded with these numbers, one a taxel.
+    /// The cells' generators, with a given seed for each taxel.
     Seeds(Arc<[u32]>),
-    /// Codes that are given.
+    /// Given codes.
     Patterns(Arc<Patterns>),
 }
 

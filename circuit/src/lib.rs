@@ -1,8 +1,8 @@
 //! Weights, summing amplifier, readout effects and ADC of the single-pixel tactile skin.
 //!
-//! Every cell drives its taxel with a level of its own pseudorandom sequence; one amplifier sums all taxels onto one
+//! Every cell drives its taxel with a level from its pseudorandom sequence. One amplifier sums all taxels onto one
 //! wire, and one converter reads it: y = Σ wᵢ·xᵢ, with xᵢ = Rf·Vd·Gᵢ. A [`Readout`] turns the conductance of a skin
-//! into the [`Block`]s of a [`Recording`], the type that recordings of the real skin have too.
+//! into the [`Block`]s of a [`Recording`]. Recordings of the real skin have the same type.
 //!
 //! ```
 //! use spts_circuit::{Interpolated, Mode, Profile, Readout};
@@ -84,7 +84,7 @@ pub use batch::Batch;
 pub use cell_run::CellRun;
 pub use codes::{CellCodes, CodesError, check_codes};
 pub use converter::{CodeScale, Converter, ConverterConfig};
-pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
+pub use effect::{BlockStart, BuildEffect, Effect, EffectSession, ProfileError};
 pub use effects::{Adc, EFFECTS, build_chain, check_effect};
 pub use fault::{BuildFault, Fault, FaultConfig};
 pub use faults::{FAULTS, build_faults};

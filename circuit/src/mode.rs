@@ -3,7 +3,7 @@
 use crate::lcg::Jump;
 use serde::{Deserialize, Serialize};
 
-/// Which of the two readouts a recording holds.
+/// The two readouts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
@@ -14,7 +14,7 @@ pub enum Mode {
 }
 
 impl Mode {
-    /// Name, as the section of a profile that lists its effects.
+    /// Name of the profile section that lists the effects of this readout.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -24,7 +24,17 @@ impl Mode {
     }
 }
 
-/// What the cells put out at a clock edge.
+/// Kind of the levels that the cells put out.
+///
+/// ```
+/// use spts_circuit::WeightMode;
+///
+/// // the cell with seed 8 at its first three rows
+/// let levels: Vec<f64> = (0..3).map(|row| WeightMode::Binary.level_from_seed(8, row)).collect();
+/// assert!(levels.iter().all(|level| level.abs() == 1.0));
+/// let analog = WeightMode::Analog.level_from_seed(8, 0);
+/// assert_eq!(analog.signum(), levels[0], "both use the generator's top byte");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum WeightMode {
@@ -47,14 +57,14 @@ impl WeightMode {
         }
     }
 
-    /// Level at `row`, counted from the loading of the seeds, of a cell whose generator was loaded with `seed`; in
-    /// raster mode no cell uses its seed, and the level is 0.
+    /// Level at `row` (counted from loading the seeds) of a cell with the generator seed `seed`. In raster mode no cell
+    /// uses its seed, and the level is 0.
     #[must_use]
     pub fn level_from_seed(self, seed: u32, row: u64) -> f64 {
         self.level(Jump::new(row.wrapping_add(1)).apply(seed))
     }
 
-    /// The readout whose cells put this out.
+    /// The readout that uses these levels.
     #[must_use]
     pub fn readout(self) -> Mode {
         match self {
@@ -63,7 +73,7 @@ impl WeightMode {
         }
     }
 
-    /// Name, as in a profile or a table.
+    /// Name, as used in profiles and tables.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

@@ -4,12 +4,12 @@ use crate::patterns::Patterns;
 use crate::weights_error::WeightsError;
 use std::fmt::Write as _;
 
-/// Largest file of patterns that is read, bytes.
+/// Size of the largest file of patterns that is read, bytes.
 pub const MAX_PATTERNS_BYTES: u64 = 1 << 26;
 /// Characters of a wrong word that an error repeats.
 const SHOWN: usize = 20;
 
-/// A text that is no pattern.
+/// Why a text is not a valid pattern.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PatternTextError {
@@ -18,27 +18,27 @@ pub enum PatternTextError {
     Word {
         /// Line, from 1.
         line: usize,
-        /// The word, or its beginning.
+        /// The word, shortened.
         word: String,
     },
-    /// A row of another length than those before it.
+    /// A row whose length differs from that of the rows before it.
     #[error("line {line}: a row of {found} taxels; the rows before it have {taxels}")]
     Length {
         /// Line, from 1.
         line: usize,
-        /// Its taxels.
+        /// Number of taxels in the row.
         found: usize,
-        /// Taxels of the first row.
+        /// Number of taxels in the first row.
         taxels: usize,
     },
-    /// No row, or too many.
+    /// No row, or too many rows.
     #[error(transparent)]
     Patterns(#[from] WeightsError),
 }
 
-/// Pattern in `text`, one line a row of the sensing matrix, in the order in which the rows are put out: a + (code 255,
-/// level +1) or − (code 0, level −1) a taxel, or whole numbers in [0, 255], the codes, with spaces or commas between
-/// them. What follows a # is a comment. The minus of a keyboard will do.
+/// Reads a pattern: one line for each row of the sensing matrix, in order of output. A row has one sign for each taxel
+/// (`+` is code 255, level +1; `−` is code 0, level −1), or codes in [0, 255] separated by spaces or commas. The
+/// keyboard's hyphen also counts as `−`. A `#` starts a comment.
 ///
 /// ```
 /// use spts_circuit::parse_patterns;
@@ -50,7 +50,7 @@ pub enum PatternTextError {
 /// ```
 ///
 /// # Errors
-/// [`PatternTextError`] for the first word that is none of these, rows of other lengths, and a text without rows.
+/// [`PatternTextError`] for the first word that is neither, rows of different lengths, or a text without rows.
 pub fn parse_patterns(text: &str) -> Result<Patterns, PatternTextError> {
     let (mut codes, mut rows, mut taxels) = (Vec::new(), 0, None);
     for (index, line) in text.lines().enumerate() {
@@ -97,7 +97,7 @@ fn signs(word: &str) -> Option<Vec<u8>> {
 }
 
 impl Patterns {
-    /// Text that [`parse_patterns`] reads: signs where all codes are 0 and 255, else codes.
+    /// The pattern as text for [`parse_patterns`]: signs if all codes are 0 or 255, otherwise codes.
     #[must_use]
     pub fn to_text(&self) -> String {
         let rows = (0..self.period() as u64).map(|row| self.row(row));

@@ -1,4 +1,4 @@
-//! Levels that repeat row after row.
+//! Levels that repeat after a number of rows.
 
 use crate::mode::WeightMode;
 use crate::weights_error::WeightsError;
@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 /// Most codes in a pattern.
 const MAX_CODES: usize = 1 << 30;
 
-/// What the cells put out, row by row, over and over again: row r of the weights is row r mod `period` of the pattern.
+/// Levels that the cells repeat: row r of the weights is row r mod `period` of the pattern.
 ///
-/// As text: `{"period": 2, "codes": [0, 255, 255, 0]}`, the codes row after row.
+/// As text: `{"period": 2, "codes": [0, 255, 255, 0]}`, with the codes in row-major order.
 ///
 /// ```
 /// use spts_circuit::{Patterns, WeightMode, Weights};
@@ -51,11 +51,11 @@ impl From<Patterns> for PatternsConfig {
 }
 
 impl Patterns {
-    /// Pattern of `period` rows of DAC codes, row-major: code k is level (k − 127.5)/127.5. The number of taxels is
-    /// that of codes a row.
+    /// A pattern of `period` rows of DAC codes in row-major order. Code k is level (k − 127.5)/127.5. The number of
+    /// taxels is the number of codes divided by `period`.
     ///
     /// # Errors
-    /// [`WeightsError`] without a code or with more than 2³⁰, and when the codes are not a whole number for each row.
+    /// [`WeightsError`] for no code, more than 2³⁰ codes, or a number of codes that is not a multiple of `period`.
     pub fn new(period: usize, codes: Vec<u8>) -> Result<Self, WeightsError> {
         let len = codes.len();
         if !(1..=MAX_CODES).contains(&len) {
@@ -71,8 +71,8 @@ impl Patterns {
         }
     }
 
-    /// Pattern of `period` rows of these levels, row-major, each in [−1, 1]: every cell puts out the code that is next to
-    /// its level.
+    /// A pattern of `period` rows, from `levels` in [−1, 1], row-major. Every cell puts out the code nearest to its
+    /// level.
     ///
     /// ```
     /// use spts_circuit::Patterns;
@@ -93,7 +93,7 @@ impl Patterns {
         Self::new(period, levels.iter().map(code).collect())
     }
 
-    /// Rows after which the pattern starts over.
+    /// Number of rows after which the pattern repeats.
     #[must_use]
     pub fn period(&self) -> usize {
         self.codes.len() / self.taxels
@@ -105,7 +105,7 @@ impl Patterns {
         self.taxels
     }
 
-    /// Codes of row `row`, one a taxel.
+    /// Codes of row `row`, one a taxel. Rows beyond the period repeat.
     #[must_use]
     pub fn row(&self, row: u64) -> &[u8] {
         let first = usize::try_from(row % self.period() as u64).unwrap_or(0) * self.taxels;

@@ -1,7 +1,7 @@
 //! Named parameter sets of the whole readout.
 
 use crate::converter::Converter;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use crate::effects::{build_chain, converter, rail_v};
 use crate::fault::FaultConfig;
 use crate::faults::build_faults;
@@ -14,7 +14,7 @@ use crate::weights_error::WeightsError;
 use serde::{Deserialize, Serialize};
 use spts_models::{SkinLayout, Streams, explain_toml, within};
 
-/// Every profile by name, as TOML: the parameters and, beside each, its source.
+/// Every profile by name, as TOML. Each parameter has its source beside it.
 pub const PROFILES: &[(&str, &str)] = &[
     ("ideal", include_str!("../profiles/ideal.toml")),
     ("as_built", include_str!("../profiles/as_built.toml")),
@@ -32,32 +32,43 @@ pub enum CompressiveWeights {
     Analog,
 }
 
-/// Parameters of the readout. Effects are listed by name under their mode; one that is not listed does not act.
+/// Parameters of the readout. Each mode lists its effects by name; an effect that is not listed does not act.
+///
+/// ```
+/// use spts_circuit::{Mode, Profile};
+///
+/// let text = "weights = \"binary\"\nsample_rate_hz = 64300\ndrive_v = 4.3\nfeedback_ohm = 1000\n\
+///             [compressive.idle_noise]\nsd_v = 0.02\n";
+/// let profile = Profile::from_toml(text)?;
+/// profile.validate(100)?;
+/// assert!((profile.volts_per_siemens() - 4300.0).abs() < 1e-9);
+/// assert_eq!(profile.weights(Mode::Compressive, 100)?.taxels(), 100);
+/// # Ok::<(), spts_circuit::ProfileError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
     /// Weights of the compressive mode.
     pub weights: CompressiveWeights,
-    /// Rule by which the cells are seeded. Default: with their addresses.
+    /// Rule that seeds the cells. Default: seeds are their addresses.
     #[serde(default)]
     pub seeding: Seeding,
-    /// Seeds of the cells in place of a rule's, one a taxel. Default: none.
+    /// Seeds of the cells, one a taxel, in place of the rule. Default: none.
     #[serde(default)]
     pub seeds: Option<Vec<u32>>,
-    /// Codes that the cells put out over and over again, in place of a generator's. Default: none. A raster scan
-    /// ignores them, as it does seeds.
+    /// Codes that the cells repeat, in place of a generator's. Default: none. A raster scan ignores patterns and seeds.
     #[serde(default)]
     pub patterns: Option<Patterns>,
     /// Measurements a second, Hz. Range [1, 1e9].
     pub sample_rate_hz: f64,
     /// Vd: drive voltage of a taxel at level 1, V. Range [1e-3, 1e3].
     pub drive_v: f64,
-    /// Rf: feedback resistance of the summing amplifier, Ω. Range [1e-3, 1e9]. Only the product Rf·Vd acts. It is that
-    /// of a skin with electrodes of 10 mm × 10 mm; see `feedback_scales` for other skins.
+    /// Rf: feedback resistance of the summing amplifier, Ω. Range [1e-3, 1e9]. Only the product Rf·Vd acts. The value
+    /// is for electrodes of 10 mm × 10 mm; see `feedback_scales` for other skins.
     pub feedback_ohm: f64,
-    /// Whether Rf is scaled with the inverse of the electrodes' area, so that a taxel under the same pressure gives the
-    /// same volts whatever its size. `false`: Rf is as written on any skin. Default true. The number of taxels does not
-    /// count: the range that is needed grows with the number that is pressed.
+    /// Whether Rf is divided by the electrodes' relative area, so that a taxel under the same pressure gives the same
+    /// voltage whatever its size. `false` uses Rf as written on any skin. Default true. Rf does not depend on the
+    /// number of taxels, because the necessary range grows with the number of pressed ones.
     #[serde(default = "scales")]
     pub feedback_scales: bool,
     /// Faulty cells, in both modes. Default: none.
@@ -77,10 +88,10 @@ fn scales() -> bool {
 }
 
 impl Profile {
-    /// Profile `name` of [`PROFILES`].
+    /// The profile called `name` in [`PROFILES`].
     ///
     /// # Errors
-    /// [`ProfileError::UnknownProfile`] when there is none.
+    /// [`ProfileError::UnknownProfile`] if there is none.
     pub fn named(name: &str) -> Result<Self, ProfileError> {
         let Some((_, text)) = PROFILES.iter().find(|(known, _)| *known == name) else {
             let known: Vec<&str> = PROFILES.iter().map(|(known, _)| *known).collect();
@@ -92,7 +103,7 @@ impl Profile {
         Self::from_toml(text)
     }
 
-    /// Profile from TOML text. Its values are checked by [`Profile::validate`], and again when a readout is built.
+    /// Reads a profile from TOML text. [`Profile::validate`] checks its values; building a readout checks them again.
     ///
     /// # Errors
     /// [`ProfileError`] for text that is not TOML, an unknown key, or a value of the wrong type.
@@ -108,11 +119,11 @@ impl Profile {
         })
     }
 
-    /// The profile as the readout of a skin with this `layout` uses it: Rf scaled as [`Profile::feedback_scales`] says,
-    /// which the result does no more. At 10 mm nothing changes, to the bit.
+    /// The profile as used for a skin with this `layout`: Rf is scaled as [`Profile::feedback_scales`] says, and
+    /// `feedback_scales` of the result is off. At 10 mm nothing changes, to the bit.
     ///
     /// # Errors
-    /// [`ProfileError::Value`] when the scaled Rf is outside [1e-3, 1e9] Ω.
+    /// [`ProfileError::Value`] if the scaled Rf is outside [1e-3, 1e9] Ω.
     pub fn on(&self, layout: &SkinLayout) -> Result<Self, ProfileError> {
         let scale = if self.feedback_scales {
             layout.relative_area()
@@ -129,7 +140,7 @@ impl Profile {
         })
     }
 
-    /// Checks every value and builds the effects of both modes once, for a skin of `taxels` taxels with electrodes of
+    /// Checks every value by building the effects of both modes once, for a skin of `taxels` taxels with electrodes of
     /// 10 mm × 10 mm.
     ///
     /// # Errors
@@ -142,7 +153,7 @@ impl Profile {
             let weights = self.weights(mode, taxels)?;
             self.effects(
                 mode,
-                &Session {
+                &EffectSession {
                     device: Streams::new(0),
                     streams: Streams::new(0),
                     weights,
@@ -154,11 +165,11 @@ impl Profile {
         Ok(())
     }
 
-    /// Faults and then the effects of `mode`, in signal order.
+    /// The faults and then the effects of `mode`, in signal order.
     ///
     /// # Errors
-    /// [`ProfileError`] for an unknown effect or fault and for parameters that it refuses.
-    pub fn effects(&self, mode: Mode, session: &Session) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
+    /// [`ProfileError`] for an unknown effect or fault, or parameters that it refuses.
+    pub fn effects(&self, mode: Mode, session: &EffectSession) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
         let mut effects = Vec::new();
         if !self.faults.is_empty() {
             effects.push(build_faults(&self.faults, session)?);
@@ -167,17 +178,17 @@ impl Profile {
         Ok(effects)
     }
 
-    /// Rf·Vd for electrodes of 10 mm × 10 mm, V/S. Ask [`Profile::on`] for that of another skin.
+    /// Rf·Vd for electrodes of 10 mm × 10 mm, V/S. For another skin, call it on the result of [`Profile::on`].
     #[must_use]
     pub fn volts_per_siemens(&self) -> f64 {
         self.feedback_ohm * self.drive_v
     }
 
-    /// Weights of `taxels` taxels in `mode`.
+    /// The weights of `taxels` taxels in `mode`.
     ///
     /// # Errors
-    /// [`ProfileError::Weights`] when `seeds` or `patterns` are unusable or those of another number of taxels, or when
-    /// more than one of `seeding = "mixed"`, `seeds` and `patterns` is given.
+    /// [`ProfileError::Weights`] if `seeds` or `patterns` are not valid or have another number of taxels, or if more
+    /// than one of `seeding = "mixed"`, `seeds` and `patterns` is given.
     pub fn weights(&self, mode: Mode, taxels: u32) -> Result<Weights, ProfileError> {
         let weight_mode = match (mode, self.weights) {
             (Mode::Raster, _) => return Ok(Weights::new(WeightMode::Raster, self.seeding, taxels)),
@@ -214,10 +225,10 @@ impl Profile {
         Ok(weights)
     }
 
-    /// The profile with `weights` in its compressive mode, whatever it had before.
+    /// The profile with `weights` in its compressive mode, replacing earlier ones.
     ///
     /// # Errors
-    /// [`ProfileError::Weights`] for weights of a raster scan.
+    /// [`ProfileError::Weights`] for raster weights.
     pub fn with_weights(&self, weights: &Weights) -> Result<Self, ProfileError> {
         let mode = match weights.mode() {
             WeightMode::Binary => CompressiveWeights::Binary,
@@ -238,19 +249,19 @@ impl Profile {
         })
     }
 
-    /// Scale of the converter of `mode`; `None` when the profile has no converter there.
+    /// Scale of the converter of `mode`; `None` if the profile has no converter in this mode.
     ///
     /// # Errors
-    /// [`ProfileError`] for parameters of the converter that are refused.
+    /// [`ProfileError`] for parameters that the converter refuses.
     pub fn converter(&self, mode: Mode) -> Result<Option<Converter>, ProfileError> {
         converter(self.chain(mode), mode)
     }
 
-    /// Largest output of the amplifier in `mode`, V: the smaller one of the effect `rails` and of the rail of the
-    /// effect `amplifier`; `None` without either.
+    /// Largest output of the amplifier in `mode`, V: the smaller one of the limit of `rails` and the rail of
+    /// `amplifier`; `None` without either effect.
     ///
     /// # Errors
-    /// [`ProfileError`] for parameters that are refused.
+    /// [`ProfileError`] for parameters that an effect refuses.
     pub fn rail_v(&self, mode: Mode) -> Result<Option<f64>, ProfileError> {
         rail_v(self.chain(mode), mode)
     }

@@ -2,7 +2,7 @@
 
 use crate::acquire_error::AcquireError;
 use crate::codes::{CellCodes, CodesError};
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::engine::Engine;
 use crate::mode::Mode;
 use crate::profile::Profile;
@@ -13,8 +13,20 @@ use crate::source::ConductanceSource;
 use crate::weights::Weights;
 use spts_models::{SkinLayout, Streams};
 
-/// The readout of one skin in one mode for one session. The clock, and with it the row of the weight matrix, runs on
-/// from block to block, as it does in the device; noise is a function of (device, session, mode, number of the block).
+/// The readout of one skin in one mode for one session. The clock, and with it the row of the weight matrix, continues
+/// from block to block, as in the device. Noise is a function of (device, session, mode, block number).
+///
+/// ```
+/// use spts_circuit::{Constant, Mode, Profile, Readout};
+/// use spts_models::{ConductanceMap, SkinLayout, Streams};
+///
+/// let profile = Profile::named("ideal")?;
+/// let mut readout = Readout::new(&profile, Mode::Compressive, &SkinLayout::default(), Streams::new(1), 0)?;
+/// let mut skin = Constant::new(ConductanceMap::from_values(10, 10, vec![1e-5; 100]))?;
+/// let block = readout.acquire(&mut skin, 200)?;
+/// assert_eq!((block.volts.len(), block.frame_position), (200, 2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Readout {
     info: RecordingInfo,
     engine: Engine,
@@ -26,13 +38,13 @@ pub struct Readout {
 }
 
 impl Readout {
-    /// Readout with `profile` of a skin with this `layout` whose seeds have just been loaded. A frame has as many
-    /// measurements as the skin has taxels. The cells' and the amplifier's parts are drawn from the streams of the
-    /// `device` alone, and are the same in every session and mode; the rest differs from `session` to session. The
-    /// profile is the one for electrodes of 10 mm × 10 mm; its feedback is scaled for others ([`Profile::on`]).
+    /// A readout of a skin with this `layout`, with freshly loaded seeds. A frame has as many measurements as the skin
+    /// has taxels. The parts of cells and amplifier depend only on the streams of the `device` and are the same in
+    /// every session and mode; everything else differs by `session`. `profile` is for electrodes of 10 mm × 10 mm; its
+    /// feedback is scaled for others ([`Profile::on`]).
     ///
     /// # Errors
-    /// [`ProfileError`] when the profile holds an unknown effect or a value outside its range.
+    /// [`ProfileError`] for an unknown effect, or a value outside its range.
     pub fn new(
         profile: &Profile,
         mode: Mode,
@@ -52,7 +64,7 @@ impl Readout {
             converter: profile.converter(mode)?,
             ..RecordingInfo::new(*layout, weights.clone(), profile.sample_rate_hz)
         };
-        let session = Session {
+        let session = EffectSession {
             device: device.child("readout/device", 0),
             streams: device.child("session", session).child(label, 0),
             weights: weights.clone(),
@@ -69,13 +81,13 @@ impl Readout {
         })
     }
 
-    /// The same readout with a skin whose cells put out `codes`, in place of what the formula of their generator gives.
-    /// Codes that are the generator's give the same recording bit for bit. Effects and faults act on them as they do on
-    /// the generator's levels; a fault that decides the level of a cell, and an edge that an effect makes it miss, put
-    /// the formula's level in its place.
+    /// The same readout with cells that put out `codes` in place of the generator's formula. If the codes equal the
+    /// formula's, the recording is the same bit for bit. Effects and faults act on them as on the generator's levels.
+    /// Where a fault determines the level of a cell, or an effect makes the cell miss an edge, the formula's level
+    /// replaces the code.
     ///
     /// # Errors
-    /// [`CodesError::Taxels`] when there are more or fewer cells than taxels.
+    /// [`CodesError::Taxels`] if the number of cells differs from that of taxels.
     pub fn with_codes(self, codes: Box<dyn CellCodes>) -> Result<Self, CodesError> {
         let (cells, taxels) = (codes.taxels(), self.measurements_per_frame());
         if cells != taxels {
@@ -93,51 +105,50 @@ impl Readout {
         self.engine.weights()
     }
 
-    /// What its recordings say of themselves.
+    /// Metadata of its recordings.
     #[must_use]
     pub fn info(&self) -> &RecordingInfo {
         &self.info
     }
 
-    /// Measurements a frame.
+    /// Number of measurements in a frame.
     #[must_use]
     pub fn measurements_per_frame(&self) -> usize {
         self.engine.weights().taxels()
     }
 
-    /// Measurements a second, Hz.
+    /// Number of measurements a second, Hz.
     #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
         self.engine.sample_rate_hz()
     }
 
-    /// Lets the clock run for `frames` frames without recording, as the device does between presses (about 57 frames).
+    /// Runs the clock for `frames` frames without recording, as the device does between presses (about 57 frames).
     pub fn skip(&mut self, frames: u64) {
         if frames > 0 {
             self.seek(self.block, self.row / self.measurements_per_frame() as u64 + frames);
         }
     }
 
-    /// Goes to the start of block number `block`, `frame` frames after the seeds were loaded. What is acquired there
-    /// does not depend on what was acquired before, so that the blocks of a session may be simulated in any order and
-    /// on any thread.
+    /// Goes to the start of block number `block`, `frame` frames after loading the seeds. What is acquired there does
+    /// not depend on earlier acquisitions, so the blocks of a session may be simulated in any order and on any thread.
     pub fn seek(&mut self, block: u64, frame: u64) {
         self.seek_row(block, frame * self.measurements_per_frame() as u64);
     }
 
-    /// As [`Readout::seek`], to `row` measurements after the seeds were loaded.
+    /// As [`Readout::seek`], with the position as `row`: measurements since loading the seeds.
     pub fn seek_row(&mut self, block: u64, row: u64) {
         self.row = row;
         self.block = block;
         self.continuous = false;
     }
 
-    /// Records `measurements` measurements of `source`, whose time 0 is the first of them. The conductance is taken
-    /// anew for every measurement.
+    /// Records `measurements` measurements of `source`, the first at the source's time 0. The conductance is evaluated
+    /// for every measurement.
     ///
     /// # Errors
-    /// [`AcquireError`] when the source has another number of taxels, does not hand out what it is asked for,
-    /// `measurements` is not a whole number of frames, or the cells put out nothing.
+    /// [`AcquireError`] if the source has another number of taxels or returns an invalid segment, `measurements` is not
+    /// a whole number of frames, or the cells have no codes.
     pub fn acquire(&mut self, source: &mut dyn ConductanceSource, measurements: usize) -> Result<Block, AcquireError> {
         let taxels = self.measurements_per_frame();
         if measurements == 0 || !measurements.is_multiple_of(taxels) {
@@ -154,10 +165,11 @@ impl Readout {
         })
     }
 
-    /// The same for any number of measurements: a large skin is read with far fewer than it has taxels.
+    /// As [`Readout::acquire`], for any number of measurements. A large skin is read with far fewer measurements than
+    /// taxels.
     ///
     /// # Errors
-    /// As [`Readout::acquire`], but for the frames.
+    /// As [`Readout::acquire`], except for incomplete frames.
     pub fn measure(
         &mut self,
         source: &mut dyn ConductanceSource,
@@ -169,7 +181,7 @@ impl Readout {
         Ok(volts)
     }
 
-    /// Begins the next block: the measurements of [`Readout::go_on`] from here on are its.
+    /// Starts the next block; the following calls of [`Readout::go_on`] measure in it.
     pub fn begin(&mut self) {
         let start = BlockStart {
             block: self.block,
@@ -183,14 +195,14 @@ impl Readout {
         self.continuous = true;
     }
 
-    /// Row of the next measurement, counted from the loading of the seeds.
+    /// Row of the next measurement, counted from loading the seeds.
     #[must_use]
     pub fn row(&self) -> u64 {
         self.row
     }
 
-    /// Measures `source`, whose time 0 is the first measurement, in the block that was begun: how the measurements of a
-    /// block are shared among calls does not show in them.
+    /// Measures `source` in the block that was begun; the source's time 0 is the first measurement. The result does not
+    /// depend on how the measurements of a block are divided among calls.
     ///
     /// # Errors
     /// As [`Readout::measure`].
@@ -207,8 +219,8 @@ impl Readout {
         Ok(())
     }
 
-    /// Records one block of `measurements` measurements for every source, with `gap_frames` unrecorded frames after
-    /// each.
+    /// Records one block of `measurements` measurements for each of `sources`, with `gap_frames` unrecorded frames
+    /// after each.
     ///
     /// # Errors
     /// As [`Readout::acquire`] and [`Recording::new`].
@@ -226,10 +238,10 @@ impl Readout {
         Ok(self.recording(blocks)?)
     }
 
-    /// Recording of `blocks` that this readout acquired.
+    /// A recording of `blocks`, which this readout acquired.
     ///
     /// # Errors
-    /// [`RecordingError`] when they do not fit together.
+    /// [`RecordingError`] if the blocks do not fit together.
     pub fn recording(&self, blocks: Vec<Block>) -> Result<Recording, RecordingError> {
         Recording::new(self.info.clone(), blocks)
     }

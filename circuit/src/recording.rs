@@ -1,4 +1,4 @@
-//! The seam between a skin, real or simulated, and everything that decodes it.
+//! Recordings: the interface between a skin, real or simulated, and everything that decodes it.
 
 use crate::converter::Converter;
 use crate::mode::Mode;
@@ -9,20 +9,20 @@ use crate::weights::Weights;
 use spts_models::SkinLayout;
 use std::ops::Range;
 
-/// One press: an unbroken run of frames.
+/// One press: consecutive frames without a gap.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Block {
-    /// Frames since the seeds were loaded, at the END of the block.
+    /// Frames from loading the seeds to the END of the block.
     pub frame_position: u64,
-    /// Frames at the start of the block in which nothing touches the skin; `None` when that is not known.
+    /// Frames at the start of the block in which nothing touches the skin; `None` if that is not known.
     pub idle_frames: Option<usize>,
     /// Output of the summing amplifier, sign-flipped, V; measurement `m` of frame `f` is entry
     /// `f · measurements_per_frame + m`. NaN where the instrument lost a sample.
     pub volts: Vec<f64>,
 }
 
-/// Presses of one session in one mode, as the amplifier's output in volts: the same type for a recording of the real
-/// skin and for a simulated one.
+/// Presses of one session in one mode, as the amplifier's output in volts. Recordings of the real skin and simulated
+/// ones have this same type.
 ///
 /// ```
 /// use spts_circuit::{Block, Recording, RecordingInfo, Seeding, WeightMode, Weights};
@@ -51,13 +51,12 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Recording of `blocks`, all equally long, with what `info` says of them.
+    /// A recording of `blocks`, all equally long, with the metadata `info`.
     ///
     /// # Errors
-    /// [`RecordingError`] without a block, measurement or frame, for a sample rate that is not positive, weights of
-    /// another skin, blocks of different lengths or of a broken number of frames, a block that begins before the seeds
-    /// were loaded, ends where the rows of weights can no longer be counted or is idle for longer than it lasts, or an
-    /// infinite sample.
+    /// [`RecordingError`] for no block, measurement or frame; a sample rate that is not positive; weights of another
+    /// skin; blocks of different lengths or an incomplete frame; an infinite sample; or a block that begins before the
+    /// seeds are loaded, ends beyond the largest row number, or is idle for longer than it lasts.
     pub fn new(info: RecordingInfo, blocks: Vec<Block>) -> Result<Self, RecordingError> {
         info.check()?;
         let measurements = info.measurements_per_frame;
@@ -110,11 +109,10 @@ impl Recording {
         Ok(Self { info, frames, blocks })
     }
 
-    /// The same recording with other blocks. Their samples may be changed ones: the converter's scale stays only if it
-    /// made them all.
+    /// The same recording with other blocks. The converter's scale is kept only if it could have produced every sample.
     ///
     /// # Errors
-    /// As for [`Recording::new`].
+    /// As [`Recording::new`].
     pub fn with_blocks(&self, blocks: Vec<Block>) -> Result<Self, RecordingError> {
         let mut info = self.info.clone();
         let made = |converter: &Converter| blocks.iter().all(|block| converter.made(&block.volts));
@@ -131,8 +129,8 @@ impl Recording {
         }
     }
 
-    /// The same recording with the first `idle_frames` frames of every block known to be idle, of a shorter block all;
-    /// `None` when it is not known.
+    /// The same recording, in which the first `idle_frames` frames of every block are marked as idle (at most the whole
+    /// block); `None` if it is not known.
     #[must_use]
     pub fn with_idle_frames(mut self, idle_frames: Option<usize>) -> Self {
         let idle_frames = idle_frames.map(|idle| idle.min(self.frames));
@@ -142,35 +140,35 @@ impl Recording {
         self
     }
 
-    /// What the recording says of itself, beside its samples.
+    /// Metadata of the recording.
     #[must_use]
     pub fn info(&self) -> &RecordingInfo {
         &self.info
     }
 
-    /// Skin that was recorded.
+    /// Layout of the recorded skin.
     #[must_use]
     pub fn layout(&self) -> &SkinLayout {
         &self.info.layout
     }
 
-    /// Weights that the cells were meant to put out. A decoder asks for [`Recording::rows`].
+    /// Weights that the cells were meant to put out. Decoders use [`Recording::rows`] instead.
     #[must_use]
     pub fn weights(&self) -> &Weights {
         &self.info.weights
     }
 
-    /// Scale of the converter; `None` when no converter acted, or when its scale is not known.
+    /// Scale of the converter; `None` if no converter acted or its scale is not known.
     #[must_use]
     pub fn converter(&self) -> Option<&Converter> {
         self.info.converter.as_ref()
     }
 
-    /// Rows of the weight matrix Φ that measurements `measurements` of block `block` used; 0-based, counted within the
-    /// block.
+    /// Rows of the weight matrix Φ of the measurements `measurements` of block `block`, both from 0; measurements are
+    /// counted within the block.
     ///
     /// # Panics
-    /// When the recording has no such block or the block no such measurements.
+    /// If the recording has no such block, or the block no such measurements.
     #[must_use]
     pub fn rows(&self, block: usize, measurements: Range<usize>) -> WeightRows<'_> {
         let len = self.blocks[block].volts.len();
@@ -182,7 +180,7 @@ impl Recording {
         WeightRows::new(&self.info.weights, first_row, measurements.len())
     }
 
-    /// Which readout this is.
+    /// The readout that made the recording.
     #[must_use]
     pub fn mode(&self) -> Mode {
         self.info.mode()
@@ -221,18 +219,19 @@ impl Recording {
     /// Samples of frame `frame` of block `block`, V.
     ///
     /// # Panics
-    /// When the recording has no such block or frame.
+    /// If the recording has no such block or frame.
     #[must_use]
     pub fn volts(&self, block: usize, frame: usize) -> &[f64] {
         let m = self.info.measurements_per_frame;
         &self.blocks[block].volts[frame * m..(frame + 1) * m]
     }
 
-    /// Row of the weight matrix that the first measurement of this frame used; the others follow it. It is
-    /// `((frame_position − frames) + frame) · measurements_per_frame`, verified against the published recordings.
+    /// Row of the weight matrix at the first measurement of this frame; the following measurements use the following
+    /// rows. It is `((frame_position − frames) + frame) · measurements_per_frame`, verified against the published
+    /// recordings.
     ///
     /// # Panics
-    /// When the recording has no such block.
+    /// If the recording has no such block.
     #[must_use]
     pub fn first_row(&self, block: usize, frame: usize) -> u64 {
         (self.blocks[block].frame_position - self.frames as u64 + frame as u64)

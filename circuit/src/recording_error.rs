@@ -1,56 +1,58 @@
-//! What makes a recording unusable.
+//! Errors of recordings.
 
-/// A recording that contradicts itself.
+/// Why data do not form a valid recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordingError {
-    /// A shape of nothing.
+    /// A dimension is zero.
     #[error("`{field}` = 0 is outside [1, ∞)")]
     Empty {
-        /// Which number is zero.
+        /// Name of the dimension.
         field: &'static str,
     },
-    /// Not a frequency.
+    /// The sample rate is not a positive number.
     #[error("`sample_rate_hz` = {value} is outside (0, ∞)")]
     SampleRate {
-        /// Offending value, Hz.
+        /// The value, Hz.
         value: f64,
     },
-    /// A block of another length than the first one, or not a whole number of frames.
+    /// A block whose length differs from the first one, or is not a whole number of frames.
     #[error("block {block} has {len} samples; expected {frames} frames of {measurements}")]
     BlockLength {
         /// 0-based block.
         block: usize,
-        /// Its samples.
+        /// Number of its samples.
         len: usize,
         /// Frames a block.
         frames: usize,
         /// Measurements a frame.
         measurements: usize,
     },
-    /// A block that would have begun before the seeds were loaded.
-    #[error("block {block} ends at frame {frame_position} but is {frames} frames long")]
+    /// A block that would begin before the seeds were loaded.
+    #[error(
+        "block {block} has `frame_position` = {frame_position}, outside [{frames}, ∞): the block is {frames} frames long"
+    )]
     FramePosition {
         /// 0-based block.
         block: usize,
-        /// Its position.
+        /// Its frame position.
         frame_position: u64,
         /// Frames a block.
         frames: usize,
     },
-    /// A block so late that the number of its last row of weights does not fit into 64 bits.
+    /// A block so late that the number of its last weight row exceeds 64 bits.
     #[error("block {block} has `frame_position` = {frame_position}, outside [{frames}, {limit}]")]
     RowCount {
         /// 0-based block.
         block: usize,
-        /// Its position.
+        /// Its frame position.
         frame_position: u64,
         /// Frames a block.
         frames: usize,
-        /// Largest position with as many measurements a frame.
+        /// Largest frame position for this number of measurements a frame.
         limit: u64,
     },
-    /// A block that is idle for longer than it is.
+    /// A block that is idle for longer than it lasts.
     #[error("block {block} has `idle_frames` = {idle_frames}, outside [0, {frames}]")]
     IdleFrames {
         /// 0-based block.
@@ -69,13 +71,13 @@ pub enum RecordingError {
         layout: usize,
     },
     /// An infinite sample.
-    #[error("block {block}, sample {sample} is {value}")]
+    #[error("block {block}, sample {sample} = {value} V is not finite; NaN marks a lost sample")]
     Infinite {
         /// 0-based block.
         block: usize,
         /// 0-based sample within the block.
         sample: usize,
-        /// Offending value.
+        /// The value.
         value: f64,
     },
 }

@@ -1,4 +1,4 @@
-//! What a recording says of itself.
+//! Metadata of a recording.
 
 use crate::converter::Converter;
 use crate::mode::{Mode, WeightMode};
@@ -7,27 +7,35 @@ use crate::weights::Weights;
 use serde::{Deserialize, Serialize};
 use spts_models::SkinLayout;
 
-/// What a recording says of itself, beside its samples: all that a decoder needs to know.
+/// Metadata of a recording: everything that a decoder needs beside the samples.
+///
+/// ```
+/// use spts_circuit::{Mode, RecordingInfo, Seeding, WeightMode, Weights};
+/// use spts_models::SkinLayout;
+///
+/// let weights = Weights::new(WeightMode::Raster, Seeding::Address, 100);
+/// let info = RecordingInfo::new(SkinLayout::default(), weights, 64_300.0);
+/// assert_eq!((info.mode(), info.measurements_per_frame), (Mode::Raster, 100));
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordingInfo {
-    /// Skin that was recorded.
+    /// Layout of the recorded skin.
     pub layout: SkinLayout,
-    /// Weights that its cells were meant to put out, as many as there are taxels. They also say which readout it is:
-    /// raster weights are those of a raster scan.
+    /// Weights that the cells were meant to put out, one for each taxel. They also determine the readout: raster
+    /// weights mean a raster scan.
     pub weights: Weights,
     /// Measurements a second, Hz. Range (0, ∞).
     pub sample_rate_hz: f64,
     /// Measurements in a frame. Range [1, ∞); 100 in the published recordings.
     pub measurements_per_frame: usize,
-    /// Scale of the converter; none when no converter acted, or when its scale is not known.
+    /// Scale of the converter; `None` if no converter acted or its scale is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub converter: Option<Converter>,
 }
 
 impl RecordingInfo {
-    /// Information on a skin that is read out with as many measurements a frame as it has taxels and without a
-    /// converter.
+    /// Metadata of a skin whose frames have one measurement for each taxel, without a converter.
     #[must_use]
     pub fn new(layout: SkinLayout, weights: Weights, sample_rate_hz: f64) -> Self {
         Self {
@@ -39,7 +47,7 @@ impl RecordingInfo {
         }
     }
 
-    /// Which readout this is.
+    /// The readout that made the recording.
     #[must_use]
     pub fn mode(&self) -> Mode {
         match self.weights.mode() {

@@ -1,4 +1,4 @@
-//! Consecutive rows of the weight matrix, without the matrix.
+//! Consecutive rows of the weight matrix, computed without storing the matrix.
 
 use crate::code_rows::CodeRows;
 use crate::codes::{CellCodes, CodesError};
@@ -17,11 +17,11 @@ const RUN: usize = 128;
 pub(crate) struct Rows {
     weights: Weights,
     first_row: u64,
-    /// What the cells put out, where that comes from outside or from a pattern.
+    /// Codes of the cells, if they are given or form a pattern.
     given: Option<Box<CodeRows>>,
-    /// Whether raster mode, too, has sums: with given codes any number of taxels may be scanned.
+    /// Whether raster mode also computes sums: given codes may drive any number of taxels.
     summed: bool,
-    /// Jump to the row before the first; none before the first edge of all.
+    /// Jump to the row before the first; `None` before the first edge.
     before: Option<Jump>,
     jumps: Jumps,
 }
@@ -186,11 +186,11 @@ impl Rows {
 }
 
 impl Weights {
-    /// Σₖ wₖ·valuesₖ at as many consecutive rows as `out` holds, starting with `first_row`; the matrix is never stored.
-    /// The sums are the same bits on every machine and however the rows are cut into calls.
+    /// Σₖ wₖ·valuesₖ at consecutive rows from `first_row` on, one for each entry of `out`; the matrix is never stored.
+    /// The sums have the same bits on every machine, and for any division of the rows among calls.
     ///
     /// # Panics
-    /// When `values` does not have one entry a taxel.
+    /// If `values` does not have one entry a taxel.
     pub fn weighted_sums(&self, first_row: u64, values: &[f64], out: &mut [f64]) {
         assert_eq!(values.len(), self.taxels(), "one value a taxel");
         if values.is_empty() {

@@ -1,15 +1,14 @@
-//! Samples at the end of a range.
+//! Saturated samples.
 
 use crate::converter::Converter;
 use crate::recording::Recording;
 use crate::recording_info::RecordingInfo;
 
 impl Recording {
-    /// Number of samples that say no more than that the output was too large: those at an end of the converter's codes,
-    /// and those within a code of `rail_v`, the largest output of the amplifier, V, where there is one. Missing samples
-    /// do not count.
+    /// Number of saturated samples: those at an end of the converter's range, and those within one code of `rail_v`,
+    /// the amplifier's largest output, V, if it is given. Missing samples do not count.
     ///
-    /// Where negative volts were set to 0, an output that is too small cannot be told from one of 0.
+    /// If negative voltages were set to 0, an output below the range cannot be distinguished from 0.
     ///
     /// ```
     /// use spts_circuit::{Block, Recording, RecordingInfo, Seeding, WeightMode, Weights};
@@ -30,7 +29,7 @@ impl Recording {
 }
 
 impl RecordingInfo {
-    /// The same of samples that belong to no [`Recording`].
+    /// As [`Recording::saturated`], for samples outside a recording.
     #[must_use]
     pub fn saturated(&self, volts: &[f64], rail_v: Option<f64>) -> usize {
         let converter = self.converter.as_ref();
@@ -49,7 +48,7 @@ impl RecordingInfo {
 #[derive(Clone, Copy)]
 struct Ends {
     first: u64,
-    /// None where the last codes are all set to 0 V.
+    /// `None` if the last codes are all set to 0 V.
     last: Option<u64>,
 }
 

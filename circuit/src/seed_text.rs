@@ -1,22 +1,22 @@
 //! Lists of seeds as text.
 
-/// Largest file of seeds that is read, bytes: a million seeds in any notation.
+/// Size of the largest file of seeds that is read, bytes: a million seeds in any notation.
 pub const MAX_SEEDS_BYTES: u64 = 1 << 24;
 /// Characters of a wrong word that an error repeats: a few more than a seed has.
 const SHOWN: usize = 20;
 
-/// A word that is no seed.
+/// A word that is not a seed.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: seed = `{word}` is not one of the whole numbers in [0, 4294967295]")]
 pub struct SeedTextError {
     /// Line, from 1.
     pub line: usize,
-    /// The word, or its beginning.
+    /// The word, shortened.
     pub word: String,
 }
 
-/// Seeds in `text`, one a taxel, row by row: whole numbers in [0, 4294967295], decimal or with 0x in front, with
-/// spaces, commas or line ends between them. What follows a # is a comment. A JSON list of numbers is read, too.
+/// Reads seeds, one a taxel in row-major order: whole numbers in [0, 4294967295], decimal or hexadecimal (0x…),
+/// separated by spaces, commas or line ends. A # starts a comment. A JSON list of numbers is accepted, too.
 ///
 /// ```
 /// use spts_circuit::parse_seeds;
@@ -28,7 +28,7 @@ pub struct SeedTextError {
 /// ```
 ///
 /// # Errors
-/// [`SeedTextError`] for the first word that is no seed.
+/// [`SeedTextError`] for the first word that is not a seed.
 pub fn parse_seeds(text: &str) -> Result<Vec<u32>, SeedTextError> {
     let trimmed = text.trim();
     let json = trimmed.starts_with('[') && trimmed.ends_with(']');

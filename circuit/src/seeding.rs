@@ -5,16 +5,24 @@ use serde::{Deserialize, Serialize};
 /// I²C address, and so the seed, of taxel 0.
 pub const FIRST_ADDRESS: u32 = 8;
 
-/// How a taxel's generator is seeded.
+/// Rule that seeds the generator of a taxel.
+///
+/// ```
+/// use spts_circuit::Seeding;
+///
+/// assert_eq!(Seeding::Address.seed(0), 8); // the I²C address
+/// assert_eq!(Seeding::Address.seed(99), 107);
+/// assert_ne!(Seeding::Mixed.seed(1).wrapping_sub(Seeding::Mixed.seed(0)), 1);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Seeding {
-    /// With the cell's address 8, 9, …: what the device does. Across taxels the states of one row then lie on an
-    /// arithmetic progression, which makes some binary rows constant.
+    /// The cell's address 8, 9, …, as in the device. The states of all taxels in one row then form an arithmetic
+    /// progression, which makes some binary rows constant.
     #[default]
     Address,
-    /// With a 32-bit non-linear mix of the address, which cures the constant rows. Not something the published
-    /// firmware can do: its seed is one byte.
+    /// A 32-bit non-linear mix of the address, which avoids constant rows. The published firmware cannot do this,
+    /// because its seed is one byte.
     Mixed,
 }
 
@@ -45,9 +53,9 @@ pub(crate) fn finalise(mut h: u32) -> u32 {
 /// Seeds of all taxels of a skin.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Seeds<'a> {
-    /// By a rule.
+    /// Seeds by a rule.
     Rule(Seeding),
-    /// One a taxel.
+    /// Given seeds, one a taxel.
     Given(&'a [u32]),
 }
 

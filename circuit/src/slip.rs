@@ -1,10 +1,10 @@
-//! Measurements that lag behind their rows, and recordings that are put back on them.
+//! Measurements that lag behind their rows, and how recordings are realigned.
 
 use crate::recording::{Block, Recording};
 use serde::{Deserialize, Serialize};
 
-/// From one measurement of a block on, the cells are `rows` clock edges behind the count of measurements: measurement
-/// i was taken with the row that measurement i − `rows` should have had. It holds until the next slip of the block.
+/// From measurement `from` of a block on, the cells are `rows` clock edges behind the count of measurements:
+/// measurement i has the row that belongs to measurement i − `rows`. This holds until the next slip of the block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Slip {
@@ -12,15 +12,15 @@ pub struct Slip {
     pub block: usize,
     /// First measurement of the block that lags.
     pub from: usize,
-    /// Rows that the measurements lag behind, in all; negative where the cells are ahead.
+    /// Total number of rows by which the measurements lag; negative if the cells are ahead.
     pub rows: i64,
 }
 
 impl Recording {
-    /// The same recording with every sample at the place of the row that it was taken with, so that
-    /// [`Recording::rows`] are its rows again. Places that no sample has are lost samples (NaN). Where edges were
-    /// missed in the middle of a block, the cells went through some rows twice; the first sample of a row stays. What
-    /// falls out of its block is dropped. `slips` are in the order of their blocks and measurements.
+    /// The same recording with every sample moved to the row with which it was taken, so that [`Recording::rows`] is
+    /// correct again. Positions without a sample are marked as lost (NaN). If edges were missed within a block, the
+    /// cells repeated some rows; the first sample of such a row is kept. Samples that move out of their block are
+    /// dropped. `slips` must be in order of block and measurement.
     ///
     /// ```
     /// use spts_circuit::{Block, Recording, RecordingInfo, Seeding, Slip, WeightMode, Weights};

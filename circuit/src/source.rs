@@ -6,16 +6,16 @@ use spts_models::ConductanceMap;
 /// Largest conductance, S. A short bar of copper has 1e5; far beyond, squares would leave the range of f64.
 const MAX_CONDUCTANCE_S: f64 = 1e12;
 
-/// Conductance of every taxel over a stretch of time in which each runs along a straight line.
+/// Conductance of every taxel during a time span in which each changes linearly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Segment<'a> {
-    /// Start, s since the start of the block. Without a line it does not matter.
+    /// Start, s since the start of the block. Not used if the conductance is constant.
     pub start_s: f64,
-    /// End, s: the first instant that is no longer in the segment; infinite without a line if need be.
+    /// End, s: the first instant after the segment; may be infinite if the conductance is constant.
     pub end_s: f64,
     /// Conductance of every taxel at the start, S. Range [0, 1e12].
     pub conductance_s: &'a [f64],
-    /// Conductance of every taxel at the end, S, the same range; `None` when it stays as it is.
+    /// Conductance of every taxel at the end, S, in the same range; `None` if it is constant.
     pub end_conductance_s: Option<&'a [f64]>,
 }
 
@@ -39,17 +39,41 @@ impl Segment<'_> {
     }
 }
 
-/// Conductance of every taxel at any time of a block, piece by piece.
+/// Conductance of every taxel at any time of a block, as a sequence of segments.
+///
+/// ```
+/// use spts_circuit::{ConductanceSource, Segment};
+///
+/// /// Four taxels that conduct more and more.
+/// struct Rising {
+///     start: [f64; 4],
+///     end: [f64; 4],
+/// }
+///
+/// impl ConductanceSource for Rising {
+///     fn taxels(&self) -> usize {
+///         4
+///     }
+///     fn segment(&mut self, time_s: f64) -> Segment<'_> {
+///         let start_s = time_s.floor();
+///         self.start = [1e-5 * start_s; 4];
+///         self.end = [1e-5 * (start_s + 1.0); 4];
+///         Segment { start_s, end_s: start_s + 1.0, conductance_s: &self.start, end_conductance_s: Some(&self.end) }
+///     }
+/// }
+/// let mut rising = Rising { start: [0.0; 4], end: [0.0; 4] };
+/// assert_eq!(rising.segment(2.5).conductance_s[0], 2e-5);
+/// ```
 pub trait ConductanceSource {
     /// Number of taxels.
     fn taxels(&self) -> usize;
 
-    /// The segment that holds `time_s`, seconds after the start of the block. The readout asks for times in increasing
-    /// order.
+    /// The segment that contains `time_s`, in seconds since the start of the block. The readout requests times in
+    /// increasing order.
     fn segment(&mut self, time_s: f64) -> Segment<'_>;
 }
 
-/// A series that is not one.
+/// Why maps do not form a conductance source.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourceError {
@@ -69,27 +93,27 @@ pub enum SourceError {
     Shape {
         /// 0-based map.
         index: usize,
-        /// Its taxels.
+        /// Number of its taxels.
         taxels: usize,
         /// Taxels of the first map.
         expected: usize,
     },
-    /// A time that is not after the one before it, or not finite.
+    /// A time that is not finite, or not after the previous one.
     #[error("time {index} is {time_s} s, not finite and after the time before it")]
     Time {
         /// 0-based map.
         index: usize,
-        /// Its time, s.
+        /// The time, s.
         time_s: f64,
     },
-    /// A conductance that is negative, too large or not a number.
+    /// A conductance that is negative, too large or NaN.
     #[error("map {index}, taxel {taxel} has conductance {value_s} S, outside [0, 1e12]")]
     Conductance {
         /// 0-based map.
         index: usize,
         /// 0-based taxel.
         taxel: usize,
-        /// Offending value, S.
+        /// The conductance, S.
         value_s: f64,
     },
 }
@@ -113,17 +137,17 @@ fn check(index: usize, map: &ConductanceMap, expected: usize) -> Result<(), Sour
     }
 }
 
-/// The same conductance for ever.
+/// A conductance that is constant in time.
 #[derive(Debug, Clone)]
 pub struct Constant {
     map: ConductanceMap,
 }
 
 impl Constant {
-    /// Source of `map`.
+    /// A source that always returns `map`.
     ///
     /// # Errors
-    /// [`SourceError`] for an empty map and for a conductance outside [0, 1e12] S.
+    /// [`SourceError`] for an empty map, or a conductance outside [0, 1e12] S.
     pub fn new(map: ConductanceMap) -> Result<Self, SourceError> {
         if map.values().is_empty() {
             return Err(SourceError::Empty);
@@ -159,20 +183,31 @@ fn held(end_s: f64, map: &ConductanceMap) -> Segment<'_> {
     }
 }
 
-/// Maps at given times, joined by straight lines; before the first and after the last one they are held.
+/// Maps at given times with linear interpolation; constant before the first and after the last map.
+///
+/// ```
+/// use spts_circuit::Interpolated;
+/// use spts_models::ConductanceMap;
+///
+/// let map = |value_s| ConductanceMap::from_values(1, 2, vec![value_s; 2]);
+/// let press = Interpolated::new(vec![0.0, 0.1], vec![map(0.0), map(2e-4)])?;
+/// assert!((press.at(0.05).values()[0] - 1e-4).abs() < 1e-16);
+/// assert_eq!(press.at(9.0), map(2e-4), "held after the last map");
+/// # Ok::<(), spts_circuit::SourceError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Interpolated {
     times_s: Vec<f64>,
     maps: Vec<ConductanceMap>,
-    /// Segment that held the last time asked for: between maps `segment` and `segment + 1`.
+    /// Segment of the last requested time: between the maps `segment` and `segment + 1`.
     segment: usize,
 }
 
 impl Interpolated {
-    /// Source through `maps[k]` at `times_s[k]`.
+    /// A source through `maps[k]` at `times_s[k]`.
     ///
     /// # Errors
-    /// [`SourceError`] for an empty series, different lengths or shapes, times that do not increase, and conductances
+    /// [`SourceError`] for an empty series, different lengths or shapes, times that do not increase, or conductances
     /// outside [0, 1e12] S.
     pub fn new(times_s: Vec<f64>, maps: Vec<ConductanceMap>) -> Result<Self, SourceError> {
         if times_s.len() != maps.len() {
@@ -199,7 +234,7 @@ impl Interpolated {
         })
     }
 
-    /// The maps, in the order of their times.
+    /// The maps, in order of time.
     #[must_use]
     pub fn maps(&self) -> &[ConductanceMap] {
         &self.maps
@@ -220,14 +255,14 @@ impl Interpolated {
         map
     }
 
-    /// The same source, whose time 0 is at `start_s` of this one.
+    /// The same source, shifted so that its time 0 is `start_s` of this one.
     #[must_use]
     pub fn starting_at(&mut self, start_s: f64) -> Started<'_> {
         Started { source: self, start_s }
     }
 }
 
-/// A source that begins at another time ([`Interpolated::starting_at`]).
+/// A source shifted in time ([`Interpolated::starting_at`]).
 #[derive(Debug)]
 pub struct Started<'a> {
     source: &'a mut Interpolated,

@@ -1,10 +1,10 @@
-//! Rows of the weight matrix that some measurements used.
+//! Rows of the weight matrix of some measurements.
 
 use crate::mode::WeightMode;
 use crate::weights::{WeightClock, Weights};
 
-/// Consecutive rows of the weight matrix Φ, one a measurement. No row is stored: the matrix of a large skin is filled
-/// piece by piece, with [`WeightRows::chunks`].
+/// Consecutive rows of the weight matrix Φ, one for each measurement. No row is stored; the matrix of a large skin can
+/// be filled piece by piece with [`WeightRows::chunks`].
 ///
 /// ```
 /// use spts_circuit::{Seeding, WeightMode, WeightRows, Weights};
@@ -25,7 +25,7 @@ pub struct WeightRows<'a> {
 }
 
 impl<'a> WeightRows<'a> {
-    /// The `len` rows of `weights` from row `first_row` on, counted from the loading of the seeds.
+    /// The `len` rows of `weights` from row `first_row` on, counted from loading the seeds.
     #[must_use]
     pub fn new(weights: &'a Weights, first_row: u64, len: usize) -> Self {
         Self {
@@ -35,13 +35,13 @@ impl<'a> WeightRows<'a> {
         }
     }
 
-    /// Weights that these are rows of.
+    /// The weights to which the rows belong.
     #[must_use]
     pub fn weights(&self) -> &'a Weights {
         self.weights
     }
 
-    /// Number of the first row, counted from the loading of the seeds.
+    /// Number of the first row, counted from loading the seeds.
     #[must_use]
     pub fn first_row(&self) -> u64 {
         self.first_row
@@ -53,7 +53,7 @@ impl<'a> WeightRows<'a> {
         self.len
     }
 
-    /// True without a row.
+    /// Whether there is no row.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
@@ -65,20 +65,20 @@ impl<'a> WeightRows<'a> {
         self.weights.taxels()
     }
 
-    /// Rows `start..start + len` of these.
+    /// The rows `start..start + len` of these.
     ///
     /// # Panics
-    /// When these are fewer.
+    /// If there are fewer rows.
     #[must_use]
     pub fn slice(&self, start: usize, len: usize) -> Self {
         assert!(start + len <= self.len, "rows {start}..{} of {}", start + len, self.len);
         Self::new(self.weights, self.first_row + start as u64, len)
     }
 
-    /// The rows in pieces of `len`, the last one shorter if need be.
+    /// The rows in pieces of `len`; the last piece may be shorter.
     ///
     /// # Panics
-    /// When `len` is 0.
+    /// If `len` is 0.
     pub fn chunks(self, len: usize) -> impl Iterator<Item = Self> {
         let starts = (0..self.len).step_by(len);
         starts.map(move |start| self.slice(start, len.min(self.len - start)))
@@ -87,7 +87,7 @@ impl<'a> WeightRows<'a> {
     /// Writes the levels, each in [−1, 1], row-major.
     ///
     /// # Panics
-    /// When `out` does not have one entry a row and taxel.
+    /// If `out` does not have one entry for each row and taxel.
     pub fn fill(&self, out: &mut [f64]) {
         let expected = self.len * self.taxels();
         assert_eq!(out.len(), expected, "one entry a row and taxel");
@@ -102,8 +102,8 @@ impl<'a> WeightRows<'a> {
         rows
     }
 
-    /// Signs of binary weights, packed, ⌈taxels/64⌉ words a row: bit k of a row is set where taxel k's weight is +1.
-    /// `None` when the weights are not binary.
+    /// Packed signs of binary weights, ⌈taxels/64⌉ words a row: bit k of a row is set if taxel k has the weight +1.
+    /// `None` if the weights are not binary.
     #[must_use]
     pub fn sign_bits(&self) -> Option<Vec<u64>> {
         (self.weights.mode() == WeightMode::Binary).then(|| {
@@ -113,7 +113,7 @@ impl<'a> WeightRows<'a> {
         })
     }
 
-    /// The rows one after another, from the first on and beyond the last.
+    /// Iterates over rows, from the first one on and beyond the last.
     #[must_use]
     pub fn clock(&self) -> WeightClock {
         self.weights.clock(self.first_row)

@@ -13,14 +13,15 @@ use std::sync::Arc;
 /// Most taxels that seeds are listed for.
 const MAX_SEEDS: usize = 1 << 24;
 
-/// Drive levels of a skin of `taxels` taxels: row `r` (0-based, counted in clock edges since the seeds were loaded)
-/// holds the level of every taxel at measurement `r`.
+/// Drive levels of a skin of `taxels` taxels. Row `r` holds the level of every taxel at measurement `r`; rows are
+/// counted from 0 in clock edges since loading the seeds.
 ///
-/// A level is the drive over its full scale. The DAC code k drives (k − 127.5)/127.5, so that codes 0 and 255 are −1
-/// and +1 and the analog levels lie between; the raster's neutral code 126 counts as 0, because the amplifier's bias is
-/// trimmed to it (what is left of it is the drive offset). Row 0 is the generator's state after ONE step from the seed.
+/// A level is the drive divided by its full scale. DAC code k drives (k − 127.5)/127.5: codes 0 and 255 are −1 and +1,
+/// and the analog levels lie between them. The neutral code 126 of the raster scan counts as 0, because the amplifier's
+/// bias is trimmed to it (the effect `drive_offset` models the remainder). Row 0 is the generator's state after ONE
+/// step from the seed.
 ///
-/// The levels come from the cells' generators, seeded by a rule ([`Weights::new`]) or with given numbers
+/// The levels come from the cells' generators, seeded by a rule ([`Weights::new`]) or with given seeds
 /// ([`Weights::with_seeds`]), or from a pattern ([`Weights::with_patterns`]). As text (JSON or TOML), in this order:
 ///
 /// ```
@@ -42,7 +43,7 @@ const MAX_SEEDS: usize = 1 << 24;
 /// # Ok::<(), serde_json::Error>(())
 /// ```
 ///
-/// `generator` may be left out; `taxels` may stand beside a list, too, and is then checked.
+/// `generator` may be omitted. `taxels` may be given together with a list and is then checked.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Weights {
     mode: WeightMode,
@@ -61,10 +62,10 @@ impl Weights {
         }
     }
 
-    /// Weights of as many taxels as there are `seeds`: what each generator is loaded with.
+    /// Weights with one generator seed for each taxel.
     ///
     /// # Errors
-    /// [`WeightsError`] without a seed or with more than 2²⁴, and in raster mode, which uses no seeds.
+    /// [`WeightsError`] for no seed, more than 2²⁴ seeds, or the raster mode, which uses no seeds.
     pub fn with_seeds(mode: WeightMode, seeds: impl Into<Arc<[u32]>>) -> Result<Self, WeightsError> {
         let (field, seeds) = ("seeds", seeds.into());
         if mode == WeightMode::Raster {
@@ -84,10 +85,10 @@ impl Weights {
         }
     }
 
-    /// Weights that repeat `patterns`. In analog mode any code is a level; in binary mode 0 is −1 and 255 is +1.
+    /// Weights that repeat `patterns`. In analog mode every code is a level; in binary mode 0 is −1 and 255 is +1.
     ///
     /// # Errors
-    /// [`WeightsError`] for other codes in binary mode, and in raster mode, which scans its taxels in their order.
+    /// [`WeightsError`] for other codes in binary mode, or for the raster mode, which scans its taxels in order.
     pub fn with_patterns(mode: WeightMode, patterns: Patterns) -> Result<Self, WeightsError> {
         patterns.check(mode)?;
         let taxels = u32::try_from(patterns.taxels()).unwrap_or(u32::MAX);
@@ -104,19 +105,19 @@ impl Weights {
         self.taxels as usize
     }
 
-    /// What the cells put out.
+    /// Kind of the levels.
     #[must_use]
     pub fn mode(&self) -> WeightMode {
         self.mode
     }
 
-    /// Where the levels come from.
+    /// Source of the levels.
     #[must_use]
     pub fn source(&self) -> &LevelSource {
         &self.source
     }
 
-    /// The pattern that the levels repeat, if they do.
+    /// The pattern that the levels repeat; `None` if they come from generators.
     #[must_use]
     pub fn patterns(&self) -> Option<&Patterns> {
         match &self.source {
@@ -125,7 +126,7 @@ impl Weights {
         }
     }
 
-    /// Seed of taxel `taxel`; `None` when the levels come from a pattern or there is no such taxel.
+    /// Seed of taxel `taxel`; `None` if the levels come from a pattern, or there is no such taxel.
     #[must_use]
     pub fn seed(&self, taxel: usize) -> Option<u32> {
         (taxel < self.taxels()).then_some(())?;
@@ -141,7 +142,7 @@ impl Weights {
     /// Level of `taxel` at `row`, in O(log row).
     ///
     /// # Panics
-    /// When the levels come from a list or a pattern without such a taxel.
+    /// If the levels come from a list or a pattern without such a taxel.
     #[must_use]
     pub fn level(&self, taxel: u32, row: u64) -> f64 {
         match (self.mode, &self.source) {
@@ -167,10 +168,10 @@ impl Weights {
         }
     }
 
-    /// Writes as many consecutive rows as `out` holds, row-major, starting with `first_row`.
+    /// Fills `out` with consecutive rows from `first_row` on, row-major.
     ///
     /// # Panics
-    /// When `out` is not a whole number of rows.
+    /// If the length of `out` is not a whole number of rows.
     pub fn fill_rows(&self, first_row: u64, out: &mut [f64]) {
         assert!(
             out.len().is_multiple_of(self.taxels().max(1)),
@@ -184,12 +185,12 @@ impl Weights {
         }
     }
 
-    /// Signs of the binary weights at consecutive rows, packed: bit k of a row is set where taxel k's weight is +1. A
-    /// row takes ⌈taxels/64⌉ words, the rest of the last one 0. For the other modes these are the top bits of the
-    /// generators, or of the codes of a pattern.
+    /// Packed signs of the binary weights at consecutive rows: bit k of a row is set if taxel k has the weight +1. A
+    /// row has ⌈taxels/64⌉ words; unused bits are 0. For the other modes these are the top bits of the generators, or
+    /// of the pattern's codes.
     ///
     /// # Panics
-    /// When `out` is not a whole number of rows.
+    /// If the length of `out` is not a whole number of rows.
     pub fn sign_bits(&self, first_row: u64, out: &mut [u64]) {
         let words = self.taxels().div_ceil(64).max(1);
         assert!(
@@ -221,11 +222,10 @@ impl Weights {
         }
     }
 
-    /// DAC codes that stand for the levels at as many consecutive rows as `out` holds, row-major, starting with
-    /// `first_row`.
+    /// Fills `out` with the DAC codes of the levels at consecutive rows from `first_row` on, row-major.
     ///
     /// # Panics
-    /// When `out` is not a whole number of rows.
+    /// If the length of `out` is not a whole number of rows.
     pub fn fill_codes(&self, first_row: u64, out: &mut [u8]) {
         let taxels = self.taxels().max(1);
         assert!(
@@ -243,7 +243,7 @@ impl Weights {
         }
     }
 
-    /// Clock whose next row is `row`.
+    /// A clock whose next row is `row`.
     #[must_use]
     pub fn clock(&self, row: u64) -> WeightClock {
         let jump = Jump::new(row);
@@ -259,7 +259,7 @@ impl Weights {
     }
 }
 
-/// Rows one after another: the state of every cell.
+/// Iterates over rows; holds the generator state of every cell.
 #[derive(Debug, Clone)]
 pub struct WeightClock {
     weights: Weights,
@@ -268,7 +268,7 @@ pub struct WeightClock {
 }
 
 impl WeightClock {
-    /// Writes the next row and moves on. `out` has one entry a taxel.
+    /// Writes the next row and advances. `out` has one entry a taxel.
     pub fn next_row(&mut self, out: &mut [f64]) {
         let mode = self.weights.mode;
         if let Some(patterns) = self.weights.patterns() {

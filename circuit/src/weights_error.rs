@@ -1,19 +1,19 @@
-//! What makes weights unusable.
+//! Errors of weights.
 
 use crate::mode::WeightMode;
 
-/// Weights that contradict themselves.
+/// Why weights are not valid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum WeightsError {
-    /// A list of nothing, or of too much.
+    /// A list that is empty or too long.
     #[error("`{field}` has {len} entries; valid: [1, {most}]")]
     Length {
         /// Name of the list.
         field: &'static str,
-        /// Its entries.
+        /// Number of its entries.
         len: usize,
-        /// Most entries.
+        /// Largest number of entries.
         most: usize,
     },
     /// A list for another skin.
@@ -21,15 +21,13 @@ pub enum WeightsError {
     Taxels {
         /// Name of the list.
         field: &'static str,
-        /// Taxels that the list is for.
+        /// Number of taxels of the list.
         found: usize,
-        /// Taxels of the skin.
+        /// Number of taxels of the skin.
         taxels: usize,
     },
-    /// Codes that do not fill their rows.
-    #[error(
-        "`patterns.codes` has {len} entries; expected one or more for each of the `patterns.period` = {period} rows"
-    )]
+    /// A number of codes that is not a multiple of the period.
+    #[error("`patterns.codes` has {len} entries, not a positive multiple of `patterns.period` = {period}")]
     Rows {
         /// Number of codes.
         len: usize,
@@ -39,17 +37,17 @@ pub enum WeightsError {
     /// A code that a binary cell does not have.
     #[error("`patterns.codes`[{index}] = {code} is no binary level; valid: 0 (level −1) and 255 (level +1)")]
     Code {
-        /// 0-based place in the list.
+        /// Position in the list, from 0.
         index: usize,
-        /// Offending code.
+        /// The code.
         code: u8,
     },
-    /// A key that the mode has no use for.
+    /// A key that the mode does not use.
     #[error("`{field}` does not go with `mode` = {:?}; valid modes: \"analog\" and \"binary\"", .mode.name())]
     Mode {
         /// Name of the key.
         field: &'static str,
-        /// Mode that has no use for it.
+        /// The mode.
         mode: WeightMode,
     },
     /// No source of the levels, or several.
@@ -58,7 +56,7 @@ pub enum WeightsError {
         /// The keys that were given.
         found: String,
     },
-    /// The number of taxels is not given and does not follow from a list.
+    /// The number of taxels is not given, and there is no list from which it follows.
     #[error("`taxels` is missing; valid: [1, 2^32 − 1]")]
     NoTaxels,
 }

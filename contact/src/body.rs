@@ -1,8 +1,18 @@
-//! A body on the skin: a mesh, where it is and how it moves.
+//! A body on the skin: a mesh with its pose and motion.
 
 use crate::mesh::TriMesh;
 
 /// A mesh with its pose and velocity in world axes.
+///
+/// ```
+/// use spts_contact::{PosedMesh, mesh::sphere};
+///
+/// let ball = sphere(33.4e-3, 24, 48); // stands on its origin
+/// let mut falling = PosedMesh::at_rest(&ball, [0.0, 0.0, 0.1]);
+/// falling.velocity_m_per_s = [0.0, 0.0, -2.0];
+/// assert!((falling.heights_m()[1] - 66.8e-3).abs() < 1e-9);
+/// assert!(falling.is_finite());
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct PosedMesh<'a> {
     /// The mesh, body axes.
@@ -11,7 +21,7 @@ pub struct PosedMesh<'a> {
     pub rotation: [[f64; 3]; 3],
     /// Position of the body origin, m.
     pub position_m: [f64; 3],
-    /// Centre of mass, world axes, m: torques are taken about it.
+    /// Centre of mass in world axes, m. Torques are about this point.
     pub centre_of_mass_m: [f64; 3],
     /// Velocity of the centre of mass, m/s.
     pub velocity_m_per_s: [f64; 3],
@@ -22,7 +32,7 @@ pub struct PosedMesh<'a> {
 }
 
 impl<'a> PosedMesh<'a> {
-    /// Rigid body at rest, not rotated, its origin and centre of mass at `position_m`.
+    /// A rigid body at rest without rotation. Its origin and its centre of mass are at `position_m`.
     #[must_use]
     pub fn at_rest(mesh: &'a TriMesh, position_m: [f64; 3]) -> Self {
         Self {
@@ -36,8 +46,8 @@ impl<'a> PosedMesh<'a> {
         }
     }
 
-    /// Heights of the lowest and the highest vertex above the body's origin, world axes, m; not in order without a
-    /// vertex.
+    /// Heights of the lowest and the highest vertex above the body's origin in world axes, m. Without a vertex, the
+    /// lowest is above the highest.
     #[must_use]
     pub fn heights_m(&self) -> [f64; 2] {
         let [_, _, up] = self.rotation;
@@ -49,7 +59,7 @@ impl<'a> PosedMesh<'a> {
         ends
     }
 
-    /// Whether pose and velocity are finite and the stiffness is a number.
+    /// Whether pose and velocity are finite, and the stiffness is not NaN.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         let vectors = [

@@ -1,4 +1,4 @@
-//! What every contact field has to fulfil.
+//! Properties that every contact field must have.
 
 use crate::body::PosedMesh;
 use crate::field::ContactField;
@@ -7,21 +7,33 @@ use crate::mesh::TriMesh;
 use crate::table::ContactBuild;
 use spts_models::SkinLayout;
 
-/// A promise of [`ContactField`] that a field does not keep.
+/// A property of [`ContactField`] that a field lacks.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{check}: got {actual:e}, expected {expected}")]
 pub struct Nonconformity {
-    /// Which promise.
+    /// Name of the property.
     pub check: &'static str,
     /// Value found.
     pub actual: f64,
-    /// What it should have been.
+    /// Expected value.
     pub expected: String,
 }
 
-/// Checks the field made by `build` with its default parameters against the promises of [`ContactField`]: balance of
-/// force, no tension, no contact without touch, finite and growing with depth, no memory, friction against sliding,
-/// nothing beside the skin, NaN for a pose or velocity that is not finite, parameters that rebuild it.
+/// Checks the field that `build` makes with default parameters for the properties of [`ContactField`]: the force
+/// balances the pressure, there is no tension, there is no force without touch, the force is finite and grows with
+/// depth, the field has no memory, friction opposes sliding, there is no pressure beside the skin, a pose or velocity
+/// that is not finite gives NaN, and the field's parameters rebuild it.
+///
+/// ```
+/// use spts_contact::{WinklerConfig, WinklerLayer, conformance};
+///
+/// // a field of your own passes the same checks
+/// conformance(|parameters, skin| {
+///     let config: WinklerConfig = parameters.try_into()?;
+///     Ok(Box::new(WinklerLayer::new(config, skin)?))
+/// })?;
+/// # Ok::<(), spts_contact::Nonconformity>(())
+/// ```
 ///
 /// # Errors
 /// The first [`Nonconformity`] found.

@@ -1,4 +1,4 @@
-//! Force against depth of a body at rest: what the world needs to know about a contact before it moves anything.
+//! Force as a function of depth for a body at rest. Simulations need it before they move the body.
 
 use crate::body::PosedMesh;
 use crate::equilibrium::{EquilibriumError, depth_limit_m};
@@ -6,8 +6,20 @@ use crate::field::ContactField;
 
 /// Static force–depth curve of one body in one orientation.
 ///
-/// Depth is how far the body is below the height at which its lowest vertex touches the free surface, so the first
-/// depth is above zero when that vertex lies beside the skin.
+/// Depth is measured from the height at which the body's lowest vertex touches the free surface. The curve starts at a
+/// depth above zero if that vertex lies beside the skin.
+///
+/// ```
+/// use spts_contact::{DepthCurve, PosedMesh, build_contact, mesh::sphere};
+/// use spts_models::SkinLayout;
+///
+/// let mut field = build_contact("winkler", toml::Table::new(), &SkinLayout::default())?;
+/// let ball = sphere(33.4e-3, 24, 48);
+/// let curve = DepthCurve::up_to_force(&mut *field, &PosedMesh::at_rest(&ball, [0.0; 3]), 20.0)?;
+/// assert!(curve.depth_m(5.0) < curve.depth_m(20.0));
+/// assert!(curve.energy_j() < 20.0 * curve.depth_m(20.0), "the force rises to 20 N on the way");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthCurve {
     depth_m: Vec<f64>,
@@ -69,7 +81,7 @@ fn depth_of(force_at: &mut impl FnMut(f64) -> f64, wanted_n: f64, deep_m: f64) -
 }
 
 impl DepthCurve {
-    /// Curve of a body of which nothing is known yet.
+    /// The curve of a body that has not been pressed yet.
     #[must_use]
     pub fn empty() -> Self {
         Self {
@@ -78,11 +90,11 @@ impl DepthCurve {
         }
     }
 
-    /// Curve of `body` (its velocity and height are ignored) up to the force `force_n`.
+    /// The curve of `body` up to the force `force_n`. The body's velocity and height are ignored.
     ///
     /// # Errors
-    /// [`EquilibriumError`] when no depth down to the body's height and 5 cm more gives that force: [`Beside`] when
-    /// none gives any, [`NoAnswer`] when the field gives up.
+    /// [`EquilibriumError`] if no depth up to the body's height plus 5 cm gives that force: [`Beside`] if no depth
+    /// gives any force, [`NoAnswer`] if the field has no answer.
     ///
     /// [`Beside`]: EquilibriumError::Beside
     /// [`NoAnswer`]: EquilibriumError::NoAnswer
@@ -144,10 +156,10 @@ impl DepthCurve {
         })
     }
 
-    /// Curve up to the depth at which the contact has absorbed `energy_j`.
+    /// The curve up to the depth at which the contact has absorbed `energy_j`.
     ///
     /// # Errors
-    /// [`EquilibriumError`] when no depth, as for [`DepthCurve::up_to_force`], absorbs that energy.
+    /// [`EquilibriumError`] if no depth in the range of [`DepthCurve::up_to_force`] absorbs that energy.
     pub fn up_to_energy(
         field: &mut dyn ContactField,
         body: &PosedMesh<'_>,
@@ -193,14 +205,14 @@ impl DepthCurve {
         }
     }
 
-    /// Work to reach the end of the curve, J.
+    /// Work to the end of the curve, J.
     #[must_use]
     pub fn energy_j(&self) -> f64 {
         let pairs = self.depth_m.windows(2).zip(self.force_n.windows(2));
         pairs.map(|(d, f)| 0.5 * (d[1] - d[0]) * (f[0] + f[1])).sum()
     }
 
-    /// Depth at `force_n`, clamped to the curve, m.
+    /// Depth at `force_n`, limited to the curve, m.
     #[must_use]
     pub fn depth_m(&self, force_n: f64) -> f64 {
         let i = self.segment(force_n);
@@ -217,8 +229,8 @@ impl DepthCurve {
         (self.depth_m[i + 1] - self.depth_m[i]) / step_n
     }
 
-    /// Largest stiffness dF/dδ between an eighth of the last force and the end, N/m: what a time step must bear.
-    /// (Below, the curve's own cells make jumps that no oscillation can follow.)
+    /// Largest stiffness dF/dδ between an eighth of the last force and the end, N/m. The time step of a simulation must
+    /// resolve it. (At smaller forces, single cells make jumps in the curve that no oscillation can follow.)
     #[must_use]
     pub fn stiffness_n_per_m(&self) -> f64 {
         let last = self.segments();

@@ -1,60 +1,72 @@
-//! What every contact field does.
+//! Interface of contact fields.
 
 use crate::body::PosedMesh;
 use crate::prepared::PreparedMesh;
 use crate::quasi_static::QuasiStatic;
 use crate::response::Response;
 
-/// Elastic layer of the skin, seen by a body.
+/// Elastic layer of the skin in contact with a body.
+///
+/// ```
+/// use spts_contact::{PosedMesh, build_contact, mesh::cuboid};
+/// use spts_models::SkinLayout;
+///
+/// let mut field = build_contact("winkler", toml::Table::new(), &SkinLayout::default())?;
+/// let block = cuboid([30e-3, 30e-3, 10e-3]);
+/// let mut force_n = |depth_m: f64| field.respond(&PosedMesh::at_rest(&block, [0.0, 0.0, -depth_m])).wrench.force_n[2];
+/// assert_eq!(force_n(0.0), 0.0);
+/// assert!(force_n(1e-3) > 2.0 * force_n(0.5e-3), "the foam densifies");
+/// # Ok::<(), spts_contact::ContactError>(())
+/// ```
 pub trait ContactField: Send {
     /// Pressure on the skin and wrench on the body for the given pose and velocity.
     ///
-    /// The normal force of the wrench equals the sum of pressure × cell area; pressure is finite and never negative,
-    /// at any depth and for any mesh whose vertices are finite and whose triangles name vertices that exist.
+    /// The normal force of the wrench equals the sum of pressure × cell area. Pressure is finite and never negative, at
+    /// any depth and for any mesh with finite vertices and valid indices.
     ///
-    /// A wrench of NaN means that there is no answer, and the pressure then means nothing: pose or velocity are not
-    /// finite, or the field's own solver gave up. A world stops with an error.
+    /// A wrench of NaN means that the field has no answer: pose or velocity is not finite, or the field's solver
+    /// failed. The pressure then has no meaning, and a simulation stops with an error.
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_>;
 
-    /// Makes `mesh` the one that bodies are expected to have. It changes no answer: a body with this very
-    /// mesh needs no comparison, and what was prepared once is not made again.
+    /// Announces the mesh of the following bodies, so that it is prepared once and not compared at each call. It
+    /// changes no answer.
     fn expect(&mut self, _mesh: &PreparedMesh) {}
 
-    /// Puts the layer under preload: `strain` is the compression of the foam under every taxel, row by row, as a share
-    /// of its thickness, while nothing touches the skin; each in [0, 1). Returns the pressure of every taxel then, Pa.
-    /// `None`, and nothing is changed, for a field without preloads.
+    /// Sets a preload: `strain` is the compression of the foam under every taxel while nothing touches the skin, as a
+    /// share of its thickness, in [0, 1) and in row-major order. Returns the resulting pressure of every taxel, Pa. A
+    /// field without preloads returns `None` and changes nothing.
     ///
-    /// Answers are what a body adds: it meets the surface at the same height, on foam that is stiffer by its
-    /// compression, and an electrode feels the answer and the preload. A preload of 0 changes no answer.
+    /// Answers are the addition due to the body: it meets the surface at the same height, on foam that its compression
+    /// has made stiffer. An electrode is under the answer plus the preload. A preload of 0 changes no answer.
     ///
     /// # Panics
-    /// When there is not one strain a taxel.
+    /// If the number of strains differs from that of the taxels.
     fn preload(&mut self, _strain: &[f64]) -> Option<Vec<f64>> {
         None
     }
 
-    /// Why the last answer was none, when the field can say.
+    /// Why the last call had no answer, if the field knows.
     fn failure(&self) -> Option<String> {
         None
     }
 
-    /// Pressure that a frame shows, Pa, shaped as in [`Response`], when the field sees more than it answered to the
-    /// dynamics; `None` when the answer is all there is, or when there is none: then [`ContactField::failure`] says
-    /// why, and a world stops with an error. It carries the same normal force `force_n`.
+    /// Pressure for a frame, Pa, with the shape of that in [`Response`], if it is more accurate than the answer for the
+    /// dynamics. It has the same normal force `force_n`. `None` if the answer itself is the best, or if there is none:
+    /// then [`ContactField::failure`] gives the reason, and a simulation stops with an error.
     ///
     /// Called after [`ContactField::respond`] with the same body, for frames only.
     fn refine(&mut self, _body: &PosedMesh<'_>, _force_n: f64) -> Option<&[f64]> {
         None
     }
 
-    /// The field as one that finds the pose under a prescribed force itself, when it is one: its presses need no
+    /// The field as one that finds the pose under a prescribed force; `None` if it cannot. Its presses need no
     /// dynamics.
     fn quasi_static(&mut self) -> Option<&mut dyn QuasiStatic> {
         None
     }
 
-    /// Relative accuracy of an answer, of which earlier poses may take a part (an iteration that starts from the last
-    /// pressure); 0 when the answer is a function of the body alone, bit for bit.
+    /// Relative accuracy of an answer whose iteration starts from the last pressure, so that earlier poses affect it. 0
+    /// if the answer depends only on the body, bit for bit.
     fn tolerance(&self) -> f64 {
         0.0
     }
@@ -62,11 +74,11 @@ pub trait ContactField: Send {
     /// Fine cells along one side of a taxel.
     fn cells_per_taxel(&self) -> usize;
 
-    /// Every parameter, defaults included, as it would be written in a scene: enough to build the same field again.
+    /// All parameters, defaults included, as a scene would write them. They are enough to build the same field again.
     fn parameters(&self) -> toml::Table;
 
     /// Damping time of the layer, s: the viscous part of the pressure is this time × the rate of the elastic part.
-    /// Bounds the time step together with the stiffness. 0 for an answer that no speed changes.
+    /// Together with the stiffness it limits the time step. 0 if answers do not depend on speed.
     fn damping_s(&self) -> f64 {
         0.0
     }

@@ -1,4 +1,4 @@
-//! What a scene produces at every sampled instant.
+//! State of the contact at every sampled instant.
 
 use spts_models::PressureMap;
 
@@ -21,7 +21,7 @@ pub struct Wrench {
 }
 
 impl Wrench {
-    /// What a contact field answers when it does not know: NaN everywhere.
+    /// The answer of a contact field that has none: NaN everywhere.
     pub const UNKNOWN: Self = Self {
         force_n: [f64::NAN; 3],
         torque_nm: [f64::NAN; 3],
@@ -29,14 +29,29 @@ impl Wrench {
 }
 
 /// State of the contact at one instant.
+///
+/// ```
+/// use spts_contact::{Frame, Pose, Wrench};
+/// use spts_models::PressureMap;
+///
+/// let pressure = PressureMap::from_values(1, 2, vec![8e3, 2e3]);
+/// let frame = Frame {
+///     time_s: 0.1,
+///     electrode_pressure: pressure.clone(),
+///     pressure,
+///     wrench: Wrench { force_n: [0.0, 0.0, 2.25], torque_nm: [0.0; 3] },
+///     pose: Pose { position_m: [0.0; 3], quaternion: [1.0, 0.0, 0.0, 0.0] },
+/// };
+/// assert!(frame.imbalance(15e-3 * 15e-3) < 1e-12);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frame {
     /// Time since the start of the scene, s.
     pub time_s: f64,
-    /// Mean pressure over each taxel's whole cell (pitch × pitch), Pa. Sum × cell area = normal contact force.
+    /// Mean pressure over each taxel's whole cell (pitch × pitch), Pa. Its sum × cell area is the normal contact force.
     pub pressure: PressureMap,
-    /// Mean pressure over each taxel's electrode (electrode × electrode, centred in the cell), Pa: what the transducer
-    /// feels. A preload of the skin is in it, and not in `pressure`.
+    /// Mean pressure over each taxel's electrode (centred in the cell), Pa, as the transducer sees it. It includes a
+    /// preload of the skin, which `pressure` does not.
     pub electrode_pressure: PressureMap,
     /// Contact wrench on the body.
     pub wrench: Wrench,
@@ -45,8 +60,8 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// How far the taxels' pressures are from carrying the body: |F_z − Σ p A| / F_z, A being the area of a taxel's
-    /// whole cell; 0 without a force.
+    /// Relative difference between force and pressure: |F_z − Σ p A| / F_z, where A is the area of a taxel's whole
+    /// cell; 0 without a force.
     #[must_use]
     pub fn imbalance(&self, cell_area_m2: f64) -> f64 {
         let force_n = self.wrench.force_n[2];

@@ -1,9 +1,9 @@
-//! Contact without a physics engine: triangle meshes, and contact fields that answer a posed mesh with the pressure on
-//! the skin and the wrench on the body.
+//! Contact without a physics engine: triangle meshes, and contact fields that compute the pressure on the skin and the
+//! wrench on a posed mesh.
 //!
-//! The skin's free surface is the plane z = 0; the foam lies below it. A contact field looks at the underside of a
-//! body, gives the pressure on a fine grid over the whole skin and the wrench on the body, and nothing else: inertia,
-//! arms and gravity belong to whoever moves the body.
+//! The skin's free surface is the plane z = 0; the foam lies below it. A contact field looks at the underside of a body
+//! and returns the pressure on a fine grid over the whole skin and the wrench on the body. Inertia, arms and gravity
+//! belong to the simulation that moves the body.
 //!
 //! ```
 //! use spts_contact::{PosedMesh, build_contact, mesh::sphere};

@@ -1,6 +1,15 @@
 //! A rectangle of fine cells.
 
 /// Half-open rectangle of cells.
+///
+/// ```
+/// use spts_contact::Patch;
+///
+/// let patch = Patch { rows: [1, 3], cols: [2, 5] };
+/// assert_eq!((patch.height(), patch.width()), (2, 3));
+/// // where its cells are in a grid of 10 columns
+/// assert_eq!(patch.lines(10).collect::<Vec<_>>(), [12..15, 22..25]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Patch {
     /// First and one-past-last row.
@@ -10,7 +19,7 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// Whether there is no cell in it.
+    /// Whether the patch has no cells.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows[0] >= self.rows[1] || self.cols[0] >= self.cols[1]
@@ -28,7 +37,7 @@ impl Patch {
         self.rows[1].saturating_sub(self.rows[0])
     }
 
-    /// The cells of every row of the patch in a row-major grid `grid_cols` wide.
+    /// The cells of each row of the patch, as index ranges of a row-major grid with `grid_cols` columns.
     pub fn lines(&self, grid_cols: usize) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
         let Self { rows, cols } = *self;
         (rows[0]..rows[1]).map(move |row| row * grid_cols + cols[0]..row * grid_cols + cols[1])

@@ -1,4 +1,4 @@
-//! A mesh made ready for contact fields.
+//! A mesh prepared for contact fields.
 
 use crate::mesh::TriMesh;
 use std::ops::{Deref, Range};
@@ -7,8 +7,9 @@ use std::sync::Arc;
 /// Most triangles of a block.
 pub(crate) const BLOCK: usize = 16;
 
-/// A mesh with its triangles sorted into blocks of neighbours, which contact fields need. It is made once and cannot
-/// change; a clone shares it, so that any number of fields, scenes and threads have one. It reads as the mesh.
+/// A mesh whose triangles are sorted into blocks of neighbours, as contact fields need. It is immutable. A clone shares
+/// the data, so any number of fields, scenes and threads can use one mesh. It dereferences to
+/// [`TriMesh`](crate::mesh::TriMesh).
 ///
 /// ```
 /// use spts_contact::{ContactField, PosedMesh, PreparedMesh, WinklerConfig, WinklerLayer, mesh::sphere};
@@ -29,11 +30,11 @@ pub struct PreparedMesh(Arc<Sorted>);
 pub(crate) struct Sorted {
     source: TriMesh,
     pub(crate) blocks: Vec<Block>,
-    /// Corners of the blocks, each block its own, body axes, m.
+    /// Corners of the triangles in body axes, m. Each block has its own.
     pub(crate) points_m: Vec<[f64; 3]>,
-    /// Triangles, by the corners of their block.
+    /// Triangles, as indices into the corners of their block.
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Whether the mesh is closed and its triangles face outward: those that face up are then nowhere the lowest.
+    /// Whether the mesh is closed and its triangles face outwards. Triangles that face up are then never the lowest.
     pub(crate) solid: bool,
 }
 

@@ -1,4 +1,4 @@
-//! The contact fields a scene can name.
+//! The table of contact fields.
 
 use crate::columns::{Footprint, WinklerConfig, WinklerLayer};
 use crate::elastic::ElasticField;
@@ -9,15 +9,15 @@ use spts_models::{ConfigError, SkinLayout, explain_toml, in_section};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ContactError {
-    /// No field of that name.
+    /// There is no field of that name.
     #[error("`contact.model` = \"{name}\" is not one of {known}")]
     Unknown {
         /// Name in the scene.
         name: String,
-        /// Names that exist.
+        /// All known names.
         known: String,
     },
-    /// The parameters do not read as this field's.
+    /// The parameters are not those of this field.
     #[error("{}", in_section("contact", &explain_toml(.0)))]
     Table(#[from] toml::de::Error),
     /// A parameter is outside its range.
@@ -28,7 +28,7 @@ pub enum ContactError {
 /// Builds a contact field from the parameters of a scene's `[contact]` section (without `model`).
 pub type ContactBuild = fn(toml::Table, &SkinLayout) -> Result<Box<dyn ContactField>, ContactError>;
 
-/// Contact fields by the name a scene uses.
+/// Contact fields with the names that scenes use.
 pub type ContactTable = &'static [(&'static str, ContactBuild)];
 
 /// Every contact field of this crate.
@@ -50,8 +50,17 @@ pub const CONTACT_FIELDS: ContactTable = &[
 
 /// Builds the field called `name`.
 ///
+/// ```
+/// use spts_contact::build_contact;
+/// use spts_models::SkinLayout;
+///
+/// let parameters = toml::toml! { stiffness_pa_per_m = 1.0 };
+/// let error = build_contact("winkler", parameters, &SkinLayout::default()).err().expect("too soft");
+/// assert!(error.to_string().contains("`contact.stiffness_pa_per_m` = 1"));
+/// ```
+///
 /// # Errors
-/// [`ContactError`] when the name is unknown or the parameters are not valid.
+/// [`ContactError`] if the name is unknown or a parameter is not valid.
 pub fn build_contact(
     name: &str,
     parameters: toml::Table,
@@ -60,10 +69,10 @@ pub fn build_contact(
     build_contact_from(&[CONTACT_FIELDS], name, parameters, skin)
 }
 
-/// Builds the field called `name` from the first of `tables` that has the name, for a program with fields of its own.
+/// Builds the field called `name` from the first of `tables` that has it. Programs with fields of their own use this.
 ///
 /// # Errors
-/// [`ContactError`] when no table has the name, or the parameters are not valid.
+/// [`ContactError`] if no table has the name, or a parameter is not valid.
 pub fn build_contact_from(
     tables: &[ContactTable],
     name: &str,

@@ -1,20 +1,33 @@
-//! From the fine pressure field to one value a taxel.
+//! Averages of the fine pressure field over taxels.
 
 use crate::patch::Patch;
 use spts_models::{PressureMap, SkinLayout};
 
-/// Averages of a fine field over each taxel's whole cell and over its electrode.
+/// Averages a fine field over each taxel's whole cell and over its electrode.
+///
+/// ```
+/// use spts_contact::TaxelBins;
+/// use spts_models::SkinLayout;
+///
+/// let skin = SkinLayout::new(1, 1, 15e-3, 10e-3)?;
+/// let mut fine_pa = vec![0.0; 9]; // 3 × 3 cells of 5 mm
+/// fine_pa[4] = 9e3; // the middle one
+/// let [cell, electrode] = TaxelBins::new(&skin, 3).means(&fine_pa, None);
+/// assert!((cell.values()[0] - 1e3).abs() < 1e-9);
+/// assert!((electrode.values()[0] - 2.25e3).abs() < 1e-9, "the electrode is 10 mm wide");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct TaxelBins {
     rows: usize,
     cols: usize,
     cells: usize,
-    /// Share of the electrode's side that falls into each fine cell along one axis; sums to 1.
+    /// Share of the electrode's side in each fine cell along one axis; the sum is 1.
     electrode_weights: Vec<f64>,
 }
 
 impl TaxelBins {
-    /// Bins for a field with `cells_per_taxel` cells along each side of a taxel of `skin`.
+    /// Averages of a field with `cells_per_taxel` cells along each side of a taxel of `skin`.
     #[must_use]
     pub fn new(skin: &SkinLayout, cells_per_taxel: usize) -> Self {
         let cell_m = skin.pitch_m() / cells_per_taxel as f64;
@@ -34,13 +47,13 @@ impl TaxelBins {
         }
     }
 
-    /// Mean over each taxel's whole cell (sum × pitch² = normal force), and over its electrode, where cells cut by its
-    /// border count with the area inside.
+    /// Mean over each taxel's whole cell (its sum × pitch² is the normal force) and over its electrode. Cells cut by
+    /// the electrode's border count with the area inside.
     ///
-    /// Of a field that is 0 outside `patch` only that is read, with the same bits.
+    /// If the field is 0 outside `patch`, only the patch is read; the result has the same bits.
     ///
     /// # Panics
-    /// When `fine` does not have `(rows · cells) × (cols · cells)` values, or `patch` is not inside them.
+    /// If `fine` does not have `(rows · cells) × (cols · cells)` values, or `patch` is not inside the field.
     #[must_use]
     pub fn means(&self, fine: &[f64], patch: Option<Patch>) -> [PressureMap; 2] {
         let patch = patch.unwrap_or_else(|| self.whole());

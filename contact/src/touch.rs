@@ -1,4 +1,4 @@
-//! Several bodies on one skin, flat or not.
+//! Several bodies on one skin, flat or curved.
 
 use crate::body::PosedMesh;
 use crate::columns::{FoamLaw, WinklerConfig, WinklerLayer};
@@ -9,7 +9,7 @@ use crate::surface::{Solid, SurfaceConfig, SurfaceField, SurfacePoints};
 use crate::taxels::TaxelBins;
 use spts_models::{ConfigError, PressureMap, SkinLayout};
 
-/// A body that may touch a skin: its mesh, made ready for any skin.
+/// A body that may touch a skin: its mesh, prepared for any skin.
 #[derive(Debug, Clone)]
 pub struct TouchBody {
     /// The mesh, body axes, m.
@@ -26,9 +26,24 @@ impl From<PreparedMesh> for TouchBody {
     }
 }
 
-/// A skin that any number of bodies touch at once: poses and velocities in, pressures and wrenches out.
+/// A skin that any number of bodies can touch at once. Input: poses and velocities. Output: pressures and wrenches.
 ///
-/// A flat skin is a [`WinklerLayer`], any other one a [`SurfaceField`]. What several bodies press at one place adds up.
+/// A flat skin is a [`WinklerLayer`], any other a [`SurfaceField`]. Pressures of several bodies at one place add up.
+///
+/// ```
+/// use spts_contact::{PosedMesh, PreparedMesh, TouchBody, TouchSkin, WinklerConfig, mesh::cylinder};
+/// use spts_models::SkinLayout;
+///
+/// let mut skin = TouchSkin::flat(SkinLayout::default(), WinklerConfig::default())?;
+/// let finger = TouchBody::from(PreparedMesh::from(cylinder(8e-3, 30e-3, 32)));
+/// let at = |x_m| (&finger, PosedMesh::at_rest(&finger.mesh, [x_m, 0.0, -1e-3]));
+/// let mut wrenches = Vec::new();
+/// skin.touch(&[at(-40e-3), at(40e-3)], &mut wrenches);
+/// let cell_area_m2 = 15e-3 * 15e-3;
+/// let sum_n = skin.pressure().sum() * cell_area_m2;
+/// assert!((sum_n - wrenches[0].force_n[2] - wrenches[1].force_n[2]).abs() < 1e-9 * sum_n);
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct TouchSkin {
     layout: SkinLayout,
@@ -37,7 +52,7 @@ pub struct TouchSkin {
     electrode_pressure: PressureMap,
     touched_m2: f64,
     stiffness_pa_per_m: f64,
-    /// Depth at which only solid is left.
+    /// Depth at which no pores are left, m.
     max_depth_m: f64,
     damping_s: f64,
 }
@@ -56,7 +71,7 @@ impl TouchSkin {
     /// A flat skin in the plane z = 0.
     ///
     /// # Errors
-    /// [`ConfigError`] when a parameter is outside its range.
+    /// [`ConfigError`] if a parameter is outside its range.
     pub fn flat(layout: SkinLayout, config: WinklerConfig) -> Result<Self, ConfigError> {
         let layer = WinklerLayer::new(config, &layout)?;
         let cells = config.cells_per_taxel;
@@ -76,10 +91,10 @@ impl TouchSkin {
         ))
     }
 
-    /// A skin with these points, whose taxels are those of `layout`, row by row.
+    /// A skin with the sample points `points`, whose taxels are those of `layout` in row-major order.
     ///
     /// # Errors
-    /// [`ConfigError`] when a parameter is outside its range, or the points have another number of taxels.
+    /// [`ConfigError`] if a parameter is outside its range, or the points have another number of taxels.
     pub fn curved(layout: SkinLayout, points: SurfacePoints, config: SurfaceConfig) -> Result<Self, ConfigError> {
         let (found, needed) = (points.taxels(), layout.taxels());
         spts_models::in_range("taxels", found as f64, found == needed, "rows × cols")?;
@@ -109,13 +124,13 @@ impl TouchSkin {
         }
     }
 
-    /// Rows and columns of taxels, their pitch and their electrodes.
+    /// Rows, columns, pitch and electrodes of the taxels.
     #[must_use]
     pub fn layout(&self) -> &SkinLayout {
         &self.layout
     }
 
-    /// Middle of every taxel on the free surface, m, and the normal there, row by row.
+    /// Centre of every taxel on the free surface, m, and the normal there, in row-major order.
     #[must_use]
     pub fn taxel_centres(&self) -> Vec<([f64; 3], [f64; 3])> {
         match &self.foam {
@@ -127,7 +142,7 @@ impl TouchSkin {
         }
     }
 
-    /// Area of every taxel, m², row by row.
+    /// Area of every taxel, m², in row-major order.
     #[must_use]
     pub fn taxel_areas_m2(&self) -> Vec<f64> {
         match &self.foam {
@@ -142,21 +157,21 @@ impl TouchSkin {
         &self.pressure
     }
 
-    /// Mean pressure over every taxel's electrode, Pa: what the transducer feels. Of a skin that is not flat it is that
-    /// over the taxel's area.
+    /// Mean pressure over every taxel's electrode, Pa, as the transducer sees it. On a curved skin it is the mean over
+    /// the taxel's area.
     #[must_use]
     pub fn electrode_pressure(&self) -> &PressureMap {
         &self.electrode_pressure
     }
 
-    /// Area of the skin that is pressed, m².
+    /// Area of the skin under pressure, m².
     #[must_use]
     pub fn touched_m2(&self) -> f64 {
         self.touched_m2
     }
 
-    /// How stiff the foam is where it is pressed, N/m, at most: everywhere as under the taxel that is pressed most. The
-    /// slope of p = K δ/(1 − δ/δ_m) at the pressure p is K (1 + p/(K δ_m))².
+    /// Upper bound of the foam's stiffness in the contact, N/m: the value under the taxel with the largest pressure is
+    /// used everywhere. The slope of p = K δ/(1 − δ/δ_m) at the pressure p is K (1 + p/(K δ_m))².
     #[must_use]
     pub fn stiffness_n_per_m(&self) -> f64 {
         let share = self.pressure.max() / (self.stiffness_pa_per_m * self.max_depth_m);
@@ -169,9 +184,9 @@ impl TouchSkin {
         self.damping_s
     }
 
-    /// Takes everything off the skin and puts `bodies` on it, each with the mesh of its [`TouchBody`]; `wrenches` are
-    /// those on the bodies, about their centres of mass, in the same order. A body whose pose or velocity is not finite
-    /// has a wrench of NaN and presses nothing.
+    /// Removes everything from the skin and places `bodies` on it, each with the mesh of its [`TouchBody`]. Writes the
+    /// wrench on each body about its centre of mass into `wrenches`, in the same order. A body whose pose or velocity
+    /// is not finite gets a wrench of NaN and presses nothing.
     pub fn touch(&mut self, bodies: &[(&TouchBody, PosedMesh<'_>)], wrenches: &mut Vec<Wrench>) {
         wrenches.clear();
         match &mut self.foam {

@@ -1,4 +1,4 @@
-//! From pressure on cells to the wrench on the body: the one place that knows friction and levers.
+//! Computes the wrench on the body from the pressure on cells. Friction and lever arms are handled only here.
 
 use crate::body::PosedMesh;
 use crate::envelope::Envelope;
@@ -34,7 +34,7 @@ pub(crate) struct Tractions {
     friction: f64,
     /// v_reg², m²/s².
     regular: f64,
-    /// Something slides.
+    /// Whether something slides.
     rubs: bool,
     force_pa: [f64; 3],
     /// Pa m.

@@ -1,4 +1,4 @@
-//! The pages that say what a data set is: for people, and for programs that look for data sets.
+//! The files that describe a data set, for people and for search programs.
 
 use crate::columns::columns;
 use crate::shard::version;
@@ -111,7 +111,8 @@ fn short(value: f64) -> String {
     }
 }
 
-/// The description in the Croissant format, version 1.0 (<https://docs.mlcommons.org/croissant/docs/croissant-spec.html>).
+/// The description in the Croissant format, version 1.0
+/// (<https://docs.mlcommons.org/croissant/docs/croissant-spec.html>).
 pub(crate) fn croissant(spec: &Spec) -> Value {
     let config = spec.config();
     let fields: Vec<Value> = columns(spec)

@@ -1,4 +1,4 @@
-//! Which rows are looked at when not all are.
+//! Selects rows when not all are needed.
 
 use crate::folder::Dataset;
 use crate::shard::shard_rows;
@@ -7,7 +7,7 @@ use rand::RngExt as _;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-/// `rows` rows spread evenly over the ranges `held`, the first one among them; all rows when there are fewer.
+/// `rows` rows spread evenly over the ranges `held`, including the first; all rows if there are fewer.
 ///
 /// ```
 /// use spts_dataset::spread_rows;
@@ -26,8 +26,8 @@ pub fn spread_rows(held: &[Range<u64>], rows: u64) -> BTreeSet<u64> {
 }
 
 impl Spec {
-    /// `rows` different rows of the ranges `held`, drawn with `seed`; all rows when there are fewer. Another `label`
-    /// draws others.
+    /// `rows` different rows of the ranges `held`, drawn with `seed`; all rows if there are fewer. Draws with different
+    /// `label`s are independent.
     #[must_use]
     pub fn drawn_rows(&self, label: &str, held: &[Range<u64>], rows: u64, seed: u64) -> BTreeSet<u64> {
         let all = count(held);
@@ -44,7 +44,7 @@ impl Spec {
 }
 
 impl Dataset {
-    /// The rows of the files that are there, file by file; whether the files are whole is not checked.
+    /// The rows of all existing files, one range a file. The files' contents are not checked.
     #[must_use]
     pub fn made_rows(&self) -> Vec<Range<u64>> {
         let made = (0..self.spec().shards()).filter(|shard| self.shard_file(*shard).symlink_metadata().is_ok());

@@ -1,4 +1,4 @@
-//! Two data sets of the same touches, row by row.
+//! Compares two data sets of the same touches, row by row.
 
 use crate::error::DatasetError;
 use crate::folder::Dataset;
@@ -12,27 +12,27 @@ use spts::progress::Progress;
 use spts::recon::metrics::{SupportScore, pearson};
 use std::collections::BTreeMap;
 
-/// How far one data set is from another, over the rows in which both have a touch.
+/// Differences between two data sets, over the rows in which both have a touch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
-    /// Rows of both.
+    /// Number of rows compared.
     pub rows: u64,
-    /// Rows in which only one of them has a pressure.
+    /// Number of rows in which only one of the data sets has a pressure.
     pub one_sided: u64,
-    /// Of all rows.
+    /// Differences over all rows.
     pub all: Errors,
-    /// By the name of the first object.
+    /// Differences by the name of the first object.
     pub objects: BTreeMap<String, Errors>,
 }
 
-/// Differences over rows: each the 10th percentile, the median and the 90th percentile.
+/// Distribution of differences over rows: 10th percentile, median and 90th percentile of each.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Errors {
     /// Rows that were compared.
     pub rows: u64,
-    /// Σ|p − q| / Σq of the pressures p against the reference's q: share of the force that lies on other taxels.
+    /// Σ|p − q| / Σq of the pressures p and the reference's q: the relative difference in pressure.
     pub pressure: [f64; 3],
-    /// The same of the conductances.
+    /// The same for the conductances.
     pub conductance: [f64; 3],
     /// Pearson correlation of the conductances.
     pub correlation: [f64; 3],
@@ -50,11 +50,11 @@ struct Rows {
 }
 
 impl Dataset {
-    /// Compares the truth of every row with that of the same row of `reference`, which has as many rows, as large files
-    /// and the same skin.
+    /// Compares the ground truth of every row with that of the same row of `reference`. The reference must have as many
+    /// rows, equally large files and the same skin.
     ///
     /// # Errors
-    /// [`DatasetError`] when the two do not go together, or a file is missing or damaged.
+    /// [`DatasetError`] if the data sets cannot be compared, or a file is missing or damaged.
     pub fn compare_with(&self, reference: &Self, progress: &dyn Progress) -> Result<Comparison, DatasetError> {
         let facts = |of: &Self| {
             let spec = of.spec();

@@ -1,15 +1,15 @@
-//! Why a data set cannot be made, checked or read.
+//! Errors of data sets.
 
 use crate::make::RowError;
 use crate::spec::SpecError;
 use spts::output::OutputError;
 use std::path::PathBuf;
 
-/// A data set that cannot be made, checked or read. The message names the file.
+/// Why a data set cannot be made, checked or read. The message names the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DatasetError {
-    /// The spec is refused.
+    /// The specification is not valid.
     #[error(transparent)]
     Spec(#[from] SpecError),
     /// A row cannot be made.
@@ -26,18 +26,18 @@ pub enum DatasetError {
         /// Cause.
         source: std::io::Error,
     },
-    /// A file is not what it should be.
+    /// The content of a file is not valid.
     #[error("{}: {problem}", path.display())]
     File {
         /// File or folder.
         path: PathBuf,
-        /// What is wrong and what to do.
+        /// The problem, and what to do.
         problem: String,
     },
-    /// A worker's part that is none.
+    /// The part of a worker is not valid.
     #[error("{0}")]
     Part(String),
-    /// A data set that a format cannot hold.
+    /// The data set does not fit an export format.
     #[error("{0}")]
     Export(String),
 }

@@ -1,4 +1,4 @@
-//! The last step: everything is checked and described.
+//! The last step of making a data set: checks everything and describes it.
 
 use crate::card::{card, croissant};
 use crate::error::DatasetError;
@@ -17,27 +17,26 @@ const STATISTICS_FILE: &str = "statistics.json";
 const CARD_FILE: &str = "README.md";
 const CROISSANT_FILE: &str = "croissant.json";
 
-/// A data set that is whole.
+/// Summary of a complete data set.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finished {
-    /// Rows.
+    /// Number of rows.
     pub rows: u64,
-    /// Files of rows.
+    /// Number of files with rows.
     pub shards: u64,
     /// Their size, bytes.
     pub bytes: u64,
-    /// SHA-256 of the names and contents of all files of rows, the same wherever the data set was made: in its folder,
-    /// that of the output of `sha256sum data/*.parquet`.
+    /// SHA-256 of the names and contents of all files with rows. It does not depend on where the data set was made. In
+    /// its folder it is the SHA-256 of the output of `sha256sum data/*.parquet`.
     pub digest: String,
 }
 
 impl Dataset {
-    /// Checks that all files are there and whole, and writes statistics, card, `croissant.json` and, last,
+    /// Checks that all files exist and are complete, and writes statistics, card, `croissant.json` and, last,
     /// `manifest.json`.
     ///
     /// # Errors
-    /// [`DatasetError`] when a file is missing, damaged, of another data set, or of no data set, and when one cannot be
-    /// written.
+    /// [`DatasetError`] if a file is missing, damaged, or not part of this data set, or cannot be written.
     pub fn finish(&self, progress: &dyn Progress) -> Result<Finished, DatasetError> {
         let spec = self.spec();
         for path in self.check_files(progress)? {
@@ -67,8 +66,8 @@ impl Dataset {
         })
     }
 
-    /// Checks that all files are there, whole and of this data set, and that there are no others. Returns the files that
-    /// runs which were ended have left behind.
+    /// Checks that all files are there, whole and of this data set, and that there are no others. Returns the files
+    /// that runs which were ended have left behind.
     ///
     /// # Errors
     /// [`DatasetError`] when a file is missing, damaged, of another data set, or of no data set.

@@ -34,7 +34,7 @@ pub(crate) struct Head {
     shards: u64,
     spec_sha256: String,
     version: String,
-    /// Layout, weights, rate and converter of the wire: with `first_row` of a row, its rows of Φ.
+    /// Layout, weights, rate and converter of the wire. With `first_row` of a row, they give its rows of Φ.
     recording: RecordingInfo,
 }
 
@@ -53,50 +53,50 @@ impl Head {
     }
 }
 
-/// A data set in its folder: `dataset.json` says what it is, `spec.toml` is its spec, `data/` has its rows.
+/// A data set in its folder: `dataset.json` describes it, `spec.toml` is its specification, and `data/` holds its rows.
 #[derive(Debug, Clone)]
 pub struct Dataset {
     folder: PathBuf,
     spec: Spec,
 }
 
-/// How far a data set is.
+/// State of a data set.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Info {
     /// Name.
     pub name: String,
-    /// Rows of the whole data set.
+    /// Number of rows of the whole data set.
     pub rows: u64,
-    /// Files of the whole data set.
+    /// Number of files of the whole data set.
     pub shards: u64,
-    /// Rows of a file.
+    /// Number of rows in a file.
     pub rows_per_shard: u64,
-    /// Files that are there.
+    /// Number of existing files.
     pub made: u64,
     /// Their size, bytes.
     pub bytes: u64,
-    /// SHA-256 of the spec and of the files that it names.
+    /// SHA-256 of the specification and of the files that it names.
     pub spec_sha256: String,
-    /// SHA-256 of all rows; none before the data set is finished.
+    /// SHA-256 of all rows; `None` until the data set is finished.
     pub digest: Option<String>,
 }
 
-/// What a run has made.
+/// Summary of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Made {
-    /// Rows that were made.
+    /// Number of new rows.
     pub rows: u64,
-    /// Files that were made.
+    /// Number of new files.
     pub shards: u64,
-    /// Files that were there already, whole.
+    /// Number of files that already existed and were complete.
     pub skipped: u64,
 }
 
 impl Dataset {
-    /// The data set of `spec` in `folder`, which is made, is empty, or holds a part of this data set.
+    /// The data set of `spec` in `folder`. The folder must be missing, empty, or hold a part of this data set.
     ///
     /// # Errors
-    /// [`DatasetError`] when the folder holds something else, or cannot be written.
+    /// [`DatasetError`] if the folder holds something else, or cannot be written.
     pub fn begin(folder: &Path, spec: Spec) -> Result<Self, DatasetError> {
         let data = folder.join(DATA_FOLDER);
         let head_file = folder.join(HEAD_FILE);
@@ -126,10 +126,10 @@ impl Dataset {
         })
     }
 
-    /// The data set that was begun in `folder`. Files that its spec names are looked for in `files`.
+    /// Opens the data set in `folder`. Files that its specification names are looked up in `files`.
     ///
     /// # Errors
-    /// [`DatasetError`] when there is none, or another version of this library began it.
+    /// [`DatasetError`] if there is no data set, or another version of this library made it.
     pub fn open(folder: &Path, files: &Path) -> Result<Self, DatasetError> {
         let head_file = folder.join(HEAD_FILE);
         let found = read_head(&head_file)?;
@@ -156,26 +156,26 @@ impl Dataset {
         })
     }
 
-    /// Its spec.
+    /// The specification.
     #[must_use]
     pub fn spec(&self) -> &Spec {
         &self.spec
     }
 
-    /// Its folder.
+    /// The folder.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// File number `shard`.
+    /// Path of file number `shard`.
     #[must_use]
     pub fn shard_file(&self, shard: u64) -> PathBuf {
         let name = shard_name(shard, self.spec.shards());
         self.folder.join(DATA_FOLDER).join(name)
     }
 
-    /// How far it is.
+    /// State of the data set.
     #[must_use]
     pub fn info(&self) -> Info {
         let sizes = (0..self.spec.shards()).filter_map(|k| std::fs::metadata(self.shard_file(k)).ok());
@@ -192,11 +192,10 @@ impl Dataset {
         }
     }
 
-    /// Makes the files of `part` that are not there yet, a thread each.
+    /// Makes the missing files of `part`, one file a thread.
     ///
     /// # Errors
-    /// [`DatasetError`] for a file that is there and is not what it should be, a row that cannot be made, and a file
-    /// that cannot be written.
+    /// [`DatasetError`] if an existing file is not valid, a row cannot be made, or a file cannot be written.
     pub fn make(&self, part: Part, progress: &dyn Progress) -> Result<Made, DatasetError> {
         let mut made = Made {
             rows: 0,

@@ -1,13 +1,14 @@
-//! Synthetic data sets: labelled touches as rows of Parquet files, the same bytes on any number of threads, shards and
-//! machines of a type.
+//! Synthetic data sets: labelled touches as rows of Parquet files. The bytes are the same for any number of threads,
+//! shards and machines of one type.
 //!
-//! A [`Spec`] says what a data set consists of; a [`Maker`] makes its rows, each a function of the spec and the row's
-//! number; [`Dataset`] is the folder that they are written to, file by file.
+//! A [`Spec`] specifies a data set. A [`Maker`] makes its rows; each is a function of the specification and the row's
+//! number. A [`Dataset`] is the folder with its files.
 //!
 //! ```
 //! use spts_dataset::{Dataset, Part, Spec};
 //!
-//! let text = "rows = 40\nrows_per_shard = 20\n[object]\nfrom = \"objects\"\nrows_per_shape = 4\n[pose]\nabout = \"placement\"";
+//! let text = "rows = 40\nrows_per_shard = 20\n[object]\nfrom = \"objects\"\nrows_per_shape = 4\n\
+//!             [pose]\nabout = \"placement\"";
 //! let spec = Spec::from_toml(text, &toml::Table::new(), ".".as_ref())?;
 //! let folder = std::env::temp_dir().join(format!("spts-doc-dataset-{}", std::process::id()));
 //! let made = Dataset::begin(&folder, spec)?.make(Part::WHOLE, &())?;

@@ -1,8 +1,8 @@
-//! Which files a worker makes, when several make a data set.
+//! Divides the files of a data set among workers.
 
 use crate::error::DatasetError;
 
-/// The files k with k mod `of` = `worker`. Which files there are does not depend on it.
+/// A worker's part: the files k with k mod `of` = `worker`. The set of files does not depend on it.
 ///
 /// ```
 /// use spts_dataset::Part;
@@ -24,13 +24,13 @@ const SLURM: [&str; 3] = ["SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_MIN", "SLURM_
 const KUBERNETES: &str = "JOB_COMPLETION_INDEX";
 
 impl Part {
-    /// All files.
+    /// The part of a single worker: all files.
     pub const WHOLE: Self = Self { worker: 0, of: 1 };
 
-    /// The part that `text` names as `worker/workers`.
+    /// Parses `worker/workers`.
     ///
     /// # Errors
-    /// [`DatasetError::Part`] when it names none.
+    /// [`DatasetError::Part`] if the text is not a valid part.
     pub fn parse(text: &str) -> Result<Self, DatasetError> {
         let numbers = text
             .split_once('/')
@@ -44,11 +44,12 @@ impl Part {
         }
     }
 
-    /// The part of a worker that `variable` describes: of a Slurm array, the task's number less the array's first one,
-    /// of the number of tasks; of a Kubernetes indexed job, its index of `workers`. `None` outside of both.
+    /// The part of this worker, found with `variable`, which reads environment variables. In a Slurm array: the task's
+    /// number minus the array's first, out of the number of tasks. In a Kubernetes indexed job: the job's index, out of
+    /// `workers`. `None` outside of both.
     ///
     /// # Errors
-    /// [`DatasetError::Part`] when a variable is no number, one is missing, or the worker is not one of them.
+    /// [`DatasetError::Part`] if a variable is missing or not a number, or the worker is out of range.
     pub fn from_environment(
         variable: impl Fn(&str) -> Option<String>,
         workers: Option<u64>,
@@ -86,7 +87,7 @@ impl Part {
         Ok(Some(Self { worker, of }))
     }
 
-    /// Its files, of `shards` in all.
+    /// The files of this part, out of `shards` files.
     pub fn shards(self, shards: u64) -> impl Iterator<Item = u64> {
         (self.worker..shards).step_by(usize::try_from(self.of).unwrap_or(usize::MAX))
     }

@@ -1,4 +1,4 @@
-//! Reading the files of a data set.
+//! Reads the files of a data set.
 
 use crate::error::DatasetError;
 use crate::store::Kind;
@@ -19,12 +19,12 @@ const BATCH_BYTES: usize = 16 << 20;
 
 /// Which rows of a file are read.
 pub(crate) enum Wanted<'a> {
-    /// All.
+    /// All rows.
     All,
-    /// Those whose column `split` says this.
+    /// Rows whose column `split` has this value.
     Split(&'static str),
-    /// Those with these places in the file, in rising order, and of them the columns of these names; all columns when
-    /// none is named.
+    /// Rows at these places in the file, in increasing order, and only the named columns of them; all columns if none
+    /// is named.
     Places(Vec<usize>, &'a [&'a str]),
 }
 
@@ -127,16 +127,16 @@ pub(crate) fn numbers(array: &ArrayRef, mut each: impl FnMut(f64)) {
     }
 }
 
-/// The values of a column, those of lists one after the other.
+/// The values of a column. Values of lists are concatenated.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ColumnValues {
-    /// Numbers of single precision; NaN where there is none.
+    /// Numbers of single precision; NaN where there is no value.
     Floats(Vec<f32>),
-    /// Whole numbers; −1 where there is none.
+    /// Whole numbers; −1 where there is no value.
     Integers(Vec<i64>),
     /// True or false.
     Flags(Vec<bool>),
-    /// Texts; empty where there is none.
+    /// Texts; empty where there is no value.
     Texts(Vec<String>),
 }
 

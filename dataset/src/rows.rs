@@ -1,4 +1,4 @@
-//! Rows of a data set as JSON: out of its files, or made from its spec.
+//! Rows of a data set as JSON, read from its files or made from its specification.
 
 use crate::columns::{Column, columns, put, stores};
 use crate::error::DatasetError;
@@ -22,10 +22,10 @@ fn object(schema: &Schema, columns: &[ArrayRef], row: usize) -> Value {
 }
 
 impl Dataset {
-    /// The first `rows` rows, each an object of its columns.
+    /// The first `rows` rows; each is an object with one entry a column.
     ///
     /// # Errors
-    /// [`DatasetError`] when a file is missing or cannot be read.
+    /// [`DatasetError`] if a file is missing or cannot be read.
     pub fn head(&self, rows: u64) -> Result<Vec<Value>, DatasetError> {
         let mut found = Vec::new();
         let wanted = (0..rows.min(self.spec().config().rows)).collect();
@@ -36,11 +36,11 @@ impl Dataset {
         Ok(found)
     }
 
-    /// Calls `each` with the rows `wanted` in rising order, each an object of the columns called `columns`, or of all
-    /// columns when none is named. Only the files that have these rows are read.
+    /// Calls `each` with the rows `wanted` in increasing order. Each row is an object with the columns called
+    /// `columns`, or with all columns if none is named. Only the files with these rows are read.
     ///
     /// # Errors
-    /// [`DatasetError`] when a row is beyond the last one, when a file is missing or cannot be read, and that of `each`.
+    /// [`DatasetError`] if a row is out of range, or a file is missing or cannot be read; or the error of `each`.
     pub fn rows(
         &self,
         wanted: &BTreeSet<u64>,
@@ -65,12 +65,10 @@ impl Dataset {
 }
 
 impl Dataset {
-    /// The columns `names` of the rows `wanted`, in rising order of the rows. Only the files that have these rows are
-    /// read.
+    /// The columns `names` of the rows `wanted`, in increasing order of row. Only the files with these rows are read.
     ///
     /// # Errors
-    /// [`DatasetError`] when there is no such column, or when a row is beyond the last one, or a file is missing or
-    /// cannot be read.
+    /// [`DatasetError`] if a column does not exist, a row is out of range, or a file is missing or cannot be read.
     pub fn columns(
         &self,
         names: &[&str],
@@ -112,10 +110,10 @@ impl Dataset {
 }
 
 impl Spec {
-    /// Makes the rows `wanted` and writes no file: calls `each` with them as [`Dataset::rows`] does with those of files.
+    /// Makes the rows `wanted` without writing a file, and calls `each` with them as [`Dataset::rows`] does.
     ///
     /// # Errors
-    /// [`DatasetError`] when a row is beyond the last one or cannot be made, and that of `each`.
+    /// [`DatasetError`] if a row is out of range or cannot be made; or the error of `each`.
     pub fn rows(
         &self,
         wanted: &BTreeSet<u64>,

@@ -31,7 +31,7 @@ const GROUP_BYTES: usize = 16 << 20;
 const GROUP_ROWS: usize = 10_000;
 const PIECE_ROWS: usize = 256;
 
-/// Schema of the files of `spec`.
+/// Arrow schema of the files of `spec`.
 #[must_use]
 pub fn schema(spec: &Spec) -> SchemaRef {
     let fields = columns(spec).into_iter().map(|column| {
@@ -44,6 +44,16 @@ pub fn schema(spec: &Spec) -> SchemaRef {
 }
 
 /// Name of file number `shard` of `shards`.
+///
+/// ```
+/// use spts_dataset::{Spec, shard_name, shard_rows};
+///
+/// let size = toml::from_str("rows = 2500\nrows_per_shard = 1000").expect("TOML");
+/// let spec = Spec::load("random-shapes", &size)?;
+/// assert_eq!(shard_rows(&spec, 2), 2000..2500);
+/// assert_eq!(shard_name(2, spec.shards()), "part-00002.parquet");
+/// # Ok::<(), spts_dataset::SpecError>(())
+/// ```
 #[must_use]
 pub fn shard_name(shard: u64, shards: u64) -> String {
     let width = shards.saturating_sub(1).to_string().len().max(5);
@@ -66,10 +76,10 @@ pub(crate) fn version() -> &'static str {
     })
 }
 
-/// Writes file number `shard` as `path`, under a temporary name until it is whole; `done` is called after every row.
+/// Writes file number `shard` to `path`, with a temporary name until it is complete. Calls `done` after every row.
 ///
 /// # Errors
-/// [`DatasetError`] when a row cannot be made or the file cannot be written.
+/// [`DatasetError`] if a row cannot be made, or the file cannot be written.
 pub fn write_shard(spec: &Spec, shard: u64, path: &Path, done: &dyn Fn()) -> Result<(), DatasetError> {
     let failed = |problem: &dyn std::fmt::Display| DatasetError::file(path, problem.to_string());
     let columns = columns(spec);
@@ -133,10 +143,10 @@ fn properties(
     Ok(properties.build())
 }
 
-/// Checks that `path` is file number `shard` of `spec`, whole: its footer, facts and number of rows.
+/// Checks that `path` is file number `shard` of `spec` and complete: footer, metadata and number of rows.
 ///
 /// # Errors
-/// [`DatasetError`] when it is not, or cannot be read.
+/// [`DatasetError`] if it is not, or cannot be read.
 pub fn check_shard(spec: &Spec, shard: u64, path: &Path) -> Result<(), DatasetError> {
     let file = File::open(path).map_err(DatasetError::read(path))?;
     let damaged = |e: parquet::errors::ParquetError| {

@@ -1,4 +1,4 @@
-//! What a whole data set holds, in numbers.
+//! Statistics of a whole data set.
 
 use crate::columns::{Column, columns};
 use crate::error::DatasetError;
@@ -11,7 +11,7 @@ use serde::Serialize;
 use spts::progress::Progress;
 use std::collections::BTreeMap;
 
-/// What a whole data set holds: its columns, in the order of the files.
+/// Statistics of a data set, column by column in file order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Statistics {
     /// Number of rows.
@@ -20,33 +20,33 @@ pub struct Statistics {
     pub columns: Vec<ColumnStatistics>,
 }
 
-/// What a column holds.
+/// Statistics of a column.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ColumnStatistics {
     /// The column.
     #[serde(flatten)]
     pub column: Column,
-    /// Values that are there; of lists all of their entries.
+    /// Number of values; for lists, the number of their entries.
     pub count: u64,
-    /// Least, mean and largest value; none of texts and without a value.
+    /// Smallest value; `None` for texts, and without any value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub least: Option<f64>,
-    /// Mean.
+    /// Mean; `None` for texts, and without any value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mean: Option<f64>,
-    /// Largest.
+    /// Largest value; `None` for texts, and without any value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub most: Option<f64>,
-    /// Number of rows of every text.
+    /// Number of rows with each text.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub texts: BTreeMap<String, u64>,
 }
 
 impl Statistics {
-    /// Reads all files of `dataset`.
+    /// Computes the statistics of all files of `dataset`.
     ///
     /// # Errors
-    /// [`DatasetError`] when a file cannot be read, or holds a value that is not finite.
+    /// [`DatasetError`] if a file cannot be read, or holds a value that is not finite.
     pub fn of(dataset: &Dataset, progress: &dyn Progress) -> Result<Self, DatasetError> {
         let spec = dataset.spec();
         let mut rows = 0;

@@ -1,4 +1,4 @@
-//! The values of a column, on their way into a file.
+//! The values of a column before they are written to a file.
 
 use arrow_array::builder::{BooleanBuilder, PrimitiveBuilder, StringBuilder};
 use arrow_array::types::{ArrowPrimitiveType, Float32Type, Int32Type, Int64Type};

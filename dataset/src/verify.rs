@@ -1,4 +1,4 @@
-//! Making rows once more, to compare them with what the files hold.
+//! Makes rows again and compares them with the files.
 
 use crate::columns::{columns, put, stores};
 use crate::error::DatasetError;
@@ -11,22 +11,22 @@ use serde::Serialize;
 use spts::progress::Progress;
 use std::collections::BTreeSet;
 
-/// What was compared.
+/// Result of a verification.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Verified {
-    /// Rows that were made once more.
+    /// Number of rows that were made again.
     pub rows: u64,
-    /// Files that they are of.
+    /// Number of files to which they belong.
     pub shards: u64,
-    /// Rows that differ, and the first column in which each does.
+    /// Rows that differ, each with the first column that differs.
     pub differ: Vec<(u64, String)>,
 }
 
 impl Dataset {
-    /// Makes a sample of `rows` rows once more, drawn with `seed`, and compares them with the files, bit for bit.
+    /// Makes `rows` rows, drawn with `seed`, again, and compares them with the files, bit for bit.
     ///
     /// # Errors
-    /// [`DatasetError`] when a file is missing, damaged or of another data set, or a row cannot be made.
+    /// [`DatasetError`] if a file is missing, damaged or of another data set, or a row cannot be made.
     pub fn verify(&self, rows: u64, seed: u64, progress: &dyn Progress) -> Result<Verified, DatasetError> {
         let all = 0..self.spec().config().rows;
         let sample = self.spec().drawn_rows("verify", &[all], rows, seed);

@@ -31,8 +31,8 @@ const IDLE_MAX_S: f64 = 86_400.0;
 /// Emulated cells at consecutive addresses from 8, on one I²C bus at 400 kHz and one clock line.
 ///
 /// Every cell is an ATtiny412 that runs the same image, with its address in the first byte of its EEPROM. All share one
-/// time; a clone is a snapshot that goes on exactly as the original does. Results are the same for any number of
-/// threads: cells meet only on the bus.
+/// time. A clone is a snapshot that continues exactly as the original does. Results do not depend on the number of
+/// threads, because cells interact only over the bus.
 #[derive(Debug, Clone)]
 pub struct Array {
     cells: Vec<Device>,
@@ -47,7 +47,7 @@ impl Array {
     /// `cells` cells that run `image`, 1 ms after power-on.
     ///
     /// # Errors
-    /// [`ArrayError::Cells`] for none or more than 112, [`ArrayError::Program`] for an image larger than the flash.
+    /// [`ArrayError::Cells`] for no cell or more than 112, [`ArrayError::Program`] for an image larger than the flash.
     pub fn new(cells: usize, image: &Image) -> Result<Self, ArrayError> {
         if cells == 0 || cells > CELLS_MAX {
             return Err(ArrayError::Cells { cells });
@@ -65,13 +65,14 @@ impl Array {
         Ok(array)
     }
 
-    /// The cells, by address.
+    /// The cells, in order of address.
     #[must_use]
     pub fn cells(&self) -> &[Device] {
         &self.cells
     }
 
-    /// The cell that was given `address`, to reset it. A cell that is run ahead of the others gets its next edge late.
+    /// The cell with the given `address`, to reset it. If the cell is run ahead of the others, it gets its next edge
+    /// late.
     pub fn cell_mut(&mut self, address: u8) -> Option<&mut Device> {
         let k = address.checked_sub(FIRST_ADDRESS)?;
         self.cells.get_mut(usize::from(k))
@@ -89,7 +90,7 @@ impl Array {
         self.cells.iter().map(Device::instructions).sum()
     }
 
-    /// What the master does to start a session: writes `mode` and its address to every cell.
+    /// Starts a session as the bus master does: writes `mode` and its address to every cell.
     ///
     /// # Errors
     /// [`BusError`] if a cell does not answer.
@@ -101,10 +102,11 @@ impl Array {
         Ok(())
     }
 
-    /// Like [`start`](Self::start) with 32-bit seeds, one a cell.
+    /// Like [`start`](Self::start), with 32-bit seeds, one for each cell.
     ///
     /// # Errors
-    /// [`ArrayError::Seeds`] unless there is one for every cell, [`ArrayError::Bus`] if a cell does not answer.
+    /// [`ArrayError::Seeds`] if the number of seeds differs from that of the cells, [`ArrayError::Bus`] if a cell does
+    /// not answer.
     pub fn start_with_seeds(&mut self, mode: CellMode, seeds: &[u32]) -> Result<(), ArrayError> {
         let cells = self.cells.len();
         if seeds.len() != cells {
@@ -122,7 +124,8 @@ impl Array {
     /// Starts every cell with its pattern.
     ///
     /// # Errors
-    /// [`ArrayError::Patterns`] unless there is one for every cell, [`ArrayError::Bus`] if a cell does not answer.
+    /// [`ArrayError::Patterns`] if the number of patterns differs from that of the cells, [`ArrayError::Bus`] if a cell
+    /// does not answer.
     pub fn start_with_patterns(&mut self, patterns: &[Pattern]) -> Result<(), ArrayError> {
         let cells = self.cells.len();
         if patterns.len() != cells {
@@ -137,15 +140,16 @@ impl Array {
         Ok(())
     }
 
-    /// Clocks the cells: `codes`, row-major (edge, cell), takes each cell's DAC code as it stands on its pin when the
-    /// edge is sampled. A pin that is not driven counts as [`NEUTRAL_CODE`](crate::NEUTRAL_CODE).
+    /// Clocks the cells and fills `codes`, row-major (edge, cell), with the DAC code on each cell's pin when the edge
+    /// is sampled. A pin that is not driven counts as [`NEUTRAL_CODE`](crate::NEUTRAL_CODE).
     ///
-    /// The first edge comes one period behind what happened last, be it the start or bus traffic. Another call with the
-    /// same clock goes on without a gap, and fetches first what a [free clock](Self::run_clock) has left. Another clock
-    /// starts anew and drops what was not fetched.
+    /// The first edge comes one period after the last event, which may be the start or bus traffic. A further call with
+    /// the same clock continues without a gap and first returns the codes that a [free-running clock](Self::run_clock)
+    /// has produced. A call with another clock starts again and drops unfetched codes.
     ///
     /// # Errors
-    /// [`ArrayError::Clock`] for a clock out of range, [`ArrayError::Codes`] if `codes` is not whole rows.
+    /// [`ArrayError::Clock`] for a clock out of range, [`ArrayError::Codes`] if the length of `codes` is not a whole
+    /// number of rows.
     pub fn clock(&mut self, clock: Clock, codes: &mut [u8]) -> Result<(), ArrayError> {
         let cells = self.cells.len();
         if !codes.len().is_multiple_of(cells) {
@@ -167,9 +171,9 @@ impl Array {
         Ok(())
     }
 
-    /// Lets the clock run by itself, during bus traffic and [`idle`](Self::idle) as well: the way to seed a cell while
-    /// clocked. [`codes`](Self::codes) or [`clock`](Self::clock) fetch what was sampled. What an earlier clock has left
-    /// is dropped: fetch it first.
+    /// Lets the clock run freely, also during bus traffic and [`idle`](Self::idle), so that a cell can be seeded while
+    /// it is clocked. [`codes`](Self::codes) or [`clock`](Self::clock) fetch the sampled codes. Unfetched codes of an
+    /// earlier clock are dropped.
     ///
     /// # Errors
     /// [`ArrayError::Clock`] for a clock out of range.
@@ -177,7 +181,7 @@ impl Array {
         self.start_train(clock, true).map(|_| ())
     }
 
-    /// Stops the clock line behind the sample of its last edge.
+    /// Stops the clock line after the sample of its last edge.
     pub fn stop_clock(&mut self) {
         if let Some(train) = self.train
             && let Some(edge) = self.followers[0].unsampled()
@@ -187,7 +191,7 @@ impl Array {
         self.train = None;
     }
 
-    /// All codes that were sampled and not fetched, row-major (edge, cell).
+    /// Fetches all sampled codes, row-major (edge, cell).
     #[must_use]
     pub fn codes(&mut self) -> Vec<u8> {
         let rows = self.followers[0].codes.len();
@@ -196,7 +200,7 @@ impl Array {
         codes
     }
 
-    /// Lets `time_s` (s) pass without bus traffic, at most a day.
+    /// Lets `time_s` seconds pass without bus traffic, at most a day.
     ///
     /// # Errors
     /// [`ArrayError::Idle`] for a time out of range.

@@ -1,18 +1,18 @@
-//! One cell.
+//! One cell as a behavioural model.
 
 use crate::pattern::{PATTERN_MODE, Pattern};
 
 /// Lowest address.
 pub const FIRST_ADDRESS: u8 = 8;
-/// Highest address that the raster reaches; its count starts over here.
+/// Highest address of the raster scan, whose count restarts here.
 pub const LAST_ADDRESS: u8 = 107;
-/// Highest address on the bus. A cell above [`LAST_ADDRESS`] is never selected by the raster; the other modes know no
-/// difference.
+/// Highest address on the bus. A cell above [`LAST_ADDRESS`] is never selected by the raster scan; other modes work
+/// there as well.
 pub const LAST_BUS_ADDRESS: u8 = 119;
-/// DAC code at which a taxel does not drive the sum: mid-scale.
+/// DAC code at which a taxel does not contribute to the sum: mid-scale.
 pub const NEUTRAL_CODE: u8 = 126;
-/// Bytes that a read returns before the bus stays idle: mode, state (4), counter, code; then the number of bits of the
-/// pattern and its bytes (8).
+/// Number of bytes in a reply, after which the bus stays idle: mode, state (4), counter, code, then the number of bits
+/// of the pattern and its bytes (8).
 pub const REPLY_BYTES: usize = 16;
 
 /// Count from which the first edge reaches the first address.
@@ -26,27 +26,27 @@ const UNSEEDED: u8 = 0xff;
 /// What a read finds behind the end of the reply: nobody pulls the line low.
 const IDLE_BUS: u8 = 0xff;
 
-/// An address that no cell listens at.
+/// An address that no cell can have.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("address {address} is outside [8, 119]")]
 pub struct AddressError {
-    /// Offending address.
+    /// The address.
     pub address: u8,
 }
 
-/// What a cell that was started with a seed puts out.
+/// Mode of a cell that was started with a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellMode {
-    /// Code 255 when it is this cell's turn, mid-scale otherwise. Mode byte 0.
+    /// Code 255 when the cell is scanned, mid-scale otherwise. Mode byte 0.
     Raster,
     /// Top byte of the generator. Mode byte 1.
     Analog,
-    /// Code 0 or 255 by the top bit of the generator. Mode byte 2.
+    /// Code 0 or 255, by the top bit of the generator. Mode byte 2.
     Binary,
 }
 
 impl CellMode {
-    /// Mode that `byte` selects, if any.
+    /// The mode that `byte` selects; `None` if there is none.
     #[must_use]
     pub fn from_byte(byte: u8) -> Option<Self> {
         match byte {
@@ -57,7 +57,7 @@ impl CellMode {
         }
     }
 
-    /// Byte that selects this mode.
+    /// The byte that selects this mode.
     #[must_use]
     pub fn byte(self) -> u8 {
         match self {
@@ -67,13 +67,13 @@ impl CellMode {
         }
     }
 
-    /// What the master writes to start a cell in this mode from a seed of one byte.
+    /// The message that starts a cell in this mode with a one-byte seed.
     #[must_use]
     pub fn pair(self, seed: u8) -> [u8; 2] {
         [self.byte(), seed]
     }
 
-    /// What the master writes to start a cell in this mode from a seed of four bytes.
+    /// The message that starts a cell in this mode with a four-byte seed.
     #[must_use]
     pub fn extended(self, seed: u32) -> [u8; 5] {
         let [s0, s1, s2, s3] = seed.to_le_bytes();
@@ -81,7 +81,18 @@ impl CellMode {
     }
 }
 
-/// State of one cell between two edges.
+/// State of one cell between two clock edges.
+///
+/// ```
+/// use spts_firmware::{Cell, CellMode};
+///
+/// let mut cell = Cell::new(8)?;
+/// cell.receive(&CellMode::Binary.pair(8)); // mode and seed, as the bus master writes them
+/// let codes: Vec<u8> = (0..100).map(|_| cell.edge()).collect();
+/// assert!(codes.iter().all(|code| [0, 255].contains(code)));
+/// assert!(codes.contains(&0) && codes.contains(&255));
+/// # Ok::<(), spts_firmware::AddressError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cell {
     address: u8,
@@ -89,7 +100,7 @@ pub struct Cell {
     counter: u8,
     state: u32,
     code: u8,
-    /// That of the last start with one.
+    /// Pattern of the last start with one.
     pattern: Option<Pattern>,
 }
 
@@ -102,7 +113,7 @@ enum Running {
 }
 
 impl Cell {
-    /// Cell as it powers up: unseeded.
+    /// A cell after power-up, without a seed.
     ///
     /// # Errors
     /// [`AddressError`] outside 8…119.
@@ -126,7 +137,7 @@ impl Cell {
         self.address
     }
 
-    /// Mode, if the cell was last started with a seed.
+    /// Mode; `None` unless the last start was with a seed.
     #[must_use]
     pub fn mode(&self) -> Option<CellMode> {
         match self.running {
@@ -135,7 +146,7 @@ impl Cell {
         }
     }
 
-    /// Pattern, if the cell was last started with one.
+    /// Pattern; `None` unless the last start was with one.
     #[must_use]
     pub fn pattern(&self) -> Option<Pattern> {
         match self.running {
@@ -150,7 +161,7 @@ impl Cell {
         self.code
     }
 
-    /// One I²C write to this cell, from START to STOP or repeated START: mode bytes, each with its seed or its pattern.
+    /// Receives one I²C write, from START to STOP or repeated START: mode bytes, each with its seed or its pattern.
     pub fn receive(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while let [mode, after @ ..] = rest {
@@ -193,12 +204,12 @@ impl Cell {
         self.counter = 0;
     }
 
-    /// One I²C read from this cell: fills `bytes` with the reply, and what is beyond it with 255.
+    /// Answers one I²C read: fills `bytes` with the reply, and the rest with 255.
     ///
-    /// The reply is the mode byte (255 before the first start), the state that the next code is made of (least
-    /// significant byte first; in raster mode the seed, 0 of a pattern), the counter as the next edge finds it (of a
-    /// pattern, the bit that it puts out), and the present DAC code; then the pattern that was written last, its number
-    /// of bits (0 before the first) and its eight bytes.
+    /// The reply is: the mode byte (255 before the first start); the state from which the next code is computed, least
+    /// significant byte first (the seed in raster mode, 0 for a pattern); the counter at the next edge (for a pattern,
+    /// the index of the bit); the present DAC code; then the pattern that was written last, as its number of bits (0
+    /// before the first) and its eight bytes.
     pub fn read(&self, bytes: &mut [u8]) {
         let (mode, state) = match self.running {
             Running::Nothing => (UNSEEDED, self.state),
@@ -215,7 +226,7 @@ impl Cell {
         }
     }
 
-    /// One edge of the clock. Returns the new DAC code.
+    /// Advances by one clock edge. Returns the new DAC code.
     pub fn edge(&mut self) -> u8 {
         self.code = match self.running {
             Running::Nothing => NEUTRAL_CODE,

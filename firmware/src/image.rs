@@ -1,17 +1,17 @@
-//! Flash images.
+//! Flash images of the cells.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use ihex::{ReaderError, Record};
 
-/// Flash of an ATtiny412 (bytes).
+/// Size of the flash of an ATtiny412, bytes.
 pub const FLASH_BYTES: usize = 4096;
 
 /// Longest file that is read: hex text of one byte a record would be a fifth of it.
 const FILE_BYTES: u64 = 1 << 18;
 
-/// Intel hex text that is no image of an ATtiny412.
+/// Why Intel hex text is not an image of an ATtiny412.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ImageError {
@@ -20,10 +20,10 @@ pub enum ImageError {
     Read {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// Cause reported by the system.
         source: io::Error,
     },
-    /// The file's text is wrong.
+    /// The text of the file is not valid.
     #[error("{}: {source}", path.display())]
     File {
         /// The file.
@@ -57,24 +57,33 @@ pub enum ImageError {
         /// The address.
         address: usize,
     },
-    /// Text behind the end-of-file record.
-    #[error("line {line}: record behind the end-of-file record")]
+    /// Text after the end-of-file record.
+    #[error("line {line}: record after the end-of-file record")]
     BehindEnd {
         /// Line, from 1.
         line: usize,
     },
-    /// The text stops early.
+    /// The end-of-file record is missing.
     #[error("line {line}: end-of-file record is missing")]
     NoEnd {
         /// Last line, from 1.
         line: usize,
     },
-    /// No data record.
+    /// There is no data record.
     #[error("no data record")]
     Empty,
 }
 
-/// What is programmed into the flash of every cell.
+/// The content of every cell's flash.
+///
+/// ```
+/// use spts_firmware::Image;
+///
+/// assert_eq!(Image::shipped().flash().len(), 4096);
+/// // four bytes at 0x1000, behind the end of flash
+/// let error = Image::from_hex(":041000000000000AE2\n:00000001FF\n").unwrap_err();
+/// assert!(error.to_string().starts_with("line 1: data record of 4 bytes at 0x1000 is outside flash"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Image {
     flash: Vec<u8>,
@@ -90,7 +99,7 @@ impl Image {
         Self::from_hex(include_str!("../cell/cell.hex")).expect("the committed image is valid")
     }
 
-    /// The same protocol written the plain way, `cell/cell_plain.hex`: it computes before it puts out, and a
+    /// The same protocol in a simple implementation, `cell/cell_plain.hex`: it computes before it outputs, and a
     /// millisecond timer delays it.
     ///
     /// # Panics
@@ -100,10 +109,10 @@ impl Image {
         Self::from_hex(include_str!("../cell/cell_plain.hex")).expect("the committed image is valid")
     }
 
-    /// Image of Intel hex text.
+    /// Reads an image from Intel hex text.
     ///
     /// # Errors
-    /// [`ImageError`] with the line at fault.
+    /// [`ImageError`], with the line.
     pub fn from_hex(text: &str) -> Result<Self, ImageError> {
         let mut flash: Vec<Option<u8>> = vec![None; FLASH_BYTES];
         let (mut base, mut ended, mut last) = (0, false, 0);
@@ -133,10 +142,10 @@ impl Image {
         Ok(Self { flash })
     }
 
-    /// Image of an Intel hex file.
+    /// Reads an image from an Intel hex file.
     ///
     /// # Errors
-    /// [`ImageError`] with the file, and the line at fault if it could be read.
+    /// [`ImageError`], with the file and, if it could be read, the line.
     pub fn read(path: &Path) -> Result<Self, ImageError> {
         let unreadable = |source| ImageError::Read {
             path: path.to_path_buf(),
@@ -149,7 +158,7 @@ impl Image {
         })
     }
 
-    /// All of flash, [`FLASH_BYTES`] long; what the image does not hold is erased, 255.
+    /// All of flash, [`FLASH_BYTES`] long. Bytes that are not part of the image are erased, 255.
     #[must_use]
     pub fn flash(&self) -> &[u8] {
         &self.flash
@@ -223,7 +232,7 @@ mod tests {
             ),
             (
                 format!("{data}\n{END}\n{data}"),
-                "line 3: record behind the end-of-file record",
+                "line 3: record after the end-of-file record",
             ),
             (format!("{data}\n"), "line 1: end-of-file record is missing"),
             (END.to_owned(), "no data record"),

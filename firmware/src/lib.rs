@@ -1,17 +1,17 @@
 //! The cell firmware of the single-pixel tactile skin: flash images, the controllers that run them, and the protocol.
 //!
-//! Every taxel has an ATtiny412 that is an I²C client and drives the taxel from its DAC. All cells share the bus and
-//! one clock line; on every edge of that line each cell puts out its next level. There are three views of such a cell
-//! here:
+//! Every taxel has an ATtiny412 that is an I²C client and drives the taxel with its DAC. All cells share the bus and
+//! one clock line; at every edge of that line each cell puts out its next level. The crate has three models of such a
+//! cell:
 //!
-//! - [`Image`]: what is in its flash, built from C and assembly in `firmware/cell`. `firmware/cell/README.md` has the
-//!   protocol, what was decided where the published device leaves it open, and the timing.
+//! - [`Image`]: the content of its flash, built from C and assembly in `firmware/cell`. `firmware/cell/README.md`
+//!   describes the protocol, the choices made where the published device leaves it open, and the timing.
 //! - [`attiny412::Device`]: an emulated ATtiny412, cycle by cycle, on an AVRxt core ([`avr`]). [`Array`] has up to 112
 //!   of them on one bus and one clock.
-//! - [`Cell`]: the protocol as behaviour, without timing: the specification that the images are tested against.
+//! - [`Cell`]: the behaviour of the protocol without timing. It is the specification for testing the images.
 //!
-//! The levels are the circuit model's weights bit for bit. What an emulated cell adds is time: when its DAC changes
-//! after an edge, and which edges it loses.
+//! The levels equal the circuit model's weights bit for bit. An emulated cell adds timing: when its DAC changes after
+//! an edge, and which edges it misses.
 //!
 //! ```
 //! use spts_firmware::{Array, CellMode, Clock, Image};

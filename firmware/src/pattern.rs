@@ -1,7 +1,7 @@
-//! Bits that a cell puts out over and over again.
+//! Bits that a cell repeats.
 
-/// Up to 64 bits: a cell in pattern mode puts out bit 0 at the first edge, code 255 where it is set and 0 where it is
-/// not, and begins again behind the last one.
+/// Up to 64 bits. A cell in pattern mode puts out bit 0 at the first edge (code 255 if it is set, 0 if not) and starts
+/// again after the last bit.
 ///
 /// ```
 /// use spts_firmware::{Cell, Pattern};
@@ -18,21 +18,21 @@ pub struct Pattern {
     word: u64,
 }
 
-/// A number of bits that no cell holds.
+/// A number of bits that a cell cannot store.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("number of bits of a pattern = {bits} is outside [1, 64]")]
 pub struct PatternError {
-    /// Offending number of bits.
+    /// The number of bits.
     pub bits: usize,
 }
 
-/// Bits that a cell holds.
+/// Number of bits that a cell can store.
 pub const PATTERN_BITS: usize = 64;
 /// Mode byte that announces a pattern.
 pub(crate) const PATTERN_MODE: u8 = 3;
 
 impl Pattern {
-    /// The lowest `bits` bits of `word`, the lowest first.
+    /// The lowest `bits` bits of `word`, starting with the lowest.
     ///
     /// # Errors
     /// [`PatternError`] outside 1…64.
@@ -43,10 +43,10 @@ impl Pattern {
         }
     }
 
-    /// These bits, the first one at the first edge.
+    /// The given bits; the first one is put out at the first edge.
     ///
     /// # Errors
-    /// [`PatternError`] without a bit or with more than 64.
+    /// [`PatternError`] for no bit, or more than 64.
     pub fn of_bits(bits: impl IntoIterator<Item = bool>) -> Result<Self, PatternError> {
         let (mut count, mut word) = (0, 0);
         for bit in bits {
@@ -70,8 +70,8 @@ impl Pattern {
         self.word >> (edge % u64::from(self.length)) & 1 == 1
     }
 
-    /// What the master writes to start a cell with this pattern: the mode byte, the number of bits, and the bits, eight
-    /// a byte, the lowest first.
+    /// The message that starts a cell with this pattern: the mode byte, the number of bits, and the bits in bytes,
+    /// starting with the lowest bit.
     #[must_use]
     pub fn message(self) -> Vec<u8> {
         let bytes = self.word.to_le_bytes();

@@ -1,7 +1,7 @@
-//! The one door through which files come in: regular files of a limited size, and text in UTF-8.
+//! Opens input files safely: only regular files of a limited size, and text in UTF-8.
 //!
-//! A file that somebody else made may be a pipe that never answers, a link to a device that never ends, or larger than
-//! memory. Every reader of such files opens them here, with a limit of its own.
+//! An untrusted file may be a pipe that never answers, a link to an endless device, or larger than memory. Every reader
+//! of such files opens them with these functions and a limit of its own.
 //!
 //! ```
 //! let path = std::env::temp_dir().join(format!("spts-input-{}.toml", std::process::id()));
@@ -16,34 +16,34 @@ use std::fs::{File, FileType, OpenOptions};
 use std::io::{self, Read as _};
 use std::path::Path;
 
-/// Why a file was not taken. The path is left to the caller, who knows what the file is for.
+/// Why a file was refused. The message has no path: the caller adds it, because it knows the file's purpose.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum InputError {
-    /// The file system said no.
+    /// The file system reports an error.
     #[error(transparent)]
     Io(#[from] io::Error),
     /// A folder, pipe, socket or device.
     #[error("is {found}, not a regular file")]
     NotRegular {
-        /// What it is.
+        /// Kind of the file.
         found: &'static str,
     },
-    /// More bytes than its reader takes.
+    /// A file that is larger than the reader's limit.
     #[error("file size = {bytes} bytes is outside [0, {most}]")]
     TooLong {
-        /// Size of the file, bytes; of a file that grows, what had been read.
+        /// Size of the file, bytes; for a file that grows, the number of bytes read.
         bytes: u64,
-        /// Most bytes that are read.
+        /// Largest size that is read, bytes.
         most: u64,
     },
-    /// Text of 16 bits a character.
+    /// Text in UTF-16.
     #[error("the text is UTF-16; only utf-8 is read, save the file as utf-8")]
     Utf16,
-    /// Bytes that are no text.
+    /// Bytes that are not UTF-8.
     #[error("the text is not utf-8: byte {byte} (from 0) is {value:#04x}")]
     NotUtf8 {
-        /// Position of the first byte that cannot be, from 0.
+        /// Position of the first byte that is not valid, from 0.
         byte: usize,
         /// Its value.
         value: u8,
@@ -59,11 +59,18 @@ impl From<InputError> for io::Error {
     }
 }
 
-/// Opens the regular file at `path`, at most `most` bytes long. Gives its length, bytes, too.
+/// Opens the regular file at `path`, at most `most` bytes long. Returns the file and its length, bytes.
+///
+/// ```
+/// use spts_input::open;
+///
+/// let folder = std::env::temp_dir();
+/// assert_eq!(open(&folder, 1000).unwrap_err().to_string(), "is a folder, not a regular file");
+/// ```
 ///
 /// # Errors
-/// [`InputError::Io`], [`InputError::NotRegular`] or [`InputError::TooLong`]. A pipe without a writer is refused, not
-/// waited for.
+/// [`InputError::Io`], [`InputError::NotRegular`] or [`InputError::TooLong`]. A pipe without a writer is refused at
+/// once.
 pub fn open(path: &Path, most: u64) -> Result<(File, u64), InputError> {
     // a device may act when it is opened, so it is not even opened
     regular(std::fs::metadata(path)?.file_type())?;
@@ -85,10 +92,10 @@ pub fn open(path: &Path, most: u64) -> Result<(File, u64), InputError> {
     Ok((file, bytes))
 }
 
-/// The bytes of the regular file at `path`, at most `most`.
+/// Reads the regular file at `path`, at most `most` bytes long.
 ///
 /// # Errors
-/// As [`open`]; [`InputError::Io`] too when there is not enough memory.
+/// As [`open`], and [`InputError::Io`] if there is not enough memory.
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
     let (file, length) = open(path, most)?;
     let mut bytes = Vec::new();
@@ -102,10 +109,10 @@ pub fn read(path: &Path, most: u64) -> Result<Vec<u8>, InputError> {
     }
 }
 
-/// The text of the regular file at `path`, at most `most` bytes, without a byte-order mark.
+/// Reads the regular file at `path`, at most `most` bytes long, as text without its byte-order mark.
 ///
 /// # Errors
-/// As [`read`], and as [`text`].
+/// As [`read`] and [`text`].
 pub fn read_text(path: &Path, most: u64) -> Result<String, InputError> {
     let mut bytes = read(path, most)?;
     text(&bytes)?;
@@ -122,7 +129,16 @@ pub fn read_text(path: &Path, most: u64) -> Result<String, InputError> {
 /// The byte-order mark of UTF-8, which some editors put first.
 const MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// `bytes` as text, without a byte-order mark.
+/// Decodes `bytes` as UTF-8 text without a byte-order mark.
+///
+/// ```
+/// use spts_input::{InputError, text};
+///
+/// assert_eq!(text(b"\xEF\xBB\xBFseed = 1")?, "seed = 1"); // without the byte-order mark
+/// let error = text(b"seed = \xE9").unwrap_err();
+/// assert_eq!(error.to_string(), "the text is not utf-8: byte 7 (from 0) is 0xe9");
+/// # Ok::<(), InputError>(())
+/// ```
 ///
 /// # Errors
 /// [`InputError::Utf16`] or [`InputError::NotUtf8`].

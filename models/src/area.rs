@@ -1,4 +1,4 @@
-//! Electrodes of other sizes than the one that transducers are calibrated for.
+//! Electrodes of another size than the one for which transducers are calibrated.
 
 use crate::grid::{ConductanceMap, PressureMap};
 use crate::transducer::Transducer;
@@ -7,7 +7,7 @@ use crate::transducer::Transducer;
 /// fingers in parallel, or fingers of twice the length, and under the same pressure it conducts twice as much.
 pub(crate) struct OnElectrode {
     calibrated: Box<dyn Transducer>,
-    /// Area over that of the calibrated electrode.
+    /// Area of the electrode divided by that of the calibrated electrode.
     relative_area: f64,
 }
 

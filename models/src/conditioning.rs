@@ -7,9 +7,21 @@ use serde::Deserialize;
 ///
 /// c(1) = `first`·b(1), c(k) = b(k) = (1 + s·ln k)/(1 + s·ln `reference_press`).
 ///
-/// The gain is 1 at the reference press, so that the static law is that of a conditioned skin. A press begins when the
-/// pressure exceeds `touch_pa` and ends when it falls below half of that; the gain changes only at the beginning, when
-/// the conductance is small.
+/// The gain is 1 at the reference press, so the static law holds for a conditioned skin. A press begins when the
+/// pressure exceeds `touch_pa`, and ends when it falls below half of `touch_pa`. The gain changes only at the beginning
+/// of a press, while the conductance is small.
+///
+/// ```
+/// use spts_models::{Conditioning, ConditioningConfig};
+///
+/// let conditioning = Conditioning::try_from(ConditioningConfig::default())?;
+/// let mut taxel = conditioning.fresh();
+/// let first = conditioning.respond(10e3, &mut taxel);
+/// conditioning.respond(0.0, &mut taxel);
+/// let second = conditioning.respond(10e3, &mut taxel);
+/// assert!(first < second && second < conditioning.gain(10));
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "ConditioningConfig")]
 pub struct Conditioning {
@@ -20,13 +32,12 @@ pub struct Conditioning {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConditioningConfig {
-    /// Extra factor of the first press. Range (0, 1]; default 0.92. With the slope below, the first press is at 0.82 of
-    /// the tenth (recorded: 0.64–0.96, median 0.80).
+    /// Extra factor of the first press. Range (0, 1]; default 0.92. With the default slope, the first press has 0.82 of
+    /// the gain of the tenth (recorded: 0.64–0.96, median 0.80).
     pub first: f64,
     /// s, gain per ln(press). Range [0, 1]; default 0.055 (recorded: 0.024–0.094).
     pub per_ln_press: f64,
-    /// Press at which the gain is 1. Range [1, 1e6]; default 10, the press that the published ground truth is taken
-    /// from.
+    /// Press at which the gain is 1. Range [1, 1e6]; default 10, the press from which the published ground truth comes.
     pub reference_press: u32,
     /// Pressure that begins a press, Pa. Range (0, 1e9]; default 100.
     pub touch_pa: f64,
@@ -61,7 +72,7 @@ impl TryFrom<ConditioningConfig> for Conditioning {
     }
 }
 
-/// Where one taxel stands.
+/// Press counter of one taxel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Presses {
     count: u32,
@@ -89,7 +100,7 @@ impl Conditioning {
         first * b(press) / b(c.reference_press)
     }
 
-    /// Moves one taxel to `pressure_pa` and returns its gain.
+    /// Applies `pressure_pa` to one taxel and returns its gain.
     pub fn respond(&self, pressure_pa: f64, presses: &mut Presses) -> f64 {
         if !presses.pressed && pressure_pa > self.config.touch_pa {
             presses.pressed = true;

@@ -1,4 +1,4 @@
-//! One error for every parameter outside its range.
+//! The error for a parameter outside its range.
 
 /// A configuration value outside its valid range.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -6,7 +6,7 @@
 pub struct ConfigError {
     /// Name of the field, as it is written in a scene file.
     pub field: String,
-    /// Offending value.
+    /// The value.
     pub value: f64,
     /// Valid range, in interval notation.
     pub range: &'static str,
@@ -27,11 +27,11 @@ impl std::fmt::Display for Shown {
     }
 }
 
-/// Returns `value` when `ok` holds, and otherwise an error that names the field. Write `ok` as a comparison that
-/// NaN fails.
+/// Returns `value` if `ok` holds, and otherwise an error that names the field. Write `ok` as a comparison that fails
+/// for NaN.
 ///
 /// # Errors
-/// [`ConfigError`] when `ok` is false.
+/// [`ConfigError`] if `ok` is false.
 pub fn in_range(field: &str, value: f64, ok: bool, range: &'static str) -> Result<f64, ConfigError> {
     if ok {
         Ok(value)
@@ -44,16 +44,24 @@ pub fn in_range(field: &str, value: f64, ok: bool, range: &'static str) -> Resul
     }
 }
 
-/// Checks that `value` is in [`least`, `most`], which `range` says in interval notation.
+/// Checks that `value` lies in [`least`, `most`]. `range` is the same interval as text.
+///
+/// ```
+/// use spts_models::within;
+///
+/// assert!(within("press.force_n", 20.0, 0.5, 100.0, "[0.5, 100]").is_ok());
+/// let error = within("press.force_n", f64::NAN, 0.5, 100.0, "[0.5, 100]").unwrap_err();
+/// assert_eq!(error.to_string(), "`press.force_n` = NaN is outside [0.5, 100]");
+/// ```
 ///
 /// # Errors
-/// [`ConfigError`] when `value` is outside the range, or NaN.
+/// [`ConfigError`] if `value` is outside the range, or NaN.
 pub fn within(field: &str, value: f64, least: f64, most: f64, range: &'static str) -> Result<(), ConfigError> {
     in_range(field, value, (least..=most).contains(&value), range).map(drop)
 }
 
-/// `message` about a field, with the `section` that the field is in: "`section.field` = 3 is outside …", or "`section`:
-/// …" for a message that does not begin with a field.
+/// Adds the `section` to `message`, an error about one of its fields: "`section.field` = 3 is outside …". If `message`
+/// does not begin with a field, the result is "`section`: …".
 #[must_use]
 pub fn in_section(section: &str, message: &str) -> String {
     let message = message.trim_end().replace('\n', "; ");

@@ -1,4 +1,4 @@
-//! What every transducer promises.
+//! Properties that every transducer must have.
 
 use crate::grid::{ConductanceMap, PressureMap};
 use crate::layout::SkinLayout;
@@ -21,20 +21,29 @@ const SPLIT_TOLERANCE: f64 = 1e-12;
 /// some units in the last place a branch and step.
 const ORDER_TOLERANCE: f64 = 1e-12;
 
-/// Checks what every transducer promises. `build` makes a fresh one for a skin.
+/// Checks the properties that every transducer must have. `build` makes a fresh transducer for a skin.
 ///
-/// - Finite and not negative for 0…1 GPa and steps of 0, 1 ns … 1 h, from rest and after a load; monotone in the
-///   pressure.
-/// - Of two histories of one press, one never below the other, the larger always gives more.
-/// - A hold gives the same however it is cut, within every waveform.
-/// - Passive: a closed path of pressure, after one cycle that closes the state too, has ∮ P dG ≥ 0; the conductance
+/// - The conductance is finite and not negative for pressures of 0…1 GPa and time steps of 0 and 1 ns…1 h, from rest
+///   and after a load. It increases with the pressure.
+/// - Of two pressure histories, one of which is never below the other, the larger gives the larger conductance.
+/// - Dividing a hold into several steps does not change the result, within any waveform.
+/// - Passive: over a closed path of pressure, after one cycle that also closes the state, ∮ P dG ≥ 0. The conductance
 ///   follows the pressure and never leads it.
-/// - Nothing conducts that is not pressed and has rested; a step of no time repeats itself; negative and NaN pressure
-///   count as none.
-/// - Equal builds give equal bits, and so does a session, whatever was before it; a fresh one is in session 0.
+/// - A taxel that is not pressed and has rested does not conduct. A step of zero time repeats the last value. Negative
+///   pressure and NaN count as zero.
+/// - Equal builds give equal bits. A session does not depend on earlier sessions. A fresh transducer is in session 0.
+///
+/// ```
+/// use spts_models::{Streams, build_transducer, check_transducer};
+///
+/// // a transducer of your own passes the same checks
+/// check_transducer(&|skin| {
+///     build_transducer("linear", toml::Table::new(), skin, Streams::new(1)).expect("defaults are valid")
+/// });
+/// ```
 ///
 /// # Panics
-/// When a promise is broken, with the numbers.
+/// If the transducer lacks a property; the message holds the numbers.
 pub fn check_transducer(build: &dyn Fn(&SkinLayout) -> Box<dyn Transducer>) {
     let skin = SkinLayout::default();
     check_extremes(build, &skin);

@@ -1,22 +1,37 @@
-//! Slow rise of the conductance under a constant load, and the delay of the material.
+//! Slow rise of the conductance under a constant load, and the material's fast lag.
 
 use crate::config::{ConfigError, in_range, within};
 use crate::lag::{Lag, LagDecays};
 use crate::prony::{MAX_TAU_S, MIN_TAU_S, Prony};
 use serde::Deserialize;
 
-/// Creep, close to logarithmic in time or a Prony series, behind a fast lag.
+/// Creep, close to logarithmic in time or a Prony series, followed by a fast lag.
 ///
-/// The conductance is multiplied by 1 + Σ gⱼ·sⱼ. Branch j relaxes with its time constant τⱼ to the load factor
-/// P/(P + `load_pa`): a released taxel forgets over the times in which it crept, and conducts nothing meanwhile.
+/// The conductance is multiplied by 1 + Σ gⱼ·sⱼ. Branch j relaxes with its time constant τⱼ to the load factor P/(P +
+/// `load_pa`). A released taxel therefore forgets its creep over the same times; it conducts nothing meanwhile.
 ///
-/// - `log`: the τⱼ lie Δ = ½ decade apart from `start_s` to `end_s` and gⱼ = c·Δ, so that a hold gains `per_decade` (c)
-///   for every decade of time between them.
-/// - `prony`: gⱼ and τⱼ as listed.
+/// - `log`: the τⱼ lie Δ = ½ decade apart from `start_s` to `end_s`, and gⱼ = c·Δ, so that the conductance under a
+///   constant load rises by `per_decade` (c) for every decade of time in this range.
+/// - `prony`: gⱼ and τⱼ are given.
 ///
-/// Fast part: the share 1 − `instant` of the conductance follows with time constant `fast_s`, downwards `fast_fall_s`.
+/// Fast part: the share 1 − `instant` of the conductance follows with time constant `fast_s`, or `fast_fall_s` when it
+/// falls.
 ///
-/// All are linear relaxations to a target that is constant over a step, so a step of any length is exact.
+/// All parts are linear relaxations to a target that is constant during a step, so a step of any length is exact.
+///
+/// ```
+/// use spts_models::{Creep, CreepConfig};
+///
+/// let creep = Creep::try_from(CreepConfig::default())?;
+/// let (mut state, mut decays) = (vec![0.0; creep.branches()], creep.decays());
+/// let mut after = |dt_s: f64| {
+///     creep.set_step(dt_s, &mut decays);
+///     creep.respond(10e3, 1e-4, &decays, &mut state) // 10 kPa, elastic conductance 0.1 mS
+/// };
+/// let (one_s, ten_s) = (after(1.0), after(9.0));
+/// assert!(((ten_s - one_s) / 1e-4 - 0.04).abs() < 0.005, "4 % for every decade of time");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "CreepConfig")]
 pub struct Creep {
@@ -27,7 +42,7 @@ pub struct Creep {
     lag: Lag,
 }
 
-/// Which series the slow part of [`Creep`] is.
+/// Kind of the series in the slow part of [`Creep`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CreepKind {
@@ -38,7 +53,7 @@ pub enum CreepKind {
     Prony,
 }
 
-/// Parameters of [`Creep`]. All are checked, whatever the kind.
+/// Parameters of [`Creep`]. All are checked, also those that the chosen kind does not use.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct CreepConfig {
@@ -51,20 +66,20 @@ pub struct CreepConfig {
     pub start_s: f64,
     /// Longest time constant, s. Range [start_s, 1e7]; default 200. Of `log` only.
     pub end_s: f64,
-    /// gⱼ, relative gains of a long hold. At most 32, range [0, 1]; default 0.04 three times: with the `tau_s` below
-    /// the same 0.04 a decade, for 2.5 decades only. Of `prony` only.
+    /// gⱼ, relative gains after a long time. At most 32, range [0, 1]; default 0.04 three times, which with the default
+    /// `tau_s` also gives 0.04 a decade, but over 2.5 decades only. Of `prony` only.
     pub shares: Vec<f64>,
     /// τⱼ, s, as many as `shares`. Range [1e-6, 1e7]; default 0.02, 0.2 and 2. Of `prony` only.
     pub tau_s: Vec<f64>,
     /// Pressure at which half of the creep is reached, Pa. Range (0, 1e9]; default 200 (estimate: any touch counts).
     pub load_pa: f64,
-    /// Time constant of the fast branch, s. Range [0, 1]; default 5e-4, so that an impact of 8 ms passes undistorted.
+    /// Time constant of the fast branch, s. Range [0, 1]; default 5e-4, which leaves an impact of 8 ms undistorted.
     pub fast_s: f64,
     /// Time constant of the fast branch while the conductance falls, s. Range [0, 1]; default `fast_s`. Conductive
     /// polymers recover more slowly than they respond (estimates for the whole response: 3 ms and 15 ms).
     pub fast_fall_s: Option<f64>,
-    /// Share of the conductance that follows at once. Range [0, 1]; default 0.85 (recorded impacts are nearly symmetric
-    /// in time).
+    /// Share of the conductance that follows without lag. Range [0, 1]; default 0.85 (recorded impacts are nearly
+    /// symmetric in time).
     pub instant: f64,
 }
 
@@ -111,7 +126,7 @@ impl TryFrom<CreepConfig> for Creep {
     }
 }
 
-/// What a step of one length does to the branches of [`Creep`], the same for all taxels.
+/// Decay factors of the branches of [`Creep`] over a step of one length; the same for all taxels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CreepDecays {
     slow: Vec<f64>,
@@ -125,7 +140,7 @@ impl Creep {
         self.slow.len() + 1
     }
 
-    /// Room for the decays of a step.
+    /// Storage for the decay factors of a step.
     #[must_use]
     pub fn decays(&self) -> CreepDecays {
         CreepDecays {
@@ -134,14 +149,14 @@ impl Creep {
         }
     }
 
-    /// Writes the decay of every branch over a step of `dt_s`.
+    /// Computes the decay factor of every branch for a step of `dt_s`.
     pub fn set_step(&self, dt_s: f64, decays: &mut CreepDecays) {
         self.slow.decays(dt_s, &mut decays.slow);
         decays.fast = self.lag.decays(dt_s);
     }
 
-    /// Moves one taxel's `state` over a step with the given `decays` under `pressure_pa` with the elastic conductance
-    /// `elastic_s`, and returns the conductance at its end, S.
+    /// Advances the `state` of one taxel by a step with the given `decays`, under `pressure_pa` and the elastic
+    /// conductance `elastic_s`. Returns the conductance at the end of the step, S.
     pub fn respond(&self, pressure_pa: f64, elastic_s: f64, decays: &CreepDecays, state: &mut [f64]) -> f64 {
         let Some((delayed_s, slow)) = state.split_last_mut() else {
             return elastic_s;

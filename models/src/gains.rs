@@ -1,4 +1,4 @@
-//! What is known of the gains of one skin's taxels.
+//! Known gains of the taxels of one skin.
 
 use crate::config::{ConfigError, in_range, within};
 use crate::layout::SkinLayout;
@@ -7,8 +7,8 @@ use crate::toml_error::explain_toml;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-/// Gains of the taxels of one skin as far as they are known: independent log-normal values, and what every session
-/// changes about them. `spts calibrate --skin` writes them as TOML.
+/// Gains of the taxels of one skin, as far as they are known: an independent log-normal distribution for each taxel,
+/// plus the change from session to session. `spts calibrate --skin` writes them as TOML.
 ///
 /// ```
 /// use spts_models::{SkinLayout, Streams, TaxelGains, Velostat, VelostatConfig};
@@ -24,33 +24,33 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TaxelGains {
-    /// Rows and columns of the skin, where they are known; another skin then refuses the gains.
+    /// Rows and columns of the skin, if they are known. A skin of another shape then refuses the gains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<[usize; 2]>,
-    /// Mean of the logarithm of a taxel's gain, one value a taxel, row-major. Range [-5, 5].
+    /// Mean of the logarithm of a taxel's gain, one value a taxel in row-major order. Range [-5, 5].
     pub log_mean: Vec<f64>,
-    /// Standard deviation of that logarithm: what is not known of it. Range [0, 2].
+    /// Standard deviation of that logarithm: the uncertainty of the gain. Range [0, 2].
     pub log_sd: Vec<f64>,
-    /// Standard deviation of the logarithm of what one session, in which the skin was mounted anew, changes a taxel's
-    /// gain by. Range [0, 2].
+    /// Standard deviation by which the logarithm of a taxel's gain changes between sessions, in each of which the skin
+    /// is mounted anew. Range [0, 2].
     pub mounting_log_sd: f64,
 }
 
 impl TaxelGains {
-    /// Gains from TOML text.
+    /// Reads gains from TOML text.
     ///
     /// # Errors
-    /// What is wrong, with the field.
+    /// A message that names the field.
     pub fn from_toml(text: &str) -> Result<Self, String> {
         let gains: Self = toml::from_str(text).map_err(|e| explain_toml(&e))?;
         gains.check(gains.log_mean.len()).map_err(|e| e.to_string())?;
         Ok(gains)
     }
 
-    /// Checks the values, and that there is one for each of `taxels` taxels.
+    /// Checks all values, and that there is one for each of `taxels` taxels.
     ///
     /// # Errors
-    /// [`ConfigError`] with the first field that is not valid.
+    /// [`ConfigError`] for the first field that is not valid.
     pub fn check(&self, taxels: usize) -> Result<(), ConfigError> {
         for (field, values, least, most, range) in [
             ("log_mean", &self.log_mean, -5.0, 5.0, "[-5, 5]"),
@@ -70,10 +70,10 @@ impl TaxelGains {
         within("gains.mounting_log_sd", self.mounting_log_sd, 0.0, 2.0, "[0, 2]")
     }
 
-    /// Checks the values, and that they are of `skin`.
+    /// Checks all values, and that they belong to `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] with the first field that is not valid.
+    /// [`ConfigError`] for the first field that is not valid.
     pub fn check_skin(&self, skin: &SkinLayout) -> Result<(), ConfigError> {
         for (field, found, needed) in [
             ("gains.shape[0]", self.shape.map(|s| s[0]), skin.rows()),
@@ -86,7 +86,7 @@ impl TaxelGains {
         self.check(skin.taxels())
     }
 
-    /// Gains with a standard normal number `z` for every taxel: exp(mean + sd·z).
+    /// The gain exp(mean + sd·z) of every taxel for its standard normal number z.
     pub fn at<'a>(&'a self, z: impl Iterator<Item = f64> + 'a) -> impl Iterator<Item = f64> + 'a {
         let known = self.log_mean.iter().zip(&self.log_sd);
         known.zip(z).map(|((mean, sd), z)| (mean + sd * z).exp())

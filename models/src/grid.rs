@@ -10,7 +10,16 @@ pub enum Pascal {}
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Siemens {}
 
-/// Map of one value a taxel: shape `(rows, cols)`, row-major, every value in unit `U`.
+/// A map with one value a taxel: shape `(rows, cols)`, row-major, all values in unit `U`.
+///
+/// ```
+/// use spts_models::PressureMap;
+///
+/// let mut pressure = PressureMap::zeros(10, 10);
+/// pressure.values_mut()[4 * 10 + 7] = 12e3; // row 4, column 7
+/// let cell_area_m2 = 15e-3 * 15e-3;
+/// assert!((pressure.sum() * cell_area_m2 - 2.7).abs() < 1e-12, "the force, N");
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid<U> {
     rows: usize,
@@ -25,16 +34,16 @@ pub type PressureMap = Grid<Pascal>;
 pub type ConductanceMap = Grid<Siemens>;
 
 impl<U> Grid<U> {
-    /// Map of zeros with shape `(rows, cols)`.
+    /// A map of zeros.
     #[must_use]
     pub fn zeros(rows: usize, cols: usize) -> Self {
         Self::from_values(rows, cols, vec![0.0; rows * cols])
     }
 
-    /// Map from row-major `values`.
+    /// A map from row-major `values`.
     ///
     /// # Panics
-    /// When `values.len() != rows * cols`.
+    /// If `values.len() != rows * cols`.
     #[must_use]
     pub fn from_values(rows: usize, cols: usize, values: Vec<f64>) -> Self {
         assert_eq!(

@@ -8,18 +8,32 @@ const MAX_OPERATORS: usize = 32;
 
 /// Prandtl–Ishlinskii superposition of generalised play operators that scale with the pressure.
 ///
-/// Operator i follows y ← max(P, min(kᵢ·P, y)), kᵢ ≥ 1: while the pressure rises it is at P, while it falls it stays
-/// where it was until P has fallen by the factor kᵢ. The effective pressure is Σ wᵢ·yᵢ with equal weights wᵢ, and the
-/// kᵢ are evenly spaced up to `width`. The loading branch is therefore the static law itself, unloading lies above it,
-/// the loop dissipates, and at P = 0 nothing is left: the recorded skin is at zero between presses, which play
-/// operators of fixed width in pascal (P ± r) would not be.
+/// Operator i follows y ← max(P, min(kᵢ·P, y)) with kᵢ ≥ 1. While the pressure rises, y equals P; while it falls, y
+/// keeps its value until P has fallen by the factor kᵢ. The effective pressure is Σ wᵢ·yᵢ with equal weights wᵢ, and
+/// the kᵢ are evenly spaced up to `width`. The loading branch is therefore the static law itself, unloading lies above
+/// it, and the loop dissipates energy. At P = 0 the effective pressure is 0, as on the recorded skin, which reads zero
+/// between presses. Play operators of a fixed width in pascal (P ± r) would not return to 0.
 ///
-/// Passive: over a closed path that closes the state too, ∮ P dφ(y) ≥ 0 for the effective pressure y = Σ wᵢ·yᵢ and
-/// every increasing φ, hence also for the conductance. A level of y is crossed downwards at no higher pressure than it
-/// was crossed upwards before. For let m be the least pressure in between and P_d that of the crossing downwards. After
-/// m no operator lies below what it was there, and y(m) is not below the level; at P_d, where some operator moves down
-/// along kᵢ·P, it stands at kᵢ·P_d > kᵢ·m, higher than at m, unless P_d = m. So P_d = m, not above the pressure of the
-/// crossing upwards. Source: A. Visintin, *Differential Models of Hysteresis* (1994), §III.2 (generalised play).
+/// Passive: over a closed path that also closes the state, ∮ P dφ(y) ≥ 0 for the effective pressure y = Σ wᵢ·yᵢ and
+/// every increasing φ, hence also for the conductance. Proof: y crosses any level downwards at a pressure no higher
+/// than at the upward crossing before. Let m be the smallest pressure between the two crossings, and P_d the pressure
+/// of the downward crossing. After m, no operator is below its value at m, and y(m) is not below the level. At P_d some
+/// operator moves down along kᵢ·P; it is at kᵢ·P_d > kᵢ·m, which is higher than at m, unless P_d = m. So P_d = m, which
+/// is not above the pressure of the upward crossing. Source: A. Visintin, *Differential Models of Hysteresis* (1994),
+/// §III.2 (generalised play).
+///
+/// ```
+/// use spts_models::{Hysteresis, HysteresisConfig};
+///
+/// let hysteresis = Hysteresis::try_from(HysteresisConfig::default())?;
+/// let mut state = vec![0.0; hysteresis.operators()];
+/// let loading_pa = hysteresis.respond(5e3, &mut state);
+/// hysteresis.respond(10e3, &mut state);
+/// let unloading_pa = hysteresis.respond(5e3, &mut state);
+/// assert!(loading_pa == 5e3 && unloading_pa > 6e3);
+/// assert!(hysteresis.respond(0.0, &mut state) == 0.0);
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "HysteresisConfig")]
 pub struct Hysteresis {
@@ -30,7 +44,7 @@ pub struct Hysteresis {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct HysteresisConfig {
-    /// Number of play operators. Range [0, 32]; default 6; 0 switches hysteresis off.
+    /// Number of play operators. Range [0, 32]; default 6. 0 switches hysteresis off.
     pub operators: usize,
     /// Largest kᵢ. Range [1, 10]; default 1.8: with the default law the loop is 12 % of full scale wide at half load
     /// (literature on Velostat: 10–20 %).
@@ -66,7 +80,7 @@ impl Hysteresis {
         self.factors.len()
     }
 
-    /// Moves one taxel's `state` to `pressure_pa` and returns its effective pressure, Pa.
+    /// Applies `pressure_pa` to the `state` of one taxel, and returns its effective pressure, Pa.
     pub fn respond(&self, pressure_pa: f64, state: &mut [f64]) -> f64 {
         if self.factors.is_empty() {
             return pressure_pa;

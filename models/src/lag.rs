@@ -1,4 +1,4 @@
-//! Delay of the material.
+//! Fast lag of the material.
 
 use crate::config::{ConfigError, within};
 

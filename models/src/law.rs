@@ -1,4 +1,4 @@
-//! Conductance as a function of a constant pressure.
+//! The static law: conductance as a function of a constant pressure.
 
 use crate::config::{ConfigError, in_range, within};
 

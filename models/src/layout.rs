@@ -3,8 +3,8 @@
 use crate::config::{ConfigError, in_range, within};
 use serde::{Deserialize, Serialize};
 
-/// Rectangular array of square taxels. The sheet lies in the plane z = 0; its outline is centred on the origin, columns
-/// run along +x and rows along −y (row 0 is the far edge), so that a printed map looks like the skin seen from above.
+/// A rectangular array of square taxels. The sheet lies in the plane z = 0 and is centred on the origin. Columns run
+/// along +x and rows along −y (row 0 is the far edge), so that a printed map looks like the skin seen from above.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "SkinLayoutConfig")]
 pub struct SkinLayout {
@@ -70,7 +70,7 @@ impl Default for SkinLayout {
 }
 
 impl SkinLayout {
-    /// Skin of `rows × cols` taxels, `pitch_m` apart, each with a square electrode of side `electrode_m`.
+    /// A skin of `rows × cols` taxels at the pitch `pitch_m`, each with a square electrode of side `electrode_m`.
     ///
     /// # Errors
     /// [`ConfigError`] for an empty or oversized array, a pitch outside [1e-6, 1] m, or an electrode outside
@@ -95,7 +95,7 @@ impl SkinLayout {
         })
     }
 
-    /// Skin of `rows × cols` taxels, `pitch_m` apart, whose electrodes fill the same share of a taxel as on the
+    /// A skin of `rows × cols` taxels at the pitch `pitch_m`. Electrodes fill the same share of a taxel as on the
     /// published skin.
     ///
     /// ```
@@ -108,12 +108,12 @@ impl SkinLayout {
     /// ```
     ///
     /// # Errors
-    /// As for [`SkinLayout::new`].
+    /// As [`SkinLayout::new`].
     pub fn with_pitch(rows: usize, cols: usize, pitch_m: f64) -> Result<Self, ConfigError> {
         Self::new(rows, cols, pitch_m, Self::usual_electrode_m(pitch_m))
     }
 
-    /// Side of the electrode of a skin of this pitch for which none is given, m: 10/15 of the pitch.
+    /// Default side of the electrode for this pitch, m: 10/15 of the pitch.
     #[must_use]
     pub fn usual_electrode_m(pitch_m: f64) -> f64 {
         pitch_m * 10.0 / 15.0
@@ -149,8 +149,8 @@ impl SkinLayout {
         self.electrode_m
     }
 
-    /// Area of a taxel's electrode over that of the published skin's, 10 mm × 10 mm, for which transducers and readouts
-    /// are calibrated. The conductance of a taxel is proportional to it. Exactly 1 for the published skin.
+    /// Area of a taxel's electrode divided by that of the published skin (10 mm × 10 mm), for which transducers and
+    /// readouts are calibrated. The conductance of a taxel is proportional to it. Exactly 1 for the published skin.
     #[must_use]
     pub fn relative_area(&self) -> f64 {
         (self.electrode_m / CALIBRATED_ELECTRODE_M).powi(2)
@@ -168,7 +168,7 @@ impl SkinLayout {
         [self.cols as f64 * self.pitch_m, self.rows as f64 * self.pitch_m]
     }
 
-    /// Position (x, y) in metres of the taxel coordinate `(row, col)`, which may be fractional.
+    /// Position (x, y), m, of the taxel coordinate `(row, col)`, which may be fractional.
     #[must_use]
     pub fn position_m(&self, row: f64, col: f64) -> [f64; 2] {
         let [width, height] = self.extent_m();

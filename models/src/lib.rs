@@ -1,9 +1,9 @@
 //! Skin layout, typed taxel maps, seeded random streams and transducers (pressure → conductance) of the single-pixel
 //! tactile skin.
 //!
-//! A transducer turns the pressure over each taxel's electrode into the conductance of its Velostat; everything
-//! upstream (contact) and downstream (circuit) sees only the maps defined here. Its parameters are those of the
-//! published skin's electrodes, 10 mm × 10 mm; [`build_transducer`] scales the conductance with the area of other ones.
+//! A transducer turns the pressure on each taxel's electrode into the conductance of its Velostat. Everything before it
+//! (contact) and after it (circuit) uses only the maps defined here. Parameters of transducers are for the electrodes
+//! of the published skin, 10 mm × 10 mm; [`build_transducer`] scales the conductance with the area of other electrodes.
 //!
 //! ```
 //! use spts_models::{ConductanceMap, PressureMap, SkinLayout, Streams, build_transducer};

@@ -1,4 +1,4 @@
-//! First-order relaxations side by side.
+//! First-order relaxations in parallel.
 
 use crate::config::{ConfigError, in_range, within};
 

@@ -3,27 +3,38 @@
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// Source of independent generators: a function of (root seed, label, item index) and of nothing else, so that results
-/// do not depend on threads or on the order of evaluation.
+/// Source of independent random generators. A generator depends only on (root seed, label, item index), so results do
+/// not depend on threads or on the order of evaluation.
+///
+/// ```
+/// use rand::RngExt as _;
+/// use spts_models::Streams;
+///
+/// let streams = Streams::new(7);
+/// let draw = |label, index| streams.rng(label, index).random::<u64>();
+/// assert_eq!(draw("pose", 3), draw("pose", 3));
+/// assert_ne!(draw("pose", 3), draw("pose", 4));
+/// assert_ne!(draw("pose", 3), draw("noise", 3));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Streams {
     root: u64,
 }
 
 impl Streams {
-    /// Streams below the root seed `root`.
+    /// The streams of the root seed `root`.
     #[must_use]
     pub fn new(root: u64) -> Self {
         Self { root }
     }
 
-    /// Independent streams for item `index` of purpose `label`, such as one session of many.
+    /// The streams of item `index` for the purpose `label`, such as one session of many.
     #[must_use]
     pub fn child(self, label: &str, index: u64) -> Self {
         Self::new(self.rng(label, index).random())
     }
 
-    /// Independent generator for item `index` of purpose `label`.
+    /// The generator of item `index` for the purpose `label`.
     #[must_use]
     pub fn rng(self, label: &str, index: u64) -> ChaCha8Rng {
         // FNV-1a: stable across releases, unlike the standard library's hasher

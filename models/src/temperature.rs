@@ -2,7 +2,7 @@
 
 use crate::config::{ConfigError, within};
 
-/// Temperature at which the law is given, °C.
+/// Temperature for which the law is given, °C.
 pub const REFERENCE_C: f64 = 25.0;
 
 /// Factor of the conductance at `temperature_c`, when the resistance has the temperature coefficient α =

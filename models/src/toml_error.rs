@@ -1,9 +1,9 @@
-//! What a TOML value is refused for, in the words of a user: field, value and what is needed.
+//! Explains errors of TOML values in the user's terms: field, value, and what is valid.
 
 use crate::config::in_section;
 use toml::de::Error;
 
-/// `error` about a value in a table, as "`press.force_n` = "much": a number is needed".
+/// The message for `error`, an error about a value in a table, such as "`press.force_n` = "much": a number is needed".
 ///
 /// ```
 /// use spts_models::explain_toml;

@@ -1,4 +1,4 @@
-//! The transducers by name. A new one is a file in `transducers/` and, here, its `mod` and its line in [`TRANSDUCERS`].
+//! The table of transducers. A new one is a file in `transducers/`, and here its `mod` and its line in [`TRANSDUCERS`].
 
 mod linear;
 mod velostat;
@@ -14,7 +14,7 @@ use crate::toml_error::explain_toml;
 use crate::transducer::Transducer;
 use serde::de::DeserializeOwned;
 
-/// A transducer that cannot be built.
+/// Why a transducer cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TransducerError {
@@ -24,7 +24,7 @@ pub enum TransducerError {
     /// A value outside its range.
     #[error(transparent)]
     Value(#[from] ConfigError),
-    /// A name that the table does not list.
+    /// A name that is not in the table.
     #[error("`{name}` is not a transducer; known: {known}")]
     Unknown {
         /// Name asked for.
@@ -34,11 +34,11 @@ pub enum TransducerError {
     },
 }
 
-/// Builds a transducer from its parameters for a skin; `streams` decide whatever differs from skin to skin. Its
-/// conductance is that of electrodes of 10 mm × 10 mm, whatever the skin's are: [`build_transducer`] scales it.
+/// Builds a transducer for a skin from its parameters. `streams` determine what differs from skin to skin. The
+/// conductance is that of electrodes of 10 mm × 10 mm, whatever the skin has: [`build_transducer`] scales it.
 pub type BuildTransducer = fn(toml::Table, &SkinLayout, Streams) -> Result<Box<dyn Transducer>, TransducerError>;
 
-/// Every transducer by name.
+/// Every transducer, by name.
 pub const TRANSDUCERS: &[(&str, BuildTransducer)] = &[
     ("linear", |table, _, _| Ok(Box::new(parse::<Linear>(table)?))),
     ("velostat", |table, skin, streams| {
@@ -52,11 +52,19 @@ fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, TransducerError> 
         .map_err(|e| TransducerError::Parameters(explain_toml(&e)))
 }
 
-/// Transducer `name` of [`TRANSDUCERS`], its conductance scaled with the area of the skin's electrodes
-/// ([`SkinLayout::relative_area`]).
+/// Builds the transducer called `name` in [`TRANSDUCERS`], and scales its conductance with the area of the skin's
+/// electrodes ([`SkinLayout::relative_area`]).
+///
+/// ```
+/// use spts_models::{SkinLayout, Streams, build_transducer};
+///
+/// let parameters = toml::toml! { exponent = 7.0 };
+/// let error = build_transducer("velostat", parameters, &SkinLayout::default(), Streams::new(1)).err();
+/// assert_eq!(error.map(|e| e.to_string()).as_deref(), Some("`exponent` = 7 is outside [0.05, 2]"));
+/// ```
 ///
 /// # Errors
-/// [`TransducerError`] for an unknown name and for parameters that are refused.
+/// [`TransducerError`] for an unknown name, or parameters that the transducer refuses.
 pub fn build_transducer(
     name: &str,
     parameters: toml::Table,

@@ -45,11 +45,13 @@ THRESHOLD = 0.23
 MEASUREMENTS = {5: 1.0, 7: 1.5, 10: 1.5, 13: 1.5, 20: 2.0, 25: 1.5, 35: 1.0, 50: 0.7}
 # nu: variance of the noise of a sample in the linear estimate, images being scaled to length 1.
 NOISE_VARIANCE = 0.012
-# Root mean square of the noise of a sample, as a share of the image's length, log-uniform: contact noise and what a window differs by.
+# Root mean square of the noise of a sample, as a share of the image's length, log-uniform: contact noise and what a
+# window differs by.
 NOISE = (0.04, 0.16)
 # The same, as a share of the sample.
 NOISE_OF_SAMPLE = 0.04
-# Log-sd of the gains of the taxels, uniform; of a smooth factor over the sheet; and between a session and the scan that is its truth.
+# Log-sd of the gains of the taxels, uniform; of a smooth factor over the sheet; and between a session and the scan that
+# is its truth.
 GAINS, SMOOTH, SESSION = (0.2, 0.6), (0.0, 0.3), 0.12
 # Length over which the smooth factor changes, taxels.
 SMOOTH_LENGTH = 2.0

@@ -28,8 +28,8 @@ pub(crate) struct Body {
 const RINGS: usize = 96;
 const SEGMENTS: usize = 192;
 
-/// Mesh of a body of revolution about z with the volume of the body itself: its corners lie a little outside, the middles
-/// of its faces a little inside, by 1e-4 of the radius.
+/// Mesh of a body of revolution about z with the volume of the body itself: its corners lie a little outside, the
+/// middles of its faces a little inside, by 1e-4 of the radius.
 fn round(profile: &[[f64; 2]], volume_m3: f64) -> TriMesh {
     let mesh = revolve(profile, SEGMENTS);
     let wider = (volume_m3 / mesh.volume_m3()).sqrt();
@@ -147,7 +147,8 @@ impl Body {
         Self::new(round(&wall, PI * radius * radius * length), stiffness)
     }
 
-    /// Capsule along z: a cylinder of `radius` and `length` metres with half balls on its ends, its origin in its middle.
+    /// Capsule along z: a cylinder of `radius` and `length` metres with half balls on its ends, its origin in its
+    /// middle.
     #[staticmethod]
     #[pyo3(signature = (radius, length, stiffness = None))]
     fn capsule(radius: f64, length: f64, stiffness: Option<f64>) -> PyResult<Self> {

@@ -302,7 +302,8 @@ impl ImageClassifier {
     }
 }
 
-/// Name of every decoder, what it is, and what it learns from: "nothing", "dictionary", "images", "classes" or "shapes".
+/// Name of every decoder, what it is, and what it learns from: "nothing", "dictionary", "images", "classes" or
+/// "shapes".
 #[pyfunction]
 pub(crate) fn decoder_table() -> Vec<(&'static str, &'static str, &'static str)> {
     let needs = |needs| match needs {

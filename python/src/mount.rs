@@ -106,8 +106,8 @@ impl Mount {
         Ok(touch)
     }
 
-    /// Lets the bodies touch the skin, `dt` s after the last time; the touch, and for every body and the skin's link its
-    /// number, and force and torque about its centre of mass in the world's frame (6,).
+    /// Lets the bodies touch the skin, `dt` s after the last time; the touch, and for every body and the skin's link
+    /// its number, and force and torque about its centre of mass in the world's frame (6,).
     #[expect(clippy::type_complexity, reason = "a pair")]
     fn loads<'py>(&self, py: Python<'py>, dt: f64) -> PyResult<(Touch, Vec<(usize, Bound<'py, PyArray1<f64>>)>)> {
         let (touch, loads) = self.felt(py, dt)?;

@@ -209,8 +209,8 @@ impl Skin {
     /// poses : dict of Body to pose
     ///     A pose is (position (3,) m, unit quaternion (4,) w x y z), in the skin's frame.
     /// twists : dict of Body to twist, optional
-    ///     Velocity (6,): linear, of the body's origin, m/s, then angular, rad/s, in the skin's frame. A body without one
-    ///     is at rest.
+    ///     Velocity (6,): linear, of the body's origin, m/s, then angular, rad/s, in the skin's frame. A body without
+    ///     one is at rest.
     /// dt : float
     ///     Time since the touch before, s.
     ///

@@ -97,8 +97,8 @@ fn classify(c: &mut Criterion) {
     });
 }
 
-/// Twenty ±1 measurements of discs and bars on 10 × 10 taxels: the estimates that are given Φ with every window, and the
-/// same with one Φ that was there before.
+/// Twenty ±1 measurements of discs and bars on 10 × 10 taxels: the estimates that are given Φ with every window, and
+/// the same with one Φ that was there before.
 fn fixed(c: &mut Criterion) {
     let (m, cols) = (20, 10);
     let mut rng = ChaCha8Rng::seed_from_u64(4);

@@ -1,10 +1,10 @@
-//! Marginalising the unknown size of an answer: y = s·(t + noise), where `s` has no scale of its own.
+//! Integrates over an unknown amplitude: y = s·(t + noise), where the scale of `s` is not known.
 
 use crate::checks::{RangeError, within};
 use crate::elementary::{exp, ln};
 use multiversion::multiversion;
 
-/// Range of the amplitude `s`, the a-priori density of ln s being constant over it.
+/// Range of the amplitude `s`. The prior density of ln s is constant over it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AmplitudeRange {
     ln_min: f64,

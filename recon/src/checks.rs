@@ -1,4 +1,4 @@
-//! Checks shared by everything that is built from parameters or fed with measurements.
+//! Checks of parameters and measurements that several modules share.
 
 /// A parameter outside its range.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -8,9 +8,9 @@ pub struct RangeError {
     pub field: &'static str,
     /// Its value.
     pub value: f64,
-    /// Least value allowed.
+    /// Smallest valid value.
     pub min: f64,
-    /// Largest value allowed.
+    /// Largest valid value.
     pub max: f64,
 }
 

@@ -1,5 +1,5 @@
-//! How good a measurement matrix is, whatever decodes it: coherence of columns and rows, rank and condition, restricted
-//! isometry.
+//! Quality of a measurement matrix, independent of the decoder: coherence of columns and rows, rank and condition,
+//! restricted isometry.
 //!
 //! ```
 //! use spts_recon::{Matrix, coherence};
@@ -19,11 +19,11 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 
-/// A matrix or a parameter that cannot be judged.
+/// A matrix or parameter that is not valid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CoherenceError {
-    /// There is no row or no column.
+    /// The matrix has no row or no column.
     #[error("matrix has shape {rows} × {cols}; both must be at least 1")]
     Empty {
         /// Rows of the matrix.
@@ -46,26 +46,26 @@ pub enum CoherenceError {
     Range(#[from] RangeError),
 }
 
-/// Likeness of vectors: |cos| of the angle between two of them, over all pairs. A vector of zeros, which no measurement
-/// shows, counts as parallel to every other one.
+/// Similarity of vectors: |cos| of the angle between two of them, over all pairs. A zero vector, which no measurement
+/// can detect, counts as parallel to every other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coherence {
-    /// Largest, in [0, 1]: the mutual coherence μ. 0 for a single vector.
+    /// Largest value, in [0, 1]: the mutual coherence μ. 0 for a single vector.
     pub max: f64,
-    /// Root mean square, in [0, 1].
+    /// Root mean square over all pairs, in [0, 1].
     pub rms: f64,
 }
 
-/// Coherence of the columns of `a`: how well one unknown is told from another.
+/// Coherence of the columns of `a`: how well unknowns can be distinguished.
 /// Source: D. L. Donoho, X. Huo, IEEE Trans. Inf. Theory 47 (2001) 2845.
 ///
 /// # Errors
-/// [`CoherenceError`] for an empty matrix and for a NaN or an infinity.
+/// [`CoherenceError`] for an empty matrix, or a value that is not finite.
 pub fn columns(a: MatrixView<'_>) -> Result<Coherence, CoherenceError> {
     Ok(coherence(&Gram::of_columns(&scaled(a)?)))
 }
 
-/// Coherence of the rows of `a`: how much of a measurement another one has said already.
+/// Coherence of the rows of `a`: how much of a measurement is already contained in another one.
 ///
 /// # Errors
 /// As [`columns`].
@@ -73,8 +73,8 @@ pub fn rows(a: MatrixView<'_>) -> Result<Coherence, CoherenceError> {
     Ok(coherence(&Gram::of_columns(&scaled(a)?.transpose())))
 }
 
-/// Least mutual coherence that `vectors` vectors of `dimension` numbers can have: √((n − m) / (m (n − 1))), and 0 for n
-/// ≤ m.
+/// Smallest possible mutual coherence of `vectors` vectors of `dimension` numbers: √((n − m) / (m (n − 1))), and 0 for
+/// n ≤ m.
 /// Source: L. R. Welch, IEEE Trans. Inf. Theory 20 (1974) 397.
 #[must_use]
 pub fn welch_bound(dimension: usize, vectors: usize) -> f64 {
@@ -85,14 +85,14 @@ pub fn welch_bound(dimension: usize, vectors: usize) -> f64 {
     ((n - m) / (m * (n - 1.0))).sqrt()
 }
 
-/// Singular values of a matrix, in short.
+/// Summary of the singular values of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spectrum {
     /// Number of singular values above max(M, N)·ε·σ₁, the usual tolerance for rounding.
     pub rank: usize,
     /// Number of singular values, min(M, N).
     pub full: usize,
-    /// Condition σ₁/σ of the least of them: how much noise may grow. ∞ below full rank.
+    /// Condition number σ₁/σ of the smallest one: the largest amplification of noise. ∞ if the rank is not full.
     pub condition: f64,
 }
 
@@ -116,30 +116,43 @@ pub fn spectrum(a: MatrixView<'_>) -> Result<Spectrum, CoherenceError> {
     })
 }
 
-/// Deviation from an isometry, and the columns that show it.
+/// Deviation from an isometry, and the columns with this deviation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Isometry {
-    /// Largest deviation found: δ_S is at least this.
+    /// Largest deviation found; δ_S is at least this large.
     pub delta: f64,
-    /// The S columns, in no order.
+    /// The S columns, in no particular order.
     pub support: Vec<usize>,
 }
 
-/// How long to look for columns that are far from an isometry.
+/// Effort of the search for columns far from an isometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct IsometrySearch {
     /// Number of supports drawn at random.
     pub random: usize,
-    /// Number of supports that are built column by column, each the worst next one, and then improved by exchanging
+    /// Number of supports built column by column, adding the worst column each time, and then improved by exchanging
     /// columns.
     pub greedy: usize,
 }
 
-/// Lower bound of the restricted isometry constant δ_S of `a` with its columns brought to unit length: the least δ with
-/// (1 − δ)‖x‖² ≤ ‖A x‖² ≤ (1 + δ)‖x‖² for every x of S = `sparsity` non-zeros. It is the largest |λ − 1| of an
-/// eigenvalue λ of any S × S block of AᵀA; the constant itself takes all supports, of which this looks at some.
+/// Lower bound of the restricted isometry constant δ_S of `a` with columns scaled to unit length: the smallest δ with
+/// (1 − δ)‖x‖² ≤ ‖A x‖² ≤ (1 + δ)‖x‖² for every x with S = `sparsity` non-zeros. The constant is the largest |λ − 1|
+/// over the eigenvalues λ of all S × S blocks of AᵀA; this function searches some of the blocks.
 /// Source: E. J. Candès, T. Tao, IEEE Trans. Inf. Theory 51 (2005) 4203; C. Dossal, G. Peyré, J. Fadili, "A numerical
 /// exploration of compressed sampling recovery", Linear Algebra Appl. 432 (2010) 1663.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::coherence::{IsometrySearch, restricted_isometry};
+///
+/// let identity = Matrix::from_rows(2, 2, vec![1.0, 0.0, 0.0, 1.0])?;
+/// let alike = Matrix::from_rows(2, 2, vec![1.0, 1.0, 0.0, 0.1])?;
+/// let search = IsometrySearch { random: 10, greedy: 1 };
+/// let mut rng = rand::SeedableRng::seed_from_u64(1);
+/// let mut delta = |a: &Matrix| restricted_isometry(a.view(), 2, search, &mut rng).map(|found| found.delta);
+/// assert!(delta(&identity)? < 1e-12 && delta(&alike)? > 0.9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
 /// As [`columns`], and [`CoherenceError::Range`] unless `sparsity` is in [1, N].

@@ -1,4 +1,4 @@
-//! Exponential and logarithm that run in SIMD lanes, which those of the standard library cannot.
+//! Exponential and logarithm for SIMD lanes, which the standard library lacks.
 
 /// eˣ for x ≤ 700, 0 below −700, to 1e-12 of itself.
 ///

@@ -1,7 +1,7 @@
-//! Inner loops of operators and pursuits, with the best instructions of this machine.
+//! Inner loops of operators and pursuits, compiled for several instruction sets.
 //!
-//! Lanes are columns, or positions in fixed eights, and no product is fused with a sum: results are the same bits
-//! whichever instruction set is chosen at run time.
+//! Lanes are columns, or positions in fixed groups of eight, and no product is fused with a sum. Results have the same
+//! bits whichever instruction set is chosen at run time.
 
 use multiversion::multiversion;
 

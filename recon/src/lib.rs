@@ -1,10 +1,10 @@
 //! Sparse recovery, dictionaries, classification, localisation and metrics for compressive measurements `y = Φ x`.
 //!
-//! The crate knows nothing of skins or circuits: matrices and slices of `f64` in, images and labels out. [`recover`]
-//! finds images, [`dictionary`] learns what they are made of, [`classify`] says what they show and [`localise`] where.
-//! [`rows`] designs what is measured.
-//! Three work while the measurements come in: [`recover::OnlineOmp`], [`recover::SequentialEstimate`] and
-//! [`classify::AnytimeClassifier`]; a [`StopRule`] ends the last two as soon as they are sure enough.
+//! The crate knows nothing about skins or circuits: its inputs are matrices and slices of `f64`, its outputs images and
+//! labels. [`recover`] reconstructs images, [`dictionary`] learns their atoms, [`classify`] identifies objects,
+//! [`localise`] finds contacts, and [`rows`] designs measurements. Three algorithms work while measurements arrive:
+//! [`recover::OnlineOmp`], [`recover::SequentialEstimate`] and [`classify::AnytimeClassifier`]. A [`StopRule`] ends the
+//! last two as soon as they are confident enough.
 //!
 //! ```
 //! use spts_recon::{Matrix, Problem, Recover as _, Workspace, recover::Omp};

@@ -1,8 +1,17 @@
-//! Dense row-major matrices: a window of consecutive measurements is a slice of rows.
+//! Dense row-major matrices. A window of consecutive measurements is a slice of rows.
 
 use nalgebra::DMatrix;
 
 /// Dense matrix, row-major.
+///
+/// ```
+/// use spts_recon::Matrix;
+///
+/// let a = Matrix::from_rows(2, 3, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0])?;
+/// assert_eq!((a.row(1), a.column(2)), (&[4.0, 5.0, 6.0][..], vec![3.0, 6.0]));
+/// assert_eq!(Matrix::from_columns(2, 3, &[1.0, 4.0, 2.0, 5.0, 3.0, 6.0])?, a);
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrix {
     nrows: usize,
@@ -18,13 +27,13 @@ pub struct MatrixView<'a> {
     values: &'a [f64],
 }
 
-/// Values that do not fill the shape they were given.
+/// The number of values differs from that of the shape.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("a {nrows} × {ncols} matrix needs {} values, got {len}", nrows * ncols)]
 pub struct ShapeError {
-    /// Number of rows asked for.
+    /// Number of rows.
     pub nrows: usize,
-    /// Number of columns asked for.
+    /// Number of columns.
     pub ncols: usize,
     /// Number of values given.
     pub len: usize,
@@ -41,10 +50,10 @@ impl Matrix {
         }
     }
 
-    /// Matrix from row-major values.
+    /// A matrix with row-major `values`.
     ///
     /// # Errors
-    /// [`ShapeError`] when `values` does not hold `nrows · ncols` numbers.
+    /// [`ShapeError`] if `values` does not hold `nrows · ncols` numbers.
     pub fn from_rows(nrows: usize, ncols: usize, values: Vec<f64>) -> Result<Self, ShapeError> {
         let len = values.len();
         if nrows.checked_mul(ncols) == Some(len) {
@@ -54,10 +63,10 @@ impl Matrix {
         }
     }
 
-    /// Matrix from column-major values, the layout of MATLAB files.
+    /// A matrix with column-major `values`, the layout of MATLAB files.
     ///
     /// # Errors
-    /// [`ShapeError`] when `values` does not hold `nrows · ncols` numbers.
+    /// [`ShapeError`] if `values` does not hold `nrows · ncols` numbers.
     pub fn from_columns(nrows: usize, ncols: usize, values: &[f64]) -> Result<Self, ShapeError> {
         if nrows.checked_mul(ncols) != Some(values.len()) {
             return Err(ShapeError {
@@ -75,10 +84,10 @@ impl Matrix {
         Ok(out)
     }
 
-    /// Matrix whose columns are `columns`, all of length `nrows`.
+    /// A matrix with the given columns, all of length `nrows`.
     ///
     /// # Panics
-    /// When a column has another length than `nrows`.
+    /// If a column has another length than `nrows`.
     #[must_use]
     pub fn from_column_slices(nrows: usize, columns: &[&[f64]]) -> Self {
         let ncols = columns.len();
@@ -147,7 +156,7 @@ impl Matrix {
         }
     }
 
-    /// `rows · self`, where `rows` is one row vector; added to `out`.
+    /// Adds the product of the row vector `row` and this matrix to `out`.
     pub fn accumulate_row(&self, row: &[f64], out: &mut [f64]) {
         for (&w, values) in row.iter().zip(self.values.chunks_exact(self.ncols.max(1))) {
             if w != 0.0 {
@@ -158,7 +167,7 @@ impl Matrix {
         }
     }
 
-    /// Sum over the rows: `1ᵀ · self`.
+    /// Sum over all rows: `1ᵀ · self`.
     #[must_use]
     pub fn column_sums(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.ncols];
@@ -181,7 +190,7 @@ impl<'a> MatrixView<'a> {
     /// View of row-major `values`.
     ///
     /// # Errors
-    /// [`ShapeError`] when `values` does not hold `nrows · ncols` numbers.
+    /// [`ShapeError`] if `values` does not hold `nrows · ncols` numbers.
     pub fn new(nrows: usize, ncols: usize, values: &'a [f64]) -> Result<Self, ShapeError> {
         if nrows.checked_mul(ncols) == Some(values.len()) {
             Ok(Self { nrows, ncols, values })
@@ -215,7 +224,7 @@ impl<'a> MatrixView<'a> {
     /// `nrows` consecutive rows from `start`.
     ///
     /// # Panics
-    /// When the rows do not exist.
+    /// If the rows do not exist.
     #[must_use]
     pub fn rows(self, start: usize, nrows: usize) -> Self {
         Self {

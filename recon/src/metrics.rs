@@ -1,4 +1,4 @@
-//! How well an image recovers the contact: support accuracy, IoU, F1 and balanced accuracy.
+//! Quality of a reconstructed image: support accuracy, IoU, F1 and balanced accuracy.
 //!
 //! ```
 //! use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
@@ -10,7 +10,7 @@
 //! assert!((SupportScore::new(&found, &truth).iou - 0.5).abs() < 1e-15);
 //! ```
 
-/// Threshold of the published evaluation, as a share of each image's own maximum.
+/// Threshold of the published evaluation, relative to each image's maximum.
 pub const SUPPORT_THRESHOLD: f64 = 0.23;
 
 /// Marks the taxels above `threshold` · max. An image without a positive value has an empty support.
@@ -20,21 +20,21 @@ pub fn support(image: &[f64], threshold: f64, out: &mut Vec<bool>) {
     out.extend(image.iter().map(|&v| max > 0.0 && v > threshold * max));
 }
 
-/// Agreement of a support with the truth.
+/// Agreement of a support with the ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SupportScore {
-    /// Share of taxels on the right side, the published "support accuracy".
+    /// Share of correctly classified taxels, called "support accuracy" in the publication.
     pub accuracy: f64,
-    /// Intersection over union; 1 when both supports are empty.
+    /// Intersection over union; 1 if both supports are empty.
     pub iou: f64,
-    /// Harmonic mean of precision and recall; 1 when both supports are empty.
+    /// Harmonic mean of precision and recall; 1 if both supports are empty.
     pub f1: f64,
     /// Mean of the true-positive and the true-negative rate; a rate without members counts as 1.
     pub balanced_accuracy: f64,
 }
 
 impl SupportScore {
-    /// Scores `found` against `truth`, which have the same length.
+    /// Scores `found` against `truth`, which must have the same length.
     #[must_use]
     pub fn new(found: &[bool], truth: &[bool]) -> Self {
         let (mut both, mut only_found, mut only_truth, mut neither) = (0.0, 0.0, 0.0, 0.0);
@@ -73,7 +73,7 @@ impl MeanScore {
         self.count += 1.0;
     }
 
-    /// Mean of all scores added, or `None` without any.
+    /// Mean of all scores added; `None` without scores.
     #[must_use]
     pub fn mean(&self) -> Option<SupportScore> {
         (self.count > 0.0).then(|| SupportScore {
@@ -85,7 +85,7 @@ impl MeanScore {
     }
 }
 
-/// Pearson correlation of two images, or `None` when one of them is constant.
+/// Pearson correlation of two images; `None` if one of them is constant.
 #[must_use]
 pub fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
     let n = a.len() as f64;
@@ -101,7 +101,7 @@ pub fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
     (scale > 0.0).then(|| ab / scale)
 }
 
-/// Median; the mean of the middle two for an even count. `None` without a value. NaN sorts last.
+/// Median (for an even count the mean of the middle two); `None` without values. NaN sorts last.
 #[must_use]
 pub fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();

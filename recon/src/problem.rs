@@ -1,9 +1,9 @@
-//! The recovery problem and the trait of everything that solves it.
+//! The recovery problem, and the trait of its solvers.
 
 use crate::matrix::MatrixView;
 use crate::workspace::Workspace;
 
-/// Find a sparse `α` with `A α ≈ y`.
+/// The problem: find a sparse `α` with `A α ≈ y`.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
     matrix: MatrixView<'a>,
@@ -11,11 +11,11 @@ pub struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    /// Problem with operator `matrix` (M × K) and measurements `y` (length M).
+    /// A problem with the operator `matrix` (M × K) and the measurements `y` (length M).
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] when the lengths differ, [`RecoverError::Empty`] when there is no measurement or
-    /// no atom, [`RecoverError::NotFinite`] when `y` holds a NaN or an infinity.
+    /// [`RecoverError::ShapeMismatch`] if the lengths differ, [`RecoverError::Empty`] if there is no measurement or no
+    /// atom, [`RecoverError::NotFinite`] if `y` holds a NaN or an infinity.
     pub fn new(matrix: MatrixView<'a>, y: &'a [f64]) -> Result<Self, RecoverError> {
         if matrix.nrows() != y.len() {
             return Err(RecoverError::ShapeMismatch {
@@ -49,9 +49,18 @@ impl<'a> Problem<'a> {
 }
 
 /// A sparse solution.
+///
+/// ```
+/// use spts_recon::{Matrix, Solution};
+///
+/// let solution = Solution { support: vec![2, 0], coefficients: vec![3.0, -1.0], residual_norm: 0.0 };
+/// let mut x = [0.0; 4];
+/// solution.scatter(&mut x);
+/// assert_eq!(x, [-1.0, 0.0, 3.0, 0.0]);
+/// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Solution {
-    /// Indices of the atoms used, in the order they were chosen.
+    /// Indices of the selected atoms, in order of selection.
     pub support: Vec<usize>,
     /// Coefficient of each atom of `support`.
     pub coefficients: Vec<f64>,
@@ -86,7 +95,7 @@ impl Solution {
         self.residual_norm = residual_norm;
     }
 
-    /// Writes the coefficients to their places in `x` (length K) and zero everywhere else.
+    /// Writes the coefficients to their positions in `x` (length K), and zeros everywhere else.
     pub fn scatter(&self, x: &mut [f64]) {
         x.fill(0.0);
         for (&k, &c) in self.support.iter().zip(&self.coefficients) {
@@ -94,7 +103,7 @@ impl Solution {
         }
     }
 
-    /// `D α` for a dictionary `D` (N × K, row-major): the image. Overwrites `image` (length N).
+    /// Computes the image `D α` for a dictionary `D` (N × K, row-major) into `image` (length N).
     pub fn synthesise(&self, dictionary: MatrixView<'_>, image: &mut [f64]) {
         for (out, row) in image
             .iter_mut()
@@ -114,7 +123,7 @@ impl Solution {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecoverError {
-    /// The operator and the measurements do not fit.
+    /// The sizes of operator and measurements differ.
     #[error("operator has {rows} rows but `y` has {len} entries")]
     ShapeMismatch {
         /// Rows of the operator.
@@ -122,7 +131,7 @@ pub enum RecoverError {
         /// Length of `y`.
         len: usize,
     },
-    /// Nothing was measured, or nothing can be chosen.
+    /// There is no measurement, or no atom.
     #[error("operator has shape {rows} × {cols}; both must be at least 1")]
     Empty {
         /// Rows of the operator.
@@ -154,32 +163,32 @@ pub enum RecoverError {
         /// First pivot that is not above zero.
         pivot: usize,
     },
-    /// The iteration ended before the answer was accurate enough.
+    /// The iteration ended before it reached the tolerance.
     #[error("no convergence in {iterations} iterations (relative error {error:.3e}, tolerance {tol:.3e})")]
     NotConverged {
-        /// Iterations done.
+        /// Number of iterations.
         iterations: usize,
-        /// Relative error reached, in the method's own measure.
+        /// Relative error reached, as the method defines it.
         error: f64,
-        /// Relative error asked for.
+        /// Required relative error.
         tol: f64,
     },
     /// A measurement is NaN or infinite.
     #[error("`y[{index}]` = {value} is not finite")]
     NotFinite {
-        /// Where.
+        /// Index of the measurement.
         index: usize,
         /// The value.
         value: f64,
     },
-    /// A measurement less what the prior mean predicts is beyond the range of numbers.
-    #[error("`y[{index}]` less the prior mean's prediction is beyond the range of 64-bit numbers")]
+    /// A measurement minus the prior mean's prediction exceeds the range of numbers.
+    #[error("`y[{index}]` minus the prior mean's prediction exceeds the range of 64-bit numbers")]
     InnovationOverflow {
-        /// Which measurement.
+        /// Index of the measurement.
         index: usize,
     },
-    /// A coefficient is beyond the range of numbers, as with measurements of 1e300 and an operator of 1e-300.
-    #[error("the coefficient of atom {atom} is beyond the range of 64-bit numbers")]
+    /// A coefficient exceeds the range of numbers, as with measurements of 1e300 and an operator of 1e-300.
+    #[error("the coefficient of atom {atom} exceeds the range of 64-bit numbers")]
     Overflow {
         /// Column of the operator.
         atom: usize,
@@ -187,12 +196,38 @@ pub enum RecoverError {
 }
 
 /// A sparse-recovery algorithm.
+///
+/// ```
+/// use spts_recon::{Matrix, Problem, Recover, RecoverError, Solution, Workspace};
+///
+/// /// The atom (of length 1) that correlates most with the measurements.
+/// struct Single;
+///
+/// impl Recover for Single {
+///     fn recover_into(&self, p: &Problem<'_>, _: &mut Workspace, best: &mut Solution) -> Result<(), RecoverError> {
+///         *best = Solution::default();
+///         let mut atom = vec![0.0; p.y().len()];
+///         for k in 0..p.matrix().ncols() {
+///             p.matrix().copy_column(k, &mut atom);
+///             let c: f64 = atom.iter().zip(p.y()).map(|(a, y)| a * y).sum();
+///             if best.coefficients.first().is_none_or(|b| c.abs() > b.abs()) {
+///                 (best.support, best.coefficients) = (vec![k], vec![c]);
+///             }
+///         }
+///         Ok(())
+///     }
+/// }
+/// let a = Matrix::from_rows(2, 2, vec![1.0, 0.0, 0.0, 1.0]).unwrap();
+/// let solution = Single.recover(&Problem::new(a.view(), &[0.2, 3.0])?, &mut Workspace::default())?;
+/// assert_eq!(solution.support, [1]);
+/// # Ok::<(), RecoverError>(())
+/// ```
 pub trait Recover: Send + Sync {
-    /// Solves `problem` and overwrites `solution`, whose memory is used again. After an error its content is of no
+    /// Solves `problem` into `solution`, whose memory is reused. After an error the content of `solution` has no
     /// meaning.
     ///
     /// # Errors
-    /// [`RecoverError`] when the problem cannot be solved; never panics on a [`Problem`].
+    /// [`RecoverError`] if the problem cannot be solved. A valid [`Problem`] never causes a panic.
     fn recover_into(
         &self,
         problem: &Problem<'_>,

@@ -1,4 +1,4 @@
-//! The control: a raster scan of few pixels, interpolated to the whole array.
+//! The baseline: a raster scan of few pixels, interpolated to the whole array.
 //!
 //! ```
 //! use spts_recon::raster::Interpolation;
@@ -13,8 +13,8 @@
 
 use spade::{DelaunayTriangulation, FloatTriangulation as _, HasPosition, Point2, Triangulation as _};
 
-/// Linear map from the readings of `measured` pixels to the whole image: every pixel is a weighted mean of at most
-/// three measured ones.
+/// Linear map from the readings of `measured` pixels to the whole image: every pixel is a weighted mean of up to three
+/// measured ones.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interpolation {
     measured: Vec<usize>,
@@ -34,9 +34,9 @@ impl HasPosition for Site {
 }
 
 impl Interpolation {
-    /// Scan of `measurements` evenly spaced pixels of a `rows × cols` array: pixels round(i·(N−1)/(M−1)); linear
-    /// interpolation on their Delaunay triangulation, the nearest measured pixel outside their convex hull (and
-    /// everywhere when they lie on a line).
+    /// A scan of `measurements` evenly spaced pixels of a `rows × cols` array: pixels round(i·(N−1)/(M−1)).
+    /// Interpolation is linear on their Delaunay triangulation. Outside their convex hull, and everywhere if they lie
+    /// on a line, the nearest measured pixel is used.
     #[must_use]
     pub fn evenly_spaced(rows: usize, cols: usize, measurements: usize) -> Self {
         Self::new(rows, cols, evenly_spaced(rows * cols, measurements))
@@ -72,13 +72,13 @@ impl Interpolation {
         Self { measured, weights }
     }
 
-    /// Pixels that are measured, in scan order.
+    /// The measured pixels, in scan order.
     #[must_use]
     pub fn measured(&self) -> &[usize] {
         &self.measured
     }
 
-    /// Interpolates the scan of `image` at the measured pixels to the whole array.
+    /// Reads `image` at the measured pixels and interpolates them to the whole array.
     pub fn apply(&self, image: &[f64], out: &mut [f64]) {
         for (o, weights) in out.iter_mut().zip(&self.weights) {
             *o = weights.iter().map(|&(slot, w)| w * image[self.measured[slot]]).sum();

@@ -1,10 +1,21 @@
-//! Dictionaries that hold an image at every place.
+//! Dictionaries with every image at all places.
 
 use crate::matrix::Matrix;
 
-/// Every atom of `dictionary` (images of `cols` columns, row-major) moved by −`reach`…`reach` rows and columns, zeros
-/// moving in from outside. Atoms that lose everything are left out; the others keep their values, so that an atom cut
-/// by the edge stays shorter.
+/// Every atom of `dictionary` (images with `cols` columns, row-major) shifted by −`reach`…`reach` rows and columns,
+/// with zeros moving in. Atoms that become empty are dropped. The others keep their values, so an atom cut by the edge
+/// has a smaller length.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::dictionary::shifted;
+///
+/// let image = [0.0, 0.0, 0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 0.0]; // 3 × 3 pixels
+/// let everywhere = shifted(&Matrix::from_columns(9, 1, &image)?, 3, 1);
+/// assert_eq!(everywhere.ncols(), 9);
+/// assert!(everywhere.column_sums().iter().all(|sum| *sum == 5.0));
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
 #[must_use]
 pub fn shifted(dictionary: &Matrix, cols: usize, reach: usize) -> Matrix {
     let rows = dictionary.nrows() / cols.max(1);

@@ -1,25 +1,37 @@
-//! Rows of Φ·D for ±1 weights Φ, by look-up instead of multiplication.
+//! Rows of Φ·D for ±1 weights Φ, by table look-up instead of multiplication.
 
 use crate::matrix::MatrixView;
 use crate::table_kernels::{self, ENTRIES, GROUP};
 
-/// Precision of the tables: `f64`, or `f32` for half the memory traffic.
+/// Precision of the tables: `f64`, or `f32` with half the memory traffic.
 pub trait TableFloat: Copy + Send + Sync + table_kernels::Gather {}
 
 impl TableFloat for f32 {}
 impl TableFloat for f64 {}
 
-/// Tables of Σₖ ±D\[k\] over groups of 8 rows of a dictionary D (N × K): a row of Φ·D is then the sum of ⌈N/8⌉ table
-/// rows, N/8 additions an atom instead of N multiplications and additions.
+/// Tables of Σₖ ±D\[k\] over groups of 8 rows of a dictionary D (N × K). A row of Φ·D is then the sum of ⌈N/8⌉ table
+/// rows: N/8 additions for each atom instead of N multiplications and additions.
 ///
-/// Memory: 256·⌈N/8⌉·K numbers; N = K = 100 takes 2.7 MB in `f64`, 1.3 MB in `f32`. With `f32` the sums are `f32` as
-/// well, and a row is exact to ⌈N/8⌉·6e-8 of the sum of magnitudes in its column, far below what a measurement
-/// resolves. The idea is the "method of four Russians": V. L. Arlazarov et al., Dokl. Akad. Nauk SSSR 194 (1970).
+/// Memory: 256·⌈N/8⌉·K numbers; N = K = 100 takes 2.7 MB in `f64` and 1.3 MB in `f32`. With `f32` the sums are also
+/// `f32`, and the error of a row is at most ⌈N/8⌉·6e-8 of the sum of magnitudes in its column, far below the resolution
+/// of a measurement. The idea is the "method of four Russians": V. L. Arlazarov et al., Dokl. Akad. Nauk SSSR 194
+/// (1970).
+///
+/// ```
+/// use spts_recon::{Matrix, SignTables};
+///
+/// let dictionary = Matrix::from_rows(3, 1, vec![1.0, 2.0, 4.0])?;
+/// let tables = SignTables::<f64>::new(dictionary.view());
+/// let mut row = [0.0];
+/// tables.fill_rows(&[0b101], &mut row); // the signs +, −, +
+/// assert_eq!(row, [1.0 - 2.0 + 4.0]);
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct SignTables<T> {
     nrows: usize,
     ncols: usize,
-    /// Group after group, sign pattern after sign pattern, K numbers each.
+    /// Ordered by group, then by sign pattern, with K numbers each.
     values: Vec<T>,
 }
 
@@ -37,18 +49,18 @@ impl<T: TableFloat> SignTables<T> {
         Self { nrows, ncols, values }
     }
 
-    /// Words of 64 signs that a row of Φ takes: ⌈N/64⌉.
+    /// Number of 64-bit words for the signs of a row of Φ: ⌈N/64⌉.
     #[must_use]
     pub fn words(&self) -> usize {
         self.nrows.div_ceil(64)
     }
 
-    /// Writes φᵀ D for one row φ after the other: bit k of a row (bit k mod 64 of its word ⌊k/64⌋) is set where φₖ = +1
-    /// and clear where φₖ = −1. `signs` holds [`Self::words`] words a row; bits past N do not matter. `out` is
-    /// row-major with K numbers a row.
+    /// Computes φᵀ D for consecutive rows φ. Bit k of a row (bit k mod 64 of its word ⌊k/64⌋) is set if φₖ = +1 and
+    /// clear if φₖ = −1. `signs` holds [`Self::words`] words for each row; bits after N are ignored. `out` is row-major
+    /// with K numbers for each row.
     ///
     /// # Panics
-    /// When `signs` and `out` do not hold the same whole number of rows.
+    /// If `signs` and `out` do not hold the same whole number of rows.
     pub fn fill_rows(&self, signs: &[u64], out: &mut [f64]) {
         let words = self.words().max(1);
         assert!(

@@ -1,12 +1,11 @@
-//! When enough has been measured.
+//! Decides when enough has been measured.
 
 use crate::recover::ParameterError;
 
-/// Stops a run of measurements at a wanted confidence: after at least one sample, and at most [`StopRule::most`].
+/// Stops a series of measurements at a wanted confidence: after at least one sample, and at most [`StopRule::most`].
 ///
-/// The confidence is what the algorithm itself says after a sample: the probability of the most probable class
-/// ([`crate::classify::AnytimeClassifier`]), or the expected intersection over union of an image
-/// ([`crate::recover::SequentialEstimate`]).
+/// The confidence comes from the algorithm: the probability of the best class ([`crate::classify::AnytimeClassifier`]),
+/// or the expected intersection over union of an image ([`crate::recover::SequentialEstimate`]).
 ///
 /// Source of the rule for classes: C. W. Baum, V. V. Veeravalli, "A sequential procedure for multihypothesis testing",
 /// IEEE Trans. Inf. Theory 40(6), 1994; with two classes it is Wald's sequential probability ratio test.
@@ -26,20 +25,21 @@ pub struct StopRule {
     most: usize,
 }
 
-/// How a run of measurements ended.
+/// How a series of measurements ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stopped {
-    /// Measurements taken.
+    /// Number of measurements.
     pub measurements: usize,
-    /// Whether the wanted confidence was reached. If not, the measurements ran out.
+    /// Whether the wanted confidence was reached. If not, the largest number of measurements was.
     pub reached: bool,
 }
 
 impl StopRule {
-    /// Stops when the confidence is at least `confidence`, in (0.5, 1), or after `most` measurements, at least 1.
+    /// A rule that stops when the confidence is at least `confidence`, in (0.5, 1), or after `most` measurements, at
+    /// least 1.
     ///
     /// # Errors
-    /// [`ParameterError`] when one of them is outside its range.
+    /// [`ParameterError`] if one of them is outside its range.
     pub fn new(confidence: f64, most: usize) -> Result<Self, ParameterError> {
         if !(confidence > 0.5 && confidence < 1.0) {
             return Err(ParameterError {
@@ -64,14 +64,14 @@ impl StopRule {
         self.confidence
     }
 
-    /// Most measurements.
+    /// Largest number of measurements.
     #[must_use]
     pub fn most(&self) -> usize {
         self.most
     }
 
-    /// Whether a run ends after `measurements` samples with this `confidence`. It never ends before the first sample. A
-    /// confidence that is not a number never reaches the wanted one.
+    /// The end of the series, if it ends after `measurements` samples with this `confidence`. It never ends before the
+    /// first sample. NaN never reaches the wanted confidence.
     #[must_use]
     pub fn after(&self, measurements: usize, confidence: f64) -> Option<Stopped> {
         let reached = confidence >= self.confidence;

@@ -1,5 +1,5 @@
-//! Inner loop of [`SignTables`](crate::SignTables): sums of table rows, the same bits whichever instruction set is
-//! chosen.
+//! Inner loop of [`SignTables`](crate::SignTables): sums of table rows. The bits do not depend on the chosen
+//! instruction set.
 
 use multiversion::multiversion;
 
@@ -52,7 +52,7 @@ fn gather_of<T: Gather>(values: &[T], signs: &[u64], words: usize, groups: usize
     }
 }
 
-/// A precision of the tables, with its own compiled loop.
+/// Precision of the tables, with its own compiled loop.
 pub trait Gather: Copy + Default + Into<f64> + std::ops::AddAssign {
     /// The nearest number of this precision.
     fn nearest(value: f64) -> Self;

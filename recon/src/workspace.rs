@@ -3,10 +3,10 @@
 use std::any::{Any, TypeId};
 use std::fmt;
 
-/// Scratch memory reused between calls, so that a decode allocates nothing but its answer.
+/// Scratch memory reused between calls, so that a decode allocates only its result.
 ///
-/// Every method states its own memory as a type: the workspace holds one value of each type that was asked for, and
-/// hands out the same value the next time. What a value held before must not matter to who asks for it.
+/// Every method defines its memory as a type. The workspace holds one value of each requested type and returns the same
+/// value next time. A method must not depend on the earlier content of its value.
 ///
 /// ```
 /// use spts_recon::Workspace;
@@ -21,15 +21,15 @@ use std::fmt;
 /// ```
 #[derive(Default)]
 pub struct Workspace {
-    /// One value a type, a handful: looked through from the first to the last.
+    /// One value for each type. There are only a few, so they are searched linearly.
     values: Vec<(TypeId, Box<dyn Any + Send + Sync>)>,
 }
 
 impl Workspace {
-    /// The workspace's value of type `T`, its default the first time.
+    /// The workspace's value of type `T`. The first call creates it as `T::default()`.
     ///
     /// # Panics
-    /// Never: a value is found under its own type.
+    /// Never: a value is stored under its own type.
     pub fn scratch<T: Any + Default + Send + Sync>(&mut self) -> &mut T {
         let id = TypeId::of::<T>();
         let found = self.values.iter().position(|(other, _)| *other == id);

@@ -1,24 +1,24 @@
-//! Fidelity levels of the contact: what each was measured to cost and to err, and the choice of one for a wanted error.
+//! Fidelity levels of the contact: the measured cost and error of each, and the choice of one for a given tolerance.
 
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 
-/// A fidelity level: one way to answer a contact.
+/// A fidelity level: a contact model, with or without dynamics.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FidelityLevel {
     /// Name in the table.
     pub name: &'static str,
     /// Name in figures and printed tables.
     pub label: &'static str,
-    /// Contact field, as `contact.model` in a scene.
+    /// Contact model, as `contact.model` in a scene.
     pub model: &'static str,
-    /// Whether an elastic field is solved at every step (true) or for frames only.
+    /// Whether an elastic field is solved at every time step (`true`) or for frames only (`false`).
     pub coupled: Option<bool>,
-    /// Whether it is driven by MuJoCo: has a time step, and can bounce.
+    /// Whether MuJoCo simulates the dynamics; only then are there a time step and bounces.
     pub dynamic: bool,
 }
 
-/// Every fidelity level, cheapest first; the last but one is the reference.
+/// Every fidelity level, the cheapest first. The last but one is the reference.
 pub const LEVELS: &[FidelityLevel] = &[
     FidelityLevel {
         name: "footprint",
@@ -57,7 +57,7 @@ pub const LEVELS: &[FidelityLevel] = &[
     },
 ];
 
-/// The level that the others are measured against.
+/// Name of the level with which the others are compared.
 pub const REFERENCE: &str = "layer";
 
 impl FidelityLevel {
@@ -67,8 +67,8 @@ impl FidelityLevel {
         LEVELS.iter().find(|level| level.name == name)
     }
 
-    /// Writes this level, at a resolution, into the `[contact]` section of a scene. Other parameters of the section
-    /// stay, as far as the level takes them.
+    /// Writes this level, with the given resolution, into the `[contact]` section of a scene. Other parameters of the
+    /// section are kept if the level has them.
     pub fn apply(&self, contact: &mut toml::Table, cells_per_taxel: usize) {
         change_model(contact, self.model);
         let cells = i64::try_from(cells_per_taxel).unwrap_or(i64::MAX);
@@ -84,8 +84,9 @@ const ELASTIC_ONLY: [&str; 4] = ["poisson", "tolerance", "coupled", "densificati
 /// Those of them that every elastic field chooses by itself.
 const OWN_CHOICE: [&str; 2] = ["coupled", "densification"];
 
-/// Names another contact field in the `[contact]` section of a scene, and removes what belonged to the one before: a
-/// saved scene, every default written out, can then be run on any level. What no field takes stays, to be refused.
+/// Changes the contact model in the `[contact]` section of a scene, and removes the parameters of the earlier model. A
+/// saved scene, which contains all defaults, can then be run on any level. Parameters that no model has are kept, so
+/// that they are reported as errors.
 pub fn change_model(contact: &mut toml::Table, model: &str) {
     let before = contact.insert("model".to_owned(), model.into());
     let before = before.as_ref().and_then(toml::Value::as_str).unwrap_or("winkler");
@@ -102,13 +103,13 @@ pub fn change_model(contact: &mut toml::Table, model: &str) {
     }
 }
 
-/// One line of the measured table: a scene on a level at a resolution and a time step. Errors are relative to the
-/// reference level at its finest.
+/// One line of the measured table: a scene with a level, a resolution and a time step. Errors are relative to the
+/// reference level at its finest resolution.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredSetting {
     /// Scene of the study.
     pub scene: String,
-    /// What happens in it: "press" or "drop".
+    /// Task of the scene: "press" or "drop".
     pub task: String,
     /// Name of the fidelity level; the column is called `rung`.
     #[serde(rename = "rung")]
@@ -117,40 +118,40 @@ pub struct MeasuredSetting {
     pub cells: String,
     /// Fine cells along one side of a taxel.
     pub cells_per_taxel: usize,
-    /// Step of the dynamics, s; between frames for a level without dynamics.
+    /// Time step of the dynamics, s; the time between frames for a level without dynamics.
     pub timestep_s: f64,
-    /// Wall time of a step, µs.
+    /// Wall time of a time step, µs.
     pub cost_us_per_step: f64,
-    /// Wall time of a second of the scene, s.
+    /// Wall time of a simulated second, s.
     pub cost_s_per_s: f64,
-    /// Fine pressure: root mean square of the error over that of the reference.
+    /// Error of the fine pressure: its root mean square relative to that of the reference.
     pub pressure_rms_rel: f64,
-    /// The same of the taxels' pressures over the whole course.
+    /// Error of the taxels' pressures over the whole scene, in the same measure.
     pub taxel_rms_rel: f64,
-    /// Support accuracy after the whole chain, less that of the reference.
+    /// Support accuracy after the whole chain, minus that of the reference.
     pub support_delta: f64,
-    /// Intersection over union of the support, less that of the reference.
+    /// Intersection over union of the support, minus that of the reference.
     pub iou_delta: f64,
-    /// Share of windows classified correctly, less that of the reference.
+    /// Share of correctly classified windows, minus that of the reference.
     pub class_delta: f64,
 }
 
-/// A choice from the table.
+/// A setting chosen from the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FidelityChoice {
-    /// FidelityLevel.
+    /// The fidelity level.
     pub level: &'static FidelityLevel,
     /// Fine cells along one side of a taxel.
     pub cells_per_taxel: usize,
-    /// Step of the dynamics, s.
+    /// Time step of the dynamics, s.
     pub timestep_s: f64,
-    /// Largest error of the taxels' pressures over the study's scenes of this kind.
+    /// Largest error of the taxels' pressures over the scenes of this task.
     pub taxel_rms_rel: f64,
-    /// Mean cost over the study's scenes of this kind, s a second.
+    /// Mean cost over the scenes of this task, in seconds a simulated second.
     pub cost_s_per_s: f64,
 }
 
-/// The table that `spts fidelity` measured, as shipped: default skin and foam, 20 N.
+/// The shipped table, measured by `spts fidelity`: default skin and foam, 20 N.
 #[must_use]
 pub fn measured() -> &'static [MeasuredSetting] {
     static TABLE: OnceLock<Vec<MeasuredSetting>> = OnceLock::new();
@@ -161,8 +162,16 @@ pub fn measured() -> &'static [MeasuredSetting] {
     })
 }
 
-/// The cheapest level, resolution and time step of `table` whose largest taxel-pressure error over all scenes of `task`
-/// ("press" or "drop") is at most `tolerance`; `None` when there is none.
+/// The cheapest level, resolution and time step in `table` whose largest error of the taxels' pressures over all scenes
+/// of `task` ("press" or "drop") is at most `tolerance`; `None` if there is none.
+///
+/// ```
+/// use spts_sim::fidelity::{cheapest, measured};
+///
+/// let rough = cheapest(measured(), "press", 0.5).expect("a level meets 50 %");
+/// let exact = cheapest(measured(), "press", 0.05).expect("a level meets 5 %");
+/// assert!(rough.cost_s_per_s <= exact.cost_s_per_s && exact.taxel_rms_rel <= 0.05);
+/// ```
 #[must_use]
 pub fn cheapest(table: &[MeasuredSetting], task: &str, tolerance: f64) -> Option<FidelityChoice> {
     let rows: Vec<&MeasuredSetting> = table.iter().filter(|row| row.task == task).collect();

@@ -1,4 +1,4 @@
-//! UR5, ball and the MuJoCo world around a contact field: scenes in, pressure frames out.
+//! UR5 arm, ball and MuJoCo simulation around a contact field: scenes in, pressure frames out.
 //!
 //! ```
 //! use spts_sim::{Mechanics, World};

@@ -1,4 +1,4 @@
-//! Pictures of a world, drawn off-screen by MuJoCo through EGL.
+//! Pictures of a simulation, drawn off-screen by MuJoCo through EGL.
 
 use crate::world::model::compile;
 use crate::world::visual::{BODY_GEOM, MAX_PADS, PAD_RGB, Visuals, pad_name};
@@ -7,7 +7,7 @@ use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera};
 use mujoco_rs::renderer::MjRenderer;
 use spts_contact::Frame;
 
-/// Where the picture is taken from.
+/// Position of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Camera {
     /// Arm and skin.
@@ -36,7 +36,7 @@ pub struct Picture {
     pub rgb: Vec<u8>,
 }
 
-/// Draws one scene again and again; keep it for a film.
+/// Draws a scene repeatedly. Keep the renderer to draw a film.
 #[derive(Debug)]
 pub struct Renderer {
     model: Box<MjModel>,
@@ -49,10 +49,10 @@ pub struct Renderer {
 const CLEAR_ALPHA: f32 = 0.28;
 
 impl Renderer {
-    /// Renderer for the scene of `world`.
+    /// A renderer for the scene of `world`.
     ///
     /// # Errors
-    /// [`SimError`] when the size is outside [1, 8192] or MuJoCo does not take the model.
+    /// [`SimError`] if the size is outside [1, 8192], or MuJoCo rejects the model.
     pub fn new(world: &World, width: usize, height: usize) -> Result<Self, SimError> {
         if ![width, height].iter().all(|side| (1..=MAX_PIXELS).contains(side)) {
             return Err(SimError::PictureSize { width, height });
@@ -72,11 +72,11 @@ impl Renderer {
         })
     }
 
-    /// Picture of `world` as it stands; with `frame`, the skin's pads are coloured by its pressure (relative to
-    /// `full_scale_pa`), and a close-up shows them through the body.
+    /// Draws `world` in its present state. With `frame`, the skin's pads are coloured by its pressure relative to
+    /// `full_scale_pa`, and a close-up shows them through the body.
     ///
     /// # Errors
-    /// [`SimError::Render`] when there is no EGL.
+    /// [`SimError::Render`] if EGL is missing.
     pub fn draw(&mut self, world: &World, camera: Camera, frame: Option<(&Frame, f64)>) -> Result<Picture, SimError> {
         let failed = |error: mujoco_rs::renderer::RendererError| SimError::Render(error.to_string());
         for (taxel, &geom) in self.pads.iter().enumerate() {

@@ -45,12 +45,12 @@ pub(super) fn hostile() -> Vec<(&'static str, String, &'static str)> {
         (
             "answers without reading",
             "yes '{\"label\": 1}'".to_owned(),
-            "windows had been asked",
+            "windows had been sent",
         ),
         (
             "answers without reading, slowly",
             "while :; do echo '{\"label\": 1}'; sleep .2; done".to_owned(),
-            "windows had been asked",
+            "windows had been sent",
         ),
         (
             "reads nothing",

@@ -1,13 +1,13 @@
-//! `KEY=VALUE`: one field of a table and the value that it shall have.
+//! `KEY=VALUE`: one field of a table, and the value to give it.
 
 use std::fmt;
 use std::str::FromStr;
 use toml::{Table, Value};
 
-/// One field of a scene, or of another table, and the value it shall have.
+/// One field of a scene or of another table, and the value to give it.
 ///
-/// The key is a dotted path, as in `press.force_n`. An entry of a list goes by its number from 0, and `+` adds one, as
-/// in `faults.0.taxel` or `faults.+`. A value is TOML; a bare word is a string.
+/// The key is a dotted path, such as `press.force_n`. A number selects an entry of a list, counted from 0
+/// (`faults.0.taxel`); `+` appends an entry (`faults.+`). The value is TOML. A bare word is a string.
 ///
 /// ```
 /// use spts::assign::Assignment;
@@ -21,20 +21,20 @@ use toml::{Table, Value};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Assignment {
-    /// Keys, of which the one counts whose section, `[press]` or `[drop]`, the scene has.
+    /// Alternative keys, of which the scene uses the one whose section (`[press]` or `[drop]`) it has.
     pub(crate) keys: Vec<String>,
     pub(crate) value: Value,
     /// How the user wrote it.
     said: String,
 }
 
-/// A value that cannot be put into a scene.
+/// A value that cannot be put into a table.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{said}: {reason}")]
 pub struct AssignError {
     /// What was asked for, as the user wrote it.
     pub said: String,
-    /// Why it cannot be.
+    /// Why the value cannot be set.
     pub reason: String,
 }
 
@@ -77,10 +77,11 @@ impl fmt::Display for Assignment {
 }
 
 impl Assignment {
-    /// What the option `option` of a command stands for: `value` for the one of `keys` whose section the scene has.
+    /// The assignment of `value` for the option `option` of a command. `keys` are alternatives: the one
+    /// whose section the scene has is set.
     ///
     /// # Panics
-    /// Without a key.
+    /// If `keys` is empty.
     #[must_use]
     pub fn of_option(option: &str, keys: &[&str], value: Value) -> Self {
         assert!(!keys.is_empty(), "an option stands for a key");
@@ -95,7 +96,7 @@ impl Assignment {
         }
     }
 
-    /// Whether it sets `key`.
+    /// Whether the assignment sets `key`.
     #[must_use]
     pub fn sets(&self, key: &str) -> bool {
         self.keys.iter().any(|k| k == key)
@@ -109,10 +110,10 @@ impl Assignment {
         }
     }
 
-    /// Puts the value into `table`, which need not be a scene and is not checked.
+    /// Puts the value into `table`. `table` may be any table, and the result is not checked as a scene.
     ///
     /// # Errors
-    /// [`AssignError`] for a key below one that has a value, and for an entry of a list that is not there.
+    /// [`AssignError`] if the key lies below a plain value, or names an entry that a list does not have.
     pub fn put_into(&self, table: &mut Table) -> Result<(), AssignError> {
         self.put(table, &self.keys[0])
     }

@@ -1,7 +1,7 @@
-//! What has to go when a signal ends the program: temporary folders and the processes that the program has started.
+//! Clean-up when a signal ends the program: temporary folders and processes that the program has started.
 //!
-//! Destructors do not run when a signal ends a program. What they would remove is therefore listed here while it
-//! exists, and [`end_on_signals`] lets SIGINT, SIGTERM and SIGHUP remove all of it first.
+//! A signal ends a program without running destructors. Whatever they would remove is therefore listed here, and
+//! [`end_on_signals`] removes everything listed before SIGINT, SIGTERM or SIGHUP ends the program.
 //!
 //! ```
 //! use spts::cleanup::{Leftover, listed};
@@ -30,17 +30,17 @@ const ATTEMPTS: usize = 20;
 /// Time between two such attempts.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// Something that must not outlive the program.
+/// A resource that must not outlive the program.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Leftover {
-    /// A folder, removed with all that is in it.
+    /// A folder, removed with its contents.
     Folder(PathBuf),
-    /// Folders, each removed if it is empty by then, in this order.
+    /// Folders, removed in this order, each only if it is empty.
     EmptyFolders(Vec<PathBuf>),
     /// A file.
     File(PathBuf),
-    /// A group of processes, by the process number of its leader; ended by SIGKILL.
+    /// A process group, given by its leader's process number, and ended by SIGKILL.
     Group(Pid),
 }
 
@@ -61,7 +61,7 @@ fn list() -> MutexGuard<'static, List> {
     LIST.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// An entry of the list, taken off when dropped. Whoever holds it removes the thing itself.
+/// An entry of the list, removed when dropped. Its owner removes the resource itself.
 #[derive(Debug)]
 #[must_use = "an entry that is dropped is off the list"]
 pub struct Entry(u64);
@@ -72,11 +72,11 @@ impl Drop for Entry {
     }
 }
 
-/// Calls `make` and lists what it has made, as `leftover` says. No signal comes between the two. `make` must neither
-/// list anything nor drop an [`Entry`].
+/// Calls `make` and lists its result as `leftover` says. No signal is handled between the two. `make` must neither list
+/// anything nor drop an [`Entry`].
 ///
 /// # Errors
-/// The error of `make`, after which nothing is listed.
+/// The error of `make`; nothing is listed then.
 pub fn listed<T>(
     make: impl FnOnce() -> io::Result<T>,
     leftover: impl FnOnce(&T) -> Leftover,
@@ -89,11 +89,11 @@ pub fn listed<T>(
     Ok((made, Entry(number)))
 }
 
-/// From now on SIGINT, SIGTERM and SIGHUP remove all that is listed and end the program with status 128 + the number of
-/// the signal. A SIGHUP that is ignored, as under `nohup`, stays so.
+/// Installs the handler: SIGINT, SIGTERM and SIGHUP remove everything listed and end the program with status 128 + the
+/// number of the signal. If SIGHUP is ignored, as under `nohup`, it stays ignored.
 ///
 /// # Errors
-/// [`io::Error`] when the operating system takes no handler or no thread.
+/// [`io::Error`] if the operating system refuses the handler or its thread.
 pub fn end_on_signals() -> io::Result<()> {
     let mut signals = vec![SIGINT, SIGTERM];
     if !is_ignored(SIGHUP) {

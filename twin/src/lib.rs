@@ -1,5 +1,4 @@
-//! The twin of the single-pixel tactile skin as a library: scenes in, recordings out, and everything that is kept of
-//! them.
+//! The twin of the single-pixel tactile skin as a library: it simulates scenes, records them, and stores the results.
 //!
 //! A [`Scene`] says what presses on which skin and how the skin is read out, a [`Twin`] records it, and a [`Session`]
 //! holds the recordings, simulated or real. The matrix Φ of a decoder comes from the [`Recording`], whatever its
@@ -32,9 +31,9 @@
 //! ```
 //!
 //! [`Scene::from_toml`] takes any skin, object, transducer and readout; [`SceneConfig`](scene::SceneConfig) lists the
-//! fields. Another simulation gives its contact as [`Frame`]s to a [`Chain`], which records them: that needs no MuJoCo,
-//! and none is linked without the feature `mujoco`. Recordings of the published skin and folders of sessions open as a
-//! [`SessionSet`](data::SessionSet).
+//! fields. Another simulator can pass its contact as [`Frame`]s to a [`Chain`], which records them. This needs no
+//! MuJoCo: the crate links MuJoCo only with the feature `mujoco`. A [`SessionSet`](data::SessionSet) opens folders of
+//! sessions and the recordings of the published skin.
 //!
 //! The crates behind this one are [`contact`], [`models`], [`circuit`], [`firmware`], [`recon`] and, with the feature
 //! `mujoco`, [`sim`].
@@ -76,7 +75,12 @@ pub use spts_recon as recon;
 #[cfg(feature = "mujoco")]
 pub use spts_sim as sim;
 
-/// The example of the README is compiled with the documentation tests.
+/// The examples of the README are compiled with the documentation tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
 pub struct Readme;
+
+/// The examples of the book's chapter on rows are compiled with the documentation tests.
+#[cfg(doctest)]
+#[doc = include_str!("../../docs/rows.md")]
+pub struct RowsChapter;

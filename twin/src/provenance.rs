@@ -1,4 +1,4 @@
-//! Where a result comes from: what every result file carries, and the machine, which no result depends on.
+//! Provenance of a result, which every result file carries, and the machine, on which no result depends.
 
 use serde::{Deserialize, Serialize};
 #[cfg(feature = "mujoco")]
@@ -7,7 +7,7 @@ use spts_sim::world::MUJOCO_VERSION;
 #[cfg(not(feature = "mujoco"))]
 const MUJOCO_VERSION: &str = "none";
 
-/// What a result depends on. The same on every machine and for any number of threads.
+/// Everything on which a result depends. It is the same on every machine and for any number of threads.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
@@ -17,14 +17,14 @@ pub struct Provenance {
     pub scene_hash: String,
     /// Version of this package.
     pub version: String,
-    /// Revision of the sources, `-dirty` when they were changed after it; `unknown` outside a repository.
+    /// Revision of the sources, with `-dirty` if they were changed afterwards; `unknown` outside a repository.
     pub git_revision: String,
     /// Version of MuJoCo; `none` in a build without it.
     pub mujoco_version: String,
 }
 
 impl Provenance {
-    /// Provenance of what comes from `seed` and the scene with the hash `scene_hash`.
+    /// Provenance of a result computed from `seed` and the scene with hash `scene_hash`.
     #[must_use]
     pub fn new(seed: u64, scene_hash: String) -> Self {
         Self {
@@ -37,10 +37,10 @@ impl Provenance {
     }
 }
 
-/// The machine and the threads: for files of timings only.
+/// The machine and its threads; written only to files of timings.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Machine {
-    /// Model of the processor; `unknown` where it cannot be read.
+    /// Model of the processor; `unknown` if it cannot be read.
     pub cpu: String,
     /// Operating system and architecture.
     pub platform: String,
@@ -49,7 +49,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This machine, now.
+    /// The machine on which the program runs.
     #[must_use]
     pub fn here() -> Self {
         Self {
@@ -61,6 +61,14 @@ impl Machine {
 }
 
 /// FNV-1a of `bytes` as 16 hexadecimal digits.
+///
+/// ```
+/// use spts::provenance::{combined_hash, hash_text};
+///
+/// assert_eq!(hash_text(b"seed = 7").len(), 16);
+/// let hashes = [hash_text(b"a"), hash_text(b"b")];
+/// assert_ne!(combined_hash(&hashes), combined_hash(&[hashes[1].clone(), hashes[0].clone()]));
+/// ```
 #[must_use]
 pub fn hash_text(bytes: &[u8]) -> String {
     format!("{:016x}", fnv1a(bytes))

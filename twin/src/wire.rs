@@ -8,10 +8,10 @@ use spts_recon::metrics::median;
 /// Measurements of the untouched skin from which its output is known.
 const IDLE: usize = 2000;
 
-/// The one wire of a skin: transducer and electronics with their state, pressure after pressure.
+/// The one wire of a skin: transducer and electronics with their state, fed with one pressure after the other.
 ///
-/// Transducer and clocks run from call to call, and how measurements are shared among calls does not show in them. The
-/// skin is untouched while it is measured for the first time, in either mode: that gives [`Wire::idle_v`].
+/// Transducer and clocks keep running between calls, so the result does not depend on how measurements are divided
+/// among calls. [`Wire::new`] measures the untouched skin in both modes, which gives [`Wire::idle_v`].
 ///
 /// ```
 /// use spts::{Chain, ChainConfig, Mode, PressureMap, SkinLayout, Wire};
@@ -38,10 +38,10 @@ struct Line {
 }
 
 impl Wire {
-    /// Wire of the skin of `chain` in session number `session`.
+    /// The wire of the skin of `chain`, in session number `session`.
     ///
     /// # Errors
-    /// [`ChainError`] when the weights cannot come from where the chain says.
+    /// [`ChainError`] if the source of the weights cannot provide them.
     pub fn new(chain: &Chain, session: u64) -> Result<Self, ChainError> {
         let layout = chain.skin();
         let shape = [layout.rows(), layout.cols()];
@@ -64,13 +64,13 @@ impl Wire {
         })
     }
 
-    /// Puts `electrode_pressure` on the electrodes, where it stays for `dt_s` seconds and until the next one comes.
+    /// Applies `electrode_pressure` for `dt_s` seconds. It then stays until the next call.
     ///
     /// # Errors
-    /// [`ChainError::Source`] for a conductance that is not usable.
+    /// [`ChainError::Source`] for a conductance that cannot be used.
     ///
     /// # Panics
-    /// For a map of another shape.
+    /// If the map has another shape than the skin.
     pub fn feel(&mut self, electrode_pressure: &PressureMap, dt_s: f64) -> Result<(), ChainError> {
         let found = [electrode_pressure.rows(), electrode_pressure.cols()];
         assert_eq!(found, self.shape, "shape of the pressure");
@@ -78,16 +78,16 @@ impl Wire {
         Ok(())
     }
 
-    /// Measures what the skin feels, V, as often as `volts` has places.
+    /// Fills `volts` with consecutive measurements, V.
     ///
     /// # Errors
-    /// [`ChainError::Acquire`] when the cells put out nothing.
+    /// [`ChainError::Acquire`] if the cells put out nothing.
     pub fn measure(&mut self, mode: Mode, volts: &mut [f64]) -> Result<(), ChainError> {
         let line = &mut self.lines[index(mode)];
         Ok(line.readout.go_on(&mut self.felt, volts)?)
     }
 
-    /// The rows of Φ of the next `count` measurements.
+    /// The rows of Φ for the next `count` measurements.
     #[must_use]
     pub fn rows(&self, mode: Mode, count: usize) -> WeightRows<'_> {
         let readout = &self.lines[index(mode)].readout;
@@ -100,13 +100,13 @@ impl Wire {
         self.lines[index(mode)].idle_v
     }
 
-    /// Conductance of the taxels, row by row, S.
+    /// Conductance of the taxels in row-major order, S.
     #[must_use]
     pub fn conductance_s(&self) -> &[f64] {
         self.felt.values()
     }
 
-    /// What a recording of it says of itself.
+    /// Metadata of a recording of this wire.
     #[must_use]
     pub fn info(&self, mode: Mode) -> &RecordingInfo {
         self.lines[index(mode)].readout.info()
@@ -176,8 +176,8 @@ mod tests {
         }
     }
 
-    /// What the wire says of a box, 40 measurements and a raster scan as hexadecimal bytes. The Python package has to say
-    /// the same (`python/tests/test_wire.py`).
+    /// What the wire says of a box, 40 measurements and a raster scan as hexadecimal bytes. The Python package has to
+    /// say the same (`python/tests/test_wire.py`).
     #[test]
     fn the_bytes_of_a_press() -> Result<(), Box<dyn std::error::Error>> {
         use spts_contact::mesh::cuboid;

@@ -1,8 +1,8 @@
-//! What one summing amplifier makes of a skin, against its clock and its converter.
+//! Error budget of one summing amplifier for a skin, a clock and a converter.
 
-use super::noise::Noise;
+use super::noise::AmplifierNoise;
 use super::parts::Amplifier;
-use super::response::Response;
+use super::response::AmplifierResponse;
 use crate::effects::Adc;
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, within};
@@ -11,11 +11,11 @@ use spts_models::{ConfigError, within};
 /// and 6 of 100 000 measurements lie beyond four.
 pub(super) const EXCURSION_SD: f64 = 4.0;
 
-/// A pressed skin, in numbers that do not depend on its size.
+/// A pressed skin, described independently of its size.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Skin {
-    /// Share of the taxels that is pressed, evenly spread over the amplifiers where there are several. Range [0, 1].
+    /// Share of taxels that are pressed, spread evenly over the amplifiers if there are several. Range [0, 1].
     pub pressed_share: f64,
     /// Conductance of a pressed taxel, S. Range [0, 1].
     pub pressed_s: f64,
@@ -39,10 +39,10 @@ impl Default for Skin {
 }
 
 impl Skin {
-    /// Checks every number.
+    /// Checks that every value is in its range.
     ///
     /// # Errors
-    /// [`ConfigError`] that names the one outside its range.
+    /// [`ConfigError`] that names the value outside its range.
     pub fn validate(&self) -> Result<(), ConfigError> {
         within("pressed_share", self.pressed_share, 0.0, 1.0, "[0, 1]")?;
         within("pressed_s", self.pressed_s, 0.0, 1.0, "[0, 1]")?;
@@ -72,12 +72,12 @@ impl Skin {
     }
 }
 
-/// What the amplifier has to work with.
+/// Conditions under which the amplifier works.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
-    /// Pressed skin.
+    /// The pressed skin.
     pub skin: Skin,
-    /// Converter behind the last amplifier.
+    /// The converter after the last amplifier.
     pub adc: Adc,
     /// Time from the change of the drives to the sampling of the output, s.
     pub available_s: f64,
@@ -87,20 +87,20 @@ pub struct Setting {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {
-    /// The output has not settled to half a step of the converter when it is sampled.
+    /// When the output is sampled, it has not yet settled to half a step of the converter.
     Settling,
-    /// The sum goes beyond the amplifier's rails.
+    /// The sum exceeds the amplifier's rails.
     Rails,
-    /// The sum goes beyond the converter's range.
+    /// The sum exceeds the converter's range.
     ConverterRange,
-    /// The feedback takes more current than the amplifier can deliver.
+    /// The feedback needs more current than the amplifier can deliver.
     OutputCurrent,
     /// A taxel's signal is less than one step of the converter.
     ConverterStep,
 }
 
 impl Limit {
-    /// In words.
+    /// The limit in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -123,7 +123,7 @@ pub(super) fn worst(loads: impl IntoIterator<Item = Strain>) -> Option<Limit> {
     failing.reduce(worse).map(|(limit, _)| limit)
 }
 
-/// One amplifier with one wire and one converter. All volts are at its output.
+/// Error budget of one amplifier with one wire and one converter. All voltages are at its output.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Budget {
     /// 1 + Rf·ΣG.
@@ -132,46 +132,46 @@ pub struct Budget {
     pub bandwidth_hz: f64,
     /// Quality factor of the response; it rings above ½.
     pub quality: f64,
-    /// Time to settle within half a step of the converter after a step over its whole range, s; without slewing.
+    /// Time for a step over the whole range to settle within half a step of the converter, s; without slewing.
     pub settle_s: f64,
-    /// Time that the slew rate adds at most, s: from one end of the excursion to the other.
+    /// Longest time that the slew rate adds, s: from one end of the excursion to the other.
     pub slew_s: f64,
     /// Noise by source, V rms.
-    pub noise_v: Noise,
-    /// All of it, V rms; without the converter.
+    pub noise_v: AmplifierNoise,
+    /// Root sum of squares of all sources, V rms; without the converter.
     pub noise_v_rms: f64,
     /// Step of the converter, V.
     pub adc_step_v: f64,
-    /// Noise of that step, V rms: step/√12.
+    /// Quantisation noise of the converter, V rms: step/√12.
     pub adc_noise_v: f64,
     /// Signal of one pressed taxel, V: Rf·Vd·G.
     pub signal_v: f64,
-    /// Signal of one pressed taxel over the amplifier's noise, dB.
+    /// Signal of one pressed taxel relative to the amplifier's noise, dB.
     pub snr_db: f64,
-    /// The same with the noise of the converter's step.
+    /// `snr_db` with the quantisation noise of the converter included.
     pub snr_adc_db: f64,
     /// Standard deviation of the sum of all taxels under random signs, V.
     pub sum_rms_v: f64,
-    /// The sum with all signs alike, V.
+    /// Sum if all signs are equal, V.
     pub sum_worst_v: f64,
-    /// Sum that has to fit, V: four standard deviations, or the worst where that is less.
+    /// Sum that has to fit, V: four standard deviations, or `sum_worst_v` if that is less.
     pub excursion_v: f64,
-    /// Largest output that amplifier and converter both can handle, V.
+    /// Largest output within the ranges of amplifier and converter, V.
     pub range_v: f64,
-    /// Whether the excursion goes beyond that.
+    /// Whether `excursion_v` exceeds `range_v`.
     pub saturates: bool,
-    /// What fails by the largest factor, if anything does: the quantity over what it may be, see [`Limit`].
+    /// The limit that is exceeded by the largest factor, if any is exceeded; see [`Limit`].
     pub limit: Option<Limit>,
 }
 
 impl Budget {
-    /// Budget of `amplifier` with `taxels` taxels.
+    /// The budget of `amplifier` with `taxels` taxels.
     #[must_use]
     pub fn new(amplifier: &Amplifier, taxels: f64, setting: &Setting) -> Self {
         let Setting { skin, adc, available_s } = setting;
         let conductance_s = skin.conductance_s(taxels);
-        let response = Response::new(amplifier, conductance_s);
-        let noise_v = Noise::rms(amplifier, conductance_s);
+        let response = AmplifierResponse::new(amplifier, conductance_s);
+        let noise_v = AmplifierNoise::rms(amplifier, conductance_s);
         let feedback_ohm = amplifier.network().feedback_ohm;
         let [sum_rms_v, sum_worst_v] =
             [skin.current_rms_a(taxels), skin.current_worst_a(taxels)].map(|current_a| feedback_ohm * current_a);

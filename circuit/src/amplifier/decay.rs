@@ -1,14 +1,14 @@
-//! Free motion of a system of second order.
+//! Free motion of a second-order system.
 
 /// Modes of ẍ − 2σẋ + (σ² − δ)x = 0 with σ ≤ 0: λ = σ ± √δ.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Decay {
     sigma: f64,
-    /// δ: the modes decay without turning when it is ≥ 0, and oscillate when it is < 0.
+    /// δ: the modes decay without oscillation for δ ≥ 0, and oscillate for δ < 0.
     delta: f64,
     /// √|δ|.
     root: f64,
-    /// Slow real mode −(σ² − δ)/(|σ| + √δ), which does not lose digits; σ where the modes oscillate.
+    /// Slow real mode −(σ² − δ)/(|σ| + √δ), in a form that does not lose digits; σ if the modes oscillate.
     slow: f64,
 }
 

@@ -1,4 +1,5 @@
-//! The summing amplifier from its parts: what it does to a step, what it adds as noise, and how far it scales.
+//! The summing amplifier, modelled from its parts: its step response, its noise, and how it scales with the number of
+//! taxels.
 //!
 //! Every taxel k is a conductance Gk between its own drive Vk and the bus, the inverting input of an operational
 //! amplifier with Rf ∥ Cf from output to bus and Cb from bus to ground. With v the bus, o the output, S = ΣGk and I =
@@ -6,20 +7,20 @@
 //!
 //! (Cb + Cf) v′ = Cf o′ − (S + 1/Rf) v + o/Rf + I,  o′ = ωt (Vos − v) − ωp o,  |o′| ≤ slew rate, |o| ≤ rail,
 //!
-//! where ωt = 2π·GBW and ωp = ωt/A0. [`Transient`] solves this, [`Response`] and [`Noise`] are its small-signal
-//! properties in closed form, and [`Budget`] sets them against a skin, a converter and a clock; [`Remedy`] says what
-//! more taxels take.
+//! where ωt = 2π·GBW and ωp = ωt/A0. [`Transient`] solves these equations. [`AmplifierResponse`] and [`AmplifierNoise`]
+//! are the small-signal properties in closed form. [`Budget`] compares them with a skin, a converter and a clock, and
+//! [`Remedy`] lists what larger skins need.
 //!
 //! ```
-//! use spts_circuit::amplifier::{Amplifier, Load, Network, OpAmp, Response, Transient};
+//! use spts_circuit::amplifier::{Amplifier, BusLoad, Network, OpAmp, AmplifierResponse, Transient};
 //!
 //! let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
 //! // a hundred taxels of 20 µS between them and 3 V on one: −1 kΩ · 20 µS · 3 V
-//! let load = Load { conductance_s: 100.0 * 20e-6, current_a: 20e-6 * 3.0 };
+//! let load = BusLoad { conductance_s: 100.0 * 20e-6, current_a: 20e-6 * 3.0 };
 //! let mut transient = Transient::new(amplifier);
 //! transient.advance(load, 10e-6);
 //! assert!((transient.output_v() + 0.06).abs() < 1e-6);
-//! assert!((Response::new(&amplifier, load.conductance_s).noise_gain() - 3.0).abs() < 1e-12);
+//! assert!((AmplifierResponse::new(&amplifier, load.conductance_s).noise_gain() - 3.0).abs() < 1e-12);
 //! # Ok::<(), spts_models::ConfigError>(())
 //! ```
 
@@ -37,9 +38,9 @@ mod state;
 mod transient;
 
 pub use budget::{Budget, Limit, Setting, Skin};
-pub use noise::Noise;
+pub use noise::AmplifierNoise;
 pub use parts::{Amplifier, Network, OpAmp};
 pub use remedies::{Remedied, Remedy, fewest_wires, remedied};
-pub use response::Response;
-pub use state::Load;
+pub use response::AmplifierResponse;
+pub use state::BusLoad;
 pub use transient::Transient;

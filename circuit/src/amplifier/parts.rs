@@ -1,4 +1,4 @@
-//! What the amplifier is made of.
+//! The parts of the amplifier.
 
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, within};
@@ -22,14 +22,15 @@ pub struct OpAmp {
     pub dc_gain: f64,
     /// Largest rate of change of the output, V/s. Range [1, 1e15].
     pub slew_v_per_s: f64,
-    /// The output stays within ± this, V. Range [1e-3, 1e6]. Default: 0.1 V inside ± 15 V; the part allows ± 20 V.
+    /// The output stays within ± this voltage, V. Range [1e-3, 1e6]. Default: 0.1 V inside ± 15 V; the part allows ± 20
+    /// V.
     pub rail_v: f64,
     /// Largest output current, A. Range [1e-9, 1e6].
     pub output_a: f64,
     /// Input voltage noise en far above `noise_corner_hz`, V/√Hz. Range [0, 1e-3].
     pub noise_v_per_rthz: f64,
-    /// Corner fc of the 1/f noise, Hz: the input voltage noise is en²·(1 + fc/f) from 1 Hz on and en² below, where it
-    /// counts as offset. 0 is white noise alone. Range [0, 1e9].
+    /// Corner fc of the 1/f noise, Hz. The input voltage noise is en²·(1 + fc/f) above 1 Hz, and en² below, where 1/f
+    /// noise counts as offset. 0 gives white noise only. Range [0, 1e9].
     pub noise_corner_hz: f64,
     /// Input current noise in, A/√Hz, white. Range [0, 1e-3].
     pub noise_a_per_rthz: f64,
@@ -50,17 +51,18 @@ impl Default for OpAmp {
     }
 }
 
-/// What is around the operational amplifier.
+/// The passive parts around the operational amplifier.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Network {
-    /// Feedback resistance Rf, Ω. Range [1e-9, 1e9]. Default 1 kΩ, an estimate: only Rf·Vd·G is known of the device.
+    /// Feedback resistance Rf, Ω. Range [1e-9, 1e9]. Default 1 kΩ, an estimate: only Rf·Vd·G of the device is known.
     pub feedback_ohm: f64,
-    /// Capacitance Cf across the feedback resistance, F. Range [0, 1e-6]. Default 0: none is known of.
+    /// Capacitance Cf across the feedback resistance, F. Range [0, 1e-6]. Default 0, as the device is not known to have
+    /// one.
     pub feedback_f: f64,
-    /// Capacitance Cb of the bus against ground, the amplifier's input included, F. Range [0, 1]: a million taxels of
-    /// 1 µF. Default 0: it is not known. Some nF, which 100 electrodes and their wires can have, make the output ring
-    /// for several µs.
+    /// Capacitance Cb between bus and ground, including the amplifier's input, F. Range [0, 1], enough for a million
+    /// taxels of 1 µF. Default 0, as the value is not known. A few nF, possible for 100 electrodes with their wires,
+    /// make the output ring for several µs.
     pub bus_f: f64,
     /// Input offset Vos, V. Range [−1, 1]. Default 0; the TLV9362 has ± 0.4 mV.
     pub offset_v: f64,
@@ -80,7 +82,16 @@ impl Default for Network {
     }
 }
 
-/// A summing amplifier whose every parameter lies within its range.
+/// A summing amplifier whose parameters are all within their ranges.
+///
+/// ```
+/// use spts_circuit::amplifier::{Amplifier, Network, OpAmp};
+///
+/// let network = Network { bus_f: 2e-9, ..Network::default() };
+/// assert!(Amplifier::new(OpAmp::default(), network).is_ok());
+/// let error = Amplifier::new(OpAmp::default(), Network { bus_f: -1.0, ..network }).unwrap_err();
+/// assert!(error.to_string().contains("bus_f"));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Amplifier {
     op_amp: OpAmp,
@@ -88,7 +99,7 @@ pub struct Amplifier {
 }
 
 impl Amplifier {
-    /// Amplifier of these parts.
+    /// An amplifier made of these parts.
     ///
     /// # Errors
     /// [`ConfigError`] that names the parameter outside its range.
@@ -115,7 +126,7 @@ impl Amplifier {
         &self.op_amp
     }
 
-    /// What is around it.
+    /// The passive parts around it.
     #[must_use]
     pub fn network(&self) -> &Network {
         &self.network

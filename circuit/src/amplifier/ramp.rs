@@ -1,8 +1,8 @@
-//! The amplifier while its output slews or stands at a rail: the output is a straight line, the bus of first order.
+//! The amplifier while its output slews or is at a rail: the output is a straight line, the bus a first-order system.
 
 use super::parts::Amplifier;
 use super::root::crossing;
-use super::state::{Load, State};
+use super::state::{BusLoad, State};
 
 /// Output at the constant rate r; the bus follows v′ = −k v + b + c t, k = (S + 1/Rf)/C.
 pub(super) struct Ramp<'a> {
@@ -10,7 +10,7 @@ pub(super) struct Ramp<'a> {
     start: State,
     /// r, V/s: ± the slew rate, or 0 at a rail.
     rate: f64,
-    /// +1 or −1: where the output is driven.
+    /// +1 or −1: direction in which the output is driven.
     sign: f64,
     /// k, 1/s.
     decay_per_s: f64,
@@ -22,7 +22,7 @@ pub(super) struct Ramp<'a> {
 
 impl<'a> Ramp<'a> {
     /// Phase from `start` on: driven up or down, with the output at `rate`.
-    pub(super) fn new(amplifier: &'a Amplifier, load: Load, start: State, rate: f64, up: bool) -> Self {
+    pub(super) fn new(amplifier: &'a Amplifier, load: BusLoad, start: State, rate: f64, up: bool) -> Self {
         let network = amplifier.network();
         let (bus_s, capacitance_f) = (amplifier.bus_s(load.conductance_s), amplifier.capacitance_f());
         let current_a =

@@ -1,9 +1,9 @@
-//! What a larger skin takes: a smaller feedback, a tree of amplifiers, or more wires.
+//! Ways to read larger skins: a smaller feedback, a tree of amplifiers, or more wires.
 
 use super::budget::{Budget, EXCURSION_SD, Limit, Setting, Strain, adc_ends_v, decibels, settling_fraction, worst};
-use super::noise::Noise;
+use super::noise::AmplifierNoise;
 use super::parts::{Amplifier, Network};
-use super::response::Response;
+use super::response::AmplifierResponse;
 use serde::Serialize;
 use spts_models::{ConfigError, in_range};
 
@@ -14,25 +14,25 @@ const TAXELS_AS_BUILT: f64 = 100.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Remedy {
-    /// None: one amplifier with the feedback as it is.
+    /// One amplifier with unchanged feedback.
     AsBuilt,
-    /// One amplifier whose feedback is smaller by the number of taxels over 100. The largest sum and the noise gain
-    /// stay, and without capacitance on the bus the bandwidth; a taxel's signal falls as 100/N, the rms of the sum as
-    /// √(100/N).
+    /// One amplifier whose feedback is divided by (number of taxels)/100. The largest sum, the noise gain and, without
+    /// capacitance on the bus, the bandwidth stay the same. The signal of a taxel falls as 100/N, and the rms of the
+    /// sum as √(100/N).
     FeedbackScaled,
-    /// One amplifier for every 100 taxels or fewer, and amplifiers that sum 100 of those or fewer, level by level, each
-    /// level with the gain ≤ 1 with which its sum still fits. One wire and one converter at the end.
+    /// One amplifier for every 100 taxels or fewer, and further levels of amplifiers that each sum up to 100 outputs.
+    /// Each level has the largest gain ≤ 1 with which its sum fits. There is one wire and one converter at the end.
     SubArrays,
-    /// As many wires as it takes, each with an amplifier as built and a converter of its own, read at the same time.
-    /// The taxels are shared out evenly, and the budget is that of a fullest wire.
+    /// As many wires as necessary, read at the same time, each with an unchanged amplifier and its own converter.
+    /// Taxels are divided evenly; the budget is that of a wire with the most taxels.
     Wires,
 }
 
 impl Remedy {
-    /// Every way, the plain one first.
+    /// Every remedy, the unchanged circuit first.
     pub const ALL: [Self; 4] = [Self::AsBuilt, Self::FeedbackScaled, Self::SubArrays, Self::Wires];
 
-    /// In words.
+    /// The remedy in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -44,34 +44,49 @@ impl Remedy {
     }
 }
 
-/// A skin read in one of these ways.
+/// A skin read with one of the remedies.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Remedied {
     /// Taxels of the whole skin.
     pub taxels: u32,
-    /// Which way.
+    /// The remedy.
     pub remedy: Remedy,
-    /// Wires, each with a converter.
+    /// Number of wires, each with its converter.
     pub wires: u32,
-    /// Amplifiers in all.
+    /// Number of amplifiers.
     pub amplifiers: u32,
-    /// Levels of amplifiers between a taxel and its converter.
+    /// Number of levels of amplifiers between a taxel and its converter.
     pub levels: u32,
     /// Feedback resistance of the first level, Ω.
     pub feedback_ohm: f64,
     /// Gain from the first level's output to the converter's input.
     pub gain: f64,
-    /// Of one wire. With several levels: the largest noise gain, the smallest bandwidth, the sum of the settling times
-    /// (which is longer than they take together), the longest slewing (the levels slew at the same time), all noise at
+    /// Budget of one wire. With several levels it holds the largest noise gain, the smallest bandwidth, the sum of the
+    /// settling times (an upper bound), the longest slewing time (levels slew at the same time), and the total noise at
     /// the last output.
     #[serde(flatten)]
     pub budget: Budget,
 }
 
-/// Budget of `taxels` taxels read with `amplifier`s, `sub_array` ≥ 2 on each where `remedy` is [`Remedy::SubArrays`].
+/// Budget of `taxels` taxels read with the parts `amplifier`. For [`Remedy::SubArrays`], every amplifier has
+/// `sub_array` ≥ 2 inputs.
+///
+/// ```
+/// use spts_circuit::amplifier::{Amplifier, Network, OpAmp, Remedy, Setting, Skin, remedied};
+///
+/// let adc = toml::from_str("bits = 10\nreference_v = 3.3\ndivider = 6.67\noffset_v = 11.0")?;
+/// let skin = Skin { pressed_share: 0.1, pressed_s: 1e-4, idle_s: 0.0, drive_v: 4.3 };
+/// let setting = Setting { skin, adc, available_s: 12e-6 };
+/// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
+/// let one = remedied(&amplifier, 10_000, 100, Remedy::AsBuilt, &setting)?;
+/// let tree = remedied(&amplifier, 10_000, 100, Remedy::SubArrays, &setting)?;
+/// assert!(one.budget.limit.is_some(), "10,000 taxels are too many for one amplifier");
+/// assert!(tree.amplifiers > 100 && tree.wires == 1);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
-/// [`ConfigError`] for no taxels, a sub-array of fewer than 2, or a feedback that scales below its range.
+/// [`ConfigError`] for zero taxels, a sub-array of fewer than 2 inputs, or a scaled feedback below its range.
 pub fn remedied(
     amplifier: &Amplifier,
     taxels: u32,
@@ -116,15 +131,15 @@ fn wired(amplifier: &Amplifier, taxels: u32, wires: u32, remedy: Remedy, setting
     }
 }
 
-/// The smallest number of wires with which nothing fails, a bus of n taxels being read with the amplifier `on_bus(n)`;
-/// one wire a taxel where something always fails.
+/// Smallest number of wires with which nothing fails. `on_bus(n)` is the amplifier of a bus of n taxels. The result is
+/// one wire a taxel if something fails for every number.
 ///
-/// More taxels on a wire are not always worse: beside a capacitance of the bus their conductance damps the ringing. So
-/// every number of wires counts, but only by the taxels on its fullest and its emptiest wire, ⌈N/w⌉ and ⌊N/w⌋, of which
-/// there are fewer than 4√N pairs.
+/// More taxels on a wire are not always worse: with a capacitance on the bus, their conductance damps the ringing.
+/// Every number of wires w is therefore considered. The outcome depends only on the fullest and the emptiest wire, with
+/// ⌈N/w⌉ and ⌊N/w⌋ taxels; there are fewer than 4√N such pairs.
 ///
 /// # Errors
-/// As [`remedied`], and those of `on_bus`.
+/// As [`remedied`], and the errors of `on_bus`.
 pub fn fewest_wires(
     taxels: u32,
     setting: &Setting,
@@ -200,9 +215,9 @@ fn sub_arrays(amplifier: &Amplifier, taxels: u32, sub_array: u32, setting: &Sett
 
 /// A tree under construction.
 struct Tree {
-    /// What holds over the levels so far; volts are at the sum of the last level's outputs.
+    /// Result over the levels so far; voltages are at the sum of the last level's outputs.
     total: Remedied,
-    /// Rails and output current of the first level alone.
+    /// Rails and output current, for the first level only.
     first: [Strain; 2],
 }
 
@@ -229,8 +244,8 @@ impl Tree {
         };
         let feedback_ohm = amplifier.network().feedback_ohm;
         let conductance_s = fan_in * gain / feedback_ohm;
-        let response = Response::new(amplifier, conductance_s);
-        let noise = Noise::rms(amplifier, conductance_s);
+        let response = AmplifierResponse::new(amplifier, conductance_s);
+        let noise = AmplifierNoise::rms(amplifier, conductance_s);
         b.noise_gain = b.noise_gain.max(response.noise_gain());
         b.bandwidth_hz = b.bandwidth_hz.min(response.bandwidth_hz());
         b.quality = b.quality.max(response.quality());

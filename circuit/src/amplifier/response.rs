@@ -5,14 +5,25 @@ use super::parts::Amplifier;
 use super::settling::settle_s;
 use std::f64::consts::TAU;
 
-/// Small-signal response with ΣG = S on the bus: from a current into the bus to the output,
+/// Small-signal response with ΣG = S on the bus. The transfer function from a current into the bus to the output is
 ///
 /// H(s) = −ωt / (a₂ s² + a₁ s + a₀), a₂ = Cb + Cf, a₁ = S + 1/Rf + ωp (Cb + Cf) + ωt Cf, a₀ = ωp (S + 1/Rf) + ωt/Rf.
 ///
-/// Source: nodal analysis of the circuit of [the module](super). Without capacitances it is the single pole of the
-/// textbook, GBW/(1 + Rf·S).
+/// Source: nodal analysis of the circuit in [the module](super). Without capacitances the result is the textbook single
+/// pole, GBW/(1 + Rf·S).
+///
+/// ```
+/// use spts_circuit::amplifier::{Amplifier, Network, OpAmp, AmplifierResponse};
+///
+/// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
+/// let small = AmplifierResponse::new(&amplifier, 100.0 * 1e-4); // 100 taxels of 0.1 mS
+/// let large = AmplifierResponse::new(&amplifier, 10_000.0 * 1e-4);
+/// assert!((small.noise_gain() - 11.0).abs() < 1e-9);
+/// assert!(large.bandwidth_hz() < small.bandwidth_hz() / 50.0, "more taxels, less bandwidth");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Response {
+pub struct AmplifierResponse {
     noise_gain: f64,
     /// ωt, rad/s.
     pub(super) unity: f64,
@@ -22,7 +33,7 @@ pub struct Response {
     pub(super) a: [f64; 3],
 }
 
-impl Response {
+impl AmplifierResponse {
     /// Response of `amplifier` with ΣG = `conductance_s` ≥ 0, S.
     #[must_use]
     pub fn new(amplifier: &Amplifier, conductance_s: f64) -> Self {
@@ -41,13 +52,13 @@ impl Response {
         }
     }
 
-    /// 1 + Rf·ΣG: gain of noise and offset at the inputs.
+    /// Noise gain 1 + Rf·ΣG, by which noise and offset at the inputs are amplified.
     #[must_use]
     pub fn noise_gain(&self) -> f64 {
         self.noise_gain
     }
 
-    /// |H| at `frequency_hz` ≥ 0: output over current into the bus, V/A; near Rf at DC.
+    /// |H| at `frequency_hz` ≥ 0, output over current into the bus, V/A; close to Rf at DC.
     #[must_use]
     pub fn gain_ohm(&self, frequency_hz: f64) -> f64 {
         let ([a0, a1, a2], omega) = (self.a, TAU * frequency_hz);
@@ -66,13 +77,13 @@ impl Response {
         (self.a[0] * self.a[2]).sqrt() / self.a[1]
     }
 
-    /// Frequency of the ringing after a step, Hz, if there is one: f₀ √(1 − 1/4Q²).
+    /// Frequency of the ringing after a step, Hz: f₀ √(1 − 1/4Q²); `None` without ringing.
     #[must_use]
     pub fn ringing_hz(&self) -> Option<f64> {
         self.decay().turning().map(|rad_per_s| rad_per_s / TAU)
     }
 
-    /// Rate a₁/2a₂ at which the ringing dies out, 1/s.
+    /// Rate a₁/2a₂ at which the ringing decays, 1/s.
     #[must_use]
     pub fn damping_per_s(&self) -> f64 {
         -self.decay().sigma()
@@ -93,8 +104,8 @@ impl Response {
         u.sqrt() / TAU
     }
 
-    /// Time after a step of the drives from which on the output stays within `fraction` of the step, s, as long as it
-    /// does not slew. Half a step of a converter of b bits is a fraction of 2^−(b+1) of its range.
+    /// Time after a step of the drives from which the output stays within `fraction` of the step, s, if it does not
+    /// slew. Half a step of a converter of b bits is the fraction 2^−(b+1) of its range.
     #[must_use]
     pub fn settle_s(&self, fraction: f64) -> f64 {
         settle_s(&self.decay(), fraction)

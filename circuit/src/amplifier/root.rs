@@ -1,4 +1,4 @@
-//! Where a monotone function crosses zero.
+//! Zero of a monotone function.
 
 /// Steps after which the bracket is taken as it is; about ten do.
 const STEPS: u32 = 200;

@@ -1,4 +1,4 @@
-//! How long a step response of second order takes.
+//! Settling time of a second-order step response.
 
 use super::decay::Decay;
 use super::root::crossing;

@@ -1,17 +1,17 @@
-//! Bus and output over time, for any step from nothing to hours.
+//! Bus and output as functions of time, for time steps from zero to hours.
 
 use super::linear::{Exit, Linear, rest};
 use super::parts::Amplifier;
 use super::ramp::{Ramp, demand_v_per_s};
-use super::state::{Load, State};
+use super::state::{BusLoad, State};
 
 /// What the output does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Phase {
     Linear,
-    /// At the slew rate; whether upwards.
+    /// At the slew rate; `true` if upwards.
     Slew(bool),
-    /// At a rail; whether the upper one.
+    /// At a rail; `true` for the upper one.
     Rail(bool),
 }
 
@@ -20,11 +20,21 @@ enum Phase {
 /// thousands.
 const PHASES: u32 = 100_000;
 
-/// The amplifier in time. Between changes of the load the solution is exact whatever the length of the step: a linear
-/// system of second order, straight lines while the output slews or stands at a rail, and the instants between them
-/// found to rounding. Rounding is relative to the larger of the volts at which it is and at which it would come to rest
-/// without rails. A rail holds the output itself, not a copy of it: the amplifier leaves a rail as soon as its input
-/// asks it to.
+/// The amplifier in the time domain. Between changes of the load the solution is exact for any step: a second-order
+/// linear system, straight lines while the output slews or is at a rail, and switching times found to rounding
+/// accuracy. Rounding is relative to the present voltage or to the final voltage without rails, whichever is larger. A
+/// rail limits the output itself, not a copy of it, so the amplifier leaves the rail as soon as its input allows.
+///
+/// ```
+/// use spts_circuit::amplifier::{Amplifier, BusLoad, Network, OpAmp, Transient};
+///
+/// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
+/// let mut transient = Transient::new(amplifier);
+/// let load = BusLoad { conductance_s: 0.01, current_a: -2e-3 };
+/// transient.advance(load, 15e-6); // one measurement
+/// assert!((transient.output_v() - 2.0).abs() < 0.01, "settled at −Rf·I");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Transient {
     amplifier: Amplifier,
@@ -32,14 +42,14 @@ pub struct Transient {
 }
 
 impl Transient {
-    /// Amplifier at rest with nothing on its bus.
+    /// An amplifier at rest with nothing on its bus.
     #[must_use]
     pub fn new(amplifier: Amplifier) -> Self {
         let mut transient = Self {
             amplifier,
             state: State::default(),
         };
-        transient.settle(Load {
+        transient.settle(BusLoad {
             conductance_s: 0.0,
             current_a: 0.0,
         });
@@ -58,12 +68,12 @@ impl Transient {
         self.state.output_v
     }
 
-    /// Goes to where `load` leaves the amplifier in the end.
+    /// Sets the state that the amplifier finally reaches under `load`.
     ///
     /// # Panics
-    /// With debug assertions, for a load that is not finite or has a negative conductance. Without them bus and output
-    /// are of no use after one that is not finite, until the next call of this.
-    pub fn settle(&mut self, load: Load) {
+    /// In builds with debug assertions, if `load` is not finite or has a negative conductance. Other builds do not
+    /// check; after a load that is not finite, bus and output are meaningless until the next call of this function.
+    pub fn settle(&mut self, load: BusLoad) {
         load.check();
         self.state = rest(&self.amplifier, load);
         let rail_v = self.amplifier.op_amp().rail_v;
@@ -77,12 +87,12 @@ impl Transient {
         }
     }
 
-    /// Lets `dt_s` seconds, finite and ≥ 0, pass with `load` on the bus.
+    /// Advances time by `dt_s` (finite and ≥ 0) with `load` on the bus.
     ///
     /// # Panics
-    /// With debug assertions, for such a load or time. Without them bus and output are of no use after one that
-    /// is not finite, until the next [`settle`](Self::settle).
-    pub fn advance(&mut self, load: Load, dt_s: f64) {
+    /// In builds with debug assertions, for a load as in [`settle`](Self::settle) or such a time. Other builds do not
+    /// check; bus and output are then meaningless until the next [`settle`](Self::settle).
+    pub fn advance(&mut self, load: BusLoad, dt_s: f64) {
         load.check();
         debug_assert!(dt_s.is_finite() && dt_s >= 0.0, "dt_s = {dt_s} is outside [0, ∞)");
         let linear = Linear::new(&self.amplifier, load);
@@ -136,7 +146,7 @@ impl Transient {
         }
     }
 
-    fn slew(&mut self, load: Load, up: bool, left_s: f64) -> (f64, Phase) {
+    fn slew(&mut self, load: BusLoad, up: bool, left_s: f64) -> (f64, Phase) {
         let op_amp = *self.amplifier.op_amp();
         let sign = if up { 1.0 } else { -1.0 };
         let rail_s = ((op_amp.rail_v - sign * self.state.output_v) / op_amp.slew_v_per_s).max(0.0);
@@ -157,7 +167,7 @@ impl Transient {
         }
     }
 
-    fn rail(&mut self, load: Load, up: bool, left_s: f64) -> (f64, Phase) {
+    fn rail(&mut self, load: BusLoad, up: bool, left_s: f64) -> (f64, Phase) {
         let ramp = Ramp::new(&self.amplifier, load, self.state, 0.0, up);
         let t = ramp.release(left_s, 0.0).unwrap_or(left_s);
         self.state = ramp.after(t);

@@ -1,9 +1,9 @@
-//! The converter and the scale of the recorded volts.
+//! The analog-to-digital converter, and the scale of the recorded volts.
 
 use crate::batch::Batch;
 use crate::converter::{CodeScale, Converter, ConverterConfig};
 use crate::effect::parse;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use serde::Deserialize;
 use spts_models::{ConfigError, in_range, within};
 
@@ -11,7 +11,15 @@ use spts_models::{ConfigError, in_range, within};
 ///
 /// y = `offset_v` − code · `reference_v` / (2^bits − 1) · `divider`,
 ///
-/// which is also how the published acquisition turns codes back into volts. Code 0 is the largest output.
+/// The published acquisition turns codes back into volts with the same formula. Code 0 is the largest output.
+///
+/// ```
+/// let adc: spts_circuit::Adc = toml::from_str("bits = 10\nreference_v = 3.3\ndivider = 6.67\noffset_v = 11.0")?;
+/// let volts = adc.volts(adc.code(2.0));
+/// assert!((volts - 2.0).abs() <= adc.lsb_v() / 2.0);
+/// assert_eq!(adc.code(50.0), 0.0, "code 0 is the largest output");
+/// # Ok::<(), toml::de::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "Config")]
 pub struct Adc {
@@ -24,11 +32,11 @@ pub struct Adc {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Resolution. Range [1, 24]; the device: 10.
+    /// Resolution, bits. Range [1, 24]; the device has 10.
     bits: u32,
-    /// Full scale of the converter, V. Range [1e-3, 1e3]; the device: 3.3.
+    /// Full scale of the converter, V. Range [1e-3, 1e3]; the device has 3.3.
     reference_v: f64,
-    /// Output of the amplifier over the voltage at the converter. Range [1e-3, 1e3].
+    /// Ratio of the amplifier's output to the voltage at the converter. Range [1e-3, 1e3].
     divider: f64,
     /// Output at code 0, V. Range [−1e6, 1e6].
     offset_v: f64,
@@ -65,21 +73,22 @@ impl Adc {
         self.lsb_v
     }
 
-    /// Code of output `volts`: the nearest one, and the first or last outside the range. It falls as the output rises.
+    /// Code of the output `volts`: the nearest one, limited to the valid codes. It falls as the output rises.
     #[must_use]
     #[inline]
     pub fn code(&self, volts: f64) -> f64 {
         ((self.offset_v - volts) / self.lsb_v).round().clamp(0.0, self.max_code)
     }
 
-    /// Output that `code` stands for, V.
+    /// Output that belongs to `code`, V.
     #[must_use]
     #[inline]
     pub fn volts(&self, code: f64) -> f64 {
         self.offset_v - code * self.lsb_v
     }
 
-    /// The same scale, for a recording from which `subtract_v` is subtracted before it is cut off at 0, if anything is.
+    /// The same scale as a [`Converter`], for a recording from which `subtract_v` (if given) is subtracted before
+    /// negative values are set to 0.
     ///
     /// # Errors
     /// [`ConfigError`] for a constant outside [−1e6, 1e6] V.
@@ -99,7 +108,7 @@ impl Adc {
     }
 }
 
-pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     Ok(Box::new(parse::<Adc>(table)?))
 }
 

@@ -1,9 +1,9 @@
-//! The summing amplifier from its parts, in time.
+//! The summing amplifier, modelled from its parts in the time domain.
 
-use crate::amplifier::{Amplifier, Load, Network, Noise, OpAmp, Transient};
+use crate::amplifier::{Amplifier, AmplifierNoise, BusLoad, Network, OpAmp, Transient};
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::span::Span;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -20,17 +20,17 @@ use spts_models::{Streams, in_range};
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// From the clock edge to the new drives, s: interrupt, generator and converter of the cell. Range [0, `sample_s`].
+    /// Time from the clock edge to the new drives, s: interrupt, generator and DAC of the cell. Range [0, `sample_s`].
     update_s: f64,
-    /// From the clock edge to the end of the sampling, s. Range [0, 1/sample rate].
+    /// Time from the clock edge to the end of sampling, s. Range [0, 1/sample rate].
     sample_s: f64,
-    /// Cb, F, see [`Network`].
+    /// Cb, F; see [`Network`].
     #[serde(default)]
     bus_f: f64,
-    /// Cf, F, see [`Network`].
+    /// Cf, F; see [`Network`].
     #[serde(default)]
     feedback_f: f64,
-    /// Vos, V, drawn once a device. Range [−1, 1].
+    /// Vos, V, drawn once for each device. Range [−1, 1].
     #[serde(default = "no_offset")]
     offset_v: Span,
     /// Temperature of all resistances, K. Range [1, 1000].
@@ -52,12 +52,13 @@ fn room_k() -> f64 {
 struct Summing {
     streams: Streams,
     amplifier: Amplifier,
-    /// From one sampling to the change of the drives after the next edge, s; and from there to the next sampling.
+    /// Time from one sampling to the change of the drives after the next edge, s; and from that change to the next
+    /// sampling.
     before_s: f64,
     after_s: f64,
     transient: Transient,
     /// Load since the last change of the drives; `None` after a gap.
-    load: Option<Load>,
+    load: Option<BusLoad>,
     rng: ChaCha8Rng,
 }
 
@@ -66,7 +67,7 @@ pub(super) fn rail_v(table: toml::Table) -> Result<f64, ProfileError> {
     Ok(parse::<Config>(table)?.op_amp.rail_v)
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let c: Config = parse(table)?;
     let period_s = 1.0 / session.sample_rate_hz;
     let sampled = (0.0..=period_s).contains(&c.sample_s);
@@ -104,7 +105,7 @@ impl Effect for Summing {
     fn apply(&mut self, batch: &mut Batch<'_>) {
         let feedback_ohm = self.amplifier.network().feedback_ohm;
         for (sum_v, output_v) in batch.sum_v.iter().zip(&mut *batch.output_v) {
-            let load = Load {
+            let load = BusLoad {
                 conductance_s: (sum_v / batch.volts_per_siemens).max(0.0),
                 current_a: *output_v / feedback_ohm,
             };
@@ -115,7 +116,7 @@ impl Effect for Summing {
                     self.transient.advance(load, self.after_s);
                 }
             }
-            let noise_v = Noise::rms(&self.amplifier, load.conductance_s).total();
+            let noise_v = AmplifierNoise::rms(&self.amplifier, load.conductance_s).total();
             let normal: f64 = StandardNormal.sample(&mut self.rng);
             // recordings hold the output with its sign turned
             *output_v = noise_v * normal - self.transient.output_v();

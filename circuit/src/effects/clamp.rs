@@ -1,8 +1,8 @@
-//! What the publication did to its raster scans.
+//! Processing of the raster scans before publication.
 
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use serde::Deserialize;
 use spts_models::within;
 
@@ -10,7 +10,7 @@ use spts_models::within;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Constant that is subtracted first, V. Range [−1e6, 1e6].
+    /// Constant that is subtracted before clamping, V. Range [−1e6, 1e6].
     subtract_v: f64,
 }
 
@@ -25,7 +25,7 @@ pub(super) fn subtract_v(table: toml::Table) -> Result<f64, ProfileError> {
     Ok(config.subtract_v)
 }
 
-pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     Ok(Box::new(Clamp {
         subtract_v: subtract_v(table)?,
     }))

@@ -2,7 +2,7 @@
 
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::span::Span;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -15,7 +15,7 @@ use spts_models::Streams;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Relative error of a contribution, drawn once a session. Range [0, 1].
+    /// Relative error of a contribution, drawn once for each session. Range [0, 1].
     fraction: Span,
 }
 
@@ -25,7 +25,7 @@ struct ContactNoise {
     rng: ChaCha8Rng,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let config: Config = parse(table)?;
     let fraction = config.fraction.within("fraction", 0.0, 1.0, "[0, 1]")?;
     Ok(Box::new(ContactNoise {

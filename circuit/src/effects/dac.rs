@@ -1,9 +1,9 @@
-//! The cells' converters from code to drive.
+//! The cells' converters from code to drive voltage.
 
 use crate::batch::{Batch, Scratch};
 use crate::codes::{FULL_SCALE, NEUTRAL, code_of};
 use crate::effect::parse;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use crate::mode::{ANALOG_SCALE, WeightMode};
 use crate::seeding::finalise;
 use crate::span::Span;
@@ -27,15 +27,15 @@ use spts_models::within;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Output at code 256, V. Range [0.5, 5.5]; the device: 4.34.
+    /// Output at code 256, V. Range [0.5, 5.5]; the device has 4.34.
     reference_v: f64,
-    /// Lowest output, V. Range [0, 0.5·`reference_v`]; the device: 0.2.
+    /// Lowest output, V. Range [0, 0.5·`reference_v`]; the device has 0.2.
     floor_v: f64,
-    /// Error at code 0, V, drawn once a cell. Range [−0.5, 0.5].
+    /// Error at code 0, V, drawn once for each cell. Range [−0.5, 0.5].
     offset_v: Span,
-    /// Error of the slope at code 255, steps, drawn once a cell. Range [−64, 64].
+    /// Error of the slope at code 255, steps, drawn once for each cell. Range [−64, 64].
     gain_lsb: Span,
-    /// INL at mid-scale, steps, drawn once a cell. Range [−8, 8].
+    /// INL at mid-scale, steps, drawn once for each cell. Range [−8, 8].
     inl_lsb: Span,
     /// DNL: largest error of a step, steps. Range [0, 1].
     dnl_lsb: f64,
@@ -46,7 +46,7 @@ struct Converter {
     offset: f64,
     gain: f64,
     inl: f64,
-    /// Decides n(c).
+    /// Key of the pseudorandom n(c).
     key: u32,
 }
 
@@ -54,13 +54,13 @@ struct Dac {
     floor: f64,
     dnl: f64,
     converters: Vec<Converter>,
-    /// Error of a level w of the two that binary and raster modes have: mean + half·w.
+    /// Error of a level w, one of the two levels of the binary or raster mode: mean + half·w.
     means: Vec<f64>,
     halves: Vec<f64>,
     scratch: Scratch,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let c: Config = parse(table)?;
     within("reference_v", c.reference_v, 0.5, 5.5, "[0.5, 5.5]")?;
     within("floor_v", c.floor_v, 0.0, 0.5 * c.reference_v, "[0, 0.5·reference_v]")?;

@@ -2,7 +2,7 @@
 
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::span::Span;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -13,7 +13,7 @@ use spts_models::Streams;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Standard deviation, V, drawn once a session. Range [0, 10].
+    /// Standard deviation, V, drawn once for each session. Range [0, 10].
     sd_v: Span,
 }
 
@@ -23,7 +23,7 @@ struct IdleNoise {
     rng: ChaCha8Rng,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let config: Config = parse(table)?;
     let sd_v = config.sd_v.within("sd_v", 0.0, 10.0, "[0, 10]")?;
     Ok(Box::new(IdleNoise {

@@ -1,4 +1,4 @@
-//! Which cell is late next: one row a cell, taken in the order of rows.
+//! Queue of the next late cells: one row for each cell, retrieved in order of row.
 
 /// Rows that have a list of their own; a power of two.
 const SPAN: usize = 1024;
@@ -11,13 +11,13 @@ const NONE: u32 = u32::MAX;
 pub(super) struct LateQueue {
     /// First cell of the list of row `r` at `r % SPAN`, for rows before `end`.
     heads: Vec<u32>,
-    /// The cell after each in its list.
+    /// Next cell in the list of each cell.
     next: Vec<u32>,
     /// Row of each cell.
     rows: Vec<u64>,
     /// First row without a list.
     end: u64,
-    /// Cells whose rows have none.
+    /// Cells whose rows have no list yet.
     beyond: Vec<u32>,
     /// Scratch: cells of one row.
     due: Vec<u32>,

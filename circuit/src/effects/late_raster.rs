@@ -1,4 +1,4 @@
-//! Late updates of a raster scan, in which two cells change in a row of the matrix: one is switched on, one off.
+//! Late updates in a raster scan, where two cells change at each row: one switches on and one off.
 
 use super::late_updates::Cell;
 use crate::batch::Batch;

@@ -1,10 +1,10 @@
-//! Taxels that still hold their previous level when the output is sampled.
+//! Taxels that still have their previous level when the output is sampled.
 
 use super::late_queue::LateQueue;
 use super::late_raster::LateRaster;
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::mode::WeightMode;
 use crate::span::Span;
 use rand::RngExt as _;
@@ -22,23 +22,24 @@ use spts_models::{Streams, in_range, within};
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Share of a taxel's flips that come late, drawn once a taxel and session. Range [0, 0.5/`period_measurements`].
+    /// Share of a taxel's flips that come late, drawn once for each taxel and session. Range [0,
+    /// 0.5/`period_measurements`].
     rate: Span,
-    /// Mean beat between timer and clock, in measurements. Range [2, 1e9).
+    /// Mean beat period between the cell's timer and the clock, measurements. Range [2, 1e9).
     period_measurements: f64,
-    /// Standard deviation of that beat over the cells, whose oscillators differ; a cell keeps its own in all sessions.
-    /// Range [0, `period_measurements`/10].
+    /// Standard deviation of that period over the cells, whose oscillators differ. A cell keeps its period in all
+    /// sessions. Range [0, `period_measurements`/10].
     period_sd_measurements: f64,
 }
 
 pub(super) struct Cell {
     phase: f64,
     period: f64,
-    /// Probability that a collision makes the cell late.
+    /// Probability that a collision of timer and clock makes the cell late.
     pub(super) late: f64,
     /// ln(1 − late).
     ln_in_time: f64,
-    /// Number of the next collision at which it is late.
+    /// Number of the next collision at which the cell is late.
     collision: f64,
 }
 
@@ -104,7 +105,7 @@ struct LateUpdates {
     queue: LateQueue,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let config: Config = parse(table)?;
     let period = config.period_measurements;
     in_range("period_measurements", period, (2.0..1e9).contains(&period), "[2, 1e9)")?;

@@ -1,8 +1,8 @@
-//! What is left of the measurements before.
+//! Remainder of earlier measurements in the present one.
 
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::span::Span;
 use serde::Deserialize;
 
@@ -11,20 +11,20 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// First tap, drawn once a session. Range [−0.4, 0.4].
+    /// First tap, drawn once for each session. Range [−0.4, 0.4].
     h1: Span,
-    /// Second tap, drawn once a session. Range [−0.4, 0.4].
+    /// Second tap, drawn once for each session. Range [−0.4, 0.4].
     h2: Span,
 }
 
 struct Memory {
     h1: f64,
     h2: f64,
-    /// Undisturbed output of the last measurement and of the one before, V.
+    /// Outputs before this effect at the last two measurements, V.
     past_v: [f64; 2],
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let config: Config = parse(table)?;
     let mut rng = session.streams.rng("memory", 0);
     Ok(Box::new(Memory {

@@ -1,9 +1,9 @@
-//! Cells that miss clock edges and lag behind their own sequences, each on its own or all together.
+//! Cells that miss clock edges and then lag behind their sequences, individually or all together.
 
 use crate::batch::Batch;
 use crate::cell_run::CellRun;
 use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::faults::skipping_clocks::SkippingClocks;
 use crate::span::Span;
 use crate::weights::Weights;
@@ -19,15 +19,14 @@ use spts_models::within;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// Probability that a cell misses an edge, drawn once a cell, the same in all sessions. Range [0, 1]; default [0,
-    /// 1e-8], a guess: of the published sessions' cells only that one is found to lag.
+    /// Probability that a cell misses an edge, drawn once for each cell and the same in all sessions. Range [0, 1];
+    /// default [0, 1e-8], an estimate: one cell in all published sessions was found to lag.
     #[serde(default = "rarely")]
     probability: Span,
-    /// Probability that all cells miss an edge. Range [0, 1]; default 0. 1e-4 is about what the sessions that slip
-    /// have.
+    /// Probability that all cells miss an edge. Range [0, 1]; default 0. Published sessions that slip have about 1e-4.
     #[serde(default)]
     all_probability: f64,
-    /// Places where all cells miss edges, beside those that are drawn; none by default.
+    /// Further positions at which all cells miss edges. Default: none.
     #[serde(default)]
     all_at: Vec<Place>,
 }
@@ -41,7 +40,7 @@ struct Place {
     /// First measurement of the block that lags. Default 0.
     #[serde(default)]
     measurement: u64,
-    /// Number of edges; negative where the cells count edges that were none. Range [−1e6, 1e6].
+    /// Number of missed edges; negative if the cells counted edges that did not exist. Range [−1e6, 1e6].
     edges: i64,
 }
 
@@ -51,19 +50,19 @@ fn rarely() -> Span {
 
 struct MissedClocks {
     weights: Weights,
-    /// Cells that miss edges on their own, in the order of their taxels.
+    /// Cells that miss edges individually, in order of taxel.
     cells: Vec<SkippingClocks>,
-    /// Edges that all cells miss by chance; its taxel means nothing.
+    /// Edges that all cells miss by chance; its taxel has no meaning.
     all: Option<SkippingClocks>,
     places: Vec<Place>,
     block: u64,
     /// Row of the block's first measurement.
     first_row: u64,
-    /// Edges that all cells have missed at the measurements of a batch, after those at the one before it.
+    /// Edges that all cells have missed: at the measurement before the batch, then at each measurement of the batch.
     common: Vec<i64>,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let config: Config = parse(table)?;
     let probability = config.probability.within("probability", 0.0, 1.0, "[0, 1]")?;
     within("all_probability", config.all_probability, 0.0, 1.0, "[0, 1]")?;
@@ -81,7 +80,7 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
     }
     let all = (config.all_probability > 0.0).then(|| {
         let streams = session.streams.child("missed-clocks/all", 0);
-        let session = Session {
+        let session = EffectSession {
             streams,
             ..session.clone()
         };

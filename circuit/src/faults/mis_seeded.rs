@@ -1,8 +1,8 @@
-//! A cell with another seed than its address.
+//! A cell with a seed other than its address.
 
 use crate::cell_run::CellRun;
 use crate::effect::parse;
-use crate::effect::{ProfileError, Session};
+use crate::effect::{EffectSession, ProfileError};
 use crate::fault::Fault;
 use crate::mode::WeightMode;
 use serde::Deserialize;
@@ -12,7 +12,7 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Config {
-    /// What the generator was loaded with. Range [0, 2³² − 1]; default 2.
+    /// Seed of the generator. Range [0, 2³² − 1]; default 2.
     #[serde(default = "mode_byte")]
     seed: u32,
 }
@@ -26,7 +26,7 @@ struct MisSeeded {
     seed: u32,
 }
 
-pub(super) fn build(table: toml::Table, _taxel: u32, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+pub(super) fn build(table: toml::Table, _taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
     let config: Config = parse(table)?;
     Ok(Box::new(MisSeeded {
         mode: session.weights.mode(),

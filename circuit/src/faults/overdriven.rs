@@ -1,8 +1,8 @@
-//! A cell with another seed whose output is analog and driven beyond its swing.
+//! A cell with another seed, whose output is analog and exceeds its swing.
 
 use crate::cell_run::CellRun;
 use crate::effect::parse;
-use crate::effect::{ProfileError, Session};
+use crate::effect::{EffectSession, ProfileError};
 use crate::fault::Fault;
 use crate::mode::WeightMode;
 use serde::Deserialize;
@@ -14,11 +14,11 @@ use spts_models::within;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 struct Config {
-    /// What the generator was loaded with. Range [0, 2³² − 1].
+    /// Seed of the generator. Range [0, 2³² − 1].
     seed: u32,
     /// Gain on the present level. Range [−100, 100].
     gain: f64,
-    /// Gain on the level before. Range [−100, 100].
+    /// Gain on the previous level. Range [−100, 100].
     carry: f64,
     /// Output at level 0. Range [−1, 1].
     bias: f64,
@@ -40,7 +40,7 @@ struct Overdriven {
     config: Config,
 }
 
-pub(super) fn build(table: toml::Table, _taxel: u32, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+pub(super) fn build(table: toml::Table, _taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
     let config: Config = parse(table)?;
     for (field, value) in [("gain", config.gain), ("carry", config.carry)] {
         within(field, value, -100.0, 100.0, "[−100, 100]")?;

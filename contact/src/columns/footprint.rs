@@ -1,4 +1,4 @@
-//! Quasi-static level: the pressure under a body at rest, without stepping anything.
+//! Quasi-static contact: the pressure under a body at rest, without time steps.
 
 use super::foam::FoamLaw;
 use super::potential::{Potential, Row, Task};

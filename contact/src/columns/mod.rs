@@ -1,4 +1,4 @@
-//! The foam as independent columns: its law, and the two fields made of it.
+//! The foam as independent columns: the foam law, and the two contact fields that use it.
 
 #[cfg(test)]
 mod convergence_tests;

@@ -1,4 +1,4 @@
-//! What a quasi-static balance minimises: pressures of one row of cells, and the sums over all of them.
+//! The potential that a quasi-static balance minimises: pressures of one row of cells, and sums over all rows.
 
 use super::foam::FoamLaw;
 use super::preload::PreloadedRow;
@@ -18,8 +18,9 @@ pub(super) struct Row {
 pub(super) struct Task<'a> {
     pub(super) law: FoamLaw,
     pub(super) load: &'a Load,
-    /// Height of the origin at which the untilted body touches, m. The state's z is small beside it where the origin is
-    /// far from the face, and small numbers resolve small forces: K A ulp(z) is all that rounding z can do.
+    /// Height of the origin at which the untilted body touches, m. Where the origin is far from the face, the state's z
+    /// is small compared with this height, and small numbers resolve small forces: rounding z changes the force by at
+    /// most K A ulp(z).
     pub(super) base_m: f64,
     /// Stiffness of the body's surface, Pa/m; ∞ for a rigid one.
     pub(super) body_pa_per_m: f64,

@@ -1,4 +1,4 @@
-//! Foam that is compressed already where nothing touches the skin.
+//! Foam that is already compressed where nothing touches the skin.
 
 use super::foam::FoamLaw;
 use crate::envelope::Envelope;

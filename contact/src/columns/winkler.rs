@@ -14,17 +14,17 @@ use crate::traction::{Friction, Tractions};
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, SkinLayout};
 
-/// Parameters of [`WinklerLayer`]. Missing ones take the values of [`WinklerConfig::default`].
+/// Parameters of [`WinklerLayer`]. A missing one takes its value in [`WinklerConfig::default`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct WinklerConfig {
-    /// K, initial stiffness of the skin, Pa/m; [1e4, 1e9]. K h is the foam's modulus.
+    /// K, initial stiffness of the skin, Pa/m; [1e4, 1e9]. K h is the modulus of the foam.
     pub stiffness_pa_per_m: f64,
     /// τ, damping time of the Kelvin–Voigt element, s; [0, 0.02].
     pub damping_s: f64,
     /// h, thickness of the foam, m; [1e-4, 10].
     pub thickness_m: f64,
-    /// ε_max, strain at which only solid is left (1 − relative density); [0.3, 1].
+    /// ε_max, strain at which no pores are left (1 − relative density); [0.3, 1].
     pub max_strain: f64,
     /// Fine cells along one side of a taxel; [1, 64].
     pub cells_per_taxel: usize,
@@ -55,12 +55,26 @@ impl Default for WinklerConfig {
 /// Bed of independent springs and dampers (Winkler foundation with Kelvin–Voigt columns) under the mesh's lower
 /// envelope.
 ///
-/// A column at depth δ, approached with the speed δ̇ = −v_z, carries p = f(max(0, δ + τ δ̇)), where f is the
-/// densifying law (`FoamLaw`) with f′(0) = K: to first order K (δ − τ v_z) as in a Kelvin–Voigt element, never tensile.
-/// Friction is Coulomb's, regularised: t = −μ p v_t / √(|v_t|² + v_reg²).
+/// A column at depth δ, approached with the speed δ′ = −v_z, has the pressure p = f(max(0, δ + τ δ′)). f is the
+/// densifying law (`FoamLaw`) with f′(0) = K. To first order this is K (δ − τ v_z), a Kelvin–Voigt element that is
+/// never in tension. Friction is regularised Coulomb friction: t = −μ p v_t / √(|v_t|² + v_reg²).
 ///
-/// Validity: a compressible layer (ν ≤ 0.3) and features wider than about 2π h; narrower ones see an edge effect of
-/// 10–30 % that independent columns lack (K. L. Johnson, *Contact Mechanics* (1985), §4.3, §5.8).
+/// Validity: a compressible layer (ν ≤ 0.3) and features wider than about 2π h. Narrower features have an edge effect
+/// of 10–30 %, which independent columns lack (K. L. Johnson, *Contact Mechanics* (1985), §4.3, §5.8).
+///
+/// ```
+/// use spts_contact::{ContactField as _, PosedMesh, WinklerConfig, WinklerLayer, mesh::cuboid};
+/// use spts_models::SkinLayout;
+///
+/// let config = WinklerConfig { friction: 0.5, ..WinklerConfig::default() };
+/// let mut layer = WinklerLayer::new(config, &SkinLayout::default())?;
+/// let block = cuboid([30e-3, 30e-3, 10e-3]);
+/// let mut body = PosedMesh::at_rest(&block, [0.0, 0.0, -1e-3]);
+/// body.velocity_m_per_s = [0.1, 0.0, 0.0]; // slides along x
+/// let [x_n, _, z_n] = layer.respond(&body).wrench.force_n;
+/// assert!((x_n / z_n + 0.5).abs() < 0.01, "friction opposes the motion");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct WinklerLayer {
     config: WinklerConfig,
@@ -76,10 +90,10 @@ pub struct WinklerLayer {
 }
 
 impl WinklerLayer {
-    /// Layer under `skin`.
+    /// A layer under `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] when a parameter is outside its range.
+    /// [`ConfigError`] if a parameter is outside its range.
     pub fn new(config: WinklerConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
         Self::check(&config, skin)?;
         let envelope = Envelope::new(skin, config.cells_per_taxel);
@@ -157,7 +171,7 @@ impl WinklerLayer {
 /// Most fine cells a layer may have.
 const MAX_CELLS: Most = (16_777_216.0, "[1, 2^24]");
 
-/// Pressure on a row of cells at `y_m`: the law `pressure_of` of cell k at δ + τ δ̇ where the body is below the
+/// Pressure on a row of cells at `y_m`: the law `pressure_of` of cell k at δ + τ δ′ where the body is below the
 /// surface.
 #[inline]
 fn press(

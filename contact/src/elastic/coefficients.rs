@@ -1,4 +1,4 @@
-//! Influence coefficients: displacement at one cell's centre under unit pressure on another cell.
+//! Influence coefficients: displacement at the centre of one cell under unit pressure on another cell.
 
 use super::deficit::{Deficit, REACH};
 use super::kernel::{ElasticKernel, confined_stiffness_pa_per_m};
@@ -6,6 +6,17 @@ use super::quadrature::gauss_legendre;
 use std::f64::consts::PI;
 
 /// Influence coefficients of square cells on a regular grid, m/Pa, by the offset between two cells.
+///
+/// ```
+/// use spts_contact::{ElasticKernel, Influence};
+///
+/// let kernel = ElasticKernel::HalfSpace { modulus_pa: 150e3, poisson: 0.2 };
+/// let influence = Influence::new(&kernel, [20, 20], 2.5e-3);
+/// // far from a cell its pressure acts as a point force: u = F (1 − ν²)/(π E r)
+/// let force_n = 2.5e-3 * 2.5e-3; // 1 Pa on the cell
+/// let point_m = force_n * 0.96 / (std::f64::consts::PI * 150e3 * 15.0 * 2.5e-3);
+/// assert!((influence.at(0, 15) / point_m - 1.0).abs() < 1e-3);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Influence {
     rows: usize,
@@ -17,9 +28,9 @@ pub struct Influence {
 /// Bounds of the rise of the surface beside a load, 0 for a half-space.
 #[derive(Debug, Clone, Copy, Default)]
 struct Bulge {
-    /// Largest under unit pressure on one cell, m/Pa.
+    /// Largest rise under unit pressure on one cell, m/Pa.
     one_m_per_pa: f64,
-    /// Under unit pressure on every cell where it makes the surface rise, m/Pa.
+    /// Rise under unit pressure on every cell that raises the surface, m/Pa.
     all_m_per_pa: f64,
 }
 
@@ -27,7 +38,7 @@ struct Bulge {
 const WIDE_CELL: f64 = 2.0 * REACH;
 
 impl Influence {
-    /// Coefficients for offsets below `[rows, cols]` between cells of side `cell_m`.
+    /// Coefficients between cells of side `cell_m`, for offsets below `[rows, cols]`.
     ///
     /// Half-space: A. E. H. Love's closed form (Phil. Trans. R. Soc. A 228 (1929) 377) at the cells' centres. Layer:
     /// the same plus g(r) = (1/2π) ∫ (C_layer − C_half-space) J₀(kr) k dk, smooth on the scale of h, averaged over the
@@ -69,13 +80,13 @@ impl Influence {
     /// Coefficient between cells `row` rows and `col` columns apart, m/Pa.
     ///
     /// # Panics
-    /// When an offset is outside the table.
+    /// If an offset is outside the table.
     #[must_use]
     pub fn at(&self, row: usize, col: usize) -> f64 {
         self.values[row * self.cols + col]
     }
 
-    /// Largest rise of the surface anywhere under a unit pressure on one cell, m/Pa; 0 for a half-space.
+    /// Largest rise of the surface under unit pressure on one cell, m/Pa; 0 for a half-space.
     #[must_use]
     pub fn bulge_m_per_pa(&self) -> f64 {
         self.bulge.one_m_per_pa
@@ -100,8 +111,9 @@ impl Influence {
         bulge
     }
 
-    /// Rise of the surface beside a wide load, in units of the depression under it: the largest value outside a
-    /// half-plane under uniform pressure. 0 for a half-space, and about where a kernel is positive.
+    /// Rise of the surface beside a wide load relative to the depression under it: the largest value outside a
+    /// half-plane under uniform pressure. 0 for a half-space, and approximately 0 for a kernel that is positive
+    /// everywhere.
     #[must_use]
     pub fn bulge(&self) -> f64 {
         if self.bulge.one_m_per_pa <= 0.0 {

@@ -5,22 +5,21 @@ use crate::limits::{self, Most, parameter};
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, SkinLayout};
 
-/// Parameters of [`ElasticField`]: those of [`WinklerConfig`], so that only the model's name changes in a scene, and a
-/// few more. Missing ones take the values of [`ElasticConfig::default`].
+/// Parameters of [`ElasticField`]: those of [`WinklerConfig`], so that a scene can change only the model's name, and
+/// some more. A missing one takes its value in [`ElasticConfig::default`].
 ///
 /// [`ElasticField`]: super::ElasticField
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ElasticConfig {
-    /// K, stiffness of the skin under uniform pressure, Pa/m; [1e4, 1e9]. Young's modulus follows from it:
-    /// E = K h (1 + ν)(1 − 2ν)/(1 − ν), for the half-space too.
+    /// K, stiffness of the skin under uniform pressure, Pa/m; [1e4, 1e9]. It determines Young's modulus: E = K h (1 +
+    /// ν)(1 − 2ν)/(1 − ν), also for the half-space.
     pub stiffness_pa_per_m: f64,
     /// τ, damping time of the Kelvin–Voigt material, s; [0, 0.02].
     pub damping_s: f64,
     /// h, thickness of the foam, m; [1e-4, 10].
     pub thickness_m: f64,
-    /// ε_max, strain at which only solid is left (1 − relative density); [0.3, 1]. Without effect when `densification`
-    /// is off.
+    /// ε_max, strain at which no pores are left (1 − relative density); [0.3, 1]. Not used if `densification` is off.
     pub max_strain: f64,
     /// Fine cells along one side of a taxel; [1, 64].
     pub cells_per_taxel: usize,
@@ -30,12 +29,12 @@ pub struct ElasticConfig {
     pub friction_speed_m_per_s: f64,
     /// ν, Poisson's ratio; [0, 0.49].
     pub poisson: f64,
-    /// Whether every step of the dynamics sees the elastic answer; if not, the dynamics run on a Winkler layer and only
-    /// frames show the elastic pressure, under the same force.
+    /// Whether every time step solves the elastic problem. If not, the dynamics use a Winkler layer, and only frames
+    /// have the elastic pressure, under the same force.
     pub coupled: bool,
-    /// Bound on the estimated error of every pressure in units of the largest; [1e-12, 1e-2].
+    /// Bound on the estimated error of every pressure, relative to the largest pressure; [1e-12, 1e-2].
     pub tolerance: f64,
-    /// Whether the foam densifies; by default in a layer, and never in a half-space.
+    /// Whether the foam densifies. Default: in a layer yes. A half-space never densifies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub densification: Option<bool>,
 }

@@ -33,7 +33,7 @@ pub(crate) struct Convolution<T: FftNum> {
     rows: usize,
     cols: usize,
     padded: [usize; 2],
-    /// Column after column, scaled for unnormalised transforms.
+    /// Column-major, scaled for unnormalised transforms.
     spectrum: Vec<T>,
     row_forward: Arc<dyn RealToComplex<T>>,
     row_inverse: Arc<dyn ComplexToReal<T>>,

@@ -1,4 +1,4 @@
-//! What a rigid base takes from the half-space's displacement.
+//! Reduction of the half-space's displacement by a rigid base.
 
 use super::kernel::layer_deficit;
 use super::quadrature::{bessel_j0, gauss_legendre};

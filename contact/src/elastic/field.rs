@@ -12,30 +12,46 @@ use spts_models::{ConfigError, SkinLayout};
 /// Linear elastic skin (bonded layer or half-space) under the mesh's lower envelope, with damping, densification and
 /// friction.
 ///
-/// Contact without adhesion: p ≥ 0, and where p > 0 the surface follows the body, C p = δ + τ δ̇. The Kelvin–Voigt
-/// material is damped in proportion to its elasticity, so that the same kernel C carries both terms (exact where the
-/// contact set does not change; the free surface's own retarded motion is left out). A body with a surface stiffness
-/// K_b yields by p/K_b more at each cell.
+/// Contact without adhesion: p ≥ 0, and where p > 0 the surface follows the body, C p = δ + τ δ′. Damping of the
+/// Kelvin–Voigt material is proportional to its elasticity, so the same kernel C describes both terms. This is exact
+/// while the contact set does not change; the retarded motion of the free surface is neglected. A body with the surface
+/// stiffness K_b yields by a further p/K_b at each cell.
 ///
-/// Densification: the linear problem gives q; the pressure is p = f(q (1/K + 1/K_b)) with the foam law f of
-/// `winkler`. This is exact for uniform pressure and for small strain; between them it keeps the linear problem's shape
-/// of contact and lets each cell stiffen by its own load, which is as good as the lateral coupling is weak (ν ≤ 0.3,
-/// patches wider than h).
+/// Densification: the linear problem gives q; the pressure is p = f(q (1/K + 1/K_b)) with the foam law f of `winkler`.
+/// This is exact for uniform pressure and for small strain. In between, the contact area is that of the linear problem,
+/// and each cell stiffens by its own load. The approximation is good if lateral coupling is weak (ν ≤ 0.3, patches
+/// wider than h).
 ///
-/// The surface beside a load rises when ν exceeds about 0.2; contact outside the geometric overlap is then looked for
-/// down to [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
+/// The surface beside a load rises if ν exceeds about 0.2. Contact outside the geometric overlap is then searched down
+/// to [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
 ///
-/// A pose or velocity that is not finite, and a contact whose iteration does not converge, have no answer: pressure 0
-/// and a wrench of NaN, which stops the world; so does a frame for which the iteration fails when not coupled. At
-/// a touch, where the force of a moving body jumps from cell to cell, such a frame may show the dynamics' own pressure.
+/// If a pose or velocity is not finite, or the iteration does not converge, there is no answer: the pressure is 0 and
+/// the wrench NaN, which stops the simulation. Without `coupled`, the same holds for a frame whose iteration fails. At
+/// first touch, where the force of a moving body jumps from cell to cell, such a frame may instead have the pressure of
+/// the dynamics.
 ///
-/// Validity: small slopes (half-space: contact narrow against the thickness), no friction in the normal problem.
+/// Validity: small slopes; for the half-space, contact that is narrow compared with the thickness; the normal problem
+/// neglects friction.
 ///
 /// [`Influence::bulge`]: super::Influence::bulge
+///
+/// ```
+/// use spts_contact::{PosedMesh, build_contact, mesh::cuboid};
+/// use spts_models::SkinLayout;
+///
+/// let mut layer = build_contact("layer", toml::Table::new(), &SkinLayout::default())?;
+/// let block = cuboid([30e-3, 30e-3, 10e-3]);
+/// let answer = layer.respond(&PosedMesh::at_rest(&block, [0.0, 0.0, -0.5e-3]));
+/// let cells = answer.pressure_pa.len().isqrt();
+/// let row = &answer.pressure_pa[cells * cells / 2..][..cells];
+/// let highest_pa = row.iter().copied().fold(0.0, f64::max);
+/// assert!(highest_pa > 1.05 * row[cells / 2], "an elastic layer is pressed most at the edges of a flat punch");
+/// # Ok::<(), spts_contact::ContactError>(())
+/// ```
 pub struct ElasticField {
     config: ElasticConfig,
     skin: ElasticSkin,
-    /// The dynamics' layer when not coupled.
+    /// The layer used by the dynamics without `coupled`.
     winkler: Option<WinklerLayer>,
 }
 
@@ -44,10 +60,10 @@ pub struct ElasticField {
 const ERROR_PER_TOLERANCE: f64 = 10.0;
 
 impl ElasticField {
-    /// Bonded layer (`bonded`) or half-space under `skin`.
+    /// A bonded layer (if `bonded`) or a half-space under `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] when a parameter is outside its range, or the skin has more than 2²⁰ fine cells.
+    /// [`ConfigError`] if a parameter is outside its range, or the skin has more than 2²⁰ fine cells.
     pub fn new(mut config: ElasticConfig, bonded: bool, skin: &SkinLayout) -> Result<Self, ConfigError> {
         config.check(bonded, skin)?;
         config.densification.get_or_insert(bonded);

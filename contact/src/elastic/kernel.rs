@@ -1,8 +1,21 @@
 //! Surface compliance of an elastic half-space and of a bonded layer, in the Fourier domain.
 
-/// Elastic body under the skin's surface, frictionless and linear.
+/// Elastic body below the skin's surface; linear and frictionless.
 ///
-/// A pressure p̂(k) on the surface moves it down by û(k) = C(|k|) p̂(k).
+/// A pressure p̂(k) lowers the surface by û(k) = C(|k|) p̂(k).
+///
+/// ```
+/// use spts_contact::{ElasticKernel, confined_stiffness_pa_per_m};
+///
+/// let (modulus_pa, poisson, thickness_m) = (150e3, 0.2, 10e-3);
+/// let layer = ElasticKernel::Layer { modulus_pa, poisson, thickness_m };
+/// let half_space = ElasticKernel::HalfSpace { modulus_pa, poisson };
+/// // fine patterns do not feel the base; uniform pressure does
+/// let fine = layer.compliance_m_per_pa(1e4) / half_space.compliance_m_per_pa(1e4);
+/// assert!((fine - 1.0).abs() < 1e-6);
+/// let uniform = layer.compliance_m_per_pa(0.0) * confined_stiffness_pa_per_m(modulus_pa, poisson, thickness_m);
+/// assert!((uniform - 1.0).abs() < 1e-12);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum ElasticKernel {

@@ -1,4 +1,4 @@
-//! One resolution of the solver: its coefficients, its operators by size, its fields.
+//! One resolution of the solver: coefficients, operators by size, and fields.
 
 use super::coefficients::Influence;
 use super::pcg::{self, Fields, Goal, Outcome, Stop};
@@ -98,10 +98,10 @@ pub(crate) struct Level {
     pub(crate) cell_m: f64,
     influence: Arc<Influence>,
     series_m_per_pa: f64,
-    /// Latest used last.
+    /// Ordered by use; the most recent one is last.
     systems: Vec<System>,
     fields: Fields,
-    /// Patch fields.
+    /// Fields on the patch.
     pub(crate) target: Vec<f64>,
     pub(crate) pressure: Vec<f64>,
     /// C · pressure where it was solved for, 0 elsewhere.

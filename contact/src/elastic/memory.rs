@@ -1,4 +1,4 @@
-//! The last answers, and the start they give to the next.
+//! Recent solutions, used to start the next one.
 
 use super::pcg::dot;
 use crate::patch::Patch;

@@ -1,6 +1,7 @@
 //! Elastic contact: a bonded layer of finite thickness, and the half-space.
 //!
-//! Kernel → influence coefficients of square cells → convolution by fast Fourier transforms → contact without tension.
+//! Stages: kernel → influence coefficients of square cells → convolution by fast Fourier transforms → contact without
+//! tension.
 
 mod coefficients;
 mod config;

@@ -1,13 +1,13 @@
-//! Preconditioned conjugate gradients for contact: pressure that is nowhere negative, no penetration anywhere.
+//! Preconditioned conjugate gradients for contact: no negative pressure and no penetration.
 
 use super::system::System;
 
 /// What is prescribed besides the shape.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Goal {
-    /// The displacement itself.
+    /// The displacement itself is prescribed.
     Displacement,
-    /// The sum of pressure over all cells, Pa; the displacement up to a constant.
+    /// The sum of the pressure over all cells, Pa, is prescribed; the displacement is known up to a constant.
     PressureSum(f64),
 }
 
@@ -16,29 +16,29 @@ pub(crate) enum Goal {
 pub(crate) struct Stop {
     /// Largest estimated error of a pressure, relative to the largest pressure.
     pub(crate) tolerance: f64,
-    /// The same for the start, which is taken as it is when it fulfils this.
+    /// The same for the start. If the start fulfils it, it is returned unchanged.
     pub(crate) start_tolerance: f64,
-    /// Most iterations.
+    /// Largest number of iterations.
     pub(crate) iterations: usize,
 }
 
-/// How an iteration ended.
+/// Result of an iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// Rigid approach added to the given displacement, m; 0 when the displacement itself is prescribed.
     pub approach_m: f64,
-    /// Iterations made.
+    /// Number of iterations.
     pub iterations: usize,
-    /// Convolutions made.
+    /// Number of convolutions.
     pub convolutions: usize,
-    /// Whether the tolerance was reached; if not, the best pressure is kept.
+    /// Whether the tolerance was reached. If not, the best pressure is kept.
     pub converged: bool,
 }
 
 /// Fields of one contact problem on a rectangle of cells, row-major.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Fields {
-    /// Displacement asked for, m; negative infinity where there can be no contact.
+    /// Prescribed displacement, m; negative infinity where contact is impossible.
     pub(crate) target: Vec<f64>,
     /// Pressure, Pa: the start on entry, the answer on return.
     pub(crate) pressure: Vec<f64>,
@@ -150,7 +150,7 @@ pub(crate) fn solve(system: &mut System, f: &mut Fields, goal: Goal, stop: Stop)
 struct State {
     /// Preconditioned residual on the contact set: the estimated error there.
     error: f64,
-    /// The larger of negative pressures inside the set and penetration outside it.
+    /// The larger of negative pressure inside the contact set and penetration outside it.
     violation: f64,
     /// Residual · preconditioned residual, and the same with the residual's change.
     power: f64,

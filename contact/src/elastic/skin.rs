@@ -1,4 +1,4 @@
-//! The elastic skin under a body: what to ask of the solver, and what its answer means.
+//! The elastic skin under a body: the problem for the solver, and what its solution means.
 
 use super::config::ElasticConfig;
 use super::kernel::{ElasticKernel, modulus_of_confined_pa};
@@ -37,11 +37,11 @@ pub(crate) struct ElasticSkin {
     /// On the patch, then on the whole skin.
     patch_pa: Vec<f64>,
     pressure_pa: Vec<f64>,
-    /// How much deeper than the dynamics' pose the last frame's body had to be, m.
+    /// Depth to be added to the dynamics' pose at the last frame, m.
     shift_m: f64,
-    /// Slope of the force there, N/m, once it is known.
+    /// Slope of the force there, N/m, once known.
     slope_n_per_m: Option<f64>,
-    /// Why the last answer was none.
+    /// Why the last call had no answer.
     failure: Option<Failure>,
 }
 

@@ -12,9 +12,9 @@ use std::sync::Arc;
 
 /// Solver for the contact of height maps with a half-space or a bonded layer.
 ///
-/// The surface is not periodic: the pressure acts on the grid, the body extends without end. Pressure is uniform on
-/// each cell, displacement is taken at its centre. Operators of the sizes used last and all buffers are kept between
-/// calls; only a size that is new among the last two dozen allocates.
+/// The surface is not periodic: pressure acts on the grid, and the body extends to infinity. Pressure is uniform on
+/// each cell; displacement is evaluated at its centre. Operators of the sizes used most recently (about two dozen) and
+/// all buffers are kept between calls, so only a new size allocates.
 ///
 /// ```
 /// use spts_contact::{ElasticKernel, ElasticSolver};
@@ -46,7 +46,7 @@ const MARGIN: usize = 2;
 const MAX_ITERATIONS: usize = 400;
 
 impl ElasticSolver {
-    /// Solver for up to `shape` (rows, columns) cells of side `cell_m`.
+    /// A solver for up to `shape` (rows, columns) cells of side `cell_m`.
     #[must_use]
     pub fn new(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
         let tables = tables(kernel, shape, cell_m);
@@ -62,7 +62,7 @@ impl ElasticSolver {
         }
     }
 
-    /// Rise of the surface beside a wide load in units of the depression under it, see [`Influence::bulge`].
+    /// Rise of the surface beside a wide load relative to the depression under it; see [`Influence::bulge`].
     ///
     /// [`Influence::bulge`]: super::Influence::bulge
     #[must_use]
@@ -71,8 +71,8 @@ impl ElasticSolver {
         self.levels.last().map_or(0.0, Level::bulge)
     }
 
-    /// Lets the pressing body yield by itself: `series_m_per_pa` (1/K of its surface) is added to each cell's own
-    /// compliance.
+    /// Makes the pressing body compliant: adds `series_m_per_pa` (1/K of its surface) to the own compliance of each
+    /// cell.
     pub fn set_series(&mut self, series_m_per_pa: f64) {
         let mut changed = false;
         for level in &mut self.levels {
@@ -84,24 +84,24 @@ impl ElasticSolver {
         }
     }
 
-    /// Forgets earlier answers: the next one is a function of its input alone.
+    /// Forgets earlier solutions: the next one depends only on its input.
     pub fn forget(&mut self) {
         self.memory.clear();
     }
 
-    /// Presses the surface down by at least `target_m` (row-major on the cells of `patch`, negative infinity where
-    /// there is no body): p ≥ 0, C p ≥ target, p (C p − target) = 0. The answer is in [`ElasticSolver::pressure_pa`],
-    /// on the patch.
+    /// Presses the surface down by at least `target_m` (row-major on the cells of `patch`; negative infinity where
+    /// there is no body): p ≥ 0, C p ≥ target, p (C p − target) = 0. [`ElasticSolver::pressure_pa`] returns the
+    /// solution on the patch.
     ///
-    /// Starts from the combination of the last answers that fits best, which is the answer itself when the contact set
-    /// has not changed and the target is a combination of the last ones, as for a flat shape that sinks and tilts.
+    /// The iteration starts from the best-fitting combination of the last solutions. This start is already the solution
+    /// if the contact set has not changed and the target is a combination of the last ones, as for a flat shape that
+    /// sinks and tilts.
     ///
-    /// A target that is nowhere finite leaves the surface free: pressure 0, converged. When the patch has more rows or
-    /// columns than the solver, or none, the answer is pressure 0, not converged. An answer that has not converged is
-    /// forgotten.
+    /// If no target value is finite, the surface is free: pressure 0, converged. If the patch is empty or larger than
+    /// the solver's grid: pressure 0, not converged. A solution that has not converged is not kept for later starts.
     ///
     /// # Panics
-    /// When `target_m` does not have one value a cell of the patch.
+    /// If `target_m` does not have one value a cell of the patch.
     pub fn sink(&mut self, patch: Patch, target_m: &[f64], tolerance: f64) -> Outcome {
         let shape = [patch.rows, patch.cols].map(|[first, end]| end.saturating_sub(first));
         assert_eq!(
@@ -155,15 +155,15 @@ impl ElasticSolver {
         }
     }
 
-    /// Presses a rigid shape of height `height_m` above its lowest point (row-major, infinite where there is nothing)
-    /// with the force `force_n` > 0. The answer is in [`ElasticSolver::pressure_pa`]; the approach is that of the
+    /// Presses a rigid shape of height `height_m` above its lowest point (row-major; infinite where there is nothing)
+    /// with the force `force_n` > 0. [`ElasticSolver::pressure_pa`] returns the solution. The approach is that of
     /// height 0.
     ///
-    /// `tolerance` bounds the estimated error of every pressure in units of the largest. When no height is finite, or
-    /// the force is not a positive number, nothing carries it: pressure 0, not converged.
+    /// `tolerance` bounds the estimated error of every pressure, relative to the largest. If no height is finite, or
+    /// the force is not a positive number: pressure 0, not converged.
     ///
     /// # Panics
-    /// When `height_m` does not have one value a cell.
+    /// If `height_m` does not have one value a cell.
     pub fn press(&mut self, height_m: &[f64], force_n: f64, tolerance: f64) -> Outcome {
         assert_eq!(height_m.len(), self.shape[0] * self.shape[1], "one height a cell");
         let any = height_m.iter().any(|h| h.is_finite());
@@ -176,7 +176,7 @@ impl ElasticSolver {
         self.nested(0, self.shape, Some(force_n), tolerance)
     }
 
-    /// Pressure, Pa, on the last shape or patch, row-major.
+    /// Pressure on the last shape or patch, Pa, row-major.
     #[must_use]
     pub fn pressure_pa(&self) -> &[f64] {
         &self.levels[0].pressure

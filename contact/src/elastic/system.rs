@@ -1,4 +1,4 @@
-//! Elastic operator and its preconditioner on a rectangle of cells.
+//! Elastic operator and preconditioner on a rectangle of cells.
 
 use super::coefficients::Influence;
 use super::convolution::{Convolution, Planner, good_size};
@@ -27,7 +27,7 @@ pub(crate) struct System {
     pub(crate) shape: [usize; 2],
     elastic: Convolution<f64>,
     inverse: Convolution<f32>,
-    /// Pressure that lowers one free cell by one metre, approximately: the diagonal of the inverse, Pa/m.
+    /// Approximate pressure that lowers one free cell by one metre, Pa/m: the diagonal of the inverse.
     pub(crate) stiffness_pa_per_m: f64,
     /// Reciprocal of a cell's own coefficient, Pa/m.
     unit_pa_per_m: f64,

@@ -1,5 +1,5 @@
-//! Influence coefficients of all levels of a solver. They are most of what a solver costs to set up, and the next one
-//! is often of the same kind: every press of a data set has its own.
+//! Influence coefficients of all levels of a solver, shared between solvers. They are most of the set-up cost, and the
+//! next solver often has the same parameters: every press of a data set makes its own solver.
 
 use super::coefficients::{Influence, deficit};
 use super::kernel::ElasticKernel;

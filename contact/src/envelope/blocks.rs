@@ -1,4 +1,4 @@
-//! A mesh in blocks of neighbouring triangles, so that whole blocks above the skin are passed over.
+//! A mesh divided into blocks of neighbouring triangles, so that whole blocks above the skin can be skipped.
 
 use super::raster::{Raster, least};
 use crate::body::PosedMesh;

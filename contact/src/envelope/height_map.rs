@@ -1,4 +1,4 @@
-//! The height map of a pose, kept while the body only moves up and down.
+//! The height map of a pose, kept while the body only moves vertically.
 
 use super::blocks::Blocks;
 use super::raster::{Cells, Raster};

@@ -26,10 +26,10 @@ use spts_models::SkinLayout;
 pub(crate) struct Envelope {
     raster: Raster,
     depth_m: Vec<f64>,
-    /// The last mesh.
+    /// Blocks of the last mesh.
     blocks: Blocks,
     touched: Patch,
-    /// Where the last body stood.
+    /// Position of the last body.
     stand: Stand,
     map: HeightMap,
 }

@@ -13,8 +13,8 @@ pub(super) struct Raster {
     cells_per_m: f64,
     /// x of the centre of column 0 and y of the centre of row 0; y falls with the row.
     first_m: [f64; 2],
-    /// A centre counts as inside down to this distance × length outside an edge (twice an area, cells²), so that none
-    /// falls between two triangles through round-off.
+    /// Tolerance outside an edge up to which a centre counts as inside, as distance × length (twice an area, cells²),
+    /// so that no centre falls between two triangles through round-off.
     slack: f64,
 }
 
@@ -23,9 +23,9 @@ pub(super) struct Cells<'a> {
     pub(super) values: &'a mut [f64],
     /// Row and column of the first value.
     pub(super) origin: [usize; 2],
-    /// Values in a row.
+    /// Number of values in a row.
     pub(super) stride: usize,
-    /// Level above which heights count, m: the value of a cell is this less the height.
+    /// Level above which heights count, m. The value of a cell is this level minus the height.
     pub(super) level_m: f64,
 }
 

@@ -141,8 +141,8 @@ fn solids_are_seen_from_below() {
 proptest! {
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(8), ..ProptestConfig::with_cases(60) })]
     /// A body that moves slowly is answered from the triangles near its stand, and that shows nowhere: every answer is
-    /// that of an envelope which has seen nothing before, bit for bit. Steps from 0.01 to 1000 µm and half as many µrad,
-    /// so that choices are kept, left and not made.
+    /// that of an envelope which has seen nothing before, bit for bit. Steps from 0.01 to 1000 µm and half as many
+    /// µrad, so that choices are kept, left and not made.
     #[test]
     fn what_came_before_does_not_show(
         object in 0..crate::objects::OBJECTS.len(),

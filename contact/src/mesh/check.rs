@@ -1,4 +1,4 @@
-//! The gate every foreign mesh passes: repair what is safe to repair, refuse the rest with the fact that is wrong.
+//! Checks every mesh from outside: repairs what is safe to repair, and refuses the rest with the reason.
 
 use super::error::MeshError;
 use super::holes::{Closed, Hole, close_holes};
@@ -15,20 +15,22 @@ const WELD_FRACTION: f64 = 1e-6;
 /// without inside has rounding, about 1e-7.
 const LEAST_VOLUME_FRACTION: f64 = 1e-6;
 
-/// Scales `raw` to metres, repairs it, checks what is left (1 mm to 2 m across, closed, with an inside) and decimates
-/// it if it has more than [`SOFT_MAX_TRIANGLES`] triangles. `file` is the name the errors carry.
+/// Scales `raw` to metres, repairs and checks it (1 mm to 2 m across, closed, with an inside), and decimates it if it
+/// has more than [`SOFT_MAX_TRIANGLES`] triangles. `file` is the name in errors.
 ///
-/// Repaired are: coinciding vertices (joined), triangles that collapse or are there more than once (dropped), triangles
-/// turned against their neighbours and parts that are inside out (turned; a cavity is not inside out), small holes
-/// (filled flat) and holes that open upward (closed above everything, which leaves the underside as it is). Parts may
-/// overlap: only the underside of their union touches. Refused are: coordinates that are not finite, any other size,
-/// larger holes that open downward or sideways, surfaces with branches or of one side, and surfaces without inside.
+/// Repairs: coinciding vertices are joined. Degenerate and duplicate triangles are dropped. Triangles that face against
+/// their neighbours and parts that are inside out are turned (a cavity is not inside out). Small holes are filled flat.
+/// Holes that open upwards are closed above everything, which leaves the underside unchanged. Parts may overlap: only
+/// the underside of their union touches.
 ///
-/// The unit is never guessed: an object 40 units wide may well be 40 mm, 40 cm or 40 inches wide, all of which could
-/// press on a skin. The error names the scale that would fit.
+/// Refused are coordinates that are not finite, other sizes, larger holes that open downwards or sideways, surfaces
+/// with branches or with one side, and surfaces without an inside.
+///
+/// The unit is never guessed: an object 40 units wide may be 40 mm, 40 cm or 40 inches wide, and each of these could
+/// press on a skin. The error suggests a scale that would fit.
 ///
 /// # Errors
-/// [`MeshError`] with the first fact that is wrong.
+/// [`MeshError`] with the first problem.
 pub fn checked(raw: &TriMesh, scale: f64, file: &str) -> Result<(TriMesh, MeshReport), MeshError> {
     check_numbers(raw, scale, file)?;
     let raw_extent = used_extent(raw);

@@ -1,12 +1,12 @@
-//! Fewer triangles, with the error measured.
+//! Reduces the number of triangles and measures the error.
 
 use super::nearest::Nearest;
 use super::size::SOFT_MAX_TRIANGLES;
 use super::tri_mesh::TriMesh;
 use meshopt::{SimplifyOptions, simplify_decoder};
 
-/// Largest distance between the surfaces before and after decimation, m. At the default stiffness of the skin,
-/// 1.5e7 Pa/m, it shifts a pressure by at most 1.5 kPa, 3 % of a usual peak, and only at the worst point.
+/// Largest allowed distance between the surfaces before and after decimation, m. At the default stiffness of the skin,
+/// 1.5e7 Pa/m, it changes a pressure by at most 1.5 kPa (3 % of a usual peak), and only at the worst point.
 pub const MAX_DECIMATION_ERROR_M: f64 = 1e-4;
 /// The same as part of the extent, which is what holds for objects below 50 mm.
 const MAX_ERROR_FRACTION: f64 = 2e-3;

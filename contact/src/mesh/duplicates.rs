@@ -1,4 +1,4 @@
-//! Dropping triangles that are there more than once.
+//! Drops duplicate triangles.
 
 use super::sides::{Sides, Unions};
 use super::tri_mesh::{TriMesh, index};

@@ -1,8 +1,16 @@
-//! What can be wrong with a mesh.
+//! Errors of meshes.
 
 use super::size::{MAX_COORDINATE_M, MAX_EXTENT_M, MIN_EXTENT_M};
 
-/// Why a mesh was refused. Every variant names the file and the fact.
+/// Why a mesh was refused. Every variant names the file and the problem.
+///
+/// ```
+/// use spts_contact::mesh::{cuboid, read_obj};
+///
+/// let in_millimetres = cuboid([40.0, 20.0, 10.0]).to_obj("block");
+/// let error = read_obj(in_millimetres.as_bytes(), 1.0, "block.obj").unwrap_err();
+/// assert!(error.to_string().starts_with("mesh `block.obj`: largest extent = 40 m after scale = 1 is outside"));
+/// ```
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum MeshError {
@@ -11,15 +19,15 @@ pub enum MeshError {
     Unreadable {
         /// Path as given.
         file: String,
-        /// What the operating system said.
+        /// Reason given by the operating system.
         reason: String,
     },
-    /// The extension is not one the readers know.
+    /// The file has an extension that is not supported.
     #[error("mesh `{file}`: extension `{extension}` is not one of obj, glb, stl")]
     UnknownExtension {
         /// Path as given.
         file: String,
-        /// Extension found, without the dot; empty when there is none.
+        /// Extension without the dot; empty if there is none.
         extension: String,
     },
     /// The scale is not a positive number.
@@ -30,7 +38,7 @@ pub enum MeshError {
         /// Scale as given.
         scale: f64,
     },
-    /// The content is not what the extension promises.
+    /// The content does not match the extension.
     #[error("mesh `{file}`: malformed: {reason}")]
     Malformed {
         /// Path as given.
@@ -46,19 +54,19 @@ pub enum MeshError {
         /// The feature.
         feature: String,
     },
-    /// More of something than is read.
+    /// The file has more elements than are read.
     #[error("mesh `{file}`: {what} = {found} is outside [0, {most}]")]
     TooLarge {
         /// Path as given.
         file: String,
-        /// What there is too much of.
+        /// Kind of the elements.
         what: &'static str,
-        /// How much there is; where it is not counted to the end, how much had been counted.
+        /// Number of elements, or the number counted before counting stopped.
         found: usize,
-        /// How much is read.
+        /// Largest number that is read.
         most: usize,
     },
-    /// A coordinate so far from the origin that nothing can be there.
+    /// A coordinate that is too far from the origin.
     #[error(
         "mesh `{file}`: vertex {vertex} has {axis} = {} = {} m after scale, outside [-{MAX_COORDINATE_M}, {MAX_COORDINATE_M}] m",
         short(*value), short(*metres)
@@ -75,7 +83,7 @@ pub enum MeshError {
         /// Coordinate after scaling, m.
         metres: f64,
     },
-    /// Nothing to press with.
+    /// The mesh has no triangle of non-zero size.
     #[error("mesh `{file}`: 0 triangles of non-zero size ({dropped} degenerate ones dropped); at least 4 are needed")]
     NoTriangles {
         /// Path as given.
@@ -95,7 +103,7 @@ pub enum MeshError {
         /// Offending value.
         value: f64,
     },
-    /// A triangle names a vertex that is not there.
+    /// A triangle refers to a vertex that does not exist.
     #[error("mesh `{file}`: triangle {triangle} uses vertex {index}, outside [0, {vertices})")]
     IndexOutOfRange {
         /// Path as given.
@@ -107,7 +115,7 @@ pub enum MeshError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// The mesh is not the size of something that presses on a skin: its unit is probably not the metre.
+    /// The size of the mesh is not plausible for an object that presses on a skin: its unit is probably not the metre.
     #[error(
         "mesh `{file}`: largest extent = {} m after scale = {} is outside [{MIN_EXTENT_M}, {MAX_EXTENT_M}] m{}",
         short(*extent_m), short(*scale), advice(*suggestion)
@@ -119,7 +127,7 @@ pub enum MeshError {
         extent_m: f64,
         /// Scale that was applied.
         scale: f64,
-        /// Unit the file is probably in and the scale for it; none when no usual unit fits.
+        /// Probable unit of the file, and the scale for it; `None` if no usual unit fits.
         suggestion: Option<(&'static str, f64)>,
     },
     /// The surface has a hole that cannot be closed without guessing.
@@ -130,16 +138,16 @@ pub enum MeshError {
     NotClosed {
         /// Path as given.
         file: String,
-        /// Edges without partner.
+        /// Number of edges without a partner.
         open_edges: usize,
-        /// Edges in all.
+        /// Number of edges.
         edges: usize,
         /// Middle of an edge of the hole, in the unit of the file.
         at: [f64; 3],
         /// Why it is not closed.
         why: &'static str,
     },
-    /// Sheets of the surface meet along an edge so that none of them can be inside or outside.
+    /// Surfaces meet along an edge in a way that leaves no consistent inside and outside.
     #[error(
         "mesh `{file}`: {triangles} triangles meet in an edge at ({:.4}, {:.4}, {:.4}) of the file, with no outside that all agree on; \
          a solid has 2, export without inner walls",
@@ -150,15 +158,15 @@ pub enum MeshError {
         file: String,
         /// Middle of the edge, in the unit of the file.
         at: [f64; 3],
-        /// Triangles on it.
+        /// Number of triangles at the edge.
         triangles: usize,
     },
-    /// The surface has one side only, like a Möbius band.
+    /// The surface has only one side, like a Möbius band.
     #[error("mesh `{file}`: the surface has one side only (noticed at ({:.4}, {:.4}, {:.4}) of the file): it has no outside", at[0], at[1], at[2])]
     OneSided {
         /// Path as given.
         file: String,
-        /// Middle of an edge on it, in the unit of the file.
+        /// Middle of an edge on the surface, in the unit of the file.
         at: [f64; 3],
     },
     /// The surface is closed but has no inside.
@@ -168,7 +176,7 @@ pub enum MeshError {
         file: String,
         /// Enclosed volume, m³.
         volume_m3: f64,
-        /// Least volume that is accepted, m³.
+        /// Smallest accepted volume, m³.
         least_m3: f64,
     },
 }

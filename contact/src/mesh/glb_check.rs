@@ -1,7 +1,7 @@
-//! Checks that every reference a GLB file's mesh reader follows leads somewhere.
+//! Checks that every reference in a GLB file that the mesh reader follows is valid.
 //!
-//! The `gltf` crate's own validation indexes before it checks (version 1.4.1), so that a damaged file could end the
-//! process; this runs instead of it.
+//! The validation of the `gltf` crate (version 1.4.1) indexes before it checks, so a damaged file could end the
+//! process. This check runs in its place.
 
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};

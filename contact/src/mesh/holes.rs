@@ -1,4 +1,4 @@
-//! Closing what may be closed without changing what touches the skin.
+//! Closes holes where this does not change the surface that touches the skin.
 
 use super::measure::{cross, dot, sub};
 use super::polygon::{Point, signed_area_m2};
@@ -28,7 +28,7 @@ const MAX_EDGES: usize = 2000;
 pub(super) struct Closed {
     /// Small holes and slits, filled flat.
     pub(super) filled: usize,
-    /// Holes that open upward, closed by walls and a lid above everything.
+    /// Holes that open upwards, closed by walls and a lid above everything.
     pub(super) lids: usize,
 }
 
@@ -39,7 +39,7 @@ pub(super) struct Hole {
     pub(super) open_edges: usize,
     /// Middle of one edge of the hole, m.
     pub(super) at_m: [f64; 3],
-    /// Why it stays open.
+    /// Why the hole stays open.
     pub(super) why: &'static str,
 }
 

@@ -12,10 +12,10 @@ use std::path::Path;
 /// A reader of one format: bytes, scale, name for errors.
 type Reader = fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError>;
 
-/// Reads an OBJ, GLB or STL file, scales it to metres and checks and repairs it as [`checked`] does. `scale` is metres
-/// per unit of the file: 1 for GLB, whose unit is the metre; 1e-3 for a file in millimetres, as OBJ and STL often are.
-/// Axes are taken as they stand in the file; in GLB the transforms of the nodes are applied. Polygons are fanned into
-/// triangles; materials, normals and textures are ignored.
+/// Reads an OBJ, GLB or STL file, scales it to metres, and checks and repairs it with [`checked`]. `scale` is the
+/// number of metres in a unit of the file: 1 for GLB, whose unit is the metre; 1e-3 for a file in millimetres, which is
+/// common for OBJ and STL. Axes stay as in the file; in GLB, node transforms are applied. Polygons become triangle
+/// fans; materials, normals and textures are ignored.
 ///
 /// ```
 /// use spts_contact::mesh::{cuboid, load};
@@ -28,7 +28,7 @@ type Reader = fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError>;
 /// ```
 ///
 /// # Errors
-/// [`MeshError`] when the file cannot be read, is not OBJ, GLB or STL, or fails a check.
+/// [`MeshError`] if the file cannot be read, is not OBJ, GLB or STL, or fails a check.
 pub fn load(path: &Path, scale: f64) -> Result<(TriMesh, MeshReport), MeshError> {
     let file = path.display().to_string();
     let extension = path
@@ -49,7 +49,7 @@ pub fn load(path: &Path, scale: f64) -> Result<(TriMesh, MeshReport), MeshError>
     read(&bytes, scale, &file)
 }
 
-/// As [`load`], from the bytes of an OBJ file; `file` is the name the errors carry.
+/// As [`load`], from the bytes of an OBJ file. `file` is the name in errors.
 ///
 /// # Errors
 /// As [`load`].
@@ -147,7 +147,7 @@ fn check_obj_index(word: &str, seen: usize, all: usize, triangle: usize, file: &
     })
 }
 
-/// As [`load`], from the bytes of a GLB file; `file` is the name the errors carry.
+/// As [`load`], from the bytes of a GLB file. `file` is the name in errors.
 ///
 /// # Errors
 /// As [`load`].
@@ -155,7 +155,7 @@ pub fn read_glb(bytes: &[u8], scale: f64, file: &str) -> Result<(TriMesh, MeshRe
     checked(&glb_mesh(bytes, file)?, scale, file)
 }
 
-/// As [`load`], from the bytes of an STL file, text or binary; `file` is the name the errors carry.
+/// As [`load`], from the bytes of an STL file, text or binary. `file` is the name in errors.
 ///
 /// # Errors
 /// As [`load`].

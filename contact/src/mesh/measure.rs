@@ -23,7 +23,7 @@ impl TriMesh {
     /// Corners of triangle `t`, m.
     ///
     /// # Panics
-    /// When `t` or one of its indices is out of range; a mesh that passed [`super::checked`] has none.
+    /// If `t` or one of its indices is out of range, which cannot happen for a mesh that passed [`super::checked`].
     #[must_use]
     pub fn corners(&self, t: usize) -> [[f64; 3]; 3] {
         self.triangles[t].map(|i| self.vertices[i as usize])
@@ -109,8 +109,8 @@ impl TriMesh {
         firsts.all(|(_, volume_m3)| *volume_m3 > 0.0)
     }
 
-    /// Edges that lack a partner running the other way: 0 for a closed, consistently oriented surface. Bodies that
-    /// touch along an edge count as closed.
+    /// Number of edges without a partner in the opposite direction: 0 for a closed, consistently oriented surface.
+    /// Bodies that touch along an edge count as closed.
     #[must_use]
     pub fn open_edges(&self) -> usize {
         Sides::of(self).edges().filter(|edge| balance(edge) != 0).count()

@@ -1,4 +1,4 @@
-//! Making the triangles of each part agree about their outside, and turning it outward.
+//! Orients the triangles of each part consistently, and outwards.
 
 use super::measure::{cross, dot, sub};
 use super::sides::{Sides, Unions};
@@ -13,14 +13,14 @@ const MAX_CONTAINERS: usize = 256;
 /// Why triangles cannot be made to agree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Disagreement {
-    /// An edge of an odd number of triangles above one.
+    /// An edge with an odd number of triangles above one.
     Branching {
         /// Middle of the edge, m.
         at_m: [f64; 3],
         /// Triangles on it.
         triangles: usize,
     },
-    /// Going round, a triangle ends up turned against itself.
+    /// On a closed path over the surface, a triangle meets itself turned over.
     OneSided {
         /// Middle of the edge at which it was noticed, m.
         at_m: [f64; 3],

@@ -1,4 +1,4 @@
-//! Outlines in the plane: closed loops of points, m, counter-clockwise, without repeating the first point.
+//! Outlines in the plane: closed loops of points, m, counter-clockwise; the first point is not repeated at the end.
 
 use std::f64::consts::TAU;
 
@@ -9,14 +9,14 @@ fn ratio(i: usize, n: usize) -> f64 {
     i as f64 / n as f64
 }
 
-/// Rectangle `width_m` (x) by `height_m` (y) about the origin.
+/// Rectangle of `width_m` (x) by `height_m` (y), centred on the origin.
 #[must_use]
 pub fn rectangle(width_m: f64, height_m: f64) -> Vec<Point> {
     let (x, y) = (0.5 * width_m, 0.5 * height_m);
     vec![[-x, -y], [x, -y], [x, y], [-x, y]]
 }
 
-/// Ellipse of half axes `a_m` (x) and `b_m` (y) about the origin, as a polygon of `sides` points.
+/// Ellipse with half axes `a_m` (x) and `b_m` (y), centred on the origin, as a polygon with `sides` points.
 #[must_use]
 pub fn ellipse(a_m: f64, b_m: f64, sides: usize) -> Vec<Point> {
     (0..sides)
@@ -27,7 +27,7 @@ pub fn ellipse(a_m: f64, b_m: f64, sides: usize) -> Vec<Point> {
         .collect()
 }
 
-/// Circle of `radius_m` about the origin, as a polygon of `sides` points.
+/// Circle of `radius_m`, centred on the origin, as a polygon with `sides` points.
 #[must_use]
 pub fn circle(radius_m: f64, sides: usize) -> Vec<Point> {
     ellipse(radius_m, radius_m, sides)
@@ -41,8 +41,18 @@ pub fn triangle(side_m: f64) -> Vec<Point> {
     vec![[-half, -height / 3.0], [half, -height / 3.0], [0.0, height * 2.0 / 3.0]]
 }
 
-/// The convex corners of `outline` replaced by arcs of `radius_m` with `steps` segments each. The radius is reduced
+/// Replaces the convex corners of `outline` by arcs of `radius_m` with `steps` segments each. The radius is reduced
 /// where a side is too short for it.
+///
+/// ```
+/// use spts_contact::mesh::polygon::{rectangle, rounded, signed_area_m2};
+///
+/// let sharp = rectangle(40e-3, 20e-3);
+/// let round = rounded(&sharp, 5e-3, 16);
+/// // each corner loses r² − πr²/4
+/// let lost_m2 = (4.0 - std::f64::consts::PI) * 5e-3 * 5e-3;
+/// assert!((signed_area_m2(&sharp) - signed_area_m2(&round) - lost_m2).abs() < 0.01 * lost_m2);
+/// ```
 #[must_use]
 pub fn rounded(outline: &[Point], radius_m: f64, steps: usize) -> Vec<Point> {
     let n = outline.len();
@@ -75,8 +85,8 @@ pub fn rounded(outline: &[Point], radius_m: f64, steps: usize) -> Vec<Point> {
     out
 }
 
-/// Outline between the curves y = `low_m(x)` and y = `high_m(x)` over `from_m ≤ x ≤ to_m`, in `steps` equal steps.
-/// Where the curves meet at an end, the two points there become one.
+/// Outline between the curves y = `low_m(x)` and y = `high_m(x)` over `from_m ≤ x ≤ to_m`, in `steps` equal steps. If
+/// the curves meet at an end, their two points there become one.
 #[must_use]
 pub fn between(
     [from_m, to_m]: Point,
@@ -92,7 +102,7 @@ pub fn between(
     out
 }
 
-/// Turned by `angle_rad` about the origin, then moved by `offset_m`.
+/// Rotates `outline` by `angle_rad` about the origin, then moves it by `offset_m`.
 #[must_use]
 pub fn placed(outline: &[Point], angle_rad: f64, offset_m: Point) -> Vec<Point> {
     let (s, c) = angle_rad.sin_cos();

@@ -1,15 +1,15 @@
-//! Splitting long edges, so that a flat face can be bent.
+//! Splits long edges, so that a flat face can be bent.
 
 use super::tri_mesh::{TriMesh, index};
 use std::collections::HashMap;
 
 impl TriMesh {
-    /// Every edge that `bends` accepts (given both its ends, m) and that is longer than `longest_m` is halved until
-    /// none is left. Neighbours share the new vertices, so that a closed mesh stays closed. At most 12 rounds: an edge
-    /// ends at 1/4096 of its length or at `longest_m`, whichever is longer.
+    /// Halves every edge that is longer than `longest_m` and for which `bends` (called with both ends, m) returns
+    /// `true`, until none is left. Neighbours share the new vertices, so a closed mesh stays closed. There are at most
+    /// 12 rounds: an edge ends at 1/4096 of its length or at `longest_m`, whichever is longer.
     ///
     /// # Panics
-    /// When an index is out of range; a mesh that passed [`super::checked`] has none.
+    /// If an index is out of range, which cannot happen for a mesh that passed [`super::checked`].
     #[must_use]
     pub fn refined(mut self, longest_m: f64, bends: impl Fn([f64; 3], [f64; 3]) -> bool) -> Self {
         for _ in 0..12 {

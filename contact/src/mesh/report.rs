@@ -1,40 +1,52 @@
-//! What was done to a mesh on its way in.
+//! Report on the check and repair of a mesh.
 
 use super::size::SOFT_MAX_TRIANGLES;
 use serde::Serialize;
 
-/// What was repaired on the way in, and what the mesh is like.
+/// Repairs of a mesh, and its properties afterwards.
+///
+/// ```
+/// use spts_contact::mesh::{cuboid, read_obj};
+///
+/// // a block in millimetres that has one triangle twice
+/// let mut block = cuboid([40.0, 20.0, 10.0]);
+/// block.triangles.push(block.triangles[0]);
+/// let (mesh, report) = read_obj(block.to_obj("block").as_bytes(), 1e-3, "block.obj")?;
+/// assert_eq!((report.duplicate_triangles, mesh.open_edges()), (1, 0));
+/// assert!(!report.notes().is_empty(), "the repair is reported");
+/// # Ok::<(), spts_contact::mesh::MeshError>(())
+/// ```
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct MeshReport {
     /// Vertices after repair.
     pub vertices: usize,
     /// Triangles after repair.
     pub triangles: usize,
-    /// Vertices that coincided with another and were joined. Not counted for STL, where each triangle has corners of
-    /// its own.
+    /// Vertices that coincided with another and were joined. Not counted for STL, where every triangle has its own
+    /// corners.
     pub joined_vertices: usize,
-    /// Triangles without three distinct corners, dropped.
+    /// Dropped triangles without three distinct corners.
     pub dropped_triangles: usize,
-    /// Triangles that were there more than once, dropped.
+    /// Dropped duplicate triangles.
     pub duplicate_triangles: usize,
     /// Triangles that were turned to agree with their neighbours.
     pub turned_triangles: usize,
-    /// The mesh, or a part of it, was inside out and has been turned.
+    /// Whether the mesh, or a part of it, was inside out and has been turned.
     pub flipped: bool,
     /// Small holes that were filled flat.
     pub filled_holes: usize,
-    /// Holes that open upward and were closed above everything, where nothing touches while the mesh stands upright: it
-    /// has to stay nearly upright.
+    /// Holes that open upwards and were closed above everything. The mesh has to stay nearly upright, so that nothing
+    /// touches there.
     pub lids: usize,
-    /// Triangles before decimation, if the mesh was decimated.
+    /// Number of triangles before decimation; `None` if the mesh was not decimated.
     pub decimated_from: Option<usize>,
-    /// Largest distance between the surfaces before and after decimation, m.
+    /// Largest distance between the surfaces before and after decimation, m; `None` without decimation.
     pub decimation_error_m: Option<f64>,
-    /// More than [`SOFT_MAX_TRIANGLES`] triangles: expect slow contact.
+    /// Whether there are more than [`SOFT_MAX_TRIANGLES`] triangles, which makes contact slow.
     pub heavy: bool,
     /// Sides of the box around the mesh, m.
     pub extent_m: [f64; 3],
-    /// Middle of the box around the mesh, seen from its origin, m.
+    /// Middle of the box around the mesh, relative to its origin, m.
     pub middle_m: [f64; 3],
     /// Enclosed volume, m³.
     pub volume_m3: f64,
@@ -47,7 +59,7 @@ impl MeshReport {
         (0..2).any(|k| self.middle_m[k].abs() > 0.5 * self.extent_m[k])
     }
 
-    /// What a user should know, a line each; empty for a mesh that was fine.
+    /// Notes for the user, one a line; empty if the mesh needed no repair.
     #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();

@@ -4,20 +4,30 @@ use super::polygon::Point;
 use super::tri_mesh::{TriMesh, index};
 use std::f64::consts::{PI, TAU};
 
-/// Solid swept by `profile`, points (r, z) in metres from the lower axis point to the upper one; the first and the
-/// last must have r = 0. `segments` around.
+/// Solid of revolution of `profile`: points (r, z), m, from the lower to the upper point on the axis. The first and the
+/// last must have r = 0. `segments` is the number of segments around the axis.
+///
+/// ```
+/// use spts_contact::mesh::revolve;
+///
+/// // a cone of 10 mm radius and 30 mm height
+/// let cone = revolve(&[[0.0, 0.0], [10e-3, 30e-3], [0.0, 30e-3]], 128);
+/// let exact_m3 = std::f64::consts::PI * 10e-3_f64.powi(2) * 30e-3 / 3.0;
+/// assert!((cone.volume_m3() / exact_m3 - 1.0).abs() < 1e-3);
+/// ```
 #[must_use]
 pub fn revolve(profile: &[Point], segments: usize) -> TriMesh {
     sweep(profile, segments, false)
 }
 
-/// Ring swept by the closed loop `section`, points (r, z) in metres with r > 0, counter-clockwise in the (r, z) plane.
+/// Ring of revolution of the closed loop `section`: points (r, z), m, with r > 0, counter-clockwise in the (r, z)
+/// plane.
 #[must_use]
 pub fn revolve_ring(section: &[Point], segments: usize) -> TriMesh {
     sweep(section, segments, true)
 }
 
-/// Sphere of `radius_m` standing on z = 0, with `rings` bands from pole to pole and `segments` around.
+/// Sphere of `radius_m` that stands on z = 0, with `rings` bands from pole to pole and `segments` around the axis.
 #[must_use]
 pub fn sphere(radius_m: f64, rings: usize, segments: usize) -> TriMesh {
     let rings = rings.max(2);

@@ -1,4 +1,4 @@
-//! The sides of the triangles, sorted by the edge they lie on.
+//! The sides of the triangles, sorted by edge.
 
 use super::tri_mesh::{TriMesh, index};
 
@@ -9,7 +9,7 @@ pub(super) struct Side {
     pub(super) edge: [u32; 2],
     /// The triangle.
     pub(super) triangle: u32,
-    /// The triangle runs along the edge from the smaller index to the larger.
+    /// Whether the triangle runs along the edge from the smaller index to the larger.
     pub(super) rising: bool,
 }
 
@@ -52,7 +52,7 @@ pub(super) fn balance(edge: &[Side]) -> i64 {
 /// Sets that are joined pair by pair, each member knowing whether it is turned against its set's first.
 pub(super) struct Unions {
     parent: Vec<u32>,
-    /// Turned against the parent.
+    /// Whether the triangle is turned against its parent.
     turned: Vec<bool>,
 }
 

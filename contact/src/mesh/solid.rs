@@ -4,19 +4,19 @@ use super::polygon::{self, Point};
 use super::tri_mesh::{TriMesh, index};
 use super::triangulate::triangulate;
 
-/// Block of the given sides along x, y, z, m; centred on the origin in x and y, standing on z = 0.
+/// Block with the given sides along x, y, z, m. It is centred on the origin in x and y and stands on z = 0.
 #[must_use]
 pub fn cuboid(sides_m: [f64; 3]) -> TriMesh {
     extrude(&polygon::rectangle(sides_m[0], sides_m[1]), &[], sides_m[2])
 }
 
-/// Upright cylinder standing on z = 0, as a prism of `sides` sides.
+/// Upright cylinder that stands on z = 0, as a prism with `sides` sides.
 #[must_use]
 pub fn cylinder(radius_m: f64, height_m: f64, sides: usize) -> TriMesh {
     extrude(&polygon::circle(radius_m, sides), &[], height_m)
 }
 
-/// Prism over `outer` minus `holes`, from z = 0 to `height_m`. The holes go right through.
+/// Prism over `outer` minus `holes`, from z = 0 to `height_m`. The holes go all the way through.
 #[must_use]
 pub fn extrude(outer: &[Point], holes: &[Vec<Point>], height_m: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
@@ -29,8 +29,17 @@ pub fn extrude(outer: &[Point], holes: &[Vec<Point>], height_m: f64) -> TriMesh 
     joined(&mesh)
 }
 
-/// Prism over `outer` from z = 0 to `height_m` with a blind recess over `inner` of `recess_m` from below: a tray
+/// Prism over `outer` from z = 0 to `height_m`, with a blind recess over `inner`, `recess_m` deep from below: a tray
 /// upside down.
+///
+/// ```
+/// use spts_contact::mesh::{extrude_recessed, polygon::rectangle};
+///
+/// // a tray of 2 mm walls, 8 mm deep
+/// let tray = extrude_recessed(&rectangle(40e-3, 40e-3), &rectangle(36e-3, 36e-3), 10e-3, 8e-3);
+/// let exact_m3 = 0.04 * 0.04 * 0.010 - 0.036 * 0.036 * 0.008;
+/// assert!((tray.volume_m3() - exact_m3).abs() < 1e-15);
+/// ```
 #[must_use]
 pub fn extrude_recessed(outer: &[Point], inner: &[Point], height_m: f64, recess_m: f64) -> TriMesh {
     let mut mesh = TriMesh::default();

@@ -1,6 +1,15 @@
 //! The mesh itself.
 
 /// Triangle mesh in metres, body axes; triangles are counter-clockwise seen from outside.
+///
+/// ```
+/// use spts_contact::mesh::cuboid;
+///
+/// let block = cuboid([40e-3, 20e-3, 10e-3]);
+/// let tilted = block.clone().rotated_x(0.1).grounded();
+/// assert!((tilted.volume_m3() - block.volume_m3()).abs() < 1e-15);
+/// assert!(tilted.bounds().unwrap().0[2].abs() < 1e-15, "its lowest point is at z = 0");
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TriMesh {
     /// Vertex positions, m.

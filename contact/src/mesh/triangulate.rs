@@ -1,7 +1,7 @@
 //! Triangulation of a polygon with holes by bridging and ear clipping.
 //!
-//! Source: D. Eberly, *Triangulation by Ear Clipping* (2002, revised 2015). The time grows with the cube of the number
-//! of points in the worst case, a spiral; `holes` bounds it for outlines from files.
+//! Source: D. Eberly, *Triangulation by Ear Clipping* (2002, revised 2015). In the worst case, a spiral, the time grows
+//! with the cube of the number of points; `holes` limits that number for outlines from files.
 
 use super::polygon::{Point, signed_area_m2, turn};
 

@@ -1,4 +1,4 @@
-//! Joining vertices that coincide and dropping triangles that collapse.
+//! Joins coinciding vertices and drops triangles that collapse.
 
 use super::tri_mesh::{TriMesh, index};
 
@@ -74,14 +74,14 @@ impl Grid {
 }
 
 impl TriMesh {
-    /// Vertices closer than `tolerance_m` joined to the first of them, triangles that lose a corner dropped, unused
-    /// vertices removed. Also returns `(vertices joined, triangles dropped)`.
+    /// Joins vertices closer than `tolerance_m` to the first of them, drops triangles that lose a corner, and removes
+    /// unused vertices. Also returns `(vertices joined, triangles dropped)`.
     ///
-    /// A thin triangle that keeps three distinct corners stays, even with no area: taking it out would open the
+    /// A thin triangle with three distinct corners stays, even if its area is zero, because removing it would open the
     /// surface.
     ///
     /// # Panics
-    /// When an index is out of range; [`super::checked`] looks before it welds.
+    /// If an index is out of range; [`super::checked`] tests the indices first.
     #[must_use]
     pub fn welded(&self, tolerance_m: f64) -> (Self, usize, usize) {
         let side_m = (CELL_TOLERANCES * tolerance_m).max(f64::MIN_POSITIVE.sqrt());

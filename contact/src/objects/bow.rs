@@ -1,4 +1,4 @@
-//! Faces that are not quite flat.
+//! Faces with a slight bow.
 
 use crate::mesh::TriMesh;
 

@@ -1,4 +1,4 @@
-//! The tip of a finger, which touches a skin and is none of the objects that are told apart.
+//! A fingertip, which touches the skin but is not one of the classified objects.
 
 use super::spec::{ObjectSpec, Placement};
 use crate::mesh::{TriMesh, sphere};
@@ -8,7 +8,7 @@ const RADIUS_M: f64 = 8e-3;
 /// Stiffness of its pulp, Pa/m: about 80 kPa over 5 mm (estimate).
 const PULP_PA_PER_M: f64 = 1.6e7;
 
-/// Tip of a finger: a ball of 8 mm radius with a soft surface. It has no label; in scenes it is `press.object =
+/// A fingertip: a ball of 8 mm radius with a soft surface. It has no label. Scenes select it with `press.object =
 /// "finger"`.
 pub const FINGER: ObjectSpec = ObjectSpec {
     name: "finger",

@@ -1,5 +1,5 @@
-//! Household things: brain, comb, eraser, fish, gel, perfume, tape, tennis ball. Lengths in metres; estimates, except
-//! the ball.
+//! Household objects: brain, comb, eraser, fish, gel, perfume, tape, tennis ball. Lengths in metres; all but the ball's
+//! are estimates.
 
 use super::bow::bowed;
 use crate::mesh::polygon::{self, Point};

@@ -1,9 +1,8 @@
-//! The seventeen objects that were pressed on the published skin, as closed solids, with the place where each is
+//! The seventeen objects that were pressed on the published skin, as closed solids, each with the place where it is
 //! pressed.
 //!
-//! The published text names the objects but gives no size. Sizes and places here were found by fitting a static
-//! contact model to the published raster recordings (`scripts/fit_objects.py`), within what is believable for the
-//! thing; they are estimates.
+//! The published text names the objects but gives no sizes. Sizes and places are estimates: a static contact model was
+//! fitted to the published raster recordings (`scripts/fit_objects.py`), within plausible sizes of each object.
 //!
 //! ```
 //! use spts_contact::objects::by_name;
@@ -23,7 +22,7 @@ pub use finger::FINGER;
 pub use spec::{ObjectSpec, Placement};
 pub use table::{BALL_STIFFNESS_PA_PER_M, OBJECTS};
 
-/// The object of that name, or `None`.
+/// The object called `name`; `None` if there is none.
 #[must_use]
 pub fn by_name(name: &str) -> Option<&'static ObjectSpec> {
     OBJECTS.iter().find(|o| o.name == name)

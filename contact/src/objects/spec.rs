@@ -1,29 +1,39 @@
-//! What is known of an object, and where it is pressed.
+//! Specification of an object and of its place on the skin.
 
 use crate::mesh::TriMesh;
 
-/// One object: what it is and how it is pressed.
+/// One object: its shape, and how it is pressed.
+///
+/// ```
+/// use spts_contact::objects::by_name;
+///
+/// let tape = by_name("tape").expect("one of the seventeen objects");
+/// let mesh = (tape.build)();
+/// assert_eq!(mesh.open_edges(), 0);
+/// assert!(mesh.extent_m() < 0.15, "smaller than the skin");
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct ObjectSpec {
     /// Name, as in the published recordings.
     pub name: &'static str,
-    /// Label of the classifier, 1 to 17 in the order of [`OBJECTS`](super::OBJECTS); 0 for what is not classified.
+    /// Label for classifiers, 1 to 17 in the order of [`OBJECTS`](super::OBJECTS); 0 for an object that is not
+    /// classified.
     pub label: u8,
     /// What the object is, in everyday words.
     pub description: &'static str,
-    /// Builds the mesh: metres, contact face towards −z, lowest point at z = 0, origin at the point that is placed at
-    /// `placement`. Body x points to increasing columns and body y to decreasing rows when the rotation is zero.
+    /// Builds the mesh: metres, contact face towards −z, lowest point at z = 0, origin at the point that `placement`
+    /// positions. At zero rotation, body x points towards increasing columns and body y towards decreasing rows.
     pub build: fn() -> TriMesh,
-    /// Stiffness of its own surface in series with the skin, Pa/m; `None` for what is rigid beside the foam.
+    /// Stiffness of the object's surface in series with the skin, Pa/m; `None` if it is rigid compared with the foam.
     pub stiffness_pa_per_m: Option<f64>,
-    /// Where and how it is pressed.
+    /// Where and at which angles the object is pressed.
     pub placement: Placement,
 }
 
-/// Pose of an object on the skin, up to its height.
+/// Pose of an object on the skin, except its height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// Row of the body origin, in taxels; row 0 is the far edge, whole numbers are taxel centres.
+    /// Row of the body origin, in taxels. Row 0 is the far edge; whole numbers are taxel centres.
     pub row: f64,
     /// Column of the body origin, in taxels.
     pub col: f64,

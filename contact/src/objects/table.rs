@@ -6,11 +6,11 @@ use super::{household, plates};
 /// The eraser's felt pad: a modulus of 1 MPa over 4 mm (estimate).
 const ERASER_PAD_PA_PER_M: f64 = 1e6 / 4e-3;
 
-/// Stiffness of a tennis ball's surface in series with the skin, Pa/m. As a sphere on springs, F = π K R δ², the ball
-/// of the ITF's forward deformation test (80 N at 5.6–7.4 mm) has K = 1.4–2.4e7 Pa/m.
+/// Stiffness of a tennis ball's surface in series with the skin, Pa/m. For a sphere on springs, F = π K R δ². The ITF's
+/// forward deformation test (80 N at 5.6–7.4 mm) then gives K = 1.4–2.4e7 Pa/m.
 pub const BALL_STIFFNESS_PA_PER_M: f64 = 2e7;
 
-/// All objects in label order.
+/// All objects, in order of label.
 pub const OBJECTS: &[ObjectSpec] = &[
     ObjectSpec {
         name: "brain",

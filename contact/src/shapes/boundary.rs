@@ -1,4 +1,4 @@
-//! Distance from the sides of a region.
+//! Distance to the sides of a region.
 
 use crate::mesh::polygon::Point;
 
@@ -7,7 +7,8 @@ use crate::mesh::polygon::Point;
 pub(super) struct Side {
     from_m: Point,
     along_m: Point,
-    /// The end's y, m: as a sum it may differ from the next side's beginning, and a point between would be outside.
+    /// y of the end, m. Because it is a sum, it may differ from the start of the next side; a point in between would be
+    /// outside.
     end_y_m: f64,
     /// 1 / length², 1/m².
     inverse: f64,
@@ -69,7 +70,7 @@ const BANDS: usize = 16;
 pub(super) struct Bands {
     low_m: f64,
     height_m: f64,
-    /// Sides band after band; `ends[b]..ends[b + 1]` are those of band b.
+    /// Sides, band by band; `ends[b]..ends[b + 1]` are those of band b.
     sides: Vec<Side>,
     ends: [usize; BANDS + 1],
 }

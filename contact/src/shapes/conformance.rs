@@ -1,11 +1,11 @@
-//! What every family has to fulfil.
+//! Properties that every family of shapes must have.
 
 use super::family::ShapeFamily;
 use super::ranges::ShapeRanges;
 use super::shape::Shape;
 use crate::mesh::{TriMesh, checked};
 
-/// Most triangles of a shape.
+/// Largest number of triangles in a shape.
 pub const MAX_TRIANGLES: usize = 6000;
 /// Largest relative error of the drawn size and of the volume's lower bound: rounding of sums over a few hundred
 /// points.
@@ -14,7 +14,7 @@ const ROUNDING: f64 = 1e-9;
 /// a field can see.
 const LEAST_TRIANGLE: f64 = 1e-7;
 
-/// A promise of [`ShapeFamily`] that a shape does not keep.
+/// A property of [`ShapeFamily`] that a shape lacks.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{family}, seed {seed}: {check}: got {actual}, expected {expected}")]
 pub struct ShapeFault {
@@ -22,16 +22,17 @@ pub struct ShapeFault {
     pub family: &'static str,
     /// Seed of the shape.
     pub seed: u64,
-    /// Which promise.
+    /// Name of the property.
     pub check: &'static str,
-    /// What was found.
+    /// Actual value.
     pub actual: String,
-    /// What it should have been.
+    /// Expected value.
     pub expected: String,
 }
 
-/// Checks the shapes of `family` for the given ranges and seeds: a closed solid that needs no repair, on z = 0, of the
-/// drawn size, relief and edge, with few and sound triangles, the same again and another one for another seed.
+/// Checks the shapes of `family` for the given ranges and seeds. A shape must be a closed solid on z = 0 that needs no
+/// repair, have the drawn size, relief and edge, and consist of few, well-formed triangles. The same seed must give the
+/// same shape, and another seed another shape.
 ///
 /// # Errors
 /// The first [`ShapeFault`] found.

@@ -1,10 +1,10 @@
-//! Random draws of a shape.
+//! Random numbers for shapes.
 
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
 
-/// The random numbers of one shape, in the few forms that families ask for.
+/// The random numbers of one shape.
 #[derive(Debug, Clone)]
 pub struct Dice(ChaCha8Rng);
 
@@ -13,27 +13,27 @@ impl Dice {
         Self(rng)
     }
 
-    /// A number of [`low`, `high`), uniform.
+    /// A uniform number in [`low`, `high`).
     pub fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.0.random::<f64>()
     }
 
-    /// A whole number of [`low`, `high`], uniform.
+    /// A uniform whole number in [`low`, `high`].
     pub fn whole(&mut self, low: usize, high: usize) -> usize {
         self.0.random_range(low..=high.max(low))
     }
 
-    /// True with the probability `share`.
+    /// `true` with the probability `share`.
     pub fn chance(&mut self, share: f64) -> bool {
         self.0.random::<f64>() < share
     }
 
-    /// An angle of [0, 2π), rad.
+    /// A uniform angle in [0, 2π), rad.
     pub fn angle_rad(&mut self) -> f64 {
         self.between(0.0, TAU)
     }
 
-    /// −1 or 1.
+    /// −1 or 1, with equal probability.
     pub fn sign(&mut self) -> f64 {
         if self.chance(0.5) { 1.0 } else { -1.0 }
     }

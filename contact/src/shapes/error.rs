@@ -1,4 +1,4 @@
-//! Why there is no shape.
+//! Errors of shapes.
 
 use spts_models::ConfigError;
 
@@ -9,22 +9,22 @@ pub enum ShapeError {
     /// No family of that name.
     #[error("shape family \"{name}\" is not one of {known}")]
     Unknown {
-        /// Name that was asked for.
+        /// Requested name.
         name: String,
         /// Names that exist.
         known: String,
     },
-    /// A range is not valid.
+    /// A range that is not valid.
     #[error(transparent)]
     Ranges(#[from] ConfigError),
-    /// A family drew outlines that touch or cross themselves, again and again.
+    /// A family whose outlines touch or cross themselves at every attempt.
     #[error("shape family \"{family}\" has no closed solid for seed {seed} in {tries} tries")]
     NoSolid {
         /// Name of the family.
         family: &'static str,
         /// Seed of the shape.
         seed: u64,
-        /// Drawings that were tried.
+        /// Number of attempts.
         tries: u64,
     },
 }

@@ -1,4 +1,4 @@
-//! A family of shapes, and how a shape of it is built.
+//! Shape families, and how their shapes are built.
 
 use super::corners::rounded;
 use super::dice::Dice;
@@ -22,7 +22,7 @@ const LEAST_EDGE_M: f64 = 0.1e-3;
 /// 1 mm at 40 mm departs from chords of 10 mm by 16 µm.
 const RELIEF_SPACING: (f64, f64) = (10e-3, 0.08);
 
-/// Solids of one kind, of which a seed picks one. A program may have families of its own:
+/// A family of solids. A seed selects one of them. A program may define families of its own:
 ///
 /// ```
 /// use spts_contact::mesh::polygon::rectangle;
@@ -43,20 +43,20 @@ const RELIEF_SPACING: (f64, f64) = (10e-3, 0.08);
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct ShapeFamily {
-    /// Name, as data sets write it.
+    /// Name, as used in data sets.
     pub name: &'static str,
-    /// What the shapes are, in everyday words.
+    /// What the shapes look like, in everyday words.
     pub description: &'static str,
-    /// Draws the outline. It may depend on the random numbers alone.
+    /// Draws the outline. It must depend only on the random numbers.
     pub plan: fn(&mut Dice) -> Plan,
 }
 
 impl ShapeFamily {
-    /// The shape of `seed`: a function of the family's name and plan, the ranges and the seed, and of nothing else.
+    /// Builds the shape of `seed`. The result depends only on the family's name and plan, the ranges and the seed.
     ///
     /// # Errors
-    /// [`ShapeError::Ranges`] for a range that is not valid; [`ShapeError::NoSolid`] when the family draws outlines
-    /// that cross themselves whatever the random numbers.
+    /// [`ShapeError::Ranges`] for a range that is not valid; [`ShapeError::NoSolid`] if the family's outlines cross
+    /// themselves for all random numbers tried.
     pub fn build(&self, ranges: &ShapeRanges, seed: u64) -> Result<Shape, ShapeError> {
         ranges.check()?;
         let streams = Streams::new(seed).child(self.name, 0);

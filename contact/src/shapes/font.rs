@@ -1,4 +1,4 @@
-//! Letters A to Z as lines, in a box one high and as wide as the letter.
+//! The letters A to Z as lines, in a box of height one and the width of the letter.
 
 use super::stroke::arc;
 use crate::mesh::polygon::Point;

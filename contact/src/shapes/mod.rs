@@ -1,9 +1,9 @@
-//! Procedural shapes: closed solids by families and seeds, thousands of different ones for synthetic data sets.
+//! Procedural shapes: families of closed solids, which give thousands of different shapes for synthetic data sets.
 //!
-//! A family draws an outline with holes; size, relief and edge come from ranges that all families share. The solid has
-//! a flat top and an underside of three parts that add up: a rounded lower edge or a dome, and a relief, which is a
-//! bow and a few waves. Points of the underside are where these need them, joined by a constrained Delaunay
-//! triangulation, so that a shape has few triangles and is built in well under a millisecond.
+//! A family draws an outline with holes; size, relief and edge are drawn from ranges that all families share. The solid
+//! has a flat top. Its underside is the sum of three parts: a rounded lower edge or a dome, a bow, and a few waves.
+//! Points lie only where these parts need them and are joined by a constrained Delaunay triangulation, so a shape has
+//! few triangles and is built in well under a millisecond.
 //!
 //! The rounded lower edge is a quarter circle in one chord (radii below 1 mm) or two. It is made of points inside the
 //! outline, at their distance from it; no loop is offset. A neck narrower than two radii, which only `union` may have,

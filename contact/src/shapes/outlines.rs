@@ -1,4 +1,4 @@
-//! Outlines that families share, about the origin.
+//! Outlines that several families use, centred on the origin.
 
 use super::dice::Dice;
 use crate::mesh::polygon::{self, Point};

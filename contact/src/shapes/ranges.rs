@@ -1,19 +1,28 @@
-//! What a data set may ask of its shapes.
+//! Ranges of a data set's shapes.
 
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, in_range, within};
 
-/// Ranges from which size, relief and edge of a shape are drawn, uniformly. Each is `[lowest, highest]`; two equal
-/// numbers fix the value. Missing ones take the values of [`ShapeRanges::default`].
+/// Ranges from which size, relief and edge of a shape are drawn uniformly. Each is `[lowest, highest]`; two equal
+/// numbers fix the value. A missing range takes its value in [`ShapeRanges::default`].
+///
+/// ```
+/// use spts_contact::shapes::ShapeRanges;
+///
+/// let ranges: ShapeRanges = toml::from_str("size_m = [0.04, 0.06]")?;
+/// assert!(ranges.check().is_ok());
+/// let wrong = ShapeRanges { size_m: [0.06, 0.04], ..ranges };
+/// assert!(wrong.check().unwrap_err().to_string().contains("size_m"));
+/// # Ok::<(), toml::de::Error>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShapeRanges {
     /// Largest horizontal extent along body x or y, m; within [5e-3, 0.3].
     pub size_m: [f64; 2],
-    /// Difference between the highest and the lowest point of the bow and the bumps of an underside, m; within
-    /// [0, 5e-3].
+    /// Difference between the highest and the lowest point of bow and waves on the underside, m; within [0, 5e-3].
     pub relief_m: [f64; 2],
-    /// Radius of the outline's corners and of the lower edge, m; within [0, 20e-3]. A narrow shape takes less.
+    /// Radius of the outline's corners and of the lower edge, m; within [0, 20e-3]. It is smaller on narrow shapes.
     pub edge_m: [f64; 2],
 }
 
@@ -30,10 +39,10 @@ impl Default for ShapeRanges {
 }
 
 impl ShapeRanges {
-    /// Checks every limit, and that the lower one is not above the upper one.
+    /// Checks that every limit is in its range, and that no lower limit is above the upper one.
     ///
     /// # Errors
-    /// [`ConfigError`] with the first field that is outside its range.
+    /// [`ConfigError`] for the first field outside its range.
     pub fn check(&self) -> Result<(), ConfigError> {
         let fields = [
             ("size_m", self.size_m, [5e-3, 0.3], "[5e-3, 0.3] m"),

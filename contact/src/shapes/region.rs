@@ -1,4 +1,4 @@
-//! From a plan's loops to simple loops of the drawn size.
+//! Turns the loops of a plan into simple loops of the drawn size.
 
 use super::plan::Plan;
 use crate::mesh::polygon::{Point, signed_area_m2};
@@ -17,9 +17,9 @@ const LEAST_PIECE: f64 = 0.02;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Region {
     pub(super) loops: Vec<Vec<Point>>,
-    /// Length of a plan's unit, m.
+    /// Length of the plan's unit, m.
     pub(super) unit_m: f64,
-    /// Where the plan's origin is, m.
+    /// Position of the plan's origin, m.
     pub(super) centre: Point,
 }
 

@@ -1,4 +1,4 @@
-//! Bow and bumps of an underside.
+//! Bow and waves of an underside.
 
 use super::dice::Dice;
 use crate::mesh::polygon::Point;

@@ -1,4 +1,4 @@
-//! The families a data set can name.
+//! The table of shape families.
 
 use super::error::ShapeError;
 use super::families;
@@ -75,11 +75,11 @@ pub const SHAPE_FAMILIES: &[ShapeFamily] = &[
     },
 ];
 
-/// The shape of `seed` out of the family called `family`: a function of these and of `ranges`, the same bytes on any
-/// thread.
+/// Builds the shape of `seed` in the family called `family`. The result depends only on the arguments, and has the same
+/// bytes on any thread.
 ///
 /// # Errors
-/// [`ShapeError`] when the name is unknown, when a range is not valid, or when the family has no solid for this seed.
+/// [`ShapeError`] if the name is unknown, a range is not valid, or the family has no solid for this seed.
 pub fn build_shape(family: &str, ranges: &ShapeRanges, seed: u64) -> Result<Shape, ShapeError> {
     let Some(known) = SHAPE_FAMILIES.iter().find(|known| known.name == family) else {
         let names: Vec<_> = SHAPE_FAMILIES

@@ -1,4 +1,4 @@
-//! Triangles over a region, with points inside.
+//! Triangulates a region with points inside.
 
 use crate::mesh::polygon::Point;
 use spade::handles::FixedVertexHandle;
@@ -8,9 +8,9 @@ use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 #[derive(Debug, Clone, Default)]
 pub(super) struct Plane {
     pub(super) points: Vec<Point>,
-    /// Of every point of a loop, the next one; the inside is on the left.
+    /// For every point of a loop, the next one; the inside is on the left.
     pub(super) next: Vec<usize>,
-    /// Edges between points inside that the triangles should have, where they cross no other.
+    /// Edges between inner points that the triangulation should have unless they cross others.
     pub(super) creases: Vec<[usize; 2]>,
 }
 

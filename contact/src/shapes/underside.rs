@@ -1,4 +1,4 @@
-//! Points of an underside and their heights before the relief.
+//! Points of an underside, and their heights before the relief is added.
 
 use super::boundary::Bands;
 use super::plan::Dome;

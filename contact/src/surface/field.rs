@@ -1,4 +1,4 @@
-//! Foam under a skin of any shape.
+//! Foam on a surface of any shape.
 
 use super::points::SurfacePoints;
 use super::solid::Solid;
@@ -11,17 +11,17 @@ use parry3d_f64::math::Vector;
 use serde::{Deserialize, Serialize};
 use spts_models::ConfigError;
 
-/// Parameters of [`SurfaceField`]. Missing ones take the values of [`SurfaceConfig::default`].
+/// Parameters of [`SurfaceField`]. A missing one takes its value in [`SurfaceConfig::default`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SurfaceConfig {
-    /// K, initial stiffness of the skin, Pa/m; [1e4, 1e9]. K h is the foam's modulus.
+    /// K, initial stiffness of the skin, Pa/m; [1e4, 1e9]. K h is the modulus of the foam.
     pub stiffness_pa_per_m: f64,
     /// τ, damping time of the Kelvin–Voigt element, s; [0, 0.02].
     pub damping_s: f64,
-    /// h, thickness of the foam, m; [1e-4, 10]. Bodies are looked for down to 2 h below the surface.
+    /// h, thickness of the foam, m; [1e-4, 10]. Bodies are searched down to 2 h below the surface.
     pub thickness_m: f64,
-    /// ε_max, strain at which only solid is left (1 − relative density); [0.3, 1].
+    /// ε_max, strain at which no pores are left (1 − relative density); [0.3, 1].
     pub max_strain: f64,
     /// μ, friction coefficient; [0, 5].
     pub friction: f64,
@@ -47,15 +47,29 @@ impl Default for SurfaceConfig {
 /// Depth to which bodies are looked for, in thicknesses of the foam.
 const REACH: f64 = 2.0;
 
-/// Bed of independent columns of foam along the normals of a surface, under any number of bodies.
+/// Independent columns of foam along the normals of a surface, under any number of bodies.
 ///
-/// A column starts at a sample point and goes in along the normal n. At depth δ, where the body's surface moves with
-/// velocity v, it carries p = f(max(0, δ − τ v·n)) as in [`WinklerLayer`](crate::WinklerLayer), and friction
-/// t = −μ p v_t/√(|v_t|² + v_reg²) along the surface. The force p·A·n + t·A acts where the column ends, at δ below the
-/// point; A is the area that the point stands for, on the free surface (to first order in δ over the radius of
-/// curvature). What several bodies press at one point adds up.
+/// A column starts at a sample point and points inwards along the normal n. At depth δ, where the body's surface moves
+/// with velocity v, its pressure is p = f(max(0, δ − τ v·n)), as in [`WinklerLayer`](crate::WinklerLayer), and friction
+/// along the surface is t = −μ p v_t/√(|v_t|² + v_reg²). The force p·A·n + t·A acts at the end of the column, δ below
+/// the point. A is the point's area on the free surface (valid to first order in δ over the radius of curvature).
+/// Pressures of several bodies at one point add up.
 ///
-/// A body that is deeper than two thicknesses counts as that deep.
+/// A body deeper than two thicknesses is treated as if at two thicknesses.
+///
+/// ```
+/// use spts_contact::{PosedMesh, Solid, SurfaceConfig, SurfaceField, SurfacePoints, Winding, mesh::sphere};
+///
+/// // half a cylinder of 50 mm radius along z
+/// let pi = std::f64::consts::PI;
+/// let (arc_rad, span_m) = ([0.0, pi], [0.0, 0.09]);
+/// let winding = Winding { shape: [6, 10], points_per_side: 4, axis: 2, centre_m: [0.0; 3], arc_rad, span_m };
+/// let mut skin = SurfaceField::new(SurfaceConfig::default(), SurfacePoints::on_cylinder(&winding, 0.05)?)?;
+/// let ball = sphere(20e-3, 16, 32); // its centre is 20 mm above its origin
+/// let wrench = skin.press(&Solid::new(&ball), &PosedMesh::at_rest(&ball, [0.0, 0.069, 0.025]));
+/// assert!(wrench.force_n[1] > 0.1 && wrench.force_n[0].abs() < 1e-3, "pushed away from the cylinder");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct SurfaceField {
     config: SurfaceConfig,
@@ -64,10 +78,10 @@ pub struct SurfaceField {
 }
 
 impl SurfaceField {
-    /// Foam under `points`, nothing on it.
+    /// Foam at `points`, with nothing on it.
     ///
     /// # Errors
-    /// [`ConfigError`] when a parameter is outside its range.
+    /// [`ConfigError`] if a parameter is outside its range.
     pub fn new(config: SurfaceConfig, points: SurfacePoints) -> Result<Self, ConfigError> {
         let c = &config;
         limits::foam(c.stiffness_pa_per_m, c.thickness_m)?;
@@ -89,26 +103,26 @@ impl SurfaceField {
         &self.points
     }
 
-    /// Pressure at every sample point, Pa: that of all bodies since [`SurfaceField::clear`].
+    /// Pressure at every sample point, Pa: the sum over all bodies since [`SurfaceField::clear`].
     #[must_use]
     pub fn pressure_pa(&self) -> &[f64] {
         &self.pressure_pa
     }
 
-    /// Area of the points that are pressed, m².
+    /// Area of the points under pressure, m².
     #[must_use]
     pub fn touched_m2(&self) -> f64 {
         let pressed = self.pressure_pa.iter().zip(&self.points.areas_m2);
         pressed.filter(|(p, _)| **p > 0.0).map(|(_, area)| area).sum()
     }
 
-    /// Takes all bodies off.
+    /// Removes all bodies.
     pub fn clear(&mut self) {
         self.pressure_pa.fill(0.0);
     }
 
-    /// Presses `body`, whose mesh is that of `solid`, beside those that press already; the wrench on it, about its
-    /// centre of mass. It is NaN, and nothing is pressed, when pose or velocity are not finite.
+    /// Presses `body`, whose mesh is that of `solid`, in addition to earlier bodies. Returns the wrench on it about its
+    /// centre of mass. If pose or velocity is not finite, the wrench is NaN and nothing is pressed.
     pub fn press(&mut self, solid: &Solid, body: &PosedMesh<'_>) -> Wrench {
         if !body.is_finite() {
             return Wrench::UNKNOWN;

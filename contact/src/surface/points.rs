@@ -1,17 +1,29 @@
-//! Where a skin is looked at.
+//! Sample points of a skin.
 
 use spts_models::{ConfigError, SkinLayout, in_range};
 
-/// Sample points of a skin's free surface, each with its outward normal, the area that it stands for, and its taxel.
+/// Sample points of a skin's free surface. Each has its outward normal, its area, and its taxel.
 ///
-/// Lengths in metres, in the skin's own axes.
+/// Lengths are in metres, in the skin's own axes.
+///
+/// ```
+/// use spts_contact::SurfacePoints;
+/// use spts_models::SkinLayout;
+///
+/// let points = SurfacePoints::flat(&SkinLayout::default(), 4)?;
+/// assert_eq!((points.len(), points.taxels()), (1600, 100));
+/// let (centre_m, normal) = points.taxel_centres()[0];
+/// assert!((centre_m[0] + 67.5e-3).abs() < 1e-12 && (centre_m[1] - 67.5e-3).abs() < 1e-12);
+/// assert_eq!(normal, [0.0, 0.0, 1.0]);
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfacePoints {
     pub(super) positions_m: Vec<[f64; 3]>,
     pub(super) normals: Vec<[f64; 3]>,
     pub(super) areas_m2: Vec<f64>,
     pub(super) taxels: Vec<u32>,
-    /// Area of every taxel: that of its points, m².
+    /// Area of every taxel, m²: the sum over its points.
     taxel_areas_m2: Vec<f64>,
 }
 
@@ -20,10 +32,10 @@ const MOST_POINTS: usize = 1 << 24;
 
 impl SurfacePoints {
     /// Points at `positions_m` with `normals` of any length but 0. Point i belongs to taxel `taxels[i]`; every taxel up
-    /// to the largest one has a point.
+    /// to the largest number must have a point.
     ///
     /// # Errors
-    /// [`ConfigError`] with the first number that is not finite, normal of length 0, area that is not above 0, list of
+    /// [`ConfigError`] for the first number that is not finite, normal of length 0, area that is not positive, list of
     /// another length, or taxel without a point.
     pub fn new(
         positions_m: Vec<[f64; 3]>,
@@ -83,11 +95,11 @@ impl SurfacePoints {
         })
     }
 
-    /// A flat skin, `cells_per_taxel` × `cells_per_taxel` points a taxel: in the plane z = 0, the middle of the skin at
-    /// the origin, rows from the largest y to the smallest and columns from the smallest x to the largest.
+    /// A flat skin with `cells_per_taxel` × `cells_per_taxel` points a taxel, in the plane z = 0 and centred on the
+    /// origin. Rows run from the largest y to the smallest, columns from the smallest x to the largest.
     ///
     /// # Errors
-    /// [`ConfigError`] when there are no points, or too many.
+    /// [`ConfigError`] for no points, or too many.
     pub fn flat(skin: &SkinLayout, cells_per_taxel: usize) -> Result<Self, ConfigError> {
         let [rows, cols] = [skin.rows(), skin.cols()].map(|n| n.saturating_mul(cells_per_taxel));
         let count = rows.saturating_mul(cols);
@@ -117,7 +129,7 @@ impl SurfacePoints {
         self.positions_m.len()
     }
 
-    /// Whether there are none; never.
+    /// Always `false`: there is at least one point.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.positions_m.is_empty()
@@ -129,19 +141,19 @@ impl SurfacePoints {
         self.taxel_areas_m2.len()
     }
 
-    /// Place of every point, m.
+    /// Position of every point, m.
     #[must_use]
     pub fn positions_m(&self) -> &[[f64; 3]] {
         &self.positions_m
     }
 
-    /// Outward normal at every point, of length 1.
+    /// Outward unit normal at every point.
     #[must_use]
     pub fn normals(&self) -> &[[f64; 3]] {
         &self.normals
     }
 
-    /// Area that every point stands for, m².
+    /// Area of every point, m².
     #[must_use]
     pub fn areas_m2(&self) -> &[f64] {
         &self.areas_m2
@@ -159,7 +171,7 @@ impl SurfacePoints {
         &self.taxel_areas_m2
     }
 
-    /// Middle of every taxel, m, and its mean normal, of length 1 unless its points face all ways.
+    /// Centre of every taxel, m, and its mean normal, of length 1 unless the normals of its points cancel.
     #[must_use]
     pub fn taxel_centres(&self) -> Vec<([f64; 3], [f64; 3])> {
         let mut sums = vec![([0.0; 3], [0.0; 3]); self.taxels()];
@@ -178,10 +190,10 @@ impl SurfacePoints {
         sums
     }
 
-    /// Mean over every taxel's area of a value at the points.
+    /// Averages `values`, one a point, over the area of every taxel into `means`.
     ///
     /// # Panics
-    /// When there is not one value a point, or not one mean a taxel.
+    /// If the number of values differs from that of the points, or that of means from the taxels.
     pub fn means(&self, values: &[f64], means: &mut [f64]) {
         assert_eq!((values.len(), means.len()), (self.len(), self.taxels()));
         means.fill(0.0);

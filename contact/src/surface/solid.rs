@@ -1,4 +1,4 @@
-//! How far a ray goes until it meets a mesh.
+//! Distance along a ray to a mesh.
 
 use crate::mesh::TriMesh;
 use parry3d_f64::bounding_volume::Aabb;
@@ -11,15 +11,15 @@ const SLACK: f64 = 1e-9;
 /// Triangles seen under a smaller sine than this are passed over: the faces beside them are met.
 const EDGE_ON: f64 = 1e-9;
 
-/// The triangles of a mesh with a hierarchy of boxes around them, body axes.
+/// The triangles of a mesh in a hierarchy of bounding boxes, in body axes.
 #[derive(Debug, Clone)]
 pub struct Solid {
     triangles: Vec<Triangle>,
     boxes: Bvh,
-    /// Corners of the box around all, m.
+    /// Lower corner of the box around all triangles, m.
     low_m: Vector,
     high_m: Vector,
-    /// Whether the mesh is closed and its triangles face outward, so that there is an inside.
+    /// Whether the mesh is closed and its triangles face outwards, so that it has an inside.
     closed: bool,
 }
 
@@ -36,7 +36,7 @@ struct Triangle {
 pub(super) struct Hit {
     /// Distance from the start of the ray, m.
     pub(super) distance_m: f64,
-    /// Whether the ray goes in there, by the order of the triangle's corners.
+    /// Whether the ray enters the body there, judged by the order of the triangle's corners.
     enters: bool,
 }
 
@@ -47,7 +47,7 @@ impl BvhLeafCost for Hit {
 }
 
 impl Solid {
-    /// The triangles of `mesh`, whose corners exist.
+    /// The solid of `mesh`, whose indices must be valid.
     #[must_use]
     pub fn new(mesh: &TriMesh) -> Self {
         let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);

@@ -65,10 +65,11 @@ fn a_flat_skin_is_winkler() {
     }
 }
 
-/// A rigid sphere of radius R on a bed of springs over a cylinder of radius S: the gap is x²/2A + y²/2B with A = R along
-/// the axis and 1/B = 1/R + 1/S around it, so that F = K π d² √(A B) at the depth d (K. L. Johnson, *Contact Mechanics*
-/// (1985), §4.3, with the volume of an elliptic paraboloid). Left out are terms of d/R = 1 % (gap and normals to second
-/// order), the foam's densification (d/h ε_max = 2 %, less than half of it in the mean), facets (0.1 %) and quadrature.
+/// A rigid sphere of radius R on a bed of springs over a cylinder of radius S: the gap is x²/2A + y²/2B with A = R
+/// along the axis and 1/B = 1/R + 1/S around it, so that F = K π d² √(A B) at the depth d (K. L. Johnson, *Contact
+/// Mechanics* (1985), §4.3, with the volume of an elliptic paraboloid). Left out are terms of d/R = 1 % (gap and
+/// normals to second order), the foam's densification (d/h ε_max = 2 %, less than half of it in the mean), facets
+/// (0.1 %) and quadrature.
 #[test]
 fn a_sphere_on_a_cylinder() {
     let (ball_m, skin_m, depth_m) = (0.03, 0.02, 0.3e-3);

@@ -1,4 +1,4 @@
-//! Grids of taxels wound around an axis: on a cylinder, or on a mesh.
+//! Grids of taxels around an axis, on a cylinder or on a mesh.
 
 use super::points::SurfacePoints;
 use super::solid::Solid;
@@ -7,10 +7,22 @@ use parry3d_f64::math::Vector;
 use spts_models::{ConfigError, in_range};
 use std::f64::consts::TAU;
 
-/// A grid of rows × cols taxels around an axis: rows from the largest coordinate along it to the smallest, columns with
-/// the angle about it. Seen from outside with the axis up, columns run from left to right.
+/// A grid of rows × cols taxels around an axis. Rows run from the largest coordinate along the axis to the smallest;
+/// columns follow the angle about it. Seen from outside with the axis pointing up, columns run from left to right.
 ///
-/// About the z axis the angle is 0 along x and π/2 along y; about x it is 0 along y, about y along z.
+/// For the z axis the angle is 0 along x and π/2 along y; for the x axis it is 0 along y; for the y axis, 0 along z.
+///
+/// ```
+/// use spts_contact::{SurfacePoints, Winding};
+///
+/// let (shape, span_m) = ([4, 12], [0.0, 0.06]);
+/// let whole = [0.0, std::f64::consts::TAU];
+/// let winding = Winding { shape, points_per_side: 3, axis: 2, centre_m: [0.0; 3], arc_rad: whole, span_m };
+/// let points = SurfacePoints::on_cylinder(&winding, 0.05)?;
+/// let area_m2: f64 = points.areas_m2().iter().sum();
+/// assert!((area_m2 / (std::f64::consts::TAU * 0.05 * 0.06) - 1.0).abs() < 1e-9);
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Winding {
     /// Rows and columns of taxels.
@@ -19,7 +31,7 @@ pub struct Winding {
     pub points_per_side: usize,
     /// Number of the axis: 0 for x, 1 for y, 2 for z.
     pub axis: usize,
-    /// A point of the axis, m.
+    /// A point on the axis, m.
     pub centre_m: [f64; 3],
     /// First and last angle, rad; at most 2π apart.
     pub arc_rad: [f64; 2],
@@ -31,7 +43,7 @@ pub struct Winding {
 const STEEPEST: f64 = 0.1;
 
 impl SurfacePoints {
-    /// Points on a cylinder of `radius_m` about the axis of `winding`.
+    /// Points on a cylinder of `radius_m` around the axis of `winding`.
     ///
     /// # Errors
     /// [`ConfigError`] for a value outside its range.
@@ -45,10 +57,10 @@ impl SurfacePoints {
         winding.points(|_, _, _| Ok((radius_m, None)))
     }
 
-    /// Points where rays towards the axis of `winding` meet `mesh` first.
+    /// Points where rays towards the axis of `winding` first meet `mesh`.
     ///
     /// # Errors
-    /// [`ConfigError`] for a value outside its range, a ray that meets nothing, and a surface that runs along its ray.
+    /// [`ConfigError`] for a value outside its range, a ray that misses the mesh, or a surface parallel to its ray.
     pub fn wrapped(winding: &Winding, mesh: &TriMesh) -> Result<Self, ConfigError> {
         let solid = Solid::new(mesh);
         let centre = Vector::from(winding.centre_m);

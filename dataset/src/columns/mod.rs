@@ -1,4 +1,4 @@
-//! The columns of a data set: one line each in the tables of the modules below.
+//! The columns of a data set; the tables in the modules below have one line a column.
 
 mod object;
 mod row;
@@ -10,24 +10,24 @@ use object::{OBJECT_COLUMNS, ObjectColumn};
 use row::ROW_COLUMNS;
 use serde::Serialize;
 
-/// A column, as `spts dataset schema` shows it.
+/// A column, as shown by `spts dataset schema`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Column {
     /// Name.
     pub name: String,
     /// Type of a value.
     pub kind: Kind,
-    /// Values of a row: a list of so many; none for a single value.
+    /// Length of the list in each row; `None` for a single value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub length: Option<usize>,
     /// Unit; empty without one.
     pub unit: &'static str,
-    /// What it is.
+    /// What the column contains.
     pub description: &'static str,
 }
 
 impl Column {
-    /// Type in words, such as `float32[100]`.
+    /// Type as text, such as `float32[100]`.
     #[must_use]
     pub fn type_name(&self) -> String {
         let name = match self.kind {
@@ -42,7 +42,16 @@ impl Column {
     }
 }
 
-/// Columns of the data set of `spec`, in their order.
+/// The columns of the data set of `spec`, in order.
+///
+/// ```
+/// use spts_dataset::{Spec, columns};
+///
+/// let columns = columns(&Spec::load("random-shapes", &toml::Table::new())?);
+/// let pressure = columns.iter().find(|column| column.name == "pressure_pa").expect("a label");
+/// assert_eq!((pressure.type_name().as_str(), pressure.unit), ("float32[100]", "Pa"));
+/// # Ok::<(), spts_dataset::SpecError>(())
+/// ```
 #[must_use]
 pub fn columns(spec: &Spec) -> Vec<Column> {
     let rows = ROW_COLUMNS.iter().filter(|(.., has, _)| has(spec));

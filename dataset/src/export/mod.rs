@@ -14,35 +14,35 @@ use spts::progress::Progress;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What a caller may choose of an export.
+/// Options of an export.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ExportOptions {
-    /// Most rows of a tar file; [1, 10^6]. Default 10,000. For `webdataset` only.
+    /// Largest number of rows in a tar file; [1, 10^6]. Default 10,000. Only for `webdataset`.
     pub rows_per_tar: Option<u64>,
 }
 
 /// What a format has written.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Written {
-    /// Rows of every split that has any.
+    /// Number of rows in every split that is not empty.
     pub splits: BTreeMap<&'static str, u64>,
-    /// Episodes; none where the format has none.
+    /// Number of episodes; `None` for a format without episodes.
     pub episodes: Option<u64>,
 }
 
-/// An export that is complete.
+/// Summary of a complete export.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Exported {
-    /// Format.
+    /// Name of the format.
     pub format: &'static str,
-    /// Rows.
+    /// Number of rows.
     pub rows: u64,
-    /// Episodes; none where the format has none.
+    /// Number of episodes; `None` for a format without episodes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub episodes: Option<u64>,
-    /// Rows of every split that has any.
+    /// Number of rows in every split that is not empty.
     pub splits: BTreeMap<&'static str, u64>,
-    /// Files, the manifest not counted.
+    /// Number of files without the manifest.
     pub files: u64,
     /// Their size, bytes.
     pub bytes: u64,
@@ -53,10 +53,10 @@ pub struct Exported {
 /// Fills an output folder with a data set.
 pub type WriteExport<'a> = Box<dyn FnOnce(&OutputFolder, &dyn Progress) -> Result<Written, DatasetError> + 'a>;
 
-/// Refuses a data set that the format cannot hold, before any row is read; otherwise gives what writes it.
+/// Checks whether the format can hold a data set before any row is read, and returns the function that writes it.
 pub type PrepareExport = for<'a> fn(&'a Dataset, &ExportOptions) -> Result<WriteExport<'a>, DatasetError>;
 
-/// The formats: name, description, and what prepares an export.
+/// The formats: name, description, and the function that prepares an export.
 pub const EXPORTS: &[(&str, &str, PrepareExport)] = &[
     (
         "lerobot",
@@ -78,12 +78,12 @@ const SPEC_FILE: &str = "spec.toml";
 const HIDDEN: &str = ".spts";
 
 impl Dataset {
-    /// Writes the data set to the folder `out` in the format called `format` of [`EXPORTS`]. The folder is missing or
-    /// empty before, and holds the whole export or nothing after.
+    /// Writes the data set into the folder `out`, in the format called `format` in [`EXPORTS`]. The folder must be
+    /// missing or empty. Afterwards it holds the whole export or nothing.
     ///
     /// # Errors
-    /// [`DatasetError`] when the format does not exist or cannot hold the data set, a file of the data set is missing
-    /// or damaged, `out` holds something, or a file cannot be written.
+    /// [`DatasetError`] if the format does not exist or cannot hold the data set, a file of the data set is missing or
+    /// damaged, `out` is not empty, or a file cannot be written.
     pub fn export(
         &self,
         format: &str,

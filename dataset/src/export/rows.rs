@@ -1,4 +1,4 @@
-//! The rows of a data set, one at a time, as exports need them.
+//! The rows of a data set, one at a time, for exports.
 
 use crate::error::DatasetError;
 use crate::folder::Dataset;

@@ -1,4 +1,4 @@
-//! Tar files (POSIX.1-1988 "ustar") whose bytes depend on names and contents alone.
+//! Tar files (POSIX.1-1988 "ustar") whose bytes depend only on names and contents.
 
 use spts::output::{AtomicFile, OutputError};
 use std::io::{self, Write as _};

@@ -47,7 +47,7 @@ struct Array {
     column: String,
     file: String,
     kind: Kind,
-    /// Bytes of the file before the values.
+    /// File header, before the values.
     header: Vec<u8>,
 }
 

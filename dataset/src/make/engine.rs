@@ -1,4 +1,4 @@
-//! The simulation of what moves in time: an object that the arm presses, or a ball that falls.
+//! Simulates motion: an object pressed by the arm, or a falling ball.
 
 use super::error::RowCause;
 use super::moving::Moving;

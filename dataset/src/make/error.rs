@@ -1,4 +1,4 @@
-//! Why a row cannot be made.
+//! Errors of rows.
 
 use crate::spec::SpecError;
 use spts::ChainError;
@@ -7,7 +7,7 @@ use spts_contact::EquilibriumError;
 #[cfg(feature = "mujoco")]
 use spts_sim::SimError;
 
-/// A row that cannot be made. It fails on any machine and at any try.
+/// Why a row cannot be made. The error is the same on any machine and at every attempt.
 #[derive(Debug, thiserror::Error)]
 #[error("row {index}: {cause}")]
 pub struct RowError {
@@ -17,43 +17,43 @@ pub struct RowError {
     pub cause: RowCause,
 }
 
-/// Why a row cannot be made.
+/// Cause of a [`RowError`].
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RowCause {
-    /// No pose of those that were tried is a balance.
-    #[error("none of {attempts} poses is a balance; the last: {source}")]
+    /// None of the poses tried has an equilibrium.
+    #[error("none of {attempts} poses has an equilibrium; the last: {source}")]
     Balance {
-        /// Poses that were drawn.
+        /// Number of poses tried.
         attempts: u64,
-        /// Why the last is none.
+        /// The error of the last pose.
         source: EquilibriumError,
     },
-    /// No pose of those that were tried can be followed in time.
+    /// None of the poses tried can be simulated in time.
     #[cfg(feature = "mujoco")]
-    #[error("none of {attempts} poses can be pressed or fallen on; the last: {source}")]
+    #[error("none of {attempts} poses can be pressed or dropped; the last: {source}")]
     Motion {
-        /// Poses that were drawn.
+        /// Number of poses tried.
         attempts: u64,
-        /// Why the last cannot.
+        /// The error of the last pose.
         source: SimError,
     },
-    /// It moves in time, and this build has no physics engine.
+    /// The row needs a simulation in time, and this build has no physics engine.
     #[cfg(not(feature = "mujoco"))]
     #[error(
-        "`record.what` is not \"hold\", or the contact field does not balance: what moves in time needs MuJoCo, which is left out here"
+        "`record.what` is not \"hold\", or the contact field does not balance: motion in time needs MuJoCo, which this build lacks"
     )]
     Engine,
-    /// A value that was drawn is refused.
+    /// A drawn value that is not valid.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// The skin or its readout is refused.
+    /// Skin or readout is not valid.
     #[error(transparent)]
     Chain(#[from] ChainError),
     /// The readout refuses the conductance.
     #[error(transparent)]
     Acquire(#[from] AcquireError),
-    /// The conductance is refused.
+    /// The conductance is not valid.
     #[error(transparent)]
     Source(#[from] SourceError),
 }

@@ -1,4 +1,4 @@
-//! Objects that lie on the skin under a force: a balance each, nothing is stepped.
+//! Objects at rest on the skin under a force: each is an equilibrium, without time steps.
 
 use super::error::RowCause;
 use super::touch::{ATTEMPTS, Touch, of_attempt};

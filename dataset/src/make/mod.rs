@@ -1,4 +1,4 @@
-//! Rows: each a function of the spec and its number, and of nothing else.
+//! Makes rows. Each is a function of the specification and its number.
 
 #[cfg(feature = "mujoco")]
 mod engine;
@@ -23,8 +23,7 @@ use press::Press;
 use skin::Skin;
 use spts_models::Streams;
 
-/// Makes the rows of a data set. It keeps what the last row had in common with the next; the rows do not depend on
-/// that.
+/// Makes the rows of a data set. It keeps intermediate results that consecutive rows share; rows do not depend on them.
 ///
 /// ```
 /// use spts_dataset::{Maker, Spec};
@@ -64,7 +63,7 @@ impl Prepared {
 }
 
 impl<'a> Maker<'a> {
-    /// A maker that has made nothing yet.
+    /// A maker for `spec`.
     #[must_use]
     pub fn new(spec: &'a Spec) -> Self {
         Self {
@@ -79,7 +78,7 @@ impl<'a> Maker<'a> {
     /// Row number `index`.
     ///
     /// # Errors
-    /// [`RowError`] when what is drawn for it cannot be pressed or recorded.
+    /// [`RowError`] if the drawn objects cannot be pressed or recorded.
     pub fn row(&mut self, index: u64) -> Result<Row<'_>, RowError> {
         let windows = self.spec.windows();
         let number = index / windows;

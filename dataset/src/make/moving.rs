@@ -1,4 +1,4 @@
-//! What is followed in time: an object that the arm presses, or a ball that falls.
+//! Contacts that are simulated in time: an object pressed by the arm, or a falling ball.
 
 use super::touch::Touch;
 use spts_contact::Frame;
@@ -7,7 +7,7 @@ use spts_models::PressureMap;
 /// One object or ball over time.
 pub(super) struct Moving {
     pub(super) touch: Touch,
-    /// In the order of their times, which count from the start of the simulation.
+    /// Frames in order of time, which counts from the start of the simulation.
     pub(super) frames: Vec<Frame>,
     /// Time of the touch, s.
     pub(super) touch_s: f64,

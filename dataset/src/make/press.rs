@@ -22,11 +22,11 @@ const HOLD_MEASUREMENTS: std::ops::Range<u64> = 50_000..70_000;
 pub(super) struct Press {
     pub(super) number: u64,
     pub(super) touches: Vec<Touch>,
-    /// What is true in every window, or in all of them.
+    /// Ground truth of each window, or one entry for all of them.
     states: Vec<State>,
     /// The samples of all windows, one after the other.
     pub(super) volts: Vec<f64>,
-    /// Row of Φ of the first measurement.
+    /// Row of Φ at the first measurement.
     pub(super) first_row: u64,
     /// Time from the touch to the first measurement, s.
     pub(super) start_s: f64,
@@ -143,7 +143,7 @@ fn presses_before(spec: &Spec, number: u64) -> usize {
 struct Block {
     number: u64,
     first_row: u64,
-    /// Whether the windows follow each other and are recorded in one go.
+    /// Whether the windows are consecutive and recorded together.
     together: bool,
     windows: u64,
 }

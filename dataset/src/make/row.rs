@@ -39,7 +39,7 @@ impl<'a> Row<'a> {
         self.index
     }
 
-    /// Number of the press, of which a row is one window.
+    /// Number of the press. A row is one window of a press.
     #[must_use]
     pub fn press(&self) -> u64 {
         self.press.number
@@ -51,7 +51,7 @@ impl<'a> Row<'a> {
         split(self.spec, self.press.number, self.shapes[0].number)
     }
 
-    /// Name of the first object, or of the family of its shape.
+    /// Name of the first object, or the family of its shape.
     #[must_use]
     pub fn name(&self) -> Arc<str> {
         Arc::clone(&self.shapes[0].choice.name)
@@ -69,7 +69,7 @@ impl<'a> Row<'a> {
         &self.state().conductance
     }
 
-    /// The raster scan, V; empty where none is recorded.
+    /// The raster scan, V; empty if none is recorded.
     #[must_use]
     pub fn image(&self) -> &'a [f64] {
         &self.state().image
@@ -82,13 +82,13 @@ impl<'a> Row<'a> {
         &self.press.volts[self.window * m..][..m]
     }
 
-    /// Rows of Φ since the seeds were loaded, before the first measurement of the window.
+    /// Row of Φ at the first measurement of the window, counted from loading the seeds.
     #[must_use]
     pub fn first_row(&self) -> u64 {
         self.press.first_row + self.spec.timing().row_of(self.window as u64)
     }
 
-    /// Φ of the window: measurements × taxels, row by row.
+    /// Φ of the window: measurements × taxels, row-major.
     #[must_use]
     pub fn phi(&self) -> Vec<f64> {
         let m = self.spec.config().record.measurements;
@@ -97,20 +97,20 @@ impl<'a> Row<'a> {
         phi
     }
 
-    /// Time from the touch to the first measurement of the window, s; below 0 before the touch.
+    /// Time from the touch to the first measurement of the window, s; negative before the touch.
     #[must_use]
     pub fn time_s(&self) -> f64 {
         let timing = self.spec.timing();
         self.press.start_s + timing.row_of(self.window as u64) as f64 / timing.rate_hz
     }
 
-    /// Normal force on the skin, N: what the pressure adds up to.
+    /// Normal force on the skin, N: the sum of pressure × area.
     #[must_use]
     pub fn contact_force_n(&self) -> f64 {
         self.pressure().sum() * self.spec.skin().cell_area_m2()
     }
 
-    /// Number of samples at an end of their range: of the window, and of the raster scan.
+    /// Number of saturated samples in the window and in the raster scan.
     #[must_use]
     pub fn saturated(&self) -> [usize; 2] {
         let [wire_v, raster_v] = self.skin.rails_v;

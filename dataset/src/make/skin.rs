@@ -16,7 +16,7 @@ pub(crate) struct Skin {
     pub(crate) number: u64,
     /// Seed of the specimen.
     pub(crate) seed: u64,
-    /// As it is before the first press.
+    /// The skin before the first press.
     pub(crate) fresh: SkinSession,
     pub(crate) compressive: Readout,
     pub(crate) raster: Readout,

@@ -1,4 +1,4 @@
-//! Which rows are for training and which for tests.
+//! Assigns rows to training, validation and tests.
 
 use crate::spec::{Spec, SplitBy};
 use rand::RngExt as _;

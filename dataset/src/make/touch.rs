@@ -1,4 +1,4 @@
-//! What is drawn for one object of a press.
+//! Random values of one object in a press.
 
 use crate::spec::{Choice, Draw, PoseOrigin, Spec};
 use spts_contact::PosedMesh;
@@ -11,15 +11,15 @@ pub(super) const ATTEMPTS: u64 = 32;
 /// Where an object lies or a ball falls, and how hard.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Touch {
-    /// Place of the object's origin from the middle of the sheet, m.
+    /// Position of the object's origin relative to the middle of the sheet, m.
     pub(crate) position_m: [f64; 2],
     pub(crate) rotation_deg: f64,
     pub(crate) tilt_deg: [f64; 2],
-    /// Normal force, N; the plateau of a course; 0 for a drop.
+    /// Normal force, N: at the plateau if it varies; 0 for a drop.
     pub(crate) force_n: f64,
     /// Stiffness of the object's own surface, Pa/m; infinite for a rigid one.
     pub(crate) stiffness_pa_per_m: f64,
-    /// Poses that were drawn before this one.
+    /// Number of poses tried before this one.
     pub(crate) refused: u64,
     pub(crate) over_edge: bool,
     pub(crate) ball: Option<Ball>,
@@ -28,7 +28,7 @@ pub(crate) struct Touch {
 /// A ball that falls.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Ball {
-    /// Height of its lowest point when it is let go, m.
+    /// Height of the lowest point at release, m.
     pub(crate) height_m: f64,
     pub(crate) mass_kg: f64,
     pub(crate) radius_m: f64,

@@ -1,4 +1,4 @@
-//! From what is written to a data set that can be made.
+//! Builds a valid specification from what is written.
 
 use super::check::{check_draws, check_faults, check_frames, check_moving, check_name};
 use super::template::is_draw;
@@ -27,10 +27,10 @@ const MAX_SPEC_BYTES: u64 = 1 << 21;
 const DEFAULT_CONTACT: [&str; 2] = ["footprint", "winkler"];
 
 impl Spec {
-    /// The spec called `name` in [`NAMED_SPECS`], or in the file `name`, with other values for some of its rows.
+    /// Reads the specification called `name` in [`NAMED_SPECS`], or in the file `name`, and applies `overrides`.
     ///
     /// # Errors
-    /// [`SpecError`] when there is none, or it is not valid.
+    /// [`SpecError`] if there is none, or it is not valid.
     pub fn load(name: &str, overrides: &toml::Table) -> Result<Self, SpecError> {
         if let Some((_, text)) = NAMED_SPECS.iter().find(|(known, _)| *known == name) {
             return Self::from_toml(text, overrides, Path::new("."));
@@ -54,11 +54,11 @@ impl Spec {
         })
     }
 
-    /// The spec that `text` writes, with the values of `overrides` in place of its own; its files are looked for in
-    /// `folder`. A table in `overrides` replaces the keys that it has, a distribution the whole number.
+    /// Reads a specification from `text` and applies `overrides`. Files that it names are looked up in `folder`. A
+    /// table in `overrides` replaces only the keys that it has; a distribution replaces the whole value.
     ///
     /// # Errors
-    /// [`SpecError`] when it is not valid.
+    /// [`SpecError`] if the specification is not valid.
     pub fn from_toml(text: &str, overrides: &toml::Table, folder: &Path) -> Result<Self, SpecError> {
         let mut table: toml::Table =
             toml::from_str(text).map_err(|e| SpecError::Syntax(e.to_string().trim_end().replace('\n', "; ")))?;

@@ -1,4 +1,4 @@
-//! What a spec is refused for before anything is built.
+//! Checks a specification before anything is built.
 
 use super::config::{DropConfig, ObjectSource, PressConfig, RecordKind, SpecConfig};
 use super::draw::Draw;

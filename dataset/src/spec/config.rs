@@ -1,4 +1,4 @@
-//! A data set as it is written: every section and its defaults.
+//! A specification as written in TOML: every section and its defaults.
 
 use super::draw::Draw;
 use serde::Deserialize;
@@ -6,43 +6,44 @@ use spts::chain::RowsConfig;
 use spts_models::SkinLayout;
 use spts_sim::mechanics::DropConfig as BallConfig;
 
-/// What a data set consists of, as TOML says it.
+/// The specification of a data set, as written in TOML.
 ///
-/// A number that the documentation calls a draw may be a distribution ([`Draw`]). Draws of `[object]` come anew for
-/// every shape, those of `[transducer]`, `[faults]` and `skin.seed` for every skin, all others for every press.
+/// A field documented as a draw may be a number or a distribution ([`Draw`]). Draws in `[object]` are made once for
+/// every shape; those in `[transducer]`, in `[faults]` and of `skin.seed` once for every skin; all others once for
+/// every press.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SpecConfig {
     /// Name of the data set: letters, digits, `-` and `_`. Default "touches".
     pub name: String,
-    /// What it is, in a sentence or two, for its card. Default: none.
+    /// Description in a sentence or two, for the data set's card. Default: none.
     pub description: String,
-    /// Rows; [1, 10^12]. Default 1000.
+    /// Number of rows; [1, 10^12]. Default 1000.
     pub rows: u64,
-    /// Rows of a file; [1, 10^6], a whole number of presses. Default: a sixteenth of all rows, at least 100 and at most
-    /// 10,000.
+    /// Number of rows in a file; [1, 10^6], a whole number of presses. Default: a sixteenth of all rows, but at least
+    /// 100 and at most 10,000.
     pub rows_per_shard: Option<u64>,
     /// Root of every random number; [0, 2^63). Default 0.
     pub seed: u64,
-    /// Readout profile by name, or a file that ends in `.toml`, relative to the spec. Default "as_built".
+    /// Readout profile: a name, or a file that ends in `.toml`, relative to the specification. Default "as_built".
     pub readout: String,
-    /// What is for training and what for tests.
+    /// Division into training, validation and tests.
     pub split: SplitConfig,
-    /// What is pressed.
+    /// The objects.
     pub object: ObjectConfig,
-    /// Where and how it lies.
+    /// Where the objects lie, and at which angles.
     pub pose: PoseConfig,
-    /// How hard and how long.
+    /// Force and duration of presses.
     pub press: PressConfig,
-    /// The ball and its fall, for `record.what` = "drop" only.
+    /// The ball and its fall; only if `record.what` is "drop".
     pub drop: Option<DropConfig>,
     /// Contact field: `model` and its parameters. Default: `footprint`, and `winkler` for drops.
     pub contact: toml::Table,
     /// The skin.
     pub skin: SkinConfig,
-    /// Transducer: `model` and its parameters, which may be draws. Default: `velostat`.
+    /// Transducer: `model` and its parameters; a parameter may be a draw. Default: `velostat`.
     pub transducer: toml::Table,
-    /// Rows of the sensing matrix, as a scene's `[rows]`.
+    /// Rows of the sensing matrix, as in a scene's `[rows]`.
     pub weights: RowsConfig,
     /// Faulty cells.
     pub faults: FaultsConfig,
@@ -50,12 +51,12 @@ pub struct SpecConfig {
     pub record: RecordConfig,
 }
 
-/// Section `[split]`: shares of the data that is kept apart.
+/// Section `[split]`: shares of the data for validation and tests.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SplitConfig {
-    /// What is never divided between two splits: a shape, or a press. Default: a shape where shapes or mesh files are
-    /// pressed, a press where the seventeen objects are.
+    /// What is never divided between two splits: a shape or a press. Default: a shape for procedural shapes and mesh
+    /// files, a press for the seventeen objects.
     pub by: Option<SplitBy>,
     /// Share for validation; [0, 1]. Default 0.1.
     pub validation: f64,
@@ -67,7 +68,7 @@ pub struct SplitConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SplitBy {
-    /// All touches with one shape: tests are on shapes that training has not seen.
+    /// All touches of one shape: tests use shapes that are not in the training data.
     Object,
     /// All windows of one press.
     Press,
@@ -77,32 +78,31 @@ pub enum SplitBy {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ObjectConfig {
-    /// Where objects come from. Default: procedural shapes.
+    /// Source of the objects. Default: procedural shapes.
     pub from: ObjectSource,
-    /// Names of the objects, families or mesh files that are taken. Default: all of the source, mesh files in the order
-    /// of their names.
+    /// Names of the objects, families or mesh files to use. Default: all of the source; mesh files in order of name.
     pub names: Option<Vec<String>>,
-    /// Folder of mesh files (`.obj`, `.glb`, `.stl`), relative to the spec. For `from = "meshes"` only.
+    /// Folder with mesh files (`.obj`, `.glb`, `.stl`), relative to the specification. Only for `from = "meshes"`.
     pub folder: Option<String>,
     /// Metres per unit of the mesh files; (0, 1000]. Default 1.
     pub scale: f64,
-    /// Consecutive rows that share a shape; a whole number of presses. Default about 100.
+    /// Number of consecutive rows with the same shape; a whole number of presses. Default about 100.
     pub rows_per_shape: Option<u64>,
-    /// Objects at once; a draw of whole numbers in [1, 3], anew for every press. Default 1.
+    /// Number of simultaneous objects; a draw of whole numbers in [1, 3], once for every press. Default 1.
     pub count: Draw,
-    /// Largest extent of a procedural shape over the skin, least and most, m. Default 20 to 90 mm.
+    /// Smallest and largest extent of a procedural shape, m. Default 20 to 90 mm.
     pub size_m: Option<[f64; 2]>,
-    /// Relief of its underside, least and most, m. Default 0 to 0.6 mm.
+    /// Smallest and largest relief of its underside, m. Default 0 to 0.6 mm.
     pub relief_m: Option<[f64; 2]>,
-    /// Radius of its edges, least and most, m. Default 0 to 3 mm.
+    /// Smallest and largest radius of its edges, m. Default 0 to 3 mm.
     pub edge_m: Option<[f64; 2]>,
 }
 
-/// Where objects come from.
+/// Source of the objects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ObjectSource {
-    /// Procedural shapes ([`spts_contact::shapes::SHAPE_FAMILIES`]), each number another one.
+    /// Procedural shapes ([`spts_contact::shapes::SHAPE_FAMILIES`]); each shape number gives a different one.
     Shapes,
     /// The seventeen objects of the published recordings, in turn.
     Objects,
@@ -112,20 +112,20 @@ pub enum ObjectSource {
     Ball,
 }
 
-/// Section `[pose]`. All are draws and add up.
+/// Section `[pose]`. All values are draws, and they add up.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PoseConfig {
-    /// What the pose is measured from. Default: the middle of the sheet.
+    /// Pose to which the values are relative. Default: the middle of the sheet.
     pub about: PoseOrigin,
-    /// Place of the object's origin along x, to large columns, as a share of the sheet's width; [−1, 1], the edges are
-    /// at ±0.5. Default 0.
+    /// Position of the object's origin along x, towards large columns, relative to the sheet's width; [−1, 1], with the
+    /// edges at ±0.5. Default 0.
     pub x_share: Draw,
-    /// The same along y, to small rows, as a share of the height. Default 0.
+    /// Position along y, towards small rows, relative to the sheet's height; [−1, 1]. Default 0.
     pub y_share: Draw,
-    /// Place along x, m; [−10, 10]. Default 0.
+    /// Position along x, m; [−10, 10]. Default 0.
     pub x_m: Draw,
-    /// Place along y, m; [−10, 10]. Default 0.
+    /// Position along y, m; [−10, 10]. Default 0.
     pub y_m: Draw,
     /// Rotation about the skin's normal, counter-clockwise seen from above, degrees; [−360, 360]. Default 0.
     pub rotation_deg: Draw,
@@ -135,13 +135,13 @@ pub struct PoseConfig {
     pub tilt_y_deg: Draw,
 }
 
-/// What a pose is measured from.
+/// Pose to which the values of `[pose]` are relative.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PoseOrigin {
     /// The middle of the sheet, upright.
     Middle,
-    /// The pose that was fitted to the published recordings. For the seventeen objects only.
+    /// The pose fitted to the published recordings. Only for the seventeen objects.
     Placement,
 }
 
@@ -149,31 +149,31 @@ pub enum PoseOrigin {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PressConfig {
-    /// Normal force on every object, N; a draw in [0.01, 1000], and in [0.5, 100] where the press is followed in time.
+    /// Normal force on every object, N; a draw in [0.01, 1000], or in [0.5, 100] if the press is simulated in time.
     /// Default 20.
     pub force_n: Draw,
-    /// Time from the touch to the first sample of a hold, or to the lift of a course, s; a draw in [0, 3600]. Default
-    /// 0.6, the middle of a published press.
+    /// Time from the touch to the first sample (`record.what = "hold"`) or to the lift ("course"), s; a draw in [0,
+    /// 3600]. Default 0.6, the middle of a published press.
     pub hold_s: Draw,
-    /// Time from 10 to 90 % of the force where the press is followed in time, s; a draw in [0.1, 10]. Default 0.205, as
-    /// in the published recordings.
+    /// Time for the rise from 10 to 90 % of the force if the press is simulated in time, s; a draw in [0.1, 10].
+    /// Default 0.205, as in the published recordings.
     pub rise_s: Draw,
-    /// Time from 90 to 10 % of the force at the end of a course, s; a draw in [0.05, 10]. Default 0.14, as in the
-    /// published recordings.
+    /// Time for the fall from 90 to 10 % of the force if `record.what = "course"`, s; a draw in [0.05, 10]. Default
+    /// 0.14, as in the published recordings.
     pub fall_s: Draw,
-    /// Stiffness against tilting of what holds the object, N m/rad; [1, 10^9]. Default 8000: the simulated arm has 6800
-    /// to 9800 about the two axes of the skin.
+    /// Tilt stiffness of the holder, N m/rad; [1, 10^9]. Default 8000; the simulated arm has 6800 to 9800 about the two
+    /// axes of the skin.
     pub tilt_stiffness_nm_per_rad: f64,
-    /// Stiffness of a shape's or mesh's own surface in series with the skin, Pa/m; a draw in [10^5, 10^12]. Default:
-    /// rigid. The seventeen objects have their own.
+    /// Stiffness of a shape's or mesh's surface in series with the skin, Pa/m; a draw in [10^5, 10^12]. Default: rigid.
+    /// The seventeen objects have values of their own.
     pub stiffness_pa_per_m: Option<Draw>,
 }
 
-/// Section `[drop]`. All are draws, anew for every drop. Defaults: a tennis ball from half a metre.
+/// Section `[drop]`. All values are draws, made once for every drop. Defaults: a tennis ball from half a metre.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DropConfig {
-    /// Height of the ball's lowest point above the skin when it is let go, m; [0.001, 5]. Default 0.5.
+    /// Height of the ball's lowest point above the skin at release, m; [0.001, 5]. Default 0.5.
     pub height_m: Draw,
     /// Mass, kg; [0.001, 50]. Default 0.0577.
     pub mass_kg: Draw,
@@ -187,30 +187,31 @@ pub struct DropConfig {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SkinConfig {
-    /// Taxels along y. Default 10.
+    /// Number of taxels along y. Default 10.
     pub rows: usize,
-    /// Taxels along x. Default 10.
+    /// Number of taxels along x. Default 10.
     pub cols: usize,
     /// Pitch, m. Default 0.015.
     pub pitch_m: f64,
-    /// Side of an electrode, m. Default two thirds of the pitch.
+    /// Side of the square electrodes, m. Default two thirds of the pitch.
     pub electrode_m: Option<f64>,
-    /// Consecutive rows that share a skin and a session; a whole number of presses. Default about 100.
+    /// Number of consecutive rows with the same skin and session; a whole number of presses. Default about 100.
     pub rows_per_skin: Option<u64>,
-    /// Specimen: the spread of its taxels and parts; a draw of whole numbers in [0, 2^53]. Default: another one every
-    /// time.
+    /// Seed of the specimen, which determines the spread of its taxels and parts; a draw of whole numbers in [0, 2^53].
+    /// Default: another one for every skin.
     pub seed: Option<Draw>,
-    /// Presses of the same kind before each, which condition the sheet; a draw of whole numbers in [0, 1000]. Default 0.
+    /// Number of equal presses before each press, which condition the sheet; a draw of whole numbers in [0, 1000].
+    /// Default 0.
     pub presses_before: Draw,
 }
 
-/// Section `[faults]`: cells that fail, other ones on every skin.
+/// Section `[faults]`: faulty cells, drawn for every skin.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FaultsConfig {
-    /// Faulty cells of a skin; a draw of whole numbers from 0 to the number of taxels. Default 0.
+    /// Number of faulty cells of a skin; a draw of whole numbers from 0 to the number of taxels. Default 0.
     pub count: Draw,
-    /// Names of the faults, each equally likely ([`spts_circuit::FAULTS`]). Default: all.
+    /// Names of the possible faults, all equally likely ([`spts_circuit::FAULTS`]). Default: all.
     pub names: Option<Vec<String>>,
 }
 
@@ -218,29 +219,30 @@ pub struct FaultsConfig {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordConfig {
-    /// When windows are recorded. Default: while the object is held.
+    /// When windows are recorded. Default: "hold".
     pub what: RecordKind,
-    /// Windows of a press or drop, a row each; [1, 10000]. Default: 1 of a hold, the whole course, 16 of a drop.
+    /// Number of windows of a press or drop, one a row; [1, 10000]. Default: 1 for "hold", the whole press for
+    /// "course", 16 for "drop".
     pub windows: Option<u64>,
-    /// Time from the beginning of a window to that of the next, s; at least as long as a window takes, at most 10. Of a
-    /// hold the default is none: its windows follow each other. Default 0.02 of a course, 0.001 of a drop.
+    /// Time from the start of one window to the start of the next, s; at least the duration of a window, at most 10.
+    /// Default: 0.02 for "course", 0.001 for "drop"; the windows of a "hold" follow each other without a gap.
     pub interval_s: Option<f64>,
-    /// Time from the beginning of the first window to the touch, s; [0, 10]. Not for holds. Default 0.1 of a course,
-    /// 0.004 of a drop.
+    /// Time from the start of the first window to the touch, s; [0, 10]. Not for "hold". Default: 0.1 for "course",
+    /// 0.004 for "drop".
     pub before_s: Option<f64>,
-    /// M, measurements of a window; [1, 10^6]. Default 20.
+    /// M, number of measurements in a window; [1, 10^6]. Default 20.
     pub measurements: usize,
-    /// What is true of every taxel, a column each. Default all three; fewer make smaller files.
+    /// Ground truth of every taxel, one column each. Default: all three; fewer give smaller files.
     pub labels: Vec<Label>,
     /// Whether the raster scan of the press is recorded. Default true.
     pub raster: bool,
-    /// Whether the rows of Φ are written out beside their generator, seeds and first row. Default false.
+    /// Whether the rows of Φ are stored, in addition to generator, seeds and first row. Default false.
     pub phi: bool,
-    /// Whether samples are written as codes of the converter in place of volts. Default false.
+    /// Whether samples are stored as codes of the converter instead of volts. Default false.
     pub codes: bool,
 }
 
-/// Something that is true of every taxel.
+/// A ground truth of every taxel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Label {
@@ -248,7 +250,7 @@ pub enum Label {
     Pressure,
     /// Its conductance: `conductance_s`.
     Conductance,
-    /// Whether it is touched: `support`.
+    /// Whether the taxel is touched: `support`.
     Support,
 }
 
@@ -266,11 +268,11 @@ impl Label {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RecordKind {
-    /// From `press.hold_s` after the touch on, while the object is held.
+    /// While the object is held: from `press.hold_s` after the touch on.
     Hold,
-    /// From before the touch on, through rise, plateau and fall of the force.
+    /// During the whole press: from before the touch, through rise, plateau and fall of the force.
     Course,
-    /// From before the touch of a falling ball on.
+    /// During the fall of a ball: from before its touch on.
     Drop,
 }
 

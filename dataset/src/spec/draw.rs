@@ -1,4 +1,4 @@
-//! Numbers that a spec fixes or draws.
+//! Numbers of a specification, fixed or random.
 
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -11,35 +11,47 @@ const NORMAL_CUT: f64 = 4.0;
 /// Most values of a grid that is given by its ends.
 const MOST_STEPS: i64 = 100_000;
 
-/// A number of a spec: the same for all rows, or drawn.
+/// A number of a specification: the same for all rows, or drawn.
 ///
-/// In TOML a number, or a table with one key: `{ uniform = [low, high] }`, `{ log_uniform = [low, high] }`,
-/// `{ normal = [mean, sd] }` (cut at four standard deviations), `{ choice = [a, b, …] }` (each equally likely), or
-/// `{ grid = [a, b, …] }` and `{ grid = { from = a, to = b, steps = n } }`. The grids of a spec take all their
-/// combinations in turn, the first one fastest.
+/// In TOML a number, or a table with one key: `{ uniform = [low, high] }`, `{ log_uniform = [low, high] }`, `{ normal =
+/// [mean, sd] }` (limited to four standard deviations), `{ choice = [a, b, …] }` (all equally likely), or `{ grid = [a,
+/// b, …] }` and `{ grid = { from = a, to = b, steps = n } }`. The grids of a specification run through all their
+/// combinations, the first grid fastest.
+///
+/// ```
+/// use spts_dataset::Draw;
+/// use spts_models::Streams;
+///
+/// let value = toml::toml! { force_n = { log_uniform = [5.0, 50.0] } };
+/// let force_n = Draw::from_toml(&value["force_n"])?;
+/// assert_eq!(force_n.range(), [5.0, 50.0]);
+/// let streams = Streams::new(1);
+/// assert!((0..100).all(|row| (5.0..=50.0).contains(&force_n.value(streams, "force", row))));
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub enum Draw {
-    /// Always this.
+    /// Always this number.
     Fixed(f64),
-    /// Evenly between the two.
+    /// Uniform between the two.
     Uniform([f64; 2]),
-    /// Its logarithm evenly between the two's.
+    /// Its logarithm is uniform between those of the two.
     LogUniform([f64; 2]),
     /// Mean and standard deviation.
     Normal([f64; 2]),
-    /// One of these.
+    /// One of these, all equally likely.
     Choice(Vec<f64>),
     /// All of these in turn.
     Grid {
         /// The values.
         values: Vec<f64>,
-        /// Items for which a value stays: the product of the lengths of the grids before it.
+        /// Number of consecutive items with the same value: the product of the lengths of the grids before it.
         stride: u64,
     },
 }
 
 impl Draw {
-    /// The number of item `index`. It depends on `streams`, `label` and `index` alone.
+    /// The number of item `index`. It depends only on the draw, `streams`, `label` and `index`.
     #[must_use]
     pub fn value(&self, streams: Streams, label: &str, index: u64) -> f64 {
         let rng = || streams.rng(label, index);
@@ -69,7 +81,7 @@ impl Draw {
         matches!(self, Self::Fixed(_))
     }
 
-    /// Least and largest number that can come.
+    /// Smallest and largest possible number.
     #[must_use]
     pub fn range(&self) -> [f64; 2] {
         match self {
@@ -83,10 +95,10 @@ impl Draw {
         }
     }
 
-    /// Checks that every number that can come is in [`least`, `most`], which `range` says in interval notation.
+    /// Checks that every possible number is in [`least`, `most`]. `range` is the same interval as text.
     ///
     /// # Errors
-    /// [`ConfigError`] with the first end that is not.
+    /// [`ConfigError`] for the first end of the range that is outside.
     pub fn within(&self, field: &str, least: f64, most: f64, range: &'static str) -> Result<(), ConfigError> {
         for end in self.range() {
             in_range(field, end, (least..=most).contains(&end), range)?;
@@ -102,10 +114,10 @@ impl Draw {
         }
     }
 
-    /// The draw that `value` writes.
+    /// The draw that `value` describes.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// A message that says what is wrong.
     pub fn from_toml(value: &Value) -> Result<Self, String> {
         if let Some(number) = number(value) {
             return number.map(Self::Fixed);

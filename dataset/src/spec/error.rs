@@ -1,4 +1,4 @@
-//! Why a spec is refused.
+//! Errors of specifications.
 
 use spts::ChainError;
 use spts_contact::ContactError;
@@ -6,7 +6,7 @@ use spts_contact::mesh::MeshError;
 use spts_models::ConfigError;
 use std::path::PathBuf;
 
-/// A spec that cannot be made. The message names the field, its value and what is valid.
+/// Why a specification is not valid. The message names the field, its value and what is valid.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SpecError {
@@ -18,22 +18,22 @@ pub enum SpecError {
         /// Cause.
         source: spts_input::InputError,
     },
-    /// No TOML, an unknown field, or a value of the wrong type.
+    /// Text that is not TOML, an unknown field, or a value of the wrong type.
     #[error("{0}")]
     Syntax(String),
     /// A number outside its range.
     #[error(transparent)]
     Value(#[from] ConfigError),
-    /// A name, or two values that do not go together.
+    /// A name that does not exist, or two values that contradict each other.
     #[error("{0}")]
     Choice(String),
-    /// The contact field is refused.
+    /// The contact field is not valid.
     #[error(transparent)]
     Contact(#[from] ContactError),
-    /// Transducer, readout, weights or faults are refused.
+    /// Transducer, readout, weights or faults are not valid.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// A mesh file is refused.
+    /// A mesh file is not valid.
     #[error(transparent)]
     Mesh(#[from] MeshError),
     /// The folder of mesh files cannot be read.

@@ -1,4 +1,4 @@
-//! What a data set consists of.
+//! Specifications of data sets.
 
 mod build;
 mod check;
@@ -26,11 +26,21 @@ use spts_circuit::RecordingInfo;
 use spts_models::{SkinLayout, Streams};
 use std::path::{Path, PathBuf};
 
-/// A data set that can be made: every field is within its range, all files that it names are there.
+/// A valid specification: every field is within its range, and all files that it names exist.
+///
+/// ```
+/// use spts_dataset::Spec;
+///
+/// let spec = Spec::load("random-shapes", &toml::toml! { rows = 5000 })?;
+/// assert_eq!((spec.config().rows, spec.skin().taxels()), (5000, 100));
+/// let error = Spec::load("random-shapes", &toml::toml! { rows = 0 }).err().expect("no rows");
+/// assert!(error.to_string().contains("`rows` = 0 is outside"));
+/// # Ok::<(), spts_dataset::SpecError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Spec {
     config: SpecConfig,
-    /// The text that was read, its overrides in it, in one order.
+    /// The text that was read, with overrides applied, in normal order.
     text: String,
     skin: SkinLayout,
     contact: (String, toml::Table),
@@ -38,31 +48,31 @@ pub struct Spec {
     transducer: Template,
     recording: RecordingInfo,
     timing: Timing,
-    /// Whether what is pressed is followed in time.
+    /// Whether contacts are simulated in time.
     moving: bool,
     rows_per_shard: u64,
     rows_per_shape: u64,
     rows_per_skin: u64,
-    /// Folder that paths are relative to.
+    /// Folder to which paths are relative.
     folder: PathBuf,
     identity: String,
 }
 
 impl Spec {
-    /// What was written, defaults filled in.
+    /// The specification as written, with defaults filled in.
     #[must_use]
     pub fn config(&self) -> &SpecConfig {
         &self.config
     }
 
-    /// The text of the spec, its overrides in it: a spec of its own.
+    /// The text of the specification with overrides applied; it is a complete specification.
     #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// SHA-256 of the spec and of the files that it names: two data sets with the same one have the same rows, if the
-    /// same version of this library made them.
+    /// SHA-256 of the specification and of the files that it names. Data sets with the same value have the same rows if
+    /// the same version of this library made them.
     #[must_use]
     pub fn identity(&self) -> &str {
         &self.identity
@@ -80,31 +90,32 @@ impl Spec {
         (&self.contact.0, &self.contact.1)
     }
 
-    /// Rows of a file; the last may have fewer.
+    /// Number of rows in a file; the last file may have fewer.
     #[must_use]
     pub fn rows_per_shard(&self) -> u64 {
         self.rows_per_shard
     }
 
-    /// Consecutive rows that share a shape.
+    /// Number of consecutive rows with the same shape.
     #[must_use]
     pub fn rows_per_shape(&self) -> u64 {
         self.rows_per_shape
     }
 
-    /// Consecutive rows that share a skin.
+    /// Number of consecutive rows with the same skin.
     #[must_use]
     pub fn rows_per_skin(&self) -> u64 {
         self.rows_per_skin
     }
 
-    /// Rows of a press or drop.
+    /// Number of rows of a press or drop.
     #[must_use]
     pub fn windows(&self) -> u64 {
         self.timing.windows
     }
 
-    /// Time from the beginning of a window to that of the next, s; `None` when the windows of a press follow each other.
+    /// Time from the start of one window to the start of the next, s; `None` if windows follow each other without a
+    /// gap.
     #[must_use]
     pub fn interval_s(&self) -> Option<f64> {
         self.timing.interval_s
@@ -144,7 +155,7 @@ impl Spec {
         self.config.rows.div_ceil(self.rows_per_shard)
     }
 
-    /// Most objects of a press.
+    /// Largest number of objects in a press.
     #[must_use]
     pub fn most_objects(&self) -> usize {
         whole(self.config.object.count.range()[1])
@@ -172,7 +183,7 @@ impl Spec {
         chain_config(&self.config, &transducer, faults)
     }
 
-    /// What the recordings of the wire say of themselves: layout, weights, rate and converter.
+    /// Metadata of the recordings: layout, weights, rate and converter.
     #[must_use]
     pub fn recording(&self) -> &RecordingInfo {
         &self.recording

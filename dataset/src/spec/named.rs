@@ -1,6 +1,6 @@
-//! The specs that ship.
+//! The specifications that ship with the library.
 
-/// Every spec by name, as TOML.
+/// Every specification by name, as TOML.
 pub const NAMED_SPECS: &[(&str, &str)] = &[
     ("presses-17", include_str!("../../specs/presses-17.toml")),
     ("random-shapes", include_str!("../../specs/random-shapes.toml")),

@@ -1,4 +1,4 @@
-//! What can be pressed: shape number → mesh.
+//! The objects of a data set: from shape number to mesh.
 
 use super::config::{ObjectConfig, ObjectSource, PoseOrigin};
 use super::error::SpecError;
@@ -34,11 +34,11 @@ enum Entry {
 /// One shape and what is known of it.
 #[derive(Debug, Clone)]
 pub(crate) struct Choice {
-    /// Name of the object or mesh file, or of the family.
+    /// Name of the object or mesh file, or name of the family.
     pub(crate) name: Arc<str>,
-    /// Label of the class: of an object its own, of families and mesh files their places in the list, from 0.
+    /// Class label: the object's own label, or the position of the family or mesh file in the list, from 0.
     pub(crate) label: i32,
-    /// Body axes; without a vertex for a ball, which is a sphere.
+    /// The mesh in body axes; without a vertex for a ball, which is an exact sphere.
     pub(crate) mesh: PreparedMesh,
     /// The object, if it is one of the seventeen.
     pub(crate) object: Option<&'static ObjectSpec>,

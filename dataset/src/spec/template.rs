@@ -1,4 +1,4 @@
-//! A table of parameters in which numbers may be draws.
+//! A table of parameters whose numbers may be draws.
 
 use super::draw::Draw;
 use super::error::SpecError;

@@ -21,12 +21,12 @@ const AFTER_S: f64 = 0.1;
 pub(crate) struct Timing {
     pub(crate) what: RecordKind,
     pub(crate) windows: u64,
-    /// Time from window to window, s; `None` when they follow each other.
+    /// Time from window to window, s; `None` if they follow each other without a gap.
     pub(crate) interval_s: Option<f64>,
     /// Time from the first window to the touch, s; 0 for holds.
     pub(crate) before_s: f64,
     measurements: u64,
-    /// Measurements a second, Hz; not known before the readout is.
+    /// Measurements a second, Hz; unknown until the readout is built.
     pub(crate) rate_hz: f64,
 }
 

@@ -39,8 +39,8 @@ fn a_stepped_press_follows_its_course() {
     follows_its_course(&format!("{COURSE}[contact]\nmodel = \"winkler\""));
 }
 
-/// Without effects y is Φ x, x being the conductance of the moment: from the middle of a window to its ends, 0.16 ms, the
-/// force rises by less than 0.1 % of its plateau, and a conductance by less than 1 % of all on the plateau.
+/// Without effects y is Φ x, x being the conductance of the moment: from the middle of a window to its ends, 0.16 ms,
+/// the force rises by less than 0.1 % of its plateau, and a conductance by less than 1 % of all on the plateau.
 #[test]
 fn samples_of_a_course_are_the_weighted_sums_of_their_moment() {
     let spec = spec(&format!("{COURSE}[contact]\nmodel = \"winkler\""));

@@ -43,8 +43,8 @@ fn a_row_depends_on_its_number_alone() {
     }
 }
 
-/// Σ p·A is the sum of the forces, which no part beside the sheet can carry: the balance is exact to 1e-12 of the force,
-/// and sums of a hundred taxels round to 1e-13.
+/// Σ p·A is the sum of the forces, which no part beside the sheet can carry: the balance is exact to 1e-12 of the
+/// force, and sums of a hundred taxels round to 1e-13.
 #[test]
 fn pressure_carries_the_force() {
     let spec = spec(SMALL);

@@ -1,12 +1,11 @@
 //! `spts budget`: what each effect costs.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{Side, parse_measurements, seed, sorted, square};
 use super::progress::Bars;
 use clap::Args;
 use spts::chain::DEFAULT_READOUT;
-use spts::output::OutputFolder;
 use spts_eval::decoders::PublishedDecode;
 use spts_studies::budget::BudgetStudy;
 use std::path::PathBuf;
@@ -29,7 +28,7 @@ use std::path::PathBuf;
 
 Files in DIR:
   budget.csv                 one line a stage, effect, mode, decode and M: changes of the scores, each with its standard error.
-                             ablation: positive is what the effect costs; addition: negative is what it costs
+                             in an ablation the cost is positive, in an addition negative
   end_points.csv             scores of the whole chain, the ideal one and the raster scan, by three truths: a frame of the scan, as
                              published; the noiseless image; and that image on a skin with the static law alone
   summary.md                 both as tables
@@ -44,11 +43,12 @@ pub(super) struct BudgetCommand {
     /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml
     #[arg(long, value_name = "NAME|FILE.toml", default_value = DEFAULT_READOUT)]
     readout: String,
-    /// Numbers of measurements; each [1, 1000], on some skins down to [1, 938]: 20 windows of M have to fit
-    /// into a press [default: 7, 20 and 50 a hundred taxels]
+    /// Numbers of measurements; each [1, 1000], or at most 938 on some skins, so that 20 windows fit into a press
+    /// [default: 7, 20 and 50 a hundred taxels]
     #[arg(long, value_delimiter = ',', value_name = "M,…", value_parser = parse_measurements)]
     measurements: Vec<usize>,
-    /// Decodes: matched, script_s20 or script_m4
+    /// Decodes. script_s20: the published script, which takes the weights for 0 and 1 and finds 20 atoms. script_m4:
+    /// the same with M/4 atoms. matched: M/4 atoms, with weights of ±1 and without the output of the idle skin
     #[arg(long, value_delimiter = ',', value_name = "DECODE,…", value_parser = parse_decode,
           default_values = ["matched", "script_s20"])]
     decode: Vec<PublishedDecode>,
@@ -84,7 +84,7 @@ impl BudgetCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, spts_report::budget::FILES)?;
+        let out = open_folder(&self.out, spts_report::budget::FILES)?;
         let study = BudgetStudy {
             objects: self.objects,
             readout: self.readout,

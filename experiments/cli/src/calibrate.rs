@@ -21,9 +21,9 @@ use std::path::{Path, PathBuf};
 /// run their own sequence. Prints each number with its standard error, and lists what recordings of presses cannot
 /// identify.
 ///
-/// With --skin, fits the gains of the taxels instead, each with a band: what the skin's images have that a simulation
-/// of the same contacts on a median skin has not, shared by all objects. Prints how well they predict the objects that
-/// they were not fitted to.
+/// With --skin, fits the gains of the taxels instead, each with a band. A gain is the factor by which a taxel's values
+/// in the images of all objects differ from those in a simulation of the same contacts on a median skin. Prints how
+/// well the gains predict objects that they were not fitted to.
 ///
 /// Two things are reported and not modelled: the even/odd pattern of the rows with nothing on the skin (`idle_parity`),
 /// where it differs from the one in contact (`parity`), and outliers that no late update explains.
@@ -37,14 +37,14 @@ use std::path::{Path, PathBuf};
   spts decode recordings/ --skin my_gains.toml --decoder evidence
 
 Use the profile in a scene with `readout = \"my_skin.toml\"`, and the gains with `transducer_parameters.gains = \"my_gains.toml\"`:
-every seed is then a skin that may be this one. The spec of a data set takes them as `transducer.gains`.")]
+every seed then draws a skin that these recordings allow. The spec of a data set takes them as `transducer.gains`.")]
 pub(super) struct CalibrateCommand {
     /// Directory of the recordings
     recordings: PathBuf,
     /// File of the profile [default: none, only the numbers are printed]
     #[arg(long, value_name = "FILE.toml", value_parser = parse_out)]
     out: Option<PathBuf>,
-    /// Session that alone is used [default: every session, their values as spans]
+    /// Use this session alone [default: all sessions; the profile then has spans over their values]
     #[arg(long, value_name = "NAME")]
     session: Option<String>,
     /// Fit the gains of the taxels in place of the readout: each with a band, from raster presses of objects that the

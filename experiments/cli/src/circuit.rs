@@ -1,24 +1,23 @@
 //! `spts circuit`: theory of the summing amplifier for a skin of any size.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{number, whole, within};
 use clap::Args;
 use serde::Serialize;
-use spts::output::OutputFolder;
 use spts_circuit::amplifier::{Network, Remedied, Skin};
 use spts_report::electronics::write;
 use spts_studies::electronics::{ElectronicsStudy, TABLE_TAXELS, text};
 use std::path::PathBuf;
 
-/// Noise, bandwidth, settling, saturation and signal of the summing amplifier, for a skin of any size, and what larger
-/// ones take.
+/// Computes noise, bandwidth, settling, saturation and signal of the summing amplifier for a skin of any size, and what
+/// larger skins need.
 ///
 /// Closed forms for the profile as_designed (TLV9362 and the published converter), checked against ngspice by the
 /// tests. The skin is assumed to be pressed on a quarter of its taxels; a measurement is taken to work when the output
 /// settles to half a step of the converter in time, four standard deviations of the sum stay within rails and
-/// converter, and a pressed taxel is worth a step. Beside the readout as built: its feedback scaled by 100/N;
-/// sub-arrays with second-level sums; and as many wires as it takes.
+/// converter, and a pressed taxel is worth a step. Three remedies stand beside the readout as built: feedback scaled by
+/// 100/N, sub-arrays with second-level sums, and as many wires as are needed.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts circuit
@@ -107,7 +106,7 @@ impl CircuitCommand {
             let text = || format!("{}\n{one_wire}", text(&ways, available_s));
             return self.common.print(&one, text);
         }
-        let out = OutputFolder::open(&self.out, spts_report::electronics::FILES)?;
+        let out = open_folder(&self.out, spts_report::electronics::FILES)?;
         let report = study.run()?;
         write(&study, &report, out)?;
         let picture = self.out.join("figures/circuit.png");

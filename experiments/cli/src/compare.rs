@@ -1,6 +1,6 @@
 //! `spts compare`: the twin against recordings of its skin.
 
-use super::context::{Common, note};
+use super::context::{Common, note, open_folder};
 use super::error::CliError;
 use super::options::seed;
 use super::progress::Bars;
@@ -9,7 +9,6 @@ use clap::Args;
 use serde::Serialize;
 use spts::chain::MAX_TOML_BYTES;
 use spts::data::DataError;
-use spts::output::OutputFolder;
 use spts_circuit::Profile;
 use spts_eval::{PublishedSkin, SessionSlip, slips_text};
 use spts_models::TaxelGains;
@@ -34,10 +33,10 @@ use std::path::{Path, PathBuf};
 /// With --images simulated, the twin is given the simulation's images in place of the skin's own: the same objects on a
 /// simulated skin, which may have gains that `spts calibrate --skin` found (--gains).
 ///
-/// With --profile, every session is a new one: its readout is not calibrated on its own presses. (Recorded images are
-/// its own all the same, and so are the cells that do not run their sequence.) Its twins have readouts drawn from the
-/// spans of a profile that was fitted to other sessions, `others` for all others in RECORDINGS, and each of its numbers
-/// is shown beside the band in which one more twin lies nine times in ten.
+/// With --profile, every session is a new one: its readout is not calibrated on its own presses. (Its recorded images
+/// are used all the same, and so is the list of its cells that do not run their sequence.) Its twins have readouts
+/// drawn from the spans of a profile that was fitted to other sessions, `others` for all others in RECORDINGS, and each
+/// of its numbers is shown beside the band in which one more twin lies nine times in ten.
 ///
 /// With --arm, the bent skin is compared instead: N skins of `spts simulate arm`, wrapped round a robot's arm, under
 /// preload and touched by a finger, beside the recording of touches in RECORDINGS (robot_arm/): output without a touch,
@@ -115,7 +114,7 @@ impl CompareCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, spts_report::compare::FILES)?;
+        let out = open_folder(&self.out, spts_report::compare::FILES)?;
         if self.arm {
             return super::compare_arm::run(&self.recordings, self.skins, self.seed, out, &self.common);
         }

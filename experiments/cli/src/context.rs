@@ -6,7 +6,9 @@ use super::terminal::{one_line, plain};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
+use spts::output::{Manifest, OutputError, OutputFolder};
 use std::io::{IsTerminal as _, Write as _};
+use std::path::Path;
 use std::time::Duration;
 
 /// Options of every command that computes.
@@ -39,6 +41,27 @@ impl Common {
     /// [`CliError::Usage`] when standard output cannot be written to, or `value` has no JSON.
     pub(super) fn print(&self, value: &impl Serialize, text: impl FnOnce() -> String) -> Result<(), CliError> {
         if self.json { print_json(value) } else { print(&text()) }
+    }
+}
+
+/// Opens the folder `path` for the results of a run that may write `files`, and says so when the results of an earlier
+/// run lie in it.
+///
+/// # Errors
+/// As for [`OutputFolder::open`].
+pub(super) fn open_folder(path: &Path, files: &[&str]) -> Result<OutputFolder, OutputError> {
+    let folder = OutputFolder::open(path, files)?;
+    note_earlier(path);
+    Ok(folder)
+}
+
+/// Says so when the results of an earlier run lie in the folder `path`.
+pub(super) fn note_earlier(path: &Path) {
+    if let Some(earlier) = Manifest::read(path) {
+        let (path, files) = (path.display(), earlier.names().count());
+        note(&format!(
+            "note: {path} has the results of an earlier run; this run replaces them ({files} files) when it ends"
+        ));
     }
 }
 

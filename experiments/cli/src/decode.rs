@@ -1,6 +1,6 @@
 //! `spts decode`: images, classes and places of sessions.
 
-use super::context::{Common, note, print, print_json};
+use super::context::{Common, note, open_folder, print, print_json};
 use super::error::CliError;
 use super::extras::{DECODE_FILES, simulated_presses, write_decoded};
 use super::options::{decoders_named, network, seed, sorted, whole};
@@ -10,7 +10,6 @@ use clap::Args;
 use serde::Serialize;
 use spts::Session;
 use spts::data::SessionSet;
-use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts::session::Event;
 use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow, LearnedDecoders};
@@ -23,9 +22,9 @@ use std::path::{Path, PathBuf};
 /// Decodes sessions: the image, class and place of what was pressed, from M measurements of the one wire.
 ///
 /// SESSION is a folder with session.json, as `spts simulate` leaves one, a folder of such folders, or recordings of the
-/// real skin. Each session is decoded with its own rows of weights, whatever its layout. Raster presses that no score
-/// looks at are learned from. Where there are none, the decoder uses a prior made for the layout: random shapes
-/// anywhere on it. Scores are given where the truth is known.
+/// real skin. Each session is decoded with its own rows of weights, whatever its layout. The decoders learn from raster
+/// presses that are not scored. Where there are none, they use a prior made for the layout: random shapes anywhere on
+/// it. Scores are given where the truth is known.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts simulate press/T --out out/T && spts decode out/T
@@ -54,7 +53,7 @@ pub(super) struct DecodeCommand {
     /// Numbers of measurements [default: 7,20,50 on 100 taxels, and the same shares of other skins]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=1_000_000))]
     measurements: Vec<u32>,
-    /// Windows a block, one after the other from the beginning of the hold
+    /// Number of windows to decode in each block, one after the other from the beginning of the hold
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u32>(1..=100_000))]
     windows: u32,
     /// Folder of the results [default: out/decode]
@@ -86,7 +85,7 @@ impl DecodeCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, DECODE_FILES)?;
+        let out = open_folder(&self.out, DECODE_FILES)?;
         let decoders = decoders_named(&self.decoder)?;
         let network = self.weights.as_deref().map(network).transpose()?;
         let mut set = SessionSet::open(&self.session)?;

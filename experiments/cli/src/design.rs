@@ -1,21 +1,20 @@
 //! `spts design`: a skin for what somebody wants of it, and the check of its promise.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{seed, whole, within};
 use super::progress::Bars;
 use clap::{Args, Subcommand};
-use spts::output::OutputFolder;
 use spts_report::design::{FILES, read_design, write};
 use spts_studies::design::{DesignObjects, DesignStudy, WireChoice};
 use std::path::PathBuf;
 
-/// Designs a skin for an area, a resolution, a latency and an image: taxels, wires, electronics, rows, decoder, and
-/// what to expect of them.
+/// Designs a skin for a wanted area, resolution, latency and image quality: its taxels, wires, electronics, rows of
+/// weights and decoder, and what to expect of them.
 ///
 /// The answer is simulated: touches of other specimens go through the design's own circuit (amplifier and converter of
 /// the profile as_designed, with the contact noise, late updates and idle noise of the recordings), and are decoded and
-/// scored. `spts design check DIR` holds the promise against touches that the design has not seen. See docs/design.md.
+/// scored. `spts design check DIR` checks the promise with touches that the design has not seen. See docs/design.md.
 #[derive(Debug, Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -32,8 +31,7 @@ Objects:
   small        procedural shapes of 20 to 40 mm
   large        procedural shapes of 40 to 90 mm
   DATASET      the name of a data set's spec (spts dataset specs), a spec file ending in .toml, or a folder that `spts dataset
-               make` has written. Its sections [object] and [pose] say whether shapes or the seventeen objects are pressed,
-               of which sizes, and whether in their places. Single objects only, no meshes and no balls
+               make` has written. Its sections [object] and [pose] say what is pressed: shapes or the seventeen objects, their sizes and their places. Single objects only, no meshes and no balls
 
 Files in DIR:
   design.json           the answer, as --json prints it
@@ -69,13 +67,13 @@ struct NewDesign {
     /// it; the decoder's time is estimated beside it
     #[arg(long, value_name = "TIME", value_parser = time, required = true)]
     latency: Option<f64>,
-    /// Intersection over union that images have to have, on average; [0.01, 0.99]
+    /// Intersection over union that the images have to reach on average; [0.01, 0.99]
     #[arg(long, value_name = "IOU", value_parser = within(0.01, 0.99, "[0.01, 0.99]"), default_value_t = 0.8)]
     iou: f64,
-    /// Number of wires, no more and no fewer; [1, 256], at most one a row of taxels
+    /// Exact number of wires; [1, 256], at most one a row of taxels
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=256), conflicts_with = "most_wires")]
     wires: Option<usize>,
-    /// Most wires: as few as do it are taken; [1, 256]
+    /// Most wires that the design may have; it takes as few as suffice; [1, 256]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=256), default_value_t = 16)]
     most_wires: usize,
     /// What is pressed: small, large or DATASET, see below
@@ -91,8 +89,8 @@ struct NewDesign {
     common: Common,
 }
 
-/// Simulates a design with touches, specimens, parts and noise that it has not seen, and says whether what it promised
-/// is found.
+/// Checks a design: simulates it with touches, specimens, parts and noise that it has not seen, and says whether the
+/// results are as it promised.
 ///
 /// The status is 0 when every quantity lies in its band, 1 when one does not, and 2 after an error.
 #[derive(Debug, Args)]
@@ -176,7 +174,7 @@ impl NewDesign {
             seed: self.seed,
         };
         study.layout()?;
-        let out = OutputFolder::open(&self.out, FILES)?;
+        let out = open_folder(&self.out, FILES)?;
         let report = study.run(&Bars::default())?;
         write(&report, out)?;
         let text = || {

@@ -65,12 +65,13 @@ impl DeviceMode {
     }
 }
 
-/// A device without the hardware: host software reads it as it reads the skin.
+/// Stands in for the hardware: host software reads this device as it reads the skin.
 ///
-/// It opens a pseudo-terminal, prints its name, and speaks the published host's protocol on it: it waits for `*`, answers
-/// `Sending.`, loads its cells, answers `Sent!.`, and sends block after block of 1,000 frames of 100 codes. Without SESSION
-/// an object is pressed again and again while it measures (contact alone, a quarter of a second up and down). With SESSION
-/// it sends that recording, of the twin or of the real skin.
+/// It opens a pseudo-terminal, prints its name, and speaks the published host's protocol on it: it waits for `*`,
+/// answers `Sending.`, loads its cells, answers `Sent!.`, and sends block after block of 1,000 frames of 100 codes.
+/// Without SESSION an object is pressed again and again while the device measures. The press is of contact alone,
+/// without an arm, and takes a quarter of a second up and down. With SESSION it sends that recording, of the twin or of
+/// the real skin.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts device --pty                            T is pressed; the first line printed is the port, such as /dev/pts/5
@@ -97,13 +98,13 @@ pub(super) struct DeviceCommand {
     /// Readout profile of the device
     #[arg(long, value_name = "PROFILE", default_value = "as_built", conflicts_with = "session")]
     readout: String,
-    /// End after so many blocks [default: those of SESSION, or no end]
+    /// Stop after so many blocks [default: those of SESSION, or no end]
     #[arg(long, value_name = "N", value_parser = whole::<u64>(1..=1_000_000))]
     blocks: Option<u64>,
     /// Send as fast as the host reads, in place of real time
     #[arg(long)]
     fast: bool,
-    /// Specimen of the skin and its noise
+    /// Seed of the skin and its noise
     #[arg(long, value_name = "SEED", default_value_t = 0, value_parser = seed)]
     seed: u64,
     /// Print the port as JSON

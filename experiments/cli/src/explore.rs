@@ -1,11 +1,10 @@
 //! `spts explore`: what a large skin takes.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{Side, seed, sorted, square, whole};
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
-use spts::output::OutputFolder;
 use spts_circuit::Seeding;
 use spts_report::explore::write;
 use spts_studies::explore::ExploreStudy;
@@ -74,7 +73,7 @@ impl ExploreCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, spts_report::explore::FILES)?;
+        let out = open_folder(&self.out, spts_report::explore::FILES)?;
         let study = ExploreStudy {
             sides: sorted(
                 self.taxels

@@ -1,11 +1,10 @@
 //! `spts fidelity`: cost and error of every fidelity level of the contact.
 
-use super::context::{Common, note};
+use super::context::{Common, note, open_folder};
 use super::error::CliError;
 use super::options::{seed, sorted, whole};
 use super::progress::Bars;
 use clap::Args;
-use spts::output::OutputFolder;
 use spts_studies::fidelity::{FidelityStudy, SettingGrid};
 use std::path::PathBuf;
 
@@ -43,7 +42,7 @@ pub(super) struct FidelityCommand {
     /// Fine cells along one side of a taxel; each [1, 24] [default: 2,3,6,12,24]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = whole::<u16>(1..=24))]
     cells: Vec<u16>,
-    /// A look in less than a minute: two resolutions, one time step
+    /// A short run of less than a minute: two resolutions, one time step
     #[arg(long)]
     quick: bool,
     /// Folder of the results
@@ -75,7 +74,7 @@ impl FidelityCommand {
             grid,
             seed: self.seed,
         };
-        let out = OutputFolder::open(&self.out, spts_report::fidelity::FILES)?;
+        let out = open_folder(&self.out, spts_report::fidelity::FILES)?;
         let report = study.run(&out.folder("scenes")?, &Bars::default())?;
         spts_report::fidelity::write(&report, out)?;
         let folder = self.out.join("figures");

@@ -1,13 +1,13 @@
 //! `spts firmware`: the cell's firmware on emulated controllers.
 
-use super::context::{Common, print};
+use super::context::{Common, open_folder, print};
 use super::error::CliError;
 use super::options::{number, whole, within};
 use super::progress::Bars;
 use clap::builder::TypedValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
-use spts::output::{OutputError, OutputFolder, check_writable};
+use spts::output::{OutputError, check_writable};
 use spts_circuit::{Seeding, WeightMode};
 use spts_firmware::attiny412::TraceRecord;
 use spts_firmware::{Clock, PATTERN_BITS, SKIN_EDGE_HZ};
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 ///
 /// Every cell of the skin is emulated: its instructions, its clock pin, its I2C address, its DAC. The image that is
 /// shipped sets the DAC first and computes the next value afterwards; the image `plain` computes first, as the
-/// published device, with a millisecond timer's interrupt beside it. A scene with `weights = "firmware"` takes its
+/// published device does, and has the interrupt of a millisecond timer. A scene with `weights = "firmware"` takes its
 /// weights from cells like these.
 #[derive(Debug, Args)]
 pub(super) struct FirmwareCommand {
@@ -41,9 +41,9 @@ enum FirmwareAction {
 
 /// Compares every code that the cells put out with the twin's weights.
 ///
-/// Status 1 when one of them differs, or a cell that is asked over the bus replies otherwise than it should. A code
-/// that comes after the sample counts as different: the image `plain` is late now and then at the default clock, and is
-/// not at a slower one sampled later.
+/// The exit status is 1 when a code differs or a cell gives a wrong reply over the bus. A code that comes after the
+/// sample counts as different: the image `plain` is sometimes late at the default clock. At a slower clock with a later
+/// sample it is not.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware verify
@@ -67,7 +67,8 @@ struct VerifyCommand {
     common: Common,
 }
 
-/// Latency from edge to DAC, largest clock rate, and late updates, of the image and of the one it is compared with.
+/// Measures the latency from clock edge to DAC, the largest clock rate and the late updates of an image, beside the
+/// images that ship.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware timing
@@ -116,8 +117,9 @@ struct WeightsCommand {
 
 /// Prints what one cell does, instruction by instruction.
 ///
-/// A line a step: tick of the 20 MHz oscillator, byte address, instruction, registers changed. The cell is seeded over
-/// the bus and clocked; with --from-reset it is left alone, for images that do not get as far as an answer.
+/// Prints one line for each step: tick of the 20 MHz oscillator, byte address, instruction, changed registers. The cell
+/// is seeded over the bus and clocked. With --from-reset it is left alone, which shows images that fail before they can
+/// answer.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware trace
@@ -127,7 +129,7 @@ struct TraceCommand {
     /// Taxel, 0-based; its address is 8 more
     #[arg(long, value_name = "K", default_value_t = 0, value_parser = whole::<usize>(0..=111))]
     taxel: usize,
-    /// Ticks of 50 ns from power-on that are shown, without bus and clock; [1, 100000000]
+    /// Show so many ticks of 50 ns from power-on, with neither bus nor clock; [1, 100000000]
     #[arg(long, value_name = "TICKS", conflicts_with_all = ["edges", "mode"], value_parser = whole::<u64>(1..=100_000_000))]
     from_reset: Option<u64>,
     /// Clock edges; [1, 10000]
@@ -158,8 +160,8 @@ struct CellOptions {
     /// Clock edges a second; [1, 1000000]
     #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = within(1.0, 1e6, "[1, 1000000] Hz"))]
     edge_hz: f64,
-    /// From an edge to the sample, µs; less than a period [default: 11, or the same share of a period shorter than the
-    /// skin's]
+    /// Time from a clock edge to the sample, µs; less than a period [default: 11, or the same share of a period shorter
+    /// than the skin's]
     #[arg(long, value_name = "US", value_parser = number)]
     sample_us: Option<f64>,
 }
@@ -285,7 +287,7 @@ impl TimingCommand {
             cells.emulated(0, CellTask::KINDS.to_vec())
         };
         let images: Vec<EmulatedCells> = names.into_iter().map(emulated).collect::<Result<_, _>>()?;
-        let out = OutputFolder::open(&self.out, spts_report::firmware::FILES)?;
+        let out = open_folder(&self.out, spts_report::firmware::FILES)?;
         let timings = time_images(&images, &Bars::default())?;
         write_timing(&timings, out)?;
         let Some((image, compared_with)) = timings.split_first() else {

@@ -1,11 +1,10 @@
 //! `spts phase`: the phase-transition picture.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{seed, whole};
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
-use spts::output::OutputFolder;
 use spts_recon::recover::Signs;
 use spts_report::phase::write;
 use spts_studies::phase::{Method, PhaseStudy, methods};
@@ -19,7 +18,7 @@ use std::path::PathBuf;
 /// The rates stand beside two theories for large N. One is the weak threshold of Donoho and Tanner: below it, the least
 /// sum (the lasso without a penalty) finds almost every signal. It is the law for nn_lasso. The other is the threshold
 /// below which only one non-negative signal fits the measurements. It is the law for nn_lmmse. For all other methods
-/// they are a reference. lmmse and tv are not shown, because they do not look for few non-zeros.
+/// both are a reference only. lmmse and tv are not shown, because they do not look for few non-zeros.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts phase --quick
@@ -73,7 +72,7 @@ impl PhaseCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, spts_report::phase::FILES)?;
+        let out = open_folder(&self.out, spts_report::phase::FILES)?;
         let signs = match self.signs {
             SignsArg::Positive => Signs::Positive,
             SignsArg::Either => Signs::Either,

@@ -1,12 +1,11 @@
 //! `spts readouts`: few-wire readouts side by side.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{Side, seed, sorted, square, whole};
 use super::progress::Bars;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use spts::output::OutputFolder;
 use spts_report::readouts::{FILES, write};
 use spts_studies::readouts::{READOUTS, ReadoutLine, ReadoutsStudy, readout};
 use std::path::PathBuf;
@@ -14,9 +13,10 @@ use std::path::PathBuf;
 /// Compares readouts that need few wires on the same skins, touches, amplifier, noise, converter and clock.
 ///
 /// Every readout reads the same held touches through the circuit: random shapes at random places for the image, its
-/// place and the latency, and the seventeen known objects for their names. Each has the largest feedback that its own
-/// sums permit; the clock of a size is the same for all. Bands are 90 % intervals over repetitions, each with a
-/// specimen of the skin, parts, noise and touches of its own. The protocol is docs/readouts.md.
+/// place and the latency, and the seventeen known objects for their names. Each readout has the largest feedback
+/// resistance that its own sums permit. All readouts of one size have the same clock. Bands are 90 % intervals over
+/// repetitions, each with a specimen of the skin, parts, noise and touches of its own. The protocol is
+/// docs/readouts.md.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts readouts
@@ -87,7 +87,7 @@ impl ReadoutsCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, FILES)?;
+        let out = open_folder(&self.out, FILES)?;
         let asked = |line: &&ReadoutLine| self.readout.is_empty() || self.readout.iter().any(|r| r.0.name == line.name);
         let study = ReadoutsStudy {
             readouts: READOUTS.iter().filter(asked).collect(),

@@ -17,8 +17,8 @@ use std::time::Duration;
 /// Records a device, real or virtual, into a session.
 ///
 /// Wakes the device on the port, reads blocks of 1,000 frames of 100 codes, and writes them as a session, which every
-/// other command takes. A folder that holds the session's other mode gets this one beside it. The device does not say
-/// what it is: its mode and readout profile are told here.
+/// other command takes. A folder that already holds the session's recording in the other mode gets this one added. The
+/// device does not say what it is; --mode and --readout do.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts record --port /dev/ttyACM0 --object cup --mode raster --out out/cup
@@ -50,13 +50,13 @@ pub(super) struct RecordCommand {
     /// Blocks at the beginning that only condition the skin
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<u64>(0..=10_000))]
     conditioning: u64,
-    /// Frames at the start of every block in which nothing touches the skin
+    /// Number of frames at the start of every block in which nothing touches the skin
     #[arg(long, value_name = "N", default_value_t = 150, value_parser = whole::<u64>(0..=1000))]
     idle: u64,
-    /// First frame of the hold, and one beyond its last
+    /// First frame of the hold, and the frame after its last
     #[arg(long, value_name = "FIRST,END", default_value = "500,700", value_delimiter = ',', num_args = 1, value_parser = whole::<u32>(0..=999))]
     hold: Vec<u32>,
-    /// Speed of the port, baud; devices on USB do not look at it
+    /// Speed of the port, baud; devices on USB ignore it
     #[arg(long, value_name = "BAUD", default_value_t = 115_200, value_parser = whole::<u32>(50..=4_000_000))]
     baud: u32,
     /// Longest silence of the device, s, [0.1, 86400]

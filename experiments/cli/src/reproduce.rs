@@ -1,6 +1,6 @@
 //! `spts reproduce`: the whole report.
 
-use super::context::Common;
+use super::context::{Common, note_earlier};
 use super::error::CliError;
 use super::options::seed;
 use super::progress::Bars;
@@ -21,7 +21,7 @@ use std::path::PathBuf;
   spts reproduce --recordings recordings/ --out out/report --seed 7
   spts reproduce --save-recordings --json")]
 pub(super) struct ReproduceCommand {
-    /// A look at everything in about a minute: few presses, few numbers of measurements
+    /// A short run of about a minute: few presses, few numbers of measurements
     #[arg(long)]
     quick: bool,
     /// Directory of recordings of the real skin to score beside the twin (see `spts validate --help`)
@@ -45,6 +45,7 @@ impl ReproduceCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
+        note_earlier(&self.out);
         let out = self.out.clone();
         let summary = Reproduction {
             seed: self.seed,
@@ -53,7 +54,7 @@ impl ReproduceCommand {
             out: self.out,
             save_recordings: self.save_recordings,
         }
-        .run(&Bars::default())?;
+        .run(&Bars::with_lines())?;
         let page = out.join("index.html");
         let text = || format!("{}\nreport: {}", text(&summary), page.display());
         self.common.print(&summary, text)

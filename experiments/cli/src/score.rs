@@ -3,26 +3,24 @@
 mod anytime;
 mod earlier;
 mod in_time;
+mod settings;
 mod training;
 
-use super::context::{Common, note, print, print_json, progress, spinner};
+use super::context::{Common, open_folder, print, print_json, progress, spinner};
 use super::error::CliError;
-use super::extras::{simulated_sessions, write_board};
-use super::options::{decoders_named, network, number, seed, sensing, sorted, whole, within};
+use super::extras::write_board;
+use super::options::{number, seed, sensing, whole, within};
 use clap::Args;
-use earlier::{check_board, read_board, verdict};
+use earlier::{check_board, note_differences, read_board, verdict};
 use serde::Serialize;
-use spts::output::{OutputFolder, write_json};
-use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
-use spts_eval::board::{BoardSettings, FILES, Regression, ScoreBoard, regressions, table};
+use spts::output::write_json;
+use spts_eval::algorithm::{DecodeError, ExternalError};
+use spts_eval::board::{BoardSettings, Difference, FILES, Regression, ScoreBoard, differences, regressions, table};
 use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
-use spts_eval::training::{PUBLISHED, SHAPES, TrainedNetwork, TrainingSource};
-use spts_eval::{ScoreError, Sensing, Source, slips_text};
+use spts_eval::training::PUBLISHED;
+use spts_eval::{ScoreError, Sensing, Source};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::time::Duration;
-use training::{SimulatedSkins, training_source};
 
 /// Scores decoders side by side on recordings of a skin.
 ///
@@ -31,9 +29,9 @@ use training::{SimulatedSkins, training_source};
 ///
 /// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes
 /// of 20 windows, and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in
-/// which the measurements arrive; the place of the bouncing ball, as recorded and with the taxels relabelled so that
-/// it may be anywhere; and the place of touches, such as those of the skin around a robot's arm. A skin that is bent
-/// gives an output without a touch, too; that of the frames before the touch is subtracted.
+/// which the measurements arrive; the place of the bouncing ball, as recorded and with the taxels relabelled so that it
+/// may be anywhere; and the place of touches, such as those of the skin around a robot's arm. A bent skin has an output
+/// even without a touch; the output of the frames before the touch is subtracted.
 ///
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that
 /// are not scored. There is one exception, which the published evaluation has too: the published library holds raster
@@ -41,9 +39,9 @@ use training::{SimulatedSkins, training_source};
 /// Gains in a file (`--learn-from FILE.toml`) may have been fitted to the scored objects too, and their mounting comes
 /// from compressive samples of presses 1-5; `calibrated` leaves out the scored object and all of those.
 ///
-/// Where the cells have missed clock edges, the samples lag behind their rows of weights. That is found by the fit of
-/// an image at every contact. The samples are put back on their rows, and a note says so; `slips` of --json has every
-/// place: session, block, `from` (the first measurement that lags) and `rows` (by how many).
+/// Where the cells have missed clock edges, the samples lag behind their rows of weights. The command finds such lags
+/// by fitting an image at every contact, puts the samples back on their rows, and says so in a note; `slips` of --json
+/// has every place: session, block, `from` (the first measurement that lags) and `rows` (by how many).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts score recordings/
@@ -124,9 +122,9 @@ pub(super) struct ScoreCommand {
     #[arg(long, conflicts_with_all = ["external", "save", "against", "no_ball", "no_times"])]
     anytime: bool,
     /// Follow contacts in time instead: every decoder is given all windows of a press or a drop in their order, from
-    /// before the touch on, and keeps what they told. Scored are its images at set times after the touch and during the
-    /// hold, beside those of the same windows alone. Only `nn_lmmse`, which has a Gaussian prior; --no-ball leaves out
-    /// the drops
+    /// before the touch on, and remembers what it has seen. Scored are its images at set times after the touch and
+    /// during the hold, beside those of the same windows alone. Only `nn_lmmse`, which has a Gaussian prior; --no-ball
+    /// leaves out the drops
     #[arg(long, conflicts_with_all = ["anytime", "external", "save", "against", "no_times"])]
     in_time: bool,
     /// Wanted confidences, each in (0.5, 1) [default: 0.8,0.9,0.95,0.99 for classes; 0.6,0.7,0.8 for images]
@@ -147,13 +145,13 @@ pub(super) struct ScoreCommand {
     left_out: bool,
     /// What to learn from; with several sources, every decoder learns from each. `published`: the dictionary and
     /// library beside the recordings, everything else from raster presses. `raster`: raster presses that are not
-    /// scored. `simulation`: simulated presses of the objects, whose places are known to half a taxel, whose rotations
-    /// to 15°, whose tilts not at all. `simulation_fitted`: presses on 32 simulated skins, placed as was fitted to the
-    /// published recordings. `calibrated`: the same, on skins with gains drawn from what unscored presses of the other
-    /// objects tell of the scored skin's. FILE.toml: the same with the gains in this file, as `spts calibrate --skin`
-    /// writes them. `shapes`: procedural shapes pressed in the simulation, no object and nothing recorded; the decoders
-    /// that learn from nothing else, `mixture` and `amortised`, are then shown too. DIR: other recordings, such as
-    /// those that `spts reproduce --save-recordings` writes
+    /// scored. `simulation`: simulated presses of the objects; places are known to half a taxel, rotations to 15°, and
+    /// tilts not at all. `simulation_fitted`: presses on 32 simulated skins, placed as was fitted to the published
+    /// recordings. `calibrated`: the same, on skins with gains drawn from what unscored presses of the other objects
+    /// tell of the scored skin's. FILE.toml: the same with the gains in this file, as `spts calibrate --skin` writes
+    /// them. `shapes`: procedural shapes pressed in the simulation, no object and nothing recorded; the decoders that
+    /// learn from nothing else, `mixture` and `amortised`, are then shown too. DIR: other recordings, such as those
+    /// that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
     /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows
@@ -162,8 +160,8 @@ pub(super) struct ScoreCommand {
     weights: Option<PathBuf>,
     /// How the rows of a window come about; with both, every decoder is scored with each. `random`: measurements that
     /// follow each other, at the rows that the cells put out. `chosen`: three windows a press, of rows chosen from
-    /// those of its hold (every third row, from the first, second and third on). The choice knows what the decoder has
-    /// learned, and neither the object nor a sample; the order of time is lost. Chosen rows have no votes
+    /// those of its hold (every third row, from the first, second and third on). The choice depends on what the decoder
+    /// has learned, and neither on the object nor on a sample; the order in time is lost. Chosen rows have no votes
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', default_value = "random", value_parser = sensing())]
     sensing: Vec<Sensing>,
     /// Leave out the times, so that the output is the same from run to run
@@ -204,6 +202,9 @@ struct BoardOutput<'a> {
     board: &'a ScoreBoard,
     #[serde(skip_serializing_if = "Option::is_none")]
     regressions: Option<&'a [Regression]>,
+    /// What this board and that of `--against` do not have in common.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    differences: Option<&'a [Difference]>,
 }
 
 impl ScoreCommand {
@@ -231,7 +232,7 @@ impl ScoreCommand {
         }
         self.common.start()?;
         let path = self.out(DEFAULT_OUT);
-        let out = OutputFolder::open(path, FILES)?;
+        let out = open_folder(path, FILES)?;
         if let Some(path) = &self.save {
             check_board(path)?;
         }
@@ -243,12 +244,16 @@ impl ScoreCommand {
             ..self.fitting(settings, &source)
         };
         let board = score(&settings, &source)?;
-        let found = before.map(|before| regressions(&before, &board, self.tolerance));
+        let found = before
+            .as_ref()
+            .map(|before| regressions(before, &board, self.tolerance));
+        let apart = before.as_ref().map(|before| differences(before, &board));
         // printed first, so that a disk that is full does not cost the run
         if self.common.json {
             print_json(&BoardOutput {
                 board: &board,
                 regressions: found.as_deref(),
+                differences: apart.as_deref(),
             })?;
         } else {
             print(&table(&board))?;
@@ -260,109 +265,15 @@ impl ScoreCommand {
         if !self.common.json {
             print(&format!("\ntables and figures: {}", path.display()))?;
         }
+        if let Some(file) = &self.against {
+            note_differences(file, apart.as_deref().unwrap_or_default());
+        }
         verdict(found.as_deref().unwrap_or_default())
     }
 
     /// Folder of the results, `default` when none is named.
     fn out<'a>(&'a self, default: &'a str) -> &'a Path {
         self.out.as_deref().unwrap_or(Path::new(default))
-    }
-
-    /// The sessions that are scored; a note says which of them slip.
-    fn source(&self) -> Result<Source, CliError> {
-        let source = match &self.twin {
-            Some(scenes) => simulated_sessions(scenes, self.seed, self.quick)?,
-            None => Source::open(self.recordings.as_deref().unwrap_or(Path::new("")))?,
-        };
-        if let Some(text) = slips_text(&source.slips) {
-            note(&format!("note: {text}"));
-        }
-        Ok(source)
-    }
-
-    /// What is learned from to score `scored`.
-    fn training(&self, scored: &Source) -> Result<Vec<TrainingSource>, CliError> {
-        let mut skins = SimulatedSkins::default();
-        if self.left_out && self.learn_from.iter().any(|name| name.ends_with(".toml")) {
-            note(
-                "note: gains in a file may have been fitted to the objects that are left out; `calibrated` leaves them out",
-            );
-        }
-        let training = self.learn_from.iter();
-        training
-            .map(|name| training_source(name, scored, self.seed, &mut skins))
-            .collect()
-    }
-
-    /// The same without decoders that nobody named and that have no weights for the skin.
-    fn fitting(&self, mut settings: BoardSettings, scored: &Source) -> BoardSettings {
-        let layout = &scored.layout;
-        let fits = TrainedNetwork::shipped().on([layout.rows(), layout.cols()]);
-        if let (true, None, Err(error)) = (self.decoder.is_empty(), &self.weights, fits) {
-            let before = settings.decoders.len();
-            settings.decoders.retain(|spec| spec.name != "amortised");
-            if settings.decoders.len() < before {
-                note(&format!("note: left out: {error}"));
-            }
-        }
-        settings
-    }
-
-    /// What is scored, but for what it learns from.
-    fn settings(&self) -> Result<BoardSettings, CliError> {
-        let decoders = if self.decoder.is_empty() {
-            if self.in_time {
-                decoders_named(&["nn_lmmse".to_owned()])?
-            } else if self.anytime {
-                DECODERS.iter().filter(|spec| spec.anytime && spec.shown).collect()
-            } else if self.external.is_empty() {
-                let shapes = self.learn_from.iter().any(|name| name == SHAPES);
-                let unseen = DECODERS.iter().filter(|spec| shapes && spec.needs.shapes());
-                BoardSettings::shown().into_iter().chain(unseen).collect()
-            } else {
-                Vec::new()
-            }
-        } else {
-            decoders_named(&self.decoder)?
-        };
-        let external = self.external.iter().map(|text| ExternalCommand {
-            limit: Duration::from_secs_f64(self.external_timeout),
-            ..ExternalCommand::parse(text)
-        });
-        let external: Vec<Arc<dyn Contender>> = external.map(|e| Arc::new(e) as Arc<dyn Contender>).collect();
-        let names = decoders.iter().map(|d| d.name).chain(external.iter().map(|e| e.name()));
-        let names: Vec<&str> = names.collect();
-        if let Some((k, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(*name)) {
-            let option = if k < decoders.len() { "--decoder" } else { "--external" };
-            return Err(CliError::Usage(format!(
-                "`{option}`: {name:?} is there twice; give every one a name of its own"
-            )));
-        }
-        let mut measurements: Vec<usize> = self.measurements.iter().map(|m| *m as usize).collect();
-        if measurements.is_empty() {
-            measurements = if self.in_time {
-                in_time::MEASUREMENTS.to_vec()
-            } else {
-                BoardSettings::MEASUREMENTS.to_vec()
-            };
-        }
-        Ok(BoardSettings {
-            decoders,
-            external,
-            measurements: sorted(measurements),
-            objects: self.object.clone(),
-            localisation: if self.no_ball || self.anytime {
-                Vec::new()
-            } else {
-                BoardSettings::LOCALISATION.to_vec()
-            },
-            left_out: self.left_out,
-            sensing: sorted(self.sensing.clone()),
-            training: Vec::new(),
-            network: self.weights.as_deref().map(network).transpose()?,
-            times: !self.no_times,
-            seed: self.seed,
-        })
     }
 }
 

@@ -1,11 +1,10 @@
 //! `spts seeds`: how good a set of seeds is, better ones, and what they are worth.
 
-use super::context::Common;
+use super::context::{Common, open_folder};
 use super::error::CliError;
 use super::options::{Side, parse_measurements, seed, sorted, square, whole, within};
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
-use spts::output::OutputFolder;
 use spts_circuit::{Seeding, WeightMode};
 use spts_report::seeds::write;
 use spts_studies::seeds::{SeedSet, SeedStudy};
@@ -101,7 +100,7 @@ impl SeedsCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, spts_report::seeds::FILES)?;
+        let out = open_folder(&self.out, spts_report::seeds::FILES)?;
         let or = |asked: Option<u32>, default: u32, quick: u32| {
             asked.unwrap_or(if self.quick { quick } else { default }) as usize
         };

@@ -1,19 +1,24 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use super::context::{Common, TICK, note, progress, spinner};
+mod folder;
+mod scenes;
+
+use super::context::{Common, TICK, note, open_folder, progress, spinner};
 use super::error::CliError;
 use super::options::{number, seed, whole};
 use clap::Args;
+use folder::default_folder;
+use scenes::SceneList;
 use spts::Session;
-use spts::output::OutputFolder;
 use spts::scene::{Assignment, Timestep};
 use spts::simulate::{Request, Summary, run};
-use spts_circuit::Recording;
+use spts_contact::Frame;
 use spts_contact::objects::OBJECTS;
-use spts_eval::decode::{DecodeRequest, DecodedSession};
+use spts_eval::decode::{DecodeRequest, DecodedSession, LearnedDecoders};
 use spts_eval::decoders::find;
 use spts_eval::training::TrainingData;
-use spts_models::Streams;
+use spts_models::{SkinLayout, Streams};
+use spts_report::animation::Animation;
 use spts_report::simulation::{FILES, SimulationFiles};
 use std::path::{Path, PathBuf};
 use toml::Value;
@@ -26,10 +31,12 @@ use toml::Value;
 /// .toml. The results depend on the scene and the seed alone: the number of threads does not change a byte of them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
+  spts simulate --list
   spts simulate press/T
   spts simulate press/tape --presses 10 --force 12 --seed 3 --render
   spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
   spts simulate bounce --height 1.0 --presses 5
+  spts simulate bounce --animate
   spts simulate arm --set bend.radius_m=0.04 --set bend.strain=0.02
   spts simulate press/T --tolerance 0.05
   spts simulate press/comb --contact layer --cells 12 --timestep auto
@@ -51,10 +58,14 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   session.json               the recordings as a session, with raster_*.npy and compressive_*.npy: see docs/session.md
   decoded.png decoded.svg    pressure, the trace of the wire, images decoded from it at three M
   pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
+  animation.gif              with --animate: the first press in motion, beside the image decoded from the wire
 A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on.")]
 pub(super) struct SimulateCommand {
-    #[arg(help = scene_help())]
-    scene: String,
+    #[arg(help = scene_help(), required_unless_present = "list")]
+    scene: Option<String>,
+    /// List the scenes and the objects, and simulate nothing; with --json as JSON
+    #[arg(long, conflicts_with = "scene")]
+    list: bool,
     /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The arm holds it at its origin; its -z side faces the
     /// skin. Small defects are repaired and large meshes are decimated, with a note. A mesh that cannot be repaired is
     /// refused with the reason
@@ -88,8 +99,9 @@ pub(super) struct SimulateCommand {
     /// the time between frames, 2 ms at most [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto")]
     timestep: Option<Timestep>,
-    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex check these by MuJoCo's own means:
-    /// they take minutes for a press and cannot simulate a ball [default: winkler, or the scene file's]
+    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex are made of MuJoCo's own parts, to
+    /// check the others: they take minutes for a press and cannot simulate a ball [default: winkler, or the scene
+    /// file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
     /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
@@ -129,8 +141,12 @@ pub(super) struct SimulateCommand {
     /// Draw the scene at the instant of the largest force
     #[arg(long)]
     render: bool,
+    /// Draw the first press in motion, as a GIF: the pressure on the taxels, the trace of the wire, and the image that
+    /// is decoded from that trace in time
+    #[arg(long, conflicts_with = "no_record")]
+    animate: bool,
     /// Folder for the results. Those of an earlier run are replaced, all at once; files that no run has written stay
-    /// [default: out/NAME]
+    /// [default: out/NAME; for a mesh out/ and the name of its file, with a number where another mesh has that name]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]
@@ -141,7 +157,7 @@ pub(super) struct SimulateCommand {
 fn scene_help() -> String {
     let names: Vec<&str> = OBJECTS.iter().map(|object| object.name).collect();
     format!(
-        "press/NAME, press (with --mesh), bounce, arm, or FILE.toml; NAME is one of {}",
+        "press/NAME, press (with --mesh), bounce, arm, or FILE.toml; NAME is finger or one of {}",
         names.join(", ")
     )
 }
@@ -227,17 +243,19 @@ impl SimulateCommand {
 
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
+        if self.list {
+            let list = SceneList::new();
+            return self.common.print(&list, || list.text());
+        }
         self.common.start()?;
         let request = Request {
-            scene: self.scene.clone(),
+            scene: self.scene.clone().unwrap_or_default(),
             assignments: self.assignments()?,
         };
         let prepared = request.prepare()?;
-        let out = match &self.out {
-            Some(out) => out.clone(),
-            None => Path::new("out").join(prepared.scene.name()),
-        };
-        let folder = OutputFolder::open(&out, FILES)?;
+        let out = self.out.clone();
+        let out = out.unwrap_or_else(|| default_folder(&prepared));
+        let folder = open_folder(&out, FILES)?;
         let mut files = SimulationFiles::create(folder, &prepared, !self.no_record)?;
         let bar = progress(prepared.scene.repeats(), "simulating");
         let done = || {
@@ -248,17 +266,40 @@ impl SimulateCommand {
                 bar.enable_steady_tick(TICK);
             }
         };
-        let simulation = run(&prepared, !self.no_record, &done, |piece| {
-            Ok::<_, CliError>(files.push(&piece)?)
-        });
+        let mut first: Vec<Frame> = Vec::new();
+        let simulate = || {
+            run(&prepared, !self.no_record, &done, |piece| {
+                if self.animate && piece.first == 0 {
+                    first.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
+                }
+                Ok::<_, CliError>(files.push(&piece)?)
+            })
+        };
+        let layout = prepared.scene.skin();
+        let decodes = !self.no_record && layout.taxels() <= MOST_DECODED;
+        // what a decoder learns depends on the skin alone, and the mechanics of one press leave a core to it
+        let (simulation, learned) = rayon::join(simulate, || decodes.then(|| Learned::new(layout)).transpose());
         bar.finish_and_clear();
-        let simulation = simulation?;
+        let (simulation, learned) = (simulation?, learned?);
         let summary = Summary::new(&prepared, &simulation);
         for text in &summary.notes {
             note(&format!("note: {text}"));
         }
-        let decoded = simulation.first.as_ref().map(decoded).transpose()?.flatten();
         let writing = spinner("writing");
+        if !self.no_record && !decodes {
+            let most = TrainingData::MOST_TAXELS;
+            note(&format!(
+                "note: a skin of more than {MOST_DECODED} taxels is not decoded here; `spts decode` takes up to {most}"
+            ));
+        }
+        let decoded = match simulation.first.as_ref().zip(learned.as_ref()) {
+            Some((session, learned)) => learned.decoded(session)?,
+            None => None,
+        };
+        if let Some(session) = simulation.first.as_ref().filter(|_| self.animate) {
+            let training = learned.as_ref().map(|learned| &learned.training);
+            files.animate(&Animation::new(&prepared, &first, session, training)?)?;
+        }
         let names = files.finish(&simulation, &summary, self.render, decoded)?;
         drop(writing);
         let text = || format!("{}\n{}: {}", summary.table(), out.display(), names.join(", "));
@@ -266,28 +307,35 @@ impl SimulateCommand {
     }
 }
 
-/// The session as `spts decode` decodes it when nothing was learned.
-fn decoded(session: &Session) -> Result<Option<DecodedSession>, CliError> {
-    let Some(layout) = session.compressive().map(Recording::layout) else {
-        return Ok(None);
-    };
-    if layout.taxels() > MOST_DECODED {
-        let most = TrainingData::MOST_TAXELS;
-        note(&format!(
-            "note: a skin of more than {MOST_DECODED} taxels is not decoded here; `spts decode` takes up to {most}"
-        ));
-        return Ok(None);
+/// What decodes a session as `spts decode` does when nothing was learned of the objects.
+struct Learned {
+    training: TrainingData,
+    request: DecodeRequest,
+    decoders: LearnedDecoders,
+}
+
+impl Learned {
+    fn new(layout: &SkinLayout) -> Result<Self, CliError> {
+        let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;
+        let request = DecodeRequest {
+            decoders: find("nn_lmmse").into_iter().collect(),
+            measurements: DecodeRequest::default_measurements(layout.taxels()),
+            windows: 1,
+            network: None,
+            seed: 1,
+        };
+        Ok(Self {
+            decoders: request.learn(layout, &training, None)?,
+            training,
+            request,
+        })
     }
-    let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;
-    let request = DecodeRequest {
-        decoders: find("nn_lmmse").into_iter().collect(),
-        measurements: DecodeRequest::default_measurements(layout.taxels()),
-        windows: 1,
-        network: None,
-        seed: 1,
-    };
-    let learned = request.learn(layout, &training, None)?;
-    Ok(Some(request.decode(session, &learned)?))
+
+    /// The decoded session; `None` without a compressive recording.
+    fn decoded(&self, session: &Session) -> Result<Option<DecodedSession>, CliError> {
+        let decode = || self.request.decode(session, &self.decoders);
+        Ok(session.compressive().map(|_| decode()).transpose()?)
+    }
 }
 
 /// Most taxels of a skin that `spts simulate` decodes at its end: a second or two.

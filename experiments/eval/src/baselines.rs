@@ -1,11 +1,11 @@
-//! Baselines: images that need no measurement.
+//! Baselines: images that use no measurement.
 
 use crate::session::ScoredSession;
 use crate::training::Learned;
 use serde::Serialize;
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 
-/// Score of an image that needs no measurement.
+/// Score of an image that uses no measurement.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BaselineRow {
     /// Object, or "mean".
@@ -22,7 +22,7 @@ pub struct BaselineRow {
     pub balanced_accuracy: f64,
 }
 
-/// Trivial baselines: an empty image, and the mean of all library images.
+/// Scores of trivial baselines: an empty image, and the mean of all library images.
 #[must_use]
 pub fn baselines(sessions: &[ScoredSession], learned: &Learned) -> Vec<BaselineRow> {
     let library = learned.classifier.library();

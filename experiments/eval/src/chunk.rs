@@ -26,9 +26,9 @@ pub(crate) fn converter_step_v(recording: &Recording) -> Option<f64> {
 /// Measurements `start..start + y.len()` of a block. Lost samples count for nothing.
 pub(crate) struct Chunk<'a> {
     recording: &'a Recording,
-    /// Row of the first measurement, as the recording says.
+    /// Row of the first measurement according to the recording.
     first_row: u64,
-    /// Output without its mean, V; 0 where a sample is lost.
+    /// Output minus its mean, V; 0 for a lost sample.
     pub(crate) y: Vec<f64>,
     lost: Vec<bool>,
     mean_v: f64,
@@ -39,13 +39,13 @@ pub(crate) struct Chunk<'a> {
 /// An image fitted to a chunk.
 #[derive(Debug, Clone)]
 pub(crate) struct Fit {
-    /// Rows that the chunk was taken to lag behind.
+    /// Number of rows by which the chunk was assumed to lag.
     pub(crate) rows: i64,
     /// Image, V.
     pub(crate) image: Vec<f64>,
-    /// Output with no taxel under load, V.
+    /// Output without load on any taxel, V.
     pub(crate) offset_v: f64,
-    /// Root mean square of what it leaves, over that of the output.
+    /// Root mean square of the residual divided by that of the output.
     pub(crate) residual: f64,
 }
 

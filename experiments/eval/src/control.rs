@@ -1,8 +1,8 @@
-//! The control: the raster session, down-sampled to M pixels a frame and interpolated.
+//! The control: the raster session, reduced to M pixels a frame and interpolated.
 //!
-//! Some of the published library's images are frames that are scored here, so the real control's classification is not
-//! held out; the twin's is, and so are all compressive scores. Evenly spaced pixels of a square array leave the
-//! Delaunay triangulation free to choose diagonals: other libraries differ by a few hundredths at small M.
+//! Some images of the published library are frames that are scored here, so the classification of the real control is
+//! not held out. That of the twin is, and so are all compressive scores. Evenly spaced pixels of a square array admit
+//! several Delaunay triangulations with different diagonals; other libraries differ by a few hundredths at small M.
 
 use crate::protocol::Truth;
 use crate::session::ScoredSession;

@@ -1,4 +1,4 @@
-//! Why there are no scores.
+//! Errors of scoring.
 
 use crate::algorithm::{DecodeError, ExternalError};
 use crate::decoders::DECODERS;
@@ -10,31 +10,31 @@ use spts_recon::recover::ParameterError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScoreError {
-    /// Nothing to score.
+    /// There is nothing to score.
     #[error("scoring needs an object with both a raster and a compressive recording; found: {found}")]
     NoSession {
-        /// The sessions and what they have.
+        /// The sessions and their recordings.
         found: String,
     },
-    /// Every decoder that was asked for needs classes, and there is nothing to learn them from.
+    /// All requested decoders need classes, and there is no training data with classes.
     #[error(
-        "`--decoder` = {decoders}: learns classes from raster presses that are not scored, and the sessions have none; record \
+        "`--decoder` = {decoders}: learns classes from raster presses that are not scored, but the sessions have none; record \
          more raster presses, or use `--learn-from simulation`"
     )]
     NoClasses {
         /// The decoders.
         decoders: String,
     },
-    /// A decoder that does not say how sure it is was asked when to stop.
-    #[error("`--decoder` = {decoder}: does not say how sure it is; valid: {valid}")]
+    /// A decoder that states no confidence cannot be stopped by it.
+    #[error("`--decoder` = {decoder}: states no confidence; valid: {valid}")]
     NoConfidence {
         /// The decoder.
         decoder: String,
-        /// Those that do.
+        /// Decoders that state one.
         valid: String,
     },
-    /// A decoder without a Gaussian prior was asked to follow a contact in time.
-    #[error("`--decoder` = {decoder}: has no Gaussian prior to follow a contact with; valid: nn_lmmse")]
+    /// A decoder without a Gaussian prior cannot track a contact in time.
+    #[error("`--decoder` = {decoder}: has no Gaussian prior to track a contact with; valid: nn_lmmse")]
     NotInTime {
         /// The decoder.
         decoder: String,
@@ -42,27 +42,27 @@ pub enum ScoreError {
     /// A wanted confidence is outside its range.
     #[error(transparent)]
     Confidence(#[from] ParameterError),
-    /// An object that has no compressive session.
+    /// An object without a compressive session.
     #[error("object {name:?} has no compressive session; valid: {valid}")]
     Object {
         /// The name.
         name: String,
-        /// Those that have one.
+        /// Objects that have one.
         valid: String,
     },
-    /// What was to be learned from is of another skin.
+    /// Training data of another skin.
     #[error("{name}: the raster session of {object} has {taxels} taxels; the scored skin has {needed}")]
     Taxels {
-        /// The source.
+        /// Name of the source of training data.
         name: String,
-        /// An object of it.
+        /// One of its objects.
         object: String,
-        /// Its taxels.
+        /// Number of its taxels.
         taxels: usize,
         /// Taxels of the scored skin.
         needed: usize,
     },
-    /// Nothing could be learned.
+    /// The training data are not usable.
     #[error(transparent)]
     Learn(#[from] LearnError),
     /// No rows can be chosen.
@@ -74,20 +74,20 @@ pub enum ScoreError {
     /// An algorithm failed.
     #[error(transparent)]
     Decode(#[from] DecodeError),
-    /// The sheet is no grid.
+    /// The grid of the localisation is not valid.
     #[error(transparent)]
     Place(#[from] RangeError),
 }
 
 impl ScoreError {
-    /// The error of a `decoder` that cannot follow a contact in time.
+    /// The error for a `decoder` that cannot track a contact in time.
     #[must_use]
     pub fn not_in_time(decoder: &str) -> Self {
         let decoder = decoder.to_owned();
         Self::NotInTime { decoder }
     }
 
-    /// The error of a `decoder` that does not say how sure it is.
+    /// The error for a `decoder` that states no confidence.
     #[must_use]
     pub fn no_confidence(decoder: &str) -> Self {
         let valid = DECODERS.iter().filter(|spec| spec.anytime).map(|spec| spec.name);

@@ -1,9 +1,18 @@
-//! Numbers of the classes, as dictionaries, libraries and external programs use them.
+//! Numbers of classes, as dictionaries, libraries and external programs use them.
 
 use spts_contact::objects::OBJECTS;
 
-/// Names of the classes: the published objects have the numbers 1 to 17, any other object the ones that follow. Number
-/// 0 is the empty skin.
+/// Names of the classes. The published objects have the numbers 1 to 17; other objects have the following numbers.
+/// Number 0 is the empty skin.
+///
+/// ```
+/// use spts_eval::Labels;
+///
+/// let mut labels = Labels::of(["cup"]);
+/// assert_eq!(labels.number("T").map(|number| number <= 17), Some(true));
+/// assert_eq!((labels.number("cup"), labels.add("pen")), (Some(18), 19));
+/// assert_eq!(labels.name(19), Some("pen"));
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Labels {
     names: Vec<String>,
@@ -19,7 +28,7 @@ impl Default for Labels {
 }
 
 impl Labels {
-    /// Numbers of `objects`, in their order, after those of the published ones.
+    /// Numbers `objects` in their order, after the published ones.
     #[must_use]
     pub fn of<'a>(objects: impl IntoIterator<Item = &'a str>) -> Self {
         let mut labels = Self::default();
@@ -29,7 +38,7 @@ impl Labels {
         labels
     }
 
-    /// The number of `object`, which is added where it is new.
+    /// Number of `object`, which is added if it is new.
     pub fn add(&mut self, object: &str) -> usize {
         self.number(object).unwrap_or_else(|| {
             self.names.push(object.to_owned());

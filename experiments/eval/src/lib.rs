@@ -1,9 +1,9 @@
 //! Scores decoders on sessions of the tactile skin, real or simulated: windows of a session go to an algorithm, and its
-//! answers into a tally.
+//! answers are scored.
 //!
-//! [`windows`](Press::windows) cuts recordings, [`decoders::DECODERS`] is the table of algorithms, [`training`] what
-//! they learn from, [`Scorer`] scores. [`board`] puts algorithms side by side, [`ScoredSkin`] is the published
-//! evaluation.
+//! [`windows`](Press::windows) divides recordings into windows, [`decoders::DECODERS`] is the table of algorithms,
+//! [`training`] provides their training data, and [`Scorer`] scores answers. [`board`] compares algorithms, and
+//! [`ScoredSkin`] is the published evaluation.
 
 pub mod algorithm;
 mod alignment;

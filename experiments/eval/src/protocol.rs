@@ -1,5 +1,5 @@
-//! Which frames are scored, and against what: the published evaluation's rules. The twin's sheet is conditioned before
-//! its session begins, so its presses are scored from the first on.
+//! The published evaluation's rules: which frames are scored, and against which ground truth. The twin's sheet is
+//! conditioned before its session begins, so all its presses are scored.
 
 use spts::session::Recorded;
 use spts_circuit::{Mode, Recording};
@@ -9,22 +9,31 @@ use std::ops::Range;
 /// Numbers of measurements of the published curves.
 pub const MEASUREMENTS: [usize; 14] = [2, 3, 5, 7, 10, 13, 15, 20, 25, 30, 40, 50, 75, 100];
 
-/// Frames in which the force of a published press is steady, whatever was drawn for its course.
+/// Frames in which the force of a published press is steady, for any drawn time course.
 pub const PLATEAU: Range<usize> = 500..650;
 
 /// Taxels of the published skin, and measurements of one of its frames.
 pub const PUBLISHED_TAXELS: usize = 100;
-/// Measurements a second at which the published frames were counted, Hz.
+/// Rate to which the published frame numbers refer, measurements a second, Hz.
 pub const PUBLISHED_RATE_HZ: f64 = 64_300.0;
-/// Span of a published press in which the evaluation takes the contact as steady, s: frames 500 to 700.
+/// Span of a published press in which the evaluation treats the contact as steady, s: frames 500 to 700.
 pub const PUBLISHED_HOLD_S: [f64; 2] = [50_000.0 / PUBLISHED_RATE_HZ, 70_000.0 / PUBLISHED_RATE_HZ];
 /// With fewer presses than this, all of them are scored.
 const FEW_PRESSES: usize = 15;
 
-/// Frames and presses that are scored (0-based).
+/// Frames and presses that are scored (from 0).
+///
+/// ```
+/// use spts_eval::protocol::Protocol;
+///
+/// let published = Protocol::default();
+/// assert_eq!((published.first_frame, published.frames), (500, 200));
+/// // 20,000 measurements of the hold give whole votes of 20 windows
+/// assert_eq!(published.windows(20, 100) % published.vote, 0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Protocol {
-    /// First press scored; the presses before it condition the foam, and are learned from.
+    /// First press scored. Earlier presses condition the foam and are used for training.
     pub first_press: usize,
     /// Number of presses scored.
     pub presses: usize,
@@ -32,13 +41,13 @@ pub struct Protocol {
     pub first_frame: usize,
     /// Number of frames scored.
     pub frames: usize,
-    /// A window for the support scores starts every so many frames.
+    /// Distance between the starts of windows for the support scores, frames.
     pub support_stride: usize,
-    /// Most windows a press for the classification scores; they follow each other without a gap.
+    /// Largest number of windows of a press for the classification scores; they follow each other without a gap.
     pub max_windows: usize,
-    /// Decisions in a vote.
+    /// Number of decisions in a vote.
     pub vote: usize,
-    /// Press and frame of the raster session that is the truth.
+    /// Press and frame of the raster session that is the ground truth.
     pub truth: (usize, usize),
 }
 
@@ -58,9 +67,10 @@ impl Default for Protocol {
 }
 
 impl Protocol {
-    /// What is scored of `recorded`, whose contact is steady during `hold_s`: every press with fewer than 15 of them,
-    /// else ten after those that condition the skin. Presses that a raster recording has for conditioning are never
-    /// scored, so that they may be learned from. A recording of the published skin gives the default.
+    /// The protocol for `recorded`, whose contact is steady during `hold_s`. If there are fewer than 15 presses, all
+    /// are scored; otherwise ten after those that condition the skin. Presses that a raster recording marks as
+    /// conditioning are never scored, so that they can be used for training. For a recording of the published skin this
+    /// is the default.
     #[must_use]
     pub fn of(recorded: &Recorded, hold_s: Option<[f64; 2]>) -> Self {
         let published = Self::default();
@@ -92,14 +102,14 @@ impl Protocol {
         }
     }
 
-    /// Presses of `recording` that are scored.
+    /// The scored presses of `recording`.
     #[must_use]
     pub fn presses_of(&self, recording: &Recording) -> std::ops::Range<usize> {
         let end = (self.first_press + self.presses).min(recording.blocks().len());
         self.first_press.min(end)..end
     }
 
-    /// Number of classification windows of `m` measurements a press: whole votes only.
+    /// Number of classification windows of `m` measurements in a press; only complete votes count.
     #[must_use]
     pub fn windows(&self, m: usize, measurements_per_frame: usize) -> usize {
         let fitting = self.frames * measurements_per_frame / m.max(1);
@@ -114,7 +124,7 @@ fn frame_at(recording: &Recording, time_s: f64) -> usize {
     frame.round().clamp(0.0, recording.frames() as f64) as usize
 }
 
-/// True contact of an object: a raster image and its support.
+/// Ground truth of an object: a raster image and its support.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
     /// Raster image, V.
@@ -124,7 +134,7 @@ pub struct Truth {
 }
 
 impl Truth {
-    /// Truth from the raster session of the object; the last press when there are fewer.
+    /// The ground truth from the raster session of the object; from its last press if there are too few.
     #[must_use]
     pub fn new(raster: &Recording, protocol: &Protocol) -> Self {
         let press = protocol.truth.0.min(raster.blocks().len() - 1);

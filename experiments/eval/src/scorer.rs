@@ -1,4 +1,4 @@
-//! The scorer: windows of a press go to an algorithm, and its answers into a tally.
+//! The scorer: gives windows of a press to an algorithm, and counts its answers.
 
 use crate::algorithm::{Algorithm, Answer, Class, DecodeError};
 use crate::decoders::TrainedDecoder;
@@ -23,9 +23,9 @@ pub(crate) struct ScoredPress<'a> {
 /// What windows are cut from.
 #[derive(Debug)]
 enum Measured {
-    /// Measurements that follow each other.
+    /// Consecutive measurements.
     Recorded(Press),
-    /// Windows that begin with the first measurement each, for images and for classes.
+    /// Windows that start with the first measurement, one set for images and one for classes.
     Chosen([Vec<Press>; 2]),
 }
 
@@ -97,7 +97,7 @@ impl<'a> ScoredPress<'a> {
     }
 }
 
-/// A decoder at work for one thread.
+/// A decoder for one thread.
 pub struct Scorer<'a> {
     algorithm: Box<dyn Algorithm + 'a>,
     classifier: &'a Src,
@@ -115,15 +115,15 @@ impl<'a> Scorer<'a> {
         }
     }
 
-    /// Answers of the decoder to `windows`, all of one M, in their order.
+    /// Answers of the decoder to `windows`, all of the same M, in order.
     ///
     /// # Errors
-    /// [`DecodeError::External`] alone: a window that cannot be solved has an empty answer.
+    /// [`DecodeError::External`] only. A window that cannot be solved has an empty answer.
     pub fn answers(&mut self, windows: &[Window<'_>]) -> Result<Vec<Answer>, DecodeError> {
         self.algorithm.decode_all(windows)
     }
 
-    /// The class in `answer`: the decoder's own, or what the classifier makes of its image.
+    /// The class of `answer`: the decoder's own, or that of the classifier for its image.
     pub fn class(&mut self, answer: &Answer) -> Option<usize> {
         match answer.class {
             Some(class) => class.label(),

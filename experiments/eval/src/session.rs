@@ -1,5 +1,4 @@
-//! A session as the scorers see it: with the number of its class, the blocks and frames that are scored, and the true
-//! images.
+//! A session prepared for scoring: number of its class, scored blocks and frames, and true images.
 
 use crate::protocol::{Protocol, Truth};
 use spts::Session;
@@ -7,35 +6,35 @@ use spts::session::Event;
 use spts_circuit::Recording;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 
-/// Both recordings of an object, with the number of its class and with the blocks and frames that are scored.
+/// Both recordings of an object, with the number of its class and the scored blocks and frames.
 #[derive(Debug, Clone)]
 pub struct ScoredSession {
     /// Name of the session.
     pub name: String,
-    /// Name of the object: its class.
+    /// Name of the object, which is its class.
     pub object: String,
     /// Number of the class.
     pub label: usize,
-    /// Whether an earlier session of the set is of the same object.
+    /// Whether an earlier session of the set has the same object.
     pub again: bool,
-    /// Whether the raster recording is that of an earlier session, so that nothing is learned from it twice.
+    /// Whether the raster recording is that of an earlier session. It is then used only once for training.
     pub shared_raster: bool,
-    /// Raster recording, when there is one.
+    /// Raster recording; `None` if there is none.
     pub raster: Option<Recording>,
-    /// Compressive recording, when there is one.
+    /// Compressive recording; `None` if there is none.
     pub compressive: Option<Recording>,
-    /// Blocks and frames of the compressive recording that are scored.
+    /// Scored blocks and frames of the compressive recording.
     pub protocol: Protocol,
-    /// The same of the raster recording. Nothing is learned from these blocks.
+    /// Scored blocks and frames of the raster recording. These blocks are not used for training.
     pub raster_protocol: Protocol,
-    /// Whether the contact is known to be steady while it is scored, so that a raster scan of it is its truth.
+    /// Whether the contact is known to be steady while it is scored, so that a raster scan is its ground truth.
     pub held: bool,
-    /// True image of every block of the compressive recording, where a simulation knows it.
+    /// True image of every block of the compressive recording, if a simulation knows it.
     pub simulated: Vec<Option<Vec<f64>>>,
 }
 
 impl ScoredSession {
-    /// `session` with `label` as the number of its class.
+    /// Prepares `session`, whose class has the number `label`.
     #[must_use]
     pub fn new(session: Session, label: usize) -> Self {
         let protocol = session.compressive.as_ref().map(|r| Protocol::of(r, session.hold_s));
@@ -59,8 +58,8 @@ impl ScoredSession {
         }
     }
 
-    /// True image of block `block` of the compressive recording: the raster scan of the object where there is one, else
-    /// what the simulation knows. `None` when neither is there.
+    /// Ground truth of block `block` of the compressive recording: the raster scan of the object or, without one, the
+    /// image known from the simulation. `None` if there is neither.
     #[must_use]
     pub fn truth(&self, block: usize) -> Option<Truth> {
         if let Some(raster) = self.raster.as_ref().filter(|_| self.held) {
@@ -72,19 +71,19 @@ impl ScoredSession {
         Some(Truth { image, support: mask })
     }
 
-    /// Name in tables of scores: the object's, or for a further session of an object its own.
+    /// Name in score tables: the object's; for a further session of the same object, the session's own.
     #[must_use]
     pub fn title(&self) -> &str {
         if self.again { &self.name } else { &self.object }
     }
 
-    /// Whether there is a compressive recording and a true image of it.
+    /// Whether there is a compressive recording and a true image for it.
     #[must_use]
     pub fn scorable(&self) -> bool {
         self.scored().any(|block| self.truth(block).is_some())
     }
 
-    /// Blocks of the compressive recording that are scored.
+    /// Scored blocks of the compressive recording.
     #[must_use]
     pub fn scored(&self) -> std::ops::Range<usize> {
         self.compressive.as_ref().map_or(0..0, |c| self.protocol.presses_of(c))

@@ -1,4 +1,4 @@
-//! Sessions that are scored or learned from: of the real skin or of the twin.
+//! Sessions for scoring or training: of the real skin or of the twin.
 
 use crate::alignment::{SessionSlip, follow_slips};
 use crate::labels::Labels;
@@ -14,37 +14,37 @@ use spts_recon::Matrix;
 use spts_recon::dictionary::shifted;
 use std::path::{Path, PathBuf};
 
-/// Everything in one place, ready to be scored.
+/// All sessions of one folder, prepared for scoring.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// What was opened.
+    /// The folder that was opened.
     pub root: PathBuf,
-    /// Sessions of presses, of one skin all.
+    /// Sessions of presses, all of one skin.
     pub sessions: Vec<ScoredSession>,
     /// Recording of the bouncing ball.
     pub bounces: Option<Recording>,
-    /// Recordings of touches at times that are not known, with the names of their sessions.
+    /// Recordings of touches at unknown times, with the names of their sessions.
     pub touches: Vec<(String, Recording)>,
     /// Dictionary and library published with them.
     pub published: Option<Published>,
-    /// What a published layout usually has and this one has not.
+    /// Parts of the published layout that this folder lacks.
     pub missing: Vec<String>,
-    /// Whether the twin made all of them.
+    /// Whether all sessions are simulated.
     pub simulated: bool,
-    /// The skin.
+    /// Layout of the skin.
     pub layout: SkinLayout,
     /// Numbers of the classes.
     pub labels: Labels,
-    /// Where samples lagged behind their rows; they have been put back on them.
+    /// Slips of the recordings, which have been realigned.
     pub slips: Vec<SessionSlip>,
 }
 
-/// Recordings of a real skin with the published dictionary and library.
+/// Recordings of a real skin, with the published dictionary and library.
 #[derive(Debug, Clone)]
 pub struct PublishedSkin {
-    /// Sessions of the objects that are there, in label order, and what the published decoder has learned.
+    /// Sessions of the available objects in order of label, and the training results of the published decoder.
     pub skin: ScoredSkin,
-    /// What was not found.
+    /// Parts that were not found.
     pub missing: Vec<String>,
 }
 
@@ -59,18 +59,18 @@ impl PublishedSkin {
 }
 
 impl Source {
-    /// Reads the sessions in `root`, as [`SessionSet::open`] does.
+    /// Reads the sessions in `root`, like [`SessionSet::open`].
     ///
     /// # Errors
-    /// [`DataError`] when there is none, or one of them cannot be scored.
+    /// [`DataError`] if there is no session, or one of them cannot be scored.
     pub fn open(root: &Path) -> Result<Self, DataError> {
         Self::new(SessionSet::open(root)?)
     }
 
-    /// The sessions of `set`, with samples that slipped put back on their rows ([`follow_slips`]).
+    /// Prepares the sessions of `set`. Samples that slipped are realigned ([`follow_slips`]).
     ///
     /// # Errors
-    /// [`DataError::Unscorable`] for a session that has nothing to score, or is of another skin than the first.
+    /// [`DataError::Unscorable`] for a session with nothing to score, or of another skin than the first.
     pub fn new(mut set: SessionSet) -> Result<Self, DataError> {
         let slips = follow_slips(&mut set);
         let bounces = set.drops().cloned();
@@ -130,12 +130,12 @@ impl Source {
         })
     }
 
-    /// What may be learned of this skin: from raster presses that are not scored, with the published dictionary and
-    /// library where they are there; and the names of its classes. Without such presses it is a prior made for the
-    /// layout, without classes.
+    /// Training data for this skin: raster presses that are not scored, with the published dictionary and library if
+    /// they exist, and the names of the classes. Without such presses, it is a prior made for the layout, without
+    /// classes.
     ///
     /// # Errors
-    /// [`LearnError`] when the images cannot be used.
+    /// [`LearnError`] if the images are not usable.
     pub fn training(&self, streams: Streams) -> Result<(TrainingData, Option<&Labels>), LearnError> {
         let presses = self.sessions.iter().filter_map(TrainingPresses::unscored);
         let presses: Vec<TrainingPresses<'_>> = presses.filter(|t| !t.is_empty()).collect();
@@ -157,15 +157,15 @@ impl Source {
         self.sessions.iter().any(same)
     }
 
-    /// The dictionary at all places: as published, or `dictionary` moved about.
+    /// The dictionary at all places: the published one, or shifted copies of `dictionary`.
     #[must_use]
     pub fn shifted(&self, dictionary: &Matrix) -> Matrix {
         let published = self.published.as_ref().and_then(|p| p.shifted.clone());
         published.unwrap_or_else(|| shifted(dictionary, self.layout.cols(), SHIFT_REACH))
     }
 
-    /// The skin with the published dictionary and library, as the published evaluation scores it; what else is missing
-    /// is added to [`Source::missing`].
+    /// The skin with the published dictionary and library, as the published evaluation scores it. Missing parts are
+    /// added to [`Source::missing`].
     ///
     /// # Errors
     /// [`DataError::Missing`] without a published dictionary or library, [`DataError::NothingFound`] without a session
@@ -197,11 +197,11 @@ impl Source {
     }
 }
 
-/// Refuses a session that would score as nothing, or as perfect because nothing is in it, and one of another skin than
-/// `layout`. `root` is the folder that the error names.
+/// Checks that a session can be scored: it must be of the skin `layout`, and have enough content that a score means
+/// something. `root` is the folder named in errors.
 ///
 /// # Errors
-/// [`DataError::Unscorable`] with the session and what is not enough.
+/// [`DataError::Unscorable`], with the session and what it lacks.
 pub fn check_session(root: &Path, session: &Session, layout: &SkinLayout) -> Result<(), DataError> {
     let refuse = |mode: &str, field, value: String, needed: String| {
         Err(DataError::Unscorable {

@@ -1,4 +1,4 @@
-//! Counts of one press and what they add up to.
+//! Counts of one press, and the resulting scores.
 
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
@@ -9,11 +9,11 @@ use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 /// Times presses are drawn anew for a confidence interval.
 const RESAMPLES: usize = 1000;
 
-/// What is scored.
+/// Scores of decoded windows.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Scores {
-    /// Support accuracy: share of taxels on the right side of .23 of the maximum. `None`, as all scores of images, for
-    /// a decoder that says classes and makes no image.
+    /// Support accuracy: share of taxels correctly above or below 0.23 of the maximum. `None`, like all image scores,
+    /// for a decoder that only classifies.
     pub support: Option<f64>,
     /// Intersection over union of the supports.
     pub iou: Option<f64>,
@@ -26,15 +26,26 @@ pub struct Scores {
     pub class_single: Option<f64>,
     /// Share of majority votes of 20 windows that are correct.
     pub class_vote20: Option<f64>,
-    /// The same with a vote list that is never cleared within a press, as the published script counts; not on the
-    /// board.
+    /// Share of correct votes with a list of decisions that is never cleared within a press, as in the published
+    /// script. Not on the board.
     #[serde(skip)]
     pub class_cumulative: Option<f64>,
-    /// Share of correct classes after the evidence of 20 windows was added up; `None` without evidence.
+    /// Share of correct classes after adding up the evidence of 20 windows; `None` without evidence.
     pub class_evidence: Option<f64>,
 }
 
 /// Scores of the windows of one press by one decoder and M.
+///
+/// ```
+/// use spts_eval::Tally;
+///
+/// let mut tally = Tally::default();
+/// tally.image(&[0.0, 2.0, 1.9, 0.1], &[false, true, false, false]);
+/// tally.decisions(&[Some(3), Some(5), Some(3), Some(3)], 3, 2);
+/// let scores = tally.scores();
+/// assert_eq!(scores.iou, Some(0.5));
+/// assert_eq!(scores.class_single, Some(0.75));
+/// ```
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
     supports: Vec<SupportScore>,
@@ -44,13 +55,13 @@ pub struct Tally {
     voted: VoteScore,
     cumulative: VoteScore,
     summed: VoteScore,
-    /// Windows that the algorithm could not solve.
+    /// Number of windows that the algorithm could not solve.
     pub(crate) failed: usize,
 }
 
 impl Tally {
-    /// Scores `image`, whose true support is `truth`. Where the windows beside it have an image and this one has none,
-    /// it counts as an empty one.
+    /// Scores `image` against the true support `truth`. If other windows have an image and this one has none, it counts
+    /// as an empty one.
     pub fn image(&mut self, image: &[f64], truth: &[bool]) {
         let mut mask = Vec::new();
         support(image, SUPPORT_THRESHOLD, &mut mask);
@@ -59,8 +70,8 @@ impl Tally {
         self.has_images |= !image.is_empty();
     }
 
-    /// Counts the classes of windows that follow each other, of which `label` is the right one: one by one, and in
-    /// votes of `vote`.
+    /// Counts the classes of consecutive windows, whose correct class is `label`: individually, and in votes of `vote`
+    /// decisions.
     pub fn decisions(&mut self, decisions: &[Option<usize>], label: usize, vote: usize) {
         self.single.add(decisions, label);
         self.voted.add(&vote_groups(decisions, vote, false), label);

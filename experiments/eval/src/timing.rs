@@ -1,4 +1,4 @@
-//! How long a decode takes.
+//! Decoding time.
 
 use crate::algorithm::{Answer, DecodeError};
 use crate::decoders::TrainedDecoder;
@@ -7,11 +7,11 @@ use spts_recon::metrics::median;
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Median time from a window to its answer, µs, on this thread, over up to `most` windows of the press, Φ·D included;
-/// the mean for algorithms that answer many at a time. `None` when the press is shorter than one window.
+/// Median time from a window to its answer, µs, on this thread, over up to `most` windows of the press, including Φ·D;
+/// the mean for algorithms that decode in batches. `None` if the press is shorter than one window.
 ///
 /// # Errors
-/// [`DecodeError::External`] alone.
+/// [`DecodeError::External`] only.
 pub fn decode_us(decoder: &TrainedDecoder, press: &Press, m: usize, most: usize) -> Result<Option<f64>, DecodeError> {
     let mut algorithm = decoder.trained.start();
     let windows = press.windows(0..press.len(), m, m).map(|(_, window)| window);

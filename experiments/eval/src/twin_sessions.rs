@@ -1,4 +1,4 @@
-//! Sessions to score when no recordings are at hand: the twin's.
+//! Sessions of the twin, for scoring without recordings.
 
 use rayon::prelude::*;
 use spts::Session;
@@ -14,39 +14,39 @@ use std::path::{Path, PathBuf};
 /// Objects of the default set: those that the real skin was recorded with in both modes.
 const OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
 
-/// What the twin presses.
+/// Which sessions the twin simulates.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TwinSessions {
-    /// Scenes as `spts simulate` names them: `press/NAME`, or files that end in .toml. Empty for the default set.
+    /// Scenes as in `spts simulate`: `press/NAME`, or files that end in .toml. Empty for the default set.
     pub scenes: Vec<String>,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Fewer presses.
+    /// Whether to simulate fewer presses.
     pub quick: bool,
 }
 
-/// Why there are no sessions.
+/// Why the twin produced no sessions.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TwinSessionsError {
     /// A scene that is not valid.
     #[error("--twin {scene}: {source}")]
     Scene {
-        /// As it was asked for.
+        /// The scene as requested.
         scene: String,
         /// Cause.
         source: Box<SimulateError>,
     },
-    /// A ball, of which no images are scored.
+    /// A drop, for which no images are scored.
     #[error("--twin {scene}: a drop has no hold to score; valid: scenes with [press]")]
     Drop {
-        /// As it was asked for.
+        /// The scene as requested.
         scene: String,
     },
     /// The simulation failed.
     #[error("--twin {scene}: {source}")]
     Twin {
-        /// As it was asked for.
+        /// The scene as requested.
         scene: String,
         /// Cause.
         source: Box<TwinError>,
@@ -54,8 +54,8 @@ pub enum TwinSessionsError {
 }
 
 impl TwinSessions {
-    /// Presses that are scanned, of which the last is the truth and the others may be learned from; and presses of the
-    /// scene `name` that are scored: as many as its file says, if it does.
+    /// Number of presses that are scanned (the last is the ground truth, the others are for training), and number of
+    /// presses of the scene `name` that are scored (as in its file, if given there).
     #[must_use]
     pub fn presses(&self, name: &str) -> [usize; 2] {
         let [scanned, scored] = if self.quick { [4, 2] } else { [8, 6] };
@@ -71,17 +71,17 @@ impl TwinSessions {
         }
     }
 
-    /// Number of presses, after each of which [`TwinSessions::simulate`] reports.
+    /// Number of presses; [`TwinSessions::simulate`] reports after each.
     #[must_use]
     pub fn steps(&self) -> usize {
         self.names().iter().flat_map(|name| self.presses(name)).sum()
     }
 
-    /// Presses, scans and records everything; `done` is called after each press. Every press is of its own mechanics,
-    /// so that nothing that is learned from is scored. A function of the scenes and the seed alone.
+    /// Simulates and records all sessions. `done` is called after each press. Every press is simulated separately, so
+    /// training data contain nothing that is scored. The result depends only on the scenes and the seed.
     ///
     /// # Errors
-    /// [`TwinSessionsError`] for a scene that is not valid, or when the simulation fails.
+    /// [`TwinSessionsError`] for a scene that is not valid, or if the simulation fails.
     pub fn simulate(&self, done: &(dyn Fn() + Sync)) -> Result<SessionSet, TwinSessionsError> {
         let scenes = self.names().into_iter().map(|name| Ok((self.scene(&name)?, name)));
         let scenes = scenes.collect::<Result<Vec<(Scene, String)>, TwinSessionsError>>()?;

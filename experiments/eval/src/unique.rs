@@ -1,6 +1,6 @@
-//! Values, each once.
+//! Removes duplicate values.
 
-/// `values` in the order in which they first appear, each once.
+/// `values` without duplicates, in order of first appearance.
 ///
 /// ```
 /// assert_eq!(spts_eval::unique([3, 1, 3, 2, 1]), [3, 1, 2]);

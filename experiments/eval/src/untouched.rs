@@ -1,4 +1,4 @@
-//! What the wire shows while nothing touches the skin.
+//! Output of the wire while nothing touches the skin.
 
 use crate::chunk::{Chunk, converter_step_v};
 use crate::windows::{Press, PressRows, idle_mean};
@@ -18,11 +18,11 @@ const MEASUREMENTS_PER_TAXEL: usize = 100;
 /// Measurements that it needs at least, for every taxel.
 const LEAST_PER_TAXEL: usize = 4;
 
-/// Output of an untouched skin. A flat one gives a constant; one that is bent, as around an arm, is under preload and
-/// gives sums like those of a touch, which are subtracted from the output measurement by measurement.
+/// Output of an untouched skin. A flat skin gives a constant. A bent skin, such as one around an arm, is under preload
+/// and gives sums like those of a touch; they are subtracted measurement by measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Untouched {
-    /// Output with no taxel under load, V.
+    /// Output without load on any taxel, V.
     pub offset_v: f64,
     /// Image of the preload, V; `None` for a flat skin.
     pub image: Option<Vec<f64>>,
@@ -36,7 +36,7 @@ impl Untouched {
         Self::in_frames(recording, block, frames)
     }
 
-    /// The same from the first `frames` frames of the block.
+    /// The untouched skin, from the first `frames` frames of the block.
     #[must_use]
     pub fn in_frames(recording: &Recording, block: usize, frames: usize) -> Self {
         let flat = || Self {
@@ -63,7 +63,7 @@ impl Untouched {
         })
     }
 
-    /// Measurements `range` of block `block` without what the untouched skin gives, V.
+    /// Measurements `range` of block `block` minus the output of the untouched skin, V.
     #[must_use]
     pub fn without(&self, recording: &Recording, block: usize, range: Range<usize>) -> Vec<f64> {
         let volts = recording.blocks()[block].volts[range.clone()].iter();
@@ -76,8 +76,8 @@ impl Untouched {
         volts.zip(sums).map(|(v, sum)| v - self.offset_v - sum).collect()
     }
 
-    /// Measurements `range` of block `block` as a press whose [`y`](crate::Window::y) has nothing of the untouched
-    /// skin.
+    /// Measurements `range` of block `block` as a press whose [`y`](crate::Window::y) is free of the untouched skin's
+    /// output.
     #[must_use]
     pub fn press(&self, recording: &Recording, block: usize, range: Range<usize>) -> Press {
         let volts = recording.blocks()[block].volts[range.clone()].to_vec();

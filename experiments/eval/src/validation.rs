@@ -1,7 +1,7 @@
-//! The rows of the published evaluation: every object, every published decode, every M.
+//! The results of the published evaluation: every object, every published decoding variant, every M.
 
 use crate::algorithm::DecodeError;
-use crate::decoders::{PublishedDecode, TrainedDecoder};
+use crate::decoders::TrainedDecoder;
 use crate::scorer::{ScoredPress, Scorer};
 use crate::session::ScoredSession;
 use crate::tally::{Scores, Tally, pool};
@@ -9,12 +9,12 @@ use crate::unique;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Scores of one object by one decode and M.
+/// Scores of one object with one decoding variant and M.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoreRow {
     /// Object, or "mean".
     pub object: String,
-    /// Decode, or "raster" for the control.
+    /// Decoding variant, or "raster" for the control.
     pub decode: &'static str,
     /// Number of measurements, M.
     pub m: usize,
@@ -30,7 +30,8 @@ pub struct ScoreRow {
     pub class_single: f64,
     /// Share of votes of 20 windows classified correctly.
     pub class_vote20: f64,
-    /// The same with a vote list that is never cleared within a press, as the published script counts.
+    /// Share of correct votes with a list of decisions that is never cleared within a press, as in the published
+    /// script.
     pub class_cumulative: f64,
 }
 
@@ -52,26 +53,26 @@ impl ScoreRow {
     }
 }
 
-/// Scores every press of the compressive recording of `session` at every M with every decode. Presses run in parallel;
-/// the result does not depend on the number of threads. `done` is called after every press.
+/// Scores every press of the compressive recording of `session` at every M with every decoder, each beside its name.
+/// Presses run in parallel; the result does not depend on the number of threads. `done` is called after every press.
 ///
 /// # Errors
-/// [`DecodeError::External`], which a published decode never is.
+/// [`DecodeError::External`] alone.
 pub fn score_session(
     session: &ScoredSession,
-    decoders: &[(PublishedDecode, TrainedDecoder)],
+    decoders: &[(&'static str, TrainedDecoder)],
     measurements: &[usize],
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<ScoreRow>, DecodeError> {
     let each = |(decode, decoder)| measurements.iter().map(move |&m| (decode, decoder, m));
-    let keys: Vec<(PublishedDecode, &TrainedDecoder, usize)> =
+    let keys: Vec<(&'static str, &TrainedDecoder, usize)> =
         decoders.iter().map(|(d, t)| (*d, t)).flat_map(each).collect();
     let presses: Vec<Vec<Tally>> = session
         .scored()
         .into_par_iter()
         .filter_map(|block| ScoredPress::new(session, block))
         .map(|press| {
-            let score = |(_, decoder, m): &(PublishedDecode, &TrainedDecoder, usize)| {
+            let score = |(_, decoder, m): &(&'static str, &TrainedDecoder, usize)| {
                 Scorer::new(decoder).score(&press, *m, Some(session.label))
             };
             let tallies = keys.iter().map(score).collect();
@@ -79,13 +80,13 @@ pub fn score_session(
             tallies
         })
         .collect::<Result<_, DecodeError>>()?;
-    let row = |(k, (decode, _, m)): (usize, &(PublishedDecode, &TrainedDecoder, usize))| {
-        ScoreRow::new(session, decode.name(), *m, &pool(presses.iter().map(|p| &p[k])))
+    let row = |(k, (decode, _, m)): (usize, &(&'static str, &TrainedDecoder, usize))| {
+        ScoreRow::new(session, decode, *m, &pool(presses.iter().map(|p| &p[k])))
     };
     Ok(keys.iter().enumerate().filter_map(row).collect())
 }
 
-/// Mean of the rows of all objects, for every decode and M, in the order of the first object's rows.
+/// Mean over all objects for every decoding variant and M, in the order of the first object's rows.
 #[must_use]
 pub fn mean_rows(rows: &[ScoreRow]) -> Vec<ScoreRow> {
     let keys = unique(rows.iter().map(|row| (row.decode, row.m)));

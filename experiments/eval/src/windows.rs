@@ -1,5 +1,4 @@
-//! Windows of consecutive measurements, which is what every algorithm is given. Nothing else cuts a recording into
-//! windows.
+//! Windows of measurements, the input of every algorithm. Only this module divides recordings into windows.
 
 use crate::protocol::Protocol;
 use crate::untouched::Untouched;
@@ -9,7 +8,7 @@ use spts_recon::{Matrix, MatrixView};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Rows of weights of consecutive measurements; presses that were recorded at the same rows share them.
+/// Rows of weights of consecutive measurements. Presses recorded at the same rows share them.
 #[derive(Debug, Clone)]
 pub struct PressRows {
     taxels: usize,
@@ -44,16 +43,16 @@ pub struct Press {
 pub struct Window<'a> {
     /// Rows of weights, M × taxels.
     pub phi: MatrixView<'a>,
-    /// The same as bits, where all weights are ±1: [`WeightRows::sign_bits`].
+    /// The rows as bits, if all weights are ±1: [`WeightRows::sign_bits`].
     pub signs: Option<&'a [u64]>,
     /// Output of the summing amplifier, V.
     pub volts: &'a [f64],
-    /// The same without the mean output of the untouched skin, V.
+    /// Output minus the mean output of the untouched skin, V.
     pub y: &'a [f64],
 }
 
 impl<'a> Window<'a> {
-    /// The first `m` measurements of the window, or all of them when it has fewer.
+    /// The first `m` measurements of the window; all if it has fewer.
     #[must_use]
     pub fn first(&self, m: usize) -> Self {
         self.part(0..m.min(self.y.len()))
@@ -118,7 +117,7 @@ impl PressRows {
         }
     }
 
-    /// The weights with taxel k renamed `to(k)`.
+    /// The weights with taxel k renumbered as `to(k)`.
     #[must_use]
     pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
         let mut phi = vec![0.0; self.phi.len()];
@@ -157,14 +156,14 @@ impl Press {
         Untouched::of(recording, block).press(recording, block, first * per_frame..end * per_frame)
     }
 
-    /// Measurements `range` of block `block` of `recording`; the untouched skin has the output `idle_v`, V.
+    /// Measurements `range` of block `block` of `recording`. The output of the untouched skin is `idle_v`, V.
     #[must_use]
     pub fn within(recording: &Recording, block: usize, range: Range<usize>, idle_v: f64) -> Self {
         let volts = recording.blocks()[block].volts[range.clone()].to_vec();
         Self::on(Arc::new(PressRows::new(recording.rows(block, range))), volts, idle_v)
     }
 
-    /// The measurements `volts`, V, at the rows `rows`; the untouched skin has the output `idle_v`, V.
+    /// The measurements `volts`, V, with the rows `rows`. The output of the untouched skin is `idle_v`, V.
     #[must_use]
     pub fn on(rows: Arc<PressRows>, volts: Vec<f64>, idle_v: f64) -> Self {
         let y = volts.iter().map(|v| v - idle_v).collect();
@@ -180,7 +179,7 @@ impl Press {
     /// The measurements with the numbers `indices`, in this order, with their rows.
     ///
     /// # Panics
-    /// When there is no such measurement.
+    /// If there is no such measurement.
     #[must_use]
     pub fn picked(&self, indices: &[usize]) -> Self {
         Self {
@@ -190,7 +189,7 @@ impl Press {
         }
     }
 
-    /// The same measurements with taxel k renamed `to(k)`.
+    /// The same measurements with taxel k renumbered as `to(k)`.
     #[must_use]
     pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
         Self {
@@ -205,13 +204,13 @@ impl Press {
         self.y.len()
     }
 
-    /// True without a measurement.
+    /// Whether there is no measurement.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.y.is_empty()
     }
 
-    /// Measurements `start..start + m`; `None` when they reach beyond the press or one of them was lost.
+    /// The measurements `start..start + m`; `None` if they extend beyond the press, or one of them was lost.
     #[must_use]
     pub fn window(&self, start: usize, m: usize) -> Option<Window<'_>> {
         let y = self.y.get(start..start + m)?;
@@ -227,8 +226,8 @@ impl Press {
         })
     }
 
-    /// Windows of `m` measurements within the measurements `range`, one every `step`, each with its first measurement.
-    /// A window in which a measurement was lost is left out.
+    /// Windows of `m` measurements within `range`, one every `step`, each with the number of its first measurement.
+    /// Windows with a lost measurement are left out.
     pub fn windows(&self, range: Range<usize>, m: usize, step: usize) -> impl Iterator<Item = (usize, Window<'_>)> {
         let starts = range.start..(range.end.min(self.len()) + 1).saturating_sub(m);
         starts
@@ -237,8 +236,8 @@ impl Press {
     }
 }
 
-/// Mean of the idle frames at the start of a block, V; the median of the whole block when it is not known which frames
-/// are idle, or no sample of them is left. Lost samples do not count.
+/// Mean of the idle frames at the start of a block, V; the median of the whole block if the idle frames are not known
+/// or all lost. Lost samples are ignored.
 #[must_use]
 pub fn idle_mean(recording: &Recording, block: usize) -> f64 {
     let block = &recording.blocks()[block];

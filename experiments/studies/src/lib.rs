@@ -1,5 +1,4 @@
-//! Studies of the twin: numbers only. Each module returns a report of its own type; nothing here draws, prints or
-//! writes files.
+//! Studies of the twin. Each module computes a report of its own type; none draws, prints or writes files.
 
 pub mod arm;
 pub mod budget;

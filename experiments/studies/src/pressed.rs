@@ -1,4 +1,4 @@
-//! Scenes of objects that are pressed where the published recordings have them.
+//! Scenes of objects pressed at their places in the published recordings.
 
 use spts::scene::{PressConfig, SceneConfig};
 

@@ -1,68 +1,77 @@
-//! What the master of the I²C bus sends and gets.
+//! Events and replies on the I²C bus.
 
-/// A transaction that failed.
+/// Why a transaction failed.
+///
+/// ```
+/// use spts_firmware::{Array, Image};
+///
+/// let mut array = Array::new(2, &Image::shipped())?; // addresses 8 and 9
+/// let error = array.write(10, &[2, 8]).unwrap_err();
+/// assert_eq!(error.to_string(), "no cell acknowledges address 10");
+/// # Ok::<(), spts_firmware::ArrayError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BusError {
-    /// No cell answers to the address.
+    /// No cell acknowledges the address.
     #[error("no cell acknowledges address {address}")]
     NoAcknowledge {
         /// Address on the bus.
         address: u8,
     },
-    /// An address with more than seven bits. Nothing was sent.
+    /// An address of more than seven bits. Nothing was sent.
     #[error("bus address {address} is outside [0, 127]")]
     Address {
-        /// Address asked for.
+        /// The address.
         address: u8,
     },
-    /// A byte broken off behind no bit, or behind all of them. Nothing was sent.
-    #[error("`bits` = {bits} of a byte that is broken off is outside [1, 7]")]
+    /// An incomplete byte of no bit, or of all bits. Nothing was sent.
+    #[error("`bits` = {bits} of an incomplete byte is outside [1, 7]")]
     Bits {
-        /// Number asked for.
+        /// The number of bits.
         bits: u8,
     },
-    /// The cell did not take a byte.
+    /// The cell did not acknowledge a byte.
     #[error("the cell at address {address} refuses byte {index} of the write")]
     Refused {
         /// Address on the bus.
         address: u8,
-        /// Place of the byte in the write, from 0.
+        /// Position of the byte in the write, from 0.
         index: usize,
     },
-    /// A cell holds the clock low. The bus is dead until that cell is reset.
+    /// A cell holds the clock low. The bus is blocked until that cell is reset.
     #[error("the cell at address {address} has held the bus clock low for 25 ms")]
     Stuck {
-        /// Address that the cell was given.
+        /// Address of the cell.
         address: u8,
     },
 }
 
-/// What a master can do on the bus.
+/// An event that a bus master can cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BusEvent {
     /// START, or repeated START within a transaction.
     Start,
-    /// A byte from the master. The first one behind a START is an address (upper seven bits) and a direction (1 =
+    /// A byte from the master. The first byte after a START holds an address (upper seven bits) and a direction (1 =
     /// read).
     Write(u8),
-    /// A byte to the master, which it acknowledges or not.
+    /// A byte to the master, which acknowledges it or not.
     Read {
         /// Whether the master asks for another byte.
         acknowledge: bool,
     },
-    /// The first bits, 1 to 7, of a byte that is broken off. Until the next START or STOP no byte reaches a cell.
+    /// The first bits, 1 to 7, of an incomplete byte. Until the next START or STOP no byte reaches a cell.
     Bits(u8),
     /// STOP.
     Stop,
 }
 
-/// What the master saw.
+/// What the master received.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BusReply {
     /// Whether a byte from the master was acknowledged.
     Acknowledged(bool),
-    /// A byte to the master; 255 if nobody sends.
+    /// A byte to the master; 255 if no cell sends.
     Byte(u8),
 }
 
@@ -72,8 +81,8 @@ pub(super) enum Stage {
     /// Whole bytes.
     #[default]
     Bytes,
-    /// A START without its address yet.
+    /// A START whose address has not come yet.
     Started,
-    /// Within a byte.
+    /// Within an incomplete byte.
     Broken,
 }

@@ -1,22 +1,30 @@
-//! The clock line: when its edges come, and how a cell follows them.
+//! The clock line: its edges, and the sampling of codes.
 
 use super::error::ArrayError;
 use crate::attiny412::{Device, OSCILLATOR_HZ};
 use crate::cell::NEUTRAL_CODE;
 
-/// Edges of the clock line, and when the codes behind each are sampled.
+/// Rate of the clock line's edges, and the delay from an edge to the sampling of the codes.
+///
+/// ```
+/// use spts_firmware::Clock;
+///
+/// assert!(Clock::at(64.3e3).check().is_ok());
+/// let late = Clock { edge_hz: 64.3e3, sample_delay_s: 20e-6 }; // longer than the period of 15.6 µs
+/// assert!(late.check().unwrap_err().to_string().starts_with("`sample_delay_s` = 0.00002"));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clock {
-    /// Edges per second, rising and falling counted alike. Range [1, 1e6].
+    /// Edges per second, rising and falling counted equally. Range [1, 1e6].
     pub edge_hz: f64,
-    /// From an edge to the sampling of its codes (s), kept to the nearest oscillator tick of 50 ns. Range [0,
-    /// 1/`edge_hz`), and at least one tick less than the shortest distance of two edges.
+    /// Time from an edge to the sampling of the codes, s, rounded to oscillator ticks of 50 ns. Range [0, 1/`edge_hz`),
+    /// and at least one tick less than the shortest distance between two edges.
     pub sample_delay_s: f64,
 }
 
 /// Rate of the recordings of the skin, edges per second.
 pub const SKIN_EDGE_HZ: f64 = 64.3e3;
-/// From an edge to the converter's sample in the published acquisition code, s.
+/// Time from an edge to the converter's sample in the published acquisition code, s.
 pub const SKIN_SAMPLE_DELAY_S: f64 = 11e-6;
 
 impl Default for Clock {
@@ -30,8 +38,8 @@ impl Default for Clock {
 }
 
 impl Clock {
-    /// The skin's clock at another rate: sampled 11 µs behind the edge, or, where the rate leaves less time, at the
-    /// same share of the period.
+    /// The skin's clock at another rate. Codes are sampled 11 µs after the edge or, if the period is too short for
+    /// that, after the same share of the period.
     #[must_use]
     pub fn at(edge_hz: f64) -> Self {
         Self {
@@ -40,10 +48,10 @@ impl Clock {
         }
     }
 
-    /// Whether the clock line can have this clock.
+    /// Checks that the clock line can run at this rate and delay.
     ///
     /// # Errors
-    /// [`ArrayError::Clock`] with the field out of range.
+    /// [`ArrayError::Clock`], with the field out of range.
     pub fn check(&self) -> Result<(), ArrayError> {
         let error = |field, value, range| Err(ArrayError::Clock { field, value, range });
         if !(1.0..=1e6).contains(&self.edge_hz) {
@@ -71,7 +79,7 @@ pub(super) struct Train {
     pub(super) clock: Clock,
     origin: u64,
     sample_delay: u64,
-    /// Goes on by itself, also during bus traffic.
+    /// Whether the clock runs freely, also during bus traffic.
     pub(super) free: bool,
 }
 
@@ -106,16 +114,16 @@ pub(super) fn ticks(time_s: f64) -> u64 {
 /// How far a cell has followed the clock line, and the codes sampled from it.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Follower {
-    /// Edges applied.
+    /// Number of edges so far.
     edges: u64,
-    /// Tick of the last of them, as the clock has it.
+    /// Tick of the last edge.
     edge_tick: u64,
-    /// Tick of the next one, once it is computed.
+    /// Tick of the next edge, once computed.
     next_tick: Option<u64>,
-    /// Edges whose code has been sampled.
+    /// Number of edges whose codes have been sampled.
     pub(super) sampled: u64,
     high: bool,
-    /// Codes that nobody has fetched yet.
+    /// Sampled codes that have not been fetched.
     pub(super) codes: Vec<u8>,
 }
 

@@ -1,19 +1,19 @@
-//! Why an array cannot exist or be run.
+//! Errors of arrays.
 
 use super::bus::BusError;
 use crate::avr::ProgramError;
 
-/// An array that cannot exist or cannot be run so.
+/// Why an array cannot be built or run.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ArrayError {
-    /// More cells than addresses, or none.
+    /// No cell, or more cells than addresses.
     #[error("{cells} cells do not fit on one bus; the range is [1, 112]")]
     Cells {
-        /// Number asked for.
+        /// Number of cells.
         cells: usize,
     },
-    /// A number of seeds other than that of the cells.
+    /// The number of seeds differs from that of the cells.
     #[error("{seeds} seeds for {cells} cells")]
     Seeds {
         /// Seeds given.
@@ -21,7 +21,7 @@ pub enum ArrayError {
         /// Cells of the array.
         cells: usize,
     },
-    /// A number of patterns other than that of the cells.
+    /// The number of patterns differs from that of the cells.
     #[error("{patterns} patterns for {cells} cells")]
     Patterns {
         /// Patterns given.
@@ -29,7 +29,7 @@ pub enum ArrayError {
         /// Cells of the array.
         cells: usize,
     },
-    /// Codes that are not whole rows.
+    /// The number of codes is not a multiple of the number of cells.
     #[error("`codes` has {codes} entries, which is no multiple of the {cells} cells")]
     Codes {
         /// Entries given.
@@ -37,7 +37,7 @@ pub enum ArrayError {
         /// Cells of the array.
         cells: usize,
     },
-    /// A clock that cannot be.
+    /// A clock out of range.
     #[error("`{field}` = {value} is outside {range}")]
     Clock {
         /// Field of [`Clock`](super::Clock).
@@ -47,10 +47,10 @@ pub enum ArrayError {
         /// Valid range.
         range: &'static str,
     },
-    /// A time that cannot pass.
-    #[error("`time_s` = {time_s} is outside [0, 86400]")]
+    /// A duration out of range.
+    #[error("`time_s` = {time_s} is outside [0, 86400] s")]
     Idle {
-        /// Time asked for (s).
+        /// Duration, s.
         time_s: f64,
     },
     /// The image does not fit into flash.

@@ -10,10 +10,11 @@ const BIT_TICKS: u64 = 50;
 const STRETCH_LIMIT_TICKS: u64 = 500_000;
 
 impl Array {
-    /// Writes `bytes` to the cell at `address`: START, address, bytes, STOP at 400 kHz. Every cell hears it.
+    /// Writes `bytes` to the cell at `address`: START, address, bytes, STOP at 400 kHz. All cells receive the traffic.
     ///
     /// # Errors
-    /// [`BusError`] if no cell answers, the cell refuses a byte (STOP follows in both cases), or a cell blocks the bus.
+    /// [`BusError`] if no cell answers or the cell refuses a byte (STOP follows in both cases), or a cell blocks the
+    /// bus.
     pub fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), BusError> {
         self.open(address, 0)?;
         for (index, byte) in bytes.iter().enumerate() {
@@ -26,7 +27,7 @@ impl Array {
     }
 
     /// Reads `out.len()` bytes from the cell at `address`: START, address, bytes (the last one not acknowledged), STOP.
-    /// Nothing is sent for an empty `out`.
+    /// An empty `out` sends nothing.
     ///
     /// # Errors
     /// [`BusError`] if no cell answers, or a cell blocks the bus.
@@ -41,7 +42,8 @@ impl Array {
         self.stop()
     }
 
-    /// Any sequence of bus events. Returns a reply for every byte; what was not acknowledged does not end the sequence.
+    /// Sends any sequence of bus events. Returns a reply for every byte. A missing acknowledgement does not end the
+    /// sequence.
     ///
     /// # Errors
     /// [`BusError::Bits`] for a number of bits out of range, [`BusError::Stuck`] if a cell blocks the bus.

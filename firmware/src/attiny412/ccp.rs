@@ -21,9 +21,9 @@ pub(super) enum Key {
 /// An access that ends a window before its time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Access {
-    /// Store to an I/O register or to SRAM: ends the window of protected I/O registers.
+    /// Store to an I/O register or SRAM: closes the window of protected I/O registers.
     Store,
-    /// Load or store of flash, EEPROM or memory controller: ends any window.
+    /// Load or store of flash, EEPROM or memory controller: closes any window.
     Memory,
 }
 

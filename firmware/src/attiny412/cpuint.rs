@@ -28,7 +28,7 @@ const LVL1EX: u8 = 0x02;
 pub(super) struct Accepted {
     /// Vector number of its source.
     pub(super) source: u8,
-    /// Entry of the vector table that it jumps through.
+    /// Entry of the vector table to which it jumps.
     pub(super) entry: u8,
     level_one: bool,
 }

@@ -20,7 +20,7 @@ pub(super) struct Dac {
     data: u8,
     before: Output,
     written_at: u64,
-    /// Written by the instruction in progress.
+    /// Whether the present instruction has written to the DAC.
     fresh: bool,
 }
 

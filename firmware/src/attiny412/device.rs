@@ -19,8 +19,8 @@ const CLOCK_PIN: u8 = 3;
 
 /// An ATtiny412.
 ///
-/// Time counts in ticks of its 20 MHz oscillator from power-on. A step is a whole instruction, so a device that is
-/// asked to run until a tick may stop a few cycles behind it. The start-up time behind a reset is left out.
+/// Time counts in ticks of the 20 MHz oscillator from power-on. A step is a whole instruction, so a device that runs
+/// until a tick may stop a few cycles after it. The start-up time after a reset is not emulated.
 #[derive(Debug, Clone)]
 pub struct Device {
     core: Core,
@@ -28,11 +28,11 @@ pub struct Device {
     space: Space,
     now: u64,
     asleep: bool,
-    /// Interrupt that is taken as soon as the core lets it.
+    /// Interrupt that is executed as soon as the core allows.
     pending: Option<Accepted>,
-    /// Tick of the next event that comes by itself.
+    /// Tick of the next event that is not caused by an instruction.
     next_event: u64,
-    /// Interrupts of PORTA that were taken.
+    /// Number of PORTA interrupts executed.
     port_interrupts: u64,
 }
 
@@ -40,13 +40,13 @@ pub struct Device {
 #[derive(Clone, Copy)]
 struct Until {
     tick: u64,
-    /// Stop as well when the I²C client no longer holds the clock.
+    /// Whether to stop when the I²C client releases the clock.
     released: bool,
 }
 
 impl Device {
-    /// Device at power-on with `program` in flash and `eeprom` at the start of its EEPROM (128 bytes, erased behind
-    /// it).
+    /// A device at power-on, with `program` in flash and `eeprom` at the start of its EEPROM (128 bytes; the rest is
+    /// erased).
     #[must_use]
     pub fn new(program: Arc<Program>, eeprom: &[u8]) -> Self {
         let space = Space::new(Arc::clone(&program), eeprom);
@@ -62,7 +62,7 @@ impl Device {
         }
     }
 
-    /// Flash of an ATtiny412 that starts with `flash`.
+    /// The flash of an ATtiny412, starting with `flash`.
     ///
     /// # Errors
     /// [`ProgramError::TooLong`] for more than 4096 bytes.
@@ -88,7 +88,7 @@ impl Device {
         self.core.instructions
     }
 
-    /// Interrupts of PORTA taken since power-on: the clock edges that the program has seen.
+    /// Number of PORTA interrupts since power-on: the clock edges that the program has handled.
     #[must_use]
     pub fn port_interrupts(&self) -> u64 {
         self.port_interrupts
@@ -112,7 +112,7 @@ impl Device {
         self.space.nvmctrl.eeprom()
     }
 
-    /// Accesses without effect since power-on: a sound program has none.
+    /// Accesses without effect since power-on. A correct program causes none.
     #[must_use]
     pub fn faults(&self) -> Faults {
         self.space.faults
@@ -124,13 +124,13 @@ impl Device {
         self.space.dac.data()
     }
 
-    /// DAC code on pin PA6; `None` while the DAC does not drive it.
+    /// DAC code on pin PA6; `None` if the DAC does not drive the pin.
     #[must_use]
     pub fn dac_output(&self) -> Option<u8> {
         self.space.dac.output()
     }
 
-    /// [`dac_output`](Self::dac_output) as it stood at `tick`, which lies behind the last change but one.
+    /// [`dac_output`](Self::dac_output) at `tick`, which must not be earlier than the last change but one.
     #[must_use]
     pub fn dac_output_at(&self, tick: u64) -> Option<u8> {
         self.space.dac.output_at(tick)
@@ -142,19 +142,18 @@ impl Device {
         self.space.dac.written_at()
     }
 
-    /// Applies a level to the clock line, pin PA3, at the present tick.
+    /// Applies a level to the clock line, pin PA3.
     pub fn set_clock(&mut self, high: bool) {
         self.set_pin(CLOCK_PIN, high);
     }
 
-    /// Applies a level to pin `pin` of PORTA, at the present tick. Other pins than those that the package brings out,
-    /// 0…3, 6 and 7, are ignored.
+    /// Applies a level to pin `pin` of PORTA. Pins that the package does not have (all but 0…3, 6 and 7) are ignored.
     pub fn set_pin(&mut self, pin: u8, high: bool) {
         self.space.port.set_pin(pin, high);
         self.space.attention = true;
     }
 
-    /// Starts over. SRAM is kept except at power-on, EEPROM always; time runs on.
+    /// Resets the device. SRAM is kept except at power-on, EEPROM always; time continues.
     pub fn reset(&mut self, cause: ResetCause) {
         self.space.reset(cause);
         // the general registers are not reset
@@ -166,12 +165,12 @@ impl Device {
         self.attend();
     }
 
-    /// Runs until `tick` or the end of the instruction that reaches it.
+    /// Runs until `tick`, or the end of the instruction that reaches it.
     pub fn run_until(&mut self, tick: u64) {
         self.run(Until { tick, released: false }, &mut Silent);
     }
 
-    /// [`run_until`](Self::run_until) that passes every step on to `sink`.
+    /// As [`run_until`](Self::run_until), passing every step to `sink`.
     pub fn trace_until(&mut self, tick: u64, sink: impl FnMut(&TraceRecord)) {
         self.run(Until { tick, released: false }, &mut Sink(sink));
     }

@@ -1,10 +1,10 @@
-//! What a program does that the emulation, or the device, does not answer to.
+//! Accesses that neither the emulation nor the device responds to.
 
 /// An access without effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Fault {
-    /// Read of an address that holds nothing, or a peripheral that is not emulated. Reads 0.
+    /// Read of an address that does not exist or whose peripheral is not emulated. Returns 0.
     Read {
         /// Data address.
         address: u16,
@@ -16,12 +16,12 @@ pub enum Fault {
         /// Byte written.
         value: u8,
     },
-    /// Write to a protected register outside its window. Ignored.
+    /// Write to a protected register outside its time window. Ignored.
     Protected {
         /// Data address.
         address: u16,
     },
-    /// A setting of an emulated register that is not emulated. Ignored.
+    /// An unsupported setting of an emulated register. Ignored.
     Unsupported {
         /// Data address.
         address: u16,
@@ -35,7 +35,7 @@ pub enum Fault {
     },
 }
 
-/// First fault and the number of faults since the device was made.
+/// First fault, and the number of faults since power-on.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Faults {
     first: Option<Fault>,

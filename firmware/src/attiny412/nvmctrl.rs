@@ -1,4 +1,4 @@
-//! Memory controller and the EEPROM behind it.
+//! Memory controller and EEPROM.
 
 use super::ccp::{Ccp, Key};
 use super::fault::Fault;
@@ -33,7 +33,7 @@ mod command {
 #[derive(Debug, Clone)]
 pub(super) struct Nvmctrl {
     eeprom: [u8; EEPROM_LEN],
-    /// Bytes waiting in the page buffer, by place in the page.
+    /// Bytes waiting in the page buffer, by position in the page.
     buffer: [Option<u8>; PAGE],
     page: usize,
     busy_until: u64,

@@ -11,17 +11,17 @@ pub(super) const LEN: u16 = 2;
 const RSTFR: u16 = BASE;
 const SWRR: u16 = BASE + 1;
 
-/// Why a device starts over.
+/// Cause of a reset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ResetCause {
-    /// Supply switched on. What SRAM holds is undefined.
+    /// Supply switched on. The content of SRAM is undefined.
     PowerOn,
-    /// Supply dipped below the brown-out level. SRAM is kept.
+    /// Supply fell below the brown-out level. SRAM is kept.
     BrownOut,
     /// Reset pin.
     External,
-    /// Written by the program.
+    /// Requested by the program.
     Software,
 }
 

@@ -1,4 +1,4 @@
-//! Memory map: which peripheral answers at which address.
+//! Memory map: the peripheral at each address.
 
 use std::sync::Arc;
 
@@ -53,11 +53,11 @@ const FLASH_END: u16 = FLASH + FLASH_LEN - 1;
 pub(super) struct Space {
     sram: [u8; SRAM_LEN],
     gpio: [u8; 4],
-    /// A register was touched that may change interrupts, clock or time of the next event.
+    /// Whether a register was accessed that may change interrupts, clock or the time of the next event.
     pub(super) attention: bool,
     /// Tick at which the present instruction started.
     pub(super) now: u64,
-    /// Cycles that the present instruction waits for flash or EEPROM; not zero only with `attention`.
+    /// Cycles that the present instruction waits for flash or EEPROM; non-zero only with `attention`.
     pub(super) wait_cycles: u32,
     pub(super) ccp: Ccp,
     pub(super) clkctrl: Clkctrl,

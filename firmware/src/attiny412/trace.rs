@@ -1,4 +1,4 @@
-//! What a device does, instruction by instruction, for debugging.
+//! Trace of a device, instruction by instruction, for debugging.
 
 use std::fmt;
 
@@ -10,11 +10,11 @@ use crate::avr::{Core, Program, disassemble};
 pub struct TraceRecord {
     /// Oscillator tick at which the step starts.
     pub tick: u64,
-    /// What happens.
+    /// Content of the step.
     pub step: TraceStep,
 }
 
-/// What happens in a step.
+/// Content of a step of a traced device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TraceStep {
@@ -22,19 +22,19 @@ pub enum TraceStep {
     Instruction {
         /// Word address.
         pc: u16,
-        /// Text as a disassembler writes it.
+        /// Text in the syntax of a disassembler.
         text: String,
-        /// Registers that it changed, by name, with the new value: r0…r31, SP, SREG.
+        /// Changed registers, by name, with the new value: r0…r31, SP, SREG.
         changes: Vec<(String, u16)>,
     },
-    /// An interrupt is taken.
+    /// An interrupt is executed.
     Interrupt {
         /// Vector number.
         vector: u8,
     },
     /// The CPU wakes up.
     Wake,
-    /// The device starts over.
+    /// The device is reset.
     Reset {
         /// Why.
         cause: ResetCause,

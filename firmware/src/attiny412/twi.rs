@@ -47,15 +47,15 @@ enum Phase {
     /// Waits for a START.
     #[default]
     Idle,
-    /// Addressed; the acknowledge bit is the program's.
+    /// Addressed; the program must send the acknowledge bit.
     AddressHeld,
     /// Ready for a byte from the master.
     Receiving,
-    /// A byte came; the acknowledge bit is the program's.
+    /// A byte has arrived; the program must send the acknowledge bit.
     ByteHeld,
-    /// The master reads; the program has to give a byte.
+    /// The master reads; the program must provide a byte.
     LoadHeld,
-    /// The byte in SDATA goes out.
+    /// The byte in SDATA is sent.
     Sending,
 }
 

@@ -15,10 +15,10 @@ pub(super) const SREG: u16 = 0x3F;
 /// Instructions for which a write to SPL holds back interrupts.
 const STACK_POINTER_HOLD: u64 = 4;
 
-/// What an instruction asks of the device around the core.
+/// Request of an instruction to the device around the core.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Event {
-    /// Nothing.
+    /// No request.
     None,
     /// SLEEP: sleep if the sleep controller allows it.
     Sleep,
@@ -26,19 +26,19 @@ pub enum Event {
     Reti,
     /// BREAK.
     Break,
-    /// WDR: the watchdog timer starts anew.
+    /// WDR: the watchdog timer restarts.
     WatchdogReset,
-    /// The word is no instruction of this core; it was passed over like a NOP.
+    /// The word is not an instruction of this core; it was executed as NOP.
     Illegal,
 }
 
 /// One executed instruction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
-    /// CPU cycles it took, with internal SRAM or I/O. Reading flash or EEPROM through the data space costs at least one
-    /// more (DS40002198, notes to the cycles), which the owner of those memories has to add.
+    /// CPU cycles, with internal SRAM or I/O. Reading flash or EEPROM through the data space costs at least one more
+    /// (DS40002198, notes to the cycles). The owner of those memories must add it.
     pub cycles: u32,
-    /// What it asks of the device.
+    /// Request to the device.
     pub event: Event,
 }
 
@@ -55,7 +55,7 @@ pub struct Core {
     pub sreg: u8,
     /// Instructions executed so far.
     pub instructions: u64,
-    /// Value of `instructions` from which interrupts are accepted again.
+    /// Value of `instructions` from which interrupts are accepted.
     hold_until: u64,
 }
 
@@ -73,8 +73,8 @@ impl Core {
         }
     }
 
-    /// Whether an interrupt may be taken before the next instruction: the I flag is set, one instruction has been
-    /// executed behind SEI and RETI, and the hold of a write to SPL is over (four instructions, or the next write to
+    /// Whether an interrupt may be executed before the next instruction: the I flag is set, one instruction has been
+    /// executed after SEI or RETI, and the hold after a write to SPL has ended (four instructions, or the next write to
     /// I/O memory).
     #[must_use]
     #[inline]
@@ -82,10 +82,10 @@ impl Core {
         self.sreg & I != 0 && self.instructions >= self.hold_until
     }
 
-    /// Takes an interrupt: stores the program counter and goes to `vector` (a number; vectors are one word each).
+    /// Executes an interrupt: stores the program counter and jumps to `vector` (a number; vectors are one word each).
     /// Returns [`INTERRUPT_ENTRY_CYCLES`].
     ///
-    /// The I flag stays: on AVRxt the interrupt controller blocks interrupts of the same or a lower level.
+    /// The I flag does not change: on AVRxt the interrupt controller blocks interrupts of the same or a lower level.
     pub fn interrupt<D: DataSpace>(&mut self, vector: u8, data: &mut D) -> u32 {
         self.push_pc(data);
         self.pc = u16::from(vector);

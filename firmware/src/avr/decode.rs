@@ -9,7 +9,7 @@ const Y: u8 = 28;
 const Z: u8 = 30;
 
 impl Op {
-    /// Decodes the instruction that starts with `word`; `second` is the word behind it, used by two-word instructions.
+    /// Decodes the instruction that starts with `word`. `second` is the following word, used by two-word instructions.
     #[must_use]
     pub fn decode(word: u16, second: u16) -> Self {
         match word >> 12 {

@@ -3,11 +3,19 @@
 use super::op::Op;
 use super::program::Program;
 
-/// The instruction at word address `pc` of `program`, such as `ldi r24, 0xC8`; where it goes to stands behind a
+/// The instruction at word address `pc` of `program`, such as `ldi r24, 0xC8`. The target of a jump follows a
 /// semicolon, as a byte address.
 ///
-/// Mnemonics and operands are those of avr-objdump, in its spelling (ROL r1 is `adc r1, r1`). Words that are no
-/// instruction of the core are `.word`.
+/// Mnemonics and operands are spelled as in avr-objdump (ROL r1 is `adc r1, r1`). Words that are not instructions of
+/// the core are `.word`.
+///
+/// ```
+/// use spts_firmware::avr::{Program, disassemble};
+///
+/// let program = Program::from_words(&[0xEC88, 0x9588]);
+/// assert_eq!(disassemble(&program, 0), "ldi r24, 0xC8");
+/// assert_eq!(disassemble(&program, 1), "sleep");
+/// ```
 #[must_use]
 pub fn disassemble(program: &Program, pc: u16) -> String {
     let op = program.op(pc);

@@ -3,8 +3,8 @@
 //! Cycle counts: *AVR Instruction Set Manual*, DS40002198, table "Instruction Set Summary", column AVRxt, with a 16-bit
 //! program counter and data in internal SRAM.
 //!
-//! The manual leaves undefined what a load to, or a store from, the pointer that it steps does (`ld r26, X+`). Here the
-//! loaded byte stays, and the old byte is stored.
+//! The manual does not define a load to, or a store from, the pointer that the instruction itself changes (`ld r26,
+//! X+`). Here the loaded byte stays, and the old byte is stored.
 
 use super::core::{Core, Event, Step};
 use super::op::Op;

@@ -1,13 +1,13 @@
 //! The AVRxt core: predecoded program, one instruction a step, exact values and cycle counts.
 //!
-//! AVRxt is the CPU of the tinyAVR 0/1/2, megaAVR 0 and AVR Dx families. Against the classic core (AVRe+) the
-//! instructions are the same, but the register file is not part of the data space, the I flag belongs to the program
-//! alone, and PUSH, ST, SBI, CBI and the calls are faster. Source of every value and cycle count: *AVR Instruction Set
+//! AVRxt is the CPU of the tinyAVR 0/1/2, megaAVR 0 and AVR Dx families. It has the instructions of the classic core
+//! (AVRe+), with these differences: the register file is not part of the data space, only the program changes the I
+//! flag, and PUSH, ST, SBI, CBI and calls are faster. Source of every value and cycle count: *AVR Instruction Set
 //! Manual*, Microchip DS40002198.
 //!
-//! [`Program`] is the flash, decoded once; [`Core`] is the state of the CPU; a [`DataSpace`] is everything else that
-//! has an address. The core knows neither clock nor interrupt sources: its user counts the cycles of each [`Step`] and,
-//! when a source asks and [`Core::interrupts_enabled`], calls [`Core::interrupt`].
+//! [`Program`] is the flash, decoded once. [`Core`] is the state of the CPU. A [`DataSpace`] is everything else that
+//! has an address. The core knows neither clock nor interrupt sources: its user counts the cycles of each [`Step`] and
+//! calls [`Core::interrupt`] if a source requests it and [`Core::interrupts_enabled`].
 //!
 //! Not executed: SPM, ELPM, EICALL, EIJMP (parts with more flash or a boot loader) and XCH, LAS, LAC, LAT, DES (XMEGA
 //! only). They report [`Event::Illegal`], as unassigned opcodes do.
@@ -47,11 +47,12 @@ pub use self::disassemble::disassemble;
 pub use self::op::Op;
 pub use self::program::{Program, ProgramError};
 
-/// Everything in the data space but the core's own SPL, SPH and SREG (0x3D…0x3F): I/O, SRAM, EEPROM and mapped flash.
+/// Everything in the data space except the core's own SPL, SPH and SREG (0x3D…0x3F): I/O, SRAM, EEPROM and mapped
+/// flash.
 ///
 /// Addresses are those of the AVRxt data space: 0x0000 is the first I/O register, r0…r31 have no address.
 pub trait DataSpace {
-    /// The byte at `address`; reading may have side effects.
+    /// Reads the byte at `address`. Reading may have side effects.
     fn read(&mut self, address: u16) -> u8;
 
     /// Writes `value` to `address`.
@@ -59,8 +60,8 @@ pub trait DataSpace {
 
     /// SBI and CBI: sets bit `mask` (one bit) at `address` to `set`.
     ///
-    /// They change that bit alone. Where writing a register back has side effects (flags cleared by writing ones),
-    /// override this read-modify-write.
+    /// These instructions change only that bit. Override this read-modify-write if writing a register back has side
+    /// effects (flags cleared by writing ones).
     #[inline]
     fn write_bit(&mut self, address: u16, mask: u8, set: bool) {
         let old = self.read(address);

@@ -1,7 +1,7 @@
-//! Instructions as they are stored for execution.
+//! Decoded instructions.
 
 /// One decoded instruction, 4 bytes. `d` and `r` are register numbers, 0…31; `p` is the low register of a pointer (26
-/// X, 28 Y, 30 Z); `a` an I/O address; `mask` one bit; `offset` is in words from the following instruction.
+/// X, 28 Y, 30 Z); `a` an I/O address; `mask` one bit; `offset` is in words relative to the following instruction.
 #[rustfmt::skip] // one line a variant
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[expect(
@@ -88,7 +88,7 @@ pub enum Op {
     Bst { d: u8, mask: u8 },
     Sbrc { r: u8, mask: u8 },
     Sbrs { r: u8, mask: u8 },
-    /// No instruction of this core.
+    /// Not an instruction of this core.
     Illegal { word: u16 },
 }
 

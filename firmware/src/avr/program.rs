@@ -1,29 +1,28 @@
-//! Flash, decoded once.
+//! Flash memory, decoded once.
 
 use super::op::Op;
 
-/// Flash that cannot be addressed.
+/// Why a flash cannot be built.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProgramError {
-    /// Size out of range.
+    /// The size is out of range.
     #[error("flash has {bytes} bytes, but it must be a power of two from 2 to 131072")]
     Size {
-        /// Bytes asked for.
+        /// Size, bytes.
         bytes: usize,
     },
-    /// The program does not fit.
+    /// The program is larger than the flash.
     #[error("program has {program} bytes, but flash has {flash}")]
     TooLong {
-        /// Bytes of the program.
+        /// Size of the program, bytes.
         program: usize,
-        /// Bytes of the flash.
+        /// Size of the flash, bytes.
         flash: usize,
     },
 }
 
-/// Program memory: its bytes and, word by word, its instructions. Share it by `Arc` between devices with the same
-/// image.
+/// Program memory: its bytes and, word by word, its instructions. Devices with the same image share it by `Arc`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Program {
     bytes: Box<[u8]>,
@@ -33,7 +32,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// Flash of `flash_bytes` that begins with `image`; the rest is erased, 0xFF.
+    /// A flash of `flash_bytes` that starts with `image`; the rest is erased, 0xFF.
     ///
     /// # Errors
     /// [`ProgramError`] if the flash is not a power of two from 2 bytes to 128 KiB, or the image does not fit.
@@ -56,7 +55,7 @@ impl Program {
         Ok(Self { bytes, ops, mask })
     }
 
-    /// The smallest flash that holds `words`; those beyond 65536, the most that can be addressed, are left out.
+    /// The smallest flash that holds `words`. Words beyond 65536, which cannot be addressed, are dropped.
     #[must_use]
     pub fn from_words(words: &[u16]) -> Self {
         let words = &words[..words.len().min(0x1_0000)];
@@ -95,7 +94,7 @@ impl Program {
         self.ops[usize::from(self.wrap(pc))]
     }
 
-    /// Word address `pc` within flash.
+    /// Wraps the word address `pc` at the end of flash.
     #[must_use]
     #[inline]
     pub const fn wrap(&self, pc: u16) -> u16 {

@@ -114,8 +114,8 @@ impl Twins {
     }
 }
 
-/// The whole protocol: no seed, every mode with either kind of seed, seeding anew in the middle, patterns of all kinds of
-/// lengths, unknown modes, broken pairs, replies.
+/// The whole protocol: no seed, every mode with either kind of seed, seeding anew in the middle, patterns of all kinds
+/// of lengths, unknown modes, broken pairs, replies.
 pub(crate) fn conforms(image: &Image, clock: Clock) -> Result<(), Difference> {
     let mut twins = Twins::new(image, 112, clock);
     twins.read_back()?;

@@ -6,6 +6,17 @@ use crate::transducer::{Transducer, loaded_pa};
 use serde::Deserialize;
 
 /// Conductance proportional to pressure, without memory: G = k·P.
+///
+/// ```
+/// use spts_models::{ConductanceMap, PressureMap, SkinLayout, Streams, build_transducer};
+///
+/// let parameters = toml::toml! { slope_s_per_pa = 2e-8 };
+/// let mut linear = build_transducer("linear", parameters, &SkinLayout::default(), Streams::new(0))?;
+/// let mut conductance = ConductanceMap::zeros(10, 10);
+/// linear.step(&PressureMap::from_values(10, 10, vec![5e3; 100]), 0.0, &mut conductance);
+/// assert!((conductance.values()[0] - 1e-4).abs() < 1e-15);
+/// # Ok::<(), spts_models::TransducerError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "LinearConfig")]
 pub struct Linear {

@@ -18,17 +18,17 @@ use serde::Deserialize;
 ///
 /// G = g₀ + G_ref · (S(P)/P_ref)ⁿ, S(P) = P/(1 + P/Ps), P_ref = 10 kPa,
 ///
-/// its change with temperature, the differences between taxels, and one table for each kind of memory.
+/// its change with temperature, the differences between taxels, and one table of parameters for each memory effect.
 ///
-/// Only Rf·Vd·G can be told from recordings. The defaults go with 4300 V/S: with 20 N, 3 taxels at 30 kPa sum to 3 V
-/// and 25 taxels at 3.5 kPa to 11 V, as recorded; the exponent is what makes both true.
+/// Recordings determine only the product Rf·Vd·G. The defaults belong to Rf·Vd = 4300 V/S: at 20 N, 3 taxels at 30 kPa
+/// sum to 3 V and 25 taxels at 3.5 kPa to 11 V, as recorded. The exponent is chosen so that both hold.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct VelostatConfig {
-    /// G_ref, conductance of a median taxel with an electrode of 10 mm × 10 mm at 10 kPa without saturation, S. Range
-    /// (0, 1]; default 1.35e-4: within 1 % of the same law fitted to the recorded plateaus of five objects (A = 6.7
-    /// mV/√Pa at this exponent and Ps, `scripts/fit_objects.py`), less the factor 1.17 that creep and conditioning add
-    /// up to there.
+    /// G_ref, conductance at 10 kPa, without saturation, of a median taxel with an electrode of 10 mm × 10 mm, S. Range
+    /// (0, 1]; default 1.35e-4. This is within 1 % of the law fitted to the recorded plateaus of five objects (A = 6.7
+    /// mV/√Pa at this exponent and Ps, `scripts/fit_objects.py`), divided by 1.17 for creep and conditioning up to that
+    /// time.
     pub reference_s: f64,
     /// n. Range [0.05, 2]; default 0.5.
     pub exponent: f64,
@@ -37,17 +37,17 @@ pub struct VelostatConfig {
     /// g₀, conductance without load, S. Range [0, 1]; default 0 (recorded idle signal: below 0.005 V a taxel).
     pub unloaded_s: f64,
     /// Standard deviation of the logarithm of a taxel's fixed gain. Range [0, 2]; default 0.30 (recorded on flat
-    /// objects: 0.36–0.39 with the objects' own unevenness).
+    /// objects: 0.36–0.39, which includes the objects' own unevenness).
     pub spread_log_sd: f64,
-    /// Standard deviation of the logarithm of a taxel's gain in one session, beside the fixed one. Range [0, 2];
-    /// default 0.10: between two sessions with one object the recorded taxels change by √2 of it, 0.12–0.16 on four
-    /// objects and 0.31 on a fifth (`spts calibrate`, median 0.14).
+    /// Standard deviation of the logarithm by which a taxel's gain varies from session to session. Range [0, 2];
+    /// default 0.10. Between two sessions with one object the recorded gains change by √2 times this value: 0.12–0.16
+    /// for four objects and 0.31 for a fifth (`spts calibrate`, median 0.14).
     pub session_log_sd: f64,
-    /// Gains of the taxels of one skin that has been calibrated, in place of `spread_log_sd` and `session_log_sd`:
-    /// every seed is then a skin that may be that one. A scene and the spec of a data set may name a file that `spts
-    /// calibrate --skin` has written. Default: none.
+    /// Gains of a calibrated skin. They replace `spread_log_sd` and `session_log_sd`; every seed then draws a skin that
+    /// the calibrated one may be. A scene or the specification of a data set may instead name a file written by `spts
+    /// calibrate --skin`. Default: none.
     pub gains: Option<TaxelGains>,
-    /// T, temperature of the sheet, °C. Range [-45, 65], in which it may be used; default 25, at which the law is
+    /// T, temperature of the sheet, °C. Range [-45, 65], the sheet's operating range; default 25, for which the law is
     /// given.
     pub temperature_c: f64,
     /// α, relative change of the resistance with temperature, 1/K. Range [-0.02, 0.02]; default 0.004 (estimate for
@@ -57,7 +57,7 @@ pub struct VelostatConfig {
     pub hysteresis: HysteresisConfig,
     /// Creep and delay.
     pub creep: CreepConfig,
-    /// Change from press to press.
+    /// Conditioning from press to press.
     pub conditioning: ConditioningConfig,
 }
 
@@ -80,13 +80,25 @@ impl Default for VelostatConfig {
     }
 }
 
-/// Velostat under interdigitated electrodes: pressure → hysteresis → static law → creep → conditioning → gain of the
-/// taxel → temperature.
+/// Velostat under interdigitated electrodes. Stages in order: pressure → hysteresis → static law → creep → conditioning
+/// → gain of the taxel → temperature.
 ///
-/// Every part lags: a closed cycle has ∮ P dG ≥ 0. For the hysteresis see [`Hysteresis`]. A creep branch,
-/// τ·ds/dt = φ(P) − s with φ increasing, has ∮ F(P) ds ≥ 0 for every increasing F, since s rises only where φ(P) > s;
-/// for the factor 1 + Σ gⱼ·sⱼ, gⱼ ≥ 0, on a law G_e(P) take F′ = G_e, for which ∮ P dG = Σ gⱼ·∮ F dsⱼ. Both at once,
-/// with the delay, are tested only.
+/// Every stage lags: a closed cycle has ∮ P dG ≥ 0. For the hysteresis see [`Hysteresis`]. For creep: a branch τ·ds/dt
+/// = φ(P) − s with φ increasing has ∮ F(P) ds ≥ 0 for every increasing F, because s rises only where φ(P) > s. For the
+/// factor 1 + Σ gⱼ·sⱼ, gⱼ ≥ 0, on a law G_e(P), choose F′ = G_e; then ∮ P dG = Σ gⱼ·∮ F dsⱼ. The combination of both
+/// stages with the lag is only tested.
+///
+/// ```
+/// use spts_models::{SkinLayout, Streams, Transducer, Velostat, VelostatConfig};
+///
+/// let skin = SkinLayout::default();
+/// let mut sheet = Velostat::new(VelostatConfig::default(), &skin, Streams::new(1))?;
+/// let before: Vec<f64> = sheet.gains().collect();
+/// sheet.start_session(1);
+/// let change = |(a, b): (&f64, f64)| (b / a).ln().abs();
+/// assert!(before.iter().zip(sheet.gains()).map(change).fold(0.0, f64::max) > 0.05, "gains differ by session");
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Velostat {
     law: PressureLaw,
@@ -94,11 +106,11 @@ pub struct Velostat {
     hysteresis: Hysteresis,
     creep: Creep,
     conditioning: Conditioning,
-    /// Factor of all conductance at the sheet's temperature.
+    /// Factor on the conductance at the sheet's temperature.
     warmth: f64,
     session: Spread,
     streams: Streams,
-    /// Gain of every taxel that no session changes.
+    /// Fixed gain of every taxel.
     fixed: Vec<f64>,
     taxels: Vec<Taxel>,
     /// State of the play operators, taxel by taxel.
@@ -113,12 +125,12 @@ pub struct Velostat {
 struct Taxel {
     gain: f64,
     presses: Presses,
-    /// Whether it has been loaded in this session. Until then nothing moves in it.
+    /// Whether the sheet has been loaded in this session. Until then its state does not change.
     loaded: bool,
 }
 
 impl Velostat {
-    /// Fresh sheet on `skin` in session 0, its taxel spread drawn from `streams`: the same streams are the same sheet.
+    /// A fresh sheet on `skin` in session 0. The taxels' gains come from `streams`: equal streams give the same sheet.
     ///
     /// # Errors
     /// [`ConfigError`] for a parameter outside its range.
@@ -157,7 +169,7 @@ impl Velostat {
         Ok(sheet)
     }
 
-    /// Gain of every taxel in this session, median 1: the fixed one times the session's.
+    /// Gain of every taxel in this session: the fixed gain (median 1) times that of the session.
     pub fn gains(&self) -> impl Iterator<Item = f64> + '_ {
         self.taxels.iter().map(|t| t.gain)
     }

@@ -1,5 +1,5 @@
-//! Which object it is: from an image ([`Src`]), from a window of measurements ([`EvidenceClassifier`]), or measurement
-//! by measurement ([`AnytimeClassifier`]).
+//! Classification of objects: from an image ([`Src`]), from a window of measurements ([`EvidenceClassifier`]), or
+//! measurement by measurement ([`AnytimeClassifier`]).
 
 mod evidence;
 mod src;

@@ -12,10 +12,10 @@ pub struct Library {
     labels: Vec<usize>,
 }
 
-/// A library whose labels do not fit its images.
+/// Why images and labels are not a valid library.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum LibraryError {
-    /// One label a column is needed.
+    /// The number of labels differs from that of the images.
     #[error("library has {columns} images but {labels} labels")]
     Labels {
         /// Columns of the image matrix.
@@ -23,17 +23,17 @@ pub enum LibraryError {
         /// Number of labels.
         labels: usize,
     },
-    /// No image is different from zero.
+    /// All images are zero.
     #[error("library holds no image that is different from zero")]
     Empty,
 }
 
 impl Library {
-    /// Library of `images` (N × number of images). Images that are zero everywhere are left out: nothing can be
-    /// represented by them.
+    /// A library of `images` (N × number of images). Images that are zero everywhere are dropped, because they can
+    /// represent nothing.
     ///
     /// # Errors
-    /// [`LibraryError`] when the number of labels differs from the number of images or nothing is left.
+    /// [`LibraryError`] if the number of labels differs from that of the images, or no image is left.
     pub fn new(images: &Matrix, labels: &[usize]) -> Result<Self, LibraryError> {
         if images.ncols() != labels.len() {
             return Err(LibraryError::Labels {
@@ -70,11 +70,25 @@ impl Library {
     }
 }
 
-/// Represents an image sparsely by library images and takes the class whose share of the representation leaves the
-/// smallest residual ‖x − L_c α_c‖₂.
+/// Represents an image as a sparse combination of library images, and returns the class whose part of the combination
+/// leaves the smallest residual ‖x − L_c α_c‖₂.
 ///
-/// Source: J. Wright et al., "Robust face recognition via sparse representation", IEEE TPAMI 31 (2009); as in the
-/// published system, the representation is an orthogonal matching pursuit with `n_nonzero_coefs` unnormalised images.
+/// Source: J. Wright et al., "Robust face recognition via sparse representation", IEEE TPAMI 31 (2009). As in the
+/// published system, the combination is found by orthogonal matching pursuit with `n_nonzero_coefs` unnormalised
+/// images.
+///
+/// ```
+/// use spts_recon::classify::{Library, Src};
+/// use spts_recon::{Matrix, Workspace};
+///
+/// // one image of each of two classes, 4 pixels each
+/// let images = Matrix::from_columns(4, 2, &[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0])?;
+/// let classifier = Src::new(Library::new(&images, &[7, 9])?, 2);
+/// let mut work = Workspace::default();
+/// assert_eq!(classifier.classify(&[0.1, 0.0, 0.9, 1.1], &mut work)?, Some(9));
+/// assert_eq!(classifier.classify(&[0.0; 4], &mut work)?, None);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Src {
     library: Library,
@@ -86,7 +100,7 @@ pub struct Src {
 #[derive(Debug, Default)]
 struct SrcScratch {
     solution: Solution,
-    /// Library images of one class in the representation, with their coefficients.
+    /// Library images of one class in the combination, with their coefficients.
     members: Vec<(usize, f64)>,
 }
 
@@ -94,8 +108,8 @@ impl Src {
     /// Sparsity of the published classifier.
     pub const PUBLISHED_SPARSITY: usize = 10;
 
-    /// Classifier on `library` with at most `n_nonzero_coefs` images a representation, found as the published code
-    /// does.
+    /// A classifier that uses at most `n_nonzero_coefs` images of `library` in a combination, found as in the published
+    /// code.
     #[must_use]
     pub fn new(library: Library, n_nonzero_coefs: usize) -> Self {
         let mut classes = library.labels.clone();
@@ -108,16 +122,16 @@ impl Src {
         }
     }
 
-    /// The images classified by.
+    /// The labelled images.
     #[must_use]
     pub fn library(&self) -> &Library {
         &self.library
     }
 
-    /// Class of `image`, or `None` for an image that no library image correlates with (an empty one).
+    /// Class of `image`; `None` for an image that no library image correlates with (such as an empty one).
     ///
     /// # Errors
-    /// [`RecoverError`] when the image does not fit the library or is not finite.
+    /// [`RecoverError`] if the size of the image differs from the library's, or a value is not finite.
     pub fn classify(&self, image: &[f64], work: &mut Workspace) -> Result<Option<usize>, RecoverError> {
         let mut scratch = std::mem::take(work.scratch::<SrcScratch>());
         let problem = Problem::new(self.library.images.view(), image);

@@ -1,6 +1,13 @@
 //! Majority votes over consecutive decisions.
 
-/// Most frequent label, the lowest of equals; `None` for no label at all. Undecided entries (`None`) do not vote.
+/// Most frequent label, the lowest of equal ones; `None` without labels. Undecided entries (`None`) do not vote.
+///
+/// ```
+/// use spts_recon::classify::majority;
+///
+/// assert_eq!(majority(&[Some(3), None, Some(5), Some(5)]), Some(5));
+/// assert_eq!(majority(&[None, None]), None);
+/// ```
 #[must_use]
 pub fn majority(decisions: &[Option<usize>]) -> Option<usize> {
     let mut labels: Vec<usize> = decisions.iter().flatten().copied().collect();
@@ -14,8 +21,8 @@ pub fn majority(decisions: &[Option<usize>]) -> Option<usize> {
     best.map(|(label, _)| label)
 }
 
-/// Majority of every full group of `size` consecutive decisions. The list is cleared between groups; the published
-/// script never clears it, which `cumulative` reproduces: each vote then counts all decisions so far.
+/// Majority of every complete group of `size` consecutive decisions. The published script never clears its list of
+/// decisions between groups; `cumulative` reproduces this, so that each vote counts all decisions so far.
 #[must_use]
 pub fn vote_groups(decisions: &[Option<usize>], size: usize, cumulative: bool) -> Vec<Option<usize>> {
     (1..=decisions.len() / size.max(1))
@@ -34,7 +41,7 @@ pub struct VoteScore {
 }
 
 impl VoteScore {
-    /// Counts `decisions` for an object of class `label`.
+    /// Counts `decisions` about an object of class `label`.
     pub fn add(&mut self, decisions: &[Option<usize>], label: usize) {
         for &decision in decisions {
             self.total += 1.0;
@@ -44,13 +51,13 @@ impl VoteScore {
         }
     }
 
-    /// Counts what `other` has counted, too.
+    /// Adds the counts of `other`.
     pub fn merge(&mut self, other: Self) {
         self.correct += other.correct;
         self.total += other.total;
     }
 
-    /// Share of correct decisions, or `None` before the first.
+    /// Share of correct decisions; `None` without decisions.
     #[must_use]
     pub fn share(&self) -> Option<f64> {
         (self.total > 0.0).then(|| self.correct / self.total)

@@ -1,4 +1,4 @@
-//! What keeps a dictionary from being learned.
+//! Errors of dictionary learning.
 
 use crate::checks::RangeError;
 use crate::problem::RecoverError;
@@ -7,29 +7,29 @@ use crate::problem::RecoverError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DictionaryError {
-    /// There is nothing to learn from.
+    /// There is no training image.
     #[error("no training image is left after preprocessing")]
     NoImages,
-    /// Images of different sizes.
+    /// Training images of different sizes.
     #[error("training image {index} has {len} values, the first has {expected}")]
     Shape {
-        /// Which image.
+        /// Number of the image, from 0.
         index: usize,
         /// Its length.
         len: usize,
         /// Length of the first image.
         expected: usize,
     },
-    /// A training image has no direction.
+    /// A training image that is zero, not finite, or far too small.
     #[error("training image {index} is zero, not finite, or less than 1e-150 of the strongest one")]
     Degenerate {
-        /// Which image.
+        /// Number of the image, from 0.
         index: usize,
     },
     /// A setting out of range.
     #[error(transparent)]
     Setting(#[from] RangeError),
-    /// The images could not be coded.
+    /// The pursuit failed on the training images.
     #[error("coding the training images: {0}")]
     Coding(#[from] RecoverError),
 }

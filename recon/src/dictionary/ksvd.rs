@@ -12,11 +12,11 @@ use crate::problem::Solution;
 use crate::recover::Choice;
 use rand_chacha::ChaCha8Rng;
 
-/// K-SVD: alternates sparse coding (a pursuit with `n_nonzero_coefs` atoms) and, atom by atom, a rank-one fit to the
-/// error that the other atoms leave in the images that use this one.
+/// K-SVD alternates between sparse coding (a pursuit with `n_nonzero_coefs` atoms) and updates of single atoms. An
+/// update is a rank-one fit to the error that the other atoms leave in the images that use the atom.
 ///
-/// min ‖X − D A‖_F with ‖aᵢ‖₀ ≤ S and ‖dₖ‖₂ = 1, from randomly drawn images. After each sweep an atom that nobody uses,
-/// or that equals another up to sign, gives way to the image that is represented worst.
+/// min ‖X − D A‖_F with ‖aᵢ‖₀ ≤ S and ‖dₖ‖₂ = 1. The atoms start from randomly drawn images. After each sweep, an atom
+/// that no image uses, or that equals another up to sign, is replaced by the image with the largest error.
 /// Source: M. Aharon, M. Elad, A. Bruckstein, IEEE Trans. Signal Process. 54 (2006) 4311; R. Rubinstein, M. Zibulevsky,
 /// M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching pursuit", Technion
 /// CS-2008-08 (2008), with one power step an atom as the rank-one fit; momentum: T. Pock, S. Sabach, "Inertial proximal
@@ -43,11 +43,10 @@ pub struct Ksvd {
     pub n_nonzero_coefs: usize,
     /// Number of sweeps.
     pub n_iter: usize,
-    /// How images are coded.
+    /// Rule by which the pursuit selects atoms.
     pub choice: Choice,
-    /// Share, in [0, 1), of its last change by which an atom is moved on before the images are coded; 0 is the
-    /// published algorithm. 0.5 to 0.7 reach the same error in about half the sweeps; near 1 the sweeps no longer
-    /// converge.
+    /// Share, in [0, 1), of an atom's last change that is added again before the images are coded. 0 is the published
+    /// algorithm. 0.5 to 0.7 reach the same error in about half the sweeps; close to 1 the sweeps no longer converge.
     pub momentum: f64,
 }
 
@@ -64,8 +63,8 @@ impl Default for Ksvd {
 }
 
 impl Ksvd {
-    /// Settings that reach a given error in the least time: orthogonal least squares, momentum 0.7; the others as by
-    /// default.
+    /// Settings that reach a given error in the least time: orthogonal least squares and momentum 0.7; the others are
+    /// defaults.
     #[must_use]
     pub fn fast() -> Self {
         Self {
@@ -75,14 +74,14 @@ impl Ksvd {
         }
     }
 
-    /// Learns a dictionary from `images` of N values each: N × number of atoms, with columns of length 1.
+    /// Learns a dictionary from `images` of N values each. The result is N × number of atoms, with columns of length 1.
     ///
-    /// With fewer images than atoms, every image starts an atom and the dictionary has as many columns as there are
-    /// images. The result is a function of the settings, the images and `rng`, whatever the number of threads.
-    /// Multiplying all images by a power of two does not change it.
+    /// With fewer images than atoms, the dictionary has one column for every image. The result depends only on the
+    /// settings, the images and `rng`, not on the number of threads. Multiplying all images by a power of two does not
+    /// change it.
     ///
     /// # Errors
-    /// [`DictionaryError`] when there is no image, images cannot be learned from, or a setting is out of range.
+    /// [`DictionaryError`] if there is no image, an image is not usable, or a setting is out of range.
     pub fn learn(&self, images: &[Vec<f64>], rng: &mut ChaCha8Rng) -> Result<Matrix, DictionaryError> {
         at_least("n_components", self.n_components, 1)?;
         at_least("n_nonzero_coefs", self.n_nonzero_coefs, 1)?;

@@ -1,4 +1,4 @@
-//! Dictionaries: which images are worth learning from, K-SVD, and atoms at every place.
+//! Dictionaries: selection of training images, K-SVD, and shifted atoms.
 
 mod coding;
 mod error;

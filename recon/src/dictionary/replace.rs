@@ -1,4 +1,4 @@
-//! Atoms that are of no use give way to images that are represented badly.
+//! Replaces useless atoms by poorly represented images.
 
 use super::training::{Training, set_unit};
 use crate::kernels::dot;

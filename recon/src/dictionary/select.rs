@@ -1,13 +1,13 @@
-//! Preprocessing of training images.
+//! Selection of training images.
 
-/// Which images enter the training set.
+/// Criteria for the training images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Selection {
-    /// An image is kept when its maximum is above this, in the unit of the images (V). Published: 0.25 V.
+    /// Threshold of the maximum above which an image is kept, in the unit of the images (V). Published: 0.25 V.
     pub min_peak: f64,
-    /// An image is kept when its cosine with every image kept before is at most this. Published: 0.95.
+    /// An image is dropped if its cosine with an image already kept exceeds this. Published: 0.95.
     pub max_coherence: f64,
-    /// At most this many images are kept.
+    /// Largest number of images that are kept.
     pub max_images: usize,
 }
 
@@ -21,7 +21,15 @@ impl Default for Selection {
     }
 }
 
-/// Indices of the images to learn from, in order: strong enough, and not too similar to one already kept.
+/// Indices of the selected images, in order: strong enough, and not too similar to one already selected.
+///
+/// ```
+/// use spts_recon::dictionary::{Selection, select};
+///
+/// let images = [vec![1.0, 0.0], vec![2.0, 0.1], vec![0.0, 1.0], vec![0.1, 0.1]];
+/// // the second resembles the first, and the last is too weak
+/// assert_eq!(select(&images, &Selection::default()), [0, 2]);
+/// ```
 #[must_use]
 pub fn select(images: &[Vec<f64>], selection: &Selection) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::new();

@@ -1,4 +1,4 @@
-//! Training images, checked and side by side in memory.
+//! Training images, checked and contiguous in memory.
 
 use super::error::DictionaryError;
 use crate::checks::{RangeError, within};

@@ -1,4 +1,4 @@
-//! Which images use an atom.
+//! The images that use each atom.
 
 use crate::problem::Solution;
 

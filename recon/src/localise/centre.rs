@@ -1,7 +1,15 @@
 //! Centre of mass of an image.
 
-/// Centre of mass of an image, as (row, col) in taxels: Σ vᵢ rᵢ / Σ vᵢ over the values above `threshold` · max and
-/// above zero. `None` when nothing is. A threshold keeps noise from pulling the centre about.
+/// Centre of mass of an image, as (row, col) in taxels: Σ vᵢ rᵢ / Σ vᵢ over the positive values above `threshold` ·
+/// max. `None` if there are none. The threshold keeps noise from shifting the centre.
+///
+/// ```
+/// use spts_recon::localise::{centre_of_mass, distance};
+///
+/// let image = [0.1, 0.0, 0.0, 0.0, 2.0, 2.0]; // 2 rows, 3 columns, noise in a corner
+/// let centre = centre_of_mass(&image, 3, 0.23).expect("a contact");
+/// assert!(distance(centre, [1.0, 1.5]) < 1e-12);
+/// ```
 #[must_use]
 pub fn centre_of_mass(image: &[f64], cols: usize, threshold: f64) -> Option<[f64; 2]> {
     let max = image.iter().copied().fold(0.0_f64, f64::max);

@@ -1,4 +1,4 @@
-//! Where the contact is.
+//! Localisation of contacts.
 //!
 //! ```
 //! use spts_recon::localise::{BlobConfig, Localiser, centre_of_mass};

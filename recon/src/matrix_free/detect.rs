@@ -1,4 +1,4 @@
-//! Where a residual looks like a contact.
+//! Finds places where a residual looks like a contact.
 
 use crate::kernels::norm;
 use crate::operator::{Atom, LinearOperator as _, ShiftedDictionary};
@@ -15,7 +15,7 @@ pub(super) struct Detector {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Detection {
     pub(super) place: usize,
-    /// In standard deviations of what chance brings.
+    /// Value in standard deviations of what chance gives.
     pub(super) score: f64,
 }
 

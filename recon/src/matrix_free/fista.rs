@@ -18,7 +18,7 @@ const HALVINGS: usize = 60;
 /// (2015) 715.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct NnFista {
-    /// λ, in units of y·A. Range (0, ∞); at 0 the gap shows nothing.
+    /// λ, in units of y·A. Range (0, ∞); at 0 the duality gap says nothing.
     pub(super) penalty: f64,
     /// Duality gap over ½ ‖y‖². Range (0, 1].
     pub(super) tol: f64,
@@ -26,14 +26,14 @@ pub(super) struct NnFista {
     pub(super) max_iter: usize,
 }
 
-/// How far a descent came.
+/// Result of a descent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Descent {
-    /// Iterations.
+    /// Number of iterations.
     pub iterations: usize,
-    /// Duality gap over ½ ‖y‖² when it was last looked at.
+    /// Duality gap divided by ½ ‖y‖² at the last check.
     pub gap: f64,
-    /// Whether the gap is `tol` or less.
+    /// Whether the gap is at most `tol`.
     pub converged: bool,
 }
 

@@ -1,4 +1,4 @@
-//! Smooth images from few coefficients: a small bump at every candidate place.
+//! Smooth images with few coefficients: one small bump at every candidate place.
 
 use crate::operator::LinearOperator;
 
@@ -11,9 +11,9 @@ const REACH_SD: f64 = 3.0;
 pub(super) struct Grains {
     /// Places, increasing.
     places: Vec<usize>,
-    /// Taxels that a bump touches, increasing.
+    /// Taxels covered by a bump, in increasing order.
     taxels: Vec<usize>,
-    /// For every place its taxels, as numbers of rows, and what the bump is worth there.
+    /// For every place, the rows of its taxels and the bump's value there.
     entries: Vec<Vec<(usize, f64)>>,
 }
 

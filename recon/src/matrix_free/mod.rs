@@ -1,4 +1,4 @@
-//! Images of large skins, from operators that are never stored.
+//! Reconstructs images of large skins with operators that are never stored.
 //!
 //! ```
 //! use spts_recon::matrix_free::RegionPursuit;

@@ -1,4 +1,4 @@
-//! Recovery of many small contacts on a large skin.
+//! Reconstructs many small contacts on a large skin.
 
 use super::detect::{Detection, Detector, dilate, is_nothing};
 use super::fista::{Descent, NnFista, check, subtract};
@@ -7,22 +7,40 @@ use crate::kernels::norm;
 use crate::operator::{Atom, Composition, LinearOperator, SelectColumns};
 use crate::problem::RecoverError;
 
-/// Finds contacts, smooth patches of a few taxels, in measurements y = Φ x + noise of a large image x ≥ 0, with few
-/// products of the whole Φ: two a round.
+/// Finds contacts, smooth patches of a few taxels, in measurements y = Φ x + noise of a large image x ≥ 0. It needs
+/// only two products with the whole Φ in each round.
 ///
-/// A round correlates the residual with Φ and blobs of several sizes; what stands out more than chance allows joins the
-/// candidate places, with the taxels around it. On the candidates alone the image, a sum of small non-negative bumps,
-/// is solved for as non-negative lasso; its support is what the next round starts from. It ends when nothing new stands
-/// out.
-/// After D. Needell, J. A. Tropp, "CoSaMP", Appl. Comput. Harmon. Anal. 26 (2009) 301, with blobs for single columns,
-/// the noise's own level for a given sparsity, and x ≥ 0.
+/// A round correlates the residual with Φ and blobs of several sizes. Places that exceed chance become candidates, with
+/// the taxels around them. On the candidates, the image is a sum of small non-negative bumps, found by a non-negative
+/// lasso. The next round starts from its support. The method ends when no new place exceeds chance.
+/// Based on D. Needell, J. A. Tropp, "CoSaMP", Appl. Comput. Harmon. Anal. 26 (2009) 301, with blobs in place of single
+/// columns, the noise level in place of a given sparsity, and x ≥ 0.
+///
+/// ```
+/// use spts_recon::matrix_free::RegionPursuit;
+/// use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator};
+///
+/// // one contact on 20 × 20 taxels, 150 measurements
+/// let seeds = (1..401_u32).map(|k| (k * k).wrapping_mul(2_654_435_761)).collect();
+/// let phi = SignOperator::new(SignGenerator::NUMERICAL_RECIPES, seeds, 0, 150);
+/// let (mut image, mut y) = ([0.0; 400], [0.0; 150]);
+/// for (k, pixel) in image.iter_mut().enumerate() {
+///     let square = (k as f64 / 20.0).floor() - 8.0;
+///     *pixel = (1.0 - (square.powi(2) + ((k % 20) as f64 - 12.0).powi(2)) / 9.0).max(0.0);
+/// }
+/// phi.apply(&image, &mut y);
+/// let found = RegionPursuit::new(20, 20).recover(&phi, &y, None)?;
+/// let distance = image.iter().zip(&found.image).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+/// assert!(distance < 0.05 * image.iter().map(|a| a * a).sum::<f64>(), "{distance}");
+/// # Ok::<(), spts_recon::RecoverError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegionPursuit {
-    /// Rows of the image.
+    /// Number of rows of the image.
     pub rows: usize,
-    /// Columns of the image.
+    /// Number of columns of the image.
     pub cols: usize,
-    /// Most rounds; [`Self::MAX_ROUNDS`] by default.
+    /// Largest number of rounds; default [`Self::MAX_ROUNDS`].
     pub max_rounds: usize,
 }
 
@@ -39,28 +57,28 @@ const PENALTY_SD: f64 = 0.5;
 /// Relative duality gap at which a descent stops, and its most iterations.
 const DESCENT: (f64, usize) = (1e-5, 120);
 
-/// What was found.
+/// Result of a [`RegionPursuit`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
     /// The image, row-major, ≥ 0.
     pub image: Vec<f64>,
     /// ‖y − Φ x‖.
     pub residual_norm: f64,
-    /// Rounds that solved for an image.
+    /// Number of rounds with a reconstruction.
     pub rounds: usize,
-    /// Candidate places of the last one.
+    /// Number of candidate places in the last round.
     pub candidates: usize,
-    /// Its descent.
+    /// Descent of the last round.
     pub descent: Descent,
-    /// Most bytes that the recovery held at once, counted: images, correlations, filters and candidates, without Φ.
+    /// Largest memory held at once, bytes: images, correlations, filters and candidates, without Φ.
     pub bytes: usize,
 }
 
 impl RegionPursuit {
-    /// Rounds by default.
+    /// Default of `max_rounds`.
     pub const MAX_ROUNDS: usize = 20;
 
-    /// Pursuit of contacts with radii of 1 to 4 taxels in images of `rows` × `cols`.
+    /// A pursuit of contacts with radii of 1 to 4 taxels in images of `rows` × `cols`.
     #[must_use]
     pub fn new(rows: usize, cols: usize) -> Self {
         Self {
@@ -70,12 +88,12 @@ impl RegionPursuit {
         }
     }
 
-    /// The image behind `y`, starting from nothing, or from an image that is like it: the last one of a series.
+    /// Reconstructs the image of `y`. `start` may be a similar image, such as the previous one of a series.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as Φ has rows, [`RecoverError::Columns`] when Φ has not
-    /// one column a taxel or the start is of another size, [`RecoverError::NotFinite`] for a NaN or an infinity,
-    /// [`RecoverError::Overflow`] when the image is beyond the range of numbers.
+    /// [`RecoverError::ShapeMismatch`] if the length of `y` differs from the rows of Φ, [`RecoverError::Columns`] if Φ
+    /// does not have one column a taxel or the size of `start` differs, [`RecoverError::NotFinite`] for a NaN or an
+    /// infinity, [`RecoverError::Overflow`] if the image exceeds the range of numbers.
     pub fn recover<A: SelectColumns>(&self, phi: &A, y: &[f64], start: Option<&[f64]>) -> Result<Found, RecoverError> {
         check(phi, y)?;
         let taxels = self.rows * self.cols;
@@ -116,13 +134,13 @@ struct Search<'a, A> {
     y: &'a [f64],
     detector: Detector,
     threshold: f64,
-    /// Weight of the bump at every place.
+    /// Coefficient of the bump at every place.
     weights: Vec<f64>,
-    /// Places that may have one.
+    /// Places that may have a bump.
     candidates: Vec<bool>,
-    /// What the image leaves of y.
+    /// Residual of y.
     residual: Vec<f64>,
-    /// What chance gives the correlations of the residual.
+    /// Variance that chance gives the correlations of the residual.
     variance: Vec<f64>,
     found: Found,
 }

@@ -1,29 +1,43 @@
-//! Measurements with an unknown constant in them.
+//! Measurements with an unknown common offset.
 
 use super::{LinearOperator, SelectColumns, check_shape};
 
-/// P∘A, where P takes the mean off: P y = y − Σy/M. For measurements y = A x + c with an unknown c, such as the offset
-/// that a lopsided drive adds with all that is pressed, P y = P A x holds exactly, at the price of one measurement.
+/// P∘A, where P subtracts the mean: P y = y − Σy/M. For measurements y = A x + c with an unknown constant c, such as
+/// the offset of asymmetric drives, P y = P A x holds exactly. This costs one measurement.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::operator::{Centred, LinearOperator as _, centre};
+///
+/// let a = Matrix::from_rows(3, 2, vec![1.0, 1.0, 1.0, -1.0, -1.0, 1.0])?;
+/// let (x, mut y, mut expected) = ([2.0, 1.0], [0.0; 3], [0.0; 3]);
+/// a.apply(&x, &mut y);
+/// y.iter_mut().for_each(|y| *y += 0.7); // an unknown offset
+/// centre(&mut y);
+/// Centred::new(a).apply(&x, &mut expected);
+/// assert!(y.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12));
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Centred<A> {
     inner: A,
 }
 
 impl<A> Centred<A> {
-    /// `inner` without the mean of what it gives.
+    /// `inner` followed by subtraction of the mean.
     #[must_use]
     pub fn new(inner: A) -> Self {
         Self { inner }
     }
 
-    /// The operator with its mean.
+    /// The operator without the subtraction.
     #[must_use]
     pub fn inner(&self) -> &A {
         &self.inner
     }
 }
 
-/// Takes the mean off `y`: what belongs to a [`Centred`] operator.
+/// Subtracts the mean of `y`, to match a [`Centred`] operator.
 pub fn centre(y: &mut [f64]) {
     let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
     y.iter_mut().for_each(|v| *v -= mean);

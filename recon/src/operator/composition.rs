@@ -1,4 +1,4 @@
-//! One operator after another.
+//! Composition of two operators.
 
 use super::{LinearOperator, check_shape};
 

@@ -1,4 +1,4 @@
-//! What every operator promises.
+//! Properties that every operator must have.
 
 use super::LinearOperator;
 use crate::kernels::{dot, norm};
@@ -14,10 +14,11 @@ fn rounding(nrows: usize, ncols: usize, whole: f64) -> f64 {
     16.0 * (nrows + ncols) as f64 * f64::EPSILON * whole.max(f64::MIN_POSITIVE)
 }
 
-/// Checks that `a` is linear, that ⟨A x, y⟩ = ⟨x, Aᵀ y⟩, and that what the answers held before does not matter.
+/// Checks that `a` is linear, that ⟨A x, y⟩ = ⟨x, Aᵀ y⟩, and that results do not depend on the earlier content of
+/// output slices.
 ///
 /// # Panics
-/// When a promise is broken, with the numbers.
+/// If a property fails; the message holds the numbers.
 pub fn check_operator(a: &impl LinearOperator) {
     let (m, n) = (a.nrows(), a.ncols());
     let (x, z, y) = (values(n, 0.0), values(n, 1.0), values(m, 2.0));

@@ -1,4 +1,5 @@
-//! Linear operators: dense, ±1 without a matrix, shifted atoms by Fourier transforms, and what is built from them.
+//! Linear operators: dense matrices, ±1 matrices that are not stored, shifted atoms by Fourier transforms, and
+//! combinations of them.
 //!
 //! ```
 //! use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator};
@@ -31,7 +32,34 @@ pub use shifted::{Atom, ShiftedDictionary};
 pub use sign::{SignGenerator, SignOperator};
 pub use sub_arrays::SubArrays;
 
-/// Linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ to rounding.
+/// A linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ up to rounding.
+///
+/// ```
+/// use spts_recon::operator::{LinearOperator, check_operator};
+///
+/// /// Differences of neighbouring numbers.
+/// struct Differences(usize);
+///
+/// impl LinearOperator for Differences {
+///     fn nrows(&self) -> usize {
+///         self.0 - 1
+///     }
+///     fn ncols(&self) -> usize {
+///         self.0
+///     }
+///     fn apply(&self, x: &[f64], y: &mut [f64]) {
+///         y.iter_mut().zip(x.windows(2)).for_each(|(y, x)| *y = x[1] - x[0]);
+///     }
+///     fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
+///         x.fill(0.0);
+///         for (k, y) in y.iter().enumerate() {
+///             x[k] -= y;
+///             x[k + 1] += y;
+///         }
+///     }
+/// }
+/// check_operator(&Differences(10));
+/// ```
 pub trait LinearOperator {
     /// Number of rows.
     fn nrows(&self) -> usize;
@@ -43,22 +71,35 @@ pub trait LinearOperator {
     fn apply_adjoint(&self, y: &[f64], x: &mut [f64]);
 }
 
-/// An operator that some of its columns can be taken from.
+/// An operator from which columns can be selected.
+///
+/// ```
+/// use spts_recon::operator::{LinearOperator as _, SelectColumns as _, SignGenerator, SignOperator};
+///
+/// let phi = SignOperator::new(SignGenerator::NUMERICAL_RECIPES, (8..108).collect(), 0, 20);
+/// let few = phi.select_columns(&[3, 42]);
+/// let (mut all, mut selected) = ([0.0; 20], [0.0; 20]);
+/// let mut image = [0.0; 100];
+/// (image[3], image[42]) = (1.0, 2.0);
+/// phi.apply(&image, &mut all);
+/// few.apply(&[1.0, 2.0], &mut selected);
+/// assert_eq!(all, selected);
+/// ```
 pub trait SelectColumns: LinearOperator {
-    /// What holds the columns.
+    /// Operator of the selected columns.
     type Selected: LinearOperator;
 
     /// The columns with these numbers, in this order.
     ///
     /// # Panics
-    /// When a column does not exist.
+    /// If a column does not exist.
     fn select_columns(&self, columns: &[usize]) -> Self::Selected;
 
-    /// Variance of every entry of Aᵀ r, were the signs of the operator's entries drawn at random: Σᵢ aᵢₖ² rᵢ². What a
-    /// residual r of no relation to the operator would correlate with it.
+    /// Variance of every entry of Aᵀ r if the signs of the operator's entries were random: Σᵢ aᵢₖ² rᵢ². This is the
+    /// correlation expected by chance from a residual r unrelated to the operator.
     ///
     /// # Panics
-    /// When `r` has not one entry a row, `variance` not one a column.
+    /// If `r` does not have one entry a row, or `variance` not one a column.
     fn chance_variance(&self, r: &[f64], variance: &mut [f64]);
 }
 

@@ -17,7 +17,7 @@ impl Atom {
     /// Atom from row-major values.
     ///
     /// # Errors
-    /// [`ShapeError`] when `values` does not hold `rows · cols` numbers.
+    /// [`ShapeError`] if `values` does not hold `rows · cols` numbers.
     pub fn new(rows: usize, cols: usize, values: Vec<f64>) -> Result<Self, ShapeError> {
         let len = values.len();
         if rows.checked_mul(cols) == Some(len) {
@@ -31,8 +31,8 @@ impl Atom {
         }
     }
 
-    /// Half an ellipsoid of unit height, √(1 − d²/(`radius_taxels` + ½)²): the pressure under a ball, with a radius of
-    /// whole taxels on a square of that many to each side of the middle.
+    /// Half an ellipsoid of unit height, √(1 − d²/(`radius_taxels` + ½)²): the pressure under a ball. The atom extends
+    /// by the radius, rounded to whole taxels, to each side of its middle.
     #[must_use]
     #[expect(
         clippy::cast_possible_truncation,
@@ -53,7 +53,7 @@ impl Atom {
         }
     }
 
-    /// The atom with every value squared.
+    /// The atom with squared values.
     #[must_use]
     pub fn squared(&self) -> Self {
         Self {
@@ -81,11 +81,24 @@ impl Atom {
     }
 }
 
-/// Dictionary of every atom at every place of a `rows` × `cols` image: column (k·rows + r)·cols + c is atom k with its
-/// middle (⌊rows/2⌋, ⌊cols/2⌋) at row r, column c. What lies outside the image is cut off.
+/// Dictionary with every atom at every place of a `rows` × `cols` image. Column (k·rows + r)·cols + c is atom k with
+/// its middle (⌊rows/2⌋, ⌊cols/2⌋) at row r, column c. Parts outside the image are cut off.
 ///
-/// A product costs one Fourier transform an atom instead of a multiplication a place and value; zero-padding keeps the
-/// convolution from wrapping around. Memory: the spectra, about 8 bytes a taxel and atom.
+/// A product costs one Fourier transform for each atom instead of one multiplication for each place and value.
+/// Zero-padding prevents the convolution from wrapping around. Memory: the spectra, about 8 bytes for each taxel and
+/// atom.
+///
+/// ```
+/// use spts_recon::operator::{Atom, LinearOperator as _, ShiftedDictionary};
+///
+/// let atom = Atom::new(1, 3, vec![1.0, 2.0, 1.0])?;
+/// let dictionary = ShiftedDictionary::new(4, 5, &[atom]);
+/// let (mut place, mut image) = ([0.0; 20], [0.0; 20]);
+/// place[2 * 5 + 3] = 10.0; // row 2, column 3
+/// dictionary.apply(&place, &mut image);
+/// assert!((image[2 * 5 + 3] - 20.0).abs() < 1e-9 && (image[2 * 5 + 4] - 10.0).abs() < 1e-9);
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
 pub struct ShiftedDictionary {
     rows: usize,
     cols: usize,
@@ -95,7 +108,7 @@ pub struct ShiftedDictionary {
 }
 
 impl ShiftedDictionary {
-    /// Dictionary of `atoms` in `rows` × `cols` images.
+    /// The dictionary of `atoms` in `rows` × `cols` images.
     #[must_use]
     pub fn new(rows: usize, cols: usize, atoms: &[Atom]) -> Self {
         let reach = |side: fn(&Atom) -> usize| atoms.iter().map(side).max().unwrap_or(0);

@@ -1,4 +1,4 @@
-//! Rows of ±1 straight from pseudorandom generators.
+//! Rows of ±1 computed from pseudorandom generators.
 
 use super::sign_kernels::{LANES, Step, add_columns, add_rows};
 use super::{LinearOperator, SelectColumns};
@@ -12,7 +12,7 @@ const BLOCK: usize = 1024 / LANES;
 /// Fewest rows for which the states of all columns are jumped to anew.
 const FEWEST_ROWS: usize = 64;
 
-/// Linear congruential generator s ↦ a·s + c mod 2³², one bit of whose state is the sign of a weight.
+/// Linear congruential generator s ↦ a·s + c mod 2³². One bit of its state is the sign of a weight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SignGenerator {
     step: Step,
@@ -29,8 +29,8 @@ impl SignGenerator {
         },
     };
 
-    /// Generator with `multiplier` a and `increment` c; a weight is +1 where bit `bit` of the state is set, −1 where it
-    /// is clear.
+    /// A generator with `multiplier` a and `increment` c. A weight is +1 if bit `bit` of the state is set, and −1
+    /// otherwise.
     ///
     /// # Errors
     /// [`RangeError`] for a `bit` beyond 31.
@@ -80,8 +80,8 @@ impl SignGenerator {
 /// M × N matrix of ±1 that is never stored: column k is the sequence of one generator with its own seed. Row r (from 0)
 /// holds the signs after `first_row + r + 1` steps from the seeds.
 ///
-/// Memory O(M + N); a product costs M·N steps of a generator, on all threads of the current rayon pool. Every sum has a
-/// fixed order: the same bits for any number of threads and any instruction set.
+/// Memory is O(M + N). A product takes M·N generator steps, on all threads of the current rayon pool. Every sum has a
+/// fixed order, so the bits are the same for any number of threads and any instruction set.
 #[derive(Debug, Clone)]
 pub struct SignOperator {
     generator: SignGenerator,
@@ -91,7 +91,7 @@ pub struct SignOperator {
 }
 
 impl SignOperator {
-    /// Rows `first_row..first_row + nrows` of the generators with `seeds`, one a column.
+    /// Rows `first_row..first_row + nrows` of generators with `seeds`, one for each column.
     #[must_use]
     pub fn new(generator: SignGenerator, seeds: Vec<u32>, first_row: u64, nrows: usize) -> Self {
         Self {
@@ -102,7 +102,7 @@ impl SignOperator {
         }
     }
 
-    /// Numbers of bytes that the operator itself holds: 4 a column, whatever the number of rows.
+    /// Memory of the operator, bytes: 4 for each column, whatever the number of rows.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of::<Self>() + self.seeds.capacity() * size_of::<u32>()

@@ -1,8 +1,7 @@
-//! Inner loops of [`SignOperator`](super::SignOperator): weights straight from the generators.
+//! Inner loops of [`SignOperator`](super::SignOperator): weights computed directly from the generators.
 //!
-//! Lanes are columns. A row is summed over one group of lanes after another, a column over one row after another, and
-//! no product is fused with a sum: results are the same bits whichever instruction set is chosen and however the rows
-//! are cut into calls.
+//! Lanes are columns. A row is summed group by group of lanes, a column row by row, and no product is fused with a sum.
+//! Results have the same bits whichever instruction set is chosen, and for any division of the rows among calls.
 
 use multiversion::multiversion;
 

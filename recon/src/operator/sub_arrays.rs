@@ -1,16 +1,29 @@
-//! A skin in parts, each on a wire of its own.
+//! A skin divided into parts, each on its own wire.
 
 use super::{LinearOperator, SelectColumns, check_shape};
 use rayon::prelude::*;
 
-/// Block-diagonal operator: sub-array after sub-array, each with its own rows (a wire) and the next run of columns.
+/// Block-diagonal operator. Each sub-array has its own rows (a wire) and the next range of columns.
+///
+/// ```
+/// use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator, SubArrays};
+///
+/// // 200 taxels on two wires, 20 measurements of each
+/// let wire = |seeds| SignOperator::new(SignGenerator::NUMERICAL_RECIPES, seeds, 0, 20);
+/// let skin = SubArrays::new(vec![wire((8..108).collect()), wire((108..208).collect())]);
+/// assert_eq!((skin.nrows(), skin.ncols()), (40, 200));
+/// let (mut image, mut y) = ([0.0; 200], [0.0; 40]);
+/// image[150] = 1.0; // on the second wire
+/// skin.apply(&image, &mut y);
+/// assert!(y[..20].iter().all(|v| *v == 0.0) && y[20..].iter().all(|v| v.abs() == 1.0));
+/// ```
 #[derive(Debug, Clone)]
 pub struct SubArrays<A> {
     parts: Vec<A>,
 }
 
 impl<A: LinearOperator + Sync> SubArrays<A> {
-    /// The sub-arrays in the order of their columns.
+    /// The given sub-arrays, in order of their columns.
     #[must_use]
     pub fn new(parts: Vec<A>) -> Self {
         Self { parts }

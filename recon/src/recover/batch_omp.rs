@@ -1,4 +1,4 @@
-//! Orthogonal matching pursuit of many measurements with one operator.
+//! Orthogonal matching pursuit for many measurements with one operator.
 
 use super::gram_pursuit::{Choice, GramPursuit};
 use super::greedy::Greedy;
@@ -8,11 +8,11 @@ use crate::matrix::{Matrix, MatrixView};
 use crate::problem::{Problem, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Orthogonal matching pursuit with the Gram matrix G = Aᵀ A ready: for many `y` measured with the same A.
+/// Orthogonal matching pursuit with a precomputed Gram matrix G = Aᵀ A, for many `y` measured with the same A.
 ///
-/// The choice is that of [`Omp`](super::Omp), a step costs O(n·K) and does not look at A. Atoms with less than 1e-10 of
-/// their square outside the span of the chosen ones are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of
-/// ‖y‖²; [`Omp`](super::Omp) resolves more.
+/// It selects atoms like [`Omp`](super::Omp). A step costs O(n·K) and does not use A. Atoms are skipped if less than
+/// 1e-10 of their square lies outside the span of the selected ones, and a pursuit ends when ‖r‖² is below 1e-14 of
+/// ‖y‖²; [`Omp`](super::Omp) has higher accuracy.
 ///
 /// ```
 /// use spts_recon::recover::BatchOmp;
@@ -44,8 +44,8 @@ pub struct BatchOmp {
 }
 
 impl BatchOmp {
-    /// Pursuit with the operator `matrix` (M × K), columns compared as if they had length 1, that stops at
-    /// `n_nonzero_coefs` atoms at the latest. Costs O(M·K²).
+    /// A pursuit with the operator `matrix` (M × K) and at most `n_nonzero_coefs` atoms. Columns are compared as if
+    /// they had length 1. Costs O(M·K²).
     ///
     /// # Errors
     /// [`RecoverError::Empty`] for a matrix without rows or columns, [`RecoverError::OperatorNotFinite`].
@@ -77,17 +77,17 @@ impl BatchOmp {
         })
     }
 
-    /// The same with another choice of the next atom.
+    /// The same pursuit with another selection rule.
     #[must_use]
     pub fn with_choice(self, choice: Choice) -> Self {
         Self { choice, ..self }
     }
 
-    /// Solves A α ≈ `y` and overwrites `solution`. After an error its content is of no meaning.
+    /// Solves A α ≈ `y` into `solution`. After an error the content of `solution` has no meaning.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`], [`RecoverError::NotFinite`]; [`RecoverError::Overflow`] when a coefficient is
-    /// beyond the range of numbers.
+    /// [`RecoverError::ShapeMismatch`], [`RecoverError::NotFinite`], and [`RecoverError::Overflow`] if a coefficient
+    /// exceeds the range of numbers.
     pub fn recover_into(
         &self,
         y: &[f64],

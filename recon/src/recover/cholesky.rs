@@ -1,4 +1,4 @@
-//! Cholesky factorisation in memory that the caller keeps, for the small systems of a decode.
+//! Cholesky factorisation in the caller's memory, for the small systems of a decoder.
 
 use crate::kernels::{axpy_of, column_sums_of, dot_of};
 use multiversion::multiversion;

@@ -5,13 +5,13 @@ use super::scaling::Scaled;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Compressive sampling matching pursuit with S = `n_nonzero_coefs`: each iteration joins the 2 S atoms that correlate
-/// best with the residual to the support, solves the least squares on all of them, and keeps the S largest
-/// coefficients.
+/// Compressive sampling matching pursuit with S = `n_nonzero_coefs`. Each iteration adds the 2 S atoms with the largest
+/// correlation with the residual to the support, solves the least-squares problem on all of them, and keeps the S
+/// largest coefficients.
 ///
-/// Columns are compared as if they had length 1, at most M atoms enter a least-squares problem (the old support first),
-/// and the coefficients are those of the least squares on the S atoms kept. It ends when the residual is nothing but
-/// rounding, when an iteration no longer lowers it (the better support is kept), or after 50 iterations.
+/// Columns are compared as if they had length 1. At most M atoms enter a least-squares problem, those of the old
+/// support first. The final coefficients are the least-squares solution on the S atoms kept. It ends when the residual
+/// is only rounding, when an iteration no longer reduces it (the better support is kept), or after 50 iterations.
 /// Source: D. Needell, J. A. Tropp, "CoSaMP: Iterative signal recovery from incomplete and inaccurate samples", Appl.
 /// Comput. Harmon. Anal. 26 (2009).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub struct Cosamp {
 const MAX_ITER: usize = 50;
 
 impl Cosamp {
-    /// Pursuit of `n_nonzero_coefs` atoms.
+    /// A pursuit of `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }

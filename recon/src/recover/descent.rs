@@ -20,7 +20,7 @@ const SOLVED: f64 = 1e-13;
 pub(super) struct NnLassoScratch {
     /// Columns of the scaled operator, one after the other, K × M.
     pub(super) columns: Vec<f64>,
-    /// What every column was divided by to be of unit length, or 1.
+    /// Divisor that scales every column to unit length, or 1.
     pub(super) lengths: Vec<f64>,
     /// Squared length of every column.
     curvature: Vec<f64>,
@@ -40,7 +40,7 @@ pub(super) struct Descent<'w> {
     m: usize,
     /// λ
     penalty: f64,
-    /// Largest correlation of a column with y; the answer is zero when λ is not below it.
+    /// Largest correlation of a column with y. The solution is zero if λ is at least this.
     largest: f64,
     work: &'w mut NnLassoScratch,
 }

@@ -1,4 +1,4 @@
-//! How good an image is expected to be, from a Gaussian posterior.
+//! Expected quality of an image under a Gaussian posterior.
 
 use libm::erfc;
 use std::f64::consts::FRAC_1_SQRT_2;

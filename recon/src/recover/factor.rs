@@ -1,4 +1,4 @@
-//! QR factorisation that grows by one column a step.
+//! QR factorisation that grows by one column in each step.
 
 use crate::kernels::{self, LANES};
 use crate::matrix::MatrixView;
@@ -16,7 +16,7 @@ pub(crate) struct Factor {
     /// Rows M, rounded up to whole lanes; the padding is zero.
     stride: usize,
     basis: Vec<f64>,
-    /// Columns of R one after the other, column n with n + 1 entries.
+    /// Columns of R, one after the other; column n has n + 1 entries.
     upper: Vec<f64>,
     projections: Vec<f64>,
     residual: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Gaussian estimates for a sensing matrix that stays the same.
+//! Gaussian estimates for a fixed sensing matrix.
 
 use super::gaussian::{smallest_variance, variance};
 use super::nnqp::{self, Hessian, Lowered};
@@ -11,12 +11,12 @@ use crate::problem::RecoverError;
 use nalgebra::{DMatrix, SymmetricEigen};
 use std::sync::Arc;
 
-/// The estimates of [`super::Lmmse`] and [`super::NnLmmse`] for one sensing matrix A (M × N) that every window is
-/// measured with, as cells in pattern mode do: all that needs no sample is computed once.
+/// The estimates of [`super::Lmmse`] and [`super::NnLmmse`] for one sensing matrix A (M × N) that is used for every
+/// window, as by cells in pattern mode. All work that needs no sample is done once.
 ///
-/// With A C Aᵀ = U Λ Uᵀ, x̂ = μ + Σₖ vₖ uₖᵀ(y − A μ) / (λₖ + σ²) with the images vₖ = C Aᵀ uₖ, for any noise σ²; with a
-/// noise that is known, x̂ = x₀ + G y. So a sample adds M or N products, and the image needs N M after the last one, or
-/// none. The largest numbers of A and y have to be between 1e-100 and 1e100.
+/// With A C Aᵀ = U Λ Uᵀ, x̂ = μ + Σₖ vₖ uₖᵀ(y − A μ) / (λₖ + σ²) with the images vₖ = C Aᵀ uₖ, for any noise σ². If the
+/// noise is known in advance, x̂ = x₀ + G y. A sample then costs M or N products. After the last sample, the image
+/// costs N M further ones or none. The largest numbers of A and y must lie between 1e-100 and 1e100.
 /// Source: as [`super::Lmmse`]; Λ and U by the symmetric QR algorithm.
 ///
 /// ```
@@ -75,14 +75,14 @@ enum Linear {
 
 /// Most measurements: their spectrum takes O(M³).
 const MOST_MEASUREMENTS: usize = 4096;
-/// Why there is no [`Fixed`] estimate.
+/// Why a [`Fixed`] estimate cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FixedError {
-    /// An operator that the prior does not go with, or that has no rows or an entry that is not finite.
+    /// An operator that does not fit the prior, has no rows, or an entry that is not finite.
     #[error(transparent)]
     Operator(#[from] RecoverError),
-    /// A noise outside its range, or too many measurements.
+    /// A noise level outside its range, or too many measurements.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
 }
@@ -91,11 +91,11 @@ pub enum FixedError {
 const HARDLY: f64 = 0.04;
 
 impl Fixed {
-    /// Estimates under `prior` for measurements by `operator` (M × N) with `noise`.
+    /// Estimates under `prior` from measurements with `operator` (M × N) and `noise`.
     ///
     /// # Errors
-    /// [`FixedError`] when the operator has another number of columns than the prior, no row, more than 4096 of them or
-    /// an entry that is not finite, and for a noise outside its range.
+    /// [`FixedError`] if the operator has another number of columns than the prior, no row, more than 4096 rows or an
+    /// entry that is not finite, or if the noise is outside its range.
     pub fn new(operator: MatrixView<'_>, prior: Arc<Gaussian>, noise: Noise) -> Result<Self, FixedError> {
         let (m, n) = (operator.nrows(), operator.ncols());
         let noise = noise.checked()?;
@@ -133,19 +133,19 @@ impl Fixed {
         })
     }
 
-    /// Number of measurements of a window.
+    /// Number of measurements in a window.
     #[must_use]
     pub fn measurements(&self) -> usize {
         self.m
     }
 
-    /// Number of pixels of an image.
+    /// Number of pixels in an image.
     #[must_use]
     pub fn pixels(&self) -> usize {
         self.prior.len()
     }
 
-    /// A window whose samples come one by one.
+    /// A window whose samples are added one by one.
     #[must_use]
     pub fn window(&self) -> FixedWindow<'_> {
         let mut window = FixedWindow {
@@ -232,26 +232,26 @@ impl Linear {
     }
 }
 
-/// A window of a [`Fixed`] sensing matrix, sample by sample. Memory is kept from one window to the next.
+/// A window measured with a [`Fixed`] sensing matrix, sample by sample. Memory is kept from window to window.
 #[derive(Debug)]
 pub struct FixedWindow<'a> {
     fixed: &'a Fixed,
     /// Samples so far, divided by the scale.
     samples: Vec<f64>,
-    /// What they add up to: the image, or t.
+    /// Sum over the samples: the image, or t.
     sums: Vec<f64>,
     /// 1/(λₖ + σ²).
     shares: Vec<f64>,
     image: Vec<f64>,
-    /// x̂ or h, with the sign and in the scale of the program.
+    /// x̂ or h, with the sign and scale of the quadratic program.
     linear_part: Vec<f64>,
-    /// What pushes pixels up to zero.
+    /// Forces that raise pixels to zero.
     forces: Vec<f64>,
     work: nnqp::Buffers,
 }
 
 impl FixedWindow<'_> {
-    /// Begins another window.
+    /// Starts another window.
     pub fn clear(&mut self) {
         self.samples.clear();
         self.sums.clear();
@@ -259,7 +259,7 @@ impl FixedWindow<'_> {
         self.sums.extend_from_slice(start);
     }
 
-    /// Takes the next sample, V. What comes behind the last measurement is not looked at.
+    /// Adds the next sample, V. Samples after the last measurement are ignored.
     pub fn push(&mut self, sample: f64) {
         let (k, sample) = (self.samples.len(), sample / self.fixed.scale);
         if k == self.fixed.m {
@@ -271,15 +271,15 @@ impl FixedWindow<'_> {
         axpy(sample, &shares[k * width..(k + 1) * width], &mut self.sums);
     }
 
-    /// Takes as many samples as there are left.
+    /// Adds samples up to the last measurement.
     pub fn extend(&mut self, samples: &[f64]) {
         samples.iter().for_each(|sample| self.push(*sample));
     }
 
-    /// The linear estimate, [`super::Lmmse`]'s.
+    /// The linear estimate, as [`super::Lmmse`] gives it.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] before the last sample, [`RecoverError::NotFinite`] when one is not.
+    /// [`RecoverError::ShapeMismatch`] before the last sample, [`RecoverError::NotFinite`] if a sample is not finite.
     pub fn image(&mut self) -> Result<&[f64], RecoverError> {
         self.estimate()?;
         Ok(&self.image)
@@ -323,9 +323,9 @@ impl FixedWindow<'_> {
         })
     }
 
-    /// The most probable image without negative pixels, [`super::NnLmmse`]'s: x̂ + P f with the posterior covariance P and
-    /// the least forces f ≥ 0 that lift every pixel to zero, or, where most pixels would have to be lifted, by the
-    /// program of [`super::NnLmmse`] itself.
+    /// The most probable image without negative pixels, as [`super::NnLmmse`] gives it: x̂ + P f with the posterior
+    /// covariance P and the smallest forces f ≥ 0 that raise every pixel to zero. If most pixels would have to be
+    /// raised, the program of [`super::NnLmmse`] itself is solved.
     ///
     /// # Errors
     /// As [`FixedWindow::image`], and [`RecoverError::NotConverged`].
@@ -343,7 +343,8 @@ impl FixedWindow<'_> {
         Ok(&self.image)
     }
 
-    /// Lifts the pixels of x̂ below zero, with a guess in `forces` of which have to be; whether that is done, which it is not where P is singular to rounding.
+    /// Lifts the pixels of x̂ below zero, with a guess in `forces` of which have to be; whether that is done, which it
+    /// is not where P is singular to rounding.
     fn lifted(&mut self) -> bool {
         let fixed = self.fixed;
         let scale = power_of_two(&self.image);

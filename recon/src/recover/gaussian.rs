@@ -1,4 +1,4 @@
-//! The linear Gaussian model y = A x + n, scaled, and the matrices that its estimators share.
+//! The linear Gaussian model y = A x + n after scaling, and the matrices that its estimators share.
 
 use super::parameter::Noise;
 use super::prior::Gaussian;

@@ -10,13 +10,13 @@ const DEPENDENT_SQUARE: f64 = 1e-10;
 /// Share of ‖y‖² below which the recurrence ‖r‖² ← ‖r‖² − p² holds rounding only.
 const CONVERGED_SQUARE: f64 = 1e-14;
 
-/// Which atom a pursuit takes next.
+/// Rule by which a pursuit selects the next atom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Choice {
-    /// The one with the largest |cosine| to the residual: [`Omp`](super::Omp).
+    /// The atom with the largest |cosine| to the residual, as [`Omp`](super::Omp).
     #[default]
     Correlation,
-    /// The one that leaves the smallest residual: [`Ols`](super::Ols).
+    /// The atom that leaves the smallest residual, as [`Ols`](super::Ols).
     LeastSquares,
 }
 
@@ -28,11 +28,11 @@ pub(crate) struct GramScratch {
     pub(super) correlation: Vec<f64>,
     /// vᵢ, one after the other.
     images: Vec<f64>,
-    /// Columns of R one after the other, column n with n + 1 entries.
+    /// Columns of R, one after the other; column n has n + 1 entries.
     upper: Vec<f64>,
     projections: Vec<f64>,
     pub(super) residual: Vec<f64>,
-    /// ‖aₖ‖² outside the span of the chosen atoms.
+    /// ‖aₖ‖² outside the span of the selected atoms.
     remaining: Vec<f64>,
 }
 
@@ -49,11 +49,11 @@ pub(crate) struct GramScratch {
 pub(super) struct GramPursuit<'a> {
     /// G, K × K.
     pub(super) gram: &'a [f64],
-    /// Weight of every atom in a choice, length K.
+    /// Weight of every atom in the selection, length K.
     pub(super) weights: &'a [f64],
-    /// Which atom is next.
+    /// Selection rule.
     pub(super) choice: Choice,
-    /// Most atoms.
+    /// Largest number of atoms.
     pub(super) limit: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What the greedy pursuits share: their scratch memory, and how a solution is handed out.
+//! Parts that all greedy pursuits share: scratch memory, and writing the solution.
 
 use super::factor::{CONVERGED, Factor};
 use super::gram_pursuit::GramScratch;
@@ -34,7 +34,7 @@ impl Greedy {
 #[derive(Debug, Default)]
 pub(crate) struct State {
     pub(crate) factor: Factor,
-    /// Weight of every column in a choice, 0 for those that must not be chosen.
+    /// Weight of every column in the selection; 0 for columns that must not be selected.
     pub(crate) weights: Vec<f64>,
     /// Aᵀ r.
     pub(crate) correlation: Vec<f64>,

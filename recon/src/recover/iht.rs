@@ -6,14 +6,31 @@ use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Normalised iterative hard thresholding: x ← H_S(x + μ Âᵀ(y − Â x)), H_S keeps the S = `n_nonzero_coefs` largest
-/// entries and Â has the columns of A scaled to length 1.
+/// Normalised iterative hard thresholding: x ← H_S(x + μ Âᵀ(y − Â x)). H_S keeps the S = `n_nonzero_coefs` largest
+/// entries, and Â has the columns of A scaled to length 1.
 ///
-/// The step is μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² with the gradient g on the support Γ; when the support changes it is shortened
-/// until μ ≤ (1 − c)‖Δx‖² / ‖Â Δx‖², which makes the residual fall. It ends when x changes by less than 1e-8 of its
-/// length, or after 500 iterations; the coefficients are the least squares on the support found.
+/// The step is μ = ‖g_Γ‖² / ‖Â_Γ g_Γ‖² with the gradient g on the support Γ. If the support changes, the step is
+/// reduced until μ ≤ (1 − c)‖Δx‖² / ‖Â Δx‖², so that the residual decreases. The iteration ends when x changes by less
+/// than 1e-8 of its length, or after 500 iterations. The coefficients are the least-squares solution on the final
+/// support.
 /// Source: T. Blumensath, M. E. Davies, "Normalized iterative hard thresholding: Guaranteed stability and performance",
 /// IEEE J. Sel. Topics Signal Process. 4 (2010).
+///
+/// ```
+/// use spts_recon::recover::{Cosamp, Iht, Omp};
+/// use spts_recon::{Matrix, Problem, Recover, Workspace};
+///
+/// // every pursuit of the table solves the same problem
+/// let a = Matrix::from_rows(4, 4, vec![
+///     1.0, 1.0, 1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0,
+/// ])?;
+/// let problem = Problem::new(a.view(), &[2.0, -2.0, 2.0, -2.0])?; // twice the second atom
+/// let pursuits: [&dyn Recover; 3] = [&Omp::new(1), &Cosamp::new(1), &Iht::new(1)];
+/// for pursuit in pursuits {
+///     assert_eq!(pursuit.recover(&problem, &mut Workspace::default())?.support, [1]);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Iht {
     n_nonzero_coefs: usize,
@@ -32,7 +49,7 @@ const MARGIN: f64 = 0.01;
 const SHORTER: f64 = 2.0;
 
 impl Iht {
-    /// Pursuit of `n_nonzero_coefs` atoms.
+    /// A pursuit of `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }

@@ -6,27 +6,41 @@ use crate::kernels::{dot, norm};
 use crate::matrix::Matrix;
 use crate::shifted::shifted;
 
-/// How example images become a Gaussian prior: the moments of the images, cleaned and moved about.
+/// Settings that turn example images into a Gaussian prior: the moments of the images after cleaning and shifting.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::recover::ImagePrior;
+///
+/// // one image of 4 × 4 pixels with a bar in its second column
+/// let bar: Vec<f64> = (0..16).map(|i| if i % 4 == 1 { 2.0 } else { 0.0 }).collect();
+/// let prior = ImagePrior { floor: 0.1, ..ImagePrior::UNSEEN }.learn(&Matrix::from_columns(16, 1, &bar)?, 4)?;
+/// let correlation = |i, j| prior.covariance().row(i)[j];
+/// assert!(correlation(1, 5) > correlation(1, 2), "neighbours along the bar go together");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImagePrior {
-    /// How far an image may lie from where its like was seen, pixels; see [`shifted`].
+    /// Largest distance of an image from where similar ones were seen, pixels; see [`shifted`].
     pub reach: usize,
-    /// Weight of the images where they were seen, in [0, 1]; the rest is spread evenly over all shifts.
+    /// Weight of the unshifted images, in [0, 1]; the rest is spread evenly over all shifts.
     pub stay: f64,
     /// Pixels below this share of their image's maximum, in [0, 1), count as background and are set to zero.
     pub threshold: f64,
-    /// Brings all images to the same length ‖x‖₂, their root mean square: a hard press says no more than a soft one.
+    /// Scales all images to the same length ‖x‖₂, their root mean square, so that a hard press counts no more than a
+    /// soft one.
     pub equal_length: bool,
-    /// Moments about the mean, or about zero: then the mean is zero, and how strong a contact is stays open.
+    /// Whether moments are about the mean. If not, they are about zero: the mean is zero, and the strength of a contact
+    /// stays open.
     pub centred: bool,
-    /// Standard deviation of a pixel that nothing explains, in the unit of the images, in (0, ∞).
+    /// Standard deviation added to every pixel, in the unit of the images, in (0, ∞).
     pub floor: f64,
 }
 
 impl ImagePrior {
-    /// For objects unlike those that were seen. From the middle of the flat top of a search over 972 settings on raster
-    /// images of 17 real objects, each left out of its own prior (`tests/priors.rs`); a noise of 0.12 of the root mean
-    /// square of `y` goes with it.
+    /// For objects unlike the example images. The middle of the flat top of a search over 972 settings on raster images
+    /// of 17 real objects, each left out of its own prior (`tests/priors.rs`). To be used with a noise of 0.12 of the
+    /// root mean square of `y`.
     pub const UNSEEN: Self = Self {
         reach: 2,
         stay: 0.3,
@@ -36,7 +50,7 @@ impl ImagePrior {
         floor: 0.01,
     };
 
-    /// For the objects that were seen, where they were seen: mean and covariance of the images as they are.
+    /// For the same objects at the same places as in the example images: their mean and covariance.
     pub const SEEN: Self = Self {
         reach: 0,
         stay: 1.0,
@@ -46,14 +60,14 @@ impl ImagePrior {
         floor: 0.025,
     };
 
-    /// Prior of images like `images` (N × number of images, each of `cols` columns, row-major). Images that are zero
-    /// everywhere are left out.
+    /// Prior of images that resemble `images` (N × number of images, each with `cols` columns, row-major). Images that
+    /// are zero everywhere are ignored.
     ///
-    /// C = Σ v x xᵀ − μ μᵀ + floor² I with μ = Σ v x, or μ = 0 when not centred; the weights v add up to 1.
+    /// C = Σ v x xᵀ − μ μᵀ + floor² I with μ = Σ v x, or μ = 0 if not centred. The weights v sum to 1.
     ///
     /// # Errors
-    /// [`PriorError`] when no image is different from zero, one is not finite, the grid does not fit or a parameter is
-    /// outside its range.
+    /// [`PriorError`] if every image is zero, one is not finite, the grid does not fit, or a parameter is outside its
+    /// range.
     pub fn learn(&self, images: &Matrix, cols: usize) -> Result<Gaussian, PriorError> {
         self.check()?;
         let pixels = images.nrows();

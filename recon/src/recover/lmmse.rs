@@ -10,14 +10,28 @@ use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 use std::sync::Arc;
 
-/// Linear minimum mean-square error estimate of x from y = A x + n with x ~ N(μ, C) and n ~ N(0, σ² I), which is also
-/// the mean of the Gaussian posterior:
+/// Linear minimum mean-square error estimate of x from y = A x + n with x ~ N(μ, C) and n ~ N(0, σ² I). It is also the
+/// mean of the Gaussian posterior:
 ///
-/// x̂ = μ + C Aᵀ (A C Aᵀ + σ² I)⁻¹ (y − A μ) = μ + (Aᵀ A + σ² C⁻¹)⁻¹ Aᵀ (y − A μ); the smaller of the two systems is
+/// x̂ = μ + C Aᵀ (A C Aᵀ + σ² I)⁻¹ (y − A μ) = μ + (Aᵀ A + σ² C⁻¹)⁻¹ Aᵀ (y − A μ). The smaller of the two systems is
 /// solved.
 ///
-/// Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to it.
+/// Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to that value.
 /// Source: S. M. Kay, "Fundamentals of Statistical Signal Processing: Estimation Theory" (1993), §10.6 and §12.5.
+///
+/// ```
+/// use spts_recon::recover::{Gaussian, Lmmse, Noise};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+/// use std::sync::Arc;
+///
+/// // two taxels that are alike; only their sum is measured
+/// let prior = Gaussian::new(vec![0.0; 2], Matrix::from_rows(2, 2, vec![1.0, 0.8, 0.8, 1.0])?)?;
+/// let a = Matrix::from_rows(1, 2, vec![1.0, 1.0])?;
+/// let lmmse = Lmmse::new(Arc::new(prior), Noise::Absolute(1e-3))?;
+/// let image = lmmse.recover(&Problem::new(a.view(), &[4.0])?, &mut Workspace::default())?;
+/// assert!(image.coefficients.iter().all(|x| (x - 2.0).abs() < 1e-3));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Lmmse {
     prior: Arc<Gaussian>,
@@ -25,10 +39,10 @@ pub struct Lmmse {
 }
 
 impl Lmmse {
-    /// Estimate under `prior` for measurements with `noise`.
+    /// The estimate under `prior` for measurements with `noise`.
     ///
     /// # Errors
-    /// [`ParameterError`] when `noise` is outside its range.
+    /// [`ParameterError`] if `noise` is outside its range.
     pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, ParameterError> {
         Ok(Self {
             prior,

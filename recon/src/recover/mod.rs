@@ -1,9 +1,9 @@
-//! Recovery algorithms: images from measurements. One that is told how many atoms to use is a file here and a line in
-//! [`RECOVER`]; one that weighs fit against a prior is a file and a line in [`REGULARISED`]. [`conformance`] and
-//! [`conformance_regularised`] run on all of them.
+//! Recovery algorithms: images from measurements. An algorithm with a given number of atoms has a file here and a line
+//! in [`RECOVER`]; one with a prior has a line in [`REGULARISED`]. [`conformance`] and [`conformance_regularised`] run
+//! on all of them.
 //!
-//! Four have operators of their own instead: [`BatchOmp`] one for many measurements, [`OnlineOmp`] and
-//! [`SequentialEstimate`] rows that come one by one, [`TrackedImage`] windows of an image that changes.
+//! Four algorithms have another interface: [`BatchOmp`] uses one operator for many measurements, [`OnlineOmp`] and
+//! [`SequentialEstimate`] accept rows one by one, and [`TrackedImage`] follows a changing image from window to window.
 
 mod batch_omp;
 mod cholesky;
@@ -71,7 +71,7 @@ use std::sync::Arc;
 /// Builds an algorithm for a target sparsity (`n_nonzero_coefs`).
 pub type Build = fn(usize) -> Box<dyn Recover>;
 
-/// Every algorithm by name.
+/// Every algorithm with a given number of atoms, by name.
 pub const RECOVER: &[(&str, Build)] = &[
     ("reference", |n_nonzero_coefs| {
         Box::new(ReferenceOmp::new(n_nonzero_coefs))
@@ -86,15 +86,14 @@ pub const RECOVER: &[(&str, Build)] = &[
 /// Builds an algorithm for K unknowns, with weak regularisation.
 ///
 /// # Errors
-/// A message when K or a parameter is outside its range.
+/// A message, if K or a parameter is outside its range.
 pub type BuildRegularised = fn(usize) -> Result<Box<dyn Recover>, Box<dyn std::error::Error>>;
 
 /// Share of the largest correlation that the penalties of [`REGULARISED`] have, and of the root mean square of `y` or
 /// of the prior deviation that its noises have.
 const WEAK: f64 = 1e-3;
 
-/// Every algorithm that weighs fit against a prior, by name, here with weak and, as to the prior, neutral settings:
-/// unit deviation, a grid of one row.
+/// Every algorithm with a prior, by name, here with weak and neutral settings: unit deviation, a grid of one row.
 pub const REGULARISED: &[(&str, BuildRegularised)] = &[
     ("nn_lasso", |_| Ok(Box::new(NnLasso::new(Penalty::Relative(WEAK))?))),
     ("lmmse", |k| {

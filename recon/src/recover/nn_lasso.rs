@@ -9,35 +9,47 @@ use crate::workspace::Workspace;
 
 /// Non-negative lasso:
 ///
-/// min ‖y − A w‖² / (2M) + α Σ wₖ subject to w ≥ 0, with α = `alpha`: the parameter of scikit-learn's
+/// min ‖y − A w‖² / (2M) + α Σ wₖ subject to w ≥ 0, where α = `alpha` is the parameter of scikit-learn's
 /// `Lasso(positive=True)`.
 ///
-/// Coordinate descent on a working set that the worst violators of the optimality conditions enter; between sweeps,
-/// Newton steps on the entries that are not zero, cut where one of them reaches zero, make the end of the descent
-/// exact. It stops when the duality gap is at most `stopping.tol` · ‖y‖² / (2M). The feasible dual point is the
-/// residual, shrunk until no column correlates with it by more than the penalty. Penalties below 1e-12 of the one that
-/// makes the answer zero are raised to it.
+/// Coordinate descent on a working set, which the worst violators of the optimality conditions join. Between sweeps,
+/// Newton steps on the non-zero entries, cut where one of them reaches zero, make the result exact. It stops when the
+/// duality gap is at most `stopping.tol` · ‖y‖² / (2M). The feasible dual point is the residual, scaled down until no
+/// column correlates with it by more than the penalty. Penalties below 1e-12 of the one that makes the solution zero
+/// are raised to that value.
 /// Source: J. Friedman, T. Hastie, R. Tibshirani, J. Stat. Softw. 33 (2010) 1, §2; gap and working set: M. Massias,
 /// A. Gramfort, J. Salmon, "Celer", ICML 2018.
+///
+/// ```
+/// use spts_recon::recover::{NnLasso, Penalty};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// let a = Matrix::from_rows(2, 3, vec![1.0, 0.0, 0.6, 0.0, 1.0, 0.8])?;
+/// let lasso = NnLasso::new(Penalty::Relative(0.01))?;
+/// let solution = lasso.recover(&Problem::new(a.view(), &[0.6, 0.8])?, &mut Workspace::default())?;
+/// assert_eq!(solution.support, [2], "one atom explains both measurements");
+/// assert!((solution.coefficients[0] - 0.99).abs() < 1e-6, "shrunk by the penalty");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NnLasso {
     alpha: Penalty,
     normalise: bool,
-    /// Largest duality gap, relative to ‖y‖² / (2M), and most sweeps; [`Self::STOPPING`] by default.
+    /// Largest duality gap relative to ‖y‖² / (2M), and largest number of sweeps; default [`Self::STOPPING`].
     pub stopping: Stopping,
 }
 
 impl NnLasso {
-    /// Gap and sweeps by default.
+    /// Default of `stopping`.
     pub const STOPPING: Stopping = Stopping {
         tol: 1e-8,
         max_iter: 10_000,
     };
 
-    /// Lasso with the penalty `alpha`.
+    /// A lasso with the penalty `alpha`.
     ///
     /// # Errors
-    /// [`ParameterError`] when `alpha` is outside its range.
+    /// [`ParameterError`] if `alpha` is outside its range.
     pub fn new(alpha: Penalty) -> Result<Self, ParameterError> {
         Ok(Self {
             alpha: alpha.checked()?,
@@ -46,7 +58,7 @@ impl NnLasso {
         })
     }
 
-    /// The same for columns brought to unit length first; the coefficients are those of the columns as given.
+    /// The same with columns scaled to unit length first. Coefficients belong to the columns as given.
     #[must_use]
     pub fn with_normalised_columns(self) -> Self {
         Self {

@@ -10,15 +10,29 @@ use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 use std::sync::Arc;
 
-/// Most probable x ≥ 0 given y = A x + n with x ~ N(μ, C), cut at zero, and n ~ N(0, σ² I):
+/// Most probable x ≥ 0 given y = A x + n, with x ~ N(μ, C) truncated to x ≥ 0, and n ~ N(0, σ² I):
 ///
 /// min ‖y − A x‖² / (2σ²) + ½ (x − μ)ᵀ C⁻¹ (x − μ) subject to x ≥ 0.
 ///
-/// Solved exactly, by block principal pivoting on (Aᵀ A + σ² C⁻¹) x − (Aᵀ y + σ² C⁻¹ μ) ≥ 0 ⊥ x ≥ 0; every answer has
-/// passed the check of these conditions, to 1e-12 of the largest term. Where no entry would be negative, it is
-/// [`super::Lmmse`]'s. Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to it.
-/// Source: C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems" (1974), ch. 23, for the problem; the prior
-/// enters it as further rows.
+/// Solved exactly by block principal pivoting on (Aᵀ A + σ² C⁻¹) x − (Aᵀ y + σ² C⁻¹ μ) ≥ 0 ⊥ x ≥ 0. Every solution is
+/// checked for these conditions, to 1e-12 of the largest term. If no entry would be negative, the solution is that of
+/// [`super::Lmmse`]. Noise variances below 1e-12 ‖A‖² tr(C) / (M N) are raised to that value.
+/// Source: C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems" (1974), ch. 23, for the problem. The prior adds
+/// further rows to it.
+///
+/// ```
+/// use spts_recon::recover::{Gaussian, NnLmmse, Noise};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+/// use std::sync::Arc;
+///
+/// let a = Matrix::from_rows(2, 2, vec![1.0, 0.0, 0.0, 1.0])?;
+/// let estimate = NnLmmse::new(Arc::new(Gaussian::white(2, 10.0)?), Noise::Absolute(0.1))?;
+/// let solution = estimate.recover(&Problem::new(a.view(), &[3.0, -0.2])?, &mut Workspace::default())?;
+/// let mut image = [0.0; 2];
+/// solution.scatter(&mut image);
+/// assert!((image[0] - 3.0).abs() < 0.01 && image[1] == 0.0, "pressure is never negative");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct NnLmmse {
     prior: Arc<Gaussian>,
@@ -29,10 +43,10 @@ pub struct NnLmmse {
 const HARDLY: f64 = 0.05;
 
 impl NnLmmse {
-    /// Estimate under `prior` for measurements with `noise`.
+    /// The estimate under `prior` for measurements with `noise`.
     ///
     /// # Errors
-    /// [`ParameterError`] when `noise` is outside its range.
+    /// [`ParameterError`] if `noise` is outside its range.
     pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, ParameterError> {
         Ok(Self {
             prior,

@@ -6,16 +6,29 @@ use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Non-negative orthogonal matching pursuit: each step chooses argmaxₖ aₖᵀ r / ‖aₖ‖₂ among the positive ones and solves
-/// min ‖y − A_S α‖₂, α ≥ 0, on the chosen atoms; those whose coefficient becomes 0 leave the support.
+/// Non-negative orthogonal matching pursuit. Each step selects argmaxₖ aₖᵀ r / ‖aₖ‖₂ among the positive values and
+/// solves min ‖y − A_S α‖₂, α ≥ 0, on the selected atoms. Atoms whose coefficient becomes 0 leave the support.
 ///
-/// The least squares are Lawson and Hanson's: as long as an unconstrained coefficient is not positive, the solution
-/// goes from the last feasible point towards it until the first one is 0, which is dropped. It ends at
-/// `n_nonzero_coefs` atoms, when no atom correlates positively, or when the residual is nothing but rounding.
+/// The least-squares solver is that of Lawson and Hanson: as long as an unconstrained coefficient is not positive, the
+/// solution moves from the last feasible point towards it until the first coefficient is 0, and that atom is dropped.
+/// The pursuit ends at `n_nonzero_coefs` atoms, when no atom has a positive correlation, or when the residual is only
+/// rounding.
 /// Source: A. M. Bruckstein, M. Elad, M. Zibulevsky, "On the uniqueness of nonnegative sparse solutions to
 /// underdetermined systems of equations", IEEE Trans. Inf. Theory 54 (2008); T. T. Nguyen, J. Idier, C. Soussen, E.-H.
 /// Djermoune, "Non-negative orthogonal greedy algorithms", IEEE Trans. Signal Process. 67 (2019); C. L. Lawson, R. J.
 /// Hanson, *Solving Least Squares Problems* (1974), ch. 23.
+///
+/// ```
+/// use spts_recon::recover::{NnOmp, Omp};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// let a = Matrix::from_rows(2, 2, vec![1.0, 0.0, 0.0, 1.0])?;
+/// let y = [1.0, -3.0];
+/// let (problem, mut work) = (Problem::new(a.view(), &y)?, Workspace::default());
+/// assert_eq!(Omp::new(1).recover(&problem, &mut work)?.support, [1]);
+/// assert_eq!(NnOmp::new(1).recover(&problem, &mut work)?.support, [0], "no negative coefficients");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NnOmp {
     n_nonzero_coefs: usize,
@@ -26,7 +39,7 @@ pub struct NnOmp {
 const STEPS: usize = 10;
 
 impl NnOmp {
-    /// Pursuit that stops at `n_nonzero_coefs` atoms at the latest.
+    /// A pursuit with at most `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }

@@ -16,8 +16,8 @@ pub(super) trait Quadratic {
     /// Appends the rows of H_FF to `face`, of which the upper triangle is read.
     fn face(&self, n: usize, free: &[usize], work: &mut Faces, face: &mut Vec<f64>);
 
-    /// Writes H x to `product`, which is zero before, for the x that is `point` on the unknowns `free`, the same ones as of the last
-    /// [`Quadratic::face`], and zero elsewhere.
+    /// Writes H x to `product`, which is zero before, for the x that is `point` on the unknowns `free`, the same ones
+    /// as of the last [`Quadratic::face`], and zero elsewhere.
     fn product(&self, free: &[usize], point: &[f64], work: &mut Faces, product: &mut [f64]);
 }
 
@@ -148,8 +148,8 @@ impl Buffers {
 /// x and h.
 ///
 /// Block principal pivoting: solve on the free unknowns, exchange all that violate a condition, fall back to the last
-/// one (Murty's rule) when whole exchanges stop to help. Murty's rule is finite for positive definite H, but it may visit
-/// very many sets; after [`ROUNDS`] an active set takes over ([`active_set`]). With F free unknowns a round costs
+/// one (Murty's rule) when whole exchanges stop to help. Murty's rule is finite for positive definite H, but it may
+/// visit very many sets; after [`ROUNDS`] an active set takes over ([`active_set`]). With F free unknowns a round costs
 /// O(M F² + F³ + (M + F) n).
 /// Source: L. F. Portugal, J. J. Júdice, L. N. Vicente, Math. Comp. 63 (1994) 625; as used by J. Kim, H. Park, SIAM J.
 /// Sci. Comput. 33 (2011) 3261.
@@ -183,8 +183,8 @@ pub(super) fn minimise(
     active_set(hessian, linear, x, work)
 }
 
-/// As [`minimise`], from x = 0: frees the most violated unknown, and goes towards the minimum on the free ones as far as
-/// none of them falls below zero. The objective falls in every round, so that no set comes twice.
+/// As [`minimise`], from x = 0: frees the most violated unknown, and goes towards the minimum on the free ones as far
+/// as none of them falls below zero. The objective falls in every round, so that no set comes twice.
 /// Source: C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems" (1974), ch. 23, algorithm NNLS.
 fn active_set(hessian: &impl Quadratic, linear: &[f64], x: &mut [f64], work: &mut Buffers) -> Result<(), RecoverError> {
     let n = linear.len();

@@ -6,16 +6,27 @@ use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Orthogonal least squares (also: optimised or order-recursive matching pursuit): each step chooses the atom that
-/// lowers the residual of the least-squares fit most, argmaxₖ (aₖᵀ r)² / ‖P aₖ‖², P the projection off the span of the
-/// chosen atoms.
+/// Orthogonal least squares (also called optimised or order-recursive matching pursuit). Each step selects the atom
+/// that reduces the residual of the least-squares fit most, argmaxₖ (aₖᵀ r)² / ‖P aₖ‖², where P projects off the span
+/// of the selected atoms.
 ///
-/// The lengths follow from the new direction q of every step, ‖P aₖ‖² ← ‖P aₖ‖² − (qᵀ aₖ)², so a step costs O(M·K) as
-/// in orthogonal matching pursuit. Scaling a column does not change the choice. It ends at `n_nonzero_coefs` atoms, or
-/// earlier when the residual is nothing but rounding.
+/// The lengths are updated with the new direction q of every step, ‖P aₖ‖² ← ‖P aₖ‖² − (qᵀ aₖ)², so a step costs
+/// O(M·K), as in orthogonal matching pursuit. Scaling a column does not change the selection. It ends at
+/// `n_nonzero_coefs` atoms, or earlier when the residual is only rounding.
 /// Source: S. Chen, S. A. Billings, W. Luo, "Orthogonal least squares methods and their application to non-linear
 /// system identification", Int. J. Control 50 (1989); L. Rebollo-Neira, D. Lowe, "Optimized orthogonal matching pursuit
 /// approach", IEEE Signal Process. Lett. 9 (2002).
+///
+/// ```
+/// use spts_recon::recover::Ols;
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// let a = Matrix::from_rows(3, 3, vec![1.0, 0.0, 0.9, 0.0, 1.0, 0.9, 0.0, 0.0, 0.1])?;
+/// let y = [2.0, 3.0, 0.0]; // twice the first atom and three times the second
+/// let solution = Ols::new(3).recover(&Problem::new(a.view(), &y)?, &mut Workspace::default())?;
+/// assert!(solution.residual_norm < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ols {
     n_nonzero_coefs: usize,
@@ -26,7 +37,7 @@ pub struct Ols {
 const DEPENDENT_SQUARE: f64 = 1e-12;
 
 impl Ols {
-    /// Pursuit that stops at `n_nonzero_coefs` atoms at the latest.
+    /// A pursuit with at most `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }

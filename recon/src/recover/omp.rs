@@ -5,13 +5,13 @@ use crate::kernels;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Orthogonal matching pursuit: each step chooses argmaxₖ |aₖᵀ r| / ‖aₖ‖₂ and makes the residual r orthogonal to all
-/// chosen atoms; the coefficients are the least-squares solution on them.
+/// Orthogonal matching pursuit. Each step selects argmaxₖ |aₖᵀ r| / ‖aₖ‖₂ and makes the residual r orthogonal to all
+/// selected atoms. The coefficients are the least-squares solution on them.
 ///
-/// It ends at `n_nonzero_coefs` atoms, or earlier when the residual is nothing but rounding. The QR factorisation of
-/// the chosen atoms grows by one column a step (Gram–Schmidt with a second pass where digits were lost), O(M·K) a step,
-/// and nothing is allocated once the workspace has its size. An atom in the span of the chosen ones is passed over; so
-/// is a column shorter than 1e-50 of the longest. Problems of any magnitude are scaled by powers of two first.
+/// It ends at `n_nonzero_coefs` atoms, or earlier when the residual is only rounding. The QR factorisation of the
+/// selected atoms grows by one column in each step (Gram–Schmidt, repeated where digits were lost), at O(M·K) a step;
+/// nothing is allocated once the workspace has its size. Atoms in the span of the selected ones, and columns shorter
+/// than 1e-50 of the longest, are skipped. Problems of any magnitude are first scaled by powers of two.
 /// Source: Y. C. Pati, R. Rezaiifar, P. S. Krishnaprasad, "Orthogonal matching pursuit", Asilomar 1993.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Omp {
@@ -19,7 +19,7 @@ pub struct Omp {
 }
 
 impl Omp {
-    /// Pursuit that stops at `n_nonzero_coefs` atoms at the latest.
+    /// A pursuit with at most `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }

@@ -1,4 +1,4 @@
-//! Orthogonal matching pursuit that is nearly done when the last measurement arrives.
+//! Orthogonal matching pursuit that does most of its work before the last measurement arrives.
 
 use super::gram_pursuit::{Choice, GramPursuit};
 use super::greedy::Greedy;
@@ -9,13 +9,13 @@ use crate::matrix::MatrixView;
 use crate::problem::{Problem, Recover as _, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Orthogonal matching pursuit of a window whose measurements come one by one.
+/// Orthogonal matching pursuit for a window whose measurements arrive one by one.
 ///
-/// The rows of A are known before the measurements: [`Self::announce`] adds them to the Gram matrix G = Aᵀ A and to the
-/// columns' lengths, O(K²) a row. [`Self::measure`] adds a measurement to Aᵀ y, O(K). What is left for
-/// [`Self::recover_into`] is a pursuit on G, which does not look at A: O(S²·K) for S atoms. The choice is that of
-/// [`Omp`]; atoms with less than 1e-10 of their square outside the span of the chosen ones are passed over. Where
-/// squares would overflow or vanish, [`Omp`] itself decodes.
+/// The rows of A are known before the measurements: [`Self::announce`] adds them to the Gram matrix G = Aᵀ A and the
+/// column lengths, at O(K²) a row. [`Self::measure`] adds a measurement to Aᵀ y, at O(K). [`Self::recover_into`] then
+/// runs a pursuit on G without using A: O(S²·K) for S atoms. It selects atoms like [`Omp`]; atoms are skipped if less
+/// than 1e-10 of their square lies outside the span of the selected ones. If squares would overflow or vanish, [`Omp`]
+/// itself is used.
 ///
 /// ```
 /// use spts_recon::recover::OnlineOmp;
@@ -50,7 +50,7 @@ pub struct OnlineOmp {
 }
 
 impl OnlineOmp {
-    /// Empty window of rows with `ncols` entries, for pursuits that stop at `n_nonzero_coefs` atoms at the latest.
+    /// An empty window of rows with `ncols` entries, for pursuits with at most `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(ncols: usize, n_nonzero_coefs: usize) -> Self {
         Self {
@@ -65,7 +65,7 @@ impl OnlineOmp {
         }
     }
 
-    /// Forgets rows and measurements.
+    /// Removes rows and measurements.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.gram.fill(0.0);
@@ -73,16 +73,16 @@ impl OnlineOmp {
         self.clear_measurements();
     }
 
-    /// Forgets the measurements; the rows stay.
+    /// Removes the measurements; the rows stay.
     pub fn clear_measurements(&mut self) {
         self.y.clear();
         self.correlation.fill(0.0);
     }
 
-    /// Adds rows of A that will be measured with, in the order of their measurements.
+    /// Adds rows of A for future measurements, in the order of measurement.
     ///
     /// # Errors
-    /// [`RecoverError::Columns`] when they do not have the window's length, [`RecoverError::OperatorNotFinite`].
+    /// [`RecoverError::Columns`] if the length of a row differs from `ncols`, [`RecoverError::OperatorNotFinite`].
     pub fn announce(&mut self, rows: MatrixView<'_>) -> Result<(), RecoverError> {
         let (k, values) = (self.ncols, rows.values());
         if rows.ncols() != k {
@@ -109,11 +109,11 @@ impl OnlineOmp {
         Ok(())
     }
 
-    /// Adds the next measurement, that of the first announced row without one.
+    /// Adds the next measurement. It belongs to the first announced row without one.
     ///
     /// # Errors
-    /// [`RecoverError::NotFinite`]; [`RecoverError::ShapeMismatch`] when no row was announced for it. Nothing is
-    /// changed then.
+    /// [`RecoverError::NotFinite`], or [`RecoverError::ShapeMismatch`] if no row was announced for it. Nothing changes
+    /// then.
     pub fn measure(&mut self, y: f64) -> Result<(), RecoverError> {
         let (index, k) = (self.y.len(), self.ncols);
         if !y.is_finite() {
@@ -131,11 +131,11 @@ impl OnlineOmp {
         Ok(())
     }
 
-    /// Solves A α ≈ y for all announced rows and overwrites `solution`. After an error its content is of no meaning.
+    /// Solves A α ≈ y for all announced rows into `solution`. After an error the content of `solution` has no meaning.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] unless every announced row has been measured, [`RecoverError::Empty`] without
-    /// rows or atoms, [`RecoverError::Overflow`] when a coefficient is beyond the range of numbers.
+    /// [`RecoverError::ShapeMismatch`] unless every announced row has a measurement, [`RecoverError::Empty`] without
+    /// rows or atoms, [`RecoverError::Overflow`] if a coefficient exceeds the range of numbers.
     pub fn recover_into(&self, workspace: &mut Workspace, solution: &mut Solution) -> Result<(), RecoverError> {
         let (k, m) = (self.ncols, self.rows.len() / self.ncols.max(1));
         let shape = |_| RecoverError::Empty { rows: m, cols: k };

@@ -1,4 +1,4 @@
-//! Parameters of the algorithms, refused where they make no sense.
+//! Parameters of the algorithms, checked for their valid ranges.
 
 use crate::kernels::norm;
 
@@ -10,7 +10,7 @@ pub struct ParameterError {
     pub field: &'static str,
     /// Its value.
     pub value: f64,
-    /// What it may be.
+    /// Valid range.
     pub range: &'static str,
 }
 
@@ -47,8 +47,8 @@ fn within(field: &'static str, value: f64, ok: bool, range: &'static str) -> Res
 pub enum Penalty {
     /// As given, in (0, ∞).
     Absolute(f64),
-    /// Share, in (0, 1], of the largest correlation of a column with `y`, maxₖ aₖᵀ y / M. The answer then scales with
-    /// `y`. At 1, that of the lasso is zero.
+    /// Relative to the largest correlation of a column with `y`, maxₖ aₖᵀ y / M; in (0, 1]. The solution then scales
+    /// with `y`. At 1 the solution of the lasso is zero.
     Relative(f64),
 }
 
@@ -71,7 +71,7 @@ impl Penalty {
 pub enum Noise {
     /// In the unit of `y`, in (0, ∞).
     Absolute(f64),
-    /// Share of the root mean square of `y`, in (0, ∞): contact noise grows with the contact.
+    /// Relative to the root mean square of `y`, in (0, ∞). Contact noise grows with the contact.
     Relative(f64),
 }
 
@@ -96,13 +96,13 @@ impl Noise {
     }
 }
 
-/// When an iteration ends: as soon as its error is at most `tol`, in the method's own measure, or with
-/// [`RecoverError::NotConverged`](crate::RecoverError::NotConverged) after `max_iter` iterations.
+/// Stopping criterion of an iteration: it ends when its error, as the method defines it, is at most `tol`, or fails
+/// with [`RecoverError::NotConverged`](crate::RecoverError::NotConverged) after `max_iter` iterations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stopping {
-    /// Largest error, in (0, ∞). A method that cannot reach it, as with 0 or NaN, ends with the error.
+    /// Largest error, in (0, ∞). If the method cannot reach it, as with 0 or NaN, it fails.
     pub tol: f64,
-    /// Most iterations.
+    /// Largest number of iterations.
     pub max_iter: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Recovery rates: the points of a phase-transition picture.
+//! Recovery rates, the points of a phase-transition diagram.
 
 use crate::matrix::Matrix;
 use crate::problem::{Problem, Recover};
@@ -7,7 +7,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// What is planted.
+/// Signs of the planted coefficients.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signs {
     /// Coefficients of either sign.
@@ -16,7 +16,16 @@ pub enum Signs {
     Positive,
 }
 
-/// A point of the phase plane and how it is measured.
+/// A point of the phase diagram, and how it is measured.
+///
+/// ```
+/// use spts_recon::recover::{Omp, PhasePoint, Signs};
+///
+/// let easy = PhasePoint { n_atoms: 60, delta: 0.5, rho: 0.1, signs: Signs::Either, trials: 20, seed: 1 };
+/// let hard = PhasePoint { rho: 0.8, ..easy };
+/// let rate = |point: PhasePoint| point.recovery_rate(&Omp::new(point.shape().1));
+/// assert!(rate(easy) > 0.9 && rate(hard) < 0.1);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PhasePoint {
     /// Atoms K, at least 1.
@@ -29,7 +38,7 @@ pub struct PhasePoint {
     pub signs: Signs,
     /// Number of random problems.
     pub trials: usize,
-    /// Seed of all of them.
+    /// Seed of all random problems.
     pub seed: u64,
 }
 
@@ -46,11 +55,11 @@ impl PhasePoint {
         (m, share(m, self.rho))
     }
 
-    /// Share of the trials in which `algorithm`, which may have been built for the S of [`Self::shape`], finds the
-    /// planted signal from exact measurements.
+    /// Share of trials in which `algorithm` finds the planted signal from exact measurements. The algorithm may have
+    /// been built for the S of [`Self::shape`].
     ///
-    /// Every trial draws a matrix of independent ±1, a support, and magnitudes uniform in [0.5, 1.5]. It is a function
-    /// of the point alone, whatever the number of threads.
+    /// Every trial draws a matrix of independent ±1, a support, and magnitudes uniform in [0.5, 1.5]. The result
+    /// depends only on the point, not on the number of threads.
     /// Source: D. L. Donoho, J. Tanner, "Observed universality of phase transitions in high-dimensional geometry",
     /// Phil. Trans. R. Soc. A 367 (2009); A. Maleki, D. L. Donoho, "Optimally tuned iterative reconstruction algorithms
     /// for compressed sensing", IEEE J. Sel. Topics Signal Process. 4 (2010).

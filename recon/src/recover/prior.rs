@@ -6,6 +6,16 @@ use crate::matrix::Matrix;
 use nalgebra::DMatrix;
 
 /// Gaussian prior x ~ N(μ, C) of N unknowns.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::recover::Gaussian;
+///
+/// let covariance = Matrix::from_rows(2, 2, vec![1.0, 0.8, 0.8, 1.0])?; // neighbours are alike
+/// let prior = Gaussian::new(vec![0.0; 2], covariance)?;
+/// assert!((prior.precision().row(0)[0] - 1.0 / 0.36).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Gaussian {
     mean: Vec<f64>,
@@ -15,11 +25,11 @@ pub struct Gaussian {
     natural: Vec<f64>,
 }
 
-/// A mean and a covariance that are not those of a Gaussian.
+/// Why mean and covariance do not define a Gaussian.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PriorError {
-    /// The covariance does not fit the mean.
+    /// The size of the covariance does not match the mean.
     #[error("covariance has shape {rows} × {cols} but `mean` has {len} entries")]
     Shape {
         /// Rows of the covariance.
@@ -32,7 +42,7 @@ pub enum PriorError {
     /// An entry of mean or covariance is NaN or infinite.
     #[error("`{field}` holds a value that is not finite")]
     NotFinite {
-        /// Mean or covariance.
+        /// `mean` or `covariance`.
         field: &'static str,
     },
     /// C ≠ Cᵀ.
@@ -44,11 +54,11 @@ pub enum PriorError {
         col: usize,
         /// The entry.
         value: f64,
-        /// The entry across the diagonal.
+        /// The entry mirrored at the diagonal.
         mirror: f64,
     },
-    /// A direction without variance.
-    #[error("covariance is not positive definite; a floor under the deviation cures that")]
+    /// The covariance has a direction without variance.
+    #[error("covariance is not positive definite; a positive `floor` or noise makes it so")]
     NotPositiveDefinite,
     /// No image, or images that do not fit the grid.
     #[error("{images} images of {pixels} pixels do not make a prior on a grid of {cols} columns")]
@@ -60,7 +70,7 @@ pub enum PriorError {
         /// Columns of the grid.
         cols: usize,
     },
-    /// A parameter of the prior of images is outside its range.
+    /// A parameter of the image prior is outside its range.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
 }
@@ -70,10 +80,10 @@ pub enum PriorError {
 const ASYMMETRY: f64 = 1e-10;
 
 impl Gaussian {
-    /// Prior with `mean` (length N) and `covariance` (N × N, positive definite).
+    /// A prior with `mean` (length N) and `covariance` (N × N, positive definite).
     ///
     /// # Errors
-    /// [`PriorError`] when they are not the mean and the covariance of a Gaussian.
+    /// [`PriorError`] if they do not define a Gaussian.
     pub fn new(mean: Vec<f64>, covariance: Matrix) -> Result<Self, PriorError> {
         let n = mean.len();
         if n == 0 || covariance.nrows() != n || covariance.ncols() != n {
@@ -105,10 +115,10 @@ impl Gaussian {
         })
     }
 
-    /// Prior of `n` independent unknowns with mean 0 and standard deviation `deviation`.
+    /// A prior of `n` independent unknowns with mean 0 and standard deviation `deviation`.
     ///
     /// # Errors
-    /// [`PriorError`] when `n` is 0 or `deviation` is outside (0, ∞).
+    /// [`PriorError`] if `n` is 0, or `deviation` is outside (0, ∞).
     pub fn white(n: usize, deviation: f64) -> Result<Self, PriorError> {
         let mut covariance = Matrix::zeros(n, n);
         for i in 0..n {

@@ -1,4 +1,4 @@
-//! Orthogonal matching pursuit as the published decoder runs it.
+//! Orthogonal matching pursuit as in the published decoder.
 
 use super::factor::{CONVERGED, DEPENDENT};
 use crate::kernels::{axpy, norm};
@@ -7,21 +7,34 @@ use crate::operator::LinearOperator as _;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Orthogonal matching pursuit, `reference` behaviour: atoms are NOT normalised, the coefficients are the least-squares
-/// solution on the chosen atoms, and the pursuit ends at `n_nonzero_coefs` atoms or as soon as another atom does not
-/// lower the residual (that atom is then dropped).
+/// Orthogonal matching pursuit with the behaviour of the published code: atoms are NOT normalised, the coefficients are
+/// the least-squares solution on the selected atoms, and the pursuit ends at `n_nonzero_coefs` atoms or as soon as
+/// another atom does not reduce the residual (that atom is then dropped).
 ///
-/// Each step chooses argmaxₖ |aₖᵀ r| and solves min ‖y − A_S α‖₂. The published code calls a pseudo-inverse; here a
-/// Gram–Schmidt QR of A_S is extended by one column a step, which gives the same minimiser while A_S has full column
-/// rank, and the residual rule ends the pursuit when it has not.
+/// Each step selects argmaxₖ |aₖᵀ r| and solves min ‖y − A_S α‖₂. The published code calls a pseudo-inverse. Here a
+/// Gram–Schmidt QR of A_S grows by one column in each step. It gives the same minimiser as long as A_S has full column
+/// rank; otherwise the residual rule ends the pursuit.
 /// Source: Y. C. Pati, R. Rezaiifar, P. S. Krishnaprasad, "Orthogonal matching pursuit", Asilomar 1993.
+///
+/// ```
+/// use spts_recon::recover::{Omp, ReferenceOmp};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// // the second atom is right, but the first is longer
+/// let a = Matrix::from_rows(2, 2, vec![10.0, 0.0, 10.0, 1.0])?;
+/// let (y, mut work) = ([0.0, 1.0], Workspace::default());
+/// let problem = Problem::new(a.view(), &y)?;
+/// assert_eq!(Omp::new(1).recover(&problem, &mut work)?.support, [1]);
+/// assert_eq!(ReferenceOmp::new(1).recover(&problem, &mut work)?.support, [0], "atoms are not normalised");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReferenceOmp {
     n_nonzero_coefs: usize,
 }
 
 impl ReferenceOmp {
-    /// Pursuit that stops at `n_nonzero_coefs` atoms at the latest.
+    /// A pursuit with at most `n_nonzero_coefs` atoms.
     #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }

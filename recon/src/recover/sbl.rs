@@ -7,20 +7,31 @@ use crate::kernels::{axpy, dot, norm};
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Sparse Bayesian learning by fast maximisation of the marginal likelihood: y = A w + n with w_k ~ N(0, γₖ) and n ~
-/// N(0, σ² I); the variances γ maximise log p(y) = −½ (log det C + yᵀ C⁻¹ y) + const, C = σ² I + A Γ Aᵀ, and most of
-/// them become zero. The answer is the posterior mean wₖ = γₖ aₖᵀ C⁻¹ y.
+/// Sparse Bayesian learning by fast maximisation of the marginal likelihood. Model: y = A w + n with w_k ~ N(0, γₖ) and
+/// n ~ N(0, σ² I). The variances γ maximise log p(y) = −½ (log det C + yᵀ C⁻¹ y) + const, C = σ² I + A Γ Aᵀ, and most
+/// of them become zero. The solution is the posterior mean wₖ = γₖ aₖᵀ C⁻¹ y.
 ///
-/// With sₖ = aₖᵀ C₋ₖ⁻¹ aₖ and qₖ = aₖᵀ C₋ₖ⁻¹ y (C without column k) the best variance of one column is (qₖ² − sₖ)/sₖ²
-/// where qₖ² > sₖ and zero elsewhere. Each step gives the column that gains most its best variance: it is added,
-/// re-estimated or deleted, and C⁻¹ follows by a rank-one update. It ends when no column gains more than `stopping.tol`
-/// nats. Noise deviations below 1e-6 of the root mean square of `y` are raised to it.
+/// With sₖ = aₖᵀ C₋ₖ⁻¹ aₖ and qₖ = aₖᵀ C₋ₖ⁻¹ y (C without column k), the best variance of one column is (qₖ² − sₖ)/sₖ²
+/// if qₖ² > sₖ, and zero otherwise. Each step assigns its best variance to the column that gains most: the column is
+/// added, re-estimated or removed, and C⁻¹ is changed by a rank-one update. The iteration ends when no column gains
+/// more than `stopping.tol` nats. Noise deviations below 1e-6 of the root mean square of `y` are raised to that value.
 /// Source: M. E. Tipping, A. C. Faul, "Fast marginal likelihood maximisation for sparse Bayesian models", AISTATS 2003,
 /// eqs. 17–24; the noise is given instead of estimated.
+///
+/// ```
+/// use spts_recon::recover::{Noise, Sbl};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// let a = Matrix::from_rows(2, 3, vec![1.0, 0.0, 0.6, 0.0, 1.0, 0.8])?;
+/// let sbl = Sbl::new(Noise::Relative(0.01))?;
+/// let solution = sbl.recover(&Problem::new(a.view(), &[0.6, 0.8])?, &mut Workspace::default())?;
+/// assert_eq!(solution.support, [2]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sbl {
     noise: Noise,
-    /// Smallest gain of a step, nats, and most steps; [`Self::STOPPING`] by default.
+    /// Smallest gain of a step, nats, and largest number of steps; default [`Self::STOPPING`].
     pub stopping: Stopping,
 }
 
@@ -30,7 +41,7 @@ const SMALLEST_NOISE: f64 = 1e-6;
 const REFRESH: usize = 32;
 
 impl Sbl {
-    /// Gain and steps by default.
+    /// Default of `stopping`.
     pub const STOPPING: Stopping = Stopping {
         tol: 1e-6,
         max_iter: 10_000,
@@ -39,7 +50,7 @@ impl Sbl {
     /// Sparse Bayesian learning for measurements with `noise`.
     ///
     /// # Errors
-    /// [`ParameterError`] when `noise` is outside its range.
+    /// [`ParameterError`] if `noise` is outside its range.
     pub fn new(noise: Noise) -> Result<Self, ParameterError> {
         Ok(Self {
             noise: noise.checked()?,

@@ -1,5 +1,5 @@
-//! Powers of two that bring a problem of any magnitude into the range in which squares neither overflow nor vanish.
-//! Dividing by one loses no digit.
+//! Powers of two that scale a problem of any magnitude so that squares neither overflow nor vanish. Dividing by a power
+//! of two loses no digits.
 
 use crate::kernels;
 use crate::matrix::MatrixView;

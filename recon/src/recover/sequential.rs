@@ -8,21 +8,21 @@ use crate::checks::{RangeError, within};
 use crate::kernels::{adjoint, axpy, dot};
 use std::sync::Arc;
 
-/// Gains and posterior variances of the estimates of [`SequentialEstimate`], row by row: all that needs no sample.
+/// Gains and posterior variances for [`SequentialEstimate`], row by row: everything that needs no sample.
 ///
-/// A row a of weights is a rank-one update: u = P a, q = aᵀ u + ν, gain g = u / q, P ← P − u uᵀ / q, from P = C on. It
-/// costs O(N²). For rows that come with a window, [`Self::push`] each before its sample and [`Self::clear`] at the
-/// window's end. For one fixed sensing matrix, push all of its rows once: every window shares them, and a sample costs
+/// A row a of weights is a rank-one update, starting from P = C: u = P a, q = aᵀ u + ν, gain g = u / q, P ← P − u uᵀ /
+/// q. It costs O(N²). If every window has its own rows, [`Self::push`] each row before its sample, and [`Self::clear`]
+/// at the end of the window. For a fixed sensing matrix, push all rows once: every window uses them, and a sample costs
 /// O(N).
 ///
-/// With [`Noise::Absolute`] the prior is x ~ N(μ, C) and the noise variance is ν = σ². With [`Noise::Relative`] image
-/// and noise have one unknown scale s: x ~ N(0, s² C), and the noise is N(0, s² ν) with ν = share² ‖a‖² tr C / N. That
-/// is the share of the root mean square of the measurements, where the estimate of the mean square is that of the
-/// prior; it does not need the samples, so that P does not either. The scale follows from the samples: ŝ² = Σ ε²/q / M
-/// with the innovations ε, under the prior density 1/s.
+/// With [`Noise::Absolute`] the prior is x ~ N(μ, C), and the noise variance is ν = σ². With [`Noise::Relative`] image
+/// and noise have a common unknown scale s: x ~ N(0, s² C), and the noise is N(0, s² ν) with ν = share² ‖a‖² tr C / N.
+/// This is the share of the measurements' root mean square, with the mean square estimated from the prior instead of
+/// the samples, so that P does not depend on the samples. The scale is estimated from the samples: ŝ² = Σ ε²/q / M with
+/// the innovations ε, under the prior density 1/s.
 ///
-/// Source: R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng. 82 (1960), without
-/// a change of the state; for the unknown scale, A. Gelman and others, *Bayesian Data Analysis* (2013), §14.2.
+/// Source: R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng. 82 (1960), with a
+/// constant state; for the unknown scale, A. Gelman and others, *Bayesian Data Analysis* (2013), §14.2.
 ///
 /// ```
 /// use spts_recon::recover::{Gaussian, Noise, SequentialEstimate, SequentialGains};
@@ -55,14 +55,14 @@ pub struct SequentialGains {
     variances: Vec<f64>,
     /// P after the last row, N × N.
     covariance: Vec<f64>,
-    /// P a, and then that over √q.
+    /// P a, and later the same divided by √q.
     product: Vec<f64>,
 }
 
-/// The estimate by the samples so far. Memory is kept from one window to the next, and a sample allocates nothing.
+/// The estimate from the samples so far. Memory is kept from window to window, and a sample allocates nothing.
 #[derive(Debug, Clone)]
 pub struct SequentialEstimate {
-    /// μ, where the estimate begins.
+    /// μ, the initial estimate.
     start: Vec<f64>,
     mean: Vec<f64>,
     /// Σ ε²/q.
@@ -71,14 +71,14 @@ pub struct SequentialEstimate {
     unknown_scale: bool,
 }
 
-/// Why a row or a sample is refused. What it was given to is then as before.
+/// Why a row or a sample is refused. Nothing has changed then.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SequentialError {
     /// The noise is outside its range.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// A prior with a mean, for images of unknown scale.
+    /// A prior with a mean, while the scale of the image is unknown.
     #[error("a prior of unknown scale has mean 0, but `mean[{index}]` = {value}")]
     Mean {
         /// Index of the first entry that is not zero.
@@ -86,7 +86,7 @@ pub enum SequentialError {
         /// Its value.
         value: f64,
     },
-    /// A row has another number of weights than the image has pixels.
+    /// The number of weights in a row differs from the number of pixels.
     #[error("the row has {cols} weights, expected {expected}")]
     Columns {
         /// Weights of the row.
@@ -94,18 +94,18 @@ pub enum SequentialError {
         /// Pixels of the image.
         expected: usize,
     },
-    /// A weight or a sample is not a number, or too large.
+    /// A weight or a sample that is not a number, or too large.
     #[error(transparent)]
     Range(#[from] RangeError),
-    /// A variance or a squared innovation is beyond the range of numbers.
+    /// A variance or a squared innovation exceeds the range of numbers.
     #[error("row {index} makes {what} overflow")]
     Overflow {
         /// Number of the row.
         index: usize,
-        /// What.
+        /// Which quantity.
         what: &'static str,
     },
-    /// A sample has no row yet.
+    /// A sample arrived before its row.
     #[error("sample {index} arrived, but only {prepared} rows are there")]
     NotPrepared {
         /// Number of the sample.
@@ -119,10 +119,10 @@ pub enum SequentialError {
 pub(super) const LARGEST: f64 = 1e100;
 
 impl SequentialGains {
-    /// Gains under `prior`, before the first row.
+    /// Gains under `prior`, without rows.
     ///
     /// # Errors
-    /// [`SequentialError`] when `noise` is outside its range, or relative and the prior has a mean.
+    /// [`SequentialError`] if `noise` is outside its range, or relative while the prior has a mean.
     pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, SequentialError> {
         let noise = noise.checked()?;
         if let (Noise::Relative(_), Some(index)) = (noise, prior.mean().iter().position(|v| *v != 0.0)) {
@@ -145,10 +145,10 @@ impl SequentialGains {
         })
     }
 
-    /// Takes the weights of the next measurement, each in ±1e100.
+    /// Adds the weights of the next measurement, each in ±1e100.
     ///
     /// # Errors
-    /// [`SequentialError`] when the row does not fit the image, a weight is not a number or out of range, or a variance
+    /// [`SequentialError`] if the row does not fit the image, a weight is not a number or out of range, or a variance
     /// overflows.
     pub fn push(&mut self, row: &[f64]) -> Result<(), SequentialError> {
         let n = self.prior.len();
@@ -205,7 +205,7 @@ impl SequentialGains {
         self.count += 1;
     }
 
-    /// Forgets all rows. Memory is kept.
+    /// Removes all rows and keeps the memory.
     pub fn clear(&mut self) {
         self.count = 0;
         self.covariance.copy_from_slice(self.prior.covariance().view().values());
@@ -217,7 +217,7 @@ impl SequentialGains {
         self.count
     }
 
-    /// Posterior covariance after the last row, N × N, at scale 1.
+    /// Posterior covariance after the last row at scale 1, N × N.
     #[must_use]
     pub fn covariance(&self) -> &[f64] {
         &self.covariance
@@ -231,7 +231,7 @@ impl SequentialGains {
 }
 
 impl SequentialEstimate {
-    /// The estimate before a sample, for `gains`.
+    /// An estimate without samples, for `gains`.
     #[must_use]
     pub fn new(gains: &SequentialGains) -> Self {
         Self {
@@ -243,18 +243,18 @@ impl SequentialEstimate {
         }
     }
 
-    /// Forgets all samples. Memory is kept.
+    /// Removes all samples and keeps the memory.
     pub fn clear(&mut self) {
         self.mean.copy_from_slice(&self.start);
         self.squares = 0.0;
         self.count = 0;
     }
 
-    /// Takes the sample `y`, in ±1e100, of the first row in `gains` that has none: x̂ ← x̂ + g (y − aᵀ x̂).
+    /// Adds the sample `y`, in ±1e100, of the first row in `gains` without one: x̂ ← x̂ + g (y − aᵀ x̂).
     ///
     /// # Errors
-    /// [`SequentialError`] when there is no row for it, the gains are of another image, `y` is not a number or out of
-    /// range, or its squared innovation overflows.
+    /// [`SequentialError`] if there is no row for the sample, the gains belong to another image, `y` is not a number or
+    /// out of range, or its squared innovation overflows.
     pub fn observe(&mut self, gains: &SequentialGains, y: f64) -> Result<(), SequentialError> {
         let (n, at) = (self.mean.len(), self.count);
         if gains.prior.len() != n {
@@ -294,7 +294,8 @@ impl SequentialEstimate {
         &self.mean
     }
 
-    /// Scale ŝ of image and noise: deviations of a pixel are ŝ √Pᵢᵢ. 1 where the scale is known, and before a sample.
+    /// Scale ŝ of image and noise: the standard deviation of pixel i is ŝ √Pᵢᵢ. 1 if the scale is known, and before the
+    /// first sample.
     #[must_use]
     pub fn scale(&self) -> f64 {
         if self.unknown_scale && self.count > 0 {
@@ -304,19 +305,20 @@ impl SequentialEstimate {
         }
     }
 
-    /// Expected intersection over union, in [0, 1], of the support of x̂ with the true one: the taxels above `threshold`
-    /// times the maximum, by the normal marginals of the posterior. It is 0 before a sample.
+    /// Expected intersection over union, in [0, 1], of the support of x̂ with the true one. The support is the set of
+    /// taxels above `threshold` times the maximum, with the normal marginals of the posterior. 0 before the first
+    /// sample.
     ///
     /// E\[IoU\] ≈ Σ_{i ∈ S} pᵢ / (|S| + Σ_{i ∉ S} pᵢ) with S the support of x̂ and pᵢ = P(xᵢ > `threshold`·max x̂).
     ///
     /// # Panics
-    /// When `gains` holds fewer rows than there are samples.
+    /// If `gains` holds fewer rows than there are samples.
     #[must_use]
     pub fn expected_iou(&self, gains: &SequentialGains, threshold: f64) -> f64 {
         self.expected_iou_of(&self.mean, gains, threshold)
     }
 
-    /// The same for the support of `image`, which may be another estimate from the same samples.
+    /// As [`Self::expected_iou`], for the support of `image`, which may be another estimate from the same samples.
     ///
     /// # Panics
     /// As [`Self::expected_iou`].

@@ -1,4 +1,4 @@
-//! Where sparse recovery breaks down in theory: the curves of a phase-transition picture.
+//! Theoretical limits of sparse recovery: the curves of a phase-transition diagram.
 
 use super::parameter::{ParameterError, share};
 use super::phase::Signs;
@@ -10,9 +10,9 @@ const STEPS: usize = 64;
 /// Parameter at which δ is below the smallest normal number.
 const LAST: f64 = 37.0;
 
-/// Weak threshold ρ(δ): below S = ρ·M non-zero coefficients, minimising Σ|x| (of x ≥ 0 where the signs are known to be
-/// positive) finds almost every signal of N = M/δ unknowns from M exact random measurements, above it almost none, as N
-/// grows without bound.
+/// Weak threshold ρ(δ). Below S = ρ·M non-zero coefficients, minimising Σ|x| (over x ≥ 0 if all signs are positive)
+/// finds almost every signal of N = M/δ unknowns from M exact random measurements; above it, almost none. The threshold
+/// holds as N tends to infinity.
 ///
 /// As a curve with the parameter z ≥ 0, with φ and Φ of the standard normal, h = φ(z) − zΦ(−z), and κ = 1 for positive
 /// signals, 2 for either sign:
@@ -24,6 +24,16 @@ const LAST: f64 = 37.0;
 /// Source: D. L. Donoho, A. Maleki, A. Montanari, "Message-passing algorithms for compressed sensing", PNAS 106 (2009)
 /// 18914, eq. 5; D. L. Donoho, J. Tanner, "Counting faces of randomly projected polytopes when the projection radically
 /// lowers dimension", J. AMS 22 (2009).
+///
+/// ```
+/// use spts_recon::recover::{Signs, weak_threshold};
+///
+/// // 20 measurements of 100 taxels: how many non-zero coefficients can be recovered?
+/// let either = 20.0 * weak_threshold(0.2, Signs::Either)?;
+/// let positive = 20.0 * weak_threshold(0.2, Signs::Positive)?;
+/// assert!((4.0..6.0).contains(&either) && positive > either);
+/// # Ok::<(), spts_recon::recover::ParameterError>(())
+/// ```
 ///
 /// # Errors
 /// [`ParameterError`] unless `delta` = M/N is in (0, 1].
@@ -47,8 +57,8 @@ pub fn weak_threshold(delta: f64, signs: Signs) -> Result<f64, ParameterError> {
     Ok(excess(low) / density(low))
 }
 
-/// Threshold of non-negativity alone, ρ = max(0, 2 − 1/δ): below S = ρ·M positive coefficients, almost every x ≥ 0 is
-/// the only one with its measurements, so that whatever looks for a non-negative fit finds it.
+/// Threshold of non-negativity alone, ρ = max(0, 2 − 1/δ). Below S = ρ·M positive coefficients, almost every x ≥ 0 is
+/// the only non-negative one with its measurements, so any method that finds a non-negative fit finds it.
 ///
 /// For matrices whose rows are as likely as their negatives.
 /// Source: D. L. Donoho, J. Tanner, "Counting the faces of randomly-projected hypercubes and orthants, with

@@ -1,4 +1,4 @@
-//! The linear Gaussian estimate of an image that changes in time, window by window.
+//! The linear Gaussian estimate of an image that changes with time, window by window.
 
 use super::expected_iou::expected_iou;
 use super::gaussian::SMALLEST_VARIANCE;
@@ -10,34 +10,34 @@ use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::MatrixView;
 use std::sync::Arc;
 
-/// How an image moves, for [`TrackedImage`]. Times are in any one unit, such as samples or seconds.
+/// Motion model of an image in [`TrackedImage`]. Times may have any unit, such as samples or seconds, but all the same.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
-    /// τ: time in which the shape of the contact is forgotten, in (0, ∞). Two images that are t apart have the
-    /// correlation exp(−t/τ).
+    /// τ: correlation time of the contact's shape, in (0, ∞). Two images at a time difference t have the correlation
+    /// exp(−t/τ).
     pub memory: f64,
-    /// T: time over which the strength of the contact is averaged, in (0, ∞). It should be shorter than the rise of a
-    /// contact, and have some tens of samples.
+    /// T: averaging time of the contact's strength, in (0, ∞). It should be shorter than the rise of a contact and
+    /// include some tens of samples.
     pub strength_memory: f64,
-    /// Noise of a sample that grows with the contact, as a share of the root mean square of the samples, in (0, ∞).
+    /// Noise of a sample that grows with the contact, relative to the root mean square of the samples, in (0, ∞).
     pub noise: f64,
     /// Noise of a sample without a contact, in the unit of the samples, in [0, ∞).
     pub idle_noise: f64,
 }
 
-/// An image followed in time: each window of samples improves what the windows before it told.
+/// An image tracked in time: each window of samples improves on the estimate of earlier windows.
 ///
-/// The image is x = s u. Its shape u is a stationary Gauss-Markov process with the prior N(0, C): from one window to
-/// the next, t later, with ρ = exp(−t/τ),
+/// The image is x = s u. Its shape u is a stationary Gauss–Markov process with the prior N(0, C). Between two windows
+/// with the time difference t, with ρ = exp(−t/τ),
 ///
 /// û ← ρ û, P ← ρ² P + (1 − ρ²) C,
 ///
-/// and every sample y = aᵀ x + n is a rank-one update of û and P, as in [`super::SequentialGains`]. It costs O(N²).
+/// and every sample y = aᵀ x + n is a rank-one update of û and P, as in [`super::SequentialGains`], at O(N²).
 ///
-/// The strength s grows with the contact and is not filtered. It follows from the mean square of the samples, weighted
-/// by exp(−age/T): s² = (⟨y²⟩ − σ₀²) / (⟨‖a‖²⟩ tr C / N), where σ₀ is the idle noise. So a contact that grows keeps its
-/// shape. The noise of a sample is σ² = (`noise`)² ⟨y²⟩ + σ₀². While nothing touches, s is small and σ/s large, so that
-/// P goes back to C: what touches next is not taken for what touched before.
+/// The strength s grows with the contact and is not filtered. It is computed from the mean square of the samples,
+/// weighted by exp(−age/T): s² = (⟨y²⟩ − σ₀²) / (⟨‖a‖²⟩ tr C / N), where σ₀ is the idle noise. A growing contact
+/// therefore keeps its shape. The noise of a sample is σ² = (`noise`)² ⟨y²⟩ + σ₀². Without a contact, s is small and
+/// σ/s large, so P returns to C: the next contact is not biased by the one before.
 ///
 /// Source: R. E. Kalman, "A new approach to linear filtering and prediction problems", J. Basic Eng. 82 (1960); for the
 /// process, S. Särkkä, *Bayesian Filtering and Smoothing* (2013), §4.3.
@@ -73,7 +73,7 @@ pub struct TrackedImage {
     /// s.
     strength: f64,
     sums: Sums,
-    /// P a, and then that over √q.
+    /// P a, and later the same divided by √q.
     product: Vec<f64>,
 }
 
@@ -92,10 +92,10 @@ struct Sums {
 const LEAST_STRENGTH: f64 = 0.02;
 
 impl TrackedImage {
-    /// An image of which nothing is known but `prior`.
+    /// An image with the prior only.
     ///
     /// # Errors
-    /// [`SequentialError`] when a field of `motion` is outside its range, or the prior has a mean.
+    /// [`SequentialError`] if a field of `motion` is outside its range, or the prior has a mean.
     pub fn new(prior: Arc<Gaussian>, motion: Motion) -> Result<Self, SequentialError> {
         positive("memory", motion.memory)?;
         positive("strength_memory", motion.strength_memory)?;
@@ -124,7 +124,7 @@ impl TrackedImage {
         })
     }
 
-    /// Forgets all samples. Memory is kept.
+    /// Removes all samples and keeps the memory.
     pub fn clear(&mut self) {
         self.shape.fill(0.0);
         self.covariance.copy_from_slice(self.prior.covariance().view().values());
@@ -134,12 +134,12 @@ impl TrackedImage {
         self.keep_variances();
     }
 
-    /// Takes the samples `y` of the rows of weights `phi` (M × N), which come `elapsed`, in [0, ∞), after those of the
-    /// window before. Weights and samples are in ±1e100.
+    /// Adds the samples `y` of the rows of weights `phi` (M × N), at the time `elapsed`, in [0, ∞), after the previous
+    /// window. Weights and samples are in ±1e100.
     ///
     /// # Errors
-    /// [`SequentialError`] when the window does not fit the image, holds what is not a number or out of range, or a
-    /// variance overflows. In the last case the image is to be cleared; else it is as before.
+    /// [`SequentialError`] if the window does not fit the image, holds a value that is not a number or out of range, or
+    /// a variance overflows. In the last case the image must be cleared; otherwise it is unchanged.
     pub fn observe(&mut self, elapsed: f64, phi: MatrixView<'_>, y: &[f64]) -> Result<(), SequentialError> {
         let n = self.prior.len();
         if phi.ncols() != n {
@@ -242,7 +242,7 @@ impl TrackedImage {
         &self.image
     }
 
-    /// Strength s of the contact: the deviation of pixel i is s √Pᵢᵢ. 0 before a sample.
+    /// Strength s of the contact: the standard deviation of pixel i is s √Pᵢᵢ. 0 before the first sample.
     #[must_use]
     pub fn strength(&self) -> f64 {
         self.strength
@@ -254,8 +254,8 @@ impl TrackedImage {
         &self.covariance
     }
 
-    /// Expected intersection over union, in [0, 1], of the support of the image with the true one, as
-    /// [`super::SequentialEstimate::expected_iou`] has it: the pixels above `threshold` times the maximum.
+    /// Expected intersection over union, in [0, 1], of the image's support with the true one, as
+    /// [`super::SequentialEstimate::expected_iou`]: pixels above `threshold` times the maximum.
     #[must_use]
     pub fn expected_iou(&self, threshold: f64) -> f64 {
         expected_iou(&self.image, &self.image, &self.variances, self.strength, threshold)

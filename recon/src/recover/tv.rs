@@ -9,22 +9,37 @@ use crate::operator::LinearOperator as _;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
 use crate::workspace::Workspace;
 
-/// Non-negative image of small total variation:
+/// Non-negative image with small total variation:
 ///
-/// min ‖y − A x‖² / (2M) + α Σ |xᵢ − xⱼ| subject to x ≥ 0, the sum over horizontal and vertical neighbours of a grid.
+/// min ‖y − A x‖² / (2M) + α Σ |xᵢ − xⱼ| subject to x ≥ 0. The sum is over horizontal and vertical neighbours of a
+/// grid.
 ///
-/// Primal–dual hybrid gradient on min_{x ≥ 0} max_{q, |p| ≤ λ} ⟨A x − y, q⟩ − ½ ‖q‖² + ⟨∇x, p⟩ with λ = M α, restarted
-/// from its running mean whenever that has made the gap much smaller, primal and dual steps rebalanced at restarts. It
-/// stops when the duality gap is at most `stopping.tol` · ‖y‖² / (2M). The dual objective is taken on 0 ≤ x ≤ R with R
-/// twice the largest x plus ‖y‖/‖A‖: as the answer stays well inside, convexity makes it optimal without that bound as
-/// well.
+/// Primal–dual hybrid gradient on min_{x ≥ 0} max_{q, |p| ≤ λ} ⟨A x − y, q⟩ − ½ ‖q‖² + ⟨∇x, p⟩ with λ = M α. It
+/// restarts from its running mean whenever that has reduced the gap enough, and rebalances primal and dual steps at
+/// restarts. It stops when the duality gap is at most `stopping.tol` · ‖y‖² / (2M). The dual objective is evaluated on
+/// 0 ≤ x ≤ R, where R is twice the largest x plus ‖y‖/‖A‖. The solution stays well inside this bound, so by convexity
+/// it is also optimal without the bound.
 /// Source: A. Chambolle, T. Pock, J. Math. Imaging Vis. 40 (2011) 120; restarts: D. Applegate et al., "Practical
 /// large-scale linear programming using primal-dual hybrid gradient", NeurIPS 2021.
+///
+/// ```
+/// use spts_recon::recover::{Penalty, Tv};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// // the first and the last of four pixels in a row are measured
+/// let a = Matrix::from_rows(2, 4, vec![1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])?;
+/// let tv = Tv::new(1, 4, Penalty::Relative(1e-3))?;
+/// let solution = tv.recover(&Problem::new(a.view(), &[2.0, 2.0])?, &mut Workspace::default())?;
+/// let mut image = [0.0; 4];
+/// solution.scatter(&mut image);
+/// assert!(image.iter().all(|x| (x - 2.0).abs() < 0.05), "the smoothest image is constant");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tv {
     grid: Grid,
     alpha: Penalty,
-    /// Largest duality gap, relative to ‖y‖² / (2M), and most iterations; [`Self::STOPPING`] by default.
+    /// Largest duality gap relative to ‖y‖² / (2M), and largest number of iterations; default [`Self::STOPPING`].
     pub stopping: Stopping,
 }
 
@@ -42,7 +57,7 @@ const POWER_MARGIN: f64 = 1.05;
 const GRADIENT_SQUARE: f64 = 8.0;
 
 impl Tv {
-    /// Gap and iterations by default.
+    /// Default of `stopping`.
     pub const STOPPING: Stopping = Stopping {
         tol: 1e-6,
         max_iter: 200_000,
@@ -51,7 +66,7 @@ impl Tv {
     /// Images of `rows` × `cols` pixels (row-major) with the penalty `alpha`.
     ///
     /// # Errors
-    /// [`ParameterError`] when `alpha` is outside its range.
+    /// [`ParameterError`] if `alpha` is outside its range.
     pub fn new(rows: usize, cols: usize, alpha: Penalty) -> Result<Self, ParameterError> {
         Ok(Self {
             grid: Grid { rows, cols },
@@ -139,9 +154,9 @@ impl Point {
 /// Memory of the iteration.
 #[derive(Debug, Default)]
 struct TvScratch {
-    /// The operator over its norm, M × N.
+    /// The operator divided by its norm, M × N.
     operator: Vec<f64>,
-    /// The measurements over their norm.
+    /// The measurements divided by their norm.
     y: Vec<f64>,
     now: Point,
     mean: Point,

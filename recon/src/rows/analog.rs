@@ -6,7 +6,7 @@ use super::greedy::Greedy;
 const CODES: u16 = 256;
 
 impl Greedy {
-    /// Rows of the 256 levels of an 8-bit converter, (2 c − 255) / 255 for the codes c.
+    /// Rows with the 256 levels of an 8-bit converter, (2 c − 255) / 255 for the codes c.
     #[must_use]
     pub fn analog() -> Self {
         let last = f64::from(CODES - 1);

@@ -1,4 +1,4 @@
-//! Better rows, level by level.
+//! Improves rows level by level.
 
 use super::headroom::Headroom;
 

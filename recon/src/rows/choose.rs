@@ -1,4 +1,4 @@
-//! Rows chosen among those that are there already.
+//! Selects rows among given candidates.
 
 use super::classes::Apart;
 use super::error::RowError;
@@ -6,13 +6,29 @@ use super::task::RowTask;
 use crate::kernels::{axpy, dot};
 use crate::matrix::MatrixView;
 
-/// `task.rows` rows of `candidates` (C × N), by their numbers, in the order of their choice: each is the one that
-/// lowers the trace of the posterior covariance most, see [`super::DESIGNERS`], `greedy`. No row is chosen twice.
+/// Selects `task.rows` rows of `candidates` (C × N), and returns their numbers in order of selection. Each is the row
+/// that reduces the trace of the posterior covariance most; see `greedy` in [`super::DESIGNERS`]. No row is selected
+/// twice.
 ///
-/// Costs O(C N) a row: P a is kept for every candidate.
+/// Costs O(C N) for each row, because P a is kept for every candidate.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::rows::{Expected, RowTask, choose_for_images};
+///
+/// let smooth = Expected::smooth([2, 2], 2.0)?;
+/// let candidates = Matrix::from_rows(3, 4, vec![
+///     1.0, -1.0, -1.0, 1.0, //
+///     1.0, 1.0, 1.0, 1.0, //
+///     1.0, 1.0, -1.0, -1.0,
+/// ])?;
+/// let chosen = choose_for_images(&RowTask::new(2, &smooth), candidates.view())?;
+/// assert_eq!(chosen[0], 1, "the sum says most about a smooth image");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 ///
 /// # Errors
-/// [`RowError`] when the task is out of range, the candidates have another number of taxels, or there are too few.
+/// [`RowError`] if the task is out of range, the candidates have another number of taxels, or there are too few.
 pub fn choose_for_images(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<Vec<usize>, RowError> {
     let n = check(task, candidates)?;
     let covariance = task.expected.covariance();
@@ -49,11 +65,11 @@ pub fn choose_for_images(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Resu
     Ok(chosen)
 }
 
-/// The same, each row the one that lowers the bound of the errors between `task.classes` most, see
-/// [`super::DESIGNERS`], `classes`.
+/// As [`choose_for_images`], but each row is the one that reduces the bound of the errors between `task.classes` most;
+/// see `classes` in [`super::DESIGNERS`].
 ///
 /// # Errors
-/// As [`choose_for_images`], and [`RowError::Classes`] without two classes.
+/// As [`choose_for_images`], and [`RowError::Classes`] for fewer than two classes.
 pub fn choose_for_classes(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<Vec<usize>, RowError> {
     let n = check(task, candidates)?;
     let mut apart = Apart::new(task.classes, task.expected.shape())?;

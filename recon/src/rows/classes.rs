@@ -1,4 +1,4 @@
-//! Rows that tell classes apart.
+//! Rows that distinguish classes.
 
 use super::ascent::{Worth, climb};
 use super::error::RowError;
@@ -12,17 +12,17 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// Rows of ±1 that tell Gaussian classes of unknown amplitude apart, one after the other.
+/// Rows of ±1 that distinguish Gaussian classes of unknown amplitude, designed one after the other.
 ///
-/// With the classes' mean covariance Σ and noise ν, templates t are compared in the metric of what the rows A say,
-/// ⟨t, u⟩ = tᵀAᵀ(A Σ Aᵀ + ν I)⁻¹A u. At an amplitude that is not known, u lies D = |t|² − max(⟨t, u⟩, 0)²/|u|² from t,
-/// and the union bound of the errors is Σ Q(√D/2) ≤ ½ Σ exp(−D/8) over ordered pairs of different classes (J. G.
-/// Proakis, *Digital Communications*, 4th ed., §5.2). Every row lowers that sum most.
+/// With the classes' mean covariance Σ and noise ν, templates t are compared in the metric of the rows A: ⟨t, u⟩ =
+/// tᵀAᵀ(A Σ Aᵀ + ν I)⁻¹A u. If the amplitude is unknown, the distance of u from t is D = |t|² − max(⟨t, u⟩, 0)²/|u|².
+/// The union bound of the errors is Σ Q(√D/2) ≤ ½ Σ exp(−D/8) over ordered pairs of different classes (J. G. Proakis,
+/// *Digital Communications*, 4th ed., §5.2). Every row is the one that reduces this sum most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Classes {
-    /// Rows that are started from.
+    /// Number of initial rows that are tried.
     pub starts: usize,
-    /// Most times through all taxels for each.
+    /// Largest number of sweeps over all taxels for each of them.
     pub sweeps: usize,
 }
 
@@ -72,11 +72,11 @@ pub(super) struct Apart {
     p: Vec<f64>,
     /// ν.
     variance: f64,
-    /// What the rows do not explain of the templates, K × N.
+    /// Part of the templates that the rows do not explain, K × N.
     residual: Vec<f64>,
     /// ⟨t, u⟩, K × K.
     products: Vec<f64>,
-    /// Ordered pairs of different classes, those that are least apart first.
+    /// Ordered pairs of different classes, the closest first.
     pairs: Vec<(usize, usize)>,
 }
 

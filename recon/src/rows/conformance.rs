@@ -1,4 +1,4 @@
-//! What every designer of rows must satisfy.
+//! Properties that every designer of rows must have.
 
 use super::covariance::posterior_trace;
 use super::error::RowError;
@@ -14,12 +14,12 @@ use rand_chacha::ChaCha8Rng;
 /// Grids: a single taxel, strips, sides that are no powers of two, a square.
 const SHAPES: [[usize; 2]; 6] = [[1, 1], [1, 7], [9, 1], [3, 5], [4, 4], [10, 10]];
 
-/// Checks `designer` on every grid, number of rows and extreme of its parameters: rows of its levels, no two alike, the
-/// same again and for any number of threads, within the headroom or an error that says so, and no image is seen worse
-/// than by chance.
+/// Checks `designer` on several grids, numbers of rows and extremes of its parameters. Rows must have its levels and
+/// differ from each other. The result must be reproducible with any number of threads. Rows must respect the headroom,
+/// or the designer returns the error that says so. No image may be measured worse than by random rows.
 ///
 /// # Panics
-/// With the name of the designer when it does not conform.
+/// If a property fails; the message names the designer.
 pub fn conformance(designer: &Designer) {
     let (name, method) = (designer.name, (designer.build)());
     for shape in SHAPES {

@@ -6,7 +6,7 @@ use super::task::{DesignRows, RowTask};
 use crate::matrix::Matrix;
 
 /// Signs of the functions cos(π(r + ½)u/R) · cos(π(c + ½)v/C) of the two-dimensional cosine transform, low frequencies
-/// first. They need to know nothing of the images but that low frequencies are strong.
+/// first. Of the images, this design assumes only that low frequencies are strong.
 /// Source: N. Ahmed, T. Natarajan, K. R. Rao, IEEE Trans. Comput. C-23 (1974) 90.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CosineSigns;

@@ -1,4 +1,4 @@
-//! Covariance of the images that is left after measurements.
+//! Covariance of the images after measurements.
 
 use super::error::RowError;
 use super::task::RowTask;
@@ -65,14 +65,14 @@ impl Posterior {
     }
 }
 
-/// Share of the expected images' variance that is left after the measurements `rows` (M × N): the trace of the
-/// posterior covariance over the trace of the prior's.
+/// Share of the expected images' variance that remains after the measurements `rows` (M × N): the trace of the
+/// posterior covariance divided by that of the prior.
 ///
-/// tr P = tr C − ‖L⁻¹ A C‖², L Lᵀ = A C Aᵀ + σ² I. Takes O(M²N) and M products with C, which for separable images take
-/// O(N) times the sides of the grid.
+/// tr P = tr C − ‖L⁻¹ A C‖², L Lᵀ = A C Aᵀ + σ² I. The cost is O(M²N) plus M products with C; for separable images such
+/// a product costs O(N) times the sides of the grid.
 ///
 /// # Errors
-/// [`RowError`] when the task is out of range or the rows do not fit its taxels.
+/// [`RowError`] if the task is out of range, or the rows have another number of taxels.
 pub fn posterior_trace(task: &RowTask<'_>, rows: &Matrix) -> Result<f64, RowError> {
     task.check(usize::MAX, "")?;
     let expected = task.expected;

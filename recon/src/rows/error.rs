@@ -1,24 +1,24 @@
-//! Why there are no rows.
+//! Errors of row design.
 
 use crate::checks::RangeError;
 use crate::coherence::CoherenceError;
 use crate::recover::PriorError;
 
-/// Why rows cannot be designed or chosen.
+/// Why rows cannot be designed or selected.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RowError {
     /// A parameter is outside its range.
     #[error(transparent)]
     Range(#[from] RangeError),
-    /// More rows are asked for than there are.
+    /// More rows are requested than exist.
     #[error("`rows` = {rows} is outside [1, {most}]: {reason}")]
     Rows {
-        /// Rows asked for.
+        /// Requested number of rows.
         rows: usize,
-        /// Most rows that can be had.
+        /// Largest possible number of rows.
         most: usize,
-        /// What limits them.
+        /// Reason for the limit.
         reason: &'static str,
     },
     /// The expected images do not fit the grid.
@@ -31,24 +31,26 @@ pub enum RowError {
         /// Columns of the grid.
         cols: usize,
     },
-    /// The designer needs classes to tell apart.
+    /// The designer needs classes to distinguish.
     #[error("`classes` has {labels} classes; rows that tell classes apart need at least 2")]
     Classes {
         /// Number of different labels.
         labels: usize,
     },
-    /// No row keeps to the headroom.
-    #[error("no row of levels ±1 has a sum below {limit:.3} of a random row's; the smallest found has {least:.3}")]
+    /// No row respects the headroom.
+    #[error(
+        "no row of levels ±1 has a sum below `largest_sum` = {limit:.3} of a random row's; the smallest has {least:.3}"
+    )]
     Headroom {
-        /// The limit, as a multiple of a random row's root mean square.
+        /// The limit, relative to a random row's root mean square.
         limit: f64,
-        /// The smallest that was found.
+        /// The smallest value found.
         least: f64,
     },
-    /// Images that make no Gaussian prior.
+    /// Images from which no Gaussian prior can be made.
     #[error(transparent)]
     Prior(#[from] PriorError),
-    /// A matrix that cannot be judged.
+    /// A matrix whose coherence cannot be computed.
     #[error(transparent)]
     Coherence(#[from] CoherenceError),
 }

@@ -1,4 +1,4 @@
-//! Better seeds by search: sets that are drawn whole, then single seeds exchanged.
+//! Searches for better seeds: first whole sets, then exchanges of single seeds.
 
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -6,17 +6,17 @@ use rayon::prelude::*;
 
 /// A search for seeds of low cost.
 pub struct Exchange<'a, E> {
-    /// Sets that are tried: half of them drawn whole, the others what the best of these becomes by exchanging one seed
-    /// at a time.
+    /// Number of sets that are tried. Half of them are drawn as a whole; the others come from the best of these by
+    /// exchanging one seed at a time.
     pub budget: usize,
-    /// The set of a salt.
+    /// Computes the set of seeds for a salt.
     pub salted: &'a (dyn Fn(u32) -> Vec<u32> + Sync),
-    /// Cost of a set.
+    /// Computes the cost of a set.
     pub cost: &'a (dyn Fn(&[u32]) -> Result<f64, E> + Sync),
 }
 
-/// The best set that `search` finds, `start` included, with its cost. Salts come from the first generator, exchanges
-/// from the second; the answer does not depend on the threads.
+/// The best set that `search` finds (`start` included), and its cost. Salts come from the first generator, exchanges
+/// from the second. The result does not depend on the number of threads.
 ///
 /// # Errors
 /// The error of the cost.

@@ -1,4 +1,4 @@
-//! What images are expected, and what they have to be robust against.
+//! Expected images, and their tolerances.
 
 use super::error::RowError;
 use crate::checks::within;
@@ -7,6 +7,17 @@ use crate::matrix::Matrix;
 use crate::recover::Gaussian;
 
 /// Second moments of the images that rows are designed for.
+///
+/// ```
+/// use spts_recon::recover::Gaussian;
+/// use spts_recon::rows::{Expected, Tolerances};
+///
+/// let prior = Gaussian::white(12, 1.0)?;
+/// let images = Expected::like(&prior, [3, 4], Tolerances { gain_log_sd: 0.3, shift: 1 })?;
+/// assert_eq!((images.shape(), images.taxels()), ([3, 4], 12));
+/// assert!(Expected::like(&prior, [4, 4], Tolerances::default()).is_err(), "12 taxels do not fill 4 × 4");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
     pub(super) shape: [usize; 2],
@@ -21,12 +32,12 @@ pub(super) enum Moments {
     Separable { rows: Matrix, cols: Matrix },
 }
 
-/// What the images may differ in from those that were expected.
+/// Differences that images may have from the expected ones.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Tolerances {
     /// Standard deviation of the logarithm of a taxel's gain, in [0, 3].
     pub gain_log_sd: f64,
-    /// Images may lie elsewhere by up to this many taxels, all places alike, at most 64.
+    /// Largest shift of the images, taxels, at most 64; all shifts are equally likely.
     pub shift: usize,
 }
 
@@ -36,8 +47,8 @@ const FLOOR: f64 = 1e-9;
 const MOST: (f64, usize) = (3.0, 64);
 
 impl Expected {
-    /// Smooth images on a grid of `shape` = [rows, columns]: Cᵢⱼ = exp(−dᵢⱼ²/2ℓ²) with the distance d in taxels, mean
-    /// 0. Separable, so that grids of any size are described by two small matrices.
+    /// Smooth images on a grid of `shape` = [rows, columns]: Cᵢⱼ = exp(−dᵢⱼ²/2ℓ²) with the distance d in taxels, and
+    /// mean 0. The covariance is separable, so two small matrices describe grids of any size.
     ///
     /// # Errors
     /// [`RowError::Range`] unless `length` ℓ is in [0.01, 1000] taxels, [`RowError::Shape`] for an empty grid.
@@ -63,12 +74,12 @@ impl Expected {
         })
     }
 
-    /// Images of `prior` on a grid of `shape` = [rows, columns], which may differ from it by `tolerances`: with gains g
-    /// of mean 1 and variance v = e^{σ²} − 1, E[g g ᵀ] = 1 + v I multiplies the second moments entry by entry; moments
-    /// of shifted images are averaged over all shifts, zeros moving in.
+    /// Images of `prior` on a grid of `shape` = [rows, columns], with `tolerances`. Gains g with mean 1 and variance v
+    /// = e^{σ²} − 1 multiply the second moments entry by entry by E[g gᵀ] = 1 + v I. Moments are averaged over all
+    /// shifts, with zeros moving in.
     ///
     /// # Errors
-    /// [`RowError::Shape`] when the prior does not fill the grid, [`RowError::Range`] for tolerances out of range.
+    /// [`RowError::Shape`] if the prior does not fit the grid, [`RowError::Range`] for tolerances out of range.
     pub fn like(prior: &Gaussian, shape: [usize; 2], tolerances: Tolerances) -> Result<Self, RowError> {
         check_shape(shape, prior.mean().len())?;
         within("gain_log_sd", tolerances.gain_log_sd, 0.0, MOST.0)?;
@@ -273,8 +284,8 @@ fn moved(shape: [usize; 2], reach: usize, mean: &[f64], second: &Matrix) -> (Vec
 mod tests {
     use super::*;
 
-    /// One taxel of 3 × 3 of value 2, moved by up to one: nine places alike, so that S = 4/9 on the diagonal; then gains
-    /// of variance v on top.
+    /// One taxel of 3 × 3 of value 2, moved by up to one: nine places alike, so that S = 4/9 on the diagonal; then
+    /// gains of variance v on top.
     #[test]
     fn tolerances_widen_the_moments() {
         let mut mean = vec![0.0; 9];

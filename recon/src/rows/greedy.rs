@@ -1,4 +1,4 @@
-//! One row after the other, each the one that lowers the posterior variance most.
+//! Rows designed one after the other, each for the largest reduction of the posterior variance.
 
 use super::ascent::{Worth, climb};
 use super::covariance::Posterior;
@@ -12,16 +12,16 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// Rows that lower the trace of the posterior covariance P of the expected images most, one after the other: the fall
-/// for a row a is |P a|² / (aᵀP a + σ²). A row starts from the signs of P's leading eigenvectors, of pairs of them and
-/// of chance, and single levels change while the fall grows.
+/// Rows that reduce the trace of the posterior covariance P of the expected images most, one after the other. The
+/// reduction by a row a is |P a|² / (aᵀP a + σ²). The search for a row starts from the signs of P's leading
+/// eigenvectors, of pairs of them, and of random vectors; single levels then change as long as the reduction grows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Greedy {
-    /// Levels that a weight may have.
+    /// Possible levels of a weight.
     pub levels: Vec<f64>,
-    /// Rows that are started from.
+    /// Number of initial rows that are tried.
     pub starts: usize,
-    /// Most times through all taxels for each.
+    /// Largest number of sweeps over all taxels for each of them.
     pub sweeps: usize,
 }
 

@@ -6,12 +6,12 @@ use super::headroom::take;
 use super::task::{DesignRows, RowTask};
 use crate::matrix::Matrix;
 
-/// Two-dimensional Walsh functions: rows of a Hadamard matrix, cut to the sheet where its sides are no powers of two.
+/// Two-dimensional Walsh functions: rows of a Hadamard matrix, cropped to the sheet if its sides are not powers of two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hadamard {
-    /// By their numbers of sign changes, like frequencies.
+    /// Ordered by number of sign changes, similar to frequencies.
     Sequency,
-    /// By the number of blocks of one sign, the fewest first.
+    /// Ordered by number of blocks of one sign, the fewest first.
     /// Source: W.-K. Yu, Sensors 19 (2019) 4122 ("cake-cutting").
     CakeCutting,
 }

@@ -54,11 +54,11 @@ impl Headroom {
     }
 }
 
-/// Largest root mean square of the sum of one of `rows` (M × N) over the expected images, as a multiple of a random
-/// row's: what a limit of [`RowTask::largest_sum`] is compared with.
+/// Largest root mean square of a row's sum over the expected images, among `rows` (M × N), relative to that of a random
+/// row. It is compared with the limit [`RowTask::largest_sum`].
 ///
 /// # Panics
-/// When the rows have another number of taxels than the images.
+/// If the rows have another number of taxels than the images.
 #[must_use]
 pub fn largest_sum(expected: &Expected, rows: &Matrix) -> f64 {
     assert_eq!(rows.ncols(), expected.taxels(), "taxels");

@@ -1,9 +1,9 @@
-//! Rows of the sensing matrix that are designed for what is to be seen, in place of random ones.
+//! Designs rows of the sensing matrix for expected images, in place of random rows.
 //!
-//! A [`RowTask`] says how many rows, of which levels, for which images; a designer in [`DESIGNERS`] answers with the
-//! sensing matrix. [`choose_for_images`] and [`choose_for_classes`] pick from rows that are there already, such as
-//! those that a press was recorded with. A designer is a file here and a line in [`DESIGNERS`]; [`conformance`] runs on
-//! all of them.
+//! A [`RowTask`] states how many rows are needed, with which levels, and for which images. A designer in [`DESIGNERS`]
+//! computes the sensing matrix. [`choose_for_images`] and [`choose_for_classes`] select among given rows, such as those
+//! with which a press was recorded. A designer has a file here and a line in [`DESIGNERS`]; [`conformance`] runs on all
+//! of them.
 //!
 //! ```
 //! use spts_recon::rows::{DESIGNERS, Expected, RowTask, posterior_trace};

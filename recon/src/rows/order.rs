@@ -1,14 +1,25 @@
-//! The order in which rows are put out.
+//! Order in which rows are put out.
 
 use crate::matrix::MatrixView;
 
-/// An order of `rows` (M × N) in which levels change least from one row to the next and from the last to the first:
-/// the sum over taxels of `weights` times the squared change, as cells that are late and an amplifier that settles feel
-/// it. Begins with row 0; nearest neighbours first, then exchanges of stretches while they gain (G. A. Croes, Oper.
-/// Res. 6 (1958) 791).
+/// Orders `rows` (M × N) so that levels change least from one row to the next and from the last to the first. The cost
+/// is the sum over taxels of `weights` times the squared change, because late cells and a settling amplifier cause
+/// errors at changes. The order begins with row 0. It is built from nearest neighbours and improved by reversing
+/// sections while this helps (G. A. Croes, Oper. Res. 6 (1958) 791).
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::rows::fewest_flips;
+///
+/// let rows = Matrix::from_rows(4, 2, vec![1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0])?;
+/// let order = fewest_flips(rows.view(), &[1.0, 1.0]);
+/// let flips = |a: usize, b: usize| rows.row(a).iter().zip(rows.row(b)).filter(|(a, b)| a != b).count();
+/// assert!((0..4).all(|k| flips(order[k], order[(k + 1) % 4]) == 1));
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
 ///
 /// # Panics
-/// When there is not one weight a taxel.
+/// If the number of weights differs from that of the taxels.
 #[must_use]
 pub fn fewest_flips(rows: MatrixView<'_>, weights: &[f64]) -> Vec<usize> {
     let (m, n) = (rows.nrows(), rows.ncols());

@@ -7,7 +7,7 @@ use crate::matrix::Matrix;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// Independent random signs, as all other designs are measured against.
+/// Independent random signs, the reference for all other designs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Random;
 

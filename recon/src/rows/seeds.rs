@@ -1,4 +1,4 @@
-//! The best rows that one generator a taxel puts out, by the choice of its seed.
+//! The best rows that generators with one seed a taxel can put out.
 
 use super::error::RowError;
 use super::exchange::{Exchange, exchange};
@@ -9,18 +9,29 @@ use crate::operator::SignGenerator;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// Rows of pseudorandom generators, one a taxel, whose seeds are searched so that the rows say different things: the
-/// mean square coherence of two rows is the least that was found.
+/// Rows of pseudorandom generators, one a taxel. Seeds are searched for the smallest mean square coherence between
+/// rows, so that rows measure different things.
+///
+/// ```
+/// use spts_recon::operator::SignGenerator;
+/// use spts_recon::rows::{Expected, RowTask, SeedsSearch};
+///
+/// let images = Expected::smooth([4, 4], 1.0)?;
+/// let search = SeedsSearch { generator: SignGenerator::NUMERICAL_RECIPES, budget: 50 };
+/// let (seeds, rows) = search.search(&RowTask::new(6, &images))?;
+/// assert_eq!((seeds.len(), rows.nrows(), rows.ncols()), (16, 6, 16));
+/// # Ok::<(), spts_recon::rows::RowError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeedsSearch {
-    /// Generator of the taxels; the first row is one step after the seed.
+    /// Generator of the taxels. The first row is one step after the seed.
     pub generator: SignGenerator,
-    /// Sets of seeds that are tried.
+    /// Number of sets of seeds that are tried.
     pub budget: usize,
 }
 
 impl SeedsSearch {
-    /// Seeds, one a taxel, and the M × N signs that they give.
+    /// The seeds, one a taxel, and their M × N signs.
     ///
     /// # Errors
     /// As [`DesignRows::design`].

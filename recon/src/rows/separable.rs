@@ -1,4 +1,4 @@
-//! Rows for large sheets, products of a row along either axis.
+//! Rows for large sheets: products of one row along each axis.
 
 use super::cosine::products;
 use super::error::RowError;
@@ -8,9 +8,9 @@ use super::headroom::take;
 use super::task::{DesignRows, RowTask};
 use crate::matrix::Matrix;
 
-/// Signs that are products a ⊗ b of a row along the rows and one along the columns of the sheet, each designed by
-/// [`Greedy`] for the covariance along its axis; pairs that explain most come first. Memory and time grow with the
-/// sides of the sheet and not with its taxels squared.
+/// Signs a ⊗ b, products of a row along the rows and one along the columns of the sheet. [`Greedy`] designs each for
+/// the covariance along its axis; pairs that explain most variance come first. Memory and time grow with the sides of
+/// the sheet, not with the square of its taxels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Separable;
 

@@ -1,4 +1,4 @@
-//! The table of designers. A new one is a file beside this and a line here.
+//! The table of designers. A new one has a file beside this one and a line here.
 
 use super::classes::Classes;
 use super::cosine::CosineSigns;
@@ -10,14 +10,14 @@ use super::separable::Separable;
 use super::task::DesignRows;
 use crate::operator::SignGenerator;
 
-/// What a designer has to know of the images.
+/// What a designer needs to know about the images.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RowNeeds {
-    /// Nothing but the grid.
+    /// Only the grid.
     Nothing,
     /// Their second moments.
     Moments,
-    /// Classes to tell apart.
+    /// Classes to distinguish.
     Classes,
 }
 
@@ -37,13 +37,13 @@ pub struct Designer {
     pub name: &'static str,
     /// Name in figures and printed tables.
     pub label: &'static str,
-    /// What it is.
+    /// Description.
     pub about: &'static str,
-    /// What it has to know.
+    /// What it needs to know about the images.
     pub needs: RowNeeds,
     /// Levels of its rows.
     pub levels: Levels,
-    /// Builds it.
+    /// Builds the designer.
     pub build: fn() -> Box<dyn DesignRows>,
 }
 
@@ -71,7 +71,7 @@ use RowNeeds::{Moments, Nothing};
 /// Sets of seeds that are tried.
 const SEED_SETS: usize = 200;
 
-/// Every designer: name, label, what it has to know, levels, how it is built; what it is.
+/// Every designer: name, label, needs, levels, builder, description.
 pub const DESIGNERS: &[Designer] = &[
     line(
         "random",
@@ -153,6 +153,13 @@ pub const DESIGNERS: &[Designer] = &[
 ];
 
 /// The designer called `name`.
+///
+/// ```
+/// use spts_recon::rows::{DESIGNERS, RowNeeds, designer};
+///
+/// assert_eq!(designer("hadamard").map(|d| d.needs), Some(RowNeeds::Nothing));
+/// assert!(DESIGNERS.iter().all(|d| designer(d.name).is_some()));
+/// ```
 #[must_use]
 pub fn designer(name: &str) -> Option<&'static Designer> {
     DESIGNERS.iter().find(|d| d.name == name)

@@ -1,4 +1,4 @@
-//! What is asked of a designer of rows.
+//! The task of a row designer.
 
 use super::error::RowError;
 use super::expected::Expected;
@@ -11,35 +11,46 @@ use crate::matrix::Matrix;
 pub struct RowTask<'a> {
     /// Number of rows M: the period of a repeated pattern, at least 1.
     pub rows: usize,
-    /// Images that are expected.
+    /// Expected images.
     pub expected: &'a Expected,
-    /// Gaussian classes for designers that tell classes apart; empty for all others.
+    /// Gaussian classes, for designers that distinguish classes; empty for all others.
     pub classes: &'a [Component],
-    /// Standard deviation of a measurement's noise as a share of the root mean square of a random row's sum, in [1e-6,
+    /// Standard deviation of a measurement's noise relative to the root mean square of a random row's sum, in [1e-6,
     /// 1e3].
     pub noise: f64,
-    /// Headroom: the largest root mean square of a row's sum over the expected images, as a multiple of a random row's,
-    /// in [0.05, 1000]. `None` for no limit.
+    /// Headroom: largest root mean square of a row's sum over the expected images, relative to a random row's, in
+    /// [0.05, 1000]. `None` for no limit.
     pub largest_sum: Option<f64>,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
 /// Designs rows of the sensing matrix.
+///
+/// ```
+/// use spts_recon::rows::{Expected, RowTask, designer, posterior_trace};
+///
+/// let smooth = Expected::smooth([6, 6], 1.5)?;
+/// let task = RowTask::new(8, &smooth);
+/// let design = |name| (designer(name).expect("in the table").build)().design(&task);
+/// let (designed, random) = (design("greedy")?, design("random")?);
+/// assert!(posterior_trace(&task, &designed)? < posterior_trace(&task, &random)?);
+/// # Ok::<(), spts_recon::rows::RowError>(())
+/// ```
 pub trait DesignRows: Send + Sync {
-    /// M × N sensing matrix, every level in [−1, 1]. The rows come in the order of their worth, so that the first few
-    /// are a design of their own; equal tasks have equal answers, for any number of threads.
+    /// Designs an M × N sensing matrix with every level in [−1, 1]. The most useful rows come first, so that the first
+    /// few are a design of their own. Equal tasks have equal results for any number of threads.
     ///
     /// # Errors
-    /// [`RowError`] when the task is out of range, or no row keeps to its headroom.
+    /// [`RowError`] if the task is out of range, or no row respects its headroom.
     fn design(&self, task: &RowTask<'_>) -> Result<Matrix, RowError>;
 }
 
 impl<'a> RowTask<'a> {
-    /// Noise of a measurement when nothing else is said: contact noise and what a prior misses.
+    /// Default noise of a measurement: contact noise, and what a prior does not describe.
     pub const NOISE: f64 = 0.15;
 
-    /// `rows` rows for the images `expected`, without a limit of their sums.
+    /// A task for `rows` rows and the images `expected`, without a limit of the sums.
     #[must_use]
     pub fn new(rows: usize, expected: &'a Expected) -> Self {
         Self {

@@ -122,8 +122,8 @@ fn the_order_of_the_samples_does_not_matter() {
     assert!((iou(&other, &other_gains) - iou(&estimate, &gains)).abs() < 1e-9);
 }
 
-/// Gains that are prepared for one sensing matrix serve any number of windows, which then say what a window with its own
-/// rows says, bit for bit, also from gains that were used before.
+/// Gains that are prepared for one sensing matrix serve any number of windows, which then say what a window with its
+/// own rows says, bit for bit, also from gains that were used before.
 #[test]
 fn prepared_gains_are_those_of_a_window() {
     let Drawn { prior, rows, y } = drawn(11, 12, 16, 0.0);
@@ -245,8 +245,8 @@ fn the_expected_iou_is_what_images_of_the_prior_have() {
     }
     assert!(reached > 0.5 * f64::from(trials), "{reached} of {trials}");
     let (said, attained) = (said / reached, attained / reached);
-    // 2,000 images with a deviation of .15 each: .004 by chance. The threshold moves with the maximum of the true image,
-    // which the formula does not know of: .05
+    // 2,000 images with a deviation of .15 each: .004 by chance. The threshold moves with the maximum of the true
+    // image, which the formula does not know of: .05
     assert!((said - attained).abs() < 0.06, "said {said:.3}, attained {attained:.3}");
 }
 

@@ -1,4 +1,4 @@
-//! One slide joint with a spring a cell: the Winkler layer, built of MuJoCo bodies.
+//! One slide joint with a spring for each cell: the Winkler layer, made of MuJoCo bodies.
 
 use super::engine::{COLUMN_MASS, Skin, tip};
 use super::tips::Tips;
@@ -8,13 +8,13 @@ use spts_contact::{ContactField, PosedMesh, Response};
 use spts_models::{ConfigError, SkinLayout};
 use std::fmt::Write as _;
 
-/// Parameters of [`TaxelBed`]. Missing ones take the values of [`TaxelBedConfig::default`].
+/// Parameters of [`TaxelBed`]. A missing one takes its value in [`TaxelBedConfig::default`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TaxelBedConfig {
     /// K, stiffness of the skin, Pa/m; [1e4, 1e9].
     pub stiffness_pa_per_m: f64,
-    /// h, thickness of the foam, m; [1e-4, 10]. It does not enter: the springs are linear.
+    /// h, thickness of the foam, m; [1e-4, 10]. It has no effect, because the springs are linear.
     pub thickness_m: f64,
     /// Fine cells along one side of a taxel; [1, 16].
     pub cells_per_taxel: usize,
@@ -32,10 +32,10 @@ impl Default for TaxelBedConfig {
     }
 }
 
-/// Bed of independent linear springs p = K δ, solved by MuJoCo: a check of
-/// [`WinklerLayer`](spts_contact::WinklerLayer) on a thick layer.
+/// Independent linear springs p = K δ, solved by MuJoCo: a check of [`WinklerLayer`](spts_contact::WinklerLayer) on a
+/// thick layer.
 ///
-/// A body that is not rigid is in series with each spring: 1/K is then 1/K + 1/K_body.
+/// A compliant body is in series with each spring: 1/K becomes 1/K + 1/K_body.
 #[derive(Debug)]
 pub struct TaxelBed {
     config: TaxelBedConfig,
@@ -46,10 +46,10 @@ pub struct TaxelBed {
 const MAX_CELLS: Most = (4096.0, "[1, 4096]");
 
 impl TaxelBed {
-    /// Bed under `skin`.
+    /// A bed under `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] when a parameter is outside its range.
+    /// [`ConfigError`] if a parameter is outside its range.
     pub fn new(config: TaxelBedConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
         limits::foam(config.stiffness_pa_per_m, config.thickness_m)?;
         limits::cells(skin, config.cells_per_taxel, (16.0, "[1, 16]"), MAX_CELLS)?;

@@ -1,7 +1,7 @@
-//! MuJoCo model of a skin under a mesh, in units in which it is of order one whatever the skin.
+//! MuJoCo model of a skin under a mesh, in units of order one for any skin.
 //!
-//! Length is counted in cells and force in K · cell³, so that a column of the skin has the stiffness 1. The engine has
-//! absolute limits (smallest mass, volume, reference times) that a fine skin in metres would meet.
+//! Length is counted in cells, and force in K · cell³, so that a column of the skin has the stiffness 1. The engine has
+//! absolute limits (smallest mass, volume, reference times), which a fine skin in metres would reach.
 
 use mujoco_rs::prelude::{MjData, MjModel};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
@@ -51,24 +51,24 @@ pub(super) enum EngineError {
     /// Pose or velocity of the body.
     #[error("the body's pose or velocity is not finite")]
     NotFinite,
-    /// The engine does not take the model.
+    /// MuJoCo rejects the model.
     #[error("MuJoCo rejects the skin: {0}")]
     Rejected(String),
-    /// It takes another model than the one meant.
-    #[error("MuJoCo counts {found} coordinates, {wanted} are meant")]
+    /// MuJoCo builds another model than intended.
+    #[error("MuJoCo counts {found} coordinates instead of {wanted}")]
     Coordinates {
         /// Number found.
         found: usize,
-        /// Number meant.
+        /// Expected number.
         wanted: usize,
     },
-    /// It counted a warning.
+    /// MuJoCo reports a warning.
     #[error("MuJoCo warning {0}: the skin is not stable")]
     Warning(usize),
-    /// The skin still moves.
+    /// The skin has not come to rest.
     #[error("the skin moves by {fastest:.1e} of the depth in a unit of time after {LONGEST}: more than {SETTLED:e}")]
     NotSettled {
-        /// Speed of the fastest coordinate over the depth.
+        /// Speed of the fastest coordinate divided by the depth.
         fastest: f64,
     },
 }
@@ -87,9 +87,9 @@ pub(super) struct Skin {
     pub(super) deformable: String,
     /// Number of coordinates.
     pub(super) coordinates: usize,
-    /// Degree of freedom whose contact force is the cell's, one a cell.
+    /// Degree of freedom whose contact force is that of the cell, one for each cell.
     pub(super) cell_dofs: Vec<usize>,
-    /// Vertical coordinates and how far each sinks when the surface sinks by 1: the flattened skin.
+    /// Vertical coordinates of the flattened skin, and how far each sinks when the surface sinks by 1.
     pub(super) flat: Vec<(usize, f64)>,
 }
 

@@ -8,11 +8,11 @@ use spts_contact::{ContactField, PosedMesh, Response};
 use spts_models::{ConfigError, SkinLayout};
 use std::fmt::Write as _;
 
-/// Parameters of [`FlexLayer`]. Missing ones take the values of [`FlexConfig::default`].
+/// Parameters of [`FlexLayer`]. A missing one takes its value in [`FlexConfig::default`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct FlexConfig {
-    /// K, stiffness of the skin under a uniform load, Pa/m; [1e4, 1e9]. Young's modulus follows from it, see
+    /// K, stiffness of the skin under a uniform load, Pa/m; [1e4, 1e9]. It determines Young's modulus; see
     /// [`FlexLayer`].
     pub stiffness_pa_per_m: f64,
     /// h, thickness of the foam, m; [1e-4, 10], and between a tenth of a cell and ten cells.
@@ -39,17 +39,18 @@ impl Default for FlexConfig {
     }
 }
 
-/// Elastic layer bonded to a rigid base, as MuJoCo's deformable: linear tetrahedra, six a brick, whose upper nodes are
-/// the centres of the cells. A node's contact force over the cell's area is the cell's pressure.
+/// Elastic layer bonded to a rigid base, as a deformable body in MuJoCo: linear tetrahedra, six for each brick. The
+/// upper nodes are the centres of the cells. The pressure of a cell is the contact force of its node divided by the
+/// cell's area.
 ///
-/// E = K h (1 + ν)(1 − 2ν)/(1 − ν), so that a uniform small compression δ answers with K δ (bonded layer, K. L.
+/// E = K h (1 + ν)(1 − 2ν)/(1 − ν), so that the response to a small uniform compression δ is K δ (bonded layer, K. L.
 /// Johnson, *Contact Mechanics* (1985), §5.8).
 ///
-/// Validity: the material is St. Venant–Kirchhoff's, softer the more it is compressed, p = K δ (1 − ε)(1 − ε/2) at the
-/// strain ε = δ/h: 15 % at ε = 0.1, and past ε = 0.42 it gives way. A node carries its whole cell, so that the edge
-/// of a body is known to half a cell and the concentration of pressure there is averaged over one. The body is taken as
-/// rigid. From [`ElasticField`](spts_contact::ElasticField) with the same K, h = 6 mm and ν = 0.2 a block of 4 × 4
-/// taxels of 15 mm differs by 5 % (relative RMS over taxels) at 1 % strain and 11 % at 5 %; with two nodes a taxel side
+/// Validity: the St. Venant–Kirchhoff material becomes softer with compression, p = K δ (1 − ε)(1 − ε/2) at the strain
+/// ε = δ/h: 15 % at ε = 0.1, and it collapses above ε = 0.42. A node represents its whole cell, so the edge of a body
+/// is known to half a cell, and the pressure peak there is averaged over one. The body is treated as rigid. Compared
+/// with [`ElasticField`](spts_contact::ElasticField) at the same K, h = 6 mm and ν = 0.2, a block of 4 × 4 taxels of 15
+/// mm differs by 5 % (relative RMS over taxels) at 1 % strain and by 11 % at 5 %; with two nodes along a taxel's side,
 /// by 3.6 % at 1 %.
 #[derive(Debug)]
 pub struct FlexLayer {
@@ -61,10 +62,10 @@ pub struct FlexLayer {
 const MAX_CELLS: Most = (400.0, "[1, 400]");
 
 impl FlexLayer {
-    /// Layer under `skin`.
+    /// A layer under `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] when a parameter is outside its range.
+    /// [`ConfigError`] if a parameter is outside its range.
     pub fn new(config: FlexConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
         limits::foam(config.stiffness_pa_per_m, config.thickness_m)?;
         parameter("poisson", config.poisson, [0.0, 0.4], "[0, 0.4]")?;

@@ -1,11 +1,11 @@
-//! The checks a scene can name beside the contact fields.
+//! The table of checks.
 
 use super::{FlexConfig, FlexLayer, TaxelBed, TaxelBedConfig};
 use spts_contact::{CONTACT_FIELDS, ContactError, ContactField, ContactTable, build_contact_from};
 use spts_models::SkinLayout;
 
-/// Independent checks of the fields, by the name a scene uses: static answers of MuJoCo's own contacts, too slow for
-/// the dynamics of a scene.
+/// Independent checks of the contact fields, with the names that scenes use: static answers of MuJoCo's own contacts.
+/// They are too slow for the dynamics of a scene.
 pub const CONTACT_CHECKS: ContactTable = &[
     ("taxel_bed", |table, skin| {
         let config: TaxelBedConfig = table.try_into()?;
@@ -17,10 +17,10 @@ pub const CONTACT_CHECKS: ContactTable = &[
     }),
 ];
 
-/// Builds the field or check called `name`.
+/// Builds the contact field or check called `name`.
 ///
 /// # Errors
-/// [`ContactError`] when the name is unknown or the parameters are not valid.
+/// [`ContactError`] if the name is unknown, or a parameter is not valid.
 pub fn build_field_or_check(
     name: &str,
     parameters: toml::Table,

@@ -1,4 +1,4 @@
-//! From a posed body to the pressure on the cells under it, whatever the skin below the tips is made of.
+//! From a posed body to the pressure on the cells under it, for any material below the tips.
 
 use super::engine::{Engine, EngineError, Skin};
 use spts_contact::mesh::TriMesh;
@@ -10,10 +10,10 @@ pub(super) struct Tips {
     cols: usize,
     cell_m: f64,
     skin: Skin,
-    /// The last mesh and its model; `None` for a mesh that cannot touch anything.
+    /// The last mesh and its model; the model is `None` if the mesh cannot touch anything.
     loaded: Option<(TriMesh, Option<Engine>)>,
     pressure_pa: Vec<f64>,
-    /// Why the last answer was none.
+    /// Why the last call had no answer.
     failure: Option<EngineError>,
 }
 

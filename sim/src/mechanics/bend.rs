@@ -1,4 +1,4 @@
-//! Section `[bend]`: the skin is wrapped round a cylinder, such as a robot's arm, and its cover presses the foam.
+//! Section `[bend]`: the skin is wrapped round a cylinder, such as a robot's arm, and its cover presses on the foam.
 
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, Exp1, StandardNormal};
@@ -6,31 +6,41 @@ use serde::{Deserialize, Serialize};
 use spts_contact::mesh::TriMesh;
 use spts_models::{ConfigError, SkinLayout, Streams, in_range};
 
-/// Section `[bend]`: the skin is wrapped round a cylinder along its columns, so that its rows lie round it.
+/// Section `[bend]`: the skin is wrapped round a cylinder along its columns, so that its rows run round the cylinder.
 ///
-/// A cover under the tension T presses the foam with T/R. It is taut over some taxels and slack over the others. Over a
-/// taut taxel the foam is compressed by a strain, log-normal from taxel to taxel; everything that presses there adds to
-/// it on the foam's own law. Where a touch draws the cover in, it slackens elsewhere. The defaults were fitted to the
-/// output of the published skin round an arm, without and with a touch (`spts compare --arm`): a strain of 0.0028 of
-/// 6 mm of foam is 260 Pa, at R = 50 mm a tension of 13 N/m, and one taxel in forty has twenty times as much.
+/// A cover under the tension T presses on the foam with T/R. It is taut over some taxels and slack over the others.
+/// Under the taut cover the foam of each taxel is compressed by a log-normal strain. The pressure of a touch adds to it
+/// by the foam's own law. Beside a touch the cover slackens, because the touch pulls it in. The defaults were fitted to
+/// the output of the published skin round an arm, without and with a touch (`spts compare --arm`): a strain of 0.0028
+/// of 6 mm foam is 260 Pa, and at R = 50 mm a tension of 13 N/m; one taxel in forty has twenty times as much.
 ///
-/// What touches the skin meets it along the cylinder's radii: its mesh is unrolled about the line in which it touches.
+/// An object meets the skin along the radii of the cylinder: its mesh is unrolled about the line of contact.
+///
+/// ```
+/// use spts_models::SkinLayout;
+/// use spts_sim::mechanics::BendConfig;
+///
+/// let bend = BendConfig { taut_share: 1.0, ..BendConfig::default() };
+/// let strain = bend.strain(&SkinLayout::default(), 1, 0);
+/// assert_eq!(strain.len(), 100);
+/// assert!(strain.iter().all(|&s| s > 0.0 && s < 1.0), "the cover is taut everywhere");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct BendConfig {
     /// R, radius of the cylinder at the skin's surface, m; [0.02, 10].
     pub radius_m: f64,
-    /// Share of the taxels over which the cover is taut; [0, 1].
+    /// Share of the taxels under taut cover; [0, 1].
     pub taut_share: f64,
-    /// Median strain of the foam under the taut cover, a share of its thickness; [0, 0.3].
+    /// Median strain of the foam under the taut cover, relative to its thickness; [0, 0.3].
     pub strain: f64,
     /// Standard deviation of the logarithm of that strain from taxel to taxel; [0, 2].
     pub strain_log_sd: f64,
-    /// Standard deviation of the logarithm by which the strain of a taxel differs from press to press, as the cover
+    /// Standard deviation of the logarithm by which a taxel's strain varies from press to press, because the cover
     /// slides; [0, 1].
     pub press_log_sd: f64,
-    /// Mean of the logarithm by which the pressure of the cover on a taxel that is not touched falls at the full force
-    /// of a press, exponentially distributed over taxels and presses; [0, 2].
+    /// Mean decrease of the logarithm of the cover's pressure on an untouched taxel at the full force of a press;
+    /// exponentially distributed over taxels and presses; [0, 2].
     pub touch_slack: f64,
 }
 
@@ -71,8 +81,8 @@ impl BendConfig {
         Ok(())
     }
 
-    /// Strain of the foam under every taxel of `skin` before press `index` touches it; 0 where the cover is slack. A
-    /// function of `seed` and `index` alone.
+    /// Strain of the foam under every taxel of `skin` before press `index`; 0 where the cover is slack. It depends only
+    /// on the arguments.
     #[must_use]
     pub fn strain(&self, skin: &SkinLayout, seed: u64, index: u64) -> Vec<f64> {
         let streams = Streams::new(seed);
@@ -90,8 +100,8 @@ impl BendConfig {
         (0..skin.taxels()).map(|_| strain()).collect()
     }
 
-    /// Logarithm by which the cover's pressure on every taxel of `skin` falls at the full force of press `index`, where
-    /// it is not touched. A function of `seed` and `index` alone.
+    /// Decrease of the logarithm of the cover's pressure on every untouched taxel of `skin` at the full force of press
+    /// `index`. It depends only on the arguments.
     #[must_use]
     pub fn slack(&self, skin: &SkinLayout, seed: u64, index: u64) -> Vec<f64> {
         let mut rng = Streams::new(seed).rng("bend/slack", index);

@@ -1,4 +1,4 @@
-//! Section `[drop]`: a free ball falls on the skin.
+//! Section `[drop]`: a free ball falls onto the skin.
 
 use super::MechanicsError;
 use super::place::Place;
@@ -8,24 +8,24 @@ use spts_models::{ConfigError, SkinLayout, in_range};
 
 /// Section `[drop]`. Defaults: an ITF tennis ball from half a metre.
 ///
-/// Beside the skin there is nothing: a ball that misses it or rolls off its rim falls on until `duration_s`, and its
+/// There is no table beside the skin: a ball that misses it or rolls off keeps falling until `duration_s`, and its
 /// frames are empty.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DropConfig {
     /// Height of the ball's lowest point above the skin at release, m; [0.001, 5].
     pub height_m: f64,
-    /// Row of the landing point, in taxels; inside the skin. Default the middle.
+    /// Row of the landing point, in taxels; inside the skin. Default: the middle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub row: Option<f64>,
-    /// Column of the landing point, in taxels; inside the skin. Default the middle.
+    /// Column of the landing point, in taxels; inside the skin. Default: the middle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub col: Option<f64>,
-    /// In place of `row` and `col`: (x, y) of the landing point from the middle of the sheet, m; x to large columns, y
-    /// to small rows; inside the skin.
+    /// Replaces `row` and `col`: landing point (x, y) relative to the middle of the sheet, m; x towards large columns,
+    /// y towards small rows; inside the skin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_m: Option<[f64; 2]>,
-    /// In place of `row` and `col`: the same as a share of the sheet's width and height; each [−0.5, 0.5].
+    /// Replaces `row` and `col`: landing point relative to the sheet's width and height; each [−0.5, 0.5].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub position_share: Option<[f64; 2]>,
     /// Mass, kg; [1e-3, 50].
@@ -36,11 +36,11 @@ pub struct DropConfig {
     pub stiffness_pa_per_m: f64,
     /// Number of drops; [1, 100000].
     pub drops: usize,
-    /// Length of a drop, s; [0.05, 60].
+    /// Duration of a drop, s; [0.05, 60].
     pub duration_s: f64,
     /// Mean time of release, s; [0, 10].
     pub release_s: f64,
-    /// The release is drawn uniformly within ± this, s; [0, `release_s`].
+    /// The release varies uniformly within ± this, s; [0, `release_s`].
     pub release_spread_s: f64,
     /// Standard deviation of the landing point along each axis, m; [0, 0.05].
     pub position_sd_m: f64,

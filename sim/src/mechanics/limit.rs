@@ -1,4 +1,4 @@
-//! The largest step that a scene's stiffness, damping and mass allow.
+//! The largest time step for a scene's stiffness, damping and mass.
 
 use super::{GRAVITY_M_PER_S2, LONGEST_STEP_S, Mechanics, MechanicsError, SHORTEST_STEP_S, Task, Timestep};
 use spts_contact::{ContactField, PosedMesh};

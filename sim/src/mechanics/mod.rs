@@ -1,5 +1,5 @@
-//! The mechanical part of a scene: what happens on the skin, as TOML or made in code. A [`Mechanics`] that exists is
-//! valid.
+//! The mechanical part of a scene: what happens on the skin, read from TOML or built in code. A [`Mechanics`] is valid
+//! by construction.
 //!
 //! ```toml
 //! seed = 7
@@ -46,11 +46,11 @@ use spts_models::{SkinLayout, in_range};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Smallest mass that moves with an object on the flange, kg: what the rotors of the arm (1 and 0.2 kg m² at the
-/// joints) weigh at the tool when pushed along the skin's normal.
+/// Smallest mass that moves with an object on the flange, kg: the effective mass of the arm's rotors (1 and 0.2 kg m²
+/// at the joints) at the tool, along the skin's normal.
 pub const ARM_MASS_KG: f64 = 1.5;
 
-/// What happens in a scene.
+/// The task of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Task<'a> {
     /// The arm presses an object.
@@ -76,7 +76,7 @@ pub struct Mechanics {
 }
 
 impl Mechanics {
-    /// Valid scene from what is written; mesh files are looked for in `folder`.
+    /// The scene that `config` describes. Mesh files are looked up in `folder`.
     ///
     /// # Errors
     /// [`MechanicsError`] for the first value that is not valid.
@@ -84,8 +84,8 @@ impl Mechanics {
         Self::build(config, folder, None)
     }
 
-    /// Valid scene in which the arm presses `mesh`, body axes in metres, which has no file and no name: `config.press`
-    /// names neither an object nor a mesh. The text of such a scene ([`Mechanics::to_toml`]) does not describe it.
+    /// The scene in which the arm presses `mesh` (body axes, m). The mesh has no file and no name: `config.press` must
+    /// name neither an object nor a mesh, and the text of the scene ([`Mechanics::to_toml`]) does not describe it.
     ///
     /// # Errors
     /// [`MechanicsError`] for the first value that is not valid.
@@ -193,15 +193,15 @@ impl Mechanics {
         Ok(scene)
     }
 
-    /// Mechanics from TOML text.
+    /// The scene in the TOML text `text`.
     ///
     /// # Errors
-    /// [`MechanicsError`] when the text is not TOML or the scene is not valid.
+    /// [`MechanicsError`] if the text is not TOML, or the scene is not valid.
     pub fn from_toml(text: &str, folder: &Path) -> Result<Self, MechanicsError> {
         Self::new(toml::from_str(text)?, folder)
     }
 
-    /// [`MechanicsConfig::press`] with everything at its default.
+    /// [`MechanicsConfig::press`] with all defaults.
     ///
     /// # Errors
     /// [`MechanicsError::UnknownObject`].
@@ -209,21 +209,21 @@ impl Mechanics {
         Self::new(MechanicsConfig::press(name), Path::new(""))
     }
 
-    /// [`MechanicsConfig::bounce`] with everything at its default.
+    /// [`MechanicsConfig::bounce`] with all defaults.
     ///
     /// # Errors
-    /// None with the defaults as they are.
+    /// None, with the defaults as they are.
     pub fn bounce() -> Result<Self, MechanicsError> {
         Self::new(MechanicsConfig::bounce(), Path::new(""))
     }
 
-    /// The scene as it was written, every default filled in.
+    /// The configuration, with all defaults filled in.
     #[must_use]
     pub fn config(&self) -> &MechanicsConfig {
         &self.config
     }
 
-    /// What happens.
+    /// The task.
     ///
     /// # Panics
     /// Never: a scene has exactly one task.
@@ -245,7 +245,7 @@ impl Mechanics {
         }
     }
 
-    /// Length of one press or drop, s.
+    /// Duration of one press or drop, s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         match self.task() {
@@ -260,47 +260,47 @@ impl Mechanics {
         &self.config.skin
     }
 
-    /// Root of every random number.
+    /// Seed of all random numbers.
     #[must_use]
     pub fn seed(&self) -> u64 {
         self.config.seed
     }
 
-    /// Step of the dynamics, s.
+    /// Time step of the dynamics, s.
     #[must_use]
     pub fn timestep_s(&self) -> f64 {
         self.timestep_s
     }
 
-    /// Time between frames (near the skin, for a drop), s.
+    /// Time between frames, s; for a drop, while the ball is near the skin.
     #[must_use]
     pub fn frame_interval_s(&self) -> f64 {
         self.frame_interval_s
     }
 
-    /// Mesh of the object or ball, body axes.
+    /// Mesh of the object or ball, in body axes.
     #[must_use]
     pub fn mesh(&self) -> &PreparedMesh {
         &self.mesh
     }
 
-    /// What was repaired in a mesh from a file; none for the seventeen objects and the ball.
+    /// Report on a mesh from a file; `None` for the seventeen objects and the ball.
     #[must_use]
     pub fn mesh_report(&self) -> Option<&MeshReport> {
         self.mesh_report.as_ref()
     }
 
-    /// Puts `field` under the preload of a bent skin before press `index`; what every taxel feels then, Pa. `None` for
-    /// a flat skin, and for a field without preloads.
+    /// Puts `field` under the preload of a bent skin before press `index`, and returns the resulting pressure of every
+    /// taxel, Pa. `None` for a flat skin, and for a field without preloads.
     pub fn preload(&self, field: &mut dyn ContactField, index: u64) -> Option<Vec<f64>> {
         let bend = self.config.bend.as_ref()?;
         field.preload(&bend.strain(self.skin(), self.seed(), index))
     }
 
-    /// A fresh contact field, not under preload ([`Mechanics::preload`]).
+    /// A fresh contact field without preload (see [`Mechanics::preload`]).
     ///
     /// # Errors
-    /// None for a scene that exists: it was built with these parameters before.
+    /// None for a valid scene: it was built with these parameters before.
     pub fn build_contact(&self) -> Result<Box<dyn ContactField>, MechanicsError> {
         let mut parameters = self.config.contact.clone();
         let model = parameters.remove("model");
@@ -310,10 +310,10 @@ impl Mechanics {
         Ok(field)
     }
 
-    /// The scene as TOML, every default filled in: reading it gives the same scene again.
+    /// The scene as TOML, with all defaults filled in. Reading it back gives the same scene.
     ///
     /// # Errors
-    /// [`MechanicsError::Write`], which no valid scene is known to cause.
+    /// [`MechanicsError::Write`], which no valid scene should cause.
     pub fn to_toml(&self) -> Result<String, MechanicsError> {
         Ok(toml::to_string(&self.config)?)
     }

@@ -1,17 +1,27 @@
-//! What of a body reaches over the edge of the sheet.
+//! Parts of a body beyond the edge of the sheet.
 
 use super::{Mechanics, Task};
 
-/// How far the part of a body that the skin can touch reaches over each edge of the sheet, m; 0 where it does not.
+/// How far the part of a body that can touch the skin extends beyond each edge of the sheet, m; 0 if it does not.
+///
+/// ```
+/// use spts_sim::Mechanics;
+///
+/// let middle = Mechanics::from_toml("[press]\nobject = \"tape\"\nrow = 4.5\ncol = 4.5", ".".as_ref())?;
+/// assert!(middle.overhang().is_none());
+/// let beside = Mechanics::from_toml("[press]\nobject = \"tape\"\nrow = 0.0\ncol = 4.5", ".".as_ref())?;
+/// assert!(beside.overhang().expect("reaches over the edge").first_row_m > 1e-3);
+/// # Ok::<(), spts_sim::mechanics::MechanicsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Overhang {
-    /// Over the edge beyond row 0.
+    /// Beyond the edge at row 0.
     pub first_row_m: f64,
-    /// Over the edge beyond the last row.
+    /// Beyond the edge at the last row.
     pub last_row_m: f64,
-    /// Over the edge beyond column 0.
+    /// Beyond the edge at column 0.
     pub first_col_m: f64,
-    /// Over the edge beyond the last column.
+    /// Beyond the edge at the last column.
     pub last_col_m: f64,
 }
 
@@ -38,9 +48,8 @@ impl Overhang {
 }
 
 impl Mechanics {
-    /// What of the body reaches over the edge of the sheet, of the part that is below the free surface at the target
-    /// force, or at the deepest point of a drop; `None` when it is less than 0.1 mm. The scatter of the presses does
-    /// not count.
+    /// Overhang of the part of the body that is below the free surface at the target force, or at the deepest point of
+    /// a drop; `None` if it is less than 0.1 mm. The scatter of presses is not included.
     #[must_use]
     pub fn overhang(&self) -> Option<Overhang> {
         let (body, _) = self.contact_body();

@@ -1,4 +1,4 @@
-//! Where something meets the sheet: in taxels, in metres from the sheet's middle, or as a share of the sheet.
+//! Place on the sheet: in taxels, in metres from the sheet's middle, or relative to the sheet.
 
 use super::MechanicsError;
 use spts_models::{ConfigError, SkinLayout, in_range};
@@ -11,9 +11,9 @@ pub(super) struct Place<'a> {
     /// Row and column, taxels.
     pub(super) row: &'a mut Option<f64>,
     pub(super) col: &'a mut Option<f64>,
-    /// (x, y) from the middle of the sheet, m: x to large columns, y to small rows.
+    /// (x, y) relative to the middle of the sheet, m: x towards large columns, y towards small rows.
     pub(super) position_m: &'a mut Option<[f64; 2]>,
-    /// The same over the sheet's width and height.
+    /// The same relative to the sheet's width and height.
     pub(super) position_share: &'a mut Option<[f64; 2]>,
 }
 

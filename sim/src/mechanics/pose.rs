@@ -4,7 +4,7 @@ use super::Mechanics;
 use spts_contact::{Pose, PosedMesh};
 
 impl Mechanics {
-    /// The scene's body, at rest, in the pose of a frame: what a contact field needs to look at that instant again.
+    /// The scene's body at rest in the pose of a frame, to evaluate a contact field at that instant again.
     #[must_use]
     pub fn posed(&self, pose: &Pose) -> PosedMesh<'_> {
         let (body, _) = self.contact_body();

@@ -1,4 +1,4 @@
-//! The step of the dynamics: as asked for, as it must be, and as it is chosen.
+//! The time step of the dynamics: as requested, its limits, and the automatic choice.
 
 use super::MechanicsError;
 use serde::de::{self, Deserialize, Deserializer, Visitor};
@@ -10,20 +10,30 @@ use std::str::FromStr;
 /// Length of one recorded block: 1000 frames × 100 measurements at 64.3 kHz, s.
 pub const BLOCK_S: f64 = 100_000.0 / 64_300.0;
 
-/// Longest step of the dynamics whatever the contact, s: it also has to resolve the arm's servos and the free fall.
+/// Longest time step for any contact, s. It must also resolve the arm's servos and the free fall.
 pub const LONGEST_STEP_S: f64 = 2e-3;
 
-/// Shortest step of the dynamics, s.
+/// Shortest time step, s.
 pub const SHORTEST_STEP_S: f64 = 1e-6;
 
-/// Step of the dynamics as a scene asks for it: a number of seconds, or `"auto"`.
+/// Time step of the dynamics, as written in a scene: a number of seconds, or `"auto"`.
 ///
-/// `auto` is the longest stable step that divides the time between frames: `frame_interval_s` over the smallest whole
-/// number that brings it within the stable limit, so that frames stay on the instants they have with the default step.
-/// A [`Mechanics`](super::Mechanics) holds the number that `auto` came to.
+/// `auto` is the longest stable step that divides the time between frames: `frame_interval_s` divided by the smallest
+/// whole number that gives a stable step. Frames are then at the same instants as with the default step. A
+/// [`Mechanics`](super::Mechanics) holds the resulting number.
+///
+/// ```
+/// use spts_sim::{Mechanics, mechanics::Timestep};
+///
+/// assert_eq!("auto".parse(), Ok(Timestep::Auto));
+/// let scene = Mechanics::from_toml("timestep_s = \"auto\"\n[press]\nobject = \"T\"", ".".as_ref())?;
+/// let steps = scene.frame_interval_s() / scene.timestep_s();
+/// assert!((steps - steps.round()).abs() < 1e-9, "the step divides the time between frames");
+/// # Ok::<(), spts_sim::mechanics::MechanicsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Timestep {
-    /// This step, s; from [`SHORTEST_STEP_S`] to the stable limit.
+    /// A fixed step, s; from [`SHORTEST_STEP_S`] to the stable limit.
     Seconds(f64),
     /// The longest stable step that divides the time between frames.
     Auto,
@@ -41,7 +51,7 @@ impl Timestep {
 }
 
 impl Timestep {
-    /// The step as it is written in a scene.
+    /// The step as TOML.
     #[must_use]
     pub fn to_toml(self) -> toml::Value {
         match self {

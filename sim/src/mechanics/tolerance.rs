@@ -1,4 +1,4 @@
-//! `tolerance`: a scene asks for an error, and takes the cheapest fidelity level that was measured to meet it.
+//! `tolerance`: a scene states the acceptable error, and uses the cheapest fidelity level that meets it.
 
 use super::{MechanicsConfig, MechanicsError};
 use crate::fidelity::{FidelityChoice, cheapest, measured};

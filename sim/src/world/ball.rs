@@ -1,9 +1,9 @@
-//! The wrench of the skin on a smooth ball that is free.
+//! The wrench of the skin on a smooth, free ball.
 //!
-//! A contact field answers any mesh: its pressure acts along the skin's normal and its friction with the velocity at
-//! the start of a step. On a free ball both need care: vertical pressures beside the centre would turn a ball that no
-//! pressure can turn, and give it energy from nowhere over the skin's rim; and friction held over a whole step would
-//! push the slip through zero and back, further each time.
+//! A contact field works for any mesh: its pressure acts along the skin's normal, and friction depends on the velocity
+//! at the start of a time step. A free ball needs more care. Vertical pressures off its centre would rotate the ball,
+//! which real pressures cannot do, and would give it energy at the skin's rim. Constant friction over a whole step
+//! would make the slip oscillate with growing amplitude.
 
 use spts_contact::Wrench;
 use spts_models::SkinLayout;
@@ -37,7 +37,7 @@ struct PressureSums {
     force_n: f64,
     /// Σ p A x and Σ p A y about the centre, N m.
     moment_nm: [f64; 2],
-    /// Σ p A x/h and Σ p A y/h, h being the height of the centre above the surface there, N.
+    /// Σ p A x/h and Σ p A y/h, N, where h is the height of the centre above the surface at that point.
     side_n: [f64; 2],
     /// Σ p A h, N m.
     height_nm: f64,

@@ -1,4 +1,4 @@
-//! What the force did in a press.
+//! Time course of the force in a press.
 
 use spts_contact::Frame;
 
@@ -7,7 +7,7 @@ use spts_contact::Frame;
 pub struct PressCourse {
     /// First frame with a force, s.
     pub onset_s: f64,
-    /// From 10 to 90 % of the plateau, s.
+    /// Time of the rise from 10 to 90 % of the plateau, s.
     pub rise_s: f64,
     /// Mean over the plateau, N.
     pub plateau_n: f64,
@@ -17,15 +17,15 @@ pub struct PressCourse {
     pub overshoot: f64,
     /// When the force falls below 90 % of the plateau, s.
     pub lift_s: f64,
-    /// From 90 to 10 % of the plateau, s.
+    /// Time of the fall from 90 to 10 % of the plateau, s.
     pub fall_s: f64,
     /// Largest [`Frame::imbalance`] of all frames.
     pub imbalance: f64,
 }
 
 impl PressCourse {
-    /// Course of `frames` with the target `target_n`, the plateau being `plateau_s` = [start, end]. `None` when the
-    /// force never passes 90 % of the target before the plateau's end and comes back below 10 % after.
+    /// Time course of `frames` with the target force `target_n` and the plateau `plateau_s` = [start, end]. `None`
+    /// unless the force exceeds 90 % of the target before the plateau's end and falls below 10 % afterwards.
     #[must_use]
     pub fn of(frames: &[Frame], target_n: f64, plateau_s: [f64; 2], cell_area_m2: f64) -> Option<Self> {
         let force = |f: &Frame| f.wrench.force_n[2];

@@ -1,4 +1,4 @@
-//! The cover of a bent skin: what the electrodes feel of it.
+//! Pressure of the cover of a bent skin on the electrodes.
 
 use crate::mechanics::{Mechanics, Task};
 use spts_contact::{ContactField, Frame};
@@ -6,9 +6,9 @@ use spts_contact::{ContactField, Frame};
 /// Pressure of the cover in one press.
 #[derive(Debug, Clone)]
 pub(super) struct Cover {
-    /// On every taxel without a touch, Pa.
+    /// Pressure on every taxel without a touch, Pa.
     rest_pa: Vec<f64>,
-    /// Logarithm by which it falls at the full force where a taxel is not touched.
+    /// Decrease of its logarithm at the full force, where a taxel is not touched.
     slack: Vec<f64>,
     /// The full force, N.
     force_n: f64,

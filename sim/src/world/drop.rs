@@ -1,4 +1,4 @@
-//! How the ball falls, and what its bounces were.
+//! The fall of the ball, and its bounces.
 
 use crate::mechanics::{DropConfig, GRAVITY_M_PER_S2, Mechanics};
 use rand::RngExt as _;
@@ -12,15 +12,15 @@ pub struct Bounce {
     pub start_s: f64,
     /// Time with a force, s.
     pub contact_s: f64,
-    /// Speed towards the skin before, m/s.
+    /// Speed towards the skin before the contact, m/s.
     pub speed_in_m_per_s: f64,
-    /// Speed away from the skin after, m/s.
+    /// Speed away from the skin after the contact, m/s.
     pub speed_out_m_per_s: f64,
     /// Largest normal force, N.
     pub peak_force_n: f64,
     /// Energy the ball lost (kinetic and potential), J.
     pub lost_j: f64,
-    /// Work the ball did against the contact force, J. Equals the loss up to the error of the integration.
+    /// Work of the ball against the contact force, J. It equals the loss up to the error of the integration.
     pub work_j: f64,
 }
 

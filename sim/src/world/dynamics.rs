@@ -1,4 +1,4 @@
-//! A press or drop stepped by MuJoCo, the contact field being an external force.
+//! A press or drop simulated by MuJoCo, with the contact field as an external force.
 
 use super::ball::{Ball, BallMotion};
 use super::drop::{Bounce, BounceLog, Sample, Start};
@@ -45,7 +45,7 @@ pub(super) struct Dynamics {
     driver: Driver,
     pub(super) step: u64,
     pub(super) last_step: u64,
-    /// Step at which the next frame is due near the skin; away from it a drop waits longer.
+    /// Time step of the next frame near the skin. Away from it a drop has fewer frames.
     next_frame: u64,
 }
 

@@ -1,4 +1,4 @@
-//! Joint angles for a pose of the flange, by damped least squares.
+//! Inverse kinematics of the arm by damped least squares.
 
 use super::ur5;
 use nalgebra::{Isometry3, Matrix6, Vector6};
@@ -12,13 +12,15 @@ const MAX_ITERATIONS: usize = 300;
 /// A pose is reached when it is this close: position in m and rotation in rad together.
 const TOLERANCE: f64 = 1e-10;
 
-/// No posture reaches the pose.
+/// No joint angles reach the pose.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("the arm cannot reach the flange position {position_m:?} m in that orientation (it stays {error_m:.3} m away)")]
+#[error(
+    "the arm cannot reach the flange position {position_m:?} m in that orientation (remaining distance {error_m:.3} m)"
+)]
 pub struct Unreachable {
-    /// Position asked for, m.
+    /// Required position, m.
     pub position_m: [f64; 3],
-    /// Distance left, m.
+    /// Remaining distance, m.
     pub error_m: f64,
 }
 
@@ -28,8 +30,8 @@ fn residual(goal: &Isometry3<f64>, pose: &Isometry3<f64>) -> Vector6<f64> {
     Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
 }
 
-/// One damped step from `joints_rad` towards `goal`: Δq = Jᵀ (J Jᵀ + λ² I)⁻¹ e, with λ shrinking with the error so that
-/// the last steps are Newton's. Returns the error before the step.
+/// One damped step from `joints_rad` towards `goal`: Δq = Jᵀ (J Jᵀ + λ² I)⁻¹ e. λ decreases with the error, so the last
+/// steps are Newton's. Returns the error before the step.
 pub fn improve(goal: &Isometry3<f64>, joints_rad: &mut [f64; 6]) -> f64 {
     let (pose, jacobian) = ur5::flange_and_jacobian(joints_rad);
     let error = residual(goal, &pose);
@@ -49,8 +51,18 @@ pub fn improve(goal: &Isometry3<f64>, joints_rad: &mut [f64; 6]) -> f64 {
 
 /// Joint angles that bring the flange to `goal`, starting from `seed_rad`.
 ///
+/// ```
+/// use spts_sim::world::{ik::solve, ur5::{HOME_RAD, flange}};
+///
+/// let mut goal = flange(&HOME_RAD);
+/// goal.translation.z += 0.05; // 5 cm higher
+/// let joints_rad = solve(&goal, &HOME_RAD)?;
+/// assert!((flange(&joints_rad).translation.vector - goal.translation.vector).norm() < 1e-6);
+/// # Ok::<(), spts_sim::world::ik::Unreachable>(())
+/// ```
+///
 /// # Errors
-/// [`Unreachable`] when the iteration ends elsewhere.
+/// [`Unreachable`] if the iteration ends elsewhere.
 pub fn solve(goal: &Isometry3<f64>, seed_rad: &[f64; 6]) -> Result<[f64; 6], Unreachable> {
     let mut joints_rad = *seed_rad;
     for _ in 0..MAX_ITERATIONS {

@@ -1,4 +1,4 @@
-//! The world: one press of the arm, or one drop of the ball, as a stream of frames.
+//! The simulation of one press of the arm or one drop of the ball, as a stream of frames.
 
 mod ball;
 mod course;
@@ -30,8 +30,9 @@ use spts_contact::Frame;
 
 /// One press or drop of a scene.
 ///
-/// MuJoCo steps it with the contact field's wrench as an external force, unless the scene's field finds the pose under
-/// a force itself ([`spts_contact::QuasiStatic`]): then the force follows the same course and nothing is stepped.
+/// MuJoCo simulates the dynamics with the contact field's wrench as an external force. If the scene's field computes
+/// the pose under a force ([`spts_contact::QuasiStatic`]), the force follows the same time course, and there are no
+/// time steps.
 pub struct World {
     scene: Mechanics,
     engine: Engine,
@@ -53,19 +54,19 @@ impl std::fmt::Debug for World {
 }
 
 impl World {
-    /// World of the scene's first press or drop.
+    /// The first press or drop of the scene.
     ///
     /// # Errors
-    /// As for [`World::repeat`].
+    /// As [`World::repeat`].
     pub fn new(scene: &Mechanics) -> Result<Self, SimError> {
         Self::repeat(scene, 0)
     }
 
-    /// World of press or drop `index` of the scene. Every repeat is a function of the scene and `index` alone, so they
-    /// can run in any order and in parallel.
+    /// Press or drop `index` of the scene. It depends only on the scene and `index`, so repeats can run in any order
+    /// and in parallel.
     ///
     /// # Errors
-    /// [`SimError`] when there is no such repeat, the arm cannot reach the place, or MuJoCo does not take the model.
+    /// [`SimError`] if there is no such repeat, the arm cannot reach the place, or MuJoCo rejects the model.
     pub fn repeat(scene: &Mechanics, index: usize) -> Result<Self, SimError> {
         if index >= scene.repeats() {
             return Err(SimError::NoSuchPress {
@@ -115,8 +116,8 @@ impl World {
         }
     }
 
-    /// The first bounce of the ball so far, finished or not; none for a press. While it lasts, what is known of it is
-    /// when it began, how fast, and its peak until now.
+    /// The first bounce of the ball, finished or not; `None` for a press. During the bounce only its start, speed and
+    /// present peak are known.
     #[must_use]
     pub fn first_bounce(&self) -> Option<Bounce> {
         match &self.engine {
@@ -125,8 +126,8 @@ impl World {
         }
     }
 
-    /// Generalised positions of the arm (joint angles, rad) or the ball (centre, m, and quaternion). Without dynamics
-    /// the joint angles are found when asked for.
+    /// Generalised positions: of the arm, joint angles, rad; of the ball, centre, m, and quaternion. Without dynamics
+    /// the joint angles are computed on request.
     #[must_use]
     pub fn positions(&self) -> Vec<f64> {
         match &self.engine {
@@ -135,7 +136,7 @@ impl World {
         }
     }
 
-    /// The frames from now to the end. Ends after the last frame or the first error.
+    /// The remaining frames. The iterator ends after the last frame or the first error.
     pub fn frames(&mut self) -> impl Iterator<Item = Result<Frame, SimError>> + '_ {
         std::iter::from_fn(move || {
             if self.failed {
@@ -157,8 +158,8 @@ impl World {
     }
 }
 
-/// The dynamics of a scene as MuJoCo's XML (MJCF), for its own tools; without shapes, which the contact field does not
-/// need.
+/// The dynamics of a scene as MuJoCo's XML (MJCF), for MuJoCo's own tools. Shapes are omitted, because the contact
+/// field does not need them.
 #[must_use]
 pub fn mjcf(scene: &Mechanics) -> String {
     model::mjcf(scene, None)

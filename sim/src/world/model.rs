@@ -1,4 +1,5 @@
-//! The MuJoCo model of a scene: bodies, joints and servos; no collision geometry, since the contact field does contact.
+//! The MuJoCo model of a scene: bodies, joints and servos. It has no collision geometry, because the contact field
+//! computes contact.
 
 use super::error::SimError;
 use super::ur5;
@@ -9,7 +10,7 @@ use nalgebra::UnitQuaternion;
 use spts_contact::mesh::TriMesh;
 use std::fmt::Write as _;
 
-/// MuJoCo version this crate is made for.
+/// MuJoCo version for which this crate is made.
 pub const MUJOCO_VERSION: &str = "3.17.0";
 
 /// Name of the body that meets the skin.

@@ -1,4 +1,4 @@
-//! How the arm presses: come down, touch, follow a course of force, lift.
+//! The motion of the arm in a press: approach, touch, follow the force, lift.
 
 use super::error::SimError;
 use super::model::tool_length_m;
@@ -49,7 +49,7 @@ pub(crate) struct PressDriver {
     plan: PressPlan,
     curve: Arc<DepthCurve>,
     arm_m_per_n: f64,
-    /// Height of the origin at which the touch should be felt, m.
+    /// Expected height of the origin at the touch, m.
     touch_height_m: f64,
     height_m: f64,
     joints_rad: [f64; 6],
@@ -64,11 +64,11 @@ pub(super) struct PressPlan {
     pub(super) config: PressConfig,
     /// Rotation of the object.
     pub(super) rotation: UnitQuaternion<f64>,
-    /// Place of the object's origin, m.
+    /// Position of the object's origin, m.
     pub(super) xy_m: [f64; 2],
-    /// How much higher than meant the arm is, m.
+    /// Error of the arm's height, upwards, m.
     rise_m: f64,
-    /// From the flange to the object.
+    /// Transformation from the flange to the object.
     pub(super) tool: Isometry3<f64>,
     pub(super) onset_s: f64,
     pub(super) lift_s: f64,

@@ -1,4 +1,4 @@
-//! A press without dynamics: the force follows its course, the contact field finds the pose.
+//! A press without dynamics: the force follows its time course, and the contact field computes the pose.
 
 use super::error::SimError;
 use super::press::{CLEARANCE_M, LAG_S, LIFT_M_PER_S2, PressPlan, TOUCH, approach_m};
@@ -31,10 +31,10 @@ pub(super) struct QuasiStaticPress {
     arm: Arm,
     /// Height of the origin at the touch, m.
     touch_height_m: f64,
-    /// The last balance, and when and how high the object was.
+    /// The last equilibrium.
     seat: Option<Seat>,
     last_contact: [f64; 2],
-    /// Its force, N, and what the skin felt: on the plateau every frame has the same.
+    /// Force of the last equilibrium, N, and its pressures and wrench. At the plateau every frame has the same.
     held: Option<(f64, [PressureMap; 2], Wrench)>,
     position_m: [f64; 3],
     quaternion: UnitQuaternion<f64>,
@@ -45,10 +45,10 @@ pub(super) struct QuasiStaticPress {
 struct Arm {
     joints_rad: [f64; 6],
     stiffness_nm_per_rad: [[f64; 2]; 2],
-    /// Tilt by a vertical force, rad/N.
+    /// Tilt caused by a vertical force, rad/N.
     tilt_rad_per_n: [f64; 2],
-    /// Place of the object's origin under the full force, m: the servos give way sideways too. It is kept for smaller
-    /// forces (0.1 mm at 20 N), so that one height map serves the whole press.
+    /// Position of the object's origin under the full force, m, because the servos also yield sideways. It is kept for
+    /// smaller forces (0.1 mm at 20 N), so that one height map serves the whole press.
     xy_m: [f64; 2],
 }
 

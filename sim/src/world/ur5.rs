@@ -29,8 +29,8 @@ pub struct Link {
 use std::f64::consts::FRAC_PI_2;
 
 /// The six links. Lengths: UR5 CB3 user manual, DH table. Masses, centres and inertias: Universal Robots' ROS 2
-/// description, `ur5/physical_parameters.yaml`. Torques: its `joint_limits.yaml`. Rotor inertias and servo stiffnesses
-/// are estimates: stiff enough that 20 N move the tool by less than half a millimetre.
+/// description, `ur5/physical_parameters.yaml`. Torques: `joint_limits.yaml` of the same. Rotor inertias and servo
+/// stiffnesses are estimates, chosen so that 20 N move the tool by less than half a millimetre.
 pub const LINKS: [Link; 6] = [
     link(
         [0.0, 0.089_159, FRAC_PI_2],
@@ -96,7 +96,7 @@ pub const JOINT_DAMPING: f64 = 2.0;
 /// Position of the base in world axes, m: half a metre from the middle of the skin.
 pub const BASE_M: [f64; 3] = [-0.5, 0.0, 0.0];
 
-/// A posture with the tool pointing down at the middle of the skin, elbow up.
+/// A posture with the tool above the middle of the skin, pointing down, elbow up.
 pub const HOME_RAD: [f64; 6] = [std::f64::consts::PI, -1.4, 1.9, -2.07, -1.57, 0.0];
 
 impl Link {
@@ -139,6 +139,14 @@ pub(crate) fn flange_and_jacobian(joints_rad: &[f64; 6]) -> (Isometry3<f64>, Mat
 }
 
 /// Pose of the flange in world axes. Its z axis points out of the arm.
+///
+/// ```
+/// use spts_sim::world::ur5::{HOME_RAD, flange};
+///
+/// let pose = flange(&HOME_RAD);
+/// let down = pose.rotation * nalgebra::Vector3::z();
+/// assert!(down.z < -0.99, "the tool points down");
+/// ```
 #[must_use]
 pub fn flange(joints_rad: &[f64; 6]) -> Isometry3<f64> {
     let mut pose = base();

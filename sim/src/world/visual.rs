@@ -1,4 +1,4 @@
-//! What a picture shows and the dynamics do not need: shapes, colours, lights and cameras.
+//! Parts of a scene for pictures only: shapes, colours, lights and cameras.
 
 use super::ur5::BASE_M;
 use crate::mechanics::{Mechanics, Task};

@@ -2,27 +2,35 @@
 
 use spts_circuit::Mode;
 
-/// How a session is recorded: mode, session number, and what happens before and between its blocks.
+/// How a session is recorded: mode, session number, and the time before and between its blocks.
+///
+/// ```
+/// use spts::{Acquisition, Mode};
+///
+/// let presses = Acquisition::presses(Mode::Compressive, 3);
+/// let drops = Acquisition::drops(Mode::Compressive, 3);
+/// assert_eq!((presses.gap_frames, drops.gap_frames), (57, 0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Acquisition {
     /// Raster scan or compressive.
     pub mode: Mode,
-    /// Number of the session: two sessions of one skin have noise of their own, and where the transducer has it, a
-    /// spread.
+    /// Number of the session. Sessions of one skin differ in their noise and, if the transducer varies between
+    /// sessions, in their gains.
     pub session: u64,
     /// Frames between loading the seeds and the first block.
     pub lead_frames: u64,
     /// Unrecorded frames after each block.
     pub gap_frames: u64,
-    /// Whether nothing touches the skin in the first 0.233 s of every block: 15,000 measurements at 64.3 kHz.
+    /// Whether nothing touches the skin in the first 0.233 s of every block (15,000 measurements at 64.3 kHz).
     pub starts_idle: bool,
-    /// Number of presses before the recording, which condition the sheet: the session's own, from the first on and over
-    /// again.
+    /// Number of presses that condition the sheet before the recording. The session's own presses are used, repeated
+    /// from the first as often as needed.
     pub conditioning_presses: usize,
 }
 
 impl Acquisition {
-    /// Presses as on the device: the arm takes about 57 frames to come back.
+    /// Presses as the published device records them: the arm needs about 57 frames to return.
     #[must_use]
     pub fn presses(mode: Mode, session: u64) -> Self {
         Self {
@@ -35,14 +43,14 @@ impl Acquisition {
         }
     }
 
-    /// Touches as on the device, which come when they like, as drops do: see [`Acquisition::drops`].
+    /// Touches as the published device records them, at unknown times; the same gaps as [`Acquisition::drops`].
     #[must_use]
     pub fn touches(mode: Mode, session: u64) -> Self {
         Self::drops(mode, session)
     }
 
-    /// Drops as on the device: blocks follow each other without a gap. When the ball is let go is not known to the
-    /// recording.
+    /// Drops as the published device records them: blocks without gaps between them. The recording does not know when
+    /// the ball is released.
     #[must_use]
     pub fn drops(mode: Mode, session: u64) -> Self {
         Self {

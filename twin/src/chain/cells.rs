@@ -1,4 +1,4 @@
-//! The cells of a skin, emulated: what their firmware puts out, row by row.
+//! Emulated cells of a skin: what their firmware puts out, row by row.
 
 use spts_circuit::{CellCodes, CodesError, Patterns, WeightMode, Weights};
 use spts_firmware::{
@@ -9,16 +9,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Cells on a bus.
 const BUS_CELLS: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
-/// Edges until the firmware's raster starts over.
+/// Edges after which the firmware's raster scan starts again.
 pub const RASTER_PERIOD: usize = (LAST_ADDRESS - FIRST_ADDRESS) as usize + 1;
 /// Rows that are clocked at a time on the way to a row.
 const STRIDE: u64 = 1024;
 
-/// Cells that cannot be emulated for a recording.
+/// Why cells cannot be emulated for a recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CellsError {
-    /// A raster of another size than the firmware's.
+    /// A raster scan of a size that the firmware does not have.
     #[error(
         "a raster scan of {taxels} taxels: the firmware's raster has {RASTER_PERIOD}; other skins have `weights` = \"model\""
     )]
@@ -26,55 +26,71 @@ pub enum CellsError {
         /// Taxels of the skin.
         taxels: usize,
     },
-    /// A pattern that no cell of the firmware holds.
+    /// A pattern that the firmware's cells cannot store.
     #[error(
         "a pattern of {levels} levels and {period} rows: the firmware's cells hold ±1 and at most {PATTERN_BITS} rows; others have `weights` = \"model\""
     )]
     Patterns {
-        /// Name of the levels.
+        /// Name of the pattern's levels.
         levels: &'static str,
-        /// Rows after which the pattern starts over.
+        /// Rows after which the pattern starts again.
         period: usize,
     },
-    /// A rate that the emulated clock line cannot have.
+    /// A rate that the emulated clock line cannot reach.
     #[error("the profile's `sample_rate_hz` = {sample_rate_hz} is outside [1, 1e6] Hz of the emulated clock")]
     Rate {
         /// Measurements a second.
         sample_rate_hz: f64,
     },
-    /// The emulated array refuses.
+    /// The emulated array refused its configuration.
     #[error(transparent)]
     Array(#[from] ArrayError),
 }
 
-/// Emulated cells with the shipped firmware, a bus for every 112 of them, seeded over the bus and clocked at the rate
-/// of the measurements. Cells on further buses have the addresses of the first one, and seeds that go on.
+/// Emulated cells that run the shipped firmware. One bus serves up to 112 cells; the cells are seeded over the bus and
+/// clocked at the rate of the measurements. Every bus uses the same addresses; the seeds continue from bus to bus.
 ///
-/// Every edge is emulated, those that are not recorded, too; a row behind is reached from the seeds again.
+/// Every edge is emulated, including those between recorded blocks. To reach an earlier row, the emulation starts again
+/// from the seeds.
+///
+/// ```
+/// use spts::chain::FirmwareCells;
+/// use spts::circuit::CellCodes as _;
+/// use spts::{Seeding, WeightMode, Weights};
+///
+/// let weights = Weights::new(WeightMode::Binary, Seeding::Address, 10);
+/// let mut emulated = FirmwareCells::new(&weights, 64_300.0)?;
+/// let (mut codes, mut formula) = ([0; 200], [0; 200]);
+/// emulated.codes(0, &mut codes)?;
+/// weights.fill_codes(0, &mut formula);
+/// assert_eq!(codes, formula, "20 rows of 10 cells");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct FirmwareCells {
-    /// The cells before row 0.
+    /// The cells as they are before row 0.
     seeded: Vec<Array>,
     buses: Vec<Array>,
     taxels: usize,
     clock: Clock,
-    /// Row that the next edge brings.
+    /// Row that the next clock edge selects.
     row: u64,
     /// Codes of one bus.
     of_bus: Vec<u8>,
-    /// What sound cells put out.
+    /// Weights that fault-free cells put out.
     weights: Weights,
     levels: Vec<f64>,
-    /// Codes handed out so far that are not those of sound cells.
+    /// Number of codes so far that differ from those of fault-free cells.
     unlike: Arc<AtomicU64>,
 }
 
 impl FirmwareCells {
-    /// Cells that are to put out `weights`, just seeded, for `sample_rate_hz` measurements a second. Output is sampled
-    /// 11 µs after the edge as on the skin, or with a faster clock at the same share of a period.
+    /// Freshly seeded cells that are to put out `weights` at `sample_rate_hz` measurements a second. The output is
+    /// sampled 11 µs after the edge, as on the real skin; with a faster clock, after the same share of a period.
     ///
     /// # Errors
-    /// [`CellsError`] for a raster of other than 100 taxels, and where the array or its clock cannot be.
+    /// [`CellsError`] for a raster scan of other than 100 taxels, or an array or clock that the emulation does not
+    /// support.
     pub fn new(weights: &Weights, sample_rate_hz: f64) -> Result<Self, CellsError> {
         Self::check(weights, sample_rate_hz)?;
         let taxels = weights.taxels();
@@ -96,8 +112,8 @@ impl FirmwareCells {
         })
     }
 
-    /// The same cells, which add to `unlike` the number of codes they hand out that are not `weights`: what a clock
-    /// that is too fast makes of them.
+    /// The same cells, counting in `unlike` every code that differs from `weights`. Cells differ when the clock is too
+    /// fast for them.
     #[must_use]
     pub fn counting(self, unlike: Arc<AtomicU64>) -> Self {
         Self { unlike, ..self }
@@ -189,10 +205,10 @@ fn fits(mode: WeightMode, patterns: &Patterns) -> Result<(), CellsError> {
     })
 }
 
-/// What the master writes to the cell of `taxel` at `address`, so that it puts out `weights`.
+/// The message that the bus master writes to the cell of `taxel` at `address` so that the cell puts out `weights`.
 ///
 /// # Errors
-/// [`CellsError::Patterns`] for patterns that cells do not hold.
+/// [`CellsError::Patterns`] for a pattern that cells cannot store.
 pub fn start_message(weights: &Weights, taxel: usize, address: u8) -> Result<Vec<u8>, CellsError> {
     let mode = cell_mode(weights.mode());
     if let Some(patterns) = weights.patterns() {
@@ -212,10 +228,10 @@ pub fn start_message(weights: &Weights, taxel: usize, address: u8) -> Result<Vec
     })
 }
 
-/// Bus with the cells of taxels `first..first + cells`, started.
+/// A bus with the cells of the taxels `first..first + cells`, seeded and started.
 ///
 /// # Errors
-/// [`CellsError`] for an array that the emulation does not take, and for patterns that cells do not hold.
+/// [`CellsError`] for an array that the emulation does not support, or a pattern that cells cannot store.
 pub fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, CellsError> {
     let mut array = Array::new(cells, image)?;
     for (address, taxel) in (FIRST_ADDRESS..).zip(first..first + cells) {

@@ -1,4 +1,4 @@
-//! Why there is no chain, or no recording.
+//! Errors of the chain from transducer to recording.
 
 use spts_circuit::ProfileError;
 use spts_models::{TransducerError, in_section};
@@ -16,7 +16,7 @@ pub enum ChainError {
         /// All known names.
         known: String,
     },
-    /// Parameters that the transducer refuses: the message names the field.
+    /// Parameters that the transducer refuses. The message names the field.
     #[error("{0}")]
     Transducer(String),
     /// No readout profile of that name.
@@ -27,16 +27,16 @@ pub enum ChainError {
         /// All known names.
         known: String,
     },
-    /// A readout profile that cannot be used: the message names the file, if there is one, and the field.
+    /// A readout profile that cannot be used. The message names the field and, if the profile is a file, the file.
     #[error("{0}")]
     Profile(String),
-    /// Rows of the sensing matrix that cannot be: the message names the field, and the file where there is one.
+    /// Rows of the sensing matrix that are not valid. The message names the field and, if there is one, the file.
     #[error("{0}")]
     Rows(String),
     /// A file of seeds or of a pattern cannot be read.
     #[error("`rows.{field}`: {path}: {source}", path = path.display())]
     RowsFile {
-        /// Key that names it.
+        /// Key of the scene that names the file.
         field: &'static str,
         /// File.
         path: PathBuf,
@@ -76,10 +76,10 @@ pub enum ChainError {
     /// The readout cannot be set up.
     #[error("readout: {0}")]
     Readout(#[from] ProfileError),
-    /// The conductance of a press is not usable.
+    /// A conductance that the readout cannot use.
     #[error("conductance: {0}")]
     Source(#[from] spts_circuit::SourceError),
-    /// The readout could not record.
+    /// The readout could not make the recording.
     #[error("readout: {0}")]
     Acquire(#[from] spts_circuit::AcquireError),
     /// A press that is too long to record.
@@ -87,9 +87,9 @@ pub enum ChainError {
     TooLong {
         /// Length of the press, s.
         duration_s: f64,
-        /// Its measurements.
+        /// Number of its measurements.
         measurements: f64,
-        /// Most that are recorded.
+        /// Largest number of measurements in a press.
         limit: f64,
     },
 }

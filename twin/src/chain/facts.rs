@@ -1,11 +1,11 @@
-//! What a simulation knows of a press beside its recording.
+//! What a simulation knows about a press beside its recording.
 
 use crate::session::{PressFacts, PressPose};
 use spts_contact::Frame;
 use spts_models::ConductanceMap;
 
-/// Facts of one press or drop at the middle of its hold, or at the instant of its largest force. `maps` are the
-/// conductances at the frames.
+/// Facts about one press or drop at the middle of its hold or, without a hold, at the instant of the largest force.
+/// `maps` are the conductances at `frames`.
 #[must_use]
 pub fn press_facts(frames: &[Frame], maps: &[ConductanceMap], hold_s: Option<[f64; 2]>) -> PressFacts {
     let at = match hold_s {

@@ -1,4 +1,4 @@
-//! Gains of a calibrated skin, from the file that a scene or a spec names.
+//! Gains of a calibrated skin, read from the file that a scene or a data set's specification names.
 
 use super::error::ChainError;
 use super::stages::MAX_TOML_BYTES;
@@ -8,11 +8,11 @@ use std::path::Path;
 /// Parameter of the transducer that may name a file.
 const GAINS: &str = "gains";
 
-/// Puts the gains in the file that `gains` of the transducer's `parameters` names, in `folder`, in place of its name:
-/// what is stored then needs no file.
+/// Replaces the file name in `gains` of the transducer's `parameters` by the gains in that file. A relative name is
+/// looked up in `folder`. A scene stored afterwards no longer needs the file.
 ///
 /// # Errors
-/// [`ChainError::Gains`] when there is no such file, or it has no gains.
+/// [`ChainError::Gains`] if the file cannot be read or holds no gains.
 pub fn read_gains(parameters: &mut toml::Table, folder: &Path) -> Result<(), ChainError> {
     let Some(toml::Value::String(name)) = parameters.get(GAINS) else {
         return Ok(());

@@ -1,4 +1,5 @@
-//! From pressure on the taxels to a recording: transducer, readout and source of weights, whatever made the pressure.
+//! From pressure on the taxels to a recording: transducer, readout and source of weights. The pressure may come from
+//! any simulation.
 
 mod acquisition;
 mod cells;

@@ -1,4 +1,4 @@
-//! The presses of one session, a few at a time: skin and readout remember those before.
+//! The presses of one session, recorded a few at a time. Skin and readout keep their state between calls.
 
 use super::acquisition::{Acquisition, idle_frames};
 use super::error::ChainError;
@@ -14,12 +14,24 @@ const BENT_S: f64 = 3600.0;
 /// Most measurements recorded of one press: ten minutes at 64.3 kHz, 320 MB.
 const MAX_MEASUREMENTS: f64 = 4e7;
 
-/// The skin in one session. Foam and Velostat remember the presses before.
+/// The skin during one session. Foam and Velostat remember earlier presses.
+///
+/// ```
+/// use spts::{Chain, ChainConfig, PressureMap, SkinLayout};
+///
+/// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+/// let pressure = PressureMap::from_values(10, 10, vec![10e3; 100]);
+/// let mut skin = chain.skin_session(0);
+/// let first = skin.hold(&pressure, 0.5).sum();
+/// skin.rest();
+/// assert!(skin.hold(&pressure, 0.5).sum() > first, "Velostat conducts better at the second press");
+/// # Ok::<(), spts::ChainError>(())
+/// ```
 pub struct SkinSession {
     transducer: Box<dyn Transducer>,
     rows: usize,
     cols: usize,
-    /// Whether a press has been before.
+    /// Whether the skin has been pressed in this session.
     pressed: bool,
 }
 
@@ -33,20 +45,21 @@ impl Clone for SkinSession {
 }
 
 impl SkinSession {
-    /// Conductance of the taxels `hold_s` after the next press has begun, whose pressure on the electrodes is constant.
+    /// Conductance of every taxel, S, `hold_s` seconds after the start of a press with the constant pressure
+    /// `electrode_pressure`.
     pub fn hold(&mut self, electrode_pressure: &PressureMap, hold_s: f64) -> ConductanceMap {
         let mut map = ConductanceMap::zeros(self.rows, self.cols);
         self.transducer.step(electrode_pressure, hold_s, &mut map);
         map
     }
 
-    /// Lets the skin rest as between two presses.
+    /// Lets the skin rest as long as between two presses.
     pub fn rest(&mut self) {
         self.transducer.rest(REST_S);
     }
 
-    /// Conductance of the taxels at every frame of the next press, after which the skin rests. A bent skin rests under
-    /// its preload, and has been under it long before the session.
+    /// Conductance of every taxel at every frame of the next press; afterwards the skin rests. A bent skin rests under
+    /// its preload, which has acted since long before the session.
     pub fn press(&mut self, frames: &[Frame]) -> Vec<ConductanceMap> {
         let preload = preload(frames);
         if let Some(preload) = preload.filter(|_| !self.pressed) {
@@ -69,10 +82,10 @@ impl SkinSession {
         maps
     }
 
-    /// The same as conductance over time.
+    /// [`SkinSession::press`] as a function of time, interpolated between the frames.
     ///
     /// # Errors
-    /// [`ChainError::Source`] when the frames are not in the order of their times.
+    /// [`ChainError::Source`] if the frames are not in order of time.
     pub fn conductance(&mut self, frames: &[Frame]) -> Result<Interpolated, ChainError> {
         let times_s = frames.iter().map(|frame| frame.time_s).collect();
         Ok(Interpolated::new(times_s, self.press(frames))?)
@@ -87,7 +100,7 @@ fn preload(frames: &[Frame]) -> Option<&PressureMap> {
     loaded.then_some(&first.electrode_pressure)
 }
 
-/// The readout in one session, its seeds loaded before the first block.
+/// The readout during one session. The seeds are loaded before the first block.
 pub struct ReadoutSession {
     readout: Readout,
     measurements: usize,
@@ -96,10 +109,10 @@ pub struct ReadoutSession {
 }
 
 impl ReadoutSession {
-    /// Records a block of every press whose conductance is known, one after the other.
+    /// Records one block for each of `sources`, in order.
     ///
     /// # Errors
-    /// [`ChainError`] when the readout refuses the conductance.
+    /// [`ChainError`] if the readout refuses a conductance.
     pub fn record(&mut self, sources: &mut [Interpolated]) -> Result<Recording, ChainError> {
         let recording = self.readout.record(sources, self.measurements, self.gap_frames)?;
         Ok(recording.with_idle_frames(self.idle_frames))
@@ -107,7 +120,7 @@ impl ReadoutSession {
 }
 
 impl Chain {
-    /// The skin in session number `session`.
+    /// The skin, ready for session number `session`.
     #[must_use]
     pub fn skin_session(&self, session: u64) -> SkinSession {
         let mut transducer = self.fresh_transducer();
@@ -120,10 +133,10 @@ impl Chain {
         }
     }
 
-    /// The readout that records presses of `duration_s` each as `acquisition` says.
+    /// The readout, ready to record presses of `duration_s` seconds each as `acquisition` says.
     ///
     /// # Errors
-    /// [`ChainError`] when a press is too long to record, or the weights cannot come from where the scene says.
+    /// [`ChainError`] if a press is too long to record, or the source of the weights cannot provide them.
     pub fn readout_session(&self, duration_s: f64, acquisition: &Acquisition) -> Result<ReadoutSession, ChainError> {
         let mut readout = self.readout(acquisition.mode, acquisition.session)?;
         readout.skip(acquisition.lead_frames);

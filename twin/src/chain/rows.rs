@@ -1,4 +1,4 @@
-//! Section `[rows]`: where the rows of the sensing matrix come from.
+//! Section `[rows]` of a scene: where the rows of the sensing matrix come from.
 
 use super::error::ChainError;
 use serde::{Deserialize, Serialize};
@@ -6,8 +6,8 @@ use spts_circuit::{CompressiveWeights, Mode, Patterns, Profile, Seeding, parse_p
 use spts_models::{SkinLayout, in_section};
 use std::path::{Path, PathBuf};
 
-/// Section `[rows]` of a scene: the weights of the compressive readout. What is given here takes the place of what the
-/// readout profile says; at most one of `seeding`, `seeds`, `seeds_file`, `patterns` and `patterns_file` is.
+/// Section `[rows]` of a scene: the weights of the compressive readout. A field given here replaces the one in the
+/// readout profile. At most one of `seeding`, `seeds`, `seeds_file`, `patterns` and `patterns_file` may be given.
 ///
 /// ```
 /// use spts::scene::Scene;
@@ -20,52 +20,53 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RowsConfig {
-    /// Which rows: those of the cells' generators, or a pattern over and over again. Default: what the other keys say.
+    /// Kind of the rows: from the cells' generators, or a repeated pattern. Default: the kind that the other fields
+    /// imply.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<RowsKind>,
-    /// Rule by which the cells are seeded: `"address"` or `"mixed"`.
+    /// Rule that seeds the cells: `"address"` or `"mixed"`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seeding: Option<Seeding>,
     /// Seed of every cell, row by row; each [0, 2^32).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seeds: Option<Vec<u32>>,
-    /// File of such seeds, relative to the scene file, as [`parse_seeds`] reads it.
+    /// File with such seeds, relative to the scene file, in the format of [`parse_seeds`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seeds_file: Option<String>,
-    /// Levels of the cells: `"binary"`, ±1, or `"analog"`, eight bits.
+    /// Levels of the weights: `"binary"` (±1) or `"analog"` (eight bits).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub levels: Option<CompressiveWeights>,
-    /// File of a pattern, relative to the scene file, as [`parse_patterns`] reads it: one line a row.
+    /// File with a pattern, relative to the scene file, in the format of [`parse_patterns`]: one row a line.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub patterns_file: Option<String>,
-    /// The pattern itself: `period` rows of `codes`, row after row.
+    /// The pattern itself: `period` rows of `codes`, one row after the other.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub patterns: Option<Patterns>,
 }
 
-/// Which rows the cells put out.
+/// How the cells form their rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RowsKind {
-    /// Those of the pseudorandom generators.
+    /// By their pseudorandom generators.
     Generator,
-    /// A pattern that repeats.
+    /// By a pattern that repeats.
     Pattern,
 }
 
-/// File that seeds or a pattern were read from.
+/// The file from which seeds or a pattern were read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RowsFile {
     /// Path of the file.
     pub path: PathBuf,
     /// Its text.
     pub text: String,
-    /// Key of the scene that names it.
+    /// Key of the scene that names the file.
     field: &'static str,
 }
 
 impl RowsConfig {
-    /// Whether the readout profile alone says where the rows come from.
+    /// Whether the section is empty, so that the readout profile alone determines the rows.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
@@ -74,8 +75,8 @@ impl RowsConfig {
     /// `profile` with these rows on a skin with this `layout`, and the file that they were read from.
     ///
     /// # Errors
-    /// [`ChainError::Rows`] for more than one source of rows or one of another kind, a file that holds none, and rows of
-    /// another number of taxels; [`ChainError::RowsFile`] for a file that cannot be read.
+    /// [`ChainError::Rows`] for more than one source of rows or one of another kind, a file that holds none, and rows
+    /// of another number of taxels; [`ChainError::RowsFile`] for a file that cannot be read.
     pub(super) fn applied(
         &self,
         mut profile: Profile,

@@ -1,19 +1,28 @@
-//! What one pressed taxel gives, against the noise of a measurement.
+//! Signal of one pressed taxel, compared with the noise of a measurement.
 
 use super::error::ChainError;
 use super::stages::Chain;
 use spts_circuit::{Constant, Mode, Profile, Readout};
 use spts_models::{ConductanceMap, PressureMap, REFERENCE_PA, SkinLayout};
 
-/// One pressed taxel in a measurement of the compressive readout.
+/// Signal and noise of one pressed taxel in a measurement of the compressive readout.
+///
+/// ```
+/// use spts::{Chain, ChainConfig, SkinLayout};
+///
+/// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+/// let taxel = chain.taxel_signal()?;
+/// assert!(!taxel.below_noise() && taxel.signal_v > 5.0 * taxel.step_v);
+/// # Ok::<(), spts::ChainError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TaxelSignal {
     /// Output of a taxel of median gain under 10 kPa, V.
     pub signal_v: f64,
-    /// Standard deviation of a measurement of this taxel alone, V: whatever the profile does to it, its own contact
-    /// noise included.
+    /// Standard deviation of a measurement of this taxel alone, V. All effects of the profile contribute, including the
+    /// taxel's contact noise.
     pub noise_v: f64,
-    /// Step of the converter, V; 0 without one.
+    /// Step of the converter, V; 0 if the profile has no converter.
     pub step_v: f64,
 }
 
@@ -25,8 +34,8 @@ const MEASUREMENTS: usize = 5000;
 const LEAST_RATIO: f64 = 2.0;
 
 impl TaxelSignal {
-    /// Whether a pressed taxel is below twice the noise of a measurement, or below a step of the converter. Its image
-    /// then takes many more measurements than there are taxels.
+    /// Whether the signal is less than twice the noise, or less than one step of the converter. An image then needs
+    /// many more measurements than there are taxels.
     #[must_use]
     pub fn below_noise(&self) -> bool {
         self.signal_v < LEAST_RATIO * self.noise_v || self.signal_v < self.step_v
@@ -34,11 +43,11 @@ impl TaxelSignal {
 }
 
 impl Chain {
-    /// Signal and noise of one taxel of this skin and readout, measured on a skin of this one taxel: without faults and
-    /// with the seeds of the rule, so that they do not depend on the rows.
+    /// Signal and noise of one taxel of this skin and readout. They are measured on a skin of one taxel, without faults
+    /// and with seeds by the rule, so that the result does not depend on the rows.
     ///
     /// # Errors
-    /// [`ChainError`] when the readout cannot be set up.
+    /// [`ChainError`] if the readout cannot be set up.
     pub fn taxel_signal(&self) -> Result<TaxelSignal, ChainError> {
         let skin = self.skin();
         let shape = (skin.rows(), skin.cols());

@@ -1,4 +1,4 @@
-//! Everything between the pressure on the skin and the recording.
+//! Every stage between the pressure on the skin and the recording.
 
 use super::acquisition::Acquisition;
 use super::cells::FirmwareCells;
@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Transducer, readout and source of weights of a skin. A chain that exists is valid: recording with it cannot fail on
-/// its configuration.
+/// Transducer, readout and source of weights of a skin. A `Chain` is valid by construction: a recording cannot fail
+/// because of its configuration.
 ///
 /// ```
 /// use spts::{Chain, ChainConfig, SkinLayout};
@@ -26,7 +26,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// ```
 #[derive(Clone)]
 pub struct Chain {
-    /// As it is on a fresh skin; every session gets a copy.
+    /// The transducer of a fresh skin. Every session works on a copy.
     transducer: Arc<dyn Transducer>,
     profile: Profile,
     profile_file: Option<ProfileFile>,
@@ -34,7 +34,7 @@ pub struct Chain {
     weights: WeightSource,
     skin: SkinLayout,
     streams: Streams,
-    /// Of the codes that emulated cells put out for this chain, those that sound cells would not.
+    /// Number of codes of emulated cells that differ from those of fault-free cells.
     unlike_codes: Arc<AtomicU64>,
 }
 
@@ -46,7 +46,7 @@ impl fmt::Debug for Chain {
     }
 }
 
-/// File that a readout profile was read from.
+/// The file from which a readout profile was read.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ProfileFile {
     /// Path of the file.
@@ -56,12 +56,12 @@ pub struct ProfileFile {
 }
 
 impl Chain {
-    /// Chain of `skin` as `config` says. A readout that ends in `.toml` is a file, looked for in `folder`. The skin is
-    /// the same specimen for every chain with the same `seed`.
+    /// The chain of the skin `skin` with the stages in `config`. A readout that ends in `.toml` is a file in `folder`.
+    /// Chains with the same `seed` have the same specimen of the skin.
     ///
     /// # Errors
-    /// [`ChainError`] for an unknown transducer, profile, fault or source of weights, a value outside its range, or an
-    /// unusable file.
+    /// [`ChainError`] for an unknown transducer, profile, fault or source of weights, a value outside its range, or a
+    /// file that cannot be used.
     pub fn new(config: &ChainConfig, skin: &SkinLayout, seed: u64, folder: &Path) -> Result<Self, ChainError> {
         let streams = Streams::new(seed);
         let name = config.transducer.as_deref().unwrap_or(DEFAULT_TRANSDUCER);
@@ -92,25 +92,25 @@ impl Chain {
         Ok(chain)
     }
 
-    /// Measurements a second, Hz.
+    /// Number of measurements a second, Hz.
     #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
         self.profile.sample_rate_hz
     }
 
-    /// File that the readout profile was read from; `None` for a profile by name.
+    /// The file from which the readout profile was read; `None` for a profile by name.
     #[must_use]
     pub fn profile_file(&self) -> Option<&ProfileFile> {
         self.profile_file.as_ref()
     }
 
-    /// File that the seeds or the pattern were read from, if they were.
+    /// The file from which seeds or a pattern were read; `None` if there is none.
     #[must_use]
     pub fn rows_file(&self) -> Option<&RowsFile> {
         self.rows_file.as_ref()
     }
 
-    /// The skin.
+    /// Layout of the skin.
     pub fn skin(&self) -> &SkinLayout {
         &self.skin
     }
@@ -125,17 +125,17 @@ impl Chain {
         self.transducer.boxed()
     }
 
-    /// Readout profile, with the rows and the faults of the scene. It is for electrodes of 10 mm × 10 mm, as it is
-    /// written.
+    /// The readout profile, including the rows and faults of the scene. Its values hold for electrodes of 10 mm × 10
+    /// mm.
     #[must_use]
     pub fn profile(&self) -> &Profile {
         &self.profile
     }
 
-    /// Checks before the first press what would keep it from being recorded in `mode`.
+    /// Checks whether presses can be recorded in `mode`, before the first one is simulated.
     ///
     /// # Errors
-    /// [`ChainError::Cells`] when its weights cannot come from where the scene says.
+    /// [`ChainError::Cells`] if the source of the weights cannot provide them.
     pub fn check(&self, mode: Mode) -> Result<(), ChainError> {
         match self.weights {
             WeightSource::Model => Ok(()),
@@ -146,10 +146,10 @@ impl Chain {
         }
     }
 
-    /// Readout of session number `session` in `mode`, its seeds just loaded.
+    /// The readout for session number `session` in `mode`, with freshly loaded seeds.
     ///
     /// # Errors
-    /// [`ChainError`] when the weights cannot come from where the scene says.
+    /// [`ChainError`] if the source of the weights cannot provide them.
     pub fn readout(&self, mode: Mode, session: u64) -> Result<Readout, ChainError> {
         let readout = Readout::new(&self.profile, mode, &self.skin, self.streams, session)?;
         match self.weights {
@@ -163,14 +163,14 @@ impl Chain {
         }
     }
 
-    /// Number of codes that emulated cells put out in the recordings so far, by this chain and its copies, and that are
-    /// not the model's: edges lost to a clock that is too fast.
+    /// Number of codes in all recordings by this chain and its copies in which the emulated cells differ from the
+    /// model. Such codes show edges that cells have lost because the clock is too fast.
     #[must_use]
     pub fn unlike_codes(&self) -> u64 {
         self.unlike_codes.load(Ordering::Relaxed)
     }
 
-    /// The same skin read out with another profile.
+    /// The same skin with another readout profile.
     ///
     /// # Errors
     /// [`ChainError`] for a profile with an unknown effect or a value outside its range.
@@ -186,10 +186,30 @@ impl Chain {
         })
     }
 
-    /// Records `presses`, `duration_s` each, one after the other. Foam and Velostat remember the presses before.
+    /// The same skin with `transducer`, a transducer of your own. The transducer starts as on a fresh skin, and its
+    /// conductances are used unchanged: one for every electrode of this skin.
+    ///
+    /// ```
+    /// use spts::models::{Linear, LinearConfig};
+    /// use spts::{Chain, ChainConfig, SkinLayout};
+    ///
+    /// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+    /// let linear = Linear::try_from(LinearConfig { slope_s_per_pa: 2e-8 })?;
+    /// let chain = chain.with_transducer(Box::new(linear));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with_transducer(&self, transducer: Box<dyn Transducer>) -> Self {
+        Self {
+            transducer: transducer.into(),
+            ..self.clone()
+        }
+    }
+
+    /// Records `presses` of `duration_s` seconds each, in order. Foam and Velostat remember earlier presses.
     ///
     /// # Errors
-    /// [`ChainError`] when the readout refuses the conductance, or a press is too long to record.
+    /// [`ChainError`] if the readout refuses a conductance, or a press is too long to record.
     pub fn record(
         &self,
         presses: &[&[Frame]],
@@ -200,10 +220,10 @@ impl Chain {
         self.record_sources(&mut sources, duration_s, acquisition)
     }
 
-    /// Records presses whose conductance is known ([`Chain::conductance`]), `duration_s` each, one after the other.
+    /// Records presses of `duration_s` seconds each, in order, from their conductances ([`Chain::conductance`]).
     ///
     /// # Errors
-    /// As for [`Chain::record`].
+    /// As [`Chain::record`].
     pub fn record_sources(
         &self,
         sources: &mut [Interpolated],
@@ -213,10 +233,10 @@ impl Chain {
         self.readout_session(duration_s, acquisition)?.record(sources)
     }
 
-    /// Conductance over time of every press, in the session and on the conditioned sheet that `acquisition` says.
+    /// Conductance of every press as a function of time, in the session and with the conditioning of `acquisition`.
     ///
     /// # Errors
-    /// [`ChainError::Source`] when the frames are not in the order of their times.
+    /// [`ChainError::Source`] if the frames of a press are not in order of time.
     pub fn conductance(
         &self,
         presses: &[&[Frame]],
@@ -229,8 +249,8 @@ impl Chain {
         presses.iter().map(|frames| skin.conductance(frames)).collect()
     }
 
-    /// Conductance of the taxels at every frame of every press of session number `session`, the skin resting between
-    /// the presses.
+    /// Conductance of every taxel at every frame of every press, in session number `session`. The skin rests between
+    /// presses.
     #[must_use]
     pub fn conductance_maps(&self, presses: &[&[Frame]], session: u64) -> Vec<Vec<ConductanceMap>> {
         let mut skin = self.skin_session(session);
@@ -242,8 +262,8 @@ fn taxels(skin: &SkinLayout) -> u32 {
     u32::try_from(skin.taxels()).unwrap_or(u32::MAX)
 }
 
-/// Largest scene or readout profile that is read, bytes: parsed, it takes some hundred times its size, and the seeds of
-/// a hundred thousand taxels have 1 MB. Larger skins have a file of seeds.
+/// Size of the largest scene or readout profile that is read, bytes. The limit keeps parsing small, because a parsed
+/// file takes some hundred times its size. The seeds of 100,000 taxels fill 1 MB; larger skins name a file of seeds.
 pub const MAX_TOML_BYTES: u64 = 1 << 21;
 
 impl ProfileFile {

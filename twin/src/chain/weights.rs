@@ -5,13 +5,13 @@ use super::error::ChainError;
 /// Where the weights of a recording come from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WeightSource {
-    /// The formula of the cells' generator.
+    /// Computed by the formula of the cells' generator.
     Model,
-    /// The codes that emulated cells with the shipped firmware put out: [`FirmwareCells`](super::FirmwareCells).
+    /// The codes of emulated cells that run the shipped firmware: [`FirmwareCells`](super::FirmwareCells).
     Firmware,
 }
 
-/// Every source of weights, by the name that a scene gives it.
+/// Every source of weights, with the name that a scene gives to it.
 pub const WEIGHT_SOURCES: &[(&str, WeightSource)] =
     &[("model", WeightSource::Model), ("firmware", WeightSource::Firmware)];
 
@@ -19,10 +19,10 @@ pub const WEIGHT_SOURCES: &[(&str, WeightSource)] =
 pub const DEFAULT_WEIGHTS: &str = "model";
 
 impl WeightSource {
-    /// Source `name` of [`WEIGHT_SOURCES`].
+    /// The source called `name` in [`WEIGHT_SOURCES`].
     ///
     /// # Errors
-    /// [`ChainError::UnknownWeights`] when there is none.
+    /// [`ChainError::UnknownWeights`] if the table has no such name.
     pub fn named(name: &str) -> Result<Self, ChainError> {
         let found = WEIGHT_SOURCES.iter().find(|(known, _)| *known == name);
         found.map(|(_, source)| *source).ok_or_else(|| {

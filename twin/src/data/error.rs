@@ -1,4 +1,4 @@
-//! What can be wrong with a directory of recordings.
+//! Errors of folders with recordings.
 
 use crate::session::SessionError;
 use std::path::PathBuf;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataError {
-    /// The file system said no.
+    /// The file system reports an error.
     #[error("{path}: {source}", path = path.display())]
     Io {
         /// File or folder.
@@ -15,7 +15,7 @@ pub enum DataError {
         /// Cause.
         source: std::io::Error,
     },
-    /// A file that others need is not there.
+    /// A required file is missing.
     #[error("{path}: missing; {needed_by} needs it", path = path.display())]
     Missing {
         /// File.
@@ -23,7 +23,7 @@ pub enum DataError {
         /// What cannot be used without it.
         needed_by: String,
     },
-    /// Not a MATLAB v5 file, or a damaged one.
+    /// A file that is not in MATLAB v5 format, or is damaged.
     #[error("{path}: not a readable MATLAB v5 file ({reason})", path = path.display())]
     NotMat {
         /// File.
@@ -41,14 +41,14 @@ pub enum DataError {
         /// Variables in the file, with their classes.
         found: String,
     },
-    /// A variable that is no array of numbers.
+    /// A variable that is not an array of numbers.
     #[error("{path}: variable `{name}` is a {class}; expected an array of numbers", path = path.display())]
     NotNumeric {
         /// File.
         path: PathBuf,
         /// Variable.
         name: &'static str,
-        /// Its class, in MATLAB's words.
+        /// Class of the variable, as MATLAB names it.
         class: &'static str,
     },
     /// A variable of the wrong shape.
@@ -60,7 +60,7 @@ pub enum DataError {
         name: &'static str,
         /// Its shape.
         shape: Vec<usize>,
-        /// What it should be.
+        /// Expected shape.
         expected: &'static str,
     },
     /// A value outside its range.
@@ -70,17 +70,17 @@ pub enum DataError {
         path: PathBuf,
         /// Variable.
         name: &'static str,
-        /// 0-based position.
+        /// Position, from 0.
         index: usize,
         /// The value.
         value: f64,
         /// Valid range.
         range: &'static str,
     },
-    /// The folder of a session cannot be used.
+    /// A session folder that cannot be used.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// The numbers do not make a recording.
+    /// Numbers that are not a valid recording.
     #[error("{path}: {source}", path = path.display())]
     Recording {
         /// File.
@@ -88,51 +88,51 @@ pub enum DataError {
         /// Cause.
         source: spts_circuit::RecordingError,
     },
-    /// A session that the scores cannot be computed from.
+    /// A session that cannot be scored.
     #[error("{path}: session {session}: `{field}` = {value}; scoring needs {needed}", path = path.display())]
     Unscorable {
         /// Folder of the recordings.
         path: PathBuf,
-        /// Name of the session, and the mode of its recording.
+        /// Name of the session and mode of its recording.
         session: String,
-        /// What is not enough.
+        /// The field that is too small.
         field: &'static str,
-        /// How much there is.
+        /// Its value.
         value: String,
-        /// How much is needed.
+        /// The value that scoring needs.
         needed: String,
     },
-    /// A session that no readout can be fitted to.
+    /// A session to which no readout can be fitted.
     #[error("{path}: {session} session: `{field}` = {value}; calibration needs {needed}", path = path.display())]
     Unfit {
         /// Folder of the recordings.
         path: PathBuf,
-        /// Session and mode.
+        /// Name of the session and mode of its recording.
         session: String,
-        /// What is not as needed.
+        /// The field that does not fit.
         field: &'static str,
-        /// What it is.
+        /// Its value.
         value: String,
-        /// What it must be.
+        /// The value that calibration needs.
         needed: String,
     },
-    /// Nothing to calibrate from.
+    /// No recording to calibrate from.
     #[error("{path}: no session of presses has a compressive recording; calibration needs one", path = path.display())]
     NoCompressive {
         /// Folder of the recordings.
         path: PathBuf,
     },
-    /// Two sessions that nothing tells apart.
+    /// Two sessions of the same name.
     #[error("{} and {}: `name` = {name:?} of both sessions; valid: names that differ", first.display(), second.display())]
     SameName {
         /// Folder of one of them.
         first: PathBuf,
         /// Folder of the other.
         second: PathBuf,
-        /// Their name, or what is made of their folders where names repeat.
+        /// Their name; or, if names repeat, the name made from their folders.
         name: String,
     },
-    /// The folder holds no recording at all.
+    /// A folder without recordings.
     #[error("{path}: no recordings found; expected session.json, folders with one, or the published recordings (presses/NAME/NAME_raster.mat, Measurements_Collected/NAME/NAME_raster.mat, or a clone of their repository)", path = path.display())]
     NothingFound {
         /// Folder.

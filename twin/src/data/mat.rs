@@ -34,7 +34,7 @@ pub fn read_mat(path: &Path, name: &'static str) -> Result<MatVariable, DataErro
     parse_mat(bytes, name, path)
 }
 
-/// Variable `name` of the file whose content is `bytes`; `path` is what the errors call it.
+/// Reads variable `name` from the content `bytes` of a MATLAB v5 file. Errors name the file `path`.
 ///
 /// # Errors
 /// As [`read_mat`].

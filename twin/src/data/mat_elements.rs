@@ -1,4 +1,4 @@
-//! What a MATLAB v5 file holds, found out before anything of it is unfolded.
+//! The elements of a MATLAB v5 file, found before anything is decompressed.
 
 /// Type of an element that is a matrix, `miMATRIX`.
 const MATRIX: u32 = 14;

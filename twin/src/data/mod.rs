@@ -1,4 +1,4 @@
-//! Where sessions come from: folders of sessions, and the published recordings of the real skin in MATLAB files.
+//! Reads sessions from folders of sessions, or from the published recordings of the real skin in MATLAB files.
 
 mod converter;
 mod error;

@@ -1,4 +1,4 @@
-//! Opens recordings: a session, a folder of sessions, or a published layout.
+//! Opens recordings: a session, a folder of sessions, or the published recordings.
 
 use super::error::DataError;
 use super::published::PublishedFiles;
@@ -15,13 +15,14 @@ impl SessionSet {
     /// Reads the sessions in `root`:
     ///
     /// - a folder with `session.json` is one session;
-    /// - a folder with such folders below it, at most three levels down, is all of them; sessions whose names repeat
-    ///   are named by their folders, and the published dictionary and library count where they lie in `root` itself;
-    /// - else `root` is searched for the published recordings: in this project's layout, in the published repository's,
-    ///   or the root of a clone of that.
+    /// - a folder that holds such folders, at most three levels deep, is the set of these sessions. Sessions whose
+    ///   names repeat are named after their folders. The published dictionary and library are used if they lie in
+    ///   `root` itself;
+    /// - any other folder is searched for the published recordings: in this project's layout, in the layout of the
+    ///   published repository, or in a clone of it.
     ///
     /// # Errors
-    /// [`DataError`] when there is no session at all, one that is there cannot be read, or two cannot be told apart.
+    /// [`DataError`] if there is no session, a session cannot be read, or two sessions have the same name.
     pub fn open(root: &Path) -> Result<Self, DataError> {
         if !root.is_dir() {
             let beside = root.file_name().is_some_and(|name| name == SESSION_FILE);

@@ -1,4 +1,4 @@
-//! Recordings of the real skin as they were published, in this project's layout or the original repository's.
+//! The published recordings of the real skin, in this project's layout or that of the original repository.
 
 use super::converter::published_converter;
 use super::error::DataError;
@@ -30,9 +30,9 @@ const CONDITIONING: usize = 5;
 /// A directory that holds at least one published recording.
 #[derive(Debug, Clone)]
 pub(super) struct PublishedFiles {
-    /// What was opened.
+    /// The folder that was opened.
     root: PathBuf,
-    /// The folder in it that the names below are relative to.
+    /// The folder to which the names below are relative.
     base: PathBuf,
 }
 

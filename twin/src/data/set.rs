@@ -1,4 +1,4 @@
-//! Sessions of one place, and what was published with them.
+//! The sessions in one folder, and what was published with them.
 
 use crate::session::{Event, Session};
 use spts_circuit::Recording;
@@ -6,27 +6,38 @@ use spts_recon::Matrix;
 use spts_recon::classify::Library;
 use std::path::PathBuf;
 
-/// All sessions in one place.
+/// All sessions in one folder.
+///
+/// ```
+/// use spts::data::SessionSet;
+///
+/// # let folder = std::env::temp_dir().join(format!("spts-doc-set-{}", std::process::id()));
+/// # std::fs::create_dir_all(&folder)?;
+/// let error = SessionSet::open(&folder).unwrap_err();
+/// assert!(error.to_string().contains("no recordings found; expected session.json"));
+/// # std::fs::remove_dir_all(&folder)?;
+/// # Ok::<(), std::io::Error>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct SessionSet {
-    /// What was opened.
+    /// The folder that was opened.
     pub root: PathBuf,
-    /// The sessions: of the published objects in the order of their labels, then of others by name.
+    /// The sessions: first those of the published objects in order of their labels, then the others by name.
     pub sessions: Vec<Session>,
-    /// Dictionary and library that were published with them.
+    /// Dictionary and library, if they were published with the sessions.
     pub published: Option<Published>,
-    /// What a published layout usually has and this one has not.
+    /// Parts of the published layout that this folder lacks.
     pub missing: Vec<String>,
 }
 
-/// Dictionary, shifted dictionary and classifier library as published.
+/// Dictionary, shifted dictionary and classifier library, as published.
 #[derive(Debug, Clone)]
 pub struct Published {
     /// K-SVD dictionary, 100 × 100.
     pub dictionary: Matrix,
-    /// Its shifted copies, 100 × 2450; absent when the file is.
+    /// Shifted copies of the dictionary, 100 × 2450; `None` if the file is missing.
     pub shifted: Option<Matrix>,
-    /// Labelled raster images; an object's label is its place among the published ones, from 1.
+    /// Labelled raster images. The label of an object is its place among the published objects, from 1.
     pub library: Library,
 }
 
@@ -37,12 +48,12 @@ impl SessionSet {
         self.sessions.iter().find(|s| s.name == name)
     }
 
-    /// Sessions in which something was pressed.
+    /// Sessions in which an object was pressed.
     pub fn presses(&self) -> impl Iterator<Item = &Session> {
         self.sessions.iter().filter(|s| s.event == Event::Press)
     }
 
-    /// Compressive recording of the first session in which something was dropped.
+    /// Compressive recording of the first session in which an object was dropped.
     #[must_use]
     pub fn drops(&self) -> Option<&Recording> {
         let drops = self.sessions.iter().filter(|s| s.event == Event::Drop);

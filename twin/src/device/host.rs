@@ -1,24 +1,24 @@
-//! The host's end.
+//! The host's end of the serial protocol.
 
 use super::virtual_device::DeviceBlock;
 use super::{SENDING, SENT, START};
 use std::io::{self, BufRead as _, BufReader, Read, Write};
 
-/// A device that answers as it should, ready to be read.
+/// A connection to a device that has answered and is ready to be read.
 pub struct Host<P> {
     port: BufReader<P>,
-    /// Blocks that were read.
+    /// Number of blocks read so far.
     read: usize,
 }
 
-/// Why nothing can be read of a device.
+/// Why a device cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum HostError {
-    /// The port failed, or was silent for too long.
+    /// The port failed, or the device was silent for too long.
     #[error("serial port: {0}")]
     Port(#[from] io::Error),
-    /// The device ended before a block did.
+    /// The connection ended within a block.
     #[error("the device ended in block {block}, after {fields} of {needed} fields")]
     Ended {
         /// Number of the block, from 0.
@@ -28,12 +28,12 @@ pub enum HostError {
         /// Fields of a block.
         needed: usize,
     },
-    /// The device said something else than it should.
+    /// The device sent unexpected text.
     #[error("the device said {found:?}; {needed} was expected")]
     Said {
-        /// What it said, as far as is shown.
+        /// The text, shortened.
         found: String,
-        /// What it should have said.
+        /// The expected text.
         needed: String,
     },
 }
@@ -48,10 +48,10 @@ const FIELD: usize = 24;
 const END: [&str; 2] = [" \r", " "];
 
 impl<P: Read + Write> Host<P> {
-    /// Wakes the device on `port` and waits until its cells are loaded.
+    /// Wakes the device on `port`, and waits until its cells are loaded.
     ///
     /// # Errors
-    /// [`HostError`] when it does not answer, or answers otherwise.
+    /// [`HostError`] if the device does not answer, or answers with unexpected text.
     pub fn greet(mut port: P) -> Result<Self, HostError> {
         port.write_all(&[START])?;
         port.flush()?;
@@ -70,10 +70,11 @@ impl<P: Read + Write> Host<P> {
         Ok(host)
     }
 
-    /// The next block of `measurements` measurements. Its last code is not sent, so that there is one less.
+    /// Reads the next block of `measurements` measurements. The device does not send the last code, so the block has
+    /// one code less.
     ///
     /// # Errors
-    /// [`HostError`] when the port fails, the block ends too early or too late, or a field is no number.
+    /// [`HostError`] if the port fails, the block is too short or too long, or a field is not a number.
     pub fn block(&mut self, measurements: usize) -> Result<DeviceBlock, HostError> {
         let needed = measurements + 1;
         let mut line = Vec::with_capacity(4 * needed);

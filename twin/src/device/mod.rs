@@ -1,12 +1,12 @@
-//! The skin's serial port: the published host's protocol, from both ends.
+//! The skin's serial port: both ends of the published protocol.
 //!
-//! The device drops every byte until it reads `*`, answers `Sending.`, loads its cells, answers `Sent!.`, and reads
-//! nothing more. From then on it sends block after block: the number of frames since its seeds were loaded, counted to
-//! the end of the block, then the codes of the converter, all with a comma behind them, a space, and the end of the
-//! line. The last code of a block is never sent.
+//! The device ignores every byte until it reads `*`. It answers `Sending.`, loads its cells, answers `Sent!.`, and
+//! reads nothing more. From then on it sends block after block, one a line: the number of frames from loading the seeds
+//! to the end of the block, then the codes of the converter. Every field is followed by a comma, and the line ends with
+//! a space. The last code of a block is never sent.
 //!
-//! [`VirtualDevice`] is the device, on a [`BlockSource`]: a session, or an object that is pressed meanwhile. [`Host`]
-//! reads a device, real or virtual.
+//! [`VirtualDevice`] is the device. It sends the blocks of a [`BlockSource`]: a recorded session, or an object pressed
+//! while it measures. [`Host`] reads a device, real or virtual.
 //!
 //! ```
 //! use spts::device::{DeviceBlock, write_block};

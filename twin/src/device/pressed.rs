@@ -1,4 +1,4 @@
-//! An object that is pressed while the device measures: contact alone, without a physics engine.
+//! An object that is pressed while the device measures. Contact only; no physics engine.
 
 use super::virtual_device::{BlockSource, DeviceBlock, DeviceError};
 use crate::chain::Chain;
@@ -9,16 +9,16 @@ use spts_contact::{PosedMesh, PreparedMesh, TouchBody, TouchSkin, WinklerConfig,
 use spts_models::{ConfigError, in_range};
 use std::f64::consts::FRAC_PI_2;
 
-/// What is pressed, and how.
+/// Which object is pressed, and how.
 #[derive(Debug, Clone, Copy)]
 pub struct PressedConfig {
-    /// The object, pressed where it was pressed in the published recordings.
+    /// The object, pressed at its place in the published recordings.
     pub object: &'static ObjectSpec,
     /// Force of the hold, N. Range [0.1, 1000].
     pub force_n: f64,
-    /// Which readout it is.
+    /// Mode of the readout.
     pub mode: Mode,
-    /// Number of blocks; `None` for no end.
+    /// Number of blocks; `None` to continue without end.
     pub blocks: Option<u64>,
     /// Number of the session.
     pub session: u64,
@@ -34,12 +34,12 @@ const DEEPEST_M: f64 = 0.05;
 /// Halvings of the depth when the one for the force is looked for.
 const HALVINGS: usize = 50;
 
-/// Presses of an object, block after block.
+/// A source that presses an object once a block.
 pub struct Pressed {
     skin: TouchSkin,
     body: TouchBody,
     posed: [[f64; 3]; 3],
-    /// Place of the object's origin when its lowest point is on the skin, m.
+    /// Position of the object's origin when its lowest point touches the skin, m.
     rest_m: [f64; 3],
     stiffness_pa_per_m: f64,
     depth_m: f64,
@@ -52,11 +52,10 @@ pub struct Pressed {
 }
 
 impl Pressed {
-    /// Presses on the skin of `chain`.
+    /// A source that presses the object of `config` on the skin of `chain`.
     ///
     /// # Errors
-    /// [`DeviceError`] for a force outside its range or that the object cannot press with, and for a readout without a
-    /// converter.
+    /// [`DeviceError`] for a force outside its range or too large for the object, or a readout without a converter.
     pub fn new(chain: &Chain, config: PressedConfig) -> Result<Self, DeviceError> {
         let refused = |e: ConfigError| DeviceError::Source(e.to_string());
         let force_n = config.force_n;

@@ -1,4 +1,4 @@
-//! The device's end.
+//! The device's end of the serial protocol.
 
 use super::{SENDING, SENT, START};
 use crate::chain::ChainError;
@@ -7,18 +7,41 @@ use std::io::{self, Read, Write};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// What the device sends of one press.
+/// One block as the device sends it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeviceBlock {
     /// Frames since the seeds were loaded, at the end of the block.
     pub frame_position: u64,
-    /// Codes of the converter, measurement after measurement.
+    /// Codes of the converter, in order of measurement.
     pub codes: Vec<u32>,
 }
 
-/// Where a device's blocks come from.
+/// A source of blocks for a virtual device.
+///
+/// ```
+/// use spts::Mode;
+/// use spts::device::{BlockSource, DeviceBlock, DeviceError};
+///
+/// /// Two blocks of the same codes.
+/// struct Twice(u64);
+///
+/// impl BlockSource for Twice {
+///     fn mode(&self) -> Mode {
+///         Mode::Compressive
+///     }
+///     fn sample_rate_hz(&self) -> f64 {
+///         64_300.0
+///     }
+///     fn next_block(&mut self) -> Result<Option<DeviceBlock>, DeviceError> {
+///         self.0 += 1;
+///         Ok((self.0 <= 2).then(|| DeviceBlock { frame_position: self.0, codes: vec![512; 100] }))
+///     }
+/// }
+/// let mut source = Twice(0);
+/// assert_eq!(std::iter::from_fn(|| source.next_block().ok().flatten()).count(), 2);
+/// ```
 pub trait BlockSource {
-    /// Which readout it is.
+    /// Mode of the readout.
     fn mode(&self) -> Mode;
 
     /// Measurements a second, Hz.
@@ -27,26 +50,26 @@ pub trait BlockSource {
     /// The next block; `None` after the last.
     ///
     /// # Errors
-    /// [`DeviceError`] when it cannot be made.
+    /// [`DeviceError`] if the block cannot be made.
     fn next_block(&mut self) -> Result<Option<DeviceBlock>, DeviceError>;
 }
 
-/// Why a virtual device has ended.
+/// Why a virtual device stopped.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DeviceError {
     /// The port failed.
     #[error("serial port: {0}")]
     Port(#[from] io::Error),
-    /// The skin or its readout failed.
+    /// Skin or readout failed.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// What was to be sent has no codes.
+    /// The source has no codes to send.
     #[error("{0}")]
     Source(String),
 }
 
-/// A device on a port. It waits and sends in real time, or as fast as it is read.
+/// A device on a port.
 pub struct VirtualDevice<P> {
     port: P,
     real_time: bool,
@@ -64,15 +87,16 @@ fn wait_s(mode: Mode) -> f64 {
 const LOADING_S: f64 = 0.1;
 
 impl<P: Read + Write> VirtualDevice<P> {
-    /// Device on `port`; in `real_time`, or as fast as it is read.
+    /// A device on `port`. If `real_time`, it sends at the rate of the real device; otherwise as fast as the host
+    /// reads.
     pub fn new(port: P, real_time: bool) -> Self {
         Self { port, real_time }
     }
 
-    /// Waits for the host and sends all blocks of `source`; `sent` is called after each. The number of blocks.
+    /// Waits for the host, then sends all blocks of `source`. Calls `sent` after each. Returns the number of blocks.
     ///
     /// # Errors
-    /// [`DeviceError`] when the port or the source fails.
+    /// [`DeviceError`] if the port or the source fails.
     pub fn serve(&mut self, source: &mut dyn BlockSource, mut sent: impl FnMut(u64)) -> Result<u64, DeviceError> {
         let mut byte = [0];
         while byte[0] != START {
@@ -98,10 +122,10 @@ impl<P: Read + Write> VirtualDevice<P> {
     }
 }
 
-/// Sends `block` but for its last code, as the device does.
+/// Sends all codes of `block` but the last, as the real device does.
 ///
 /// # Errors
-/// What the port fails with.
+/// The error of the port.
 pub fn write_block(port: &mut impl Write, block: &DeviceBlock) -> io::Result<()> {
     let mut text = String::with_capacity(4 * block.codes.len() + 32);
     let kept = block.codes.len().saturating_sub(1);

@@ -1,4 +1,4 @@
-//! One file at a time, whole or not at all.
+//! Files that are written completely or not at all.
 
 use super::disk::{self, NewFile};
 use super::error::OutputError;
@@ -6,8 +6,22 @@ use std::fs::File;
 use std::io::{self, BufWriter, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 
-/// A file that is being written. It has its name from [`AtomicFile::finish`] on; one that is dropped before leaves
-/// nothing behind, and a file that was there before as it was.
+/// A file being written. [`AtomicFile::finish`] gives it its name. If it is dropped before, nothing is left behind, and
+/// an earlier file of that name stays unchanged.
+///
+/// ```
+/// use spts::output::AtomicFile;
+/// use std::io::Write as _;
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-atomic-{}.txt", std::process::id()));
+/// let mut file = AtomicFile::create(&path)?;
+/// file.fill(|buffer| buffer.write_all(b"results"))?;
+/// assert!(!path.exists(), "the name comes last");
+/// file.finish()?;
+/// assert_eq!(std::fs::read(&path)?, b"results");
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct AtomicFile {
     buffer: BufWriter<NewFile>,
@@ -16,10 +30,10 @@ pub struct AtomicFile {
 }
 
 impl AtomicFile {
-    /// Begins the file `path`, which replaces a regular file of that name.
+    /// Starts the file `path`. It will replace a regular file of that name.
     ///
     /// # Errors
-    /// [`OutputError`] when the file cannot be made or something that is not a regular file has its name.
+    /// [`OutputError`] if the file cannot be created, or `path` is something other than a regular file.
     pub fn create(path: &Path) -> Result<Self, OutputError> {
         let failed = OutputError::write(path);
         if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
@@ -42,18 +56,18 @@ impl AtomicFile {
         })
     }
 
-    /// Writes what `fill` puts into the buffer.
+    /// Writes the bytes that `fill` puts into the buffer.
     ///
     /// # Errors
-    /// [`OutputError::Write`] when `fill` fails.
+    /// [`OutputError::Write`] if `fill` fails.
     pub fn fill(&mut self, fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>) -> Result<(), OutputError> {
         fill(&mut self.buffer).map_err(OutputError::write(&self.path))
     }
 
-    /// Gives the file its name once it is on the disk.
+    /// Waits until the bytes are on the disk, then gives the file its name.
     ///
     /// # Errors
-    /// [`OutputError::Write`] when the disk is full or says no.
+    /// [`OutputError::Write`] if the disk is full or reports an error.
     pub fn finish(mut self) -> Result<(), OutputError> {
         let failed = OutputError::write(&self.path);
         self.buffer.flush().map_err(&failed)?;
@@ -98,11 +112,11 @@ impl io::Write for AtomicFile {
     }
 }
 
-/// Writes `path` with what `fill` puts into the buffer. A regular file of that name is replaced.
+/// Writes `path` with the bytes that `fill` puts into the buffer. A regular file of that name is replaced.
 ///
 /// # Errors
-/// [`OutputError`] when the file cannot be written or something that is not a regular file has its name. Nothing is
-/// left behind then, and a file that was there before is as it was.
+/// [`OutputError`] if the file cannot be written, or `path` is something other than a regular file. Nothing is left
+/// behind then, and an earlier file stays unchanged.
 pub fn write_with(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>,
@@ -115,17 +129,17 @@ pub fn write_with(
 /// Start and end of the name of a file that is being written.
 const TEMPORARY: [&str; 2] = [".spts-", ".part"];
 
-/// Whether `name` is that of a file that is being written, or was when its run was ended.
+/// Whether `name` is a name that unfinished files have.
 #[must_use]
 pub fn is_temporary(name: &str) -> bool {
     name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1])
 }
 
-/// Removes the file `path`, which [`is_temporary`], if its run was ended. One that is being written stays, as does one
-/// of which that cannot be told.
+/// Removes the unfinished file `path` (see [`is_temporary`]) if the run that wrote it has ended. A file that is still
+/// being written, or may be, stays.
 ///
 /// # Errors
-/// [`io::Error`] when it cannot be removed.
+/// [`io::Error`] if the file cannot be removed.
 pub fn remove_left(path: &Path) -> io::Result<()> {
     let left = File::open(path).is_ok_and(|file| file.try_lock().is_ok());
     if left { std::fs::remove_file(path) } else { Ok(()) }
@@ -145,10 +159,10 @@ pub(super) fn parent(path: &Path) -> PathBuf {
     }
 }
 
-/// Checks that a file `path` can be written, and leaves nothing there: for a run that takes long to come to it.
+/// Checks that a file `path` can be written, and leaves nothing there. A long run calls this before it computes.
 ///
 /// # Errors
-/// As for [`write_with`].
+/// As [`write_with`].
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     AtomicFile::create(path).map(drop)
 }
@@ -156,7 +170,7 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
 /// Writes `bytes` as `path`.
 ///
 /// # Errors
-/// As for [`write_with`].
+/// As [`write_with`].
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     write_with(path, |out| out.write_all(bytes))
 }

@@ -1,9 +1,9 @@
-//! How the results of a run come to stand in their folder.
+//! How the results of a run move into their folder.
 //!
-//! Two folders change their names in one step (`renameat2` with `RENAME_EXCHANGE`), so whoever looks sees the earlier
-//! results or the new ones. Files that no run has written get a second name in the new folder before; what else is in
-//! the folder (folders, links, many files), a mounted folder, and a file system without such a step need
-//! [`super::placing`].
+//! Two folders exchange their names in one step (`renameat2` with `RENAME_EXCHANGE`), so a reader sees either the
+//! earlier results or the new ones. Before that, files that no run has written get a second name in the new folder.
+//! Three cases need [`super::placing`] instead: a folder that holds more than files (folders, links) or very many
+//! files, a mounted folder, and a file system without such a step.
 
 use super::atomic::parent;
 use super::disk;
@@ -170,8 +170,8 @@ fn link(folder: &Path, stage: &Path, names: &[String]) -> Option<Vec<PathBuf>> {
     Some(linked)
 }
 
-/// Removes what runs that were killed have left waiting in `folder` and beside it. The folder is locked, so all of it is
-/// of the past.
+/// Removes what runs that were killed have left waiting in `folder` and beside it. The folder is locked, so all of it
+/// is of the past.
 pub(super) fn sweep(folder: &Path) -> io::Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;

@@ -1,4 +1,4 @@
-//! Every operation that changes the disk on the way of a result, so that a test can watch each and make it fail.
+//! Every disk operation on the way to a result, so that a test can watch each and make it fail.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -6,7 +6,7 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::rc::Rc;
 
-/// What an operation does.
+/// Kind of a disk operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DiskOperation {
@@ -20,7 +20,7 @@ pub enum DiskOperation {
     Sync,
     /// Gives a file or a folder another name.
     Rename,
-    /// Lets two folders change their names.
+    /// Exchanges the names of two folders.
     Exchange,
     /// Gives a file a second name.
     Link,
@@ -28,15 +28,15 @@ pub enum DiskOperation {
     Remove,
 }
 
-/// What a watcher of the disk is told before an operation; its error takes the place of the operation.
+/// Called before every operation. If it returns an error, the operation fails with that error.
 pub type DiskWatcher = Rc<dyn Fn(DiskOperation, &Path) -> io::Result<()>>;
 
 thread_local! {
     static WATCHER: RefCell<Option<DiskWatcher>> = const { RefCell::new(None) };
 }
 
-/// Calls `run` while `watcher` is told of every operation of this thread that changes the disk. For tests of what a
-/// full disk or a lost run leaves behind.
+/// Calls `run` while `watcher` observes every disk operation of this thread. Tests use it to see what a full disk or an
+/// interrupted run leaves behind.
 pub fn watching_disk<T>(watcher: DiskWatcher, run: impl FnOnce() -> T) -> T {
     let before = WATCHER.replace(Some(watcher));
     let result = run();
@@ -50,7 +50,7 @@ fn tell(operation: DiskOperation, path: &Path) -> io::Result<()> {
     watcher.map_or(Ok(()), |watcher| watcher(operation, path))
 }
 
-/// A new file, each piece of which is told of. Inside a buffer, a piece is what the buffer holds.
+/// A new file whose writes are reported to the watcher. Behind a buffer, one write is one full buffer.
 #[derive(Debug)]
 pub struct NewFile {
     file: File,

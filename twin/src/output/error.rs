@@ -1,4 +1,4 @@
-//! Why a result could not be written.
+//! Errors of writing results.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OutputError {
-    /// The file system said no: full disk, no permission, no such folder.
+    /// The file system reports an error, such as a full disk, no permission, or a missing folder.
     #[error("{}: cannot be written: {source}", path.display())]
     Write {
         /// File.
@@ -23,13 +23,13 @@ pub enum OutputError {
         /// Cause.
         source: io::Error,
     },
-    /// A file is where the output folder should be.
+    /// A file has the name of the output folder.
     #[error("{}: is a file; the output has to be a folder", path.display())]
     IsFile {
-        /// File in the way.
+        /// File that has the folder's name.
         path: PathBuf,
     },
-    /// Another run writes to the folder.
+    /// Another run is writing to the folder.
     #[error("{}: another run is writing to this folder; choose another one, or wait until that run has ended", folder.display())]
     Locked {
         /// Folder.
@@ -38,20 +38,20 @@ pub enum OutputError {
     /// A file that no run has written has the name of a result.
     #[error("{}: is not a result of an earlier run and is not replaced; move it away or choose another folder", path.display())]
     NotOurs {
-        /// File in the way.
+        /// File that has the result's name.
         path: PathBuf,
     },
-    /// A file is not what the run wrote that its folder's manifest lists.
+    /// A file differs from the one that the manifest of its folder lists.
     #[error("{}: is not the file that {} lists; {advice}", path.display(), manifest.display())]
     Changed {
         /// File.
         path: PathBuf,
-        /// Manifest that lists it.
+        /// Manifest that lists the file.
         manifest: PathBuf,
         /// What the user can do.
         advice: &'static str,
     },
-    /// A run was ended while it put its results in place.
+    /// A run ended while it moved its results into place.
     #[error(
         "{}: is half-made: a run was ended while it put its results in place; any run with this folder as its output first puts the earlier results back",
         folder.display()
@@ -60,10 +60,10 @@ pub enum OutputError {
         /// Folder.
         folder: PathBuf,
     },
-    /// A folder or a device is where a result should be.
+    /// A folder or a device has the name of a result.
     #[error("{}: is not a regular file and is not replaced", path.display())]
     NotRegular {
-        /// What is in the way.
+        /// The folder or device.
         path: PathBuf,
     },
     /// A field of what is written is outside its range.
@@ -71,26 +71,26 @@ pub enum OutputError {
     Field {
         /// File.
         path: PathBuf,
-        /// Name of the field, with the names of what it lies in.
+        /// Name of the field, with the sections that contain it.
         field: String,
         /// Its value.
         value: String,
         /// Valid range.
         range: String,
     },
-    /// A file that would be too large to be read again.
-    #[error("{}: cannot be written: `{what}` = {bytes} bytes is outside [0, {limit}], which is read", path.display())]
+    /// A file that would be too large to read again.
+    #[error("{}: cannot be written: `{what}` = {bytes} bytes is outside [0, {limit}], the sizes that can be read again", path.display())]
     TooLarge {
         /// File.
         path: PathBuf,
-        /// What the file holds.
+        /// Contents of the file.
         what: String,
         /// Its size, bytes.
         bytes: u64,
-        /// Largest size that is read, bytes.
+        /// Size of the largest file that is read, bytes.
         limit: u64,
     },
-    /// The values do not fill the shape.
+    /// The number of values differs from that of the shape.
     #[error("{}: {values} values for an array of shape {shape:?}", path.display())]
     Shape {
         /// File.
@@ -103,7 +103,7 @@ pub enum OutputError {
 }
 
 impl OutputError {
-    /// The same error with `place` of its path.
+    /// The same error, with `place` applied to its path.
     #[must_use]
     pub fn relocated(mut self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
         let (Self::Write { path, .. }

@@ -1,4 +1,4 @@
-//! The folder of one run's results: it changes as a whole, and what no run has written in it stays.
+//! The folder for the results of one run. It changes as a whole, and files that no run has written stay.
 
 use super::atomic::RANDOM;
 use super::commit::{self, PLACING};
@@ -15,32 +15,32 @@ use std::path::{Path, PathBuf};
 /// left waiting can be removed.
 pub(super) const WAITING: &str = ".spts-";
 
-/// A folder that a run is to fill. It is the run's own from its opening on: no other run can open it. The results wait
-/// in a hidden folder inside until [`OutputFolder::commit`]. Without a commit the folder stays as it was.
+/// A folder that a run is filling. From its opening on, no other run can open it. The results wait in a hidden folder
+/// inside until [`OutputFolder::commit`]. Without a commit the folder stays unchanged.
 #[derive(Debug)]
 pub struct OutputFolder {
-    /// Without symbolic links, so that it is the folder itself that is exchanged.
+    /// The folder without symbolic links, because the exchange must act on the folder itself.
     folder: PathBuf,
-    /// As the user named it.
+    /// The folder as the user named it.
     shown: PathBuf,
     stage: PathBuf,
     timed: BTreeSet<String>,
     lock: Option<Lock>,
-    /// Lets a signal remove the stage; taken off before the results move.
+    /// Lets a signal remove the waiting results; dropped before they move.
     entry: Option<Entry>,
-    /// Folders that were made for this run, deepest first.
+    /// Folders created for this run, deepest first.
     made: Vec<PathBuf>,
-    /// Lets a signal remove them as far as they are empty.
+    /// Lets a signal remove those of the created folders that are empty.
     _made_entry: Entry,
 }
 
 impl OutputFolder {
-    /// Opens the folder `path` for a run, made with its parents where they are missing. `files` are names of results
-    /// that the run may write, as far as they are known: what would be refused when the run ends is refused now.
+    /// Opens the folder `path` for a run, and creates it and its parents where they are missing. `files` are the known
+    /// names of results: a name that could not be written at the end is refused now.
     ///
     /// # Errors
-    /// [`OutputError`] when a file is where the folder should be, the folder cannot be made or written to, another run
-    /// writes to it, or a file that no run has written has the name of a result.
+    /// [`OutputError`] if `path` is a file, the folder cannot be created or written to, another run is writing to it,
+    /// or a file that no run has written has the name of a result.
     pub fn open(path: &Path, files: &[&str]) -> Result<Self, OutputError> {
         let made = make(path)?;
         let failed = OutputError::write(path);
@@ -77,40 +77,41 @@ impl OutputFolder {
         }
     }
 
-    /// Where to write the result called `name`, which may lie in a folder of its own (`tables/scores.csv`) that
-    /// [`OutputFolder::folder`] has made.
+    /// Where to write the result `name`. It may lie in a folder (`tables/scores.csv`) that [`OutputFolder::folder`] has
+    /// created.
     #[must_use]
     pub fn path(&self, name: &str) -> PathBuf {
         self.stage.join(name)
     }
 
-    /// [`OutputFolder::path`] of a result that says how long the run took or on which machine it ran: the manifest has
-    /// its name alone, so that the same run writes the same manifest.
+    /// Where to write the result `name` if it depends on the machine or the time of the run. The manifest lists only
+    /// its name, so that repeated runs write the same manifest.
     #[must_use]
     pub fn timed_path(&mut self, name: &str) -> PathBuf {
         self.timed.insert(name.to_owned());
         self.path(name)
     }
 
-    /// Makes the folder `name` for results.
+    /// Creates the folder `name` for results.
     ///
     /// # Errors
-    /// [`OutputError::Folder`] when it cannot be made.
+    /// [`OutputError::Folder`] if the folder cannot be created.
     pub fn folder(&self, name: &str) -> Result<PathBuf, OutputError> {
         let path = self.path(name);
         make(&path)?;
         Ok(path)
     }
 
-    /// Puts the results in place of those of the run before, with a manifest, and returns their names, sorted.
+    /// Replaces the results of the earlier run by the new ones, writes a manifest, and returns the names of the
+    /// results, sorted.
     ///
-    /// A folder with nothing but results and some files beside them changes in one step. Where that cannot be, as in a
-    /// folder that a container mounts, files move one by one: the earlier results first go, then the new ones come, and
-    /// until the last is there the folder is marked as half-made.
+    /// A folder that holds only results and some files changes in one step. Where this is not possible, such as in a
+    /// folder that a container mounts, files move one by one: the earlier results are removed, then the new ones move
+    /// in. Until the last has moved, the folder is marked as half-made.
     ///
     /// # Errors
-    /// [`OutputError`] when a result has the name of a file that no run has written or that was changed since, or the
-    /// file system says no. The folder is as it was then.
+    /// [`OutputError`] if a result has the name of a file that no run has written or that has changed since, or the
+    /// file system reports an error. The folder then stays unchanged.
     pub fn commit(mut self) -> Result<Vec<String>, OutputError> {
         let names = commit::files_below(&self.stage).map_err(OutputError::write(&self.shown))?;
         let commit = || -> Result<(), OutputError> {
@@ -136,13 +137,13 @@ impl OutputFolder {
         Ok(names)
     }
 
-    /// The error as the user should see it: with the result's final place instead of where it waited.
+    /// The same error, with the result's final path in place of the path where it waits.
     #[must_use]
     pub fn unstaged(&self, error: OutputError) -> OutputError {
         error.relocated(&|path| self.final_path(path))
     }
 
-    /// Where the result that waits at `path` will be; any other path as it is.
+    /// Final path of the result that waits at `path`. Any other path is returned unchanged.
     #[must_use]
     pub fn final_path(&self, path: &Path) -> PathBuf {
         let below = path
@@ -198,9 +199,9 @@ fn check_ours(folder: &Path, manifest: Option<&Manifest>, name: &str) -> Result<
     })
 }
 
-/// Refuses files that are not what the run wrote that made `folder` or one of the two folders above: results of two
-/// runs beside each other, or a folder that a run was putting its results into when it was ended. A folder without a
-/// manifest is taken as it is.
+/// Checks that the files `names` of `folder` are those that the last run wrote. It refuses files that have changed, and
+/// a folder whose run ended while it moved its results into place. The manifest may lie in `folder` or in one of the
+/// two folders above. A folder without a manifest passes.
 ///
 /// # Errors
 /// [`OutputError::HalfMade`], [`OutputError::Changed`], or [`OutputError::Write`] for a file that cannot be read.

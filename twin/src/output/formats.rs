@@ -1,4 +1,4 @@
-//! NumPy arrays, CSV tables and JSON, with bytes that depend on the values alone.
+//! NumPy arrays, CSV tables and JSON. Their bytes depend only on the values.
 
 use super::atomic::{AtomicFile, write_with};
 use super::error::OutputError;
@@ -8,11 +8,17 @@ use std::io::{self, Write as _};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
-/// A value of a NumPy array.
+/// A type that a NumPy array can hold.
+///
+/// ```
+/// use spts::output::NpyValue;
+///
+/// assert_eq!(1.5_f64.bytes().as_ref(), 1.5_f64.to_le_bytes());
+/// ```
 pub trait NpyValue: Copy {
-    /// Type in NumPy's words.
+    /// Type as NumPy writes it, such as `f8`.
     const KIND: &'static str;
-    /// Its bytes.
+    /// Bytes of the value, little-endian.
     fn bytes(self) -> impl AsRef<[u8]>;
 }
 
@@ -30,6 +36,20 @@ macro_rules! values {
 values!(f64: "<f8", u16: "<u2", u32: "<u4");
 
 /// A NumPy array that is written piece by piece, in C order and little-endian.
+///
+/// ```
+/// use spts::output::NpyFile;
+/// use spts::session::read_npy;
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-npy-{}.npy", std::process::id()));
+/// let mut file = NpyFile::create(&path, &[2, 3])?;
+/// file.push([1.0, 2.0, 3.0])?;
+/// file.push([4.0, 5.0, 6.0])?;
+/// file.finish()?;
+/// assert_eq!(read_npy(&path)?.values, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct NpyFile<T> {
     file: AtomicFile,
@@ -41,10 +61,10 @@ pub struct NpyFile<T> {
 }
 
 impl<T: NpyValue> NpyFile<T> {
-    /// Begins the array `path` of this shape.
+    /// Starts the array `path` with shape `shape`.
     ///
     /// # Errors
-    /// [`OutputError`] when the file cannot be made.
+    /// [`OutputError`] if the file cannot be created.
     pub fn create(path: &Path, shape: &[usize]) -> Result<Self, OutputError> {
         let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
         let mut file = AtomicFile::create(path)?;
@@ -70,7 +90,7 @@ impl<T: NpyValue> NpyFile<T> {
     /// Writes the next values.
     ///
     /// # Errors
-    /// [`OutputError::Write`] when the disk is full or says no.
+    /// [`OutputError::Write`] if the disk is full or reports an error.
     pub fn push(&mut self, values: impl IntoIterator<Item = T>) -> Result<(), OutputError> {
         let written = &mut self.written;
         self.file.fill(|out| {
@@ -84,7 +104,7 @@ impl<T: NpyValue> NpyFile<T> {
     /// Gives the file its name.
     ///
     /// # Errors
-    /// [`OutputError`] when the values do not fill the shape or the file cannot be written.
+    /// [`OutputError`] if the number of values differs from that of the shape, or the file cannot be written.
     pub fn finish(self) -> Result<(), OutputError> {
         if self.shape.iter().product::<usize>() != self.written {
             return Err(OutputError::Shape {
@@ -105,7 +125,7 @@ impl<T: NpyValue> NpyFile<T> {
 /// Writes `values` as a NumPy array of little-endian doubles in C order.
 ///
 /// # Errors
-/// [`OutputError`] when the values do not fill the shape or the file cannot be written.
+/// [`OutputError`] if the number of values differs from that of the shape, or the file cannot be written.
 pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), OutputError> {
     let mut file = NpyFile::create(path, shape)?;
     file.push(values.iter().copied())?;
@@ -113,6 +133,18 @@ pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), Out
 }
 
 /// A table that is written row by row.
+///
+/// ```
+/// use spts::output::CsvFile;
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-csv-{}.csv", std::process::id()));
+/// let mut table = CsvFile::create(&path, &["name", "x", "y"])?;
+/// table.push(("cup", [0.1, 2.0]))?;
+/// table.finish()?;
+/// assert_eq!(std::fs::read_to_string(&path)?, "name,x,y\ncup,0.1,2.0\n");
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct CsvFile {
     writer: csv::Writer<AtomicFile>,
@@ -120,10 +152,10 @@ pub struct CsvFile {
 }
 
 impl CsvFile {
-    /// Begins the table `path` with this header.
+    /// Starts the table `path` with the header `header`.
     ///
     /// # Errors
-    /// [`OutputError`] when the file cannot be made.
+    /// [`OutputError`] if the file cannot be created.
     pub fn create(path: &Path, header: &[&str]) -> Result<Self, OutputError> {
         let mut options = csv::WriterBuilder::new();
         let mut writer = options.has_headers(false).from_writer(AtomicFile::create(path)?);
@@ -135,12 +167,12 @@ impl CsvFile {
         })
     }
 
-    /// Writes the next row, which may be a tuple with arrays in it: its fields follow each other. Numbers have the
-    /// fewest digits that read back as the same number.
+    /// Writes the next row. A row may be a tuple that contains arrays; their elements become fields in order. Numbers
+    /// have the fewest digits that read back as the same number.
     ///
     /// # Errors
-    /// [`OutputError::Write`] when the row has another number of fields than the header, or the disk is full or says
-    /// no.
+    /// [`OutputError::Write`] if the number of fields differs from that of the header, or the disk is full or reports
+    /// an error.
     pub fn push(&mut self, row: impl Serialize) -> Result<(), OutputError> {
         let written = self.writer.serialize(row);
         written.map_err(|e| OutputError::write(&self.path)(e.into()))
@@ -149,7 +181,7 @@ impl CsvFile {
     /// Gives the file its name.
     ///
     /// # Errors
-    /// [`OutputError`] when the file cannot be written.
+    /// [`OutputError`] if the file cannot be written.
     pub fn finish(self) -> Result<(), OutputError> {
         let failed = OutputError::write(&self.path);
         let file = self.writer.into_inner().map_err(|e| failed(e.into_error()))?;
@@ -157,10 +189,10 @@ impl CsvFile {
     }
 }
 
-/// Writes a table with the rows of [`CsvFile::push`].
+/// Writes a table with rows as in [`CsvFile::push`].
 ///
 /// # Errors
-/// [`OutputError`] when a row has another number of fields than the header or the file cannot be written.
+/// [`OutputError`] if the number of fields of a row differs from that of the header, or the file cannot be written.
 pub fn write_csv<R: Serialize>(
     path: &Path,
     header: &[&str],
@@ -174,7 +206,7 @@ pub fn write_csv<R: Serialize>(
 /// Writes a table whose header is the field names of its rows.
 ///
 /// # Errors
-/// [`OutputError`] when the file cannot be written.
+/// [`OutputError`] if the file cannot be written.
 pub fn write_table<R: Serialize>(path: &Path, rows: &[R]) -> Result<(), OutputError> {
     write_with(path, |out| {
         let mut writer = csv::Writer::from_writer(out);
@@ -185,10 +217,10 @@ pub fn write_table<R: Serialize>(path: &Path, rows: &[R]) -> Result<(), OutputEr
     })
 }
 
-/// Writes `value` as indented JSON with a line end.
+/// Writes `value` as indented JSON that ends with a newline.
 ///
 /// # Errors
-/// [`OutputError`] when the file cannot be written.
+/// [`OutputError`] if the file cannot be written.
 pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), OutputError> {
     write_with(path, |out| {
         serde_json::to_writer_pretty(&mut *out, value)?;

@@ -1,4 +1,4 @@
-//! One run at a time in a folder.
+//! Locks a folder, so that only one run writes to it at a time.
 
 use super::disk;
 use super::error::OutputError;
@@ -10,13 +10,13 @@ use std::path::{Path, PathBuf};
 /// File that a run holds locked while the folder is its own.
 pub(super) const LOCK_FILE: &str = ".spts.lock";
 
-/// The lock of a folder, given up when dropped. The operating system holds it (`flock`), not a process number in a file:
-/// it holds between containers, and a run that was killed does not hold it.
+/// The lock of a folder, given up when dropped. The operating system holds it (`flock`), not a process number in a
+/// file: it holds between containers, and a run that was killed does not hold it.
 #[derive(Debug)]
 pub(super) struct Lock {
     file: Option<File>,
     path: PathBuf,
-    /// Lets a signal remove the file; `None` where that cannot be.
+    /// Lets a signal remove the file; `None` where this is not possible.
     entry: Option<Entry>,
 }
 

@@ -1,4 +1,4 @@
-//! Which files of a folder a run has written.
+//! The manifest: which files of a folder a run has written.
 
 use super::atomic::write_bytes;
 use super::error::OutputError;
@@ -9,7 +9,7 @@ use std::fs::Metadata;
 use std::io::{self, Read as _};
 use std::path::{Component, Path};
 
-/// The file that says which files of its folder a run has written.
+/// The file that lists the files that a run has written.
 pub const MANIFEST_FILE: &str = "manifest.json";
 const FORMAT: &str = "spts-results";
 const SCHEMA: u64 = 1;
@@ -18,7 +18,22 @@ const MAX_BYTES: u64 = 1 << 25;
 /// Bytes that are hashed at a time.
 const PIECE: usize = 1 << 16;
 
-/// What a run has written.
+/// The files that a run has written.
+///
+/// ```
+/// use spts::output::{Manifest, OutputFolder, write_bytes};
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-manifest-{}", std::process::id()));
+/// let folder = OutputFolder::open(&path, &["scores.csv"])?;
+/// write_bytes(&folder.path("scores.csv"), b"iou\n0.8\n")?;
+/// folder.commit()?;
+/// let manifest = Manifest::read(&path).expect("a run has left its manifest");
+/// assert!(manifest.is_unchanged(&path, "scores.csv")?);
+/// std::fs::write(path.join("scores.csv"), "iou\n1.0\n")?;
+/// assert!(!manifest.is_unchanged(&path, "scores.csv")?);
+/// # std::fs::remove_dir_all(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
@@ -32,8 +47,8 @@ pub struct Manifest {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FileEntry {
-    /// Size, bytes, and SHA-256 of the content, in hexadecimal digits. Not there for a file that says how long the run
-    /// took, so that the same run writes the same manifest.
+    /// Size, bytes, and SHA-256 of the content in hexadecimal digits. Both are absent for a file that depends on the
+    /// machine or the time of the run, so that repeated runs write the same manifest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     bytes: Option<u64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -77,18 +92,18 @@ impl Manifest {
         })
     }
 
-    /// The manifest of the files of `folder` that `names` lists, written into it.
+    /// Writes the manifest of the files `names` of `folder` into that folder.
     ///
     /// # Errors
-    /// [`OutputError::Write`] when one of them cannot be read, or the manifest cannot be written.
+    /// [`OutputError::Write`] if a file cannot be read, or the manifest cannot be written.
     pub fn write_of(folder: &Path, names: &[String]) -> Result<Self, OutputError> {
         let manifest = Self::of(folder, names, &BTreeSet::new())?;
         manifest.write(folder)?;
         Ok(manifest)
     }
 
-    /// SHA-256 of the names and digests of the listed files below the folder `within`, in the order of their names: the
-    /// same for the same files, wherever they lie.
+    /// SHA-256 of the names and digests of the listed files below the folder `within`, in order of name. Equal files
+    /// give equal digests wherever they lie.
     #[must_use]
     pub fn digest_of(&self, within: &str) -> String {
         let mut digest = Sha256::new();
@@ -102,7 +117,7 @@ impl Manifest {
         digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    /// The manifest of `folder`, if a run has left one there. A file of that name that no run has written is none.
+    /// The manifest of `folder`, if a run has left one. A file of that name that no run has written does not count.
     #[must_use]
     pub fn read(folder: &Path) -> Option<Self> {
         let path = folder.join(MANIFEST_FILE);
@@ -124,10 +139,10 @@ impl Manifest {
         self.files.keys().map(String::as_str)
     }
 
-    /// Whether the file `name` of `folder` is still what the run wrote. A file that is not listed is not.
+    /// Whether the file `name` of `folder` is still as the run wrote it; `false` for a file that is not listed.
     ///
     /// # Errors
-    /// [`io::Error`] when the file is there and cannot be read.
+    /// [`io::Error`] if the file exists but cannot be read.
     pub fn is_unchanged(&self, folder: &Path, name: &str) -> io::Result<bool> {
         let Some(entry) = self.files.get(name) else {
             return Ok(false);

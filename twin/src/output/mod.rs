@@ -1,6 +1,6 @@
-//! Result files. Every writer is atomic: it fills a temporary file in the same folder and renames it, so that a file
-//! with the final name is always whole, and an error leaves what was there before as it was. An [`OutputFolder`] does the
-//! same for all results of a run.
+//! Result files. Every writer is atomic: it fills a temporary file in the same folder and then renames it. A file with
+//! the final name is therefore always complete, and an error leaves an earlier file unchanged. An [`OutputFolder`] does
+//! the same for all results of a run.
 //!
 //! ```
 //! use spts::output::{OutputFolder, write_npy};

@@ -1,7 +1,7 @@
-//! Results that move into their folder one by one: the earlier ones go first, then the new ones come.
+//! Moves results into their folder one by one: the earlier ones are removed first, then the new ones move in.
 //!
-//! All of it happens in the hidden folder [`PLACING`], whose coming and going are the beginning and the end: as long as
-//! it is there, the folder is half-made, and what it holds is enough to put the earlier results back.
+//! The steps happen in the hidden folder [`PLACING`]. While it exists, the visible folder is half-made, and its
+//! contents are enough to restore the earlier results.
 
 use super::commit::files_below;
 use super::disk;

@@ -1,4 +1,4 @@
-//! What can stop a simulation.
+//! Errors of a simulation.
 
 use crate::chain::ChainError;
 use crate::scene::SceneError;
@@ -13,13 +13,13 @@ pub enum TwinError {
     /// The mechanics failed.
     #[error(transparent)]
     Sim(#[from] spts_sim::SimError),
-    /// Transducer or readout failed, or the weights cannot come from where the scene says.
+    /// Transducer or readout failed, or the source of the weights cannot provide them.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// More values than are kept at once.
+    /// More values than are kept in memory at once.
     #[error("{what} = {values} is outside [1, {most}]")]
     TooLarge {
-        /// What makes up the number.
+        /// Which quantity is too large.
         what: &'static str,
         /// Number of values.
         values: usize,

@@ -1,4 +1,4 @@
-//! When the contact of a simulated press is steady.
+//! The span of a simulated press in which the contact is steady.
 
 use crate::scene::{PressConfig, Scene, Task};
 
@@ -6,8 +6,9 @@ use crate::scene::{PressConfig, Scene, Task};
 /// measurements at 64.3 kHz.
 const PUBLISHED_HOLD_S: [f64; 2] = [50_000.0 / 64_300.0, 70_000.0 / 64_300.0];
 
-/// Span of a press of `scene` in which the contact is steady, s; `None` for a drop. A press with the default course,
-/// which is the recorded one, has the published span, so that skin and twin are scored on the same instants.
+/// Span [start, end) of a press of `scene` in which the contact is steady, s; `None` for a drop. A press with the
+/// default time course, which is that of the recorded presses, has the published span, so that skin and twin are scored
+/// at the same instants.
 #[must_use]
 pub fn hold_s(scene: &Scene) -> Option<[f64; 2]> {
     let Task::Press(press) = scene.task() else {

@@ -6,19 +6,19 @@ use spts_contact::Frame;
 use spts_sim::World;
 use spts_sim::world::{Bounce, PressCourse};
 
-/// Frames of one press or drop, and what the mechanics did in it.
+/// Frames of one press or drop, and what the mechanics did.
 #[derive(Debug, Clone)]
 pub struct PressFrames {
     /// Frames in time order.
     pub frames: Vec<Frame>,
-    /// Course of the force, for a press that reached its target.
+    /// Time course of the force, for a press that reached its target.
     pub course: Option<PressCourse>,
     /// Bounces, for a drop.
     pub bounces: Vec<Bounce>,
 }
 
 impl PressFrames {
-    /// Largest |force − Σ p·A| / force over all frames; see [`Frame::imbalance`].
+    /// Largest relative difference |force − Σ p·A| / force over all frames; see [`Frame::imbalance`].
     #[must_use]
     pub fn imbalance(&self, cell_area_m2: f64) -> f64 {
         self.frames
@@ -31,7 +31,7 @@ impl PressFrames {
 /// Runs press or drop number `index` of `scene`.
 ///
 /// # Errors
-/// [`TwinError`] when the mechanics fail.
+/// [`TwinError`] if the mechanics fail.
 pub fn press_frames(scene: &Scene, index: usize) -> Result<PressFrames, TwinError> {
     let mut world = World::repeat(scene.mechanics(), index)?;
     let frames = world.frames().collect::<Result<Vec<Frame>, _>>()?;

@@ -1,4 +1,4 @@
-//! One session of a twin, its presses a few at a time.
+//! One session of a twin, recorded a few presses at a time.
 
 use super::error::TwinError;
 use super::hold::hold_s;
@@ -8,7 +8,7 @@ use crate::chain::{Acquisition, ReadoutSession, SkinSession, press_facts};
 use crate::session::{PressFacts, Recorded};
 use spts_circuit::Interpolated;
 
-/// Records presses as they come: skin and readout remember those before.
+/// Records presses as they come. Skin and readout remember earlier presses.
 pub struct TwinSession<'a> {
     twin: &'a Twin,
     skin: SkinSession,
@@ -16,10 +16,10 @@ pub struct TwinSession<'a> {
 }
 
 impl TwinSession<'_> {
-    /// Conductance of the next `presses`, and their blocks if they are read out.
+    /// Conductance of the next `presses` and, if they are read out, their blocks.
     ///
     /// # Errors
-    /// [`TwinError::Chain`] when the frames are not in the order of their times, or the readout refuses the conductance.
+    /// [`TwinError::Chain`] if the frames are not in order of time, or the readout refuses the conductance.
     pub fn record(&mut self, presses: &[PressFrames]) -> Result<(Vec<Interpolated>, Option<Recorded>), TwinError> {
         let sources = presses.iter().map(|press| self.skin.conductance(&press.frames));
         let mut sources = sources.collect::<Result<Vec<_>, _>>()?;
@@ -33,11 +33,11 @@ impl TwinSession<'_> {
 }
 
 impl Twin {
-    /// The session that `acquisition` says, before its first press, on a sheet that nothing has conditioned. Presses are
-    /// recorded if `read_out` says so.
+    /// Starts the session of `acquisition`, before its first press, on an unconditioned sheet. If `read_out`, presses
+    /// are recorded; otherwise only their conductance is computed.
     ///
     /// # Errors
-    /// [`TwinError::Chain`] when a press is too long to record, or the weights cannot come from where the scene says.
+    /// [`TwinError::Chain`] if a press is too long to record, or the source of the weights cannot provide them.
     pub fn start_session(&self, acquisition: &Acquisition, read_out: bool) -> Result<TwinSession<'_>, TwinError> {
         let chain = self.scene().chain();
         let readout = read_out.then(|| chain.readout_session(self.scene().duration_s(), acquisition));

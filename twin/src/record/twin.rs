@@ -1,4 +1,4 @@
-//! Presses of a scene, and their recordings.
+//! Simulates the presses of a scene and records them.
 
 use super::error::TwinError;
 use super::hold::hold_s;
@@ -13,9 +13,9 @@ use spts_contact::Frame;
 use spts_contact::objects::FINGER;
 use std::ops::Range;
 
-/// The twin of the skin, of what presses on it and of its readout, as a scene describes them.
+/// The twin of a scene: the skin, what presses on it, and its readout.
 ///
-/// The mechanics of different presses run in parallel. No result depends on the number of threads.
+/// Presses run in parallel. No result depends on the number of threads.
 ///
 /// ```
 /// use spts::{Mode, Scene, Twin};
@@ -45,7 +45,7 @@ impl Twin {
     /// The twin of `scene`.
     ///
     /// # Errors
-    /// [`TwinError::Scene`] as for [`Scene::hash`].
+    /// [`TwinError::Scene`], as [`Scene::hash`].
     pub fn new(scene: &Scene) -> Result<Self, TwinError> {
         Ok(Self {
             scene_hash: scene.hash()?,
@@ -59,11 +59,11 @@ impl Twin {
         &self.scene
     }
 
-    /// Runs all presses or drops of the scene and records them in `mode`, one after the other, as the real skin is
+    /// Runs all presses or drops of the scene, and records them in `mode` one after the other, as the real skin is
     /// recorded.
     ///
     /// # Errors
-    /// [`TwinError`] as for [`Twin::check`], [`Twin::presses`] and [`Twin::recorded`].
+    /// [`TwinError`], as [`Twin::check`], [`Twin::presses`] and [`Twin::recorded`].
     pub fn record(&self, mode: Mode) -> Result<Session, TwinError> {
         self.check(mode)?;
         let presses = self.presses(0..self.scene.repeats(), &|| ())?;
@@ -74,19 +74,19 @@ impl Twin {
         })
     }
 
-    /// Checks before the first press what would keep the scene from being recorded in `mode`.
+    /// Checks whether the scene can be recorded in `mode`, before the first press is simulated.
     ///
     /// # Errors
-    /// [`TwinError::Chain`] when the weights of this mode cannot come from where the scene says,
-    /// [`TwinError::TooLarge`] for more frames or measurements than are kept.
+    /// [`TwinError::Chain`] if the source of the weights cannot provide them in this mode, [`TwinError::TooLarge`] for
+    /// more frames or measurements than are kept in memory.
     pub fn check(&self, mode: Mode) -> Result<(), TwinError> {
         self.check_presses(self.scene.repeats(), mode)
     }
 
-    /// [`Twin::check`] of one press alone: for a run that does not keep its presses.
+    /// [`Twin::check`] for a run that keeps only one press at a time.
     ///
     /// # Errors
-    /// As for [`Twin::check`].
+    /// As [`Twin::check`].
     pub fn check_press(&self, mode: Mode) -> Result<(), TwinError> {
         self.check_presses(1, mode)
     }
@@ -98,8 +98,8 @@ impl Twin {
         Ok(chain.check(mode)?)
     }
 
-    /// Presses that are worth simulating together: two a thread, as far as their frames and samples leave most of the
-    /// memory alone. No result depends on it.
+    /// Number of presses to simulate together: two a thread, as long as their frames and samples fit easily into
+    /// memory. No result depends on it.
     #[must_use]
     pub fn presses_at_once(&self) -> usize {
         let taxels = self.scene.skin().taxels() as f64;
@@ -109,12 +109,12 @@ impl Twin {
         fit.min(2 * rayon::current_num_threads()).max(1)
     }
 
-    /// Runs presses or drops number `indices` of the scene, in parallel; `done` is called after each. Every press has a
-    /// place and times of its own.
+    /// Runs the presses or drops with numbers `indices`, in parallel, and calls `done` after each. Every press has its
+    /// own place and timing.
     ///
     /// # Errors
-    /// [`TwinError::TooLarge`] for more frames than are kept, [`TwinError::Sim`] when the mechanics fail or there is no
-    /// such press.
+    /// [`TwinError::TooLarge`] for more frames than are kept in memory, [`TwinError::Sim`] if the mechanics fail or a
+    /// number is out of range.
     pub fn presses(&self, indices: Range<usize>, done: &(dyn Fn() + Sync)) -> Result<Vec<PressFrames>, TwinError> {
         self.check_frames(indices.len())?;
         let presses = indices.into_par_iter().map(|index| {
@@ -125,7 +125,7 @@ impl Twin {
         presses.collect()
     }
 
-    /// How the scene is recorded in `mode` by [`Twin::record`].
+    /// The acquisition that [`Twin::record`] uses in `mode`.
     #[must_use]
     pub fn acquisition(&self, mode: Mode) -> Acquisition {
         let session = match mode {
@@ -139,10 +139,10 @@ impl Twin {
         }
     }
 
-    /// Conductance over time of each of `presses`, in the session that `acquisition` says.
+    /// Conductance of each of `presses` as a function of time, in the session of `acquisition`.
     ///
     /// # Errors
-    /// [`TwinError::Chain`] when the frames are not in the order of their times.
+    /// [`TwinError::Chain`] if the frames are not in order of time.
     pub fn conductance(
         &self,
         presses: &[PressFrames],
@@ -152,19 +152,19 @@ impl Twin {
         Ok(self.scene.chain().conductance(&frames, acquisition)?)
     }
 
-    /// Records `presses` one after the other, with what the simulation knows of each.
+    /// Records `presses` in order, together with the facts that the simulation knows about each.
     ///
     /// # Errors
-    /// [`TwinError::Chain`] when the readout refuses the conductance, or a press is too long to record.
+    /// [`TwinError::Chain`] if the readout refuses the conductance, or a press is too long to record.
     pub fn recorded(&self, presses: &[PressFrames], acquisition: &Acquisition) -> Result<Recorded, TwinError> {
         let mut conductance = self.conductance(presses, acquisition)?;
         self.read_out(presses, &mut conductance, acquisition)
     }
 
-    /// The same where the conductance of the presses is known: [`Twin::conductance`].
+    /// [`Twin::recorded`] for presses whose conductances are known from [`Twin::conductance`].
     ///
     /// # Errors
-    /// As for [`Twin::recorded`].
+    /// As [`Twin::recorded`].
     pub fn read_out(
         &self,
         presses: &[PressFrames],
@@ -178,7 +178,7 @@ impl Twin {
         })
     }
 
-    /// The session of these recordings: named after the scene, with its object, event, hold and provenance.
+    /// The session of these recordings, with the scene's name, object, event, hold and provenance.
     #[must_use]
     pub fn session(&self, raster: Option<Recorded>, compressive: Option<Recorded>) -> Session {
         Session {

@@ -1,4 +1,4 @@
-//! What is changed in a scene before it is made.
+//! Changes to a scene before it is built.
 
 use super::SceneConfig;
 use super::make_room::{conflict, make_room, section};
@@ -6,11 +6,10 @@ use crate::assign::{AssignError, Assignment};
 use toml::Table;
 
 impl Assignment {
-    /// Puts all of `assignments` into `scene`, in their order. The last one that sets a field counts.
-    ///
+    /// Applies `assignments` to `scene`, in order. If several set one field, the last counts.
     /// # Errors
-    /// [`AssignError`] as for [`Assignment::apply`], and for two of them that say one thing in two ways, such as a row
-    /// and a position in metres: of what the user says nothing is dropped.
+    /// [`AssignError`], as [`Assignment::apply`], and for two assignments that set the same quantity in two ways, such
+    /// as a row and a position in metres.
     pub fn apply_all(assignments: &[Self], scene: &mut Table) -> Result<(), AssignError> {
         for (number, later) in assignments.iter().enumerate() {
             let of = |a: &Self| a.key(scene).to_owned();
@@ -30,13 +29,13 @@ impl Assignment {
         self.keys.iter().find(has).unwrap_or(&self.keys[0])
     }
 
-    /// Puts the value into `scene`, a scene as it is written. What a scene cannot hold beside the new value goes: the
-    /// object when a mesh is set, the contact and the step when a tolerance is, the parameters of another contact model
-    /// when one is named.
+    /// Puts the value into `scene`, the table of a scene file. Fields that contradict the new value are removed: a mesh
+    /// replaces the object, a tolerance replaces contact and time step, and another contact model drops the parameters
+    /// of the earlier one.
     ///
     /// # Errors
-    /// [`AssignError`] for a key that a scene does not have, with those that it has, for a value of another type, and
-    /// for a field of a press in a drop, or of a drop in a press.
+    /// [`AssignError`] for a key that scenes do not have (the error lists the valid ones), a value of the wrong type, a
+    /// field of presses in a drop, or a field of drops in a press.
     pub fn apply(&self, scene: &mut Table) -> Result<(), AssignError> {
         let key = self.key(scene);
         match section(key) {

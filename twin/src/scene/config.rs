@@ -1,4 +1,4 @@
-//! A scene as it is written.
+//! A scene as written in TOML.
 
 use super::{BendConfig, DropConfig, PressConfig, Timestep};
 use crate::chain::{ChainConfig, RowsConfig};
@@ -6,11 +6,21 @@ use serde::{Deserialize, Serialize};
 use spts_models::SkinLayout;
 use spts_sim::mechanics::MechanicsConfig;
 
-/// A scene as it is written. Missing values take their defaults.
+/// A scene as written in TOML. A missing field takes its default.
+///
+/// ```
+/// use spts::scene::SceneConfig;
+///
+/// let scene = SceneConfig::from_toml("seed = 7\nreadout = \"ideal\"\n[press]\nobject = \"T\"")?;
+/// assert_eq!((scene.seed, scene.readout.as_deref()), (7, Some("ideal")));
+/// let error = SceneConfig::from_toml("sead = 7").err().expect("an unknown key");
+/// assert!(error.to_string().contains("sead"));
+/// # Ok::<(), spts::SceneError>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SceneConfig {
-    /// Name of the session that is recorded, and the class of a mesh. Default: the object's, the mesh file's, or
+    /// Name of the recorded session, and the class of a mesh. Default: the name of the object or of the mesh file, or
     /// `bounce`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
@@ -19,10 +29,10 @@ pub struct SceneConfig {
     /// Step of the dynamics; see [`MechanicsConfig::timestep_s`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timestep_s: Option<Timestep>,
-    /// Error of the taxels' pressures that will do, relative; see [`MechanicsConfig::tolerance`].
+    /// Largest acceptable relative error of the taxels' pressures; see [`MechanicsConfig::tolerance`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
-    /// Tolerance that a saved scene was made with; see [`MechanicsConfig::chosen_for_tolerance`].
+    /// Tolerance for which a saved scene was chosen; see [`MechanicsConfig::chosen_for_tolerance`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chosen_for_tolerance: Option<f64>,
     /// Time between frames, s; see [`MechanicsConfig::frame_interval_s`].
@@ -31,34 +41,34 @@ pub struct SceneConfig {
     /// Name of the transducer; see [`ChainConfig::transducer`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub transducer: Option<String>,
-    /// Parameters of the transducer, as it takes them.
+    /// Parameters of the transducer; see [`ChainConfig::transducer_parameters`].
     #[serde(skip_serializing_if = "toml::Table::is_empty")]
     pub transducer_parameters: toml::Table,
-    /// Readout profile by name, or a file that ends in `.toml`, relative to the scene file; see
+    /// Readout profile: a name, or a file that ends in `.toml`, relative to the scene file; see
     /// [`ChainConfig::readout`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub readout: Option<String>,
-    /// Where the weights come from: `"model"`, the formula of the cells' generator, or `"firmware"`, what emulated
-    /// cells put out.
+    /// Source of the weights: `"model"` (the formula of the cells' generator) or `"firmware"` (the codes of emulated
+    /// cells).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub weights: Option<String>,
-    /// Seeds and levels of the cells, in place of the profile's; see [`RowsConfig`].
+    /// Seeds and levels of the cells, replacing those of the profile; see [`RowsConfig`].
     #[serde(skip_serializing_if = "RowsConfig::is_empty")]
     pub rows: RowsConfig,
-    /// Faulty cells of the readout, added to those of its profile.
+    /// Faulty cells, in addition to those of the profile.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<toml::Table>,
     /// The skin.
     pub skin: SkinLayout,
-    /// `model` and the parameters of that contact field.
+    /// Contact model (`model`) and its parameters.
     pub contact: toml::Table,
-    /// The skin is wrapped round a cylinder; see [`BendConfig`]. Default: it lies flat.
+    /// Bends the skin round a cylinder; see [`BendConfig`]. Default: the skin is flat.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub bend: Option<BendConfig>,
-    /// The arm presses an object. Either this or `drop`.
+    /// Presses an object with the arm. A scene has either this or `drop`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub press: Option<PressConfig>,
-    /// A ball falls. Either this or `press`.
+    /// Drops a ball. A scene has either this or `press`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drop: Option<DropConfig>,
 }

@@ -1,4 +1,4 @@
-//! Why a scene is not valid.
+//! Errors of scenes.
 
 use super::SceneConfig;
 use crate::chain::ChainError;
@@ -13,7 +13,7 @@ const SHOWN: usize = 120;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SceneError {
-    /// The error, with the file it is in.
+    /// An error, with the file in which it occurred.
     #[error("{}: {source}", path.display())]
     InFile {
         /// Scene file.
@@ -24,7 +24,7 @@ pub enum SceneError {
     /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Read(#[from] std::io::Error),
-    /// The text is not TOML, or has a key or a value that does not belong there.
+    /// Text that is not TOML, or has an unknown key or a wrong value.
     #[error("line {line}: {message} (`{text}`)")]
     Parse {
         /// Line, from 1.
@@ -34,10 +34,10 @@ pub enum SceneError {
         /// The line's text.
         text: String,
     },
-    /// A key or a value that does not belong there.
+    /// An unknown key or a wrong value.
     #[error("{message}")]
     Field {
-        /// Field, value, and what is needed.
+        /// Field, value, and what is valid.
         message: String,
     },
     /// The scene cannot be written as TOML.
@@ -49,7 +49,7 @@ pub enum SceneError {
         /// The file.
         path: PathBuf,
     },
-    /// The session that is recorded cannot be called so.
+    /// A name that a session cannot have.
     #[error("`name` = {value:?} is outside {range}")]
     Name {
         /// The name.
@@ -57,7 +57,7 @@ pub enum SceneError {
         /// Valid names.
         range: &'static str,
     },
-    /// What happens on the skin is not valid.
+    /// The mechanics are not valid.
     #[error(transparent)]
     Mechanics(#[from] MechanicsError),
     /// Transducer, readout or weights are not valid.
@@ -98,20 +98,20 @@ impl SceneError {
 }
 
 impl SceneConfig {
-    /// What `table` writes.
+    /// The configuration in `table`.
     ///
     /// # Errors
-    /// [`SceneError::Field`] for a key or a value that does not belong there.
+    /// [`SceneError::Field`] for an unknown key or a wrong value.
     pub fn from_table(table: toml::Table) -> Result<Self, SceneError> {
         table.try_into().map_err(|error| SceneError::Field {
             message: explain_toml(&error),
         })
     }
 
-    /// What `text` writes.
+    /// The configuration in the TOML text `text`.
     ///
     /// # Errors
-    /// [`SceneError::Parse`] with the line.
+    /// [`SceneError::Parse`], with the line.
     pub fn from_toml(text: &str) -> Result<Self, SceneError> {
         toml::from_str(text).map_err(|error| SceneError::parse(text, &error))
     }

@@ -1,4 +1,4 @@
-//! What a scene says beside a field that is set, and cannot keep.
+//! Removes fields of a scene that contradict a field that is set.
 
 use super::SceneConfig;
 use spts_models::SkinLayout;

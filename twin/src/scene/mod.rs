@@ -1,5 +1,5 @@
-//! Scenes: everything from the press to the recording, as a TOML file or made in code. A [`Scene`] that exists is
-//! valid.
+//! Scenes: everything from the press to the recording, read from a TOML file or built in code. A [`Scene`] is valid by
+//! construction.
 //!
 //! ```toml
 //! seed = 7
@@ -36,7 +36,7 @@ use crate::session::{NAMES, is_plain};
 use spts_models::SkinLayout;
 use std::path::Path;
 
-/// A valid scene: the mechanics, and the chain of transducer, readout and weights behind it.
+/// A valid scene: the mechanics, and the chain of transducer, readout and weights that follows them.
 ///
 /// ```
 /// use spts::scene::Scene;
@@ -57,10 +57,10 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Valid scene from what is written; files that it names are looked for in `folder`.
+    /// The scene that `config` describes. Files that it names are looked up in `folder`.
     ///
     /// # Errors
-    /// [`SceneError`] for the first value that is not valid.
+    /// [`SceneError`] for the first field that is not valid.
     pub fn new(mut config: SceneConfig, folder: &Path) -> Result<Self, SceneError> {
         read_gains(&mut config.transducer_parameters, folder)?;
         let mechanics = Mechanics::new(config.mechanics(), folder)?;
@@ -88,18 +88,18 @@ impl Scene {
         })
     }
 
-    /// Scene from TOML text; files that it names are looked for in `folder`.
+    /// The scene in the TOML text `text`. Files that it names are looked up in `folder`.
     ///
     /// # Errors
-    /// [`SceneError`] when the text is not TOML or the scene is not valid.
+    /// [`SceneError`] if the text is not TOML, or the scene is not valid.
     pub fn from_toml(text: &str, folder: &Path) -> Result<Self, SceneError> {
         Self::new(SceneConfig::from_toml(text)?, folder)
     }
 
-    /// Scene from a file; files that it names are looked for beside it.
+    /// Reads a scene file. Files that it names are looked up beside it.
     ///
     /// # Errors
-    /// [`SceneError::InFile`] with the file's name around what is wrong.
+    /// [`SceneError::InFile`], with the name of the file.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
         let read = || {
@@ -112,18 +112,19 @@ impl Scene {
         read().map_err(|source: SceneError| source.in_file(path))
     }
 
-    /// The arm presses the object called `name` at its place, ten times, with everything at its default.
+    /// Ten presses of the object called `name` by the arm, at the place of the published recordings. Everything else
+    /// has its default.
     ///
     /// # Errors
-    /// [`SceneError::Mechanics`] when there is no object of that name.
+    /// [`SceneError::Mechanics`] if there is no object of that name.
     pub fn press(name: &str) -> Result<Self, SceneError> {
         Self::new(MechanicsConfig::press(name).into(), Path::new(""))
     }
 
-    /// The arm presses the mesh in `file` (`scale` metres a unit) in the middle of the skin, ten times.
+    /// Ten presses of the mesh in `file` (`scale` metres a unit) in the middle of the skin.
     ///
     /// # Errors
-    /// [`SceneError`] when the mesh is not usable.
+    /// [`SceneError`] if the mesh cannot be used.
     pub fn press_mesh(file: impl AsRef<Path>, scale: f64) -> Result<Self, SceneError> {
         let file = file.as_ref();
         let name = file
@@ -132,21 +133,21 @@ impl Scene {
         Self::new(MechanicsConfig::press_mesh(name, scale).into(), Path::new(""))
     }
 
-    /// A tennis ball falls from half a metre on the middle of the skin, ten times, with everything at its default.
+    /// Ten drops of a tennis ball from half a metre onto the middle of the skin. Everything else has its default.
     ///
     /// # Errors
-    /// None with the defaults as they are.
+    /// None, with the defaults as they are.
     pub fn bounce() -> Result<Self, SceneError> {
         Self::new(MechanicsConfig::bounce().into(), Path::new(""))
     }
 
-    /// The scene as it was written, every default filled in.
+    /// The configuration, with all defaults filled in.
     #[must_use]
     pub fn config(&self) -> &SceneConfig {
         &self.config
     }
 
-    /// The mechanical part, from which a [`World`](spts_sim::World) is made.
+    /// The mechanics, from which a [`World`](spts_sim::World) is built.
     #[must_use]
     pub fn mechanics(&self) -> &Mechanics {
         &self.mechanics
@@ -158,14 +159,14 @@ impl Scene {
         &self.chain
     }
 
-    /// Name of the session that is recorded.
+    /// Name of the recorded session.
     #[must_use]
     pub fn name(&self) -> &str {
         self.config.name.as_deref().unwrap_or_default()
     }
 
-    /// What is pressed or dropped, as the class of its session: the object by name, a mesh by the name of the scene, or
-    /// the ball.
+    /// Class of the session, that is what is pressed or dropped: the name of the object, the name of the scene for a
+    /// mesh, or `ball`.
     #[must_use]
     pub fn object(&self) -> &str {
         match self.task() {
@@ -174,7 +175,7 @@ impl Scene {
         }
     }
 
-    /// What happens.
+    /// Whether the scene presses or drops, with the parameters.
     #[must_use]
     pub fn task(&self) -> Task<'_> {
         self.mechanics.task()
@@ -204,19 +205,19 @@ impl Scene {
         self.config.seed
     }
 
-    /// The scene as TOML, every default filled in: reading it gives the same scene again.
+    /// The scene as TOML, with all defaults filled in. Reading it back gives the same scene.
     ///
     /// # Errors
-    /// [`SceneError::Write`], which no valid scene is known to cause.
+    /// [`SceneError::Write`], which no valid scene should cause.
     pub fn to_toml(&self) -> Result<String, SceneError> {
         Ok(toml::to_string(&self.config)?)
     }
 
-    /// Hash of the scene: of its TOML, and bit for bit of its mesh, its profile file and its seeds, whatever these
+    /// Hash of the scene: of its TOML text, and of the contents of its mesh, profile and seed files, whatever these
     /// files are called.
     ///
     /// # Errors
-    /// As for [`Scene::to_toml`].
+    /// As [`Scene::to_toml`].
     pub fn hash(&self) -> Result<String, SceneError> {
         let mut bytes = toml::to_string(&self.portable())?.into_bytes();
         let mesh = self.mechanics.mesh();
@@ -234,9 +235,9 @@ impl Scene {
         Ok(hash_text(&bytes))
     }
 
-    /// The scene, every default filled in, with the files it needs under the names [`MESH_COPY`] with the mesh's
-    /// extension,
-    /// [`READOUT_COPY`], [`SEEDS_COPY`] and [`PATTERNS_COPY`]: what is written beside results, with a copy of those files.
+    /// The configuration with all defaults filled in. Files are named [`MESH_COPY`] (with the extension of the mesh),
+    /// [`READOUT_COPY`], [`SEEDS_COPY`] and [`PATTERNS_COPY`]. It is written beside the results, together with copies
+    /// of these files.
     #[must_use]
     pub fn portable(&self) -> SceneConfig {
         let mut config = self.config.clone();
@@ -263,7 +264,7 @@ pub const MESH_COPY: &str = "mesh";
 pub const READOUT_COPY: &str = "readout.toml";
 /// Name of the copy of a file of seeds.
 pub const SEEDS_COPY: &str = "seeds.txt";
-/// Name of the copy of a file of a pattern.
+/// Name of the copy of a pattern file.
 pub const PATTERNS_COPY: &str = "patterns.txt";
 
 /// Name of a scene that has none: of its object, of its mesh file, or `bounce`.

@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// Largest array that is read, bytes: a session of 400 presses of the published skin in volts is 320 MB.
 pub(super) const MAX_BYTES: u64 = 1 << 30;
-/// Most samples of a recording that are read, as codes of 16 bits.
+/// Largest number of samples of a recording that is read, as codes of 16 bits.
 pub const MOST_SAMPLES: u64 = MAX_BYTES / 2;
 /// Values that are read at a time.
 const PIECE: usize = 1 << 13;
@@ -24,7 +24,7 @@ pub(super) fn npy_bytes(shape: &[usize], width: usize) -> u64 {
         .saturating_add(HEADER_BYTES)
 }
 
-/// An array in C order.
+/// An array in C order, as NumPy stores it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NpyArray<T = f64> {
     /// Size along each dimension.
@@ -36,8 +36,8 @@ pub struct NpyArray<T = f64> {
 /// Reads the array at `path`: little-endian doubles in C order, as [`crate::output::write_npy`] writes them.
 ///
 /// # Errors
-/// [`SessionError`] when the file is not a regular one, cannot be read, is larger than 1 GB, or is not such an array
-/// from its first byte to its last.
+/// [`SessionError`] if the file is not a regular one, cannot be read, is larger than 1 GB, or is not exactly such an
+/// array.
 pub fn read_npy(path: &Path) -> Result<NpyArray, SessionError> {
     read_doubles(path, None)
 }

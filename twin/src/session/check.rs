@@ -1,4 +1,4 @@
-//! What has to hold in every session that is written or read.
+//! Conditions that hold in every session that is written or read.
 
 use super::{Recorded, Session};
 use spts_circuit::Mode;

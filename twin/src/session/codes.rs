@@ -1,4 +1,4 @@
-//! Samples as the codes that left the converter.
+//! Samples as codes of the converter.
 
 use spts_circuit::Converter;
 

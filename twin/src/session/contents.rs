@@ -1,4 +1,4 @@
-//! What stands in `session.json`. docs/session.md describes it for users.
+//! The contents of `session.json`. docs/session.md describes them for users.
 
 use super::{Event, PressPose, SESSION_FILE};
 use crate::provenance::Provenance;

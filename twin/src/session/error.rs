@@ -1,4 +1,4 @@
-//! What can be wrong with a session's folder.
+//! Errors of session folders.
 
 use crate::output::OutputError;
 use std::path::PathBuf;
@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SessionError {
-    /// The file system said no.
+    /// The file system reports an error.
     #[error("{path}: {source}", path = path.display())]
     Io {
         /// File or folder.
@@ -15,7 +15,7 @@ pub enum SessionError {
         /// Cause.
         source: std::io::Error,
     },
-    /// A schema that this program does not know.
+    /// A version of the schema that this program cannot read.
     #[error("{path}: `schema` = {found} is not known; this program reads {known}", path = path.display())]
     Schema {
         /// File.
@@ -25,12 +25,12 @@ pub enum SessionError {
         /// Versions that can be read.
         known: &'static str,
     },
-    /// Text that is no session.
+    /// A file that does not describe a session.
     #[error("{path}: {reason}", path = path.display())]
     Text {
         /// File.
         path: PathBuf,
-        /// What is wrong, with line and column.
+        /// The cause, with line and column.
         reason: String,
     },
     /// A field outside its range.
@@ -38,14 +38,14 @@ pub enum SessionError {
     Field {
         /// File.
         path: PathBuf,
-        /// Name of the field, with the names of what it lies in.
+        /// Name of the field, with the sections that contain it.
         field: String,
         /// Its value.
         value: String,
         /// Valid range.
         range: String,
     },
-    /// Not a NumPy array, or a damaged one.
+    /// A file that is not a NumPy array, or is damaged.
     #[error("{path}: not a readable NumPy array ({reason})", path = path.display())]
     NotNpy {
         /// File.
@@ -53,19 +53,19 @@ pub enum SessionError {
         /// What the reader found.
         reason: String,
     },
-    /// An array of another shape than session.json says.
+    /// An array whose shape differs from that in `session.json`.
     #[error("{path}: shape {found:?}; expected {expected:?} ({dimensions})", path = path.display())]
     Shape {
         /// File.
         path: PathBuf,
         /// Its shape.
         found: Vec<usize>,
-        /// What it should be.
+        /// Expected shape.
         expected: Vec<usize>,
-        /// What the dimensions are.
+        /// Meaning of the dimensions.
         dimensions: &'static str,
     },
-    /// A code that the converter does not have.
+    /// A code that the converter cannot produce.
     #[error("{path}: entry {index} is {code}; the converter has the codes 0 to {max_code}, and {missing} marks a missing sample", path = path.display())]
     Code {
         /// File.
@@ -74,12 +74,12 @@ pub enum SessionError {
         index: usize,
         /// The code.
         code: u32,
-        /// Largest code.
+        /// Largest code of the converter.
         max_code: u32,
-        /// Mark of a missing sample.
+        /// Code that marks a missing sample.
         missing: u32,
     },
-    /// A pressure or conductance that cannot be.
+    /// A pressure or conductance outside its range.
     #[error("{path}: entry {index} (in C order, from 0) is {value}, outside [0, ∞); NaN marks a map that is not known and then fills all of it", path = path.display())]
     Truth {
         /// File.
@@ -89,7 +89,7 @@ pub enum SessionError {
         /// The value, Pa or S.
         value: f64,
     },
-    /// The numbers do not make a recording.
+    /// Numbers that are not a valid recording.
     #[error("{path}: `{mode}`: {source}", path = path.display())]
     Recording {
         /// File.

@@ -1,4 +1,4 @@
-//! Sessions: recordings of one object or event, with everything that is known of them.
+//! Sessions: recordings of one object or event, with everything known about them.
 //!
 //! ```
 //! use spts::session::{Event, Recorded, Session};
@@ -52,11 +52,11 @@ pub enum Event {
     Press,
     /// Something fell on the skin.
     Drop,
-    /// Something touched the skin, at a time that is not known.
+    /// Something touched the skin, at an unknown time.
     Touch,
 }
 
-/// Position and orientation of what was pressed, in the frame of the skin.
+/// Position and orientation of the pressed body, in the frame of the skin.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PressPose {
@@ -66,36 +66,35 @@ pub struct PressPose {
     pub quaternion: [f64; 4],
 }
 
-/// What is known of one block of a recording beside its samples. A simulation knows all of it, a real skin hardly
-/// anything.
+/// Facts about one block of a recording beside its samples. A simulation knows all of them, a real skin hardly any.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PressFacts {
-    /// Time within the block at which the rest was taken, s: the middle of the hold, or the instant of the largest
+    /// Time within the block to which the other facts refer, s: the middle of the hold, or the instant of the largest
     /// force.
     pub time_s: Option<f64>,
-    /// Pose of what was pressed.
+    /// Pose of the pressed body.
     pub pose: Option<PressPose>,
     /// Normal force on the skin, N.
     pub force_n: Option<f64>,
     /// Mean pressure over each taxel's cell, Pa.
     pub pressure: Option<PressureMap>,
-    /// Conductance of each taxel, S: what the readout saw.
+    /// Conductance of each taxel, S, as the readout saw it.
     pub conductance: Option<ConductanceMap>,
 }
 
-/// A recording with what is known of its blocks.
+/// A recording, with the facts known about its blocks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recorded {
-    /// The samples, and the rows of weights that they were taken with.
+    /// The samples, and the rows of weights with which they were taken.
     pub recording: Recording,
-    /// Number of blocks at the beginning that only condition the skin and are not scored.
+    /// Number of blocks at the beginning that only condition the skin. They are not scored.
     pub conditioning: usize,
-    /// One entry a block; empty when nothing is known.
+    /// Facts about each block; empty if nothing is known.
     pub presses: Vec<PressFacts>,
 }
 
 impl Recorded {
-    /// A recording of whose blocks nothing is known.
+    /// A recording without facts about its blocks.
     #[must_use]
     pub fn new(recording: Recording) -> Self {
         Self {
@@ -105,7 +104,7 @@ impl Recorded {
         }
     }
 
-    /// What is known of block `block`.
+    /// The facts about block `block`.
     #[must_use]
     pub fn facts(&self, block: usize) -> Option<&PressFacts> {
         self.presses.get(block)
@@ -115,24 +114,24 @@ impl Recorded {
 /// Recordings of one object or event.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Session {
-    /// Name, by which a set of sessions tells this one from others: that of a file, spaces allowed.
+    /// Name that identifies the session within a set. It must be valid as a file name; spaces are allowed.
     pub name: String,
-    /// What was pressed or dropped: the class that a classifier is asked for. Several sessions of one object share it.
+    /// What was pressed or dropped: the class that a classifier is to find. Several sessions may share it.
     pub object: String,
     /// What happened in every block.
     pub event: Event,
-    /// Span [start, end) of a block in which the contact is steady, s; `None` when it is not known, as for a drop.
+    /// Span [start, end) of a block in which the contact is steady, s; `None` if it is not known, as for a drop.
     pub hold_s: Option<[f64; 2]>,
     /// The raster recording.
     pub raster: Option<Recorded>,
     /// The compressive recording.
     pub compressive: Option<Recorded>,
-    /// Where the session comes from; `None` for a real skin.
+    /// Provenance of a simulated session; `None` for a real skin.
     pub provenance: Option<Provenance>,
 }
 
 impl Session {
-    /// A session called `name`, of the object with this name, without a recording.
+    /// A session called `name`, of the object with that name, without recordings.
     #[must_use]
     pub fn new(name: &str, event: Event) -> Self {
         Self {
@@ -158,7 +157,7 @@ impl Session {
         self.compressive.as_ref().map(|r| &r.recording)
     }
 
-    /// The skin; `None` without a recording.
+    /// Layout of the skin; `None` without a recording.
     #[must_use]
     pub fn layout(&self) -> Option<&SkinLayout> {
         self.compressive().or(self.raster()).map(Recording::layout)

@@ -1,4 +1,4 @@
-//! The header of a NumPy array, read without trust.
+//! Reads the header of a NumPy array from an untrusted file.
 
 use npyz::NpyHeader;
 use std::io::{self, Read};
@@ -8,8 +8,8 @@ const MAGIC: &[u8; 6] = b"\x93NUMPY";
 /// Longest header that is parsed, bytes: type, order and a few sides, padded. The parser makes room for whatever length
 /// a file states, and descends into every bracket of it.
 const MAX_HEADER: usize = 1 << 10;
-/// Brackets within each other in a header that is parsed: a dictionary with a tuple of sides has two, one with a record type
-/// four. The parser's time doubles with every one.
+/// Brackets within each other in a header that is parsed: a dictionary with a tuple of sides has two, one with a record
+/// type four. The parser's time doubles with every one.
 const MAX_DEPTH: usize = 6;
 
 /// Most brackets of `text` within each other.
@@ -26,10 +26,10 @@ fn deepest(text: &[u8]) -> usize {
     most
 }
 
-/// The header of the array that `reader` begins with, and its sides; `reader` is left at the first value.
+/// Reads the header at the start of `reader`, and the sides of the array. `reader` is left at the first value.
 ///
 /// # Errors
-/// [`io::Error`] for what is no such header: `InvalidData` with what is wrong, or the reader's own error.
+/// [`io::Error`]: `InvalidData` with the cause for a header that is not valid, or the error of the reader.
 pub fn read_npy_header(reader: &mut impl Read) -> io::Result<(NpyHeader, Vec<usize>)> {
     let invalid = |reason: String| io::Error::new(io::ErrorKind::InvalidData, reason);
     let mut start = [0; 10];
@@ -84,19 +84,19 @@ fn countable(text: &[u8]) -> Result<(), String> {
         .ok_or_else(|| "the shape is too large".to_owned())
 }
 
-/// Values of an array of these sides.
+/// Number of values of an array with these sides.
 ///
 /// # Errors
-/// [`io::ErrorKind::InvalidData`] for more than can be counted.
+/// [`io::ErrorKind::InvalidData`] for more values than can be counted.
 pub fn npy_values(sides: &[usize]) -> io::Result<usize> {
     let values = sides.iter().try_fold(1_usize, |n, &side| n.checked_mul(side));
     values.ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, format!("shape {sides:?} is too large")))
 }
 
-/// An empty vector with room for `values` values.
+/// An empty vector with capacity for `values` values.
 ///
 /// # Errors
-/// [`io::ErrorKind::OutOfMemory`] when there is no such room.
+/// [`io::ErrorKind::OutOfMemory`] if the memory cannot be reserved.
 pub fn room<T>(values: usize) -> io::Result<Vec<T>> {
     let mut room = Vec::new();
     room.try_reserve_exact(values).map_err(|_| {

@@ -1,5 +1,5 @@
-//! The samples of a recording as an array that is written block by block: codes where every sample so far is the volt of
-//! a code, else volts.
+//! The samples of a recording, as an array written block by block. It holds codes as long as every sample is the
+//! voltage of a code, and volts otherwise.
 
 use super::arrays::npy_bytes;
 use super::codes::{code, is_narrow, missing_mark};

@@ -1,4 +1,4 @@
-//! A session's folder that is written block by block, so that a session may be larger than the memory.
+//! Writes a session's folder block by block, so that a session may be larger than the memory.
 
 use super::arrays::{self, npy_bytes};
 use super::check::{Invalid, check_header, check_recorded};
@@ -11,7 +11,7 @@ use spts_circuit::{Block, Mode};
 use spts_models::Grid;
 use std::path::{Path, PathBuf};
 
-/// Writes a session into a folder that waits to be put in place.
+/// Writes a session, block by block, into a folder that is moved into place afterwards.
 ///
 /// ```
 /// # use spts::{Block, Mode, Recording, RecordingInfo, Seeding, SkinLayout, WeightMode, Weights};
@@ -38,12 +38,12 @@ pub struct SessionWriter {
     contents: Contents,
     raster: Option<RecordingWriter>,
     compressive: Option<RecordingWriter>,
-    /// Whether what is too large to be read again is refused.
+    /// Whether a session that is too large to read again is refused.
     limited: bool,
 }
 
 impl SessionWriter {
-    /// Begins `session` in the folder `dir`, which exists. Its recordings are handed over by [`SessionWriter::push`].
+    /// Starts `session` in the folder `dir`, which must exist. [`SessionWriter::push`] adds its recordings.
     ///
     /// # Errors
     /// [`OutputError::Field`] for a name or a hold that could not be read again.
@@ -74,10 +74,10 @@ impl SessionWriter {
         Self { limited: true, ..self }
     }
 
-    /// Writes the next blocks of the recording in `mode`, which is to have `blocks` of them.
+    /// Writes the next blocks of the recording in `mode`, which will have `blocks` blocks in all.
     ///
     /// # Errors
-    /// [`OutputError`] when they contradict what was written before, or a file cannot be written.
+    /// [`OutputError`] if the blocks contradict the earlier ones, or a file cannot be written.
     pub fn push(&mut self, mode: Mode, piece: &Recorded, blocks: usize) -> Result<(), OutputError> {
         check_recorded(mode, piece, blocks).map_err(|invalid| refused(&self.dir, invalid))?;
         let writer = match mode {
@@ -91,10 +91,10 @@ impl SessionWriter {
         writer.push(piece)
     }
 
-    /// Ends the session: `session.json` is written last, so that a folder with this file in it is whole.
+    /// Completes the session. `session.json` is written last: a folder that holds it is complete.
     ///
     /// # Errors
-    /// [`OutputError`] when a recording has another number of blocks than it was to have, or a file cannot be written.
+    /// [`OutputError`] if a recording has another number of blocks than announced, or a file cannot be written.
     pub fn finish(mut self) -> Result<(), OutputError> {
         self.contents.raster = self.raster.map(RecordingWriter::finish).transpose()?;
         self.contents.compressive = self.compressive.map(RecordingWriter::finish).transpose()?;

@@ -1,10 +1,10 @@
-//! Why a scene was not simulated.
+//! Errors of `spts simulate`.
 
 use crate::record::TwinError;
 use crate::scene::{AssignError, SceneError};
 use std::path::PathBuf;
 
-/// A simulation that could not start or go on.
+/// Why a simulation could not start or continue.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimulateError {
@@ -14,10 +14,10 @@ pub enum SimulateError {
     /// Mechanics, transducer or readout failed, or the scene is too large.
     #[error(transparent)]
     Twin(#[from] TwinError),
-    /// Neither a known scene nor a scene file.
+    /// A name that is neither a known scene nor a scene file.
     #[error("SCENE = \"{name}\" is not press/NAME, press with --mesh, bounce, arm, or a file that ends in .toml")]
     UnknownScene {
-        /// What was asked for.
+        /// The name.
         name: String,
     },
     /// A value that cannot be put into the scene.

@@ -1,4 +1,4 @@
-//! One scene from its name or file to its frames and recordings.
+//! Simulates one scene, given by name or file, up to its frames and recordings.
 
 mod error;
 mod notes;

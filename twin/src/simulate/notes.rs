@@ -1,4 +1,4 @@
-//! What the user should know of a scene before it runs, and of its recordings afterwards.
+//! Notes for the user: about a scene before it runs, and about its recordings afterwards.
 
 use super::run::Saturated;
 use crate::chain::ChainError;
@@ -73,8 +73,8 @@ fn below_noise(scene: &Scene) -> Result<Option<String>, ChainError> {
     }))
 }
 
-/// Notes on the recordings of a run: samples that saturate, more samples than can be read again, and a scan that there is
-/// not.
+/// Notes on the recordings of a run: samples that saturate, more samples than can be read again, and a scan that there
+/// is not.
 pub(super) fn of_recordings(scene: &Scene, saturated: &[Option<Saturated>; 2]) -> Vec<String> {
     let modes = [Mode::Raster, Mode::Compressive].into_iter().zip(saturated);
     let mut notes = Vec::new();

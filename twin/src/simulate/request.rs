@@ -1,4 +1,4 @@
-//! From what the command line says to a valid scene that can be written down and run again.
+//! Turns a request of the command line into a valid scene that can be stored and run again.
 
 use super::error::SimulateError;
 use super::notes;
@@ -10,7 +10,7 @@ use spts_contact::mesh::MAX_FILE_BYTES;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
-/// A scene as asked for: its name or file, and what to change in it.
+/// A request to simulate: a scene by name or file, and the changes to it.
 ///
 /// ```
 /// use spts::simulate::Request;
@@ -25,7 +25,7 @@ pub struct Request {
     /// `press/NAME`, `press` (with a mesh), `bounce`, one of [`NAMED_SCENES`], or a file that ends in `.toml`. `press`
     /// and `bounce` have one press or drop.
     pub scene: String,
-    /// What to change, in order. Files are looked for in the folder in which the program runs.
+    /// Changes, in order. Files are looked up in the current folder.
     pub assignments: Vec<Assignment>,
 }
 
@@ -37,19 +37,19 @@ pub const NAMED_SCENES: &[(&str, &str)] = &[("arm", include_str!("arm.toml"))];
 pub struct Prepared {
     /// The scene.
     pub scene: Scene,
-    /// The scene as TOML, every default filled in, with the names of [`Prepared::copies`] for the files it needs.
+    /// The scene as TOML with all defaults filled in. Files have the names of [`Prepared::copies`].
     pub scene_toml: String,
     /// Hash of the scene.
     pub scene_hash: String,
-    /// Files that the scene needs beside it: name and content.
+    /// Files that the scene needs beside it: names and contents.
     pub copies: Vec<(String, Vec<u8>)>,
-    /// What the user should know, such as what was repaired in a mesh. There is one mesh in a run, so it needs no name,
-    /// and the notes are the same when its copy is simulated again.
+    /// Notes for the user, such as repairs of a mesh. The notes do not name the mesh, so that they are the same when
+    /// its copy is simulated.
     pub notes: Vec<String>,
 }
 
 impl Prepared {
-    /// What meets the skin: the object by name, `mesh`, or `ball`.
+    /// What touches the skin: the name of the object, `mesh`, or `ball`.
     #[must_use]
     pub fn body(&self) -> &str {
         match self.scene.task() {
@@ -69,7 +69,7 @@ impl Request {
     /// Checks everything that can be checked before the first step.
     ///
     /// # Errors
-    /// [`SimulateError`] that names the file or option, the value, and what is valid.
+    /// [`SimulateError`], which names the file or option, the value, and what is valid.
     pub fn prepare(&self) -> Result<Prepared, SimulateError> {
         let mut table = self.start()?;
         Assignment::apply_all(&self.assignments, &mut table)?;

@@ -1,4 +1,4 @@
-//! The mechanics of every press, and their recordings, a few presses at a time.
+//! Simulates and records the presses of a run, a few at a time.
 
 use super::error::SimulateError;
 use super::request::Prepared;
@@ -10,16 +10,16 @@ use spts_circuit::{AcquireError, Interpolated, Mode, Recording};
 use spts_contact::Frame;
 use std::time::{Duration, Instant};
 
-/// Some presses of a run, one after the other, with everything that comes of them.
+/// Consecutive presses of a run, with all their results.
 #[derive(Debug, Clone)]
 pub struct SimulatedPiece<'a> {
     /// Number of the first press or drop.
     pub first: usize,
-    /// Presses or drops in all.
+    /// Total number of presses or drops.
     pub of: usize,
-    /// What the mechanics gave.
+    /// Results of the mechanics.
     pub presses: &'a [PressFrames],
-    /// Conductance of the taxels over time, press by press, in the session of the raster recording.
+    /// Conductance of the taxels as a function of time, one entry a press, in the session of the raster recording.
     pub conductance: Vec<Interpolated>,
     /// Blocks of the raster recording.
     pub raster: Option<Recorded>,
@@ -38,45 +38,45 @@ pub struct Peak {
     pub at: Frame,
 }
 
-/// Samples at the end of a range, of all samples.
+/// Number of samples at the end of a range, among all samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Saturated {
-    /// Samples at an end.
+    /// Number of samples at an end of the range.
     pub samples: usize,
-    /// All samples.
+    /// Number of all samples.
     pub of: usize,
 }
 
-/// What is left of a run when its presses have been handed over.
+/// Summary of a run after all its presses have been handed over.
 #[derive(Debug, Clone)]
 pub struct Simulation {
     /// Every press or drop in numbers.
     pub presses: Vec<PressSummary>,
-    /// Where the force was largest; the first such instant of several.
+    /// The instant of the largest force; the first of several equal ones.
     pub peak: Option<Peak>,
-    /// The session with its first blocks alone, at most [`Simulation::FIRST_BLOCKS`], unless no recording was asked for.
+    /// The session with only its first blocks, at most [`Simulation::FIRST_BLOCKS`]; `None` if nothing was recorded.
     pub first: Option<Session>,
-    /// Samples of both recordings, raster scan first, that are at an end of the converter's or the amplifier's range.
+    /// Samples at an end of the converter's or amplifier's range: of the raster recording, then of the compressive one.
     pub saturated: [Option<Saturated>; 2],
-    /// Time the mechanics took.
+    /// Time spent on the mechanics.
     pub mechanics: Duration,
-    /// Time the transducer and the readouts took.
+    /// Time spent on the transducer and the readouts.
     pub recording: Duration,
 }
 
 impl Simulation {
-    /// Blocks that are kept of a recording.
+    /// Number of blocks of a recording that are kept.
     pub const FIRST_BLOCKS: usize = 6;
 }
 
-/// Runs all presses of the scene, some in parallel, and records them in both modes when `record` says so, each as
-/// [`Twin::record`] does; in the compressive one alone where emulated cells cannot scan the skin. `each` is handed the
-/// presses in their order, and none is kept: a run may have any number. `done` is called after the mechanics of each
-/// press. The result does not depend on the number of threads.
+/// Simulates all presses of the scene, several in parallel. If `record`, records them in both modes as [`Twin::record`]
+/// does; only in the compressive mode if emulated cells cannot scan the skin. `each` gets the presses in order, and
+/// none is kept, so a run may have any number. `done` is called after the mechanics of each press. The result does not
+/// depend on the number of threads.
 ///
 /// # Errors
-/// [`SimulateError`] when a press is too large, its weights cannot come from the firmware, or the mechanics or the
-/// readout fail; or the error of `each`.
+/// [`SimulateError`] if a press is too large, the firmware cannot provide its weights, or mechanics or readout fail; or
+/// the error of `each`.
 pub fn run<E: From<SimulateError>>(
     prepared: &Prepared,
     record: bool,

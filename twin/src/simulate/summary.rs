@@ -1,4 +1,4 @@
-//! What happened, in numbers.
+//! Summary of a run, in numbers.
 
 use super::notes;
 use super::request::Prepared;
@@ -18,9 +18,9 @@ pub struct BounceSummary {
     pub start_s: f64,
     /// Time with a force, s.
     pub contact_s: f64,
-    /// Speed towards the skin before, m/s.
+    /// Speed towards the skin before the contact, m/s.
     pub speed_in_m_per_s: f64,
-    /// Speed away from the skin after, m/s.
+    /// Speed away from the skin after the contact, m/s.
     pub speed_out_m_per_s: f64,
     /// Coefficient of restitution.
     pub restitution: f64,
@@ -41,12 +41,12 @@ impl From<&Bounce> for BounceSummary {
     }
 }
 
-/// Course of the force in one press that reached its target.
+/// Time course of the force in a press that reached its target.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CourseSummary {
     /// First frame with a force, s.
     pub onset_s: f64,
-    /// From 10 to 90 % of the plateau, s.
+    /// Time of the rise from 10 to 90 % of the plateau, s.
     pub rise_s: f64,
     /// Mean over the plateau, N.
     pub plateau_force_n: f64,
@@ -56,7 +56,7 @@ pub struct CourseSummary {
     pub overshoot: f64,
     /// When the force falls below 90 % of the plateau, s.
     pub lift_s: f64,
-    /// From 90 to 10 % of the plateau, s.
+    /// Time of the fall from 90 to 10 % of the plateau, s.
     pub fall_s: f64,
 }
 
@@ -77,19 +77,19 @@ impl From<&PressCourse> for CourseSummary {
 /// One press or drop.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PressSummary {
-    /// Its number, from 0.
+    /// Number of the press, from 0.
     pub press: usize,
     /// Number of frames.
     pub frames: usize,
     /// Largest normal force in a frame, N.
     pub peak_force_n: f64,
-    /// When that was, s.
+    /// Time of the largest force, s.
     pub peak_time_s: f64,
     /// Largest pressure on a taxel in a frame, Pa.
     pub peak_pressure_pa: f64,
-    /// Largest |force − Σ p A| / force over all frames with a force.
+    /// Largest |force − Σ p·A| / force over all frames with a force.
     pub force_imbalance: f64,
-    /// Course of the force; none for a drop and for a press that did not reach its target.
+    /// Time course of the force; `None` for a drop, and for a press that did not reach its target.
     pub course: Option<CourseSummary>,
     /// Contacts of the ball.
     pub bounces: Vec<BounceSummary>,
@@ -119,20 +119,20 @@ impl PressSummary {
     }
 }
 
-/// A whole run. The same for the same scene, on any number of threads.
+/// Summary of a whole run. It is the same for the same scene, on any number of threads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// What meets the skin: the object by name, `mesh`, or `ball`.
+    /// What touches the skin: the name of the object, `mesh`, or `ball`.
     pub body: String,
     /// `press` or `drop`.
     pub task: &'static str,
-    /// Target force, N; for a press.
+    /// Target force, N; `None` for a drop.
     pub force_n: Option<f64>,
-    /// Transducer.
+    /// Name of the transducer.
     pub transducer: Option<String>,
-    /// Readout profile.
+    /// Name of the readout profile.
     pub readout: Option<String>,
-    /// Where the weights come from.
+    /// Source of the weights.
     pub weights: Option<String>,
     /// Measurements a second of the recordings, Hz.
     pub sample_rate_hz: Option<f64>,
@@ -140,19 +140,19 @@ pub struct Summary {
     pub peak_force_n: f64,
     /// Largest relative difference between the force and the integral of the pressure.
     pub force_imbalance: f64,
-    /// A mesh from a file: what was repaired, and what it is like.
+    /// Repairs and properties of a mesh from a file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<MeshReport>,
-    /// Press by press.
+    /// One entry a press.
     pub presses: Vec<PressSummary>,
-    /// What was repaired or should be known.
+    /// Notes for the user, such as repairs.
     pub notes: Vec<String>,
-    /// Where the numbers come from.
+    /// Provenance of the numbers.
     pub provenance: Provenance,
 }
 
 impl Summary {
-    /// Summary of what `prepared` produced.
+    /// The summary of `simulation`, the run of `prepared`.
     #[must_use]
     pub fn new(prepared: &Prepared, simulation: &Simulation) -> Self {
         let scene = &prepared.scene;
@@ -200,7 +200,7 @@ impl Summary {
         }
     }
 
-    /// The summary for people.
+    /// The summary as text.
     #[must_use]
     pub fn table(&self) -> String {
         let mut out = format!(

@@ -1,4 +1,4 @@
-//! Bars, and bars that meet.
+//! Bars and junctions of bars.
 
 use crate::mesh::polygon::{self, Point};
 use crate::shapes::dice::Dice;

@@ -1,4 +1,4 @@
-//! How the families draw their outlines.
+//! The outlines of the shape families.
 
 mod bars;
 mod blobs;

@@ -1,4 +1,4 @@
-//! Plates, whole and with holes.
+//! Plates with and without holes.
 
 use crate::mesh::polygon::{self, Point};
 use crate::shapes::boundary::{Side, depth_m, sides};

@@ -1,4 +1,4 @@
-//! Several feet of one body.
+//! Bodies with several feet.
 
 use crate::mesh::polygon::{self, Point};
 use crate::shapes::dice::Dice;

@@ -1,4 +1,4 @@
-//! Numbers as Arrow arrays, in the types that LeRobot reads.
+//! Arrow arrays of numbers, in the types that LeRobot reads.
 
 use super::episode::{integer, single};
 use super::features::{Feature, Scalar};

@@ -9,7 +9,7 @@ use crate::spec::Spec;
 pub(super) struct Episode {
     pub(super) task: String,
     pub(super) length: usize,
-    /// Values of every feature, frame by frame, as exact as the file has them.
+    /// Values of every feature, frame by frame, with the precision of the file.
     pub(super) values: Vec<Vec<f64>>,
 }
 

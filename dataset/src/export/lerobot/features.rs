@@ -1,4 +1,4 @@
-//! The features of a frame: one line each in the table below.
+//! The features of a frame; the table below has one line a feature.
 
 use crate::error::DatasetError;
 use crate::export::rows::RowView;
@@ -37,9 +37,9 @@ type Fill = fn(&RowView<'_>, &mut Vec<f64>) -> Result<(), DatasetError>;
 pub(super) enum Source {
     /// The columns of the row.
     Row(Fill),
-    /// The state of the next frame; of the last frame its own.
+    /// The state in the next frame; in the last frame, its own state.
     NextState,
-    /// Frame of the episode over the frame rate.
+    /// Frame number within the episode, divided by the frame rate.
     Timestamp,
     /// Number of the frame within its episode.
     Frame,

@@ -1,8 +1,8 @@
 //! LeRobot v3.0: a press is an episode, a row is a frame.
 //!
-//! Layout, as LeRobot 0.4 and later read it: `meta/info.json`, `meta/stats.json`, `meta/tasks.parquet`,
-//! `meta/episodes/chunk-000/file-000.parquet` with the statistics of every episode, and the frames in
-//! `data/chunk-000/file-000.parquet`, a group of rows for an episode.
+//! Layout, as read by LeRobot 0.4 and later: `meta/info.json`, `meta/stats.json`, `meta/tasks.parquet`,
+//! `meta/episodes/chunk-000/file-000.parquet` with the statistics of every episode, and
+//! `data/chunk-000/file-000.parquet` with the frames, one row group an episode.
 
 mod arrays;
 mod episode;
@@ -97,7 +97,7 @@ struct Recorder<'a> {
     frame_bytes: u64,
     table: EpisodeTable<'a>,
     stats: Vec<MergedStats>,
-    /// Tasks in the order of their first episodes, and their numbers.
+    /// Tasks in order of first use, with their numbers.
     tasks: Vec<String>,
     task_numbers: HashMap<String, usize>,
     episodes: u64,

@@ -1,4 +1,4 @@
-//! A table over several Parquet files, in chunks, as LeRobot lays it out.
+//! A table spread over several Parquet files in chunks, as in LeRobot's layout.
 
 use crate::error::DatasetError;
 use arrow_array::RecordBatch;
@@ -22,7 +22,7 @@ pub(super) struct Series<'a> {
     out: &'a OutputFolder,
     folder: &'static str,
     schema: SchemaRef,
-    /// Number of the file that is being written, and what it holds.
+    /// Number of the file being written, and its content.
     number: u64,
     bytes: u64,
     groups: u64,
@@ -112,8 +112,8 @@ mod tests {
     use arrow_array::Int64Array;
     use arrow_schema::{DataType, Field, Schema};
 
-    /// A file is closed before it grows over its size or its number of groups; one group may be larger; chunks have 1000
-    /// files.
+    /// A file is closed before it grows over its size or its number of groups; one group may be larger; chunks have
+    /// 1000 files.
     #[test]
     fn files_have_limits() {
         let dir = tempfile::tempdir().unwrap();

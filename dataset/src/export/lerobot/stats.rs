@@ -1,4 +1,4 @@
-//! Statistics of features, as LeRobot has them: of every episode, and merged over all.
+//! Statistics of features in LeRobot's form: for every episode, and merged over all.
 
 /// Names of the statistics, in the order of [`FeatureStats::values`].
 pub(super) const NAMES: [&str; 9] = ["min", "max", "mean", "std", "q01", "q10", "q50", "q90", "q99"];
@@ -107,8 +107,8 @@ impl MergedStats {
 mod tests {
     use super::*;
 
-    /// Against NumPy 2: `a = [[1, 10], [4, -2], [2, 7], [8, 0.5]]`, its `min`, `max`, `mean`, `std` and `quantile` along
-    /// axis 0. The tolerance is a few roundings of numbers about 10.
+    /// Against NumPy 2: `a = [[1, 10], [4, -2], [2, 7], [8, 0.5]]`, its `min`, `max`, `mean`, `std` and `quantile`
+    /// along axis 0. The tolerance is a few roundings of numbers about 10.
     #[test]
     fn statistics_are_those_of_numpy() {
         let frames = [1.0, 10.0, 4.0, -2.0, 2.0, 7.0, 8.0, 0.5];

@@ -1,7 +1,7 @@
 //! `spts dataset export`.
 
 use super::make::Files;
-use crate::context::{print, print_json};
+use crate::context::{note_earlier, print, print_json};
 use crate::error::CliError;
 use crate::options::whole;
 use crate::progress::Bars;
@@ -12,8 +12,8 @@ use std::path::PathBuf;
 
 /// Writes a data set in the layout of another program.
 ///
-/// All files of the data set must be there; they are checked first. OUT holds the whole export in the end, or nothing if
-/// the export fails or is stopped.
+/// All files of the data set must be there; they are checked first. OUT holds the whole export in the end, or nothing
+/// if the export fails or is stopped.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset export lerobot out/shapes --out out/shapes_lerobot
@@ -59,6 +59,7 @@ impl ExportCommand {
             rows_per_tar: self.rows_per_tar,
         };
         let dataset = self.files.open(&self.folder)?;
+        note_earlier(&self.out);
         let exported = dataset.export(&self.format, &self.out, &options, &Bars::default())?;
         if self.json {
             return print_json(&exported);

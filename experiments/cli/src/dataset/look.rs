@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// Makes a sample of rows once more and compares them with the files, bit for bit.
 ///
-/// Status 1 when a row differs.
+/// The exit status is 1 when a row differs.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset verify out/shapes
@@ -24,7 +24,7 @@ pub(super) struct VerifyCommand {
     /// Rows that are compared; [1, 10^9]
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u64>(1..=1_000_000_000))]
     rows: u64,
-    /// Chooses the rows
+    /// Seed of the choice of rows
     #[arg(long, value_name = "SEED", default_value_t = 0, value_parser = seed)]
     seed: u64,
     #[command(flatten)]
@@ -35,8 +35,8 @@ pub(super) struct VerifyCommand {
 
 /// Compares the truth of every row with that of the same row of another data set.
 ///
-/// For two that differ in one thing, such as the contact field. Means of pressure and conductance are relative to the
-/// reference; rows without a touch are left out.
+/// It is meant for two data sets that differ in one thing, such as the contact field. Means of pressure and conductance
+/// are relative to the reference; rows without a touch are left out.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
   spts dataset make presses-17 --rows 170 --set object.rows_per_shape=1 --out out/footprint
@@ -55,7 +55,7 @@ pub(super) struct CompareCommand {
     common: Common,
 }
 
-/// Says what a folder holds and how far it is.
+/// Says what a folder holds and how many of its files are made.
 #[derive(Debug, Args)]
 pub(super) struct InfoCommand {
     /// Folder of the data set

@@ -14,8 +14,8 @@ use std::time::Instant;
 
 /// Makes the rows of a data set.
 ///
-/// Files that are there already, whole and of this data set, are skipped; a run that was ended is begun again with the
-/// same command. Without --shard all files are made and the data set is finished.
+/// Files of this data set that are there and complete are skipped. A run that was stopped goes on with the same
+/// command. Without --shard all files are made and the data set is finished.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset make random-shapes --rows 100000 --out out/shapes
@@ -44,10 +44,10 @@ pub(super) struct MakeCommand {
     /// Root of every random number, in place of the spec's
     #[arg(long, value_name = "SEED", value_parser = seed)]
     seed: Option<u64>,
-    /// Another value for a field of the spec, a dotted path; may be repeated
+    /// Changes a field of the spec: KEY is its dotted path, VALUE is TOML; repeatable
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
     set: Vec<Assignment>,
-    /// This worker and the number of workers: makes the files k with k mod n = i
+    /// Makes the share of worker i of n: the files k with k mod n = i
     #[arg(long, value_name = "i/n", conflicts_with = "shards")]
     shard: Option<String>,
     /// Number of workers of a Kubernetes indexed job
@@ -75,7 +75,7 @@ pub(super) struct FinishCommand {
 /// Where the files of a spec are.
 #[derive(Debug, Args)]
 pub(super) struct Files {
-    /// Folder that the files which the spec names are relative to
+    /// Folder in which to look for the files that the spec names
     #[arg(long, value_name = "DIR", default_value = ".")]
     files: PathBuf,
 }

@@ -16,7 +16,7 @@ use clap::{Args, Subcommand};
 ///
 /// A spec says what is pressed, where and how hard, on which skin, and what is recorded; every number in it may be a
 /// distribution. A row is a function of the spec and its number alone: any number of threads, workers and machines of
-/// a type make the same files, and a run that was ended goes on where it was.
+/// one type make the same files. A run that was stopped goes on where it was when it is started again.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset make random-shapes --rows 10000 --out out/shapes

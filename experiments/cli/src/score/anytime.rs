@@ -1,11 +1,10 @@
 //! `spts score --anytime`: decoders that stop as soon as they are sure enough.
 
-use super::super::context::{print, print_json, progress, spinner};
+use super::super::context::{open_folder, print, print_json, progress, spinner};
 use super::super::error::CliError;
 use super::super::extras::write_anytime;
 use super::super::options::sorted_numbers;
 use super::{ScoreCommand, explained};
-use spts::output::OutputFolder;
 use spts_eval::anytime::{AnytimeBoard, FILES, StopSettings, table};
 use spts_eval::board::BoardSettings;
 use spts_eval::{ScoreError, Source};
@@ -19,7 +18,7 @@ impl ScoreCommand {
         let wanted = self.wanted()?;
         self.common.start()?;
         let path = self.out(DEFAULT_OUT);
-        let out = OutputFolder::open(path, FILES)?;
+        let out = open_folder(path, FILES)?;
         let settings = self.settings()?;
         if let Some(spec) = settings.decoders.iter().find(|spec| !spec.anytime) {
             return Err(CliError::Usage(ScoreError::no_confidence(spec.name).to_string()));

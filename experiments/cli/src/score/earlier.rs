@@ -3,24 +3,62 @@
 use super::super::context::note;
 use super::super::error::CliError;
 use spts::output::{OutputError, check_writable};
-use spts_eval::board::{Regression, ScoreBoard};
+use spts_eval::board::{Difference, Regression, ScoreBoard};
 use std::path::Path;
 
-/// Says which scores fell.
+/// Says what this board and the earlier one, which is in `file`, do not have in common.
+pub(super) fn note_differences(file: &Path, found: &[Difference]) {
+    let file = file.display();
+    for Difference {
+        what,
+        only_before,
+        only_now,
+    } in found
+    {
+        let sides = [
+            (format!("only in {file}"), only_before),
+            ("only in this run".to_owned(), only_now),
+        ];
+        let sides = sides.iter().filter(|(_, names)| !names.is_empty());
+        let sides: Vec<String> = sides
+            .map(|(side, names)| format!("{side}: {}", names.join(", ")))
+            .collect();
+        let means = if *what == "objects" {
+            "; the means are over different objects"
+        } else {
+            ""
+        };
+        note(&format!("note: {what} {}{means}", sides.join("; ")));
+    }
+}
+
+/// Says which scores fell, and which rows of the earlier board this one lacks.
 ///
 /// # Errors
-/// [`CliError::Differs`] when one did.
+/// [`CliError::Differs`] when there are any.
 pub(super) fn verdict(found: &[Regression]) -> Result<(), CliError> {
     if found.is_empty() {
         return Ok(());
     }
     for r in found {
-        let now = r.now.map_or_else(|| "gone".to_owned(), |v| format!("{v:.4}"));
-        note(&format!("{}: {} was {:.4}, is {now}", r.what, r.score, r.before));
+        if let Some(now) = r.now {
+            note(&format!("{}: {} was {:.4}, is {now:.4}", r.what, r.score, r.before));
+        }
     }
-    let gone = found.iter().filter(|r| r.now.is_none()).count();
-    let fell = found.len() - gone;
-    Err(CliError::Differs(format!("{fell} scores fell, {gone} are gone")))
+    let gone: Vec<&Regression> = found.iter().filter(|r| r.now.is_none()).collect();
+    for row in gone.chunk_by(|a, b| a.what == b.what) {
+        let scores: Vec<&str> = row.iter().map(|r| r.score).collect();
+        note(&format!(
+            "{}: not scored in this run: {}",
+            row[0].what,
+            scores.join(", ")
+        ));
+    }
+    let fell = found.len() - gone.len();
+    Err(CliError::Differs(format!(
+        "{fell} scores fell, {} are gone",
+        gone.len()
+    )))
 }
 
 /// Refuses to save a board where one cannot be written, and in place of a file that is no board.

@@ -1,10 +1,9 @@
 //! `spts score --in-time`: contacts that are followed in time.
 
-use super::super::context::{print, print_json, progress, spinner};
+use super::super::context::{open_folder, print, print_json, progress, spinner};
 use super::super::error::CliError;
 use super::super::extras::write_in_time;
 use super::{ScoreCommand, explained};
-use spts::output::OutputFolder;
 use spts_eval::board::BoardSettings;
 use spts_eval::in_time::{FILES, InTimeBoard, table};
 use spts_eval::{ScoreError, Sensing, Source};
@@ -20,7 +19,7 @@ impl ScoreCommand {
     pub(super) fn follow_in_time(&self) -> Result<(), CliError> {
         self.common.start()?;
         let path = self.out(DEFAULT_OUT);
-        let out = OutputFolder::open(path, FILES)?;
+        let out = open_folder(path, FILES)?;
         let settings = self.settings()?;
         if let Some(spec) = settings.decoders.iter().find(|spec| spec.name != "nn_lmmse") {
             return Err(CliError::Usage(ScoreError::not_in_time(spec.name).to_string()));

@@ -1,22 +1,21 @@
 //! `spts sensing design`: rows for a skin.
 
 use super::{DesignerArg, designer_named, layout, skin};
-use crate::context::Common;
+use crate::context::{Common, open_folder};
 use crate::error::CliError;
 use crate::options::{seed, whole, within};
 use crate::progress::Bars;
 use clap::Args;
-use spts::output::OutputFolder;
 use spts::progress::Progress as _;
 use spts_recon::rows::{RowTask, Tolerances};
 use spts_report::sensing::{DESIGN_FILES, write_design};
 use spts_studies::sensing::{DesignImages, RowDesign};
 use std::path::PathBuf;
 
-/// Designs M rows for a skin, and writes what a scene, a session and the cells need of them.
+/// Designs M rows for a skin, and writes them as a scene, a session and the cells need them.
 ///
-/// Designers that need a prior get random shapes anywhere on the skin, of which nothing was recorded, unless --smooth or
-/// --recordings says otherwise. See docs/rows.md.
+/// Designers that need a prior learn from simulated random shapes anywhere on the skin, unless --smooth or --recordings
+/// is given. See docs/rows.md.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts sensing design
@@ -39,7 +38,7 @@ Files in DIR:
   design.json         what the rows are like
   figures/rows.png    every row as a picture of the skin; rows.svg the same")]
 pub(super) struct DesignCommand {
-    /// Who designs them
+    /// Designer; see below
     #[arg(long, value_name = "NAME", default_value = "greedy", value_parser = designer_named())]
     designer: DesignerArg,
     /// Number of rows M; [1, 1024]
@@ -48,25 +47,26 @@ pub(super) struct DesignCommand {
     /// Taxels of the skin, rows and columns, each [1, 1024] [default: 10x10]
     #[arg(long, value_name = "ROWSxCOLS", default_value = "10x10", value_parser = skin, conflicts_with = "recordings")]
     skin: [usize; 2],
-    /// Images are smooth over about this distance, taxels, and nothing else is known of them; [0.01, 1000]
+    /// Prior: images are smooth over about this distance, in taxels, and nothing else is known of them; [0.01, 1000]
     #[arg(long, value_name = "TAXELS", conflicts_with = "recordings", value_parser = within(0.01, 1000.0, "[0.01, 1000] taxels"))]
     smooth: Option<f64>,
-    /// Images and templates are those of the raster presses in this folder that are not scored
+    /// Prior: images and templates of the raster presses in this folder, without those that are scored
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
     /// Noise of a measurement as a share of the root mean square of a random row's sum; [1e-6, 1000]
     #[arg(long, value_name = "SHARE", default_value_t = RowTask::NOISE, value_parser = within(1e-6, 1e3, "[1e-6, 1000]"))]
     noise: f64,
-    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05, 1000]
+    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05,
+    /// 1000]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
     /// Standard deviation of the logarithm of the taxels' gains, which nobody knows; [0, 3]
     #[arg(long, value_name = "SD", default_value_t = 0.0, value_parser = within(0.0, 3.0, "[0, 3]"))]
     gains: f64,
-    /// Images may lie elsewhere by up to so many taxels; [0, 64]
+    /// Images may be shifted by up to so many taxels; [0, 64]
     #[arg(long, value_name = "TAXELS", default_value_t = 0, value_parser = whole::<usize>(0..=64))]
     shift: usize,
-    /// Puts the rows out in an order in which cells change least, and not in that of their worth
+    /// Order the rows so that cells change least, in place of the best rows first
     #[arg(long)]
     fewest_flips: bool,
     /// Root of every random number
@@ -83,7 +83,7 @@ impl DesignCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, DESIGN_FILES)?;
+        let out = open_folder(&self.out, DESIGN_FILES)?;
         let design = RowDesign {
             layout: layout(self.skin)?,
             designer: self.designer.0,

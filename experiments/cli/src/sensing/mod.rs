@@ -11,7 +11,7 @@ use spts::SkinLayout;
 use spts_recon::rows::{DESIGNERS, Designer, designer};
 use study::StudyCommand;
 
-/// Designs the rows of the sensing matrix, and measures what they are worth.
+/// Designs the rows of the sensing matrix, and measures how much better than random rows they are.
 #[derive(Debug, Args)]
 pub(super) struct SensingCommand {
     #[command(subcommand)]

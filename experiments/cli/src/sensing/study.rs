@@ -1,13 +1,12 @@
 //! `spts sensing study`: what designed rows are worth in the twin.
 
 use super::{DesignerArg, layout, named, skin};
-use crate::context::Common;
+use crate::context::{Common, open_folder};
 use crate::error::CliError;
 use crate::options::{decoders_named, parse_measurements, seed, sorted, whole, within};
 use crate::progress::Bars;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use spts::output::OutputFolder;
 use spts_circuit::PROFILES;
 use spts_recon::rows::{Tolerances, designer};
 use spts_report::sensing::{STUDY_FILES, write_study};
@@ -17,14 +16,14 @@ use std::path::PathBuf;
 /// Measures on simulated skins what designed rows are worth against random ones, and what they cost.
 ///
 /// Every repetition has a specimen of the skin, touches and noise of its own. Touches are procedural shapes and the
-/// seventeen objects, at random places, rotations and forces. Neither rows nor decoder know any of them: both have the
-/// same prior, random outlines anywhere on the skin. The truth is the conductance of the taxels. Bands are 90 %
-/// intervals of the mean over the repetitions.
+/// seventeen objects, at random places, rotations and forces. Rows and decoder know none of them: both have the same
+/// prior, random outlines anywhere on the skin. The truth is the conductance of the taxels. Bands are 90 % intervals of
+/// the mean over the repetitions.
 ///
 /// Classes are the seventeen objects at their published places. Templates, and the rows of this part, come from twelve
 /// other skins.
 ///
-/// Costs are errors of the samples: each cause alone, against the same samples without it.
+/// A cost is the error that one cause alone adds to the samples.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts sensing study
@@ -52,7 +51,7 @@ pub(super) struct StudyCommand {
     #[arg(long, value_delimiter = ',', value_name = "NAME,…", default_values = ["ideal", "as_built"],
           value_parser = PossibleValuesParser::new(PROFILES.iter().map(|(name, _)| *name)))]
     readout: Vec<String>,
-    /// Decoder of all rows: lmmse or another one that makes images without classes
+    /// Decoder for all rows: lmmse, or another decoder that makes images and needs no classes
     #[arg(long, value_name = "NAME", default_value = "nn_lmmse")]
     decoder: String,
     /// Taxels of the skin, rows and columns; at most 2048 in all
@@ -64,7 +63,8 @@ pub(super) struct StudyCommand {
     /// Touches a repetition, of shapes and of objects each; [1, 10000] [default: 68, 34 with --quick]
     #[arg(long, value_name = "COUNT", value_parser = whole::<usize>(1..=10_000))]
     touches: Option<usize>,
-    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05, 1000]
+    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05,
+    /// 1000]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
     /// Standard deviation of the logarithm of the taxels' gains that rows are designed for; [0, 3]
@@ -87,7 +87,7 @@ impl StudyCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = OutputFolder::open(&self.out, STUDY_FILES)?;
+        let out = open_folder(&self.out, STUDY_FILES)?;
         let measurements = match (self.measurements.is_empty(), self.quick) {
             (false, _) => self.measurements,
             (true, false) => vec![5, 7, 10, 13, 20, 25, 30, 40, 50],

@@ -1,4 +1,4 @@
-//! What goes wrong with programs outside.
+//! Errors of external programs.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,7 +16,7 @@ pub enum ExternalError {
         /// Why.
         source: Arc<std::io::Error>,
     },
-    /// The file of answers that the command should have written is missing or not as documented.
+    /// The answers file that the command should have written is missing or not valid.
     #[error("`{command}` wrote no valid answers: {}: {source}", path.display())]
     AnswersFile {
         /// The command.
@@ -26,7 +26,7 @@ pub enum ExternalError {
         /// Why.
         source: Arc<std::io::Error>,
     },
-    /// The command cannot be started or its pipe broke.
+    /// The command cannot be started, or its pipe broke.
     #[error("`{command}`: {source}")]
     Pipe {
         /// The command.
@@ -34,17 +34,17 @@ pub enum ExternalError {
         /// Why.
         source: Arc<std::io::Error>,
     },
-    /// The command ended, or closed one of its pipes, before it had answered.
+    /// The command ended, or closed a pipe, before it had answered.
     #[error("`{command}` {how} before it had answered {waited}")]
     Ended {
         /// The command.
         command: String,
-        /// Its end: with its exit status, or the pipe that it closed.
+        /// How it ended: with its exit status, or the pipe that it closed.
         how: String,
-        /// What it should have answered.
+        /// Which answer was missing.
         waited: String,
     },
-    /// The command failed after it had answered everything.
+    /// The command failed after its last answer.
     #[error("`{command}` ended with an error ({status}) after its last answer; its answers are not scored")]
     Status {
         /// The command.
@@ -52,42 +52,42 @@ pub enum ExternalError {
         /// Its exit status.
         status: String,
     },
-    /// The command took longer than it may.
+    /// The command exceeded the time limit.
     #[error("`{command}` was ended: {waited} took longer than the limit of {} s", limit.as_secs_f64())]
     Late {
-        /// The command.
+        /// Which answer was late.
         command: String,
-        /// What was waited for.
+        /// Which answer was late.
         waited: String,
         /// The limit.
         limit: Duration,
     },
-    /// The command answered what it had not been asked.
+    /// The command wrote more answers than it was asked for.
     #[error(
-        "`{command}` wrote line {line} of its output before it had read window {line} ({asked} windows had been asked); it needs one line a window, written after the window was read"
+        "`{command}` wrote line {line} of its output before it had read window {line} ({asked} windows had been sent); it must write one line a window, after reading the window"
     )]
     Surplus {
         /// The command.
         command: String,
         /// Number of the line, from 1.
         line: usize,
-        /// Windows that had been asked.
+        /// Number of windows that had been sent.
         asked: usize,
     },
-    /// An algorithm that is no program failed.
+    /// An algorithm inside this program failed.
     #[error("{name}: {problem}")]
     Failed {
         /// Name of the algorithm.
         name: String,
-        /// What went wrong.
+        /// The problem.
         problem: String,
     },
-    /// The answer is not one.
+    /// The answer is not valid.
     #[error("`{command}` answered {problem}")]
     Answer {
         /// The command.
         command: String,
-        /// What is wrong with the answer.
+        /// The problem with the answer.
         problem: String,
     },
 }

@@ -1,4 +1,4 @@
-//! What is scored: algorithms that turn windows into images or classes.
+//! Algorithms that turn windows into images or classes, and are scored on them.
 
 mod external;
 
@@ -14,28 +14,28 @@ use spts_recon::classify::EvidenceError;
 use spts_recon::recover::{Gaussian, SequentialError};
 use std::sync::Arc;
 
-/// What an algorithm says about a window.
+/// Answer of an algorithm to a window.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Answer {
-    /// Tactile image, one value a taxel, in any unit; empty when the algorithm makes none.
+    /// Tactile image, one value a taxel, in any unit; empty if the algorithm makes none.
     pub image: Vec<f64>,
-    /// Class of the object; `None` leaves it to the scorer's own classifier, which looks at the image.
+    /// Class of the object. `None` leaves it to the scorer's classifier, which uses the image.
     pub class: Option<Class>,
     /// Whether the window could not be solved.
     pub failed: bool,
 }
 
-/// An algorithm's own classification.
+/// Class found by an algorithm itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Class {
     /// One of the labels.
     Known(usize),
-    /// None of them, or undecided.
+    /// None of the labels, or undecided.
     Unknown,
 }
 
 impl Class {
-    /// The label.
+    /// The label; `None` for [`Class::Unknown`].
     #[must_use]
     pub fn label(self) -> Option<usize> {
         match self {
@@ -48,32 +48,57 @@ impl Class {
 /// Why a window has no answer.
 #[derive(Debug, thiserror::Error)]
 pub enum DecodeError {
-    /// The decoder cannot solve it. Such a window scores as an empty image of no class.
+    /// The decoder cannot solve it. The window scores as an empty image without a class.
     #[error(transparent)]
     Recover(#[from] RecoverError),
-    /// The classifier cannot weigh it. Such a window scores as an empty image of no class.
+    /// The classifier cannot process it. The window scores as an empty image without a class.
     #[error(transparent)]
     Evidence(#[from] EvidenceError),
     /// The confidence of an image cannot be computed.
     #[error(transparent)]
     Sequential(#[from] SequentialError),
-    /// An external program failed, which ends the run.
+    /// An external program failed. This ends the run.
     #[error(transparent)]
     External(#[from] ExternalError),
 }
 
-/// An algorithm at work, with memory of its own.
+/// An algorithm ready to decode, with its own memory.
+///
+/// ```
+/// use spts_eval::algorithm::{Algorithm, Answer, DecodeError};
+/// use spts_eval::{PressRows, Press, Window};
+/// use spts_recon::Matrix;
+///
+/// /// The image Φᵀ y, the simplest of all decoders.
+/// struct BackProjection;
+///
+/// impl Algorithm for BackProjection {
+///     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
+///         answer.image = vec![0.0; window.phi.ncols()];
+///         for (row, y) in window.phi.values().chunks_exact(window.phi.ncols()).zip(window.y) {
+///             answer.image.iter_mut().zip(row).for_each(|(x, w)| *x += w * y);
+///         }
+///         Ok(())
+///     }
+/// }
+/// let phi = Matrix::from_rows(2, 3, vec![1.0, -1.0, 1.0, 1.0, 1.0, -1.0]).unwrap();
+/// let press = Press::on(PressRows::of_matrix(&phi).into(), vec![2.0, 2.0], 0.0);
+/// let mut answer = Answer::default();
+/// BackProjection.decode(&press.window(0, 2).expect("two measurements"), &mut answer)?;
+/// assert_eq!(answer.image, [4.0, 0.0, 0.0]);
+/// # Ok::<(), DecodeError>(())
+/// ```
 pub trait Algorithm {
-    /// Answers `window`; overwrites `answer`, whose memory is used again.
+    /// Decodes `window` into `answer`, whose memory is reused.
     ///
     /// # Errors
     /// [`DecodeError`].
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError>;
 
-    /// Answers `windows` in their order, all of one M. Windows that cannot be solved get an empty answer.
+    /// Decodes `windows` in order; all have the same M. A window that cannot be solved gets an empty answer.
     ///
     /// # Errors
-    /// [`DecodeError::External`] alone.
+    /// [`DecodeError::External`] only.
     fn decode_all(&mut self, windows: &[Window<'_>]) -> Result<Vec<Answer>, DecodeError> {
         let mut answers = vec![Answer::default(); windows.len()];
         for (window, answer) in windows.iter().zip(&mut answers) {
@@ -92,85 +117,137 @@ pub trait Algorithm {
         Ok(answers)
     }
 
-    /// Whether windows are answered many at a time, so that the time of one alone means nothing.
+    /// Whether windows are decoded in batches, so that the time of a single one has no meaning.
     fn batched(&self) -> bool {
         false
     }
 
-    /// Class by the evidence of several windows added up; `None` for an algorithm that weighs no evidence.
+    /// Class with the largest evidence summed over several windows; `None` for an algorithm without evidence.
     fn sum(&mut self, windows: &[Window<'_>]) -> Option<Class> {
         let _ = windows;
         None
     }
 }
 
-/// What a confidence is about.
+/// The property to which a confidence refers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Subject {
-    /// The class: the probability of the most probable one.
+    /// The class: the probability of the best one.
     Class,
     /// The image: the expected intersection over union of its support with the true one.
     Image,
 }
 
-/// What the samples so far say.
+/// Answer and confidence after the samples so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Belief {
-    /// How sure the algorithm is of its answer, [0, 1].
+    /// Confidence of the algorithm in its answer, [0, 1].
     pub confidence: f64,
-    /// The class, for an algorithm that is asked for one.
+    /// The class, for an algorithm that classifies.
     pub class: Option<Class>,
 }
 
-/// How sure an algorithm is after every sample of a window, with memory of its own.
+/// Confidence of an algorithm after every sample of a window, with its own memory.
+///
+/// ```
+/// use spts_eval::algorithm::{Belief, Class, Confidence, DecodeError};
+/// use spts_eval::Window;
+///
+/// /// More and more sure of class 1, whatever it sees.
+/// struct Naive(f64);
+///
+/// impl Confidence for Naive {
+///     fn begin(&mut self) {
+///         self.0 = 0.5;
+///     }
+///     fn observe(&mut self, _sample: &Window<'_>) -> Result<Belief, DecodeError> {
+///         self.0 += 0.5 * (1.0 - self.0);
+///         Ok(Belief { confidence: self.0, class: Some(Class::Known(1)) })
+///     }
+/// }
+/// let mut naive = Naive(0.9);
+/// naive.begin();
+/// assert_eq!(naive.0, 0.5);
+/// ```
 pub trait Confidence {
-    /// Begins another window.
+    /// Starts the next window.
     fn begin(&mut self);
 
-    /// Takes the next sample of the window, as a window of one measurement.
+    /// Adds the next sample of the window, given as a window of one measurement.
     ///
     /// # Errors
     /// [`DecodeError`].
     fn observe(&mut self, sample: &Window<'_>) -> Result<Belief, DecodeError>;
 }
 
-/// An algorithm that has learned what it needs, shared by all threads.
+/// A trained algorithm, shared by all threads.
+///
+/// ```
+/// use spts_eval::algorithm::{Algorithm, Answer, DecodeError, Trained};
+/// use spts_eval::Window;
+///
+/// /// The mean image of the training data, whatever is measured.
+/// struct MeanImage(Vec<f64>);
+/// struct Running<'a>(&'a MeanImage);
+///
+/// impl Trained for MeanImage {
+///     fn start(&self) -> Box<dyn Algorithm + '_> {
+///         Box::new(Running(self))
+///     }
+/// }
+/// impl Algorithm for Running<'_> {
+///     fn decode(&mut self, _: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
+///         answer.image.clone_from(&self.0.0);
+///         Ok(())
+///     }
+/// }
+/// let trained = MeanImage(vec![0.5; 100]);
+/// assert!(!trained.start().batched() && trained.prior().is_none());
+/// ```
 pub trait Trained: Send + Sync {
     /// An algorithm for one thread.
     fn start(&self) -> Box<dyn Algorithm + '_>;
 
-    /// What the algorithm is sure of, and how sure it is, for one thread; `None` for an algorithm that cannot say so.
+    /// Confidence of the algorithm in one property of the contact, for one thread; `None` if it cannot state one.
     fn confidence(&self) -> Option<(Subject, Box<dyn Confidence + '_>)> {
         None
     }
 
-    /// The Gaussian prior of its images, about zero, by which a contact can be followed in time; `None` for an
-    /// algorithm without one.
+    /// The zero-mean Gaussian prior of its images, with which a contact can be tracked in time; `None` for an algorithm
+    /// without one.
     fn prior(&self) -> Option<Arc<Gaussian>> {
         None
     }
 
-    /// Called once all windows are answered: an algorithm that is another program ends here, and says whether it ended
-    /// well. Calling it again does nothing.
+    /// Called after all windows are decoded. An external program ends here and reports whether it succeeded. Further
+    /// calls do nothing.
     ///
     /// # Errors
-    /// [`DecodeError::External`] alone.
+    /// [`DecodeError::External`] only.
     fn finish(&self) -> Result<(), DecodeError> {
         Ok(())
     }
 }
 
-/// An algorithm that the board is given beside those of its own table.
+/// An algorithm outside the board's own table.
+///
+/// ```
+/// use spts_eval::external::ExternalCommand;
+/// use spts_eval::algorithm::Contender as _;
+///
+/// let contender = ExternalCommand::parse("mine=python3 decoder.py {windows} {answers}");
+/// assert_eq!(contender.name(), "mine");
+/// ```
 pub trait Contender: Send + Sync {
-    /// Its name on the board.
+    /// Name on the board.
     fn name(&self) -> &str;
 
-    /// The algorithm after it has learned from `data`, whose classes have the numbers of `labels`. `left_out` is the
-    /// object that is kept out of `data`, if one is.
+    /// Trains the algorithm on `data`, whose classes are numbered as in `labels`. `left_out` is the object that is
+    /// excluded from `data`, if any.
     ///
     /// # Errors
-    /// [`ScoreError`] when it cannot learn or start.
+    /// [`ScoreError`] if it cannot be trained or started.
     fn learn(
         &self,
         data: &TrainingData,

@@ -1,11 +1,11 @@
-//! Blocks whose cells have missed clock edges, found and put back on their rows.
+//! Finds blocks whose cells have missed clock edges, and realigns them with their rows.
 //!
-//! Recordings say which row of weights every measurement was taken with. When all cells miss an edge, the samples lag
-//! behind these rows from then on, in later blocks, too. A chunk of a few hundred measurements in which something
-//! touches the skin shows it: an image that is fitted to them leaves .1 to .5 of the output where the rows are right,
-//! and √(1 − N/L) of it, the share that N free numbers take of L, where they are not. [`find_slips`] follows every
-//! block chunk by chunk, searches other rows where the fit is lost, and finds the measurement where two of them meet. An
-//! untouched skin says nothing: what slips there is found at the next contact.
+//! A recording states the row of weights of every measurement. If all cells miss an edge, the samples lag behind these
+//! rows from then on, also in later blocks. A chunk of a few hundred measurements of a contact reveals this: the
+//! residual of an image fitted to it is 0.1 to 0.5 of the output if the rows are correct. If they are not, it is √(1 −
+//! N/L) of the output, as for N free parameters and L random numbers. [`find_slips`] follows every block chunk by
+//! chunk, searches other rows where the fit fails, and finds the measurement at which the rows change. An untouched
+//! skin gives no information: a slip there is found at the next contact.
 //!
 //! ```
 //! use spts_circuit::{Block, Recording, RecordingInfo, Seeding, Slip, WeightMode, Weights};
@@ -49,9 +49,9 @@ pub struct SessionSlip {
     pub slip: Slip,
 }
 
-/// Slips of `recording`, in the order of blocks and measurements; empty when all of it is where it says. A block that
-/// lags at its first contact is taken to lag from its first measurement on. Raster scans, skins of more than 1024
-/// taxels and blocks shorter than a chunk are not checked.
+/// The slips of `recording`, in order of block and measurement; empty if there are none. If a block lags at its first
+/// contact, the lag is assumed from its first measurement on. Raster scans, skins of more than 1024 taxels, and blocks
+/// shorter than a chunk are not checked.
 #[must_use]
 pub fn find_slips(recording: &Recording) -> Vec<Slip> {
     if recording.mode() != Mode::Compressive || recording.taxels() > MOST_TAXELS {
@@ -62,7 +62,7 @@ pub fn find_slips(recording: &Recording) -> Vec<Slip> {
     tracker.into_slips()
 }
 
-/// Puts the compressive recordings of `set` back on their rows where they slip; what was found.
+/// Realigns the compressive recordings of `set` where they slip, and returns the slips.
 pub fn follow_slips(set: &mut SessionSet) -> Vec<SessionSlip> {
     let follow = |session: &mut Session| {
         let Some(recorded) = &mut session.compressive else {
@@ -82,7 +82,16 @@ pub fn follow_slips(set: &mut SessionSet) -> Vec<SessionSlip> {
     found.concat()
 }
 
-/// One line that says which sessions slip, by how much and from where on; `None` when none does.
+/// One line that lists the sessions that slip, by how many rows, and from where; `None` without slips.
+///
+/// ```
+/// use spts_circuit::Slip;
+/// use spts_eval::{SessionSlip, slips_text};
+///
+/// assert_eq!(slips_text(&[]), None);
+/// let slip = SessionSlip { session: "cup".to_owned(), slip: Slip { block: 2, from: 4100, rows: 1 } };
+/// assert!(slips_text(&[slip]).expect("a line").contains("cup"));
+/// ```
 #[must_use]
 pub fn slips_text(slips: &[SessionSlip]) -> Option<String> {
     /// Places of a session that are named.

@@ -1,4 +1,4 @@
-//! Which rows a chunk was taken with, when they are not those that were expected.
+//! Finds the rows of a chunk when they are not the expected ones.
 
 use crate::chunk::{Chunk, Fit};
 use std::ops::RangeInclusive;

@@ -32,7 +32,7 @@ const ROUNDS: usize = 3;
 pub(super) struct Tracker<'a> {
     recording: &'a Recording,
     len: usize,
-    /// Lag that was last found.
+    /// Lag found last.
     lag: i64,
     slips: Vec<Slip>,
 }
@@ -121,9 +121,9 @@ impl<'a> Tracker<'a> {
         by_noise.min(by_step.unwrap_or(STRONG * most))
     }
 
-    /// Measurement at which the lag of `before`, fitted at or before measurement `seen`, becomes that of `after`, fitted
-    /// from measurement `found` on: where the samples before it leave least of the one image and those after it least
-    /// of the other.
+    /// Measurement at which the lag of `before`, fitted at or before measurement `seen`, becomes that of `after`,
+    /// fitted from measurement `found` on: where the samples before it leave least of the one image and those after it
+    /// least of the other.
     fn meeting(&self, block: usize, seen: usize, before: &Fit, found: usize, after: &Fit) -> usize {
         let samples = self.recording.blocks()[block].volts.len();
         let end = (found + self.len).min(samples);

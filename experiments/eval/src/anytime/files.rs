@@ -4,7 +4,7 @@ use super::rows::AnytimeBoard;
 use super::tally::StopScores;
 use spts::output::{OutputError, OutputFolder, write_csv, write_json};
 
-/// Files outside of folders of their own.
+/// Names of the result files.
 pub const FILES: &[&str] = &["anytime.json", "anytime.csv", "objects.csv"];
 
 /// Columns that both tables begin with.
@@ -30,7 +30,7 @@ const SCORES: [&str; 7] = [
 /// Writes `anytime.json`, `anytime.csv` and `objects.csv` into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
+/// [`OutputError`] if a file cannot be written.
 pub fn write(board: &AnytimeBoard, out: &mut OutputFolder) -> Result<(), OutputError> {
     write_json(&out.path("anytime.json"), board)?;
     let more = [

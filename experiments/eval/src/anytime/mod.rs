@@ -1,9 +1,9 @@
-//! Decoders that stop as soon as they are sure enough: how many samples they take, and how often they are right.
+//! Decoders that stop as soon as they are confident enough: how many samples they need, and how often they are right.
 //!
-//! A decoder that says after every sample how sure it is ([`crate::algorithm::Confidence`]) is given the samples of a
-//! window one by one. For every wanted confidence, the first sample at which it is reached is where the decoder stops,
-//! and what the decoder answers there is scored as on the board. Beside it stands the same decoder with a fixed number
-//! of samples. The board trains and cuts windows: [`crate::board::TrainedBoard::stops`].
+//! A decoder that states its confidence after every sample ([`crate::algorithm::Confidence`]) gets the samples of a
+//! window one by one. For every wanted confidence it stops at the first sample that reaches it, and its answer there is
+//! scored as on the board. The same decoder with a fixed number of samples is the comparison.
+//! [`crate::board::TrainedBoard::stops`] trains and provides the windows.
 
 mod files;
 mod rows;
@@ -23,9 +23,9 @@ use crate::algorithm::Subject;
 /// Wanted confidences.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StopSettings {
-    /// Probabilities of the most probable class, each in (0.5, 1).
+    /// Wanted probabilities of the best class, each in (0.5, 1).
     pub class: Vec<f64>,
-    /// Expected intersections over union of the image, each in (0.5, 1).
+    /// Wanted expected intersections over union of the image, each in (0.5, 1).
     pub image: Vec<f64>,
 }
 

@@ -1,41 +1,41 @@
-//! Lines of results.
+//! Rows of the results.
 
 use super::tally::StopScores;
 use crate::algorithm::Subject;
 use crate::sensing::Sensing;
 use serde::{Deserialize, Serialize};
 
-/// One decoder with one way to stop: means over the objects.
+/// One decoder with one stopping rule: means over the objects.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AnytimeRow {
     /// Algorithm.
     pub decoder: String,
-    /// What it is sure of, and what `attained` is the score of.
+    /// The property to which the confidence refers, and of which `attained` is the score.
     pub subject: Subject,
-    /// How the rows of a window come about.
+    /// How the rows of a window are obtained.
     pub sensing: Sensing,
-    /// Whether the scored object was kept out of what the algorithm learned from.
+    /// Whether the scored object was excluded from the training data.
     pub left_out: bool,
-    /// What it learned from, as on the board.
+    /// Training data, named as on the board.
     pub learned_from: String,
-    /// Confidence at which it stops. `None`: it takes a fixed number of samples.
+    /// Confidence at which the decoder stops; `None` for a fixed number of samples.
     pub confidence: Option<f64>,
-    /// Most samples of a window.
+    /// Largest number of samples in a window.
     pub most: usize,
     /// Scores, means over the objects.
     #[serde(flatten)]
     pub scores: StopScores,
-    /// 95 % confidence interval of `samples`, by drawing presses anew within every object.
+    /// 95 % confidence interval of `samples`, by resampling presses within every object.
     pub samples_ci: Option<[f64; 2]>,
-    /// The same of `attained`.
+    /// 95 % confidence interval of `attained`, by the same resampling.
     pub attained_ci: Option<[f64; 2]>,
-    /// Windows of all objects.
+    /// Number of windows of all objects.
     pub windows: usize,
-    /// Windows that the algorithm could not follow to their end; they count as never sure and wrong.
+    /// Number of windows that the algorithm could not process to the end. They count as never confident and wrong.
     pub failed: usize,
 }
 
-/// The same on one object.
+/// One decoder with one stopping rule on one object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AnytimeObject {
     /// Algorithm.
@@ -55,11 +55,11 @@ pub struct AnytimeObject {
     /// Scores.
     #[serde(flatten)]
     pub scores: StopScores,
-    /// Windows of the object.
+    /// Number of windows of the object.
     pub windows: usize,
 }
 
-/// Everything `spts score --anytime` prints.
+/// Results of `spts score --anytime`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct AnytimeBoard {
     /// Means over the objects.

@@ -1,4 +1,4 @@
-//! Gives a decoder the samples of a window one by one, and notes where it is sure enough.
+//! Gives a decoder the samples of a window one by one, and records where it is confident enough.
 
 use super::tally::{PressStops, WindowStop};
 use crate::algorithm::{Answer, Belief, Class, Confidence, DecodeError, Subject};
@@ -11,7 +11,7 @@ use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 /// When a window ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum End {
-    /// As soon as the decoder is sure enough.
+    /// As soon as the decoder is confident enough.
     Sure(StopRule),
     /// After a fixed number of samples.
     Fixed(usize),

@@ -1,4 +1,4 @@
-//! Where the windows of a press were stopped, and what that adds up to.
+//! Where the windows of a press were stopped, and the resulting scores.
 
 use crate::tally::bootstrap;
 use serde::{Deserialize, Serialize};
@@ -7,13 +7,13 @@ use spts_models::Streams;
 /// How one window ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct WindowStop {
-    /// Samples taken.
+    /// Number of samples.
     pub(super) samples: usize,
     /// Whether the wanted confidence was reached.
     pub(super) reached: bool,
     /// Confidence at the end.
     pub(super) stated: f64,
-    /// 1 or 0 for a class that is right or wrong, the intersection over union of an image.
+    /// For a class 1 if right and 0 if wrong; for an image the intersection over union.
     pub(super) attained: f64,
 }
 
@@ -21,25 +21,26 @@ pub(super) struct WindowStop {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct PressStops {
     pub(super) windows: Vec<WindowStop>,
-    /// Windows that the algorithm could not follow.
+    /// Number of windows that the algorithm could not process.
     pub(crate) failed: usize,
 }
 
-/// Samples needed, and what they are good for.
+/// Number of samples, and the scores reached with them.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct StopScores {
-    /// Mean number of samples taken. A window that never reached the wanted confidence counts with all of its samples.
-    /// `None`, as all scores, without a window.
+    /// Mean number of samples. A window that never reached the wanted confidence counts with all of its samples.
+    /// `None`, like all scores, without windows.
     pub samples: Option<f64>,
     /// Median number of samples.
     pub samples_median: Option<f64>,
-    /// Number of samples that nine of ten windows need at most.
+    /// Number of samples that is sufficient for 90 % of the windows.
     pub samples_p90: Option<f64>,
-    /// What is attained: the share of right classes, or the mean intersection over union, of all windows.
+    /// Score over all windows: share of right classes, or mean intersection over union.
     pub attained: Option<f64>,
-    /// The same of the windows that reached the wanted confidence. `None` when none did.
+    /// Score over the windows that reached the wanted confidence; `None` if none did.
     pub attained_reached: Option<f64>,
-    /// Mean confidence that the windows that reached the wanted one ended with: a calibrated decoder attains it.
+    /// Mean final confidence of the windows that reached the wanted one. For a calibrated decoder it equals
+    /// `attained_reached`.
     pub stated: Option<f64>,
     /// Share of windows that never reached the wanted confidence.
     pub never: Option<f64>,

@@ -1,4 +1,4 @@
-//! Results as tables to read.
+//! Results as text tables.
 
 use super::rows::{AnytimeBoard, AnytimeRow};
 use crate::algorithm::Subject;
@@ -6,8 +6,8 @@ use crate::decoders::label;
 use crate::sensing::Sensing;
 use crate::unique;
 
-/// Classes, images of learned objects and images of objects that were left out: a line for every way to stop, then
-/// objects.
+/// Tables of classes, of images of known objects, and of images of left-out objects, with one line for every stopping
+/// rule; then a table of objects.
 #[must_use]
 pub fn table(board: &AnytimeBoard) -> String {
     let mut out = String::new();

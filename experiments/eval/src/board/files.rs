@@ -7,13 +7,13 @@ use spts::output::{OutputError, OutputFolder, write_csv, write_json, write_table
 /// Columns that both tables have.
 const SCORES: [&str; 6] = ["support", "iou", "f1", "class_single", "class_vote20", "class_evidence"];
 
-/// Files outside of folders of their own.
+/// Names of the result files.
 pub const FILES: &[&str] = &["board.json", "board.csv", "objects.csv", "localisation.csv"];
 
 /// Writes `board.json`, `board.csv`, `objects.csv` and `localisation.csv` into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
+/// [`OutputError`] if a file cannot be written.
 pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), OutputError> {
     write_json(&out.path("board.json"), board)?;
     let times = ["decode_us", "acquire_us", "too_slow", "failed"];

@@ -1,4 +1,4 @@
-//! The board's decoders with a Gaussian prior, followed in time.
+//! Tracks contacts in time with those decoders of the board that have a Gaussian prior.
 
 use super::run::Entry;
 use super::settings::{TrainedBoard, found};
@@ -15,13 +15,13 @@ use std::sync::Arc;
 type Everything = Vec<Followed>;
 
 impl TrainedBoard<'_> {
-    /// Follows every scored press, and every drop of the ball, by every decoder and number of measurements. `done` is
-    /// called after every press. Drops are not scored where one of the objects is left out: what is left out is not the
-    /// ball.
+    /// Tracks every scored press, and every drop of the ball, with every decoder and number of measurements. `done` is
+    /// called after every press. Drops are not scored when an object is left out, because the ball is not one of the
+    /// objects.
     ///
     /// # Errors
-    /// [`ScoreError::NotInTime`] for a decoder without a Gaussian prior, [`ScoreError::Decode`] when a window cannot be
-    /// followed.
+    /// [`ScoreError::NotInTime`] for a decoder without a Gaussian prior, [`ScoreError::Decode`] if a window cannot be
+    /// processed.
     pub fn in_time(&self, done: &(dyn Fn() + Sync)) -> Result<InTimeBoard, ScoreError> {
         if self.run.sessions.is_empty() && self.source.bounces.is_none() {
             return Err(ScoreError::NoSession {

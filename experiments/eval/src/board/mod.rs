@@ -1,8 +1,9 @@
-//! The board: algorithms side by side on the same windows, truth, votes and time.
+//! The board: compares algorithms on the same windows, with ground truth, majority votes and decoding time.
 //!
-//! [`BoardSettings::learn`] trains, [`TrainedBoard::score`] decodes and scores, and [`regressions`] holds a board
-//! against an earlier one.
+//! [`BoardSettings::learn`] trains, [`TrainedBoard::score`] decodes and scores, and [`regressions`] compares a board
+//! with an earlier one.
 
+mod difference;
 mod files;
 mod in_time;
 mod regression;
@@ -13,6 +14,7 @@ mod stops;
 mod text;
 mod trainer;
 
+pub use difference::{Difference, differences};
 pub use files::{FILES, write};
 pub use regression::{Regression, regressions};
 pub use rows::{BoardRow, ObjectRow, ScoreBoard};

@@ -1,4 +1,4 @@
-//! The board's lines.
+//! Rows of the board.
 
 use crate::alignment::SessionSlip;
 use crate::place::PlaceRow;
@@ -13,31 +13,31 @@ pub struct BoardRow {
     pub decoder: String,
     /// Number of measurements, M.
     pub m: usize,
-    /// Whether the scored object was kept out of what the algorithm learned from.
+    /// Whether the scored object was excluded from the training data.
     pub left_out: bool,
-    /// What it learned from: "published", "raster" (raster presses of the same recordings that are not scored),
-    /// "nothing", or the name of another source.
+    /// Training data: "published", "raster" (raster presses of the same recordings that are not scored), "nothing", or
+    /// the name of another source.
     pub learned_from: String,
-    /// How the rows of a window come about.
+    /// How the rows of a window are obtained.
     #[serde(default)]
     pub sensing: Sensing,
     /// Scores, means over the objects.
     #[serde(flatten)]
     pub scores: Scores,
-    /// 95 % confidence interval of `support`, by drawing presses anew within every object.
+    /// 95 % confidence interval of `support`, by resampling presses within every object.
     pub support_ci: Option<[f64; 2]>,
-    /// The same of `iou`.
+    /// 95 % confidence interval of `iou`, by the same resampling.
     pub iou_ci: Option<[f64; 2]>,
-    /// The same of `class_single`.
+    /// 95 % confidence interval of `class_single`, by the same resampling.
     pub class_single_ci: Option<[f64; 2]>,
-    /// Median time of a decode on one thread, µs: rows of weights and samples in, image or class out, Φ·D included. The
-    /// only columns that differ from run to run are this one and `too_slow`. `None` when times were not asked for.
+    /// Median time of a decode on one thread, µs, from rows of weights and samples to image or class, including Φ·D.
+    /// Only this column and `too_slow` differ between runs. `None` if times were not requested.
     pub decode_us: Option<f64>,
-    /// Time in which M measurements arrive, µs.
+    /// Time in which the M measurements arrive, µs.
     pub acquire_us: f64,
-    /// Whether a decode takes longer than that.
+    /// Whether a decode takes longer than `acquire_us`; `None` if times were not requested.
     pub too_slow: Option<bool>,
-    /// Windows that the algorithm could not solve; they score as empty images of no class.
+    /// Number of windows that the algorithm could not solve. They score as empty images without a class.
     pub failed: usize,
 }
 
@@ -60,30 +60,30 @@ pub struct ObjectRow {
     /// Scores.
     #[serde(flatten)]
     pub scores: Scores,
-    /// 95 % confidence interval of `iou`, by drawing the object's presses anew.
+    /// 95 % confidence interval of `iou`, by resampling the object's presses.
     #[serde(default)]
     pub iou_ci: Option<[f64; 2]>,
-    /// The same of `class_single`.
+    /// 95 % confidence interval of `class_single`, by the same resampling.
     #[serde(default)]
     pub class_single_ci: Option<[f64; 2]>,
 }
 
-/// Everything `spts score` prints.
+/// Results of `spts score`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ScoreBoard {
     /// Means over the objects.
     pub rows: Vec<BoardRow>,
-    /// The bouncing ball, and touches.
+    /// Localisation of the bouncing ball, and of touches.
     pub localisation: Vec<PlaceRow>,
     /// Object by object.
     pub objects: Vec<ObjectRow>,
-    /// Where samples lagged behind their rows, on which they were put back before they were scored.
+    /// Slips of the recordings, which were realigned before scoring.
     #[serde(default)]
     pub slips: Vec<SessionSlip>,
 }
 
 impl ScoreBoard {
-    /// The row of `decoder`, `m`, `left_out` and `learned_from`, of windows that follow each other.
+    /// The row of `decoder`, `m`, `left_out` and `learned_from` with consecutive measurements.
     #[must_use]
     pub fn row(&self, decoder: &str, m: usize, left_out: bool, learned_from: &str) -> Option<&BoardRow> {
         let same = |r: &&BoardRow| {
@@ -93,7 +93,7 @@ impl ScoreBoard {
         self.rows.iter().find(same)
     }
 
-    /// The row of the same decoder and conditions as `other`.
+    /// The row with the same decoder and conditions as `other`.
     #[must_use]
     pub fn row_like(&self, other: &BoardRow) -> Option<&BoardRow> {
         let key = |r: &BoardRow| (r.m, r.left_out, r.sensing);

@@ -23,11 +23,11 @@ pub(super) struct Entry {
     pub(super) learned_from: String,
     pub(super) left_out: bool,
     pub(super) sensing: Sensing,
-    /// Whether it has learned the scored classes, so that its classes are scored.
+    /// Whether the scored classes are in the training data, so that classes are scored.
     pub(super) knows_classes: bool,
-    /// One a scored session.
+    /// One decoder for each scored session.
     pub(super) decoders: Vec<TrainedDecoder>,
-    /// The same for rows that are chosen; empty for those that follow each other.
+    /// One row chooser for each scored session; empty for consecutive measurements.
     pub(super) choosers: Vec<Arc<RowChooser>>,
 }
 
@@ -145,8 +145,8 @@ impl Run<'_> {
     }
 
     /// What `score` makes of `press` for every entry: the press as it is, or at rows that are chosen for the entry, as
-    /// many as the largest number of measurements; for classes where `classes` says so. Rows are chosen once for all that
-    /// has learned from the same.
+    /// many as the largest number of measurements; for classes where `classes` says so. Rows are chosen once for all
+    /// that has learned from the same.
     pub(super) fn each_entry<'e, T>(
         &self,
         entries: impl IntoIterator<Item = &'e Entry>,

@@ -1,4 +1,4 @@
-//! Which algorithms are scored, on what, learned from where.
+//! Settings of a board: the algorithms, their training data, and what they are scored on.
 
 use super::rows::ScoreBoard;
 use super::run::{Entry, Run};
@@ -15,50 +15,50 @@ use spts_circuit::Recording;
 use spts_recon::Matrix;
 use std::sync::Arc;
 
-/// What is to be scored.
+/// Settings of a board.
 pub struct BoardSettings {
     /// Algorithms.
     pub decoders: Vec<&'static DecoderSpec>,
-    /// Those of others: programs, and what implements the trait.
+    /// External algorithms: programs, and other implementations of the trait.
     pub external: Vec<Arc<dyn Contender>>,
     /// Numbers of measurements.
     pub measurements: Vec<usize>,
-    /// Objects that are scored; all when none is named.
+    /// Names of the objects that are scored; empty for all.
     pub objects: Vec<String>,
     /// Numbers of measurements for the bouncing ball and for touches.
     pub localisation: Vec<usize>,
-    /// Whether every algorithm is also scored with the scored object kept out of what it learned from.
+    /// Whether every algorithm is also scored with the scored object excluded from its training data.
     pub left_out: bool,
-    /// What is learned from; every algorithm is scored once with each.
+    /// Sources of training data. Every algorithm is scored with each.
     pub training: Vec<TrainingSource>,
-    /// How the rows of windows come about; every algorithm is scored with each.
+    /// Ways to obtain the rows of windows. Every algorithm is scored with each.
     pub sensing: Vec<Sensing>,
-    /// The network of decoders that use one; `None` for the one that ships.
+    /// The network for decoders that use one; `None` for the one shipped with the program.
     pub network: Option<TrainedNetwork>,
     /// Whether decodes are timed.
     pub times: bool,
-    /// Root of the random numbers of dictionary learning.
+    /// Seed of the random numbers for dictionary learning.
     pub seed: u64,
 }
 
-/// Algorithms that have learned, and the presses that wait for them.
+/// Trained algorithms, and the presses on which they will be scored.
 pub struct TrainedBoard<'a> {
     settings: &'a BoardSettings,
     pub(super) source: &'a Source,
     pub(super) run: Run<'a>,
     pub(super) entries: Vec<Entry>,
-    /// For the ball and for touches.
+    /// Dictionary for the ball and for touches.
     dictionary: Option<Matrix>,
 }
 
 impl TrainedBoard<'_> {
-    /// Number of presses, after each of which [`TrainedBoard::score`] reports.
+    /// Number of presses; [`TrainedBoard::score`] reports after each.
     #[must_use]
     pub fn steps(&self) -> usize {
         self.run.presses().len()
     }
 
-    /// Decodes and scores every press; `done` is called after each.
+    /// Decodes and scores every press. `done` is called after each.
     ///
     /// # Errors
     /// [`ScoreError`].
@@ -72,8 +72,8 @@ impl TrainedBoard<'_> {
         })
     }
 
-    /// Rows of the bouncing ball and of touches; touches alone have no rows of locators with a dictionary. None without
-    /// a recording of them.
+    /// Results for the bouncing ball and for touches. Without a ball, there are none of locators with a dictionary;
+    /// without any recording of either, there are none at all.
     ///
     /// # Errors
     /// [`ScoreError`].
@@ -122,21 +122,21 @@ fn dictionary(source: &Source, trainer: &mut Trainer<'_>) -> Result<Matrix, Lear
 }
 
 impl BoardSettings {
-    /// The default numbers of measurements.
+    /// Default numbers of measurements.
     pub const MEASUREMENTS: [usize; 8] = [5, 7, 10, 13, 20, 25, 50, 100];
-    /// The default numbers of measurements for the ball.
+    /// Default numbers of measurements for the ball.
     pub const LOCALISATION: [usize; 6] = [5, 7, 10, 15, 20, 25];
 
-    /// The algorithms shown when none is named.
+    /// The algorithms on the board if none is named.
     #[must_use]
     pub fn shown() -> Vec<&'static DecoderSpec> {
         DECODERS.iter().filter(|spec| spec.shown).collect()
     }
 
-    /// Learns everything that [`TrainedBoard::score`] needs.
+    /// Trains everything that [`TrainedBoard::score`] needs.
     ///
     /// # Errors
-    /// [`ScoreError`] when there is nothing to score or nothing can be learned.
+    /// [`ScoreError`] if there is nothing to score, or no training data.
     pub fn learn<'a>(&'a self, source: &'a Source) -> Result<TrainedBoard<'a>, ScoreError> {
         let run = self.run(source);
         let scored: Vec<&str> = run.sessions.iter().map(|s| s.object.as_str()).collect();

@@ -1,4 +1,4 @@
-//! The board's decoders, stopped as soon as they are sure enough.
+//! Stops the board's decoders as soon as they are confident enough.
 
 use super::run::Entry;
 use super::settings::TrainedBoard;
@@ -19,13 +19,13 @@ struct Stopped<'a> {
 }
 
 impl TrainedBoard<'_> {
-    /// Stops every decoder at the confidences of `settings`, and after every number of measurements of the board, the
-    /// largest of which is the most that a window takes. Classes are scored where they were learned. `done` is called
-    /// after every press.
+    /// Stops every decoder at the confidences of `settings`, and after each of the board's numbers of measurements; the
+    /// largest of these is the length of a window. Classes are scored if they were trained. `done` is called after
+    /// every press.
     ///
     /// # Errors
-    /// [`ScoreError::NoConfidence`] for a decoder that does not say how sure it is, [`ScoreError::Confidence`] for a
-    /// confidence outside (0.5, 1), [`ScoreError::Rows`] when no rows can be chosen.
+    /// [`ScoreError::NoConfidence`] for a decoder that states no confidence, [`ScoreError::Confidence`] for a
+    /// confidence outside (0.5, 1), [`ScoreError::Rows`] if no rows can be chosen.
     pub fn stops(&self, settings: &StopSettings, done: &(dyn Fn() + Sync)) -> Result<AnytimeBoard, ScoreError> {
         let stopped = self.stopped(settings)?;
         let presses = self.run.presses();

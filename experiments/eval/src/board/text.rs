@@ -1,4 +1,4 @@
-//! The board as a table to read.
+//! The board as text tables.
 
 use super::rows::{BoardRow, ObjectRow, ScoreBoard};
 use crate::decoders::label;
@@ -7,7 +7,8 @@ use crate::sensing::Sensing;
 use crate::training::{PUBLISHED, RASTER};
 use crate::unique;
 
-/// The board in columns: closed and left-out rows, then places, then the objects at the largest M up to 20.
+/// The board as tables: rows with known and with left-out objects, then places, then single objects at the largest M up
+/// to 20.
 #[must_use]
 pub fn table(board: &ScoreBoard) -> String {
     let mut out = String::new();

@@ -23,13 +23,13 @@ pub(super) struct TrainingRequest<'a> {
     pub(super) decoders: &'a [&'static DecoderSpec],
     /// External ones.
     pub(super) external: &'a [Arc<dyn Contender>],
-    /// Every algorithm learns from each.
+    /// Sources of training data, each for every algorithm.
     pub(super) training: &'a [TrainingSource],
-    /// Whether every algorithm also learns without the scored object.
+    /// Whether every algorithm is also trained without the scored object.
     pub(super) left_out: bool,
-    /// How the rows of windows come about; every algorithm is scored with each.
+    /// Ways to obtain the rows of windows, each for every algorithm.
     pub(super) sensing: &'a [Sensing],
-    /// The network of decoders that use one; `None` for the one that ships.
+    /// The network for decoders that use one; `None` for the one shipped with the program.
     pub(super) network: Option<&'a TrainedNetwork>,
     /// The scored objects.
     pub(super) objects: &'a [&'a str],
@@ -61,7 +61,7 @@ impl Algorithm<'_> {
 /// What algorithms learn from.
 struct Training<'a> {
     source: &'a TrainingSource,
-    /// Whether that is the published dictionary.
+    /// Whether this is the published dictionary.
     published: bool,
     left_out: bool,
 }
@@ -78,9 +78,9 @@ struct At<'a> {
 struct TrainingKey {
     /// Name of the source.
     source: String,
-    /// The scored object, where it matters.
+    /// The scored object, if the training depends on it.
     object: Option<String>,
-    /// Whether raster images of this object are left out of the training data.
+    /// Whether this object is excluded from the training data.
     left_out: bool,
 }
 
@@ -88,7 +88,7 @@ struct TrainingKey {
 struct Prepared {
     key: TrainingKey,
     data: TrainingData,
-    /// Chooses rows for it, once that is asked for.
+    /// Chooses rows for this training data; built on request.
     chooser: Option<Arc<RowChooser>>,
 }
 
@@ -96,10 +96,10 @@ struct Prepared {
 pub(super) struct Trainer<'a> {
     source: &'a Source,
     streams: Streams,
-    /// Classes of the scored sessions and of everything that is learned from.
+    /// Classes of the scored sessions and of all training data.
     labels: Labels,
     prepared: Vec<Prepared>,
-    /// Whether every raster press of the source is scored, so that none may be learned from.
+    /// Whether every raster press of the source is scored, so that none may be used for training.
     layout_only: bool,
     network: Option<TrainedNetwork>,
 }

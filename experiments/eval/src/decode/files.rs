@@ -1,4 +1,4 @@
-//! Decoded sessions as files: a table, and an archive of arrays a session.
+//! Decoded sessions as files: one table, and one archive of arrays for each session.
 
 use super::{DecodedSession, DecodedWindow, arrays};
 use spts::Session;
@@ -21,13 +21,13 @@ const COLUMNS: [&str; 13] = [
     "col",
 ];
 
-/// Files outside of folders of their own.
+/// Names of the result files that do not depend on the session.
 pub const FILES: &[&str] = &["windows.csv"];
 
-/// Writes `windows.csv` and one `NAME.npz` a session into the folder `out`.
+/// Writes `windows.csv` and one `NAME.npz` for each session into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
+/// [`OutputError`] if a file cannot be written.
 pub fn write(decoded: &[(&Session, DecodedSession)], out: &mut OutputFolder) -> Result<(), OutputError> {
     let rows = decoded.iter().flat_map(|(_, session)| &session.rows);
     let line = |r: &DecodedWindow| {

@@ -1,4 +1,4 @@
-//! Decodes single windows of sessions: image, class and place of each, scored where a truth is known.
+//! Decodes single windows of sessions into image, class and place, and scores them where the ground truth is known.
 
 mod arrays;
 mod files;
@@ -24,22 +24,22 @@ use spts_recon::classify::Src;
 use spts_recon::localise::centre_of_mass;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, pearson, support};
 
-/// What is decoded.
+/// Settings of `spts decode`.
 #[derive(Clone)]
 pub struct DecodeRequest {
     /// Decoders of the board.
     pub decoders: Vec<&'static DecoderSpec>,
     /// Numbers of measurements.
     pub measurements: Vec<usize>,
-    /// Windows a block, one after the other from the beginning of the hold.
+    /// Number of consecutive windows in each block, from the beginning of the hold.
     pub windows: usize,
-    /// The network of decoders that use one; `None` for the one that ships.
+    /// The network for decoders that use one; `None` for the one shipped with the program.
     pub network: Option<TrainedNetwork>,
-    /// Root of the random numbers of the shapes that decoders of objects never seen learn from.
+    /// Seed of the procedural shapes that train decoders for unseen objects.
     pub seed: u64,
 }
 
-/// Decoders that know a layout, and the classes that they know.
+/// Decoders trained for a layout, and the classes that they know.
 pub struct LearnedDecoders {
     trained: Vec<Box<dyn Trained>>,
     classifier: Option<Src>,
@@ -51,9 +51,9 @@ pub struct LearnedDecoders {
 pub struct DecodedWindow {
     /// Name of the session.
     pub session: String,
-    /// Block of the recording, from 0.
+    /// Number of the block, from 0.
     pub block: usize,
-    /// Window of the block, from 0.
+    /// Number of the window within the block, from 0.
     pub window: usize,
     /// Decoder.
     pub decoder: &'static str,
@@ -61,13 +61,13 @@ pub struct DecodedWindow {
     pub m: usize,
     /// First measurement of the window, within the block.
     pub start: usize,
-    /// Support accuracy; `None` where no truth is known.
+    /// Support accuracy; `None` without ground truth.
     pub support: Option<f64>,
-    /// Intersection over union of the supports; `None` where no truth is known.
+    /// Intersection over union of the supports; `None` without ground truth.
     pub iou: Option<f64>,
-    /// Pearson's correlation of the image with the true one; `None` where no truth is known, or either is constant.
+    /// Pearson correlation of the image with the true one; `None` without ground truth, or if either is constant.
     pub correlation: Option<f64>,
-    /// Class that was found; `None` when the decoder knows of no class, or of none like this.
+    /// Class that was found; `None` if the decoder has no classes, or found none.
     pub label: Option<String>,
     /// Class of the session's object.
     pub label_true: String,
@@ -85,44 +85,44 @@ pub struct DecodedSession {
     pub session: String,
     /// Rows and columns of the skin.
     pub shape: [usize; 2],
-    /// Whether the object is one of the classes that were learned, so that a class can be right.
+    /// Whether the object is one of the trained classes.
     pub knows_class: bool,
-    /// In the order block, decoder, M, window.
+    /// In order of block, decoder, M, window.
     pub rows: Vec<DecodedWindow>,
-    /// True image of every block; `None` where none is known.
+    /// True image of every block; `None` where it is not known.
     pub truth: Vec<Option<Vec<f64>>>,
-    /// Measurements of the windows of each M, in the order M, block, window.
+    /// Measurements of the windows for each M, in order of M, block, window.
     pub measured: Vec<MeasuredWindow>,
 }
 
-/// What a decoder was given.
+/// The input of a decoder.
 #[derive(Debug, Clone)]
 pub struct MeasuredWindow {
-    /// Block of the recording.
+    /// Number of the block.
     pub block: usize,
-    /// Window of the block.
+    /// Number of the window within the block.
     pub window: usize,
     /// Number of measurements.
     pub m: usize,
     /// Rows of weights, M × taxels.
     pub phi: Vec<f64>,
-    /// Output of the summing amplifier without that of the untouched skin, V.
+    /// Output of the summing amplifier minus that of the untouched skin, V.
     pub y: Vec<f64>,
 }
 
-/// Why a session is not decoded.
+/// Why a session cannot be decoded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DecodeSessionError {
-    /// Only raster scans.
+    /// The session has only raster scans.
     #[error("session {session:?} has no compressive recording to decode")]
     NoRecording {
         /// Name of the session.
         session: String,
     },
-    /// Windows that reach beyond the block.
+    /// The windows extend beyond the block.
     #[error(
-        "`measurements` = {m} in {windows} windows is outside [1, {most}]: from measurement {start} on, a block of session {session:?} has {most} more"
+        "`measurements` = {m} in {windows} windows is outside [1, {most}]: a block of session {session:?} has {most} measurements from measurement {start} on"
     )]
     TooMany {
         /// Name of the session.
@@ -133,7 +133,7 @@ pub enum DecodeSessionError {
         windows: usize,
         /// First measurement of the first window.
         start: usize,
-        /// Measurements from there to the end of the block.
+        /// Number of measurements from there to the end of the block.
         most: usize,
     },
     /// A decoder cannot be trained for the skin.
@@ -150,8 +150,8 @@ pub enum DecodeSessionError {
 }
 
 impl DecodeRequest {
-    /// Numbers of measurements for a skin of `taxels` taxels when none are asked for: 7, 20 and 50 on 100 taxels, and
-    /// the same shares of any other number.
+    /// Default numbers of measurements for a skin of `taxels` taxels: 7, 20 and 50 for 100 taxels, and the same shares
+    /// of other numbers.
     #[must_use]
     pub fn default_measurements(taxels: usize) -> Vec<usize> {
         let mut shares: Vec<usize> = [7, 20, 50].map(|m| (m * taxels).div_ceil(100)).to_vec();
@@ -172,8 +172,8 @@ impl DecodeRequest {
         Ok(Some(data.with_network(self.network.clone())))
     }
 
-    /// The decoders with what `training` says of a skin of this `layout`. `classes` are the names of its labels; `None`
-    /// when it has no classes.
+    /// Trains the decoders with `training` for a skin of this `layout`. `classes` are the names of its labels; `None`
+    /// without classes.
     ///
     /// # Errors
     /// [`DecodeSessionError::Training`].
@@ -200,7 +200,7 @@ impl DecodeRequest {
         })
     }
 
-    /// Decodes every block of `session` with decoders that have `learned` for its layout.
+    /// Decodes every block of `session` with the decoders `learned` for its layout.
     ///
     /// # Errors
     /// [`DecodeSessionError`].

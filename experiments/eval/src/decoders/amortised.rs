@@ -40,7 +40,7 @@ struct AtWork<'a> {
     network: &'a Unrolled,
     work: Workspace,
     touched: Vec<f64>,
-    /// Image, and rows and samples so far, of a window that comes sample by sample.
+    /// Image, rows and samples so far of a window that arrives sample by sample.
     image: Vec<f64>,
     phi: Vec<f64>,
     y: Vec<f64>,

@@ -1,4 +1,4 @@
-//! Baseline: the mean image whose measurements correlate best with y.
+//! Baseline: the mean image whose predicted measurements correlate best with y.
 
 use crate::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
 use crate::training::{Dictionary, LearnError, TrainingData};

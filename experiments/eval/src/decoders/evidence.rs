@@ -1,4 +1,4 @@
-//! Gaussian classes weighed by the evidence of y.
+//! Classification by the evidence of Gaussian classes given y.
 
 use super::bank::Bank;
 use crate::algorithm::{Algorithm, Answer, Belief, Class, Confidence, DecodeError, Subject, Trained};

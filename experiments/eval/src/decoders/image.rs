@@ -1,4 +1,4 @@
-//! Decoders that recover an image, on the atoms of a dictionary or on the taxels themselves.
+//! Decoders that reconstruct an image, from atoms of a dictionary or directly from taxels.
 
 use super::quarter;
 use super::sure::ImageConfidence;
@@ -23,9 +23,9 @@ const VARIATION: Penalty = Penalty::Relative(0.02);
 /// How the cells' weights are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Weights {
-    /// ±1, which is what the cells put out about their middle; the idle output is removed from y.
+    /// ±1, the levels of the cells about their middle; the idle output is subtracted from y.
     Signs,
-    /// {0, 1}, and y as it is: the published script.
+    /// {0, 1}, with y unchanged, as in the published script.
     Script,
 }
 
@@ -44,9 +44,9 @@ struct ImageDecoder {
     unknowns: Unknowns,
     weights: Weights,
     build: Box<Build>,
-    /// How sure it is of its image, for an algorithm that says so.
+    /// Confidence in the image, for algorithms that state it.
     confidence: Option<ImageConfidence>,
-    /// Its prior about zero, for an algorithm that has one.
+    /// Zero-mean prior, for algorithms that have one.
     prior: Option<Arc<Gaussian>>,
 }
 

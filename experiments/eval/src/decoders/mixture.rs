@@ -1,4 +1,4 @@
-//! Images by a mixture of Gaussians over procedural shapes, weighed by the evidence of y.
+//! Images by a mixture of Gaussians over procedural shapes, weighted by the evidence given y.
 
 use super::bank::Bank;
 use crate::algorithm::{Algorithm, Answer, DecodeError, Trained};

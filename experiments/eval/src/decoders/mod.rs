@@ -1,4 +1,4 @@
-//! The table of algorithms. A new one is a file here and a line in [`DECODERS`].
+//! The table of algorithms. A new one has a file here and a line in [`DECODERS`].
 
 mod amortised;
 mod bank;
@@ -18,25 +18,25 @@ use crate::algorithm::Trained;
 use crate::training::{LearnError, TrainingData};
 use Needs::{Classes, Dictionary, Images, Network, Nothing, Shapes};
 
-/// What an algorithm learns from.
+/// Training data that an algorithm needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Needs {
     /// Nothing.
     Nothing,
-    /// A dictionary: the published one, unless another source is asked for or an object is left out.
+    /// A dictionary: the published one, unless another source is requested or an object is left out.
     Dictionary,
     /// Raster images.
     Images,
     /// Raster images of named objects.
     Classes,
-    /// Procedural shapes pressed in the simulation, wherever the others learn from.
+    /// Procedural shapes pressed in the simulation, for every source of training data.
     Shapes,
-    /// Nothing but the weights of a network, which was trained on such shapes before.
+    /// Only the weights of a network, which was trained on such shapes before.
     Network,
 }
 
 impl Needs {
-    /// Whether what is learned from are procedural shapes, wherever the others learn from.
+    /// Whether the training data are procedural shapes, for every source of training data.
     #[must_use]
     pub fn shapes(self) -> bool {
         matches!(self, Self::Shapes | Self::Network)
@@ -44,21 +44,29 @@ impl Needs {
 }
 
 /// One line of the table of algorithms.
+///
+/// ```
+/// use spts_eval::decoders::{DECODERS, find};
+///
+/// let evidence = find("evidence").expect("in the table");
+/// assert!(evidence.shown && evidence.anytime);
+/// assert!(DECODERS.iter().all(|decoder| !decoder.about.is_empty()));
+/// ```
 #[derive(Clone, Copy)]
 pub struct DecoderSpec {
     /// Name on the command line and in files.
     pub name: &'static str,
     /// Name in figures and printed tables.
     pub label: &'static str,
-    /// What it is.
+    /// Description.
     pub about: &'static str,
-    /// What it learns from.
+    /// Training data that it needs.
     pub needs: Needs,
-    /// Whether the board shows it when none is named.
+    /// Whether the board shows it if none is named.
     pub shown: bool,
-    /// Whether it says after every sample how sure it is.
+    /// Whether it states its confidence after every sample.
     pub anytime: bool,
-    /// Learns.
+    /// Trains the algorithm.
     pub train: Train,
 }
 
@@ -98,8 +106,7 @@ const SCRIPT_M4: DecoderSpec = spec("script_m4", "script, M/4 atoms", Dictionary
 const MATCHED: DecoderSpec = spec("matched", "matched", Dictionary, true, image::matched)
     .about("the published pursuit with weights ±1 and the idle output removed");
 
-/// Every algorithm: name, label, what it learns from, whether it is shown when none is named, how it learns; what it
-/// is.
+/// Every algorithm: name, label, training data, whether it is shown by default, training function, description.
 pub const DECODERS: &[DecoderSpec] = &[
     spec("empty", "empty image", Nothing, true, trivial::empty).about("baseline: an empty image"),
     spec("mean_image", "mean image", Images, true, trivial::mean_image)
@@ -148,7 +155,7 @@ pub fn find(name: &str) -> Option<&'static DecoderSpec> {
     DECODERS.iter().find(|spec| spec.name == name)
 }
 
-/// What the algorithm `name` is called in figures and printed tables; a program from outside has its own name.
+/// Label of the algorithm `name` in figures and printed tables. An external program is labelled by its name.
 #[must_use]
 pub fn label(name: &str) -> &str {
     find(name).map_or(name, |spec| spec.label)

@@ -1,4 +1,4 @@
-//! The decodes of the published evaluation, by name; each is a line of the table of algorithms.
+//! The decoding variants of the published evaluation. Each is a line in the table of algorithms.
 
 use super::trained::TrainedDecoder;
 use super::{DecoderSpec, MATCHED, SCRIPT_M4, SCRIPT_S20};
@@ -6,18 +6,25 @@ use crate::training::{LearnError, Learned, TrainingData};
 use serde::{Serialize, Serializer};
 
 /// How the published evaluation turns a window of measurements into an image.
+///
+/// ```
+/// use spts_eval::decoders::{PublishedDecode, find, quarter};
+///
+/// assert_eq!((quarter(20), quarter(50), quarter(1)), (5, 13, 1));
+/// assert!(PublishedDecode::ALL.iter().all(|decode| find(decode.name()).is_some()));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PublishedDecode {
-    /// As the published script: weights {0, 1}, no offset, 20 atoms.
+    /// As in the published script: weights {0, 1}, no offset, 20 atoms.
     ScriptS20,
-    /// As the paper's text: weights {0, 1}, no offset, M/4 atoms.
+    /// As in the paper's text: weights {0, 1}, no offset, M/4 atoms.
     ScriptM4,
-    /// Matched to the device: weights ±1, the idle mean removed, M/4 atoms.
+    /// Adapted to the device: weights ±1, the idle mean subtracted, M/4 atoms.
     Matched,
 }
 
 impl PublishedDecode {
-    /// Every decode.
+    /// Every variant.
     pub const ALL: [Self; 3] = [Self::ScriptS20, Self::ScriptM4, Self::Matched];
 
     /// Its line of the table of algorithms.
@@ -41,21 +48,31 @@ impl PublishedDecode {
         self.line().label
     }
 
-    /// The decoder with dictionary and library of `learned`.
+    /// The decoder of this variant, with dictionary and library of `learned`.
     ///
     /// # Errors
-    /// [`LearnError`] when it cannot use these.
+    /// [`LearnError`] if `learned` is not usable.
     pub fn decoder(self, learned: &Learned) -> Result<TrainedDecoder, LearnError> {
         TrainedDecoder::new(self.line(), &TrainingData::given(learned))
     }
 
-    /// All of them.
+    /// The decoders of all variants.
     ///
     /// # Errors
-    /// [`LearnError`] when one of them cannot use what was learned.
+    /// [`LearnError`] if `learned` is not usable.
     pub fn decoders(learned: &Learned) -> Result<Vec<(Self, TrainedDecoder)>, LearnError> {
         let each = Self::ALL.into_iter();
         each.map(|decode| Ok((decode, decode.decoder(learned)?))).collect()
+    }
+
+    /// All of them, each beside its name.
+    ///
+    /// # Errors
+    /// [`LearnError`] when one of them cannot use what was learned.
+    pub fn named(learned: &Learned) -> Result<Vec<(&'static str, TrainedDecoder)>, LearnError> {
+        let each = Self::ALL.into_iter();
+        each.map(|decode| Ok((decode.name(), decode.decoder(learned)?)))
+            .collect()
     }
 }
 

@@ -1,4 +1,4 @@
-//! How sure an image is, sample by sample.
+//! Confidence in an image, sample by sample.
 
 use crate::algorithm::{Belief, Confidence, DecodeError};
 use crate::windows::Window;

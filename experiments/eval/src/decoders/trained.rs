@@ -1,4 +1,4 @@
-//! A decoder that has learned.
+//! A trained decoder.
 
 use super::DecoderSpec;
 use crate::algorithm::Trained;
@@ -6,7 +6,7 @@ use crate::training::{LearnError, TrainingData};
 use spts_recon::classify::Src;
 use std::sync::Arc;
 
-/// An algorithm that has learned what it needs, with the classifier of the images of algorithms that say no class.
+/// A trained algorithm, with an image classifier for algorithms that find no class themselves.
 #[derive(Clone)]
 pub struct TrainedDecoder {
     pub(crate) trained: Arc<dyn Trained>,
@@ -14,10 +14,10 @@ pub struct TrainedDecoder {
 }
 
 impl TrainedDecoder {
-    /// The algorithm `spec` after it has learned from `data`.
+    /// Trains the algorithm `spec` with `data`.
     ///
     /// # Errors
-    /// [`LearnError`] when it cannot learn from them.
+    /// [`LearnError`] if `data` is not usable.
     pub fn new(spec: &DecoderSpec, data: &TrainingData) -> Result<Self, LearnError> {
         Ok(Self::of(Arc::from((spec.train)(data)?), data))
     }

@@ -1,4 +1,4 @@
-//! Baselines that do not look at the measurements.
+//! Baselines that ignore the measurements.
 
 use crate::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
 use crate::training::{LearnError, TrainingData};

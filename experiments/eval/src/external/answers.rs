@@ -1,4 +1,4 @@
-//! What an answer has to be.
+//! Checks of answers.
 
 use crate::algorithm::{Answer, Class, ExternalError};
 use crate::labels::Labels;
@@ -25,11 +25,11 @@ fn given<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Opt
 /// The answers that make sense for one skin and one set of training data.
 #[derive(Debug, Clone)]
 pub(super) struct Valid {
-    /// Values of an image.
+    /// Number of values in an image.
     pub(super) taxels: usize,
-    /// Names of the classes by number, as the program is told them.
+    /// Names of the classes by number, as sent to the program.
     pub(super) classes: BTreeMap<usize, String>,
-    /// The object that was left out: right, but not among the classes.
+    /// Number of the left-out object: a correct answer, although not one of the classes.
     left_out: Option<usize>,
 }
 
@@ -102,10 +102,10 @@ impl Valid {
     }
 }
 
-/// Checks `line` as the answer of a program that is asked for images of `taxels` values and for classes 1 to `classes`.
+/// Checks `line` as the answer of a program that must return images of `taxels` values or classes 1 to `classes`.
 ///
 /// # Errors
-/// What is wrong with it.
+/// A message that says what is wrong.
 pub fn check_line(line: &[u8], taxels: usize, classes: usize) -> Result<Answer, String> {
     let valid = Valid {
         taxels,

@@ -1,4 +1,4 @@
-//! A program that runs for every press and M, on files.
+//! A program that runs once for every press and M, and exchanges files.
 
 use super::answers::refused;
 use super::exchange::{Exchange, shell};
@@ -26,7 +26,7 @@ pub(super) struct Files<'a> {
     pub(super) settings: &'a Settings,
     pub(super) exchange: &'a Exchange,
     pub(super) learn: &'a Path,
-    /// The first error of all threads, which ends the runs of the others.
+    /// The first error of any thread; it ends the runs of the others.
     pub(super) failure: &'a OnceLock<ExternalError>,
 }
 

@@ -1,4 +1,4 @@
-//! The temporary folder of the files that a program is given and writes.
+//! The temporary folder for files exchanged with a program.
 
 use super::in_file;
 use crate::algorithm::ExternalError;

@@ -1,23 +1,22 @@
-//! Algorithms outside this program: any command that reads windows and answers images or labels.
+//! External algorithms: any command that reads windows and answers with images or labels.
 //!
-//! Without placeholders the command runs once and is fed line by line: first a header
-//! `{"taxels": …, "rows": …, "cols": …, "left_out": …, "learn": …, "classes": {"1": "brain", …}}`, then one JSON object
-//! a window `{"m": …, "phi": ["+-+…", …], "y": […], "volts": […]}` with one string of signs a measurement, or, where
-//! weights are not ±1, one array of numbers a measurement; it answers each with a line `{"image": […]}` or `{"label":
-//! …}` (null: unknown) or both, and must not wait for the next one before it does. When its input ends it has to end
-//! with status 0.
+//! A command without placeholders runs once and is sent lines. The first line is a header `{"taxels": …, "rows": …,
+//! "cols": …, "left_out": …, "learn": …, "classes": {"1": "brain", …}}`. Each further line is one window, `{"m": …,
+//! "phi": ["+-+…", …], "y": […], "volts": […]}`, with one string of signs for each measurement or, if weights are not
+//! ±1, one array of numbers. The program answers each window with a line `{"image": […]}` or `{"label": …}` (null:
+//! unknown) or both, before it waits for the next window. When its input ends, it must end with status 0.
 //!
-//! With `{windows}` and `{answers}` in it the command runs for every press and M: the first is an .npz file with `phi`
-//! (windows × M × taxels, int8; float64 where weights are not ±1), `y` and `volts` (windows × M), the second the .npz
-//! file that it writes, with `images` (windows × taxels) or `labels` (windows; −1: unknown) or both, and nothing else.
-//! `{learn}`, like the header's `learn`, is an .npz file with the raster images (images × taxels) and labels that may
-//! be learned from. Placeholders stand without quotes: each becomes one word of the shell, whatever is in the path. The
-//! paths are in the environment too: `SPTS_LEARN`, `SPTS_WINDOWS`, `SPTS_ANSWERS`.
+//! A command with `{windows}` and `{answers}` runs once for every press and M. The first is an .npz file with `phi`
+//! (windows × M × taxels, int8; float64 if weights are not ±1), `y` and `volts` (windows × M). The second is the .npz
+//! file that the program writes, with only `images` (windows × taxels), `labels` (windows; −1: unknown), or both.
+//! `{learn}`, like the header's `learn`, is an .npz file with the raster images (images × taxels) and labels for
+//! training. Placeholders are written without quotes: each becomes one word of the shell, whatever the path contains.
+//! The environment also holds the paths: `SPTS_LEARN`, `SPTS_WINDOWS`, `SPTS_ANSWERS`.
 //!
-//! A label is one of the header's classes, an image has one finite value a taxel. Any other answer, an answer too many,
-//! a bad exit status, and a window or a run that takes longer than [`ExternalCommand::limit`] end the scoring with an
-//! error. Programs end with `spts`, however it ends, with all they have started in the same process group. The
-//! temporary folder of a `spts` that is killed (SIGKILL) is removed by the next run.
+//! A label must be one of the header's classes, and an image must have one finite value a taxel. Any other answer, an
+//! additional answer, a bad exit status, or exceeding [`ExternalCommand::limit`] for a window or a run ends the scoring
+//! with an error. When `spts` ends, for whatever reason, it also ends the program and all processes in its group. If
+//! `spts` itself is killed (SIGKILL), the next run removes its temporary folder.
 
 mod answers;
 mod batch;
@@ -45,20 +44,20 @@ use stream::Stream;
 pub struct ExternalCommand {
     /// Name.
     pub name: String,
-    /// What the shell runs.
+    /// The command for the shell.
     pub command: String,
-    /// Longest time that the answer to a window may take, from the question on; the end after the last answer as well,
-    /// and one run on files. Range: [`ExternalCommand::LIMIT_S`].
+    /// Time limit for the answer to a window, for the end after the last answer, and for one run on files. Range:
+    /// [`ExternalCommand::LIMIT_S`].
     pub limit: Duration,
 }
 
 impl ExternalCommand {
-    /// Range of [`ExternalCommand::limit`], s: the least lets a shell start, the most is a day.
+    /// Range of [`ExternalCommand::limit`], s: from the time in which a shell starts to a day.
     pub const LIMIT_S: [f64; 2] = [0.1, 86_400.0];
     /// Default of [`ExternalCommand::limit`].
     pub const DEFAULT_LIMIT: Duration = Duration::from_secs(60);
 
-    /// `NAME=COMMAND`, or a command that is its own name. A name has letters, digits, `-` and `_` only.
+    /// Parses `NAME=COMMAND`, or a command that is its own name. A name has only letters, digits, `-` and `_`.
     #[must_use]
     pub fn parse(text: &str) -> Self {
         let is_name = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
@@ -92,7 +91,7 @@ impl Contender for ExternalCommand {
 /// What every way of speaking with a program needs.
 #[derive(Debug, Clone)]
 struct Settings {
-    /// As the user gave it.
+    /// The command as the user wrote it.
     command: String,
     limit: Duration,
     valid: Valid,
@@ -112,7 +111,7 @@ impl Settings {
 /// A command with its exchange folder.
 pub(crate) struct External {
     settings: Settings,
-    /// Line by line, or `None` for a run a press. It ends before its folder goes.
+    /// The program that is sent lines; `None` for one run a press. It ends before its folder is removed.
     stream: Option<Mutex<Stream>>,
     /// The first error of a run on files.
     failure: OnceLock<ExternalError>,

@@ -1,5 +1,5 @@
-//! The two pipes of a program that is fed line by line. Each has a thread, so that neither a program that does not read
-//! nor one that does not write keeps anybody waiting beyond a deadline.
+//! The two pipes of a program that is sent lines. Each has a thread, so that a program that does not read or does not
+//! write cannot delay anybody beyond a deadline.
 
 use std::io::{self, BufRead as _, BufReader, Read as _, Write as _};
 use std::process::{ChildStdin, ChildStdout};
@@ -18,40 +18,40 @@ const LINE_BYTES: [usize; 2] = [64, 4096];
 pub(super) enum Event {
     /// A line of the output.
     Line(Vec<u8>),
-    /// A line of this number, from 1, before its window was asked or read. Nothing is read any more.
+    /// The line with this number, from 1, came before its window was sent or read. Reading ends.
     Surplus(usize),
-    /// A line of more bytes than an answer has. Nothing is read any more.
+    /// A line longer than any valid answer. Reading ends.
     TooLong,
     /// The output has ended.
     OutputEnd,
-    /// The program reads no more.
+    /// The program has closed its input.
     InputClosed,
-    /// The system said no.
+    /// The system reports an error.
     Failed(io::Error),
 }
 
 /// What a program has not done yet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Asked {
-    /// Read the line of this number: the header is 0, windows count from 1.
+    /// To read the line with this number: the header is 0, windows count from 1.
     Write(usize),
-    /// Answer.
+    /// To answer.
     Answer,
 }
 
 /// Counts that the threads share.
 #[derive(Debug, Default)]
 struct Counts {
-    /// Windows that were handed to the writing thread.
+    /// Number of windows handed to the writing thread.
     asked: AtomicUsize,
-    /// Lines that are in the pipe.
+    /// Number of lines written to the pipe.
     written: AtomicUsize,
 }
 
 /// Both pipes.
 #[derive(Debug)]
 pub(super) struct Pipes {
-    /// `None` once nothing more is sent.
+    /// `None` after the last line has been sent.
     input: Option<Sender<String>>,
     events: Receiver<Event>,
     counts: Arc<Counts>,

@@ -1,4 +1,4 @@
-//! A program that the shell runs, in a process group of its own, which ends as a whole.
+//! A program run by the shell in its own process group, which is ended as a whole.
 
 use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 use spts::cleanup::{Entry, Leftover, listed};
@@ -20,9 +20,9 @@ const KEEPER: &str = "read -r _; kill -KILL 0";
 pub(super) struct Process {
     child: Child,
     leader: Pid,
-    /// A member of the group that ends it when `spts` is gone.
+    /// A member of the group that ends it if `spts` disappears.
     keeper: Option<Child>,
-    /// `None` once the group was ended.
+    /// `None` after the group was ended.
     entry: Option<Entry>,
 }
 

@@ -1,4 +1,4 @@
-//! A program that is fed line by line.
+//! A program that is sent lines.
 
 use super::answers::refused;
 use super::pipes::{Asked, Event, Pipes};
@@ -22,9 +22,9 @@ pub(super) struct Stream {
     settings: Settings,
     process: Process,
     pipes: Pipes,
-    /// Windows that have been asked.
+    /// Number of windows sent.
     asked: usize,
-    /// Why it is not asked any more: every thread that comes later gets the same error at once.
+    /// Why no more windows are sent. All threads that come later get this error at once.
     failure: Option<ExternalError>,
     finished: bool,
 }

@@ -1,4 +1,4 @@
-//! Contacts that are followed: their samples, the moments at which they are scored, and what is true then.
+//! Contacts to be tracked: samples, scored moments, and ground truth.
 
 use super::tally::Moment;
 use crate::chunk::Chunk;
@@ -36,21 +36,21 @@ pub(crate) struct FollowedContact {
 /// When an image is scored, and against what.
 pub(super) struct ScoredMoment {
     pub(super) at: Moment,
-    /// The last window is the one that ends with this sample or before it.
+    /// The last window ends with this sample or before it.
     pub(super) end: usize,
     pub(super) support: Vec<bool>,
-    /// Place of a ball.
+    /// True position of a ball.
     pub(super) centre: Option<[f64; 2]>,
 }
 
-fn samples(time_s: f64, rate_hz: f64) -> usize {
+pub(super) fn samples(time_s: f64, rate_hz: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
     let count = (time_s * rate_hz).round().max(0.0) as usize;
     count
 }
 
 /// Root mean square of the samples before the one with the number `touch`, V; 0 where there is none.
-fn idle_noise(recording: &Recording, block: usize, untouched: &Untouched, touch: usize) -> f64 {
+pub(super) fn idle_noise(recording: &Recording, block: usize, untouched: &Untouched, touch: usize) -> f64 {
     let [from, to] = IDLE_S.map(|time_s| touch.saturating_sub(samples(time_s, recording.sample_rate_hz())));
     let y = untouched.without(recording, block, from..to);
     let finite = || y.iter().filter(|v| v.is_finite());

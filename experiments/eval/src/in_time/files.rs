@@ -4,7 +4,7 @@ use super::rows::{InTimeBoard, InTimeRow};
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, write_csv, write_json};
 
-/// Files outside of folders of their own.
+/// Names of the result files.
 pub const FILES: &[&str] = &["in_time.json", "in_time.csv", "objects.csv"];
 
 const COLUMNS: [&str; 25] = [
@@ -38,7 +38,7 @@ const COLUMNS: [&str; 25] = [
 /// Writes `in_time.json`, `in_time.csv` and `objects.csv` into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
+/// [`OutputError`] if a file cannot be written.
 pub fn write(board: &InTimeBoard, out: &mut OutputFolder) -> Result<(), OutputError> {
     write_json(&out.path("in_time.json"), board)?;
     write_csv(&out.path("in_time.csv"), &COLUMNS, board.rows.iter().map(line))?;

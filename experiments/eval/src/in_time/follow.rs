@@ -1,4 +1,4 @@
-//! Follows one contact with one decoder.
+//! Tracks one contact with one decoder.
 
 use super::event::FollowedContact;
 use super::motion;

@@ -1,18 +1,19 @@
-//! Contacts that are followed in time, beside the same windows decoded each alone: what memory gains while a contact
-//! arrives, grows, holds and bounces.
+//! Contacts tracked in time, compared with decoding each window alone: what memory gains while a contact arrives,
+//! grows, holds and bounces.
 //!
-//! A decoder with a Gaussian prior of images ([`crate::algorithm::Trained::prior`]) is given all windows of a press or
-//! a drop in their order, from before the touch on, and keeps what they told ([`spts_recon::recover::TrackedImage`]).
-//! At set times after the touch its image is scored, and so are those of the decoder for the last window alone and for
-//! a longer window of as many samples as there are taxels. The board trains: [`crate::board::TrainedBoard::in_time`].
+//! A decoder with a Gaussian prior of images ([`crate::algorithm::Trained::prior`]) gets all windows of a press or drop
+//! in order, from before the touch on, and keeps their information ([`spts_recon::recover::TrackedImage`]). At set
+//! times after the touch its image is scored, together with the decoder's images for the last window alone and for a
+//! longer window with as many samples as there are taxels. [`crate::board::TrainedBoard::in_time`] trains the decoders.
 //!
-//! During the rise of a press the true support is that of the least-squares image of the samples that follow the
-//! window, which no decoder has seen; during the hold it is the board's. The truth of a drop is the least-squares image
-//! of the whole contact, as for places: the samples that are decoded are among those that it is made of.
+//! During the rise of a press the true support is that of the least-squares image of the samples after the window,
+//! which no decoder has used; during the hold it is the board's. The ground truth of a drop is the least-squares image
+//! of the whole contact, as for places; it includes the decoded samples.
 
 mod event;
 mod files;
 mod follow;
+mod images;
 mod rows;
 mod tally;
 mod text;
@@ -20,6 +21,7 @@ mod text;
 pub(crate) use event::{drops, press};
 pub use files::{FILES, write};
 pub(crate) use follow::{Followed, follow};
+pub use images::{FollowedImage, followed_images};
 pub use rows::{ContactKind, InTimeBoard, InTimeObject, InTimeRow};
 pub use tally::{InTimeScores, Interval};
 pub(crate) use tally::{Moment, scores};

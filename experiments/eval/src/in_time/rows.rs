@@ -1,9 +1,9 @@
-//! Lines of results.
+//! Rows of the results.
 
 use super::tally::InTimeScores;
 use serde::{Deserialize, Serialize};
 
-/// What is followed.
+/// Kind of contact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ContactKind {
@@ -27,40 +27,40 @@ impl ContactKind {
 /// One decoder with windows of one size at one moment: means over the objects.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InTimeRow {
-    /// Algorithm of windows alone, whose prior is followed in time.
+    /// Algorithm for single windows, whose prior is used for tracking.
     pub decoder: String,
-    /// Whether the scored object was kept out of what the algorithm learned from.
+    /// Whether the scored object was excluded from the training data.
     pub left_out: bool,
-    /// What it learned from, as on the board.
+    /// Training data, named as on the board.
     pub learned_from: String,
-    /// What is followed.
+    /// Kind of contact.
     pub contact: ContactKind,
-    /// Samples of a window.
+    /// Number of samples in a window.
     pub m: usize,
-    /// Time from the touch to the end of the window, s. `None`: while the contact is steady.
+    /// Time from the touch to the end of the window, s; `None` while the contact is steady.
     pub since_touch_s: Option<f64>,
     /// Scores, means over the objects.
     #[serde(flatten)]
     pub scores: InTimeScores,
-    /// Presses or drops that are scored.
+    /// Number of presses or drops that are scored.
     pub contacts: usize,
 }
 
-/// The same of one object.
+/// One decoder on one object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InTimeObject {
     /// Object.
     pub object: String,
-    /// Its line.
+    /// Its results.
     #[serde(flatten)]
     pub row: InTimeRow,
 }
 
-/// Everything `spts score --in-time` prints.
+/// Results of `spts score --in-time`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct InTimeBoard {
     /// Means over the objects.
     pub rows: Vec<InTimeRow>,
-    /// Object by object, of presses.
+    /// Single objects, for presses.
     pub objects: Vec<InTimeObject>,
 }

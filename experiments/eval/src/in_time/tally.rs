@@ -1,4 +1,4 @@
-//! What following contacts adds up to.
+//! Scores of tracked contacts.
 
 use super::follow::Followed;
 use crate::tally::bootstrap;
@@ -8,7 +8,7 @@ use spts_models::Streams;
 /// When an image is scored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Moment {
-    /// So long after the touch, s.
+    /// This long after the touch, s.
     After(f64),
     /// While the contact is steady.
     Hold,
@@ -34,31 +34,31 @@ pub(crate) struct Compared {
 /// 95 % interval.
 pub type Interval = Option<[f64; 2]>;
 
-/// Scores at one moment: of the last window alone, of the last samples as many as there are taxels, and in time.
-/// Intervals are of 95 %, by drawing presses or drops anew. What was not scored is `None`.
+/// Scores at one moment: of the last window alone, of a longer window with as many samples as taxels, and with
+/// tracking. Intervals are 95 % confidence intervals, by resampling presses or drops. `None` where nothing was scored.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct InTimeScores {
-    /// Mean intersection over union, the last window alone.
+    /// Mean intersection over union of the last window alone.
     pub iou_alone: Option<f64>,
     /// Its interval.
     pub iou_alone_ci: Interval,
-    /// The same of a longer window.
+    /// Mean intersection over union of the longer window.
     pub iou_longer: Option<f64>,
-    /// The same in time.
+    /// Mean intersection over union with tracking.
     pub iou_in_time: Option<f64>,
     /// Its interval.
     pub iou_in_time_ci: Interval,
-    /// Mean of the differences in time less alone.
+    /// Mean of the differences between tracking and the last window alone.
     pub iou_gain: Option<f64>,
     /// Its interval.
     pub iou_gain_ci: Interval,
-    /// Of drops: mean distance of the centre of the image from the true one, the last window alone, taxels.
+    /// For drops: mean distance of the image's centre from the true one, of the last window alone, taxels.
     pub error_alone_px: Option<f64>,
-    /// The same of a longer window.
+    /// Mean distance of the longer window, taxels.
     pub error_longer_px: Option<f64>,
-    /// The same in time.
+    /// Mean distance with tracking, taxels.
     pub error_in_time_px: Option<f64>,
-    /// In time less alone: below zero is better.
+    /// Mean distance with tracking minus that of the last window alone, taxels; negative is better.
     pub error_gain_px: Option<f64>,
     /// Its interval.
     pub error_gain_ci: Interval,

@@ -1,12 +1,12 @@
-//! Results as tables to read.
+//! Results as text tables.
 
 use super::rows::{ContactKind, InTimeBoard, InTimeRow};
 use super::tally::Interval;
 use crate::decoders::label;
 use crate::unique;
 
-/// A table for presses and one for drops, a line for every decoder, number of samples and moment; then objects during
-/// the hold and at the first moments of the rise.
+/// One table for presses and one for drops, with a line for every decoder, number of samples and moment; then objects
+/// during the hold and at the first moments of the rise.
 #[must_use]
 pub fn table(board: &InTimeBoard) -> String {
     let mut out = String::new();

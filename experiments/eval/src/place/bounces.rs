@@ -1,4 +1,4 @@
-//! The bouncing ball in a compressive recording: when it touches, and the true image of its contact.
+//! The bouncing ball in a compressive recording: times and true images of its contacts.
 
 use crate::protocol::PUBLISHED_RATE_HZ;
 use nalgebra::{DMatrix, DVector};
@@ -35,7 +35,7 @@ const GAP: usize = 100;
 /// Shorter events are not contacts of a ball, measurements of the published skin (3 ms).
 const SHORTEST: usize = 200;
 
-/// Contacts of the ball in every block, by the moving root mean square of the output about its median.
+/// Contacts of the ball in every block, detected by the moving root mean square of the output about its median.
 #[must_use]
 pub fn find_bounces(recording: &Recording) -> Vec<RecordedBounce> {
     recording
@@ -90,7 +90,7 @@ fn contacts(block: usize, volts: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
 }
 
 /// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with the recording's Φ, negative values set to zero.
-/// `None` when a sample is lost or the normal equations are singular.
+/// `None` if a sample is lost, or the normal equations are singular.
 #[must_use]
 pub fn contact_image(recording: &Recording, bounce: &RecordedBounce) -> Option<Vec<f64>> {
     let (n, m) = (recording.taxels(), bounce.end - bounce.start);

@@ -1,4 +1,4 @@
-//! One contact of the ball or of a finger, as recorded or with its taxels relabelled.
+//! One contact of the ball or of a finger, as recorded or with relabelled taxels.
 
 use super::bounces::{RecordedBounce, contact_image};
 use super::touches::RecordedTouch;

@@ -1,4 +1,4 @@
-//! Ways to tell a place from measurements. A new one is a type here and a line in [`LOCATORS`].
+//! Algorithms that locate a contact. A new one is a type here and a line in [`LOCATORS`].
 
 use crate::decoders::quarter;
 use crate::training::Dictionary;
@@ -25,7 +25,7 @@ pub(super) trait Locate {
 
 pub(super) type StartLocator = for<'a> fn(&'a Tools, &'a Press) -> Box<dyn Locate + 'a>;
 
-/// What the locator `name` is called in figures and printed tables.
+/// Label of the locator `name` in figures and printed tables.
 #[must_use]
 pub fn locator_label(name: &str) -> &str {
     match name {
@@ -122,7 +122,7 @@ impl Locate for Pursuit<'_> {
 /// Posterior mean over blobs.
 struct Blob<'a> {
     tools: &'a Tools,
-    /// φᵀ·blob of every blob, for every measurement; what cannot be projected is left empty.
+    /// φᵀ·blob of every blob for every measurement; empty if the projection fails.
     projected: Vec<Vec<f64>>,
     evidence: BlobEvidence,
 }

@@ -1,4 +1,4 @@
-//! Where the bouncing ball or a finger is: from windows of measurements to places.
+//! Locates the bouncing ball or a finger from windows of measurements.
 
 mod bounces;
 mod contact;
@@ -48,7 +48,8 @@ pub(crate) fn localise(
     Ok(found.iter().filter_map(Located::localisation_row).collect())
 }
 
-/// Rows of every locator at every M of `measurements`, as recorded and relabelled, by windows of every kind of `sensing`.
+/// Rows of every locator at every M of `measurements`, as recorded and relabelled, by windows of every kind of
+/// `sensing`.
 ///
 /// # Errors
 /// [`ScoreError::Place`] when the sheet is no grid of `cols` columns, [`ScoreError::Rows`] when no rows can be chosen.
@@ -99,8 +100,8 @@ pub(crate) fn touch_places(
     Ok(found.iter().filter_map(|row| row.place_row(name)).collect())
 }
 
-/// Mean distance, taxels, between the touched taxel of `touches` and the one that explains most of a window of M
-/// measurements on its own (locator `taxel`), for every M of `measurements` and all windows; `None` without a window.
+/// Mean distance, taxels, between the touched taxel of `touches` and the taxel that alone explains most of a window
+/// (locator `taxel`), over all windows, for every M of `measurements`; `None` without a window.
 #[must_use]
 pub fn touch_errors_px(recording: &Recording, touches: &[RecordedTouch], measurements: &[usize]) -> Vec<Option<f64>> {
     let cols = recording.layout().cols();

@@ -1,4 +1,4 @@
-//! Lines of the tables of places.
+//! Rows of the localisation tables.
 
 use crate::sensing::Sensing;
 use serde::{Deserialize, Serialize};
@@ -14,17 +14,17 @@ fn ball() -> String {
 /// Localisation of contacts by one decoder at one M.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlaceRow {
-    /// What touched the skin: "ball", or the name of a session of touches.
+    /// Kind of contact: "ball", or the name of a session of touches.
     #[serde(default = "ball")]
     pub contact: String,
     /// Algorithm.
     pub decoder: String,
     /// Number of measurements, M.
     pub m: usize,
-    /// Whether the taxels were relabelled cyclically, so that the contact may be anywhere: as recorded, all drops fall
+    /// Whether the taxels were relabelled cyclically, so that the contact may be anywhere. As recorded, all drops fall
     /// near the middle.
     pub relabelled: bool,
-    /// How the rows of a window come about.
+    /// How the rows of a window are obtained.
     #[serde(default)]
     pub sensing: Sensing,
     /// Mean distance from the true centre, taxels.
@@ -33,10 +33,10 @@ pub struct PlaceRow {
     pub share_under_1px: f64,
 }
 
-/// One line of the published localisation.
+/// One row of the published localisation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LocalisationRow {
-    /// Decode.
+    /// Decoding variant.
     pub decode: &'static str,
     /// Number of measurements.
     pub m: usize,

@@ -1,4 +1,4 @@
-//! A touch of a skin that may be bent: when it begins and ends, and which taxel is touched.
+//! A touch of a skin, flat or bent: its start and end, and the touched taxel.
 
 use crate::chunk::Chunk;
 use crate::untouched::Untouched;
@@ -21,16 +21,16 @@ const MARGIN_FRAMES: usize = 5;
 pub struct RecordedTouch {
     /// Block of the recording.
     pub block: usize,
-    /// First measurement of the touch, to a frame.
+    /// First measurement of the touch, accurate to a frame.
     pub start: usize,
-    /// One past its last measurement, to a frame.
+    /// One past its last measurement, accurate to a frame.
     pub end: usize,
-    /// What the wire shows without a touch, estimated from the frames before it.
+    /// Output without a touch, estimated from the frames before it.
     pub untouched: Untouched,
 }
 
-/// The touch of every block that has one: from the first frame to the last in which the output differs from that of the
-/// untouched skin. The first 20 frames of a block have to be without a touch.
+/// The touch of every block that has one: from the first to the last frame in which the output differs from that of the
+/// untouched skin. There must be no touch in the first 20 frames of a block.
 #[must_use]
 pub fn find_touches(recording: &Recording) -> Vec<RecordedTouch> {
     let blocks = 0..recording.blocks().len();
@@ -76,7 +76,7 @@ fn levels(recording: &Recording, block: usize, untouched: &Untouched) -> Vec<f64
 }
 
 impl RecordedTouch {
-    /// The least-squares image of the whole touch, without the untouched skin, V.
+    /// The least-squares image of the whole touch minus the untouched skin, V.
     #[must_use]
     pub fn image(&self, recording: &Recording) -> Option<Vec<f64>> {
         let mut image = Chunk::new(recording, self.block, self.start, self.end - self.start)
@@ -88,14 +88,14 @@ impl RecordedTouch {
         Some(image)
     }
 
-    /// The touched taxel: the largest of [`RecordedTouch::image`].
+    /// The touched taxel: the largest value of [`RecordedTouch::image`].
     #[must_use]
     pub fn taxel(&self, recording: &Recording) -> Option<usize> {
         let image = self.image(recording)?;
         (0..image.len()).max_by(|a, b| image[*a].total_cmp(&image[*b]))
     }
 
-    /// Measurements in the middle of the touch, at most `most`, without the output of the untouched skin.
+    /// At most `most` measurements in the middle of the touch, minus the output of the untouched skin.
     #[must_use]
     pub fn press(&self, recording: &Recording, most: usize) -> Press {
         let len = (self.end - self.start).min(most);

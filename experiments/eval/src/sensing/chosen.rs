@@ -1,4 +1,4 @@
-//! Rows chosen from those that a press was recorded with.
+//! Selects rows among those with which a press was recorded.
 
 use crate::training::{LearnError, TrainingData};
 use crate::windows::Press;
@@ -17,7 +17,7 @@ const CANDIDATES: [usize; 2] = [3, 4];
 /// Noise of a measurement that rows are chosen with, as a share of the root mean square of a random row's sum.
 const NOISE: f64 = RowTask::NOISE;
 
-/// Chooses rows for what a decoder has learned: it knows neither the object that is scored nor any sample.
+/// Selects rows for the training data of a decoder. It knows neither the scored object nor any sample.
 #[derive(Debug, Clone)]
 pub struct RowChooser {
     images: Expected,
@@ -25,10 +25,10 @@ pub struct RowChooser {
 }
 
 impl RowChooser {
-    /// For images and classes like those of `data`.
+    /// A chooser for images and classes like those of `data`.
     ///
     /// # Errors
-    /// [`LearnError`] when they make no prior.
+    /// [`LearnError`] if they make no prior.
     pub fn new(data: &TrainingData) -> Result<Self, LearnError> {
         let prior = data.prior(ImagePrior::UNSEEN)?;
         let templates = &data.templates;

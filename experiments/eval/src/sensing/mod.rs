@@ -1,8 +1,8 @@
-//! Which measurements of a recording make a window: those that follow each other, or rows that are chosen.
+//! Which measurements of a recording form a window: consecutive ones, or those with selected rows.
 //!
-//! A held press streams thousands of random rows at a constant image, so that any set of rows that a rule chooses
-//! without a look at the samples can be scored on real samples. The order of time is lost: what a cell remembers of the
-//! row before, and what changes during the press, is that of the press and not of the window.
+//! A held press contains thousands of random rows of a constant image. Any set of rows that a rule selects without
+//! looking at the samples can therefore be scored on real samples. The order in time is lost: memory effects of the
+//! cells, and changes during the press, are those of the recording and not of the window.
 
 mod chosen;
 
@@ -11,19 +11,25 @@ pub(crate) use chosen::chosen_places;
 
 use serde::{Deserialize, Serialize};
 
-/// How the rows of a window come about.
+/// How the rows of a window are obtained.
+///
+/// ```
+/// use spts_eval::Sensing;
+///
+/// assert_eq!(Sensing::ALL.map(Sensing::name), ["random", "chosen"]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sensing {
-    /// Consecutive measurements, at the rows that the cells put out.
+    /// Consecutive measurements, with the rows that the cells put out.
     #[default]
     Random,
-    /// Rows chosen from those of a press for what the decoder has learned, before any sample is seen.
+    /// Rows selected from those of a press for the decoder's training data, before any sample is used.
     Chosen,
 }
 
 impl Sensing {
-    /// All of them.
+    /// Both ways.
     pub const ALL: [Self; 2] = [Self::Random, Self::Chosen];
 
     /// Name on the command line and in files.

@@ -1,4 +1,4 @@
-//! Everything an algorithm may know before it sees a compressive measurement.
+//! Training data: everything that an algorithm may know before it gets a compressive measurement.
 
 use super::dictionary::{Dictionary, learn_dictionary};
 use super::error::LearnError;
@@ -22,26 +22,38 @@ use std::sync::{Arc, OnceLock};
 const POSES_OF_A_LIBRARY: usize = 30;
 
 /// Dictionary, library, templates and images for priors.
+///
+/// ```
+/// use spts_eval::training::TrainingData;
+/// use spts_models::Streams;
+/// use spts_recon::Matrix;
+///
+/// // one image of each of two classes, on a sheet of 2 × 2 taxels
+/// let images = Matrix::from_columns(4, 2, &[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]).unwrap();
+/// let data = TrainingData::of_images(images, &[1, 2], 2, Streams::new(1))?;
+/// assert_eq!((data.shape, data.templates.labels()), ([2, 2], &[1, 2][..]));
+/// # Ok::<(), spts_eval::training::LearnError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct TrainingData {
     /// Rows and columns of the sheet.
     pub shape: [usize; 2],
-    /// Labelled images for the classifier by images.
+    /// Labelled images for classification by images.
     pub library: Library,
-    /// One labelled mean image an object.
+    /// One labelled mean image for each object.
     pub templates: Library,
     /// Images for priors, taxels × images.
     pub images: Matrix,
-    /// γ: relative standard deviation of the scored skin's gains from those of the skins learned from, one value a
+    /// γ: relative standard deviation of the scored skin's gains compared with those of the training skins, one value a
     /// taxel; empty for the same skin.
     pub gain_sd: Vec<f64>,
-    /// Whether the images are of random shapes, which lie anywhere already.
+    /// Whether the images show random shapes, which already lie anywhere.
     random_shapes: bool,
-    /// The same images, all taxels with the same gain, where a simulation knows them.
+    /// The same images with equal gains of all taxels, if a simulation knows them.
     alike: Option<Arc<Matrix>>,
-    /// Labels of these images, where they are of named objects in many poses.
+    /// Labels of these images, if they show named objects in many poses.
     posed: Option<Arc<Vec<usize>>>,
-    /// The network that was named; the one that ships otherwise.
+    /// The requested network; `None` for the one shipped with the program.
     network: Option<TrainedNetwork>,
     candidates: Arc<Vec<Vec<f64>>>,
     streams: Streams,
@@ -49,14 +61,14 @@ pub struct TrainingData {
 }
 
 impl TrainingData {
-    /// Most taxels of a skin of which nothing was recorded: the sums of signs of its dictionary take 1 GiB.
+    /// Largest number of taxels of a skin without recordings: the sign tables of its dictionary take 1 GiB.
     pub const MOST_TAXELS: usize = 2048;
 
-    /// Learns from `training` on a sheet of `cols` columns; the dictionary is learned with `streams` when it is asked
-    /// for.
+    /// Training data from `training`, for a sheet with `cols` columns. The dictionary is learned with `streams` on
+    /// request.
     ///
     /// # Errors
-    /// [`LearnError::Library`] when there is nothing to learn from.
+    /// [`LearnError::Library`] if there is no training image.
     pub fn new(
         training: &[TrainingPresses<'_>],
         cols: usize,
@@ -80,10 +92,10 @@ impl TrainingData {
         })
     }
 
-    /// Learns from `simulated` presses at gain 1 as skins with these `gains` show them.
+    /// Training data from `simulated` presses at gain 1, as skins with these `gains` would record them.
     ///
     /// # Errors
-    /// As [`Self::new`]; [`LearnError::Recording`] when a gain makes a sample infinite.
+    /// As [`Self::new`]; [`LearnError::Recording`] if a gain makes a sample infinite.
     pub fn of_skin(
         simulated: &[ScoredSession],
         gains: &TaxelGains,
@@ -95,14 +107,14 @@ impl TrainingData {
         Self::new(&training, cols, gain_sds(gains), streams)
     }
 
-    /// What the `images` (taxels × images) of a sheet of `cols` columns and their `labels` tell; the dictionary is
-    /// learned from them, with `streams`, when it is asked for. Negative values count as they are.
+    /// Training data from `images` (taxels × images) of a sheet with `cols` columns, and their `labels`. The dictionary
+    /// is learned with `streams` on request. Negative values are used as they are.
     ///
     /// # Errors
-    /// [`LearnError::Library`] when no image is different from zero.
+    /// [`LearnError::Library`] if all images are zero.
     ///
     /// # Panics
-    /// When there is not one label an image.
+    /// If the number of labels differs from that of the images.
     pub fn of_images(images: Matrix, labels: &[usize], cols: usize, streams: Streams) -> Result<Self, LearnError> {
         assert_eq!(images.ncols(), labels.len(), "labels");
         let columns: Vec<Vec<f64>> = (0..images.ncols()).map(|k| images.column(k)).collect();
@@ -138,12 +150,12 @@ impl TrainingData {
         })
     }
 
-    /// What may be known of a skin of this layout when nothing was recorded of it: images of random shapes for priors,
-    /// a dictionary of blobs, and no class.
+    /// Training data for a skin of this layout without any recording: images of random shapes for priors, a dictionary
+    /// of blobs, and no classes.
     ///
     /// # Errors
-    /// [`LearnError::TooLarge`] for more than [`TrainingData::MOST_TAXELS`], [`LearnError::Library`] when the images
-    /// cannot be used.
+    /// [`LearnError::TooLarge`] for more than [`TrainingData::MOST_TAXELS`], [`LearnError::Library`] if the images are
+    /// not usable.
     pub fn for_layout(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
         let (taxels, most) = (skin.taxels(), Self::MOST_TAXELS);
         if taxels > most {
@@ -168,11 +180,11 @@ impl TrainingData {
         })
     }
 
-    /// The same with images of the procedural shapes in place of random outlines: pressed in the simulation on taxels
-    /// whose gains scatter as a skin's do.
+    /// As [`Self::for_layout`], with images of procedural shapes instead of random outlines: pressed in the simulation,
+    /// on taxels with the usual spread of gains.
     ///
     /// # Errors
-    /// As [`Self::for_layout`]; [`LearnError::Shapes`] when no shape can be pressed on the skin.
+    /// As [`Self::for_layout`]; [`LearnError::Shapes`] if no shape can be pressed on the skin.
     pub fn for_shapes(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
         let data = Self::for_layout(skin, streams)?;
         let alike = shape_images(skin, streams.rng("shapes", 0).random())?;
@@ -183,8 +195,8 @@ impl TrainingData {
         })
     }
 
-    /// What the `objects`, each with its label, tell in all their poses, on a sheet of `cols` columns whose gains
-    /// nobody knows.
+    /// Training data from `objects`, each with its label, in all their poses, for a sheet with `cols` columns and
+    /// unknown gains.
     ///
     /// # Errors
     /// As [`Self::of_images`].
@@ -213,20 +225,19 @@ impl TrainingData {
         })
     }
 
-    /// Images of objects in many poses, all taxels of the same gain, with their labels; `None` where the poses are
-    /// known.
+    /// Images of objects in many poses with equal gains of all taxels, and their labels; `None` if the poses are known.
     #[must_use]
     pub fn posed(&self) -> Option<(&Matrix, &[usize])> {
         Some((self.alike(), self.posed.as_ref()?.as_slice()))
     }
 
-    /// The same with the network that decoders are to use.
+    /// The same training data with the network for decoders that use one.
     #[must_use]
     pub fn with_network(self, network: Option<TrainedNetwork>) -> Self {
         Self { network, ..self }
     }
 
-    /// Images for mixtures, taxels × images: without the gains of single taxels where a simulation knows them.
+    /// Images for mixtures, taxels × images; with equal gains of all taxels if a simulation knows them.
     #[must_use]
     pub fn alike(&self) -> &Matrix {
         self.alike.as_deref().unwrap_or(&self.images)
@@ -235,14 +246,14 @@ impl TrainingData {
     /// The network for this sheet.
     ///
     /// # Errors
-    /// [`LearnError::Network`] when it is for another one.
+    /// [`LearnError::Network`] if it is for another sheet.
     pub fn network(&self) -> Result<Arc<Unrolled>, LearnError> {
         let network = self.network.clone().unwrap_or_else(TrainedNetwork::shipped);
         Ok(network.on(self.shape)?)
     }
 
-    /// Dictionary and library of `learned` and nothing else: its images also stand for the templates and the images of
-    /// priors.
+    /// Training data with only the dictionary and library of `learned`. The library's images also serve as templates
+    /// and as images for priors.
     #[must_use]
     pub fn given(learned: &Learned) -> Self {
         let library = learned.classifier.library().clone();
@@ -262,7 +273,7 @@ impl TrainingData {
         }
     }
 
-    /// The same with a dictionary and a library that were given.
+    /// The same training data with the given dictionary and library.
     #[must_use]
     pub fn with_published(mut self, dictionary: &Matrix, library: &Library) -> Self {
         self.dictionary = OnceLock::from(Arc::new(Dictionary::new(dictionary.clone())));
@@ -270,7 +281,7 @@ impl TrainingData {
         self
     }
 
-    /// The dictionary that was given, or one by K-SVD with the published preprocessing.
+    /// The given dictionary, or one learned by K-SVD with the published preprocessing.
     ///
     /// # Errors
     /// [`LearnError::Dictionary`].
@@ -284,7 +295,7 @@ impl TrainingData {
         Ok(Arc::clone(self.dictionary.get_or_init(|| learned)))
     }
 
-    /// Prior of images, cleaned and moved about as `how` says.
+    /// A prior of the images, cleaned and shifted as `how` says.
     ///
     /// # Errors
     /// [`LearnError::Prior`].

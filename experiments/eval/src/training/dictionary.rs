@@ -1,4 +1,4 @@
-//! Dictionaries: atoms with the tables by which rows of Φ·D are looked up, and how they are learned.
+//! Dictionaries: atoms with look-up tables for rows of Φ·D, and how they are learned.
 
 use rand::seq::SliceRandom as _;
 use spts_models::Streams;
@@ -6,19 +6,32 @@ use spts_recon::dictionary::{DictionaryError, Ksvd, Selection, select};
 use spts_recon::{Matrix, MatrixView, SignTables};
 use std::ops::Range;
 
-/// A dictionary with its tables, by which rows of Φ·D are looked up.
+/// A dictionary with look-up tables for rows of Φ·D.
+///
+/// ```
+/// use spts_eval::training::Dictionary;
+/// use spts_recon::Matrix;
+///
+/// let dictionary = Dictionary::new(Matrix::from_columns(3, 1, &[1.0, 2.0, 4.0]).unwrap());
+/// let phi = Matrix::from_rows(1, 3, vec![1.0, -1.0, 1.0]).unwrap();
+/// let mut row = [0.0];
+/// dictionary.project(phi.view(), None, &mut row);
+/// assert_eq!(row, [3.0]);
+/// dictionary.to_unit_weights(&mut row); // the weights {1, 0, 1}
+/// assert_eq!(row, [5.0]);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Dictionary {
     /// Atoms, taxels × K.
     pub atoms: Matrix,
     /// Look-up tables of the atoms.
     pub tables: SignTables<f64>,
-    /// Σ over the taxels of every atom: Φ·D with weights {0, 1} is (Φ·D with ±1 + this) / 2.
+    /// Sum over the taxels of every atom. Φ·D with weights {0, 1} is (Φ·D with ±1 + this sum) / 2.
     pub sums: Vec<f64>,
 }
 
 impl Dictionary {
-    /// Dictionary of `atoms`, taxels × K.
+    /// The dictionary of `atoms`, taxels × K.
     #[must_use]
     pub fn new(atoms: Matrix) -> Self {
         Self {
@@ -28,7 +41,7 @@ impl Dictionary {
         }
     }
 
-    /// Rows of Φ·D for the rows `phi` of Φ, by look-ups where `signs` has the weights as bits.
+    /// Computes rows of Φ·D for the rows `phi` of Φ, by look-up if `signs` holds the weights as bits.
     pub fn project(&self, phi: MatrixView<'_>, signs: Option<&[u64]>, out: &mut [f64]) {
         if let Some(signs) = signs {
             return self.tables.fill_rows(signs, out);
@@ -40,7 +53,7 @@ impl Dictionary {
         }
     }
 
-    /// Turns rows of Φ·D with weights ±1 into those with weights {0, 1}.
+    /// Turns rows of Φ·D with weights ±1 into rows with weights {0, 1}.
     pub fn to_unit_weights(&self, rows: &mut [f64]) {
         for row in rows.chunks_exact_mut(self.sums.len().max(1)) {
             row.iter_mut().zip(&self.sums).for_each(|(a, s)| *a = 0.5 * (*a + s));
@@ -48,14 +61,14 @@ impl Dictionary {
     }
 }
 
-/// How much the published decoder learns from.
+/// Amount of training data for the published decoder.
 #[derive(Debug, Clone)]
 pub struct Learning {
-    /// Raster presses of every object that are learned from.
+    /// Raster presses of every object that are used for training.
     pub presses: Range<usize>,
-    /// Most training images of the dictionary.
+    /// Largest number of training images of the dictionary.
     pub training_images: usize,
-    /// Sweeps of the dictionary learning.
+    /// Number of sweeps of the dictionary learning.
     pub sweeps: usize,
 }
 

@@ -1,4 +1,4 @@
-//! Why nothing could be learned.
+//! Errors of training.
 
 use super::gains::SkinGainsError;
 use super::network::NetworkError;
@@ -8,40 +8,40 @@ use spts_recon::classify::LibraryError;
 use spts_recon::dictionary::DictionaryError;
 use spts_recon::recover::{ParameterError, PriorError, SequentialError};
 
-/// Why nothing could be learned.
+/// Why a decoder cannot be trained.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LearnError {
-    /// A skin that is too large for decoders that keep matrices of its taxels.
+    /// The skin is too large for decoders that keep matrices of its taxels.
     #[error("taxels = {taxels} is outside [1, {most}]: the decoders keep matrices of taxels × taxels")]
     TooLarge {
         /// Number of taxels.
         taxels: usize,
-        /// Most that they take.
+        /// Largest number of taxels.
         most: usize,
     },
     /// No raster image is strong enough for a dictionary.
     #[error("dictionary: {0}")]
     Dictionary(#[from] DictionaryError),
-    /// No raster image for the library.
+    /// There is no raster image for the library.
     #[error("library: {0}")]
     Library(#[from] LibraryError),
-    /// No raster image for the prior.
+    /// There is no raster image for the prior.
     #[error("prior: {0}")]
     Prior(#[from] PriorError),
     /// A parameter of a decoder is out of its range.
     #[error("parameter: {0}")]
     Parameter(#[from] ParameterError),
-    /// The templates make no classifier.
+    /// No classifier can be made from the templates.
     #[error("templates: {0}")]
     Evidence(#[from] spts_recon::classify::EvidenceError),
-    /// The prior makes no sequential estimate.
+    /// No sequential estimate can be made from the prior.
     #[error("prior: {0}")]
     Sequential(#[from] SequentialError),
-    /// No rows can be chosen for what was learned.
+    /// No rows can be selected for the training data.
     #[error("rows: {0}")]
     Rows(#[from] spts_recon::rows::RowError),
-    /// A range is not one.
+    /// A range is not valid.
     #[error("range: {0}")]
     Range(#[from] RangeError),
     /// The gains of the skin are not known.
@@ -50,10 +50,10 @@ pub enum LearnError {
     /// No shapes can be pressed on the skin.
     #[error("shapes: {0}")]
     Shapes(#[source] Box<ShapesError>),
-    /// The network that was trained cannot be used.
+    /// The network cannot be used.
     #[error("{0}")]
     Network(#[source] Box<NetworkError>),
-    /// Gains make a sample infinite.
+    /// A gain makes a sample infinite.
     #[error("gains: {0}")]
     Recording(#[from] spts_circuit::RecordingError),
 }

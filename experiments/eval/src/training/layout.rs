@@ -1,4 +1,4 @@
-//! What decoders may know of a skin that nothing was recorded of: images of random shapes pressed anywhere on it.
+//! Training data for a skin without recordings: images of random shapes pressed anywhere on it.
 
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;

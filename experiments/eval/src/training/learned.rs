@@ -1,4 +1,4 @@
-//! What the published decoder has learned: a dictionary and a library.
+//! Training results of the published decoder: a dictionary and a library.
 
 use super::dictionary::{Dictionary, Learning, learn_dictionary};
 use super::error::LearnError;
@@ -10,15 +10,15 @@ use spts_recon::classify::{Library, Src};
 use spts_recon::dictionary::shifted;
 use std::sync::Arc;
 
-/// Reach of the shifted dictionary when none is published, taxels.
+/// Reach of the shifted dictionary if none is published, taxels.
 pub const SHIFT_REACH: usize = 2;
 
-/// What the published decoder has learned.
+/// Training results of the published decoder.
 #[derive(Debug, Clone)]
 pub struct Learned {
     /// Dictionary.
     pub dictionary: Arc<Dictionary>,
-    /// Dictionary with its shifted copies, for contacts at places that were never learned, taxels × atoms.
+    /// The dictionary with shifted copies, for contacts at untrained places, taxels × atoms.
     pub shifted: Matrix,
     /// Classifier.
     pub classifier: Arc<Src>,
@@ -27,8 +27,8 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// What is learned from a dictionary (taxels × atoms), its shifted copies, which are made where there are none, and
-    /// a library, of an array of `cols` columns.
+    /// Combines a dictionary (taxels × atoms), its shifted copies (computed if not given) and a library, for an array
+    /// with `cols` columns.
     #[must_use]
     pub fn new(dictionary: Matrix, shifted_copies: Option<Matrix>, library: Library, cols: usize) -> Self {
         Self {
@@ -40,10 +40,10 @@ impl Learned {
     }
 
     /// Learns a dictionary by K-SVD (published preprocessing) and a library from the raster recordings of `sessions`,
-    /// of an array of `cols` columns.
+    /// for an array with `cols` columns.
     ///
     /// # Errors
-    /// [`LearnError`] when no raster image is strong enough to learn from.
+    /// [`LearnError`] if no raster image is strong enough.
     pub fn learn(
         sessions: &[ScoredSession],
         learning: &Learning,

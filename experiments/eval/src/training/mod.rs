@@ -1,4 +1,4 @@
-//! What decoders are trained with: raster images of sessions, of simulated skins, or random shapes on a layout.
+//! Training data of decoders: raster images of sessions, of simulated skins, or of random shapes on a layout.
 
 mod data;
 mod dictionary;

@@ -1,4 +1,4 @@
-//! Weights of the decoder `amortised`: the ones that ship, or a file of one's own.
+//! Weights of the decoder `amortised`: those shipped with the program, or a file.
 
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
 use spts_recon::Matrix;
@@ -13,7 +13,16 @@ const LARGEST: u64 = 1 << 30;
 /// What files say that they are.
 const KIND: &str = "spts amortised 1";
 
-/// A network and the grid that it is for.
+/// A network, and the grid for which it was trained.
+///
+/// ```
+/// use spts_eval::training::TrainedNetwork;
+///
+/// let network = TrainedNetwork::shipped();
+/// assert!(network.on([10, 10]).is_ok());
+/// let error = network.on([12, 20]).err().expect("another sheet");
+/// assert!(error.to_string().contains("`amortised` has weights for 10 × 10 taxels"));
+/// ```
 #[derive(Debug, Clone)]
 pub struct TrainedNetwork {
     /// Rows and columns of the sheet.
@@ -29,15 +38,15 @@ pub enum NetworkError {
     /// The file cannot be read.
     #[error(transparent)]
     Read(#[from] spts_input::InputError),
-    /// The file is none of safetensors.
-    #[error("{path}: no file of weights: {reason}")]
+    /// The file is not in safetensors format.
+    #[error("{path}: not a file of weights in safetensors format: {reason}")]
     Format {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// Cause.
         reason: String,
     },
-    /// The weights make no network.
+    /// The weights do not form a network.
     #[error("{path}: {source}")]
     Weights {
         /// The file.
@@ -52,7 +61,7 @@ pub enum NetworkError {
         .weights[0], .weights[1], .skin[0], .skin[1]
     )]
     Shape {
-        /// Rows and columns that the weights are for.
+        /// Rows and columns for which the weights are.
         weights: [usize; 2],
         /// Rows and columns of the skin.
         skin: [usize; 2],
@@ -60,7 +69,7 @@ pub enum NetworkError {
 }
 
 impl TrainedNetwork {
-    /// The network that ships, for the published skin of 10 × 10 taxels.
+    /// The network shipped with the program, for the published skin of 10 × 10 taxels.
     ///
     /// # Panics
     /// Never: a test reads it.
@@ -73,10 +82,10 @@ impl TrainedNetwork {
         NETWORK.clone()
     }
 
-    /// The network whose weights are in the file at `path`, as `python -m spts.amortised` writes it.
+    /// Reads a network from the file at `path`, as written by `python -m spts.amortised`.
     ///
     /// # Errors
-    /// [`NetworkError`] when the file cannot be read or holds no such network.
+    /// [`NetworkError`] if the file cannot be read, or holds no such network.
     pub fn open(path: &Path) -> Result<Self, NetworkError> {
         Self::parse(&spts_input::read(path, LARGEST)?, path)
     }
@@ -129,10 +138,10 @@ impl TrainedNetwork {
         })
     }
 
-    /// The network, for a sheet of `skin` rows and columns.
+    /// The network, for a sheet with `skin` rows and columns.
     ///
     /// # Errors
-    /// [`NetworkError::Shape`] when it is for another one.
+    /// [`NetworkError::Shape`] if it is for another sheet.
     pub fn on(&self, skin: [usize; 2]) -> Result<Arc<Unrolled>, NetworkError> {
         if self.shape == skin {
             Ok(Arc::clone(&self.network))

@@ -1,4 +1,4 @@
-//! The objects pressed in the simulation by somebody who does not know exactly how they lie.
+//! Simulated presses of the objects in approximately known poses.
 
 use super::shapes::{ShapesError, scaled};
 use rayon::prelude::*;
@@ -7,17 +7,17 @@ use spts_dataset::{Maker, Spec};
 use spts_models::{SkinLayout, Streams};
 use spts_recon::Matrix;
 
-/// What is known of how an object lies: its place to half a taxel and its rotation to 15°, as read off by eye; nothing
-/// of its tilt.
+/// How accurately the pose of an object is known: its place to half a taxel and its rotation to 15°, as read by eye;
+/// its tilt is unknown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PoseKnowledge {
     /// Step to which a place is known along each axis, m.
     pub place_step_m: f64,
-    /// Standard deviation about it, m.
+    /// Standard deviation of the place about the step, m.
     pub place_sd_m: f64,
     /// Step to which a rotation is known, degrees.
     pub rotation_step_deg: f64,
-    /// Standard deviation about it, degrees.
+    /// Standard deviation of the rotation about the step, degrees.
     pub rotation_sd_deg: f64,
     /// Standard deviation of the tilt about each axis of the skin, degrees.
     pub tilt_sd_deg: f64,
@@ -46,16 +46,16 @@ const MIDDLE: f64 = 4.5;
 pub struct PosedObject {
     /// Name.
     pub name: &'static str,
-    /// Taxels × presses, all taxels of the same gain, each image scaled to a maximum of 1.
+    /// Taxels × presses, with equal gains of all taxels; each image is scaled to a maximum of 1.
     pub images: Matrix,
 }
 
 impl PoseKnowledge {
-    /// Images of all objects on a skin of this `layout`, on which they keep their metres from the middle. A function of
-    /// the layout and of `seed`; `done` is called after every object.
+    /// Images of all objects on a skin of this `layout`, at the same distances in metres from the middle. The result
+    /// depends only on the layout and `seed`. `done` is called after every object.
     ///
     /// # Errors
-    /// [`ShapesError`] when they cannot be pressed there.
+    /// [`ShapesError`] if the objects cannot be pressed there.
     pub fn press(
         &self,
         layout: &SkinLayout,

@@ -1,4 +1,4 @@
-//! Raster presses that are learned from, and the images taken of them.
+//! Raster presses for training, and the images made from them.
 
 use crate::protocol::{PLATEAU, PUBLISHED_RATE_HZ, PUBLISHED_TAXELS};
 use crate::session::ScoredSession;
@@ -18,18 +18,18 @@ const LIBRARY_IMAGES: usize = 10;
 /// Frames of a press that a prior is learned from: early, middle and late on the plateau.
 const PRIOR_FRAMES: [usize; 3] = [520, 580, 640];
 
-/// A raster recording and those of its presses that are learned from.
+/// A raster recording, and which of its presses are used for training.
 #[derive(Debug, Clone)]
 pub struct TrainingPresses<'a> {
     label: usize,
     raster: &'a Recording,
-    /// Frames of the hold of this recording; it begins with [`PLATEAU`] in the published recordings.
+    /// Frames of the hold of this recording; in the published recordings it begins with [`PLATEAU`].
     hold: Range<usize>,
     presses: Vec<usize>,
 }
 
 impl<'a> TrainingPresses<'a> {
-    /// The presses `presses` of `session`, as far as there are any; `None` without a raster recording.
+    /// The presses `presses` of `session`, as far as they exist; `None` without a raster recording.
     #[must_use]
     pub fn within(session: &'a ScoredSession, presses: &Range<usize>) -> Option<Self> {
         let raster = session.raster.as_ref().filter(|_| !session.shared_raster)?;
@@ -45,7 +45,7 @@ impl<'a> TrainingPresses<'a> {
         })
     }
 
-    /// All presses of `session` that are neither scored nor the truth; `None` without a raster recording.
+    /// All presses of `session` that are neither scored nor ground truth; `None` without a raster recording.
     #[must_use]
     pub fn unscored(session: &'a ScoredSession) -> Option<Self> {
         let all = Self::all(session)?;
@@ -65,7 +65,7 @@ impl<'a> TrainingPresses<'a> {
         Self::within(session, &(0..usize::MAX))
     }
 
-    /// The same presses as those of the class `label`.
+    /// The same presses, with the class `label`.
     #[must_use]
     pub fn labelled(self, label: usize) -> Self {
         Self { label, ..self }
@@ -119,7 +119,7 @@ impl<'a> TrainingPresses<'a> {
     }
 }
 
-/// Candidates for a dictionary's training set, in the order presses, frames, sessions.
+/// Candidates for a dictionary's training images, in order of press, frame, session.
 #[must_use]
 pub fn training_images(training: &[TrainingPresses<'_>]) -> Vec<Vec<f64>> {
     let most = training.iter().map(|t| t.presses.len()).max().unwrap_or(0);
@@ -139,15 +139,15 @@ pub fn training_images(training: &[TrainingPresses<'_>]) -> Vec<Vec<f64>> {
 /// Ten plateau images of every object.
 ///
 /// # Errors
-/// [`LibraryError`] when no image is different from zero.
+/// [`LibraryError`] if all images are zero.
 pub fn library(training: &[TrainingPresses<'_>]) -> Result<Library, LibraryError> {
     class_library(training, |t| t.plateau_images().map(<[f64]>::to_vec).collect())
 }
 
-/// One mean image an object. An object without a press is left out.
+/// One mean image for each object. An object without a press is left out.
 ///
 /// # Errors
-/// [`LibraryError`] when no image is different from zero.
+/// [`LibraryError`] if all images are zero.
 pub fn templates(training: &[TrainingPresses<'_>]) -> Result<Library, LibraryError> {
     class_library(training, |t| vec![t.mean_image()])
 }

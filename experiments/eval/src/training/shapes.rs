@@ -1,11 +1,11 @@
-//! Images of procedural shapes, pressed in the simulation on a skin of which nothing was recorded.
+//! Images of procedural shapes, pressed in the simulation on a skin without recordings.
 
 use rayon::prelude::*;
 use spts_dataset::{Maker, RowError, Spec, SpecError};
 use spts_models::SkinLayout;
 use spts_recon::Matrix;
 
-/// The data set that is pressed.
+/// The data set of these shapes.
 pub const SHAPES_SPEC: &str = "unseen-shapes";
 /// Presses for a sheet of 100 taxels: four hundred for each of the thirty clusters of a mixture.
 const PRESSES: u64 = 12_000;
@@ -16,11 +16,11 @@ const FEWEST: u64 = 1_500;
 /// Presses that one maker makes: neighbours share a shape.
 const CHUNK: u64 = 50;
 
-/// Why no shapes can be pressed.
+/// Why shapes cannot be pressed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShapesError {
-    /// The layout makes no data set.
+    /// No data set can be made for the layout.
     #[error(transparent)]
     Spec(#[from] SpecError),
     /// A shape cannot be pressed.
@@ -28,11 +28,11 @@ pub enum ShapesError {
     Row(#[from] RowError),
 }
 
-/// Images of a skin of this `layout` (taxels × presses) under the shapes of [`SHAPES_SPEC`], all taxels of the same
-/// gain, each scaled to a maximum of 1. A function of the layout and of `seed`.
+/// Images of a skin of this `layout` (taxels × presses) under the shapes of [`SHAPES_SPEC`], with equal gains of all
+/// taxels, each scaled to a maximum of 1. The result depends only on the layout and `seed`.
 ///
 /// # Errors
-/// [`ShapesError`] when the layout is too large to be pressed.
+/// [`ShapesError`] if the layout is too large.
 pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, ShapesError> {
     let presses = (VALUES / layout.taxels().max(1) as u64).clamp(FEWEST, PRESSES);
     let skin: toml::Table = [

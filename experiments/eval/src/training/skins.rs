@@ -1,4 +1,4 @@
-//! Raster presses to learn from on many simulated skins: nobody knows the real one before it was pressed.
+//! Raster presses on many simulated skins for training, because the real skin is unknown before it is pressed.
 
 use crate::labels::Labels;
 use crate::protocol::PUBLISHED_HOLD_S;
@@ -16,26 +16,35 @@ use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_models::{ConfigError, SkinLayout, Streams, VelostatConfig, in_range};
 use std::path::Path;
 
-/// What is scattered from skin to skin.
+/// How simulated skins and presses vary.
+///
+/// ```
+/// use spts_eval::training::Skins;
+/// use spts_models::SkinLayout;
+///
+/// let median = Skins::median(SkinLayout::default());
+/// assert_eq!((median.spread_log_sd, median.force_factor), (0.0, 1.0));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Skins {
-    /// Rows, columns, pitch and electrode of every skin. The objects keep their metres from its middle.
+    /// Layout of every skin. The objects keep their distance in metres from its middle.
     pub layout: SkinLayout,
-    /// Number of skins, on each of which every object is pressed once; [1, 10000].
+    /// Number of skins. Every object is pressed once on each; [1, 10000].
     pub skins: usize,
-    /// Standard deviation of the logarithm of a taxel's gain that all sessions of a skin share; [0, 2].
+    /// Standard deviation of the logarithm of a taxel's gain, common to all sessions of a skin; [0, 2].
     pub spread_log_sd: f64,
-    /// The same for the part of the gain that changes from session to session; [0, 2].
+    /// Standard deviation of the logarithm of the gain's change from session to session; [0, 2].
     pub session_log_sd: f64,
-    /// Standard deviation of an object's place along each axis, m; [0, 0.01].
+    /// Standard deviation of an object's position along each axis, m; [0, 0.01].
     pub position_sd_m: f64,
     /// Standard deviation of an object's rotation about each axis, degrees; [0, 5].
     pub rotation_sd_deg: f64,
-    /// The force of a press is drawn log-uniformly from the default divided by this to the default times this; [1, 4].
+    /// The force of a press is log-uniform between the default divided by this factor and the default times this
+    /// factor; [1, 4].
     pub force_factor: f64,
-    /// The same for the initial stiffness of the foam; [1, 4].
+    /// The same factor for the initial stiffness of the foam; [1, 4].
     pub stiffness_factor: f64,
-    /// Readout profile that scans the presses.
+    /// Readout profile of the raster scans.
     pub readout: &'static str,
 }
 
@@ -59,8 +68,8 @@ impl Default for Skins {
 }
 
 impl Skins {
-    /// Presses on as many median skins: only the arm's repeatability differs from one to the other. They are scanned
-    /// without the faults of a scan, since y = Φx is about the images that are then seen.
+    /// Presses on the same number of median skins, which differ only by the arm's repeatability. They are scanned
+    /// without readout faults, because y = Φx refers to the true images.
     #[must_use]
     pub fn median(layout: SkinLayout) -> Self {
         Self {
@@ -73,7 +82,7 @@ impl Skins {
     }
 }
 
-/// Why there are no simulated presses to learn from.
+/// Why presses cannot be simulated for training.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SkinsError {
@@ -83,15 +92,15 @@ pub enum SkinsError {
     /// The simulation failed.
     #[error("{object}: {source}")]
     Twin {
-        /// What was pressed.
+        /// Name of the object.
         object: &'static str,
         /// Cause.
         source: TwinError,
     },
-    /// The presses do not make a session.
+    /// The presses do not form a session.
     #[error("{object}: {source}")]
     Session {
-        /// What was pressed.
+        /// Name of the object.
         object: &'static str,
         /// Cause.
         source: RecordingError,
@@ -99,11 +108,12 @@ pub enum SkinsError {
 }
 
 impl Skins {
-    /// Presses every object once on every skin: sessions in label order, block k of each raster session from skin k,
-    /// nothing compressive. A function of `seed` alone; `done` is called after every press.
+    /// Presses every object once on every skin. The sessions are in order of label; block k of each raster session is
+    /// from skin k, and there are no compressive recordings. The result depends only on `seed`. `done` is called after
+    /// every press.
     ///
     /// # Errors
-    /// [`SkinsError`] for a parameter outside its range, or when the simulation fails.
+    /// [`SkinsError`] for a parameter outside its range, or if the simulation fails.
     pub fn press(&self, seed: u64, done: &(dyn Fn() + Sync)) -> Result<Vec<ScoredSession>, SkinsError> {
         self.check()?;
         let labels = Labels::default();

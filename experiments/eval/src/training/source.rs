@@ -1,27 +1,27 @@
-//! Where decoders get their training data from.
+//! Sources of training data.
 
 use super::poses::PosedObject;
 use crate::session::ScoredSession;
 use spts_models::TaxelGains;
 
-/// Name of the dictionary and library that were published with the recordings.
+/// Name of the dictionary and library published with the recordings.
 pub const PUBLISHED: &str = "published";
-/// Name of what was learned from raster presses of the scored recordings themselves.
+/// Name of training data from raster presses of the scored recordings themselves.
 pub const RASTER: &str = "raster";
-/// Name of what is known of a skin that nothing may be learned from: random shapes on its layout.
+/// Name of training data for a skin without usable recordings: random shapes on its layout.
 pub const LAYOUT: &str = "layout";
 /// Name of [`TrainingSource::Shapes`].
 pub const SHAPES: &str = "shapes";
-/// Name of [`TrainingSource::Calibrated`] with the scored recordings' own gains.
+/// Name of [`TrainingSource::Calibrated`] with gains estimated from the scored recordings.
 pub const CALIBRATED: &str = "calibrated";
 
-/// Where decoders get their training data from.
+/// A source of training data.
 #[derive(Debug, Clone)]
 pub enum TrainingSource {
-    /// Dictionary and library as published beside the recordings, where they are; everything else as
+    /// Dictionary and library as published with the recordings, if they exist; everything else as
     /// [`TrainingSource::Raster`].
     Published,
-    /// Raster presses of the scored recordings that are not scored.
+    /// Raster presses of the scored recordings that are not scored themselves.
     Raster,
     /// Raster presses of other recordings.
     Other {
@@ -29,28 +29,29 @@ pub enum TrainingSource {
         name: String,
         /// The recordings.
         sessions: Vec<ScoredSession>,
-        /// Whether all presses are learned from, as of a twin. Of a real skin, presses that would be scored are not: it
-        /// may be the scored skin.
+        /// Whether all presses are used, as for a twin. For a real skin, presses that would be scored are excluded,
+        /// because it may be the scored skin.
         all: bool,
         /// γ: relative standard deviation of the gains between that skin and the scored one; 0 for the same skin.
         gain_sd: f64,
     },
-    /// Procedural shapes pressed in the simulation: nothing recorded, and no object that is scored.
+    /// Procedural shapes pressed in the simulation: no recording, and no scored object.
     Shapes,
-    /// The objects pressed in the simulation in all the poses that they may have; the name on the board beside them.
+    /// The objects, pressed in the simulation in all possible poses.
     Poses {
         /// Name on the board.
         name: String,
         /// The objects.
         objects: Vec<PosedObject>,
     },
-    /// Raster presses simulated at gain 1, on skins that may be the scored one: with gains drawn from their posterior.
+    /// Raster presses simulated at gain 1, recorded on possible versions of the scored skin: gains are drawn from their
+    /// posterior.
     Calibrated {
         /// Name on the board.
         name: String,
         /// The presses.
         simulated: Vec<ScoredSession>,
-        /// The posterior; `None` for that of the unscored raster presses of all objects but the scored one.
+        /// The posterior; `None` to estimate it from the unscored raster presses of all objects but the scored one.
         gains: Option<TaxelGains>,
     },
 }

@@ -4,6 +4,7 @@ mod frames;
 mod picture;
 
 use super::ReportError;
+use super::animation::{ANIMATION_FILE, Animation};
 use super::decode::save_picture;
 use super::figures::encode_png;
 use frames::{FRAME_COLUMNS, MapFiles, frame_row};
@@ -69,6 +70,7 @@ pub const FILES: &[&str] = &[
     "scene_close.png",
     "decoded.png",
     "decoded.svg",
+    ANIMATION_FILE,
     SESSION_FILE,
 ];
 
@@ -134,6 +136,17 @@ impl<'a> SimulationFiles<'a> {
         Ok(())
     }
 
+    /// Writes the `animation` of a press.
+    ///
+    /// # Errors
+    /// [`ReportError`] when the file cannot be written or no font is found.
+    pub fn animate(&self, animation: &Animation) -> Result<(), ReportError> {
+        let path = self.out.path(ANIMATION_FILE);
+        let gif = animation.gif(&path).map_err(ReportError::from);
+        let written = gif.and_then(|gif| Ok(write_bytes(&path, &gif)?));
+        written.map_err(|error| error.unstaged(&self.out))
+    }
+
     /// Writes what is known at the end, with a picture of the `decoded` first blocks, and puts all files in place. With
     /// `render`, pictures of the scene as well; when those cannot be drawn, the rest is put in place first. Returns the
     /// names of the files.
@@ -161,13 +174,20 @@ impl<'a> SimulationFiles<'a> {
             write_json(&out.path("summary.json"), summary)?;
             write_json(&out.timed_path("timing.json"), &SimulationTiming::of(simulation))
         };
+        let pictures = || {
+            let folder = out.path("");
+            let pair = simulation.first.as_ref().zip(decoded);
+            let (pressure, decoded) = rayon::join(
+                || pressure_picture(&out, prepared, simulation),
+                || pair.map(|pair| save_picture(&[pair], &folder, "decoded")).transpose(),
+            );
+            pressure?;
+            decoded?;
+            Ok(())
+        };
         let written = numbers().map_err(ReportError::from);
         written
-            .and_then(|()| pressure_picture(&out, prepared, simulation))
-            .and_then(|()| match simulation.first.as_ref().zip(decoded) {
-                Some(pair) => Ok(save_picture(&[pair], &out.path(""), "decoded")?),
-                None => Ok(()),
-            })
+            .and_then(|()| pictures())
             .map_err(|error| error.unstaged(&out))?;
         let drawn = render.then(|| scene_pictures(prepared, simulation)).transpose();
         for (name, picture) in drawn.iter().flatten().flatten() {

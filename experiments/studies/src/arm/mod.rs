@@ -1,9 +1,9 @@
-//! A skin wrapped round a robot's arm and touched by a finger: the published recording, and the twin's bent skin
-//! (`spts simulate arm`) beside it, statistic by statistic.
+//! A skin wrapped round a robot's arm and touched by a finger: compares the published recording with the twin's bent
+//! skin (`spts simulate arm`), statistic by statistic.
 //!
-//! A bent skin carries a preload, so that some taxels have an output without a touch. How much and on how many says
-//! whether the twin's preload is like the real one; how large a touch on top of it is, and how well it is located, says
-//! whether the rest is.
+//! A bent skin is under a preload, so that some taxels have an output without a touch. The size of that output and the
+//! number of such taxels show whether the twin's preload is like the real one. The size of a touch, and how accurately
+//! it is located, show whether the rest is.
 
 mod statistics;
 mod study;

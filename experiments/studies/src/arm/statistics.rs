@@ -1,44 +1,44 @@
-//! What a recording of touches says of the preload and of the touches.
+//! Statistics of a recording of touches: preload and touches.
 
 use serde::Serialize;
 use spts_circuit::Recording;
 use spts_eval::place::{RecordedTouch, find_touches, touch_errors_px};
 use spts_recon::metrics::{median, pearson};
 
-/// A taxel of which an untouched skin gives more than this is loaded, V: five times what 2000 measurements with a noise
-/// of 0.15 V leave of a taxel, and a fifth of the largest of the published skin.
+/// Output above which a taxel of an untouched skin counts as loaded, V: five times the error of a taxel estimated from
+/// 2000 measurements with a noise of 0.15 V, and a fifth of the largest value on the published skin.
 pub const LOADED_V: f64 = 0.1;
 
-/// Numbers of measurements at which touches are located.
+/// Numbers of measurements for locating touches.
 pub const MEASUREMENTS: [usize; 3] = [7, 10, 25];
 
-/// Numbers of one recording.
+/// Statistics of one recording.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TouchStatistics {
-    /// Touches that were found.
+    /// Number of touches found.
     pub touches: usize,
-    /// Taxels above [`LOADED_V`] without a touch, mean over the blocks.
+    /// Number of taxels above [`LOADED_V`] without a touch, mean over the blocks.
     pub loaded_taxels: f64,
     /// Sum of the image without a touch, V, mean over the blocks.
     pub rest_sum_v: f64,
-    /// Its largest taxel, V, mean over the blocks.
+    /// Largest taxel without a touch, V, mean over the blocks.
     pub rest_largest_v: f64,
-    /// Correlation of the images without a touch of a block and the next, mean over the blocks.
+    /// Correlation of the images without a touch of consecutive blocks, mean over the blocks.
     pub rest_correlation: f64,
-    /// Share of that sum that the loaded taxels lose in a touch, median over the touches.
+    /// Share of `rest_sum_v` that the loaded taxels lose during a touch, median over the touches.
     pub rest_lost: f64,
-    /// Largest taxel of a touch, V, without the preload; median over the touches.
+    /// Largest taxel of a touch minus the preload, V, median over the touches.
     pub touch_v: f64,
-    /// Share of the sum of squares of a touch that its largest taxel has, median over the touches.
+    /// Share of the largest taxel in the sum of squares of a touch, median over the touches.
     pub touch_in_one: f64,
-    /// Distance of the located from the touched taxel, taxels, mean over windows of the numbers of [`MEASUREMENTS`].
+    /// Distance of the located from the touched taxel, taxels, mean over the windows, for each of [`MEASUREMENTS`].
     pub errors_px: [f64; MEASUREMENTS.len()],
 }
 
-/// Label, unit and value of a number.
+/// Label, unit and value of a statistic.
 pub type StatisticOf = (&'static str, &'static str, fn(&TouchStatistics) -> f64);
 
-/// Every number that is compared.
+/// All statistics that are compared.
 pub const STATISTICS: [StatisticOf; 10] = [
     ("loaded taxels at rest", "", |s| s.loaded_taxels),
     ("sum at rest", "V", |s| s.rest_sum_v),
@@ -53,8 +53,8 @@ pub const STATISTICS: [StatisticOf; 10] = [
 ];
 
 impl TouchStatistics {
-    /// Numbers of `recording`, whose blocks begin without a touch; `None` when no touch of a skin under preload is
-    /// found.
+    /// Statistics of `recording`, whose blocks must begin without a touch; `None` if no touch of a skin under preload
+    /// is found.
     #[must_use]
     pub fn of(recording: &Recording) -> Option<Self> {
         let touches = find_touches(recording);

@@ -1,4 +1,4 @@
-//! The study: the published recording and simulated bent skins through the same code.
+//! Compares the published recording with simulated bent skins, through the same code.
 
 use super::statistics::{STATISTICS, StatisticOf, TouchStatistics};
 use super::text;
@@ -29,13 +29,13 @@ pub enum ArmError {
     /// The recordings cannot be used.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// No recording of touches of a bent skin.
+    /// There is no recording of touches of a bent skin.
     #[error(
         "{}: no compressive session of touches in which the skin is under preload; such sessions lie in robot_arm/",
         recordings.display()
     )]
     NoTouches {
-        /// Directory of the recordings.
+        /// Folder of the recordings.
         recordings: PathBuf,
     },
     /// The scene is not valid.
@@ -44,7 +44,7 @@ pub enum ArmError {
     /// The simulation failed.
     #[error(transparent)]
     Twin(#[from] TwinError),
-    /// No touch of a simulated skin was found.
+    /// No touch was found on a simulated skin.
     #[error("no touch was found on the simulated skin of seed {seed}")]
     NotFound {
         /// Its seed.
@@ -52,18 +52,18 @@ pub enum ArmError {
     },
 }
 
-/// What is compared.
+/// Settings of the comparison.
 #[derive(Debug, Clone, Copy)]
 pub struct ArmStudy<'a> {
-    /// Directory of the recordings; the first session of touches in it is compared.
+    /// Folder of the recordings; its first session of touches is compared.
     pub recordings: &'a Path,
-    /// Simulated skins.
+    /// Number of simulated skins.
     pub skins: u64,
-    /// Seed of the first skin; the others have the seeds after it.
+    /// Seed of the first skin; the others have the following seeds.
     pub seed: u64,
 }
 
-/// One statistic: the real skin, and the simulated ones.
+/// One statistic of the real skin and of the simulated ones.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ArmBand {
     /// Name.
@@ -74,32 +74,32 @@ pub struct ArmBand {
     pub real: f64,
     /// Mean over the simulated skins.
     pub twin: f64,
-    /// Lower end of the band: one more simulated skin lies within it with a probability of 90 %.
+    /// Lower end of the band, in which a further simulated skin lies with a probability of 90 %.
     pub low: f64,
-    /// Its upper end.
+    /// Upper end of the band.
     pub high: f64,
-    /// Whether the real skin lies within it.
+    /// Whether the real skin lies in the band.
     pub inside: bool,
 }
 
-/// What was found.
+/// Results of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ArmReport {
-    /// Session of the recordings.
+    /// Name of the recorded session.
     pub session: String,
     /// Touches found in it.
     pub touches: usize,
-    /// Simulated skins.
+    /// Number of simulated skins.
     pub skins: u64,
     /// Every statistic.
     pub statistics: Vec<ArmBand>,
 }
 
 impl ArmStudy<'_> {
-    /// Simulates and compares. A function of the recordings and the seed alone.
+    /// Simulates and compares. The result depends only on the recordings and the seed.
     ///
     /// # Errors
-    /// [`ArmError`] without a recording of touches on a preloaded skin, or when the simulation fails.
+    /// [`ArmError`] without a recording of touches on a preloaded skin, or if the simulation fails.
     pub fn run(&self, progress: &dyn Progress) -> Result<ArmReport, ArmError> {
         let set = SessionSet::open(self.recordings)?;
         let of_touches = |session: &&Session| session.event == Event::Touch;
@@ -135,7 +135,7 @@ impl ArmStudy<'_> {
 }
 
 impl ArmReport {
-    /// The statistics as a table to read.
+    /// The statistics as a text table.
     #[must_use]
     pub fn text(&self) -> String {
         text::table(self)

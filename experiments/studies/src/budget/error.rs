@@ -1,4 +1,4 @@
-//! Why a budget cannot be measured.
+//! Errors of the budget study.
 
 use spts::chain::ChainError;
 use spts::record::TwinError;
@@ -9,24 +9,24 @@ use spts_eval::training::LearnError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BudgetError {
-    /// There is nothing to press.
+    /// No object is named.
     #[error("`--objects` names no object")]
     NoObject,
     /// An object that does not exist.
-    #[error("`--objects`: `{name}` is not all or one of {known}")]
+    #[error("`--objects`: `{name}` is neither \"all\" nor one of {known}")]
     UnknownObject {
-        /// Name that was asked for.
+        /// Requested name.
         name: String,
         /// All known names.
         known: String,
     },
-    /// An object that is asked for twice.
+    /// An object is named twice.
     #[error("`--objects`: `{name}` is there twice")]
     RepeatedObject {
         /// Its name.
         name: String,
     },
-    /// More measurements than a press has room for.
+    /// A press is too short for this number of measurements.
     #[error(
         "`--measurements`: {m} is outside [1, {most}] on a skin of {taxels} taxels: a press has no room for a vote of windows of {m}"
     )]
@@ -44,13 +44,13 @@ pub enum BudgetError {
     /// A recording cannot be made.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// Nothing is learned from the raster scans.
+    /// The raster scans contain no training data.
     #[error(transparent)]
     Learn(#[from] LearnError),
     /// The presses cannot be scored.
     #[error(transparent)]
     Score(#[from] ScoreError),
-    /// The parameters that take a part of the transducer away cannot be read.
+    /// The parameters that disable a part of the transducer cannot be read.
     #[error(transparent)]
     Part(#[from] toml::de::Error),
 }

@@ -13,7 +13,7 @@ pub struct MeanWithError {
     pub mean: f64,
     /// Its standard error.
     pub se: f64,
-    /// Sessions S that it is the mean of.
+    /// Number of sessions S.
     pub sessions: usize,
 }
 

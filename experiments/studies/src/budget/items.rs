@@ -1,4 +1,4 @@
-//! What can be taken away from the chain, and the stage that each part belongs to.
+//! The parts of the chain that can be disabled, and their stages.
 
 use spts_circuit::{EFFECTS, FAULTS, Profile};
 use spts_eval::unique;

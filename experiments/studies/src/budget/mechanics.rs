@@ -1,4 +1,4 @@
-//! The presses: run once an object and contact model, whatever is read out of them.
+//! The presses: simulated once for each object and contact model, whatever the readout.
 
 use super::size::BudgetSize;
 use rayon::prelude::*;

@@ -1,9 +1,9 @@
 //! `spts budget`: how much support accuracy, IoU and classification each effect of each stage costs.
 //!
-//! Objects are pressed once (`mechanics`). A skin (`skin`) is a contact model and the parts of the transducer that act:
-//! its raster scans are the truth and what its decoder learns from. On every skin the presses are recorded with every
-//! readout that is compared (`variants`) under the same noise, decoded and scored (`scorer`); the differences are the
-//! budget (`table`).
+//! Objects are pressed once (`mechanics`). A skin (`skin`) is a contact model with the active parts of the transducer;
+//! its raster scans are the ground truth and the training data of its decoder. On every skin the presses are recorded
+//! with every readout to be compared (`variants`) under the same noise, decoded and scored (`scorer`). The differences
+//! are the budget (`table`).
 
 mod error;
 pub(crate) mod estimate;
@@ -42,27 +42,27 @@ use spts_eval::decoders::PublishedDecode;
 use spts_eval::protocol::PUBLISHED_TAXELS;
 use variants::{EVERYTHING, Variant, Variants};
 
-/// Objects that the published recordings hold in both modes.
+/// Objects that the published recordings contain in both modes.
 pub const DEFAULT_OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
-/// Numbers of measurements on the published skin; a larger one takes the same shares of its taxels.
+/// Numbers of measurements on the published skin. A larger skin uses the same shares of its taxels.
 pub const DEFAULT_MEASUREMENTS: [usize; 3] = [7, 20, 50];
 
-/// What to take apart.
+/// Settings of the budget study.
 #[derive(Debug, Clone)]
 pub struct BudgetStudy {
-    /// Names of objects; "all" for every one, empty for [`DEFAULT_OBJECTS`].
+    /// Names of objects; "all" for every object, empty for [`DEFAULT_OBJECTS`].
     pub objects: Vec<String>,
-    /// Readout profile: a name, or a file when it ends in `.toml`.
+    /// Readout profile: a name, or a file that ends in `.toml`.
     pub readout: String,
-    /// Numbers of measurements; empty for [`DEFAULT_MEASUREMENTS`] or the same shares of a larger skin's taxels.
+    /// Numbers of measurements; empty for [`DEFAULT_MEASUREMENTS`], or the same shares of a larger skin's taxels.
     pub measurements: Vec<usize>,
-    /// Decodes.
+    /// Decoding variants.
     pub decodes: Vec<PublishedDecode>,
-    /// Taxels along one side of the skin. Range [10, 40].
+    /// Number of taxels along one side of the skin. Range [10, 40].
     pub side: usize,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// Few presses, little learning.
+    /// Whether to simulate few presses and train little.
     pub quick: bool,
 }
 
@@ -70,7 +70,7 @@ impl BudgetStudy {
     /// Presses, records and scores everything.
     ///
     /// # Errors
-    /// [`BudgetError`] when an object, a number of measurements or the readout cannot be used, or the simulation fails.
+    /// [`BudgetError`] if an object, a number of measurements or the readout is not valid, or the simulation fails.
     pub fn run(&self, progress: &dyn Progress) -> Result<BudgetReport, BudgetError> {
         let size = if self.quick {
             BudgetSize::quick()

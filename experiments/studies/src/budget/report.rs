@@ -1,4 +1,4 @@
-//! What a budget found.
+//! Results of the budget study.
 
 use super::table::{BudgetRow, EndPoint};
 use super::variants::Direction;
@@ -6,19 +6,19 @@ use serde::Serialize;
 use spts::provenance::Provenance;
 use spts_eval::unique;
 
-/// What every effect costs.
+/// Cost of every effect.
 #[derive(Debug, Clone, Serialize)]
 pub struct BudgetReport {
-    /// One line an effect, direction, decode and M.
+    /// One row for each effect, direction, decoding variant and M.
     pub rows: Vec<BudgetRow>,
-    /// The whole chain, the ideal one and the scan that is the truth.
+    /// Scores of the whole chain, of the ideal chain, and of the scan that is the ground truth.
     pub end_points: Vec<EndPoint>,
-    /// What they depend on.
+    /// Provenance of the numbers.
     pub provenance: Provenance,
 }
 
 impl BudgetReport {
-    /// The row of an effect, if it was measured.
+    /// The row of an effect; `None` if it was not measured.
     #[must_use]
     pub fn find(
         &self,
@@ -31,19 +31,19 @@ impl BudgetReport {
         self.rows.iter().find(found)
     }
 
-    /// Stage and effect of every row, each once.
+    /// Stage and effect of every row, without duplicates.
     #[must_use]
     pub fn effects(&self) -> Vec<(&'static str, &'static str)> {
         unique(self.rows.iter().map(|r| (r.stage, r.effect)))
     }
 
-    /// Decodes, each once.
+    /// Decoding variants, without duplicates.
     #[must_use]
     pub fn decodes(&self) -> Vec<&'static str> {
         unique(self.rows.iter().map(|r| r.decode))
     }
 
-    /// Numbers of measurements, each once.
+    /// Numbers of measurements, without duplicates.
     #[must_use]
     pub fn measurements(&self) -> Vec<usize> {
         unique(self.rows.iter().map(|r| r.m))

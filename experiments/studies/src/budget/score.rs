@@ -1,13 +1,13 @@
-//! Scores of a press by every truth.
+//! Scores of a press against each ground truth.
 
 use spts_eval::Tally;
 
 /// Scores of one press with one decode and M.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct PressScores {
-    /// Support accuracy by every truth of [`super::skin::TRUTHS`].
+    /// Support accuracy against each ground truth in [`super::skin::TRUTHS`].
     pub(super) support: [f64; 3],
-    /// Intersection over union by every truth.
+    /// Intersection over union against each ground truth.
     pub(super) iou: [f64; 3],
     /// Share of single windows classified correctly.
     pub(super) class_single: f64,

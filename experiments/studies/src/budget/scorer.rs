@@ -1,4 +1,4 @@
-//! Recording and scoring one press with one readout.
+//! Records and scores one press with one readout.
 
 use super::error::BudgetError;
 use super::score::PressScores;

@@ -1,4 +1,4 @@
-//! How much is simulated and scored.
+//! Amount of simulation and scoring.
 
 use spts::chain::Acquisition;
 use spts_circuit::Mode;
@@ -8,14 +8,13 @@ use spts_eval::training::Learning;
 /// Size of a budget.
 #[derive(Debug, Clone)]
 pub(super) struct BudgetSize {
-    /// Raster presses of an object: the last is the truth, the ones before are learned from.
+    /// Number of raster presses of an object. The last is the ground truth; the earlier ones are training data.
     pub(super) raster_presses: usize,
-    /// What the decoder learns from.
+    /// Training data of the decoder.
     pub(super) learning: Learning,
-    /// Compressive sessions of an object. Each holds one press of its own, and has noise and a learned dictionary of
-    /// its own.
+    /// Number of compressive sessions of an object. Each has one press, its own noise, and its own learned dictionary.
     pub(super) sessions: usize,
-    /// Votes of a press at most, spread evenly over the plateau.
+    /// Largest number of votes in a press, spread evenly over the plateau.
     pub(super) votes: usize,
 }
 

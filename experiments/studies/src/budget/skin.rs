@@ -1,4 +1,4 @@
-//! One skin: what it conducts in every press, what its decoder has learned, and what counts as touched.
+//! One skin: its conductance in every press, the training of its decoder, and its ground truths.
 
 use super::error::BudgetError;
 use super::estimate::ScoreTable;
@@ -31,14 +31,14 @@ pub(super) type Masks = [Vec<bool>; 3];
 
 /// A skin that has been pressed and learned from.
 pub(super) struct LearnedSkin {
-    /// Transducer and whole readout.
+    /// Transducer and complete readout.
     pub(super) chain: Chain,
-    /// Its decoders, one a compressive session: learning begins at random, and two dictionaries learned from the same
-    /// scans differ in what they score.
+    /// Decoders, one for each compressive session. Training starts at random, so two dictionaries learned from the same
+    /// scans have different scores.
     pub(super) learned: Vec<Learned>,
-    /// Objects in the order of the presses.
+    /// Objects in order of the presses.
     pub(super) objects: Vec<LearnedObject>,
-    /// Instants that are scored.
+    /// Scored instants.
     pub(super) protocol: Protocol,
 }
 
@@ -48,9 +48,9 @@ pub(super) struct LearnedObject {
     pub(super) name: &'static str,
     /// Label.
     pub(super) label: usize,
-    /// Conductance over time, one source a compressive session.
+    /// Conductance as a function of time, one source for each compressive session.
     pub(super) sources: Vec<Interpolated>,
-    /// Truths.
+    /// Ground truths.
     pub(super) masks: Masks,
     raster: Recording,
 }

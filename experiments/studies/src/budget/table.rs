@@ -1,4 +1,4 @@
-//! The budget's lines and its end points.
+//! Rows of the budget, and end points.
 
 use super::estimate::{MeanWithError, ScoreTable, change, level};
 use super::score::PressScores;
@@ -8,24 +8,24 @@ use serde::Serialize;
 use spts_eval::RASTER;
 use spts_eval::decoders::PublishedDecode;
 
-/// Cost of one effect with one decode and M: scores of the changed chain less those of its reference, each with its
-/// standard error over the presses.
+/// Cost of one effect with one decoding variant and M: scores of the modified chain minus those of the reference chain,
+/// each with its standard error over the presses.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BudgetRow {
     /// Stage: contact, transducer, faults, drive, amplifier, noise or converter.
     pub stage: &'static str,
-    /// Effect, `whole_stage` for all of the stage at once, or `layer` for another contact model.
+    /// Effect; `whole_stage` for all effects of the stage together; `layer` for another contact model.
     pub effect: &'static str,
-    /// "ablation": the whole chain less the effect, against the whole chain; "addition": the ideal chain and the
-    /// effect, against the ideal chain.
+    /// "ablation": the whole chain without the effect, compared with the whole chain; "addition": the ideal chain with
+    /// the effect, compared with the ideal chain.
     pub mode: &'static str,
-    /// Decode.
+    /// Decoding variant.
     pub decode: &'static str,
     /// Number of measurements, M.
     pub m: usize,
     /// Number of taxels, N.
     pub taxels: usize,
-    /// Number of sessions S: the standard errors have S − 1 degrees of freedom.
+    /// Number of sessions S. The standard errors have S − 1 degrees of freedom.
     pub sessions: usize,
     /// Change of the support accuracy.
     pub support_delta: f64,
@@ -43,24 +43,24 @@ pub struct BudgetRow {
     pub class_vote20_delta: f64,
     /// Its standard error.
     pub class_vote20_se: f64,
-    /// Change of the intersection over union with what a skin of the static law alone would show at that instant: the
-    /// truth that the transducer cannot move.
+    /// Change of the intersection over union with the image of a skin that has only the static law, at the same
+    /// instant. The transducer cannot change this ground truth.
     pub iou_contact_delta: f64,
     /// Its standard error.
     pub iou_contact_se: f64,
 }
 
-/// A change of a score with its standard error, taken from a row.
+/// Reads the change of a score, with its standard error, from a row.
 pub type Change = fn(&BudgetRow) -> MeanWithError;
 
 impl BudgetRow {
-    /// Change of the intersection over union by the published truth.
+    /// Change of the intersection over union with the published ground truth.
     #[must_use]
     pub fn iou(&self) -> MeanWithError {
         self.change(self.iou_delta, self.iou_se)
     }
 
-    /// Change of the intersection over union with the contact alone.
+    /// Change of the intersection over union with the ground truth of the contact alone.
     #[must_use]
     pub fn iou_contact(&self) -> MeanWithError {
         self.change(self.iou_contact_delta, self.iou_contact_se)
@@ -76,19 +76,19 @@ impl BudgetRow {
     }
 }
 
-/// Scores of an end point by one truth.
+/// Scores of an end point against one ground truth.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EndPoint {
-    /// "everything", "ideal", or "scan" for the raster frames that the truth is one of.
+    /// "everything", "ideal", or "scan" for the raster frames to which the ground truth belongs.
     pub chain: &'static str,
-    /// Decode; "raster" for the scan.
+    /// Decoding variant; "raster" for the scan.
     pub decode: &'static str,
     /// Number of measurements, M.
     pub m: usize,
     /// Number of taxels, N.
     pub taxels: usize,
-    /// What counts as touched: "raster", the scan's own frame, as published; "image", the noiseless image of the same
-    /// skin at that instant; "contact", that of a skin with the static law alone.
+    /// Ground truth: "raster" is the scan's own frame, as in the publication; "image" the noiseless image of the same
+    /// skin at that instant; "contact" that of a skin with only the static law.
     pub truth: &'static str,
     /// Support accuracy.
     pub support: f64,

@@ -1,4 +1,4 @@
-//! Which chains are compared with which.
+//! The chains that are compared.
 
 use super::items::{BudgetItem, CONTACT, stages};
 use serde::Serialize;
@@ -7,9 +7,9 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
-    /// The chain less the effect, compared with the whole chain: a positive change is what the effect costs.
+    /// The chain without the effect, compared with the whole chain: a positive change is the cost of the effect.
     Ablation,
-    /// The ideal chain and the effect, compared with the ideal chain: a negative change is what the effect costs.
+    /// The ideal chain with the effect, compared with the ideal chain: a negative change is the cost of the effect.
     Addition,
 }
 
@@ -24,7 +24,7 @@ impl Direction {
     }
 }
 
-/// Name of the line of a whole stage.
+/// Name of the row for a whole stage.
 pub const WHOLE_STAGE: &str = "whole_stage";
 /// Name of the line of the contact model.
 pub(super) const LAYER: &str = "layer";
@@ -32,9 +32,9 @@ pub(super) const LAYER: &str = "layer";
 /// A chain: the contact model, and which of the items act.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Variant {
-    /// Whether the foam is an elastic layer in place of columns.
+    /// Whether the foam is an elastic layer instead of columns.
     pub(super) layer: bool,
-    /// Which items act.
+    /// Which items are active.
     pub(super) acts: Vec<bool>,
 }
 

@@ -1,15 +1,15 @@
-//! The beat of a cell's timer with the common clock, from its late flips.
+//! Beat of a cell's timer with the common clock, found from its late flips.
 
-/// Beat of one cell's timer against the measurement clock.
+/// Beat of one cell's timer with the measurement clock.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Beat {
-    /// Taxel, 0-based.
+    /// Taxel, from 0.
     pub taxel: usize,
-    /// Late flips that it is from.
+    /// Number of late flips used.
     pub events: usize,
     /// Period, measurements.
     pub period_measurements: f64,
-    /// Power of the period's line over the mean of all periods tried.
+    /// Power of the line at this period divided by the mean over all periods tried.
     pub prominence: f64,
 }
 

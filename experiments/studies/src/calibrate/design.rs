@@ -1,14 +1,14 @@
-//! The ±1 weights of a run of measurements as packed columns, and least squares with them.
+//! The ±1 weights of consecutive measurements as packed columns, and least squares with them.
 
 use nalgebra::{DMatrix, DVector};
 use spts_circuit::{WeightMode, WeightRows};
 
-/// A cell that runs on another seed than its address.
+/// A cell that runs with a seed other than its address.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub struct Reseeded {
-    /// Taxel, 0-based, row-major.
+    /// Taxel, from 0, row-major.
     pub taxel: u32,
-    /// What its generator was loaded with.
+    /// Seed of its generator.
     pub seed: u32,
 }
 

@@ -1,4 +1,4 @@
-//! Cells that do not run their own sequence: another seed, or a lag of missed edges.
+//! Cells that do not run their own sequence, because of another seed or missed edges.
 
 use super::design::Reseeded;
 use super::fit::{FitRequest, WINDOW_FRAMES, fit_windows};
@@ -17,27 +17,27 @@ const SEEDS: u32 = 256;
 /// Largest lag that is looked for, measurements.
 const LAGS: u64 = 100;
 
-/// A sequence in the output that no cell should send.
+/// A sequence in the output that no cell should produce.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum CellFault {
-    /// A cell runs on another seed.
+    /// A cell runs with another seed.
     MisSeeded {
-        /// The taxel that shows no contact of its own where the raster session has one, each given away once. `None`
-        /// without a raster session, or when no touched taxel is left.
+        /// The taxel without a contact of its own where the raster session has one; no taxel is used twice. `None`
+        /// without a raster session, or if no touched taxel is left.
         taxel: Option<u32>,
-        /// Seed that it runs on.
+        /// Seed of the cell.
         seed: u32,
-        /// Its amplitude as ±1, V.
+        /// Amplitude of its ±1 output, V.
         amplitude_v: f64,
     },
     /// A cell lags behind its own sequence.
     Lagging {
         /// Taxel.
         taxel: u32,
-        /// Missed edges, measurements.
+        /// Number of missed edges, measurements.
         lag: u64,
-        /// Its amplitude, V.
+        /// Amplitude of its output, V.
         amplitude_v: f64,
     },
 }
@@ -163,7 +163,7 @@ fn missing(image: &[f64], raster: &[f64], taken: &[u32]) -> Option<u32> {
     free.min_by(|p, q| p.1.total_cmp(&q.1)).map(|(k, _)| k)
 }
 
-/// Cells with another seed among `faults`, of which it is known where they are.
+/// The cells with another seed among `faults` whose taxel is known.
 #[must_use]
 pub fn reseeded(faults: &[CellFault]) -> Vec<Reseeded> {
     let cell = |fault: &CellFault| match *fault {

@@ -5,8 +5,9 @@ use super::statistics::{OUTLIER_SD, robust_sd};
 use spts_circuit::Recording;
 use std::ops::Range;
 
-/// Frames in a window. An image of 100 taxels from 2500 measurements has a noise of σ/√2500 a taxel, which adds 4 % to
-/// the variance of the output it predicts; over 25 frames (39 ms) creep moves the image by less than that.
+/// Number of frames in a window. An image of 100 taxels from 2500 measurements has a noise of σ/√2500 a taxel, which
+/// adds 4 % to the variance of the predicted output. During 25 frames (39 ms) creep changes the image by less than
+/// that.
 pub const WINDOW_FRAMES: usize = 25;
 
 /// One window and what was fitted to it.
@@ -20,13 +21,13 @@ pub(crate) struct FitWindow {
     pub(crate) image: Vec<f64>,
     /// Constant c, V.
     pub(crate) offset_v: f64,
-    /// Half the difference between even and odd rows, V; 0 when it was not fitted.
+    /// Half the difference between even and odd rows, V; 0 if it was not fitted.
     pub(crate) parity_v: f64,
     /// y − Φx − c, V; NaN for a lost sample.
     pub(crate) residual_v: Vec<f64>,
     /// Φx, V.
     pub(crate) model_v: Vec<f64>,
-    /// √(1 − p/n): a fit of p coefficients to n measurements leaves this share of the noise in the residual.
+    /// √(1 − p/n): share of the noise that remains in the residual when p coefficients are fitted to n measurements.
     pub(crate) left_over: f64,
 }
 

@@ -1,4 +1,4 @@
-//! How much the taxels change between two sessions with the same object.
+//! Changes of the taxels' gains between two sessions with the same object.
 
 use super::statistics::{mean, sd};
 use serde::Serialize;
@@ -11,21 +11,21 @@ const FEWEST: usize = 3;
 /// Gain of one taxel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TaxelGain {
-    /// 0-based, row-major.
+    /// Taxel, from 0, row-major.
     pub taxel: usize,
-    /// Compressive over raster image, over the geometric mean of that ratio.
+    /// Ratio of compressive to raster image, divided by the geometric mean of the ratios.
     pub gain: f64,
 }
 
-/// Gains of the loaded taxels in the compressive session, relative to the raster session of the same object. What both
-/// share, the contact's own pressure and the taxel's fixed gain, cancels.
+/// Gains of the loaded taxels in the compressive session, relative to the raster session of the same object. The
+/// contact's pressure and the taxel's fixed gain are common to both and cancel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SessionGains {
     /// Loaded taxels.
     pub taxels: Vec<TaxelGain>,
-    /// Standard deviation of ln gain. Two sessions differ: one has 1/√2 of it.
+    /// Standard deviation of ln gain. It contains the changes of two sessions; that of one is smaller by √2.
     pub log_sd: f64,
-    /// Its standard error, log_sd/√(2(n − 1)) (n Gaussian values).
+    /// Standard error of `log_sd`: log_sd/√(2(n − 1)) for n Gaussian values.
     pub standard_error: f64,
 }
 

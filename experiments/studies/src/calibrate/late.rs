@@ -28,22 +28,22 @@ const FEWEST_FLIPS: f64 = 1e4;
 /// Flips of one taxel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Counts {
-    /// Flips that would be an outlier if late.
+    /// Number of flips that would be outliers if they were late.
     flips: f64,
-    /// Outliers that match one of its flips, and no other taxel's better.
+    /// Number of outliers that match a flip of this taxel better than any other taxel's.
     matched: f64,
-    /// How many of these match by chance.
+    /// Number of these matches expected by chance.
     chance: f64,
 }
 
-/// Share of late flips of one taxel.
+/// Rate of late flips of one taxel.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct LateCell {
-    /// Taxel, 0-based.
+    /// Taxel, from 0.
     pub taxel: usize,
-    /// Late updates a flip.
+    /// Late updates divided by flips.
     pub per_flip: f64,
-    /// Its standard error from the number of events (Poisson).
+    /// Standard error from the number of events (Poisson).
     pub standard_error: f64,
 }
 
@@ -74,15 +74,15 @@ impl Counts {
 #[derive(Debug, Clone)]
 pub(super) struct Late {
     core_v: f64,
-    /// Residuals beyond the outlier limit whose past and future allow the shifts.
+    /// Number of residuals beyond the outlier limit, with enough data before and after for the shifts.
     outliers: f64,
-    /// Those that match a flip.
+    /// Number of outliers that match a flip.
     matched: f64,
-    /// Those that match a shifted one, mean over the shifts.
+    /// Number of outliers that match a shifted flip, mean over the shifts.
     by_chance: f64,
     /// Flips of every taxel; `chance` is filled in by [`Late::cells`].
     counts: Vec<Counts>,
-    /// Taxel and row of every outlier that a late update of the taxel may explain.
+    /// Taxel and row of every outlier that may be a late update of the taxel.
     pub(super) events: Vec<(usize, u64)>,
 }
 

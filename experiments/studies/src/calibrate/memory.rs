@@ -1,4 +1,4 @@
-//! What the measurements before leave in a residual: rₙ = Σ hₖ·(Φx)ₙ₋ₖ.
+//! Remainder of earlier measurements in a residual: rₙ = Σ hₖ·(Φx)ₙ₋ₖ.
 
 use super::fit::FitWindow;
 use super::statistics::{OUTLIER_SD, robust_sd};

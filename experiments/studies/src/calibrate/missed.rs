@@ -1,4 +1,4 @@
-//! Presses that missed: hardly any contact while the others of the session have one.
+//! Presses that missed: almost no contact, while the others of the session have one.
 
 use super::press::PressNumbers;
 use serde::Serialize;
@@ -12,15 +12,15 @@ const LEAST_SHARE: f64 = 1.0 / 3.0;
 /// A press that is left out.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MissedPress {
-    /// Number of the press, 1-based.
+    /// Number of the press, from 1.
     pub press: usize,
-    /// Σx above the idle Σx, V.
+    /// Σx minus the idle Σx, V.
     pub raised_v: f64,
-    /// Its median over the presses of the session, V.
+    /// Median of `raised_v` over the presses of the session, V.
     pub usual_raised_v: f64,
     /// ‖x‖₂, V.
     pub norm_v: f64,
-    /// Its median over the presses of the session, V.
+    /// Median of `norm_v` over the presses of the session, V.
     pub usual_norm_v: f64,
 }
 

@@ -1,9 +1,9 @@
-//! Calibration: what recordings of a skin say about its readout, with the uncertainty of each number.
+//! Calibration: estimates the parameters of a skin's readout from recordings, with their uncertainty.
 //!
-//! Every press of a session is fitted by itself, y = Φx + c, in windows short enough to follow creep, outliers first
-//! found and then left out. Presses that missed are left out. The numbers of a session are medians over its presses;
-//! their scatter over the presses gives the standard error. From several sessions, a profile has the spans that a new
-//! session falls into.
+//! Every press of a session is fitted separately, y = Φx + c, in windows short enough to follow creep. Outliers are
+//! found first and then left out, and so are presses that missed. The values of a session are medians over its presses;
+//! their scatter gives the standard error. A profile from several sessions has spans in which a new session is
+//! expected.
 
 mod beat;
 mod design;
@@ -60,7 +60,7 @@ use spts_eval::{SessionSlip, follow_slips};
 use std::ops::Range;
 use std::path::Path;
 
-/// Both recordings of a session; the raster one may be missing.
+/// Both recordings of a session; the raster recording may be missing.
 #[derive(Debug, Clone)]
 pub struct SessionPair {
     /// Name of the session.
@@ -69,19 +69,19 @@ pub struct SessionPair {
     pub object: String,
     /// Compressive recording.
     pub compressive: Recording,
-    /// Its frames in which the contact is steady.
+    /// Frames of the compressive recording in which the contact is steady.
     pub hold: Range<usize>,
     /// Raster recording, and its frames in which the contact is steady.
     pub raster: Option<(Recording, Range<usize>)>,
-    /// Samples of the compressive recording that lagged behind their rows, and were put back on them.
+    /// Slips of the compressive recording, which has been realigned.
     pub slips: Vec<SessionSlip>,
 }
 
-/// The sessions in `root` that have a compressive recording of presses, each one that can be calibrated from.
+/// The sessions in `root` with a compressive recording of presses, all usable for calibration.
 ///
 /// # Errors
-/// [`DataError`] when a session that is there cannot be used, has weights that are not binary, or holds its contact for
-/// less than [`WINDOW_FRAMES`]; or there is none.
+/// [`DataError`] if a session is not usable, has weights that are not binary, or holds its contact for less than
+/// [`WINDOW_FRAMES`]; or if there is no session.
 pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
     let mut set = SessionSet::open(root)?;
     let slips = follow_slips(&mut set);

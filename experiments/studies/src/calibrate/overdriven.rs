@@ -1,4 +1,4 @@
-//! A mis-seeded cell that is not binary either: an analog output, driven beyond its swing.
+//! A mis-seeded cell with an analog output that exceeds its swing.
 
 use super::design::Reseeded;
 use super::fit::{FitRequest, fit_windows};
@@ -8,20 +8,20 @@ use serde::Serialize;
 use spts_circuit::{Recording, WeightMode};
 use std::ops::Range;
 
-/// Output of the cell: clamp(gain·aₙ + carry·aₙ₋₁ + bias, −1, 1), a being the analog level of its generator.
+/// Output of the cell: clamp(gain·aₙ + carry·aₙ₋₁ + bias, −1, 1), where a is the analog level of its generator.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Overdriven {
-    /// Taxel, 0-based, row-major.
+    /// Taxel, from 0, row-major.
     pub taxel: u32,
-    /// Seed that it runs on.
+    /// Seed of the cell.
     pub seed: u32,
     /// Gain on the present level.
     pub gain: f64,
-    /// Gain on the level before.
+    /// Gain on the previous level.
     pub carry: f64,
     /// Output at level 0.
     pub bias: f64,
-    /// What its taxel adds at full output over what a fit of ±1 finds for it.
+    /// Contribution of its taxel at full output, divided by the value from a fit with ±1 weights.
     pub over_binary: f64,
 }
 
@@ -90,9 +90,9 @@ pub(super) fn fit(recording: &Recording, hold: &Range<usize>, blocks: &[usize], 
 
 /// One measurement with the cell's levels.
 struct Sample {
-    /// What the ±1 fit leaves, V.
+    /// Residual of the fit with ±1 weights, V.
     residual_v: f64,
-    /// What it gives to the cell, V.
+    /// Contribution of the cell in that fit, V.
     binary_v: f64,
     level: f64,
     before: f64,

@@ -1,4 +1,4 @@
-//! Parameters of the readout that sessions identify, and the spans that a profile draws them from.
+//! Parameters of the readout that sessions determine, and the spans for a profile.
 
 use super::predict::{PredictedInside, SessionValues, clipped, leave_one_out, predicted};
 use super::session::SessionEstimates;
@@ -9,11 +9,11 @@ use serde::Serialize;
 pub(super) struct Parameter {
     /// Section and key of the profile.
     pub(super) name: &'static str,
-    /// Number of [`super::PressNumbers`] that has its uncertainty.
+    /// Name of the value in [`super::PressNumbers`] that has its uncertainty.
     number: &'static str,
-    /// Smallest and largest value that the readout takes: rates, fractions and noise are not below 0.
+    /// Smallest and largest valid value of the readout; rates, shares and noise are not negative.
     limits: [f64; 2],
-    /// Value of a session; NaN when the session does not identify it.
+    /// Value of a session; NaN if the session does not determine it.
     value: fn(&SessionEstimates) -> f64,
 }
 
@@ -73,17 +73,17 @@ const PARAMETERS: [Parameter; 8] = [
 /// The one parameter that is drawn once a taxel, not once a session.
 const LATE_RATE: &str = "late_updates.rate";
 
-/// A parameter of the profile: one value a session.
+/// A parameter of the profile, with one value for each session.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedParameter {
     /// Section and key.
     pub name: &'static str,
-    /// Value of every session that identifies it.
+    /// Value of every session that determines it.
     pub sessions: Vec<f64>,
-    /// What the profile draws from: the span that a new session falls into with probability [`super::COVERAGE`]; of the
-    /// late rate, which differs from taxel to taxel, the spread of the taxels. `None` when no session identifies it.
+    /// Span for the profile, in which a new session lies with probability [`super::COVERAGE`]; for the late rate, which
+    /// differs from taxel to taxel, the spread over the taxels. `None` if no session determines it.
     pub span: Option<(f64, f64)>,
-    /// Mean over the sessions, or with one session the median over its presses, and standard error.
+    /// Mean over the sessions (for one session, median over its presses) and standard error.
     pub estimate: Estimated,
 }
 
@@ -106,7 +106,8 @@ fn fitted(parameter: &Parameter, sessions: &[SessionEstimates]) -> FittedParamet
         _ => Estimated::mean_of(&values),
     };
     let mut span = predicted(&values).map(|span| clipped(span, parameter.limits));
-    // one session's own value is known better than which of its taxels are the late ones: drawn anew, they would change it
+    // one session's own value is known better than which of its taxels are the late ones: drawn anew, they would change
+    // it
     if parameter.name == LATE_RATE && sessions.len() > 1 {
         span = late_span(estimate.value, sessions).or(span);
     }

@@ -1,16 +1,24 @@
-//! What sessions say of the next one: spans that a new session's number falls into, and whether they do.
+//! Prediction of new sessions: spans for their values, and whether these hold.
 
 use super::statistics::{mean, sd};
 use serde::Serialize;
 
-/// Share of new sessions whose number falls into the span that was predicted for it.
+/// Probability that a new session's value lies in the predicted span.
 pub const COVERAGE: f64 = 0.9;
 
-/// Span that the number of a new session falls into with probability [`COVERAGE`], given that of earlier sessions:
-/// mean ± t·s·√(1 + 1/n), with s the standard deviation of n − 1 degrees of freedom and t the two-sided quantile of
-/// Student's distribution with as many. Exact for Gaussian numbers. One value predicts itself only. `None` without one.
+/// Span in which the value of a new session lies with probability [`COVERAGE`], given those of earlier sessions: mean ±
+/// t·s·√(1 + 1/n), with the standard deviation s (n − 1 degrees of freedom) and the two-sided quantile t of Student's
+/// distribution. Exact for Gaussian values. A single value predicts only itself. `None` without values.
 ///
 /// Source: G. J. Hahn, W. Q. Meeker, *Statistical Intervals* (1991), §4.4.
+///
+/// ```
+/// use spts_studies::calibrate::predicted;
+///
+/// let (low, high) = predicted(&[0.9, 1.0, 1.1]).expect("three sessions");
+/// assert!(low < 0.7 && high > 1.3, "few sessions predict a wide span");
+/// assert_eq!(predicted(&[]), None);
+/// ```
 #[must_use]
 pub fn predicted(values: &[f64]) -> Option<(f64, f64)> {
     let n = values.len();
@@ -71,31 +79,31 @@ fn student_t(probability: f64, freedom: usize) -> f64 {
     0.5 * (low + high)
 }
 
-/// One number, each session's held against the span that the other sessions predict.
+/// One parameter: the value of each session compared with the span predicted from the other sessions.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PredictedNumber {
     /// Name of the parameter.
     pub name: &'static str,
-    /// Sessions that were held against the others.
+    /// Number of sessions compared with the others.
     pub sessions: usize,
-    /// Those inside the predicted span.
+    /// Number of sessions inside the predicted span.
     pub inside: usize,
-    /// Those between the smallest and the largest value of the others.
+    /// Number of sessions between the smallest and the largest value of the others.
     pub inside_range: usize,
     /// Names of the sessions outside the predicted span.
     pub outside: Vec<String>,
 }
 
-/// Whether spans predict: every session left out in turn.
+/// Test of the spans: every session is left out in turn.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PredictedInside {
-    /// Share that the spans are made for, [`COVERAGE`].
+    /// Nominal share of the spans, [`COVERAGE`].
     pub coverage: f64,
-    /// Share of all numbers of all sessions inside the span that the other sessions predict.
+    /// Share of all values of all sessions inside the span predicted from the other sessions.
     pub share: f64,
-    /// The same of the range of the other sessions' values.
+    /// Share of all values inside the range of the other sessions' values.
     pub share_of_range: f64,
-    /// Number by number.
+    /// One entry for each parameter.
     pub numbers: Vec<PredictedNumber>,
 }
 
@@ -103,9 +111,9 @@ pub struct PredictedInside {
 pub(super) struct SessionValues<'a> {
     /// Name of the parameter.
     pub(super) name: &'static str,
-    /// Smallest and largest value that the readout takes.
+    /// Smallest and largest valid value of the readout.
     pub(super) limits: [f64; 2],
-    /// Sessions that identify it, and its value.
+    /// Sessions that determine it, with their values.
     pub(super) sessions: Vec<(&'a str, f64)>,
 }
 

@@ -1,4 +1,4 @@
-//! Everything that one press says about the readout.
+//! Estimates from one press.
 
 use super::design::Reseeded;
 use super::fit::{FitRequest, FitWindow, WINDOW_FRAMES, fit_windows};
@@ -9,15 +9,17 @@ use super::statistics::{OUTLIER_SD, kurtosis, mean, robust_sd, sd};
 use spts_circuit::Recording;
 use std::ops::Range;
 
-/// Numbers of one press. "Residual" is what a least-squares fit of image and constant leaves on the plateau, "clean"
-/// the residual less its memory and less what cells that are not binary add to it; all in V where nothing else is said.
+/// Estimates from one press, in V unless stated otherwise. "Residual" is the residual of a least-squares fit of image
+/// and constant on the plateau. "Clean" is the residual minus memory, and minus the contributions of cells that are not
+/// binary.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct PressNumbers {
     /// Mean with nothing on the skin.
     pub idle_mean_v: f64,
     /// Standard deviation with nothing on the skin.
     pub idle_sd_v: f64,
-    /// The same less what image, constant and parity of the row explain: the noise floor.
+    /// Noise floor: standard deviation with nothing on the skin, after subtracting image, constant and parity of the
+    /// row.
     pub idle_noise_v: f64,
     /// Half the difference between even and odd rows with nothing on the skin.
     pub idle_parity_v: f64,
@@ -27,9 +29,9 @@ pub struct PressNumbers {
     pub residual_v: f64,
     /// Root mean square of the clean residual.
     pub clean_v: f64,
-    /// Standard deviation of its core, from the median absolute value.
+    /// Standard deviation of the clean residual's core, from the median absolute value.
     pub core_v: f64,
-    /// Taps of the memory.
+    /// First tap of the memory.
     pub h1: f64,
     /// Second tap.
     pub h2: f64,
@@ -43,20 +45,21 @@ pub struct PressNumbers {
     pub sum_v: f64,
     /// ‖x‖₂.
     pub norm_v: f64,
-    /// Offset of the drive with no conductance at all: c = (1 + h1 + h2)·(constant + asymmetry·Σx), with and without
-    /// contact, as the memory passes 1 + h1 + h2 of what stands still. NaN without contact.
+    /// Constant part of the drive offset: c = (1 + h1 + h2)·(constant + asymmetry·Σx), with and without contact; 1 + h1
+    /// + h2 is the memory's gain for constant signals. NaN without contact.
     pub constant_v: f64,
-    /// Share of Σx in the drive's offset, (c − idle c)/((1 + h1 + h2)·(Σx − idle Σx)). NaN without contact.
+    /// Part of the drive offset that is proportional to Σx: (c − idle c)/((1 + h1 + h2)·(Σx − idle Σx)). NaN without
+    /// contact.
     pub asymmetry: f64,
     /// Share of clean residuals beyond 5 standard deviations of the core.
     pub outliers: f64,
     /// Kurtosis of the clean residual.
     pub kurtosis: f64,
-    /// Late updates a flip.
+    /// Late updates divided by flips.
     pub late_per_flip: f64,
-    /// Share of the outliers that no late update explains.
+    /// Share of outliers that are not late updates.
     pub unexplained: f64,
-    /// Noise that grows with the contact, over ‖x‖₂: √(core² − idle noise²)/‖x‖₂. NaN without contact.
+    /// Noise that grows with the contact, relative to ‖x‖₂: √(core² − idle noise²)/‖x‖₂. NaN without contact.
     pub contact_fraction: f64,
 }
 
@@ -67,7 +70,7 @@ pub(super) struct PressAnalysis {
     pub(super) numbers: PressNumbers,
     /// Mean image of the plateau, V.
     pub(super) image: Vec<f64>,
-    /// Flips and late ones, a taxel.
+    /// Flips and late flips of every taxel.
     pub(super) late: Vec<Counts>,
     /// Late flips: taxel and row.
     pub(super) events: Vec<(usize, u64)>,

@@ -1,4 +1,4 @@
-//! From estimates to a readout profile.
+//! Turns estimates into a readout profile.
 
 use super::faults::CellFault;
 use super::parameters::{FittedParameter, fitted_parameters};
@@ -19,7 +19,7 @@ const RATE_STEP_HZ: f64 = 100.0;
 /// The cells' oscillators are off by this share at room temperature: a rate of the recordings that is nearer is kept.
 const OSCILLATOR_SHARE: f64 = 0.01;
 
-/// What recordings of presses cannot tell apart, and why.
+/// Parameters that recordings of presses cannot distinguish, and why.
 pub const NOT_IDENTIFIABLE: [&str; 6] = [
     "Rf and Vd apart: only Rf·Vd·G acts, and G is not known",
     "taxel gains apart from the contact's own pressure, as no object presses evenly: only their change between two sessions of one object",
@@ -29,7 +29,7 @@ pub const NOT_IDENTIFIABLE: [&str; 6] = [
     "the raster path: nothing is fitted to raster sessions; [raster.*] is kept from the base profile",
 ];
 
-/// What the recordings show and the readout does not model.
+/// Effects in the recordings that the readout does not model.
 pub const NOT_MODELLED: [&str; 2] = [
     "the even/odd pattern with nothing on the skin (idle_parity, up to 0.12 V) where it differs from that in contact (parity): the \
      profile has one, that in contact; idle_noise is without it, idle_sd with it",
@@ -37,26 +37,26 @@ pub const NOT_MODELLED: [&str; 2] = [
      from late updates, they are taken for these",
 ];
 
-/// Parameters of the readout, read off the estimates.
+/// Parameters of the readout, derived from the estimates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedReadout {
-    /// Compressive parameters, in the order of the profile.
+    /// Compressive parameters, in order of the profile.
     pub values: Vec<FittedParameter>,
-    /// Mean beat, measurements, and its standard error over the cells; `None` when no beat is seen.
+    /// Mean beat period, measurements, and its standard error over the cells; `None` if no beat is found.
     pub beat: Option<Estimated>,
-    /// Standard deviation of the beat over the cells.
+    /// Standard deviation of the beat period over the cells.
     pub beat_sd: f64,
     /// Measurements a second, Hz; `None` without a beat.
     pub sample_rate_hz: Option<f64>,
     /// Grid of the converter's values.
     pub steps: Option<ConverterSteps>,
-    /// Lines of the profile for cells that do not run their own sequence.
+    /// Profile text for cells that do not run their own sequence.
     faults: String,
     sessions: Vec<String>,
     /// Weights of the recordings.
     #[serde(skip)]
     weights: Option<Weights>,
-    /// Measurements a second that the recordings give, Hz.
+    /// Measurements a second stated in the recordings, Hz.
     #[serde(skip)]
     recorded_hz: Option<f64>,
 }
@@ -67,7 +67,7 @@ const DIGITS: i32 = 4;
 const ERROR_DIGITS: i32 = 2;
 
 impl FittedReadout {
-    /// Readout fitted to all `sessions` together, or of one. They have the same weights and the same rate.
+    /// Fits the readout to all `sessions` together, or to one. They must have the same weights and rate.
     #[must_use]
     pub fn of(sessions: &[SessionEstimates]) -> Self {
         let periods = periods(sessions);
@@ -85,10 +85,10 @@ impl FittedReadout {
         }
     }
 
-    /// The profile as TOML; what the recordings do not identify is kept from the TOML table `base`.
+    /// The profile as TOML. Parameters that the recordings do not determine are taken from the TOML table `base`.
     ///
     /// # Errors
-    /// The message of a `base` that cannot be written.
+    /// An error if `base` cannot be written as TOML.
     pub fn to_toml(&self, base: &toml::Table) -> Result<String, toml::ser::Error> {
         let mut out = self.header();
         let kept = |key: &str| {

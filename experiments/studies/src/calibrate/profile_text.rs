@@ -1,10 +1,10 @@
-//! The fitted profile on top of the shipped one, checked as a scene checks it.
+//! Merges the fitted profile into the shipped one, and checks it like a scene's.
 
 use super::profile::FittedReadout;
 use spts::chain::DEFAULT_READOUT;
 use spts_circuit::{PROFILES, Profile, ProfileError};
 
-/// Fitted numbers that are not a profile.
+/// Why fitted values are not a valid profile.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FittedError {
@@ -14,16 +14,16 @@ pub enum FittedError {
     /// The profile cannot be written.
     #[error(transparent)]
     Text(#[from] toml::ser::Error),
-    /// The readout refuses it.
+    /// The readout refuses the profile.
     #[error(transparent)]
     Profile(#[from] ProfileError),
 }
 
-/// Profile of `readings` and its text, valid for a skin of `taxels` taxels. What they do not identify is kept from the
+/// The profile of `readings` and its text, for a skin of `taxels` taxels. Undetermined parameters are taken from the
 /// default readout.
 ///
 /// # Errors
-/// [`FittedError`] when the numbers are outside of what a readout takes.
+/// [`FittedError`] if a value is outside its range.
 pub fn fitted_profile(readings: &FittedReadout, taxels: u32) -> Result<(Profile, String), FittedError> {
     let base = PROFILES.iter().find(|(name, _)| *name == DEFAULT_READOUT);
     let base: toml::Table = toml::from_str(base.map_or("", |(_, text)| text))?;

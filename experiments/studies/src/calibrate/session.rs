@@ -1,4 +1,4 @@
-//! What the presses of one session say together.
+//! Combines the presses of one session.
 
 use super::SessionPair;
 use super::beat::{Beat, beat};
@@ -45,7 +45,7 @@ pub(super) const NUMBERS: [Number; 22] = [
     ("contact_fraction", "", |p| p.contact_fraction),
 ];
 
-/// Quantiles of the output that are compared.
+/// Number of quantiles of the output that are compared.
 pub const QUANTILES: usize = 100;
 
 /// Estimates of one session.
@@ -53,17 +53,17 @@ pub const QUANTILES: usize = 100;
 pub struct SessionEstimates {
     /// Name of the session.
     pub session: String,
-    /// Presses that were used, 1-based.
+    /// Presses that were used, from 1.
     pub presses: Vec<usize>,
-    /// Presses that missed and are left out.
+    /// Presses that missed and were left out.
     pub missed: Vec<MissedPress>,
     /// Median over the presses and standard error, by name.
     pub numbers: BTreeMap<&'static str, Estimated>,
-    /// Converter's grid; `None` when the values are not on one.
+    /// Grid of the converter; `None` if the values are not on a grid.
     pub steps: Option<ConverterSteps>,
-    /// Share of late flips of the taxels loaded enough to be told apart.
+    /// Rate of late flips of the taxels with enough load to be distinguished.
     pub late_cells: Vec<LateCell>,
-    /// Beats of the cells whose late updates can be told apart.
+    /// Beats of the cells whose late updates can be distinguished.
     pub beats: Vec<Beat>,
     /// Cells that do not run their own sequence.
     pub faults: Vec<CellFault>,
@@ -71,7 +71,7 @@ pub struct SessionEstimates {
     pub overdriven: Vec<Overdriven>,
     /// Image of the plateau, median over the presses, V.
     pub image_v: Vec<f64>,
-    /// Taxels against the raster session; `None` without one, or when too few taxels are loaded.
+    /// Taxels compared with the raster session; `None` without one, or if too few taxels are loaded.
     pub gains: Option<SessionGains>,
     /// Quantiles of the output on the plateau, V.
     #[serde(skip)]
@@ -82,21 +82,21 @@ pub struct SessionEstimates {
     /// Weights of the recording.
     #[serde(skip)]
     pub weights: Weights,
-    /// Its measurements a second, Hz.
+    /// Measurements a second of the recording, Hz.
     #[serde(skip)]
     pub sample_rate_hz: f64,
 }
 
 impl SessionEstimates {
-    /// Median over the presses of the number `name`; NaN when there is none.
+    /// Median over the presses of the value `name`; NaN if there is none.
     #[must_use]
     pub fn value(&self, name: &str) -> f64 {
         self.numbers.get(name).map_or(f64::NAN, |e| e.value)
     }
 
     /// Estimates from the given presses of `recording`, the compressive recording of `pair` or one like it. The raster
-    /// recording of `pair` says which cell a foreign sequence belongs to, and what the taxels are compared with. Presses
-    /// that missed are left out. `None` when no press determines an image.
+    /// recording of `pair` shows to which cell a foreign sequence belongs, and is the reference for the taxels. Presses
+    /// that missed are left out. `None` if no press determines an image.
     #[must_use]
     pub fn of(pair: &SessionPair, recording: &Recording, blocks: &[usize]) -> Option<Self> {
         let hold = &pair.hold;

@@ -1,4 +1,4 @@
-//! The skin as a whole: the gains of its taxels, from raster presses of objects that the simulation knows.
+//! Estimates the gains of a skin's taxels from raster presses of objects that the simulation knows.
 
 use super::error::CalibrateError;
 use super::session::SessionEstimates;
@@ -19,14 +19,14 @@ const MOUNTED_PRESSES: (usize, usize) = (1, 5);
 /// Simulated presses of every object: they differ by the arm's repeatability alone.
 const PRESSES: usize = 4;
 
-/// How a skin is calibrated.
+/// Settings of the skin's calibration.
 #[derive(Debug, Clone, Copy)]
 pub struct SkinStudy {
-    /// Root of the random numbers of the simulated presses.
+    /// Seed of the simulated presses.
     pub seed: u64,
 }
 
-/// What was found of a skin.
+/// Results of the skin's calibration.
 #[derive(Debug, Clone, Serialize)]
 pub struct SkinReport {
     /// Rows and columns.
@@ -34,16 +34,16 @@ pub struct SkinReport {
     /// Posterior of the gains, and the standard deviations of the random effects.
     #[serde(flatten)]
     pub skin: SkinGains,
-    /// Sessions that the mounting's standard deviation comes from: of each, log-sd of one session. Empty where no
-    /// session has both recordings; it is then that of the transducer's defaults.
+    /// Sessions from which the standard deviation of mountings is estimated. Empty if no session has both recordings;
+    /// the transducer's default is then used.
     pub mountings: Vec<Mounting>,
-    /// Sessions without a press that is not scored: their scored presses were used.
+    /// Sessions in which all presses are scored, so that scored presses had to be used.
     pub scored: Vec<String>,
-    /// How well every object is predicted with the gains that the other objects tell.
+    /// For every object, how well it is predicted with the gains estimated from the other objects.
     pub objects: Vec<ObjectCheck>,
 }
 
-/// What two sessions with one object differ by.
+/// Change of the gains by mounting the skin, from two sessions with one object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Mounting {
     /// Session.
@@ -52,7 +52,7 @@ pub struct Mounting {
     pub log_sd: f64,
 }
 
-/// A simulated image beside that of the skin, without and with the gains that other objects tell.
+/// A simulated image compared with that of the skin, without and with the gains estimated from other objects.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ObjectCheck {
     /// Object.
@@ -63,11 +63,10 @@ pub struct ObjectCheck {
 }
 
 impl SkinStudy {
-    /// Fits the gains to the recordings in `root`. Raster presses that are scored are not used, unless there are no
-    /// others.
+    /// Fits the gains to the recordings in `root`. Scored raster presses are used only if there are no others.
     ///
     /// # Errors
-    /// [`CalibrateError`] when the recordings cannot be used, or no object of theirs is known to the simulation.
+    /// [`CalibrateError`] if the recordings are not usable, or the simulation knows none of their objects.
     pub fn run(&self, root: &Path, progress: &dyn Progress) -> Result<SkinReport, CalibrateError> {
         let source = Source::open(root)?;
         if source.sessions.iter().all(|s| s.raster.is_none()) {
@@ -171,11 +170,10 @@ fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Mounting>, Cali
 }
 
 impl SkinReport {
-    /// The gains as TOML, which a scene, the spec of a data set, `spts score --learn-from` and `spts decode --skin`
-    /// take.
+    /// The gains as TOML, for scenes, specifications of data sets, `spts score --learn-from` and `spts decode --skin`.
     ///
     /// # Errors
-    /// [`CalibrateError::Skin`], which no gains are known to cause.
+    /// [`CalibrateError::Skin`], which no gains should cause.
     pub fn toml(&self) -> Result<String, CalibrateError> {
         let [rows, cols] = self.shape;
         let gains = TaxelGains {
@@ -195,7 +193,7 @@ impl SkinReport {
         ))
     }
 
-    /// Which sessions have lent presses that are scored; `None` when none has.
+    /// Text about sessions whose scored presses were used; `None` if there are none.
     #[must_use]
     pub fn scored_text(&self) -> Option<String> {
         (!self.scored.is_empty()).then(|| {
@@ -206,7 +204,7 @@ impl SkinReport {
         })
     }
 
-    /// Factor by which every gain may be larger or smaller, 90 %.
+    /// Factor by which every gain may be larger or smaller (90 % interval).
     pub fn bands(&self) -> impl Iterator<Item = f64> + '_ {
         self.skin.gains.log_sd.iter().map(|sd| (BAND_SD * sd).exp())
     }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use spts_recon::metrics::median;
 
-/// Outliers lie beyond this many robust standard deviations.
+/// Number of robust standard deviations beyond which a value is an outlier.
 pub const OUTLIER_SD: f64 = 5.0;
 
 /// 1/Φ⁻¹(3/4): the median absolute value of a centred Gaussian times this is its standard deviation.
@@ -40,8 +40,8 @@ pub(super) fn kurtosis(values: &[f64]) -> f64 {
     }
 }
 
-/// Quantiles of the finite values at (k + ½)/`count`, by linear interpolation between order statistics. Empty without a
-/// value.
+/// Quantiles of the finite values at (k + ½)/`count`, by linear interpolation between order statistics. Empty without
+/// values.
 #[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "places within a list")]
 pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
@@ -60,19 +60,27 @@ pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
 }
 
 /// A number with its uncertainty.
+///
+/// ```
+/// use spts_studies::calibrate::Estimated;
+///
+/// let lsb_mv = Estimated::median_of(&[21.5, 21.4, 21.6, 21.5, 90.0]); // one press went wrong
+/// assert_eq!(lsb_mv.value, 21.5);
+/// assert!(lsb_mv.standard_error.expect("five presses") < 0.2);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimated {
     /// Median over the presses of a session, or mean over sessions.
     pub value: f64,
-    /// Its standard error. `None` with fewer than two.
+    /// Standard error of the value; `None` for fewer than two presses or sessions.
     pub standard_error: Option<f64>,
     /// Number of presses (or sessions).
     pub n: usize,
 }
 
 impl Estimated {
-    /// Mean of `values` and its standard error, s/√n with s the standard deviation of n − 1 degrees of freedom; values
-    /// that are not finite do not count.
+    /// Mean of `values` and its standard error s/√n, with the standard deviation s (n − 1 degrees of freedom). Values
+    /// that are not finite are ignored.
     #[must_use]
     pub fn mean_of(values: &[f64]) -> Self {
         let values = finite(values);
@@ -84,8 +92,8 @@ impl Estimated {
         }
     }
 
-    /// Median of `values`, which a few values that are far off do not move, and its standard error: √(π/2)·s/√n of
-    /// Gaussian values, with s from their median distance to the median. Values that are not finite do not count.
+    /// Median of `values`, which is robust against a few outliers, and its standard error √(π/2)·s/√n for Gaussian
+    /// values, with s from the median distance to the median. Values that are not finite are ignored.
     #[must_use]
     pub fn median_of(values: &[f64]) -> Self {
         let values = finite(values);

@@ -1,13 +1,13 @@
-//! The converter's step from the values that occur.
+//! Finds the converter's step from the values that occur.
 
 use spts_circuit::Recording;
 
 /// Grid of the values of a recording: y = `origin_v` + k·`step_v`.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct ConverterSteps {
-    /// LSB, V: the largest step of which every difference of two values is a multiple.
+    /// LSB, V: the largest step such that every difference of two values is a multiple of it.
     pub step_v: f64,
-    /// A value that occurs, V.
+    /// One of the values, V.
     pub origin_v: f64,
 }
 

@@ -1,4 +1,4 @@
-//! The whole calibration: recordings in, estimates and a readout profile out.
+//! The whole calibration: from recordings to estimates and a readout profile.
 
 use super::error::CalibrateError;
 use super::parameters::predicted_inside;
@@ -14,41 +14,41 @@ use spts_circuit::{LevelSource, Recording};
 use spts_eval::SessionSlip;
 use std::path::Path;
 
-/// Which sessions and presses are used.
+/// Selects sessions and presses.
 #[derive(Debug, Clone, Default)]
 pub struct CalibrationStudy {
-    /// Session that alone is used; every session when there is none.
+    /// The only session to use; `None` for all.
     pub session: Option<String>,
-    /// First and last press that are used, 1-based; all when there are none.
+    /// First and last press to use, from 1; `None` for all.
     pub presses: Option<(usize, usize)>,
 }
 
-/// What a calibration found.
+/// Results of a calibration.
 #[derive(Debug, Clone, Serialize)]
 pub struct CalibrationReport {
     /// Estimates of every session.
     pub sessions: Vec<SessionEstimates>,
-    /// Parameters of the readout, from all sessions together.
+    /// Parameters of the readout, from all sessions.
     pub profile: FittedReadout,
-    /// Whether every session lies in the spans that the other sessions predict; `None` with fewer than three.
+    /// Whether each session lies in the spans predicted from the others; `None` for fewer than three sessions.
     pub predicted_inside: Option<PredictedInside>,
-    /// Samples that lagged behind their rows, and were put back on them.
+    /// Slips of the recordings, which have been realigned.
     pub slips: Vec<SessionSlip>,
-    /// What recordings of presses cannot tell apart, and why.
+    /// Parameters that recordings of presses cannot distinguish, and why.
     pub not_identifiable: [&'static str; NOT_IDENTIFIABLE.len()],
-    /// What the recordings show and the readout does not model.
+    /// Effects in the recordings that the readout does not model.
     pub not_modelled: [&'static str; NOT_MODELLED.len()],
-    /// Taxels of the largest skin.
+    /// Number of taxels of the largest skin.
     #[serde(skip)]
     taxels: usize,
 }
 
 impl CalibrationStudy {
-    /// Fits the sessions in the directory `recordings`, each reported to `progress`.
+    /// Fits the sessions in the folder `recordings`.
     ///
     /// # Errors
-    /// [`CalibrateError`] when the recordings cannot be used, the session is not there, the sessions differ in their
-    /// weights or their rate, or no press of a session can be fitted.
+    /// [`CalibrateError`] if the recordings are not usable, the session does not exist, sessions differ in their
+    /// weights or rate, or no press of a session can be fitted.
     pub fn run(&self, recordings: &Path, progress: &dyn Progress) -> Result<CalibrationReport, CalibrateError> {
         let mut pairs = read(recordings)?;
         if let Some(name) = &self.session {
@@ -132,17 +132,17 @@ fn source(source: &LevelSource) -> String {
 }
 
 impl CalibrationReport {
-    /// The fitted readout profile as TOML; what the recordings do not identify is kept from the default readout.
+    /// The fitted readout profile as TOML. Undetermined parameters are taken from the default readout.
     ///
     /// # Errors
-    /// [`CalibrateError::Fitted`] when the numbers are outside of what a readout takes.
+    /// [`CalibrateError::Fitted`] if a value is outside its range.
     pub fn profile_toml(&self) -> Result<String, CalibrateError> {
         let taxels = u32::try_from(self.taxels).unwrap_or(u32::MAX);
         let (_, text) = fitted_profile(&self.profile, taxels)?;
         Ok(text)
     }
 
-    /// The estimates as a table to read, and what the recordings cannot say.
+    /// The estimates as a text table, with what the recordings cannot determine.
     #[must_use]
     pub fn text(&self) -> String {
         format!(

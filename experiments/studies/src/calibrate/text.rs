@@ -4,7 +4,8 @@ use super::predict::PredictedInside;
 use super::session::{NUMBERS, SessionEstimates};
 use super::statistics::Estimated;
 
-/// One line a number, one column a session: median ± standard error over the presses; then beats, steps and faults.
+/// One line for each value and one column for each session: median ± standard error over the presses. Then beats, steps
+/// and faults.
 #[must_use]
 pub fn table(sessions: &[SessionEstimates]) -> String {
     let mut out = format!("{:<22}", "");

@@ -1,4 +1,4 @@
-//! Score curves of the twin's replayed sessions beside the skin's.
+//! Score curves of the twin's replayed sessions, compared with the skin's.
 
 use super::{ComparedSession, split};
 use serde::Serialize;
@@ -25,19 +25,19 @@ const METRICS: [Metric; 3] = [
 pub struct CurveDistance {
     /// Score.
     pub metric: &'static str,
-    /// Decode.
+    /// Decoding variant.
     pub decode: &'static str,
-    /// Mean of |twin − real| over [`MEASUREMENTS`], of the mean over the objects.
+    /// Mean over [`MEASUREMENTS`] of |twin − real|, each the mean over the objects.
     pub mean_abs_difference: f64,
     /// Largest |twin − real|.
     pub max_abs_difference: f64,
-    /// Mean difference that is allowed.
+    /// Largest allowed mean difference.
     pub tolerance: f64,
-    /// Whether it is met.
+    /// Whether the mean difference is allowed.
     pub ok: bool,
 }
 
-/// Curves and the rows they are from.
+/// Score curves, and the rows from which they are computed.
 #[derive(Debug, Clone)]
 pub struct ScoreCurves {
     /// Distances.
@@ -48,7 +48,7 @@ pub struct ScoreCurves {
     pub twin: Vec<ScoreRow>,
 }
 
-/// Number of times [`curves`] reports progress.
+/// Number of progress reports of [`curves`].
 #[must_use]
 pub fn steps(compared: &[ComparedSession], real: &PublishedSkin) -> usize {
     2 * compared
@@ -79,17 +79,17 @@ fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recordin
     Some((recording.with_blocks(blocks).ok()?, protocol))
 }
 
-/// Scores the compared sessions of both skins, on the presses of the protocol that the readout was not calibrated on.
-/// True images, dictionary and library are the published ones for both: the truth is the skin's own raster session.
+/// Scores the compared sessions of both skins, on presses of the protocol that were not used for calibration. True
+/// images, dictionary and library are the published ones for both: the ground truth is the skin's own raster session.
 ///
 /// # Errors
-/// [`ScoreError`] when the published dictionary or library cannot be used.
+/// [`ScoreError`] if the published dictionary or library is not usable.
 pub fn curves(
     compared: &[ComparedSession],
     real: &PublishedSkin,
     done: &(dyn Fn() + Sync),
 ) -> Result<ScoreCurves, ScoreError> {
-    let decoders = PublishedDecode::decoders(&real.skin.learned).map_err(ScoreError::from)?;
+    let decoders = PublishedDecode::named(&real.skin.learned).map_err(ScoreError::from)?;
     let score = |is_twin: bool| {
         let mut rows = Vec::new();
         for c in compared {

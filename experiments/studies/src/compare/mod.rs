@@ -1,8 +1,7 @@
-//! The twin against recordings of the skin it is the twin of: the same images, the same rows of weights, the same
-//! estimators.
+//! Compares the twin with recordings of its real skin: same images, same rows of weights, same estimators.
 //!
-//! The readout is calibrated on every other press of a session and compared on the others, or it is fitted to other
-//! sessions: so the comparison can fail.
+//! The readout is calibrated on every other press of a session and compared on the others, or fitted to other sessions.
+//! The comparison can therefore fail.
 
 mod curves;
 mod predicted;
@@ -25,22 +24,21 @@ use simulated::{SimulatedPresses, skin_seed};
 use spts_circuit::{Profile, Recording};
 use spts_models::Streams;
 
-/// Real and twin estimates of one session, and the twin's recording.
+/// Estimates of one session of the real skin and of the twin, and the twin's recording.
 #[derive(Debug, Clone)]
 pub struct ComparedSession {
-    /// Estimates of the skin's presses that are compared.
+    /// Estimates from the skin's compared presses.
     pub real: SessionEstimates,
-    /// Estimates of the twin's.
+    /// Estimates from the twin's presses.
     pub twin: SessionEstimates,
-    /// The readout that was fitted to the calibration presses.
+    /// The readout fitted to the calibration presses.
     pub readings: FittedReadout,
-    /// The twin's session; presses that are not compared are the skin's own.
+    /// The twin's session. Presses that are not compared are the skin's own.
     pub recording: Recording,
 }
 
-/// Presses (0-based) that calibrate a session, and those that are compared: the first, third, … and the second, fourth,
-/// …. The readout drifts in the course of a session (the first tap of the memory by 0.01), so that neither half may be
-/// the earlier one. `None` with one press.
+/// Presses (from 0) for calibration, and for comparison: the first, third, … and the second, fourth, …. They alternate
+/// because the readout drifts during a session (the first tap of the memory by 0.01). `None` for one press.
 #[must_use]
 pub fn split(recording: &Recording) -> Option<(Vec<usize>, Vec<usize>)> {
     let presses = recording.blocks().len();
@@ -95,7 +93,7 @@ fn twin_of(
 /// Calibrates, replays and analyses one session.
 ///
 /// # Errors
-/// [`ReplayError`] when it has too few presses, a press cannot be fitted, or the readout refuses what was fitted.
+/// [`ReplayError`] if there are too few presses, a press cannot be fitted, or the readout refuses the fitted values.
 pub fn compare(pair: &SessionPair, images: &Images, streams: Streams) -> Result<ComparedSession, ReplayError> {
     let (calibration, compared) = split(&pair.compressive).ok_or_else(|| ReplayError::OnePress {
         session: pair.session.clone(),
@@ -116,10 +114,10 @@ pub fn compare(pair: &SessionPair, images: &Images, streams: Streams) -> Result<
     })
 }
 
-/// [`compare`] for every session; `done` is called after each.
+/// [`compare`] for every session. `done` is called after each.
 ///
 /// # Errors
-/// The first session's that cannot be compared.
+/// The error of the first session that cannot be compared.
 pub fn compare_all(
     pairs: &[SessionPair],
     images: &Images,

@@ -1,4 +1,4 @@
-//! New sessions, predicted with a profile that was fitted to others.
+//! Prediction of sessions with a profile fitted to others.
 
 use super::replay::ReplayError;
 use super::statistics::{COMPARED_NAMES, value_of};
@@ -10,25 +10,25 @@ use serde::Serialize;
 use spts_circuit::Profile;
 use spts_models::Streams;
 
-/// What predicts a session.
+/// The profile for a prediction.
 #[derive(Debug, Clone)]
 pub enum Predictor {
     /// A profile fitted to all presses of the other sessions.
     Others,
-    /// This profile.
+    /// The given profile.
     Profile(Box<Profile>),
 }
 
-/// How sessions are predicted.
+/// Settings of the predictions.
 #[derive(Debug, Clone)]
 pub struct Prediction {
     /// The profile.
     pub predictor: Predictor,
-    /// Twins of every session, each with other values from the spans of the profile; [2, 1000].
+    /// Number of twins of every session, each with other values from the spans of the profile; [2, 1000].
     pub draws: u64,
 }
 
-/// One number of one session beside the band of its twins.
+/// One statistic of one session, compared with the band of its twins.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PredictedStatistic {
     /// Session.
@@ -39,11 +39,11 @@ pub struct PredictedStatistic {
     pub real: f64,
     /// Mean of the twins.
     pub twin: f64,
-    /// Lower end of the span that one more twin falls into with a probability of 90 %.
+    /// Lower end of the span in which a further twin lies with a probability of 90 %.
     pub low: f64,
     /// Its upper end.
     pub high: f64,
-    /// Whether the real value lies in it.
+    /// Whether the real value lies in the span.
     pub inside: bool,
 }
 

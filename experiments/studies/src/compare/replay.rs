@@ -1,40 +1,40 @@
-//! Images through the twin's readout: the skin's own, or others.
+//! Sends images through the twin's readout: the skin's own images, or others.
 
 use crate::calibrate::{FitRequest, FittedError, SessionEstimates, WINDOW_FRAMES, fit_windows, reseeded};
 use rayon::prelude::*;
 use spts_circuit::{Block, Interpolated, Mode, Profile, Readout, Recording};
 use spts_models::{ConductanceMap, Streams};
 
-/// Why a session could not be replayed.
+/// Why a session cannot be replayed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReplayError {
-    /// Nothing is left to compare with.
+    /// There is only one press, so none is left for the comparison.
     #[error("{session} compressive: `presses` = 1 is outside [2, ∞): some calibrate, the others are compared")]
     OnePress {
         /// Object.
         session: String,
     },
-    /// Nothing predicts the only session.
+    /// There is only one session, so none is left for the prediction.
     #[error("{session} compressive: the only session, and no other to fit a profile to; name a profile")]
     NoOthers {
         /// Session.
         session: String,
     },
-    /// An object that the simulation does not know.
+    /// The simulation does not know the object.
     #[error("{session} compressive: `object` = {object:?} is not known to the simulation; known: {known}")]
     UnknownObject {
         /// Session.
         session: String,
         /// Its object.
         object: String,
-        /// Names of the known ones.
+        /// Names of the known objects.
         known: String,
     },
-    /// The object could not be pressed.
+    /// The press could not be simulated.
     #[error("simulated presses: {0}")]
     Simulation(#[source] Box<spts::TwinError>),
-    /// The gains cannot be given to a scene.
+    /// The gains are not valid in a scene.
     #[error("gains: {0}")]
     Gains(String),
     /// The samples do not determine an image.
@@ -43,31 +43,31 @@ pub enum ReplayError {
         /// Object.
         session: String,
     },
-    /// The fitted numbers are not a profile.
+    /// The fitted values are not a valid profile.
     #[error("the fitted profile: {0}")]
     Fitted(#[from] FittedError),
     /// The readout refuses the profile.
     #[error("readout: {0}")]
     Profile(#[from] spts_circuit::ProfileError),
-    /// The fitted image is not a conductance.
+    /// The fitted image is not a valid conductance.
     #[error("conductance: {0}")]
     Source(#[from] spts_circuit::SourceError),
     /// The readout could not record.
     #[error("readout: {0}")]
     Acquire(#[from] spts_circuit::AcquireError),
-    /// The blocks do not make a recording.
+    /// The blocks do not form a valid recording.
     #[error(transparent)]
     Recording(#[from] spts_circuit::RecordingError),
 }
 
-/// Conductance over time of a press, by its number.
+/// Conductance of a press as a function of time, by the number of the press.
 pub type PressSource<'a> = dyn Fn(usize) -> Result<Interpolated, ReplayError> + Sync + 'a;
 
-/// Records the presses `blocks` of `real` anew: their conductance by `source`, at the same rows of weights, through the
-/// readout with `profile` and the weights of `real`, in session number `session`. The other presses stay as they are.
+/// Records the presses `blocks` of `real` again: with the conductance from `source`, the same rows of weights, and the
+/// readout `profile`, in session number `session`. The other presses are unchanged.
 ///
 /// # Errors
-/// [`ReplayError`] when a press has no conductance or the readout refuses it.
+/// [`ReplayError`] if a press has no conductance, or the readout refuses it.
 pub fn replay(
     real: &Recording,
     blocks: &[usize],
@@ -107,11 +107,11 @@ fn press(
     Ok(Block { idle_frames, ..anew })
 }
 
-/// What the skin's conductance was in the presses of `real`, measured by least squares in windows of [`WINDOW_FRAMES`],
-/// for a readout with `profile`.
+/// Conductance of the skin in the presses of `real`, measured by least squares in windows of [`WINDOW_FRAMES`], for a
+/// readout with `profile`.
 ///
-/// The windows' own noise reaches the twin's output as √(p/n) = 0.2 of one measurement's noise, 4 % of its variance; it
-/// is constant within a window, so that the estimators, which fit the image anew, do not see it.
+/// The noise of the windows adds √(p/n) = 0.2 of one measurement's noise to the twin's output, 4 % of its variance. It
+/// is constant within a window, so the estimators, which fit the image again, are not affected.
 pub fn recorded_images<'a>(
     real: &'a Recording,
     fitted: &'a SessionEstimates,

@@ -1,4 +1,4 @@
-//! Presses of the simulation, to send through the readout in place of the skin's own images.
+//! Simulated presses that replace the skin's own images as input of the readout.
 
 use super::replay::ReplayError;
 use crate::calibrate::SessionPair;

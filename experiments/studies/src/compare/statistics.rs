@@ -1,10 +1,10 @@
-//! Numbers of the recordings, real against twin, with what difference is allowed.
+//! Statistics of the recordings, real and simulated, with the allowed differences.
 
 use super::ComparedSession;
 use crate::calibrate::SessionEstimates;
 use serde::Serialize;
 
-/// One number of one session.
+/// One statistic of one session.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Statistic {
     /// Object.
@@ -13,26 +13,26 @@ pub struct Statistic {
     pub name: &'static str,
     /// Value in the recordings of the skin.
     pub real: f64,
-    /// Its standard error; `None` when it has none.
+    /// Standard error of that value; `None` if there is none.
     pub real_standard_error: Option<f64>,
-    /// Value in the twin's.
+    /// Value in the twin's recordings.
     pub twin: f64,
-    /// Its standard error.
+    /// Standard error of that value; `None` if there is none.
     pub twin_standard_error: Option<f64>,
     /// Allowed difference, in words.
     pub tolerance: &'static str,
-    /// Whether the difference is allowed; `None` for what the readout does not model.
+    /// Whether the difference is allowed; `None` for effects that the readout does not model.
     pub ok: Option<bool>,
 }
 
 /// What difference is allowed.
 #[derive(Debug, Clone, Copy)]
 enum Allowed {
-    /// |twin − real| as a share of |real|.
+    /// |twin − real| relative to |real|.
     Share(f64),
     /// |twin − real|.
     Difference(f64),
-    /// Larger over smaller; both must be positive.
+    /// The larger value divided by the smaller; both must be positive.
     Factor(f64),
 }
 
@@ -129,7 +129,7 @@ fn session(real: &SessionEstimates, twin: &SessionEstimates) -> Vec<Statistic> {
 /// Numbers of the recordings that the readout does not model.
 const NOT_MODELLED: [&str; 3] = ["idle_sd", "idle_parity", "unexplained_outliers"];
 
-/// What the readout does not model, of every session: beside each other, without a verdict.
+/// Statistics of effects that the readout does not model, for every session, without a verdict.
 #[must_use]
 pub fn not_modelled(compared: &[ComparedSession]) -> Vec<Statistic> {
     let row = |c: &ComparedSession, name: &'static str| {

@@ -1,4 +1,4 @@
-//! The whole comparison: recordings in, numbers and curves out.
+//! The whole comparison: from recordings to statistics and curves.
 
 use super::predicted::{PredictedStatistic, Prediction, predicted_statistics};
 use super::statistics::{not_modelled, statistics};
@@ -29,51 +29,51 @@ pub enum CompareError {
     Score(#[from] ScoreError),
 }
 
-/// Which images the twin's readout is given.
+/// The images for the twin's readout.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Images {
-    /// Those that were measured on the skin.
+    /// Those measured on the skin.
     #[default]
     Recorded,
     /// Those of the simulation: the same object on a simulated skin.
     Simulated {
-        /// Gains of that skin; `None` for any skin.
+        /// Gains of that skin; `None` for an arbitrary skin.
         gains: Option<TaxelGains>,
     },
 }
 
-/// What is compared.
+/// Settings of the comparison.
 #[derive(Debug, Clone)]
 pub struct CompareStudy<'a> {
-    /// Directory that the sessions were read from.
+    /// Folder from which the sessions were read.
     pub recordings: &'a Path,
     /// Its sessions.
     pub pairs: &'a [SessionPair],
-    /// What the presses are scored with; without it there are no score curves.
+    /// What is needed for scoring; without it there are no score curves.
     pub real: Option<&'a PublishedSkin>,
-    /// Which images the twin is given.
+    /// The images for the twin.
     pub images: Images,
-    /// Predict every session with a profile fitted to others, in place of calibrating on its own odd presses.
+    /// Predicts every session with a profile fitted to others, instead of calibrating on its own odd presses.
     pub prediction: Option<Prediction>,
-    /// Root of the twin's random numbers.
+    /// Seed of the twin's random numbers.
     pub seed: u64,
 }
 
-/// What a comparison found.
+/// Results of a comparison.
 #[derive(Debug, Clone, Serialize)]
 pub struct CompareReport {
     /// Sessions.
     #[serde(skip)]
     pub compared: Vec<ComparedSession>,
-    /// Numbers that must agree.
+    /// Statistics that must agree.
     pub statistics: Vec<Statistic>,
-    /// Score curves, if they were asked for. Their distances alone are serialised.
+    /// Score curves, if requested. Only their distances are serialised.
     #[serde(serialize_with = "distances_only")]
     pub curves: Option<ScoreCurves>,
-    /// Numbers beside the band that a profile fitted to others predicts, if that was asked for.
+    /// Statistics compared with the band of a profile fitted to others, if requested.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub predicted: Vec<PredictedStatistic>,
-    /// Numbers that the readout does not model.
+    /// Statistics of effects that the readout does not model.
     pub not_modelled: Vec<Statistic>,
 }
 
@@ -86,10 +86,10 @@ fn distances(curves: Option<&ScoreCurves>) -> &[CurveDistance] {
 }
 
 impl CompareStudy<'_> {
-    /// Calibrates and replays every session, and scores them when it is known with what.
+    /// Calibrates and replays every session, and scores it if the published dictionary and library are given.
     ///
     /// # Errors
-    /// [`CompareError`] when a session cannot be compared.
+    /// [`CompareError`] if a session cannot be compared.
     pub fn run(&self, progress: &dyn Progress) -> Result<CompareReport, CompareError> {
         if let Some(prediction) = &self.prediction {
             #[expect(clippy::cast_possible_truncation, reason = "at most 1000 draws")]
@@ -135,19 +135,19 @@ impl CompareStudy<'_> {
 }
 
 impl CompareReport {
-    /// Both kinds of numbers.
+    /// Statistics of both kinds.
     #[must_use]
     pub fn all_statistics(&self) -> Vec<Statistic> {
         [self.statistics.as_slice(), &self.not_modelled].concat()
     }
 
-    /// Distances of the score curves; none without curves.
+    /// Distances of the score curves; empty without curves.
     #[must_use]
     pub fn distances(&self) -> &[CurveDistance] {
         distances(self.curves.as_ref())
     }
 
-    /// The numbers and the distances of the curves as tables to read.
+    /// Statistics and distances of the curves as text tables.
     #[must_use]
     pub fn text(&self) -> String {
         text::table(self)

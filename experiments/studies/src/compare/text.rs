@@ -7,8 +7,8 @@ fn verdict(ok: bool) -> &'static str {
     if ok { "ok" } else { "DIFFERS" }
 }
 
-/// A number with its standard error; a dash where there is nothing to form it from, such as the share of the outliers
-/// that are unexplained without an outlier.
+/// A value with its standard error; a dash if it is undefined, such as the share of unexplained outliers when there are
+/// no outliers.
 #[must_use]
 pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
     match error {

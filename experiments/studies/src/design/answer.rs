@@ -1,4 +1,4 @@
-//! What follows from a design: costs, the constraint that binds, other ways, and files that simulate it.
+//! Consequences of a design: costs, the limiting constraint, alternatives, and files to simulate it.
 
 use super::bench::{Bench, draw, mean};
 use super::error::DesignError;

@@ -1,9 +1,16 @@
-//! The band in which a check is expected.
+//! The band in which the result of a check is expected.
 
 use crate::budget::student::two_sided;
 use serde::{Deserialize, Serialize};
 
-/// A mean that was found, and the band in which the mean of another run of the same size is expected.
+/// The mean of a quantity, and the band in which the mean of another run of the same size is expected.
+///
+/// ```
+/// use spts_studies::design::Promise;
+///
+/// let iou = Promise { mean: 0.81, low: 0.78, high: 0.84 };
+/// assert!(iou.holds(0.80) && !iou.holds(0.70));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Promise {
@@ -23,7 +30,7 @@ impl Promise {
     }
 }
 
-/// Probability that a check of a design that is as it says finds one of its quantities outside of the band.
+/// Probability that the check of a correct design finds one of its quantities outside the band.
 pub const OUTSIDE: f64 = 0.01;
 
 /// The promise of a quantity that `repetitions` have found, for a check of as many repetitions, one of `quantities`

@@ -1,4 +1,4 @@
-//! Touches through the circuit of a design, decoded and scored.
+//! Sends touches through the circuit of a design, decodes and scores them.
 
 use super::classes::Classes;
 use super::error::DesignError;
@@ -19,7 +19,7 @@ pub(super) const TOUCHES: [usize; 2] = [8, 17];
 #[derive(Debug)]
 pub(super) struct Repetition {
     pub(super) touches: Vec<Touch>,
-    /// Samples of every touch, V: measurement by measurement, of every wire.
+    /// Samples of every touch, V: by measurement, then by wire.
     volts: Vec<Vec<f64>>,
 }
 
@@ -28,9 +28,9 @@ pub(super) struct Repetition {
 pub(super) struct RepetitionScore {
     /// Mean IoU.
     pub(super) iou: f64,
-    /// Median distance of the centres, taxels. A touch of which no image is found counts with the skin's diagonal.
+    /// Median distance of the centres, taxels. A touch without an image counts with the skin's diagonal.
     pub(super) place_px: f64,
-    /// Share of the objects that are told apart, where they are.
+    /// Share of correctly classified objects, where objects are classified.
     pub(super) class: Option<f64>,
 }
 
@@ -79,8 +79,8 @@ pub(super) struct Bench {
     places: usize,
 }
 
-/// Taxels that are solved for with M measurements of a wire: this share of M. With as many taxels as measurements, noise
-/// is fitted. The share is interpolated: M/2, M and 3M/2 were compared, on 48 touches of each of a few skins.
+/// Taxels that are solved for with M measurements of a wire: this share of M. With as many taxels as measurements,
+/// noise is fitted. The share is interpolated: M/2, M and 3M/2 were compared, on 48 touches of each of a few skins.
 const PLACES_SHARE: f64 = 0.75;
 /// Fewest taxels that are solved for.
 const FEWEST_PLACES: usize = 4;

@@ -1,4 +1,4 @@
-//! A design held against other touches.
+//! Checks a design with other touches.
 
 use super::answer::layout_of;
 use super::band::Promise;
@@ -11,53 +11,53 @@ use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Profile, parse_patterns};
 
-/// A design, the files that go with it, and the seed of the check.
+/// A design, its files, and the seed of the check.
 #[derive(Debug, Clone)]
 pub struct DesignCheck {
-    /// What is promised.
+    /// The design with its promise.
     pub design: Design,
     /// Readout profile of a wire.
     pub profile: Profile,
-    /// Text of the pattern, where rows are designed.
+    /// Text of the pattern, if rows are designed.
     pub pattern: Option<String>,
-    /// Root of every random number of the check.
+    /// Seed of all random numbers of the check.
     pub seed: u64,
 }
 
-/// One quantity that was promised, and what was found.
+/// One promised quantity, and its value in the check.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CheckedQuantity {
     /// Name.
     pub quantity: &'static str,
-    /// What was promised.
+    /// Promised value and band.
     pub promised: Promise,
-    /// What the check found.
+    /// Value in the check.
     pub found: f64,
-    /// Whether that lies in the band.
+    /// Whether the value lies in the band.
     pub agrees: bool,
 }
 
-/// What a check found.
+/// Results of a check.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CheckReport {
     /// Whether all quantities lie in their bands.
     pub agrees: bool,
     /// Quantities.
     pub quantities: Vec<CheckedQuantity>,
-    /// Repetitions.
+    /// Number of repetitions.
     pub repetitions: usize,
-    /// Touches of each.
+    /// Number of touches in each repetition.
     pub touches: usize,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
 impl DesignCheck {
-    /// Simulates the design: other specimens of the skin, other parts of the device, other touches and other noise than
-    /// those that the promise rests on, and as many of them.
+    /// Simulates the design with specimens of the skin, device parts, touches and noise other than those on which the
+    /// promise is based, and with the same number of them.
     ///
     /// # Errors
-    /// [`DesignError`] when the design is none, or its files do not go with it.
+    /// [`DesignError`] if the design is not valid, or its files do not belong to it.
     pub fn run(&self, progress: &dyn Progress) -> Result<CheckReport, DesignError> {
         let design = &self.design;
         let layout = layout_of(design)?;

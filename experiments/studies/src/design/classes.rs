@@ -1,4 +1,4 @@
-//! Which of the seventeen objects was pressed.
+//! Classification of the seventeen objects.
 
 use super::error::DesignError;
 use crate::touches::Touch;

@@ -1,9 +1,9 @@
-//! Why no skin is designed.
+//! Errors of the design study.
 
 use crate::electronics::ElectronicsError;
 use crate::touches::TouchError;
 
-/// Why there is no [`DesignReport`](super::DesignReport), or why a design cannot be checked.
+/// Why there is no [`DesignReport`](super::DesignReport), or a design cannot be checked.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DesignError {
@@ -14,10 +14,10 @@ pub enum DesignError {
         field: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Valid range.
         range: &'static str,
     },
-    /// Area and resolution make a skin that is too small or too large.
+    /// Area and resolution give a skin that is too small or too large.
     #[error("`area` / `resolution`: {rows:.0} × {cols:.0} taxels are outside [2, 256] a side")]
     Taxels {
         /// Rows of taxels.
@@ -28,41 +28,41 @@ pub enum DesignError {
     /// More wires than rows of taxels.
     #[error("`wires` = {wires} is outside [1, {rows}]: every wire reads whole rows of the skin")]
     Wires {
-        /// Wires asked for.
+        /// Requested number of wires.
         wires: usize,
         /// Rows of taxels.
         rows: usize,
     },
-    /// Objects that nobody knows.
+    /// Objects that are not known.
     #[error(
         "`objects` = {name:?}: {reason}; valid: small, large, the name of a data set's spec (presses-17, random-shapes, …), a spec file that ends in .toml, or the folder of a data set"
     )]
     Objects {
-        /// What was asked for.
+        /// Requested name.
         name: String,
-        /// Why it cannot be had.
+        /// Cause.
         reason: String,
     },
-    /// The latency does not hold the measurements of any image.
+    /// The latency is too short for the measurements of any image.
     #[error(
         "`latency` = {latency_s:.6} s is outside [{least_s:.6}, ∞): {least} measurements take that long at {rate_hz:.0} Hz"
     )]
     Latency {
-        /// Latency asked for, s.
+        /// Requested latency, s.
         latency_s: f64,
-        /// Least latency, s.
+        /// Smallest possible latency, s.
         least_s: f64,
-        /// Measurements of the smallest window.
+        /// Number of measurements of the smallest window.
         least: usize,
         /// Rate, Hz.
         rate_hz: f64,
     },
-    /// The design in a folder is none.
+    /// The design in a folder is not valid.
     #[error("{what}: {reason}")]
     NoDesign {
         /// File.
         what: String,
-        /// What is wrong with it.
+        /// Cause.
         reason: String,
     },
     /// The electronics of as_designed cannot be used.
@@ -71,39 +71,39 @@ pub enum DesignError {
     /// Touches that cannot be drawn or measured.
     #[error(transparent)]
     Touch(#[from] TouchError),
-    /// A value that the skin, the amplifier or the readout does not take.
+    /// A value outside the range of the skin, the amplifier or the readout.
     #[error(transparent)]
     Config(#[from] spts_models::ConfigError),
     /// A readout that cannot be built.
     #[error(transparent)]
     Profile(#[from] spts_circuit::ProfileError),
-    /// A profile without a stage that the design changes.
+    /// A profile lacks a stage that the design changes.
     #[error("profile {profile}: no `{name}`")]
     NoStage {
         /// Profile.
         profile: &'static str,
-        /// What it lacks.
+        /// Name of the missing stage.
         name: &'static str,
     },
-    /// A profile that has no text.
+    /// A profile cannot be written as text.
     #[error("profile: {0}")]
     ProfileText(#[from] toml::ser::Error),
-    /// Rows that are no weights.
+    /// Rows that are not valid weights.
     #[error(transparent)]
     Weights(#[from] spts_circuit::WeightsError),
     /// Rows that cannot be designed.
     #[error(transparent)]
     Rows(#[from] spts_recon::rows::RowError),
-    /// Images that make no prior.
+    /// Images from which no prior can be made.
     #[error(transparent)]
     Prior(#[from] spts_recon::recover::PriorError),
     /// Measurements that cannot be decoded.
     #[error(transparent)]
     Decode(#[from] spts_recon::matrix_free::SheetError),
-    /// Templates that make no classes.
+    /// Templates from which no classes can be made.
     #[error(transparent)]
     Library(#[from] spts_recon::classify::LibraryError),
-    /// Classes that cannot be told apart.
+    /// Classes that cannot be distinguished.
     #[error(transparent)]
     Classes(#[from] spts_recon::classify::EvidenceError),
     /// Amplitudes of classes that are out of range.

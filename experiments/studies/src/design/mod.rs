@@ -1,8 +1,8 @@
-//! A skin for what somebody wants of it: area, resolution, latency and image in; taxels, wires, electronics, rows and
-//! decoder out, with a promise that a simulation of other touches can check.
+//! Designs a skin for given requirements. Input: area, resolution, latency and image quality. Output: taxels, wires,
+//! electronics, rows and decoder, with a promise that a simulation of other touches can check.
 //!
-//! [`DesignStudy`] searches. [`DesignCheck`] simulates a [`Design`] with touches, specimens and parts that the search
-//! has not seen, and says whether what was promised is found.
+//! [`DesignStudy`] searches. [`DesignCheck`] simulates a [`Design`] with touches, specimens and parts that were not
+//! used in the search, and reports whether the promise holds.
 
 mod answer;
 mod band;

@@ -1,4 +1,4 @@
-//! What a skin is designed for.
+//! The objects for which a skin is designed.
 
 use super::error::DesignError;
 use crate::touches::{TouchObjects, TouchScene};
@@ -14,30 +14,39 @@ const USUAL_SIZES_M: [f64; 2] = [0.02, 0.09];
 /// Those of the seventeen objects, about.
 const OBJECT_SIZES_M: [f64; 2] = [0.03, 0.1];
 
-/// What a skin is designed for: single objects, pressed with 5 to 40 N and held still.
+/// The objects for which a skin is designed: single objects, pressed with 5 to 40 N and held still.
+///
+/// ```
+/// use spts_studies::design::DesignObjects;
+///
+/// assert_eq!(DesignObjects::named("small")?.size_m, [20e-3, 40e-3]);
+/// let error = DesignObjects::named("huge").unwrap_err();
+/// assert!(error.to_string().starts_with("`objects` = \"huge\""));
+/// # Ok::<(), spts_studies::design::DesignError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DesignObjects {
-    /// Name that was asked for.
+    /// Requested name.
     pub name: String,
-    /// Whether they are the seventeen objects of the published recordings, and not procedural shapes.
+    /// Whether they are the seventeen objects of the published recordings. If not, they are procedural shapes.
     pub seventeen: bool,
-    /// Whether they stay at their published places and rotations.
+    /// Whether they keep their published places and rotations.
     pub placed: bool,
-    /// Largest extent over the skin, least and most, m.
+    /// Smallest and largest extent over the skin, m.
     pub size_m: [f64; 2],
 }
 
 impl DesignObjects {
-    /// `small` (shapes of 20 to 40 mm), `large` (40 to 90 mm), or what the spec of a data set says in its sections
-    /// `[object]` and `[pose]`: a spec's name, its file, or the folder of a data set.
+    /// `small` (shapes of 20 to 40 mm), `large` (40 to 90 mm), or the sections `[object]` and `[pose]` of a data set's
+    /// specification, given by its name, its file, or the folder of a data set.
     ///
-    /// Of a spec, the source of the objects, the sizes of shapes and whether objects stay in their published places
-    /// count; its skin, forces, readout and numbers do not.
+    /// From a specification, the source of the objects, the sizes of shapes and whether objects keep their published
+    /// places are used. Its skin, forces, readout and numbers are not.
     ///
     /// # Errors
-    /// [`DesignError::Objects`] for a spec that cannot be read, and for one of meshes, balls or several objects at
-    /// once.
+    /// [`DesignError::Objects`] for a specification that cannot be read, or has meshes, balls or several simultaneous
+    /// objects.
     pub fn named(name: &str) -> Result<Self, DesignError> {
         let shapes = |size_m| Self {
             name: name.to_owned(),

@@ -1,4 +1,4 @@
-//! What was designed, and what it promises.
+//! The design and its promise.
 
 use super::band::Promise;
 use super::objects::DesignObjects;
@@ -6,7 +6,7 @@ use super::rows::RowSource;
 use super::wire::WireDesign;
 use serde::{Deserialize, Serialize};
 
-/// A designed skin: all that simulates it once more, and what is expected of it.
+/// A designed skin: everything needed to simulate it again, and its expected performance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Design {
@@ -16,11 +16,11 @@ pub struct Design {
     pub cols: usize,
     /// Number of taxels N.
     pub taxels: usize,
-    /// Distance of neighbouring taxels, m.
+    /// Distance between neighbouring taxels, m.
     pub pitch_m: f64,
     /// Side of an electrode, m.
     pub electrode_m: f64,
-    /// What it is designed for.
+    /// The objects for which it is designed.
     pub objects: DesignObjects,
     /// Wires, each with a sub-array, an amplifier and a converter, read at the same time.
     pub wires: usize,
@@ -28,17 +28,17 @@ pub struct Design {
     pub sub_arrays: Vec<usize>,
     /// Electronics of a wire.
     pub wire: WireDesign,
-    /// Where the rows of the sensing matrix come from.
+    /// Source of the rows of the sensing matrix.
     pub row_source: RowSource,
-    /// Measurements of every wire.
+    /// Number of measurements of every wire.
     pub m_per_wire: usize,
-    /// Measurements of all wires, M.
+    /// Number of measurements of all wires, M.
     pub m: usize,
     /// Decoder.
     pub decoder: DecoderDesign,
-    /// What is expected.
+    /// Expected performance.
     pub expected: Expectation,
-    /// Root of every random number of the design.
+    /// Seed of all random numbers of the design.
     pub seed: u64,
 }
 
@@ -48,55 +48,56 @@ pub struct Design {
 pub struct DecoderDesign {
     /// Name: `spts_recon::matrix_free::SheetDecoder`.
     pub name: String,
-    /// Taxels that are solved for at most.
+    /// Largest number of taxels with non-zero values.
     pub places: usize,
-    /// Covariance of two taxels of a row at a distance of 0, 1, 2, … taxels, over that at 0: the images that are
-    /// expected.
+    /// Covariance of two taxels of a row at a distance of 0, 1, 2, … taxels in the expected images, relative to that at
+    /// 0.
     pub covariance_along_rows: Vec<f64>,
-    /// The same for two taxels of a column.
+    /// The same covariance for two taxels of a column.
     pub covariance_along_cols: Vec<f64>,
-    /// Bytes that the prepared decoder holds.
+    /// Memory of the prepared decoder, bytes.
     pub bytes: usize,
-    /// Multiplications of an image, about.
+    /// Approximate number of multiplications for an image.
     pub products: usize,
 }
 
-/// What a check of the design is expected to find.
+/// Expected results of a check of the design.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expectation {
     /// Intersection over union of image and touch.
     pub iou: Promise,
-    /// Distance of image and touch, median, taxels.
+    /// Median distance between image and touch, taxels.
     pub place_px: Promise,
-    /// The same, mm.
+    /// Median distance between image and touch, mm.
     pub place_mm: Promise,
-    /// Share of the seventeen objects that are recognised; `None` where that cannot be said.
+    /// Share of the seventeen objects that are recognised; `None` if it cannot be determined.
     pub class: Option<Promise>,
-    /// Why it cannot be said.
+    /// Why it cannot be determined.
     pub no_class: Option<String>,
-    /// Repetitions, each with a specimen, parts, touches and noise of its own.
+    /// Number of repetitions, each with its own specimen, parts, touches and noise.
     pub repetitions: usize,
-    /// Touches of a repetition.
+    /// Number of touches in a repetition.
     pub touches: usize,
-    /// Probability that the check of a design that is as it says finds a quantity outside of its band.
+    /// Probability that the check of a correct design finds a quantity outside its band.
     pub outside: f64,
 }
 
-/// Where the time from touch to image goes.
+/// Parts of the time from touch to image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LatencyParts {
-    /// Latency asked for, s.
+    /// Requested latency, s.
     pub limit_s: f64,
-    /// All measurements of a wire, s: what counts against the limit.
+    /// Time of all measurements of a wire, s, which must not exceed the limit.
     pub acquisition_s: f64,
     /// Part of every measurement in which the output settles, s.
     pub settle_s: f64,
-    /// Time of the decoder for the largest image at 10⁹ multiplications a second, s; an estimate beside the limit.
+    /// Time of the decoder for the largest image at 10⁹ multiplications a second, s: an estimate that is not part of
+    /// the limit.
     pub decode_estimate_s: f64,
 }
 
-/// What drives the cost.
+/// Quantities that determine the cost.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CostDrivers {
     /// Cells, one a taxel.
@@ -107,34 +108,34 @@ pub struct CostDrivers {
     pub amplifiers: usize,
     /// Converters.
     pub converters: usize,
-    /// Buses of at most 112 cells, which load side by side.
+    /// Buses of up to 112 cells, which are loaded in parallel.
     pub buses: usize,
-    /// Bits of every cell's pattern; none for generators.
+    /// Number of bits of every cell's pattern; `None` for generators.
     pub pattern_bits: Option<usize>,
-    /// Bytes that are written to a cell before the start.
+    /// Bytes written to each cell before the start.
     pub bytes_a_cell: usize,
     /// Time to write them to all cells at 400 kHz, s.
     pub load_s: f64,
 }
 
-/// The constraint that binds.
+/// The limiting constraint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Binding {
-    /// The image decides how many measurements are needed, and there is time for more.
+    /// The image quality determines the number of measurements, and there is time for more.
     Iou,
     /// There is no time for more measurements on a wire.
     Latency,
-    /// No more wires are allowed, or there are none.
+    /// No more wires are allowed or possible.
     Wires,
     /// The amplifier needs longer to settle than the published clock leaves.
     AmplifierSettling,
-    /// More measurements than taxels, or than a decoder holds, would be needed.
+    /// More measurements would be needed than there are taxels, or than a decoder can hold.
     Measurements,
 }
 
 impl Binding {
-    /// In words.
+    /// The constraint in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -147,37 +148,37 @@ impl Binding {
     }
 }
 
-/// Another way to build it.
+/// An alternative design.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alternative {
-    /// What is different, in words.
+    /// Difference from the design, in words.
     pub what: String,
     /// Taxels.
     pub taxels: usize,
-    /// Distance of neighbouring taxels, m.
+    /// Distance between neighbouring taxels, m.
     pub pitch_m: f64,
     /// Wires.
     pub wires: usize,
-    /// Where rows come from.
+    /// Source of the rows.
     pub rows: String,
-    /// Measurements of every wire.
+    /// Number of measurements of every wire.
     pub m_per_wire: usize,
     /// Time of all measurements, s.
     pub acquisition_s: f64,
-    /// Mean IoU, simulated with fewer touches than the design itself; `None` where nothing was simulated.
+    /// Mean IoU, simulated with fewer touches than the design itself; `None` if nothing was simulated.
     pub iou: Option<f64>,
     /// Median place error, mm.
     pub place_mm: Option<f64>,
 }
 
-/// IoU against the number of measurements.
+/// IoU as a function of the number of measurements.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignCurve {
     /// Wires.
     pub wires: usize,
-    /// Where rows come from.
+    /// Source of the rows.
     pub rows: RowSource,
-    /// Points, M a wire rising.
+    /// Points in increasing order of M on a wire.
     pub points: Vec<DesignPoint>,
 }
 
@@ -186,44 +187,45 @@ pub struct DesignCurve {
 pub struct DesignPoint {
     /// Measurements of every wire.
     pub m_per_wire: usize,
-    /// IoU with the band that its mean lies in, of the repetitions of the search.
+    /// Mean IoU and its band over the repetitions of the search.
     pub iou: crate::touches::Band,
     /// Median place error, taxels.
     pub place_px: f64,
 }
 
-/// The answer.
+/// Results of the search.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignReport {
-    /// Whether the design is expected to have the IoU that was asked for within the latency.
+    /// Whether the design is expected to reach the requested IoU within the latency.
     pub reached: bool,
-    /// IoU asked for.
+    /// Requested IoU.
     pub iou_wanted: f64,
-    /// The design: the one with the fewest wires and then the fewest measurements, or the best that there is.
+    /// The design with the fewest wires and then the fewest measurements that meets the requirements; otherwise the
+    /// best one.
     #[serde(flatten)]
     pub design: Design,
-    /// Time from touch to image.
+    /// Parts of the time from touch to image.
     pub latency: LatencyParts,
-    /// Cost drivers.
+    /// Quantities that determine the cost.
     pub cost: CostDrivers,
-    /// The constraint that binds.
+    /// The limiting constraint.
     pub binding: Binding,
-    /// Why, in a sentence.
+    /// Explanation of the constraint, in a sentence.
     pub binding_reason: String,
-    /// Most taxels on one wire as designed with the pressed skin of `spts circuit`, as `spts circuit` and `spts
-    /// explore` print it.
+    /// Largest number of taxels on one wire with the electronics of `as_designed` and the pressed skin of `spts
+    /// circuit`, as shown by `spts circuit` and `spts explore`.
     pub one_wire_taxels: Option<u32>,
-    /// Other ways to build it.
+    /// Alternative designs.
     pub alternatives: Vec<Alternative>,
-    /// IoU against M for everything that was tried.
+    /// IoU as a function of M for every combination that was tried.
     pub curves: Vec<DesignCurve>,
     /// Readout profile, TOML.
     #[serde(skip)]
     pub profile: String,
-    /// Pattern of a sub-array, one line a row; `None` for generators.
+    /// Pattern of a sub-array, one row a line; `None` for generators.
     #[serde(skip)]
     pub pattern: Option<String>,
-    /// Scene that `spts simulate` takes.
+    /// Scene for `spts simulate`.
     #[serde(skip)]
     pub scene: String,
 }

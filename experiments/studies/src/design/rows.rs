@@ -12,13 +12,13 @@ pub(super) const PATTERN_ROWS: usize = spts_firmware::PATTERN_BITS;
 /// `greedy` is asked on wires of so many taxels at most: its time grows with their square.
 const GREEDY_TAXELS: usize = 256;
 
-/// Where rows come from.
+/// Source of the rows.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RowSource {
     /// Pseudorandom signs of the cells' generators, seeded with a 32-bit mix of their addresses.
     Generator,
-    /// A designer's, held by the cells as a pattern of at most 64 rows.
+    /// Rows by the named designer, stored in the cells as a pattern of at most 64 rows.
     Designer(String),
 }
 
@@ -56,7 +56,7 @@ impl RowSource {
 pub(super) struct BandRows {
     /// Columns of the skin.
     cols: usize,
-    /// Rows of the skin of every wire.
+    /// Rows of the skin that belong to each wire.
     pub(super) bands: Vec<Range<usize>>,
     /// Weights of every wire.
     pub(super) weights: Vec<Weights>,

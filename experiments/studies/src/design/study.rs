@@ -15,31 +15,47 @@ use spts_circuit::Profile;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::matrix_free::SheetPrior;
 
-/// Wires of a design.
+/// Number of wires of a design.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WireChoice {
-    /// So many, no more and no fewer.
+    /// Exactly this number.
     Exactly(usize),
-    /// As few as do it, and at most so many.
+    /// As few as necessary, and at most this number.
     UpTo(usize),
 }
 
-/// A skin that is asked for.
+/// Requirements of a skin.
+///
+/// ```
+/// use spts_studies::design::{DesignObjects, DesignStudy, WireChoice};
+///
+/// let study = DesignStudy {
+///     area_m: [0.16, 0.16],
+///     pitch_m: 5e-3,
+///     latency_s: 5e-3,
+///     iou: 0.8,
+///     wires: WireChoice::UpTo(4),
+///     objects: DesignObjects::named("small")?,
+///     seed: 1,
+/// };
+/// assert_eq!(study.layout()?.taxels(), 32 * 32);
+/// # Ok::<(), spts_studies::design::DesignError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct DesignStudy {
     /// Width and height of the sheet, m.
     pub area_m: [f64; 2],
-    /// Distance of neighbouring taxels, m.
+    /// Distance between neighbouring taxels, m.
     pub pitch_m: f64,
     /// Time from touch to image, s.
     pub latency_s: f64,
-    /// IoU that images have to have, on average.
+    /// Required mean IoU of the images.
     pub iou: f64,
-    /// Wires.
+    /// Number of wires.
     pub wires: WireChoice,
-    /// What is pressed.
+    /// The objects for which it is designed.
     pub objects: DesignObjects,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -80,11 +96,11 @@ pub(super) struct Tried {
     pub(super) wire: WireDesign,
     pub(super) curve: DesignCurve,
     pub(super) source: RowSource,
-    /// Most measurements of a wire within the latency.
+    /// Largest number of measurements of a wire within the latency.
     pub(super) most: usize,
-    /// Whether the latency sets that, and not the rows, the taxels or the decoder.
+    /// Whether this limit comes from the latency, and not from the rows, the taxels or the decoder.
     pub(super) by_latency: bool,
-    /// Least measurements with the IoU.
+    /// Smallest number of measurements with the required IoU.
     pub(super) reached: Option<usize>,
 }
 
@@ -102,10 +118,10 @@ impl Tried {
 }
 
 impl DesignStudy {
-    /// Designs the skin. Equal questions have equal answers, for any number of threads.
+    /// Designs the skin. The result depends only on the settings, not on the number of threads.
     ///
     /// # Errors
-    /// [`DesignError`] for an input outside its range, and when touches cannot be drawn, measured or decoded.
+    /// [`DesignError`] for an input outside its range, or if touches cannot be drawn, measured or decoded.
     pub fn run(&self, progress: &dyn Progress) -> Result<DesignReport, DesignError> {
         let layout = self.layout()?;
         progress.stage("learning", None);
@@ -122,7 +138,7 @@ impl DesignStudy {
         Ok(report)
     }
 
-    /// The skin.
+    /// Layout of the skin.
     ///
     /// # Errors
     /// [`DesignError::Range`], [`DesignError::Taxels`] and [`DesignError::Wires`].

@@ -1,4 +1,4 @@
-//! A design and its check, to read.
+//! A design and its check as text.
 
 use super::answer::counted;
 use super::band::Promise;
@@ -9,7 +9,7 @@ use super::wire::FeedbackLimit;
 use crate::electronics::ElectronicsStudy;
 
 impl DesignReport {
-    /// The answer for people.
+    /// The design as text.
     #[must_use]
     pub fn text(&self) -> String {
         let (d, w) = (&self.design, &self.design.wire);
@@ -201,7 +201,7 @@ fn table(alternatives: &[Alternative]) -> String {
 }
 
 impl CheckReport {
-    /// The check for people.
+    /// The check as text.
     #[must_use]
     pub fn text(&self) -> String {
         let mut out = format!(

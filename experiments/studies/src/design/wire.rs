@@ -21,51 +21,51 @@ pub(super) struct Pressing {
     pub(super) square_s2: f64,
 }
 
-/// What decides the feedback resistance.
+/// What determines the feedback resistance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FeedbackLimit {
-    /// The sum of the fullest touch uses the range of amplifier and converter.
+    /// The sum of the strongest touch uses the whole range of amplifier and converter.
     Range,
-    /// A larger one would not settle within the clock's period.
+    /// With a larger one the output would not settle within the clock's period.
     Settling,
-    /// No feedback settles within the period of the published clock: the clock is slower.
+    /// With no feedback does the output settle within the period of the published clock; the clock is slower.
     SlowerClock,
 }
 
-/// Electronics of one wire. All wires of a design are alike; the numbers are those of the fullest one.
+/// Electronics of one wire. All wires are alike; the values are for the wire with the most taxels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WireDesign {
-    /// Taxels on it.
+    /// Number of taxels on it.
     pub taxels: usize,
     /// Operational amplifier: that of the profile as_designed.
     pub amplifier: String,
     /// Measurements a second, Hz.
     pub rate_hz: f64,
-    /// Time of a measurement, s.
+    /// Duration of a measurement, s.
     pub period_s: f64,
-    /// Part of it in which the output settles, s.
+    /// Part of the measurement in which the output settles, s.
     pub available_s: f64,
-    /// Time that the output takes to settle to half a step of the converter, with slewing, s.
+    /// Settling time of the output to half a step of the converter, including slewing, s.
     pub settle_s: f64,
     /// Feedback resistance, Ω.
     pub feedback_ohm: f64,
-    /// What decided it.
+    /// What determined it.
     pub feedback_limit: FeedbackLimit,
-    /// 1 + Rf ΣG under the fullest touch.
+    /// 1 + Rf ΣG under the strongest touch.
     pub noise_gain: f64,
-    /// Sum that has to fit, V: four standard deviations of random signs, or all signs alike for designed rows.
+    /// Sum that has to fit, V: four standard deviations for random signs, or all signs alike for designed rows.
     pub excursion_v: f64,
-    /// Largest output that amplifier and converter both can handle, V.
+    /// Largest output within the ranges of amplifier and converter, V.
     pub range_v: f64,
     /// Resolution of the converter, bits.
     pub adc_bits: u32,
     /// Step of the converter, V at the amplifier's output.
     pub adc_step_v: f64,
-    /// A pressed taxel of the fullest touch over that step.
+    /// Signal of a pressed taxel in the strongest touch, in steps of the converter.
     pub steps_per_taxel: f64,
-    /// What fails by the amplifier's closed forms all the same, if anything does.
+    /// Limit that the amplifier's closed forms show as exceeded; `None` if there is none.
     pub limit: Option<String>,
 }
 

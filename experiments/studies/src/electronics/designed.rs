@@ -1,4 +1,4 @@
-//! The electronics of the profile as_designed, as numbers of the closed forms.
+//! The electronics of the profile `as_designed` as parameters of the closed forms.
 
 use super::{ElectronicsError, ElectronicsStudy};
 use spts_circuit::amplifier::{Network, OpAmp, Skin};
@@ -8,10 +8,10 @@ use spts_circuit::{Adc, Profile};
 const SUB_ARRAY: u32 = 100;
 
 impl ElectronicsStudy {
-    /// The profile as_designed, for the usual pressed skin.
+    /// The profile `as_designed`, with the default pressed skin.
     ///
     /// # Errors
-    /// [`ElectronicsError`] when the profile has no amplifier or no converter.
+    /// [`ElectronicsError`] if the profile has no amplifier or no converter.
     pub fn as_designed() -> Result<Self, ElectronicsError> {
         let profile = Profile::named("as_designed")?;
         let stage = |stage: &'static str| {

@@ -1,4 +1,4 @@
-//! What the summing amplifier makes of a skin of any size, in closed form, and what larger skins take.
+//! The summing amplifier with skins of any size, in closed form, and what larger skins need.
 
 mod designed;
 mod error;

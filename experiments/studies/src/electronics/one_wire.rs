@@ -1,4 +1,4 @@
-//! The largest skin that one wire reads.
+//! The largest skin that one wire can read.
 
 use super::error::ElectronicsError;
 use super::study::ElectronicsStudy;
@@ -8,12 +8,12 @@ use spts_circuit::amplifier::{Budget, Setting};
 const RATIO: f64 = 1.01;
 
 impl ElectronicsStudy {
-    /// The largest number of taxels, pressed as [`ElectronicsStudy::skin`] says, with which nothing fails on one wire:
-    /// it depends on the electronics and on that pressing alone. `None` when something fails with any number.
+    /// The largest number of taxels, pressed as in [`ElectronicsStudy::skin`], with which nothing fails on one wire. It
+    /// depends only on the electronics and that pressing. `None` if something fails with any number.
     ///
-    /// More taxels are not always worse, as beside a capacitance of the bus their conductance damps the ringing. So all
-    /// sizes are looked at, in steps of 1 %, and what is between the largest that works and the next one is bisected. A
-    /// range of sizes narrower than a step, with failing ones on both sides, may be missed.
+    /// More taxels are not always worse: with a capacitance on the bus, their conductance damps the ringing. Therefore
+    /// all sizes are tried in steps of 1 %, and the interval between the largest that works and the next is bisected. A
+    /// range of working sizes that is narrower than a step may be missed.
     ///
     /// ```
     /// use spts_studies::electronics::ElectronicsStudy;
@@ -59,7 +59,7 @@ impl ElectronicsStudy {
         Ok(Some(most))
     }
 
-    /// What [`ElectronicsStudy::largest_on_one_wire`] found, in words.
+    /// Describes the result of [`ElectronicsStudy::largest_on_one_wire`].
     #[must_use]
     pub fn one_wire_text(&self, taxels: Option<u32>) -> String {
         let pressing = format!(

@@ -1,4 +1,4 @@
-//! The amplifier's closed forms for skins of all sizes, read in every way.
+//! The amplifier's closed forms for skins of all sizes, with every remedy.
 
 use super::error::ElectronicsError;
 use serde::Serialize;
@@ -13,22 +13,32 @@ const SWEEP_TAXELS: [u32; 13] = [
 /// Largest capacitance of a bus, F, as [`Network`] says.
 const LARGEST_BUS_F: f64 = 1.0;
 
-/// Amplifier, skin, clock and converter, of which the closed forms are taken.
+/// Amplifier, skin, clock and converter for the closed forms.
+///
+/// ```
+/// use spts_studies::electronics::ElectronicsStudy;
+///
+/// let study = ElectronicsStudy::as_designed()?;
+/// let small = study.of(100)?;
+/// assert!(small[0].budget.limit.is_none(), "100 taxels work on one wire");
+/// assert!(study.of(100_000)?[0].budget.limit.is_some());
+/// # Ok::<(), spts_studies::electronics::ElectronicsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ElectronicsStudy {
     /// Operational amplifier of every stage.
     pub op_amp: OpAmp,
-    /// What is around the first one.
+    /// The passive parts around the first amplifier.
     pub network: Network,
-    /// Capacitance that every taxel adds to its bus, F. Range [0, 1e-6], and 1 F for all on one bus.
+    /// Capacitance that every taxel adds to its bus, F. Range [0, 1e-6], and 1 F for all taxels of a bus.
     pub taxel_f: f64,
     /// Skin.
     pub skin: Skin,
     /// Measurements a second, Hz.
     pub rate_hz: f64,
-    /// Part of every period in which the output cannot settle, s: before the drives change, and after it is sampled.
+    /// Part of every period in which the output cannot settle, s: before the drives change, and after the sampling.
     pub busy_s: f64,
-    /// Taxels, or amplifiers of the level below, on one amplifier of a tree.
+    /// Number of taxels, or of amplifiers of the level below, on one amplifier of a tree.
     pub sub_array: u32,
     /// Converter.
     #[serde(skip)]
@@ -36,10 +46,10 @@ pub struct ElectronicsStudy {
 }
 
 impl ElectronicsStudy {
-    /// Time in which the output has to settle, s.
+    /// Time available for settling, s.
     ///
     /// # Errors
-    /// [`ElectronicsError::Rate`] when the rate leaves none, or is no rate.
+    /// [`ElectronicsError::Rate`] if the rate leaves no time, or is not positive.
     pub fn available_s(&self) -> Result<f64, ElectronicsError> {
         let available_s = 1.0 / self.rate_hz - self.busy_s;
         if self.rate_hz >= 1.0 && available_s > 0.0 {
@@ -51,10 +61,10 @@ impl ElectronicsStudy {
         })
     }
 
-    /// A skin of `taxels` taxels, read in every way.
+    /// A skin of `taxels` taxels with every remedy.
     ///
     /// # Errors
-    /// [`ElectronicsError`] that names the number outside its range.
+    /// [`ElectronicsError`], with the value outside its range.
     pub fn of(&self, taxels: u32) -> Result<Vec<Remedied>, ElectronicsError> {
         let setting = Setting {
             skin: self.skin,
@@ -98,7 +108,7 @@ impl ElectronicsStudy {
         Amplifier::new(self.op_amp, network)
     }
 
-    /// All sizes from 100 to a million taxels, in every way.
+    /// All sizes from 100 to a million taxels, with every remedy.
     ///
     /// # Errors
     /// As [`ElectronicsStudy::of`].
@@ -112,14 +122,14 @@ impl ElectronicsStudy {
     }
 }
 
-/// Skins of all sizes, read in every way.
+/// Skins of all sizes, with every remedy.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ElectronicsReport {
-    /// Time in which the output has to settle, s.
+    /// Time available for settling, s.
     pub available_s: f64,
-    /// Most taxels on one wire, [`ElectronicsStudy::largest_on_one_wire`].
+    /// Largest number of taxels on one wire, [`ElectronicsStudy::largest_on_one_wire`].
     pub one_wire_taxels: Option<u32>,
-    /// Size by size, every way in the order of [`Remedy::ALL`].
+    /// Ordered by size, then in the order of [`Remedy::ALL`].
     pub rows: Vec<Remedied>,
 }
 

@@ -1,11 +1,11 @@
-//! Skins of all sizes as a table for people.
+//! Skins of all sizes as a text table.
 
 use spts_circuit::amplifier::Remedied;
 
 /// Sizes of the printed table.
 pub const TABLE_TAXELS: [u32; 5] = [100, 1000, 10_000, 100_000, 1_000_000];
 
-/// The rows as a Markdown table, which is readable as plain text too.
+/// The rows as a Markdown table, which is also readable as plain text.
 #[must_use]
 pub fn text(rows: &[Remedied], available_s: f64) -> String {
     let mut out = format!(

@@ -1,4 +1,4 @@
-//! Why a skin cannot be explored.
+//! Errors of the exploration.
 
 use crate::electronics::ElectronicsError;
 
@@ -15,18 +15,18 @@ pub enum ExploreError {
     /// The readout of a wire cannot be built.
     #[error(transparent)]
     Profile(#[from] spts_circuit::ProfileError),
-    /// A profile lacks an effect, or the effect lacks a number.
+    /// A profile lacks an effect, or the effect lacks a value.
     #[error("profile {profile}: no `compressive.{name}`")]
     NoEffect {
         /// Profile.
         profile: &'static str,
-        /// Name of the effect, and of the number.
+        /// Name of the effect, and of the value.
         name: &'static str,
     },
-    /// More taxels on a wire than there are seeds.
+    /// There are more taxels on a wire than seeds.
     #[error("taxels of a wire: {0}")]
     Cells(#[from] std::num::TryFromIntError),
-    /// The conductance of the taxels is not usable.
+    /// The conductance of the taxels is not valid.
     #[error(transparent)]
     Source(#[from] spts_circuit::SourceError),
     /// A wire cannot be measured.

@@ -7,11 +7,11 @@ use serde::Serialize;
 pub struct PowerLaw {
     /// Exponent.
     pub exponent: f64,
-    /// Its standard error, from the scatter about the line.
+    /// Standard error of the exponent, from the scatter about the line.
     pub exponent_se: f64,
     /// y at x = 1.
     pub prefactor: f64,
-    /// Points.
+    /// Number of points.
     pub points: usize,
 }
 

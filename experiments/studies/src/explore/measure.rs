@@ -1,4 +1,4 @@
-//! What the wires of a large skin deliver, and the operator they stand for.
+//! Measurements of the wires of a large skin, and the corresponding operator.
 
 use super::error::ExploreError;
 use super::scene::ExploreScene;
@@ -19,7 +19,7 @@ struct Wire {
     pressed: (Readout, Constant),
     idle: (Readout, Constant),
     seeds: Vec<u32>,
-    /// Pressed less idle, V.
+    /// Pressed minus idle, V.
     volts: Vec<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! How many measurements a large skin needs, on one wire or several, with the limits of the electronics in the loop.
+//! Number of measurements that a large skin needs, on one or several wires, including the limits of the electronics.
 
 mod error;
 mod fit;
@@ -11,6 +11,6 @@ pub(crate) mod wiring;
 
 pub use error::ExploreError;
 pub use fit::PowerLaw;
-pub use report::{CostFit, ExploreReport, SizeRow, Trial};
+pub use report::{CostFit, ExploreReport, ExploreTrial, SizeRow};
 pub use study::{ExploreStudy, WANTED_IOU, WANTED_LOCATED};
 pub use wiring::Way;

@@ -1,4 +1,4 @@
-//! What an exploration found: every size wired in every way, and how the costs grow.
+//! Results of an exploration: every size with every wiring, and how the costs grow.
 
 use super::fit::{PowerLaw, power_law};
 use super::wiring::{Way, Wiring};
@@ -6,24 +6,24 @@ use super::{WANTED_IOU, WANTED_LOCATED};
 use serde::Serialize;
 use spts_circuit::amplifier::Limit;
 
-/// One number of measurements, means over the scenes.
+/// Results with one number of measurements; means over the scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Trial {
-    /// Measurements of every wire.
+pub struct ExploreTrial {
+    /// Number of measurements of every wire.
     pub rows_per_wire: usize,
-    /// Measurements of all wires together, M.
+    /// Number of measurements of all wires together, M.
     pub measurements: usize,
     /// Intersection over union of the supports.
     pub iou: f64,
-    /// Share of the contacts found less than a taxel from where they are.
+    /// Share of the contacts found within less than a taxel of their true place.
     pub located: f64,
-    /// Bytes that recovery, operator and measurements hold, counted; the most of any scene.
+    /// Memory of recovery, operator and measurements, bytes; the largest of all scenes.
     pub bytes: usize,
-    /// Time of a recovery, s, with all threads.
+    /// Time of a recovery with all threads, s.
     pub decode_s: f64,
 }
 
-impl Trial {
+impl ExploreTrial {
     /// Nothing added up yet.
     pub(super) fn none(rows_per_wire: usize, measurements: usize) -> Self {
         Self {
@@ -47,45 +47,45 @@ impl Trial {
     }
 }
 
-/// One size wired in one way.
+/// One size with one wiring.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SizeRow {
     /// Taxels N.
     pub taxels: usize,
-    /// Contacts of a scene.
+    /// Number of contacts in a scene.
     pub contacts: usize,
-    /// How it is wired.
+    /// Wiring.
     pub way: Way,
     /// Wires.
     pub wires: usize,
-    /// What fails by the amplifier's closed forms, if anything does.
+    /// Limit that the amplifier's closed forms show as exceeded; `None` if there is none.
     pub limit: Option<Limit>,
     /// Feedback resistance, Ω.
     pub feedback_ohm: f64,
-    /// 1 + Rf·ΣG of the fullest wire.
+    /// 1 + Rf·ΣG of the wire with the most taxels.
     pub noise_gain: f64,
-    /// Time to settle with slewing, s.
+    /// Settling time including slewing, s.
     pub settle_s: f64,
-    /// Time of a measurement, s.
+    /// Duration of a measurement, s.
     pub period_s: f64,
-    /// Signal of a fully pressed taxel over a step of the converter.
+    /// Signal of a fully pressed taxel, in steps of the converter.
     pub steps_per_taxel: f64,
-    /// Least number of measurements, of those tried, with the wanted IoU.
+    /// Smallest number of measurements, among those tried, with the wanted IoU.
     pub m_iou: Option<usize>,
-    /// Least number of measurements, of those tried, with the wanted share of contacts less than a taxel away.
+    /// Smallest number of measurements, among those tried, with the wanted share of located contacts.
     pub m_located: Option<usize>,
-    /// Time to acquire the measurements for the IoU, all wires at once, s.
+    /// Time of the measurements for the wanted IoU, all wires in parallel, s.
     pub acquire_s: Option<f64>,
     /// Time to scan every taxel of every wire at the same clock, s.
     pub raster_s: f64,
     /// Every number of measurements that was tried.
-    pub trials: Vec<Trial>,
+    pub trials: Vec<ExploreTrial>,
 }
 
 impl SizeRow {
-    pub(super) fn new(wiring: &Wiring, taxels: usize, contacts: usize, trials: Vec<Trial>) -> Self {
-        let least = |aim: fn(&Trial) -> bool| trials.iter().filter(|t| aim(t)).min_by_key(|t| t.measurements);
-        let iou = least(Trial::has_iou);
+    pub(super) fn new(wiring: &Wiring, taxels: usize, contacts: usize, trials: Vec<ExploreTrial>) -> Self {
+        let least = |aim: fn(&ExploreTrial) -> bool| trials.iter().filter(|t| aim(t)).min_by_key(|t| t.measurements);
+        let iou = least(ExploreTrial::has_iou);
         Self {
             taxels,
             contacts,
@@ -98,16 +98,16 @@ impl SizeRow {
             period_s: wiring.period_s,
             steps_per_taxel: wiring.steps_per_taxel,
             m_iou: iou.map(|t| t.measurements),
-            m_located: least(Trial::has_located).map(|t| t.measurements),
+            m_located: least(ExploreTrial::has_located).map(|t| t.measurements),
             acquire_s: iou.map(|t| t.rows_per_wire as f64 * wiring.period_s),
             raster_s: taxels.div_ceil(wiring.wires) as f64 * wiring.period_s,
             trials,
         }
     }
 
-    /// The trial with the wanted IoU and the fewest measurements, or the last one.
+    /// The trial with the wanted IoU and the fewest measurements; otherwise the last one.
     #[must_use]
-    pub fn deciding(&self) -> Option<&Trial> {
+    pub fn deciding(&self) -> Option<&ExploreTrial> {
         let found = self.trials.iter().find(|t| Some(t.measurements) == self.m_iou);
         found.or(self.trials.last())
     }
@@ -119,36 +119,37 @@ impl SizeRow {
     }
 }
 
-/// A cost that grows as a power of the number of taxels.
+/// A cost as a power law of the number of taxels.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CostFit {
-    /// How the skin is wired.
+    /// Wiring.
     pub way: Way,
-    /// What grows.
+    /// Name of the cost.
     pub cost: &'static str,
-    /// The law, in taxels.
+    /// The power law.
     #[serde(flatten)]
     pub law: PowerLaw,
 }
 
 impl CostFit {
-    /// Whether the cost is a time of this machine.
+    /// Whether the cost is a computing time on this machine.
     #[must_use]
     pub fn is_of_this_machine(&self) -> bool {
         self.cost == DECODING
     }
 }
 
-/// What an exploration found.
+/// Results of an exploration.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExploreReport {
     /// Every size in every way.
     pub rows: Vec<SizeRow>,
-    /// Cost against size.
+    /// Costs as functions of size.
     pub fits: Vec<CostFit>,
-    /// Most taxels with which nothing fails on one wire as designed, by the closed forms and for the pressed skin of
-    /// `spts circuit`: [`ElectronicsStudy::largest_on_one_wire`](crate::electronics::ElectronicsStudy), whatever sizes
-    /// were asked for.
+    /// Largest number of taxels with which nothing fails on one wire with the electronics of `as_designed`, by the
+    /// closed forms and for the pressed skin of `spts circuit`:
+    /// [`ElectronicsStudy::largest_on_one_wire`](crate::electronics::ElectronicsStudy). It does not depend on the sizes
+    /// in the study.
     pub one_wire_taxels: Option<u32>,
 }
 

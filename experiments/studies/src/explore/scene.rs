@@ -1,4 +1,4 @@
-//! Contacts at random places of a large skin, and where they are in an image.
+//! Contacts at random places of a large skin, and their places in an image.
 
 use rand::RngExt as _;
 use spts_models::Streams;
@@ -16,7 +16,7 @@ const PEAK: std::ops::Range<f64> = 0.5..1.0;
 /// A pressed skin.
 #[derive(Debug, Clone)]
 pub(crate) struct ExploreScene {
-    /// Conductance above that of the idle skin, S, row-major, `side` × `side`.
+    /// Conductance minus that of the idle skin, S, row-major, `side` × `side`.
     pub(crate) image_s: Vec<f64>,
     /// Contacts.
     pub(crate) contacts: usize,

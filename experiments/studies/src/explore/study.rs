@@ -1,8 +1,8 @@
-//! The search for the number of measurements that a skin of every size needs.
+//! Searches the number of measurements that a skin of every size needs.
 
 use super::error::ExploreError;
 use super::measure::MeasuredWires;
-use super::report::{ExploreReport, SizeRow, Trial};
+use super::report::{ExploreReport, ExploreTrial, SizeRow};
 use super::scene::{ExploreScene, located, scene};
 use super::wiring::{Way, Wiring, wirings};
 use crate::electronics::ElectronicsStudy;
@@ -14,9 +14,9 @@ use spts_recon::matrix_free::RegionPursuit;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 use std::time::Instant;
 
-/// IoU that has to be reached.
+/// Wanted IoU.
 pub const WANTED_IOU: f64 = 0.8;
-/// Share of the contacts that have to be found less than a taxel from where they are.
+/// Wanted share of contacts found within less than a taxel of their true place.
 pub const WANTED_LOCATED: f64 = 0.95;
 /// Rounds of a recovery.
 const MAX_ROUNDS: usize = 10;
@@ -30,21 +30,21 @@ const MOST: (f64, usize) = (0.05, 1000);
 pub struct ExploreStudy {
     /// Sides of the square skins, taxels.
     pub sides: Vec<u32>,
-    /// Scenes a size.
+    /// Number of scenes for each size.
     pub scenes: u64,
     /// Seeds of the cells.
     pub seeding: Seeding,
-    /// Whether M grows by factors of 2 only, without a look between the last two.
+    /// Whether M is only doubled, without a trial between the last two values.
     pub quick: bool,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
 impl ExploreStudy {
-    /// Explores every size in every way. All numbers but the times are the same for any number of threads.
+    /// Explores every size with every wiring. All values except times are the same for any number of threads.
     ///
     /// # Errors
-    /// [`ExploreError`] when the electronics cannot be built or a wire cannot be measured.
+    /// [`ExploreError`] if the electronics cannot be built, or a wire cannot be measured.
     pub fn run(&self, progress: &dyn Progress) -> Result<ExploreReport, ExploreError> {
         let electronics = ElectronicsStudy::as_designed()?;
         progress.stage("exploring", Some(self.sides.len() * Way::ALL.len()));
@@ -88,11 +88,11 @@ impl ExploreStudy {
         let most = most_measurements(taxels).div_ceil(wiring.wires);
         let contacts = scenes.first().map_or(1, |scene| scene.contacts);
         let mut rows = (FIRST_PER_CONTACT * contacts).div_ceil(wiring.wires).max(8).min(most);
-        let mut trials: Vec<Trial> = Vec::new();
+        let mut trials: Vec<ExploreTrial> = Vec::new();
         loop {
             trials.push(trial(side, wiring, scenes, &mut measured, rows)?);
-            let reached = |aim: fn(&Trial) -> bool| trials.iter().any(aim);
-            if rows == most || (reached(Trial::has_iou) && reached(Trial::has_located)) {
+            let reached = |aim: fn(&ExploreTrial) -> bool| trials.iter().any(aim);
+            if rows == most || (reached(ExploreTrial::has_iou) && reached(ExploreTrial::has_located)) {
                 break;
             }
             rows = (2 * rows).min(most);
@@ -106,10 +106,10 @@ impl ExploreStudy {
 
 /// Half an octave below the least M that reaches an aim.
 fn refine(
-    trials: &mut Vec<Trial>,
-    mut at: impl FnMut(usize) -> Result<Trial, ExploreError>,
+    trials: &mut Vec<ExploreTrial>,
+    mut at: impl FnMut(usize) -> Result<ExploreTrial, ExploreError>,
 ) -> Result<(), ExploreError> {
-    for aim in [Trial::has_iou, Trial::has_located] {
+    for aim in [ExploreTrial::has_iou, ExploreTrial::has_located] {
         let least = trials.iter().filter(|t| aim(t)).map(|t| t.rows_per_wire).min();
         let between = least.map(half_octave_below);
         if let Some(rows) = between.filter(|rows| trials.iter().all(|t| t.rows_per_wire != *rows) && *rows >= 4) {
@@ -140,12 +140,12 @@ fn trial(
     scenes: &[ExploreScene],
     measured: &mut [MeasuredWires],
     rows: usize,
-) -> Result<Trial, ExploreError> {
+) -> Result<ExploreTrial, ExploreError> {
     let pursuit = RegionPursuit {
         max_rounds: MAX_ROUNDS,
         ..RegionPursuit::new(side, side)
     };
-    let mut sum = Trial::none(rows, rows * wiring.wires);
+    let mut sum = ExploreTrial::none(rows, rows * wiring.wires);
     let share = 1.0 / scenes.len() as f64;
     let (mut truth, mut mask) = (Vec::new(), Vec::new());
     for (scene, measured) in scenes.iter().zip(measured) {

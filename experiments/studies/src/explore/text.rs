@@ -1,11 +1,11 @@
-//! The exploration as a table for people.
+//! The exploration as a text table.
 
 use super::report::ExploreReport;
 use crate::electronics::ElectronicsStudy;
 use spts_circuit::amplifier::Limit;
 
 impl ExploreReport {
-    /// The table for people.
+    /// The results as a text table.
     #[must_use]
     pub fn text(&self) -> String {
         let mut out = String::from(

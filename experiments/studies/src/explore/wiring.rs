@@ -11,26 +11,26 @@ use spts_models::ConfigError;
 /// Share of the converter's range that a fitted feedback uses: the sum is Gaussian, and scenes differ.
 const HEADROOM: f64 = 0.8;
 
-/// How a skin is wired.
+/// Wiring of a skin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {
-    /// y = Φx on one wire, without electronics: what the decoder needs.
+    /// y = Φx on one wire without electronics: the requirements of the decoder alone.
     Ideal,
-    /// One wire with the amplifier and the clock of as_designed.
+    /// One wire with the amplifier and the clock of `as_designed`.
     AsDesigned,
-    /// One wire whose feedback is lowered until the sum fits the converter, and whose clock is slowed until the output
+    /// One wire whose feedback is reduced until the sum fits the converter, and whose clock is slowed until the output
     /// settles.
     Fitted,
-    /// As many wires as the parts of as_designed take, each for a band of the skin's rows, read at the same time.
+    /// As many wires as the parts of `as_designed` need, each for a band of the skin's rows, read in parallel.
     Wires,
 }
 
 impl Way {
-    /// Every way.
+    /// Every wiring.
     pub const ALL: [Self; 4] = [Self::Ideal, Self::AsDesigned, Self::Fitted, Self::Wires];
 
-    /// In words.
+    /// The wiring in words.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -49,17 +49,17 @@ pub(crate) struct Wiring {
     pub(crate) wires: usize,
     /// Readout of every wire.
     pub(crate) profile: Profile,
-    /// Time of a measurement, s.
+    /// Duration of a measurement, s.
     pub(crate) period_s: f64,
     /// Feedback resistance, Ω.
     pub(crate) feedback_ohm: f64,
-    /// 1 + Rf·ΣG of the fullest wire.
+    /// 1 + Rf·ΣG of the wire with the most taxels.
     pub(crate) noise_gain: f64,
-    /// Time to settle to half a step of the converter, with slewing, s.
+    /// Settling time to half a step of the converter, including slewing, s.
     pub(crate) settle_s: f64,
-    /// Signal of a fully pressed taxel over a step of the converter.
+    /// Signal of a fully pressed taxel, in steps of the converter.
     pub(crate) steps_per_taxel: f64,
-    /// What fails by the closed forms, if anything does.
+    /// Limit that the closed forms show as exceeded; `None` if there is none.
     pub(crate) limit: Option<Limit>,
 }
 

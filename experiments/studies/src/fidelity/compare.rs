@@ -1,4 +1,4 @@
-//! Errors of pressures against the reference, relative root mean squares: √(Σ (p − p_ref)² / Σ p_ref²).
+//! Errors of pressures compared with the reference, as relative root mean squares: √(Σ (p − p_ref)² / Σ p_ref²).
 
 use super::run::{ContactRun, FinePressure};
 use spts_contact::Frame;

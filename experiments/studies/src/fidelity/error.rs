@@ -1,4 +1,4 @@
-//! Why the contact models cannot be compared.
+//! Errors of the fidelity study.
 
 use spts::chain::ChainError;
 use spts::output::OutputError;
@@ -12,21 +12,21 @@ use spts_recon::dictionary::DictionaryError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FidelityError {
-    /// A scene that does not exist.
+    /// The scene does not exist.
     #[error("`--scene {name}` is not one of {known}, or a file that ends in .toml")]
     UnknownScene {
-        /// Name that was asked for.
+        /// Requested name.
         name: String,
         /// All known names.
         known: String,
     },
-    /// A scene that is asked for twice.
+    /// A scene is named twice.
     #[error("`--scene {name}`: named twice")]
     RepeatedScene {
-        /// Its name or file.
+        /// Name or file of the scene.
         name: String,
     },
-    /// Scenes that no decoder can have in common.
+    /// Scenes of different skins, which need different decoders.
     #[error("`--scene`: `{first}` and `{other}` have different skins; study them one at a time")]
     DifferentSkins {
         /// First scene.
@@ -43,13 +43,13 @@ pub enum FidelityError {
     /// The mesh of a scene cannot be written.
     #[error(transparent)]
     Mesh(#[from] OutputError),
-    /// The references' images make no dictionary.
-    #[error("nothing to learn from: {0}")]
+    /// No dictionary can be learned from the reference's images.
+    #[error("no training data for the dictionary: {0}")]
     Dictionary(#[from] DictionaryError),
-    /// The references' images make no library.
-    #[error("nothing to learn from: {0}")]
+    /// No library can be made from the reference's images.
+    #[error("no training data for the library: {0}")]
     Library(#[from] LibraryError),
-    /// The decoder cannot use what was learned.
+    /// The decoder cannot use the training data.
     #[error(transparent)]
     Learn(#[from] LearnError),
     /// A recording cannot be scored.

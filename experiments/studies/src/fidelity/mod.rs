@@ -1,9 +1,7 @@
-//! `spts fidelity`: what every fidelity level of the contact costs, and how wrong it is, down to the scores a user
-//! sees.
+//! `spts fidelity`: cost and error of every fidelity level of the contact, up to the error of the scores.
 //!
-//! Every scene is run on every level, at several resolutions and time steps, and compared with the reference level at
-//! its finest (`settings`): the pressures (`compare`) and, after transducer, readout and decoder, the scores
-//! (`scores`).
+//! Every scene is run with every level, at several resolutions and time steps (`settings`), and compared with the
+//! reference level at its finest: pressures (`compare`) and, after transducer, readout and decoder, scores (`scores`).
 
 mod compare;
 mod error;
@@ -35,14 +33,14 @@ use spts::scene::Scene;
 use spts_sim::fidelity::MeasuredSetting;
 use std::path::Path;
 
-/// What to measure.
+/// Settings of the fidelity study.
 #[derive(Debug, Clone)]
 pub struct FidelityStudy {
     /// Names of built-in scenes, or scene files; empty for all built-in ones.
     pub scenes: Vec<String>,
     /// Levels, resolutions and time steps.
     pub grid: SettingGrid,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
@@ -56,7 +54,7 @@ pub struct Refusal {
     pub level: &'static str,
     /// Fine cells along one side of a taxel.
     pub cells_per_taxel: usize,
-    /// Step of the dynamics, s.
+    /// Time step of the dynamics, s.
     pub timestep_s: f64,
     /// Why.
     pub reason: String,
@@ -71,11 +69,11 @@ struct Reference {
 }
 
 impl FidelityStudy {
-    /// Runs every scene in every setting. The meshes that only this study has are written to the folder `meshes`, which
-    /// exists.
+    /// Runs every scene with every setting. Meshes that only this study uses are written to the folder `meshes`, which
+    /// must exist.
     ///
     /// # Errors
-    /// [`FidelityError`] when a scene cannot be used, a reference cannot be run, or a mesh cannot be written.
+    /// [`FidelityError`] if a scene is not usable, a reference cannot be run, or a mesh cannot be written.
     pub fn run(&self, meshes: &Path, progress: &dyn Progress) -> Result<FidelityReport, FidelityError> {
         let scenes = scenes::build(&self.scenes, self.seed, meshes)?;
         let runs: usize = scenes.iter().map(|s| self.grid.settings(s.is_drop()).len()).sum();

@@ -1,4 +1,4 @@
-//! What a fidelity study found.
+//! Results of a fidelity study.
 
 use super::run::FinePressure;
 use super::{Refusal, SettingResult};
@@ -9,14 +9,14 @@ use spts_sim::fidelity::{LEVELS, MeasuredSetting};
 /// Cost and error of every setting of every scene.
 #[derive(Debug, Clone, Serialize)]
 pub struct FidelityReport {
-    /// One line a scene, level, resolution and time step; the references have errors of zero.
+    /// One row for each scene, level, resolution and time step. The references have zero error.
     pub rows: Vec<MeasuredSetting>,
-    /// What could not be run: a step beyond the scene's limit, most of all.
+    /// Settings that could not be run, mostly because of a time step beyond the scene's limit.
     pub refusals: Vec<Refusal>,
-    /// Fine pressure in the middle of the span that is scored, one field a row.
+    /// Fine pressure in the middle of the scored span, one field for each row.
     #[serde(skip)]
     pub fine: Vec<FinePressure>,
-    /// What the rows depend on.
+    /// Provenance of the rows.
     #[serde(skip)]
     pub provenance: Provenance,
 }

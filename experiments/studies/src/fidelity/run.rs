@@ -1,4 +1,4 @@
-//! One press or drop of a scene on one level: its frames, its fine pressure at the fullest instant, its cost.
+//! One press or drop of a scene with one level: frames, fine pressure at the strongest instant, and cost.
 
 use spts::record::TwinError;
 use spts::scene::{Scene, Task};
@@ -31,7 +31,7 @@ pub(super) struct ContactRun {
     pub(super) frames: Vec<Frame>,
     pub(super) bounces: Vec<Bounce>,
     pub(super) fine: FinePressure,
-    /// Span in which the scores are taken, s: plateau of a press, first contact of a drop.
+    /// Span of the scores, s: plateau of a press, first contact of a drop.
     pub(super) span_s: [f64; 2],
     pub(super) cost_us_per_step: f64,
     pub(super) cost_s_per_s: f64,

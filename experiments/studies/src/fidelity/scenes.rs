@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Names of the built-in scenes.
 pub const SCENES: [&str; 7] = ["sphere", "punch", "edge", "T", "tape", "comb", "drop"];
 
-/// A scene of the study, to be run on any level.
+/// A scene of the study, to be run with any level.
 #[derive(Debug, Clone)]
 pub struct FidelityScene {
     /// Name in the table.
@@ -25,7 +25,7 @@ pub struct FidelityScene {
 const REPEATS: usize = 2;
 
 impl FidelityScene {
-    /// Whether a ball drops in it.
+    /// Whether the scene is a drop.
     #[must_use]
     pub fn is_drop(&self) -> bool {
         self.config.drop.is_some()

@@ -1,8 +1,8 @@
-//! The error that reaches the user: the same decoder on the recordings of every level.
+//! Errors of scores: the same decoder on the recordings of every level.
 //!
-//! Dictionary and library are learned once, from the reference's conductance images of the first press; every level's
-//! second press is recorded with the same noise, decoded with the matched weights at M = 20 and scored against the
-//! reference's conductance image of the same instant. What differs between two levels is then the contact alone.
+//! Dictionary and library are learned once, from the reference's conductance images of the first press. Every level's
+//! second press is recorded with the same noise, decoded with the variant `matched` at M = 20, and scored against the
+//! reference's conductance image at the same instant. Two levels then differ only in the contact.
 
 use super::Reference;
 use super::error::FidelityError;

@@ -1,15 +1,23 @@
-//! Which levels are measured, at which resolutions and time steps.
+//! Levels, resolutions and time steps to be measured.
 
 use spts_sim::fidelity::{FidelityLevel, LEVELS, REFERENCE};
 
 /// Levels × resolutions × time steps.
+///
+/// ```
+/// use spts_studies::fidelity::SettingGrid;
+///
+/// let (quick, full) = (SettingGrid::quick(), SettingGrid::full());
+/// assert!(quick.cells_per_taxel.len() <= full.cells_per_taxel.len());
+/// assert!(full.reference_cells > *full.cells_per_taxel.first().expect("resolutions"));
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SettingGrid {
     /// Fine cells along one side of a taxel.
     pub cells_per_taxel: Vec<usize>,
-    /// Steps of a press, s.
+    /// Time steps of a press, s.
     pub press_steps_s: Vec<f64>,
-    /// Steps of a drop, s.
+    /// Time steps of a drop, s.
     pub drop_steps_s: Vec<f64>,
     /// Resolution of the reference.
     pub reference_cells: usize,
@@ -27,7 +35,7 @@ pub(super) struct ContactSetting {
 pub(super) const FRAME_S: f64 = 2e-3;
 
 impl SettingGrid {
-    /// The study that ships.
+    /// The settings of the shipped table.
     #[must_use]
     pub fn full() -> Self {
         Self {
@@ -38,7 +46,7 @@ impl SettingGrid {
         }
     }
 
-    /// A look in less than a minute.
+    /// Settings that take less than a minute.
     #[must_use]
     pub fn quick() -> Self {
         Self {

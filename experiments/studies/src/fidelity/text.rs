@@ -1,16 +1,16 @@
-//! The study in words: one line a setting, means over all scenes of a kind.
+//! The study as text: one line for each setting, with means over all scenes of a task.
 
 use super::FidelityReport;
 use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
 
-/// A setting, means over all scenes of one kind.
+/// A setting; means over all scenes of one task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SettingMeans<'a> {
-    /// Row of the first scene: level, resolution and time step, which all rows share.
+    /// Row of the first scene. All rows share its level, resolution and time step.
     pub first: &'a MeasuredSetting,
-    /// Number of scenes it was measured on.
+    /// Number of scenes with this setting.
     pub scenes: usize,
-    /// Wall time of a step, µs.
+    /// Wall time of a time step, µs.
     pub cost_us_per_step: f64,
     /// Wall time of a simulated second, s.
     pub cost_s_per_s: f64,
@@ -18,17 +18,17 @@ pub struct SettingMeans<'a> {
     pub pressure_rms_rel: f64,
     /// Error of the taxels' pressures, relative root mean square.
     pub taxel_rms_rel: f64,
-    /// The same of the worst scene.
+    /// Largest error of the taxels' pressures over the scenes, relative root mean square.
     pub worst_taxel_rms_rel: f64,
-    /// Size of the change of the support accuracy.
+    /// Absolute change of the support accuracy.
     pub support_change: f64,
-    /// Size of the change of the intersection over union.
+    /// Absolute change of the intersection over union.
     pub iou_change: f64,
-    /// Size of the change of the share of windows classified correctly.
+    /// Absolute change of the share of correctly classified windows.
     pub class_change: f64,
 }
 
-/// Every setting of the scenes of `task`, levels from cheap to dear; means over the scenes.
+/// Every setting of the scenes of `task`, the cheapest level first; means over the scenes.
 #[must_use]
 pub fn setting_means<'a>(rows: &'a [MeasuredSetting], task: &str) -> Vec<SettingMeans<'a>> {
     let rows: Vec<&MeasuredSetting> = rows.iter().filter(|r| r.task == task).collect();
@@ -72,7 +72,7 @@ fn alike(a: &MeasuredSetting, b: &MeasuredSetting) -> bool {
 }
 
 impl FidelityReport {
-    /// Means over the scenes, as a table to read.
+    /// Means over the scenes as a text table.
     #[must_use]
     pub fn text(&self) -> String {
         markdown(self)

@@ -13,15 +13,15 @@ use std::path::Path;
 pub struct EmulatedCells {
     /// Name of the image.
     pub image_name: String,
-    /// What the cells run.
+    /// The image of the cells.
     pub image: Image,
     /// Cells on the bus; [1, 112].
     pub cells: usize,
-    /// Edges in every mode.
+    /// Number of edges in every mode.
     pub edges: u64,
-    /// What the cells are started with, one after another.
+    /// Tasks of the cells, one after another.
     pub tasks: Vec<CellTask>,
-    /// Seeds of the cells: one byte as published, or 32 bits by the extended command.
+    /// Seeds of the cells: one byte as in the publication, or 32 bits by the extended command.
     pub seeding: Seeding,
     /// Clock.
     pub clock: Clock,
@@ -30,7 +30,7 @@ pub struct EmulatedCells {
 /// The image called `name`: `shipped`, `plain`, or a file in Intel's hex format.
 ///
 /// # Errors
-/// [`FirmwareError::Image`] when there is none.
+/// [`FirmwareError::Image`] if there is none.
 pub fn image(name: &str) -> Result<Image, FirmwareError> {
     match name {
         "shipped" => Ok(Image::shipped()),

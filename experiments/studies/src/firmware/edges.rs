@@ -17,7 +17,7 @@ pub(super) struct Edges {
 pub(super) struct Answer {
     /// DAC code at the end of the period.
     pub(super) code: u8,
-    /// Ticks from the edge to the last update of the DAC, if there was one.
+    /// Ticks from the edge to the last update of the DAC; `None` without an update.
     pub(super) latency_ticks: Option<u64>,
 }
 

@@ -1,30 +1,30 @@
-//! Why emulated cells cannot be run.
+//! Errors of emulated cells.
 
 use spts::chain::CellsError;
 use spts_circuit::WeightsError;
 use spts_firmware::avr::ProgramError;
 use spts_firmware::{AddressError, ArrayError, BusError, ImageError};
 
-/// Why there is no answer from emulated cells.
+/// Why emulated cells give no result.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum FirmwareError {
-    /// There is no such image, or the file holds none.
+    /// There is no such image, or the file contains none.
     #[error("`--image`: {0}; valid: shipped, plain, or a hex file")]
     Image(#[from] ImageError),
-    /// The cells of an image cannot be used.
+    /// The cells of an image do not work.
     #[error("image {image}: {failure}")]
     Cells {
         /// Name of the image.
         image: String,
-        /// What the cells do wrong.
+        /// The failure.
         #[source]
         failure: CellFailure,
     },
-    /// A taxel that the cells do not have.
+    /// There is no such taxel.
     #[error("taxel {taxel} is outside [0, {last}]")]
     NoTaxel {
-        /// Taxel, 0-based.
+        /// Taxel, from 0.
         taxel: usize,
         /// The last one.
         last: usize,
@@ -34,7 +34,7 @@ pub enum FirmwareError {
     Edges(#[from] std::num::TryFromIntError),
 }
 
-/// What cells that run an image do wrong.
+/// Failure of cells that run an image.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum CellFailure {
@@ -44,20 +44,20 @@ pub enum CellFailure {
     /// A cell does not answer on the bus.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The image is no program.
+    /// The image is not a valid program.
     #[error(transparent)]
     Program(#[from] ProgramError),
-    /// Cells cannot put out such weights.
+    /// Cells cannot put out these weights.
     #[error(transparent)]
     Cells(#[from] CellsError),
-    /// There are no such weights.
+    /// The weights are not valid.
     #[error(transparent)]
     Weights(#[from] WeightsError),
     /// No cell has this address.
     #[error(transparent)]
     Address(#[from] AddressError),
-    /// Codes that are not the twin's, even under a slow clock.
-    #[error("other codes than the twin's in {mode} mode; `spts firmware verify` says which")]
+    /// The codes differ from the twin's, even with a slow clock.
+    #[error("codes differ from the twin's in {mode} mode; `spts firmware verify` shows which")]
     OtherCodes {
         /// Mode of the cells.
         mode: String,
@@ -68,8 +68,8 @@ pub enum CellFailure {
         /// Mode of the cells.
         mode: String,
     },
-    /// No clock is slow enough.
-    #[error("loses edges of any clock in {mode} mode")]
+    /// The cell misses edges of every clock.
+    #[error("misses edges of any clock in {mode} mode")]
     LosesEdges {
         /// Mode of the cells.
         mode: String,

@@ -26,21 +26,21 @@ pub struct LateUpdates {
     pub edge_hz: f64,
     /// Time from an edge to the converter's sample, s.
     pub sample_delay_s: f64,
-    /// Edges at which the level changes.
+    /// Number of edges at which the level changes.
     pub flips: u64,
-    /// Those whose new level comes after the sample.
+    /// Number of those whose new level comes after the sample.
     pub late: u64,
-    /// Late ones, as a share of the flips.
+    /// Share of late flips.
     pub late_share: f64,
-    /// Period of the late ones, measurements, found as in the recordings; none when they have none.
+    /// Period of the late flips, measurements, found as in recordings; `None` without a period.
     pub period_measurements: Option<f64>,
-    /// Time from the edge to the new level, ticks of 50 ns: of every flip, in order.
+    /// Time from the edge to the new level, ticks of 50 ns, for every flip, sorted.
     #[serde(skip)]
     pub latency_ticks: Vec<u64>,
 }
 
 impl LateUpdates {
-    /// Share of the flips that come later than `delay_s` after the edge.
+    /// Share of the flips later than `delay_s` after the edge.
     #[must_use]
     pub fn share_beyond(&self, delay_s: f64) -> f64 {
         let late = self
@@ -51,10 +51,10 @@ impl LateUpdates {
 }
 
 impl EmulatedCells {
-    /// Late updates of one binary cell of these cells' image at `edge_hz`.
+    /// Late updates of one binary cell with this image at `edge_hz`.
     ///
     /// # Errors
-    /// [`FirmwareError`] when the cell does not answer on the bus.
+    /// [`FirmwareError`] if the cell does not answer on the bus.
     pub fn lateness(&self, edge_hz: f64) -> Result<LateUpdates, FirmwareError> {
         let device = self.cell(CellTask::Mode(WeightMode::Binary), TAXEL)?;
         let stretches: Vec<(Vec<u64>, Vec<u64>)> = (0..STRETCHES)

@@ -1,4 +1,4 @@
-//! Edges that a cell does not see.
+//! Clock edges that a cell misses.
 
 use super::cells::EmulatedCells;
 use super::edges::Edges;
@@ -13,11 +13,11 @@ const EDGES: u32 = 5000;
 const CODES: usize = 64;
 
 impl EmulatedCells {
-    /// Share of the edges that a binary cell does not see when they come at `edge_hz`: the lag of its sequence
-    /// afterwards. None when what it puts out is no part of the sequence.
+    /// Share of edges at `edge_hz` that a binary cell misses, from the final lag of its sequence. `None` if its output
+    /// is not part of the sequence.
     ///
     /// # Errors
-    /// [`FirmwareError`] when the cell does not answer on the bus.
+    /// [`FirmwareError`] if the cell does not answer on the bus.
     pub fn lost_share(&self, edge_hz: f64) -> Result<Option<f64>, FirmwareError> {
         let mode = WeightMode::Binary;
         let task = CellTask::Mode(mode);

@@ -1,4 +1,4 @@
-//! The cell's firmware on emulated controllers, against the weights that the twin assumes.
+//! The cells' firmware on emulated controllers, compared with the weights that the twin assumes.
 
 mod cells;
 mod edges;

@@ -22,25 +22,25 @@ pub struct ImageTiming {
     pub image: String,
     /// Latency and largest clock rate, by mode.
     pub modes: Vec<ModeTiming>,
-    /// Updates that come late, binary mode, at the skin's rate.
+    /// Late updates in binary mode at the skin's rate.
     pub late: LateUpdates,
-    /// Edges that a binary cell loses of faster and faster clocks.
+    /// Edges that a binary cell misses with increasing clock rates.
     pub lost: Vec<LostEdges>,
 }
 
-/// Edges that are lost at one rate.
+/// Missed edges at one rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LostEdges {
     /// Rate of the edges, Hz.
     pub edge_hz: f64,
-    /// Share of them that is lost; none when what the cell puts out is no part of its sequence.
+    /// Share of missed edges; `None` if the output is not part of the cell's sequence.
     pub share: Option<f64>,
 }
 
-/// Times the cells of every image.
+/// Measures the timing of every image.
 ///
 /// # Errors
-/// [`FirmwareError`] when a cell does not answer, puts out other codes than the twin's, or follows no clock.
+/// [`FirmwareError`] if a cell does not answer, puts out codes that differ from the twin's, or follows no clock.
 pub fn time_images(images: &[EmulatedCells], progress: &dyn Progress) -> Result<Vec<ImageTiming>, FirmwareError> {
     progress.stage("timing the cells", Some(STAGES * images.len()));
     let timings = images.iter().map(|cells| ImageTiming::of(cells, progress));

@@ -1,19 +1,26 @@
-//! What cells are started with.
+//! Tasks of cells.
 
 use serde::{Serialize, Serializer};
 use spts_circuit::{Patterns, Seeding, WeightMode, Weights, WeightsError};
 
-/// What cells are started with. As text its `mode`, and the `period` of a pattern.
+/// How cells are started. As text: its `mode`, and for a pattern also its `period`.
+///
+/// ```
+/// use spts_studies::firmware::CellTask;
+///
+/// assert_eq!(CellTask::Pattern(20).period(), Some(20));
+/// assert_eq!(CellTask::ALL[0].mode(), "raster");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellTask {
-    /// Seeds, in a mode of the generator or the raster.
+    /// With seeds, in a mode of the generator or the raster.
     Mode(WeightMode),
-    /// Patterns of so many bits, in [1, 64]: those that cells of mixed seeds put out first.
+    /// With patterns of this number of bits, in [1, 64]: the first outputs of cells with mixed seeds.
     Pattern(usize),
 }
 
 impl CellTask {
-    /// All modes, in the order of their bytes; patterns of three lengths.
+    /// All modes, in the order of their bytes, and patterns of three lengths.
     pub const ALL: [Self; 6] = [
         Self::Mode(WeightMode::Raster),
         Self::Mode(WeightMode::Analog),
@@ -34,7 +41,7 @@ impl CellTask {
         }
     }
 
-    /// Bits of the pattern.
+    /// Number of bits of the pattern; `None` for other modes.
     #[must_use]
     pub fn period(self) -> Option<usize> {
         match self {
@@ -43,7 +50,7 @@ impl CellTask {
         }
     }
 
-    /// Mode, with the bits of a pattern.
+    /// Name of the mode, with the number of bits for a pattern.
     #[must_use]
     pub fn name(self) -> String {
         match self {

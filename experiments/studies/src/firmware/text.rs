@@ -1,10 +1,10 @@
-//! Results to read.
+//! Results as text.
 
 use super::study::ImageTiming;
 use super::verify::Verification;
 use spts_firmware::FIRST_ADDRESS;
 
-/// A verification, one line a mode.
+/// A verification, one line for each mode.
 #[must_use]
 pub fn verification_text(v: &Verification) -> String {
     let mut out = format!(

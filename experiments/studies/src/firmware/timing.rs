@@ -1,4 +1,4 @@
-//! How long after a clock edge a cell's output changes, and how fast a clock the cell follows.
+//! Delay from a clock edge to a cell's new output, and the fastest clock that the cell follows.
 
 use super::cells::EmulatedCells;
 use super::edges::Edges;
@@ -9,7 +9,7 @@ use serde::Serialize;
 use spts_firmware::SKIN_EDGE_HZ;
 use spts_firmware::attiny412::{Device, OSCILLATOR_HZ};
 
-/// Rate that the skin is designed for, edges a second.
+/// Rate for which the skin is designed, edges a second.
 pub const DESIGN_EDGE_HZ: f64 = 72_000.0;
 
 /// Edges in which a latency is looked for: hundreds of periods of a timer of 16320 ticks.
@@ -33,18 +33,18 @@ pub(super) const SLOW_HZ: f64 = 5_000.0;
 /// One mode of one image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ModeTiming {
-    /// What the cell is started with.
+    /// Task of the cell.
     #[serde(flatten)]
     pub task: CellTask,
     /// Longest time from an edge to the new output, CPU cycles at 20 MHz.
     pub latency_cycles: u64,
-    /// Shortest.
+    /// Shortest time from an edge to the new output, CPU cycles.
     pub latency_cycles_min: u64,
-    /// Shortest period of edges from which on none is lost, cycles.
+    /// Shortest period of edges from which on none is missed, cycles.
     pub least_period_cycles: u32,
-    /// Largest rate of edges up to which none is lost, Hz.
+    /// Largest rate of edges up to which none is missed, Hz.
     pub max_edge_hz: f64,
-    /// What is left of the period at 72 kHz, as a share of the least period: `max_edge_hz`/72 kHz − 1.
+    /// Margin of the period at 72 kHz, relative to the shortest period: `max_edge_hz`/72 kHz − 1.
     pub margin_at_72_khz: f64,
 }
 
@@ -52,8 +52,8 @@ impl EmulatedCells {
     /// Latency and largest clock rate for each of [`EmulatedCells::tasks`].
     ///
     /// # Errors
-    /// [`FirmwareError`] when a cell does not answer on the bus, puts out other codes than the twin's even under a slow
-    /// clock, or follows none.
+    /// [`FirmwareError`] if a cell does not answer on the bus, puts out codes that differ from the twin's even with a
+    /// slow clock, or follows no clock.
     pub fn timing(&self) -> Result<Vec<ModeTiming>, FirmwareError> {
         self.tasks.par_iter().map(|&task| self.task_timing(task)).collect()
     }

@@ -1,4 +1,4 @@
-//! What one cell does, instruction by instruction.
+//! Traces one cell, instruction by instruction.
 
 use super::cells::EmulatedCells;
 use super::edges::Edges;
@@ -8,11 +8,10 @@ use spts_firmware::FIRST_ADDRESS;
 use spts_firmware::attiny412::{Device, TraceRecord};
 
 impl EmulatedCells {
-    /// Passes every step of the cell of `taxel`, started with `task`, on to `line`, for as many edges as there are in
-    /// [`EmulatedCells::edges`].
+    /// Calls `line` for every step of the cell of `taxel`, started with `task`, during [`EmulatedCells::edges`] edges.
     ///
     /// # Errors
-    /// [`FirmwareError`] when there is no such taxel or a cell does not answer.
+    /// [`FirmwareError`] if there is no such taxel, or a cell does not answer.
     pub fn trace(&self, task: CellTask, taxel: usize, line: &mut dyn FnMut(&TraceRecord)) -> Result<(), FirmwareError> {
         let mut edges = Edges::new(self.cell(task, taxel)?, self.clock.edge_hz);
         for _ in 0..self.edges {
@@ -21,10 +20,10 @@ impl EmulatedCells {
         Ok(())
     }
 
-    /// Passes the first `ticks` ticks of the cell of `taxel` after power-on on to `line`.
+    /// Calls `line` for the first `ticks` ticks of the cell of `taxel` after power-on.
     ///
     /// # Errors
-    /// [`FirmwareError`] when there is no such taxel.
+    /// [`FirmwareError`] if there is no such taxel.
     pub fn trace_from_reset(
         &self,
         taxel: usize,

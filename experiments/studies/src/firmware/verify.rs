@@ -1,4 +1,4 @@
-//! Emulated cells against the circuit's weights, code for code.
+//! Compares emulated cells with the circuit's weights, code by code.
 
 use super::cells::EmulatedCells;
 use super::error::{CellFailure, FirmwareError};
@@ -14,58 +14,58 @@ use std::time::Instant;
 /// Edges between two comparisons, a step of progress: a megabyte of codes and its levels for a hundred cells.
 const CHUNK: usize = 4096;
 
-/// The first code that is not the twin's.
+/// The first code that differs from the twin's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mismatch {
-    /// What the cells were started with.
+    /// Task of the cells.
     #[serde(flatten)]
     pub task: CellTask,
-    /// Edge since the seeds were loaded, 0-based.
+    /// Edge since loading the seeds, from 0.
     pub edge: u64,
-    /// Taxel, 0-based.
+    /// Taxel, from 0.
     pub taxel: usize,
     /// DAC code of the emulated cell.
     pub code: u8,
-    /// Level that it stands for.
+    /// Level of that code.
     pub level: f64,
     /// The twin's weight.
     pub expected_level: f64,
 }
 
-/// One mode.
+/// Results for one mode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModeVerification {
-    /// What the cells were started with.
+    /// Task of the cells.
     #[serde(flatten)]
     pub task: CellTask,
-    /// Codes that are not the twin's, of cells × edges.
+    /// Number of codes, out of cells × edges, that differ from the twin's.
     pub mismatches: u64,
-    /// Cells whose reply at the end (mode, state, counter, code) is not the behavioural cell's.
+    /// Number of cells whose final reply (mode, state, counter, code) differs from that of the behavioural cell.
     pub read_back_mismatches: usize,
 }
 
-/// All modes.
+/// Results for all modes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verification {
     /// Name of the image.
     pub image: String,
-    /// Cells on the bus.
+    /// Number of cells on the bus.
     pub cells: usize,
-    /// Clock edges in every mode.
+    /// Number of clock edges in every mode.
     pub edges: u64,
     /// Rate of the clock, Hz.
     pub edge_hz: f64,
-    /// Codes and read-backs that are not the twin's, over all modes.
+    /// Number of codes and replies that differ from the twin's, over all modes.
     pub mismatches: u64,
-    /// The first of them.
+    /// The first code that differs.
     pub first_mismatch: Option<Mismatch>,
-    /// By mode.
+    /// Results for each mode.
     pub modes: Vec<ModeVerification>,
-    /// Instructions that the cells executed.
+    /// Number of instructions that the cells executed.
     pub instructions: u64,
     /// Wall time of the emulation and the comparison, s.
     pub seconds: f64,
-    /// Emulated instructions a second, of all threads together.
+    /// Emulated instructions a second, summed over all threads.
     pub instructions_per_s: f64,
 }
 
@@ -73,7 +73,7 @@ impl EmulatedCells {
     /// Runs the cells in every mode and compares.
     ///
     /// # Errors
-    /// [`FirmwareError`] when the array cannot be built or a cell does not answer.
+    /// [`FirmwareError`] if the array cannot be built, or a cell does not answer.
     pub fn verify(&self, progress: &dyn Progress) -> Result<Verification, FirmwareError> {
         let blocks = usize::try_from(self.edges).unwrap_or(usize::MAX).div_ceil(CHUNK);
         progress.stage("clocking the cells", Some(blocks.saturating_mul(self.tasks.len())));

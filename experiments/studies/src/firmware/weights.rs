@@ -1,4 +1,4 @@
-//! The weights that emulated cells put out, block by block.
+//! The weights of emulated cells, block by block.
 
 use super::cells::EmulatedCells;
 use super::error::FirmwareError;
@@ -9,7 +9,7 @@ use spts_firmware::{Array, ArrayError, Clock};
 /// Edges of a block: a few megabytes of levels.
 const BLOCK: usize = 4096;
 
-/// The levels of all cells, a block of edges at a time.
+/// The levels of all cells, one block of edges at a time.
 #[derive(Debug)]
 pub struct EmulatedWeights {
     array: Array,
@@ -23,10 +23,10 @@ pub struct EmulatedWeights {
 }
 
 impl EmulatedCells {
-    /// The levels that cells started with `task` put out, at [`EmulatedCells::edges`] edges since then.
+    /// The levels of cells started with `task`, at the following [`EmulatedCells::edges`] edges.
     ///
     /// # Errors
-    /// [`FirmwareError`] when a cell does not answer, or there are more edges than an array has rows.
+    /// [`FirmwareError`] if a cell does not answer, or there are more edges than an array has rows.
     pub fn emulated_weights(&self, task: CellTask) -> Result<EmulatedWeights, FirmwareError> {
         let edges = usize::try_from(self.edges)?;
         Ok(EmulatedWeights {
@@ -49,7 +49,7 @@ impl EmulatedWeights {
         [self.edges, self.cells]
     }
 
-    /// Number of blocks, from the first edge to the last.
+    /// Number of blocks.
     #[must_use]
     pub fn blocks(&self) -> usize {
         self.edges.div_ceil(BLOCK)
@@ -58,7 +58,7 @@ impl EmulatedWeights {
     /// Levels in [−1, 1] of the next block, edge by edge and cell by cell; `None` after the last edge.
     ///
     /// # Errors
-    /// [`ArrayError`] when the cells cannot be clocked.
+    /// [`ArrayError`] if the cells cannot be clocked.
     pub fn next_block(&mut self) -> Result<Option<&[f64]>, ArrayError> {
         let rows = self.left.min(BLOCK);
         if rows == 0 {

@@ -1,6 +1,6 @@
 //! Bands over simulated skins, and the distance of the real skin from them.
 
-use super::images::Images;
+use super::images::ReadoutImages;
 use crate::calibrate::predicted;
 use serde::Serialize;
 use spts_eval::Scores;
@@ -37,11 +37,11 @@ impl ObjectScore {
     }
 }
 
-/// One score of one object: the simulated skins and the real one.
+/// One score of one object: simulated skins and real skin.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ObjectBand {
-    /// Images that the twin's recordings are of.
-    pub images: Images,
+    /// The images of the twin's recordings.
+    pub images: ReadoutImages,
     /// Decoder.
     pub decoder: String,
     /// Number of measurements, M.
@@ -50,51 +50,62 @@ pub struct ObjectBand {
     pub score: &'static str,
     /// Object.
     pub object: String,
-    /// The real skin's.
+    /// Score of the real skin.
     pub real: f64,
     /// Mean over the simulated skins.
     pub twin: f64,
-    /// Lower end of the band: one more simulated skin scores within it with a probability of 90 %.
+    /// Lower end of the band, in which a further simulated skin scores with a probability of 90 %.
     pub low: f64,
-    /// Its upper end.
+    /// Upper end of the band.
     pub high: f64,
     /// twin − real.
     pub difference: f64,
-    /// Whether the real skin lies within the band.
+    /// Whether the real skin lies in the band.
     pub inside: bool,
     /// Score of every simulated skin.
     #[serde(skip)]
     pub skins: Vec<f64>,
 }
 
-/// Distance of twin and skin in one score.
+/// Distance between twin and real skin in one score.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoreDistance {
-    /// Images that the twin's recordings are of.
-    pub images: Images,
+    /// The images of the twin's recordings.
+    pub images: ReadoutImages,
     /// Decoder.
     pub decoder: String,
     /// Number of measurements, M.
     pub m: usize,
     /// One of [`SCORES`].
     pub score: &'static str,
-    /// Mean over the objects of |twin − real|, with the twin's mean over the simulated skins. Errors of opposite sign
-    /// do not cancel.
+    /// Mean over the objects of |twin − real|, where "twin" is the mean over the simulated skins. Errors of opposite
+    /// sign do not cancel.
     pub mean_abs_difference: f64,
-    /// The same of one simulated skin, in place of the real one, to the mean of the others: what would be left if the
-    /// real skin were one of the twin's.
+    /// The same distance for a simulated skin in place of the real one, from the mean of the others: the expected
+    /// distance if the real skin were one of the twin's.
     pub between_skins: f64,
-    /// Mean over the objects, twin less real, where errors cancel.
+    /// Mean over the objects of twin − real, in which errors cancel.
     pub difference_of_means: f64,
-    /// Objects.
+    /// Number of objects.
     pub objects: usize,
     /// Objects whose real score lies outside the band, separated by spaces.
     pub outside: String,
 }
 
-/// The band of every score of the real skin that all `skins` have too, in the order of `real`.
+/// The band of every score of the real skin that all `skins` also have, in the order of `real`.
+///
+/// ```
+/// use spts_studies::per_object::{ReadoutImages, ObjectScore, bands};
+///
+/// let (decoder, object) = ("matched".to_owned(), "T".to_owned());
+/// let one = ObjectScore { decoder, m: 20, score: "iou", object, value: 0.0 };
+/// let score = |value| ObjectScore { value, ..one.clone() };
+/// let skins: Vec<_> = [0.70, 0.74, 0.78].map(|value| vec![score(value)]).to_vec();
+/// let band = &bands(ReadoutImages::Twin, &[score(0.76)], &skins)[0];
+/// assert!(band.inside && (band.twin - 0.74).abs() < 1e-12);
+/// ```
 #[must_use]
-pub fn bands(images: Images, real: &[ObjectScore], skins: &[Vec<ObjectScore>]) -> Vec<ObjectBand> {
+pub fn bands(images: ReadoutImages, real: &[ObjectScore], skins: &[Vec<ObjectScore>]) -> Vec<ObjectBand> {
     let band = |real: &ObjectScore| {
         let same = |skin: &Vec<ObjectScore>| skin.iter().find(|s| s.is_of(real)).map(|s| s.value);
         let skins: Vec<f64> = skins.iter().map(same).collect::<Option<_>>()?;
@@ -119,7 +130,7 @@ pub fn bands(images: Images, real: &[ObjectScore], skins: &[Vec<ObjectScore>]) -
     real.iter().filter_map(band).collect()
 }
 
-/// The distance in every score of `bands`, in their order.
+/// The distance in every score of `bands`, in order.
 #[must_use]
 pub fn distances(bands: &[ObjectBand]) -> Vec<ScoreDistance> {
     let mut out: Vec<ScoreDistance> = Vec::new();
@@ -180,7 +191,7 @@ mod tests {
     fn opposite_errors_do_not_cancel() {
         let real = [score("brain", 0.7), score("trig", 0.3)];
         let skins = [[0.31, 0.69], [0.29, 0.71]].map(|[a, b]| vec![score("brain", a), score("trig", b)]);
-        let bands = bands(Images::Twin, &real, &skins);
+        let bands = bands(ReadoutImages::Twin, &real, &skins);
         let distances = distances(&bands);
         assert_eq!(distances.len(), 1);
         assert_abs_diff_eq!(distances[0].difference_of_means, 0.0, epsilon = 1e-12);
@@ -193,13 +204,13 @@ mod tests {
     #[test]
     fn a_real_skin_like_the_twin_s_lies_within_the_band() {
         let skins = [0.4, 0.6, 0.4, 0.6].map(|v| vec![score("brain", v)]);
-        let within = |real: f64| bands(Images::Twin, &[score("brain", real)], &skins)[0].inside;
+        let within = |real: f64| bands(ReadoutImages::Twin, &[score("brain", real)], &skins)[0].inside;
         assert!(within(0.5) && within(0.79) && !within(0.81) && !within(0.19));
     }
 
     #[test]
     fn a_score_that_a_skin_lacks_has_no_band() {
         let skins = [vec![score("brain", 0.5)], vec![]];
-        assert!(bands(Images::Twin, &[score("brain", 0.5)], &skins).is_empty());
+        assert!(bands(ReadoutImages::Twin, &[score("brain", 0.5)], &skins).is_empty());
     }
 }

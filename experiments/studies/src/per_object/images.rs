@@ -1,25 +1,25 @@
-//! What the twin's recordings are of. Replacing the simulated images by the skin's own, one property at a time, shows
-//! where a difference of twin and skin comes from.
+//! The images of the twin's recordings. Replacing the simulated images by the skin's own, one property at a time, shows
+//! the cause of a difference between twin and skin.
 
 use serde::Serialize;
 
-/// Images that are read out by the twin.
+/// Images that the twin reads out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Images {
-    /// The twin's own: simulated contact, taxels with gains drawn anew for every skin.
+pub enum ReadoutImages {
+    /// The twin's own: simulated contact, with gains drawn for every skin.
     Twin,
-    /// Simulated contact, taxels with the gains of the real skin as raster presses of the OTHER objects tell them.
+    /// Simulated contact, with the gains of the real skin as estimated from raster presses of the OTHER objects.
     TwinWithSkinGains,
-    /// The real skin's raster image of the object, in both modes: shape and gains are real, and nothing changes between
+    /// The real skin's raster image of the object, in both modes: shape and gains are real, and do not change between
     /// the raster and the compressive session.
     SkinRaster,
     /// The real skin's image in its compressive session, by least squares: shape, gains and mounting are real.
     SkinCompressive,
 }
 
-impl Images {
-    /// In words.
+impl ReadoutImages {
+    /// The kind of images in words.
     #[must_use]
     pub const fn label(self) -> &'static str {
         match self {

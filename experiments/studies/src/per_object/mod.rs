@@ -1,9 +1,9 @@
-//! Twin and skin object by object: the twin's scores over many simulated skins as a band, and the real skin's score
-//! beside it.
+//! Compares twin and skin object by object: the twin's scores over many simulated skins form a band, with which the
+//! real skin's score is compared.
 //!
-//! One simulated skin says little: its taxels, its session and its noise are one draw, and errors of several objects
-//! cancel in a mean over objects. Here the band of an object is what one more skin of the twin would score, and the
-//! distance of twin and skin is the mean over objects of |twin − real|.
+//! One simulated skin says little: its taxels, session and noise are a single draw, and in a mean over objects errors
+//! cancel. Here the band of an object shows what a further skin of the twin would score, and the distance between twin
+//! and skin is the mean over objects of |twin − real|.
 
 mod band;
 mod images;
@@ -12,5 +12,5 @@ mod study;
 mod text;
 
 pub use band::{ObjectBand, ObjectScore, SCORES, ScoreDistance, ScoreOf, bands, distances};
-pub use images::Images;
+pub use images::ReadoutImages;
 pub use study::{DECODERS, MEASUREMENTS, PerObjectError, PerObjectReport, PerObjectStudy};

@@ -1,4 +1,4 @@
-//! Simulated skins to score: the twin's presses, and presses of given images through the twin's readout.
+//! Simulated skins for scoring: the twin's presses, and given images through the twin's readout.
 
 use super::study::PerObjectError;
 use crate::pressed::footprint_scene;

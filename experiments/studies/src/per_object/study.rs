@@ -1,7 +1,7 @@
-//! The study: every simulated skin recorded and scored like the real one.
+//! Records and scores every simulated skin like the real one.
 
 use super::band::{ObjectBand, ObjectScore, SCORES, ScoreDistance, ScoreOf, bands, distances};
-use super::images::Images;
+use super::images::ReadoutImages;
 use super::skin::{presses, twin, with_images, with_skin_gains};
 use super::text;
 use crate::calibrate::{SessionEstimates, read};
@@ -20,20 +20,20 @@ use std::path::Path;
 
 /// Numbers of measurements.
 pub const MEASUREMENTS: [usize; 3] = [7, 20, 50];
-/// Decoders: the published pursuit with matched weights, and the two that do best.
+/// Decoders: the published pursuit with matched weights, and the two best decoders.
 pub const DECODERS: [&str; 3] = ["matched", "nn_lmmse", "evidence"];
 
-/// Why twin and skin cannot be held against each other.
+/// Why twin and skin cannot be compared.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PerObjectError {
     /// The recordings cannot be used.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// No object of the twin has been recorded compressively.
+    /// The recordings contain no compressive session of an object that the twin knows.
     #[error("the recordings hold no compressive session of an object that the twin has; it has {known}")]
     NoObject {
-        /// Objects of the twin.
+        /// Objects that the twin knows.
         known: String,
     },
     /// The simulation failed.
@@ -45,46 +45,46 @@ pub enum PerObjectError {
     /// The readout refuses its profile.
     #[error("readout: {0}")]
     Profile(#[from] ProfileError),
-    /// An image is not a conductance.
+    /// An image is not a valid conductance.
     #[error("conductance: {0}")]
     Source(#[from] SourceError),
     /// The readout could not record.
     #[error("readout: {0}")]
     Acquire(#[from] AcquireError),
-    /// The skin's gains are not known.
+    /// The gains of the skin are not known.
     #[error("gains of the skin: {0}")]
     Gains(#[from] SkinGainsError),
     /// There are no raster images.
     #[error("raster images: {0}")]
-    Images(#[from] LibraryError),
+    ReadoutImages(#[from] LibraryError),
 }
 
-/// What is compared.
+/// Settings of the comparison.
 #[derive(Debug, Clone, Copy)]
 pub struct PerObjectStudy<'a> {
-    /// Directory of the recordings.
+    /// Folder of the recordings.
     pub recordings: &'a Path,
-    /// Simulated skins.
+    /// Number of simulated skins.
     pub skins: u64,
-    /// Seed of the first skin; the others have the seeds after it.
+    /// Seed of the first skin; the others have the following seeds.
     pub seed: u64,
-    /// Whether the skin's own images are read out by the twin, too ([`Images`]).
+    /// Whether the twin also reads out the skin's own images ([`ReadoutImages`]).
     pub causes: bool,
 }
 
-/// What was found.
+/// Results of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PerObjectReport {
-    /// Simulated skins.
+    /// Number of simulated skins.
     pub skins: u64,
-    /// Distances, score by score.
+    /// Distances, one for each score.
     pub distances: Vec<ScoreDistance>,
-    /// Bands, object by object.
+    /// Bands, one for each object and score.
     pub objects: Vec<ObjectBand>,
 }
 
 impl PerObjectStudy<'_> {
-    /// Simulates, records and scores. A function of the recordings and the seed alone.
+    /// Simulates, records and scores. The result depends only on the recordings and the seed.
     ///
     /// # Errors
     /// [`PerObjectError`].
@@ -102,7 +102,7 @@ impl PerObjectStudy<'_> {
         }
         let of_real = scores(&real, &objects, self.seed)?;
         progress.end();
-        let of = |images: Images, skin: &(dyn Fn(u64) -> Result<Source, PerObjectError> + Sync)| {
+        let of = |images: ReadoutImages, skin: &(dyn Fn(u64) -> Result<Source, PerObjectError> + Sync)| {
             let seeds = self.seed..self.seed.saturating_add(self.skins);
             let skins = seeds.into_par_iter().map(|seed| scores(&skin(seed)?, &objects, seed));
             let skins = skins.collect::<Result<Vec<_>, PerObjectError>>()?;
@@ -111,19 +111,22 @@ impl PerObjectStudy<'_> {
         let skins = usize::try_from(self.skins).unwrap_or(usize::MAX);
         let done = || progress.step();
         progress.stage("pressing simulated skins", Some(skins * presses(objects.len())));
-        let mut all = of(Images::Twin, &|seed| {
+        let mut all = of(ReadoutImages::Twin, &|seed| {
             Ok(Source::new(twin(seed, &objects, true, &done)?)?)
         })?;
         progress.end();
         if self.causes {
             progress.stage("with the skin's gains", Some(skins * presses(objects.len())));
-            all.extend(of(Images::TwinWithSkinGains, &|seed| {
+            all.extend(of(ReadoutImages::TwinWithSkinGains, &|seed| {
                 with_skin_gains(&twin(seed, &objects, false, &done)?, &real, seed)
             })?);
             progress.end();
             for (images, volts) in [
-                (Images::SkinRaster, raster_images(&real, &objects)?),
-                (Images::SkinCompressive, compressive_images(self.recordings, &objects)?),
+                (ReadoutImages::SkinRaster, raster_images(&real, &objects)?),
+                (
+                    ReadoutImages::SkinCompressive,
+                    compressive_images(self.recordings, &objects)?,
+                ),
             ] {
                 progress.stage(images.label(), Some(skins * real.sessions.len()));
                 all.extend(of(images, &|seed| with_images(&real, &volts, seed, &done))?);
@@ -143,10 +146,13 @@ impl PerObjectReport {
     #[must_use]
     pub fn distance(&self, decoder: &str, m: usize, score: &str) -> Option<&ScoreDistance> {
         let same = |d: &&ScoreDistance| d.decoder == decoder && d.m == m && d.score == score;
-        self.distances.iter().filter(|d| d.images == Images::Twin).find(same)
+        self.distances
+            .iter()
+            .filter(|d| d.images == ReadoutImages::Twin)
+            .find(same)
     }
 
-    /// Tables to read.
+    /// The results as text tables.
     #[must_use]
     pub fn text(&self) -> String {
         text::tables(self)

@@ -1,4 +1,4 @@
-//! Why the phase plane cannot be measured.
+//! Errors of the phase study.
 
 use spts_recon::recover::ParameterError;
 
@@ -6,7 +6,7 @@ use spts_recon::recover::ParameterError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PhaseError {
-    /// The theory says nothing for this undersampling.
+    /// The theory is not defined for this undersampling.
     #[error(transparent)]
     Theory(#[from] ParameterError),
     /// A method cannot be built.
@@ -14,7 +14,7 @@ pub enum PhaseError {
     Method {
         /// Name of the method.
         name: &'static str,
-        /// What the method says.
+        /// Message of the method.
         reason: String,
     },
 }

@@ -1,4 +1,4 @@
-//! Which algorithms the picture shows, and what theory says of each.
+//! The algorithms of the phase diagram, and their theoretical limits.
 
 use super::error::PhaseError;
 use serde::Serialize;
@@ -18,13 +18,14 @@ const POSITIVE: [&str; 3] = ["nn_omp", "nn_lasso", "nn_lmmse"];
 /// Its bias stays below the 1 % that tell success from failure until the normal equations are conditioned to 1e3.
 const PENALTY: f64 = 1e-5;
 
-/// The curve that stands beside a method.
+/// The theoretical curve for a method.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Theory {
-    /// Least Σ|x|, or Σx of x ≥ 0 when the signs are positive: a law for the lasso, a reference for every other method.
+    /// Smallest Σ|x|, or Σx with x ≥ 0 for positive signs: the law for the lasso, and a reference for every other
+    /// method.
     Weak,
-    /// Any non-negative fit: the law for a method that asks for nothing else.
+    /// Any non-negative fit: the law for a method that requires nothing else.
     Orthant,
 }
 
@@ -44,29 +45,29 @@ impl Theory {
 /// How a method is built.
 #[derive(Debug, Clone, Copy)]
 enum Builder {
-    /// For a number of non-zeros.
+    /// Built for a number of non-zeros.
     Sparsity(Build),
-    /// For a number of unknowns.
+    /// Built for a number of unknowns.
     Unknowns(BuildRegularised),
 }
 
-/// A recovery algorithm of the picture.
+/// A recovery algorithm in the diagram.
 #[derive(Debug, Clone, Copy)]
 pub struct Method {
     /// Name, as in the tables of the reconstruction crate.
     pub name: &'static str,
-    /// The curve beside it.
+    /// Its theoretical curve.
     pub theory: Theory,
-    /// Whether it is told the number of non-zeros.
+    /// Whether it is given the number of non-zeros.
     pub told_sparsity: bool,
     builder: Builder,
 }
 
 impl Method {
-    /// The algorithm for `n` unknowns, `sparsity` of which are not zero.
+    /// Builds the algorithm for `n` unknowns with `sparsity` non-zeros.
     ///
     /// # Errors
-    /// [`PhaseError::Method`] when a parameter is outside its range.
+    /// [`PhaseError::Method`] if a parameter is outside its range.
     pub fn build(&self, n: usize, sparsity: usize) -> Result<Box<dyn Recover>, PhaseError> {
         match self.builder {
             Builder::Sparsity(build) => Ok(build(sparsity)),
@@ -78,7 +79,16 @@ impl Method {
     }
 }
 
-/// Every method that applies to coefficients of these signs, in the order of the tables.
+/// Every method for coefficients of these signs, in the order of the tables.
+///
+/// ```
+/// use spts_recon::recover::Signs;
+/// use spts_studies::phase::methods;
+///
+/// let names: Vec<_> = methods(Signs::Positive).iter().map(|method| method.name).collect();
+/// assert!(names.contains(&"nn_lasso"));
+/// assert!(!methods(Signs::Either).iter().any(|method| method.name == "nn_lasso"), "for positive signs only");
+/// ```
 #[must_use]
 pub fn methods(signs: Signs) -> Vec<Method> {
     let told = RECOVER.iter().map(|&(name, build)| Method {

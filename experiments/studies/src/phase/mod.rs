@@ -1,4 +1,4 @@
-//! Where in the plane of undersampling and sparsity each recovery algorithm works, beside the theory.
+//! Phase diagrams: for which undersampling and sparsity each recovery algorithm works, compared with theory.
 
 mod error;
 mod methods;

@@ -1,4 +1,4 @@
-//! Recovery rates over the phase plane, and where they fall through one half.
+//! Recovery rates over the phase diagram, and where they fall below one half.
 
 use super::error::PhaseError;
 use super::methods::{Method, Theory};
@@ -7,40 +7,40 @@ use serde::Serialize;
 use spts::progress::Progress;
 use spts_recon::recover::{PhasePoint, Signs};
 
-/// Cells of the plane along each axis.
+/// Number of cells along each axis of the diagram.
 pub const CELLS: usize = 20;
 
-/// Methods and problems of a phase plane.
+/// Methods and problems of a phase diagram.
 #[derive(Debug, Clone)]
 pub struct PhaseStudy {
     /// Algorithms.
     pub methods: Vec<Method>,
     /// Signs of the planted coefficients.
     pub signs: Signs,
-    /// Unknowns N. Range [20, 2000].
+    /// Number of unknowns N. Range [20, 2000].
     pub unknowns: usize,
-    /// Random problems a point. Range [1, 100000].
+    /// Number of random problems for each point. Range [1, 100000].
     pub trials: usize,
-    /// Take every fifth column of cells only.
+    /// Whether to compute only every fifth column.
     pub quick: bool,
     /// Seed of all problems.
     pub seed: u64,
 }
 
-/// A point of the plane.
+/// A point of the diagram.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RatePoint {
     /// Algorithm.
     pub method: &'static str,
-    /// Measurements M.
+    /// Number of measurements M.
     pub m: usize,
-    /// Non-zero coefficients S.
+    /// Number of non-zero coefficients S.
     pub s: usize,
     /// Undersampling M/N.
     pub delta: f64,
     /// Sparsity S/M.
     pub rho: f64,
-    /// Share of the problems that were solved to 1 %. Zero without a try once two points of less sparsity had none.
+    /// Share of the problems solved to 1 %. It is set to zero without a trial after two sparser points with zero.
     pub rate: f64,
 }
 
@@ -51,29 +51,29 @@ pub struct Crossing {
     pub method: &'static str,
     /// Undersampling M/N.
     pub delta: f64,
-    /// Sparsity S/M, between the last point above one half and the first at or below it; 0 stands for ρ → 0, where all
-    /// is solved. `None` when the rate never falls that far.
+    /// Sparsity S/M, interpolated between the last point above one half and the first at or below it. 0 stands for ρ →
+    /// 0, if no point is above one half. `None` if the rate never falls that far.
     pub rho: Option<f64>,
-    /// Its standard error: that of a rate of one half over the slope between the two points.
+    /// Standard error of `rho`: that of a rate of one half divided by the slope between the two points.
     pub standard_error: Option<f64>,
-    /// What the theory beside it says for N → ∞.
+    /// Theoretical value for N → ∞.
     pub theory_rho: f64,
-    /// Which theory.
+    /// The theoretical curve.
     pub theory: Theory,
 }
 
-/// Recovery rates over the plane, and where they fall through one half.
+/// Recovery rates over the diagram, and where they fall below one half.
 #[derive(Debug, Clone, Serialize)]
 pub struct PhaseReport {
-    /// Unknowns N.
+    /// Number of unknowns N.
     pub unknowns: usize,
-    /// Problems a point.
+    /// Number of problems for each point.
     pub trials: usize,
     /// Seed of all problems.
     pub seed: u64,
     /// Whether the planted coefficients are all positive.
     pub positive: bool,
-    /// Where the rates fall through one half.
+    /// Where the rates fall below one half.
     pub crossings: Vec<Crossing>,
     /// Every point.
     pub rates: Vec<RatePoint>,
@@ -92,10 +92,10 @@ impl PhaseStudy {
         (1..=CELLS / step).map(|i| (i * step) as f64 / CELLS as f64).collect()
     }
 
-    /// Measures all points. The numbers do not depend on the threads.
+    /// Measures all points. The result does not depend on the number of threads.
     ///
     /// # Errors
-    /// [`PhaseError`] when a method cannot be built or N is too small for the plane.
+    /// [`PhaseError`] if a method cannot be built, or N is too small for the diagram.
     pub fn run(&self, progress: &dyn Progress) -> Result<PhaseReport, PhaseError> {
         let tasks: Vec<(Method, f64)> = self
             .methods

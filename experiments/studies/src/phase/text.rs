@@ -6,7 +6,7 @@ use super::study::{Crossing, PhaseReport};
 const SHOWN: [f64; 2] = [0.25, 0.5];
 
 impl PhaseReport {
-    /// Crossings at δ = .25 and .5, one line a method, beside the theory.
+    /// Crossings at δ = 0.25 and 0.5, one line for each method, with the theoretical values.
     #[must_use]
     pub fn text(&self) -> String {
         let mut out = format!(

@@ -1,4 +1,4 @@
-//! Which of the known objects an image shows.
+//! Classification of an image as one of the known objects.
 
 use crate::touches::Touch;
 use std::sync::Arc;
@@ -6,7 +6,7 @@ use std::sync::Arc;
 /// Shifts that are tried along either axis, taxels.
 const REACH: isize = 1;
 
-/// Images of known objects, from other presses on the same skin; the most alike one names an image.
+/// Images of known objects from other presses on the same skin. An image is classified by the most similar one.
 #[derive(Debug, Clone)]
 pub struct Templates {
     rows: usize,
@@ -18,12 +18,13 @@ pub struct Templates {
 #[derive(Debug, Clone)]
 struct Known {
     name: Arc<str>,
-    /// Taxels that are not zero, and their values; of length 1 together.
+    /// Indices and values of non-zero taxels, normalised to length 1.
     taxels: Vec<(usize, f64)>,
 }
 
 impl Templates {
-    /// Templates from `touches` on a skin of `rows` × `cols`: the mean of all touches of an object, each of length 1.
+    /// Templates from `touches` on a skin of `rows` × `cols`: the mean of all touches of an object, normalised to
+    /// length 1.
     #[must_use]
     pub fn new(touches: &[Touch], rows: usize, cols: usize) -> Self {
         let mut sums: Vec<(Arc<str>, Vec<f64>)> = Vec::new();
@@ -50,8 +51,8 @@ impl Templates {
         }
     }
 
-    /// The object whose template, moved by up to a taxel along either axis, correlates most with `image`: its length is
-    /// the same for all templates and need not be known. `None` for an image of nothing.
+    /// The object whose template, shifted by up to a taxel along each axis, correlates most with `image`. The length of
+    /// `image` does not matter. `None` for an empty image.
     #[must_use]
     pub fn name(&self, image: &[f64]) -> Option<&str> {
         let shifts = (-REACH..=REACH).flat_map(|r| (-REACH..=REACH).map(move |c| (r, c)));

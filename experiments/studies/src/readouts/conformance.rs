@@ -1,4 +1,4 @@
-//! What every readout promises.
+//! Properties that every readout must have.
 
 use super::readout::ReadoutSkin;
 use super::table::ReadoutLine;
@@ -29,12 +29,12 @@ fn plate(layout: &SkinLayout, pressed_s: f64) -> Touch {
     }
 }
 
-/// Checks what every readout promises: on skins that are no squares, readings with rising numbers of measurements,
-/// images of finite values ≥ 0 with one a taxel, times that are positive and in order; a contact that stands out is
-/// shown and noticed; an untouched skin is not noticed; the same wire gives the same readings, in any order of touches.
+/// Checks a readout on skins that are not square. Numbers of measurements must increase; images must have one finite
+/// value ≥ 0 for each taxel; times must be positive and in order. A strong contact must be shown and noticed, and an
+/// untouched skin must not be. Equal wires must give equal readings, in any order of touches.
 ///
 /// # Panics
-/// When a promise is broken, with the readout's name.
+/// If a property fails; the message names the readout.
 pub fn conformance(line: &ReadoutLine) {
     SKINS.iter().for_each(|skin| on_skin(line, *skin));
 }

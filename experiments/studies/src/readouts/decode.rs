@@ -1,4 +1,4 @@
-//! Images from few rows of ±1, the same in every frame.
+//! Decodes images from few rows of ±1 that are the same in every frame.
 
 use super::error::ReadoutsError;
 use super::polish::{contact_taxels, non_negative};
@@ -23,9 +23,9 @@ pub(super) const WHOLE_IMAGES: usize = 400;
 /// What the rows are like, which decides how skins of more than [`WHOLE_IMAGES`] taxels are decoded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Rows {
-    /// Pseudorandom: contacts are found as patches.
+    /// Pseudorandom; contacts are found as patches.
     Random,
-    /// Products of rows along the axes, for images that are alike over this distance, taxels.
+    /// Products of rows along the axes, for images that are smooth over this distance, taxels.
     Smooth(f64),
 }
 
@@ -38,12 +38,12 @@ pub(super) struct FewRows {
 
 /// How the image is found.
 enum Decoder {
-    /// The most probable non-negative image under a prior, `nn_lmmse`; and the root mean square of the sums that the
-    /// prior expects.
+    /// The most probable non-negative image under a prior, `nn_lmmse`; and the root mean square of the sums expected
+    /// under the prior.
     Gaussian(Box<Fixed>, f64),
-    /// Patches, found by [`RegionPursuit`], then their taxels solved for.
+    /// Patches found by [`RegionPursuit`]; then their taxels are solved for.
     Patches,
-    /// The non-negative estimate of smooth images on so many taxels, those that the linear estimate puts first.
+    /// The non-negative estimate of smooth images, on the given number of taxels with the largest linear estimates.
     Sheet(Arc<SheetDecoder>, usize),
 }
 

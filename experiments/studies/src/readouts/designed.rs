@@ -1,4 +1,4 @@
-//! Signs that are designed for what is to be seen.
+//! Signs designed for the expected images.
 
 use super::decode::{FewRows, Rows, WHOLE_IMAGES};
 use super::error::ReadoutsError;

@@ -1,4 +1,4 @@
-//! Why readouts cannot be compared.
+//! Errors of the readouts study.
 
 use crate::electronics::ElectronicsError;
 use crate::explore::ExploreError;
@@ -23,7 +23,7 @@ pub enum ReadoutsError {
     /// The readout of a wire cannot be built.
     #[error(transparent)]
     Profile(#[from] spts_circuit::ProfileError),
-    /// Cells that do not go with the wire.
+    /// The cells do not fit the wire.
     #[error(transparent)]
     Codes(#[from] spts_circuit::CodesError),
     /// The rows cannot be designed.
@@ -44,12 +44,12 @@ pub enum ReadoutsError {
     /// There is no prior for a large sheet.
     #[error(transparent)]
     Prior(#[from] spts_recon::recover::PriorError),
-    /// An effect of the profile is missing, or lacks a number.
+    /// An effect of the profile is missing, or lacks a value.
     #[error("profile as_built or as_designed: no `compressive.{effect}.{number}`")]
     NoNumber {
         /// Effect.
         effect: &'static str,
-        /// Number.
+        /// Name of the value.
         number: &'static str,
     },
 }

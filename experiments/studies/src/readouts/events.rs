@@ -1,4 +1,4 @@
-//! Event-driven code division: a taxel that changes sends its own signature, whenever that is.
+//! Event-driven code division: a taxel that changes sends its own signature at any time.
 
 use super::error::ReadoutsError;
 use super::messages::{Message, Sender, receive};

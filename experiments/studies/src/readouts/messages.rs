@@ -1,4 +1,4 @@
-//! Overlapping messages of sparse pulses on one wire, and who sent them.
+//! Overlapping messages of sparse pulses on one wire, and how their senders are found.
 
 use rand::RngExt as _;
 use spts_models::Streams;
@@ -25,11 +25,11 @@ pub(super) struct Message {
 /// A transmission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sender {
-    /// Who sends.
+    /// Sending taxel.
     pub(super) taxel: usize,
     /// First slot of the message.
     pub(super) start: usize,
-    /// What is sent, in [0, [`Message::LEVELS`]).
+    /// Value that is sent, in [0, [`Message::LEVELS`]).
     pub(super) value: u8,
 }
 

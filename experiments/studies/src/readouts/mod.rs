@@ -1,7 +1,8 @@
-//! Few-wire readouts compared: the same skins, touches, amplifier, noise, converter and clock for all of them.
+//! Compares readouts with few wires: skins, touches, amplifier, noise, converter and clock are the same for all.
 //!
-//! A [`WireReadout`] asks a [`HeldWire`] for measurements and answers with images; [`READOUTS`] is the table of them,
-//! and [`conformance`] runs on every line. [`ReadoutsStudy`] measures them, and the protocol is docs/readouts.md.
+//! A [`WireReadout`] requests measurements from a [`HeldWire`] and returns images. [`READOUTS`] is the table of
+//! readouts, and [`conformance`] checks every line. [`ReadoutsStudy`] measures them; docs/readouts.md describes the
+//! protocol.
 //!
 //! ```no_run
 //! use spts_studies::readouts::{READOUTS, ReadoutsStudy};
@@ -44,9 +45,9 @@ pub use conformance::conformance;
 pub use error::ReadoutsError;
 pub use published::{PUBLISHED, PublishedSystem};
 pub use readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
-pub use report::{GOOD_IOU, ReadoutRow, ReadoutsReport, SizeWire, Trial};
+pub use report::{GOOD_IOU, ReadoutRow, ReadoutTrial, ReadoutsReport, SizeWire};
 pub use rows::{StoredRows, WalshRows};
 pub use study::{ReadoutsParameters, ReadoutsStudy};
 pub use table::{READOUTS, ReadoutLine, readout};
-pub use wire::{FALSE_ALARM_S, Frame, HeldWire, WireSession};
+pub use wire::{FALSE_ALARM_S, HeldWire, WireFrame, WireSession};
 pub use wiring::{ReadoutWire, SkinWire};

@@ -1,4 +1,4 @@
-//! Taxels of found contacts, solved for one by one.
+//! Refines found contacts by solving for their taxels individually.
 
 use spts_recon::Matrix;
 

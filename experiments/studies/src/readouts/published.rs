@@ -1,4 +1,4 @@
-//! What published systems state: shown beside what was measured here, and never mixed with it.
+//! Figures stated by published systems. They are listed for comparison and never mixed with measured results.
 
 use serde::Serialize;
 
@@ -9,11 +9,11 @@ pub struct PublishedSystem {
     pub name: &'static str,
     /// Taxels.
     pub taxels: usize,
-    /// Images a second, as stated; of events, the inverse of the stated latency.
+    /// Images a second, as stated; for events, the inverse of the stated latency.
     pub frames_hz: f64,
-    /// Signal wires, in words.
+    /// Signal wires, as text.
     pub wires: &'static str,
-    /// What the number is.
+    /// The stated figure.
     pub stated: &'static str,
     /// Source.
     pub source: &'static str,

@@ -1,4 +1,4 @@
-//! Pseudorandom signs, few of them.
+//! Few rows of pseudorandom signs.
 
 use super::decode::{FewRows, Rows};
 use super::error::ReadoutsError;

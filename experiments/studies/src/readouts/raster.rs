@@ -1,4 +1,4 @@
-//! One taxel after another.
+//! Scans one taxel after another.
 
 use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};

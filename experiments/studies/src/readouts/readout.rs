@@ -1,4 +1,4 @@
-//! What a readout is.
+//! Interface of readouts.
 
 use super::error::ReadoutsError;
 use super::wire::HeldWire;
@@ -12,7 +12,7 @@ const SHARES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
 /// Fewest and most measurements of those.
 const MEASUREMENTS: std::ops::RangeInclusive<usize> = 5..=2000;
 
-/// A way to read a skin over one wire.
+/// A method to read a skin over one wire.
 ///
 /// ```
 /// use spts_studies::readouts::{READOUTS, readout};
@@ -21,42 +21,42 @@ const MEASUREMENTS: std::ops::RangeInclusive<usize> = 5..=2000;
 /// assert_eq!(READOUTS.len(), 6);
 /// ```
 pub trait WireReadout: Send + Sync {
-    /// Rows, gains and whatever else needs no touch. A function of the skin alone.
+    /// Computes rows, gains and everything else that depends only on the skin.
     ///
     /// # Errors
-    /// [`ReadoutsError`] when there is none for this skin.
+    /// [`ReadoutsError`] if the readout does not support this skin.
     fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError>;
 }
 
-/// A readout of one skin.
+/// A readout prepared for one skin.
 pub trait PreparedReadout: Send + Sync {
     /// Largest magnitude of Σ wₖ·gₖ, S, over all its measurements of a skin with the conductances `conductance_s`, idle
-    /// ones included: what the feedback is fitted to.
+    /// measurements included. The feedback resistance is chosen for it.
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64;
 
-    /// Reads the touch that is held on `wire`: one reading for every number of measurements that this readout is tried
-    /// with, in rising order and the same number of readings for every touch.
+    /// Reads the touch on `wire`. Returns one reading for every number of measurements with which this readout is
+    /// tested, in increasing order; every touch has the same number of readings.
     ///
     /// # Errors
-    /// [`ReadoutsError`] when the wire cannot be measured or an image not recovered.
+    /// [`ReadoutsError`] if the wire cannot be measured, or an image cannot be recovered.
     fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError>;
 }
 
-/// An image, and what it took.
+/// An image, and the measurements that it needed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
-    /// Measurements that the image takes.
+    /// Number of measurements for the image.
     pub measurements: usize,
     /// One value a taxel, in any unit.
     pub image: Vec<f64>,
-    /// Mean number of measurements from the onset of the touch, at a random moment, until a sample is beyond the alarm;
-    /// `None` when none is.
+    /// Mean number of measurements from the onset of the touch, at a random moment, to the first sample beyond the
+    /// alarm threshold; `None` if there is no such sample.
     pub noticed: Option<f64>,
-    /// The same until a place on the skin is known for it.
+    /// Mean number of measurements from the onset until the place of the touch is known; `None` if it never is.
     pub placed: Option<f64>,
 }
 
-/// A skin that readouts are prepared for.
+/// The skin for which readouts are prepared.
 pub struct ReadoutSkin {
     /// Rows, columns and pitch.
     pub layout: SkinLayout,
@@ -66,7 +66,7 @@ pub struct ReadoutSkin {
 }
 
 impl ReadoutSkin {
-    /// A skin of this layout; random numbers that readouts need before they see one come from `seed`.
+    /// A skin of this layout. `seed` determines the random numbers that readouts need for preparation.
     #[must_use]
     pub fn new(layout: SkinLayout, seed: u64) -> Self {
         Self {
@@ -76,7 +76,7 @@ impl ReadoutSkin {
         }
     }
 
-    /// What may be known of images on this skin when nothing was recorded: random shapes anywhere.
+    /// Prior of the images on this skin without any recording: random shapes anywhere.
     ///
     /// # Errors
     /// [`ReadoutsError`] for a skin of more than [`TrainingData::MOST_TAXELS`].
@@ -88,7 +88,8 @@ impl ReadoutSkin {
         Ok(Arc::clone(self.prior.get_or_init(|| prior)))
     }
 
-    /// Numbers of measurements for a readout that is free in it: 1 to 50 % of the taxels, at least 5 and at most 2000.
+    /// Numbers of measurements for a readout that can choose them: 1 to 50 % of the taxels, at least 5 and at most
+    /// 2000.
     #[must_use]
     pub fn measurements(&self) -> Vec<usize> {
         #[expect(clippy::cast_possible_truncation, reason = "skins have far fewer than 2^52 taxels")]
@@ -98,9 +99,9 @@ impl ReadoutSkin {
     }
 }
 
-/// Mean number of measurements until the first of those `beyond` the alarm, for a frame that is repeated and an onset
-/// at a moment that is uniform over it: half a measurement until the next one, and all up to the one that is beyond.
-/// `None` when there is none.
+/// Mean number of measurements from the onset to the first one beyond the alarm threshold (`beyond`), for a repeated
+/// frame and an onset at a uniformly distributed moment: half a measurement until the next one, plus all up to the one
+/// beyond the threshold. `None` if there is none.
 #[must_use]
 pub fn until_noticed(beyond: &[bool]) -> Option<f64> {
     let first = beyond.iter().position(|b| *b)?;

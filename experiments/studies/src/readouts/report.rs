@@ -1,46 +1,46 @@
-//! What the benchmark found.
+//! Results of the benchmark.
 
 use super::published::{PUBLISHED, PublishedSystem};
 use crate::touches::Band;
 use serde::Serialize;
 
-/// IoU from which an image counts as good: the one that large skins are asked for in [`explore`](crate::explore).
+/// IoU from which an image counts as good: the wanted IoU of large skins in [`explore`](crate::explore).
 pub const GOOD_IOU: f64 = crate::explore::WANTED_IOU;
 
-/// The clock of a size, the same for all readouts.
+/// The clock for skins of one size, the same for all readouts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SizeWire {
     /// Taxels N.
     pub taxels: usize,
-    /// Time of a measurement, s.
+    /// Duration of a measurement, s.
     pub period_s: f64,
 }
 
-/// One readout with one number of measurements: bands over the repetitions.
+/// One readout with one number of measurements; bands over the repetitions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Trial {
-    /// Measurements of an image, M.
+pub struct ReadoutTrial {
+    /// Number of measurements for an image, M.
     pub measurements: usize,
-    /// Images a second on the shared clock.
+    /// Images a second with the common clock.
     pub frames_hz: f64,
-    /// Intersection over union of the supports, shapes at random places.
+    /// Intersection over union of the supports, for shapes at random places.
     pub iou: Option<Band>,
-    /// Distance of the centres, taxels, of the shapes whose image shows something.
+    /// Distance of the centres, taxels, for the shapes with a non-empty image.
     pub place_px: Option<Band>,
-    /// Share of the seventeen objects that are named rightly.
+    /// Share of the seventeen objects that are classified correctly.
     pub accuracy: Option<Band>,
-    /// Mean time from a touch at a random moment until a sample is beyond the alarm, s, of the touches that are
+    /// Mean time from a touch at a random moment to a sample beyond the alarm threshold, s, for the touches that are
     /// noticed.
     pub noticed_s: Option<Band>,
-    /// The same until a place on the skin is known, s.
+    /// Mean time from a touch until its place is known, s.
     pub placed_s: Option<Band>,
-    /// Share of the shapes whose image shows nothing.
+    /// Share of the shapes with an empty image.
     pub lost: f64,
-    /// Share of the shapes of which no sample is beyond the alarm.
+    /// Share of the shapes without a sample beyond the alarm threshold.
     pub unnoticed: f64,
 }
 
-impl Trial {
+impl ReadoutTrial {
     /// Whether the mean IoU is good.
     #[must_use]
     pub fn is_good(&self) -> bool {
@@ -56,21 +56,21 @@ pub struct ReadoutRow {
     /// Name in figures.
     #[serde(skip)]
     pub label: &'static str,
-    /// Measured wires.
+    /// Number of measured wires.
     pub wires: usize,
     /// Taxels N.
     pub taxels: usize,
-    /// Feedback resistance that its largest sum permits, Ω.
+    /// Largest feedback resistance for which its sums fit, Ω.
     pub feedback_ohm: f64,
-    /// Every number of measurements, rising.
-    pub trials: Vec<Trial>,
+    /// One entry for each number of measurements, in increasing order.
+    pub trials: Vec<ReadoutTrial>,
 }
 
 impl ReadoutRow {
-    /// The trial with the fewest measurements and a good image; when there is none, the one with the best IoU.
+    /// The trial with the fewest measurements and a good image; otherwise the one with the best IoU.
     #[must_use]
-    pub fn deciding(&self) -> Option<&Trial> {
-        let iou = |t: &Trial| t.iou.map_or(0.0, |iou| iou.mean);
+    pub fn deciding(&self) -> Option<&ReadoutTrial> {
+        let iou = |t: &ReadoutTrial| t.iou.map_or(0.0, |iou| iou.mean);
         let best = self.trials.iter().max_by(|a, b| iou(a).total_cmp(&iou(b)));
         self.trials.iter().find(|t| t.is_good()).or(best)
     }
@@ -81,9 +81,9 @@ impl ReadoutRow {
 pub struct ReadoutsReport {
     /// The clock of every size.
     pub wires: Vec<SizeWire>,
-    /// Size after size, every readout in the order of the table.
+    /// Ordered by size, then in the order of the table.
     pub rows: Vec<ReadoutRow>,
-    /// What published systems state.
+    /// Figures stated by published systems.
     pub published: &'static [PublishedSystem],
 }
 

@@ -1,4 +1,4 @@
-//! What cells put out, in place of what their generators would.
+//! Outputs of cells that replace those of their generators.
 
 use spts_circuit::{CellCodes, CodesError};
 use std::sync::Arc;
@@ -20,7 +20,15 @@ fn repeated(row: u64, period: usize) -> usize {
     usize::try_from(row % period.max(1) as u64).unwrap_or(0)
 }
 
-/// Levels that are stored, M × N, and come round again after M rows.
+/// Stored levels, M × N, which repeat after M rows.
+///
+/// ```
+/// use spts_studies::readouts::StoredRows;
+///
+/// let rows = StoredRows::new(3, vec![1, -1, 0, 1, 1, 1]);
+/// assert_eq!((rows.len(), rows.taxels()), (2, 3));
+/// assert_eq!(rows.sums(&[5.0, 2.0, 1.0]), [3.0, 8.0]);
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct StoredRows {
     taxels: usize,
@@ -28,10 +36,10 @@ pub struct StoredRows {
 }
 
 impl StoredRows {
-    /// `levels` −1, 0 or +1, row after row, of `taxels` taxels.
+    /// Rows of `levels` (−1, 0 or +1, row-major) for `taxels` taxels.
     ///
     /// # Panics
-    /// When the levels are not a whole number of rows.
+    /// If the levels are not a whole number of rows.
     #[must_use]
     pub fn new(taxels: usize, levels: Vec<i8>) -> Self {
         assert!(
@@ -51,7 +59,7 @@ impl StoredRows {
         self.levels.len() / self.taxels
     }
 
-    /// True without a row; there is no such thing.
+    /// Always `false`: there is at least one row.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.levels.is_empty()
@@ -66,16 +74,16 @@ impl StoredRows {
     /// Levels of row `r`, one a taxel.
     ///
     /// # Panics
-    /// When there is no such row.
+    /// If there is no such row.
     #[must_use]
     pub fn row(&self, r: usize) -> &[i8] {
         &self.levels[r * self.taxels..(r + 1) * self.taxels]
     }
 
-    /// Σ wₖ·valuesₖ of every row.
+    /// Σ wₖ·valuesₖ for every row.
     ///
     /// # Panics
-    /// When there is not one value a taxel.
+    /// If the number of values differs from that of the taxels.
     #[must_use]
     pub fn sums(&self, values: &[f64]) -> Vec<f64> {
         assert_eq!(values.len(), self.taxels, "one value a taxel");
@@ -98,8 +106,18 @@ impl CellCodes for StoredRows {
     }
 }
 
-/// Walsh functions as cells count them out: taxel k has weight (−1)^(number of ones of r and k) at row r. They come
-/// round again after as many rows as the next power of two holds; none is stored.
+/// Walsh functions, computed by counting: at row r, taxel k has the weight (−1)^(number of ones of r and k). They
+/// repeat after the next power of two of the number of taxels; no row is stored.
+///
+/// ```
+/// use spts_studies::readouts::WalshRows;
+///
+/// let walsh = WalshRows::new(4);
+/// let sums = walsh.transform(&[0.0, 3.0, 0.0, 0.0]); // one pressed taxel
+/// assert_eq!(sums, [3.0, -3.0, 3.0, -3.0]);
+/// let image: Vec<f64> = walsh.transform(&sums).iter().map(|x| x / 4.0).collect();
+/// assert_eq!(image, [0.0, 3.0, 0.0, 0.0]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WalshRows {
     taxels: usize,
@@ -118,8 +136,8 @@ impl WalshRows {
         self.taxels.next_power_of_two()
     }
 
-    /// Σ wₖ·valuesₖ of every row, by the fast transform. With the sums for values it is its own inverse, but for the
-    /// number of rows.
+    /// Σ wₖ·valuesₖ for every row, by the fast transform. Applied to the sums it is its own inverse, up to a factor of
+    /// the number of rows.
     #[must_use]
     pub fn transform(self, values: &[f64]) -> Vec<f64> {
         let mut sums = values.to_vec();

@@ -1,9 +1,9 @@
-//! The benchmark: every readout on the same skins, touches, wire, noise and clock.
+//! The benchmark: every readout with the same skins, touches, wire, noise and clock.
 
 use super::classify::Templates;
 use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, Reading, ReadoutSkin};
-use super::report::{ReadoutRow, ReadoutsReport, SizeWire, Trial};
+use super::report::{ReadoutRow, ReadoutTrial, ReadoutsReport, SizeWire};
 use super::table::ReadoutLine;
 use super::wire::WireSession;
 use super::wiring::SkinWire;
@@ -23,22 +23,22 @@ const TEMPLATE_PRESSES: usize = 2;
 /// Random shapes that, with one press of every object, calibrate the feedback and the clock.
 const CALIBRATION_SHAPES: usize = 16;
 
-/// What is compared on which skins.
+/// Settings of the benchmark.
 #[derive(Clone)]
 pub struct ReadoutsStudy {
     /// Readouts.
     pub readouts: Vec<&'static ReadoutLine>,
     /// Sides of the square skins, taxels.
     pub sides: Vec<usize>,
-    /// Repetitions, each with a specimen of the skin, parts, noise and touches of its own.
+    /// Number of repetitions, each with its own specimen of the skin, parts, noise and touches.
     pub repetitions: usize,
-    /// Shapes a repetition, at random places, for image, place and latency.
+    /// Number of shapes in a repetition, at random places, for image, place and latency.
     pub shapes: usize,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// What says of a study how it was done.
+/// Parameters that document a study.
 #[derive(Debug, Clone, Serialize)]
 pub struct ReadoutsParameters {
     readouts: Vec<&'static str>,
@@ -72,7 +72,7 @@ struct Means {
 }
 
 impl ReadoutsStudy {
-    /// What the study depends on.
+    /// The parameters of the study.
     #[must_use]
     pub fn parameters(&self) -> ReadoutsParameters {
         ReadoutsParameters {
@@ -86,10 +86,10 @@ impl ReadoutsStudy {
         }
     }
 
-    /// Runs every readout on every skin. All numbers are the same for any number of threads.
+    /// Runs every readout on every skin. All values are the same for any number of threads.
     ///
     /// # Errors
-    /// [`ReadoutsError`] when a skin cannot be built, touched or measured.
+    /// [`ReadoutsError`] if a skin cannot be built, touched or measured.
     pub fn run(&self, progress: &dyn Progress) -> Result<ReadoutsReport, ReadoutsError> {
         let a_size = self.readouts.len() * (1 + self.repetitions);
         progress.stage("comparing readouts", Some(self.sides.len() * a_size));
@@ -243,7 +243,7 @@ fn mean(values: &[f64]) -> Option<f64> {
 }
 
 /// Bands over the repetitions, one line a number of measurements.
-fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<Trial> {
+fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<ReadoutTrial> {
     let count = repetitions.first().map_or(0, |means| means.len());
     let trial = |index: usize| {
         let means: Vec<&Means> = repetitions.iter().filter_map(|means| means.get(index)).collect();
@@ -254,7 +254,7 @@ fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<Trial> {
         let share = |part: &dyn Fn(&Means) -> usize| {
             mean(&means.iter().map(|m| part(m) as f64 / touches(m)).collect::<Vec<f64>>())
         };
-        Trial {
+        ReadoutTrial {
             measurements,
             frames_hz: 1.0 / (measurements as f64 * period_s),
             iou: each(&|m| Some(m.iou)),

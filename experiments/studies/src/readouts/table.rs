@@ -1,4 +1,4 @@
-//! The table of readouts. A new one is a file beside this and a line here.
+//! The table of readouts. A new one has a file beside this one and a line here.
 
 use super::adaptive::Adaptive;
 use super::code_division::CodeDivision;
@@ -9,19 +9,27 @@ use super::raster::Raster;
 use super::readout::WireReadout;
 
 /// One line of the table.
+///
+/// ```
+/// use spts_studies::readouts::readout;
+///
+/// let designed = readout("designed").expect("in the table");
+/// assert_eq!(designed.wires, 1);
+/// assert!(readout("telepathy").is_none());
+/// ```
 #[derive(Clone, Copy)]
 pub struct ReadoutLine {
     /// Name on the command line and in files.
     pub name: &'static str,
     /// Name in figures and printed tables.
     pub label: &'static str,
-    /// What a cell has to be able to do for it.
+    /// Requirements on a cell.
     pub cell: &'static str,
-    /// Where it has been published.
+    /// Publication of the method.
     pub source: &'static str,
-    /// Wires beside those of the supply and of the bus or clock that sets the cells: the measured ones.
+    /// Number of measured wires, without those of the supply and of the bus or clock for the cells.
     pub wires: usize,
-    /// Builds it.
+    /// Builds the readout.
     pub build: fn() -> Box<dyn WireReadout>,
 }
 

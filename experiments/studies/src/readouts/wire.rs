@@ -1,4 +1,4 @@
-//! The shared wire as a readout sees it.
+//! The common wire as a readout sees it.
 
 use super::error::ReadoutsError;
 use super::rows::StoredRows;
@@ -14,21 +14,23 @@ const IDLE_FRAMES: usize = 4;
 const IDLE_MEASUREMENTS: usize = 512;
 /// Number of the idle skin's block; touches have numbers far below.
 const IDLE_BLOCK: u64 = 1 << 40;
-/// Time in which one false alarm is accepted, s.
+/// Mean time between false alarms that is accepted, s.
 pub const FALSE_ALARM_S: f64 = 10.0;
 
-/// A frame of a held touch.
+/// A frame during a held touch.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
-    /// Samples less those of the idle skin at the same rows, V.
+pub struct WireFrame {
+    /// Samples minus those of the idle skin at the same rows, V.
     pub volts: Vec<f64>,
-    /// A sample beyond this, V, is a touch: on an idle skin one is expected less than once in [`FALSE_ALARM_S`].
+    /// Threshold beyond which a sample means a touch, V: on an idle skin fewer than one is expected in
+    /// [`FALSE_ALARM_S`].
     pub alarm_v: f64,
 }
 
-impl Frame {
-    /// The samples of a scan of a sheet of `cols` columns that belong to a contact, and 0 for all others: those beyond
-    /// the alarm, and the positive ones right beside them. On a large skin, noise would else have taxels of its own.
+impl WireFrame {
+    /// The samples of a scan of a sheet with `cols` columns that belong to a contact, and 0 for all others. A contact
+    /// consists of the samples beyond the alarm threshold and the positive ones next to them. On a large skin, noise
+    /// would otherwise appear as taxels.
     #[must_use]
     pub fn contacts(&self, cols: usize) -> Vec<f64> {
         let mut image = vec![0.0; self.volts.len()];
@@ -52,14 +54,14 @@ impl Frame {
 
 /// What the idle skin reads, once a session.
 struct Idle {
-    /// One value a row of a frame, V.
+    /// One value for each row of a frame, V.
     volts: Vec<f64>,
-    /// Standard deviation of a sample less its reference, V.
+    /// Standard deviation of a sample minus its reference, V.
     sd_v: f64,
 }
 
-/// A wire with its parts in one session: what every readout of it shares. A frame of one kind of rows is measured with
-/// it, touch after touch.
+/// A wire with its parts in one session, shared by all readouts. It measures frames of one kind of rows, touch after
+/// touch.
 pub struct WireSession<'a> {
     wire: &'a ReadoutWire,
     layout: SkinLayout,
@@ -67,13 +69,13 @@ pub struct WireSession<'a> {
     period_s: f64,
     idle_s: f64,
     pressed_s: f64,
-    /// The readout, and what it reads when nothing is touched; built with the first frame.
+    /// The readout, and its output without a touch; built with the first frame.
     frames: Option<(TouchWire, Idle)>,
 }
 
 impl<'a> WireSession<'a> {
-    /// A session with `wire` on a skin of `layout`: `period_s` a measurement, `idle_s` of an untouched and `pressed_s`
-    /// of a fully pressed taxel, S; `device` is the root of its random numbers.
+    /// A session with `wire` on a skin of `layout`. A measurement takes `period_s`; an untouched taxel has the
+    /// conductance `idle_s` and a fully pressed one `pressed_s`, S. `device` provides its random numbers.
     #[must_use]
     pub fn new(
         wire: &'a ReadoutWire,
@@ -93,7 +95,7 @@ impl<'a> WireSession<'a> {
         }
     }
 
-    /// The wire while `touch` is held; its noise follows from `number`.
+    /// The wire while `touch` is held. `number` determines its noise.
     pub fn hold<'w>(&'w mut self, touch: &'w Touch, number: u64) -> HeldWire<'w, 'a> {
         HeldWire {
             session: self,
@@ -120,7 +122,7 @@ impl<'a> WireSession<'a> {
         number: u64,
         measurements: usize,
         build: impl FnOnce(&Self) -> Result<Readout, ReadoutsError>,
-    ) -> Result<Frame, ReadoutsError> {
+    ) -> Result<WireFrame, ReadoutsError> {
         let (mut wire, idle) = match self.frames.take() {
             Some(frames) if frames.1.volts.len() == measurements => frames,
             _ => {
@@ -134,7 +136,7 @@ impl<'a> WireSession<'a> {
         volts.iter_mut().zip(&idle.volts).for_each(|(v, idle)| *v -= idle);
         let alarm_v = self.alarm_v(idle.sd_v);
         self.frames = Some((wire, idle));
-        Ok(Frame { volts, alarm_v })
+        Ok(WireFrame { volts, alarm_v })
     }
 
     fn map(&self, values: Vec<f64>) -> ConductanceMap {
@@ -167,8 +169,8 @@ impl<'a> WireSession<'a> {
     }
 }
 
-/// The wire while a touch is held: what a [`WireReadout`](super::WireReadout) asks for measurements. The touch itself
-/// is not to be had.
+/// The wire while a touch is held. A [`WireReadout`](super::WireReadout) requests measurements from it, and has no
+/// access to the touch itself.
 pub struct HeldWire<'w, 'a> {
     session: &'w mut WireSession<'a>,
     touch: &'w Touch,
@@ -176,23 +178,23 @@ pub struct HeldWire<'w, 'a> {
 }
 
 impl HeldWire<'_, '_> {
-    /// Output of a conductance at level 1, V/S.
+    /// Output for a conductance at level 1, V/S.
     #[must_use]
     pub fn volts_per_siemens(&self) -> f64 {
         self.session.volts_per_siemens()
     }
 
-    /// Levels that codes 0 and 255 stand for, by the data sheet.
+    /// Levels of the codes 0 and 255 according to the data sheet.
     #[must_use]
     pub fn levels(&self) -> [f64; 2] {
         self.session.wire.levels
     }
 
-    /// A raster frame: sample k is taxel k at level 1, and all others at 0.
+    /// A raster frame: sample k has taxel k at level 1, and all others at 0.
     ///
     /// # Errors
-    /// [`ReadoutsError`] when the readout cannot be built.
-    pub fn scan(&mut self) -> Result<Frame, ReadoutsError> {
+    /// [`ReadoutsError`] if the readout cannot be built.
+    pub fn scan(&mut self) -> Result<WireFrame, ReadoutsError> {
         let taxels = self.session.layout.taxels();
         let touch = self.touch.conductance_s.values();
         self.session.frame(touch, self.number, taxels, |session| {
@@ -201,15 +203,15 @@ impl HeldWire<'_, '_> {
         })
     }
 
-    /// A frame of `measurements` rows of ±1, all of which are of the same kind in one session.
+    /// A frame of `measurements` rows of ±1. All frames of a session must have the same kind of rows.
     ///
     /// # Errors
-    /// [`ReadoutsError`] when the rows are those of another skin.
+    /// [`ReadoutsError`] if the rows belong to another skin.
     pub fn signs<R: CellCodes + Clone + 'static>(
         &mut self,
         rows: &R,
         measurements: usize,
-    ) -> Result<Frame, ReadoutsError> {
+    ) -> Result<WireFrame, ReadoutsError> {
         let touch = self.touch.conductance_s.values();
         self.session.frame(touch, self.number, measurements, |session| {
             let profile = Profile {
@@ -221,8 +223,8 @@ impl HeldWire<'_, '_> {
         })
     }
 
-    /// What each cell measures of its own taxel, S: the conductance above that of the idle skin, with the relative
-    /// noise of a contact. For cells that have a converter of their own; the receiver at the end of the wire does not
+    /// Each cell's own measurement of its taxel, S: the conductance minus that of the idle skin, with the relative
+    /// noise of a contact. It is for cells with a converter of their own; the receiver at the end of the wire does not
     /// know it.
     #[must_use]
     pub fn own_values_s(&self) -> Vec<f64> {
@@ -234,18 +236,22 @@ impl HeldWire<'_, '_> {
         self.touch.conductance_s.values().iter().map(noisy).collect()
     }
 
-    /// Seed of what cells do at moments that no clock sets, another one for every touch.
+    /// Random numbers for events that are not synchronised with a clock; different for every touch.
     #[must_use]
     pub fn moments(&self) -> Streams {
         self.session.device.child("readouts/moments", self.number)
     }
 
-    /// Samples while `chips.taxels()` cells put out `chips` (levels −1, 0, +1) through resistors of their own, each
-    /// with the conductance of a fully pressed taxel, and all other cells are switched off. `None` is a silent wire.
+    /// Samples while `chips.taxels()` cells put out `chips` (levels −1, 0, +1) through resistors of their own with the
+    /// conductance of a fully pressed taxel, and all other cells are off. `None` is a silent wire.
     ///
     /// # Errors
-    /// [`ReadoutsError`] when the readout cannot be built.
-    pub fn transmissions(&mut self, chips: Option<&StoredRows>, measurements: usize) -> Result<Frame, ReadoutsError> {
+    /// [`ReadoutsError`] if the readout cannot be built.
+    pub fn transmissions(
+        &mut self,
+        chips: Option<&StoredRows>,
+        measurements: usize,
+    ) -> Result<WireFrame, ReadoutsError> {
         let session = &*self.session;
         let published = SkinLayout::default();
         let line = |chips: &StoredRows| -> Result<TouchWire, ReadoutsError> {
@@ -262,7 +268,7 @@ impl HeldWire<'_, '_> {
         let map = ConductanceMap::from_values(1, chips.taxels(), vec![each_s; chips.taxels()]);
         let mut volts = line(chips)?.volts(map, self.number, 0, measurements)?;
         volts.iter_mut().for_each(|v| *v -= idle_v);
-        Ok(Frame {
+        Ok(WireFrame {
             volts,
             alarm_v: session.alarm_v(variance.sqrt()),
         })
@@ -289,7 +295,7 @@ mod tests {
     /// does not.
     #[test]
     fn contacts_are_what_is_beyond_the_alarm_and_beside_it() {
-        let frame = Frame {
+        let frame = WireFrame {
             volts: vec![2.0, -0.3, 0.0, 0.4, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9],
             alarm_v: 1.0,
         };

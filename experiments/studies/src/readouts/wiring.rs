@@ -1,4 +1,5 @@
-//! The wire of a size: one clock for all readouts, and for each the largest feedback that its sums permit.
+//! The wire for skins of one size: one clock for all readouts, and for each the largest feedback for which its sums
+//! fit.
 
 use super::error::ReadoutsError;
 use crate::electronics::ElectronicsStudy;
@@ -18,41 +19,41 @@ const HALVINGS: usize = 30;
 /// name, and the number that is drawn once a session.
 const SESSION: [(&str, &str); 2] = [("contact_noise", "fraction"), ("idle_noise", "sd_v")];
 
-/// The wire of a skin of one size.
+/// The wire for skins of one size.
 #[derive(Debug, Clone)]
 pub struct SkinWire {
-    /// Profile with the clock of this size; the feedback is that of sums under random signs.
+    /// Profile with the clock of this size. Its feedback is for sums with random signs.
     base: Profile,
     electronics: ElectronicsStudy,
     setting: Setting,
     amplifier: Amplifier,
     taxels: u32,
-    /// Time of a measurement, s.
+    /// Duration of a measurement, s.
     pub period_s: f64,
-    /// Conductance of a taxel that nothing touches, S.
+    /// Conductance of an untouched taxel, S.
     pub idle_s: f64,
 }
 
-/// A readout's wire.
+/// The wire of a readout.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadoutWire {
-    /// Profile, the same in both modes.
+    /// Profile, which is the same in both modes.
     pub profile: Profile,
     /// Feedback resistance, Ω.
     pub feedback_ohm: f64,
-    /// Levels that the codes 0 and 255 stand for by the data sheet of the cells' converters.
+    /// Levels of the codes 0 and 255 according to the data sheet of the cells' converters.
     pub levels: [f64; 2],
     /// Relative noise of a contact in this session.
     pub contact_noise: f64,
 }
 
 impl SkinWire {
-    /// The wire of `taxels` taxels: the clock permits the touch `largest_s` (conductances above the idle skin's, S)
-    /// under random signs, with the feedback lowered until its sums fit and the clock slowed until they settle, as in
+    /// The wire of `taxels` taxels. The feedback is reduced until the sums of the touch `largest_s` (conductances minus
+    /// the idle skin's, S) with random signs fit, and the clock is slowed until they settle, as in
     /// [`explore`](crate::explore).
     ///
     /// # Errors
-    /// [`ReadoutsError`] when the electronics cannot be built.
+    /// [`ReadoutsError`] if the electronics cannot be built.
     pub fn new(taxels: u32, largest_s: &[f64]) -> Result<Self, ReadoutsError> {
         let electronics = ElectronicsStudy::as_designed()?;
         let scene = ExploreScene {
@@ -86,11 +87,12 @@ impl SkinWire {
         self.electronics.skin.pressed_s
     }
 
-    /// The wire of a readout whose largest sum is `largest_sum_s`, S, in one session: the feedback is the largest with
-    /// which the sum takes 70 % of the range of amplifier and converter and the output settles within the clock.
+    /// The wire of a readout with the largest sum `largest_sum_s`, S, in one session. The feedback is the largest for
+    /// which the sum uses 70 % of the range of amplifier and converter, and the output settles within the clock's
+    /// period.
     ///
     /// # Errors
-    /// [`ReadoutsError`] when the amplifier cannot be built, or a profile lacks a number.
+    /// [`ReadoutsError`] if the amplifier cannot be built, or a profile lacks a value.
     pub fn fitted(&self, largest_sum_s: f64, session: Streams) -> Result<ReadoutWire, ReadoutsError> {
         let range_v = self.budget(self.amplifier.network().feedback_ohm)?.range_v;
         let fits = HEADROOM * range_v / (self.base.drive_v * largest_sum_s.max(f64::MIN_POSITIVE));

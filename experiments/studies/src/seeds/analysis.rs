@@ -1,4 +1,4 @@
-//! What a set's sensing matrix is like, whatever decodes it.
+//! Quality of a set's sensing matrix, independent of the decoder.
 
 use super::error::SeedError;
 use super::set::{PERIOD_ROWS, SeedSet};
@@ -24,21 +24,21 @@ const ISOMETRY_WINDOWS: usize = 16;
 /// Supports that the isometry constant is bounded by.
 const ISOMETRY: IsometrySearch = IsometrySearch { random: 100, greedy: 2 };
 
-/// What does not depend on a window.
+/// Properties that do not depend on a window.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SeedFacts {
     /// Name of the set.
     pub seeds: String,
     /// Number of taxels N.
     pub taxels: usize,
-    /// Rows after which everything starts again.
+    /// Number of rows after which all levels repeat.
     pub period_rows: u64,
-    /// Least number of rows after which one taxel starts to repeat another one's levels.
+    /// Smallest number of rows after which one taxel starts to repeat another one's levels.
     pub least_phase_rows: u64,
     /// Rows among the first 1000 (counted from 1) on which all taxels have the same level.
     pub constant_rows: Vec<usize>,
-    /// Share of the first 100,000 rows whose sum is beyond 90 % of the sum of their magnitudes: measurements of nothing
-    /// but the total.
+    /// Share of the first 100,000 rows whose sum exceeds 90 % of the sum of their magnitudes. Such rows measure little
+    /// more than the total.
     pub nearly_constant_share: f64,
     /// Rank of the first N rows.
     pub first_rank: usize,
@@ -56,25 +56,25 @@ pub struct WindowRow {
     pub rank_mean: f64,
     /// Least rank.
     pub rank_least: usize,
-    /// Share of the windows that have full rank.
+    /// Share of the windows with full rank.
     pub full_rank_share: f64,
-    /// Median condition σ₁/σ_min; ∞ (null in JSON) when half of the windows lack rank.
+    /// Median condition number σ₁/σ_min; ∞ (null in JSON) if half of the windows lack full rank.
     pub condition_median: f64,
     /// Mutual coherence of the columns, mean over the windows.
     pub column_coherence: f64,
     /// Root mean square coherence of two columns.
     pub column_rms: f64,
-    /// Bound of Welch on the mutual coherence of the columns.
+    /// Welch's lower bound on the mutual coherence of the columns.
     pub welch_bound: f64,
     /// Largest coherence of two rows, mean over the windows.
     pub row_coherence: f64,
-    /// The same in the worst window.
+    /// Largest coherence of two rows in the worst window.
     pub row_coherence_worst: f64,
     /// Root mean square coherence of two rows; 1/√N for independent ones.
     pub row_rms: f64,
     /// Sparsity S of the isometry constant: M/4, in [2, 8].
     pub isometry_s: usize,
-    /// Lower bound of the restricted isometry constant δ_S, mean over 16 windows. From 1 on, some S columns are
+    /// Lower bound of the restricted isometry constant δ_S, mean over 16 windows. At 1 or more, some S columns are
     /// dependent.
     pub isometry_delta: f64,
 }

@@ -1,4 +1,4 @@
-//! Why a set of seeds cannot be judged.
+//! Errors of the seeds study.
 
 use spts::data::DataError;
 use spts_eval::ScoreError;
@@ -7,11 +7,11 @@ use spts_recon::coherence::CoherenceError;
 use spts_recon::dictionary::DictionaryError;
 use std::path::PathBuf;
 
-/// Why there is no set of seeds, or no [`SeedReport`](super::SeedReport) of one.
+/// Why a set of seeds cannot be read or analysed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SeedError {
-    /// A word that is no seed.
+    /// A word that is not a seed.
     #[error("{source_name}, line {line}: seed = `{word}` is not one of the whole numbers in [0, 4294967295]")]
     NoSeed {
         /// File or option.
@@ -21,16 +21,16 @@ pub enum SeedError {
         /// The word.
         word: String,
     },
-    /// A number of seeds that is not that of a square skin.
+    /// The number of seeds is not that of a square skin.
     #[error("{source_name}: number of seeds = {seeds} is not one of the square numbers in [{least}, {most}]")]
     NotSquare {
         /// File or option.
         source_name: String,
         /// Number of seeds.
         seeds: usize,
-        /// Least number allowed.
+        /// Smallest valid number.
         least: usize,
-        /// Largest number allowed.
+        /// Largest valid number.
         most: usize,
     },
     /// A file of seeds cannot be read.
@@ -54,7 +54,7 @@ pub enum SeedError {
         /// Number of seeds.
         seeds: usize,
     },
-    /// The sensing matrix cannot be judged.
+    /// The sensing matrix cannot be analysed.
     #[error("sensing matrix: {0}")]
     Matrix(#[from] CoherenceError),
     /// No dictionary can be learned from the synthetic images.

@@ -22,7 +22,7 @@ const EDGE: f64 = 0.7;
 /// Images of one kind, and the dictionary that they are decoded with.
 #[derive(Debug)]
 pub(super) struct Images {
-    /// What they are.
+    /// Source of the images.
     pub(super) source: &'static str,
     /// Images, row-major.
     pub(super) images: Vec<Vec<f64>>,

@@ -1,8 +1,8 @@
-//! How good the sensing matrix of a set of seeds is, better seeds, and what they are worth.
+//! Quality of the sensing matrix of a set of seeds, search for better seeds, and their benefit.
 //!
-//! A set (`set`) gives the rows that cells with these seeds put out. `analysis` judges windows of them whatever decodes
-//! them, `search` looks for better seeds, and `worth` sends the same images (`images`) through every set and compares
-//! what decoders make of it.
+//! A set (`set`) defines the rows that cells with these seeds put out. `analysis` analyses windows of them
+//! independently of the decoder, `search` looks for better seeds, and `worth` sends the same images (`images`) through
+//! every set and compares the decoded ones.
 
 mod analysis;
 mod error;

@@ -1,4 +1,4 @@
-//! Better seeds by search: mixed addresses with another salt, then single seeds exchanged.
+//! Searches better seeds: mixed addresses with another salt, then exchanges of single seeds.
 
 use super::analysis::starts;
 use super::error::SeedError;
@@ -16,24 +16,24 @@ const SEEN: usize = 24;
 /// Windows of its own that its answer is judged on.
 const UNSEEN: usize = 192;
 
-/// How a search went. The cost is the mean square coherence of two rows of a window, 1/N for independent rows: Σ over
-/// pairs of rows is, but for a constant, Σ over pairs of columns (the frame potential), so that a lower one is better
-/// for both.
+/// Result of a search. The cost is the mean square coherence of two rows of a window, 1/N for independent rows. The sum
+/// over pairs of rows equals the sum over pairs of columns (the frame potential) up to a constant, so a lower cost
+/// improves both.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SeedSearch {
-    /// Sets that were tried.
+    /// Number of sets tried.
     pub tried: usize,
     /// Rows of a window.
     pub m: usize,
-    /// Cost of the mixed addresses on the windows that the search looked at.
+    /// Cost of the mixed addresses on the windows used in the search.
     pub mixed_cost: f64,
-    /// Cost of what was found, on the same windows.
+    /// Cost of the found set on the same windows.
     pub found_cost: f64,
     /// Cost of the mixed addresses on other windows.
     pub mixed_cost_unseen: f64,
-    /// Cost of what was found on these.
+    /// Cost of the found set on the other windows.
     pub found_cost_unseen: f64,
-    /// Standard error of the difference of the two, window by window.
+    /// Standard error of the difference of the two, over the windows.
     pub unseen_se: f64,
 }
 
@@ -41,7 +41,7 @@ pub struct SeedSearch {
 const BEYOND: f64 = 2.0;
 
 impl SeedSearch {
-    /// Whether what was found is better than the mixed addresses where the search did not look, by more than chance.
+    /// Whether the found set is better than the mixed addresses on the other windows, by more than chance.
     #[must_use]
     pub fn gained(&self) -> bool {
         self.mixed_cost_unseen - self.found_cost_unseen > BEYOND * self.unseen_se

@@ -12,16 +12,26 @@ use std::path::Path;
 pub(super) const SIDES: std::ops::RangeInclusive<usize> = 4..=32;
 
 /// Seeds of the cells of a square skin, taxel by taxel.
+///
+/// ```
+/// use spts_studies::seeds::SeedSet;
+///
+/// let set = SeedSet::parse("mine", "--seeds", "1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16")?;
+/// assert_eq!(set.side(), 4);
+/// let error = SeedSet::parse("mine", "--seeds", "8, 9, 10").unwrap_err();
+/// assert!(error.to_string().contains("number of seeds = 3"));
+/// # Ok::<(), spts_studies::seeds::SeedError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SeedSet {
-    /// What they are called in tables.
+    /// Name in tables.
     pub name: String,
-    /// Seed of every taxel, row-major; a square number of them.
+    /// Seed of every taxel, row-major; a square number.
     pub seeds: Vec<u32>,
 }
 
 impl SeedSet {
-    /// Seeds that the circuit's own rule `seeding` gives a skin of `side` × `side` taxels.
+    /// The seeds of the circuit's rule `seeding` for a skin of `side` × `side` taxels.
     #[must_use]
     pub fn of(seeding: Seeding, side: usize) -> Self {
         let name = match seeding {
@@ -34,8 +44,8 @@ impl SeedSet {
         }
     }
 
-    /// Different random bytes: seeds for cells that take one byte only, as the published firmware's do. `None` for more
-    /// than 256 taxels.
+    /// Different random bytes: seeds for cells that accept only one byte, like those with the published firmware.
+    /// `None` for more than 256 taxels.
     #[must_use]
     pub fn bytes(side: usize, streams: Streams) -> Option<Self> {
         let mut bytes: Vec<u32> = (0..=u32::from(u8::MAX)).collect();
@@ -46,10 +56,10 @@ impl SeedSet {
         })
     }
 
-    /// Seeds in `text`, as [`parse_seeds`] reads them; `source` stands in messages.
+    /// Reads seeds from `text` like [`parse_seeds`]; `source` is named in errors.
     ///
     /// # Errors
-    /// [`SeedError`] for anything else, and for a number of seeds that is not that of a square skin.
+    /// [`SeedError`] for a word that is not a seed, or a number of seeds that is not that of a square skin.
     pub fn parse(name: &str, source: &str, text: &str) -> Result<Self, SeedError> {
         let seeds = parse_seeds(text).map_err(|error| SeedError::NoSeed {
             source_name: source.to_owned(),
@@ -74,7 +84,7 @@ impl SeedSet {
     /// Seeds in the file `path`, see [`Self::parse`].
     ///
     /// # Errors
-    /// [`SeedError::Read`] when the file cannot be read, and as [`Self::parse`].
+    /// [`SeedError::Read`] if the file cannot be read, and as [`Self::parse`].
     pub fn read(path: &Path) -> Result<Self, SeedError> {
         let text = spts_input::read_text(path, MAX_SEEDS_BYTES).map_err(|error| SeedError::Read {
             path: path.to_owned(),
@@ -92,8 +102,7 @@ impl SeedSet {
         self.seeds.len().isqrt()
     }
 
-    /// `nrows` rows of the sensing matrix from row `first_row` on, counted from the loading of the seeds: levels in
-    /// [−1, 1].
+    /// `nrows` rows of the sensing matrix from row `first_row` on, counted from loading the seeds: levels in [−1, 1].
     #[must_use]
     pub fn rows(&self, mode: WeightMode, first_row: u64, nrows: usize) -> Matrix {
         let jump = Jump::new(first_row);
@@ -109,8 +118,8 @@ impl SeedSet {
         rows
     }
 
-    /// Least number of rows after which a taxel starts to repeat another one's levels. All generators run through the
-    /// same cycle of 2³² states; seeds are places on it.
+    /// Smallest number of rows after which a taxel starts to repeat another one's levels. All generators run through
+    /// the same cycle of 2³² states; a seed is a position on it.
     #[must_use]
     pub fn least_phase(&self) -> u64 {
         let mut phases: Vec<u64> = self.seeds.iter().map(|&seed| u64::from(phase(seed))).collect();

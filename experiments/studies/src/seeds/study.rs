@@ -1,4 +1,4 @@
-//! The whole study: the set that was given, mixed addresses, searched seeds and random bytes, side by side.
+//! The whole study: compares the given set, mixed addresses, searched seeds and random bytes.
 
 use super::analysis::{self, SeedFacts, WindowRow};
 use super::error::SeedError;
@@ -12,58 +12,58 @@ use spts_circuit::{Seeding, WeightMode};
 use spts_models::Streams;
 use std::path::PathBuf;
 
-/// The set of seeds to judge, and what it is judged by.
+/// A set of seeds, and the settings of its analysis.
 #[derive(Debug, Clone)]
 pub struct SeedStudy {
-    /// Set to judge.
+    /// The set to analyse.
     pub given: SeedSet,
     /// Weights of the cells: binary or analog.
     pub mode: WeightMode,
     /// Numbers of rows M of a window, each at least 1.
     pub rows: Vec<usize>,
-    /// Windows that are judged; at least 1.
+    /// Number of windows that are analysed; at least 1.
     pub windows: usize,
-    /// Sets that the search tries.
+    /// Number of sets that the search tries.
     pub budget: usize,
-    /// Synthetic images.
+    /// Number of synthetic images.
     pub images: usize,
-    /// Noise of a measurement as a share of ‖x‖₂.
+    /// Noise of a measurement relative to ‖x‖₂.
     pub noise: f64,
-    /// Recordings of a skin of as many taxels.
+    /// Recordings of a skin with the same number of taxels.
     pub recordings: Option<PathBuf>,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// How good the sets are, and what they are worth.
+/// Quality of the sets, and their benefit.
 #[derive(Debug, Clone, Serialize)]
 pub struct SeedReport {
-    /// Name of the set that was asked about.
+    /// Name of the given set.
     pub given: String,
     /// Weights of the cells.
     pub mode: WeightMode,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
-    /// What is proposed: the mixed addresses, or the searched seeds when they are better on windows that the search did
-    /// not see, by more than chance.
+    /// Recommended set: the mixed addresses, or the searched seeds if they are better on windows not used in the
+    /// search, by more than chance.
     pub proposed: String,
     /// Every set, the given one first.
     pub sets: Vec<SeedSet>,
-    /// What does not depend on a window, one a set.
+    /// Properties that do not depend on a window, one entry for each set.
     pub facts: Vec<SeedFacts>,
-    /// Windows, set by set.
+    /// Windows, ordered by set.
     pub windows: Vec<WindowRow>,
-    /// How the search went.
+    /// Result of the search.
     pub search: SeedSearch,
     /// IoU.
     pub worth: Vec<WorthRow>,
 }
 
 impl SeedStudy {
-    /// Judges and compares. The numbers do not depend on the threads.
+    /// Analyses and compares. The result does not depend on the number of threads.
     ///
     /// # Errors
-    /// [`SeedError`] when the recordings cannot be used or are of a skin of another size.
+    /// [`SeedError`] if the recordings are not usable, or are of a skin of another size.
     pub fn run(&self, progress: &dyn Progress) -> Result<SeedReport, SeedError> {
         let streams = Streams::new(self.seed);
         let side = self.given.side();

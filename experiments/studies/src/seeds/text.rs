@@ -1,4 +1,4 @@
-//! The study as tables.
+//! The study as text tables.
 
 use super::study::SeedReport;
 use std::fmt::Write as _;

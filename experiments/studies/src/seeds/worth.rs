@@ -1,4 +1,4 @@
-//! What a set of seeds is worth: the same images, rows and noise through every set.
+//! Benefit of a set of seeds: the same images, rows and noise for every set.
 
 use super::analysis::SPAN_ROWS;
 use super::error::SeedError;
@@ -29,13 +29,13 @@ const DECODERS: [&str; 2] = ["omp", "nn_lasso"];
 /// IoU of one set with one decoder and M.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WorthRow {
-    /// What the images are: synthetic or recorded.
+    /// Source of the images: synthetic or recorded.
     pub images: &'static str,
-    /// Standard deviation of the noise of a measurement as a share of ‖x‖₂.
+    /// Standard deviation of a measurement's noise relative to ‖x‖₂.
     pub noise: f64,
     /// Decoder.
     pub decoder: &'static str,
-    /// Measurements M.
+    /// Number of measurements M.
     pub m: usize,
     /// Name of the set.
     pub seeds: String,
@@ -43,7 +43,7 @@ pub struct WorthRow {
     pub iou: f64,
     /// Its standard error, over the images.
     pub iou_se: f64,
-    /// IoU more than with the first set, image by image.
+    /// IoU minus that of the first set, image by image.
     pub gain: f64,
     /// Its standard error, over the images.
     pub gain_se: f64,
@@ -54,7 +54,7 @@ pub(super) struct SeedComparison<'a> {
     pub(super) sets: &'a [SeedSet],
     pub(super) mode: WeightMode,
     pub(super) measurements: &'a [usize],
-    /// Noises, shares of ‖x‖₂.
+    /// Noise levels, relative to ‖x‖₂.
     pub(super) noises: &'a [f64],
     pub(super) streams: Streams,
 }

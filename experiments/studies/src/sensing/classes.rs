@@ -1,4 +1,4 @@
-//! Classes told apart with designed rows: seventeen objects at their usual places, on skins without any recording.
+//! Classification with designed rows: seventeen objects at their usual places, on skins without any recording.
 
 use super::error::SensingError;
 use super::rows_for::{RowsFor, rows_for};
@@ -28,7 +28,7 @@ const PRESSES: usize = 6;
 /// The classifier.
 const DECODER: &str = "evidence";
 
-/// Share of the windows that one designer's rows classify.
+/// Share of the windows that are classified correctly with one designer's rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ClassRow {
     /// Readout profile.
@@ -37,7 +37,7 @@ pub struct ClassRow {
     pub designer: &'static str,
     /// Measurements M.
     pub m: usize,
-    /// Share of the windows whose object is named, of seventeen.
+    /// Share of the windows whose object, of seventeen, is classified correctly.
     pub classified: Band,
 }
 

@@ -1,4 +1,4 @@
-//! What rows cost: how large their sums are, and what the readout's effects do to them.
+//! Cost of rows: the size of their sums, and the errors caused by the readout's effects.
 
 use super::error::SensingError;
 use super::rows_for::RowsFor;
@@ -22,12 +22,12 @@ const CAUSES: [(&str, &str, &str); 5] = [
     ("as_designed", "amplifier", "settling"),
 ];
 
-/// One order of one designer's rows.
+/// One designer's rows in one order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CostRow {
     /// Designer of the rows.
     pub designer: &'static str,
-    /// "worth", the order in which they were designed, or "fewest flips".
+    /// "worth", the order of the design, or "fewest flips".
     pub order: &'static str,
     /// Measurements M of the pattern.
     pub m: usize,
@@ -37,7 +37,7 @@ pub struct CostRow {
     pub rms_v: f64,
     /// Largest sample, V.
     pub peak_v: f64,
-    /// Root mean square error that every cause adds, as a share of that of the samples.
+    /// Root mean square error due to every cause, relative to that of the samples.
     pub errors: Vec<CauseError>,
 }
 
@@ -46,7 +46,7 @@ pub struct CostRow {
 pub struct CauseError {
     /// Cause.
     pub cause: &'static str,
-    /// Root mean square error as a share of the root mean square of the samples.
+    /// Root mean square error relative to the root mean square of the samples.
     pub share: f64,
 }
 
@@ -169,7 +169,7 @@ impl CostRow {
         mean
     }
 
-    /// Headroom: the range of the converter of as_built over the largest sample.
+    /// Headroom: the converter's range in `as_built` divided by the largest sample.
     #[must_use]
     pub fn headroom(&self) -> Option<f64> {
         let rail_v = Profile::named("as_built").ok()?.rail_v(Mode::Compressive).ok()??;

@@ -1,4 +1,4 @@
-//! Rows for a skin, and what they are like.
+//! Designs rows for a skin, and describes them.
 
 use super::cost::flips;
 use super::error::SensingError;
@@ -23,46 +23,46 @@ const BUS_CELLS: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
 /// Random designs that a design is compared with.
 const RANDOM: u64 = 16;
 
-/// Images that rows are designed for.
+/// Images for which rows are designed.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DesignImages {
-    /// Smooth ones, whose pixels are alike up to about this distance, taxels.
+    /// Smooth images, whose pixels are similar up to about this distance, taxels.
     Smooth(f64),
     /// Random shapes anywhere on the skin.
     Shapes,
-    /// Those of the recordings in this folder, moved about; its templates for designers that tell classes apart.
+    /// Those of the recordings in this folder, shifted; their templates are for designers that distinguish classes.
     Recordings(PathBuf),
 }
 
-/// Rows that are wanted.
+/// Settings of a row design.
 #[derive(Clone)]
 pub struct RowDesign {
-    /// The skin. Recordings bring their own.
+    /// The skin. Recordings define their own.
     pub layout: SkinLayout,
-    /// Who designs them.
+    /// The designer.
     pub designer: &'static Designer,
     /// Number of rows.
     pub rows: usize,
-    /// What they are designed for.
+    /// Images for which rows are designed.
     pub images: DesignImages,
     /// Noise of a measurement, as of [`RowTask`].
     pub noise: f64,
     /// Limit of the sums, as of [`RowTask`].
     pub largest_sum: Option<f64>,
-    /// What images may differ in from those that are expected.
+    /// Differences that images may have from the expected ones.
     pub tolerances: Tolerances,
-    /// Whether rows are put out in an order in which cells change least.
+    /// Whether rows are ordered so that cells change least.
     pub fewest_flips: bool,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// Rows, and what they are like.
+/// The rows, with their properties.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DesignReport {
+pub struct RowDesignReport {
     /// Designer.
     pub designer: &'static str,
-    /// Its name in figures.
+    /// Name of the designer in figures.
     #[serde(skip)]
     pub label: &'static str,
     /// Rows and columns of the skin.
@@ -71,27 +71,27 @@ pub struct DesignReport {
     pub m: usize,
     /// "binary", ±1, or "analog".
     pub levels: &'static str,
-    /// Share of the expected images' variance that is left after the M measurements.
+    /// Share of the expected images' variance that remains after the M measurements.
     pub variance_left: f64,
-    /// The same of random signs: mean of sixteen.
+    /// The same share for random signs; mean of sixteen.
     pub variance_left_random: f64,
-    /// Largest root mean square of a row's sum over the expected images, as a multiple of a random row's.
+    /// Largest root mean square of a row's sum over the expected images, relative to a random row's.
     pub largest_sum: f64,
     /// Mean share of the cells whose level changes from one row to the next and from the last to the first.
     pub flips: f64,
-    /// Bytes that are written to a cell as a pattern; none when no cell holds it.
+    /// Bytes written to a cell as a pattern; `None` if cells cannot store it.
     pub bytes_a_cell: Option<usize>,
-    /// Time in which all cells are loaded over one bus of 400 kHz each 112 cells, s; none when no cell holds the pattern.
+    /// Time to load all cells over one bus of 400 kHz for each 112 cells, s; `None` if cells cannot store the pattern.
     pub load_s: Option<f64>,
-    /// Whether seeds of the cells' generators begin with these rows.
+    /// Whether there are seeds of the cells' generators that begin with these rows.
     pub seeds_found: bool,
-    /// The rows, in the order in which they are put out.
+    /// The rows, in order of output.
     #[serde(skip)]
     pub patterns: Patterns,
-    /// The same as weights.
+    /// The rows as weights.
     #[serde(skip)]
     pub weights: Weights,
-    /// Seeds, one a cell, that begin with the rows.
+    /// Seeds, one for each cell, that begin with the rows.
     #[serde(skip)]
     pub seeds: Option<Vec<u32>>,
 }
@@ -100,8 +100,9 @@ impl RowDesign {
     /// Designs the rows.
     ///
     /// # Errors
-    /// [`SensingError`] for a task out of range, recordings that cannot be read, and images that make no prior.
-    pub fn run(&self) -> Result<DesignReport, SensingError> {
+    /// [`SensingError`] for a task out of range, recordings that cannot be read, or images from which no prior can be
+    /// made.
+    pub fn run(&self) -> Result<RowDesignReport, SensingError> {
         let (expected, classes) = self.expected()?;
         let task = RowTask {
             classes: &classes,
@@ -140,7 +141,7 @@ impl RowDesign {
                     .map(|pattern| pattern.message().len())
             })
             .flatten();
-        Ok(DesignReport {
+        Ok(RowDesignReport {
             designer: self.designer.name,
             label: self.designer.label,
             skin: expected.shape(),

@@ -1,4 +1,4 @@
-//! Why no rows are designed.
+//! Errors of row design.
 
 use spts::data::DataError;
 use spts_circuit::WeightsError;
@@ -6,32 +6,32 @@ use spts_eval::training::LearnError;
 use spts_recon::recover::PriorError;
 use spts_recon::rows::RowError;
 
-/// Why no rows are designed.
+/// Why no rows can be designed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SensingError {
-    /// No rows of this kind.
+    /// The designer has no such rows.
     #[error(transparent)]
     Rows(#[from] RowError),
     /// Recordings that cannot be read.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// Nothing to learn from.
+    /// There is no training data.
     #[error(transparent)]
     Learn(#[from] LearnError),
-    /// Images that make no prior.
+    /// Images from which no prior can be made.
     #[error(transparent)]
     Prior(#[from] PriorError),
     /// Touches that cannot be pressed or measured.
     #[error(transparent)]
     Touch(#[from] crate::touches::TouchError),
-    /// A readout that is not there.
+    /// There is no such readout.
     #[error(transparent)]
     Profile(#[from] spts_circuit::ProfileError),
-    /// Windows that cannot be answered.
+    /// Windows that cannot be decoded.
     #[error(transparent)]
     Decode(#[from] spts_eval::algorithm::DecodeError),
-    /// Rows that are no pattern.
+    /// Rows that are not a valid pattern.
     #[error(transparent)]
     Weights(#[from] WeightsError),
 }

@@ -1,4 +1,4 @@
-//! A design as weights that cells put out.
+//! Turns a design into weights that cells put out.
 
 use super::error::SensingError;
 use spts_circuit::{Patterns, WeightMode, Weights};

@@ -1,4 +1,4 @@
-//! What designed rows are worth on a simulated skin, against random ones, and what they cost.
+//! Benefit of designed rows over random ones on a simulated skin, and their cost.
 
 use super::classes::ClassRow;
 use super::cost::{CostRow, costs};
@@ -19,7 +19,7 @@ use spts_recon::rows::{DESIGNERS, Designer, Expected, RowNeeds, RowTask, Toleran
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// What is compared with what.
+/// Settings of the comparison.
 #[derive(Clone)]
 pub struct SensingStudy {
     /// The skin.
@@ -30,24 +30,24 @@ pub struct SensingStudy {
     pub measurements: Vec<usize>,
     /// Names of readout profiles.
     pub readouts: Vec<String>,
-    /// Decoder of the board's table that all rows share.
+    /// Decoder of the board's table, used with all rows.
     pub decoder: &'static DecoderSpec,
-    /// Repetitions, each with a specimen of the skin, touches, noise and random rows of its own.
+    /// Number of repetitions, each with its own specimen of the skin, touches, noise and random rows.
     pub skins: usize,
-    /// Touches a repetition, of shapes and of objects.
+    /// Number of touches in a repetition, of shapes and of objects.
     pub touches: usize,
     /// Limit of the sums, as of [`RowTask`].
     pub largest_sum: Option<f64>,
-    /// What images may differ in from those that rows are designed for.
+    /// Differences that images may have from those for which rows are designed.
     pub tolerances: Tolerances,
-    /// Root of every random number.
+    /// Seed of all random numbers.
     pub seed: u64,
 }
 
-/// IoU and place of one kind of touches with one designer and M.
+/// IoU and place error for one kind of touches with one designer and M.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensingRow {
-    /// What is pressed: "shapes" or "objects".
+    /// Kind of touches: "shapes" or "objects".
     pub touches: &'static str,
     /// Readout profile.
     pub readout: String,
@@ -57,7 +57,7 @@ pub struct SensingRow {
     pub m: usize,
     /// Intersection over union of the supports.
     pub iou: Band,
-    /// IoU more than with random rows of the same repetition.
+    /// IoU minus that with random rows in the same repetition.
     pub gain: Band,
     /// Mean distance of the centres, taxels.
     pub place_px: Option<Band>,
@@ -68,7 +68,7 @@ pub struct SensingRow {
 /// IoU of one object, or of one family of shapes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NamedRow {
-    /// What is pressed: "shapes" or "objects".
+    /// Kind of touches: "shapes" or "objects".
     pub touches: &'static str,
     /// Object, or family of the shapes.
     pub name: String,
@@ -78,47 +78,48 @@ pub struct NamedRow {
     pub designer: &'static str,
     /// Measurements M.
     pub m: usize,
-    /// Touches.
+    /// Number of touches.
     pub count: usize,
     /// Intersection over union of the supports, mean over the touches of all repetitions.
     pub iou: f64,
 }
 
-/// The fewest measurements of one designer that do as well as random rows.
+/// The number of random rows with the same IoU as one designer's rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Equal {
-    /// What is pressed: "shapes" or "objects".
+    /// Kind of touches: "shapes" or "objects".
     pub touches: &'static str,
     /// Readout profile.
     pub readout: String,
     /// Designer of the rows.
     pub designer: &'static str,
-    /// Its measurements.
+    /// Number of its measurements.
     pub m: usize,
-    /// Measurements with random rows that have the same IoU, interpolated; `None` when even the most do not.
+    /// Number of measurements with random rows that gives the same IoU, interpolated; `None` if even the largest number
+    /// does not.
     pub random_m: Option<f64>,
 }
 
-/// What the rows are worth.
+/// Results of the comparison.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensingReport {
     /// Rows and columns of the skin.
     pub skin: [usize; 2],
-    /// Decoder of all.
+    /// Decoder.
     pub decoder: &'static str,
-    /// Repetitions.
+    /// Number of repetitions.
     pub skins: usize,
-    /// Touches a repetition and kind.
+    /// Number of touches in a repetition and kind.
     pub touches: usize,
     /// Scores.
     pub rows: Vec<SensingRow>,
-    /// Measurements with random rows that each designer's are worth.
+    /// Equivalent numbers of random rows.
     pub equal: Vec<Equal>,
     /// Shares of the seventeen objects that are classified.
     pub classes: Vec<ClassRow>,
-    /// Errors of the samples by cause, and sums.
+    /// Errors of the samples by cause, and sizes of the sums.
     pub costs: Vec<CostRow>,
-    /// Scores object by object and family by family.
+    /// Scores of single objects and families.
     pub named: Vec<NamedRow>,
 }
 
@@ -133,7 +134,7 @@ type NamedScore = (Arc<str>, TouchScore);
 
 /// Scores of one repetition, in the order of the keys.
 struct Repetition {
-    /// Touch by touch: name and score.
+    /// Name and score of every touch.
     scores: Vec<Vec<NamedScore>>,
     /// Share of clipped samples.
     clipped: Vec<f64>,
@@ -151,15 +152,15 @@ struct Key<'a> {
 }
 
 impl SensingStudy {
-    /// Designers of the table that images alone are enough for.
+    /// Designers of the table that need no classes.
     pub fn designers() -> impl Iterator<Item = &'static Designer> {
         DESIGNERS.iter().filter(|d| d.needs != RowNeeds::Classes)
     }
 
-    /// Compares; a function of the study alone, for any number of threads.
+    /// Compares. The result depends only on the settings, not on the number of threads.
     ///
     /// # Errors
-    /// [`SensingError`] for a skin without a prior, rows that cannot be designed and touches that cannot be measured.
+    /// [`SensingError`] for a skin without a prior, rows that cannot be designed, or touches that cannot be measured.
     pub fn run(&self, progress: &dyn Progress) -> Result<SensingReport, SensingError> {
         let streams = Streams::new(self.seed);
         let data = TrainingData::for_layout(&self.layout, streams)?;

@@ -1,10 +1,10 @@
-//! A design to read.
+//! A design as text.
 
-use super::design::DesignReport;
+use super::design::RowDesignReport;
 use super::study::SensingReport;
 
-impl DesignReport {
-    /// A few lines.
+impl RowDesignReport {
+    /// A summary in a few lines.
     #[must_use]
     pub fn text(&self) -> String {
         let [rows, cols] = self.skin;
@@ -41,7 +41,7 @@ impl DesignReport {
 const SHOWN: [usize; 5] = [7, 13, 20, 25, 40];
 
 impl SensingReport {
-    /// IoU of every designer at a few M, what they are worth in random rows, and what they cost.
+    /// IoU of every designer at some M, the equivalent numbers of random rows, and the cost.
     #[must_use]
     pub fn text(&self) -> String {
         let [rows, cols] = self.skin;

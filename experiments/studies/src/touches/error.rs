@@ -1,10 +1,10 @@
-//! Why touches cannot be drawn or measured.
+//! Errors of touches.
 
 /// Why touches cannot be drawn or measured.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum TouchError {
-    /// What is to be pressed is no valid data set.
+    /// The objects are not a valid data set.
     #[error(transparent)]
     Spec(#[from] spts_dataset::SpecError),
     /// A touch cannot be pressed.
@@ -16,7 +16,7 @@ pub enum TouchError {
     /// A touch cannot be measured.
     #[error(transparent)]
     Acquire(#[from] spts_circuit::AcquireError),
-    /// The conductance of the taxels is not usable.
+    /// The conductance of the taxels is not valid.
     #[error(transparent)]
     Source(#[from] spts_circuit::SourceError),
 }

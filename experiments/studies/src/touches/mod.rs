@@ -1,7 +1,7 @@
-//! Touches on a skin, sent through its circuit: what studies of sensing matrices and of readouts have in common.
+//! Touches on a skin, sent through its circuit: common parts of the studies of sensing matrices and of readouts.
 //!
-//! A [`TouchScene`] says what is pressed on which skin, and [`TouchScene::draw`] presses it. A [`TouchWire`] measures
-//! the touches through a readout profile with any weights, and a [`TouchScore`] says how well an image shows one.
+//! A [`TouchScene`] defines objects and skin, and [`TouchScene::draw`] presses the objects. A [`TouchWire`] measures
+//! the touches through a readout profile with any weights, and a [`TouchScore`] compares an image with the touch.
 //!
 //! ```
 //! use spts_circuit::{Profile, Seeding, WeightMode, Weights};

@@ -1,4 +1,4 @@
-//! What is pressed on which skin.
+//! Objects, skin and touches.
 
 use super::error::TouchError;
 use spts_dataset::{Maker, Spec};
@@ -7,10 +7,10 @@ use spts_recon::localise::centre_of_mass;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 use std::sync::Arc;
 
-/// What is pressed.
+/// Kind of the pressed objects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TouchObjects {
-    /// Procedural shapes of all families, another one for every touch.
+    /// Procedural shapes of all families, a different one for every touch.
     Shapes,
     /// The seventeen objects of the published recordings, in turn.
     Objects,
@@ -21,24 +21,34 @@ const MARGIN_M: f64 = 0.03;
 /// Objects lie within this share of the sheet's width and height at least, from the middle to both sides.
 const LEAST_SHARE: f64 = 0.3;
 
-/// What is pressed on which skin: single objects at random places, rotations and forces (5 to 40 N), held still. All
-/// touches are on one specimen of the skin.
+/// Objects and skin: single objects at random places, rotations and forces (5 to 40 N), held still. All touches are on
+/// one specimen of the skin.
+///
+/// ```
+/// use spts_models::SkinLayout;
+/// use spts_studies::touches::{TouchObjects, TouchScene};
+///
+/// let touches = TouchScene::new(SkinLayout::default(), TouchObjects::Objects, 3, 1).draw()?;
+/// assert_eq!(touches.len(), 3);
+/// assert!(touches.iter().all(|touch| touch.conductance_s.max() > 0.0));
+/// # Ok::<(), spts_studies::touches::TouchError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TouchScene {
     /// Rows, columns, pitch and electrode.
     pub layout: SkinLayout,
-    /// What is pressed.
+    /// Kind of the objects.
     pub objects: TouchObjects,
-    /// Largest extent of a procedural shape, least and most, m; `None` for the usual 20 to 90 mm.
+    /// Smallest and largest extent of a procedural shape, m; `None` for the default 20 to 90 mm.
     pub size_m: Option<[f64; 2]>,
-    /// Whether objects stay at their published places and rotations, as far in metres from the middle of any sheet. For
-    /// [`TouchObjects::Objects`] only.
+    /// Whether objects keep their published places and rotations, at the same distance in metres from the middle of any
+    /// sheet. Only for [`TouchObjects::Objects`].
     pub placed: bool,
     /// Number of touches.
     pub touches: usize,
-    /// Root of every random number: touches, and the specimen of the skin.
+    /// Seed of all random numbers: touches, and the specimen of the skin.
     pub seed: u64,
-    /// Specimen of the skin, if it is not that of `seed`.
+    /// Specimen of the skin, if it is to differ from that of `seed`.
     pub specimen: Option<u64>,
 }
 
@@ -47,16 +57,16 @@ pub struct TouchScene {
 pub struct Touch {
     /// Name of the object, or of the shape's family.
     pub name: Arc<str>,
-    /// Conductance of every taxel, S. An untouched taxel has none.
+    /// Conductance of every taxel, S; 0 for an untouched taxel.
     pub conductance_s: ConductanceMap,
     /// Taxels above 23 % of the largest conductance.
     pub support: Vec<bool>,
-    /// Centre of mass of the taxels of the support, (row, column), taxels; `None` when nothing is felt.
+    /// Centre of mass of the support, (row, column), taxels; `None` for an empty support.
     pub centre_px: Option<[f64; 2]>,
 }
 
 impl TouchScene {
-    /// `touches` of `objects` on a skin.
+    /// A scene with `touches` touches of `objects` on a skin.
     #[must_use]
     pub fn new(layout: SkinLayout, objects: TouchObjects, touches: usize, seed: u64) -> Self {
         Self {
@@ -70,10 +80,10 @@ impl TouchScene {
         }
     }
 
-    /// Presses all touches; a function of the scene alone.
+    /// Presses all touches. The result depends only on the scene.
     ///
     /// # Errors
-    /// [`TouchError`] when the skin or a size is out of range, or a touch cannot be pressed.
+    /// [`TouchError`] if the skin or a size is out of range, or a touch cannot be pressed.
     pub fn draw(&self) -> Result<Vec<Touch>, TouchError> {
         if self.touches == 0 {
             return Ok(Vec::new());

@@ -1,4 +1,4 @@
-//! How well images show touches.
+//! Comparison of images with touches.
 
 use super::scene::Touch;
 use crate::budget::student::two_sided;
@@ -7,20 +7,20 @@ use spts_models::SkinLayout;
 use spts_recon::localise::{centre_of_mass, distance};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 
-/// How well an image shows a touch.
+/// Scores of an image of a touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TouchScore {
     /// Intersection over union of the supports.
     pub iou: f64,
-    /// Distance of the centres, taxels; `None` when the image or the touch has none.
+    /// Distance of the centres, taxels; `None` if the image or the touch is empty.
     pub place_px: Option<f64>,
 }
 
 impl TouchScore {
-    /// The score of `image`, one value a taxel, in any unit.
+    /// The scores of `image`, one value a taxel, in any unit.
     ///
     /// # Panics
-    /// When the image and the touch have different numbers of taxels.
+    /// If image and touch have different numbers of taxels.
     #[must_use]
     pub fn of(image: &[f64], touch: &Touch, layout: &SkinLayout) -> Self {
         assert_eq!(image.len(), touch.support.len(), "taxels");
@@ -34,13 +34,19 @@ impl TouchScore {
     }
 }
 
-/// A mean with the band that it lies in: mean and a 90 % interval over independent repetitions, of which each has a
-/// skin, noise and touches of its own.
+/// A mean over independent repetitions, each with its own skin, noise and touches, and its 90 % confidence interval.
+///
+/// ```
+/// use spts_studies::touches::band;
+///
+/// let iou = band(&[0.78, 0.80, 0.82]).expect("three repetitions");
+/// assert!((iou.mean - 0.80).abs() < 1e-12 && iou.low < 0.78 && iou.high > 0.82);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Band {
     /// Mean of the repetitions.
     pub mean: f64,
-    /// Lower end: mean − t s/√R, Student's t of 90 % with R − 1 degrees of freedom.
+    /// Lower end: mean − t s/√R, with Student's t of 90 % and R − 1 degrees of freedom.
     pub low: f64,
     /// Upper end.
     pub high: f64,
@@ -65,7 +71,7 @@ fn quantile(freedom: u32) -> f64 {
     low
 }
 
-/// The band of the mean of `repetitions`; a single one has a band of no width. `None` without one.
+/// Mean and band of `repetitions`. The band of a single one has no width. `None` without repetitions.
 #[must_use]
 pub fn band(repetitions: &[f64]) -> Option<Band> {
     let count = repetitions.len();

@@ -1,4 +1,4 @@
-//! Touches, measured.
+//! Measures touches.
 
 use super::error::TouchError;
 use super::scene::Touch;
@@ -10,7 +10,21 @@ const IDLE_MEASUREMENTS: usize = 1000;
 /// Block of the untouched skin; touches have numbers far below.
 const IDLE_BLOCK: u64 = 1 << 40;
 
-/// The wire of a skin: a readout with its device's parts and one session's noise.
+/// The wire of a skin: a readout with its device's parts, and the noise of one session.
+///
+/// ```
+/// use spts_circuit::{Mode, Profile};
+/// use spts_models::{SkinLayout, Streams};
+/// use spts_studies::touches::{TouchObjects, TouchScene, TouchWire};
+///
+/// let layout = SkinLayout::default();
+/// let profile = Profile::named("ideal").expect("it ships");
+/// let weights = profile.weights(Mode::Compressive, 100).expect("100 taxels");
+/// let mut wire = TouchWire::new(&profile, &weights, &layout, Streams::new(1))?;
+/// let touch = &TouchScene::new(layout, TouchObjects::Objects, 1, 1).draw()?[0];
+/// assert_eq!(wire.measure(touch, 0, 0, 20)?.len(), 20);
+/// # Ok::<(), spts_studies::touches::TouchError>(())
+/// ```
 pub struct TouchWire {
     readout: Readout,
     rail_v: Option<f64>,
@@ -19,10 +33,11 @@ pub struct TouchWire {
 }
 
 impl TouchWire {
-    /// The readout `profile` of a skin, with `weights` in place of its own; `device` is the root of its random numbers.
+    /// A readout with `profile` and `weights`, which replace those of the profile. `device` provides its random
+    /// numbers.
     ///
     /// # Errors
-    /// [`TouchError`] when the readout cannot be built.
+    /// [`TouchError`] if the readout cannot be built.
     pub fn new(profile: &Profile, weights: &Weights, layout: &SkinLayout, device: Streams) -> Result<Self, TouchError> {
         let profile = profile.with_weights(weights)?;
         let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0)?;
@@ -37,7 +52,7 @@ impl TouchWire {
         })
     }
 
-    /// A wire of a readout that was built elsewhere, from whose samples nothing is taken off.
+    /// A wire with the given readout. Nothing is subtracted from its samples.
     #[must_use]
     pub fn of(readout: Readout) -> Self {
         Self {
@@ -48,11 +63,11 @@ impl TouchWire {
         }
     }
 
-    /// Samples of a skin of this conductance at the rows `first_row..first_row + measurements`, V, as they come. The
-    /// noise follows from `number`.
+    /// Unmodified samples of a skin with this conductance at the rows `first_row..first_row + measurements`, V.
+    /// `number` determines the noise.
     ///
     /// # Errors
-    /// [`TouchError`] when the skin is another one.
+    /// [`TouchError`] if the skin has another size.
     pub fn volts(
         &mut self,
         conductance_s: ConductanceMap,
@@ -65,11 +80,11 @@ impl TouchWire {
         Ok(self.readout.measure(&mut source, measurements)?)
     }
 
-    /// Samples of `touch` at the rows `first_row..first_row + measurements`, less the mean of the untouched skin, V.
-    /// The noise follows from `number`.
+    /// Samples of `touch` at the rows `first_row..first_row + measurements`, minus the mean of the untouched skin, V.
+    /// `number` determines the noise.
     ///
     /// # Errors
-    /// [`TouchError`] when the touch is of another skin.
+    /// [`TouchError`] if the touch is on a skin of another size.
     pub fn measure(
         &mut self,
         touch: &Touch,
@@ -83,7 +98,7 @@ impl TouchWire {
         Ok(volts)
     }
 
-    /// Samples of all touches so far that were at an end of their range.
+    /// Number of samples of all touches so far at an end of their range.
     #[must_use]
     pub fn clipped(&self) -> usize {
         self.clipped

@@ -1,4 +1,4 @@
-//! The evidence classifier as a stream: one call a measurement.
+//! The evidence classifier for a stream of measurements.
 
 use super::classifier::{Decision, EvidenceClassifier, Posterior};
 use super::component::EvidenceError;
@@ -8,9 +8,9 @@ use crate::stop::{StopRule, Stopped};
 
 /// Best class and its probability after every measurement, for weights ±1.
 ///
-/// The weights of a row are known before its sample: [`Self::prepare`] them while the skin settles, and little is left
-/// to be done when the sample arrives. Windows keep their evidence: [`Self::next_window`] after some twenty
-/// measurements lets the amplitude change.
+/// The weights of a row are known before its sample. Call [`Self::prepare`] for them while the skin settles; little
+/// work is then left when the sample arrives. [`Self::next_window`], called after about twenty measurements, keeps the
+/// evidence but lets the amplitude change.
 ///
 /// ```
 /// use spts_recon::classify::{AnytimeClassifier, EvidenceClassifier, Library, TemplateModel};
@@ -38,7 +38,7 @@ pub struct AnytimeClassifier {
 }
 
 impl AnytimeClassifier {
-    /// Stream that has seen nothing. Its tables take 1 kB · ⌈N/8⌉ for every column of the classifier's bank.
+    /// A stream without samples. Its tables take 1 kB · ⌈N/8⌉ for every column of the classifier's bank.
     #[must_use]
     pub fn new(classifier: EvidenceClassifier) -> Self {
         let mut out = Self {
@@ -53,11 +53,10 @@ impl AnytimeClassifier {
         out
     }
 
-    /// Does all that needs no sample for the row after the last one prepared. `signs` as in [`SignTables::fill_rows`],
-    /// one row.
+    /// Prepares the next row: does all work that needs no sample. `signs` has one row, as in [`SignTables::fill_rows`].
     ///
     /// # Errors
-    /// [`EvidenceError`] when `signs` does not have ⌈N/64⌉ words, or a projection of the templates is beyond ±1e12.
+    /// [`EvidenceError`] if `signs` does not have ⌈N/64⌉ words, or a projection of the templates is beyond ±1e12.
     pub fn prepare(&mut self, signs: &[u64]) -> Result<(), EvidenceError> {
         if signs.len() != self.tables.words() {
             return Err(EvidenceError::Shape {
@@ -70,21 +69,21 @@ impl AnytimeClassifier {
         self.preparation.push(&self.row)
     }
 
-    /// Takes the sample `y` of the first prepared row that has none and says what it is now.
+    /// Adds the sample `y` of the first prepared row without one, and returns the decision.
     ///
     /// # Errors
-    /// [`EvidenceError`] when `y` is not finite or beyond ±1e80, or no row is prepared for it. A lost sample costs its
-    /// row: [`Self::next_window`] begins again without it.
+    /// [`EvidenceError`] if `y` is not finite or beyond ±1e80, or no row is prepared for it. A row whose sample is lost
+    /// cannot be skipped: start again with [`Self::next_window`], without it.
     pub fn observe(&mut self, y: f64) -> Result<Decision, EvidenceError> {
         self.evidence.observe(&self.preparation, y)?;
         Ok(self.decide())
     }
 
-    /// [`Self::prepare`] and [`Self::observe`] in one, for rows that were not prepared ahead.
+    /// [`Self::prepare`] and [`Self::observe`] in one call, for rows that were not prepared ahead.
     ///
     /// # Errors
-    /// As both, and [`EvidenceError::RowsWaiting`] while prepared rows wait for their samples: `y` would be taken for
-    /// the first one's. The stream is then as before.
+    /// As both, and [`EvidenceError::RowsWaiting`] if prepared rows still wait for their samples, because `y` would be
+    /// assigned to the first of them. The stream is then unchanged.
     pub fn push(&mut self, signs: &[u64], y: f64) -> Result<Decision, EvidenceError> {
         let waiting = self.preparation.rows() - self.evidence.count();
         if waiting > 0 {
@@ -96,8 +95,8 @@ impl AnytimeClassifier {
         self.observe(y)
     }
 
-    /// Pushes `samples`, rows of signs and measurements, until `rule` says that the best outcome's probability is enough
-    /// or the measurements are. Samples that follow are left in their iterator.
+    /// Adds `samples` (rows of signs, and measurements) until `rule` stops: the best outcome is probable enough, or the
+    /// number of measurements is reached. Later samples stay in the iterator.
     ///
     /// # Errors
     /// As [`Self::push`].
@@ -118,13 +117,14 @@ impl AnytimeClassifier {
         Ok((decision, Stopped { measurements, reached }))
     }
 
-    /// Best outcome and its probability now; without a sample, by the prior.
+    /// The best outcome and its probability; without a sample, that of the prior.
     pub fn decide(&mut self) -> Decision {
         self.classifier
             .decide(&self.preparation, &self.evidence, &mut self.posterior)
     }
 
-    /// What the last decision rests on, all outcomes in the order of [`EvidenceClassifier::outcomes`].
+    /// Probabilities and evidence of all outcomes at the last decision, in the order of
+    /// [`EvidenceClassifier::outcomes`].
     #[must_use]
     pub fn posterior(&self) -> &Posterior {
         &self.posterior
@@ -136,21 +136,21 @@ impl AnytimeClassifier {
         &self.classifier
     }
 
-    /// Samples of this window.
+    /// Number of samples in this window.
     #[must_use]
     pub fn samples(&self) -> usize {
         self.evidence.count()
     }
 
-    /// Ends the window: what it said is kept, rows prepared without a sample are forgotten, and the next image may have
-    /// another amplitude and other deformations.
+    /// Ends the window. Its evidence is kept, rows without a sample are dropped, and the next image may have another
+    /// amplitude and other deformations.
     pub fn next_window(&mut self) {
         self.classifier
             .next_window(&self.preparation, &mut self.evidence, &mut self.posterior);
         self.preparation.clear();
     }
 
-    /// Forgets everything.
+    /// Removes all samples, rows and evidence.
     pub fn clear(&mut self) {
         self.preparation.clear();
         self.evidence.clear();

@@ -1,4 +1,4 @@
-//! The classifier: a bank of Gaussian components and what their evidence says.
+//! The classifier: Gaussian components and their evidence.
 
 use super::component::{Component, EvidenceError};
 use super::filter::{Evidence, Preparation, Shape};
@@ -7,33 +7,60 @@ use crate::amplitude::{AmplitudeRange, Marginals};
 use crate::checks::within;
 use crate::matrix::Matrix;
 
-/// Weighs Gaussian components by the evidence of measurements, amplitude integrated out:
+/// Compares Gaussian components by their evidence given the measurements, integrated over the amplitude:
 ///
 /// ln p(y | c) = ln Σₖ wₖ ∫ N(y; s Φ tₖ, s²(Φ Fₖ Fₖᵀ Φᵀ + vₖ I)) p(s) ds over the components k of class c.
 ///
 /// Source of the rule: Bayes' theorem, with equal priors for the known classes.
+///
+/// ```
+/// use spts_recon::AmplitudeRange;
+/// use spts_recon::classify::{Component, EvidenceClassifier, Posterior};
+///
+/// // two classes of 2 taxels, whose images differ in the second one
+/// let class = |label, mean: [f64; 2]| Component {
+///     label: Some(label),
+///     weight: 1.0,
+///     mean: mean.to_vec(),
+///     factors: Vec::new(),
+///     noise_variance: 0.01,
+/// };
+/// let classes = [class(1, [1.0, 0.0]), class(2, [1.0, 1.0])];
+/// let classifier = EvidenceClassifier::new(&classes, AmplitudeRange::new(0.1, 10.0)?, 0.1)?;
+/// let (mut rows, mut evidence) = (classifier.preparation(), classifier.evidence());
+/// for (phi, y) in [([1.0, 1.0], 4.0), ([1.0, -1.0], 0.1)] {
+///     // a row of Φ times the bank
+///     let mut projected = vec![0.0; classifier.bank().ncols()];
+///     classifier.bank().accumulate_row(&phi, &mut projected);
+///     rows.push(&projected)?;
+///     evidence.observe(&rows, y)?;
+/// }
+/// let decision = classifier.decide(&rows, &evidence, &mut Posterior::default());
+/// assert!(decision.label == Some(2) && decision.probability > 0.99);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct EvidenceClassifier {
     shape: Shape,
     bank: Matrix,
     noise: Vec<f64>,
-    /// Outcome and ln weight within it, of every component.
+    /// Outcome, and ln weight within it, of every component.
     members: Vec<(usize, f64)>,
     outcomes: Vec<Option<usize>>,
     log_prior: Vec<f64>,
     amplitude: AmplitudeRange,
 }
 
-/// Best outcome and its probability.
+/// Best outcome, and its probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
-    /// Class, or `None` for unknown.
+    /// Class, or `None` for the outcome "unknown".
     pub label: Option<usize>,
-    /// Its probability, [0, 1].
+    /// Probability of that outcome, [0, 1].
     pub probability: f64,
 }
 
-/// Everything evidence says; its memory is reused from decision to decision.
+/// Evidence and probabilities of all outcomes. The memory is reused from decision to decision.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Posterior {
     /// ln p(y | outcome) of every outcome.
@@ -47,12 +74,12 @@ pub struct Posterior {
 }
 
 impl EvidenceClassifier {
-    /// Classifier by `components`, whose amplitude lies in `amplitude`. `unknown_prior` is the prior probability of the
-    /// components without a label, [1e-12, 0.999]; it is not used when there is none. The other classes share the rest
+    /// A classifier with the given components and amplitude range. `unknown_prior`, [1e-12, 0.999], is the prior
+    /// probability of the components without a label; it is not used if there are none. The classes share the rest
     /// equally.
     ///
     /// # Errors
-    /// [`EvidenceError`] when there is no component, they differ in size, or a number is out of range.
+    /// [`EvidenceError`] if there is no component, their sizes differ, or a number is out of range.
     pub fn new(components: &[Component], amplitude: AmplitudeRange, unknown_prior: f64) -> Result<Self, EvidenceError> {
         within("unknown_prior", unknown_prior, 1e-12, 0.999)?;
         let taxels = components.first().map_or(0, |c| c.mean.len());
@@ -87,21 +114,22 @@ impl EvidenceClassifier {
         })
     }
 
-    /// Means and deformations of all components, N × K: [`Preparation::push`] takes rows of Φ times this matrix. For
-    /// weights ±1, [`SignTables`](crate::SignTables) of it form them, and [`super::AnytimeClassifier`] does all of it.
+    /// Means and deformations of all components, N × K. [`Preparation::push`] needs rows of Φ times this matrix. For
+    /// weights ±1, [`SignTables`](crate::SignTables) compute these products, and [`super::AnytimeClassifier`] combines
+    /// all steps.
     #[must_use]
     pub fn bank(&self) -> &Matrix {
         &self.bank
     }
 
-    /// Outcomes in the order of [`Posterior::probabilities`]: the labels in rising order, then `None` if anything may
-    /// be unknown.
+    /// Outcomes in the order of [`Posterior::probabilities`]: labels in increasing order, then `None` if there are
+    /// components without a label.
     #[must_use]
     pub fn outcomes(&self) -> &[Option<usize>] {
         &self.outcomes
     }
 
-    /// Empty preparation for this classifier.
+    /// An empty preparation for this classifier.
     #[must_use]
     pub fn preparation(&self) -> Preparation {
         Preparation::new(self.shape, &self.noise)
@@ -113,8 +141,8 @@ impl EvidenceClassifier {
         Evidence::new(self.shape, self.outcomes.len())
     }
 
-    /// Fills `posterior` with what the samples so far say and returns the best outcome, the first of equals. Without a
-    /// sample that is the prior.
+    /// Computes `posterior` from the samples so far and returns the best outcome (the first of equal ones). Without a
+    /// sample, this is the prior.
     pub fn decide(&self, preparation: &Preparation, evidence: &Evidence, posterior: &mut Posterior) -> Decision {
         self.weigh(preparation, evidence, posterior);
         let outcomes = posterior.log_evidence.iter().zip(&self.log_prior);
@@ -169,8 +197,8 @@ impl EvidenceClassifier {
         }
     }
 
-    /// Ends the window: its evidence is carried on, and the next sample belongs to a new window, whose image may have
-    /// another amplitude and other deformations.
+    /// Ends the window. Its evidence is kept; the next sample belongs to a new window, whose image may have another
+    /// amplitude and other deformations.
     pub fn next_window(&self, preparation: &Preparation, evidence: &mut Evidence, posterior: &mut Posterior) {
         self.weigh(preparation, evidence, posterior);
         evidence.carried.copy_from_slice(&posterior.log_evidence);

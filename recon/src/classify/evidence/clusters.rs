@@ -1,4 +1,4 @@
-//! Gaussian components from many images of one class: clusters of images that resemble each other.
+//! Gaussian components learned from many images of a class: clusters of similar images.
 
 use super::component::{Component, EvidenceError};
 use super::templates::principal;
@@ -11,33 +11,45 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// Makes a mixture of Gaussians from images of which there are many: of an object in all its poses, or of all shapes
-/// that are thought possible.
+/// Builds a mixture of Gaussians from many images, such as those of an object in all poses, or of many possible shapes.
 ///
-/// Images are scaled to length 1 and put into clusters (k-means, from k-means++ seeds). A component is
-/// u ~ N(t, C + γ² diag E\[u²\] + f² I), with mean t and covariance C of its cluster and γ for the gains of taxels that
-/// nobody has measured.
+/// Images are scaled to length 1 and clustered (k-means with k-means++ seeds). The component of a cluster with mean t
+/// and covariance C is u ~ N(t, C + γ² diag E\[u²\] + f² I); γ stands for unknown gains of the taxels.
 /// Sources: S. P. Lloyd, IEEE Trans. Inf. Theory 28 (1982) 129; D. Arthur, S. Vassilvitskii, "k-means++", SODA 2007.
+///
+/// ```
+/// use rand::SeedableRng as _;
+/// use spts_recon::Matrix;
+/// use spts_recon::classify::ClusterModel;
+///
+/// // two kinds of images of one class
+/// let images = Matrix::from_columns(3, 4, &[1.0, 0.0, 0.0, 2.0, 0.1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.1, 3.0])?;
+/// let model = ClusterModel { clusters: 2, gain: 0.1, floor: 0.05, noise: 0.1, rank: 2 };
+/// let learned = model.learn(&images, 5, &mut rand_chacha::ChaCha8Rng::seed_from_u64(1))?;
+/// assert_eq!(learned.components.len(), 2);
+/// assert!(learned.components.iter().all(|component| component.label == Some(5)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClusterModel {
-    /// Most clusters of a class, [1, 10000].
+    /// Largest number of clusters of a class, [1, 10000].
     pub clusters: usize,
     /// γ: relative standard deviation of a taxel's gain, [0, 10].
     pub gain: f64,
-    /// f: standard deviation of every taxel, as a share of the image's length, [1e-6, 10].
+    /// f: standard deviation of every taxel, relative to the image's length, [1e-6, 10].
     pub floor: f64,
-    /// Standard deviation of the noise of one measurement, as a share of the image's length, [1e-6, 1e5].
+    /// Standard deviation of the noise of one measurement, relative to the image's length, [1e-6, 1e5].
     pub noise: f64,
-    /// Eigenvectors kept of a covariance; the rest is white.
+    /// Number of eigenvectors of a covariance that are kept; the rest is treated as white.
     pub rank: usize,
 }
 
-/// Components, and each as a whole Gaussian for [`super::ImageEstimator`], in the same order.
+/// The learned components, and in the same order the full Gaussians for [`super::ImageEstimator`].
 #[derive(Debug, Clone, Default)]
 pub struct Clusters {
-    /// For the classifier.
+    /// Components for the classifier.
     pub components: Vec<Component>,
-    /// For images.
+    /// Gaussians for images.
     pub priors: Vec<Gaussian>,
 }
 
@@ -45,11 +57,11 @@ pub struct Clusters {
 const ROUNDS: usize = 20;
 
 impl ClusterModel {
-    /// Components of the class `label` from `images` (N × number of images); those that are zero everywhere are left
-    /// out. A function of `rng` and of the images alone.
+    /// Learns the components of the class `label` from `images` (N × number of images). Images that are zero everywhere
+    /// are ignored. The result depends only on `rng` and the images.
     ///
     /// # Errors
-    /// [`EvidenceError`] when a parameter is out of range or no image is left.
+    /// [`EvidenceError`] if a parameter is out of range, or no image is left.
     pub fn learn(&self, images: &Matrix, label: usize, rng: &mut ChaCha8Rng) -> Result<Clusters, EvidenceError> {
         self.check()?;
         let units = unit_images(images);
@@ -128,11 +140,11 @@ pub(super) fn wide(model: &ClusterModel, images: &Matrix, label: usize) -> Resul
 }
 
 impl Clusters {
-    /// The clusters of `model` for `images` and one wide component for what is in none of them, which has the share
-    /// `apart` of the weight, (0, 1).
+    /// The clusters of `model` for `images`, plus one wide component for images that resemble none of them. `apart`,
+    /// (0, 1), is the weight of that component.
     ///
     /// # Errors
-    /// As [`ClusterModel::learn`]; [`EvidenceError::Range`] for a share out of range.
+    /// As [`ClusterModel::learn`]; [`EvidenceError::Range`] for a weight out of range.
     pub fn with_wide(
         model: &ClusterModel,
         images: &Matrix,

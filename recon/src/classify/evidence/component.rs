@@ -3,16 +3,16 @@
 use crate::checks::{RangeError, within};
 use crate::recover::PriorError;
 
-/// Images u ~ N(`mean`, F Fᵀ) seen through y/s = Φ u + e, e ~ N(0, `noise_variance`·I).
+/// Images u ~ N(`mean`, F Fᵀ), observed through y/s = Φ u + e, e ~ N(0, `noise_variance`·I).
 ///
-/// Independent deviations D of the taxels belong into `noise_variance` as tr D: for weights ±1 that is exactly what
-/// they add to the variance of every measurement, and what they add to the covariance of two measurements has mean zero
-/// over the weights.
+/// Independent deviations D of the taxels are added to `noise_variance` as tr D. For weights ±1 this is exactly their
+/// contribution to the variance of every measurement; their contribution to the covariance of two measurements has mean
+/// zero over the weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Component {
-    /// Class, or `None` for a component that stands for everything unknown.
+    /// Class; `None` for a component of the outcome "unknown".
     pub label: Option<usize>,
-    /// Weight among the components of the same class, > 0; only ratios count.
+    /// Weight among the components of the same class, > 0. Only ratios matter.
     pub weight: f64,
     /// Mean image t, length N, in units of the amplitude.
     pub mean: Vec<f64>,
@@ -29,32 +29,32 @@ const LARGEST: f64 = 1e6;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum EvidenceError {
-    /// No component was given, or components without a taxel.
+    /// There is no component, or components have no taxels.
     #[error("there is no component, or none with a taxel")]
     Empty,
-    /// Something has the wrong length.
+    /// An argument has the wrong length.
     #[error("{what} has {len} values, expected {expected}")]
     Shape {
-        /// What.
+        /// Which argument.
         what: &'static str,
         /// Its length.
         len: usize,
-        /// The length that fits.
+        /// Expected length.
         expected: usize,
     },
     /// A parameter or a measurement is out of range.
     #[error(transparent)]
     Range(#[from] RangeError),
-    /// Images that make no Gaussian prior.
+    /// Images from which no Gaussian prior can be made.
     #[error(transparent)]
     Prior(#[from] PriorError),
     /// A template image has no value above zero.
     #[error("image {index} has no value above zero")]
     NoContact {
-        /// Which image.
+        /// Number of the image, from 0.
         index: usize,
     },
-    /// A measurement arrived whose weights have not been prepared.
+    /// A sample arrived before its row was prepared.
     #[error("measurement {index} arrived, but only {prepared} rows are prepared")]
     NotPrepared {
         /// Index of the measurement.
@@ -62,7 +62,7 @@ pub enum EvidenceError {
         /// Number of prepared rows.
         prepared: usize,
     },
-    /// A row arrived with its sample while rows prepared before it still wait for theirs.
+    /// A row arrived with its sample while earlier rows wait for theirs.
     #[error("a row arrived with its sample, but {waiting} rows prepared before it still wait for theirs")]
     RowsWaiting {
         /// Number of prepared rows without a sample.

@@ -1,9 +1,9 @@
-//! Evidence of all components at once, measurement by measurement, with the components as SIMD lanes.
+//! Evidence of all components, measurement by measurement, with the components as SIMD lanes.
 //!
-//! For one component, y = s·(Φ t + Φ F z + e) with z ~ N(0, I), e ~ N(0, v I), is filtered with the row f = (Φ F)ₘ: w =
-//! P f, q = v + fᵀ w, gain g = w/q, innovation ε = yₘ − fᵀ ẑ, ẑ += g ε, P −= w gᵀ. The innovations are independent, so
-//! that ln |C| = Σ ln q and ỹᵀỹ = Σ ε²/q, exactly. P, q and g do not depend on the samples, and neither does the same
-//! filter run on Φ t: they are prepared before the samples arrive.
+//! For one component, y = s·(Φ t + Φ F z + e) with z ~ N(0, I) and e ~ N(0, v I). The filter for the row f = (Φ F)ₘ is:
+//! w = P f, q = v + fᵀ w, gain g = w/q, innovation ε = yₘ − fᵀ ẑ, ẑ += g ε, P −= w gᵀ. The innovations are independent,
+//! so ln |C| = Σ ln q and ỹᵀỹ = Σ ε²/q hold exactly. P, q, g and the same filter applied to Φ t do not depend on the
+//! samples and are computed before they arrive.
 //! Source: B. Anderson, J. Moore, *Optimal Filtering* (1979), §5.3 and §10.1 (innovations and likelihood).
 
 use super::component::EvidenceError;
@@ -14,9 +14,9 @@ use crate::checks::{measurement, within};
 /// Sizes shared by everything that belongs to one classifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shape {
-    /// Blocks of [`LANES`] components.
+    /// Number of blocks of [`LANES`] components.
     pub(super) blocks: usize,
-    /// Deformations of a component.
+    /// Number of deformations of a component.
     pub(super) rank: usize,
 }
 
@@ -40,21 +40,21 @@ impl Shape {
 /// Largest value of a projected row; squares and their sums stay finite.
 const LARGEST_ROW: f64 = 1e12;
 
-/// Everything about the rows of a window that needs no sample. Memory is reused after [`Preparation::clear`].
+/// Everything about the rows of a window that needs no sample. [`Preparation::clear`] keeps the memory.
 #[derive(Debug, Clone)]
 pub struct Preparation {
     shape: Shape,
     noise: Vec<f64>,
     rows: usize,
-    /// Per row: the row itself, gains, innovations of Φ t, 1/q.
+    /// For every row: the row itself, gains, innovations of Φ t, 1/q.
     projected: Vec<f64>,
     gains: Vec<f64>,
     innovations: Vec<f64>,
     precisions: Vec<f64>,
-    /// Per row, after it: t̃ᵀt̃ and ln |C|, without the amplitude.
+    /// For every row, after it: t̃ᵀt̃ and ln |C|, without the amplitude.
     squares: Vec<f64>,
     log_determinants: Vec<f64>,
-    /// P of all lanes and the filtered state of Φ t, after the last row.
+    /// P of all lanes, and the filtered state of Φ t, after the last row.
     covariance: Vec<f64>,
     state: Vec<f64>,
 }
@@ -78,7 +78,7 @@ impl Preparation {
         out
     }
 
-    /// Forgets all rows: a new window begins.
+    /// Removes all rows, for a new window.
     pub fn clear(&mut self) {
         let rank = self.shape.rank;
         self.rows = 0;
@@ -91,17 +91,17 @@ impl Preparation {
         }
     }
 
-    /// Number of rows prepared.
+    /// Number of prepared rows.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Prepares for a measurement with the weights φ; `row` is φᵀ·[bank](super::EvidenceClassifier::bank).
+    /// Prepares a measurement with the weights φ. `row` is φᵀ·[bank](super::EvidenceClassifier::bank).
     ///
     /// # Errors
-    /// [`EvidenceError`] when the length differs from the bank's number of columns, or a value is beyond ±1e12 or not
-    /// finite.
+    /// [`EvidenceError`] if the length differs from the bank's number of columns, or a value is not finite or beyond
+    /// ±1e12.
     pub fn push(&mut self, row: &[f64]) -> Result<(), EvidenceError> {
         if row.len() != self.shape.row() {
             return Err(EvidenceError::Shape {
@@ -181,7 +181,7 @@ impl Preparation {
     }
 }
 
-/// What the samples of a window said so far.
+/// Evidence from the samples of a window so far.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     shape: Shape,
@@ -189,7 +189,7 @@ pub struct Evidence {
     yy: Vec<f64>,
     yt: Vec<f64>,
     state: Vec<f64>,
-    /// Log evidence of every outcome from windows before this one.
+    /// Log evidence of every outcome from earlier windows.
     pub(super) carried: Vec<f64>,
 }
 
@@ -211,7 +211,7 @@ impl Evidence {
         self.count
     }
 
-    /// Forgets everything, earlier windows included.
+    /// Removes all evidence, including that of earlier windows.
     pub fn clear(&mut self) {
         self.carried.fill(0.0);
         self.begin_window();
@@ -224,11 +224,11 @@ impl Evidence {
         }
     }
 
-    /// Takes the next sample `y` of the window whose rows are in `preparation`.
+    /// Adds the next sample `y` of the window whose rows are in `preparation`.
     ///
     /// # Errors
-    /// [`EvidenceError`] when `y` is not finite or beyond ±1e80, its row has not been prepared, or the preparation is
-    /// another classifier's. The evidence is then as before.
+    /// [`EvidenceError`] if `y` is not finite or beyond ±1e80, its row has not been prepared, or the preparation
+    /// belongs to another classifier. The evidence is then unchanged.
     pub fn observe(&mut self, preparation: &Preparation, y: f64) -> Result<(), EvidenceError> {
         let (n, lanes) = (self.count, self.shape.lanes());
         if preparation.shape != self.shape {

@@ -1,4 +1,4 @@
-//! The image that goes with a decision.
+//! The image that belongs to a decision.
 
 use super::classifier::Posterior;
 use crate::matrix::MatrixView;
@@ -7,23 +7,24 @@ use crate::recover::{Gaussian, Lmmse, NnLmmse, Noise, ParameterError};
 use crate::workspace::Workspace;
 use std::sync::Arc;
 
-/// Posterior mean image E[x | y] over all components, each with its whole covariance: where the classifier counts the
-/// deviations of single taxels as noise, here they are part of the image.
+/// Posterior mean image E[x | y] over all components, each with its full covariance. Deviations of single taxels, which
+/// the classifier treats as noise, are part of the image here.
 ///
-/// x̂ = Σₖ wₖ (ŝₖ tₖ + Cₖ Φᵀ (Φ Cₖ Φᵀ + σ² I)⁻¹ (y − ŝₖ Φ tₖ)), with the weights wₖ and the mean amplitudes ŝₖ of the
-/// decision and the covariances Cₖ; it is linear in the amplitude, so that the mean amplitude gives the mean image.
+/// x̂ = Σₖ wₖ (ŝₖ tₖ + Cₖ Φᵀ (Φ Cₖ Φᵀ + σ² I)⁻¹ (y − ŝₖ Φ tₖ)). The weights wₖ and mean amplitudes ŝₖ are those of the
+/// decision, and Cₖ are the covariances. The image is linear in the amplitude, so the mean amplitude gives the mean
+/// image.
 /// Source: as [`Lmmse`].
 #[derive(Debug, Clone)]
 pub struct ImageEstimator {
     components: Vec<Lmmse>,
-    /// The same with non-negative taxels, and how many of the heaviest components are solved so.
+    /// Non-negative estimates, and the number of the most probable components that use them.
     non_negative: Option<(Vec<NnLmmse>, usize)>,
 }
 
 /// Memory of an estimate.
 #[derive(Debug, Default)]
 struct ImageScratch {
-    /// y over the amplitude of a component.
+    /// y divided by the amplitude of a component.
     scaled: Vec<f64>,
     /// Image of a component at amplitude 1.
     solution: Solution,
@@ -35,11 +36,11 @@ struct ImageScratch {
 const SMALLEST_WEIGHT: f64 = 1e-3;
 
 impl ImageEstimator {
-    /// Estimator by the priors of the components, in their order ([`super::TemplateModel::image_priors`]), for
-    /// measurements with a noise of standard deviation `noise` at amplitude 1.
+    /// An estimator with the priors of the components in their order ([`super::TemplateModel::image_priors`]), for
+    /// measurements whose noise has the standard deviation `noise` at amplitude 1.
     ///
     /// # Errors
-    /// [`ParameterError`] when `noise` is outside (0, ∞).
+    /// [`ParameterError`] if `noise` is outside (0, ∞).
     pub fn new(priors: Vec<Gaussian>, noise: f64) -> Result<Self, ParameterError> {
         let lmmse = |prior| Lmmse::new(Arc::new(prior), Noise::Absolute(noise));
         Ok(Self {
@@ -48,8 +49,8 @@ impl ImageEstimator {
         })
     }
 
-    /// Estimator of images that are nowhere below zero: the mean of the most probable non-negative images of the `most`
-    /// heaviest components, at least 1.
+    /// An estimator of non-negative images: the mean of the most probable non-negative images of the `most` (at least
+    /// 1) most probable components.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -68,14 +69,13 @@ impl ImageEstimator {
         }
     }
 
-    /// Overwrites `image` (one value a taxel, in units of `y`) with the image of the window `y` = Φ x that `posterior`
-    /// was decided on.
+    /// Computes `image` (one value a taxel, in units of `y`) for the window `y` = Φ x with the decision `posterior`.
     ///
     /// # Errors
-    /// [`RecoverError`] when Φ and `y` do not fit each other or the taxels, are empty or not finite.
+    /// [`RecoverError`] if the sizes of Φ, `y` and the taxels do not match, or are zero, or a value is not finite.
     ///
     /// # Panics
-    /// When `posterior` is another classifier's, or `image` has another length than the priors' means.
+    /// If `posterior` belongs to another classifier, or `image` has another length than the priors' means.
     pub fn estimate(
         &self,
         posterior: &Posterior,

@@ -1,5 +1,5 @@
-//! Inner loops of the filter: one step for all components, a block of SIMD lanes at a time. Every lane is computed in
-//! the same order of operations whichever instruction set is chosen.
+//! Inner loops of the filter: one step for all components, one block of SIMD lanes at a time. Every lane has the same
+//! order of operations whichever instruction set is chosen.
 
 use crate::elementary::ln;
 use multiversion::multiversion;

@@ -1,12 +1,10 @@
-//! Classifying the measurements themselves, without an image in between: Gaussian classes, their evidence and
-//! calibrated probabilities.
+//! Classifies measurements directly, without an image: Gaussian classes, their evidence, and calibrated probabilities.
 //!
-//! x = s·u, u ~ N(t, F Fᵀ + D): a template t, its likely deformations F, independent deviations D, and an amplitude s
-//! of unknown size. [`TemplateModel`] makes such classes from images,
-//! [`ClusterModel`] from many images a class, [`EvidenceClassifier`] weighs them,
-//! [`Preparation`] holds what can be computed before a sample arrives and [`Evidence`] what the samples said so far;
-//! [`AnytimeClassifier`] is all of them for weights ±1, one call a sample. [`ImageEstimator`] makes the image that goes
-//! with a decision.
+//! Model: x = s·u, u ~ N(t, F Fᵀ + D), with a template t, its likely deformations F, independent deviations D, and an
+//! amplitude s of unknown size. [`TemplateModel`] builds such classes from a few images, [`ClusterModel`] from many.
+//! [`EvidenceClassifier`] compares them. [`Preparation`] holds what is computed before a sample arrives, and
+//! [`Evidence`] the result of the samples so far. [`AnytimeClassifier`] combines all of these for weights ±1, with one
+//! call a sample. [`ImageEstimator`] computes the image that belongs to a decision.
 
 mod anytime;
 mod classifier;

@@ -8,40 +8,54 @@ use crate::recover::Gaussian;
 use crate::shifted::shifted;
 use nalgebra::DMatrix;
 
-/// Makes Gaussian classes from images: u ~ N(t, Σ) with t the image scaled to a maximum of 1, a the image blurred, and
+/// Builds Gaussian classes from images: u ~ N(t, Σ), where t is the image scaled to a maximum of 1, a the blurred
+/// image, and
 ///
 /// Σᵢⱼ = m² aᵢ aⱼ (ρ exp(−dᵢⱼ²/2ℓ²) + (1 − ρ) δᵢⱼ) + γᵢ² tᵢ² δᵢⱼ + f² δᵢⱼ,
 ///
-/// where d is the distance of two taxels and γᵢ is 0 for images of the same skin. The smooth part and the gains' are
-/// kept to their `rank` largest eigenvectors; the rest, the other independent parts and the noise of a measurement are
-/// white (see [`Component`]).
+/// where d is the distance of two taxels, and γᵢ is 0 for images of the same skin. Of the smooth part and the gains'
+/// part only the `rank` largest eigenvectors are kept. The rest, the other independent parts and the noise of a
+/// measurement are treated as white (see [`Component`]).
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::classify::{Library, TemplateModel};
+///
+/// let image = [0.0, 1.0, 0.0, 0.0, 3.0, 0.0, 0.0, 1.0, 0.0];
+/// let library = Library::new(&Matrix::from_columns(9, 1, &image)?, &[4])?;
+/// let model = TemplateModel { reach: 1, ..TemplateModel::new(3) };
+/// let classes = model.classes(&library)?;
+/// assert_eq!(classes.len(), 9, "one component for each place within one taxel");
+/// assert!(classes.iter().all(|class| class.label == Some(4)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TemplateModel {
-    /// Columns of the grid.
+    /// Number of columns of the grid.
     pub cols: usize,
-    /// m: standard deviation of an image's values as a share of the blurred image, [0, 10].
+    /// m: standard deviation of an image's values relative to the blurred image, [0, 10].
     pub mismatch: f64,
-    /// Standard deviation of the blur, taxels, [0, 100]; 0 is no blur.
+    /// Standard deviation of the blur, taxels, [0, 100]; 0 for no blur.
     pub blur_px: f64,
     /// ρ: share of the variance that is smooth, [0, 1].
     pub smooth_share: f64,
     /// ℓ: correlation length of the smooth part, taxels, [0.01, 1000].
     pub length_px: f64,
-    /// γ: relative standard deviation of every taxel's gain about the one that the images were seen with, one value a
-    /// taxel in [0, 10]; empty for images of the same skin.
+    /// γ: relative standard deviation of every taxel's gain compared with that in the images, one value a taxel in [0,
+    /// 10]; empty for images of the same skin.
     pub gains: Vec<f64>,
-    /// f: standard deviation of every taxel, as a share of the maximum, [0, 10].
+    /// f: standard deviation of every taxel, relative to the maximum, [0, 10].
     pub floor: f64,
-    /// Standard deviation of the noise of one measurement, as a share of the image's maximum, [1e-6, 1e5].
+    /// Standard deviation of the noise of one measurement, relative to the image's maximum, [1e-6, 1e5].
     pub noise: f64,
-    /// Eigenvectors kept of the smooth part.
+    /// Number of eigenvectors of the smooth part that are kept.
     pub rank: usize,
-    /// Every image is also expected moved by up to this many rows and columns, all places alike.
+    /// Largest shift, in rows and columns, at which every image is also expected; all shifts are equally likely.
     pub reach: usize,
 }
 
 impl TemplateModel {
-    /// Values that suit presses of one hand's repeatability; `noise` covers what a session differs from another by.
+    /// Values for presses that are repeated accurately. `noise` also covers the differences between sessions.
     #[must_use]
     pub fn new(cols: usize) -> Self {
         Self {
@@ -58,9 +72,9 @@ impl TemplateModel {
         }
     }
 
-    /// The same for a classifier with an unknown outcome: classes wide enough that a press unlike its template is still
-    /// nearer to its class than to the unknown. Chosen on windows made from raster images, each object in turn left out
-    /// of classes and unknown.
+    /// Values for a classifier with the outcome "unknown". Its classes are so wide that an unusual press of an object
+    /// is still closer to its class than to "unknown". Chosen on windows computed from raster images, leaving each
+    /// object in turn out of classes and "unknown".
     #[must_use]
     pub fn open(cols: usize) -> Self {
         Self {
@@ -98,10 +112,10 @@ impl TemplateModel {
         Ok(())
     }
 
-    /// One component for every image of `library` and place in reach.
+    /// One component for every image of `library` and every shift.
     ///
     /// # Errors
-    /// [`EvidenceError`] when a parameter is out of range, the images do not fill the grid, or one has no value above
+    /// [`EvidenceError`] if a parameter is out of range, the images do not fit the grid, or an image has no value above
     /// zero.
     pub fn classes(&self, library: &Library) -> Result<Vec<Component>, EvidenceError> {
         let places = self.places(library, self.reach)?;
@@ -111,10 +125,10 @@ impl TemplateModel {
             .collect())
     }
 
-    /// What [`Self::classes`] are made from, as whole Gaussians and in the same order: for [`super::ImageEstimator`].
+    /// The components of [`Self::classes`] as full Gaussians, in the same order, for [`super::ImageEstimator`].
     ///
     /// # Errors
-    /// As [`Self::classes`]; [`EvidenceError::Prior`] without any deviation, as with `floor` = 0 and `mismatch` = 0.
+    /// As [`Self::classes`]; [`EvidenceError::Prior`] if there is no deviation, as with `floor` = 0 and `mismatch` = 0.
     pub fn image_priors(&self, library: &Library) -> Result<Vec<Gaussian>, EvidenceError> {
         let places = self.places(library, self.reach)?.into_iter();
         places
@@ -169,8 +183,8 @@ impl TemplateModel {
         }
     }
 
-    /// A component for what is in no class: mean and sample covariance of all images of `library`, each at its place
-    /// and one taxel to every side, scaled to a maximum of 1.
+    /// A component for objects of no class: mean and sample covariance of all images of `library`, each scaled to a
+    /// maximum of 1, unshifted and shifted by one taxel in every direction.
     ///
     /// # Errors
     /// As [`Self::classes`].
@@ -187,7 +201,7 @@ impl TemplateModel {
         })
     }
 
-    /// What [`Self::unknown`] is made from, as a whole Gaussian.
+    /// [`Self::unknown`] as a full Gaussian.
     ///
     /// # Errors
     /// As [`Self::image_priors`].

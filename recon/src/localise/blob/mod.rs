@@ -1,4 +1,4 @@
-//! Where a small round contact is: the evidence of Gaussian blobs on a grid of centres.
+//! Localises a small round contact by the evidence of Gaussian blobs on a grid of centres.
 
 #[cfg(test)]
 mod tests;
@@ -7,25 +7,25 @@ use crate::amplitude::Moments;
 use crate::checks::{RangeError, measurement, within};
 use multiversion::multiversion;
 
-/// Blobs x = s·b, bᵢ = exp(−|pᵢ − c|²/2w²), with centres c on a grid over the sheet and a few widths w; a measurement
+/// Blobs x = s·b, bᵢ = exp(−|pᵢ − c|²/2w²), with centres c on a grid over the sheet and several widths w. A measurement
 /// is y = s·(φᵀb + e), e ~ N(0, `noise`²‖b‖²).
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlobConfig {
-    /// Rows of the sheet, [1, 10000].
+    /// Number of rows of the sheet, [1, 10000].
     pub rows: usize,
-    /// Columns of the sheet, [1, 10000].
+    /// Number of columns of the sheet, [1, 10000].
     pub cols: usize,
-    /// Spacing of the centres, taxels, [0.05, 10]. They reach from the first taxel's centre to the last one's.
+    /// Spacing of the centres, taxels, [0.05, 10]. Centres extend from the first taxel's centre to the last one's.
     pub step_px: f64,
     /// Widths w, taxels, each in [0.3, 100].
     pub widths_px: Vec<f64>,
-    /// Standard deviation of a measurement's noise as a share of s·‖b‖, [1e-6, 1e6]. It also stands for whatever a blob
-    /// does not explain.
+    /// Standard deviation of a measurement's noise relative to s·‖b‖, [1e-6, 1e6]. It also covers everything that a
+    /// blob does not describe.
     pub noise: f64,
 }
 
 impl BlobConfig {
-    /// Centres every quarter of a taxel and widths that suit a ball.
+    /// Centres a quarter of a taxel apart, and widths for a ball.
     #[must_use]
     pub fn new(rows: usize, cols: usize) -> Self {
         Self {
@@ -42,7 +42,7 @@ impl BlobConfig {
 #[derive(Debug, Clone)]
 struct Axis {
     centres: Vec<f64>,
-    /// One row a centre, one column a taxel.
+    /// One row for every centre, one column for every taxel.
     profiles: Vec<f64>,
     /// The same transposed.
     transposed: Vec<f64>,
@@ -77,33 +77,33 @@ struct Width {
     cols: Axis,
 }
 
-/// A bank of blobs. Templates are numbered width by width, row by row, column by column.
+/// Blob templates, numbered by width, then row, then column.
 #[derive(Debug, Clone)]
 pub struct Localiser {
     rows: usize,
     cols: usize,
     widths: Vec<Width>,
-    /// Variance of a measurement at amplitude 1, per template, and its logarithm.
+    /// Variance of a measurement at amplitude 1 for every template, and its logarithm.
     variances: Vec<f64>,
     log_variances: Vec<f64>,
     /// Variance of a uniform distribution over one step of the centres, taxels².
     cell: f64,
 }
 
-/// Where a contact is and how sure that is.
+/// Position of a contact and its uncertainty.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Posterior mean of the centre, (row, col), taxels.
     pub position_px: [f64; 2],
     /// Posterior covariance of the centre, taxels².
     pub covariance_px2: [[f64; 2]; 2],
-    /// Least-squares amplitude of the most likely blob, φᵀb·y / ‖φᵀb‖², in units of y; 0 without a signal.
+    /// Least-squares amplitude of the most probable blob, φᵀb·y / ‖φᵀb‖², in units of y; 0 without a signal.
     pub amplitude: f64,
-    /// Width of the most likely blob, taxels.
+    /// Width of the most probable blob, taxels.
     pub width_px: f64,
 }
 
-/// What measurements said about every blob.
+/// Evidence of every blob from the measurements so far.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlobEvidence {
     count: f64,
@@ -114,10 +114,10 @@ pub struct BlobEvidence {
 }
 
 impl Localiser {
-    /// Bank of the blobs of `config`.
+    /// The blobs of `config`.
     ///
     /// # Errors
-    /// [`RangeError`] when a number is out of range, or there is no width (`widths_px` = 0).
+    /// [`RangeError`] if a number is out of range, or there is no width (`widths_px` = 0).
     pub fn new(config: &BlobConfig) -> Result<Self, RangeError> {
         within("rows", config.rows as f64, 1.0, 1e4)?;
         within("cols", config.cols as f64, 1.0, 1e4)?;
@@ -153,11 +153,12 @@ impl Localiser {
         self.variances.len()
     }
 
-    /// φᵀb of every blob, for one row φ of weights (`rows · cols` values, row-major); overwrites `projected`. Needs no
-    /// sample, and is separable: O(centres a column · (rows · cols + centres a row · cols)) a width.
+    /// Computes φᵀb of every blob into `projected`, for one row φ of weights (`rows · cols` values, row-major). It
+    /// needs no sample. Blobs are separable, so the cost for each width is O(centres a column · (rows · cols + centres
+    /// a row · cols)).
     ///
     /// # Errors
-    /// [`RangeError`] when `weights` has another length or holds a value beyond ±1e12 or not finite.
+    /// [`RangeError`] if `weights` has another length, or a value that is not finite or beyond ±1e12.
     pub fn project(&self, weights: &[f64], projected: &mut Vec<f64>) -> Result<(), RangeError> {
         let taxels = (self.rows * self.cols) as f64;
         within("number of weights", weights.len() as f64, taxels, taxels)?;
@@ -175,7 +176,7 @@ impl Localiser {
         Ok(())
     }
 
-    /// Empty evidence for this bank.
+    /// Empty evidence for these blobs.
     #[must_use]
     pub fn evidence(&self) -> BlobEvidence {
         let zeros = vec![0.0; self.templates()];
@@ -188,8 +189,8 @@ impl Localiser {
         }
     }
 
-    /// Posterior of the centre: every blob is weighed by its evidence, the amplitude integrated out ([Laplace], flat in
-    /// ln s), all centres and widths being equally likely before. Without a signal, that is the whole sheet.
+    /// Posterior of the centre. Every blob is weighted by its evidence, integrated over the amplitude ([Laplace], flat
+    /// in ln s); all centres and widths are equally likely a priori. Without a signal the result is the whole sheet.
     ///
     /// [Laplace]: https://en.wikipedia.org/wiki/Laplace%27s_method
     pub fn estimate(&self, evidence: &mut BlobEvidence) -> Estimate {
@@ -284,11 +285,11 @@ fn weigh([count, yy]: [f64; 2], [yt, tt, variances, log_variances]: [&[f64]; 4],
 }
 
 impl BlobEvidence {
-    /// Takes one measurement `y` with its row projected by [`Localiser::project`].
+    /// Adds one measurement `y`; `projected` is its row after [`Localiser::project`].
     ///
     /// # Errors
-    /// [`RangeError`] when `y` is not finite or beyond ±1e80, or `projected` is another bank's; the evidence is then as
-    /// before.
+    /// [`RangeError`] if `y` is not finite or beyond ±1e80, or `projected` belongs to other blobs. The evidence is then
+    /// unchanged.
     pub fn observe(&mut self, projected: &[f64], y: f64) -> Result<(), RangeError> {
         let expected = self.yt.len() as f64;
         within("number of projections", projected.len() as f64, expected, expected)?;
@@ -302,7 +303,7 @@ impl BlobEvidence {
         Ok(())
     }
 
-    /// Forgets all measurements.
+    /// Removes all measurements.
     pub fn clear(&mut self) {
         self.count = 0.0;
         self.yy = 0.0;

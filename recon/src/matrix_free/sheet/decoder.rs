@@ -1,4 +1,4 @@
-//! Images of large sheets for a sensing matrix that stays the same.
+//! Reconstructs images of large sheets measured with a fixed sensing matrix.
 
 use super::prior::SheetPrior;
 use crate::checks::{RangeError, within};
@@ -11,13 +11,12 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What measurements hold beside the image, as shares of the root mean square of a row's sum.
+/// Noise of measurements, relative to the root mean square of a row's sum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SheetNoise {
-    /// Standard deviation of a measurement's own noise; [1e-6, 1000].
+    /// Standard deviation of the independent noise of a measurement; [1e-6, 1000].
     pub own: f64,
-    /// Standard deviation of what all measurements of a wire have in common, as drives that are not symmetric make it;
-    /// [0, 1000].
+    /// Standard deviation of an offset common to all measurements of a wire, as asymmetric drives cause it; [0, 1000].
     pub common: f64,
 }
 
@@ -28,34 +27,35 @@ impl Default for SheetNoise {
     }
 }
 
-/// Why there is no image.
+/// Why no image can be computed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SheetError {
-    /// A noise outside its range.
+    /// A noise level outside its range.
     #[error(transparent)]
     Noise(#[from] RangeError),
-    /// Rows or measurements that do not fit.
+    /// Rows or measurements of the wrong size.
     #[error(transparent)]
     Recover(#[from] RecoverError),
-    /// The taxels that are solved for have no prior.
+    /// The selected taxels have no valid prior.
     #[error(transparent)]
     Prior(#[from] PriorError),
-    /// A noise that the non-negative estimate does not take.
+    /// A noise level that the non-negative estimate does not accept.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
 }
 
-/// Images x of a sheet from measurements y = Φ x + o + n, for a sensing matrix Φ (M × N) that stays the same: x ~
-/// N(0, a² A ⊗ B) with an unknown scale a, noise n of every measurement, an offset o that all measurements of a wire
-/// share.
+/// Estimates images x of a sheet from measurements y = Φ x + o + n with a fixed sensing matrix Φ (M × N). The prior is
+/// x ~ N(0, a² A ⊗ B) with an unknown scale a. Each measurement has its noise n; all measurements of a wire share an
+/// offset o.
 ///
-/// All that needs no sample is computed as rows are added: C φᵢ as A Xᵢ B with the row as a grid Xᵢ, and the Cholesky
-/// factor of Φ C Φᵀ + noise, row by row, so that the first m rows are prepared as soon as they are there. Memory is 2 M
-/// N numbers. The linear estimate C Φᵀ (Φ C Φᵀ + noise)⁻¹ y then takes M² + M N products.
-/// Rows of a wire that reads a part of the sheet cost as much less to prepare. The non-negative one solves for
-/// the taxels that the linear one puts first, with all others at zero. Its prior is C of those taxels, and its noise is
-/// a share of what touches of those taxels alone would measure.
+/// Everything that needs no sample is computed when rows are added: C φᵢ = A Xᵢ B, with the row as a grid Xᵢ, and the
+/// Cholesky factor of Φ C Φᵀ + noise, row by row. The first m rows are therefore ready at once. Memory is 2 M N
+/// numbers. The linear estimate C Φᵀ (Φ C Φᵀ + noise)⁻¹ y then takes M² + M N products. Rows of a wire that reads only
+/// a part of the sheet cost proportionally less.
+///
+/// The non-negative estimate considers only the taxels with the largest linear estimate; all others are zero. Its prior
+/// is C of those taxels. Its noise is relative to what touches of those taxels alone would measure.
 ///
 /// ```
 /// use spts_recon::matrix_free::{SheetDecoder, SheetNoise, SheetPrior};
@@ -77,7 +77,7 @@ pub enum SheetError {
 pub struct SheetDecoder {
     prior: SheetPrior,
     noise: SheetNoise,
-    /// Number of wires, which share the taxels.
+    /// Number of wires.
     count: usize,
     /// Φ, M × N.
     rows: Vec<f64>,
@@ -85,9 +85,9 @@ pub struct SheetDecoder {
     cross: Vec<f64>,
     /// Wire of every row.
     wires: Vec<usize>,
-    /// Taxels of every row that its wire reads, from the first to the last.
+    /// Range of the taxels that the wire of each row reads.
     spans: Vec<Range<usize>>,
-    /// Cholesky factor, row i with i + 1 entries behind those before it.
+    /// Cholesky factor; row i has i + 1 entries and follows the rows before it.
     factor: Vec<f64>,
 }
 
@@ -95,10 +95,10 @@ pub struct SheetDecoder {
 const BLOCK: usize = 8;
 
 impl SheetDecoder {
-    /// A decoder without rows, for a sheet that `wires` wires share evenly.
+    /// A decoder without rows, for a sheet that is divided evenly among `wires` wires.
     ///
     /// # Errors
-    /// [`SheetError::Noise`] for a noise outside its range.
+    /// [`SheetError::Noise`] for a noise level outside its range.
     pub fn new(prior: SheetPrior, noise: SheetNoise, wires: usize) -> Result<Self, SheetError> {
         within("own", noise.own, 1e-6, 1e3)?;
         within("common", noise.common, 0.0, 1e3)?;
@@ -114,31 +114,31 @@ impl SheetDecoder {
         })
     }
 
-    /// Rows so far.
+    /// Number of rows so far.
     #[must_use]
     pub fn measurements(&self) -> usize {
         self.wires.len()
     }
 
-    /// Bytes that rows, their products with the prior and the factor take when there are `measurements` rows.
+    /// Memory of `measurements` rows, their products with the prior, and the factor, bytes.
     #[must_use]
     pub fn bytes(&self, measurements: usize) -> usize {
         (2 * measurements * self.prior.taxels() + measurements * (measurements + 1) / 2) * size_of::<f64>()
     }
 
-    /// Multiplications that an image of `measurements` rows takes, about: the linear estimate, the inverse of the
-    /// covariance of `most` taxels, and one solution for all of them. Exchanges solve a few times, for fewer of them.
+    /// Approximate number of multiplications for an image from `measurements` rows: the linear estimate, the inverse of
+    /// the covariance of `most` taxels, and one solution for all of them. The active-set method solves several times,
+    /// for fewer taxels.
     #[must_use]
     pub fn products(&self, measurements: usize, most: usize) -> usize {
         let (m, n) = (measurements, most.min(self.prior.taxels()));
         m * m + m * self.prior.taxels() + m * n + n * n * n + 2 * m * n * n
     }
 
-    /// Adds `rows` (row-major, N values each), which are read by `wires` (one number a row, the first wire is 0).
+    /// Adds `rows` (row-major, N values each). `wires` holds the number of each row's wire, from 0.
     ///
     /// # Errors
-    /// [`SheetError::Recover`] when there is not one wire of those that there are a row, or a row is not finite or
-    /// depends on those before it to rounding.
+    /// [`SheetError::Recover`] if a row has no valid wire, is not finite, or depends linearly on earlier rows.
     pub fn extend(&mut self, rows: &[f64], wires: &[usize]) -> Result<(), SheetError> {
         let taxels = self.prior.taxels();
         if rows.len() != wires.len() * taxels || wires.iter().any(|wire| *wire >= self.count) {
@@ -219,7 +219,7 @@ impl SheetDecoder {
     /// The linear estimate from measurements of the first rows, N values.
     ///
     /// # Errors
-    /// [`SheetError::Recover`] when there are more measurements than rows, none, or one is not finite.
+    /// [`SheetError::Recover`] if there are no measurements, more measurements than rows, or one that is not finite.
     pub fn linear(&self, y: &[f64]) -> Result<Vec<f64>, SheetError> {
         let m = y.len();
         if m > self.measurements() || m == 0 {
@@ -248,10 +248,10 @@ impl SheetDecoder {
         Ok(image)
     }
 
-    /// The non-negative estimate from measurements of the first rows, N values, at most `most` of them above zero.
+    /// The non-negative estimate from measurements of the first rows: N values, at most `most` of them positive.
     ///
     /// # Errors
-    /// As [`SheetDecoder::linear`], and when the program has no solution to rounding.
+    /// As [`SheetDecoder::linear`], and if the iteration fails because of rounding.
     pub fn non_negative(&self, y: &[f64], most: usize) -> Result<Vec<f64>, SheetError> {
         let linear = self.linear(y)?;
         let taxels = self.prior.taxels();

@@ -1,4 +1,4 @@
-//! Gaussian priors of large sheets, as two small matrices.
+//! Gaussian priors of large sheets, stored as two small matrices.
 
 use crate::kernels::axpy;
 use crate::matrix::Matrix;
@@ -7,8 +7,17 @@ use crate::recover::{ParameterError, PriorError};
 /// Share of the variance that every taxel has for itself at least: keeps factors of the covariance positive.
 const FLOOR: f64 = 1e-3;
 
-/// Gaussian prior x ~ N(0, A ⊗ B) of images on a grid of R × C taxels: A (R × R) along the rows, B (C × C) along the
-/// columns, both with 1 on the diagonal. The scale of the images is left open.
+/// Gaussian prior x ~ N(0, A ⊗ B) of images on a grid of R × C taxels: A (R × R) along rows and B (C × C) along
+/// columns, both with 1 on the diagonal. The scale of the images is not specified.
+///
+/// ```
+/// use spts_recon::matrix_free::SheetPrior;
+///
+/// let prior = SheetPrior::smooth([100, 200], 3.0)?;
+/// assert_eq!(prior.taxels(), 20_000);
+/// assert!((prior.covariance(0, 3) - (-0.5_f64).exp()).abs() < 1e-3, "3 taxels apart in a row");
+/// # Ok::<(), spts_recon::recover::PriorError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SheetPrior {
     rows: Matrix,
@@ -16,11 +25,11 @@ pub struct SheetPrior {
 }
 
 impl SheetPrior {
-    /// Images on a grid of `shape` = [rows, columns] that are smooth over `length` taxels: the covariance of two taxels
-    /// is exp(−d²/2ℓ²) with their distance d.
+    /// Prior of images on a grid of `shape` = [rows, columns] that are smooth over `length` taxels: the covariance of
+    /// two taxels at distance d is exp(−d²/2ℓ²).
     ///
     /// # Errors
-    /// [`PriorError`] for an empty grid, or unless `length` is in [0.01, 1000].
+    /// [`PriorError`] for an empty grid, or if `length` is outside [0.01, 1000].
     pub fn smooth(shape: [usize; 2], length: f64) -> Result<Self, PriorError> {
         if !(0.01..=1000.0).contains(&length) {
             return Err(PriorError::Parameter(ParameterError {
@@ -34,12 +43,12 @@ impl SheetPrior {
         Ok(Self::stationary(shape.map(lags)))
     }
 
-    /// Images on a grid of `shape` = [rows, columns] that are like `images` (row-major), wherever they lie: the
-    /// covariance along an axis is the mean product of two taxels at a distance over the mean square. Every image
-    /// counts alike, whatever its scale, and images of nothing do not count.
+    /// Prior of images on a grid of `shape` = [rows, columns] that resemble `images` (row-major), at any position. The
+    /// covariance along an axis is the mean product of two taxels at a distance, divided by the mean square. Every
+    /// image counts equally, whatever its scale; images that are zero are ignored.
     ///
     /// # Errors
-    /// [`PriorError::Images`] when there is no image that is different from zero, or one does not fill the grid.
+    /// [`PriorError::Images`] if every image is zero, or one does not fit the grid.
     pub fn like<'a>(images: impl IntoIterator<Item = &'a [f64]>, shape: [usize; 2]) -> Result<Self, PriorError> {
         let [rows, cols] = shape;
         check_shape(shape, 0)?;

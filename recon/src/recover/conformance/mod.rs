@@ -1,5 +1,5 @@
-//! What every recovery algorithm must satisfy: what all of them must is here, and what is asked of one kind only in a
-//! file of its own.
+//! Properties that every recovery algorithm must have. Common ones are in this file; those of one kind have a file of
+//! their own.
 
 mod pursuit;
 mod regularised;
@@ -23,7 +23,7 @@ type Make<'a> = &'a dyn Fn(usize) -> Box<dyn Recover>;
 struct Suite<'a> {
     name: &'a str,
     rng: ChaCha8Rng,
-    /// A workspace that has seen every problem before.
+    /// A workspace that has been used for every problem before.
     used: Workspace,
 }
 

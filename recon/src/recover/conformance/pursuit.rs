@@ -1,4 +1,4 @@
-//! What is asked of algorithms that are told how many atoms to use.
+//! Properties of algorithms that are given a number of atoms.
 
 use super::super::Build;
 use super::{Suite, largest_difference, product};
@@ -6,13 +6,13 @@ use crate::matrix::Matrix;
 use crate::problem::Solution;
 use rand::RngExt as _;
 
-/// Runs the conformance suite on the algorithm built by `build`: recovers single atoms and sparse non-negative signals
-/// in an easy regime, keeps the sparsity it was given, follows the scale of `y` and the order of the columns, does not
-/// depend on the history of its workspace, answers degenerate problems with finite numbers or an error, and refuses
-/// what is not finite.
+/// Runs the conformance suite on the algorithm built by `build`. It must recover single atoms and sparse non-negative
+/// signals in an easy regime, respect the given sparsity, follow the scale of `y` and the order of the columns, not
+/// depend on earlier uses of its workspace, solve degenerate problems with finite numbers or an error, and refuse
+/// values that are not finite.
 ///
 /// # Panics
-/// When a property does not hold; the message names it.
+/// If a property fails; the message names it.
 pub fn conformance(name: &str, build: Build) {
     let mut suite = Pursuits {
         suite: Suite::new(name),

@@ -1,4 +1,4 @@
-//! What is asked of algorithms that weigh fit against a prior.
+//! Properties of algorithms that balance fit and prior.
 
 use super::super::BuildRegularised;
 use super::{Suite, product};
@@ -8,13 +8,13 @@ use crate::problem::Recover;
 /// Unknowns of the problems on which answers are compared.
 const K: usize = 24;
 
-/// Runs the conformance suite on the algorithm built by `build`: recovers a planted sparse signal from twice as many
-/// measurements as unknowns, scales with its measurements, follows when the order of the unknowns is turned round,
-/// does not depend on the history of its workspace, answers degenerate
-/// problems with finite numbers or an error, and refuses what is not finite.
+/// Runs the conformance suite on the algorithm built by `build`. It must recover a sparse signal from twice as many
+/// measurements as unknowns, scale with its measurements, follow a reversed order of the unknowns, not depend on
+/// earlier uses of its workspace, solve degenerate problems with finite numbers or an error, and refuse values that are
+/// not finite.
 ///
 /// # Panics
-/// When a property does not hold; the message names it.
+/// If a property fails; the message names it.
 pub fn conformance_regularised(name: &str, build: BuildRegularised) {
     let make = |k: usize| build(k).unwrap_or_else(|e| panic!("{name}: {e}"));
     let mut suite = Regularised {

@@ -1,4 +1,4 @@
-//! Images by a small network that has learned from many simulated ones: the steps of an iteration, each with the exact
+//! Images by a small neural network, trained on many simulated ones: an unrolled iteration, each step with the exact
 //! residual.
 
 mod layer;
@@ -18,8 +18,8 @@ use crate::sign_rows::SignTables;
 use crate::workspace::Workspace;
 use std::sync::Arc;
 
-/// An amortised posterior: what training has found out once about all images, rows and numbers of samples stands in
-/// weights, and a decode is a few products of matrices.
+/// An amortised posterior: training stores what is common to all images, rows and numbers of samples in the weights, so
+/// a decode takes only a few matrix products.
 ///
 /// With ±1 rows Φ (M × N), S = Φ K Φᵀ + ν I = L Lᵀ, V = L⁻¹ Φ K, w = L⁻¹ y, s = |w|/√M and v = √(diag K − Σ V²):
 ///
@@ -27,11 +27,21 @@ use std::sync::Arc;
 /// z = W₂ max(0, W₁ [x, Vᵀ e, Vᵀ w/s, v, h, ln(M/20), |e|/√M] + b₁) + b₂, x ← max(0, x + z), h ← tanh z;
 /// p = 1/(1 + exp(−(Wₒ [h, x] + bₒ))), the probability that a taxel is above .23 of the maximum.
 ///
-/// The image is s x, changed least so that its support is the one of largest expected intersection over union under p.
-/// Linear algebra is in double precision, the network in single. Rows of another size than ±1 are scaled to a root mean
-/// square of 1.
-/// Source: K. Gregor, Y. LeCun, "Learning fast approximations of sparse coding", ICML 2010, for unrolling; the gain of
-/// the linear estimate in every step is the exact data term.
+/// The image is s x, with the smallest change that gives it the support of largest expected intersection over union
+/// under p. Linear algebra uses double precision, the network single precision. Rows other than ±1 are scaled to a root
+/// mean square of 1.
+/// Source: K. Gregor, Y. LeCun, "Learning fast approximations of sparse coding", ICML 2010, for unrolling. The exact
+/// data term is the gain of the linear estimate in every step.
+///
+/// ```
+/// use spts_recon::recover::UnrolledWeights;
+///
+/// // an untrained network for 100 taxels
+/// let weights = UnrolledWeights::plain(100, 1e-3)?;
+/// assert_eq!(weights.taxels(), 100);
+/// assert!(UnrolledWeights::plain(100, -1.0).is_err());
+/// # Ok::<(), spts_recon::recover::UnrolledError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Unrolled {
     model: Arc<Model>,
@@ -74,17 +84,17 @@ struct Scratch {
     order: Vec<usize>,
 }
 
-/// What a decode says beside the image.
+/// Result of a decode beside the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touched {
-    /// Taxels of the support.
+    /// Number of taxels in the support.
     pub taxels: usize,
     /// Expected intersection over union of the support with the true one, [0, 1].
     pub expected_iou: f64,
 }
 
 impl Unrolled {
-    /// Network with `weights`.
+    /// A network with `weights`.
     #[must_use]
     pub fn new(weights: UnrolledWeights) -> Self {
         let tables = SignTables::new(weights.prior.view());
@@ -99,12 +109,12 @@ impl Unrolled {
         self.model.weights.taxels()
     }
 
-    /// Overwrites `image` with the image of `problem` in units of `y`, and `probabilities` with the probability of every
-    /// taxel that it is above .23 of the image's maximum. Both are zero where `y` or all rows are.
+    /// Computes the image of `problem` into `image`, in units of `y`, and into `probabilities` the probability that
+    /// each taxel exceeds .23 of the image's maximum. Both are zero if `y` or all rows are zero.
     ///
     /// # Errors
-    /// [`RecoverError`] when the rows have another number of taxels or an entry that is not finite, or a taxel is
-    /// beyond the range of numbers.
+    /// [`RecoverError`] if the rows have another number of taxels or an entry that is not finite, or a taxel exceeds
+    /// the range of numbers.
     pub fn estimate(
         &self,
         problem: &Problem<'_>,

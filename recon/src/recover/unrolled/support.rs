@@ -1,4 +1,4 @@
-//! The support that is expected to be right, and an image that goes with it.
+//! The support with the largest expected IoU, and an image with that support.
 
 use crate::metrics::SUPPORT_THRESHOLD;
 

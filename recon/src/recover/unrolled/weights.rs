@@ -1,4 +1,4 @@
-//! The numbers of an unrolled network.
+//! The weights of an unrolled network.
 
 use super::layer::WIDTHS;
 use crate::matrix::Matrix;
@@ -6,15 +6,15 @@ use crate::matrix::Matrix;
 /// A dense layer: out = W u + b.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Layer {
-    /// W in tiles of outputs, each inputs × width, so that a decode reads it from end to end.
+    /// W in tiles of outputs, each inputs × width, so that a decode reads it sequentially.
     pub(super) weights: Vec<f32>,
     /// b, one an output.
     pub(super) bias: Vec<f32>,
 }
 
 impl Layer {
-    /// Layer with `weights` (inputs × outputs, row-major) and one `bias` an output. [`super::UnrolledWeights::new`]
-    /// checks that they fit.
+    /// A layer with `weights` (inputs × outputs, row-major) and one `bias` for each output.
+    /// [`super::UnrolledWeights::new`] checks that layers fit together.
     #[must_use]
     pub fn new(weights: Vec<f32>, bias: Vec<f32>) -> Self {
         let (outputs, inputs) = (bias.len(), weights.len() / bias.len().max(1));
@@ -60,7 +60,7 @@ pub struct UnrolledStep {
     pub change: Layer,
 }
 
-/// Everything that an [`super::Unrolled`] network has learned, for N taxels, H hidden numbers, P of memory.
+/// All weights of an [`super::Unrolled`] network for N taxels, H hidden values and P values of memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnrolledWeights {
     /// K, second moments of images of length 1, N × N.
@@ -72,24 +72,24 @@ pub struct UnrolledWeights {
     pub(super) memory: usize,
 }
 
-/// Why numbers are no network.
+/// Why numbers are not a valid network.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum UnrolledError {
-    /// An array of another length than the others ask for.
+    /// An array whose length does not match the others.
     #[error("{what} have {len} numbers, expected {expected}")]
     Length {
-        /// What.
+        /// Name of the array.
         what: String,
-        /// Numbers that are there.
+        /// Its length.
         len: usize,
-        /// Numbers that fit.
+        /// Expected length.
         expected: usize,
     },
     /// A NaN or an infinity.
     #[error("{what} have a number that is not finite")]
     NotFinite {
-        /// What.
+        /// Name of the array.
         what: String,
     },
     /// A number outside its range.
@@ -99,7 +99,7 @@ pub enum UnrolledError {
         field: &'static str,
         /// Its value.
         value: f64,
-        /// What is valid.
+        /// Valid range.
         range: &'static str,
     },
 }
@@ -114,11 +114,11 @@ const STEEP: f32 = 100.0;
 const MOMENTS: [f64; 2] = [1e-3, 1e3];
 
 impl UnrolledWeights {
-    /// Network of `steps` and an `output` layer for images whose second moments are `prior` (N × N), with a noise of
-    /// variance `noise_variance`, both for images of length 1.
+    /// A network of `steps` and an `output` layer. `prior` (N × N) holds the second moments of the images and
+    /// `noise_variance` the variance of the noise, both for images of length 1.
     ///
     /// # Errors
-    /// [`UnrolledError`] when the layers do not fit each other, a number is not finite, or the prior is none.
+    /// [`UnrolledError`] if the layers do not fit together, a number is not finite, or the prior is not valid.
     pub fn new(
         prior: Matrix,
         noise_variance: f64,
@@ -182,11 +182,11 @@ impl UnrolledWeights {
         })
     }
 
-    /// Network for `taxels` that are independent and alike, which has learned nothing. Every step adds the linear
-    /// estimate from the residual and cuts at zero; taxels above a quarter of the image's length count as touched.
+    /// An untrained network for `taxels` that are independent and alike. Every step adds the linear estimate from the
+    /// residual and sets negative values to zero; taxels above a quarter of the image's length count as touched.
     ///
     /// # Errors
-    /// [`UnrolledError`] when the number of taxels or the noise is out of range.
+    /// [`UnrolledError`] if the number of taxels or the noise is out of range.
     pub fn plain(taxels: usize, noise_variance: f64) -> Result<Self, UnrolledError> {
         let n = taxels;
         let mut prior = Matrix::zeros(n, n);

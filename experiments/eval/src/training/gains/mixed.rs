@@ -1,4 +1,4 @@
-//! The linear mixed model of log gains: amplitudes of sessions, gains of taxels, errors of contacts, mountings.
+//! The linear mixed model of log gains: amplitudes of sessions, gains of taxels, errors of contacts, and mountings.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -7,7 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 pub(super) struct Ratio {
     /// Number of the session, from 0.
     pub(super) session: usize,
-    /// Number of the object that was pressed.
+    /// Number of the pressed object.
     pub(super) object: usize,
     /// Taxel.
     pub(super) taxel: usize,
@@ -18,11 +18,11 @@ pub(super) struct Ratio {
 /// Standard deviations of the three random effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Effects {
-    /// σ of a taxel's gain.
+    /// σ of the taxels' gains.
     pub(super) gain: f64,
-    /// σ꜀ of what the simulated contact of an object is wrong by on a taxel.
+    /// σ_c of the error of a simulated contact on a taxel.
     pub(super) contact: f64,
-    /// σₘ of what a mounting changes on a taxel.
+    /// σₘ of the change of a taxel's gain by mounting the skin.
     pub(super) mounting: f64,
 }
 
@@ -38,11 +38,11 @@ pub(super) struct Solution {
 }
 
 /// Ratios of sessions and taxels, r = a_s + l_i + c_oi + m_si with a_s of a flat density, l_i ~ N(0, σ²), c_oi ~
-/// N(0, σ꜀²) shared by all sessions of an object, m_si ~ N(0, σₘ²), all independent.
+/// N(0, σ_c²) shared by all sessions of an object, m_si ~ N(0, σₘ²), all independent.
 ///
 /// Source: S. R. Searle, G. Casella and C. E. McCulloch, *Variance Components* (1992), chapters 6 and 7 (restricted
 /// likelihood, prediction of random effects). Given the effects, the ratios of an object on a taxel have the covariance
-/// σ꜀² 11ᵀ + σₘ² I, whose inverse is (I − ρ 11ᵀ)/σₘ² with ρ = σ꜀²/(σₘ² + n σ꜀²). Every such group tells about one
+/// σ_c² 11ᵀ + σₘ² I, whose inverse is (I − ρ 11ᵀ)/σₘ² with ρ = σ_c²/(σₘ² + n σ_c²). Every such group tells about one
 /// taxel, so that the taxels' part of the normal equations is diagonal and is eliminated: O(taxels × sessions²).
 pub(super) struct MixedModel {
     /// Ratios sorted by taxel and object.

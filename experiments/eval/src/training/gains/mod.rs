@@ -1,4 +1,4 @@
-//! The gains of a skin's taxels, from raster images of it and of the same contacts on a median skin.
+//! Gains of a skin's taxels, estimated from its raster images and simulated images of the same contacts.
 
 mod mixed;
 #[cfg(test)]
@@ -21,32 +21,32 @@ const TOUCHED: f64 = 0.1;
 /// No contact is believed to tell more than this factor about one taxel.
 const LARGEST_FACTOR: f64 = 4.0;
 
-/// What raster presses tell about the gains of a skin: the posterior of a linear mixed model.
+/// Gains of a skin estimated from raster presses: the posterior of a linear mixed model.
 ///
-/// On the taxels that a simulated contact touches, log(v/m) = a + l + c + e, where v is the image of the skin and m
-/// that of the simulation at gain 1: a is the amplitude of the session, of which nothing is known; l ~ N(0, σ²) the
-/// logarithm of the taxel's gain, the same in all sessions; c ~ N(0, σ꜀²) what the simulated contact of this object is
-/// wrong by; and e ~ N(0, σₘ²) what this mounting of the skin changes. σ and σ꜀ are fitted to the ratios, σₘ is given.
+/// On the taxels touched in a simulated contact, log(v/m) = a + l + c + e. v is the image of the skin and m that of the
+/// simulation at gain 1. a is the unknown amplitude of the session. l ~ N(0, σ²) is the logarithm of the taxel's gain,
+/// the same in all sessions. c ~ N(0, σ_c²) is the error of this object's simulated contact. e ~ N(0, σₘ²) is the
+/// change by this mounting of the skin. σ and σ_c are fitted to the ratios; σₘ is given.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SkinGains {
     /// The posterior.
     #[serde(flatten)]
     pub gains: TaxelGains,
-    /// σ: standard deviation of the logarithm of a taxel's gain over the skin.
+    /// σ: standard deviation of the logarithm of the gains over the skin.
     pub spread_log_sd: f64,
-    /// σ꜀: standard deviation of the logarithm of a contact's error on a taxel.
+    /// σ_c: standard deviation of the logarithm of a contact's error on a taxel.
     pub contact_log_sd: f64,
-    /// Sessions that told about every taxel.
+    /// Number of sessions with information about each taxel.
     pub sessions: Vec<usize>,
-    /// Objects that were pressed in them.
+    /// Number of objects pressed in them.
     pub fitted_objects: usize,
 }
 
-/// Why a skin has no gains.
+/// Why gains cannot be estimated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SkinGainsError {
-    /// No object is in both sets of images.
+    /// No object has both an image of the skin and a simulated one.
     #[error("no object has both an image of the skin and a simulated one")]
     NoPair,
     /// Images of different sizes.
@@ -60,11 +60,11 @@ pub enum SkinGainsError {
 }
 
 impl SkinGains {
-    /// Gains of the skin that `skin` shows, one image a session, of which `simulated` shows the contacts at gain 1, one
-    /// image a label. Labels that are not in both are not used. `mounting_log_sd` is σₘ.
+    /// Estimates the gains from `skin`, one image for each session, and `simulated`, one image of the contact at gain 1
+    /// for each label. Labels that are not in both are ignored. `mounting_log_sd` is σₘ.
     ///
     /// # Errors
-    /// [`SkinGainsError`] when no label is in both, or the images differ in size.
+    /// [`SkinGainsError`] if no label is in both, or the image sizes differ.
     pub fn estimate(skin: &Library, simulated: &Library, mounting_log_sd: f64) -> Result<Self, SkinGainsError> {
         let taxels = skin.images().nrows();
         if taxels != simulated.images().nrows() {
@@ -121,24 +121,24 @@ impl SkinGains {
     }
 }
 
-/// A simulated image beside that of a skin whose gains other contacts tell.
+/// Comparison of a simulated image with that of a skin whose gains were estimated from other contacts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GainCheck {
-    /// Taxels that the simulated contact touches.
+    /// Number of taxels touched in the simulated contact.
     pub taxels: usize,
     /// Correlation of the images.
     pub correlation: f64,
-    /// The same with the mean gains applied to the simulated image.
+    /// Correlation after applying the mean gains to the simulated image.
     pub correlation_with_gains: f64,
-    /// Share of the touched taxels whose ratio lies in the predicted 90 %: of gain, contact and mounting.
+    /// Share of the touched taxels whose ratio lies in the predicted 90 % interval of gain, contact and mounting.
     pub inside: f64,
 }
 
-/// Two-sided 90 % of a normal distribution, standard deviations.
+/// Half width of a two-sided 90 % interval of a normal distribution, standard deviations.
 pub const BAND_SD: f64 = 1.644_853_626_951_472_7;
 
 impl SkinGains {
-    /// Compares an image of the skin with the `simulated` one at gain 1; `None` when it touches fewer than two taxels.
+    /// Compares an image of the skin with the `simulated` one at gain 1; `None` if fewer than two taxels are touched.
     #[must_use]
     pub fn check(&self, skin: &[f64], simulated: &[f64]) -> Option<GainCheck> {
         let with_gains: Vec<f64> = simulated
@@ -176,12 +176,12 @@ impl SkinGains {
     }
 }
 
-/// The raster `sessions` as skins with these `gains` would have shown them, every press on another skin that may be
-/// this one, mounted anew; compressive recordings are left out. Presses come in pairs whose deviations from the mean
-/// are opposite, so that their mean image is nearly that of the mean gains. A function of `streams` alone.
+/// The raster `sessions` as skins with these `gains` would record them. Every press is on another possible skin,
+/// mounted anew. Compressive recordings are dropped. Presses come in pairs with opposite deviations from the mean, so
+/// that their mean image is close to that of the mean gains. The result depends only on `streams`.
 ///
 /// # Errors
-/// [`RecordingError`] when a gain makes a sample infinite.
+/// [`RecordingError`] if a gain makes a sample infinite.
 pub fn on_skins_with(
     gains: &TaxelGains,
     sessions: &[ScoredSession],
@@ -239,15 +239,15 @@ fn logs(skin: &[f64], simulated: &[f64]) -> Vec<(usize, f64)> {
     }
 }
 
-/// γ of every taxel of a skin with these `gains` in one session: relative standard deviation √(exp(σ²) − 1) of its
+/// γ of every taxel of a skin with these `gains` in one session: the relative standard deviation √(exp(σ²) − 1) of its
 /// log-normal gain.
 #[must_use]
 pub fn gain_sds(gains: &TaxelGains) -> Vec<f64> {
     gains.session_log_sd().map(relative_sd).collect()
 }
 
-/// γ of a skin that is none of the usual simulated ones: relative standard deviation of its taxels' log-normal gains in
-/// one session, √(exp(σ² + σₛ²) − 1) with σ = `spread_log_sd` and σₛ = `session_log_sd` as the transducer has them.
+/// γ of an unknown skin: the relative standard deviation of its taxels' log-normal gains in one session, √(exp(σ² +
+/// σₛ²) − 1), with the transducer's σ = `spread_log_sd` and σₛ = `session_log_sd`.
 #[must_use]
 pub fn simulated_gain_sd() -> f64 {
     let sheet = VelostatConfig::default();

@@ -11,7 +11,7 @@ fn library(images: &[&[f64]]) -> Library {
 }
 
 /// Two objects on two taxels whose gains are e^±a, all ratios exact. With the amplitude free, the difference of the two
-/// log gains has a prior of variance 2σ² and two measurements of variance 2(σ꜀² + σₘ²): it is 2a · 2/(2 + (σ꜀² +
+/// log gains has a prior of variance 2σ² and two measurements of variance 2(σ_c² + σₘ²): it is 2a · 2/(2 + (σ_c² +
 /// σₘ²)/σ²).
 #[test]
 fn gains_shrink_as_the_regression_says() {

@@ -1,0 +1,98 @@
+//! The two animations of the report.
+
+use super::Animation;
+use crate::ReportError;
+use spts::output::write_bytes;
+use spts::scene::Assignment;
+use spts::simulate::{Request, SimulateError, run};
+use spts_eval::decode::DecodeSessionError;
+use spts_eval::training::TrainingData;
+use spts_models::Streams;
+use std::path::Path;
+
+/// One animation of the report: what a page shows of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MotionFigure {
+    /// Scene, as `spts simulate` names it.
+    pub scene: &'static str,
+    /// File of the animation.
+    pub file: &'static str,
+    /// File of one picture of it, for readers who want nothing to move.
+    pub still: &'static str,
+    /// What it shows, for those who cannot see it.
+    pub alt: &'static str,
+    /// Caption.
+    pub caption: &'static str,
+}
+
+/// Every animation of the report, in the order of the page.
+pub const MOTION_FIGURES: [MotionFigure; 2] = [
+    MotionFigure {
+        scene: "press/T",
+        file: "press.gif",
+        still: "press_still.png",
+        alt: "A T is pressed on the skin: the pressure on every taxel, the voltage on the one wire, and the image decoded \
+              from it, side by side.",
+        caption: "A press of the T. Left: the pressure on the taxels. Middle: the last samples of the one wire. Right: \
+                  the image, decoded in time from the wire alone by a decoder that has never seen a T.",
+    },
+    MotionFigure {
+        scene: "bounce",
+        file: "bounce.gif",
+        still: "bounce_still.png",
+        alt: "A ball bounces on the skin for eight milliseconds: the pressure on every taxel, the voltage on the one wire, \
+              and the image decoded from it, side by side.",
+        caption: "A ball that is dropped from half a metre touches the skin for some eight milliseconds. Left: the \
+                  pressure on the taxels. Middle: the last samples of the one wire. Right: the image, decoded in time \
+                  from the wire alone by a decoder that has never seen a ball.",
+    },
+];
+
+/// An animation of the report that could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MotionError {
+    /// The scene cannot be simulated.
+    #[error(transparent)]
+    Simulate(#[from] SimulateError),
+    /// Its recording cannot be decoded.
+    #[error(transparent)]
+    Decode(#[from] DecodeSessionError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    Report(#[from] ReportError),
+}
+
+/// Simulates the scenes of [`MOTION_FIGURES`] with the root `seed` and writes their files into `folder`.
+///
+/// # Errors
+/// [`MotionError`].
+pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), MotionError> {
+    for figure in MOTION_FIGURES {
+        let assignment: Assignment = format!("seed={seed}").parse().map_err(SimulateError::from)?;
+        let request = Request {
+            scene: figure.scene.to_owned(),
+            assignments: vec![assignment],
+        };
+        let prepared = request.prepare()?;
+        let mut frames = Vec::new();
+        let simulation = run(&prepared, true, &|| (), |piece| {
+            frames.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
+            Ok::<_, SimulateError>(())
+        })?;
+        let Some(session) = &simulation.first else { continue };
+        let training = TrainingData::for_layout(prepared.scene.skin(), Streams::new(1)).ok();
+        let animation = Animation::new(&prepared, &frames, session, training.as_ref())?;
+        for (name, gif) in [(figure.file, true), (figure.still, false)] {
+            let path = folder.join(name);
+            let bytes = if gif {
+                animation.gif(&path)
+            } else {
+                animation.still(&path)
+            };
+            let bytes = bytes.map_err(ReportError::from)?;
+            write_bytes(&path, &bytes).map_err(ReportError::from)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,204 @@
+//! Contacts in motion: the pressure on the skin, the trace of its one wire, and the image decoded from that trace, as
+//! one GIF.
+
+mod encode;
+mod figures;
+mod palette;
+mod picture;
+#[cfg(test)]
+mod tests;
+mod timeline;
+mod wire;
+
+pub use figures::{MOTION_FIGURES, MotionError, MotionFigure, simulate_motion};
+
+use crate::figures::FigureError;
+use crate::figures::draw::{Canvas, encode_png, paint};
+use encode::gif;
+use palette::Palette;
+use picture::{COLUMNS, Moment, Stage};
+use rayon::prelude::*;
+use spts::Session;
+use spts::scene::Task;
+use spts::simulate::Prepared;
+use spts_contact::Frame;
+use spts_eval::decode::{DecodeRequest, DecodeSessionError};
+use spts_eval::idle_mean;
+use spts_eval::in_time::{FollowedImage, followed_images};
+use spts_eval::training::TrainingData;
+use std::path::Path;
+use timeline::{Timeline, pressure_pa};
+use wire::Trace;
+
+/// Name of the file of `spts simulate --animate`.
+pub const ANIMATION_FILE: &str = "animation.gif";
+
+/// One press or drop in motion.
+///
+/// ```no_run
+/// use spts::simulate::{Request, SimulateError, run};
+/// use spts_report::animation::Animation;
+///
+/// let prepared = Request { scene: "bounce".to_owned(), assignments: Vec::new() }.prepare()?;
+/// let mut frames = Vec::new();
+/// let simulation = run(&prepared, true, &|| (), |piece| {
+///     frames = piece.presses[0].frames.clone();
+///     Ok::<_, SimulateError>(())
+/// })?;
+/// let session = simulation.first.as_ref().expect("it was recorded");
+/// let animation = Animation::new(&prepared, &frames, session, None)?;
+/// std::fs::write("bounce.gif", animation.gif("bounce.gif".as_ref())?)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Animation {
+    stage: Stage,
+    /// Pressure at every instant, Pa.
+    pressures: Vec<Vec<f64>>,
+    /// Image and window at every instant.
+    images: Vec<FollowedImage>,
+    /// Output of the block without that of the idle skin, V.
+    output_v: Vec<f64>,
+}
+
+impl Animation {
+    /// The first press of `prepared`: its `frames`, and the first block of the compressive recording of `session`, from
+    /// which alone the image is decoded. `training` says what images on the skin are like; without it nothing is
+    /// decoded.
+    ///
+    /// # Errors
+    /// [`DecodeSessionError`] when there is no recording, or it cannot be followed.
+    pub fn new(
+        prepared: &Prepared,
+        frames: &[Frame],
+        session: &Session,
+        training: Option<&TrainingData>,
+    ) -> Result<Self, DecodeSessionError> {
+        let without = || DecodeSessionError::NoRecording {
+            session: session.name.clone(),
+        };
+        let recording = session.compressive().ok_or_else(without)?;
+        let volts = &recording.blocks().first().ok_or_else(without)?.volts;
+        let (layout, rate_hz) = (recording.layout(), recording.sample_rate_hz());
+        let timeline = Timeline::of(frames, volts.len() as f64 / rate_hz);
+        #[expect(clippy::cast_possible_truncation, reason = "clamped to the samples of the block")]
+        let sample = |time_s: f64| ((time_s * rate_hz).round().max(0.0) as usize).min(volts.len());
+        let ends: Vec<usize> = timeline.instants_s.iter().map(|time_s| sample(*time_s)).collect();
+
+        // a fifth of the taxels, and no more samples than come between two pictures
+        let shares = DecodeRequest::default_measurements(layout.taxels());
+        let between = ends
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .min()
+            .unwrap_or(usize::MAX);
+        let m = shares.get(1).copied().unwrap_or(1).min(between).max(1);
+        let images = match training {
+            Some(training) => followed_images(session, 0, training, m, &ends)?,
+            None => ends.iter().map(|&end| undecoded(end, m)).collect(),
+        };
+        let pressures = timeline.instants_s.iter().map(|time_s| pressure_pa(frames, *time_s));
+        let pressures: Vec<Vec<f64>> = pressures.collect();
+        let idle_v = idle_mean(recording, 0);
+        let output_v: Vec<f64> = volts.iter().map(|v| v - idle_v).collect();
+        let shown = sample(timeline.from_s)..sample(timeline.to_s);
+        let largest = |values: &mut dyn Iterator<Item = f64>| values.filter(|v| v.is_finite()).fold(0.0, f64::max);
+        Ok(Self {
+            stage: Stage {
+                title: title(prepared),
+                shape: (layout.rows(), layout.cols()),
+                trace: Trace::new(volts, shown.clone(), COLUMNS),
+                rate_hz,
+                m,
+                peak_pa: largest(&mut pressures.iter().flatten().copied()),
+                peak_v: match training {
+                    Some(_) => Ok(largest(&mut images.iter().flat_map(|at| &at.image).copied())),
+                    None => Err(format!("a skin of {} taxels is not decoded here", layout.taxels())),
+                },
+                largest_v: largest(&mut output_v[shown].iter().map(|v| v.abs())).max(f64::MIN_POSITIVE),
+                timeline,
+            },
+            pressures,
+            images,
+            output_v,
+        })
+    }
+
+    /// Number of pictures.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.images.len()
+    }
+
+    /// True without a picture: the block is too short for one.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.images.is_empty()
+    }
+
+    /// Picture number `k`.
+    fn picture(&self, k: usize) -> Canvas {
+        let at = &self.images[k];
+        self.stage.draw(&Moment {
+            time_s: self.stage.timeline.instants_s[k],
+            pressure_pa: &self.pressures[k],
+            image: &at.image,
+            window: &at.window,
+            samples: &self.output_v[at.window.clone()],
+        })
+    }
+
+    /// The animation as the bytes of a GIF file that repeats for ever; the same on any number of threads. `path` is the
+    /// file they are for, named in errors.
+    ///
+    /// # Errors
+    /// [`FigureError::Paint`] when no font is found.
+    pub fn gif(&self, path: &Path) -> Result<Vec<u8>, FigureError> {
+        let palette = Palette::new();
+        let paint = |k: usize| {
+            let (width, height, rgb) = paint(&self.picture(k), path)?;
+            Ok((palette.numbers(&rgb), [width, height]))
+        };
+        let painted = (0..self.len()).into_par_iter().map(paint);
+        let painted: Vec<(Vec<u8>, [usize; 2])> = painted.collect::<Result<_, FigureError>>()?;
+        let size = painted.first().map_or([1; 2], |(_, size)| *size);
+        let [width, height] = size.map(|side| u16::try_from(side).unwrap_or(u16::MAX));
+        let pictures: Vec<Vec<u8>> = painted.into_iter().map(|(picture, _)| picture).collect();
+        gif(&pictures, (width, height), &palette).map_err(|error| FigureError::Paint {
+            path: path.to_owned(),
+            reason: error.to_string(),
+        })
+    }
+
+    /// The picture with the largest pressure, as the bytes of a PNG file; `path` is the file they are for, named in
+    /// errors.
+    ///
+    /// # Errors
+    /// As [`Animation::gif`].
+    pub fn still(&self, path: &Path) -> Result<Vec<u8>, FigureError> {
+        let sum = |k: &usize| self.pressures[*k].iter().sum::<f64>();
+        let strongest = (0..self.len()).max_by(|a, b| sum(a).total_cmp(&sum(b)));
+        let canvas = strongest.map_or_else(|| Canvas::new(1.0, 1.0, ""), |k| self.picture(k));
+        let (width, height, rgb) = paint(&canvas, path)?;
+        encode_png(&rgb, width, height, path)
+    }
+}
+
+/// The window before `end` where nothing is decoded.
+fn undecoded(end: usize, m: usize) -> FollowedImage {
+    FollowedImage {
+        window: end.saturating_sub(m)..end,
+        image: Vec::new(),
+    }
+}
+
+/// What happens, in a few words.
+fn title(prepared: &Prepared) -> String {
+    match prepared.scene.task() {
+        Task::Press(press) => {
+            let mut body = prepared.body().chars();
+            let first: String = body.next().into_iter().flat_map(char::to_uppercase).collect();
+            format!("{first}{} pressed on the skin with {} N", body.as_str(), press.force_n)
+        }
+        Task::Drop(drop) => format!("A ball dropped on the skin from {} m", drop.height_m),
+    }
+}

@@ -1,0 +1,76 @@
+"""The book: every page at three widths, in light and dark. `make book` builds it."""
+
+import functools
+import http.server
+import threading
+
+import pytest
+from conftest import ROOT, WIDTHS
+
+BOOK = ROOT / "out/book"
+PAGES = sorted(path.relative_to(BOOK).as_posix() for path in BOOK.glob("*.html"))
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    """Serves files and says nothing."""
+
+    def log_message(self, *_):
+        pass
+
+
+@pytest.fixture(scope="module")
+def address():
+    """Where the book is served: its search needs a server, as in any browser."""
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=BOOK))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    server.server_close()
+
+
+def test_the_book_is_there():
+    if not BOOK.is_dir():
+        pytest.skip(f"{BOOK}: not there; `make book` builds it")
+    assert len(PAGES) > 20, PAGES
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_every_page_fits(width, visit, address):
+    one = visit(width)
+    for page in PAGES:
+        one.open(f"{address}/{page}")
+        one.check()
+        one.shoot(f"book_{page.removesuffix('.html')}")
+
+
+@pytest.mark.skipif(not PAGES, reason="the book is not built")
+def test_the_dark_is_dark(visit, address):
+    one = visit(WIDTHS[0], scheme="dark")
+    for page in ("index.html", "scenes.html", "validation.html"):
+        one.open(f"{address}/{page}")
+        one.check()
+        ground = one.page.evaluate("getComputedStyle(document.body).backgroundColor")
+        assert max(int(part) for part in ground.strip("rgba()").split(",")[:3]) < 80, ground
+        one.shoot(f"book_{page.removesuffix('.html')}")
+
+
+@pytest.mark.skipif(not PAGES, reason="the book is not built")
+def test_the_search_finds_a_field(visit, address):
+    one = visit()
+    page = one.open(f"{address}/index.html")
+    # the index is loaded when the field is entered
+    page.click("input.md-search__input")
+    page.keyboard.type("cells_per_taxel", delay=20)
+    page.wait_for_selector(".md-search-result__item a", timeout=60_000)
+    assert "scenes" in page.locator(".md-search-result__item a").first.get_attribute("href")
+    one.check()
+
+
+@pytest.mark.skipif(not PAGES, reason="the book is not built")
+def test_nothing_is_fetched_from_elsewhere(visit, address):
+    one = visit()
+    asked = []
+    one.page.on("request", lambda request: asked.append(request.url))
+    one.open(f"{address}/scenes.html")
+    assert asked
+    assert [url for url in asked if not url.startswith((address, "data:"))] == []
