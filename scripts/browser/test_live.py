@@ -32,11 +32,20 @@ def live(visit, address):
     def make(width=1400, scheme="light"):
         one = visit(width, scheme)
         one.open(address)
-        one.page.wait_for_function("Number(document.body.dataset.frame) > 20", timeout=60_000)
-        one.page.wait_for_function("/overlap \\d/.test(document.getElementById('scores-1').textContent)", timeout=60_000)
+        until(one.page, "Number(document.body.dataset.frame) > 20")
+        until(one.page, "/overlap \\d/.test(document.getElementById('scores-1').textContent)")
         return one
 
     return make
+
+
+def until(page, condition):
+    """Waits until it is so. The page's security policy keeps Playwright's own waiting from evaluating text."""
+    for _ in range(1200):
+        if page.evaluate(condition):
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError(f"a minute passed without {condition}")
 
 
 def pixels(page, canvas):
@@ -47,7 +56,7 @@ def pixels(page, canvas):
 def frames(page, count):
     """Waits for so many more updates."""
     first = page.evaluate("Number(document.body.dataset.frame)")
-    page.wait_for_function(f"Number(document.body.dataset.frame) > {first + count}", timeout=60_000)
+    until(page, f"Number(document.body.dataset.frame) > {first + count}")
 
 
 def at(page, x, y):
@@ -210,7 +219,7 @@ def test_meshes_are_dropped(live):
     one = live()
     page = one.page
     drop(page, "block.stl", stl(block(40, 30, 20)))
-    page.wait_for_function("document.getElementById('mesh-notes').textContent.includes('40 × 30 × 20 mm')")
+    until(page, "document.getElementById('mesh-notes').textContent.includes('40 × 30 × 20 mm')")
     assert page.locator("#object").input_value() == "block.stl"
     frames(page, 40)
     on_bottom = pixels(page, "pad")
@@ -228,10 +237,10 @@ def test_meshes_are_dropped(live):
         }""",
         list(stl(block(50, 50, 5))),
     )
-    page.wait_for_function("document.getElementById('object').value === 'dropped.stl'")
+    until(page, "document.getElementById('object').value === 'dropped.stl'")
     # a broken one is refused, and the one before presses on
     drop(page, "half.stl", stl(block(40, 30, 20))[:300])
-    page.wait_for_function("document.getElementById('error').textContent.includes('half.stl')")
+    until(page, "document.getElementById('error').textContent.includes('half.stl')")
     assert page.locator("#object").input_value() == "dropped.stl"
     frames(page, 5)
     one.check()
@@ -243,7 +252,7 @@ def test_a_mesh_of_a_million_triangles_is_refused_or_pressed_while_the_page_goes
     # one more than is read: refused at once, without a stop
     triangle = struct.pack("<12fH", 0, 0, 0, 0, 0, 0, 40, 0, 0, 0, 30, 10, 0)
     drop(page, "huge.stl", bytes(80) + struct.pack("<I", 1_000_001) + triangle * 1_000_001)
-    page.wait_for_function("document.getElementById('error').textContent.includes('huge.stl')", timeout=60_000)
+    until(page, "document.getElementById('error').textContent.includes('huge.stl')")
     frames(page, 20)
     one.check()
 
@@ -292,7 +301,7 @@ def test_bad_messages_are_shown_and_do_no_harm(live, address):
     )
     page.evaluate("document.getElementById('turn').max = 720")
     page.locator("#turn").fill("720")
-    page.wait_for_function("document.getElementById('error').textContent.includes('`degrees` = 720')")
+    until(page, "document.getElementById('error').textContent.includes('`degrees` = 720')")
     assert page.locator("#error").is_visible()
     frames(page, 20)
     one.check()
