@@ -145,8 +145,8 @@ pub(super) const FIGURES: &[FigureLine] = &[
         section: "bounce",
         file: "6_localisation",
         alt: "Falling curves of the distance to the true centre over the number of measurements M, with the level of a guess and two stars from the paper.",
-        caption: "As Fig. 6: how far the estimated centre of the contact is from the true one, mean over all bounces. All drops fall \
-                  near the middle of the skin, so to say “the middle” without a measurement is already as good as the dotted \
+        caption: "As Fig. 6: how far the estimated centre of the contact is from the true one, mean over all bounces. The drops fall around \
+                  the middle of the skin, so to say “the middle” without a measurement is already as good as the grey \
                   line: only what lies below it has learned a place from the wire.",
         compared: None,
         draw: |s| Charts(s.skins.fig_6()),
