@@ -71,6 +71,27 @@ impl Patterns {
         }
     }
 
+    /// A pattern of `period` rows, from `levels` in [−1, 1], row-major. Every cell puts out the code nearest to its level.
+    ///
+    /// ```
+    /// use spts_circuit::Patterns;
+    ///
+    /// assert_eq!(Patterns::of_levels(1, &[-1.0, 1.0])?.row(0), [0, 255]);
+    /// # Ok::<(), spts_circuit::WeightsError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Patterns::new`].
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "float to integer casts saturate"
+    )]
+    pub fn of_levels(period: usize, levels: &[f64]) -> Result<Self, WeightsError> {
+        let code = |level: &f64| (127.5 * (1.0 + level)).round() as u8;
+        Self::new(period, levels.iter().map(code).collect())
+    }
+
     /// Number of rows after which the pattern repeats.
     #[must_use]
     pub fn period(&self) -> usize {

@@ -47,6 +47,7 @@ studies!(
 studies!(
     spts::TwinError,
     spts::simulate::SimulateError,
+    spts_live::LiveError,
     spts_report::ReportError,
     spts_report::design::DesignFolderError,
     spts_report::figures::FigureError,

@@ -2,7 +2,7 @@
 
 use crate::error::CliError;
 use crate::{
-    budget, calibrate, circuit, compare, design, explore, fidelity, firmware, phase, readouts, reproduce, seeds,
+    budget, calibrate, circuit, compare, design, explore, fidelity, firmware, live, phase, readouts, reproduce, seeds,
     sensing, simulate, validate,
 };
 use clap::Subcommand;
@@ -20,6 +20,7 @@ pub(super) enum FullCommand {
     Design(Box<design::DesignCommand>),
     Explore(explore::ExploreCommand),
     Firmware(firmware::FirmwareCommand),
+    Live(live::LiveCommand),
     Phase(phase::PhaseCommand),
     Readouts(readouts::ReadoutsCommand),
     Seeds(seeds::SeedsCommand),
@@ -41,6 +42,7 @@ impl FullCommand {
             Self::Design(command) => command.run(),
             Self::Explore(command) => command.run(),
             Self::Firmware(command) => command.run(),
+            Self::Live(command) => command.run(),
             Self::Phase(command) => command.run(),
             Self::Readouts(command) => command.run(),
             Self::Seeds(command) => command.run(),

@@ -26,6 +26,8 @@ mod fidelity;
 mod firmware;
 #[cfg(feature = "full")]
 mod full;
+#[cfg(feature = "full")]
+mod live;
 #[cfg_attr(
     not(feature = "full"),
     expect(dead_code, reason = "some belong to commands that are left out")

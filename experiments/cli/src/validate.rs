@@ -66,7 +66,7 @@ impl ValidateCommand {
 
 fn score(real: &PublishedSkin, measurements: &[usize]) -> Result<ValidationOutput, CliError> {
     let bar = progress(real.skin.steps(), "scoring presses");
-    let scores = real.skin.score(measurements, measurements, &|| bar.inc(1));
+    let scores = real.skin.score(measurements, measurements, &[], &|| bar.inc(1));
     bar.finish_and_clear();
     Ok(ValidationOutput {
         scores: scores?,

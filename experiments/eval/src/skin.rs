@@ -2,9 +2,10 @@
 
 use crate::baselines::{BaselineRow, baselines};
 use crate::control::score_raster;
-use crate::decoders::PublishedDecode;
+use crate::decoders::{PublishedDecode, TrainedDecoder};
 use crate::error::ScoreError;
-use crate::place::{LocalisationRow, localise};
+use crate::place::{LocalisationRow, PlaceRow, localise, places};
+use crate::sensing::Sensing;
 use crate::session::ScoredSession;
 use crate::training::Learned;
 use crate::validation::{ScoreRow, mean_rows, score_session};
@@ -40,8 +41,9 @@ impl ScoredSkin {
         self.sessions.iter().map(|s| s.scored().len() + 1).sum()
     }
 
-    /// Scores the skin at every M of `measurements`, and the ball's place at every M of `localisation`. `done` is
-    /// called after every press and every raster recording.
+    /// Scores the skin at every M of `measurements` by the published decodes and by the decoders in `more`, each beside
+    /// its name, and the ball's place at every M of `localisation`; `done` is called after every press and every raster
+    /// recording.
     ///
     /// # Errors
     /// [`ScoreError`] if the trained dictionary or library does not fit the skin.
@@ -49,9 +51,11 @@ impl ScoredSkin {
         &self,
         measurements: &[usize],
         localisation: &[usize],
+        more: &[(&'static str, TrainedDecoder)],
         done: &(dyn Fn() + Sync),
     ) -> Result<SkinScores, ScoreError> {
-        let decoders = PublishedDecode::decoders(&self.learned)?;
+        let mut decoders = PublishedDecode::named(&self.learned)?;
+        decoders.extend(more.iter().cloned());
         let (mut compressive, mut raster) = (Vec::new(), Vec::new());
         for session in &self.sessions {
             compressive.extend(score_session(session, &decoders, measurements, done)?);
@@ -68,6 +72,19 @@ impl ScoredSkin {
             localisation: located,
             baselines: baselines(&self.sessions, &self.learned),
         })
+    }
+
+    /// The ball's place at every M of `measurements` by every locator, as recorded and with the taxels relabelled; none
+    /// without a ball.
+    ///
+    /// # Errors
+    /// [`ScoreError`] when the sheet is no grid or no rows can be chosen.
+    pub fn ball_places(&self, measurements: &[usize]) -> Result<Vec<PlaceRow>, ScoreError> {
+        let Some(recording) = &self.bounces else {
+            return Ok(Vec::new());
+        };
+        let shifted = self.learned.shifted.clone();
+        places(recording, shifted, self.learned.cols, measurements, &[Sensing::Random])
     }
 }
 

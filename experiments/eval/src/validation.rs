@@ -1,7 +1,7 @@
 //! The results of the published evaluation: every object, every published decoding variant, every M.
 
 use crate::algorithm::DecodeError;
-use crate::decoders::{PublishedDecode, TrainedDecoder};
+use crate::decoders::TrainedDecoder;
 use crate::scorer::{ScoredPress, Scorer};
 use crate::session::ScoredSession;
 use crate::tally::{Scores, Tally, pool};
@@ -53,26 +53,26 @@ impl ScoreRow {
     }
 }
 
-/// Scores every press of the compressive recording of `session` at every M with every decoding variant. Presses run in
-/// parallel; the result does not depend on the number of threads. `done` is called after every press.
+/// Scores every press of the compressive recording of `session` at every M with every decoder, each beside its name.
+/// Presses run in parallel; the result does not depend on the number of threads. `done` is called after every press.
 ///
 /// # Errors
-/// [`DecodeError::External`], which the published variants never cause.
+/// [`DecodeError::External`] alone.
 pub fn score_session(
     session: &ScoredSession,
-    decoders: &[(PublishedDecode, TrainedDecoder)],
+    decoders: &[(&'static str, TrainedDecoder)],
     measurements: &[usize],
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<ScoreRow>, DecodeError> {
     let each = |(decode, decoder)| measurements.iter().map(move |&m| (decode, decoder, m));
-    let keys: Vec<(PublishedDecode, &TrainedDecoder, usize)> =
+    let keys: Vec<(&'static str, &TrainedDecoder, usize)> =
         decoders.iter().map(|(d, t)| (*d, t)).flat_map(each).collect();
     let presses: Vec<Vec<Tally>> = session
         .scored()
         .into_par_iter()
         .filter_map(|block| ScoredPress::new(session, block))
         .map(|press| {
-            let score = |(_, decoder, m): &(PublishedDecode, &TrainedDecoder, usize)| {
+            let score = |(_, decoder, m): &(&'static str, &TrainedDecoder, usize)| {
                 Scorer::new(decoder).score(&press, *m, Some(session.label))
             };
             let tallies = keys.iter().map(score).collect();
@@ -80,8 +80,8 @@ pub fn score_session(
             tallies
         })
         .collect::<Result<_, DecodeError>>()?;
-    let row = |(k, (decode, _, m)): (usize, &(PublishedDecode, &TrainedDecoder, usize))| {
-        ScoreRow::new(session, decode.name(), *m, &pool(presses.iter().map(|p| &p[k])))
+    let row = |(k, (decode, _, m)): (usize, &(&'static str, &TrainedDecoder, usize))| {
+        ScoreRow::new(session, decode, *m, &pool(presses.iter().map(|p| &p[k])))
     };
     Ok(keys.iter().enumerate().filter_map(row).collect())
 }

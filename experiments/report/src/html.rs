@@ -4,20 +4,19 @@ use crate::figures::draw::escape;
 
 /// Style of the page, light and dark, screen and print.
 const STYLE: &str = include_str!("style.css");
-/// Longest caption that is also the alternative text of its figure, in characters.
-const ALT_LENGTH: usize = 160;
-
 /// The whole report.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Page {
     /// Heading.
     pub title: String,
-    /// What was done and what came out, plain text; blank lines separate paragraphs.
+    /// What the page is and what came out, plain text; blank lines separate paragraphs.
     pub summary: String,
     /// Headline numbers.
     pub cards: Vec<Card>,
     /// Sections, in order.
     pub sections: Vec<Section>,
+    /// Terms and what they mean.
+    pub glossary: Vec<(String, String)>,
     /// How the page was made: name and value.
     pub provenance: Vec<(String, String)>,
 }
@@ -27,12 +26,12 @@ pub struct Page {
 pub struct Card {
     /// Quantity.
     pub label: String,
-    /// Value of the twin, with its unit.
-    pub twin: String,
-    /// Value of the recorded sensor.
-    pub real: Option<String>,
-    /// Value the paper states.
-    pub paper: Option<String>,
+    /// Whose value it is.
+    pub of: String,
+    /// Value, with its unit.
+    pub value: String,
+    /// What the value is held against: whose, and the value.
+    pub others: Vec<(String, String)>,
     /// Condition or remark.
     pub note: String,
 }
@@ -46,11 +45,75 @@ pub struct Section {
     pub title: String,
     /// One or two sentences, plain text.
     pub lead: String,
-    /// Figures: stem of the file in `figures/`, and caption. The SVG is shown; a stem that ends in `.png` shows the
-    /// PNG. Both are linked.
-    pub figures: Vec<(String, String)>,
+    /// Figures.
+    pub figures: Vec<PageFigure>,
     /// Tables.
     pub tables: Vec<Table>,
+}
+
+/// One figure of a section.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PageFigure {
+    /// Stem of the file in `figures/`. The SVG is shown, with `.png` the PNG, and both are linked. A name that ends in
+    /// `.gif` is an animation.
+    pub file: String,
+    /// File in `figures/` that stands for an animation in print, and for readers who want nothing to move.
+    pub still: Option<String>,
+    /// What is to be seen, for those who cannot see it.
+    pub alt: String,
+    /// What it means.
+    pub caption: String,
+}
+
+impl PageFigure {
+    /// The figure in `file`, with what is to be seen and what it means.
+    pub fn new(file: impl Into<String>, alt: impl Into<String>, caption: impl Into<String>) -> Self {
+        Self {
+            file: file.into(),
+            still: None,
+            alt: alt.into(),
+            caption: caption.into(),
+        }
+    }
+
+    fn html(&self) -> String {
+        let (alt, caption) = (escape(&self.alt), escape(&self.caption));
+        let stem = link(self.file.trim_end_matches(".png"));
+        let (kind, shown, source, before) = if self.file.ends_with(".gif") {
+            ("picture", stem.clone(), format!("figures/{stem}\""), self.standing())
+        } else if self.file.ends_with(".png") {
+            let source = format!("figures/{stem}.png\" srcset=\"figures/{stem}.png 2x\"");
+            ("picture", format!("{stem}.png"), source, String::new())
+        } else {
+            (
+                "chart",
+                format!("{stem}.svg"),
+                format!("figures/{stem}.svg\""),
+                String::new(),
+            )
+        };
+        let image = format!("<picture>{before}<img src=\"{source} alt=\"{alt}\"></picture>");
+        let files = if self.file.ends_with(".gif") {
+            format!("<a href=\"figures/{stem}\">GIF</a>")
+        } else {
+            format!("<a href=\"figures/{stem}.svg\">SVG</a> <a href=\"figures/{stem}.png\">PNG</a>")
+        };
+        format!(
+            "<figure>\n<div class=\"plate {kind}\"><a href=\"figures/{shown}\">{image}</a></div>\n\
+             <figcaption>{caption} <span class=\"files\">{files}</span></figcaption>\n</figure>\n"
+        )
+    }
+
+    /// The picture in place of an animation.
+    fn standing(&self) -> String {
+        let still = self.still.as_deref();
+        still.map_or_else(String::new, |file| {
+            format!(
+                "<source media=\"print, (prefers-reduced-motion: reduce)\" srcset=\"figures/{}\">",
+                link(file)
+            )
+        })
+    }
 }
 
 /// One table.
@@ -70,38 +133,43 @@ pub struct Table {
 #[must_use]
 pub fn html(page: &Page) -> String {
     let title = escape(&page.title);
-    let contents: String = page
-        .sections
-        .iter()
-        .map(|section| {
-            format!(
-                "<li><a href=\"#{}\">{}</a></li>\n",
-                anchor(&section.id),
-                escape(&section.title)
-            )
-        })
-        .collect();
+    let entry = |id: &str, title: &str| format!("<li><a href=\"#{}\">{}</a></li>\n", anchor(id), escape(title));
+    let mut contents: String = page.sections.iter().map(|s| entry(&s.id, &s.title)).collect();
+    let last = [
+        (&page.glossary, "glossary", "Glossary"),
+        (&page.provenance, "provenance", "Provenance"),
+    ];
+    let mut terms = String::new();
+    for (list, id, title) in last.iter().filter(|(list, ..)| !list.is_empty()) {
+        contents.push_str(&entry(id, title));
+        terms.push_str(&definitions(id, title, list));
+    }
     let cards: String = page.cards.iter().map(card).collect();
     let sections: String = page.sections.iter().map(section).collect();
-    let provenance: String = page
-        .provenance
-        .iter()
-        .map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value)))
-        .collect();
     let nav = wrapped(&contents, "<nav aria-label=\"Contents\"><ol>\n", "</ol></nav>\n");
-    let cards = wrapped(&cards, "<div class=\"cards\">\n", "</div>\n");
-    let provenance = wrapped(
-        &provenance,
-        "<section id=\"provenance\"><h2>Provenance</h2>\n<dl>\n",
-        "</dl>\n</section>\n",
+    let cards = wrapped(
+        &cards,
+        "<section id=\"main-figures\">\n<h2>The main figures</h2>\n<div class=\"cards\">\n",
+        "</div>\n</section>\n",
     );
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"color-scheme\" content=\"light dark\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n\
-         </head>\n<body>\n<header>\n<h1>{title}</h1>\n{}{cards}</header>\n{nav}<main>\n{sections}{provenance}</main>\n\
+         </head>\n<body>\n<header>\n<h1>{title}</h1>\n{}</header>\n{nav}<main>\n{cards}{sections}{terms}</main>\n\
          </body>\n</html>\n",
         paragraphs(&page.summary, "summary")
+    )
+}
+
+/// A section of terms and what they are.
+fn definitions(id: &str, title: &str, list: &[(String, String)]) -> String {
+    let rows = list
+        .iter()
+        .map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value)));
+    format!(
+        "<section id=\"{id}\" class=\"terms\"><h2>{title}</h2>\n<dl>\n{}</dl>\n</section>\n",
+        rows.collect::<String>()
     )
 }
 
@@ -130,50 +198,28 @@ fn anchor(id: &str) -> String {
 }
 
 fn card(card: &Card) -> String {
-    let others: String = [("real skin", &card.real), ("paper", &card.paper)]
-        .into_iter()
-        .filter_map(|(name, value)| value.as_ref().map(|value| (name, value)))
-        .map(|(name, value)| format!("<div class=\"{name}\"><dt>{name}</dt><dd>{}</dd></div>", escape(value)))
+    let others = card.others.iter();
+    let others: String = others
+        .map(|(name, value)| format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value)))
         .collect();
     format!(
-        "<article class=\"card\"><h2>{}</h2><p class=\"value\"><span>twin</span>{}</p>{}{}</article>\n",
+        "<article class=\"card\"><h3>{}</h3><p class=\"value\"><span>{}</span> {}</p>{}{}</article>\n",
         escape(&card.label),
-        escape(&card.twin),
+        escape(&card.of),
+        escape(&card.value),
         wrapped(&others, "<dl>", "</dl>"),
         wrapped(&escape(&card.note), "<p class=\"note\">", "</p>"),
     )
 }
 
 fn section(section: &Section) -> String {
-    let figures: String = section
-        .figures
-        .iter()
-        .map(|(stem, caption)| figure(stem, caption))
-        .collect();
+    let figures: String = section.figures.iter().map(PageFigure::html).collect();
     let tables: String = section.tables.iter().map(table).collect();
     format!(
         "<section id=\"{}\">\n<h2>{}</h2>\n{}{figures}{tables}</section>\n",
         anchor(&section.id),
         escape(&section.title),
         paragraphs(&section.lead, "lead")
-    )
-}
-
-fn figure(stem: &str, caption: &str) -> String {
-    let plain = stem.strip_suffix(".png").or(stem.strip_suffix(".svg")).unwrap_or(stem);
-    let file = link(plain);
-    let source = if stem.ends_with(".png") {
-        format!("src=\"figures/{file}.png\" srcset=\"figures/{file}.png 2x\"")
-    } else {
-        format!("src=\"figures/{file}.svg\"")
-    };
-    let alt: String = caption.chars().take(ALT_LENGTH).collect();
-    format!(
-        "<figure>\n<div class=\"plate\"><a href=\"figures/{file}.png\"><img {source} alt=\"{}\"></a></div>\n\
-         <figcaption>{} <span class=\"files\"><a href=\"figures/{file}.svg\">SVG</a> \
-         <a href=\"figures/{file}.png\">PNG</a></span></figcaption>\n</figure>\n",
-        escape(&alt),
-        escape(caption)
     )
 }
 

@@ -14,6 +14,7 @@ pub mod fidelity;
 pub mod figures;
 pub mod firmware;
 mod html;
+mod labels;
 mod origin;
 pub mod per_object;
 pub mod phase;
@@ -27,5 +28,5 @@ pub mod sensing;
 pub mod simulation;
 
 pub use error::{ReportError, write_all_or_none};
-pub use html::{Card, Page, Section, Table, html};
+pub use html::{Card, Page, PageFigure, Section, Table, html};
 pub use origin::Origin;

@@ -1,6 +1,6 @@
 //! A page of made-up numbers, for tests.
 
-use super::{Card, Page, Section, Table};
+use super::{Card, Page, PageFigure, Section, Table};
 
 /// Strings from literals.
 fn cells(row: &[&str]) -> Vec<String> {
@@ -11,9 +11,12 @@ fn cells(row: &[&str]) -> Vec<String> {
 pub(crate) fn page() -> Page {
     let card = |label: &str, twin: &str, real: Option<&str>, paper: Option<&str>| Card {
         label: label.to_owned(),
-        twin: twin.to_owned(),
-        real: real.map(str::to_owned),
-        paper: paper.map(str::to_owned),
+        of: "twin".to_owned(),
+        value: twin.to_owned(),
+        others: [("real skin", real), ("paper", paper)]
+            .into_iter()
+            .filter_map(|(name, value)| Some((name.to_owned(), value?.to_owned())))
+            .collect(),
         note: "made-up numbers".to_owned(),
     };
     let section = |id: &str, title: &str, figures: &[&str], tables: Vec<Table>| Section {
@@ -24,8 +27,9 @@ pub(crate) fn page() -> Page {
         figures: figures
             .iter()
             .map(|stem| {
-                (
-                    (*stem).to_owned(),
+                PageFigure::new(
+                    *stem,
+                    format!("Made-up curves “{stem}”"),
                     format!("Synthetic figure “{stem}” with a caption of a usual length."),
                 )
             })
@@ -61,6 +65,7 @@ pub(crate) fn page() -> Page {
             section("fig4", "Adaptive reconstruction", &["adaptive", "objects.png"], vec![]),
             section("fig5", "A bouncing ball", &["bounce", "one", "awkward"], vec![table]),
         ],
+        glossary: vec![("taxel".to_owned(), "one touch-sensitive element of the skin".to_owned())],
         provenance: vec![
             ("seed".to_owned(), "1".to_owned()),
             ("data".to_owned(), "none: this page is synthetic".to_owned()),

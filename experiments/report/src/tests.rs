@@ -1,11 +1,11 @@
 //! Tests of the page.
 
-use super::{Page, Section, Table, html};
+use super::{Page, PageFigure, Section, Table, html};
 use crate::figures::tests::check_markup;
 use crate::samples;
 
 /// HTML elements without an end tag.
-const VOID: [&str; 2] = ["meta", "img"];
+const VOID: [&str; 3] = ["meta", "img", "source"];
 
 /// The page without its style sheet, which is not markup.
 fn markup(page: &Page) -> String {
@@ -23,6 +23,39 @@ fn page_is_well_formed_and_self_contained() {
     assert!(html(&samples::page()).contains("prefers-color-scheme: dark"));
     assert!(text.contains("src=\"figures/two.svg\"") && text.contains("src=\"figures/objects.png\""));
     assert!(text.contains("href=\"figures/objects.svg\"") && text.contains("href=\"tables/accuracy.csv\""));
+}
+
+/// Glossary and provenance are in the navigation, and a figure has words of its own for those who cannot see it.
+#[test]
+fn navigation_leads_to_every_section() {
+    let page = samples::page();
+    let text = markup(&page);
+    let ids = page
+        .sections
+        .iter()
+        .map(|s| s.id.as_str())
+        .chain(["glossary", "provenance"]);
+    for id in ids {
+        let (link, place) = (format!("<a href=\"#{id}\">"), format!("<section id=\"{id}\""));
+        assert!(text.contains(&link) && text.contains(&place), "{id}");
+    }
+    assert!(text.contains("alt=\"Made-up curves “two”\""));
+}
+
+/// An animation is one file, and a picture stands for it where nothing is to move.
+#[test]
+fn animations_are_shown_as_they_are() {
+    let figure = PageFigure {
+        still: Some("still.png".to_owned()),
+        ..PageFigure::new("press.gif", "a press", "A press.")
+    };
+    assert!(
+        figure
+            .html()
+            .contains("prefers-reduced-motion: reduce)\" srcset=\"figures/still.png\"")
+    );
+    assert!(figure.html().contains("src=\"figures/press.gif\" alt=\"a press\""));
+    assert!(!figure.html().contains("svg"));
 }
 
 #[test]
@@ -43,7 +76,7 @@ fn text_cannot_become_markup() {
         id: nasty.clone(),
         title: nasty.clone(),
         lead: nasty.clone(),
-        figures: vec![(nasty.clone(), nasty.clone())],
+        figures: vec![PageFigure::new(nasty.clone(), nasty.clone(), nasty.clone())],
         tables: vec![table],
     };
     let page = Page {
@@ -51,12 +84,13 @@ fn text_cannot_become_markup() {
         summary: nasty.clone(),
         cards: vec![super::Card {
             label: nasty.clone(),
-            twin: nasty.clone(),
-            real: Some(nasty.clone()),
-            paper: Some(nasty.clone()),
+            of: nasty.clone(),
+            value: nasty.clone(),
+            others: vec![(nasty.clone(), nasty.clone())],
             note: nasty.clone(),
         }],
         sections: vec![section],
+        glossary: vec![(nasty.clone(), nasty.clone())],
         provenance: vec![(nasty.clone(), nasty)],
     };
     let text = markup(&page);

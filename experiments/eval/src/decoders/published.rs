@@ -57,6 +57,16 @@ impl PublishedDecode {
         let each = Self::ALL.into_iter();
         each.map(|decode| Ok((decode, decode.decoder(learned)?))).collect()
     }
+
+    /// All of them, each beside its name.
+    ///
+    /// # Errors
+    /// [`LearnError`] when one of them cannot use what was learned.
+    pub fn named(learned: &Learned) -> Result<Vec<(&'static str, TrainedDecoder)>, LearnError> {
+        let each = Self::ALL.into_iter();
+        each.map(|decode| Ok((decode.name(), decode.decoder(learned)?)))
+            .collect()
+    }
 }
 
 /// M/4 rounded half up, at least 1: the published rule for the number of atoms.

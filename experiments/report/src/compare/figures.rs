@@ -1,6 +1,7 @@
 //! Residuals, quantiles and score curves, real beside twin.
 
 use crate::figures::{Chart, FigureError, Series, Style, save_charts};
+use crate::labels::{decoder_label, object_label};
 use spts_eval::decoders::PublishedDecode;
 use spts_studies::calibrate::quantiles;
 use spts_studies::compare::{ComparedSession, ScoreCurves};
@@ -53,12 +54,12 @@ fn histogram(compared: &ComparedSession) -> Chart {
             .collect()
     };
     Chart {
-        title: compared.real.session.clone(),
-        x_label: "residual without memory (V)".to_owned(),
-        y_label: "share of samples a bin".to_owned(),
+        title: object_label(&compared.real.session).to_owned(),
+        x_label: "residual without memory, V".to_owned(),
+        y_label: "share of samples in a bin".to_owned(),
         y_log: true,
         series: vec![
-            Series::new("sensor", Style::Real, 0, shares(&compared.real.clean_v)),
+            Series::new("real skin", Style::Real, 0, shares(&compared.real.clean_v)),
             Series::new("twin", Style::Twin, 0, shares(&compared.twin.clean_v)),
         ],
         ..Chart::default()
@@ -77,9 +78,9 @@ fn quantile_plot(compared: &ComparedSession) -> Chart {
         .collect();
     let ten = |values: &[f64]| -> Vec<f64> { quantiles(values, POINTS).iter().map(|v| 10.0 * v).collect() };
     Chart {
-        title: compared.real.session.clone(),
-        x_label: "quantile of the sensor (V)".to_owned(),
-        y_label: "quantile of the twin (V)".to_owned(),
+        title: object_label(&compared.real.session).to_owned(),
+        x_label: "quantile of the real skin, V".to_owned(),
+        y_label: "quantile of the twin, V".to_owned(),
         series: vec![
             Series::new("equal", Style::Baseline, 0, ends),
             Series::new("output", Style::Twin, 0, output),
@@ -103,7 +104,7 @@ fn scores(curves: &ScoreCurves, decode: PublishedDecode) -> Chart {
     ]) {
         for (style, whose, rows) in [
             (Style::Twin, "twin", &curves.twin),
-            (Style::Real, "sensor", &curves.real),
+            (Style::Real, "real skin", &curves.real),
         ] {
             let points = rows
                 .iter()
@@ -118,7 +119,7 @@ fn scores(curves: &ScoreCurves, decode: PublishedDecode) -> Chart {
         }
     }
     Chart {
-        title: decode.label().to_owned(),
+        title: decoder_label(decode.name()).to_owned(),
         x_label: "measurements M".to_owned(),
         y_label: "score, mean over the objects".to_owned(),
         x_log: true,

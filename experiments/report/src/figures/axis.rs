@@ -2,6 +2,8 @@
 
 /// Share of the range left free beyond the data.
 const PADDING: f64 = 0.04;
+/// Ticks of a logarithmic axis below which it takes those of a linear one.
+const LEAST_TICKS: usize = 3;
 
 /// A linear or logarithmic axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,7 +88,18 @@ impl Axis {
     #[must_use]
     pub fn ticks(&self, count: usize) -> Vec<(f64, String)> {
         if self.log {
-            self.log_ticks()
+            let ticks = self.log_ticks();
+            if ticks.len() >= LEAST_TICKS {
+                return ticks;
+            }
+            // Less than a decade between two ticks of the usual leads: ticks as on a linear axis.
+            let linear = Self {
+                low: 10_f64.powf(self.low),
+                high: 10_f64.powf(self.high),
+                log: false,
+            };
+            let finer = linear.linear_ticks(count);
+            if finer.len() > ticks.len() { finer } else { ticks }
         } else {
             self.linear_ticks(count)
         }
@@ -183,6 +196,16 @@ mod tests {
     fn measurement_counts_have_familiar_ticks() {
         let axis = Axis::new([2.0, 100.0].into_iter(), true, None);
         assert_eq!(labels(&axis), ["2", "5", "10", "20", "50", "100"]);
+    }
+
+    /// One tick says where, but not how far: a short logarithmic axis has more.
+    #[test]
+    fn a_short_logarithmic_axis_has_several_ticks() {
+        for (low, high) in [(11.0, 19.0), (55.0, 65.0), (0.012, 0.014), (2.1, 2.9)] {
+            let axis = Axis::new([low, high].into_iter(), true, None);
+            let ticks = labels(&axis);
+            assert!(ticks.len() >= 3, "{low} {high} {ticks:?}");
+        }
     }
 
     #[test]

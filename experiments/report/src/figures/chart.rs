@@ -1,5 +1,7 @@
 //! Line charts: what is plotted.
 
+use super::looks::{self, Stroke};
+
 /// Whose numbers a series shows. Decides colour and stroke, the same in every figure.
 ///
 /// Colours are from the palette of M. Okabe and K. Ito, *Color Universal Design* (2008), safe for the common kinds
@@ -20,6 +22,8 @@ pub enum Style {
     Baseline,
     /// One of several alternatives, all of the twin: solid, six hues and markers, one a variant.
     Alternative,
+    /// A decoder or locator, whose variant follows from its name alone: see [`super::decoder_variant`].
+    Decoder,
 }
 
 /// One curve.
@@ -36,6 +40,8 @@ pub struct Series {
     pub points: Vec<(f64, f64)>,
     /// Bands at some of the points: horizontal coordinate, lower and upper end. Drawn as thin bars.
     pub spans: Vec<(f64, f64, f64)>,
+    /// Scatter about the curve: horizontal coordinate, lower and upper end. Drawn as a shade.
+    pub scatter: Vec<(f64, f64, f64)>,
 }
 
 impl Style {
@@ -43,6 +49,7 @@ impl Style {
     pub(super) const fn variants(self) -> u8 {
         match self {
             Self::Alternative => 6,
+            Self::Decoder => looks::VARIANTS,
             _ => 4,
         }
     }
@@ -57,7 +64,19 @@ impl Series {
             variant,
             points,
             spans: Vec::new(),
+            scatter: Vec::new(),
         }
+    }
+
+    /// The curve `name` of the decoder, locator or control `decoder`, in that one's own colour.
+    pub fn of_decoder(name: impl Into<String>, decoder: &str, stroke: Stroke, points: Vec<(f64, f64)>) -> Self {
+        Self::new(name, Style::Decoder, looks::decoder_variant(decoder, stroke), points)
+    }
+
+    /// The same curve with a shade of its scatter.
+    #[must_use]
+    pub fn with_scatter(self, scatter: Vec<(f64, f64, f64)>) -> Self {
+        Self { scatter, ..self }
     }
 
     /// The same curve with bands.
@@ -76,6 +95,17 @@ pub struct Claim {
     pub x: Option<f64>,
     /// Vertical coordinate.
     pub y: Option<f64>,
+}
+
+/// A range on the horizontal axis that the paper states.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StatedRange {
+    /// Words beside the range.
+    pub label: String,
+    /// Lower end.
+    pub from: f64,
+    /// Upper end.
+    pub to: f64,
 }
 
 /// One panel.
@@ -97,6 +127,8 @@ pub struct Chart {
     pub series: Vec<Series>,
     /// Claims of the paper.
     pub claims: Vec<Claim>,
+    /// Ranges that the paper states, shaded.
+    pub ranges: Vec<StatedRange>,
     /// What others have published: points that are drawn hollow.
     pub published: Vec<Claim>,
 }

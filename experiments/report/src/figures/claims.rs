@@ -63,7 +63,7 @@ pub(super) fn draw_marks(
                 points,
                 stroke: CLAIM,
                 width: 1.6,
-                dash: marker::dash(Style::Paper),
+                dash: marker::dash(Style::Paper, 0),
             });
         }
         marks.push(Mark {

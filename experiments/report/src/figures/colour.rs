@@ -1,6 +1,7 @@
 //! Colours: one perceptually even map for values, one ink for each style.
 
 use super::chart::Style;
+use super::looks;
 
 /// A 24-bit sRGB colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,6 +59,7 @@ pub fn style(style: Style, variant: u8) -> Rgb {
         Style::RasterReal => Rgb(0x7a, 0x3e, 0x00),
         Style::Paper => CLAIM,
         Style::Baseline => Rgb(0x00, 0x9e, 0x73),
+        Style::Decoder => return looks::look(variant).0,
         Style::Alternative => return ALTERNATIVES[usize::from(variant % style.variants())],
     };
     match variant % 4 {

@@ -4,6 +4,7 @@ use super::chart::{Chart, Style};
 use super::colour::{self, CLAIM, INK};
 use super::draw::{Canvas, Point, Shape, TextStyle, text_width};
 use super::marker;
+use super::shade::RANGE_OPACITY;
 
 /// Size of the words.
 const SIZE: f64 = 13.0;
@@ -23,6 +24,8 @@ pub(super) enum LegendKey {
     Star,
     /// The line of a claim.
     Dashes,
+    /// The shade of a range that the paper states.
+    Shade,
     /// The ring of a published system.
     Ring,
 }
@@ -56,6 +59,9 @@ pub(super) fn entries(chart: &Chart) -> Vec<(LegendKey, String)> {
         if (claim.x.is_some() || claim.y.is_some()) && !out.contains(&entry) {
             out.push(entry);
         }
+    }
+    if !chart.ranges.is_empty() {
+        out.push((LegendKey::Shade, "range in the paper".to_owned()));
     }
     if !chart.published.is_empty() {
         out.push((LegendKey::Ring, "published, as stated".to_owned()));
@@ -97,7 +103,7 @@ impl Legend {
                 let (points, middle) = (vec![(x, y), (x + SAMPLE, y)], (x + SAMPLE / 2.0, y));
                 match key {
                     LegendKey::Curve(style, variant) => {
-                        let (stroke, dash) = (colour::style(*style, *variant), marker::dash(*style));
+                        let (stroke, dash) = (colour::style(*style, *variant), marker::dash(*style, *variant));
                         canvas.items.push(Shape::Line {
                             points,
                             stroke,
@@ -106,6 +112,7 @@ impl Legend {
                         });
                         marker::draw(canvas, middle, *style, *variant);
                     }
+                    LegendKey::Shade => canvas.rect((x, y - 7.0), (SAMPLE, 14.0), CLAIM, RANGE_OPACITY),
                     LegendKey::Star => marker::star(canvas, middle),
                     LegendKey::Ring => marker::ring(canvas, middle),
                     LegendKey::Dashes => {
@@ -113,7 +120,7 @@ impl Legend {
                             points,
                             stroke: CLAIM,
                             width: 1.6,
-                            dash: marker::dash(Style::Paper),
+                            dash: marker::dash(Style::Paper, 0),
                         });
                     }
                 }

@@ -3,13 +3,15 @@
 use super::chart::Style;
 use super::colour::{self, CLAIM, INK, Rgb, WHITE};
 use super::draw::{Canvas, Point, Shape};
+use super::looks;
 
 /// Half the width of a marker.
 const RADIUS: f64 = 4.2;
 
 /// Dash and gap of a style's stroke; `None` is solid.
-pub(super) const fn dash(style: Style) -> Option<(f64, f64)> {
+pub(super) fn dash(style: Style, variant: u8) -> Option<(f64, f64)> {
     match style {
+        Style::Decoder => looks::stroke(variant).dash(),
         Style::Paper => Some((7.0, 4.0)),
         Style::Baseline => Some((2.2, 3.2)),
         _ => None,
@@ -20,19 +22,25 @@ pub(super) const fn dash(style: Style) -> Option<(f64, f64)> {
 pub(super) fn draw(canvas: &mut Canvas, place: Point, style: Style, variant: u8) {
     let fill = colour::style(style, variant);
     let first = match style {
-        Style::Twin | Style::Real | Style::Alternative => 0,
+        Style::Twin | Style::Real | Style::Alternative | Style::Decoder => 0,
         Style::Raster | Style::RasterReal => 1,
         Style::Baseline => 2,
         Style::Paper => 3,
     };
     let form = match style {
+        Style::Decoder => looks::look(variant).1,
         Style::Alternative => [1, 0, 5, 3, 2, 4][usize::from(variant % style.variants())],
         _ => (first + variant % 4) % 4,
     };
     // A white rim separates markers that overlap.
     shape(canvas, place, form, RADIUS + 1.0, WHITE);
     shape(canvas, place, form, RADIUS, fill);
-    if matches!(style, Style::Real | Style::RasterReal) {
+    let hollow = match style {
+        Style::Real | Style::RasterReal => true,
+        Style::Decoder => looks::stroke(variant).hollow(),
+        _ => false,
+    };
+    if hollow {
         shape(canvas, place, form, RADIUS - 1.8, WHITE);
     }
 }

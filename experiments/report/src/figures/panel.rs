@@ -7,7 +7,7 @@ use super::draw::{Anchor, Canvas, Point, Shape, TextStyle, save, text_width, wra
 use super::error::FigureError;
 use super::frame::PanelFrame;
 use super::legend::{self, Legend, LegendKey};
-use super::{claims, colour, marker};
+use super::{claims, coincide, colour, marker, shade};
 use std::path::Path;
 
 /// Size of tick labels.
@@ -23,7 +23,7 @@ const STROKE: f64 = 2.2;
 /// Width of the bar of a band.
 const BAR: f64 = 1.4;
 /// Markers on one curve at most; a longer curve carries every second, third, … one.
-const MARKERS: usize = 24;
+const MARKERS: usize = 40;
 
 /// Writes one figure of one or several panels, side by side, to `dir/name.svg` and `dir/name.png`.
 ///
@@ -114,8 +114,14 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         .collect();
     let claimed =
         |pick: fn(&super::chart::Claim) -> Option<f64>| chart.claims.iter().chain(&chart.published).filter_map(pick);
+    let stated = chart.ranges.iter().flat_map(|range| [range.from, range.to]);
     let x = Axis::new(
-        curves.iter().flatten().map(|p| p.0).chain(claimed(|c| c.x)),
+        curves
+            .iter()
+            .flatten()
+            .map(|p| p.0)
+            .chain(claimed(|c| c.x))
+            .chain(stated),
         chart.x_log,
         None,
     );
@@ -140,7 +146,9 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
     };
     draw_axes(canvas, chart, &frame, left, &y_ticks);
 
+    shade::draw_ranges(canvas, chart, &frame);
     let mut busy: Vec<Point> = Vec::new();
+    let mut drawn: Vec<Vec<Point>> = Vec::new();
     // Twin and sensor lie above the rest: baselines and claims are drawn first.
     let mut order: Vec<_> = chart.series.iter().zip(&curves).collect();
     order.sort_by_key(|(series, _)| match series.style {
@@ -149,16 +157,18 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         Style::RasterReal => 2,
         Style::Raster => 3,
         Style::Real => 4,
-        Style::Twin | Style::Alternative => 5,
+        Style::Twin | Style::Alternative | Style::Decoder => 5,
     });
     let mut marks = claims::draw_marks(canvas, &chart.claims, &frame, marker::star);
     marks.extend(claims::draw_marks(canvas, &chart.published, &frame, marker::ring));
     for (series, points) in order {
         let places: Vec<Point> = points.iter().filter_map(|&p| frame.place(p)).collect();
         let stroke = colour::style(series.style, series.variant);
+        let below = coincide::below(&places, &drawn);
+        shade::draw_scatter(canvas, series, &frame);
         for piece in clip(&places, &frame) {
             busy.extend(samples(&piece));
-            let dash = marker::dash(series.style);
+            let dash = coincide::dash(below).or(marker::dash(series.style, series.variant));
             canvas.items.push(Shape::Line {
                 points: piece,
                 stroke,
@@ -170,10 +180,13 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
             canvas.line(&bar, stroke, BAR);
         }
         let stride = places.len().div_ceil(MARKERS).max(1);
+        // on a curve that is drawn already, every second marker is left to it
+        let stride = stride * (1 + below.min(1));
         for &place in places.iter().step_by(stride).filter(|&&place| frame.holds(place)) {
             busy.push(place);
             marker::draw(canvas, place, series.style, series.variant);
         }
+        drawn.push(places);
     }
     claims::draw_labels(canvas, &marks, &frame, &busy);
     if curves.iter().all(Vec::is_empty) {

@@ -1,10 +1,11 @@
 //! Tables and the figure of twin and skin object by object, for `spts compare` and the report.
 
+use crate::PageFigure;
 use crate::figures::{FigureError, Interval, IntervalChart, IntervalPanel, save_intervals};
+use crate::labels::{decoder_label as label, object_label, object_list};
 use crate::{Section, Table};
 use spts::output::{OutputError, write_json, write_table};
-use spts_eval::decoders::label;
-use spts_studies::per_object::{Images, MEASUREMENTS, ObjectBand, PerObjectReport, SCORES, ScoreDistance};
+use spts_studies::per_object::{MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES, ScoreDistance};
 use std::path::Path;
 
 /// Name of the figure.
@@ -45,8 +46,17 @@ fn short_label(score: &str) -> &str {
     }
 }
 
+/// A decoder in the heading of a panel.
+fn short_decoder(name: &str) -> &str {
+    match name {
+        "matched" => "published",
+        "nn_lmmse" => "NN LMMSE",
+        other => spts_eval::decoders::label(other),
+    }
+}
+
 fn of_twin(report: &PerObjectReport) -> impl Iterator<Item = &ObjectBand> {
-    report.objects.iter().filter(|b| b.images == Images::Twin)
+    report.objects.iter().filter(|b| b.images == ReadoutImages::Twin)
 }
 
 fn chart(report: &PerObjectReport) -> IntervalChart {
@@ -72,7 +82,7 @@ fn chart(report: &PerObjectReport) -> IntervalChart {
             })
         };
         IntervalPanel {
-            title: format!("{}, {decoder}, M = {m}", short_label(score)),
+            title: format!("{}, {}, M = {m}", short_label(score), short_decoder(decoder)),
             intervals: rows.iter().map(interval).collect(),
         }
     };
@@ -80,13 +90,13 @@ fn chart(report: &PerObjectReport) -> IntervalChart {
         .iter()
         .flat_map(|(score, decoder)| MEASUREMENTS.map(|m| panel(score, decoder, m)));
     IntervalChart {
-        title: format!("Twin and skin, object by object; {} simulated skins", report.skins),
+        title: format!("Twin and real skin, object by object; {} simulated skins", report.skins),
         legend: [
             "twin: mean, and where one more simulated skin lies (90 %)".to_owned(),
-            "sensor".to_owned(),
+            "real skin".to_owned(),
         ],
         panels: panels.collect(),
-        rows,
+        rows: rows.iter().map(|name| object_label(name).to_owned()).collect(),
         columns: MEASUREMENTS.len(),
     }
 }
@@ -95,19 +105,20 @@ fn chart(report: &PerObjectReport) -> IntervalChart {
 pub(crate) fn section(report: &PerObjectReport) -> Section {
     Section {
         id: "per_object".to_owned(),
-        title: "Twin and skin, object by object".to_owned(),
+        title: "Twin and real skin".to_owned(),
         lead: format!(
-            "{} simulated skins, each with taxels, sessions and noise of its own, press the objects that the skin recorded compressively. Their \
-             scores give every object a band in which one more simulated skin lies nine times in ten. The distance of twin and skin is the mean \
-             over the objects of |twin − real|: errors of opposite sign do not cancel. “Between skins” is what one of the simulated skins has in \
-             place of the real one.",
+            "{} simulated skins, each with taxels, mounting and noise of its own, feel the objects that the real skin recorded in compressed \
+             form. Their scores give every object a band in which one more simulated skin lies nine times in ten. The distance of twin and \
+             real skin is the mean over the objects of |twin − real|, in which errors of opposite sign do not cancel. “Between skins” is the \
+             distance of one simulated skin from the others: the real skin cannot be expected to be closer.",
             report.skins
         ),
-        figures: vec![(
-            FIGURE.to_owned(),
-            "Band and mean of the simulated skins, and the real skin's score; red where it lies outside. “Class” is the share of single windows \
-             classified rightly."
-                .to_owned(),
+        figures: vec![PageFigure::new(
+            FIGURE,
+            "Panels by decoder and number of measurements: for every object a blue band of the simulated skins and a mark for the real skin.",
+            "Scores object by object. Blue: band and mean of the simulated skins. Circle: the real skin, a red square where it lies outside the \
+             band. “IoU” is the overlap of decoded and true contact, “class” the share of single windows classified correctly, “NN LMMSE” \
+             the non-negative LMMSE decoder.",
         )],
         tables: vec![distances(report), objects(report)],
     }
@@ -122,11 +133,11 @@ fn distances(report: &PerObjectReport) -> Table {
             format!("{:.3}", d.mean_abs_difference),
             format!("{:.3}", d.between_skins),
             format!("{:+.3}", d.difference_of_means),
-            d.outside.clone(),
+            object_list(&d.outside),
         ]
     };
     let header = [
-        "decode",
+        "decoder",
         "score",
         "M",
         "|twin − real|",
@@ -141,7 +152,7 @@ fn distances(report: &PerObjectReport) -> Table {
         rows: report
             .distances
             .iter()
-            .filter(|d| d.images == Images::Twin)
+            .filter(|d| d.images == ReadoutImages::Twin)
             .map(row)
             .collect(),
         file: Some(TABLES[1].to_owned()),
@@ -154,16 +165,16 @@ fn objects(report: &PerObjectReport) -> Table {
             label(&b.decoder).to_owned(),
             score_label(b.score).to_owned(),
             b.m.to_string(),
-            b.object.clone(),
+            object_label(&b.object).to_owned(),
             format!("{:.3}", b.real),
             format!("{:.3}", b.twin),
             format!("{:.3} – {:.3}", b.low, b.high),
             if b.inside { "" } else { "outside" }.to_owned(),
         ]
     };
-    let header = ["decode", "score", "M", "object", "real", "twin", "band", ""];
+    let header = ["decoder", "score", "M", "object", "real skin", "twin, mean", "band", ""];
     Table {
-        caption: "Object by object".to_owned(),
+        caption: "Scores object by object".to_owned(),
         header: header.map(str::to_owned).to_vec(),
         rows: of_twin(report).map(row).collect(),
         file: Some(TABLES[0].to_owned()),

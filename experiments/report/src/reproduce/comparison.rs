@@ -1,7 +1,8 @@
 //! The readout beside the recordings it is fitted to: the skin's own images through the twin's electronics.
 
 use super::ReproduceError;
-use crate::{ReportError, Section, Table, compare};
+use crate::labels::{decoder_label, object_label, statistic_label};
+use crate::{PageFigure, ReportError, Section, Table, compare};
 use spts::output::write_table;
 use spts::progress::Progress;
 use spts_eval::PublishedSkin;
@@ -41,17 +42,29 @@ impl ReadoutSection {
 
     /// Section of the page.
     pub(super) fn section(&self) -> Section {
-        let figure = |file: &str, caption: &str| (file.to_owned(), caption.to_owned());
         Section {
             id: "readout".to_owned(),
             title: "The readout".to_owned(),
-            lead: "The skin's own images, measured by least squares, sent through the twin's readout at the same rows of weights. The readout is \
-                   calibrated on the odd presses of each session, compared on the even ones with the same estimators, and scored on the even ones of presses 6 to 15."
+            lead: "The electronics alone: images of the real skin, found from its recordings by least squares, go through the twin's readout with the \
+                   same weights. The readout is fitted to the odd presses of each recording, and compared and scored on the even ones."
                 .to_owned(),
             figures: vec![
-                figure("residuals", "Residual of the least-squares fit, the memory taken out: share of samples a bin."),
-                figure("quantiles", "Quantiles of the output, and of ten times that residual, twin against skin."),
-                figure("scores", "Score curves with the published dictionary and library, the skin's raster image as the truth for both."),
+                PageFigure::new(
+                    "residuals",
+                    "Histograms of the residuals of twin and real skin, one panel a recording.",
+                    "What the fitted image does not explain of the wire, without the memory of earlier samples: share of samples in each bin.",
+                ),
+                PageFigure::new(
+                    "quantiles",
+                    "Quantiles of the twin over those of the real skin, one panel a recording, close to the diagonal.",
+                    "Quantiles of the wire's voltage, and of ten times the residual. Equal distributions lie on the dotted line.",
+                ),
+                PageFigure::new(
+                    "scores",
+                    "Score curves over the number of measurements for twin and real skin, one panel a published decoder.",
+                    "Scores of the published decoders, mean over the objects, with the published dictionary and library. The real skin's raster \
+                     image is the truth for both.",
+                ),
             ],
             tables: vec![self.statistics_table(), self.curves_table()],
         }
@@ -60,8 +73,8 @@ impl ReadoutSection {
     fn statistics_table(&self) -> Table {
         let row = |s: &Statistic| {
             vec![
-                s.session.clone(),
-                s.name.replace('_', " "),
+                object_label(&s.session).to_owned(),
+                statistic_label(s.name),
                 with_error(s.real, s.real_standard_error, 4),
                 with_error(s.twin, s.twin_standard_error, 4),
                 s.tolerance.to_owned(),
@@ -69,10 +82,17 @@ impl ReadoutSection {
             ]
         };
         Table {
-            caption: "Statistics of the even presses, V where they have a unit".to_owned(),
-            header: ["session", "statistic", "real", "twin", "allowed", "met"]
-                .map(str::to_owned)
-                .to_vec(),
+            caption: "Statistics of the even presses, ± standard error".to_owned(),
+            header: [
+                "recording",
+                "statistic",
+                "real skin",
+                "twin",
+                "allowed difference",
+                "met",
+            ]
+            .map(str::to_owned)
+            .to_vec(),
             rows: self.0.all_statistics().iter().map(row).collect(),
             file: Some("readout_statistics_real.csv".to_owned()),
         }
@@ -81,21 +101,33 @@ impl ReadoutSection {
     fn curves_table(&self) -> Table {
         let row = |c: &CurveDistance| {
             vec![
-                c.decode.to_owned(),
-                c.metric.to_owned(),
+                decoder_label(c.decode).to_owned(),
+                score_label(c.metric),
                 format!("{:.4}", c.mean_abs_difference),
                 format!("{:.4}", c.max_abs_difference),
                 format!("{:.2}", c.tolerance),
                 met(c.ok),
             ]
         };
-        let header = ["decode", "score", "mean", "largest", "mean allowed", "met"];
+        let header = ["decoder", "score", "mean", "largest", "mean allowed", "met"];
         Table {
             caption: "|twin − real| of the score curves over M = 7 … 100".to_owned(),
             header: header.map(str::to_owned).to_vec(),
             rows: self.0.distances().iter().map(row).collect(),
             file: Some("readout_curves_real.csv".to_owned()),
         }
+    }
+}
+
+/// What a score is called.
+fn score_label(name: &str) -> String {
+    match name {
+        "support" => "support accuracy".to_owned(),
+        "iou" => "IoU".to_owned(),
+        "f1" => "F1".to_owned(),
+        "class_single" => "single windows classified".to_owned(),
+        "class_vote20" => "votes of 20 classified".to_owned(),
+        other => other.replace('_', " "),
     }
 }
 

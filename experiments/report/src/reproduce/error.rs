@@ -1,6 +1,7 @@
 //! Why the report cannot be made.
 
 use crate::ReportError;
+use crate::animation::MotionError;
 use spts::data::DataError;
 use spts::output::OutputError;
 use spts::record::TwinError;
@@ -19,6 +20,9 @@ pub enum ReproduceError {
     /// The twin cannot be run.
     #[error(transparent)]
     Twin(#[from] TwinError),
+    /// The animations cannot be made.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
     /// Nothing is learned from the twin's raster images.
     #[error(transparent)]
     Learn(#[from] LearnError),

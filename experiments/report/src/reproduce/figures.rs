@@ -27,89 +27,130 @@ pub(super) enum Drawing {
 
 use Drawing::{Charts, Sheet as Images};
 
-/// A line of the table: section of the page, file (with `.png` where the page shows pixels), caption, and what draws
-/// it.
-pub(super) struct FigureLine(
-    pub(super) &'static str,
-    pub(super) &'static str,
-    pub(super) &'static str,
-    Draw,
-);
-
-type Draw = fn(&Shown<'_>) -> Drawing;
+/// A line of the table.
+pub(super) struct FigureLine {
+    /// Section of the page.
+    pub(super) section: &'static str,
+    /// File, with `.png` where the page shows pixels.
+    pub(super) file: &'static str,
+    /// What is to be seen, for those who cannot see it.
+    pub(super) alt: &'static str,
+    /// What it means.
+    pub(super) caption: &'static str,
+    /// What the caption says more when the real skin stands beside the twin.
+    pub(super) compared: Option<&'static str>,
+    draw: fn(&Shown<'_>) -> Drawing,
+}
 
 /// Every figure, in the order of the page.
 pub(super) const FIGURES: &[FigureLine] = &[
-    FigureLine(
-        "objects",
-        "s5_objects.png",
-        "As Fig. S5, the paper’s seventeen objects. Median raster images; r is Pearson's correlation of twin and recording.",
-        |s| Images(sheets::objects(s.dataset, s.skins, s.correlations)),
-    ),
-    FigureLine(
-        "classification",
-        "3b_classification",
-        "As Fig. 3B. Share of correct decisions over M. Curves are means over the objects that both skins recorded compressively. \
-         The published library holds some of the very frames that the real raster control is scored on; nothing else is scored on \
-         what was learned.",
-        |s| Charts(s.skins.fig_3b()),
-    ),
-    FigureLine(
-        "classification",
-        "3c_support",
-        "As Fig. 3C. Support accuracy counts every taxel, so an empty image already scores well; IoU does not reward it.",
-        |s| Charts(s.skins.fig_3c()),
-    ),
-    FigureLine(
-        "classification",
-        "3d_frequency",
-        "As Fig. 3D. Frames a second over M: acquired, and decoded on this machine.",
-        |s| Charts(s.skins.fig_3d(s.timings)),
-    ),
-    FigureLine(
-        "classification",
-        "3e_latency",
-        "As Fig. 3E. Left: the published rule, which begins 100 frames after contact. Right: from first contact on, while the force \
-         still rises.",
-        |s| Charts(s.skins.fig_3e()),
-    ),
-    FigureLine(
-        "adaptive",
-        "4_adaptive.png",
-        "As Fig. 4, where the T is distinct at 15 measurements. The published compressive recordings hold no T; “rec” stands in for \
-         both skins.",
-        |s| Images(sheets::adaptive(s.skins, s.dataset.cols)),
-    ),
-    FigureLine(
-        "adaptive",
-        "s4_examples.png",
-        "As Fig. S4. One window of each object at several M; the paper finds 15–20 enough for small objects and 25–30 for large ones.",
-        |s| Images(sheets::examples(s.skins, s.dataset.cols)),
-    ),
-    FigureLine(
-        "adaptive",
-        "s6_dictionary.png",
-        "As Fig. S6. First atoms of the learned dictionaries, 100 atoms each.",
-        |s| Images(sheets::dictionaries(s.skins, s.dataset.cols)),
-    ),
-    FigureLine(
-        "bounce",
-        "5b_change",
-        "As Fig. 5B. Change from frame to frame, and frames in a contact, over M.",
-        |s| Charts(s.skins.fig_5().0),
-    ),
-    FigureLine(
-        "bounce",
-        "5c_peak",
-        "As Fig. 5C. Largest taxel over time at several M.",
-        |s| Charts(s.skins.fig_5().1),
-    ),
-    FigureLine(
-        "bounce",
-        "6_localisation",
-        "As Fig. 6. Distance between the centre of mass of the decoded image and of the whole contact's.",
-        |s| Charts(s.skins.fig_6()),
-    ),
+    FigureLine {
+        section: "objects",
+        file: "s5_objects.png",
+        alt: "Seventeen rows of pictures: each object on the skin, the pressure on the 10 by 10 taxels, and the raster image.",
+        caption: "As Fig. S5 of the paper: its 17 objects, rebuilt from their names and raster images. The raster images are \
+                  mottled where the pressure is even: every taxel has a gain of its own, as on a real skin, and they differ by \
+                  some 20 %.",
+        compared: Some(
+            "The simulated gains are drawn at random, so the mottle of twin and real skin cannot agree; r is the correlation of \
+             their raster images (median over presses), which the gains keep below 1.",
+        ),
+        draw: |s| Images(sheets::objects(s.dataset, s.skins, s.correlations)),
+    },
+    FigureLine {
+        section: "classification",
+        file: "3b_classification",
+        alt: "Curves of the share of correctly classified windows, which rise with the number of measurements M; stars mark what the paper states.",
+        caption: "As Fig. 3B: how often the right object is named, of 17, mean over the objects. A vote of 20 windows takes 20 \
+                  times as long as a single window.",
+        compared: Some(
+            "Means are over the objects that both skins recorded in compressed form. The published library holds some of the \
+             very frames that the real skin's raster scan is scored on; nothing else is scored on what was learned.",
+        ),
+        draw: |s| Charts(s.skins.fig_3b()),
+    },
+    FigureLine {
+        section: "classification",
+        file: "3c_support",
+        alt: "Curves of support accuracy and of intersection over union, which rise with the number of measurements M; shades mark the ranges of the paper.",
+        caption: "As Fig. 3C: how well the decoded image shows which taxels are touched, mean over the objects. Support accuracy \
+                  is the paper's measure. It counts untouched taxels too, so an empty image already scores well; IoU does not reward it.",
+        compared: None,
+        draw: |s| Charts(s.skins.fig_3c()),
+    },
+    FigureLine {
+        section: "classification",
+        file: "3d_frequency",
+        alt: "Falling lines of frames a second over the number of measurements M, acquired and decoded, with two stars from the paper.",
+        caption: "As Fig. 3D: images a second. The wire delivers the blue line; decoding keeps up where the green line lies above it.",
+        compared: None,
+        draw: |s| Charts(s.skins.fig_3d(s.timings)),
+    },
+    FigureLine {
+        section: "classification",
+        file: "3e_latency",
+        alt: "Curves of the share of presses classified correctly over milliseconds, for several M.",
+        caption: "As Fig. 3E: how soon a press is recognised, by the published decoder; mean over presses. Left: the published \
+                  rule begins 100 frames after contact. Right: from first contact on, while the force still rises.",
+        compared: None,
+        draw: |s| Charts(s.skins.fig_3e()),
+    },
+    FigureLine {
+        section: "adaptive",
+        file: "4_adaptive.png",
+        alt: "Rows of tactile images that sharpen from 2 to 15 measurements, above them bars of the measurements used.",
+        caption: "As Fig. 4, where the T is distinct at 15 measurements: one window of one press, neither the best nor the worst. \
+                  With so few measurements the published decoder shows blobs in or near the contact, and often no T. The evidence \
+                  decoder has learned from raster images of this very object, so it shows the whole T as soon as it \
+                  recognises it.",
+        compared: Some("The published compressed recordings hold no T; the rectangle stands in for both skins."),
+        draw: |s| Images(sheets::adaptive(s.skins, s.dataset.cols)),
+    },
+    FigureLine {
+        section: "adaptive",
+        file: "s4_examples.png",
+        alt: "Rows of tactile images of five objects at 5 to 100 measurements, beside their raster images.",
+        caption: "As Fig. S4: one window of each object at several M. The paper finds 15 to 20 measurements enough for small \
+                  objects and 25 to 30 for large ones.",
+        compared: None,
+        draw: |s| Images(sheets::examples(s.skins, s.dataset.cols)),
+    },
+    FigureLine {
+        section: "adaptive",
+        file: "s6_dictionary.png",
+        alt: "Small tactile images: the first 40 atoms of the dictionary.",
+        caption: "As Fig. S6: the patterns from which the published decoder composes an image, 40 of 100.",
+        compared: Some("Below the twin's, those that were published with the real skin."),
+        draw: |s| Images(sheets::dictionaries(s.skins, s.dataset.cols)),
+    },
+    FigureLine {
+        section: "bounce",
+        file: "5b_change",
+        alt: "Two charts over the measurements a frame: the mean change from frame to frame rises, the frames in a contact fall.",
+        caption: "As Fig. 5B: the fewer measurements a frame has, the more frames fall into one contact, and the less changes \
+                  from one to the next. Means over all bounces.",
+        compared: None,
+        draw: |s| Charts(s.skins.fig_5b()),
+    },
+    FigureLine {
+        section: "bounce",
+        file: "5c_peak",
+        alt: "Humps of the largest taxel over milliseconds for 25, 50 and 100 measurements a frame, with shades of their scatter.",
+        caption: "As Fig. 5C: the largest taxel of the decoded image while the ball touches. Lines are medians over all bounces, \
+                  shades hold the middle half of them, and every marker is a frame.",
+        compared: None,
+        draw: |s| Charts(s.skins.fig_5c()),
+    },
+    FigureLine {
+        section: "bounce",
+        file: "6_localisation",
+        alt: "Falling curves of the distance to the true centre over the number of measurements M, with the level of a guess and two stars from the paper.",
+        caption: "As Fig. 6: how far the estimated centre of the contact is from the true one, mean over all bounces. All drops fall \
+                  near the middle of the skin, so to say “the middle” without a measurement is already as good as the dotted \
+                  line: only what lies below it has learned a place from the wire.",
+        compared: None,
+        draw: |s| Charts(s.skins.fig_6()),
+    },
 ];
 
 /// Writes every figure, as .svg and .png, into the folder `dir`.
@@ -117,9 +158,9 @@ pub(super) const FIGURES: &[FigureLine] = &[
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
 pub(super) fn draw(dir: &Path, shown: &Shown<'_>) -> Result<(), ReportError> {
-    for FigureLine(_, file, _, draw) in FIGURES {
-        let name = file.trim_end_matches(".png");
-        match draw(shown) {
+    for figure in FIGURES {
+        let name = figure.file.trim_end_matches(".png");
+        match (figure.draw)(shown) {
             Charts(charts) => save_charts(&charts, dir, name)?,
             Images(sheet) => save_sheet(&sheet, dir, name)?,
         }

@@ -1,5 +1,6 @@
 //! The numbers at the top of the report.
 
+use super::best::SHOWN;
 use super::curves::BothSkins;
 use super::dataset::SimulatedData;
 use super::results::{MEAN_COMMON, SkinResults};
@@ -38,11 +39,20 @@ pub struct Headline {
     pub class_vote20_m20_matched_common_twin: Option<f64>,
     pub class_vote20_m20_matched_real: Option<f64>,
     pub class_vote20_m20_script_real: Option<f64>,
+    pub iou_m20_evidence_twin: Option<f64>,
+    pub iou_m20_evidence_common_twin: Option<f64>,
+    pub iou_m20_evidence_real: Option<f64>,
+    pub class_vote20_m20_evidence_twin: Option<f64>,
+    pub class_vote20_m20_evidence_common_twin: Option<f64>,
+    pub class_vote20_m20_evidence_real: Option<f64>,
     pub class_single_m20_matched_twin: Option<f64>,
     pub class_single_m20_matched_common_twin: Option<f64>,
     pub class_single_m20_matched_real: Option<f64>,
     pub localisation_px_m25_twin: Option<f64>,
     pub localisation_px_m25_real: Option<f64>,
+    /// Distance of the middle of the skin from the ball, which takes no measurement.
+    pub localisation_px_middle_twin: Option<f64>,
+    pub localisation_px_middle_real: Option<f64>,
     /// First bounce of every drop, from the mechanics, mean.
     pub bounce_contact_ms_twin: Option<f64>,
     /// The twin's contacts as its recording shows them, median.
@@ -90,6 +100,7 @@ impl Headline {
         let (matched, script) = (PublishedDecode::Matched.name(), PublishedDecode::ScriptS20.name());
         let of_twin = |object: &str| twin.scores.row(object, matched, M);
         let of_real = |decode: &str| real.and_then(|r| r.scores.row("mean", decode, M));
+        let of_best = |object: &str| twin.scores.row(object, SHOWN, M);
         let firsts = || dataset.drops.iter().filter_map(|d| d.bounces.first());
         let courses = || dataset.objects.iter().flat_map(|o| o.courses.iter().flatten());
         let r: Vec<f64> = correlations.iter().map(|c| c.pearson_r).collect();
@@ -116,11 +127,19 @@ impl Headline {
             class_vote20_m20_matched_common_twin: of_twin(MEAN_COMMON).map(|s| s.class_vote20),
             class_vote20_m20_matched_real: of_real(matched).map(|s| s.class_vote20),
             class_vote20_m20_script_real: of_real(script).map(|s| s.class_vote20),
+            iou_m20_evidence_twin: of_best("mean").map(|s| s.iou),
+            iou_m20_evidence_common_twin: of_best(MEAN_COMMON).map(|s| s.iou),
+            iou_m20_evidence_real: of_real(SHOWN).map(|s| s.iou),
+            class_vote20_m20_evidence_twin: of_best("mean").map(|s| s.class_vote20),
+            class_vote20_m20_evidence_common_twin: of_best(MEAN_COMMON).map(|s| s.class_vote20),
+            class_vote20_m20_evidence_real: of_real(SHOWN).map(|s| s.class_vote20),
             class_single_m20_matched_twin: of_twin("mean").map(|s| s.class_single),
             class_single_m20_matched_common_twin: of_twin(MEAN_COMMON).map(|s| s.class_single),
             class_single_m20_matched_real: of_real(matched).map(|s| s.class_single),
             localisation_px_m25_twin: twin.scores.located(matched, M_FAST).map(|l| l.mean_px),
             localisation_px_m25_real: real.and_then(|r| r.scores.located(matched, M_FAST)).map(|l| l.mean_px),
+            localisation_px_middle_twin: twin.middle_px(M_FAST),
+            localisation_px_middle_real: real.and_then(|r| r.middle_px(M_FAST)),
             bounce_contact_ms_twin: mean(firsts().map(|b| b.contact_s * 1e3)),
             bounce_contact_recorded_ms_twin: twin.contact_ms(),
             bounce_contact_ms_real: real.and_then(SkinResults::contact_ms),

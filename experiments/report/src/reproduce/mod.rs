@@ -1,5 +1,6 @@
 //! `spts reproduce`: simulate, learn, score, draw, report.
 
+mod best;
 mod comparison;
 mod curves;
 mod dataset;
@@ -20,11 +21,14 @@ mod tracking;
 pub use error::ReproduceError;
 pub use headline::Headline;
 
-use crate::{Origin, ReportError, html, per_object};
+use crate::animation::{MOTION_FIGURES, MotionError, simulate_motion};
+use crate::{Origin, PageFigure, ReportError, html, per_object};
+use best::best;
 use comparison::ReadoutSection;
 use curves::BothSkins;
 use dataset::SimulatedData;
 use figures::Shown;
+use page::PageContent;
 use results::SkinResults;
 use serde::Serialize;
 use size::ReproductionSize;
@@ -32,11 +36,11 @@ use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts::progress::Progress;
 use spts::provenance::Provenance;
 use spts_eval::protocol::Protocol;
-use spts_eval::training::Learned;
+use spts_eval::training::{Learned, TrainingPresses};
 use spts_eval::{PublishedSkin, ScoredSession, ScoredSkin};
 use spts_models::Streams;
 use spts_studies::per_object::{PerObjectReport, PerObjectStudy};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Files outside of folders of their own.
@@ -97,6 +101,11 @@ impl Reproduction {
         let real = self.recordings.as_deref().map(PublishedSkin::open).transpose()?;
         progress.stage("simulating presses", Some(dataset::steps(&size)));
         let dataset = dataset::simulate(self.seed, &size, &|| progress.step())?;
+        progress.stage("drawing what moves", None);
+        simulate_motion(self.seed, &out.folder("figures")?).map_err(|error| match error {
+            MotionError::Report(error) => ReproduceError::Report(error.unstaged(&out)),
+            error => ReproduceError::Motion(error),
+        })?;
         progress.stage("learning", None);
         let twin = self.twin_skin(&dataset, &size)?;
         progress.end();
@@ -118,8 +127,16 @@ impl Reproduction {
         let presses = twin.steps() + real.as_ref().map_or(0, ScoredSkin::steps);
         progress.stage("scoring presses", Some(presses));
         let done = || progress.step();
-        let mut twin = SkinResults::new(twin, &size.measurements, &size.localisation, &done)?;
-        let real = real.map(|skin| SkinResults::new(skin, &size.measurements, &size.localisation, &done));
+        let streams = Streams::new(self.seed);
+        let of_twin = twin.sessions.iter();
+        let of_twin = of_twin.filter_map(|s| TrainingPresses::within(s, &size.learning.presses));
+        let of_twin = best(of_twin, dataset.cols, streams)?;
+        let mut twin = SkinResults::new(twin, of_twin, &size.measurements, &size.localisation, &done)?;
+        let real = real.map(|skin| {
+            let unscored = skin.sessions.iter().filter_map(TrainingPresses::unscored);
+            let of_real = best(unscored, skin.learned.cols, streams)?;
+            SkinResults::new(skin, of_real, &size.measurements, &size.localisation, &done)
+        });
         let mut real = real.transpose()?;
         progress.end();
         let common: Vec<String> = real
@@ -217,14 +234,31 @@ impl Reproduction {
             headline,
             provenance: Origin::here(Provenance::new(self.seed, dataset.scene_hash.clone())),
         };
-        let means = page::means_table(skins);
-        let mut page = page::page(&summary, means, &correlations, self.quick, missing);
-        page.sections.extend(per_object.map(per_object::section));
+        let mut page = page::page(&PageContent {
+            summary: &summary,
+            skins,
+            correlations: &correlations,
+            missing,
+            quick: self.quick,
+            per_object: per_object.map(per_object::section),
+            animations: motion(&figures),
+        });
+        // the readout comes after what the skins are compared in
         page.sections.extend(comparison.map(ReadoutSection::section));
         write_bytes(&out.timed_path("index.html"), html(&page).as_bytes())?;
         write_json(&out.timed_path("summary.json"), &summary)?;
         Ok(summary)
     }
+}
+
+/// The moving pictures that are in the folder `figures`.
+fn motion(figures: &Path) -> Vec<PageFigure> {
+    let there = MOTION_FIGURES.iter().filter(|m| figures.join(m.file).is_file());
+    let each = there.map(|m| PageFigure {
+        still: Some(m.still.to_owned()),
+        ..PageFigure::new(m.file, m.alt, m.caption)
+    });
+    each.collect()
 }
 
 /// `skin` with the real skin's presses scored as in the published evaluation.

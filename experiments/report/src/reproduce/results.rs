@@ -1,10 +1,11 @@
 //! Everything the report says of one skin.
 
+use super::best::SHOWN;
 use super::error::ReproduceError;
 use super::latency::{LatencyRow, latency};
 use super::tracking::{TraceRow, TrackingRow, traces, tracking};
 use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
-use spts_eval::place::{RecordedBounce, find_bounces};
+use spts_eval::place::{PlaceRow, RecordedBounce, find_bounces};
 use spts_eval::{BaselineRow, ScoredSkin, SkinScores, mean_rows};
 use spts_recon::metrics::median;
 
@@ -30,32 +31,38 @@ pub(super) struct SkinResults {
     pub(super) skin: ScoredSkin,
     /// Its scores.
     pub(super) scores: SkinScores,
-    /// Its decoder in the pictures.
+    /// Its published decoder in the pictures.
     pub(super) matched: TrainedDecoder,
+    /// Its best decoders, each beside its name.
+    pub(super) best: Vec<(&'static str, TrainedDecoder)>,
     /// Classification over time.
     pub(super) latency: Vec<LatencyRow>,
     /// Contacts of the ball.
     pub(super) bounces: Vec<RecordedBounce>,
     /// Peak of every reconstructed frame of every contact.
     pub(super) traces: Vec<TraceRow>,
+    /// Where the ball is by every locator.
+    pub(super) places: Vec<PlaceRow>,
     /// What the number of measurements a frame does to it.
     pub(super) tracking: Vec<TrackingRow>,
 }
 
 impl SkinResults {
-    /// Scores `skin`.
+    /// Scores `skin`, by the published decoders and by its `best` ones.
     ///
     /// # Errors
     /// [`ReproduceError::Score`] when what was learned does not fit the skin.
     pub(super) fn new(
         skin: ScoredSkin,
+        best: Vec<(&'static str, TrainedDecoder)>,
         measurements: &[usize],
         localisation: &[usize],
         done: &(dyn Fn() + Sync),
     ) -> Result<Self, ReproduceError> {
-        let scores = skin.score(measurements, localisation, done)?;
+        let scores = skin.score(measurements, localisation, &best, done)?;
         let matched = PublishedDecode::Matched.decoder(&skin.learned)?;
         let latency = latency(&skin, &matched)?;
+        let places = skin.ball_places(localisation)?;
         let (mut bounces, mut traces) = (Vec::new(), Vec::new());
         if let Some(recording) = &skin.bounces {
             bounces = find_bounces(recording);
@@ -67,7 +74,9 @@ impl SkinResults {
             skin,
             scores,
             matched,
+            best,
             latency,
+            places,
             bounces,
             traces,
             tracking,
@@ -109,5 +118,19 @@ impl SkinResults {
         let recording = self.skin.bounces.as_ref()?;
         let durations: Vec<f64> = self.bounces.iter().map(|b| b.duration_s(recording) * 1e3).collect();
         median(&durations)
+    }
+
+    /// Mean distance of the middle of the skin from the ball in the contacts that windows of `m` measurements fit into,
+    /// taxels.
+    #[must_use]
+    pub(super) fn middle_px(&self, m: usize) -> Option<f64> {
+        let middle = |r: &&PlaceRow| r.decoder == "middle" && !r.relabelled && r.m == m;
+        self.places.iter().find(middle).map(|r| r.mean_px)
+    }
+
+    /// The decoder in the pictures beside the published one: its name and itself.
+    pub(super) fn shown(&self) -> Option<(&'static str, &TrainedDecoder)> {
+        let found = self.best.iter().find(|(name, _)| *name == SHOWN);
+        found.map(|(name, decoder)| (*name, decoder))
     }
 }

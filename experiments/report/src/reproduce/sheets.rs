@@ -6,7 +6,9 @@ use super::images::{ProgressiveImages, median_image, progressive};
 use super::results::SkinResults;
 use super::tables::CorrelationRow;
 use crate::figures::{Sheet, Tile, TileRow};
+use crate::labels::object_label;
 use spts_eval::ScoredSession;
+use spts_eval::decoders::TrainedDecoder;
 use spts_eval::protocol::Truth;
 use spts_recon::Matrix;
 
@@ -43,12 +45,12 @@ struct ShownWindow {
 }
 
 impl ShownWindow {
-    /// The window in the middle of the plateau of the last press scored.
-    fn new(results: &SkinResults, object: &str, measurements: &[usize]) -> Option<Self> {
+    /// The window in the middle of the plateau of the last press scored, as `decoder` decodes it.
+    fn new(results: &SkinResults, decoder: &TrainedDecoder, object: &str, measurements: &[usize]) -> Option<Self> {
         let session = find(results, object)?;
         let press = session.scored().last()?;
         Some(Self {
-            found: progressive(&results.matched, session, press, FRAME, measurements)?,
+            found: progressive(decoder, session, press, FRAME, measurements)?,
             truth: session.truth(press)?,
         })
     }
@@ -99,85 +101,104 @@ pub(super) fn objects(dataset: &SimulatedData, skins: &BothSkins<'_>, correlatio
             }));
         }
         TileRow {
-            label: name.clone(),
+            label: object_label(name).to_owned(),
             tiles,
         }
     });
-    let mut titles = vec!["scene", "pressure", "twin, raster"];
+    let mut titles = vec!["object", "pressure", "raster image"];
     if skins.real.is_some() {
-        titles.push("real, raster");
+        titles[2] = "raster image, twin";
+        titles.push("raster image, real skin");
     }
     Sheet {
-        title: "Seventeen objects".to_owned(),
+        title: "The 17 objects, pressed with 20 N".to_owned(),
         column_titles: titles.into_iter().map(str::to_owned).collect(),
         rows: rows.collect(),
         tile_px: 120,
     }
 }
 
-/// Fig. 4: images from the first 2 to 15 measurements. The published compressive recordings hold no T, so the real row
-/// shows another object.
+/// Fig. 4: images from the first 2 to 15 measurements, by the published decoder and by the best. The published
+/// compressive recordings hold no T, so the rows of the real skin show another object.
 #[must_use]
 pub(super) fn adaptive(skins: &BothSkins<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
-    let mut add = |name: &str, object: &str, results: &SkinResults| {
-        let Some(shown) = ShownWindow::new(results, object, &PROGRESS) else {
-            return;
-        };
-        let bars = shown.found.images.iter().map(|(m, _)| Tile::Bars {
-            values: shown.found.y.clone(),
-            highlight: *m,
-            caption: String::new(),
-        });
-        rows.push(TileRow {
-            label: format!("{object}, {name}: y"),
-            tiles: bars.chain([Tile::Empty]).collect(),
-        });
-        rows.push(TileRow {
-            label: format!("{object}, {name}"),
-            tiles: shown.images(cols).chain([shown.raster(cols)]).collect(),
-        });
+    let mut add = |whose: &str, object: &str, results: &SkinResults| {
+        let decoders = [Some(("published decoder", &results.matched)), results.shown()];
+        let title = format!("{}{whose}", object_label(object));
+        for (index, (name, decoder)) in decoders.into_iter().flatten().enumerate() {
+            let Some(shown) = ShownWindow::new(results, decoder, object, &PROGRESS) else {
+                continue;
+            };
+            if index == 0 {
+                let bars = shown.found.images.iter().map(|(m, _)| Tile::Bars {
+                    values: shown.found.y.clone(),
+                    highlight: *m,
+                    caption: String::new(),
+                });
+                rows.push(TileRow {
+                    label: format!("{title}: the wire"),
+                    tiles: bars.chain([Tile::Empty]).collect(),
+                });
+            }
+            rows.push(TileRow {
+                label: format!("{title}: {name}"),
+                tiles: shown.images(cols).chain([shown.raster(cols)]).collect(),
+            });
+        }
     };
-    add("twin", "T", skins.twin);
-    if let Some(real) = skins.real {
-        add("real", "rec", real);
-        add("twin", "rec", skins.twin);
+    match skins.real {
+        None => add("", "T", skins.twin),
+        Some(real) => {
+            add(", twin", "T", skins.twin);
+            add(", twin", "rec", skins.twin);
+            add(", real skin", "rec", real);
+        }
     }
     Sheet {
-        title: "Adaptive reconstruction from the first M of 15 measurements".to_owned(),
+        title: "Images from the first M of 15 measurements".to_owned(),
         column_titles: PROGRESS
             .iter()
             .map(|m| format!("M = {m}"))
-            .chain(["raster".to_owned()])
+            .chain(["raster image".to_owned()])
             .collect(),
         rows,
         tile_px: 96,
     }
 }
 
-/// Fig. S4: reconstructions at several M.
+/// Fig. S4: reconstructions at several M, by the published decoder and by the best.
 #[must_use]
 pub(super) fn examples(skins: &BothSkins<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
+    let both = [("twin", Some(skins.twin)), ("real skin", skins.real)];
     for object in EXAMPLE_OBJECTS {
-        for (name, results) in [("twin", Some(skins.twin)), ("real", skins.real)] {
-            let Some(shown) = results.and_then(|r| ShownWindow::new(r, object, &EXAMPLES)) else {
-                continue;
+        for (whose, results) in both.iter().filter_map(|(whose, results)| Some((whose, (*results)?))) {
+            let whose = if skins.real.is_some() {
+                format!(", {whose}")
+            } else {
+                String::new()
             };
-            rows.push(TileRow {
-                label: format!("{object}, {name}"),
-                tiles: [shown.raster(cols)].into_iter().chain(shown.images(cols)).collect(),
-            });
+            let decoders = [Some(("published", &results.matched)), results.shown()];
+            for (name, decoder) in decoders.into_iter().flatten() {
+                let Some(shown) = ShownWindow::new(results, decoder, object, &EXAMPLES) else {
+                    continue;
+                };
+                rows.push(TileRow {
+                    label: format!("{}{whose}: {name}", object_label(object)),
+                    tiles: [shown.raster(cols)].into_iter().chain(shown.images(cols)).collect(),
+                });
+            }
         }
     }
     Sheet {
-        title: "Reconstructions, matched decode".to_owned(),
-        column_titles: ["raster".to_owned()]
+        title: "Images at several M".to_owned(),
+        column_titles: ["raster image".to_owned()]
             .into_iter()
             .chain(EXAMPLES.iter().map(|m| format!("M = {m}")))
             .collect(),
         rows,
-        tile_px: 96,
+        tile_px: 80,
     }
 }
 
@@ -190,19 +211,23 @@ pub(super) fn dictionaries(skins: &BothSkins<'_>, cols: usize) -> Sheet {
         for first in (0..dictionary.ncols().min(ATOMS)).step_by(ACROSS) {
             let last = (first + ACROSS).min(dictionary.ncols());
             rows.push(TileRow {
-                label: format!("{name} {}–{last}", first + 1),
+                label: format!("{name}atoms {}–{last}", first + 1),
                 tiles: (first..last)
                     .map(|k| heat(&signed(&dictionary.column(k)), cols, String::new(), None))
                     .collect(),
             });
         }
     };
-    add("twin", &skins.twin.skin.learned.dictionary.atoms);
-    if let Some(real) = skins.real {
-        add("published", &real.skin.learned.dictionary.atoms);
+    let of_twin = &skins.twin.skin.learned.dictionary.atoms;
+    match skins.real {
+        None => add("", of_twin),
+        Some(real) => {
+            add("twin, ", of_twin);
+            add("published, ", &real.skin.learned.dictionary.atoms);
+        }
     }
     Sheet {
-        title: "Learned dictionaries, first atoms".to_owned(),
+        title: "First atoms of the learned dictionary".to_owned(),
         column_titles: vec![],
         rows,
         tile_px: 72,

@@ -3,6 +3,7 @@
 use super::dataset::SimulatedData;
 use super::images::median_image;
 use super::results::SkinResults;
+use super::tracking::{CourseRow, TRACKING_MEASUREMENTS, over_bounces};
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, write_csv, write_npy, write_table};
 use spts_recon::metrics::pearson;
@@ -68,7 +69,13 @@ pub(super) fn write_skin(dir: &Path, whose: &str, results: &SkinResults) -> Resu
     write_table(&path("localisation"), &results.scores.localisation)?;
     write_table(&path("baselines"), &results.scores.baselines)?;
     write_table(&path("latency"), &results.latency)?;
+    write_table(&path("places"), &results.places)?;
     write_table(&path("bounce_traces"), &results.traces)?;
+    let courses: Vec<CourseRow> = TRACKING_MEASUREMENTS
+        .iter()
+        .flat_map(|&m| over_bounces(&results.traces, m))
+        .collect();
+    write_table(&path("bounce_courses"), &courses)?;
     write_table(&path("bounce_tracking"), &results.tracking)
 }
 

@@ -100,3 +100,79 @@ pub(super) fn tracking(bounces: &[RecordedBounce], traces: &[TraceRow]) -> Vec<T
         })
         .collect()
 }
+
+/// Largest taxel at one instant, over the bounces.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct CourseRow {
+    /// Measurements a frame.
+    pub(super) m: usize,
+    /// End of the frame's acquisition since first contact, ms.
+    pub(super) time_ms: f64,
+    /// Bounces that have a frame there.
+    pub(super) bounces: usize,
+    /// Lower quartile, V.
+    pub(super) low_v: f64,
+    /// Median, V.
+    pub(super) median_v: f64,
+    /// Upper quartile, V.
+    pub(super) high_v: f64,
+}
+
+/// The course of all bounces in frames of `m` measurements, at the instants at which at least half of the bounces have a
+/// frame.
+#[must_use]
+pub(super) fn over_bounces(traces: &[TraceRow], m: usize) -> Vec<CourseRow> {
+    // frames begin the same number of measurements before first contact, so that their instants agree
+    let instant = |t: &TraceRow| (t.time_ms * 1e3).round();
+    let mut of: Vec<&TraceRow> = traces.iter().filter(|t| t.m == m).collect();
+    of.sort_by(|a, b| instant(a).total_cmp(&instant(b)).then(a.peak_v.total_cmp(&b.peak_v)));
+    let groups: Vec<&[&TraceRow]> = of.chunk_by(|a, b| instant(a).total_cmp(&instant(b)).is_eq()).collect();
+    let most = groups.iter().map(|g| g.len()).max().unwrap_or(0);
+    let kept = groups.into_iter().filter(|g| 2 * g.len() >= most);
+    kept.map(|group| CourseRow {
+        m,
+        time_ms: group[0].time_ms,
+        bounces: group.len(),
+        low_v: quantile(group, 0.25),
+        median_v: quantile(group, 0.5),
+        high_v: quantile(group, 0.75),
+    })
+    .collect()
+}
+
+/// Quantile of the peaks of `sorted`, which is not empty, between neighbours by straight line.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a place in a list of bounces, never negative"
+)]
+fn quantile(sorted: &[&TraceRow], share: f64) -> f64 {
+    let place = share * (sorted.len() - 1) as f64;
+    let (below, part) = (place.floor() as usize, place.fract());
+    let above = (below + 1).min(sorted.len() - 1);
+    sorted[below].peak_v + part * (sorted[above].peak_v - sorted[below].peak_v)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Four bounces with peaks 1 to 4 V; one frame that a single bounce has is left out.
+    #[test]
+    fn courses_are_quartiles_over_the_bounces() {
+        let trace = |bounce: usize, time_ms: f64, peak_v: f64| TraceRow {
+            bounce,
+            m: 25,
+            time_ms,
+            peak_v,
+        };
+        let mut traces: Vec<TraceRow> = (0..4).map(|b| trace(b, 0.4, [3.0, 1.0, 4.0, 2.0][b])).collect();
+        traces.push(trace(0, 9.0, 7.0));
+        let courses = over_bounces(&traces, 25);
+        assert_eq!((courses.len(), courses[0].bounces), (1, 4));
+        assert_relative_eq!(courses[0].low_v, 1.75);
+        assert_relative_eq!(courses[0].median_v, 2.5);
+        assert_relative_eq!(courses[0].high_v, 3.25);
+        assert!(over_bounces(&traces, 50).is_empty());
+    }
+}

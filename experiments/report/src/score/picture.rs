@@ -1,31 +1,11 @@
 //! The board as curves, over measurements and over wall time.
 
-use crate::figures::{Chart, FigureError, Series, Style, save_charts};
+use crate::figures::{Chart, FigureError, Series, Stroke, save_charts};
 use spts_eval::board::{BoardRow, ScoreBoard};
 use spts_eval::decoders::label;
 use spts_eval::place::{PlaceRow, locator_label};
 use spts_eval::unique;
 use std::path::Path;
-
-/// Looks of the curves, in the order of the decoders: colour and shade.
-const LOOKS: [(Style, u8); 16] = [
-    (Style::Baseline, 0),
-    (Style::Baseline, 1),
-    (Style::Baseline, 2),
-    (Style::Paper, 0),
-    (Style::Real, 0),
-    (Style::Twin, 1),
-    (Style::Twin, 2),
-    (Style::Raster, 0),
-    (Style::RasterReal, 0),
-    (Style::Twin, 0),
-    (Style::Raster, 1),
-    (Style::RasterReal, 1),
-    (Style::Raster, 2),
-    (Style::Twin, 3),
-    (Style::Real, 1),
-    (Style::Paper, 1),
-];
 
 /// Writes `reconstruction`, `classification` and, with a ball, `localisation`, each as .svg and .png.
 ///
@@ -116,12 +96,10 @@ fn scores(
                 .map(|r| (r.learned_from.as_str(), r.sensing)),
         )
     };
-    let most = names.iter().map(|name| sources(name).len()).max().unwrap_or(1).max(1);
     let mut series = Vec::new();
-    for (n, name) in names.iter().enumerate() {
+    for name in &names {
         let sources = sources(name);
         for (k, (from, sensing)) in sources.iter().enumerate() {
-            let (style, shade) = LOOKS[(n * most + k) % LOOKS.len()];
             let same = |r: &&&BoardRow| r.decoder == *name && r.learned_from == *from && r.sensing == *sensing;
             let points: Vec<(f64, f64)> = rows.iter().filter(same).filter_map(|r| point(r)).collect();
             let mut words = label(name).to_owned();
@@ -132,7 +110,7 @@ fn scores(
                 words.push_str(&format!(", {} rows", sensing.name()));
             }
             if !points.is_empty() {
-                series.push(Series::new(words, style, shade, points));
+                series.push(Series::of_decoder(words, name, Stroke::of(k), points));
             }
         }
     }
@@ -151,9 +129,6 @@ fn scores(
     }
 }
 
-/// Colours of the locators, in their order; the relabelled ones are a shade lighter.
-const LOCATOR_STYLES: [Style; 4] = [Style::Baseline, Style::Paper, Style::Real, Style::Twin];
-
 /// Rows of the bouncing ball.
 fn ball(board: &ScoreBoard) -> impl Iterator<Item = &PlaceRow> {
     board.localisation.iter().filter(|row| row.contact == "ball")
@@ -163,18 +138,12 @@ fn localisation(board: &ScoreBoard) -> Vec<Chart> {
     let kinds = unique(ball(board).map(|row| (row.decoder.as_str(), row.relabelled)));
     let chart = |title: &str, y_label: &str, get: fn(&PlaceRow) -> f64, range| {
         let series = kinds.iter().map(|(name, relabelled)| {
-            let locator = kinds.iter().position(|k| k.0 == *name).unwrap_or_default();
-            let style = LOCATOR_STYLES[locator % LOCATOR_STYLES.len()];
             let of = ball(board);
             let rows = of.filter(|r| r.decoder == *name && r.relabelled == *relabelled);
             let points = rows.map(|r| (r.m as f64, get(r))).collect();
             let taxels = if *relabelled { ", relabelled" } else { "" };
-            Series::new(
-                format!("{}{taxels}", locator_label(name)),
-                style,
-                u8::from(*relabelled),
-                points,
-            )
+            let stroke = Stroke::of(usize::from(*relabelled));
+            Series::of_decoder(format!("{}{taxels}", locator_label(name)), name, stroke, points)
         });
         Chart {
             title: title.to_owned(),

@@ -89,7 +89,7 @@ pub fn curves(
     real: &PublishedSkin,
     done: &(dyn Fn() + Sync),
 ) -> Result<ScoreCurves, ScoreError> {
-    let decoders = PublishedDecode::decoders(&real.skin.learned).map_err(ScoreError::from)?;
+    let decoders = PublishedDecode::named(&real.skin.learned).map_err(ScoreError::from)?;
     let score = |is_twin: bool| {
         let mut rows = Vec::new();
         for c in compared {

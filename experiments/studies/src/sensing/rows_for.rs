@@ -57,16 +57,6 @@ impl RowsFor {
 
 /// The rows with the numbers `order`, as codes of the cells' converters.
 pub(super) fn patterns(rows: &Matrix, order: &[usize]) -> Result<Patterns, SensingError> {
-    let codes = order.iter().flat_map(|&r| rows.row(r)).map(|level| code(*level));
-    Ok(Patterns::new(order.len(), codes.collect())?)
-}
-
-/// DAC code of a level.
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "float to integer casts saturate"
-)]
-fn code(level: f64) -> u8 {
-    (127.5 * (1.0 + level)).round() as u8
+    let levels: Vec<f64> = order.iter().flat_map(|&r| rows.row(r)).copied().collect();
+    Ok(Patterns::of_levels(order.len(), &levels)?)
 }

@@ -1,0 +1,65 @@
+//! `spts live`: the skin under the mouse, on a page of this machine.
+
+use super::context::{Common, note, print, print_json};
+use super::error::CliError;
+use super::options::seed;
+use clap::Args;
+use serde::Serialize;
+use spts_live::{LiveConfig, Server};
+
+/// Port that is easy to keep as a bookmark.
+const PORT: u16 = 7117;
+
+/// Serves a page on which you press the skin with the mouse and see its wire and two decoded images move.
+///
+/// The page is served to this machine alone, at http://127.0.0.1:PORT/; it needs no other program and no network.
+/// Choose an object, or drop a mesh file onto the page. Press it anywhere on the skin, as hard as you like. Two decoders
+/// show what they make of the wire, each at random or designed rows of the sensing matrix, from M = 5 to 100
+/// measurements. Cells can be broken and the noise changed while it runs. There are 40 updates a second on one core.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts live                          then open the address that it prints
+  spts live --object tennis --seed 3
+  spts live --port 0                 any free port
+  ssh -L 7117:127.0.0.1:7117 HOST    shows the page of a program that runs on HOST; the port has to be the same
+
+--json prints {\"url\"} on one line, and then serves. Ctrl-C ends it. docs/live.md says what each control does.")]
+pub(super) struct LiveCommand {
+    /// Port on 127.0.0.1; 0 for any free one
+    #[arg(long, value_name = "PORT", default_value_t = PORT)]
+    port: u16,
+    /// Object at the beginning: one of the seventeen, or finger
+    #[arg(long, value_name = "NAME", default_value = "T")]
+    object: String,
+    /// Specimen of the skin and its noise
+    #[arg(long, value_name = "SEED", default_value_t = 0, value_parser = seed)]
+    seed: u64,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What the command prints first.
+#[derive(Serialize)]
+struct Served {
+    url: String,
+}
+
+impl LiveCommand {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let server = Server::bind(&LiveConfig {
+            port: self.port,
+            seed: self.seed,
+            object: self.object,
+        })?;
+        let url = format!("http://{}/", server.address());
+        if self.common.json {
+            print_json(&Served { url })?;
+        } else {
+            print(&url)?;
+            note("open this address in a browser; Ctrl-C ends it");
+        }
+        Ok(server.run()?)
+    }
+}

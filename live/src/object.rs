@@ -1,0 +1,203 @@
+//! What presses the skin.
+
+use crate::error::LiveError;
+use serde::{Deserialize, Serialize};
+use spts_contact::PreparedMesh;
+use spts_contact::mesh::TriMesh;
+use spts_contact::objects::{FINGER, OBJECTS, ObjectSpec};
+
+/// Objects that can be chosen: all of the table, and the tip of a finger.
+pub(crate) fn choosable() -> impl Iterator<Item = &'static ObjectSpec> {
+    OBJECTS.iter().chain([&FINGER])
+}
+
+/// Side of a mesh that touches the skin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// −z of the file.
+    #[default]
+    Bottom,
+    /// +z.
+    Top,
+    /// −y.
+    Front,
+    /// +y.
+    Back,
+    /// −x.
+    Left,
+    /// +x.
+    Right,
+}
+
+impl Side {
+    /// Rotation that turns the side downward.
+    fn matrix(self) -> [[f64; 3]; 3] {
+        match self {
+            Self::Bottom => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            Self::Top => [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]],
+            Self::Front => [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],
+            Self::Back => [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]],
+            Self::Left => [[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]],
+            Self::Right => [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]],
+        }
+    }
+}
+
+/// An object that is ready to press.
+#[derive(Debug, Clone)]
+pub struct LiveObject {
+    /// Name: of the table, or of the file.
+    pub name: String,
+    /// The mesh, contact face towards −z; its origin is where the mouse is.
+    pub mesh: PreparedMesh,
+    /// Stiffness of its own surface, Pa/m.
+    pub stiffness_pa_per_m: f64,
+    /// Angle at which it begins, degrees.
+    pub degrees: f64,
+}
+
+impl LiveObject {
+    /// The object of the table with this name.
+    ///
+    /// # Errors
+    /// [`LiveError::Unknown`] when there is none.
+    pub fn named(name: &str) -> Result<Self, LiveError> {
+        let Some(spec) = choosable().find(|spec| spec.name == name) else {
+            let known: Vec<&str> = choosable().map(|spec| spec.name).collect();
+            return Err(LiveError::Unknown {
+                field: "object",
+                name: name.to_owned(),
+                known: known.join(", "),
+            });
+        };
+        Ok(Self {
+            name: spec.name.to_owned(),
+            mesh: PreparedMesh::from((spec.build)()),
+            stiffness_pa_per_m: spec.stiffness_pa_per_m.unwrap_or(f64::INFINITY),
+            degrees: spec.placement.rotation_rad.to_degrees().round(),
+        })
+    }
+
+    /// A rigid body of the shape of `mesh`, on `side`, held over the middle of its box.
+    #[must_use]
+    pub fn of_mesh(name: &str, mesh: &TriMesh, side: Side) -> Self {
+        let turned = mesh.clone().rotated(side.matrix());
+        let middle = [0, 1].map(|axis| {
+            let values = turned.vertices.iter().map(|v| v[axis]);
+            let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
+                [low.min(v), high.max(v)]
+            });
+            0.5 * (low + high)
+        });
+        Self {
+            name: name.to_owned(),
+            mesh: PreparedMesh::from(turned.translated([-middle[0], -middle[1], 0.0])),
+            stiffness_pa_per_m: f64::INFINITY,
+            degrees: 0.0,
+        }
+    }
+
+    /// What of it can be seen from below.
+    #[must_use]
+    pub fn shape(&self) -> Shape {
+        Shape::of(&self.name, self.degrees, &self.mesh)
+    }
+}
+
+/// The underside of an object, as the page draws it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "type", rename = "shape")]
+pub struct Shape {
+    /// Name of the object.
+    pub name: String,
+    /// Angle at which it begins, degrees.
+    pub degrees: f64,
+    /// x and y of every triangle's three corners, mm, before it is turned.
+    pub corners_mm: Vec<[f32; 6]>,
+    /// Height of every triangle's middle above the lowest point, mm.
+    pub heights_mm: Vec<f32>,
+}
+
+impl Shape {
+    #[expect(clippy::cast_possible_truncation, reason = "millimetres on a screen")]
+    fn of(name: &str, degrees: f64, mesh: &TriMesh) -> Self {
+        let tenth = |m: f64| ((1e4 * m).round() / 10.0) as f32;
+        let low_m = mesh.vertices.iter().map(|v| v[2]).fold(f64::INFINITY, f64::min);
+        let mut seen: Vec<(f32, [f32; 6])> = Vec::new();
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(|i| mesh.vertices[i as usize]);
+            let up = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+            if up < 0.0 {
+                let height = tenth((a[2] + b[2] + c[2]) / 3.0 - low_m);
+                let corners = [a[0], a[1], b[0], b[1], c[0], c[1]].map(tenth);
+                seen.push((height, corners));
+            }
+        }
+        // far ones first, so that near ones cover them
+        seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+        Self {
+            name: name.to_owned(),
+            degrees,
+            heights_mm: seen.iter().map(|(height, _)| *height).collect(),
+            corners_mm: seen.into_iter().map(|(_, corners)| corners).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts_contact::mesh::cuboid;
+
+    /// Every side of a box whose six sides differ in their middles is the one that ends below.
+    #[test]
+    fn sides_face_down() {
+        let axes = [
+            (Side::Bottom, 2, -1.0),
+            (Side::Top, 2, 1.0),
+            (Side::Front, 1, -1.0),
+            (Side::Back, 1, 1.0),
+            (Side::Left, 0, -1.0),
+            (Side::Right, 0, 1.0),
+        ];
+        for (side, axis, sign) in axes {
+            let mut point = [0.0; 3];
+            point[axis] = sign;
+            let turned = side.matrix().map(|row| (0..3).map(|k| row[k] * point[k]).sum::<f64>());
+            assert!((turned[2] + 1.0).abs() < 1e-15, "{side:?}: {turned:?}");
+            let m = side.matrix();
+            let det = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
+                - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+                + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0]);
+            assert!((det - 1.0).abs() < 1e-15, "{side:?} mirrors");
+        }
+    }
+
+    #[test]
+    fn a_box_shows_its_lower_side() {
+        let mesh = cuboid([0.04, 0.02, 0.01]).translated([0.1, 0.0, 0.0]);
+        let shape = LiveObject::of_mesh("box.stl", &mesh, Side::Bottom).shape();
+        assert_eq!(shape.corners_mm.len(), 2);
+        assert!(shape.heights_mm.iter().all(|h| *h < 0.01));
+        let far = shape
+            .corners_mm
+            .iter()
+            .flatten()
+            .fold(0.0_f32, |far, v| far.max(v.abs()));
+        assert!((far - 20.0).abs() < 1e-6, "{far}");
+    }
+
+    #[test]
+    fn every_object_can_be_chosen() {
+        for spec in choosable() {
+            let object = LiveObject::named(spec.name).unwrap();
+            assert!(!object.shape().corners_mm.is_empty(), "{}", spec.name);
+        }
+        let message = LiveObject::named("teapot").unwrap_err().to_string();
+        assert!(
+            message.contains("`object` = \"teapot\"") && message.contains("tennis"),
+            "{message}"
+        );
+    }
+}
