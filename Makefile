@@ -53,14 +53,14 @@ python: setup
 	"$(PYTHON_SCENES)/bin/python" -m pytest --quiet --tb=short -p no:cacheprovider python/tests/test_scenes.py
 
 # The book, out/book/index.html: its links are checked, its commands and its Python are run. BLOCKS="--with slow" runs what takes minutes, too.
-# Where the Python package is not built (`make python`), its examples are left out.
+# MkDocs is not told to be quiet: it would then count no warning. Where the Python package is not built (`make python`), its examples are left out.
 BOOK ?= out/mkdocs
 BLOCKS ?=
 book: setup
 	./scripts/environment.sh "$(BOOK)" scripts/docs/requirements.txt
 	cargo build --release --locked --quiet --workspace
 	python3 scripts/docs/links.py
-	NO_MKDOCS_2_WARNING=1 "$(BOOK)/bin/mkdocs" build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 "$(BOOK)/bin/mkdocs" build --strict
 	$(if $(wildcard $(PYTHON)/bin/python),"$(PYTHON)/bin/python" scripts/docs/run_blocks.py,"$(BOOK)/bin/python" scripts/docs/run_blocks.py --without python) $(BLOCKS)
 
 # The pages that people look at, in a real browser: Debian's Chromium. SHOTS=DIR keeps pictures of them.

@@ -85,5 +85,7 @@ def _marks(page, number, line):
     words = frozenset(word.strip() for word in mark[2].split(","))
     known = MARKS if mark[1] == "run" else KINDS
     if not words <= known:
-        raise PageError(f"{page}:{number}: marks are {', '.join(sorted(known))}, and not {', '.join(sorted(words - known))}")
+        raise PageError(
+            f"{page}:{number}: marks are {', '.join(sorted(known))}, and not {', '.join(sorted(words - known))}"
+        )
     return words

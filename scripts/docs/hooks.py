@@ -33,9 +33,8 @@ def on_files(files, config):
             for _, target in LINK.findall(file.content_string):
                 linked.add(in_repository(file.src_uri, target))
     for path in sorted(linked - {None}):
-        source = ROOT / path
-        if path not in ELSEWHERE and not path.startswith("docs/") and source.is_file():
-            files.append(File.generated(config, f"source/{path}", abs_src_path=str(source)))
+        if path not in ELSEWHERE and not path.startswith("docs/") and copied(path):
+            files.append(File.generated(config, f"source/{path}", abs_src_path=str(ROOT / path)))
     return files
 
 
@@ -53,11 +52,16 @@ def on_page_markdown(markdown, page, **_):
             return f"[{text}]({ELSEWHERE[path]}{anchor})"
         if path.startswith("docs/"):
             return f"[{text}]({path.removeprefix('docs/')}{anchor})"
-        if (ROOT / path).is_file():
+        if copied(path):
             return f"[{text}](source/{path})"
         return text
 
     return LINK.sub(turn, markdown)
+
+
+def copied(path):
+    """Whether the file at `path` is copied beside the book: MkDocs leaves hidden folders out."""
+    return (ROOT / path).is_file() and not any(part.startswith(".") for part in path.split("/"))
 
 
 def in_repository(page, target):

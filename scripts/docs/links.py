@@ -3,7 +3,6 @@
 `python scripts/docs/links.py`. Addresses on the web are looked at, not fetched.
 """
 
-import pathlib
 import re
 import sys
 import urllib.parse
@@ -48,7 +47,16 @@ def faults(page):
 
 
 def main():
-    more = [ROOT / name for name in ("ARCHITECTURE.md", "CONTRIBUTING.md", "SECURITY.md", "examples/README.md", "firmware/cell/README.md")]
+    more = [
+        ROOT / name
+        for name in (
+            "ARCHITECTURE.md",
+            "CONTRIBUTING.md",
+            "SECURITY.md",
+            "examples/README.md",
+            "firmware/cell/README.md",
+        )
+    ]
     wrong = 0
     for page in [*pages(), *(page for page in more if page.exists())]:
         for fault in faults(page):
