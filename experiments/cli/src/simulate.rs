@@ -12,10 +12,9 @@ use scenes::SceneList;
 use spts::Session;
 use spts::scene::{Assignment, Timestep};
 use spts::simulate::{Request, Summary, run};
-use spts_circuit::Recording;
 use spts_contact::Frame;
 use spts_contact::objects::OBJECTS;
-use spts_eval::decode::{DecodeRequest, DecodedSession};
+use spts_eval::decode::{DecodeRequest, DecodedSession, LearnedDecoders};
 use spts_eval::decoders::find;
 use spts_eval::training::TrainingData;
 use spts_models::{SkinLayout, Streams};
@@ -268,27 +267,38 @@ impl SimulateCommand {
             }
         };
         let mut first: Vec<Frame> = Vec::new();
-        let simulation = run(&prepared, !self.no_record, &done, |piece| {
-            if self.animate && piece.first == 0 {
-                first.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
-            }
-            Ok::<_, CliError>(files.push(&piece)?)
-        });
+        let simulate = || {
+            run(&prepared, !self.no_record, &done, |piece| {
+                if self.animate && piece.first == 0 {
+                    first.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
+                }
+                Ok::<_, CliError>(files.push(&piece)?)
+            })
+        };
+        let layout = prepared.scene.skin();
+        let decodes = !self.no_record && layout.taxels() <= MOST_DECODED;
+        // what a decoder learns depends on the skin alone, and the mechanics of one press leave a core to it
+        let (simulation, learned) = rayon::join(simulate, || decodes.then(|| Learned::new(layout)).transpose());
         bar.finish_and_clear();
-        let simulation = simulation?;
+        let (simulation, learned) = (simulation?, learned?);
         let summary = Summary::new(&prepared, &simulation);
         for text in &summary.notes {
             note(&format!("note: {text}"));
         }
         let writing = spinner("writing");
-        let layout = prepared.scene.skin();
-        let training = (!self.no_record).then(|| training(layout)).transpose()?.flatten();
-        let decoded = match simulation.first.as_ref().zip(training.as_ref()) {
-            Some((session, training)) => decoded(session, training)?,
+        if !self.no_record && !decodes {
+            let most = TrainingData::MOST_TAXELS;
+            note(&format!(
+                "note: a skin of more than {MOST_DECODED} taxels is not decoded here; `spts decode` takes up to {most}"
+            ));
+        }
+        let decoded = match simulation.first.as_ref().zip(learned.as_ref()) {
+            Some((session, learned)) => learned.decoded(session)?,
             None => None,
         };
         if let Some(session) = simulation.first.as_ref().filter(|_| self.animate) {
-            files.animate(&Animation::new(&prepared, &first, session, training.as_ref())?)?;
+            let training = learned.as_ref().map(|learned| &learned.training);
+            files.animate(&Animation::new(&prepared, &first, session, training)?)?;
         }
         let names = files.finish(&simulation, &summary, self.render, decoded)?;
         drop(writing);
@@ -297,33 +307,35 @@ impl SimulateCommand {
     }
 }
 
-/// What is known of images on a skin that nothing was learned of; `None`, with a note, for one of too many taxels.
-fn training(layout: &SkinLayout) -> Result<Option<TrainingData>, CliError> {
-    if layout.taxels() > MOST_DECODED {
-        let most = TrainingData::MOST_TAXELS;
-        note(&format!(
-            "note: a skin of more than {MOST_DECODED} taxels is not decoded here; `spts decode` takes up to {most}"
-        ));
-        return Ok(None);
-    }
-    let training = TrainingData::for_layout(layout, Streams::new(1));
-    Ok(Some(training.map_err(|e| CliError::Usage(e.to_string()))?))
+/// What decodes a session as `spts decode` does when nothing was learned of the objects.
+struct Learned {
+    training: TrainingData,
+    request: DecodeRequest,
+    decoders: LearnedDecoders,
 }
 
-/// The session as `spts decode` decodes it when nothing was learned; `None` without a compressive recording.
-fn decoded(session: &Session, training: &TrainingData) -> Result<Option<DecodedSession>, CliError> {
-    let Some(layout) = session.compressive().map(Recording::layout) else {
-        return Ok(None);
-    };
-    let request = DecodeRequest {
-        decoders: find("nn_lmmse").into_iter().collect(),
-        measurements: DecodeRequest::default_measurements(layout.taxels()),
-        windows: 1,
-        network: None,
-        seed: 1,
-    };
-    let learned = request.learn(layout, training, None)?;
-    Ok(Some(request.decode(session, &learned)?))
+impl Learned {
+    fn new(layout: &SkinLayout) -> Result<Self, CliError> {
+        let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;
+        let request = DecodeRequest {
+            decoders: find("nn_lmmse").into_iter().collect(),
+            measurements: DecodeRequest::default_measurements(layout.taxels()),
+            windows: 1,
+            network: None,
+            seed: 1,
+        };
+        Ok(Self {
+            decoders: request.learn(layout, &training, None)?,
+            training,
+            request,
+        })
+    }
+
+    /// The decoded session; `None` without a compressive recording.
+    fn decoded(&self, session: &Session) -> Result<Option<DecodedSession>, CliError> {
+        let decode = || self.request.decode(session, &self.decoders);
+        Ok(session.compressive().map(|_| decode()).transpose()?)
+    }
 }
 
 /// Most taxels of a skin that `spts simulate` decodes at its end: a second or two.

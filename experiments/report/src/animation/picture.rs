@@ -160,6 +160,7 @@ impl Stage {
         };
         canvas.text((left + width, top - 12.0), &marked, coloured);
 
+        let now = at(moment.time_s);
         // the window is wide enough to be seen
         let ends = [moment.window.start, moment.window.end].map(|sample| at(sample as f64 / self.rate_hz));
         let wide = half_pixel(ends[1] - ends[0]).max(1.5);
@@ -169,11 +170,11 @@ impl Stage {
             let Some([low, high]) = range else { continue };
             let x = left + column as f64 * COLUMN;
             let (upper, lower) = (level(*high), level(*low));
-            let colour = if x < ends[1] { TRACE } else { AHEAD };
+            let colour = if x < now { TRACE } else { AHEAD };
             canvas.rect((x, upper), (COLUMN, (lower - upper).max(0.5)), colour, 1.0);
         }
         canvas.frame((left, top), (width, height), FRAME, 1.0);
-        canvas.line(&[(ends[1], top), (ends[1], top + height)], WINDOW, 1.0);
+        canvas.line(&[(now, top), (now, top + height)], WINDOW, 1.0);
 
         for (tick, label) in axis.ticks(4) {
             let Some(place) = axis.place(tick).filter(|place| (0.02..=0.98).contains(place)) else {

@@ -174,13 +174,20 @@ impl<'a> SimulationFiles<'a> {
             write_json(&out.path("summary.json"), summary)?;
             write_json(&out.timed_path("timing.json"), &SimulationTiming::of(simulation))
         };
+        let pictures = || {
+            let folder = out.path("");
+            let pair = simulation.first.as_ref().zip(decoded);
+            let (pressure, decoded) = rayon::join(
+                || pressure_picture(&out, prepared, simulation),
+                || pair.map(|pair| save_picture(&[pair], &folder, "decoded")).transpose(),
+            );
+            pressure?;
+            decoded?;
+            Ok(())
+        };
         let written = numbers().map_err(ReportError::from);
         written
-            .and_then(|()| pressure_picture(&out, prepared, simulation))
-            .and_then(|()| match simulation.first.as_ref().zip(decoded) {
-                Some(pair) => Ok(save_picture(&[pair], &out.path(""), "decoded")?),
-                None => Ok(()),
-            })
+            .and_then(|()| pictures())
             .map_err(|error| error.unstaged(&out))?;
         let drawn = render.then(|| scene_pictures(prepared, simulation)).transpose();
         for (name, picture) in drawn.iter().flatten().flatten() {
