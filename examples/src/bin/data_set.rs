@@ -46,6 +46,9 @@ fn main() -> Result<()> {
     else {
         return Err("a column has another type".into());
     };
+    let rows_of = |name: &str| splits.iter().filter(|split| *split == name).count();
+    let counts = ["train", "validation", "test"].map(|name| format!("{name} {}", rows_of(name)));
+    println!("rows: {}", counts.join(", "));
     println!(" force, N   taxels that conduct   split");
     for row in [0, 100, 200, 300, 399] {
         let image = &images[100 * row..100 * (row + 1)];
