@@ -9,7 +9,7 @@ const SHARE: f64 = 0.8;
 
 /// Dash and gap of a curve that lies on `below` others: the gaps show what is below.
 pub(super) fn dash(below: usize) -> Option<(f64, f64)> {
-    (below > 0).then(|| (9.0, 9.0 + 4.0 * below as f64))
+    (below > 0).then_some((9.0, 9.0 + 4.0 * below as f64))
 }
 
 /// How many of `earlier` the curve `places` lies on.
