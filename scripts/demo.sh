@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What `make demo` does after set-up: builds, draws a first picture, and makes the report: demo.sh REPORT [RECORDINGS]. Says before each
-# step what it is and how long it takes, and after it how long it took.
+# What `make demo` does after set-up: builds, draws a first picture, and makes the report: demo.sh REPORT [RECORDINGS].
+# Says before each step what it is and how long it takes, and after it how long it took.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 report=$1

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Installs the command line into a folder: install.sh [FOLDER], ~/.local unless given. FOLDER/bin/spts finds the MuJoCo library in
-# FOLDER/lib, so that the folder can be moved, and the repository deleted. Needs what scripts/setup.sh has fetched.
+# Installs the command line into a folder: install.sh [FOLDER], ~/.local unless given. FOLDER/bin/spts finds the MuJoCo
+# library in FOLDER/lib, so that the folder can be moved, and the repository deleted. Needs what scripts/setup.sh has
+# fetched.
 set -euo pipefail
 prefix=$(realpath --canonicalize-missing "${1:-$HOME/.local}")
 cd "$(dirname "$0")/.."

@@ -22,8 +22,8 @@ fn pressed(dir: &Path, arguments: &str) -> (String, String) {
     (folder, String::from_utf8_lossy(&output.stderr).into_owned())
 }
 
-/// Two meshes of one name, and a mesh with the name of an object, keep their results apart; the same mesh again replaces
-/// its own, and says so.
+/// Two meshes of one name, and a mesh with the name of an object, keep their results apart; the same mesh again
+/// replaces its own, and says so.
 #[test]
 fn meshes_do_not_overwrite_each_other() {
     let dir = tempfile::tempdir().unwrap();

@@ -13,7 +13,7 @@ use netlist::{Drive, Limits, netlist};
 use rand::RngExt as _;
 use ringing::ringing;
 use simulator::{found, interpolate, run};
-use spts_circuit::amplifier::{Amplifier, Load, Network, Noise, OpAmp, Response, Transient};
+use spts_circuit::amplifier::{Amplifier, AmplifierNoise, AmplifierResponse, BusLoad, Network, OpAmp, Transient};
 use spts_models::Streams;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -30,8 +30,8 @@ struct Case {
 
 impl Case {
     /// Load before the edge, or after it.
-    fn load(&self, edge: usize) -> Load {
-        Load {
+    fn load(&self, edge: usize) -> BusLoad {
+        BusLoad {
             conductance_s: self.drives.iter().map(|d| d.conductance_s).sum(),
             current_a: self.drives.iter().map(|d| d.conductance_s * d.edges[edge].1).sum(),
         }
@@ -132,14 +132,14 @@ fn operating_point_noise_and_bandwidth() {
         assert_within("output", rest.output_v(), spice.printed("v(out)"), TENTH_LSB_V, case);
 
         let total_v = spice.printed("onoise_total");
-        let rms_v = Noise::rms(&case.amplifier, load.conductance_s).total();
+        let rms_v = AmplifierNoise::rms(&case.amplifier, load.conductance_s).total();
         assert_within("noise", rms_v, total_v, 1e-3 * total_v, case);
         for (hz, density) in spice.data("noise.dat").into_iter().step_by(150) {
-            let found = Noise::density(&case.amplifier, load.conductance_s, hz).total();
+            let found = AmplifierNoise::density(&case.amplifier, load.conductance_s, hz).total();
             assert_within("noise density", found, density, 1e-3 * density, case);
         }
 
-        let response = Response::new(&case.amplifier, load.conductance_s);
+        let response = AmplifierResponse::new(&case.amplifier, load.conductance_s);
         let decibels = spice.data("ac.dat");
         let down = decibels[0].1 - 20.0 * 2_f64.sqrt().log10();
         let end = decibels.iter().rposition(|(_, db)| *db >= down).unwrap();
@@ -157,7 +157,7 @@ fn step_response_and_ringing() {
     let rang = AtomicUsize::new(0);
     in_parallel(&cases(), |case| {
         let (before, after) = (case.load(0), case.load(1));
-        let response = Response::new(&case.amplifier, after.conductance_s);
+        let response = AmplifierResponse::new(&case.amplifier, after.conductance_s);
         // steps of a 300th of the fastest turn or time constant, until a millionth of the step is left
         let long_s = response.settle_s(1e-6);
         let step_s = response.ringing_hz().unwrap_or(response.bandwidth_hz()).recip() / 300.0;

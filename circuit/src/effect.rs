@@ -8,7 +8,7 @@ use spts_models::{ConfigError, Streams, explain_toml};
 
 /// Inputs of an effect that are constant during a session.
 #[derive(Debug, Clone)]
-pub struct Session {
+pub struct EffectSession {
     /// Random streams of the device, which determine its parts. They are the same in every session and mode.
     pub device: Streams,
     /// Random streams of this session and mode, which determine what happens in it.
@@ -123,7 +123,7 @@ pub enum ProfileError {
 }
 
 /// Builds an effect from its parameters.
-pub type BuildEffect = fn(toml::Table, &Session) -> Result<Box<dyn Effect>, ProfileError>;
+pub type BuildEffect = fn(toml::Table, &EffectSession) -> Result<Box<dyn Effect>, ProfileError>;
 
 /// Parameters of an effect from its table.
 pub(crate) fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {

@@ -18,7 +18,7 @@ mod rails;
 pub use adc::Adc;
 
 use crate::converter::Converter;
-use crate::effect::{BlockStart, BuildEffect, Effect, ProfileError, Session, parse};
+use crate::effect::{BlockStart, BuildEffect, Effect, EffectSession, ProfileError, parse};
 use crate::engine::Engine;
 use crate::mode::{Mode, WeightMode};
 use crate::seeding::Seeding;
@@ -59,7 +59,7 @@ pub const EFFECTS: &[(&str, BuildEffect)] = &[
 ///
 /// # Errors
 /// [`ProfileError`] for an unknown effect, or parameters that it refuses.
-pub fn build_chain(chain: &toml::Table, session: &Session) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
+pub fn build_chain(chain: &toml::Table, session: &EffectSession) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
     let mode = session.weights.mode().readout();
     if let Some(name) = chain.keys().find(|k| EFFECTS.iter().all(|(name, _)| name != k)) {
         let known: Vec<&str> = EFFECTS.iter().map(|(name, _)| *name).collect();
@@ -125,9 +125,9 @@ pub(crate) fn rail_v(chain: &toml::Table, mode: Mode) -> Result<Option<f64>, Pro
 ///
 /// # Panics
 /// If the effect lacks a property; the message holds the numbers.
-pub fn check_effect(build: &dyn Fn(&Session) -> Box<dyn Effect>) {
+pub fn check_effect(build: &dyn Fn(&EffectSession) -> Box<dyn Effect>) {
     for mode in [WeightMode::Binary, WeightMode::Analog, WeightMode::Raster] {
-        let session = Session {
+        let session = EffectSession {
             device: Streams::new(2),
             streams: Streams::new(3),
             weights: Weights::new(mode, Seeding::Address, 4),
@@ -155,7 +155,13 @@ pub fn check_effect(build: &dyn Fn(&Session) -> Box<dyn Effect>) {
 }
 
 /// Bits of 1000 measurements of block `block` through `effect`, while 4 taxels change.
-fn block_of(effect: &mut [Box<dyn Effect>; 1], session: &Session, block: u64, scale_s: f64, batch: usize) -> Vec<u64> {
+fn block_of(
+    effect: &mut [Box<dyn Effect>; 1],
+    session: &EffectSession,
+    block: u64,
+    scale_s: f64,
+    batch: usize,
+) -> Vec<u64> {
     let map = |a: f64| {
         let values = vec![0.0, scale_s, 0.5 * scale_s, a * scale_s];
         ConductanceMap::from_values(2, 2, values)

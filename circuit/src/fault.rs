@@ -1,7 +1,7 @@
 //! Faults of single cells or taxels.
 
 use crate::cell_run::CellRun;
-use crate::effect::{ProfileError, Session};
+use crate::effect::{EffectSession, ProfileError};
 use serde::Deserialize;
 
 /// One fault of a profile's `[[faults]]` list.
@@ -47,4 +47,4 @@ pub trait Fault: Send {
 }
 
 /// Builds a fault of a taxel from its parameters.
-pub type BuildFault = fn(toml::Table, u32, &Session) -> Result<Box<dyn Fault>, ProfileError>;
+pub type BuildFault = fn(toml::Table, u32, &EffectSession) -> Result<Box<dyn Fault>, ProfileError>;

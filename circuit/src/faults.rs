@@ -9,7 +9,7 @@ pub(crate) mod skipping_clocks;
 mod stuck;
 
 use crate::batch::Batch;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use crate::fault::{BuildFault, Fault, FaultConfig};
 use spts_models::in_section;
 
@@ -36,7 +36,7 @@ fn known() -> String {
 /// # Errors
 /// [`ProfileError`] for an unknown fault, a taxel that the skin does not have, parameters outside their range, or a
 /// second fault that determines the level of the same cell.
-pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub fn build_faults(configs: &[FaultConfig], session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let mut cells: Vec<FaultyCell> = Vec::new();
     for (index, config) in configs.iter().enumerate() {
         let taxel = config.taxel as usize;
@@ -61,7 +61,7 @@ pub fn build_faults(configs: &[FaultConfig], session: &Session) -> Result<Box<dy
     Ok(Box::new(Faults { cells }))
 }
 
-fn build_fault(index: usize, config: &FaultConfig, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+fn build_fault(index: usize, config: &FaultConfig, session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
     let Some((_, build)) = FAULTS.iter().find(|(name, _)| *name == config.name) else {
         return Err(ProfileError::UnknownFault {
             index,
@@ -126,8 +126,8 @@ mod tests {
     use crate::weights::Weights;
     use spts_models::Streams;
 
-    fn session(mode: WeightMode) -> Session {
-        Session {
+    fn session(mode: WeightMode) -> EffectSession {
+        EffectSession {
             device: Streams::new(4),
             streams: Streams::new(4),
             weights: Weights::new(mode, Seeding::Address, 100),

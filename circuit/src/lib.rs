@@ -84,7 +84,7 @@ pub use batch::Batch;
 pub use cell_run::CellRun;
 pub use codes::{CellCodes, CodesError, check_codes};
 pub use converter::{CodeScale, Converter, ConverterConfig};
-pub use effect::{BlockStart, BuildEffect, Effect, ProfileError, Session};
+pub use effect::{BlockStart, BuildEffect, Effect, EffectSession, ProfileError};
 pub use effects::{Adc, EFFECTS, build_chain, check_effect};
 pub use fault::{BuildFault, Fault, FaultConfig};
 pub use faults::{FAULTS, build_faults};

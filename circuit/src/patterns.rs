@@ -71,7 +71,8 @@ impl Patterns {
         }
     }
 
-    /// A pattern of `period` rows, from `levels` in [−1, 1], row-major. Every cell puts out the code nearest to its level.
+    /// A pattern of `period` rows, from `levels` in [−1, 1], row-major. Every cell puts out the code nearest to its
+    /// level.
     ///
     /// ```
     /// use spts_circuit::Patterns;

@@ -1,7 +1,7 @@
 //! Named parameter sets of the whole readout.
 
 use crate::converter::Converter;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use crate::effects::{build_chain, converter, rail_v};
 use crate::fault::FaultConfig;
 use crate::faults::build_faults;
@@ -153,7 +153,7 @@ impl Profile {
             let weights = self.weights(mode, taxels)?;
             self.effects(
                 mode,
-                &Session {
+                &EffectSession {
                     device: Streams::new(0),
                     streams: Streams::new(0),
                     weights,
@@ -169,7 +169,7 @@ impl Profile {
     ///
     /// # Errors
     /// [`ProfileError`] for an unknown effect or fault, or parameters that it refuses.
-    pub fn effects(&self, mode: Mode, session: &Session) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
+    pub fn effects(&self, mode: Mode, session: &EffectSession) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
         let mut effects = Vec::new();
         if !self.faults.is_empty() {
             effects.push(build_faults(&self.faults, session)?);

@@ -2,7 +2,7 @@
 
 use crate::acquire_error::AcquireError;
 use crate::codes::{CellCodes, CodesError};
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::engine::Engine;
 use crate::mode::Mode;
 use crate::profile::Profile;
@@ -64,7 +64,7 @@ impl Readout {
             converter: profile.converter(mode)?,
             ..RecordingInfo::new(*layout, weights.clone(), profile.sample_rate_hz)
         };
-        let session = Session {
+        let session = EffectSession {
             device: device.child("readout/device", 0),
             streams: device.child("session", session).child(label, 0),
             weights: weights.clone(),

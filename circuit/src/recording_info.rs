@@ -8,6 +8,15 @@ use serde::{Deserialize, Serialize};
 use spts_models::SkinLayout;
 
 /// Metadata of a recording: everything that a decoder needs beside the samples.
+///
+/// ```
+/// use spts_circuit::{Mode, RecordingInfo, Seeding, WeightMode, Weights};
+/// use spts_models::SkinLayout;
+///
+/// let weights = Weights::new(WeightMode::Raster, Seeding::Address, 100);
+/// let info = RecordingInfo::new(SkinLayout::default(), weights, 64_300.0);
+/// assert_eq!((info.mode(), info.measurements_per_frame), (Mode::Raster, 100));
+/// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordingInfo {

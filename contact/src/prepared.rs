@@ -9,7 +9,7 @@ pub(crate) const BLOCK: usize = 16;
 
 /// A mesh whose triangles are sorted into blocks of neighbours, as contact fields need. It is immutable. A clone shares
 /// the data, so any number of fields, scenes and threads can use one mesh. It dereferences to
-/// [`TriMesh`](crate::TriMesh).
+/// [`TriMesh`](crate::mesh::TriMesh).
 ///
 /// ```
 /// use spts_contact::{ContactField, PosedMesh, PreparedMesh, WinklerConfig, WinklerLayer, mesh::sphere};

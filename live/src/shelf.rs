@@ -31,6 +31,9 @@ pub(crate) enum Made<T> {
     Refused(String),
 }
 
+/// What has been asked for so far, by name.
+type ByName<T> = Mutex<BTreeMap<&'static str, Made<T>>>;
+
 impl<T> Clone for Made<T> {
     fn clone(&self) -> Self {
         match self {
@@ -46,8 +49,8 @@ impl<T> Clone for Made<T> {
 #[derive(Default)]
 pub struct Shelf {
     layout: SkinLayout,
-    decoders: Mutex<BTreeMap<&'static str, Made<Decoder>>>,
-    designs: Mutex<BTreeMap<&'static str, Made<Design>>>,
+    decoders: ByName<Decoder>,
+    designs: ByName<Design>,
     /// One thing at a time is made.
     making: Mutex<()>,
     outlines: OnceLock<Result<TrainingData, String>>,
@@ -101,7 +104,7 @@ impl Shelf {
     /// What is on `shelf` under `name`; begins to make it when nothing is.
     fn get<T: Send + Sync + 'static>(
         self: &Arc<Self>,
-        table: fn(&Self) -> &Mutex<BTreeMap<&'static str, Made<T>>>,
+        table: fn(&Self) -> &ByName<T>,
         name: &'static str,
         make: impl FnOnce(&Self) -> Result<T, String> + Send + 'static,
     ) -> Made<T> {

@@ -15,12 +15,14 @@ from conftest import WIDTHS
 
 SCHEMES = ("light", "dark")
 
-# Names of programs and files, which nobody who reads the page knows: words with an underscore, and short names of objects
+# Names of programs and files, which nobody who reads the page knows: words with an underscore, and short names of
+# objects
 INTERNAL = re.compile(r"\b[A-Za-z]+[0-9]*_[A-Za-z0-9_]+\b|\b(?:rec|trig|smallT)\b")
 # The platform in the provenance
 KNOWN = {"x86_64"}
 
-# Text whose contrast with what is behind it is below 4.5, or 3 for large text (WCAG 2.2, 1.4.3). Boxes behind it may be transparent.
+# Text whose contrast with what is behind it is below 4.5, or 3 for large text (WCAG 2.2, 1.4.3). Boxes behind it may be
+# transparent.
 FAINT = """() => {
   const parse = c => (c.match(/[0-9.]+/g) || [0, 0, 0, 0]).map(Number);
   const over = ([r, g, b, a = 1], under) => [r, g, b].map((v, i) => a * v + (1 - a) * under[i]);

@@ -1,8 +1,8 @@
 //! Error budget of one summing amplifier for a skin, a clock and a converter.
 
-use super::noise::Noise;
+use super::noise::AmplifierNoise;
 use super::parts::Amplifier;
-use super::response::Response;
+use super::response::AmplifierResponse;
 use crate::effects::Adc;
 use serde::{Deserialize, Serialize};
 use spts_models::{ConfigError, within};
@@ -137,7 +137,7 @@ pub struct Budget {
     /// Longest time that the slew rate adds, s: from one end of the excursion to the other.
     pub slew_s: f64,
     /// Noise by source, V rms.
-    pub noise_v: Noise,
+    pub noise_v: AmplifierNoise,
     /// Root sum of squares of all sources, V rms; without the converter.
     pub noise_v_rms: f64,
     /// Step of the converter, V.
@@ -170,8 +170,8 @@ impl Budget {
     pub fn new(amplifier: &Amplifier, taxels: f64, setting: &Setting) -> Self {
         let Setting { skin, adc, available_s } = setting;
         let conductance_s = skin.conductance_s(taxels);
-        let response = Response::new(amplifier, conductance_s);
-        let noise_v = Noise::rms(amplifier, conductance_s);
+        let response = AmplifierResponse::new(amplifier, conductance_s);
+        let noise_v = AmplifierNoise::rms(amplifier, conductance_s);
         let feedback_ohm = amplifier.network().feedback_ohm;
         let [sum_rms_v, sum_worst_v] =
             [skin.current_rms_a(taxels), skin.current_worst_a(taxels)].map(|current_a| feedback_ohm * current_a);

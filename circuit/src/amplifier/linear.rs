@@ -3,7 +3,7 @@
 use super::decay::Decay;
 use super::parts::Amplifier;
 use super::root::crossing;
-use super::state::{Load, State};
+use super::state::{BusLoad, State};
 
 /// Share by which the slew rate or a rail has to be exceeded before it acts: rounding alone must not switch phases.
 const MARGIN: f64 = 1e-9;
@@ -31,7 +31,7 @@ pub(super) struct Linear {
 }
 
 impl Linear {
-    pub(super) fn new(amplifier: &Amplifier, load: Load) -> Self {
+    pub(super) fn new(amplifier: &Amplifier, load: BusLoad) -> Self {
         let (unity, pole) = (amplifier.unity_rad_per_s(), amplifier.pole_rad_per_s());
         let (feedback_ohm, feedback_f) = (amplifier.network().feedback_ohm, amplifier.network().feedback_f);
         let (bus_s, capacitance_f) = (amplifier.bus_s(load.conductance_s), amplifier.capacitance_f());
@@ -117,7 +117,7 @@ impl Linear {
 /// Where the linear system comes to rest, rails or not:
 ///
 /// o∞ = ((1 + Rf·S)·Vos − Rf·I) / (1 + (1 + Rf·S)/A0), v∞ = Vos − o∞/A0.
-pub(super) fn rest(amplifier: &Amplifier, load: Load) -> State {
+pub(super) fn rest(amplifier: &Amplifier, load: BusLoad) -> State {
     let (network, dc_gain) = (amplifier.network(), amplifier.op_amp().dc_gain);
     let noise_gain = network.feedback_ohm * amplifier.bus_s(load.conductance_s);
     let output_v =

@@ -7,20 +7,20 @@
 //!
 //! (Cb + Cf) v′ = Cf o′ − (S + 1/Rf) v + o/Rf + I,  o′ = ωt (Vos − v) − ωp o,  |o′| ≤ slew rate, |o| ≤ rail,
 //!
-//! where ωt = 2π·GBW and ωp = ωt/A0. [`Transient`] solves these equations. [`Response`] and [`Noise`] are the
-//! small-signal properties in closed form. [`Budget`] compares them with a skin, a converter and a clock, and
+//! where ωt = 2π·GBW and ωp = ωt/A0. [`Transient`] solves these equations. [`AmplifierResponse`] and [`AmplifierNoise`]
+//! are the small-signal properties in closed form. [`Budget`] compares them with a skin, a converter and a clock, and
 //! [`Remedy`] lists what larger skins need.
 //!
 //! ```
-//! use spts_circuit::amplifier::{Amplifier, Load, Network, OpAmp, Response, Transient};
+//! use spts_circuit::amplifier::{Amplifier, BusLoad, Network, OpAmp, AmplifierResponse, Transient};
 //!
 //! let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
 //! // a hundred taxels of 20 µS between them and 3 V on one: −1 kΩ · 20 µS · 3 V
-//! let load = Load { conductance_s: 100.0 * 20e-6, current_a: 20e-6 * 3.0 };
+//! let load = BusLoad { conductance_s: 100.0 * 20e-6, current_a: 20e-6 * 3.0 };
 //! let mut transient = Transient::new(amplifier);
 //! transient.advance(load, 10e-6);
 //! assert!((transient.output_v() + 0.06).abs() < 1e-6);
-//! assert!((Response::new(&amplifier, load.conductance_s).noise_gain() - 3.0).abs() < 1e-12);
+//! assert!((AmplifierResponse::new(&amplifier, load.conductance_s).noise_gain() - 3.0).abs() < 1e-12);
 //! # Ok::<(), spts_models::ConfigError>(())
 //! ```
 
@@ -38,9 +38,9 @@ mod state;
 mod transient;
 
 pub use budget::{Budget, Limit, Setting, Skin};
-pub use noise::Noise;
+pub use noise::AmplifierNoise;
 pub use parts::{Amplifier, Network, OpAmp};
 pub use remedies::{Remedied, Remedy, fewest_wires, remedied};
-pub use response::Response;
-pub use state::Load;
+pub use response::AmplifierResponse;
+pub use state::BusLoad;
 pub use transient::Transient;

@@ -1,7 +1,7 @@
 //! Noise at the amplifier's output, by source.
 
 use super::parts::Amplifier;
-use super::response::Response;
+use super::response::AmplifierResponse;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
@@ -13,16 +13,16 @@ const FLICKER_FROM_HZ: f64 = 1.0;
 /// Noise by source: at the output in V, or as a density in V/√Hz.
 ///
 /// ```
-/// use spts_circuit::amplifier::{Amplifier, Network, Noise, OpAmp};
+/// use spts_circuit::amplifier::{Amplifier, Network, AmplifierNoise, OpAmp};
 ///
 /// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
-/// let noise = Noise::rms(&amplifier, 0.01);
+/// let noise = AmplifierNoise::rms(&amplifier, 0.01);
 /// assert!(noise.voltage > noise.feedback, "the operational amplifier's voltage noise is amplified by 1 + Rf·ΣG");
 /// assert!(noise.total() < 1e-3, "less than 1 mV, far below the converter's step");
 /// # Ok::<(), spts_models::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Noise {
+pub struct AmplifierNoise {
     /// Thermal noise of the taxels: a current of 4kT·ΣG into the bus.
     pub taxels: f64,
     /// Thermal noise of the feedback resistance: a current of 4kT/Rf into the bus.
@@ -33,11 +33,11 @@ pub struct Noise {
     pub current: f64,
 }
 
-impl Noise {
+impl AmplifierNoise {
     /// Noise density at the output at `frequency_hz` ≥ 0, V/√Hz.
     #[must_use]
     pub fn density(amplifier: &Amplifier, conductance_s: f64, frequency_hz: f64) -> Self {
-        let response = Response::new(amplifier, conductance_s);
+        let response = AmplifierResponse::new(amplifier, conductance_s);
         let per_current = response.gain_ohm(frequency_hz);
         let per_voltage = per_current * response.bus_s.hypot(TAU * frequency_hz * response.a[2]);
         let corner_hz = amplifier.op_amp().noise_corner_hz;
@@ -59,13 +59,13 @@ impl Noise {
     ///
     /// ∫|H|² df = ωt²/(4 a₀ a₁), ∫|E|² df = ωt² ((S + 1/Rf)² + C a₀)/(4 a₀ a₁), C = Cb + Cf.
     ///
-    /// 1/f noise adds fc ∫|E|²/f df from 1 Hz on, see `Response::flicker`.
+    /// 1/f noise adds fc ∫|E|²/f df from 1 Hz on, see `AmplifierResponse::flicker`.
     ///
     /// Source: the integral of |(b₁s + b₀)/(a₂s² + a₁s + a₀)|² over all frequencies, (b₁²a₀ + b₀²a₂)/(2a₀a₁a₂); H. M.
     /// James, N. B. Nichols, R. S. Phillips, *Theory of Servomechanisms* (1947), appendix.
     #[must_use]
     pub fn rms(amplifier: &Amplifier, conductance_s: f64) -> Self {
-        let response = Response::new(amplifier, conductance_s);
+        let response = AmplifierResponse::new(amplifier, conductance_s);
         let [a0, a1, a2] = response.a;
         let per_current = response.unity / (4.0 * a0 * a1).sqrt();
         let per_voltage = per_current * response.bus_s.hypot((a2 * a0).sqrt());

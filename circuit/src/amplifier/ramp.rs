@@ -2,7 +2,7 @@
 
 use super::parts::Amplifier;
 use super::root::crossing;
-use super::state::{Load, State};
+use super::state::{BusLoad, State};
 
 /// Output at the constant rate r; the bus follows v′ = −k v + b + c t, k = (S + 1/Rf)/C.
 pub(super) struct Ramp<'a> {
@@ -22,7 +22,7 @@ pub(super) struct Ramp<'a> {
 
 impl<'a> Ramp<'a> {
     /// Phase from `start` on: driven up or down, with the output at `rate`.
-    pub(super) fn new(amplifier: &'a Amplifier, load: Load, start: State, rate: f64, up: bool) -> Self {
+    pub(super) fn new(amplifier: &'a Amplifier, load: BusLoad, start: State, rate: f64, up: bool) -> Self {
         let network = amplifier.network();
         let (bus_s, capacitance_f) = (amplifier.bus_s(load.conductance_s), amplifier.capacitance_f());
         let current_a =

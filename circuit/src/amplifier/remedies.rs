@@ -1,9 +1,9 @@
 //! Ways to read larger skins: a smaller feedback, a tree of amplifiers, or more wires.
 
 use super::budget::{Budget, EXCURSION_SD, Limit, Setting, Strain, adc_ends_v, decibels, settling_fraction, worst};
-use super::noise::Noise;
+use super::noise::AmplifierNoise;
 use super::parts::{Amplifier, Network};
-use super::response::Response;
+use super::response::AmplifierResponse;
 use serde::Serialize;
 use spts_models::{ConfigError, in_range};
 
@@ -244,8 +244,8 @@ impl Tree {
         };
         let feedback_ohm = amplifier.network().feedback_ohm;
         let conductance_s = fan_in * gain / feedback_ohm;
-        let response = Response::new(amplifier, conductance_s);
-        let noise = Noise::rms(amplifier, conductance_s);
+        let response = AmplifierResponse::new(amplifier, conductance_s);
+        let noise = AmplifierNoise::rms(amplifier, conductance_s);
         b.noise_gain = b.noise_gain.max(response.noise_gain());
         b.bandwidth_hz = b.bandwidth_hz.min(response.bandwidth_hz());
         b.quality = b.quality.max(response.quality());

@@ -13,17 +13,17 @@ use std::f64::consts::TAU;
 /// pole, GBW/(1 + Rf·S).
 ///
 /// ```
-/// use spts_circuit::amplifier::{Amplifier, Network, OpAmp, Response};
+/// use spts_circuit::amplifier::{Amplifier, Network, OpAmp, AmplifierResponse};
 ///
 /// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
-/// let small = Response::new(&amplifier, 100.0 * 1e-4); // 100 taxels of 0.1 mS
-/// let large = Response::new(&amplifier, 10_000.0 * 1e-4);
+/// let small = AmplifierResponse::new(&amplifier, 100.0 * 1e-4); // 100 taxels of 0.1 mS
+/// let large = AmplifierResponse::new(&amplifier, 10_000.0 * 1e-4);
 /// assert!((small.noise_gain() - 11.0).abs() < 1e-9);
 /// assert!(large.bandwidth_hz() < small.bandwidth_hz() / 50.0, "more taxels, less bandwidth");
 /// # Ok::<(), spts_models::ConfigError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Response {
+pub struct AmplifierResponse {
     noise_gain: f64,
     /// ωt, rad/s.
     pub(super) unity: f64,
@@ -33,7 +33,7 @@ pub struct Response {
     pub(super) a: [f64; 3],
 }
 
-impl Response {
+impl AmplifierResponse {
     /// Response of `amplifier` with ΣG = `conductance_s` ≥ 0, S.
     #[must_use]
     pub fn new(amplifier: &Amplifier, conductance_s: f64) -> Self {

@@ -2,14 +2,14 @@
 
 /// What the taxels feed into the bus while their drives are constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Load {
+pub struct BusLoad {
     /// S = ΣGk, S. Range [0, 1e9].
     pub conductance_s: f64,
     /// I = ΣGk·Vk, A; the output settles near −Rf·I. Range ± 1e9 V/Rf.
     pub current_a: f64,
 }
 
-impl Load {
+impl BusLoad {
     /// Finite, and no negative conductance.
     pub(super) fn check(self) {
         let Self {

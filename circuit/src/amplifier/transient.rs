@@ -3,7 +3,7 @@
 use super::linear::{Exit, Linear, rest};
 use super::parts::Amplifier;
 use super::ramp::{Ramp, demand_v_per_s};
-use super::state::{Load, State};
+use super::state::{BusLoad, State};
 
 /// What the output does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,11 +26,11 @@ const PHASES: u32 = 100_000;
 /// rail limits the output itself, not a copy of it, so the amplifier leaves the rail as soon as its input allows.
 ///
 /// ```
-/// use spts_circuit::amplifier::{Amplifier, Load, Network, OpAmp, Transient};
+/// use spts_circuit::amplifier::{Amplifier, BusLoad, Network, OpAmp, Transient};
 ///
 /// let amplifier = Amplifier::new(OpAmp::default(), Network::default())?;
 /// let mut transient = Transient::new(amplifier);
-/// let load = Load { conductance_s: 0.01, current_a: -2e-3 };
+/// let load = BusLoad { conductance_s: 0.01, current_a: -2e-3 };
 /// transient.advance(load, 15e-6); // one measurement
 /// assert!((transient.output_v() - 2.0).abs() < 0.01, "settled at −Rf·I");
 /// # Ok::<(), spts_models::ConfigError>(())
@@ -49,7 +49,7 @@ impl Transient {
             amplifier,
             state: State::default(),
         };
-        transient.settle(Load {
+        transient.settle(BusLoad {
             conductance_s: 0.0,
             current_a: 0.0,
         });
@@ -73,7 +73,7 @@ impl Transient {
     /// # Panics
     /// In builds with debug assertions, if `load` is not finite or has a negative conductance. Other builds do not
     /// check; after a load that is not finite, bus and output are meaningless until the next call of this function.
-    pub fn settle(&mut self, load: Load) {
+    pub fn settle(&mut self, load: BusLoad) {
         load.check();
         self.state = rest(&self.amplifier, load);
         let rail_v = self.amplifier.op_amp().rail_v;
@@ -92,7 +92,7 @@ impl Transient {
     /// # Panics
     /// In builds with debug assertions, for a load as in [`settle`](Self::settle) or such a time. Other builds do not
     /// check; bus and output are then meaningless until the next [`settle`](Self::settle).
-    pub fn advance(&mut self, load: Load, dt_s: f64) {
+    pub fn advance(&mut self, load: BusLoad, dt_s: f64) {
         load.check();
         debug_assert!(dt_s.is_finite() && dt_s >= 0.0, "dt_s = {dt_s} is outside [0, ∞)");
         let linear = Linear::new(&self.amplifier, load);
@@ -146,7 +146,7 @@ impl Transient {
         }
     }
 
-    fn slew(&mut self, load: Load, up: bool, left_s: f64) -> (f64, Phase) {
+    fn slew(&mut self, load: BusLoad, up: bool, left_s: f64) -> (f64, Phase) {
         let op_amp = *self.amplifier.op_amp();
         let sign = if up { 1.0 } else { -1.0 };
         let rail_s = ((op_amp.rail_v - sign * self.state.output_v) / op_amp.slew_v_per_s).max(0.0);
@@ -167,7 +167,7 @@ impl Transient {
         }
     }
 
-    fn rail(&mut self, load: Load, up: bool, left_s: f64) -> (f64, Phase) {
+    fn rail(&mut self, load: BusLoad, up: bool, left_s: f64) -> (f64, Phase) {
         let ramp = Ramp::new(&self.amplifier, load, self.state, 0.0, up);
         let t = ramp.release(left_s, 0.0).unwrap_or(left_s);
         self.state = ramp.after(t);

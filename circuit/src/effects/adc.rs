@@ -3,7 +3,7 @@
 use crate::batch::Batch;
 use crate::converter::{CodeScale, Converter, ConverterConfig};
 use crate::effect::parse;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use serde::Deserialize;
 use spts_models::{ConfigError, in_range, within};
 
@@ -108,7 +108,7 @@ impl Adc {
     }
 }
 
-pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     Ok(Box::new(parse::<Adc>(table)?))
 }
 

@@ -1,9 +1,9 @@
 //! The summing amplifier, modelled from its parts in the time domain.
 
-use crate::amplifier::{Amplifier, Load, Network, Noise, OpAmp, Transient};
+use crate::amplifier::{Amplifier, AmplifierNoise, BusLoad, Network, OpAmp, Transient};
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::span::Span;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -58,7 +58,7 @@ struct Summing {
     after_s: f64,
     transient: Transient,
     /// Load since the last change of the drives; `None` after a gap.
-    load: Option<Load>,
+    load: Option<BusLoad>,
     rng: ChaCha8Rng,
 }
 
@@ -67,7 +67,7 @@ pub(super) fn rail_v(table: toml::Table) -> Result<f64, ProfileError> {
     Ok(parse::<Config>(table)?.op_amp.rail_v)
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let c: Config = parse(table)?;
     let period_s = 1.0 / session.sample_rate_hz;
     let sampled = (0.0..=period_s).contains(&c.sample_s);
@@ -105,7 +105,7 @@ impl Effect for Summing {
     fn apply(&mut self, batch: &mut Batch<'_>) {
         let feedback_ohm = self.amplifier.network().feedback_ohm;
         for (sum_v, output_v) in batch.sum_v.iter().zip(&mut *batch.output_v) {
-            let load = Load {
+            let load = BusLoad {
                 conductance_s: (sum_v / batch.volts_per_siemens).max(0.0),
                 current_a: *output_v / feedback_ohm,
             };
@@ -116,7 +116,7 @@ impl Effect for Summing {
                     self.transient.advance(load, self.after_s);
                 }
             }
-            let noise_v = Noise::rms(&self.amplifier, load.conductance_s).total();
+            let noise_v = AmplifierNoise::rms(&self.amplifier, load.conductance_s).total();
             let normal: f64 = StandardNormal.sample(&mut self.rng);
             // recordings hold the output with its sign turned
             *output_v = noise_v * normal - self.transient.output_v();

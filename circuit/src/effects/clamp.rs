@@ -2,7 +2,7 @@
 
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use serde::Deserialize;
 use spts_models::within;
 
@@ -25,7 +25,7 @@ pub(super) fn subtract_v(table: toml::Table) -> Result<f64, ProfileError> {
     Ok(config.subtract_v)
 }
 
-pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     Ok(Box::new(Clamp {
         subtract_v: subtract_v(table)?,
     }))

@@ -2,7 +2,7 @@
 
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use crate::span::Span;
 use serde::Deserialize;
 
@@ -19,7 +19,7 @@ struct ClockPattern {
     amplitude_v: f64,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let config: Config = parse(table)?;
     let amplitude_v = config.amplitude_v.within("amplitude_v", -2.0, 2.0, "[−2, 2]")?;
     Ok(Box::new(ClockPattern {

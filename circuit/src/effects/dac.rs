@@ -3,7 +3,7 @@
 use crate::batch::{Batch, Scratch};
 use crate::codes::{FULL_SCALE, NEUTRAL, code_of};
 use crate::effect::parse;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use crate::mode::{ANALOG_SCALE, WeightMode};
 use crate::seeding::finalise;
 use crate::span::Span;
@@ -60,7 +60,7 @@ struct Dac {
     scratch: Scratch,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let c: Config = parse(table)?;
     within("reference_v", c.reference_v, 0.5, 5.5, "[0.5, 5.5]")?;
     within("floor_v", c.floor_v, 0.0, 0.5 * c.reference_v, "[0, 0.5·reference_v]")?;

@@ -2,7 +2,7 @@
 
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use crate::span::Span;
 use serde::Deserialize;
 
@@ -29,7 +29,7 @@ struct DriveOffset {
     asymmetry: f64,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let config: Config = parse(table)?;
     let mut rng = session.streams.rng("drive-offset", 0);
     Ok(Box::new(DriveOffset {

@@ -2,7 +2,7 @@
 
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::span::Span;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -23,7 +23,7 @@ struct IdleNoise {
     rng: ChaCha8Rng,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let config: Config = parse(table)?;
     let sd_v = config.sd_v.within("sd_v", 0.0, 10.0, "[0, 10]")?;
     Ok(Box::new(IdleNoise {

@@ -4,7 +4,7 @@ use super::late_queue::LateQueue;
 use super::late_raster::LateRaster;
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::mode::WeightMode;
 use crate::span::Span;
 use rand::RngExt as _;
@@ -105,7 +105,7 @@ struct LateUpdates {
     queue: LateQueue,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let config: Config = parse(table)?;
     let period = config.period_measurements;
     in_range("period_measurements", period, (2.0..1e9).contains(&period), "[2, 1e9)")?;

@@ -3,7 +3,7 @@
 use crate::batch::Batch;
 use crate::cell_run::CellRun;
 use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, ProfileError, Session};
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
 use crate::faults::skipping_clocks::SkippingClocks;
 use crate::span::Span;
 use crate::weights::Weights;
@@ -62,7 +62,7 @@ struct MissedClocks {
     common: Vec<i64>,
 }
 
-pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     let config: Config = parse(table)?;
     let probability = config.probability.within("probability", 0.0, 1.0, "[0, 1]")?;
     within("all_probability", config.all_probability, 0.0, 1.0, "[0, 1]")?;
@@ -80,7 +80,7 @@ pub(super) fn build(table: toml::Table, session: &Session) -> Result<Box<dyn Eff
     }
     let all = (config.all_probability > 0.0).then(|| {
         let streams = session.streams.child("missed-clocks/all", 0);
-        let session = Session {
+        let session = EffectSession {
             streams,
             ..session.clone()
         };

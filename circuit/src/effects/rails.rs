@@ -2,7 +2,7 @@
 
 use crate::batch::Batch;
 use crate::effect::parse;
-use crate::effect::{Effect, ProfileError, Session};
+use crate::effect::{Effect, EffectSession, ProfileError};
 use serde::Deserialize;
 use spts_models::in_range;
 
@@ -29,7 +29,7 @@ pub(super) fn limit_v(table: toml::Table) -> Result<f64, ProfileError> {
     )?)
 }
 
-pub(super) fn build(table: toml::Table, _session: &Session) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
     Ok(Box::new(Rails {
         limit_v: limit_v(table)?,
     }))

@@ -2,7 +2,7 @@
 
 use crate::cell_run::CellRun;
 use crate::effect::parse;
-use crate::effect::{ProfileError, Session};
+use crate::effect::{EffectSession, ProfileError};
 use crate::fault::Fault;
 use serde::Deserialize;
 
@@ -11,7 +11,7 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 struct Dead {}
 
-pub(super) fn build(table: toml::Table, _taxel: u32, _session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+pub(super) fn build(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
     Ok(Box::new(parse::<Dead>(table)?))
 }
 

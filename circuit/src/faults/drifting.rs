@@ -2,7 +2,7 @@
 
 use crate::cell_run::CellRun;
 use crate::effect::parse;
-use crate::effect::{ProfileError, Session};
+use crate::effect::{EffectSession, ProfileError};
 use crate::fault::Fault;
 use serde::Deserialize;
 use spts_models::within;
@@ -20,7 +20,7 @@ fn slow_loss() -> f64 {
     -0.01
 }
 
-pub(super) fn build(table: toml::Table, _taxel: u32, _session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+pub(super) fn build(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
     let drifting: Drifting = parse(table)?;
     let rate = drifting.rate_per_s;
     within("rate_per_s", rate, -10.0, 10.0, "[−10, 10]")?;

@@ -2,7 +2,7 @@
 
 use crate::cell_run::CellRun;
 use crate::effect::parse;
-use crate::effect::{ProfileError, Session};
+use crate::effect::{EffectSession, ProfileError};
 use crate::fault::Fault;
 use crate::mode::WeightMode;
 use serde::Deserialize;
@@ -40,7 +40,7 @@ struct Overdriven {
     config: Config,
 }
 
-pub(super) fn build(table: toml::Table, _taxel: u32, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+pub(super) fn build(table: toml::Table, _taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
     let config: Config = parse(table)?;
     for (field, value) in [("gain", config.gain), ("carry", config.carry)] {
         within(field, value, -100.0, 100.0, "[−100, 100]")?;

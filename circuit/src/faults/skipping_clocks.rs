@@ -2,7 +2,7 @@
 
 use crate::cell_run::CellRun;
 use crate::effect::parse;
-use crate::effect::{ProfileError, Session};
+use crate::effect::{EffectSession, ProfileError};
 use crate::fault::Fault;
 use crate::weights::Weights;
 use rand::seq::index;
@@ -44,7 +44,7 @@ pub(crate) struct SkippingClocks {
     missed: Vec<u64>,
 }
 
-pub(super) fn build(table: toml::Table, taxel: u32, session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+pub(super) fn build(table: toml::Table, taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
     let config: Config = parse(table)?;
     Ok(Box::new(SkippingClocks::new(session, taxel, config.probability)?))
 }
@@ -54,7 +54,7 @@ impl SkippingClocks {
     ///
     /// # Errors
     /// [`ProfileError`] for a probability out of range.
-    pub(crate) fn new(session: &Session, taxel: u32, probability: f64) -> Result<Self, ProfileError> {
+    pub(crate) fn new(session: &EffectSession, taxel: u32, probability: f64) -> Result<Self, ProfileError> {
         within("probability", probability, 0.0, 1.0, "[0, 1]")?;
         let mut cell = Self {
             weights: session.weights.clone(),
@@ -149,8 +149,8 @@ mod tests {
     use crate::mode::WeightMode;
     use crate::seeding::Seeding;
 
-    fn session() -> Session {
-        Session {
+    fn session() -> EffectSession {
+        EffectSession {
             device: Streams::new(9),
             streams: Streams::new(9),
             weights: Weights::new(WeightMode::Binary, Seeding::Address, 8),

@@ -2,7 +2,7 @@
 
 use crate::cell_run::CellRun;
 use crate::effect::parse;
-use crate::effect::{ProfileError, Session};
+use crate::effect::{EffectSession, ProfileError};
 use crate::fault::Fault;
 use serde::Deserialize;
 use spts_models::within;
@@ -20,7 +20,7 @@ fn high() -> f64 {
     1.0
 }
 
-pub(super) fn build(table: toml::Table, _taxel: u32, _session: &Session) -> Result<Box<dyn Fault>, ProfileError> {
+pub(super) fn build(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
     let stuck: Stuck = parse(table)?;
     within("level", stuck.level, -1.0, 1.0, "[−1, 1]")?;
     Ok(Box::new(stuck))

@@ -2,7 +2,7 @@
 
 use approx::assert_relative_eq;
 use proptest::prelude::*;
-use spts_circuit::amplifier::{Amplifier, Load, Network, Noise, OpAmp, Response, Transient};
+use spts_circuit::amplifier::{Amplifier, AmplifierNoise, AmplifierResponse, BusLoad, Network, OpAmp, Transient};
 use std::f64::consts::{PI, TAU};
 
 fn amplifier(network: Network) -> Amplifier {
@@ -36,22 +36,22 @@ fn network(bus_f: f64, feedback_f: f64) -> Network {
     }
 }
 
-fn load(conductance_s: f64, current_a: f64) -> Load {
-    Load {
+fn load(conductance_s: f64, current_a: f64) -> BusLoad {
+    BusLoad {
         conductance_s,
         current_a,
     }
 }
 
 /// (v, o) from the differential equations alone, by Runge and Kutta's method of fourth order in steps of `h`.
-fn runge_kutta(amplifier: &Amplifier, loads: &[(Load, f64)], h: f64) -> Vec<f64> {
+fn runge_kutta(amplifier: &Amplifier, loads: &[(BusLoad, f64)], h: f64) -> Vec<f64> {
     let (op_amp, n) = (amplifier.op_amp(), amplifier.network());
     let (unity, pole) = (
         TAU * op_amp.gain_bandwidth_hz,
         TAU * op_amp.gain_bandwidth_hz / op_amp.dc_gain,
     );
     let capacitance_f = n.bus_f + n.feedback_f;
-    let rates = |[v, o]: [f64; 2], load: Load| {
+    let rates = |[v, o]: [f64; 2], load: BusLoad| {
         let demand = unity * (n.offset_v - v) - pole * o;
         let mut rate = demand.clamp(-op_amp.slew_v_per_s, op_amp.slew_v_per_s);
         if (o >= op_amp.rail_v && rate > 0.0) || (o <= -op_amp.rail_v && rate < 0.0) {
@@ -139,7 +139,7 @@ fn one_pole_is_an_exponential() {
         let expected = last_v * -(-t / tau_s).exp_m1();
         assert_relative_eq!(transient.output_v(), expected, epsilon = 5e-9);
     }
-    let response = Response::new(&amplifier, conductance_s);
+    let response = AmplifierResponse::new(&amplifier, conductance_s);
     assert_relative_eq!(response.bandwidth_hz(), 1.0 / (TAU * tau_s), max_relative = 1e-8);
     assert_relative_eq!(response.settle_s((-7.62_f64).exp()), 7.62 * tau_s, max_relative = 1e-8);
 }
@@ -155,8 +155,8 @@ fn the_table_of_sizes_is_met() {
         (1e5, 3826.0, 2.8e3, 438e-6, [252.0, 4.1, 22956.0], 1.5e-3),
     ] {
         let (amplifier, conductance_s) = (white(Network::default()), taxels * 38.25e-6);
-        let response = Response::new(&amplifier, conductance_s);
-        let density = Noise::density(&amplifier, conductance_s, 0.0);
+        let response = AmplifierResponse::new(&amplifier, conductance_s);
+        let density = AmplifierNoise::density(&amplifier, conductance_s, 0.0);
         // two digits: half a unit of the second is 5 % at most; the finite open-loop gain is 0.4 % of the last row
         let near = |found: f64, expected: f64| assert_relative_eq!(found, expected, max_relative = 0.03);
         near(response.noise_gain(), noise_gain);
@@ -165,17 +165,17 @@ fn the_table_of_sizes_is_met() {
         near(density.taxels * 1e9, densities_nv[0]);
         near(density.feedback * 1e9, densities_nv[1]);
         near(density.voltage * 1e9, densities_nv[2]);
-        near(Noise::rms(&amplifier, conductance_s).total(), rms_v);
+        near(AmplifierNoise::rms(&amplifier, conductance_s).total(), rms_v);
     }
 }
 
 /// Ringing with a noise gain of 5.508 as an independent circuit simulator gave it, to its two or three digits.
 #[test]
 fn bus_capacitance_rings() {
-    let at = |bus_f, feedback_f| Response::new(&amplifier(network(bus_f, feedback_f)), 4.508e-3);
+    let at = |bus_f, feedback_f| AmplifierResponse::new(&amplifier(network(bus_f, feedback_f)), 4.508e-3);
     assert_relative_eq!(at(10e-9, 0.0).natural_hz(), 411e3, max_relative = 2e-3);
     assert_relative_eq!(at(10e-9, 0.0).quality(), 4.7, max_relative = 1e-2);
-    let rms_v = |bus_f| Noise::rms(&white(network(bus_f, 0.0)), 4.508e-3).total();
+    let rms_v = |bus_f| AmplifierNoise::rms(&white(network(bus_f, 0.0)), 4.508e-3).total();
     assert_relative_eq!(rms_v(1e-9), 0.104e-3, max_relative = 1e-2);
     assert_relative_eq!(rms_v(10e-9), 0.274e-3, max_relative = 1e-2);
     // envelope 5 µs after an edge: 26 % without and 5 % with 100 pF across the feedback
@@ -218,7 +218,7 @@ fn noise_is_the_integral_over_the_response() {
             }
             last = Some(now);
         }
-        let noise = Noise::rms(&amplifier, 4e-3);
+        let noise = AmplifierNoise::rms(&amplifier, 4e-3);
         let kt4 = 4.0 * 1.380_649e-23 * 300.0;
         assert_relative_eq!(noise.taxels, (kt4 * 4e-3 * current).sqrt(), max_relative = 2e-4);
         assert_relative_eq!(
@@ -237,7 +237,7 @@ fn noise_is_the_integral_over_the_response() {
             noise_corner_hz: 1e9,
             ..OpAmp::default()
         };
-        let pink = Noise::rms(&Amplifier::new(op_amp, *amplifier.network()).unwrap(), 4e-3);
+        let pink = AmplifierNoise::rms(&Amplifier::new(op_amp, *amplifier.network()).unwrap(), 4e-3);
         let expected = 6e-9 * (voltage + 1e9 * flicker).sqrt();
         assert_relative_eq!(pink.voltage, expected, max_relative = 2e-4);
     }
@@ -258,7 +258,7 @@ fn flicker_of_a_single_pole_is_a_logarithm() {
                 ..OpAmp::default()
             };
             let amplifier = Amplifier::new(op_amp, Network::default()).unwrap();
-            Noise::rms(&amplifier, conductance_s).voltage
+            AmplifierNoise::rms(&amplifier, conductance_s).voltage
         };
         let white_hz = 0.5 * PI * pole_hz;
         let flicker_hz = 0.5 * (pole_hz * pole_hz).ln_1p();
@@ -270,7 +270,7 @@ fn flicker_of_a_single_pole_is_a_logarithm() {
     }
     // the density: twice the power at the corner, and nothing but white noise below 1 Hz
     let amplifier = amplifier(Network::default());
-    let density = |hz| Noise::density(&amplifier, 4e-3, hz).voltage;
+    let density = |hz| AmplifierNoise::density(&amplifier, 4e-3, hz).voltage;
     assert_relative_eq!(density(1e3) / density(0.5), 2_f64.sqrt(), max_relative = 1e-6);
     assert_relative_eq!(density(0.5), density(0.0), max_relative = 1e-9);
 }
@@ -287,8 +287,8 @@ fn flicker_is_smooth_at_the_critical_case() {
     let (bus_s, pole, rate) = (5e-3, TAU * 10.6, TAU * 10.6 * 5e-3 + TAU * 10.6e6 * 1e-3);
     let half = 2.0 * rate / (pole * pole) - bus_s / pole;
     let critical_f = (bus_s / pole).powi(2) / (half + (half * half - (bus_s / pole).powi(2)).sqrt());
-    let of = |bus_f| Noise::rms(&Amplifier::new(pink, network(bus_f, 0.0)).unwrap(), 4e-3).voltage;
-    let response = Response::new(&amplifier(network(critical_f, 0.0)), 4e-3);
+    let of = |bus_f| AmplifierNoise::rms(&Amplifier::new(pink, network(bus_f, 0.0)).unwrap(), 4e-3).voltage;
+    let response = AmplifierResponse::new(&amplifier(network(critical_f, 0.0)), 4e-3);
     assert_relative_eq!(response.quality(), 0.5, max_relative = 1e-9);
     for part in [1e-12, -1e-12, 1e-9, -1e-9] {
         assert_relative_eq!(of(critical_f * (1.0 + part)), of(critical_f), max_relative = 1e-8);
@@ -398,11 +398,11 @@ proptest! {
             let rounding_v = 1e-14 * largest_v + 1e-9 * op_amp.rail_v;
             prop_assert!(change <= op_amp.slew_v_per_s * ten(dt) * (1.0 + 1e-6) + rounding_v, "{change} V in {} s", ten(dt));
         }
-        let response = Response::new(&amplifier, 1.0);
+        let response = AmplifierResponse::new(&amplifier, 1.0);
         for x in [response.bandwidth_hz(), response.quality(), response.natural_hz(), response.settle_s(5e-4)] {
             prop_assert!(x.is_finite() && x > 0.0, "{response:?}");
         }
-        prop_assert!(Noise::rms(&amplifier, 1.0).total().is_finite());
+        prop_assert!(AmplifierNoise::rms(&amplifier, 1.0).total().is_finite());
     }
 
     /// The time to settle is the last time outside the band, whether it rings or not.
@@ -410,7 +410,7 @@ proptest! {
     fn settling_is_the_last_time_outside(bus_pf in 0.0..20e3_f64, feedback_pf in 0.0..500.0_f64, taxels_us in 0.0..1e5_f64) {
         let amplifier = small_signal(network(bus_pf * 1e-12, feedback_pf * 1e-12));
         let (fraction, conductance_s) = (0.5 / 1023.0, taxels_us * 1e-6);
-        let settle_s = Response::new(&amplifier, conductance_s).settle_s(fraction);
+        let settle_s = AmplifierResponse::new(&amplifier, conductance_s).settle_s(fraction);
         let drive = load(conductance_s, 1e-3);
         let last_v = {
             let mut transient = Transient::new(amplifier);
@@ -453,8 +453,8 @@ fn more_conductance_is_slower_and_noisier() {
         let mut last: Option<(f64, f64)> = None;
         for k in 0..150 {
             let conductance_s = 10_f64.powf(-9.0 + 0.1 * f64::from(k));
-            let bandwidth_hz = Response::new(&amplifier, conductance_s).bandwidth_hz();
-            let density = Noise::density(&amplifier, conductance_s, 0.0).total();
+            let bandwidth_hz = AmplifierResponse::new(&amplifier, conductance_s).bandwidth_hz();
+            let density = AmplifierNoise::density(&amplifier, conductance_s, 0.0).total();
             assert!(bandwidth_hz > 0.0 && density.is_finite());
             if let Some((hz, v)) = last {
                 assert!(bandwidth_hz < hz * (1.0 + 1e-12));
@@ -490,7 +490,7 @@ fn parts_outside_their_ranges_are_refused() {
 #[test]
 fn ringing_is_seen_in_the_step_response() {
     let amplifier = small_signal(network(10e-9, 0.0));
-    let response = Response::new(&amplifier, 4.508e-3);
+    let response = AmplifierResponse::new(&amplifier, 4.508e-3);
     let (hz, damping) = (response.ringing_hz().unwrap(), response.damping_per_s());
     let drive = load(4.508e-3, 1e-3);
     let at = |t: f64| {

@@ -1,6 +1,6 @@
 //! Every effect of the table keeps what effects promise, and refuses nonsense.
 
-use spts_circuit::{EFFECTS, Profile, Seeding, Session, WeightMode, Weights, build_chain, check_effect};
+use spts_circuit::{EFFECTS, EffectSession, Profile, Seeding, WeightMode, Weights, build_chain, check_effect};
 use spts_models::Streams;
 
 /// The parameters of `as_built`, or of `as_designed` for what only that has, for the DAC the limits of its data sheet,
@@ -36,7 +36,7 @@ fn every_effect_conforms() {
 
 #[test]
 fn nonsense_is_refused_with_its_name() {
-    let session = Session {
+    let session = EffectSession {
         device: Streams::new(0),
         streams: Streams::new(0),
         weights: Weights::new(WeightMode::Binary, Seeding::Address, 100),

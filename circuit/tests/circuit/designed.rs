@@ -4,7 +4,7 @@ use crate::readout::{press_v, profile, skin};
 use approx::assert_relative_eq;
 use proptest::prelude::*;
 use spts_circuit::amplifier::{
-    Amplifier, Limit, Network, Noise, OpAmp, Remedied, Remedy, Response, Setting, Skin, remedied,
+    Amplifier, AmplifierNoise, AmplifierResponse, Limit, Network, OpAmp, Remedied, Remedy, Setting, Skin, remedied,
 };
 use spts_circuit::{Adc, Mode, Profile, Readout};
 use spts_models::SkinLayout;
@@ -44,7 +44,7 @@ fn a_fast_amplifier_adds_its_noise_only() {
     let volts_per_siemens = profile("").volts_per_siemens();
     let conductance_s = sum_v / volts_per_siemens;
     let amplifier = Amplifier::new(OpAmp::default(), Network::default()).unwrap();
-    let rms_v = Noise::rms(&amplifier, conductance_s).total();
+    let rms_v = AmplifierNoise::rms(&amplifier, conductance_s).total();
     let mut square = 0.0;
     for ((u, s), y) in ideal.iter().zip(&silent).zip(&noisy) {
         assert!((u - s).abs() <= 2e-5 * u.abs() + 2e-5, "{u} {s}");
@@ -70,7 +70,7 @@ fn bus_capacitance_leaves_a_memory() {
         ..Network::default()
     };
     let amplifier = Amplifier::new(OpAmp::default(), network).unwrap();
-    let response = Response::new(&amplifier, sum_v / profile("").volts_per_siemens());
+    let response = AmplifierResponse::new(&amplifier, sum_v / profile("").volts_per_siemens());
     let (damping, turning) = (response.damping_per_s(), TAU * response.ringing_hz().unwrap());
     let error = |k: f64| {
         let t = 5e-6 + k / 64.3e3;
@@ -186,7 +186,7 @@ fn a_tree_of_two_levels_adds_up() {
     let gain = 14.9 / (one.excursion_v * 10_f64.sqrt());
     assert_relative_eq!(tree.gain, gain, max_relative = 1e-12);
     assert_relative_eq!(tree.budget.signal_v, 0.495 * gain, max_relative = 1e-12);
-    let second_v = Noise::rms(&white(), 10.0 * gain / 1e3).total();
+    let second_v = AmplifierNoise::rms(&white(), 10.0 * gain / 1e3).total();
     let noise_v = (10_f64.sqrt() * gain * one.noise_v_rms).hypot(second_v);
     assert_relative_eq!(tree.budget.noise_v_rms, noise_v, max_relative = 1e-12);
 }

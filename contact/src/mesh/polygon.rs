@@ -43,6 +43,16 @@ pub fn triangle(side_m: f64) -> Vec<Point> {
 
 /// Replaces the convex corners of `outline` by arcs of `radius_m` with `steps` segments each. The radius is reduced
 /// where a side is too short for it.
+///
+/// ```
+/// use spts_contact::mesh::polygon::{rectangle, rounded, signed_area_m2};
+///
+/// let sharp = rectangle(40e-3, 20e-3);
+/// let round = rounded(&sharp, 5e-3, 16);
+/// // each corner loses r² − πr²/4
+/// let lost_m2 = (4.0 - std::f64::consts::PI) * 5e-3 * 5e-3;
+/// assert!((signed_area_m2(&sharp) - signed_area_m2(&round) - lost_m2).abs() < 0.01 * lost_m2);
+/// ```
 #[must_use]
 pub fn rounded(outline: &[Point], radius_m: f64, steps: usize) -> Vec<Point> {
     let n = outline.len();

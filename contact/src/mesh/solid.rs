@@ -31,6 +31,15 @@ pub fn extrude(outer: &[Point], holes: &[Vec<Point>], height_m: f64) -> TriMesh 
 
 /// Prism over `outer` from z = 0 to `height_m`, with a blind recess over `inner`, `recess_m` deep from below: a tray
 /// upside down.
+///
+/// ```
+/// use spts_contact::mesh::{extrude_recessed, polygon::rectangle};
+///
+/// // a tray of 2 mm walls, 8 mm deep
+/// let tray = extrude_recessed(&rectangle(40e-3, 40e-3), &rectangle(36e-3, 36e-3), 10e-3, 8e-3);
+/// let exact_m3 = 0.04 * 0.04 * 0.010 - 0.036 * 0.036 * 0.008;
+/// assert!((tray.volume_m3() - exact_m3).abs() < 1e-15);
+/// ```
 #[must_use]
 pub fn extrude_recessed(outer: &[Point], inner: &[Point], height_m: f64, recess_m: f64) -> TriMesh {
     let mut mesh = TriMesh::default();

@@ -4,6 +4,20 @@ use crate::mesh::polygon::Point;
 
 /// An outline with holes, and the form of the underside. Lengths are in any unit: the shape is scaled to its drawn
 /// size.
+///
+/// ```
+/// use spts_contact::mesh::polygon::{circle, rectangle};
+/// use spts_contact::shapes::{ShapeFamily, ShapeRanges};
+///
+/// let washer = ShapeFamily {
+///     name: "washer",
+///     description: "Square with a round hole",
+///     plan: |_| spts_contact::shapes::Plan::apart(vec![rectangle(1.0, 1.0)], vec![circle(0.25, 32)], 0.25),
+/// };
+/// let shape = washer.build(&ShapeRanges::default(), 1)?;
+/// assert_eq!((shape.holes, shape.parts), (1, 1));
+/// # Ok::<(), spts_contact::shapes::ShapeError>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Plan {
     /// Closed counter-clockwise loops whose union is the footprint. Loops of a [`Plan::union`] may overlap and cross

@@ -11,6 +11,18 @@ use std::f64::consts::TAU;
 /// columns follow the angle about it. Seen from outside with the axis pointing up, columns run from left to right.
 ///
 /// For the z axis the angle is 0 along x and π/2 along y; for the x axis it is 0 along y; for the y axis, 0 along z.
+///
+/// ```
+/// use spts_contact::{SurfacePoints, Winding};
+///
+/// let (shape, span_m) = ([4, 12], [0.0, 0.06]);
+/// let whole = [0.0, std::f64::consts::TAU];
+/// let winding = Winding { shape, points_per_side: 3, axis: 2, centre_m: [0.0; 3], arc_rad: whole, span_m };
+/// let points = SurfacePoints::on_cylinder(&winding, 0.05)?;
+/// let area_m2: f64 = points.areas_m2().iter().sum();
+/// assert!((area_m2 / (std::f64::consts::TAU * 0.05 * 0.06) - 1.0).abs() < 1e-9);
+/// # Ok::<(), spts_models::ConfigError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Winding {
     /// Rows and columns of taxels.

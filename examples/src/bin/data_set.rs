@@ -8,7 +8,7 @@ use spts_dataset::{ColumnValues, Dataset, Part, Spec};
 
 /// Procedural shapes anywhere on the sheet, pressed with 5 to 50 N; 20 samples of the one wire for each touch.
 const SPEC: &str = "
-name = 'my touches'
+name = 'my-touches'
 rows = 400
 rows_per_shard = 100
 seed = 3

@@ -141,8 +141,8 @@ pub(super) struct SimulateCommand {
     /// Draw the scene at the instant of the largest force
     #[arg(long)]
     render: bool,
-    /// Draw the first press in motion, as a GIF: the pressure on the taxels, the trace of the wire, and the image that is
-    /// decoded from that trace in time
+    /// Draw the first press in motion, as a GIF: the pressure on the taxels, the trace of the wire, and the image that
+    /// is decoded from that trace in time
     #[arg(long, conflicts_with = "no_record")]
     animate: bool,
     /// Folder for the results. Those of an earlier run are replaced, all at once; files that no run has written stay

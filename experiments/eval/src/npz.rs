@@ -10,6 +10,16 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// Shape and values, in C order.
+///
+/// ```
+/// use spts_eval::npz::{NpzArray, read, write};
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-npz-{}.npz", std::process::id()));
+/// write(&path, &[("y", NpzArray::Doubles(&[2], &[0.5, 1.5]))])?;
+/// assert_eq!(read(&path, "y", &[2])?, Some(vec![0.5, 1.5]));
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), std::io::Error>(())
+/// ```
 pub enum NpzArray<'a> {
     /// Doubles.
     Doubles(&'a [usize], &'a [f64]),

@@ -182,12 +182,28 @@ fn wrapped(content: &str, before: &str, after: &str) -> String {
     }
 }
 
-/// Text as paragraphs.
+/// Text as paragraphs; what stands between back quotes is code.
 fn paragraphs(text: &str, class: &str) -> String {
     text.split("\n\n")
         .filter(|part| !part.trim().is_empty())
-        .map(|part| format!("<p class=\"{class}\">{}</p>\n", escape(part.trim())))
+        .map(|part| format!("<p class=\"{class}\">{}</p>\n", with_code(&escape(part.trim()))))
         .collect()
+}
+
+/// Every second piece between back quotes as code; a back quote without its partner stays.
+fn with_code(text: &str) -> String {
+    let pieces: Vec<&str> = text.split('`').collect();
+    if pieces.len().is_multiple_of(2) {
+        return text.to_owned();
+    }
+    let each = pieces.iter().enumerate().map(|(index, piece)| {
+        if index % 2 == 1 {
+            format!("<code>{piece}</code>")
+        } else {
+            (*piece).to_owned()
+        }
+    });
+    each.collect()
 }
 
 /// Letters, digits, `-` and `_`; anything else becomes `-`.
@@ -202,9 +218,11 @@ fn card(card: &Card) -> String {
     let others: String = others
         .map(|(name, value)| format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value)))
         .collect();
+    // a number stays with its M
+    let title = escape(&card.label).replace(" = ", "\u{a0}=\u{a0}");
     format!(
         "<article class=\"card\"><h3>{}</h3><p class=\"value\"><span>{}</span> {}</p>{}{}</article>\n",
-        escape(&card.label),
+        title,
         escape(&card.of),
         escape(&card.value),
         wrapped(&others, "<dl>", "</dl>"),

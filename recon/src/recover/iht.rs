@@ -15,6 +15,22 @@ use crate::workspace::Workspace;
 /// support.
 /// Source: T. Blumensath, M. E. Davies, "Normalized iterative hard thresholding: Guaranteed stability and performance",
 /// IEEE J. Sel. Topics Signal Process. 4 (2010).
+///
+/// ```
+/// use spts_recon::recover::{Cosamp, Iht, Omp};
+/// use spts_recon::{Matrix, Problem, Recover, Workspace};
+///
+/// // every pursuit of the table solves the same problem
+/// let a = Matrix::from_rows(4, 4, vec![
+///     1.0, 1.0, 1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0,
+/// ])?;
+/// let problem = Problem::new(a.view(), &[2.0, -2.0, 2.0, -2.0])?; // twice the second atom
+/// let pursuits: [&dyn Recover; 3] = [&Omp::new(1), &Cosamp::new(1), &Iht::new(1)];
+/// for pursuit in pursuits {
+///     assert_eq!(pursuit.recover(&problem, &mut Workspace::default())?.support, [1]);
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Iht {
     n_nonzero_coefs: usize,

@@ -16,6 +16,17 @@ use crate::workspace::Workspace;
 /// Source: S. Chen, S. A. Billings, W. Luo, "Orthogonal least squares methods and their application to non-linear
 /// system identification", Int. J. Control 50 (1989); L. Rebollo-Neira, D. Lowe, "Optimized orthogonal matching pursuit
 /// approach", IEEE Signal Process. Lett. 9 (2002).
+///
+/// ```
+/// use spts_recon::recover::Ols;
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// let a = Matrix::from_rows(3, 3, vec![1.0, 0.0, 0.9, 0.0, 1.0, 0.9, 0.0, 0.0, 0.1])?;
+/// let y = [2.0, 3.0, 0.0]; // twice the first atom and three times the second
+/// let solution = Ols::new(3).recover(&Problem::new(a.view(), &y)?, &mut Workspace::default())?;
+/// assert!(solution.residual_norm < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Ols {
     n_nonzero_coefs: usize,

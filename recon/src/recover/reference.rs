@@ -15,6 +15,19 @@ use crate::workspace::Workspace;
 /// Gram–Schmidt QR of A_S grows by one column in each step. It gives the same minimiser as long as A_S has full column
 /// rank; otherwise the residual rule ends the pursuit.
 /// Source: Y. C. Pati, R. Rezaiifar, P. S. Krishnaprasad, "Orthogonal matching pursuit", Asilomar 1993.
+///
+/// ```
+/// use spts_recon::recover::{Omp, ReferenceOmp};
+/// use spts_recon::{Matrix, Problem, Recover as _, Workspace};
+///
+/// // the second atom is right, but the first is longer
+/// let a = Matrix::from_rows(2, 2, vec![10.0, 0.0, 10.0, 1.0])?;
+/// let (y, mut work) = ([0.0, 1.0], Workspace::default());
+/// let problem = Problem::new(a.view(), &y)?;
+/// assert_eq!(Omp::new(1).recover(&problem, &mut work)?.support, [1]);
+/// assert_eq!(ReferenceOmp::new(1).recover(&problem, &mut work)?.support, [0], "atoms are not normalised");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReferenceOmp {
     n_nonzero_coefs: usize,

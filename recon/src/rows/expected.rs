@@ -7,6 +7,17 @@ use crate::matrix::Matrix;
 use crate::recover::Gaussian;
 
 /// Second moments of the images that rows are designed for.
+///
+/// ```
+/// use spts_recon::recover::Gaussian;
+/// use spts_recon::rows::{Expected, Tolerances};
+///
+/// let prior = Gaussian::white(12, 1.0)?;
+/// let images = Expected::like(&prior, [3, 4], Tolerances { gain_log_sd: 0.3, shift: 1 })?;
+/// assert_eq!((images.shape(), images.taxels()), ([3, 4], 12));
+/// assert!(Expected::like(&prior, [4, 4], Tolerances::default()).is_err(), "12 taxels do not fill 4 × 4");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Expected {
     pub(super) shape: [usize; 2],

@@ -11,6 +11,17 @@ use rand_chacha::ChaCha8Rng;
 
 /// Rows of pseudorandom generators, one a taxel. Seeds are searched for the smallest mean square coherence between
 /// rows, so that rows measure different things.
+///
+/// ```
+/// use spts_recon::operator::SignGenerator;
+/// use spts_recon::rows::{Expected, RowTask, SeedsSearch};
+///
+/// let images = Expected::smooth([4, 4], 1.0)?;
+/// let search = SeedsSearch { generator: SignGenerator::NUMERICAL_RECIPES, budget: 50 };
+/// let (seeds, rows) = search.search(&RowTask::new(6, &images))?;
+/// assert_eq!((seeds.len(), rows.nrows(), rows.ncols()), (16, 6, 16));
+/// # Ok::<(), spts_recon::rows::RowError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SeedsSearch {
     /// Generator of the taxels. The first row is one step after the seed.

@@ -153,6 +153,13 @@ pub const DESIGNERS: &[Designer] = &[
 ];
 
 /// The designer called `name`.
+///
+/// ```
+/// use spts_recon::rows::{DESIGNERS, RowNeeds, designer};
+///
+/// assert_eq!(designer("hadamard").map(|d| d.needs), Some(RowNeeds::Nothing));
+/// assert!(DESIGNERS.iter().all(|d| designer(d.name).is_some()));
+/// ```
 #[must_use]
 pub fn designer(name: &str) -> Option<&'static Designer> {
     DESIGNERS.iter().find(|d| d.name == name)

@@ -3,6 +3,16 @@
 use super::{Mechanics, Task};
 
 /// How far the part of a body that can touch the skin extends beyond each edge of the sheet, m; 0 if it does not.
+///
+/// ```
+/// use spts_sim::Mechanics;
+///
+/// let middle = Mechanics::from_toml("[press]\nobject = \"tape\"\nrow = 4.5\ncol = 4.5", ".".as_ref())?;
+/// assert!(middle.overhang().is_none());
+/// let beside = Mechanics::from_toml("[press]\nobject = \"tape\"\nrow = 0.0\ncol = 4.5", ".".as_ref())?;
+/// assert!(beside.overhang().expect("reaches over the edge").first_row_m > 1e-3);
+/// # Ok::<(), spts_sim::mechanics::MechanicsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Overhang {
     /// Beyond the edge at row 0.

@@ -145,7 +145,7 @@ fn bad_scenes() {
             // 2 g on 1e9 Pa/m with 20 ms of damping: no step of a microsecond or more
             "timestep_s = \"auto\"\n[contact]\nstiffness_pa_per_m = 1e9\ndamping_s = 0.02\n[drop]\nmass_kg = 2e-3\nheight_m = 5.0\nstiffness_pa_per_m = 1e12",
             &[
-                "no `timestep_s`",
+                "no valid `timestep_s`",
                 "0.002 kg",
                 "allows at most",
                 "1e-6 s",
@@ -350,7 +350,7 @@ fn places_are_kept_in_metres() {
         ),
         (
             "position_m = [0.0, 0.0]\nrow = 3.0",
-            "`press.position_m` and `press.position_share` is needed, found 2",
+            "`press.position_m` and `press.position_share`; found 2",
         ),
     ] {
         let error = read(&format!("{press}{place}")).unwrap_err();

@@ -21,6 +21,16 @@ pub const SHORTEST_STEP_S: f64 = 1e-6;
 /// `auto` is the longest stable step that divides the time between frames: `frame_interval_s` divided by the smallest
 /// whole number that gives a stable step. Frames are then at the same instants as with the default step. A
 /// [`Mechanics`](super::Mechanics) holds the resulting number.
+///
+/// ```
+/// use spts_sim::{Mechanics, mechanics::Timestep};
+///
+/// assert_eq!("auto".parse(), Ok(Timestep::Auto));
+/// let scene = Mechanics::from_toml("timestep_s = \"auto\"\n[press]\nobject = \"T\"", ".".as_ref())?;
+/// let steps = scene.frame_interval_s() / scene.timestep_s();
+/// assert!((steps - steps.round()).abs() < 1e-9, "the step divides the time between frames");
+/// # Ok::<(), spts_sim::mechanics::MechanicsError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Timestep {
     /// A fixed step, s; from [`SHORTEST_STEP_S`] to the stable limit.

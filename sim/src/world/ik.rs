@@ -51,6 +51,16 @@ pub fn improve(goal: &Isometry3<f64>, joints_rad: &mut [f64; 6]) -> f64 {
 
 /// Joint angles that bring the flange to `goal`, starting from `seed_rad`.
 ///
+/// ```
+/// use spts_sim::world::{ik::solve, ur5::{HOME_RAD, flange}};
+///
+/// let mut goal = flange(&HOME_RAD);
+/// goal.translation.z += 0.05; // 5 cm higher
+/// let joints_rad = solve(&goal, &HOME_RAD)?;
+/// assert!((flange(&joints_rad).translation.vector - goal.translation.vector).norm() < 1e-6);
+/// # Ok::<(), spts_sim::world::ik::Unreachable>(())
+/// ```
+///
 /// # Errors
 /// [`Unreachable`] if the iteration ends elsewhere.
 pub fn solve(goal: &Isometry3<f64>, seed_rad: &[f64; 6]) -> Result<[f64; 6], Unreachable> {

@@ -4,6 +4,18 @@ use super::virtual_device::{BlockSource, DeviceBlock, DeviceError};
 use spts_circuit::{Converter, Mode, Recording};
 
 /// The blocks of a recording, in order.
+///
+/// ```
+/// use spts::device::{BlockSource as _, Played};
+/// use spts::{Block, Recording, RecordingInfo, Seeding, SkinLayout, WeightMode, Weights};
+///
+/// let layout = SkinLayout::new(1, 8, 5e-3, 3e-3)?;
+/// let info = RecordingInfo::new(layout, Weights::new(WeightMode::Binary, Seeding::Mixed, 8), 64_300.0);
+/// let block = Block { frame_position: 10, idle_frames: None, volts: vec![0.25; 80] };
+/// let recording = Recording::new(info, vec![block])?;
+/// assert!(Played::new(&recording).is_err(), "volts without a converter's scale have no codes");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Played<'a> {
     recording: &'a Recording,
     converter: Converter,

@@ -8,6 +8,20 @@ use std::path::{Path, PathBuf};
 
 /// A file being written. [`AtomicFile::finish`] gives it its name. If it is dropped before, nothing is left behind, and
 /// an earlier file of that name stays unchanged.
+///
+/// ```
+/// use spts::output::AtomicFile;
+/// use std::io::Write as _;
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-atomic-{}.txt", std::process::id()));
+/// let mut file = AtomicFile::create(&path)?;
+/// file.fill(|buffer| buffer.write_all(b"results"))?;
+/// assert!(!path.exists(), "the name comes last");
+/// file.finish()?;
+/// assert_eq!(std::fs::read(&path)?, b"results");
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug)]
 pub struct AtomicFile {
     buffer: BufWriter<NewFile>,

@@ -9,6 +9,12 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 /// A type that a NumPy array can hold.
+///
+/// ```
+/// use spts::output::NpyValue;
+///
+/// assert_eq!(1.5_f64.bytes().as_ref(), 1.5_f64.to_le_bytes());
+/// ```
 pub trait NpyValue: Copy {
     /// Type as NumPy writes it, such as `f8`.
     const KIND: &'static str;

@@ -7,6 +7,16 @@ use spts_models::SkinLayout;
 use spts_sim::mechanics::MechanicsConfig;
 
 /// A scene as written in TOML. A missing field takes its default.
+///
+/// ```
+/// use spts::scene::SceneConfig;
+///
+/// let scene = SceneConfig::from_toml("seed = 7\nreadout = \"ideal\"\n[press]\nobject = \"T\"")?;
+/// assert_eq!((scene.seed, scene.readout.as_deref()), (7, Some("ideal")));
+/// let error = SceneConfig::from_toml("sead = 7").err().expect("an unknown key");
+/// assert!(error.to_string().contains("sead"));
+/// # Ok::<(), spts::SceneError>(())
+/// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SceneConfig {

@@ -12,8 +12,8 @@ use std::path::PathBuf;
 
 /// Writes a data set in the layout of another program.
 ///
-/// All files of the data set must be there; they are checked first. OUT holds the whole export in the end, or nothing if
-/// the export fails or is stopped.
+/// All files of the data set must be there; they are checked first. OUT holds the whole export in the end, or nothing
+/// if the export fails or is stopped.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset export lerobot out/shapes --out out/shapes_lerobot

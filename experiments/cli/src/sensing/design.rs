@@ -56,7 +56,8 @@ pub(super) struct DesignCommand {
     /// Noise of a measurement as a share of the root mean square of a random row's sum; [1e-6, 1000]
     #[arg(long, value_name = "SHARE", default_value_t = RowTask::NOISE, value_parser = within(1e-6, 1e3, "[1e-6, 1000]"))]
     noise: f64,
-    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05, 1000]
+    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05,
+    /// 1000]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
     /// Standard deviation of the logarithm of the taxels' gains, which nobody knows; [0, 3]

@@ -63,7 +63,8 @@ pub(super) struct StudyCommand {
     /// Touches a repetition, of shapes and of objects each; [1, 10000] [default: 68, 34 with --quick]
     #[arg(long, value_name = "COUNT", value_parser = whole::<usize>(1..=10_000))]
     touches: Option<usize>,
-    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05, 1000]
+    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05,
+    /// 1000]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
     /// Standard deviation of the logarithm of the taxels' gains that rows are designed for; [0, 3]

@@ -149,6 +149,27 @@ pub struct Belief {
 }
 
 /// Confidence of an algorithm after every sample of a window, with its own memory.
+///
+/// ```
+/// use spts_eval::algorithm::{Belief, Class, Confidence, DecodeError};
+/// use spts_eval::Window;
+///
+/// /// More and more sure of class 1, whatever it sees.
+/// struct Naive(f64);
+///
+/// impl Confidence for Naive {
+///     fn begin(&mut self) {
+///         self.0 = 0.5;
+///     }
+///     fn observe(&mut self, _sample: &Window<'_>) -> Result<Belief, DecodeError> {
+///         self.0 += 0.5 * (1.0 - self.0);
+///         Ok(Belief { confidence: self.0, class: Some(Class::Known(1)) })
+///     }
+/// }
+/// let mut naive = Naive(0.9);
+/// naive.begin();
+/// assert_eq!(naive.0, 0.5);
+/// ```
 pub trait Confidence {
     /// Starts the next window.
     fn begin(&mut self);
@@ -161,6 +182,29 @@ pub trait Confidence {
 }
 
 /// A trained algorithm, shared by all threads.
+///
+/// ```
+/// use spts_eval::algorithm::{Algorithm, Answer, DecodeError, Trained};
+/// use spts_eval::Window;
+///
+/// /// The mean image of the training data, whatever is measured.
+/// struct MeanImage(Vec<f64>);
+/// struct Running<'a>(&'a MeanImage);
+///
+/// impl Trained for MeanImage {
+///     fn start(&self) -> Box<dyn Algorithm + '_> {
+///         Box::new(Running(self))
+///     }
+/// }
+/// impl Algorithm for Running<'_> {
+///     fn decode(&mut self, _: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
+///         answer.image.clone_from(&self.0.0);
+///         Ok(())
+///     }
+/// }
+/// let trained = MeanImage(vec![0.5; 100]);
+/// assert!(!trained.start().batched() && trained.prior().is_none());
+/// ```
 pub trait Trained: Send + Sync {
     /// An algorithm for one thread.
     fn start(&self) -> Box<dyn Algorithm + '_>;

@@ -6,6 +6,13 @@ use crate::training::{LearnError, Learned, TrainingData};
 use serde::{Serialize, Serializer};
 
 /// How the published evaluation turns a window of measurements into an image.
+///
+/// ```
+/// use spts_eval::decoders::{PublishedDecode, find, quarter};
+///
+/// assert_eq!((quarter(20), quarter(50), quarter(1)), (5, 13, 1));
+/// assert!(PublishedDecode::ALL.iter().all(|decode| find(decode.name()).is_some()));
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PublishedDecode {
     /// As in the published script: weights {0, 1}, no offset, 20 atoms.

@@ -12,6 +12,12 @@ pub(crate) use chosen::chosen_places;
 use serde::{Deserialize, Serialize};
 
 /// How the rows of a window are obtained.
+///
+/// ```
+/// use spts_eval::Sensing;
+///
+/// assert_eq!(Sensing::ALL.map(Sensing::name), ["random", "chosen"]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Sensing {

@@ -22,6 +22,18 @@ use std::sync::{Arc, OnceLock};
 const POSES_OF_A_LIBRARY: usize = 30;
 
 /// Dictionary, library, templates and images for priors.
+///
+/// ```
+/// use spts_eval::training::TrainingData;
+/// use spts_models::Streams;
+/// use spts_recon::Matrix;
+///
+/// // one image of each of two classes, on a sheet of 2 × 2 taxels
+/// let images = Matrix::from_columns(4, 2, &[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]).unwrap();
+/// let data = TrainingData::of_images(images, &[1, 2], 2, Streams::new(1))?;
+/// assert_eq!((data.shape, data.templates.labels()), ([2, 2], &[1, 2][..]));
+/// # Ok::<(), spts_eval::training::LearnError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct TrainingData {
     /// Rows and columns of the sheet.

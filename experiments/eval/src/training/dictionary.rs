@@ -7,6 +7,19 @@ use spts_recon::{Matrix, MatrixView, SignTables};
 use std::ops::Range;
 
 /// A dictionary with look-up tables for rows of Φ·D.
+///
+/// ```
+/// use spts_eval::training::Dictionary;
+/// use spts_recon::Matrix;
+///
+/// let dictionary = Dictionary::new(Matrix::from_columns(3, 1, &[1.0, 2.0, 4.0]).unwrap());
+/// let phi = Matrix::from_rows(1, 3, vec![1.0, -1.0, 1.0]).unwrap();
+/// let mut row = [0.0];
+/// dictionary.project(phi.view(), None, &mut row);
+/// assert_eq!(row, [3.0]);
+/// dictionary.to_unit_weights(&mut row); // the weights {1, 0, 1}
+/// assert_eq!(row, [5.0]);
+/// ```
 #[derive(Debug, Clone)]
 pub struct Dictionary {
     /// Atoms, taxels × K.

@@ -6,8 +6,8 @@ use crate::figures::draw::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, save_p
 use crate::figures::{FigureError, draw_heat};
 use std::path::Path;
 
-/// Most rows of a picture. Those of a large skin with three objects each are then 28,000 pixels high; figures are cut off
-/// at 32,768.
+/// Most rows of a picture. Those of a large skin with three objects each are then 28,000 pixels high; figures are cut
+/// off at 32,768.
 pub const MOST_PREVIEW_ROWS: u64 = 150;
 
 /// Border of the picture, and space between cards, across and down, CSS pixels.
@@ -51,8 +51,8 @@ struct Card {
 }
 
 /// Draws a card for every row: the true pressure with the support outlined, the raster image where it is recorded, and
-/// the samples. Every map and every strip has a scale of its own, and the colours of pressure go with its square root, so
-/// that light touches are seen beside firm ones.
+/// the samples. Every map and every strip has a scale of its own, and the colours of pressure go with its square root,
+/// so that light touches are seen beside firm ones.
 ///
 /// # Errors
 /// [`FigureError`] when the file cannot be written or no font is found.

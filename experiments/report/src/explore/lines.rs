@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use spts_circuit::amplifier::Limit;
-use spts_studies::explore::{ExploreReport, SizeRow, Trial, Way};
+use spts_studies::explore::{ExploreReport, ExploreTrial, SizeRow, Way};
 
 /// A line of `explore.csv`.
 #[derive(Debug, Serialize)]
@@ -80,7 +80,7 @@ pub(super) fn size_lines(report: &ExploreReport) -> Vec<SizeLine> {
 }
 
 pub(super) fn trial_lines(report: &ExploreReport) -> Vec<TrialLine> {
-    let line = |(r, t): (&SizeRow, &Trial)| TrialLine {
+    let line = |(r, t): (&SizeRow, &ExploreTrial)| TrialLine {
         taxels: r.taxels,
         way: r.way,
         wires: r.wires,
@@ -93,7 +93,7 @@ pub(super) fn trial_lines(report: &ExploreReport) -> Vec<TrialLine> {
 }
 
 pub(super) fn timing_lines(report: &ExploreReport) -> Vec<TimingLine> {
-    let line = |(r, t): (&SizeRow, &Trial)| TimingLine {
+    let line = |(r, t): (&SizeRow, &ExploreTrial)| TimingLine {
         taxels: r.taxels,
         way: r.way,
         measurements: t.measurements,
@@ -102,7 +102,7 @@ pub(super) fn timing_lines(report: &ExploreReport) -> Vec<TimingLine> {
     trials(report).map(line).collect()
 }
 
-fn trials(report: &ExploreReport) -> impl Iterator<Item = (&SizeRow, &Trial)> {
+fn trials(report: &ExploreReport) -> impl Iterator<Item = (&SizeRow, &ExploreTrial)> {
     report.rows.iter().flat_map(|r| r.trials.iter().map(move |t| (r, t)))
 }
 

@@ -149,6 +149,9 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
     shade::draw_ranges(canvas, chart, &frame);
     let mut busy: Vec<Point> = Vec::new();
     let mut drawn: Vec<Vec<Point>> = Vec::new();
+    for series in &chart.series {
+        shade::draw_scatter(canvas, series, &frame);
+    }
     // Twin and sensor lie above the rest: baselines and claims are drawn first.
     let mut order: Vec<_> = chart.series.iter().zip(&curves).collect();
     order.sort_by_key(|(series, _)| match series.style {
@@ -165,7 +168,6 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         let places: Vec<Point> = points.iter().filter_map(|&p| frame.place(p)).collect();
         let stroke = colour::style(series.style, series.variant);
         let below = coincide::below(&places, &drawn);
-        shade::draw_scatter(canvas, series, &frame);
         for piece in clip(&places, &frame) {
             busy.extend(samples(&piece));
             let dash = coincide::dash(below).or(marker::dash(series.style, series.variant));

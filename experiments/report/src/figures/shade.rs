@@ -14,8 +14,8 @@ pub(super) const RANGE_OPACITY: f64 = 0.18;
 /// Opacity of the scatter about a curve.
 const SCATTER_OPACITY: f64 = 0.22;
 
-/// Draws the ranges that the paper states. The words stand at the foot of a range, each on lines of its own, so that
-/// ranges side by side do not cover each other's words.
+/// Draws the ranges that the paper states. The words stand at the foot of the panel, inside of a range that is wide
+/// enough, or beside it where no other range is, each on lines of its own.
 pub(super) fn draw_ranges(canvas: &mut Canvas, chart: &Chart, frame: &PanelFrame) {
     let bottom = frame.top + frame.height;
     let mut foot = bottom - 4.0;
@@ -26,8 +26,15 @@ pub(super) fn draw_ranges(canvas: &mut Canvas, chart: &Chart, frame: &PanelFrame
         canvas.rect((left, frame.top), (right - left, frame.height), CLAIM, RANGE_OPACITY);
         let lines = wrap(&range.label, SIZE, false, 0.5 * frame.width);
         let widest = lines.iter().map(|l| text_width(l, SIZE, false)).fold(0.0, f64::max);
-        // beside the range on the side that has room
-        let (at, anchor) = if left - frame.left > widest + 8.0 {
+        let others = chart.ranges.iter().filter(|other| *other != range);
+        let before: Vec<f64> = others
+            .filter(|other| other.to <= range.from)
+            .filter_map(|other| column(frame, other.to))
+            .collect();
+        let free = before.iter().copied().fold(frame.left, f64::max);
+        let (at, anchor) = if right - left > widest + 8.0 {
+            (0.5 * (left + right), Anchor::Middle)
+        } else if left - free > widest + 8.0 {
             (left - 5.0, Anchor::End)
         } else {
             (right + 5.0, Anchor::Start)

@@ -5,7 +5,7 @@ use crate::figures::{FigureError, Interval, IntervalChart, IntervalPanel, save_i
 use crate::labels::{decoder_label as label, object_label, object_list};
 use crate::{Section, Table};
 use spts::output::{OutputError, write_json, write_table};
-use spts_studies::per_object::{Images, MEASUREMENTS, ObjectBand, PerObjectReport, SCORES, ScoreDistance};
+use spts_studies::per_object::{MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES, ScoreDistance};
 use std::path::Path;
 
 /// Name of the figure.
@@ -56,7 +56,7 @@ fn short_decoder(name: &str) -> &str {
 }
 
 fn of_twin(report: &PerObjectReport) -> impl Iterator<Item = &ObjectBand> {
-    report.objects.iter().filter(|b| b.images == Images::Twin)
+    report.objects.iter().filter(|b| b.images == ReadoutImages::Twin)
 }
 
 fn chart(report: &PerObjectReport) -> IntervalChart {
@@ -152,7 +152,7 @@ fn distances(report: &PerObjectReport) -> Table {
         rows: report
             .distances
             .iter()
-            .filter(|d| d.images == Images::Twin)
+            .filter(|d| d.images == ReadoutImages::Twin)
             .map(row)
             .collect(),
         file: Some(TABLES[1].to_owned()),

@@ -1,7 +1,7 @@
 //! Lines of the benchmark's table.
 
 use serde::Serialize;
-use spts_studies::readouts::{ReadoutRow, ReadoutsReport, Trial};
+use spts_studies::readouts::{ReadoutRow, ReadoutTrial, ReadoutsReport};
 use spts_studies::touches::Band;
 
 /// A line of `readouts.csv`.
@@ -43,7 +43,7 @@ pub(super) fn lines(report: &ReadoutsReport) -> Vec<TrialLine> {
         let wire = report.wires.iter().find(|wire| wire.taxels == row.taxels);
         wire.map_or(0.0, |wire| wire.period_s)
     };
-    let line = |(row, t): (&ReadoutRow, &Trial)| {
+    let line = |(row, t): (&ReadoutRow, &ReadoutTrial)| {
         let [iou, iou_low, iou_high] = ends(t.iou);
         let [place_px, place_px_low, place_px_high] = ends(t.place_px);
         let [accuracy, accuracy_low, accuracy_high] = ends(t.accuracy);

@@ -1,7 +1,7 @@
 //! The benchmark as a picture.
 
 use crate::figures::{Chart, Claim, Series, Style};
-use spts_studies::readouts::{GOOD_IOU, READOUTS, ReadoutRow, ReadoutsReport, SizeWire, Trial};
+use spts_studies::readouts::{GOOD_IOU, READOUTS, ReadoutRow, ReadoutTrial, ReadoutsReport, SizeWire};
 use spts_studies::touches::Band;
 
 /// Number of the readout in the table: its ink, the same in every panel.
@@ -69,7 +69,7 @@ fn over_measurements(
     report: &ReadoutsReport,
     what: &str,
     y_label: &str,
-    value: &dyn Fn(&Trial) -> Option<Band>,
+    value: &dyn Fn(&ReadoutTrial) -> Option<Band>,
 ) -> Vec<Chart> {
     let chart = |wire: &SizeWire| {
         let rows = report.rows.iter().filter(|row| row.taxels == wire.taxels);

@@ -99,10 +99,10 @@ pub(super) const FIGURES: &[FigureLine] = &[
         section: "adaptive",
         file: "4_adaptive.png",
         alt: "Rows of tactile images that sharpen from 2 to 15 measurements, above them bars of the measurements used.",
-        caption: "As Fig. 4, where the T is distinct at 15 measurements: one window of one press, neither the best nor the worst. \
-                  With so few measurements the published decoder shows blobs in or near the contact, and often no T. The evidence \
-                  decoder has learned from raster images of this very object, so it shows the whole T as soon as it \
-                  recognises it.",
+        caption: "As Fig. 4, where the paper's T is distinct at 15 measurements. This is one window of one press, neither the \
+                  best nor the worst: from how many measurements on a T is seen differs from window to window. The \
+                  evidence decoder has learned from raster images of this very object. It shows a mixture of objects until \
+                  it recognises one, and then the whole T; of an object that it has never felt it would show another.",
         compared: Some("The published compressed recordings hold no T; the rectangle stands in for both skins."),
         draw: |s| Images(sheets::adaptive(s.skins, s.dataset.cols)),
     },

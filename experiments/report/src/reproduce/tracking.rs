@@ -118,8 +118,8 @@ pub(super) struct CourseRow {
     pub(super) high_v: f64,
 }
 
-/// The course of all bounces in frames of `m` measurements, at the instants at which at least half of the bounces have a
-/// frame.
+/// The course of all bounces in frames of `m` measurements, at the instants at which at least half of the bounces have
+/// a frame.
 #[must_use]
 pub(super) fn over_bounces(traces: &[TraceRow], m: usize) -> Vec<CourseRow> {
     // frames begin the same number of measurements before first contact, so that their instants agree

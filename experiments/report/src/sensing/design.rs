@@ -7,7 +7,7 @@ use spts::chain::start_message;
 use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts_circuit::FIRST_ADDRESS;
 use spts_firmware::LAST_BUS_ADDRESS;
-use spts_studies::sensing::DesignReport;
+use spts_studies::sensing::RowDesignReport;
 
 /// Rows that are drawn, at most.
 const SHOWN: usize = 40;
@@ -33,7 +33,7 @@ pub const DESIGN_FILES: &[&str] = &["rows.txt", "design.json", "weights.json", "
 ///
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
-pub fn write_design(report: &DesignReport, out: OutputFolder) -> Result<(), ReportError> {
+pub fn write_design(report: &RowDesignReport, out: OutputFolder) -> Result<(), ReportError> {
     write_all_or_none(out, |out| {
         write_bytes(&out.path("rows.txt"), report.patterns.to_text().as_bytes())?;
         write_json(&out.path("design.json"), report)?;
@@ -56,7 +56,7 @@ pub fn write_design(report: &DesignReport, out: OutputFolder) -> Result<(), Repo
 
 /// What the master writes to give every cell its pattern, when one bus has addresses for all of them and the cells hold
 /// it.
-fn writes(report: &DesignReport) -> Option<Vec<PatternWrite>> {
+fn writes(report: &RowDesignReport) -> Option<Vec<PatternWrite>> {
     report.bytes_a_cell?;
     let write = |taxel: usize| {
         let address = u8::try_from(FIRST_ADDRESS as usize + taxel).ok()?;
@@ -72,7 +72,7 @@ fn writes(report: &DesignReport) -> Option<Vec<PatternWrite>> {
 }
 
 /// Every row as a picture of the skin: dark −1, bright +1.
-fn rows(report: &DesignReport) -> Sheet {
+fn rows(report: &RowDesignReport) -> Sheet {
     let [rows, cols] = report.skin;
     let tile = |r: usize| Tile::Heat {
         values: report

@@ -60,6 +60,14 @@ pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
 }
 
 /// A number with its uncertainty.
+///
+/// ```
+/// use spts_studies::calibrate::Estimated;
+///
+/// let lsb_mv = Estimated::median_of(&[21.5, 21.4, 21.6, 21.5, 90.0]); // one press went wrong
+/// assert_eq!(lsb_mv.value, 21.5);
+/// assert!(lsb_mv.standard_error.expect("five presses") < 0.2);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimated {
     /// Median over the presses of a session, or mean over sessions.

@@ -25,6 +25,22 @@ pub enum WireChoice {
 }
 
 /// Requirements of a skin.
+///
+/// ```
+/// use spts_studies::design::{DesignObjects, DesignStudy, WireChoice};
+///
+/// let study = DesignStudy {
+///     area_m: [0.16, 0.16],
+///     pitch_m: 5e-3,
+///     latency_s: 5e-3,
+///     iou: 0.8,
+///     wires: WireChoice::UpTo(4),
+///     objects: DesignObjects::named("small")?,
+///     seed: 1,
+/// };
+/// assert_eq!(study.layout()?.taxels(), 32 * 32);
+/// # Ok::<(), spts_studies::design::DesignError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct DesignStudy {
     /// Width and height of the sheet, m.

@@ -11,6 +11,6 @@ pub(crate) mod wiring;
 
 pub use error::ExploreError;
 pub use fit::PowerLaw;
-pub use report::{CostFit, ExploreReport, SizeRow, Trial};
+pub use report::{CostFit, ExploreReport, ExploreTrial, SizeRow};
 pub use study::{ExploreStudy, WANTED_IOU, WANTED_LOCATED};
 pub use wiring::Way;

@@ -8,7 +8,7 @@ use spts_circuit::amplifier::Limit;
 
 /// Results with one number of measurements; means over the scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Trial {
+pub struct ExploreTrial {
     /// Number of measurements of every wire.
     pub rows_per_wire: usize,
     /// Number of measurements of all wires together, M.
@@ -23,7 +23,7 @@ pub struct Trial {
     pub decode_s: f64,
 }
 
-impl Trial {
+impl ExploreTrial {
     /// Nothing added up yet.
     pub(super) fn none(rows_per_wire: usize, measurements: usize) -> Self {
         Self {
@@ -79,13 +79,13 @@ pub struct SizeRow {
     /// Time to scan every taxel of every wire at the same clock, s.
     pub raster_s: f64,
     /// Every number of measurements that was tried.
-    pub trials: Vec<Trial>,
+    pub trials: Vec<ExploreTrial>,
 }
 
 impl SizeRow {
-    pub(super) fn new(wiring: &Wiring, taxels: usize, contacts: usize, trials: Vec<Trial>) -> Self {
-        let least = |aim: fn(&Trial) -> bool| trials.iter().filter(|t| aim(t)).min_by_key(|t| t.measurements);
-        let iou = least(Trial::has_iou);
+    pub(super) fn new(wiring: &Wiring, taxels: usize, contacts: usize, trials: Vec<ExploreTrial>) -> Self {
+        let least = |aim: fn(&ExploreTrial) -> bool| trials.iter().filter(|t| aim(t)).min_by_key(|t| t.measurements);
+        let iou = least(ExploreTrial::has_iou);
         Self {
             taxels,
             contacts,
@@ -98,7 +98,7 @@ impl SizeRow {
             period_s: wiring.period_s,
             steps_per_taxel: wiring.steps_per_taxel,
             m_iou: iou.map(|t| t.measurements),
-            m_located: least(Trial::has_located).map(|t| t.measurements),
+            m_located: least(ExploreTrial::has_located).map(|t| t.measurements),
             acquire_s: iou.map(|t| t.rows_per_wire as f64 * wiring.period_s),
             raster_s: taxels.div_ceil(wiring.wires) as f64 * wiring.period_s,
             trials,
@@ -107,7 +107,7 @@ impl SizeRow {
 
     /// The trial with the wanted IoU and the fewest measurements; otherwise the last one.
     #[must_use]
-    pub fn deciding(&self) -> Option<&Trial> {
+    pub fn deciding(&self) -> Option<&ExploreTrial> {
         let found = self.trials.iter().find(|t| Some(t.measurements) == self.m_iou);
         found.or(self.trials.last())
     }

@@ -2,7 +2,7 @@
 
 use super::error::ExploreError;
 use super::measure::MeasuredWires;
-use super::report::{ExploreReport, SizeRow, Trial};
+use super::report::{ExploreReport, ExploreTrial, SizeRow};
 use super::scene::{ExploreScene, located, scene};
 use super::wiring::{Way, Wiring, wirings};
 use crate::electronics::ElectronicsStudy;
@@ -88,11 +88,11 @@ impl ExploreStudy {
         let most = most_measurements(taxels).div_ceil(wiring.wires);
         let contacts = scenes.first().map_or(1, |scene| scene.contacts);
         let mut rows = (FIRST_PER_CONTACT * contacts).div_ceil(wiring.wires).max(8).min(most);
-        let mut trials: Vec<Trial> = Vec::new();
+        let mut trials: Vec<ExploreTrial> = Vec::new();
         loop {
             trials.push(trial(side, wiring, scenes, &mut measured, rows)?);
-            let reached = |aim: fn(&Trial) -> bool| trials.iter().any(aim);
-            if rows == most || (reached(Trial::has_iou) && reached(Trial::has_located)) {
+            let reached = |aim: fn(&ExploreTrial) -> bool| trials.iter().any(aim);
+            if rows == most || (reached(ExploreTrial::has_iou) && reached(ExploreTrial::has_located)) {
                 break;
             }
             rows = (2 * rows).min(most);
@@ -106,10 +106,10 @@ impl ExploreStudy {
 
 /// Half an octave below the least M that reaches an aim.
 fn refine(
-    trials: &mut Vec<Trial>,
-    mut at: impl FnMut(usize) -> Result<Trial, ExploreError>,
+    trials: &mut Vec<ExploreTrial>,
+    mut at: impl FnMut(usize) -> Result<ExploreTrial, ExploreError>,
 ) -> Result<(), ExploreError> {
-    for aim in [Trial::has_iou, Trial::has_located] {
+    for aim in [ExploreTrial::has_iou, ExploreTrial::has_located] {
         let least = trials.iter().filter(|t| aim(t)).map(|t| t.rows_per_wire).min();
         let between = least.map(half_octave_below);
         if let Some(rows) = between.filter(|rows| trials.iter().all(|t| t.rows_per_wire != *rows) && *rows >= 4) {
@@ -140,12 +140,12 @@ fn trial(
     scenes: &[ExploreScene],
     measured: &mut [MeasuredWires],
     rows: usize,
-) -> Result<Trial, ExploreError> {
+) -> Result<ExploreTrial, ExploreError> {
     let pursuit = RegionPursuit {
         max_rounds: MAX_ROUNDS,
         ..RegionPursuit::new(side, side)
     };
-    let mut sum = Trial::none(rows, rows * wiring.wires);
+    let mut sum = ExploreTrial::none(rows, rows * wiring.wires);
     let share = 1.0 / scenes.len() as f64;
     let (mut truth, mut mask) = (Vec::new(), Vec::new());
     for (scene, measured) in scenes.iter().zip(measured) {

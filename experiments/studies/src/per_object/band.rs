@@ -1,6 +1,6 @@
 //! Bands over simulated skins, and the distance of the real skin from them.
 
-use super::images::Images;
+use super::images::ReadoutImages;
 use crate::calibrate::predicted;
 use serde::Serialize;
 use spts_eval::Scores;
@@ -41,7 +41,7 @@ impl ObjectScore {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ObjectBand {
     /// The images of the twin's recordings.
-    pub images: Images,
+    pub images: ReadoutImages,
     /// Decoder.
     pub decoder: String,
     /// Number of measurements, M.
@@ -71,7 +71,7 @@ pub struct ObjectBand {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoreDistance {
     /// The images of the twin's recordings.
-    pub images: Images,
+    pub images: ReadoutImages,
     /// Decoder.
     pub decoder: String,
     /// Number of measurements, M.
@@ -95,17 +95,17 @@ pub struct ScoreDistance {
 /// The band of every score of the real skin that all `skins` also have, in the order of `real`.
 ///
 /// ```
-/// use spts_studies::per_object::{Images, ObjectScore, bands};
+/// use spts_studies::per_object::{ReadoutImages, ObjectScore, bands};
 ///
 /// let (decoder, object) = ("matched".to_owned(), "T".to_owned());
 /// let one = ObjectScore { decoder, m: 20, score: "iou", object, value: 0.0 };
 /// let score = |value| ObjectScore { value, ..one.clone() };
 /// let skins: Vec<_> = [0.70, 0.74, 0.78].map(|value| vec![score(value)]).to_vec();
-/// let band = &bands(Images::Twin, &[score(0.76)], &skins)[0];
+/// let band = &bands(ReadoutImages::Twin, &[score(0.76)], &skins)[0];
 /// assert!(band.inside && (band.twin - 0.74).abs() < 1e-12);
 /// ```
 #[must_use]
-pub fn bands(images: Images, real: &[ObjectScore], skins: &[Vec<ObjectScore>]) -> Vec<ObjectBand> {
+pub fn bands(images: ReadoutImages, real: &[ObjectScore], skins: &[Vec<ObjectScore>]) -> Vec<ObjectBand> {
     let band = |real: &ObjectScore| {
         let same = |skin: &Vec<ObjectScore>| skin.iter().find(|s| s.is_of(real)).map(|s| s.value);
         let skins: Vec<f64> = skins.iter().map(same).collect::<Option<_>>()?;
@@ -191,7 +191,7 @@ mod tests {
     fn opposite_errors_do_not_cancel() {
         let real = [score("brain", 0.7), score("trig", 0.3)];
         let skins = [[0.31, 0.69], [0.29, 0.71]].map(|[a, b]| vec![score("brain", a), score("trig", b)]);
-        let bands = bands(Images::Twin, &real, &skins);
+        let bands = bands(ReadoutImages::Twin, &real, &skins);
         let distances = distances(&bands);
         assert_eq!(distances.len(), 1);
         assert_abs_diff_eq!(distances[0].difference_of_means, 0.0, epsilon = 1e-12);
@@ -204,13 +204,13 @@ mod tests {
     #[test]
     fn a_real_skin_like_the_twin_s_lies_within_the_band() {
         let skins = [0.4, 0.6, 0.4, 0.6].map(|v| vec![score("brain", v)]);
-        let within = |real: f64| bands(Images::Twin, &[score("brain", real)], &skins)[0].inside;
+        let within = |real: f64| bands(ReadoutImages::Twin, &[score("brain", real)], &skins)[0].inside;
         assert!(within(0.5) && within(0.79) && !within(0.81) && !within(0.19));
     }
 
     #[test]
     fn a_score_that_a_skin_lacks_has_no_band() {
         let skins = [vec![score("brain", 0.5)], vec![]];
-        assert!(bands(Images::Twin, &[score("brain", 0.5)], &skins).is_empty());
+        assert!(bands(ReadoutImages::Twin, &[score("brain", 0.5)], &skins).is_empty());
     }
 }

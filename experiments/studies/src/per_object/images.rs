@@ -6,7 +6,7 @@ use serde::Serialize;
 /// Images that the twin reads out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Images {
+pub enum ReadoutImages {
     /// The twin's own: simulated contact, with gains drawn for every skin.
     Twin,
     /// Simulated contact, with the gains of the real skin as estimated from raster presses of the OTHER objects.
@@ -18,7 +18,7 @@ pub enum Images {
     SkinCompressive,
 }
 
-impl Images {
+impl ReadoutImages {
     /// The kind of images in words.
     #[must_use]
     pub const fn label(self) -> &'static str {

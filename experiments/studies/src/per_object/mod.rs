@@ -12,5 +12,5 @@ mod study;
 mod text;
 
 pub use band::{ObjectBand, ObjectScore, SCORES, ScoreDistance, ScoreOf, bands, distances};
-pub use images::Images;
+pub use images::ReadoutImages;
 pub use study::{DECODERS, MEASUREMENTS, PerObjectError, PerObjectReport, PerObjectStudy};

@@ -1,7 +1,7 @@
 //! Records and scores every simulated skin like the real one.
 
 use super::band::{ObjectBand, ObjectScore, SCORES, ScoreDistance, ScoreOf, bands, distances};
-use super::images::Images;
+use super::images::ReadoutImages;
 use super::skin::{presses, twin, with_images, with_skin_gains};
 use super::text;
 use crate::calibrate::{SessionEstimates, read};
@@ -56,7 +56,7 @@ pub enum PerObjectError {
     Gains(#[from] SkinGainsError),
     /// There are no raster images.
     #[error("raster images: {0}")]
-    Images(#[from] LibraryError),
+    ReadoutImages(#[from] LibraryError),
 }
 
 /// Settings of the comparison.
@@ -68,7 +68,7 @@ pub struct PerObjectStudy<'a> {
     pub skins: u64,
     /// Seed of the first skin; the others have the following seeds.
     pub seed: u64,
-    /// Whether the twin also reads out the skin's own images ([`Images`]).
+    /// Whether the twin also reads out the skin's own images ([`ReadoutImages`]).
     pub causes: bool,
 }
 
@@ -102,7 +102,7 @@ impl PerObjectStudy<'_> {
         }
         let of_real = scores(&real, &objects, self.seed)?;
         progress.end();
-        let of = |images: Images, skin: &(dyn Fn(u64) -> Result<Source, PerObjectError> + Sync)| {
+        let of = |images: ReadoutImages, skin: &(dyn Fn(u64) -> Result<Source, PerObjectError> + Sync)| {
             let seeds = self.seed..self.seed.saturating_add(self.skins);
             let skins = seeds.into_par_iter().map(|seed| scores(&skin(seed)?, &objects, seed));
             let skins = skins.collect::<Result<Vec<_>, PerObjectError>>()?;
@@ -111,19 +111,22 @@ impl PerObjectStudy<'_> {
         let skins = usize::try_from(self.skins).unwrap_or(usize::MAX);
         let done = || progress.step();
         progress.stage("pressing simulated skins", Some(skins * presses(objects.len())));
-        let mut all = of(Images::Twin, &|seed| {
+        let mut all = of(ReadoutImages::Twin, &|seed| {
             Ok(Source::new(twin(seed, &objects, true, &done)?)?)
         })?;
         progress.end();
         if self.causes {
             progress.stage("with the skin's gains", Some(skins * presses(objects.len())));
-            all.extend(of(Images::TwinWithSkinGains, &|seed| {
+            all.extend(of(ReadoutImages::TwinWithSkinGains, &|seed| {
                 with_skin_gains(&twin(seed, &objects, false, &done)?, &real, seed)
             })?);
             progress.end();
             for (images, volts) in [
-                (Images::SkinRaster, raster_images(&real, &objects)?),
-                (Images::SkinCompressive, compressive_images(self.recordings, &objects)?),
+                (ReadoutImages::SkinRaster, raster_images(&real, &objects)?),
+                (
+                    ReadoutImages::SkinCompressive,
+                    compressive_images(self.recordings, &objects)?,
+                ),
             ] {
                 progress.stage(images.label(), Some(skins * real.sessions.len()));
                 all.extend(of(images, &|seed| with_images(&real, &volts, seed, &done))?);
@@ -143,7 +146,10 @@ impl PerObjectReport {
     #[must_use]
     pub fn distance(&self, decoder: &str, m: usize, score: &str) -> Option<&ScoreDistance> {
         let same = |d: &&ScoreDistance| d.decoder == decoder && d.m == m && d.score == score;
-        self.distances.iter().filter(|d| d.images == Images::Twin).find(same)
+        self.distances
+            .iter()
+            .filter(|d| d.images == ReadoutImages::Twin)
+            .find(same)
     }
 
     /// The results as text tables.

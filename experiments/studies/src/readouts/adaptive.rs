@@ -2,7 +2,7 @@
 
 use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
-use super::wire::{Frame, HeldWire};
+use super::wire::{HeldWire, WireFrame};
 use std::collections::VecDeque;
 
 /// Adaptive sub-sampling: single taxels on ever finer grids until one is touched; then its neighbours, and theirs,
@@ -72,7 +72,7 @@ impl Grids {
     }
 
     /// The taxels that are read, `count` at most, from the samples of all.
-    fn read_taxels(&self, frame: &Frame, count: usize) -> Vec<bool> {
+    fn read_taxels(&self, frame: &WireFrame, count: usize) -> Vec<bool> {
         let mut read = vec![false; self.order.len()];
         let (mut near, mut grids) = (VecDeque::new(), self.order.iter().copied());
         for _ in 0..count {
@@ -91,12 +91,12 @@ impl Grids {
     /// Samples of the contacts where they were taken; elsewhere that of the nearest taxel that was read, or the mean of
     /// several that are as near, up to one and a half pitches of a grid of `count` taxels. So a contact that was read
     /// to its rim, where nothing is touched, ends there.
-    fn fill(&self, frame: &Frame, read: &[bool], count: usize) -> Vec<f64> {
+    fn fill(&self, frame: &WireFrame, read: &[bool], count: usize) -> Vec<f64> {
         let pitch = (self.order.len() as f64 / count.max(1) as f64).sqrt();
         #[expect(clippy::cast_possible_truncation, reason = "at most the side of the skin")]
         let reach = (1.5 * pitch).ceil() as usize;
         // of the taxels that were read alone: the alarm of another one is not known
-        let known = Frame {
+        let known = WireFrame {
             volts: (0..read.len())
                 .map(|k| if read[k] { frame.volts[k] } else { 0.0 })
                 .collect(),
@@ -183,7 +183,7 @@ mod tests {
             order: coarse_to_fine(32, 32),
             counts: Vec::new(),
         };
-        let mut frame = Frame {
+        let mut frame = WireFrame {
             volts: vec![0.0; 1024],
             alarm_v: 0.5,
         };

@@ -18,7 +18,7 @@ pub struct SizeWire {
 
 /// One readout with one number of measurements; bands over the repetitions.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Trial {
+pub struct ReadoutTrial {
     /// Number of measurements for an image, M.
     pub measurements: usize,
     /// Images a second with the common clock.
@@ -40,7 +40,7 @@ pub struct Trial {
     pub unnoticed: f64,
 }
 
-impl Trial {
+impl ReadoutTrial {
     /// Whether the mean IoU is good.
     #[must_use]
     pub fn is_good(&self) -> bool {
@@ -63,14 +63,14 @@ pub struct ReadoutRow {
     /// Largest feedback resistance for which its sums fit, Ω.
     pub feedback_ohm: f64,
     /// One entry for each number of measurements, in increasing order.
-    pub trials: Vec<Trial>,
+    pub trials: Vec<ReadoutTrial>,
 }
 
 impl ReadoutRow {
     /// The trial with the fewest measurements and a good image; otherwise the one with the best IoU.
     #[must_use]
-    pub fn deciding(&self) -> Option<&Trial> {
-        let iou = |t: &Trial| t.iou.map_or(0.0, |iou| iou.mean);
+    pub fn deciding(&self) -> Option<&ReadoutTrial> {
+        let iou = |t: &ReadoutTrial| t.iou.map_or(0.0, |iou| iou.mean);
         let best = self.trials.iter().max_by(|a, b| iou(a).total_cmp(&iou(b)));
         self.trials.iter().find(|t| t.is_good()).or(best)
     }

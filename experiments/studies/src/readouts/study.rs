@@ -3,7 +3,7 @@
 use super::classify::Templates;
 use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, Reading, ReadoutSkin};
-use super::report::{ReadoutRow, ReadoutsReport, SizeWire, Trial};
+use super::report::{ReadoutRow, ReadoutTrial, ReadoutsReport, SizeWire};
 use super::table::ReadoutLine;
 use super::wire::WireSession;
 use super::wiring::SkinWire;
@@ -243,7 +243,7 @@ fn mean(values: &[f64]) -> Option<f64> {
 }
 
 /// Bands over the repetitions, one line a number of measurements.
-fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<Trial> {
+fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<ReadoutTrial> {
     let count = repetitions.first().map_or(0, |means| means.len());
     let trial = |index: usize| {
         let means: Vec<&Means> = repetitions.iter().filter_map(|means| means.get(index)).collect();
@@ -254,7 +254,7 @@ fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<Trial> {
         let share = |part: &dyn Fn(&Means) -> usize| {
             mean(&means.iter().map(|m| part(m) as f64 / touches(m)).collect::<Vec<f64>>())
         };
-        Trial {
+        ReadoutTrial {
             measurements,
             frames_hz: 1.0 / (measurements as f64 * period_s),
             iou: each(&|m| Some(m.iou)),

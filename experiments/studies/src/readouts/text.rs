@@ -1,6 +1,6 @@
 //! The benchmark as text tables.
 
-use super::report::{GOOD_IOU, ReadoutsReport, Trial};
+use super::report::{GOOD_IOU, ReadoutTrial, ReadoutsReport};
 use crate::touches::Band;
 
 /// "0.87 ± 0.03": mean and half width of a band.
@@ -55,7 +55,7 @@ impl ReadoutsReport {
 }
 
 /// The columns of a trial after M.
-fn cells(t: &Trial) -> String {
+fn cells(t: &ReadoutTrial) -> String {
     let notes = [(t.lost, "no image"), (t.unnoticed, "not noticed")];
     let [lost, unnoticed] = notes.map(|(share, what)| {
         if share > 0.0 {

@@ -19,7 +19,7 @@ pub const FALSE_ALARM_S: f64 = 10.0;
 
 /// A frame during a held touch.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Frame {
+pub struct WireFrame {
     /// Samples minus those of the idle skin at the same rows, V.
     pub volts: Vec<f64>,
     /// Threshold beyond which a sample means a touch, V: on an idle skin fewer than one is expected in
@@ -27,7 +27,7 @@ pub struct Frame {
     pub alarm_v: f64,
 }
 
-impl Frame {
+impl WireFrame {
     /// The samples of a scan of a sheet with `cols` columns that belong to a contact, and 0 for all others. A contact
     /// consists of the samples beyond the alarm threshold and the positive ones next to them. On a large skin, noise
     /// would otherwise appear as taxels.
@@ -122,7 +122,7 @@ impl<'a> WireSession<'a> {
         number: u64,
         measurements: usize,
         build: impl FnOnce(&Self) -> Result<Readout, ReadoutsError>,
-    ) -> Result<Frame, ReadoutsError> {
+    ) -> Result<WireFrame, ReadoutsError> {
         let (mut wire, idle) = match self.frames.take() {
             Some(frames) if frames.1.volts.len() == measurements => frames,
             _ => {
@@ -136,7 +136,7 @@ impl<'a> WireSession<'a> {
         volts.iter_mut().zip(&idle.volts).for_each(|(v, idle)| *v -= idle);
         let alarm_v = self.alarm_v(idle.sd_v);
         self.frames = Some((wire, idle));
-        Ok(Frame { volts, alarm_v })
+        Ok(WireFrame { volts, alarm_v })
     }
 
     fn map(&self, values: Vec<f64>) -> ConductanceMap {
@@ -194,7 +194,7 @@ impl HeldWire<'_, '_> {
     ///
     /// # Errors
     /// [`ReadoutsError`] if the readout cannot be built.
-    pub fn scan(&mut self) -> Result<Frame, ReadoutsError> {
+    pub fn scan(&mut self) -> Result<WireFrame, ReadoutsError> {
         let taxels = self.session.layout.taxels();
         let touch = self.touch.conductance_s.values();
         self.session.frame(touch, self.number, taxels, |session| {
@@ -211,7 +211,7 @@ impl HeldWire<'_, '_> {
         &mut self,
         rows: &R,
         measurements: usize,
-    ) -> Result<Frame, ReadoutsError> {
+    ) -> Result<WireFrame, ReadoutsError> {
         let touch = self.touch.conductance_s.values();
         self.session.frame(touch, self.number, measurements, |session| {
             let profile = Profile {
@@ -247,7 +247,11 @@ impl HeldWire<'_, '_> {
     ///
     /// # Errors
     /// [`ReadoutsError`] if the readout cannot be built.
-    pub fn transmissions(&mut self, chips: Option<&StoredRows>, measurements: usize) -> Result<Frame, ReadoutsError> {
+    pub fn transmissions(
+        &mut self,
+        chips: Option<&StoredRows>,
+        measurements: usize,
+    ) -> Result<WireFrame, ReadoutsError> {
         let session = &*self.session;
         let published = SkinLayout::default();
         let line = |chips: &StoredRows| -> Result<TouchWire, ReadoutsError> {
@@ -264,7 +268,7 @@ impl HeldWire<'_, '_> {
         let map = ConductanceMap::from_values(1, chips.taxels(), vec![each_s; chips.taxels()]);
         let mut volts = line(chips)?.volts(map, self.number, 0, measurements)?;
         volts.iter_mut().for_each(|v| *v -= idle_v);
-        Ok(Frame {
+        Ok(WireFrame {
             volts,
             alarm_v: session.alarm_v(variance.sqrt()),
         })
@@ -291,7 +295,7 @@ mod tests {
     /// does not.
     #[test]
     fn contacts_are_what_is_beyond_the_alarm_and_beside_it() {
-        let frame = Frame {
+        let frame = WireFrame {
             volts: vec![2.0, -0.3, 0.0, 0.4, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9],
             alarm_v: 1.0,
         };

@@ -59,7 +59,7 @@ pub struct RowDesign {
 
 /// The rows, with their properties.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DesignReport {
+pub struct RowDesignReport {
     /// Designer.
     pub designer: &'static str,
     /// Name of the designer in figures.
@@ -102,7 +102,7 @@ impl RowDesign {
     /// # Errors
     /// [`SensingError`] for a task out of range, recordings that cannot be read, or images from which no prior can be
     /// made.
-    pub fn run(&self) -> Result<DesignReport, SensingError> {
+    pub fn run(&self) -> Result<RowDesignReport, SensingError> {
         let (expected, classes) = self.expected()?;
         let task = RowTask {
             classes: &classes,
@@ -141,7 +141,7 @@ impl RowDesign {
                     .map(|pattern| pattern.message().len())
             })
             .flatten();
-        Ok(DesignReport {
+        Ok(RowDesignReport {
             designer: self.designer.name,
             label: self.designer.label,
             skin: expected.shape(),

@@ -11,6 +11,6 @@ mod text;
 pub use classes::ClassRow;
 pub use cost::{CauseError, CostRow};
 pub(crate) use design::load_s;
-pub use design::{DesignImages, DesignReport, RowDesign};
+pub use design::{DesignImages, RowDesign, RowDesignReport};
 pub use error::SensingError;
 pub use study::{Equal, NamedRow, SensingReport, SensingRow, SensingStudy};

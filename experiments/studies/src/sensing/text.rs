@@ -1,9 +1,9 @@
 //! A design as text.
 
-use super::design::DesignReport;
+use super::design::RowDesignReport;
 use super::study::SensingReport;
 
-impl DesignReport {
+impl RowDesignReport {
     /// A summary in a few lines.
     #[must_use]
     pub fn text(&self) -> String {

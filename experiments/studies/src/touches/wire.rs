@@ -11,6 +11,20 @@ const IDLE_MEASUREMENTS: usize = 1000;
 const IDLE_BLOCK: u64 = 1 << 40;
 
 /// The wire of a skin: a readout with its device's parts, and the noise of one session.
+///
+/// ```
+/// use spts_circuit::{Mode, Profile};
+/// use spts_models::{SkinLayout, Streams};
+/// use spts_studies::touches::{TouchObjects, TouchScene, TouchWire};
+///
+/// let layout = SkinLayout::default();
+/// let profile = Profile::named("ideal").expect("it ships");
+/// let weights = profile.weights(Mode::Compressive, 100).expect("100 taxels");
+/// let mut wire = TouchWire::new(&profile, &weights, &layout, Streams::new(1))?;
+/// let touch = &TouchScene::new(layout, TouchObjects::Objects, 1, 1).draw()?[0];
+/// assert_eq!(wire.measure(touch, 0, 0, 20)?.len(), 20);
+/// # Ok::<(), spts_studies::touches::TouchError>(())
+/// ```
 pub struct TouchWire {
     readout: Readout,
     rail_v: Option<f64>,

@@ -16,6 +16,20 @@ use rayon::prelude::*;
 /// Images are scaled to length 1 and clustered (k-means with k-means++ seeds). The component of a cluster with mean t
 /// and covariance C is u ~ N(t, C + γ² diag E\[u²\] + f² I); γ stands for unknown gains of the taxels.
 /// Sources: S. P. Lloyd, IEEE Trans. Inf. Theory 28 (1982) 129; D. Arthur, S. Vassilvitskii, "k-means++", SODA 2007.
+///
+/// ```
+/// use rand::SeedableRng as _;
+/// use spts_recon::Matrix;
+/// use spts_recon::classify::ClusterModel;
+///
+/// // two kinds of images of one class
+/// let images = Matrix::from_columns(3, 4, &[1.0, 0.0, 0.0, 2.0, 0.1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.1, 3.0])?;
+/// let model = ClusterModel { clusters: 2, gain: 0.1, floor: 0.05, noise: 0.1, rank: 2 };
+/// let learned = model.learn(&images, 5, &mut rand_chacha::ChaCha8Rng::seed_from_u64(1))?;
+/// assert_eq!(learned.components.len(), 2);
+/// assert!(learned.components.iter().all(|component| component.label == Some(5)));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ClusterModel {
     /// Largest number of clusters of a class, [1, 10000].

@@ -9,6 +9,15 @@ const FLOOR: f64 = 1e-3;
 
 /// Gaussian prior x ~ N(0, A ⊗ B) of images on a grid of R × C taxels: A (R × R) along rows and B (C × C) along
 /// columns, both with 1 on the diagonal. The scale of the images is not specified.
+///
+/// ```
+/// use spts_recon::matrix_free::SheetPrior;
+///
+/// let prior = SheetPrior::smooth([100, 200], 3.0)?;
+/// assert_eq!(prior.taxels(), 20_000);
+/// assert!((prior.covariance(0, 3) - (-0.5_f64).exp()).abs() < 1e-3, "3 taxels apart in a row");
+/// # Ok::<(), spts_recon::recover::PriorError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SheetPrior {
     rows: Matrix,

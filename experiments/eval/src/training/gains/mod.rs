@@ -25,8 +25,8 @@ const LARGEST_FACTOR: f64 = 4.0;
 ///
 /// On the taxels touched in a simulated contact, log(v/m) = a + l + c + e. v is the image of the skin and m that of the
 /// simulation at gain 1. a is the unknown amplitude of the session. l ~ N(0, σ²) is the logarithm of the taxel's gain,
-/// the same in all sessions. c ~ N(0, σ_c²) is the error of this object's simulated contact. e ~ N(0, σₘ²) is the change
-/// by this mounting of the skin. σ and σ_c are fitted to the ratios; σₘ is given.
+/// the same in all sessions. c ~ N(0, σ_c²) is the error of this object's simulated contact. e ~ N(0, σₘ²) is the
+/// change by this mounting of the skin. σ and σ_c are fitted to the ratios; σₘ is given.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SkinGains {
     /// The posterior.

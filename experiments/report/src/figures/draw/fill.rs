@@ -123,7 +123,8 @@ impl Pixels {
     }
 }
 
-/// Where a scan line is inside a polygon: from the first crossing to the second, from the third to the fourth, and so on.
+/// Where a scan line is inside a polygon: from the first crossing to the second, from the third to the fourth, and so
+/// on.
 #[derive(Clone, Default)]
 struct Spans(Vec<f64>);
 

@@ -20,8 +20,8 @@ pub(super) struct BothSkins<'a> {
 
 /// Numbers of measurements with which the paper finds small objects reconstructed well enough, and large ones.
 const STATED: [(&str, f64, f64); 2] = [
-    ("paper: enough for small objects", 15.0, 20.0),
-    ("paper: enough for large objects", 25.0, 30.0),
+    ("paper: 15–20 for small objects", 15.0, 20.0),
+    ("paper: 25–30 for large objects", 25.0, 30.0),
 ];
 
 fn as_f64(m: usize) -> f64 {
@@ -145,8 +145,8 @@ impl BothSkins<'_> {
     #[must_use]
     pub(super) fn fig_3b(&self) -> Vec<Chart> {
         let claims = [
-            claim("paper: at least 0.80", 13.0, 0.80),
-            claim("paper: at least 0.98", 20.0, 0.98),
+            claim("paper: at least 0.80 at M = 13", 13.0, 0.80),
+            claim("paper: at least 0.98 at M = 20", 20.0, 0.98),
         ];
         let mut labels = self.twin.skin.learned.classifier.library().labels().to_vec();
         labels.sort_unstable();

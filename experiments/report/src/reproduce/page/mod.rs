@@ -106,7 +106,7 @@ fn summary(content: &PageContent<'_>) -> String {
     text.push_str(if content.skins.real.is_some() {
         " Beside the twin stands the real skin: its published recordings, scored by the same code."
     } else {
-        " No recordings of the real skin were given; --recordings DIR shows them beside the twin."
+        " No recordings of the real skin were given; `spts reproduce --recordings DIR` shows them beside the twin."
     });
     if content.quick {
         text.push_str(" This was a quick run with few presses and windows, so the scores scatter by a few per cent.");
