@@ -174,7 +174,8 @@ impl<'a> SimulationFiles<'a> {
             write_json(&out.path("summary.json"), summary)?;
             write_json(&out.timed_path("timing.json"), &SimulationTiming::of(simulation))
         };
-        let pictures = || {
+        let written = numbers().map_err(ReportError::from);
+        let pictures = || -> Result<(), ReportError> {
             let folder = out.path("");
             let pair = simulation.first.as_ref().zip(decoded);
             let (pressure, decoded) = rayon::join(
@@ -185,7 +186,6 @@ impl<'a> SimulationFiles<'a> {
             decoded?;
             Ok(())
         };
-        let written = numbers().map_err(ReportError::from);
         written
             .and_then(|()| pictures())
             .map_err(|error| error.unstaged(&out))?;
