@@ -323,7 +323,7 @@ fn what_is_wrong_is_named() {
         (
             "\"frame_position\": 10".to_owned(),
             "\"frame_position\": 9".to_owned(),
-            "ends at frame 9",
+            "`frame_position` = 9, outside [10, ∞)",
         ),
         ("\"rows\": 2".to_owned(), "\"rows\": 3".to_owned(), "12"),
     ];
