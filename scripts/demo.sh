@@ -5,7 +5,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 report=$1
 recordings=${2:-}
-first=$(dirname "$report")/first_press
+first=out/first_press
 
 began=$SECONDS
 # step NUMBER WHAT COMMAND...

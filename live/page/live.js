@@ -233,7 +233,14 @@ async function drop(file) {
     return;
   }
   at("mesh-notes").replaceChildren(Object.assign(document.createElement("li"), { textContent: `Reading ${file.name} …` }));
-  const bytes = await file.arrayBuffer();
+  let bytes;
+  try {
+    bytes = await file.arrayBuffer();
+  } catch (error) {
+    at("mesh-notes").replaceChildren();
+    showError(`${file.name} cannot be read: ${error.message}`);
+    return;
+  }
   send({ type: "mesh", name: file.name, unit: at("unit").value });
   if (socket?.readyState === WebSocket.OPEN) socket.send(bytes);
 }

@@ -71,7 +71,8 @@ export function watch(canvas, state, changed, chosen) {
     changed();
   }, { passive: false });
   canvas.addEventListener("keydown", (event) => {
-    if (!state.skin) return;
+    // the browser's own keys, such as those that enlarge the page
+    if (!state.skin || event.ctrlKey || event.metaKey || event.altKey) return;
     const step = event.shiftKey ? 1 : state.mode === "break" ? state.skin.pitch_mm : 5;
     const arrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
     const arrow = arrows[event.key];

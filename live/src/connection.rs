@@ -82,7 +82,9 @@ pub(crate) async fn serve(mut socket: WebSocket, shared: Arc<Shared>) {
                     },
                     Some(Ok(_)) => continue,
                 };
-                if told.send(told_now).await.is_err() {
+                // a session that takes nothing for so long waits for this page to take what it was told
+                let taken = tokio::time::timeout(PATIENCE, told.send(told_now)).await;
+                if !matches!(taken, Ok(Ok(()))) {
                     return;
                 }
             }

@@ -31,6 +31,8 @@ pub struct LiveSession {
     sound: Settings,
     /// Whether the wires are those of the settings.
     wired: bool,
+    /// Whether none is left out because its rows are being designed.
+    complete: bool,
     lines: Vec<Line>,
     mesh: Option<Arc<UploadedMesh>>,
     truth: Vec<bool>,
@@ -55,6 +57,7 @@ impl LiveSession {
             sound: settings.clone(),
             settings,
             wired: false,
+            complete: false,
             lines: Vec::new(),
             mesh: None,
             truth: Vec::new(),
@@ -178,20 +181,27 @@ impl LiveSession {
         })
     }
 
-    /// Builds the wires again when something that they depend on was changed.
+    /// Builds the wires again when something that they depend on was changed, and adds those whose rows were not
+    /// designed before.
     fn wire(&mut self) -> Result<(), LiveError> {
-        if self.wired {
+        if self.wired && self.complete {
             return Ok(());
         }
-        match wires(&self.settings, &self.shelf, self.seed) {
+        let there = if self.wired {
+            std::mem::take(&mut self.lines)
+        } else {
+            Vec::new()
+        };
+        match wires(&self.settings, &self.shelf, self.seed, there) {
             Ok((lines, complete)) => {
                 self.lines = lines;
                 self.sound = self.settings.clone();
-                self.wired = complete;
+                (self.wired, self.complete) = (true, complete);
                 Ok(())
             }
             Err(error) => {
                 self.settings = self.sound.clone();
+                self.wired = false;
                 Err(error)
             }
         }

@@ -68,14 +68,23 @@ impl Line {
     }
 }
 
-/// The wires that `settings` need, each of the same specimen of the skin; those whose rows are not designed yet are
-/// left out, and then the second value is false.
-pub(crate) fn wires(settings: &Settings, shelf: &Arc<Shelf>, seed: u64) -> Result<(Vec<Line>, bool), LiveError> {
+/// The wires that `settings` need, in the order of the panels, each of the same specimen of the skin. Wires that are
+/// `there` go on. Those whose rows are not designed yet are left out, and then the second value is false.
+pub(crate) fn wires(
+    settings: &Settings,
+    shelf: &Arc<Shelf>,
+    seed: u64,
+    mut there: Vec<Line>,
+) -> Result<(Vec<Line>, bool), LiveError> {
     let mut lines: Vec<Line> = Vec::new();
     let mut complete = true;
     for panel in &settings.panels {
         let name = panel.rows_name();
         if lines.iter().any(|line| line.rows == name) {
+            continue;
+        }
+        if let Some(k) = there.iter().position(|line| line.rows == name) {
+            lines.push(there.swap_remove(k));
             continue;
         }
         let patterns = match panel.rows.map(|designer| shelf.design(designer)) {
@@ -148,7 +157,7 @@ mod tests {
             let mut settings = Settings::usual().unwrap();
             settings.panels[1].rows = None;
             settings.noise = noise;
-            let (mut lines, complete) = wires(&settings, &shelf, 3).unwrap();
+            let (mut lines, complete) = wires(&settings, &shelf, 3, Vec::new()).unwrap();
             assert!(complete && lines.len() == 1);
             let mut squares = 0.0;
             for _ in 0..20 {

@@ -18,6 +18,7 @@ import os
 import pathlib
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -72,8 +73,12 @@ def run_shell(block, folder, spts):
 def run_python(block, names):
     """Output of a `python` block, which sees what those before it on its page have named."""
     printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(compile(block.text, block.where, "exec"), names)
+    signal.alarm(TIMEOUT_S)
+    try:
+        with contextlib.redirect_stdout(printed):
+            exec(compile(block.text, block.where, "exec"), names)
+    finally:
+        signal.alarm(0)
     return printed.getvalue()
 
 
@@ -103,7 +108,9 @@ def run_page(page, options):
             except (AssertionError, subprocess.TimeoutExpired) as error:
                 report.append(f"{block.where}: {error}")
                 return report, False
-            except Exception:  # whatever a block of Python raises
+            except KeyboardInterrupt:
+                raise
+            except BaseException:  # whatever a block of Python raises, its own end included
                 report.append(f"{block.where}:\n{traceback.format_exc(limit=-3)}")
                 return report, False
             if said and options.times:

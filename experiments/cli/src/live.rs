@@ -1,10 +1,9 @@
 //! `spts live`: the skin under the mouse, on a page of this machine.
 
-use super::context::{Common, note, print, print_json};
+use super::context::{Common, note, print};
 use super::error::CliError;
 use super::options::seed;
 use clap::Args;
-use serde::Serialize;
 use spts_live::{LiveConfig, Server};
 
 /// Port that is easy to keep as a bookmark.
@@ -15,7 +14,7 @@ const PORT: u16 = 7117;
 /// The page is served to this machine alone, at http://127.0.0.1:PORT/; it needs no other program and no network.
 /// Choose an object, or drop a mesh file onto the page. Press it anywhere on the skin, as hard as you like. Two
 /// decoders show what they make of the wire, each at random or designed rows of the sensing matrix, from M = 5 to 100
-/// measurements. Cells can be broken and the noise changed while it runs. There are 40 updates a second on one core.
+/// measurements. Cells can be broken and the noise changed while it runs. There are up to 40 updates a second on one core.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts live                          then open the address that it prints
@@ -38,12 +37,6 @@ pub(super) struct LiveCommand {
     common: Common,
 }
 
-/// What the command prints first.
-#[derive(Serialize)]
-struct Served {
-    url: String,
-}
-
 impl LiveCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
@@ -55,7 +48,8 @@ impl LiveCommand {
         })?;
         let url = format!("http://{}/", server.address());
         if self.common.json {
-            print_json(&Served { url })?;
+            // one line, for a script that reads a line and goes on while the page is served
+            print(&serde_json::json!({ "url": url }).to_string())?;
         } else {
             print(&url)?;
             note("open this address in a browser; Ctrl-C ends it");
