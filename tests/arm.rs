@@ -149,7 +149,7 @@ fn what_is_not_valid_is_refused() {
         refused(dir.path(), &["simulate", "arm", "--set", set], &facts);
     }
     let ball = ["simulate", "bounce", "--set", "bend={}"];
-    refused(dir.path(), &ball, &["[bend]", "[press]", "ball"]);
+    refused(dir.path(), &ball, &["[bend]", "[press]", "drops"]);
     let empty = dir.path().to_str().unwrap();
     refused(dir.path(), &["compare", empty, "--arm"], &[empty]);
 }

@@ -1,7 +1,7 @@
 //! `spts dataset export`.
 
 use super::make::Files;
-use crate::context::{note_earlier, print, print_json};
+use crate::context::{print, print_json};
 use crate::error::CliError;
 use crate::options::whole;
 use crate::progress::Bars;
@@ -59,7 +59,6 @@ impl ExportCommand {
             rows_per_tar: self.rows_per_tar,
         };
         let dataset = self.files.open(&self.folder)?;
-        note_earlier(&self.out);
         let exported = dataset.export(&self.format, &self.out, &options, &Bars::default())?;
         if self.json {
             return print_json(&exported);
