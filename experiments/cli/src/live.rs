@@ -13,8 +13,9 @@ const PORT: u16 = 7117;
 ///
 /// The page is served to this machine alone, at http://127.0.0.1:PORT/; it needs no other program and no network.
 /// Choose an object, or drop a mesh file onto the page. Press it anywhere on the skin, as hard as you like. Two
-/// decoders show what they make of the wire, each at random or designed rows of the sensing matrix, from M = 5 to 100
-/// measurements. Cells can be broken and the noise changed while it runs. There are up to 40 updates a second on one core.
+/// decoders show what they make of the wire, each at random or designed rows of the sensing matrix, from M = 5 to
+/// 100 measurements. Cells can be broken and the noise changed while it runs. There are up to 40 updates a second
+/// on one core.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts live                          then open the address that it prints
