@@ -75,7 +75,11 @@ class Visit:
         self.complaints = []
         self.page.on("console", lambda m: self.complaints.append(m.text) if m.type in ("error", "warning") else None)
         self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        self.page.on("requestfailed", lambda r: self.complaints.append(f"{r.url}: {r.failure}"))
+        # what a page still loads when it is left is aborted, and no fault
+        self.page.on(
+            "requestfailed",
+            lambda r: self.complaints.append(f"{r.url}: {r.failure}") if r.failure != "net::ERR_ABORTED" else None,
+        )
 
     def open(self, address):
         """Opens an address, or a file, and waits until nothing loads any more."""
