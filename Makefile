@@ -1,5 +1,5 @@
-# Everything a user needs: `make demo` runs the twin and writes a report, `make test` checks it; `make validate` runs the slow tests too.
-# RECORDINGS=DIR scores recordings of the real skin beside the twin, and lets the tests use them.
+# Everything a user needs: `make demo` runs the twin and writes a report, `make test` checks it; `make validate` runs
+# the slow tests too. RECORDINGS=DIR scores recordings of the real skin beside the twin, and lets the tests use them.
 
 RECORDINGS ?= $(wildcard ../shared/recordings)
 OUT ?= out/report
@@ -21,23 +21,24 @@ install: setup
 test: setup
 	cargo test --release --locked --workspace
 
-# The slow tests, which `make test` leaves out, some minutes: ngspice's speed, MuJoCo's finite elements, a million edges of a hundred
-# cells, the processor against yasimavr, and with recordings the score curves of twin and skin. Without recordings, ngspice or yasimavr,
-# what needs them says so and is skipped.
+# The slow tests, which `make test` leaves out, some minutes: ngspice's speed, MuJoCo's finite elements, a million edges
+# of a hundred cells, the processor against yasimavr, and with recordings the score curves of twin and skin. Without
+# recordings, ngspice or yasimavr, what needs them says so and is skipped.
 validate: setup
 	cargo test --release --locked --workspace --lib --bins --tests -- --ignored
 
-# Data sets, read with the programs that people read them with (pyarrow, DuckDB, polars, pandas, Hugging Face `datasets`, Croissant), and
-# made by many workers, Ray among them. A minute or two; the first time, and after a change of their versions, it fetches Python packages of about 1 GB.
+# Data sets, read with the programs that people read them with (pyarrow, DuckDB, polars, pandas, Hugging Face
+# `datasets`, Croissant), and made by many workers, Ray among them. A minute or two; the first time, and after a change
+# of their versions, it fetches Python packages of about 1 GB.
 READERS ?= out/readers
 readers: setup
 	./scripts/environment.sh "$(READERS)" scripts/dataset/requirements.txt
 	cargo build --release --locked --quiet --workspace
 	"$(READERS)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
-# The Python package `spts`: its wheel, in out/wheels, installed into two virtual environments and tested there: out/python has everything that
-# it can work with, out/python-scenes the MuJoCo that its scenes need. Ten minutes the first time, and then after a change; it fetches Python packages of
-# about 500 MB once.
+# The Python package `spts`: its wheel, in out/wheels, installed into two virtual environments and tested there:
+# out/python has everything that it can work with, out/python-scenes the MuJoCo that its scenes need. Ten minutes the
+# first time, and then after a change; it fetches Python packages of about 500 MB once.
 PYTHON ?= out/python
 PYTHON_SCENES ?= out/python-scenes
 WHEELS ?= out/wheels
@@ -52,8 +53,9 @@ python: setup
 	"$(PYTHON)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
 	"$(PYTHON_SCENES)/bin/python" -m pytest --quiet --tb=short -p no:cacheprovider python/tests/test_scenes.py
 
-# The book, out/book/index.html: its links are checked, its commands and its Python are run. BLOCKS="--with slow" runs what takes minutes, too.
-# MkDocs is not told to be quiet: it would then count no warning. Where the Python package is not built (`make python`), its examples are left out.
+# The book, out/book/index.html: its links are checked, its commands and its Python are run. BLOCKS="--with slow" runs
+# what takes minutes, too. MkDocs is not told to be quiet: it would then count no warning. Where the Python package is
+# not built (`make python`), its examples are left out.
 BOOK ?= out/mkdocs
 BLOCKS ?=
 book: setup

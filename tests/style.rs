@@ -48,14 +48,15 @@ fn root() -> PathBuf {
 
 #[test]
 fn comments_fit_into_their_width() {
-    let files = sources(&root(), &[".rs", ".py", ".sh"]);
+    let mut files = sources(&root(), &[".rs", ".py", ".sh", ".js", ".css", "Makefile"]);
+    files.extend(sources(&root().join(".github"), &[".yml"]));
     assert!(files.len() > 500, "{} sources", files.len());
     let mut wide = Vec::new();
     for file in files {
-        let sign = if file.extension().is_some_and(|e| e == "rs") {
-            "//"
-        } else {
-            "#"
+        let sign = match file.extension().and_then(|e| e.to_str()) {
+            Some("rs" | "js") => "//",
+            Some("css") => "/*",
+            _ => "#",
         };
         let text = std::fs::read_to_string(&file).unwrap();
         for (number, line) in (1..).zip(text.lines()) {

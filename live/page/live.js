@@ -98,6 +98,7 @@ function greet(hello) {
     for (const [taxel, name] of state.faults) send({ type: "fault", taxel, name });
     if ([...at("object").options].some((option) => option.value === state.object && !option.dataset.mesh)) {
       send({ type: "object", name: state.object });
+      send({ type: "turn", degrees: state.degrees });
     }
   }
   labels();

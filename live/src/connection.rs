@@ -10,7 +10,6 @@ use crate::session::LiveSession;
 use axum::body::Bytes;
 use axum::extract::ws::{Message, WebSocket};
 use serde::Serialize;
-use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc::{Receiver, Sender, channel};
@@ -21,8 +20,6 @@ const WAITING: usize = 256;
 const UNSENT: usize = 4;
 /// Time in which a page has to take a message.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// Updates from which their rate is known.
-const COUNTED: usize = 40;
 
 /// What a session is told.
 enum Told {
@@ -105,7 +102,10 @@ fn read_mesh(
         ));
     };
     tokio::task::spawn_blocking(move || {
-        let mesh = UploadedMesh::read(&name, unit, &bytes).map(Box::new);
+        let read = || UploadedMesh::read(&name, unit, &bytes).map(Box::new);
+        // the page waits for an answer, whatever became of its mesh
+        let mesh = std::panic::catch_unwind(read)
+            .unwrap_or_else(|_| Err(LiveError::Message(format!("{name}: cannot be read"))));
         drop((place, bytes));
         // a page that was closed needs none
         let _ = told.blocking_send(Told::Mesh(mesh));
@@ -124,7 +124,6 @@ fn run(shared: &Shared, mut requests: Receiver<Told>, shown: &Sender<String>) {
         }
     };
     let greeting = tell(shown, &session.options()).and_then(|()| tell(shown, &session.shape()));
-    let mut ends: VecDeque<Instant> = VecDeque::with_capacity(COUNTED + 1);
     let mut due = Instant::now();
     let mut open = greeting.is_some();
     while open {
@@ -132,11 +131,7 @@ fn run(shared: &Shared, mut requests: Receiver<Told>, shown: &Sender<String>) {
         open = !gone && obey(&mut session, told, shown).is_some();
         open = open
             && match session.step() {
-                Ok(mut frame) => {
-                    ends.push_back(Instant::now());
-                    frame.rate_hz = rate_hz(&mut ends);
-                    show(shown, &frame)
-                }
+                Ok(frame) => show(shown, &frame),
                 Err(error) => tell_error(shown, &error).is_some(),
             };
         due = (due + Duration::from_secs_f64(UPDATE_S)).max(Instant::now());
@@ -191,19 +186,6 @@ fn obey(session: &mut LiveSession, told: Vec<Told>, shown: &Sender<String>) -> O
     }
     shape.map_or(Some(()), |shape| tell(shown, &shape))?;
     refused.map_or(Some(()), |error| tell_error(shown, &error))
-}
-
-/// Updates a second.
-fn rate_hz(ends: &mut VecDeque<Instant>) -> f64 {
-    while ends.len() > COUNTED {
-        ends.pop_front();
-    }
-    match (ends.front(), ends.back()) {
-        (Some(first), Some(last)) if ends.len() > 1 => {
-            (ends.len() - 1) as f64 / last.duration_since(*first).as_secs_f64()
-        }
-        _ => 0.0,
-    }
 }
 
 /// Shows a frame, unless earlier ones are not sent yet. False when the page is gone.

@@ -22,8 +22,6 @@ pub struct Frame {
     pub panels: Vec<PanelFrame>,
     /// Time that the update took, ms.
     pub work_ms: f64,
-    /// Updates a second.
-    pub rate_hz: f64,
 }
 
 /// A frame of measurements of one wire.

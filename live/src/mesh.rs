@@ -48,8 +48,9 @@ impl UploadedMesh {
     /// # Errors
     /// [`LiveError::Mesh`] for a mesh that cannot press.
     pub fn read(name: &str, unit: MeshUnit, bytes: &[u8]) -> Result<Self, LiveError> {
-        let name: String = name.chars().filter(|c| !c.is_control()).take(MOST_NAME).collect();
         let extension = name.rsplit_once('.').map_or("", |(_, end)| end).to_ascii_lowercase();
+        let shown = |text: &str| -> String { text.chars().filter(|c| !c.is_control()).take(MOST_NAME).collect() };
+        let (name, extension) = (shown(name), shown(&extension));
         let read: Read = match extension.as_str() {
             "stl" => read_stl,
             "obj" => read_obj,

@@ -177,7 +177,6 @@ impl LiveSession {
             lines: lines.collect(),
             panels: panels.into(),
             work_ms: 1e3 * start.elapsed().as_secs_f64(),
-            rate_hz: 0.0,
         })
     }
 

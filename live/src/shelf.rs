@@ -12,6 +12,7 @@ use spts_recon::Matrix;
 use spts_recon::recover::ImagePrior;
 use spts_recon::rows::{Designer, Expected, RowTask, Tolerances};
 use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// What decoders and designers know is the same for every seed of the skin: the root of its random numbers.
@@ -115,11 +116,13 @@ impl Shelf {
         let shelf = Arc::clone(self);
         let started = std::thread::Builder::new().name(format!("make {name}")).spawn(move || {
             let one = locked(&shelf.making);
-            let made = make(&shelf);
+            // pages wait for it: it is refused, too, when it panics
+            let made = catch_unwind(AssertUnwindSafe(|| make(&shelf)));
             drop(one);
             let made = match made {
-                Ok(made) => Made::Ready(Arc::new(made)),
-                Err(reason) => Made::Refused(reason),
+                Ok(Ok(made)) => Made::Ready(Arc::new(made)),
+                Ok(Err(reason)) => Made::Refused(reason),
+                Err(_) => Made::Refused("an error of the program; its standard error says more".to_owned()),
             };
             locked(table(&shelf)).insert(name, made);
         });

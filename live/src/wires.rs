@@ -15,6 +15,9 @@ use std::sync::Arc;
 /// Measurements of every update: those that are decoded come first.
 const RECORDED: usize = crate::options::MEASUREMENTS[1];
 
+/// Measurements before those that are shown, so that the amplifier knows the one before.
+const SETTLING: usize = 8;
+
 /// A wire with one kind of rows.
 pub(crate) struct Line {
     /// Name of the rows.
@@ -22,6 +25,10 @@ pub(crate) struct Line {
     wire: Wire,
     idle_v: f64,
     sample_rate_hz: f64,
+    /// Time that the skin has felt so far, s.
+    felt_s: f64,
+    /// Measurements in that time, those that nobody looks at included.
+    passed: u64,
     recorded: Option<Press>,
     volts: Vec<f64>,
 }
@@ -34,6 +41,8 @@ impl Line {
             idle_v: wire.idle_v(Mode::Compressive),
             sample_rate_hz: chain.sample_rate_hz(),
             wire,
+            felt_s: 0.0,
+            passed: 0,
             recorded: None,
             volts: Vec::new(),
         })
@@ -42,11 +51,27 @@ impl Line {
     /// Lets the skin feel the pressure for `dt_s`, and measures it.
     pub(crate) fn record(&mut self, electrode_pressure: &PressureMap, dt_s: f64) -> Result<(), LiveError> {
         self.wire.feel(electrode_pressure, dt_s)?;
+        self.catch_up(dt_s);
+        self.wire.measure(Mode::Compressive, &mut [0.0; SETTLING])?;
         let rows = PressRows::new(self.wire.rows(Mode::Compressive, RECORDED));
         self.volts.resize(RECORDED, 0.0);
         self.wire.measure(Mode::Compressive, &mut self.volts)?;
+        self.passed += (SETTLING + RECORDED) as u64;
         self.recorded = Some(Press::on(Arc::new(rows), self.volts.clone(), self.idle_v));
         Ok(())
+    }
+
+    /// Lets the measurements pass that the wire takes in `dt_s` and nobody looks at, in whole frames.
+    fn catch_up(&mut self, dt_s: f64) {
+        self.felt_s += dt_s;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "casts saturate")]
+        let due = (self.felt_s * self.sample_rate_hz) as u64;
+        let frame = self.wire.info(Mode::Compressive).measurements_per_frame as u64;
+        let frames = (due / frame).saturating_sub(self.passed / frame);
+        if frames > 0 {
+            self.wire.pass(Mode::Compressive, frames);
+            self.passed = (self.passed / frame + frames) * frame;
+        }
     }
 
     /// What was measured last.
@@ -148,6 +173,33 @@ fn with_noise(mut profile: Profile, factor: f64) -> Profile {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The wire's clock goes on with the skin's: a cell that loses 1 % of its output a second has lost a tenth of it
+    /// after ten seconds of updates. The ideal readout has no noise, and both wires feel the same.
+    #[test]
+    fn a_drifting_cell_drifts_in_the_time_of_the_skin() {
+        let shelf = Arc::new(Shelf::new());
+        let line = |faulty: bool| {
+            let mut settings = Settings::usual().unwrap();
+            settings.panels[1].rows = None;
+            settings.read_out("ideal", 1.0).unwrap();
+            if faulty {
+                settings.fault(44, Some("drifting"), 100).unwrap();
+            }
+            wires(&settings, &shelf, 3, Vec::new()).unwrap().0.swap_remove(0)
+        };
+        let mut pressure = PressureMap::zeros(10, 10);
+        pressure.values_mut()[44] = 2e4;
+        let [mut sound, mut drifting] = [line(false), line(true)];
+        for _ in 0..400 {
+            sound.record(&pressure, 0.025).unwrap();
+            drifting.record(&pressure, 0.025).unwrap();
+        }
+        let size = |line: &Line| line.volts().iter().map(|v| v.abs()).sum::<f64>();
+        let lost = 1.0 - size(&drifting) / size(&sound);
+        // 2000 idle measurements come before, .03 s; a window begins within a frame, .0016 s, of its time
+        assert!((0.0995..0.1010).contains(&lost), "{lost}");
+    }
 
     /// The scatter of an untouched wire is the noise that was asked for, converter and late updates aside.
     #[test]

@@ -87,6 +87,16 @@ impl Wire {
         Ok(line.readout.go_on(&mut self.felt, volts)?)
     }
 
+    /// Lets `frames` frames pass without recording them, counted from the start of the current frame. Clocks and faults
+    /// go on. The amplifier forgets the measurement before.
+    pub fn pass(&mut self, mode: Mode, frames: u64) {
+        if frames > 0 {
+            let readout = &mut self.lines[index(mode)].readout;
+            readout.skip(frames);
+            readout.begin();
+        }
+    }
+
     /// The rows of Φ for the next `count` measurements.
     #[must_use]
     pub fn rows(&self, mode: Mode, count: usize) -> WeightRows<'_> {

@@ -33,8 +33,9 @@ pub struct FollowedImage {
 }
 
 /// Follows block `block` of the compressive recording of `session` by windows of `m` measurements, and gives the image
-/// at each of `ends`: ascending numbers of measurements, of which those before are known. Nothing else of the session
-/// is looked at. `training` says what images on a skin of this layout are like.
+/// at each of `ends`: ascending numbers of measurements, of which those before are known. Of the later ones only the
+/// scatter is used, and in a drop, which has no idle frames, the median as the output of the untouched skin.
+/// `training` says what images on a skin of this layout are like.
 ///
 /// Windows with a lost sample are passed over. A skin of many taxels keeps its image for several `ends`, so that the
 /// work is bounded.

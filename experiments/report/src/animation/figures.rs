@@ -6,7 +6,7 @@ use spts::output::write_bytes;
 use spts::scene::Assignment;
 use spts::simulate::{Request, SimulateError, run};
 use spts_eval::decode::DecodeSessionError;
-use spts_eval::training::TrainingData;
+use spts_eval::training::{LearnError, TrainingData};
 use spts_models::Streams;
 use std::path::Path;
 
@@ -55,6 +55,15 @@ pub enum MotionError {
     /// The scene cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
+    /// Its scene records nothing.
+    #[error("{scene}: nothing was recorded")]
+    Unrecorded {
+        /// The scene.
+        scene: &'static str,
+    },
+    /// The decoder cannot learn for its skin.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
     /// Its recording cannot be decoded.
     #[error(transparent)]
     Decode(#[from] DecodeSessionError),
@@ -80,9 +89,10 @@ pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), MotionError> {
             frames.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
             Ok::<_, SimulateError>(())
         })?;
-        let Some(session) = &simulation.first else { continue };
-        let training = TrainingData::for_layout(prepared.scene.skin(), Streams::new(1)).ok();
-        let animation = Animation::new(&prepared, &frames, session, training.as_ref())?;
+        let unrecorded = MotionError::Unrecorded { scene: figure.scene };
+        let session = simulation.first.as_ref().ok_or(unrecorded)?;
+        let training = TrainingData::for_layout(prepared.scene.skin(), Streams::new(1))?;
+        let animation = Animation::new(&prepared, &frames, session, Some(&training))?;
         for (name, gif) in [(figure.file, true), (figure.still, false)] {
             let path = folder.join(name);
             let bytes = if gif {

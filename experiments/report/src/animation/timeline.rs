@@ -4,7 +4,7 @@ use spts_contact::Frame;
 
 /// Time between two pictures, hundredths of a second: the unit of a GIF.
 pub(super) const DELAY_CS: u16 = 7;
-/// Least length of the animation, s: it is up to twice as long.
+/// Least length of the animation, s. Speeds are round, so that it is up to two and a half times as long.
 const SHOWN_S: f64 = 3.0;
 /// Loaded is what has more than this share of the largest force.
 const LOADED: f64 = 0.005;
