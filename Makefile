@@ -31,10 +31,12 @@ validate: setup
 # `datasets`, Croissant), and made by many workers, Ray among them. A minute or two; the first time, and after a change
 # of their versions, it fetches Python packages of about 1 GB.
 READERS ?= out/readers
+# a file of tests on a core
+PARALLEL = --numprocesses logical --dist loadfile
 readers: setup
 	./scripts/environment.sh "$(READERS)" scripts/dataset/requirements.txt
 	cargo build --release --locked --quiet --workspace
-	"$(READERS)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
+	"$(READERS)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
 # The Python package `spts`: its wheel, in out/wheels, installed into two virtual environments and tested there:
 # out/python has everything that it can work with, out/python-scenes the MuJoCo that its scenes need. Ten minutes the
@@ -50,7 +52,7 @@ python: setup
 	./scripts/wheel.sh "$(PYTHON)/bin/maturin" "$(WHEELS)"
 	"$(PYTHON)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	"$(PYTHON_SCENES)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
-	"$(PYTHON)/bin/python" -m pytest --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
+	"$(PYTHON)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
 	"$(PYTHON_SCENES)/bin/python" -m pytest --quiet --tb=short -p no:cacheprovider python/tests/test_scenes.py
 
 # The book, out/book/index.html: its links are checked, its commands and its Python are run. BLOCKS="--with slow" runs

@@ -3,11 +3,11 @@
 # with NumPy: that of PYTHON (python3 unless given).
 set -euo pipefail
 cd "$(dirname "$0")"
-export CARGO_TARGET_DIR=../target
 python=${PYTHON:-python3}
 out=../out/examples
 
-cargo build --locked --release --quiet --bins
+# with all of the workspace, whose features and so whose parts are then those of the tests
+cargo build --locked --release --quiet --workspace
 mkdir -p "$out"
 programs=$PWD/../target/release
 run() { printf '\n-- %s\n' "$*"; "$programs/$@"; }

@@ -8,9 +8,7 @@ cd "$(dirname "$0")/.."
 library=third_party/mujoco/lib/libmujoco.so.3.17.0
 [ -f "$library" ] || { echo "install: $library is missing; run scripts/setup.sh first" >&2; exit 1; }
 
-# in place of the repository's own flags, which name a folder beside the build
-export RUSTFLAGS="-C link-arg=-Wl,-rpath,\$ORIGIN/../lib"
-cargo install --locked --path experiments/cli --root "$prefix" --force --no-track --target-dir target/install
+cargo install --locked --path experiments/cli --root "$prefix" --force --no-track
 install -D -m 755 "$library" "$prefix/lib/$(basename "$library")"
 "$prefix/bin/spts" --version
 echo "install: $prefix/bin/spts"

@@ -1,5 +1,8 @@
 """What cannot be is a ValueError that says the field, the value and what is valid; nothing panics."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import spts
@@ -170,3 +173,9 @@ def test_decoding(skin, pressed):
     ]:
         with pytest.raises(ValueError, match=text):
             spts.decode(*arguments)
+
+
+def test_commands_of_the_full_program():
+    said = subprocess.run([sys.executable, "-m", "spts", "simulate", "press/T"], capture_output=True, text=True)
+    assert said.returncode == 2
+    assert "simulate, reproduce, live and the studies are in the program that `make install` makes" in said.stderr

@@ -1,5 +1,6 @@
 //! A command line that cannot be used, on one line: option, value and valid range, as for a field of a scene.
 
+use super::extras::COMMANDS_ELSEWHERE;
 use super::terminal::one_line;
 use clap::Error;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -28,7 +29,12 @@ pub fn refusal(error: &Error) -> Option<String> {
             let said = said.split("\n\nUsage:").next().unwrap_or_default();
             let said = said.split("\n\nFor more information").next().unwrap_or_default();
             let said = said.strip_prefix("error: ").unwrap_or(said);
-            Some(one_line(said).replace(":; ", ": "))
+            let said = one_line(said).replace(":; ", ": ");
+            let elsewhere = match error.kind() {
+                ErrorKind::InvalidSubcommand => COMMANDS_ELSEWHERE,
+                _ => "",
+            };
+            Some(format!("{said}{elsewhere}"))
         }
     }
 }

@@ -4,6 +4,9 @@ use crate::figures::draw::escape;
 
 /// Style of the page, light and dark, screen and print.
 const STYLE: &str = include_str!("style.css");
+/// Number of rows from which a table is folded away; print shows all of them.
+const FOLDED_FROM: usize = 40;
+
 /// The whole report.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Page {
@@ -291,12 +294,18 @@ fn table(table: &Table) -> String {
         let file = link(file.strip_suffix(".csv").unwrap_or(file));
         format!(" <span class=\"files\"><a href=\"tables/{file}.csv\">CSV</a></span>")
     });
-    format!(
-        "<figure class=\"table\">\n<figcaption>{}{file}</figcaption>\n<div class=\"scroll\" tabindex=\"0\">\
-         <table>\n<thead>{}</thead>\n<tbody>\n{body}</tbody>\n</table></div>\n</figure>\n",
-        escape(&table.caption),
+    let whole = format!(
+        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead>{}</thead>\n<tbody>\n{body}</tbody>\n</table></div>\n",
         row(&table.header, "th")
-    )
+    );
+    let count = table.rows.len();
+    let shown = if count > FOLDED_FROM {
+        format!("<details>\n<summary>All {count} rows</summary>\n{whole}</details>\n")
+    } else {
+        whole
+    };
+    let caption = escape(&table.caption);
+    format!("<figure class=\"table\">\n<figcaption>{caption}{file}</figcaption>\n{shown}</figure>\n")
 }
 
 /// Whether a cell holds no value.

@@ -9,6 +9,9 @@ use spts_models::SkinLayout;
 pub(crate) use spts_report::decode::{FILES as DECODE_FILES, write as write_decoded};
 pub(crate) use spts_report::score::{write as write_board, write_anytime, write_in_time};
 
+/// Where the commands are that this program lacks: it has all.
+pub(crate) const COMMANDS_ELSEWHERE: &str = "";
+
 /// Sessions of `scenes`, simulated now.
 pub(crate) fn simulated_sessions(scenes: &[String], seed: u64, quick: bool) -> Result<Source, CliError> {
     let scenes = scenes.to_vec();

@@ -7,9 +7,11 @@ mod without;
 
 #[cfg(feature = "full")]
 pub(super) use full::{
-    DECODE_FILES, simulated_presses, simulated_sessions, write_anytime, write_board, write_decoded, write_in_time,
+    COMMANDS_ELSEWHERE, DECODE_FILES, simulated_presses, simulated_sessions, write_anytime, write_board, write_decoded,
+    write_in_time,
 };
 #[cfg(not(feature = "full"))]
 pub(super) use without::{
-    DECODE_FILES, simulated_presses, simulated_sessions, write_anytime, write_board, write_decoded, write_in_time,
+    COMMANDS_ELSEWHERE, DECODE_FILES, simulated_presses, simulated_sessions, write_anytime, write_board, write_decoded,
+    write_in_time,
 };

@@ -37,7 +37,11 @@ pub(super) fn draw_ranges(canvas: &mut Canvas, chart: &Chart, frame: &PanelFrame
         } else if left - free > widest + 8.0 {
             (left - 5.0, Anchor::End)
         } else {
-            (right + 5.0, Anchor::Start)
+            // no further than the frame
+            (
+                (right + 5.0).min(frame.left + frame.width - widest - 4.0),
+                Anchor::Start,
+            )
         };
         let first = foot - LINE * (lines.len() as f64 - 0.5);
         canvas.lines((at, first), &lines, TextStyle::new(SIZE, MUTED).anchored(anchor));

@@ -71,7 +71,7 @@ pub(super) fn page(content: &PageContent<'_>) -> Page {
         cards: cards::cards(&content.summary.headline),
         sections,
         glossary: glossary::terms(compared),
-        provenance: origin(content.summary),
+        provenance: [origin(content.summary), not_recorded(content.missing)].concat(),
     }
 }
 
@@ -112,7 +112,7 @@ fn summary(content: &PageContent<'_>) -> String {
         text.push_str(" This was a quick run with few presses and windows, so the scores scatter by a few per cent.");
     }
     if !content.missing.is_empty() {
-        text.push_str(&format!(" {}", not_recorded(content.missing)));
+        text.push_str(" Skins are compared by what was recorded; what was not stands under Provenance.");
     }
     text
 }
@@ -152,8 +152,8 @@ fn ball_lead(compared: bool) -> String {
     format!("A tennis ball is dropped from half a metre on eight places near the middle of the skin.{both}")
 }
 
-/// What is missing, entries of the form "object: what" joined by what they miss.
-fn not_recorded(missing: &[String]) -> String {
+/// Objects by what was not recorded of them, for the provenance; entries of `missing` have the form "object: what".
+fn not_recorded(missing: &[String]) -> Vec<(String, String)> {
     let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
     for entry in missing {
         let (object, what) = entry.split_once(": ").unwrap_or((entry, ""));
@@ -162,10 +162,9 @@ fn not_recorded(missing: &[String]) -> String {
             None => groups.push((what, vec![object_label(object)])),
         }
     }
-    let sentences = groups
-        .iter()
-        .map(|(what, objects)| format!("No {what} was given for {}.", objects.join(", ")));
-    sentences.collect::<Vec<_>>().join(" ")
+    let rows = groups.iter();
+    rows.map(|(what, objects)| (format!("no {what} of"), objects.join(", ")))
+        .collect()
 }
 
 fn origin(summary: &ReproductionSummary) -> Vec<(String, String)> {
