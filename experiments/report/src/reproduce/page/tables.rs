@@ -4,7 +4,8 @@ use super::super::curves::BothSkins;
 use super::super::results::SkinResults;
 use super::super::tables::CorrelationRow;
 use crate::Table;
-use crate::labels::{decoder_label, object_label};
+use crate::labels::object_label;
+use spts_eval::decoders::label;
 
 /// Numbers of measurements shown in the table of mean scores; the CSV has all.
 const SHOWN: [usize; 7] = [5, 7, 10, 20, 25, 50, 100];
@@ -30,11 +31,11 @@ pub(super) fn means(skins: &BothSkins<'_>) -> Table {
                 r.class_single,
                 r.class_vote20,
             ];
-            rows.push(row([decoder_label(r.decode).to_owned(), r.m.to_string()], &scores, 0));
+            rows.push(row([label(r.decode).to_owned(), r.m.to_string()], &scores, 0));
         }
         for b in results.scores.baselines.iter().filter(|b| b.object == object) {
             let scores = [b.support, b.iou, b.f1, b.balanced_accuracy];
-            rows.push(row([decoder_label(b.baseline).to_owned(), "0".to_owned()], &scores, 2));
+            rows.push(row([label(b.baseline).to_owned(), "0".to_owned()], &scores, 2));
         }
     };
     add("twin", skins.twin, skins.common());
