@@ -125,8 +125,8 @@ pub struct Table {
     pub header: Vec<String>,
     /// Cells, row by row.
     pub rows: Vec<Vec<String>>,
-    /// Stem of the file in `tables/`, with or without `.csv`.
-    pub file: Option<String>,
+    /// Files in `tables/` that hold the rows, with or without `.csv`.
+    pub files: Vec<String>,
 }
 
 /// The page as one HTML document; `figures/` and `tables/` are looked for beside it.
@@ -287,12 +287,22 @@ fn table(table: &Table) -> String {
         format!("<tr>{cells}</tr>\n")
     };
     let body: String = table.rows.iter().map(|cells| row(cells, "td")).collect();
-    let file = table.file.as_deref().map_or(String::new(), |file| {
-        let file = link(file.strip_suffix(".csv").unwrap_or(file));
-        format!(" <span class=\"files\"><a href=\"tables/{file}.csv\">CSV</a></span>")
+    // one file needs no name, several do
+    let files = table.files.iter().map(|file| {
+        let stem = file.strip_suffix(".csv").unwrap_or(file);
+        let words = if table.files.len() > 1 {
+            escape(&format!("{stem}.csv"))
+        } else {
+            "CSV".to_owned()
+        };
+        format!(
+            " <span class=\"files\"><a href=\"tables/{}.csv\">{words}</a></span>",
+            link(stem)
+        )
     });
+    let files: String = files.collect();
     format!(
-        "<figure class=\"table\">\n<figcaption>{}{file}</figcaption>\n<div class=\"scroll\" tabindex=\"0\">\
+        "<figure class=\"table\">\n<figcaption>{}{files}</figcaption>\n<div class=\"scroll\" tabindex=\"0\">\
          <table>\n<thead>{}</thead>\n<tbody>\n{body}</tbody>\n</table></div>\n</figure>\n",
         escape(&table.caption),
         row(&table.header, "th")

@@ -158,7 +158,7 @@ fn distances(report: &PerObjectReport) -> Table {
             .filter(|d| d.images == ReadoutImages::Twin)
             .map(row)
             .collect(),
-        file: Some(TABLES[1].to_owned()),
+        files: vec![TABLES[1].to_owned()],
     }
 }
 
@@ -180,6 +180,6 @@ fn objects(report: &PerObjectReport) -> Table {
         caption: "Scores object by object".to_owned(),
         header: header.map(str::to_owned).to_vec(),
         rows: of_twin(report).map(row).collect(),
-        file: Some(TABLES[0].to_owned()),
+        files: vec![TABLES[0].to_owned()],
     }
 }

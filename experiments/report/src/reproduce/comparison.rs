@@ -95,7 +95,7 @@ impl ReadoutSection {
             .map(str::to_owned)
             .to_vec(),
             rows: self.0.all_statistics().iter().map(row).collect(),
-            file: Some("readout_statistics_real.csv".to_owned()),
+            files: vec!["readout_statistics_real.csv".to_owned()],
         }
     }
 
@@ -115,7 +115,7 @@ impl ReadoutSection {
             caption: "|twin − real| of the score curves over M = 7 … 100".to_owned(),
             header: header.map(str::to_owned).to_vec(),
             rows: self.0.distances().iter().map(row).collect(),
-            file: Some("readout_curves_real.csv".to_owned()),
+            files: vec!["readout_curves_real.csv".to_owned()],
         }
     }
 }
