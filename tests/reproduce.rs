@@ -3,6 +3,7 @@
 use crate::command::{files, succeeds, words};
 use crate::recordings::recordings;
 use serde_json::Value;
+use std::path::Path;
 
 #[test]
 fn a_quick_report_is_complete_and_does_not_depend_on_the_threads() {
@@ -48,6 +49,22 @@ fn a_quick_report_is_complete_and_does_not_depend_on_the_threads() {
             assert!(size > 1000, "{figure}.{ending} has {size} bytes");
         }
         assert!(page.contains(figure), "{figure} is not on the page");
+    }
+    check_tables(&page, &out.join("tables"), real.is_some());
+}
+
+/// Every table that the page links is there, and the scores of every skin on it are linked.
+fn check_tables(page: &str, folder: &Path, with_recordings: bool) {
+    let links = page.split("href=\"tables/").skip(1);
+    let linked: Vec<&str> = links.filter_map(|rest| rest.split('"').next()).collect();
+    for file in &linked {
+        assert!(folder.join(file).is_file(), "{file} is linked and not there");
+    }
+    for skin in ["twin", "real"].into_iter().take(if with_recordings { 2 } else { 1 }) {
+        for name in ["scores", "baselines"] {
+            let file = format!("{name}_{skin}.csv");
+            assert!(linked.contains(&file.as_str()), "{file} is not on the page");
+        }
     }
 }
 

@@ -120,7 +120,7 @@ impl Options {
         });
         let decoders = decoders().map(|spec| Choice {
             name: spec.name,
-            label: plain_label(spec).to_owned(),
+            label: spec.label.to_owned(),
             about: spec.about.to_owned(),
             group: if PublishedDecode::ALL.iter().any(|decode| decode.name() == spec.name) {
                 "Published with the skin"
@@ -174,20 +174,6 @@ fn is_noisy(profile: &str) -> bool {
 
 /// Effects that are noise, each with the parameter that says how much.
 pub(crate) const NOISES: [(&str, &str); 2] = [("contact_noise", "fraction"), ("idle_noise", "sd_v")];
-
-/// What a decoder is called where nobody knows the names of algorithms.
-fn plain_label(spec: &'static DecoderSpec) -> &'static str {
-    match spec.name {
-        "script_s20" => "published script",
-        "script_m4" => "published script, M/4 atoms",
-        "matched" => "published pursuit, matched to ±1",
-        "amortised" => "trained network",
-        "nn_lmmse" => "linear estimate, no negative pressure",
-        "nn_lmmse_seen" => "linear estimate, objects seen",
-        "lmmse" => "linear estimate",
-        _ => spec.label,
-    }
-}
 
 /// Decoders that need to know no object.
 fn decoders() -> impl Iterator<Item = &'static DecoderSpec> {

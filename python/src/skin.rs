@@ -1,14 +1,21 @@
-//! Skins and touches.
+//! Skins: how they are made, and what can be asked of them.
+
+mod shape;
+mod touch;
+
+pub(crate) use shape::triples;
+pub(crate) use touch::{Placed, Touch};
 
 use crate::body::Body;
 use crate::count::whole;
 use crate::pose::{PoseIn, checked_twist};
 use crate::refuse::refuse;
-use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
+use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
-use spts::contact::{PosedMesh, SurfaceConfig, SurfacePoints, TouchSkin, Winding, WinklerConfig, Wrench};
-use spts::{PressureMap, SkinLayout};
+use pyo3::types::PyDict;
+use shape::{surface, triples_out, winding};
+use spts::SkinLayout;
+use spts::contact::{SurfaceConfig, SurfacePoints, TouchSkin, WinklerConfig};
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -46,39 +53,6 @@ struct State {
     skin: TouchSkin,
     touches: u64,
     time_s: f64,
-}
-
-/// What the skin feels at one moment.
-#[pyclass(frozen, module = "spts")]
-pub(crate) struct Touch {
-    /// Mean pressure over every taxel, Pa, (rows, cols).
-    #[pyo3(get)]
-    pressure: Py<PyArray2<f64>>,
-    /// Wrench on every body about its origin, in the skin's frame: (force (3,) N, torque (3,) N m).
-    #[pyo3(get)]
-    wrenches: Py<PyDict>,
-    /// Area that is pressed, m².
-    #[pyo3(get)]
-    area: f64,
-    /// Time of the touch, s: the sum of every `dt` up to it.
-    #[pyo3(get)]
-    pub(crate) time: f64,
-    /// Number of the touch, from 1.
-    #[pyo3(get)]
-    pub(crate) number: u64,
-    /// What the transducer feels.
-    pub(crate) felt: PressureMap,
-    /// Which skin.
-    pub(crate) skin: u64,
-}
-
-/// Where a body is and how it moves, in the skin's frame.
-pub(crate) struct Placed {
-    pub(crate) position_m: [f64; 3],
-    pub(crate) rotation: [[f64; 3]; 3],
-    /// Velocity of its origin.
-    pub(crate) velocity_m_per_s: [f64; 3],
-    pub(crate) spin_rad_per_s: [f64; 3],
 }
 
 /// Velocity of a body at rest.
@@ -364,57 +338,6 @@ impl Skin {
         }
     }
 
-    /// Puts `bodies` on the skin; what it feels, and the wrenches on them.
-    pub(crate) fn touched(
-        &self,
-        py: Python<'_>,
-        bodies: &[Py<Body>],
-        placed: &[Placed],
-        dt: f64,
-    ) -> PyResult<(Touch, Vec<Wrench>)> {
-        if !(0.0..=1e9).contains(&dt) {
-            return Err(refuse(format!("`dt` = {dt} is outside [0, 1e9] s")));
-        }
-        let pairs: Vec<_> = bodies.iter().map(Py::get).zip(placed).collect();
-        let (wrenches, values, felt, [area, time], number) = py.detach(|| {
-            let posed = pairs.iter().map(|(body, placed)| {
-                let posed = PosedMesh {
-                    rotation: placed.rotation,
-                    velocity_m_per_s: placed.velocity_m_per_s,
-                    angular_velocity_rad_per_s: placed.spin_rad_per_s,
-                    stiffness_pa_per_m: body.stiffness_pa_per_m,
-                    ..PosedMesh::at_rest(&body.body.mesh, placed.position_m)
-                };
-                (&body.body, posed)
-            });
-            let posed: Vec<_> = posed.collect();
-            let mut wrenches: Vec<Wrench> = Vec::with_capacity(posed.len());
-            let mut state = self.locked();
-            state.skin.touch(&posed, &mut wrenches);
-            state.touches += 1;
-            state.time_s += dt;
-            let values = state.skin.pressure().values().to_vec();
-            let felt = state.skin.electrode_pressure().clone();
-            let scalars = [state.skin.touched_m2(), state.time_s];
-            (wrenches, values, felt, scalars, state.touches)
-        });
-        let found = PyDict::new(py);
-        for (key, wrench) in bodies.iter().zip(&wrenches) {
-            let pair = [wrench.force_n, wrench.torque_nm].map(|v| PyArray1::from_slice(py, &v));
-            found.set_item(key, PyTuple::new(py, pair)?)?;
-        }
-        let touch = Touch {
-            pressure: values.into_pyarray(py).reshape([felt.rows(), felt.cols()])?.unbind(),
-            wrenches: found.unbind(),
-            area,
-            time,
-            number,
-            felt,
-            skin: self.id,
-        };
-        Ok((touch, wrenches))
-    }
-
     /// Stiffness and damping of the foam where it is touched, N/m and N s/m.
     pub(crate) fn stiffness(&self) -> [f64; 2] {
         let state = self.locked();
@@ -440,58 +363,4 @@ impl Skin {
     pub(crate) fn id(&self) -> u64 {
         self.id
     }
-}
-
-fn surface(
-    stiffness: Option<f64>,
-    thickness: Option<f64>,
-    damping: Option<f64>,
-    friction: Option<f64>,
-) -> SurfaceConfig {
-    let default = SurfaceConfig::default();
-    SurfaceConfig {
-        stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
-        thickness_m: thickness.unwrap_or(default.thickness_m),
-        damping_s: damping.unwrap_or(default.damping_s),
-        friction: friction.unwrap_or(default.friction),
-        ..default
-    }
-}
-
-fn winding(
-    [rows, cols]: [i128; 2],
-    points: i128,
-    axis: &str,
-    centre_m: [f64; 3],
-    arc: (f64, f64),
-    span_m: [f64; 2],
-) -> PyResult<Winding> {
-    let names = ["x", "y", "z"];
-    let number = names.iter().position(|name| *name == axis);
-    Ok(Winding {
-        shape: [whole("rows", rows)?, whole("cols", cols)?],
-        points_per_side: whole("points", points)?,
-        axis: number.ok_or_else(|| refuse(format!("`axis` = \"{axis}\"; valid: \"x\", \"y\", \"z\"")))?,
-        centre_m,
-        arc_rad: [arc.0, arc.1],
-        span_m,
-    })
-}
-
-/// The rows of an array (n, 3) called `name`.
-pub(crate) fn triples(name: &str, array: &PyArrayLike2<'_, f64, AllowTypeChange>) -> PyResult<Vec<[f64; 3]>> {
-    let array = array.as_array();
-    if array.ncols() != 3 {
-        let shape = array.shape();
-        return Err(refuse(format!("`{name}` has shape {shape:?}; (n, 3) is needed")));
-    }
-    Ok(array.rows().into_iter().map(|r| [r[0], r[1], r[2]]).collect())
-}
-
-fn triples_out(py: Python<'_>, rows: impl ExactSizeIterator<Item = [f64; 3]>) -> PyResult<Bound<'_, PyArray2<f64>>> {
-    let count = rows.len();
-    rows.flatten()
-        .collect::<Vec<f64>>()
-        .into_pyarray(py)
-        .reshape([count, 3])
 }

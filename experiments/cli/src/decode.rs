@@ -13,7 +13,7 @@ use spts::data::SessionSet;
 use spts::progress::Progress as _;
 use spts::session::Event;
 use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow, LearnedDecoders};
-use spts_eval::decoders::label;
+use spts_eval::decoders::short_label;
 use spts_eval::training::TrainingData;
 use spts_eval::{Labels, SessionSlip, Source, check_session, follow_slips, slips_text, unique};
 use spts_models::{SkinLayout, Streams};
@@ -264,7 +264,7 @@ fn table(decoded: &[(&Session, DecodedSession)]) -> String {
             out.push_str(&format!(
                 "{:<16} {:<18} {m:>5}  {:>7}  {:>7}  {:>5}  {:>11}  {right:>10}\n",
                 session.session,
-                label(decoder),
+                short_label(decoder),
                 rows.len(),
                 mean(|r| r.support),
                 mean(|r| r.iou),

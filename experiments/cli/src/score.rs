@@ -309,7 +309,7 @@ fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliErr
 fn list() -> String {
     let lines = DECODERS.iter().map(|spec| {
         let mark = if spec.shown { "*" } else { " " };
-        format!("{mark} {:<14} {:<22} {}", spec.name, spec.label, spec.about)
+        format!("{mark} {:<14} {:<22} {}", spec.name, spec.short, spec.about)
     });
     let lines: Vec<String> = lines.collect();
     format!("{}\n\n* shown when no decoder is named", lines.join("\n"))

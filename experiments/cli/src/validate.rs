@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use spts_eval::PublishedSkin;
 use spts_eval::SkinScores;
-use spts_eval::decoders::label;
+use spts_eval::decoders::short_label;
 use spts_eval::place::locator_label;
 use spts_eval::protocol::MEASUREMENTS;
 use std::path::PathBuf;
@@ -81,7 +81,7 @@ fn table(report: &ValidationOutput) -> String {
     for r in report.scores.rows.iter().filter(|r| r.object == "mean") {
         out.push_str(&format!(
             "{:<16} {:>4}    {:.3}  {:.3}  {:.3}     {:.3}   {:.3}   {:.3}\n",
-            label(r.decode),
+            short_label(r.decode),
             r.m,
             r.support,
             r.iou,
@@ -94,7 +94,7 @@ fn table(report: &ValidationOutput) -> String {
     for b in report.scores.baselines.iter().filter(|b| b.object == "mean") {
         out.push_str(&format!(
             "{:<16}    –    {:.3}  {:.3}  {:.3}     {:.3}       –       –\n",
-            label(b.baseline),
+            short_label(b.baseline),
             b.support,
             b.iou,
             b.f1,

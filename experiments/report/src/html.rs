@@ -128,8 +128,8 @@ pub struct Table {
     pub header: Vec<String>,
     /// Cells, row by row.
     pub rows: Vec<Vec<String>>,
-    /// Stem of the file in `tables/`, with or without `.csv`.
-    pub file: Option<String>,
+    /// Files in `tables/` that hold the rows, with or without `.csv`.
+    pub files: Vec<String>,
 }
 
 /// The page as one HTML document; `figures/` and `tables/` are looked for beside it.
@@ -290,10 +290,20 @@ fn table(table: &Table) -> String {
         format!("<tr>{cells}</tr>\n")
     };
     let body: String = table.rows.iter().map(|cells| row(cells, "td")).collect();
-    let file = table.file.as_deref().map_or(String::new(), |file| {
-        let file = link(file.strip_suffix(".csv").unwrap_or(file));
-        format!(" <span class=\"files\"><a href=\"tables/{file}.csv\">CSV</a></span>")
+    // one file needs no name, several do
+    let files = table.files.iter().map(|file| {
+        let stem = file.strip_suffix(".csv").unwrap_or(file);
+        let words = if table.files.len() > 1 {
+            escape(&format!("{stem}.csv"))
+        } else {
+            "CSV".to_owned()
+        };
+        format!(
+            " <span class=\"files\"><a href=\"tables/{}.csv\">{words}</a></span>",
+            link(stem)
+        )
     });
+    let files: String = files.collect();
     let whole = format!(
         "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead>{}</thead>\n<tbody>\n{body}</tbody>\n</table></div>\n",
         row(&table.header, "th")
@@ -305,7 +315,7 @@ fn table(table: &Table) -> String {
         whole
     };
     let caption = escape(&table.caption);
-    format!("<figure class=\"table\">\n<figcaption>{caption}{file}</figcaption>\n{shown}</figure>\n")
+    format!("<figure class=\"table\">\n<figcaption>{caption}{files}</figcaption>\n{shown}</figure>\n")
 }
 
 /// Whether a cell holds no value.

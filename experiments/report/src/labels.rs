@@ -1,6 +1,4 @@
-//! Plain words for what files and programs know by a short name.
-
-use spts_eval::decoders::label;
+//! Plain words for what files and programs know by a short name; those for decoders are in the table of decoders.
 
 /// What an object is called in figures and on the page.
 #[must_use]
@@ -17,20 +15,6 @@ pub(crate) fn object_label(name: &str) -> &str {
         "tennis" => "tennis ball",
         "trig" => "triangle",
         other => other,
-    }
-}
-
-/// What a decoder, baseline or control is called on the page of the report.
-#[must_use]
-pub(crate) fn decoder_label(name: &str) -> &str {
-    match name {
-        "matched" => "published decoder, matched",
-        "script_s20" => "published script, 20 atoms",
-        "script_m4" => "published script, M/4 atoms",
-        "script_s5" => "published script, 5 atoms",
-        "raster" => "raster scan of M taxels",
-        "evidence" => "evidence decoder",
-        other => label(other),
     }
 }
 

@@ -44,7 +44,7 @@ pub(crate) fn page() -> Page {
             cells(&["“T”", "20", "97.0", "–", "−1.0"]),
             cells(&["cup, upside down", "100", "98.8 ± 0.4", "99.1", "−0.3"]),
         ],
-        file: Some("accuracy".to_owned()),
+        files: vec!["accuracy".to_owned()],
     };
     Page {
         title: "Single-pixel tactile skin: the twin against the sensor (synthetic page)".to_owned(),

@@ -70,7 +70,7 @@ fn text_cannot_become_markup() {
         caption: nasty.clone(),
         header: vec![nasty.clone()],
         rows: vec![vec![nasty.clone(), nasty.clone()]],
-        file: Some(nasty.clone()),
+        files: vec![nasty.clone(), nasty.clone()],
     };
     let section = Section {
         id: nasty.clone(),
@@ -96,6 +96,16 @@ fn text_cannot_become_markup() {
     let text = markup(&page);
     assert!(!text.contains("<script"), "{text}");
     check_markup(&text, &VOID).unwrap();
+}
+
+/// A table whose rows are in several files links each by its name.
+#[test]
+fn every_file_of_a_table_is_linked() {
+    let mut page = samples::page();
+    page.sections[0].tables[0].files = vec!["one.csv".to_owned(), "two".to_owned()];
+    let text = markup(&page);
+    assert!(text.contains("<a href=\"tables/one.csv\">one.csv</a>"), "{text}");
+    assert!(text.contains("<a href=\"tables/two.csv\">two.csv</a>"), "{text}");
 }
 
 /// Numbers are flush right, and a dash does not turn a column into words.

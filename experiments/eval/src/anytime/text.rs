@@ -2,7 +2,7 @@
 
 use super::rows::{AnytimeBoard, AnytimeRow};
 use crate::algorithm::Subject;
-use crate::decoders::label;
+use crate::decoders::short_label;
 use crate::sensing::Sensing;
 use crate::unique;
 
@@ -81,7 +81,7 @@ fn line(row: &AnytimeRow) -> String {
     };
     format!(
         "{:<20} {:<11} {:<6} {:>7}  {:>7} {:>11} {:>6} {:>5}  {:>8} {:>13} {:>7} {:>6}{failed}\n",
-        label(&row.decoder),
+        short_label(&row.decoder),
         row.learned_from,
         row.sensing.name(),
         wanted(row.confidence),
@@ -110,7 +110,7 @@ fn objects(board: &AnytimeBoard) -> String {
         let kind = if row.left_out { "left out" } else { &row.learned_from };
         out.push_str(&format!(
             "{:<20} {kind:<11} {:<6} {:>7} {:>9}",
-            label(&row.decoder),
+            short_label(&row.decoder),
             row.sensing.name(),
             wanted(row.confidence),
             ""

@@ -13,6 +13,7 @@ mod settings;
 mod stops;
 mod text;
 mod trainer;
+mod training_sets;
 
 pub use difference::{Difference, differences};
 pub use files::{FILES, write};

@@ -114,6 +114,7 @@ fn dictionary(source: &Source, trainer: &mut Trainer<'_>) -> Result<Matrix, Lear
     match &source.published {
         Some(published) => Ok(published.dictionary.clone()),
         None => Ok(trainer
+            .sets
             .data(&TrainingSource::Raster, false, None)?
             .dictionary()?
             .atoms

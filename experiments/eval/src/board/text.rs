@@ -1,7 +1,7 @@
 //! The board as text tables.
 
 use super::rows::{BoardRow, ObjectRow, ScoreBoard};
-use crate::decoders::label;
+use crate::decoders::short_label;
 use crate::place::locator_label;
 use crate::sensing::Sensing;
 use crate::training::{PUBLISHED, RASTER};
@@ -92,7 +92,7 @@ fn line(row: &BoardRow) -> String {
     };
     format!(
         "{:<22} {:<11} {:<6} {:>4}  {:>7} {:>6} {:>13} {:>6}  {:>6} {:>7} {:>8}  {:>10} {:>9.0}{slow}{failed}\n",
-        shorten(label(&row.decoder), 22),
+        shorten(short_label(&row.decoder), 22),
         shorten(&row.learned_from, 11),
         row.sensing.name(),
         row.m,
@@ -133,7 +133,7 @@ fn objects(board: &ScoreBoard) -> String {
         } else {
             shorten(&row.learned_from, 11)
         };
-        let name = shorten(label(&row.decoder), 22);
+        let name = shorten(short_label(&row.decoder), 22);
         out.push_str(&format!("{name:<22} {kind:<11} {:<6}", row.sensing.name()));
         let same = board.objects.iter().filter(|o| {
             let conditions = (o.m, o.left_out, o.sensing) == (m, row.left_out, row.sensing);
@@ -186,7 +186,7 @@ fn gaps(board: &ScoreBoard) -> String {
             both.map_or_else(|| "–".to_owned(), |(own, other)| format!("{:+.3}", other - own))
         };
         let (iou, single) = (gap(a.iou, b.iou), gap(a.class_single, b.class_single));
-        let name = shorten(label(&row.decoder), 22);
+        let name = shorten(short_label(&row.decoder), 22);
         out.push_str(&format!(
             "{name:<22} {:<20} {:<10} {iou:>7} {single:>8}\n",
             row.learned_from, row.object

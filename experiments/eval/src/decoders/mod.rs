@@ -5,12 +5,14 @@ mod bank;
 mod correlate;
 mod evidence;
 mod image;
+mod labels;
 mod mixture;
 mod published;
 mod sure;
 mod trained;
 mod trivial;
 
+pub use labels::{label, short_label};
 pub use published::{PublishedDecode, quarter};
 pub use trained::TrainedDecoder;
 
@@ -56,8 +58,10 @@ impl Needs {
 pub struct DecoderSpec {
     /// Name on the command line and in files.
     pub name: &'static str,
-    /// Name in figures and printed tables.
+    /// Name in plain words, on pages and in their figures.
     pub label: &'static str,
+    /// Name where space is short: in printed tables, and in figures with many decoders.
+    pub short: &'static str,
     /// Description.
     pub about: &'static str,
     /// Training data that it needs.
@@ -76,6 +80,7 @@ const fn spec(name: &'static str, label: &'static str, needs: Needs, shown: bool
     DecoderSpec {
         name,
         label,
+        short: label,
         about: "",
         needs,
         shown,
@@ -85,6 +90,12 @@ const fn spec(name: &'static str, label: &'static str, needs: Needs, shown: bool
 }
 
 impl DecoderSpec {
+    /// The line with a shorter label.
+    const fn short(mut self, short: &'static str) -> Self {
+        self.short = short;
+        self
+    }
+
     /// The line with what the algorithm is.
     const fn about(mut self, about: &'static str) -> Self {
         self.about = about;
@@ -99,14 +110,30 @@ impl DecoderSpec {
 }
 
 // The decodes of the published evaluation, which [`PublishedDecode`] names.
-const SCRIPT_S20: DecoderSpec = spec("script_s20", "script, 20 atoms", Dictionary, true, image::script_s20)
+const SCRIPT_S20: DecoderSpec = spec("script_s20", "published script", Dictionary, true, image::script_s20)
+    .short("script, 20 atoms")
     .about("the published script: weights {0, 1}, no offset, 20 atoms");
-const SCRIPT_M4: DecoderSpec = spec("script_m4", "script, M/4 atoms", Dictionary, false, image::script_m4)
-    .about("the published text: weights {0, 1}, no offset, M/4 atoms");
-const MATCHED: DecoderSpec = spec("matched", "matched", Dictionary, true, image::matched)
-    .about("the published pursuit with weights ±1 and the idle output removed");
+const SCRIPT_M4: DecoderSpec = spec(
+    "script_m4",
+    "published script, M/4 atoms",
+    Dictionary,
+    false,
+    image::script_m4,
+)
+.short("script, M/4 atoms")
+.about("the published text: weights {0, 1}, no offset, M/4 atoms");
+const MATCHED: DecoderSpec = spec(
+    "matched",
+    "published pursuit, matched to ±1",
+    Dictionary,
+    true,
+    image::matched,
+)
+.short("matched")
+.about("the published pursuit with weights ±1 and the idle output removed");
 
-/// Every algorithm: name, label, training data, whether it is shown by default, training function, description.
+/// Every algorithm: name, label, training data, whether it is shown by default, training function, shorter label,
+/// description.
 pub const DECODERS: &[DecoderSpec] = &[
     spec("empty", "empty image", Nothing, true, trivial::empty).about("baseline: an empty image"),
     spec("mean_image", "mean image", Images, true, trivial::mean_image)
@@ -125,22 +152,32 @@ pub const DECODERS: &[DecoderSpec] = &[
     spec("nn_lasso", "non-negative lasso", Dictionary, true, image::nn_lasso)
         .about("non-negative lasso on normalised columns"),
     spec("sbl", "sparse Bayes", Dictionary, false, image::sbl).about("sparse Bayesian learning"),
-    spec("lmmse", "LMMSE", Images, false, image::lmmse)
+    spec("lmmse", "linear estimate", Images, false, image::lmmse)
+        .short("LMMSE")
         .about("linear minimum mean square error, prior of images like those seen"),
-    spec("nn_lmmse", "non-negative LMMSE", Images, true, image::nn_lmmse)
-        .about("linear minimum mean square error with non-negative taxels, prior for unseen objects")
-        .anytime(),
+    spec(
+        "nn_lmmse",
+        "linear estimate, no negative pressure",
+        Images,
+        true,
+        image::nn_lmmse,
+    )
+    .short("non-negative LMMSE")
+    .about("linear minimum mean square error with non-negative taxels, prior for unseen objects")
+    .anytime(),
     spec(
         "nn_lmmse_seen",
-        "NN LMMSE, objects seen",
+        "linear estimate, objects seen",
         Images,
         false,
         image::nn_lmmse_seen,
     )
+    .short("NN LMMSE, objects seen")
     .about("as nn_lmmse, prior for the objects that were seen"),
     spec("mixture", "mixture of shapes", Shapes, false, mixture::train)
         .about("thirty clusters of simulated shapes weighed by the evidence of y, non-negative taxels"),
-    spec("amortised", "amortised", Network, false, amortised::train)
+    spec("amortised", "trained network", Network, false, amortised::train)
+        .short("amortised")
         .about("network trained on simulated shapes: image and the probability that a taxel is touched")
         .anytime(),
     spec("tv", "total variation", Nothing, false, image::tv).about("total variation with non-negative taxels"),
@@ -155,21 +192,14 @@ pub fn find(name: &str) -> Option<&'static DecoderSpec> {
     DECODERS.iter().find(|spec| spec.name == name)
 }
 
-/// Label of the algorithm `name` in figures and printed tables. An external program is labelled by its name.
-#[must_use]
-pub fn label(name: &str) -> &str {
-    find(name).map_or(name, |spec| spec.label)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn names_and_labels_are_unique() {
+    fn names_are_unique_and_described() {
         for (k, spec) in DECODERS.iter().enumerate() {
-            let before = &DECODERS[..k];
-            let twice = before.iter().any(|d| d.name == spec.name || d.label == spec.label);
+            let twice = DECODERS[..k].iter().any(|before| before.name == spec.name);
             assert!(!twice && !spec.about.is_empty(), "{}", spec.name);
         }
     }

@@ -42,7 +42,7 @@ impl PublishedDecode {
         self.line().name
     }
 
-    /// Name in figures and printed tables.
+    /// Name in plain words.
     #[must_use]
     pub fn label(self) -> &'static str {
         self.line().label

@@ -2,7 +2,7 @@
 
 use super::rows::{ContactKind, InTimeBoard, InTimeRow};
 use super::tally::Interval;
-use crate::decoders::label;
+use crate::decoders::short_label;
 use crate::unique;
 
 /// One table for presses and one for drops, with a line for every decoder, number of samples and moment; then objects
@@ -84,7 +84,7 @@ fn line(row: &InTimeRow) -> String {
     };
     format!(
         "{:<20} {:<11} {:>4} {:>8}  {:>6} {:>11} {:>7} {:>7} {:>11} {:>6} {:>13}{more}\n",
-        label(&row.decoder),
+        short_label(&row.decoder),
         learned(row),
         row.m,
         moment(row.since_touch_s),
@@ -110,7 +110,7 @@ fn objects(board: &InTimeBoard) -> String {
     for row in board.rows.iter().filter(|row| row.contact == ContactKind::Press) {
         out.push_str(&format!(
             "{:<20} {:<11} {:>4} {:>8}",
-            label(&row.decoder),
+            short_label(&row.decoder),
             learned(row),
             row.m,
             moment(row.since_touch_s)

@@ -1,7 +1,7 @@
 //! The figure of a budget.
 
 use crate::figures::{BarChart, BarGroup, BarRow, Style};
-use spts_eval::decoders::label;
+use spts_eval::decoders::short_label;
 use spts_studies::budget::{BudgetReport, CONTACT, Change, Direction, MeanWithError, WHOLE_STAGE};
 
 /// IoU lost to every effect with `decode`, one panel an M: when the effect is taken from the whole chain, and when it
@@ -30,7 +30,7 @@ pub(super) fn bars(report: &BudgetReport, decode: &str, truth: &str, iou: Change
         }
     });
     BarChart {
-        title: format!("IoU lost to each effect, {} decode, {truth}", label(decode)),
+        title: format!("IoU lost to each effect, {} decode, {truth}", short_label(decode)),
         x_label: "IoU lost".to_owned(),
         panels: measurements.iter().map(|m| format!("M = {m}")).collect(),
         groups: [

@@ -1,8 +1,8 @@
 //! Residuals, quantiles and score curves, real beside twin.
 
 use crate::figures::{Chart, FigureError, Series, Style, save_charts};
-use crate::labels::{decoder_label, object_label};
-use spts_eval::decoders::PublishedDecode;
+use crate::labels::object_label;
+use spts_eval::decoders::{PublishedDecode, label};
 use spts_studies::calibrate::quantiles;
 use spts_studies::compare::{ComparedSession, ScoreCurves};
 use std::path::Path;
@@ -119,7 +119,7 @@ fn scores(curves: &ScoreCurves, decode: PublishedDecode) -> Chart {
         }
     }
     Chart {
-        title: decoder_label(decode.name()).to_owned(),
+        title: label(decode.name()).to_owned(),
         x_label: "measurements M".to_owned(),
         y_label: "score, mean over the objects".to_owned(),
         x_log: true,

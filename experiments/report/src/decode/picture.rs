@@ -3,7 +3,7 @@
 use crate::figures::{FigureError, Sheet, Tile, TileRow, save_sheet};
 use spts::Session;
 use spts_eval::decode::{DecodedSession, DecodedWindow};
-use spts_eval::decoders::label;
+use spts_eval::decoders::short_label;
 use std::path::Path;
 
 /// Rows that are shown at most.
@@ -40,7 +40,7 @@ pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name:
                 .collect();
             if columns.len() == 2 {
                 columns.extend(first.iter().map(|r| {
-                    let name = label(r.decoder);
+                    let name = short_label(r.decoder);
                     if same_m {
                         format!("{name}, M = {}", r.m)
                     } else {

@@ -2,10 +2,13 @@
 
 use crate::PageFigure;
 use crate::figures::{FigureError, Interval, IntervalChart, IntervalPanel, save_intervals};
-use crate::labels::{decoder_label as label, object_label, object_list};
+use crate::labels::{object_label, object_list};
 use crate::{Section, Table};
 use spts::output::{OutputError, write_json, write_table};
-use spts_studies::per_object::{MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES, ScoreDistance};
+use spts_eval::decoders::{label, short_label};
+use spts_studies::per_object::{
+    DECODERS, MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES, ScoreDistance,
+};
 use std::path::Path;
 
 /// Name of the figure.
@@ -39,20 +42,18 @@ fn score_label(score: &str) -> &str {
 }
 
 /// In a word, for the heading of a panel.
-fn short_label(score: &str) -> &str {
+fn short_score(score: &str) -> &str {
     match score {
         "class_single" => "class",
         other => score_label(other),
     }
 }
 
-/// A decoder in the heading of a panel.
-fn short_decoder(name: &str) -> &str {
-    match name {
-        "matched" => "published",
-        "nn_lmmse" => "NN LMMSE",
-        other => spts_eval::decoders::label(other),
-    }
+/// What the headings of panels call decoders, if it is not their label.
+fn short_labels() -> String {
+    let shorter = DECODERS.iter().filter(|name| label(name) != short_label(name));
+    let each = shorter.map(|name| format!("“{}” is the {}", short_label(name), label(name)));
+    each.collect::<Vec<_>>().join("; ")
 }
 
 fn of_twin(report: &PerObjectReport) -> impl Iterator<Item = &ObjectBand> {
@@ -82,7 +83,7 @@ fn chart(report: &PerObjectReport) -> IntervalChart {
             })
         };
         IntervalPanel {
-            title: format!("{}, {}, M = {m}", short_label(score), short_decoder(decoder)),
+            title: format!("{}, {}, M = {m}", short_score(score), short_label(decoder)),
             intervals: rows.iter().map(interval).collect(),
         }
     };
@@ -116,9 +117,11 @@ pub(crate) fn section(report: &PerObjectReport) -> Section {
         figures: vec![PageFigure::new(
             FIGURE,
             "Panels by decoder and number of measurements: for every object a blue band of the simulated skins and a mark for the real skin.",
-            "Scores object by object. Blue: band and mean of the simulated skins. Circle: the real skin, a red square where it lies outside the \
-             band. “IoU” is the overlap of decoded and true contact, “class” the share of single windows classified correctly, “NN LMMSE” \
-             the non-negative LMMSE decoder.",
+            format!(
+                "Scores object by object. Blue: band and mean of the simulated skins. Circle: the real skin, a red square where it lies outside the \
+                 band. “IoU” is the overlap of decoded and true contact, “class” the share of single windows classified correctly. {}.",
+                short_labels()
+            ),
         )],
         tables: vec![distances(report), objects(report)],
     }
@@ -155,7 +158,7 @@ fn distances(report: &PerObjectReport) -> Table {
             .filter(|d| d.images == ReadoutImages::Twin)
             .map(row)
             .collect(),
-        file: Some(TABLES[1].to_owned()),
+        files: vec![TABLES[1].to_owned()],
     }
 }
 
@@ -177,6 +180,6 @@ fn objects(report: &PerObjectReport) -> Table {
         caption: "Scores object by object".to_owned(),
         header: header.map(str::to_owned).to_vec(),
         rows: of_twin(report).map(row).collect(),
-        file: Some(TABLES[0].to_owned()),
+        files: vec![TABLES[0].to_owned()],
     }
 }

@@ -1,11 +1,12 @@
 //! The readout beside the recordings it is fitted to: the skin's own images through the twin's electronics.
 
 use super::ReproduceError;
-use crate::labels::{decoder_label, object_label, statistic_label};
+use crate::labels::{object_label, statistic_label};
 use crate::{PageFigure, ReportError, Section, Table, compare};
 use spts::output::write_table;
 use spts::progress::Progress;
 use spts_eval::PublishedSkin;
+use spts_eval::decoders::label;
 use spts_studies::calibrate::read;
 use spts_studies::compare::{CompareReport, CompareStudy, CurveDistance, Images, Statistic, with_error};
 use std::path::Path;
@@ -94,14 +95,14 @@ impl ReadoutSection {
             .map(str::to_owned)
             .to_vec(),
             rows: self.0.all_statistics().iter().map(row).collect(),
-            file: Some("readout_statistics_real.csv".to_owned()),
+            files: vec!["readout_statistics_real.csv".to_owned()],
         }
     }
 
     fn curves_table(&self) -> Table {
         let row = |c: &CurveDistance| {
             vec![
-                decoder_label(c.decode).to_owned(),
+                label(c.decode).to_owned(),
                 score_label(c.metric),
                 format!("{:.4}", c.mean_abs_difference),
                 format!("{:.4}", c.max_abs_difference),
@@ -114,7 +115,7 @@ impl ReadoutSection {
             caption: "|twin − real| of the score curves over M = 7 … 100".to_owned(),
             header: header.map(str::to_owned).to_vec(),
             rows: self.0.distances().iter().map(row).collect(),
-            file: Some("readout_curves_real.csv".to_owned()),
+            files: vec!["readout_curves_real.csv".to_owned()],
         }
     }
 }

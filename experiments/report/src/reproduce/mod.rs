@@ -201,10 +201,10 @@ impl Reproduction {
             .map_or_else(Vec::new, |real| tables::correlations(skins.twin, real));
 
         let folder = out.folder("tables")?;
-        tables::write_skin(&folder, "twin", skins.twin)?;
+        tables::write_skin(&folder, tables::TWIN, skins.twin)?;
         tables::write_mechanics(&folder, dataset)?;
         if let Some(real) = skins.real {
-            tables::write_skin(&folder, "real", real)?;
+            tables::write_skin(&folder, tables::REAL, real)?;
             write_table(&folder.join("raster_correlation.csv"), &correlations)?;
         }
         write_table(&out.timed_path("timings.csv"), timings)?;

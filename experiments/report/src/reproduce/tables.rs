@@ -59,12 +59,23 @@ struct BounceRow {
     imbalance: f64,
 }
 
-/// Writes the tables of one skin, named by `whose` ("twin" or "real").
+/// The twin in the names of tables.
+pub(super) const TWIN: &str = "twin";
+/// The real skin in the names of tables.
+pub(super) const REAL: &str = "real";
+
+/// File of the table `name` of the skin `whose`, [`TWIN`] or [`REAL`].
+#[must_use]
+pub(super) fn skin_file(name: &str, whose: &str) -> String {
+    format!("{name}_{whose}.csv")
+}
+
+/// Writes the tables of one skin, named by `whose`, [`TWIN`] or [`REAL`].
 ///
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
 pub(super) fn write_skin(dir: &Path, whose: &str, results: &SkinResults) -> Result<(), OutputError> {
-    let path = |name: &str| dir.join(format!("{name}_{whose}.csv"));
+    let path = |name: &str| dir.join(skin_file(name, whose));
     write_table(&path("scores"), &results.scores.rows)?;
     write_table(&path("localisation"), &results.scores.localisation)?;
     write_table(&path("baselines"), &results.scores.baselines)?;

@@ -4,7 +4,7 @@ use crate::figures::{Chart, FigureError, Series, Style, save_charts};
 use spts_eval::Sensing;
 use spts_eval::algorithm::Subject;
 use spts_eval::anytime::{AnytimeBoard, AnytimeRow};
-use spts_eval::decoders::label;
+use spts_eval::decoders::short_label;
 use spts_eval::unique;
 use std::path::Path;
 
@@ -70,7 +70,7 @@ fn series(rows: &[&AnytimeRow]) -> Vec<Series> {
         let shade = if *stops { 0 } else { 1 };
         let how = if *stops { "stops when sure" } else { "fixed number" };
         let whose = if several {
-            format!(", {}, {from}", label(decoder))
+            format!(", {}, {from}", short_label(decoder))
         } else {
             String::new()
         };

@@ -2,7 +2,7 @@
 
 use crate::figures::{Chart, FigureError, Series, Stroke, save_charts};
 use spts_eval::board::{BoardRow, ScoreBoard};
-use spts_eval::decoders::label;
+use spts_eval::decoders::short_label;
 use spts_eval::place::{PlaceRow, locator_label};
 use spts_eval::unique;
 use std::path::Path;
@@ -102,7 +102,7 @@ fn scores(
         for (k, (from, sensing)) in sources.iter().enumerate() {
             let same = |r: &&&BoardRow| r.decoder == *name && r.learned_from == *from && r.sensing == *sensing;
             let points: Vec<(f64, f64)> = rows.iter().filter(same).filter_map(|r| point(r)).collect();
-            let mut words = label(name).to_owned();
+            let mut words = short_label(name).to_owned();
             if sources.iter().any(|(other, _)| other != from) {
                 words.push_str(&format!(", {from}"));
             }

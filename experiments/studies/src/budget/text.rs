@@ -4,7 +4,7 @@ use super::estimate::{CHANCE, MeanWithError};
 use super::report::BudgetReport;
 use super::table::{BudgetRow, Change, EndPoint};
 use super::variants::{Direction, WHOLE_STAGE};
-use spts_eval::decoders::label;
+use spts_eval::decoders::short_label;
 
 /// Changes of all scores, with their headings.
 const CHANGES: [(&str, Change); 5] = [
@@ -35,7 +35,7 @@ fn overview(report: &BudgetReport) -> String {
     for decode in report.decodes() {
         out.push_str(&format!(
             "\n{}: change of the IoU without each effect (against everything) and with it alone (against ideal)\n\n",
-            label(decode)
+            short_label(decode)
         ));
         let mut heads = Vec::new();
         for m in report.measurements() {
@@ -80,7 +80,7 @@ fn markdown(report: &BudgetReport) -> String {
                 (Direction::Ablation, "without each effect, against everything"),
                 (Direction::Addition, "with each effect alone, against ideal"),
             ] {
-                out.push_str(&format!("\n{}, M = {m}, {heading}\n\n", label(decode)));
+                out.push_str(&format!("\n{}, M = {m}, {heading}\n\n", short_label(decode)));
                 let heads: Vec<String> = CHANGES.iter().map(|(head, _)| (*head).to_owned()).collect();
                 out.push_str(&table(report, &heads, &|stage, effect| {
                     let row = report.find((stage, effect), direction, (decode, m));
@@ -131,7 +131,7 @@ fn ends(report: &BudgetReport) -> String {
         out.push_str(&format!(
             "| {:<11} | {:<16} | {:>4} | {:<7} | {:>7.3} | {:.3} | {:.3} | {:>10} |\n",
             p.chain,
-            label(p.decode),
+            short_label(p.decode),
             p.m,
             p.truth,
             p.support,
@@ -153,7 +153,7 @@ fn unexplained(points: &[EndPoint]) -> String {
     for (image, raster) in ideal("image").zip(ideal("raster")) {
         out.push_str(&format!(
             "{}, M = {}: {:.3}, {:.3}\n",
-            label(image.decode),
+            short_label(image.decode),
             image.m,
             1.0 - image.iou,
             image.iou - raster.iou

@@ -1,7 +1,7 @@
 //! The comparison as tables for the terminal.
 
 use super::{CompareReport, PredictedStatistic};
-use spts_eval::decoders::label;
+use spts_eval::decoders::short_label;
 
 fn verdict(ok: bool) -> &'static str {
     if ok { "ok" } else { "DIFFERS" }
@@ -45,7 +45,7 @@ pub(super) fn table(report: &CompareReport) -> String {
     for c in distances {
         out.push_str(&format!(
             "{:<16} {:<13} {:.4}  {:.4}  allowed {:.2}  {}\n",
-            label(c.decode),
+            short_label(c.decode),
             c.metric,
             c.mean_abs_difference,
             c.max_abs_difference,

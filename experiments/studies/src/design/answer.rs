@@ -4,7 +4,9 @@ use super::bench::{Bench, draw, mean};
 use super::error::DesignError;
 use super::report::{Alternative, Binding, CostDrivers, Design, DesignReport, LatencyParts};
 use super::rows::{BandRows, RowSource};
-use super::study::{COMPARED, DesignStudy, Ground, Tried, WireChoice, is_slowed};
+use super::search::Tried;
+use super::study::{DesignStudy, Ground, WireChoice};
+use super::wire::FeedbackLimit;
 use crate::sensing::load_s;
 use spts_firmware::{FIRST_ADDRESS, LAST_BUS_ADDRESS, Pattern};
 use spts_models::SkinLayout;
@@ -19,6 +21,8 @@ const GENERATOR_BYTES: usize = 5;
 const FULL: f64 = 0.9;
 /// How much coarser the other pitch is.
 const COARSER: f64 = 1.5;
+/// Repetitions that an alternative is looked at with.
+const COMPARED: usize = 5;
 
 impl DesignStudy {
     /// The whole answer: `chosen` was promised as `design`, and `others` were looked at before.
@@ -78,7 +82,7 @@ impl DesignStudy {
     ) -> (Binding, String) {
         let latency_ms = 1e3 * self.latency_s;
         let (iou, wires) = (self.iou, design.wires);
-        if is_slowed(&design.wire) {
+        if design.wire.feedback_limit == FeedbackLimit::SlowerClock {
             let reason = format!(
                 "the output takes {:.1} µs to settle, so that the clock is slowed to {:.1} kHz",
                 1e6 * design.wire.settle_s,

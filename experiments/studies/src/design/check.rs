@@ -6,10 +6,12 @@ use super::bench::{Bench, draw, mean};
 use super::error::DesignError;
 use super::report::Design;
 use super::rows::{BandRows, RowSource, bands};
-use super::study::{DesignStudy, WireChoice, check_streams};
+use super::study::{DesignStudy, WireChoice};
+use rand::RngExt as _;
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Profile, parse_patterns};
+use spts_models::Streams;
 
 /// A design, its files, and the seed of the check.
 #[derive(Debug, Clone)]
@@ -124,7 +126,7 @@ impl DesignCheck {
             &design.objects,
             &layout,
             label,
-            check_streams(self.seed),
+            Streams::new(self.seed).rng("design/check", 0).random(),
             expected.repetitions,
         )?;
         let scores = bench.score(&bench.measure(drawn, m)?, m, classes.as_ref())?;

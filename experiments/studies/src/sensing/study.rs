@@ -1,13 +1,12 @@
-//! Benefit of designed rows over random ones on a simulated skin, and their cost.
+//! Benefit of designed rows over random ones, measured on simulated skins, and their cost.
 
-use super::classes::ClassRow;
 use super::cost::{CostRow, costs};
 use super::error::SensingError;
+use super::report::SensingReport;
 use super::rows_for::{RowsFor, rows_for};
-use crate::touches::{Band, Touch, TouchObjects, TouchScene, TouchScore, TouchWire, band};
+use crate::touches::{Touch, TouchObjects, TouchScene, TouchScore, TouchWire};
 use rand::RngExt as _;
 use rayon::prelude::*;
-use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::Profile;
 use spts_eval::decoders::{DecoderSpec, TrainedDecoder};
@@ -16,7 +15,6 @@ use spts_eval::{Press, PressRows, Scorer};
 use spts_models::{SkinLayout, Streams};
 use spts_recon::recover::ImagePrior;
 use spts_recon::rows::{DESIGNERS, Designer, Expected, RowNeeds, RowTask, Tolerances};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Settings of the comparison.
@@ -44,111 +42,24 @@ pub struct SensingStudy {
     pub seed: u64,
 }
 
-/// IoU and place error for one kind of touches with one designer and M.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SensingRow {
-    /// Kind of touches: "shapes" or "objects".
-    pub touches: &'static str,
-    /// Readout profile.
-    pub readout: String,
-    /// Designer of the rows.
-    pub designer: &'static str,
-    /// Measurements M.
-    pub m: usize,
-    /// Intersection over union of the supports.
-    pub iou: Band,
-    /// IoU minus that with random rows in the same repetition.
-    pub gain: Band,
-    /// Mean distance of the centres, taxels.
-    pub place_px: Option<Band>,
-    /// Share of the samples at an end of the range.
-    pub clipped: f64,
-}
-
-/// IoU of one object, or of one family of shapes.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct NamedRow {
-    /// Kind of touches: "shapes" or "objects".
-    pub touches: &'static str,
-    /// Object, or family of the shapes.
-    pub name: String,
-    /// Readout profile.
-    pub readout: String,
-    /// Designer of the rows.
-    pub designer: &'static str,
-    /// Measurements M.
-    pub m: usize,
-    /// Number of touches.
-    pub count: usize,
-    /// Intersection over union of the supports, mean over the touches of all repetitions.
-    pub iou: f64,
-}
-
-/// The number of random rows with the same IoU as one designer's rows.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Equal {
-    /// Kind of touches: "shapes" or "objects".
-    pub touches: &'static str,
-    /// Readout profile.
-    pub readout: String,
-    /// Designer of the rows.
-    pub designer: &'static str,
-    /// Number of its measurements.
-    pub m: usize,
-    /// Number of measurements with random rows that gives the same IoU, interpolated; `None` if even the largest number
-    /// does not.
-    pub random_m: Option<f64>,
-}
-
-/// Results of the comparison.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SensingReport {
-    /// Rows and columns of the skin.
-    pub skin: [usize; 2],
-    /// Decoder.
-    pub decoder: &'static str,
-    /// Number of repetitions.
-    pub skins: usize,
-    /// Number of touches in a repetition and kind.
-    pub touches: usize,
-    /// Scores.
-    pub rows: Vec<SensingRow>,
-    /// Equivalent numbers of random rows.
-    pub equal: Vec<Equal>,
-    /// Shares of the seventeen objects that are classified.
-    pub classes: Vec<ClassRow>,
-    /// Errors of the samples by cause, and sizes of the sums.
-    pub costs: Vec<CostRow>,
-    /// Scores of single objects and families.
-    pub named: Vec<NamedRow>,
-}
-
 /// Kinds of touches, and their names.
-const KINDS: [(TouchObjects, &str); 2] = [(TouchObjects::Shapes, "shapes"), (TouchObjects::Objects, "objects")];
+pub(super) const KINDS: [(TouchObjects, &str); 2] =
+    [(TouchObjects::Shapes, "shapes"), (TouchObjects::Objects, "objects")];
 
 /// The designer that all others are compared with.
 pub(super) const RANDOM: &str = "random";
 
 /// Name of what is touched, and the score of its image.
-type NamedScore = (Arc<str>, TouchScore);
+pub(super) type NamedScore = (Arc<str>, TouchScore);
 
-/// Scores of one repetition, in the order of the keys.
-struct Repetition {
+/// Scores of one repetition, in the order of the report's columns.
+pub(super) struct Repetition {
     /// Name and score of every touch.
-    scores: Vec<Vec<NamedScore>>,
+    pub(super) scores: Vec<Vec<NamedScore>>,
     /// Share of clipped samples.
-    clipped: Vec<f64>,
+    pub(super) clipped: Vec<f64>,
     /// Errors by designer and cause.
-    costs: Vec<CostRow>,
-}
-
-/// What a column of scores belongs to.
-#[derive(Clone, Copy)]
-struct Key<'a> {
-    kind: usize,
-    readout: &'a str,
-    designer: &'static Designer,
-    m: usize,
+    pub(super) costs: Vec<CostRow>,
 }
 
 impl SensingStudy {
@@ -205,25 +116,7 @@ impl SensingStudy {
             .collect::<Result<_, _>>()?;
         progress.end();
         let classes = self.classes(progress)?;
-        Ok(self.report(&repetitions, classes))
-    }
-
-    /// All columns of scores.
-    fn keys(&self) -> Vec<Key<'_>> {
-        let mut keys = Vec::new();
-        for kind in 0..KINDS.len() {
-            for readout in &self.readouts {
-                for &m in &self.measurements {
-                    keys.extend(self.designers.iter().map(|&designer| Key {
-                        kind,
-                        readout,
-                        designer,
-                        m,
-                    }));
-                }
-            }
-        }
-        keys
+        Ok(SensingReport::new(self, &repetitions, classes))
     }
 
     fn repetition(
@@ -296,104 +189,6 @@ impl SensingStudy {
         let share = wire.clipped() as f64 / (m * touches.len()).max(1) as f64;
         Ok((scores.collect(), share))
     }
-
-    fn report(&self, repetitions: &[Repetition], classes: Vec<ClassRow>) -> SensingReport {
-        let keys = self.keys();
-        let iou_of = |k: usize| -> Vec<f64> {
-            let mean =
-                |scores: &Vec<NamedScore>| scores.iter().map(|(_, s)| s.iou).sum::<f64>() / scores.len().max(1) as f64;
-            repetitions.iter().map(|r| mean(&r.scores[k])).collect()
-        };
-        let random = self.designers.iter().position(|d| d.name == RANDOM);
-        let width = self.designers.len();
-        let (mut rows, mut named) = (Vec::new(), Vec::new());
-        for (k, key) in keys.iter().enumerate() {
-            let (own, touches) = (iou_of(k), KINDS[key.kind].1);
-            let of_random = random.map_or_else(|| own.clone(), |r| iou_of(k - k % width + r));
-            let gains: Vec<f64> = own.iter().zip(&of_random).map(|(a, b)| a - b).collect();
-            let places: Vec<f64> = repetitions.iter().filter_map(|r| mean_place(&r.scores[k])).collect();
-            let (Some(iou), Some(gain)) = (band(&own), band(&gains)) else {
-                continue;
-            };
-            rows.push(SensingRow {
-                touches,
-                readout: key.readout.to_owned(),
-                designer: key.designer.name,
-                m: key.m,
-                iou,
-                gain,
-                place_px: band(&places),
-                clipped: repetitions.iter().map(|r| r.clipped[k]).sum::<f64>() / repetitions.len() as f64,
-            });
-            let mut names: BTreeMap<&str, (usize, f64)> = BTreeMap::new();
-            for (name, score) in repetitions.iter().flat_map(|r| &r.scores[k]) {
-                let entry = names.entry(name).or_default();
-                *entry = (entry.0 + 1, entry.1 + score.iou);
-            }
-            named.extend(names.into_iter().map(|(name, (count, sum))| NamedRow {
-                touches,
-                name: name.to_owned(),
-                readout: key.readout.to_owned(),
-                designer: key.designer.name,
-                m: key.m,
-                count,
-                iou: sum / count as f64,
-            }));
-        }
-        let columns: Vec<&[CostRow]> = repetitions.iter().map(|r| &r.costs[..]).collect();
-        SensingReport {
-            skin: [self.layout.rows(), self.layout.cols()],
-            decoder: self.decoder.name,
-            skins: self.skins,
-            touches: self.touches,
-            equal: equals(&rows),
-            rows,
-            classes,
-            costs: CostRow::mean(&columns),
-            named,
-        }
-    }
-}
-
-/// Mean distance of the centres of all touches that have one.
-fn mean_place(scores: &[NamedScore]) -> Option<f64> {
-    let places: Vec<f64> = scores.iter().filter_map(|(_, s)| s.place_px).collect();
-    (!places.is_empty()).then(|| places.iter().sum::<f64>() / places.len() as f64)
-}
-
-/// How many measurements with random rows each other row of the table is worth: where the random curve, a straight
-/// line between the M that were tried, first has its IoU.
-fn equals(rows: &[SensingRow]) -> Vec<Equal> {
-    let alike = |a: &SensingRow, b: &SensingRow| a.touches == b.touches && a.readout == b.readout;
-    let worth = |row: &SensingRow| {
-        let mut curve: Vec<(f64, f64)> = rows
-            .iter()
-            .filter(|r| r.designer == RANDOM && alike(r, row))
-            .map(|r| (r.m as f64, r.iou.mean))
-            .collect();
-        curve.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let first = curve
-            .first()
-            .filter(|first| first.1 >= row.iou.mean)
-            .map(|first| first.0);
-        let crossing = curve
-            .windows(2)
-            .find(|w| w[0].1 < row.iou.mean && w[1].1 >= row.iou.mean);
-        first.or_else(|| {
-            let [(m0, i0), (m1, i1)] = [*crossing?.first()?, *crossing?.last()?];
-            Some(m0 + (m1 - m0) * (row.iou.mean - i0) / (i1 - i0))
-        })
-    };
-    let others = rows.iter().filter(|row| row.designer != RANDOM);
-    others
-        .map(|row| Equal {
-            touches: row.touches,
-            readout: row.readout.clone(),
-            designer: row.designer,
-            m: row.m,
-            random_m: worth(row),
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -452,31 +247,5 @@ mod tests {
             .map(|n| n.count)
             .sum();
         assert_eq!(touched, 2 * 2 * 3 * 12);
-    }
-
-    /// By hand: random has .2, .4, .8 at 5, 10, 20; .5 lies a quarter of the way from 10 to 20.
-    #[test]
-    fn what_a_row_is_worth_is_interpolated() {
-        let row = |designer: &'static str, m: usize, iou: f64| SensingRow {
-            touches: "shapes",
-            readout: "ideal".to_owned(),
-            designer,
-            m,
-            iou: band(&[iou]).unwrap(),
-            gain: band(&[0.0]).unwrap(),
-            place_px: None,
-            clipped: 0.0,
-        };
-        let rows = [
-            row("random", 20, 0.8),
-            row("random", 5, 0.2),
-            row("random", 10, 0.4),
-            row("greedy", 5, 0.5),
-            row("greedy", 10, 0.9),
-            row("hadamard", 5, 0.1),
-        ];
-        let found: Vec<Option<f64>> = equals(&rows).iter().map(|e| e.random_m).collect();
-        assert!((found[0].unwrap() - 12.5).abs() < 1e-12);
-        assert_eq!((found[1], found[2]), (None, Some(5.0)));
     }
 }

@@ -1,7 +1,7 @@
 //! A design as text.
 
 use super::design::RowDesignReport;
-use super::study::SensingReport;
+use super::report::SensingReport;
 
 impl RowDesignReport {
     /// A summary in a few lines.

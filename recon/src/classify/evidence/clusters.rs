@@ -1,7 +1,7 @@
 //! Gaussian components learned from many images of a class: clusters of similar images.
 
 use super::component::{Component, EvidenceError};
-use super::templates::principal;
+use super::covariance::principal;
 use crate::checks::within;
 use crate::kernels::{axpy, dot, norm};
 use crate::matrix::Matrix;

@@ -10,6 +10,7 @@ mod anytime;
 mod classifier;
 mod clusters;
 mod component;
+mod covariance;
 mod filter;
 mod image;
 mod lanes;

@@ -1,15 +1,12 @@
 //! Reconstructs images of large sheets measured with a fixed sensing matrix.
 
+use super::error::SheetError;
 use super::prior::SheetPrior;
-use crate::checks::{RangeError, within};
-use crate::kernels::{adjoint, dot};
-use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover as _, RecoverError, Solution};
-use crate::recover::{Gaussian, NnLmmse, Noise, ParameterError, PriorError};
-use crate::workspace::Workspace;
+use crate::checks::within;
+use crate::kernels::{adjoint, axpy, dot};
+use crate::problem::RecoverError;
 use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::Arc;
 
 /// Noise of measurements, relative to the root mean square of a row's sum.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,24 +22,6 @@ impl Default for SheetNoise {
     fn default() -> Self {
         Self { own: 0.1, common: 0.5 }
     }
-}
-
-/// Why no image can be computed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SheetError {
-    /// A noise level outside its range.
-    #[error(transparent)]
-    Noise(#[from] RangeError),
-    /// Rows or measurements of the wrong size.
-    #[error(transparent)]
-    Recover(#[from] RecoverError),
-    /// The selected taxels have no valid prior.
-    #[error(transparent)]
-    Prior(#[from] PriorError),
-    /// A noise level that the non-negative estimate does not accept.
-    #[error(transparent)]
-    Parameter(#[from] ParameterError),
 }
 
 /// Estimates images x of a sheet from measurements y = Φ x + o + n with a fixed sensing matrix Φ (M × N). The prior is
@@ -75,16 +54,16 @@ pub enum SheetError {
 /// ```
 #[derive(Debug, Clone)]
 pub struct SheetDecoder {
-    prior: SheetPrior,
-    noise: SheetNoise,
+    pub(super) prior: SheetPrior,
+    pub(super) noise: SheetNoise,
     /// Number of wires.
-    count: usize,
+    pub(super) count: usize,
     /// Φ, M × N.
-    rows: Vec<f64>,
+    pub(super) rows: Vec<f64>,
     /// Φ C, M × N.
     cross: Vec<f64>,
     /// Wire of every row.
-    wires: Vec<usize>,
+    pub(super) wires: Vec<usize>,
     /// Range of the taxels that the wire of each row reads.
     spans: Vec<Range<usize>>,
     /// Cholesky factor; row i has i + 1 entries and follows the rows before it.
@@ -240,85 +219,12 @@ impl SheetDecoder {
         for i in (0..m).rev() {
             shares[i] /= row(i)[i];
             let (before, own) = shares.split_at_mut(i);
-            crate::kernels::axpy(-own[0], &row(i)[..i], before);
+            axpy(-own[0], &row(i)[..i], before);
         }
         let taxels = self.prior.taxels();
         let mut image = vec![0.0; taxels];
         adjoint(&self.cross[..m * taxels], &shares, &mut image);
         Ok(image)
-    }
-
-    /// The non-negative estimate from measurements of the first rows: N values, at most `most` of them positive.
-    ///
-    /// # Errors
-    /// As [`SheetDecoder::linear`], and if the iteration fails because of rounding.
-    pub fn non_negative(&self, y: &[f64], most: usize) -> Result<Vec<f64>, SheetError> {
-        let linear = self.linear(y)?;
-        let taxels = self.prior.taxels();
-        let mut places: Vec<usize> = (0..taxels).collect();
-        if most < taxels {
-            places.sort_by(|a, b| linear[*b].total_cmp(&linear[*a]).then(a.cmp(b)));
-            places.truncate(most.max(1));
-            places.sort_unstable();
-        }
-        let values = self.solve(y, &places)?;
-        let mut image = vec![0.0; taxels];
-        places.iter().zip(&values).for_each(|(k, v)| image[*k] = *v);
-        Ok(image)
-    }
-
-    /// The non-negative program on `places`.
-    fn solve(&self, y: &[f64], places: &[usize]) -> Result<Vec<f64>, SheetError> {
-        let (m, n, taxels) = (y.len(), places.len(), self.prior.taxels());
-        let scale = y.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-        if scale == 0.0 {
-            return Ok(vec![0.0; n]);
-        }
-        let mut a = Matrix::zeros(m, n);
-        for i in 0..m {
-            let row = &self.rows[i * taxels..(i + 1) * taxels];
-            a.row_mut(i).iter_mut().zip(places).for_each(|(v, k)| *v = row[*k]);
-        }
-        let mut y: Vec<f64> = y.iter().map(|v| v / scale).collect();
-        self.whiten(&mut a, &mut y);
-        let mut covariance = Matrix::zeros(n, n);
-        for (r, i) in places.iter().enumerate() {
-            let row = covariance.row_mut(r);
-            row.iter_mut()
-                .zip(places)
-                .for_each(|(v, j)| *v = self.prior.covariance(*i, *j));
-        }
-        let noise = Noise::Absolute(self.noise.own * (n as f64 / self.count as f64).sqrt());
-        let prior = Gaussian::new(vec![0.0; n], covariance)?;
-        let estimate = NnLmmse::new(Arc::new(prior), noise)?;
-        let mut solution = Solution::default();
-        let problem = Problem::new(a.view(), &y)?;
-        estimate.recover_into(&problem, &mut Workspace::default(), &mut solution)?;
-        let mut values = vec![0.0; n];
-        solution.scatter(&mut values);
-        values.iter_mut().for_each(|v| *v *= scale);
-        Ok(values)
-    }
-
-    /// Takes most of what is common to the rows of a wire off all columns: with own noise σ², common noise τ² and m
-    /// rows, a share 1 − 1/√(1 + m τ²/σ²) of the mean, which leaves noise of σ² in every direction.
-    fn whiten(&self, a: &mut Matrix, y: &mut [f64]) {
-        let ratio = (self.noise.common / self.noise.own).powi(2);
-        let wires = &self.wires[..y.len()];
-        for wire in 0..self.count {
-            let members: Vec<usize> = (0..y.len()).filter(|i| wires[*i] == wire).collect();
-            let count = members.len() as f64;
-            let share = 1.0 - 1.0 / (1.0 + count * ratio).sqrt();
-            let mut mean = vec![0.0; a.ncols()];
-            for i in &members {
-                crate::kernels::axpy(share / count, a.row(*i), &mut mean);
-            }
-            let mean_y = members.iter().map(|i| y[*i]).sum::<f64>() * share / count;
-            for i in members {
-                crate::kernels::axpy(-1.0, &mean, a.row_mut(i));
-                y[i] -= mean_y;
-            }
-        }
     }
 }
 
@@ -327,93 +233,4 @@ fn span(row: &[f64]) -> Range<usize> {
     let first = row.iter().position(|v| *v != 0.0).unwrap_or(0);
     let last = row.iter().rposition(|v| *v != 0.0).map_or(first, |last| last + 1);
     first..last
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use nalgebra::{DMatrix, DVector};
-
-    fn signs(rows: usize, taxels: usize) -> Vec<f64> {
-        let sign = |k: u64| {
-            if (k * k).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 63 == 1 {
-                1.0
-            } else {
-                -1.0
-            }
-        };
-        (1..=(rows * taxels) as u64).map(sign).collect()
-    }
-
-    fn decoder(rows: usize, wires: &[usize]) -> SheetDecoder {
-        let prior = SheetPrior::smooth([5, 6], 1.2).unwrap();
-        let count = wires.iter().max().unwrap() + 1;
-        let mut decoder = SheetDecoder::new(prior, SheetNoise::default(), count).unwrap();
-        let phi = signs(rows, 30);
-        // in two parts
-        decoder.extend(&phi[..7 * 30], &wires[..7]).unwrap();
-        decoder.extend(&phi[7 * 30..], &wires[7..]).unwrap();
-        decoder
-    }
-
-    /// Against the formula with dense matrices, for all rows and for the first of them, on one wire and on two.
-    #[test]
-    fn the_linear_estimate_is_the_formula() {
-        for wires in [vec![0; 20], (0..20).map(|i| i % 2).collect::<Vec<_>>()] {
-            let decoder = decoder(20, &wires);
-            let c = DMatrix::from_fn(30, 30, |i, j| decoder.prior.covariance(i, j));
-            for m in [20, 9] {
-                let phi = DMatrix::from_row_slice(m, 30, &decoder.rows[..m * 30]);
-                let square = 30.0 / if wires[1] == 1 { 2.0 } else { 1.0 };
-                let noise = DMatrix::from_fn(m, m, |i, j| {
-                    square * (if i == j { 0.01 } else { 0.0 } + if wires[i] == wires[j] { 0.25 } else { 0.0 })
-                });
-                let y: Vec<f64> = (0..m).map(|i| (i as f64 * 1.7).sin()).collect();
-                let system = &phi * &c * phi.transpose() + noise;
-                let expected = &c * phi.transpose() * system.try_inverse().unwrap() * DVector::from_vec(y.clone());
-                let found = decoder.linear(&y).unwrap();
-                for (found, expected) in found.iter().zip(expected.iter()) {
-                    assert!((found - expected).abs() < 1e-10, "{found} {expected}");
-                }
-            }
-        }
-    }
-
-    /// Where the linear estimate is not negative, both are the same; and an offset of a wire changes hardly anything.
-    #[test]
-    fn the_non_negative_estimate_goes_with_the_linear_one() {
-        let decoder = decoder(24, &[0; 24]);
-        let truth: Vec<f64> = (0..30).map(|k| if (13..16).contains(&k) { 2.0 } else { 0.0 }).collect();
-        let phi = Matrix::from_rows(24, 30, decoder.rows.clone()).unwrap();
-        let y: Vec<f64> = (0..24).map(|i| dot(phi.row(i), &truth)).collect();
-        let image = decoder.non_negative(&y, 30).unwrap();
-        let strongest = (0..30).max_by(|a, b| image[*a].total_cmp(&image[*b])).unwrap();
-        assert!((13..16).contains(&strongest) && image.iter().all(|v| *v >= 0.0));
-        let shifted: Vec<f64> = y.iter().map(|v| v + 3.0).collect();
-        let other = decoder.non_negative(&shifted, 30).unwrap();
-        let far = image
-            .iter()
-            .zip(&other)
-            .fold(0.0_f64, |far, (a, b)| far.max((a - b).abs()));
-        assert!(far < 0.3, "{far}");
-        // fewer places than taxels
-        let few = decoder.non_negative(&y, 5).unwrap();
-        assert!(few.iter().filter(|v| **v > 0.0).count() <= 5);
-        assert!(decoder.non_negative(&[0.0; 24], 30).unwrap().iter().all(|v| *v == 0.0));
-    }
-
-    #[test]
-    fn what_does_not_fit_is_refused() {
-        let prior = SheetPrior::smooth([2, 2], 1.0).unwrap();
-        let noise = SheetNoise {
-            own: f64::NAN,
-            common: 0.0,
-        };
-        assert!(SheetDecoder::new(prior.clone(), noise, 1).is_err());
-        let mut decoder = SheetDecoder::new(prior, SheetNoise::default(), 1).unwrap();
-        assert!(decoder.extend(&[1.0; 5], &[0]).is_err() && decoder.extend(&[f64::NAN; 4], &[0]).is_err());
-        decoder.extend(&[1.0; 4], &[0]).unwrap();
-        assert!(decoder.linear(&[1.0, 2.0]).is_err() && decoder.linear(&[]).is_err());
-        assert!(decoder.linear(&[f64::INFINITY]).is_err());
-    }
 }

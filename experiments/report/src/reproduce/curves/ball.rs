@@ -2,8 +2,9 @@
 
 use super::super::results::SkinResults;
 use super::super::tracking::{TrackingRow, over_bounces};
-use super::{BothSkins, as_f64, claim, over_m, short_label};
+use super::{BothSkins, as_f64, claim, over_m};
 use crate::figures::{Chart, Series, StatedRange, Stroke, Style};
+use spts_eval::decoders::{PublishedDecode, label};
 use spts_eval::place::locator_label;
 
 /// Numbers of measurements a frame in Fig. 5C, and the hue of each.
@@ -96,8 +97,8 @@ impl BothSkins<'_> {
                 let (name, stroke) = match (locator, stroke) {
                     ("middle", Stroke::Solid) => ("always the middle of the skin", Stroke::Dotted),
                     ("middle", _) => ("always the middle of the skin", Stroke::DashDot),
-                    ("matched", _) => (short_label(locator), stroke),
-                    ("script_s5", _) => ("published script", stroke),
+                    ("matched", _) => (label(locator), stroke),
+                    ("script_s5", _) => (label(PublishedDecode::ScriptS20.name()), stroke),
                     _ => (locator_label(locator), stroke),
                 };
                 all.push(Series::of_decoder(format!("{name}{whose}"), locator, stroke, points));

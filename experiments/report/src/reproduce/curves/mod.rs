@@ -7,7 +7,7 @@ mod speed;
 use super::best::BEST;
 use super::results::{MEAN_COMMON, SkinResults};
 use crate::figures::{Chart, Claim, Series, StatedRange, Stroke, Style};
-use spts_eval::decoders::PublishedDecode;
+use spts_eval::decoders::{PublishedDecode, label};
 use spts_eval::{BaselineRow, RASTER, ScoreRow};
 
 /// Both skins; the real one only when recordings were given.
@@ -59,17 +59,6 @@ fn over_m(title: &str, y_label: &str, series: Vec<Series>, claims: Vec<Claim>) -
     }
 }
 
-/// In a legend.
-fn short_label(decode: &str) -> &str {
-    match decode {
-        "matched" => "published, matched",
-        "script_s20" => "published script",
-        RASTER => "raster scan of M taxels",
-        "evidence" => "evidence",
-        other => spts_eval::decoders::label(other),
-    }
-}
-
 impl BothSkins<'_> {
     /// Objects that the curves are means over: those both skins recorded compressively, or all of the twin's.
     pub(super) fn common(&self) -> &'static str {
@@ -95,7 +84,7 @@ impl BothSkins<'_> {
             for (results, whose, stroke) in self.named() {
                 let points = board(results, self.common(), decode, get);
                 if !points.is_empty() {
-                    let name = format!("{}{whose}", short_label(decode));
+                    let name = format!("{}{whose}", label(decode));
                     all.push(Series::of_decoder(name, decode, stroke, points));
                 }
             }

@@ -3,6 +3,7 @@
 use super::super::headline::Headline;
 use crate::Card;
 use crate::labels::object_list;
+use spts_eval::decoders::label;
 
 /// Number with `digits` decimals, or `None` for none.
 fn number(value: Option<f64>, digits: usize) -> Option<String> {
@@ -64,8 +65,8 @@ fn distances(h: &Headline) -> Vec<Option<Card>> {
             "mean difference, published decoder",
             share.text(h.iou_m20_matched_mean_abs_difference),
             &[
-                ("evidence", share.text(h.iou_m20_evidence_mean_abs_difference)),
-                ("non-negative LMMSE", share.text(h.iou_m20_nn_lmmse_mean_abs_difference)),
+                (label("evidence"), share.text(h.iou_m20_evidence_mean_abs_difference)),
+                (label("nn_lmmse"), share.text(h.iou_m20_nn_lmmse_mean_abs_difference)),
                 ("two simulated skins", share.text(h.iou_m20_matched_between_skins)),
             ],
             format!(
@@ -76,7 +77,10 @@ fn distances(h: &Headline) -> Vec<Option<Card>> {
             "Twin against real skin: classes, M = 20",
             "mean difference, published decoder",
             share.text(h.class_single_m20_matched_mean_abs_difference),
-            &[("evidence", share.text(h.class_single_m20_evidence_mean_abs_difference))],
+            &[(
+                label("evidence"),
+                share.text(h.class_single_m20_evidence_mean_abs_difference),
+            )],
             "Mean over the objects of the difference in the share of single windows classified correctly.".to_owned(),
         ),
     ]

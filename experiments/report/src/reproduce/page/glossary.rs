@@ -1,5 +1,8 @@
 //! Terms of the page.
 
+use spts_eval::RASTER;
+use spts_eval::decoders::label;
+
 /// Terms that need the real skin.
 const COMPARED: [(&str, &str); 2] = [
     (
@@ -13,7 +16,7 @@ const COMPARED: [(&str, &str); 2] = [
 ];
 
 /// Terms of every page.
-const ALWAYS: [(&str, &str); 14] = [
+const ALWAYS: [(&str, &str); 10] = [
     (
         "taxel",
         "One touch-sensitive element of the skin, as a pixel of an image. The skin has 10 × 10, 15 mm apart.",
@@ -32,10 +35,6 @@ const ALWAYS: [(&str, &str); 14] = [
         "Reading the taxels one after another: the true image, and the slow way to get it.",
     ),
     (
-        "raster scan of M taxels",
-        "The control: M taxels of a raster scan, the others filled in between them. It takes as long as M measurements.",
-    ),
-    (
         "support",
         "The touched taxels: those above 0.23 of the largest value of an image.",
     ),
@@ -47,6 +46,19 @@ const ALWAYS: [(&str, &str); 14] = [
         "IoU",
         "Intersection over union: taxels touched in both the decoded and the true image, over those touched in either. 1 is perfect, 0 is no overlap.",
     ),
+    ("vote of 20", "The object that most of 20 windows in a row name."),
+    (
+        "gain",
+        "How much a taxel answers to a pressure. It differs from taxel to taxel by some 20 %, and a raster image shows it as mottle.",
+    ),
+];
+
+/// Decoders and the control of every page, which stand there under their labels.
+const SCORED: [(&str, &str); 4] = [
+    (
+        RASTER,
+        "The control: M taxels of a raster scan, the others filled in between them. It takes as long as M measurements.",
+    ),
     (
         "matched",
         "The published decoder with weights of ±1, as the skin has them, and the output without contact taken off. The published script uses weights of 0 and 1.",
@@ -56,13 +68,8 @@ const ALWAYS: [(&str, &str); 14] = [
         "A decoder that knows typical images of every object. It weighs which object explains the measurements best, and the image is the mean of what remains possible.",
     ),
     (
-        "non-negative LMMSE",
-        "A decoder that knows how touched taxels usually go together, and that no pressure is negative. It needs no object to be known.",
-    ),
-    ("vote of 20", "The object that most of 20 windows in a row name."),
-    (
-        "gain",
-        "How much a taxel answers to a pressure. It differs from taxel to taxel by some 20 %, and a raster image shows it as mottle.",
+        "nn_lmmse",
+        "A decoder that knows how touched taxels usually go together, and that no pressure is negative. It needs no object to be known. Also called non-negative LMMSE.",
     ),
 ];
 
@@ -72,7 +79,9 @@ pub(super) fn terms(compared: bool) -> Vec<(String, String)> {
     let mut all: Vec<(String, String)> = ALWAYS
         .iter()
         .chain(more)
-        .map(|(term, meaning)| ((*term).to_owned(), (*meaning).to_owned()))
+        .copied()
+        .chain(SCORED.map(|(name, meaning)| (label(name), meaning)))
+        .map(|(term, meaning)| (term.to_owned(), meaning.to_owned()))
         .collect();
     all.sort_by_key(|(term, _)| term.to_lowercase());
     all

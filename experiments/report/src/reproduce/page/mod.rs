@@ -5,11 +5,13 @@ mod glossary;
 mod tables;
 
 use super::ReproductionSummary;
+use super::best::BEST;
 use super::curves::BothSkins;
 use super::figures::FIGURES;
 use super::tables::CorrelationRow;
 use crate::labels::object_label;
 use crate::{Page, PageFigure, Section};
+use spts_eval::decoders::label;
 
 /// What the page is made of.
 pub(super) struct PageContent<'a> {
@@ -139,7 +141,9 @@ fn scores_lead(compared: bool) -> String {
     };
     format!(
         "Windows of M measurements are decoded into images and classified: by the two decoders that were published with \
-         the skin, and by the two that do best here, evidence and non-negative LMMSE.{from}"
+         the skin, and by the two that do best here, “{}” and “{}”.{from}",
+        label(BEST[0]),
+        label(BEST[1])
     )
 }
 

@@ -2,11 +2,12 @@
 
 use super::super::curves::BothSkins;
 use super::super::results::SkinResults;
-use super::super::tables::CorrelationRow;
+use super::super::tables::{CorrelationRow, REAL, TWIN, skin_file};
 use crate::Table;
-use crate::labels::{decoder_label, object_label};
+use crate::labels::object_label;
+use spts_eval::decoders::label;
 
-/// Numbers of measurements shown in the table of mean scores; the CSV has all.
+/// Numbers of measurements shown in the table of mean scores; its files have all.
 const SHOWN: [usize; 7] = [5, 7, 10, 20, 25, 50, 100];
 
 /// Table of the mean scores.
@@ -30,11 +31,11 @@ pub(super) fn means(skins: &BothSkins<'_>) -> Table {
                 r.class_single,
                 r.class_vote20,
             ];
-            rows.push(row([decoder_label(r.decode).to_owned(), r.m.to_string()], &scores, 0));
+            rows.push(row([label(r.decode).to_owned(), r.m.to_string()], &scores, 0));
         }
         for b in results.scores.baselines.iter().filter(|b| b.object == object) {
             let scores = [b.support, b.iou, b.f1, b.balanced_accuracy];
-            rows.push(row([decoder_label(b.baseline).to_owned(), "0".to_owned()], &scores, 2));
+            rows.push(row([label(b.baseline).to_owned(), "0".to_owned()], &scores, 2));
         }
     };
     add("twin", skins.twin, skins.common());
@@ -58,11 +59,13 @@ pub(super) fn means(skins: &BothSkins<'_>) -> Table {
         "Means over the 17 objects"
     };
     let skin = compared.then_some("skin");
+    let whose = std::iter::once(TWIN).chain(compared.then_some(REAL));
+    let files = whose.flat_map(|whose| [skin_file("scores", whose), skin_file("baselines", whose)]);
     Table {
         caption: caption.to_owned(),
         header: skin.into_iter().chain(header).map(str::to_owned).collect(),
         rows,
-        file: Some("scores_twin.csv".to_owned()),
+        files: files.collect(),
     }
 }
 
@@ -73,6 +76,6 @@ pub(super) fn correlations(rows: &[CorrelationRow]) -> Table {
         caption: "Correlation (Pearson's r) of the twin's and the real skin's median raster images".to_owned(),
         header: vec!["object".to_owned(), "r".to_owned()],
         rows: rows.iter().map(row).collect(),
-        file: Some("raster_correlation.csv".to_owned()),
+        files: vec!["raster_correlation.csv".to_owned()],
     }
 }

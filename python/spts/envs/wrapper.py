@@ -1,0 +1,77 @@
+"""A skin for any environment with a MuJoCo model. Needs `mujoco`."""
+
+from __future__ import annotations
+
+import gymnasium as gym
+
+from .tactile import Tactile, fresh_seed
+
+
+class TactileWrapper(gym.ObservationWrapper):
+    """Adds a skin to an environment with a MuJoCo model: what it feels becomes a part of the observation.
+
+    The environment steps as it always does; the skin's forces act in every step of it. Needs `mujoco`.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        With `model` and `data` of MuJoCo, as all of gymnasium's and gymnasium-robotics's have.
+    skin : spts.Skin
+    site, bodies, link_geoms
+        As of `spts.mujoco.attach`.
+    key : str
+        Name of the new part of the observation. Observations that are no dictionaries become `observation`.
+    observe, measurements, decoder, wire
+        As of `spts.envs.Tactile`.
+    """
+
+    def __init__(
+        self,
+        env,
+        skin,
+        *,
+        site,
+        bodies,
+        link_geoms=None,
+        key="tactile",
+        observe="samples",
+        measurements=None,
+        decoder="nn_lmmse",
+        wire=None,
+    ):
+        from .. import mujoco as ours
+
+        super().__init__(env)
+        inner = env.unwrapped
+        if not (hasattr(inner, "model") and hasattr(inner, "data")):
+            raise ValueError(f"`env` = {inner}: it has no `model` and `data` of MuJoCo")
+        self.touch = ours.attach(inner.model, inner.data, skin, site=site, bodies=bodies, link_geoms=link_geoms)
+        self.touch.hook(self._feel)
+        self._tactile, self._key = Tactile(skin, observe, measurements, decoder, wire), key
+        spaces = env.observation_space
+        own = dict(spaces.spaces) if isinstance(spaces, gym.spaces.Dict) else {"observation": spaces}
+        if key in own:
+            raise ValueError(f'`key` = "{key}": the environment\'s observation has that already')
+        self.observation_space = gym.spaces.Dict({**own, key: self._tactile.space})
+
+    def reset(self, *, seed=None, options=None):
+        # what the environment computes while it resets is no touch
+        found, info = self.env.reset(seed=seed, options=options)
+        self._tactile.reset(fresh_seed(self.unwrapped.np_random))
+        self.touch.reset()
+        return self.observation(found), info
+
+    def _feel(self, touch):
+        self._tactile.feel(touch)
+
+    def observation(self, observation):
+        touch = self.touch.last
+        if touch is None:
+            # nothing has been felt since the reset
+            touch = self.touch.skin.touch({}, dt=0.0)
+        parts = observation if isinstance(observation, dict) else {"observation": observation}
+        return {**parts, self._key: self._tactile.of(touch)}
+
+    def close(self):
+        self.touch.detach()
+        super().close()
