@@ -60,8 +60,12 @@ pub fn within(field: &str, value: f64, least: f64, most: f64, range: &'static st
     in_range(field, value, (least..=most).contains(&value), range).map(drop)
 }
 
-/// Adds the `section` to `message`, an error about one of its fields: "`section.field` = 3 is outside …". If `message`
-/// does not begin with a field, the result is "`section`: …".
+/// Names the section of a TOML file in an error about one of its keys. `message` is the error as the section's reader
+/// gives it; the result is one line.
+///
+/// - A message that begins with a key and its value, "`bits` = 40 is outside [1, 24]", becomes "`adc.bits` = 40 is
+///   outside [1, 24]" for the `section` "adc".
+/// - Any other message, such as "unknown field", becomes "`adc`: unknown field".
 #[must_use]
 pub fn in_section(section: &str, message: &str) -> String {
     let message = message.trim_end().replace('\n', "; ");

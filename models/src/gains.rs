@@ -27,7 +27,7 @@ pub struct TaxelGains {
     /// Rows and columns of the skin, if they are known. A skin of another shape then refuses the gains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<[usize; 2]>,
-    /// Mean of the logarithm of a taxel's gain, one value a taxel in row-major order. Range [-5, 5].
+    /// Mean of the natural logarithm of a taxel's gain, one value a taxel in row-major order. Range [-5, 5].
     pub log_mean: Vec<f64>,
     /// Standard deviation of that logarithm: the uncertainty of the gain. Range [0, 2].
     pub log_sd: Vec<f64>,
@@ -86,7 +86,8 @@ impl TaxelGains {
         self.check(skin.taxels())
     }
 
-    /// The gain exp(mean + sd·z) of every taxel for its standard normal number z.
+    /// The gain exp(mean + sd·z) of every taxel, in row-major order. `z` has one number a taxel: how many standard
+    /// deviations its logarithm lies above the mean.
     pub fn at<'a>(&'a self, z: impl Iterator<Item = f64> + 'a) -> impl Iterator<Item = f64> + 'a {
         let known = self.log_mean.iter().zip(&self.log_sd);
         known.zip(z).map(|((mean, sd), z)| (mean + sd * z).exp())
@@ -99,7 +100,9 @@ impl TaxelGains {
             .collect()
     }
 
-    /// Standard deviation of the logarithm of every taxel's gain in one session.
+    /// Standard deviation of the natural logarithm of every taxel's gain in a session that was not part of the
+    /// calibration, one value a taxel in row-major order: √(`log_sd`² + `mounting_log_sd`²), the uncertainty of the
+    /// fixed gain and the change from session to session together.
     pub fn session_log_sd(&self) -> impl Iterator<Item = f64> + '_ {
         self.log_sd.iter().map(|sd| sd.hypot(self.mounting_log_sd))
     }

@@ -176,7 +176,8 @@ impl ElasticSolver {
         self.nested(0, self.shape, Some(force_n), tolerance)
     }
 
-    /// Pressure on the last shape or patch, Pa, row-major.
+    /// Pressure that the last call of [`Self::sink`] or [`Self::press`] has found, Pa: one value for each grid square,
+    /// row by row. After `sink` the squares are those of its patch, after `press` those of the whole grid.
     #[must_use]
     pub fn pressure_pa(&self) -> &[f64] {
         &self.levels[0].pressure

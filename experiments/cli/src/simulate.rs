@@ -145,8 +145,9 @@ pub(super) struct SimulateCommand {
     /// is decoded from that trace in time
     #[arg(long, conflicts_with = "no_record")]
     animate: bool,
-    /// Folder for the results. Those of an earlier run are replaced, all at once; files that no run has written stay
-    /// [default: out/NAME; for a mesh out/ and the name of its file, with a number where another mesh has that name]
+    /// Folder for the results. When the run ends, it replaces the files that an earlier run has written there; all other
+    /// files in the folder stay. Default: out/NAME for press/NAME and the other scenes, and out/FILE for --mesh FILE.obj.
+    /// If out/FILE has the results of another mesh, the folder is out/FILE_2, out/FILE_3 and so on [default: out/NAME]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]

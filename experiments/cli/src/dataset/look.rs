@@ -81,13 +81,19 @@ pub(super) struct HeadCommand {
     files: Files,
 }
 
-/// Prints the columns of the data set that a spec makes.
+/// Prints the columns of the data set that a spec makes: name, type, unit and meaning, one column a line.
+///
+/// No row is made. The columns depend on the spec: `record.phi = true` in it adds the column `phi`, for example.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts dataset schema
+  spts dataset schema courses
+  spts dataset schema my_spec.toml --json")]
 pub(super) struct SchemaCommand {
-    /// Spec: a TOML file, or one of those that ship
+    /// Spec: a TOML file, or the name of one that ships (`spts dataset specs` lists them)
     #[arg(value_name = "SPEC", default_value = "random-shapes")]
     spec: String,
-    /// Print them as JSON on standard output
+    /// Print the columns as JSON on standard output
     #[arg(long)]
     json: bool,
 }

@@ -174,7 +174,8 @@ pub trait Confidence {
     /// Starts the next window.
     fn begin(&mut self);
 
-    /// Adds the next sample of the window, given as a window of one measurement.
+    /// Takes the next sample of the window into account, and returns the answer so far and how sure the algorithm is of
+    /// it. `sample` is a window of one measurement: the sample and its row.
     ///
     /// # Errors
     /// [`DecodeError`].

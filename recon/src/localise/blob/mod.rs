@@ -77,7 +77,8 @@ struct Width {
     cols: Axis,
 }
 
-/// Blob templates, numbered by width, then row, then column.
+/// Finds the centre of a small round contact in the samples of a window. It compares them with Gaussian blobs at all
+/// centres of a grid and in several widths ([`BlobConfig`]), which are numbered by width, then row, then column.
 #[derive(Debug, Clone)]
 pub struct Localiser {
     rows: usize,
@@ -103,7 +104,9 @@ pub struct Estimate {
     pub width_px: f64,
 }
 
-/// Evidence of every blob from the measurements so far.
+/// What the samples of a window say so far about where the skin is touched: for every blob (a centre and a width) of a
+/// [`Localiser`], the sums from which [`Localiser::estimate`] computes how well that blob explains all samples. Made
+/// empty by [`Localiser::evidence`]; [`BlobEvidence::observe`] adds a sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlobEvidence {
     count: f64,
@@ -176,7 +179,7 @@ impl Localiser {
         Ok(())
     }
 
-    /// Empty evidence for these blobs.
+    /// Evidence of no sample, to begin a window with.
     #[must_use]
     pub fn evidence(&self) -> BlobEvidence {
         let zeros = vec![0.0; self.templates()];
@@ -285,7 +288,8 @@ fn weigh([count, yy]: [f64; 2], [yt, tt, variances, log_variances]: [&[f64]; 4],
 }
 
 impl BlobEvidence {
-    /// Adds one measurement `y`; `projected` is its row after [`Localiser::project`].
+    /// Takes one more sample `y` into account. `projected` is what [`Localiser::project`] makes of the sample's row of
+    /// the sensing matrix: one number for each blob.
     ///
     /// # Errors
     /// [`RangeError`] if `y` is not finite or beyond ±1e80, or `projected` belongs to other blobs. The evidence is then
@@ -303,7 +307,7 @@ impl BlobEvidence {
         Ok(())
     }
 
-    /// Removes all measurements.
+    /// Removes all samples, for a new window.
     pub fn clear(&mut self) {
         self.count = 0.0;
         self.yy = 0.0;
