@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("`{field}` = {} is outside {range}", Shown(*value))]
 pub struct ConfigError {
-    /// Name of the field, as it is written in a scene file.
+    /// Name of the parameter: its key in a scene file, such as `press.force_n`.
     pub field: String,
     /// The value.
     pub value: f64,
@@ -27,7 +27,7 @@ impl std::fmt::Display for Shown {
     }
 }
 
-/// Returns `value` if `ok` holds, and otherwise an error that names the field. Write `ok` as a comparison that fails
+/// Returns `value` if `ok` holds, and otherwise an error that names `field`, the parameter's key in a scene file. Write `ok` as a comparison that fails
 /// for NaN.
 ///
 /// # Errors

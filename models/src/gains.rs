@@ -40,7 +40,7 @@ impl TaxelGains {
     /// Reads gains from TOML text.
     ///
     /// # Errors
-    /// A message that names the field.
+    /// A message that names the key of the file that is wrong.
     pub fn from_toml(text: &str) -> Result<Self, String> {
         let gains: Self = toml::from_str(text).map_err(|e| explain_toml(&e))?;
         gains.check(gains.log_mean.len()).map_err(|e| e.to_string())?;
@@ -50,7 +50,7 @@ impl TaxelGains {
     /// Checks all values, and that there is one for each of `taxels` taxels.
     ///
     /// # Errors
-    /// [`ConfigError`] for the first field that is not valid.
+    /// [`ConfigError`] for the first value that is not valid.
     pub fn check(&self, taxels: usize) -> Result<(), ConfigError> {
         for (field, values, least, most, range) in [
             ("log_mean", &self.log_mean, -5.0, 5.0, "[-5, 5]"),
@@ -73,7 +73,7 @@ impl TaxelGains {
     /// Checks all values, and that they belong to `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] for the first field that is not valid.
+    /// [`ConfigError`] for the first value that is not valid.
     pub fn check_skin(&self, skin: &SkinLayout) -> Result<(), ConfigError> {
         for (field, found, needed) in [
             ("gains.shape[0]", self.shape.map(|s| s[0]), skin.rows()),

@@ -57,7 +57,7 @@ impl<'a> Row<'a> {
         Arc::clone(&self.shapes[0].choice.name)
     }
 
-    /// Mean pressure over every taxel's cell, Pa.
+    /// Mean pressure over every taxel's area, Pa.
     #[must_use]
     pub fn pressure(&self) -> &'a PressureMap {
         &self.state().pressure

@@ -37,7 +37,7 @@ pub struct SpecConfig {
     pub press: PressConfig,
     /// The ball and its fall; only if `record.what` is "drop".
     pub drop: Option<DropConfig>,
-    /// Contact field: `model` and its parameters. Default: `footprint`, and `winkler` for drops.
+    /// Contact model: its name, `model`, and its parameters. Default: `footprint`, and `winkler` for drops.
     pub contact: toml::Table,
     /// The skin.
     pub skin: SkinConfig,
@@ -246,7 +246,7 @@ pub struct RecordConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Label {
-    /// Mean pressure over the taxel's cell: `pressure_pa`.
+    /// Mean pressure over the taxel's area: `pressure_pa`.
     Pressure,
     /// Its conductance: `conductance_s`.
     Conductance,

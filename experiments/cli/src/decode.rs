@@ -62,8 +62,8 @@ pub(super) struct DecodeCommand {
     /// Root of the random numbers of learning
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
-    /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows
-    /// and columns than the published one [default: those that ship]
+    /// Trained network of the decoder `amortised`, a file that `python -m spts.amortised` writes; needed for a skin of
+    /// other rows and columns than the published one [default: the network that ships]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Gains of this skin, as `spts calibrate --skin` writes them: learn from presses of the known objects that are

@@ -154,8 +154,8 @@ pub(super) struct ScoreCommand {
     /// that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
-    /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows
-    /// and columns than the published one [default: those that ship]
+    /// Trained network of the decoder `amortised`, a file that `python -m spts.amortised` writes; needed for a skin of
+    /// other rows and columns than the published one [default: the network that ships]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// How the rows of a window come about; with both, every decoder is scored with each. `random`: measurements that

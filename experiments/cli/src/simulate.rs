@@ -53,7 +53,7 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
   summary.json timing.json   what happened; how long it took on which machine
   frames.csv                 force, torque, pose, peak pressure, area of the loaded taxels, frame by frame
   time_s.npy                 F: time of the frames, s
-  pressure_pa.npy            N x F x R x C: mean over each taxel's cell, Pa; electrode_pressure_pa.npy over its electrode
+  pressure_pa.npy            N x F x R x C: mean over each taxel's area, Pa; electrode_pressure_pa.npy over its electrode
   conductance_s.npy          N x F x R x C: what the readout sees, S
   session.json               the recordings as a session, with raster_*.npy and compressive_*.npy: see docs/session.md
   decoded.png decoded.svg    pressure, the trace of the wire, images decoded from it at three M
@@ -99,16 +99,17 @@ pub(super) struct SimulateCommand {
     /// the time between frames, 2 ms at most [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto")]
     timestep: Option<Timestep>,
-    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex are made of MuJoCo's own parts, to
-    /// check the others: they take minutes for a press and cannot simulate a ball [default: winkler, or the scene
-    /// file's]
+    /// Contact model, which computes the pressure between object and skin: footprint, winkler, layer or half_space.
+    /// taxel_bed and flex are made of MuJoCo's own parts, to check the others: they take minutes for a press and cannot
+    /// simulate a ball [default: winkler, or the scene file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
-    /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
+    /// Resolution of the contact: grid squares along one side of a taxel; [1, 64] [default: 6, or the scene file's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=64))]
     cells: Option<u32>,
-    /// Largest relative error of the taxels' pressures, [0.03, 1]: chooses the cheapest contact, cells and time step
-    /// that meet it, by the measurements of `spts fidelity`
+    /// Largest relative error of the taxels' pressures, [0.03, 1]: chooses the cheapest contact model, grid and
+    /// time step that meet it, by the measurements of `spts fidelity` [default: none; --contact, --cells and --timestep
+    /// say it]
     #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], value_parser = number)]
     tolerance: Option<f64>,
     /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]
@@ -121,18 +122,18 @@ pub(super) struct SimulateCommand {
     /// file's]
     #[arg(long, value_name = "NAME|FILE.toml")]
     readout: Option<String>,
-    /// Where the weights come from. model: the formula of the cells' generator. firmware: the output of emulated cells,
-    /// which is slower and gives the same recording as long as the cells keep up with the clock [default: model, or the
-    /// scene file's]
+    /// Where the weights of the taxels come from. model: the formula of the cells' generator. firmware: the output of
+    /// emulated cells (the microcontrollers behind the taxels), which is slower and gives the same recording as long as
+    /// the cells keep up with the clock [default: model, or the scene file's]
     #[arg(long, value_name = "NAME")]
     weights: Option<String>,
     /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting,
     /// detached; TAXEL counts from 0, row by row. Parameters stand under [[faults]] in a scene or profile file
     #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
     faults: Vec<(String, u32)>,
-    /// Any field of the scene, repeatable: KEY is a dotted path, such as press.force_n, skin.rows or
-    /// transducer_parameters.temperature_c, VALUE is TOML, and a bare word is a string. The options above are short
-    /// forms of such fields
+    /// Sets any key of the scene file, repeatable: KEY is its dotted path, such as press.force_n, skin.rows or
+    /// transducer_parameters.temperature_c, VALUE is TOML, and a bare word is a string. docs/scenes.md has all keys. The
+    /// options above are short forms for some of them
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
     set: Vec<Assignment>,
     /// Only the mechanics and the conductance, no recording

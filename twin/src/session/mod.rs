@@ -76,7 +76,7 @@ pub struct PressFacts {
     pub pose: Option<PressPose>,
     /// Normal force on the skin, N.
     pub force_n: Option<f64>,
-    /// Mean pressure over each taxel's cell, Pa.
+    /// Mean pressure over each taxel's area (pitch × pitch), Pa.
     pub pressure: Option<PressureMap>,
     /// Conductance of each taxel, S, as the readout saw it.
     pub conductance: Option<ConductanceMap>,

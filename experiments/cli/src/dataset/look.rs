@@ -35,7 +35,7 @@ pub(super) struct VerifyCommand {
 
 /// Compares the truth of every row with that of the same row of another data set.
 ///
-/// It is meant for two data sets that differ in one thing, such as the contact field. Means of pressure and conductance
+/// It is meant for two data sets that differ in one thing, such as the contact model. Means of pressure and conductance
 /// are relative to the reference; rows without a touch are left out.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:

@@ -44,7 +44,8 @@ pub(super) struct MakeCommand {
     /// Root of every random number, in place of the spec's
     #[arg(long, value_name = "SEED", value_parser = seed)]
     seed: Option<u64>,
-    /// Changes a field of the spec: KEY is its dotted path, VALUE is TOML; repeatable
+    /// Changes one key of the spec file for this run: KEY is its dotted path, VALUE is TOML; repeatable. docs/datasets.md
+    /// has all keys
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
     set: Vec<Assignment>,
     /// Makes the share of worker i of n: the files k with k mod n = i

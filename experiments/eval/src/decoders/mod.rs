@@ -31,7 +31,7 @@ pub enum Needs {
     Classes,
     /// Procedural shapes pressed in the simulation, for every source of training data.
     Shapes,
-    /// Only the weights of a network, which was trained on such shapes before.
+    /// Only the parameters of a network, which was trained on such shapes before.
     Network,
 }
 

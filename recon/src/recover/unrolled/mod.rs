@@ -107,7 +107,7 @@ pub struct Touched {
 }
 
 impl Unrolled {
-    /// A network with `weights`.
+    /// A network with the numbers that its training has found.
     #[must_use]
     pub fn new(weights: UnrolledWeights) -> Self {
         let tables = SignTables::new(weights.prior.view());

@@ -13,7 +13,7 @@ pub struct Layer {
 }
 
 impl Layer {
-    /// A layer with `weights` (inputs × outputs, row-major) and one `bias` for each output.
+    /// A layer whose `weights` are the matrix W (inputs × outputs, row-major), with one `bias` b for each output.
     /// [`super::UnrolledWeights::new`] checks that layers fit together.
     #[must_use]
     pub fn new(weights: Vec<f32>, bias: Vec<f32>) -> Self {
