@@ -169,7 +169,7 @@ pub(super) const ROW_COLUMNS: &[RowColumn] = &[
         Kind::F32,
         TAXELS,
         "Pa",
-        "true mean pressure over every taxel's area, row by row of the skin",
+        "true mean pressure over every taxel's cell, row by row of the skin",
         |spec| Label::Pressure.is_in(spec),
         |r, s| {
             s.numbers(r.pressure().values());
