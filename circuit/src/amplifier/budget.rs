@@ -72,7 +72,8 @@ impl Skin {
     }
 }
 
-/// Conditions under which the amplifier works.
+/// What the amplifier has to cope with: how the skin is pressed, the converter behind it, and the time between a change
+/// of the drives and the sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// The pressed skin.
@@ -83,7 +84,7 @@ pub struct Setting {
     pub available_s: f64,
 }
 
-/// Why a readout does not work.
+/// Why a readout does not work at a given size of the skin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {

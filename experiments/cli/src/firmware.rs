@@ -29,6 +29,11 @@ use std::path::{Path, PathBuf};
 /// computes first, as the published device does, and is interrupted by a timer every millisecond, so that its DAC is
 /// sometimes late. A scene with `weights = "firmware"` takes its weights from cells like these.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts firmware verify --cells 20
+  spts firmware timing
+  spts firmware weights --mode analog --out weights.npy
+  spts firmware trace --taxel 3")]
 pub(super) struct FirmwareCommand {
     #[command(subcommand)]
     command: FirmwareAction,
@@ -83,10 +88,10 @@ struct VerifyCommand {
 Files in DIR:
   timing.csv                 one line an image and mode
   timing.json                the same, and the late updates
-  figures/firmware.png       share of lost edges over the clock's rate, share of late DAC updates over the sample's delay;
-                             firmware.svg the same")]
+  figures/firmware.png       share of lost edges over the clock's rate, share of late DAC updates over the sample's
+                             delay; firmware.svg the same")]
 struct TimingCommand {
-    /// Image: shipped, plain, or a file in Intel's hex format; the other two are shown beside it
+    /// Firmware image to time: shipped, plain, or a file in Intel's hex format; those that ship are shown beside it
     #[arg(long, value_name = "IMAGE", default_value = "shipped")]
     image: String,
     /// Folder of the results
@@ -160,7 +165,7 @@ struct CellOptions {
     /// Cells on the bus, addresses 8 and up; [1, 112]
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u8>(1..=112))]
     cells: u8,
-    /// Image: shipped, plain, or a file in Intel's hex format
+    /// Firmware image: shipped, plain, or a file in Intel's hex format
     #[arg(long, value_name = "IMAGE", default_value = "shipped")]
     image: String,
     /// Seeds of the cells' random generators: address is the cell's bus address in one byte, as published; mixed is a

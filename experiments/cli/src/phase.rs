@@ -29,13 +29,14 @@ use std::path::PathBuf;
 
 Files in DIR:
   rates.csv                 one line a method, M and S: share of the problems that were solved
-  crossings.csv             one line a method and M: the S/M at which half are solved, its standard error, and the theory
+  crossings.csv             one line a method and M: the S/M at which half are solved, its standard error, and the
+                            theory
   phase.json                both
-  figures/phase.png         the S/M at which half are solved, over M/N, beside the theory; phase_rates.png all shares, with the
-                            theory outlined; .svg the same
+  figures/phase.png         the S/M at which half are solved, over M/N, beside the theory; phase_rates.png all shares,
+                            with the theory outlined; .svg the same
 
-For small N, the share falls from 1 to 0 over a range of S/M of about N^(-1/2), a little above the theory. Where it is zero at two
-neighbouring S, it is taken as zero for all larger S without a trial.")]
+For small N, the share falls from 1 to 0 over a range of S/M of about N^(-1/2), a little above the theory. Where it is
+zero at two neighbouring S, it is taken as zero for all larger S without a trial.")]
 pub(super) struct PhaseCommand {
     /// Recovery algorithms, by the names in docs/decoders.md [default: all that look for sparse signals of these
     /// --signs]

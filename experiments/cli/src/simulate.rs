@@ -48,12 +48,14 @@ use toml::Value;
   spts simulate out/T/scene.toml --out out/again
 
 Files in DIR (N presses, F frames, the skin's rows R and columns C):
-  scene.toml                 the scene with every default; simulate it again for the same bytes. Files that it names lie beside it
+  scene.toml                 the scene with every default; simulate it again for the same bytes. Files that it names lie
+                             beside it
   manifest.json              what the run wrote, with sizes and SHA-256: a later run replaces these files and no others
   summary.json timing.json   what happened; how long it took on which machine
   frames.csv                 force, torque, pose, peak pressure, area of the loaded taxels, frame by frame
   time_s.npy                 F: time of the frames, s
-  pressure_pa.npy            N x F x R x C: mean over each taxel's area, Pa; electrode_pressure_pa.npy over its electrode
+  pressure_pa.npy            N x F x R x C: mean over each taxel's area, Pa; electrode_pressure_pa.npy over its
+                             electrode
   conductance_s.npy          N x F x R x C: what the readout sees, S
   session.json               the recordings as a session, with raster_*.npy and compressive_*.npy: see docs/session.md
   decoded.png decoded.svg    pressure, the trace of the wire, images decoded from it at three M
@@ -68,7 +70,7 @@ pub(super) struct SimulateCommand {
     list: bool,
     /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The arm holds it at its origin; its -z side faces the
     /// skin. Small defects are repaired and large meshes are decimated, with a note. A mesh that cannot be repaired is
-    /// refused with the reason
+    /// refused with the reason [default: none]
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh file, 0.001 for millimetres; (0, 1000] [default: 1]
@@ -80,10 +82,10 @@ pub(super) struct SimulateCommand {
     /// Column of the object's origin, in taxels [default: the object's own place]
     #[arg(long, value_name = "COL", value_parser = number)]
     col: Option<f64>,
-    /// Rotation about the skin's normal, counter-clockwise from above, degrees; [-360, 360]
+    /// Rotation about the skin's normal, counter-clockwise from above, degrees; [-360, 360] [default: the object's own]
     #[arg(long, value_name = "DEG", value_parser = number)]
     rotation_deg: Option<f64>,
-    /// Tilt about the skin's x and y axes, degrees; each [-60, 60]
+    /// Tilt about the skin's x and y axes, degrees; each [-60, 60] [default: the object's own]
     #[arg(long, value_name = "X,Y", value_parser = parse_pair, allow_hyphen_values = true)]
     tilt_deg: Option<[f64; 2]>,
     /// Force on the plateau, N; [0.5, 100] [default: 20]
@@ -128,12 +130,13 @@ pub(super) struct SimulateCommand {
     #[arg(long, value_name = "NAME")]
     weights: Option<String>,
     /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting,
-    /// detached; TAXEL counts from 0, row by row. Parameters stand under [[faults]] in a scene or profile file
+    /// detached; TAXEL counts from 0, row by row. Parameters stand under [[faults]] in a scene or profile
+    /// file [default: none]
     #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
     faults: Vec<(String, u32)>,
     /// Sets any key of the scene file, repeatable: KEY is its dotted path, such as press.force_n, skin.rows or
     /// transducer_parameters.temperature_c, VALUE is TOML, and a bare word is a string. docs/scenes.md has all keys. The
-    /// options above are short forms for some of them
+    /// options above are short forms for some of them [default: none]
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
     set: Vec<Assignment>,
     /// Only the mechanics and the conductance, no recording

@@ -39,12 +39,12 @@ use std::path::PathBuf;
   spts sensing study --skin 16x16 --readout as_built
 
 Files in DIR:
-  study.csv             one line a kind of touches, readout, designer and M: IoU, how much it exceeds that of random rows, bands,
-                        error of the place, share of clipped samples
+  study.csv             one line a kind of touches, readout, designer and M: IoU, how much it exceeds that of random
+                        rows, bands, error of the place, share of clipped samples
   equal.csv             how many random rows give the same IoU as the rows of each designer
   classes.csv           share of the touches whose object is named rightly, one line a readout, designer and M
-  costs.csv             largest sample, headroom and errors by cause, for the rows in the designer's order and in the order in which
-                        the fewest weights change from row to row
+  costs.csv             largest sample, headroom and errors by cause, for the rows in the designer's order and in the
+                        order in which the fewest weights change from row to row
   objects.csv           IoU of every object and of every family of shapes
   study.json            all of them
   figures/sensing.png   IoU over M with bands; sensing.svg the same")]
@@ -75,8 +75,8 @@ pub(super) struct StudyCommand {
     /// --quick 34]
     #[arg(long, value_name = "COUNT", value_parser = whole::<usize>(1..=10_000))]
     touches: Option<usize>,
-    /// Limits the signal that designed rows give, so that the amplifier does not clip it: their root mean square, as a
-    /// multiple of that of random rows; [0.05, 1000] [default: no limit]
+    /// Upper limit of the samples of a designed row, so that the amplifier does not clip them: their root mean square,
+    /// as a multiple of that of a random row; [0.05, 1000] [default: no limit]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
     /// Standard deviation of the natural logarithm of the taxels' gains that the designers reckon with; [0, 3]

@@ -204,7 +204,8 @@ impl SkinReport {
         })
     }
 
-    /// Factor by which every gain may be larger or smaller (90 % interval).
+    /// Uncertainty of the gains, one factor a taxel, row by row: with a probability of 90 %, the true gain lies between
+    /// the found one divided by the factor and the found one times the factor.
     pub fn bands(&self) -> impl Iterator<Item = f64> + '_ {
         self.skin.gains.log_sd.iter().map(|sd| (BAND_SD * sd).exp())
     }

@@ -92,13 +92,14 @@ impl Preparation {
         }
     }
 
-    /// Number of prepared rows.
+    /// Number of rows prepared for the window so far.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Prepares a measurement with the weights φ. `row` is φᵀ·[bank](super::EvidenceClassifier::bank).
+    /// Prepares the next measurement of the window, taken with the weights φ of the taxels. `row` is
+    /// φᵀ·[bank](super::EvidenceClassifier::bank): one number for each column of the bank.
     ///
     /// # Errors
     /// [`EvidenceError`] if the length differs from the bank's number of columns, or a value is not finite or beyond

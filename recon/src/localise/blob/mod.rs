@@ -150,15 +150,16 @@ impl Localiser {
         })
     }
 
-    /// Number of blobs.
+    /// Number of blobs: centres × widths.
     #[must_use]
     pub fn templates(&self) -> usize {
         self.variances.len()
     }
 
-    /// Computes φᵀb of every blob into `projected`, for one row φ of weights (`rows · cols` values, row-major). It
-    /// needs no sample. Blobs are separable, so the cost for each width is O(centres a column · (rows · cols + centres
-    /// a row · cols)).
+    /// Computes which sample every blob of amplitude 1 would give with one row φ of the sensing matrix: φᵀb for each
+    /// blob b, written into `projected`. `weights` is that row: `rows · cols` values, row-major. No sample is needed,
+    /// so that it can be done before the sample arrives. Blobs are separable, so the cost for each width is O(centres a
+    /// column · (rows · cols + centres a row · cols)).
     ///
     /// # Errors
     /// [`RangeError`] if `weights` has another length, or a value that is not finite or beyond ±1e12.
