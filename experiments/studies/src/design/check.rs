@@ -24,7 +24,7 @@ pub struct DesignCheck {
     pub seed: u64,
 }
 
-/// One promised quantity, and its value in the check.
+/// One quantity that a design promises, such as the IoU, and its value in the check.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CheckedQuantity {
     /// Name.
@@ -37,7 +37,7 @@ pub struct CheckedQuantity {
     pub agrees: bool,
 }
 
-/// Results of a check.
+/// Results of `spts design check`: whether new simulated touches find what the design promised.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CheckReport {
     /// Whether all quantities lie in their bands.

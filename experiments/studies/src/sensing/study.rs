@@ -19,7 +19,8 @@ use spts_recon::rows::{DESIGNERS, Designer, Expected, RowNeeds, RowTask, Toleran
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Settings of the comparison.
+/// Settings of `spts sensing study`, which measures what designed rows of the sensing matrix are worth against random
+/// ones.
 #[derive(Clone)]
 pub struct SensingStudy {
     /// The skin.
@@ -100,7 +101,7 @@ pub struct Equal {
     pub random_m: Option<f64>,
 }
 
-/// Results of the comparison.
+/// Results of `spts sensing study`: scores of designed and random rows, and what the rows cost.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensingReport {
     /// Rows and columns of the skin.
