@@ -136,7 +136,8 @@ pub struct MeasuredSetting {
     pub class_delta: f64,
 }
 
-/// A setting chosen from the table.
+/// The cheapest contact model, grid and time step that meet a wanted error, from the table that `spts fidelity`
+/// measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FidelityChoice {
     /// The fidelity level.

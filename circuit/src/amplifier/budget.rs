@@ -11,7 +11,7 @@ use spts_models::{ConfigError, within};
 /// and 6 of 100 000 measurements lie beyond four.
 pub(super) const EXCURSION_SD: f64 = 4.0;
 
-/// A pressed skin, described independently of its size.
+/// How a skin is pressed, as far as the amplifier is concerned; independent of the number of taxels.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Skin {

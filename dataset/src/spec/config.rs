@@ -74,7 +74,7 @@ pub enum SplitBy {
     Press,
 }
 
-/// Section `[object]`.
+/// Section `[object]`: what is pressed.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ObjectConfig {
@@ -145,7 +145,7 @@ pub enum PoseOrigin {
     Placement,
 }
 
-/// Section `[press]`.
+/// Section `[press]`: how hard and how long an object is pressed.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PressConfig {
@@ -183,7 +183,7 @@ pub struct DropConfig {
     pub stiffness_pa_per_m: Draw,
 }
 
-/// Section `[skin]`.
+/// Section `[skin]`: layout of the skin, and how many specimens there are.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SkinConfig {
@@ -215,7 +215,7 @@ pub struct FaultsConfig {
     pub names: Option<Vec<String>>,
 }
 
-/// Section `[record]`.
+/// Section `[record]`: which windows are recorded, and what is stored of them.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordConfig {

@@ -50,7 +50,7 @@ use std::sync::Arc;
 /// at the joints) at the tool, along the skin's normal.
 pub const ARM_MASS_KG: f64 = 1.5;
 
-/// The task of a scene.
+/// What happens in a scene: presses by the arm, or drops of a ball.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Task<'a> {
     /// The arm presses an object.
@@ -64,7 +64,7 @@ const LONGEST_FRAME_INTERVAL_S: f64 = 0.1;
 /// What `frame_interval_s` may be, for errors.
 const FRAME_INTERVAL_RANGE: &str = "[timestep_s, 0.1] s for a press, [timestep_s, 2e-4] s for a drop";
 
-/// A valid scene with its mesh.
+/// The mechanical part of a scene, checked, with the mesh of its object: what presses on the skin, where and how hard.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mechanics {
     config: MechanicsConfig,

@@ -111,7 +111,7 @@ impl Recorded {
     }
 }
 
-/// Recordings of one object or event.
+/// Recordings of one object or event on one skin, raster and compressive, with what is known of every press.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Session {
     /// Name that identifies the session within a set. It must be valid as a file name; spaces are allowed.

@@ -91,7 +91,7 @@ pub struct Localiser {
     cell: f64,
 }
 
-/// Position of a contact and its uncertainty.
+/// Where a contact is, how uncertain its place is, and the strength and width of the blob that fits best.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Posterior mean of the centre, (row, col), taxels.
