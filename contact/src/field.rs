@@ -22,10 +22,11 @@ use crate::response::Response;
 pub trait ContactField: Send {
     /// Pressure on the skin and wrench on the body for the given pose and velocity.
     ///
-    /// The normal force of the wrench equals the sum of pressure × area over all grid squares. Pressure is finite and never negative, at
-    /// any depth and for any mesh with finite vertices and valid indices.
+    /// The normal force of the wrench equals the sum of pressure × area over all grid squares. Pressure is finite and
+    /// never negative, at any depth and for any mesh with finite vertices and valid indices.
     ///
-    /// A wrench of NaN means that there is no answer: pose or velocity is not finite, or a solver failed. The pressure then has no meaning, and a simulation stops with an error.
+    /// A wrench of NaN means that there is no answer: pose or velocity is not finite, or a solver failed. The pressure
+    /// then has no meaning, and a simulation stops with an error.
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_>;
 
     /// Announces the mesh of the following bodies, so that it is prepared once and not compared at each call. It
@@ -74,7 +75,8 @@ pub trait ContactField: Send {
     /// Grid squares along one side of a taxel: the resolution of the pressure.
     fn cells_per_taxel(&self) -> usize;
 
-    /// All parameters, defaults included, as a scene would write them. They are enough to build the same contact field again.
+    /// All parameters, defaults included, as a scene would write them. They are enough to build the same contact field
+    /// again.
     fn parameters(&self) -> toml::Table;
 
     /// Damping time of the layer, s: the viscous part of the pressure is this time × the rate of the elastic part.

@@ -70,8 +70,8 @@ pub fn build_contact(
     build_contact_from(&[CONTACT_FIELDS], name, parameters, skin)
 }
 
-/// Builds the contact field called `name` from the first of `tables` that has it. It is for programs with contact fields
-/// of their own: `tables` are then [`CONTACT_FIELDS`] and theirs.
+/// Builds the contact field called `name` from the first of `tables` that has it. It is for programs with contact
+/// fields of their own: `tables` are then [`CONTACT_FIELDS`] and theirs.
 ///
 /// # Errors
 /// [`ContactError`] if no table has the name, or a parameter is not valid.

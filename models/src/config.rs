@@ -27,8 +27,8 @@ impl std::fmt::Display for Shown {
     }
 }
 
-/// Returns `value` if `ok` holds, and otherwise an error that names `field`, the parameter's key in a scene file. Write `ok` as a comparison that fails
-/// for NaN.
+/// Returns `value` if `ok` holds, and otherwise an error that names `field`, the parameter's key in a scene file. Write
+/// `ok` as a comparison that fails for NaN.
 ///
 /// # Errors
 /// [`ConfigError`] if `ok` is false.

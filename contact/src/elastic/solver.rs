@@ -13,8 +13,9 @@ use std::sync::Arc;
 /// Solver for the contact of height maps with a half-space or a bonded layer.
 ///
 /// The surface is divided into a grid of squares (in names: `cell`). It is not periodic: pressure acts on the grid, and
-/// the body extends to infinity. Pressure is uniform on each square; displacement is evaluated at its centre. Operators of the sizes used most recently (about two dozen) and
-/// all buffers are kept between calls, so only a new size allocates.
+/// the body extends to infinity. Pressure is uniform on each square; displacement is evaluated at its centre. Operators
+/// of the sizes used most recently (about two dozen) and all buffers are kept between calls, so only a new size
+/// allocates.
 ///
 /// ```
 /// use spts_contact::{ElasticKernel, ElasticSolver};

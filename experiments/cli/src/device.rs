@@ -72,8 +72,8 @@ impl DeviceMode {
 /// frames of 100 codes of the converter.
 ///
 /// Without SESSION, an object is pressed on a simulated skin again and again, a press a block; only the contact is
-/// simulated, not the arm, and the force rises and falls in about a quarter of a second. With SESSION, the device sends that
-/// recording, of the twin or of the real skin.
+/// simulated, not the arm, and the force rises and falls in about a quarter of a second. With SESSION, the device sends
+/// that recording, of the twin or of the real skin.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts device --pty                            T is pressed; the first line printed is the port, such as /dev/pts/5

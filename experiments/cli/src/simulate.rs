@@ -135,8 +135,8 @@ pub(super) struct SimulateCommand {
     #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
     faults: Vec<(String, u32)>,
     /// Sets any key of the scene file, repeatable: KEY is its dotted path, such as press.force_n, skin.rows or
-    /// transducer_parameters.temperature_c, VALUE is TOML, and a bare word is a string. docs/scenes.md has all keys. The
-    /// options above are short forms for some of them [default: none]
+    /// transducer_parameters.temperature_c, VALUE is TOML, and a bare word is a string. docs/scenes.md has all keys.
+    /// The options above are short forms for some of them [default: none]
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
     set: Vec<Assignment>,
     /// Only the mechanics and the conductance, no recording
@@ -149,9 +149,9 @@ pub(super) struct SimulateCommand {
     /// is decoded from that trace in time
     #[arg(long, conflicts_with = "no_record")]
     animate: bool,
-    /// Folder for the results. When the run ends, it replaces the files that an earlier run has written there; all other
-    /// files in the folder stay. Default: out/NAME for press/NAME and the other scenes, and out/FILE for --mesh FILE.obj.
-    /// If out/FILE has the results of another mesh, the folder is out/FILE_2, out/FILE_3 and so on [default: out/NAME]
+    /// Folder for the results. When the run ends, it replaces the files that an earlier run has written there; all
+    /// other files in the folder stay [default: out/NAME, such as out/T for press/T; with --mesh cup.obj out/cup, or
+    /// out/cup_2, out/cup_3 and so on where out/cup has the results of another mesh]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]

@@ -290,8 +290,8 @@ impl Mechanics {
         self.mesh_report.as_ref()
     }
 
-    /// Puts the contact field `field` under the preload of a bent skin before press `index`, and returns the resulting pressure of every
-    /// taxel, Pa. `None` for a flat skin, and for a contact field without preloads.
+    /// Puts the contact field `field` under the preload of a bent skin before press `index`, and returns the resulting
+    /// pressure of every taxel, Pa. `None` for a flat skin, and for a contact field without preloads.
     pub fn preload(&self, field: &mut dyn ContactField, index: u64) -> Option<Vec<f64>> {
         let bend = self.config.bend.as_ref()?;
         field.preload(&bend.strain(self.skin(), self.seed(), index))

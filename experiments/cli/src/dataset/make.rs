@@ -47,8 +47,8 @@ pub(super) struct MakeCommand {
     /// Root of every random number; [0, 2^63) [default: the spec's]
     #[arg(long, value_name = "SEED", value_parser = seed)]
     seed: Option<u64>,
-    /// Changes one key of the spec file for this run: KEY is its dotted path, VALUE is TOML; repeatable. docs/datasets.md
-    /// has all keys [default: none]
+    /// Changes one key of the spec file for this run: KEY is its dotted path, VALUE is TOML; repeatable.
+    /// docs/datasets.md has all keys [default: none]
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
     set: Vec<Assignment>,
     /// Make the files of worker i of n only, those whose number k has k mod n = i; count from 0 [default: what the

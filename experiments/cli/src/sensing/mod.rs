@@ -13,8 +13,8 @@ use study::StudyCommand;
 
 /// Designs the rows of the sensing matrix, and measures how much better than random rows they are.
 ///
-/// A row is one weight a taxel: a sample is the sum of all taxels, each times its weight. The published cells draw their
-/// weights at random.
+/// A row is one weight a taxel: a sample is the sum of all taxels, each times its weight. The published cells draw
+/// their weights at random.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts sensing design --designer cosine_signs --rows 20
