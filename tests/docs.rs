@@ -1,7 +1,8 @@
 //! The documentation says what the program takes: every command line and TOML block of README.md and of the book is
-//! parsed, and the reference of scenes, profiles and specs has every field.
+//! parsed, the reference of scenes, profiles and specs has every field, and every command has examples and help.
 
 mod fields;
+mod help;
 mod pages;
 
 use pages::{Block, blocks, inline_code, pages};

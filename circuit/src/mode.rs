@@ -3,7 +3,7 @@
 use crate::lcg::Jump;
 use serde::{Deserialize, Serialize};
 
-/// The two readouts.
+/// The two ways to read the skin: one taxel after the other, or all taxels weighted and added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {

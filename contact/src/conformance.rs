@@ -7,7 +7,7 @@ use crate::mesh::TriMesh;
 use crate::table::ContactBuild;
 use spts_models::SkinLayout;
 
-/// A property of [`ContactField`] that a field lacks.
+/// A property that [`ContactField`] demands and an implementation lacks.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{check}: got {actual:e}, expected {expected}")]
 pub struct Nonconformity {
@@ -19,15 +19,15 @@ pub struct Nonconformity {
     pub expected: String,
 }
 
-/// Checks the field that `build` makes with default parameters for the properties of [`ContactField`]: the force
-/// balances the pressure, there is no tension, there is no force without touch, the force is finite and grows with
-/// depth, the field has no memory, friction opposes sliding, there is no pressure beside the skin, a pose or velocity
-/// that is not finite gives NaN, and the field's parameters rebuild it.
+/// Checks the contact field that `build` makes with default parameters for the properties of [`ContactField`]: the
+/// force balances the pressure, there is no tension, there is no force without touch, the force is finite and grows
+/// with depth, earlier calls change no answer, friction opposes sliding, there is no pressure beside the skin, a pose
+/// or velocity that is not finite gives NaN, and `parameters` rebuild the same contact field.
 ///
 /// ```
 /// use spts_contact::{WinklerConfig, WinklerLayer, conformance};
 ///
-/// // a field of your own passes the same checks
+/// // a contact field of your own passes the same checks
 /// conformance(|parameters, skin| {
 ///     let config: WinklerConfig = parameters.try_into()?;
 ///     Ok(Box::new(WinklerLayer::new(config, skin)?))
@@ -57,7 +57,7 @@ pub fn conformance(build: ContactBuild) -> Result<(), Nonconformity> {
         let sum: f64 = response.pressure_pa.iter().sum::<f64>() * area_m2;
         let normal = response.wrench.force_n[2];
         check(
-            "one value a fine cell",
+            "one value a grid square",
             response.pressure_pa.len() == skin.taxels() * cells * cells,
             response.pressure_pa.len(),
             "taxels × cells²",

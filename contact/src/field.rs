@@ -1,11 +1,12 @@
-//! Interface of contact fields.
+//! Interface of contact fields: what computes the pressure between a body and the skin.
 
 use crate::body::PosedMesh;
 use crate::prepared::PreparedMesh;
 use crate::quasi_static::QuasiStatic;
 use crate::response::Response;
 
-/// Elastic layer of the skin in contact with a body.
+/// A contact model at work: the skin's foam, which answers a posed body with the pressure on the skin and the wrench on
+/// the body.
 ///
 /// ```
 /// use spts_contact::{PosedMesh, build_contact, mesh::cuboid};
@@ -21,11 +22,11 @@ use crate::response::Response;
 pub trait ContactField: Send {
     /// Pressure on the skin and wrench on the body for the given pose and velocity.
     ///
-    /// The normal force of the wrench equals the sum of pressure × cell area. Pressure is finite and never negative, at
-    /// any depth and for any mesh with finite vertices and valid indices.
+    /// The normal force of the wrench equals the sum of pressure × area over all grid squares. Pressure is finite and
+    /// never negative, at any depth and for any mesh with finite vertices and valid indices.
     ///
-    /// A wrench of NaN means that the field has no answer: pose or velocity is not finite, or the field's solver
-    /// failed. The pressure then has no meaning, and a simulation stops with an error.
+    /// A wrench of NaN means that there is no answer: pose or velocity is not finite, or a solver failed. The pressure
+    /// then has no meaning, and a simulation stops with an error.
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_>;
 
     /// Announces the mesh of the following bodies, so that it is prepared once and not compared at each call. It
@@ -33,8 +34,8 @@ pub trait ContactField: Send {
     fn expect(&mut self, _mesh: &PreparedMesh) {}
 
     /// Sets a preload: `strain` is the compression of the foam under every taxel while nothing touches the skin, as a
-    /// share of its thickness, in [0, 1) and in row-major order. Returns the resulting pressure of every taxel, Pa. A
-    /// field without preloads returns `None` and changes nothing.
+    /// share of its thickness, in [0, 1) and in row-major order. Returns the resulting pressure of every taxel, Pa;
+    /// `None`, and nothing changes, for a contact model without preloads.
     ///
     /// Answers are the addition due to the body: it meets the surface at the same height, on foam that its compression
     /// has made stiffer. An electrode is under the answer plus the preload. A preload of 0 changes no answer.
@@ -45,7 +46,7 @@ pub trait ContactField: Send {
         None
     }
 
-    /// Why the last call had no answer, if the field knows.
+    /// Why the last call had no answer; `None` if it had one, or if the reason is not known.
     fn failure(&self) -> Option<String> {
         None
     }
@@ -59,8 +60,8 @@ pub trait ContactField: Send {
         None
     }
 
-    /// The field as one that finds the pose under a prescribed force; `None` if it cannot. Its presses need no
-    /// dynamics.
+    /// The same contact field as one that finds the pose under a prescribed force, so that a press needs no dynamics;
+    /// `None` for a contact model that cannot.
     fn quasi_static(&mut self) -> Option<&mut dyn QuasiStatic> {
         None
     }
@@ -71,10 +72,11 @@ pub trait ContactField: Send {
         0.0
     }
 
-    /// Fine cells along one side of a taxel.
+    /// Grid squares along one side of a taxel: the resolution of the pressure.
     fn cells_per_taxel(&self) -> usize;
 
-    /// All parameters, defaults included, as a scene would write them. They are enough to build the same field again.
+    /// All parameters, defaults included, as a scene would write them. They are enough to build the same contact field
+    /// again.
     fn parameters(&self) -> toml::Table;
 
     /// Damping time of the layer, s: the viscous part of the pressure is this time × the rate of the elastic part.

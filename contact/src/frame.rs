@@ -48,9 +48,9 @@ impl Wrench {
 pub struct Frame {
     /// Time since the start of the scene, s.
     pub time_s: f64,
-    /// Mean pressure over each taxel's whole cell (pitch × pitch), Pa. Its sum × cell area is the normal contact force.
+    /// Mean pressure over each taxel's whole area (pitch × pitch), Pa. Its sum × pitch² is the normal contact force.
     pub pressure: PressureMap,
-    /// Mean pressure over each taxel's electrode (centred in the cell), Pa, as the transducer sees it. It includes a
+    /// Mean pressure over each taxel's electrode (centred in that area), Pa, as the transducer sees it. It includes a
     /// preload of the skin, which `pressure` does not.
     pub electrode_pressure: PressureMap,
     /// Contact wrench on the body.

@@ -1,8 +1,10 @@
 //! Contact without a physics engine: triangle meshes, and contact fields that compute the pressure on the skin and the
 //! wrench on a posed mesh.
 //!
-//! The skin's free surface is the plane z = 0; the foam lies below it. A contact field looks at the underside of a body
-//! and returns the pressure on a fine grid over the whole skin and the wrench on the body. Inertia, arms and gravity
+//! The skin's free surface is the plane z = 0; the foam lies below it. A *contact field* (a contact model at work, in
+//! code `field`) looks at the underside of a body and returns the pressure on a fine grid over the whole skin and the
+//! wrench on the body. The squares of that grid, several along each side of a taxel, are called *cells* in names such
+//! as `cells_per_taxel`: they have nothing to do with the microcontrollers behind the taxels. Inertia, arms and gravity
 //! belong to the simulation that moves the body.
 //!
 //! ```

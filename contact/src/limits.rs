@@ -1,4 +1,4 @@
-//! Parameter ranges that contact fields share. Errors name the field as a scene writes it.
+//! Parameter ranges that contact fields share. Errors name the parameter by its key in a scene.
 
 use spts_models::{ConfigError, SkinLayout, in_range, within};
 

@@ -1,13 +1,14 @@
-//! A rectangle of fine cells.
+//! A rectangle of grid squares.
 
-/// Half-open rectangle of cells.
+/// Rectangle of squares of the grid on which contact is computed: rows `rows[0]..rows[1]` and columns
+/// `cols[0]..cols[1]`.
 ///
 /// ```
 /// use spts_contact::Patch;
 ///
 /// let patch = Patch { rows: [1, 3], cols: [2, 5] };
 /// assert_eq!((patch.height(), patch.width()), (2, 3));
-/// // where its cells are in a grid of 10 columns
+/// // where its squares are in a grid of 10 columns
 /// assert_eq!(patch.lines(10).collect::<Vec<_>>(), [12..15, 22..25]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -19,7 +20,7 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// Whether the patch has no cells.
+    /// Whether the patch has no grid squares.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows[0] >= self.rows[1] || self.cols[0] >= self.cols[1]
@@ -37,7 +38,7 @@ impl Patch {
         self.rows[1].saturating_sub(self.rows[0])
     }
 
-    /// The cells of each row of the patch, as index ranges of a row-major grid with `grid_cols` columns.
+    /// The grid squares of each row of the patch, as index ranges of a row-major grid with `grid_cols` columns.
     pub fn lines(&self, grid_cols: usize) -> impl Iterator<Item = std::ops::Range<usize>> + use<> {
         let Self { rows, cols } = *self;
         (rows[0]..rows[1]).map(move |row| row * grid_cols + cols[0]..row * grid_cols + cols[1])

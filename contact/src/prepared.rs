@@ -8,7 +8,7 @@ use std::sync::Arc;
 pub(crate) const BLOCK: usize = 16;
 
 /// A mesh whose triangles are sorted into blocks of neighbours, as contact fields need. It is immutable. A clone shares
-/// the data, so any number of fields, scenes and threads can use one mesh. It dereferences to
+/// the data, so any number of contact fields, scenes and threads can use one mesh. It dereferences to
 /// [`TriMesh`](crate::mesh::TriMesh).
 ///
 /// ```

@@ -18,7 +18,7 @@ pub enum Holder {
     },
 }
 
-/// The load on a body.
+/// What presses a body onto the skin: a force along a vertical axis, through a holder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Load {
     /// Normal force, N; positive.
@@ -32,7 +32,7 @@ pub struct Load {
     pub from: Option<Seat>,
 }
 
-/// Height and tilts of a body in the skin.
+/// How a pressed body lies in the skin: its height and its small tilts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seat {
     /// Height of the body's origin before tilting, m.
@@ -41,7 +41,7 @@ pub struct Seat {
     pub tilt_rad: [f64; 2],
 }
 
-/// A body in equilibrium.
+/// A body that lies in equilibrium under a load: its pose, and the pressure under it.
 #[derive(Debug, Clone, Copy)]
 pub struct Balance<'a> {
     /// Height and tilts.

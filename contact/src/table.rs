@@ -9,7 +9,7 @@ use spts_models::{ConfigError, SkinLayout, explain_toml, in_section};
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ContactError {
-    /// There is no field of that name.
+    /// There is no contact field of that name.
     #[error("`contact.model` = \"{name}\" is not one of {known}")]
     Unknown {
         /// Name in the scene.
@@ -17,7 +17,7 @@ pub enum ContactError {
         /// All known names.
         known: String,
     },
-    /// The parameters are not those of this field.
+    /// The parameters are not those of this contact field.
     #[error("{}", in_section("contact", &explain_toml(.0)))]
     Table(#[from] toml::de::Error),
     /// A parameter is outside its range.
@@ -48,7 +48,8 @@ pub const CONTACT_FIELDS: ContactTable = &[
     }),
 ];
 
-/// Builds the field called `name`.
+/// Builds the contact field that scenes call `name`, for the layout `skin`. `parameters` are its section `[contact]`
+/// without `model`; missing ones take their defaults.
 ///
 /// ```
 /// use spts_contact::build_contact;
@@ -69,7 +70,8 @@ pub fn build_contact(
     build_contact_from(&[CONTACT_FIELDS], name, parameters, skin)
 }
 
-/// Builds the field called `name` from the first of `tables` that has it. Programs with fields of their own use this.
+/// Builds the contact field called `name` from the first of `tables` that has it. It is for programs with contact
+/// fields of their own: `tables` are then [`CONTACT_FIELDS`] and theirs.
 ///
 /// # Errors
 /// [`ContactError`] if no table has the name, or a parameter is not valid.

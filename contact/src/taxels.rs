@@ -1,19 +1,20 @@
-//! Averages of the fine pressure field over taxels.
+//! Averages of the pressure on the fine grid over taxels.
 
 use crate::patch::Patch;
 use spts_models::{PressureMap, SkinLayout};
 
-/// Averages a fine field over each taxel's whole cell and over its electrode.
+/// Averages a map with several grid squares a taxel over each taxel, once over its whole area and once over its
+/// electrode.
 ///
 /// ```
 /// use spts_contact::TaxelBins;
 /// use spts_models::SkinLayout;
 ///
 /// let skin = SkinLayout::new(1, 1, 15e-3, 10e-3)?;
-/// let mut fine_pa = vec![0.0; 9]; // 3 × 3 cells of 5 mm
+/// let mut fine_pa = vec![0.0; 9]; // 3 × 3 grid squares of 5 mm
 /// fine_pa[4] = 9e3; // the middle one
-/// let [cell, electrode] = TaxelBins::new(&skin, 3).means(&fine_pa, None);
-/// assert!((cell.values()[0] - 1e3).abs() < 1e-9);
+/// let [taxel, electrode] = TaxelBins::new(&skin, 3).means(&fine_pa, None);
+/// assert!((taxel.values()[0] - 1e3).abs() < 1e-9);
 /// assert!((electrode.values()[0] - 2.25e3).abs() < 1e-9, "the electrode is 10 mm wide");
 /// # Ok::<(), spts_models::ConfigError>(())
 /// ```
@@ -27,7 +28,7 @@ pub struct TaxelBins {
 }
 
 impl TaxelBins {
-    /// Averages of a field with `cells_per_taxel` cells along each side of a taxel of `skin`.
+    /// Averages of maps with `cells_per_taxel` grid squares along each side of a taxel of `skin`.
     #[must_use]
     pub fn new(skin: &SkinLayout, cells_per_taxel: usize) -> Self {
         let cell_m = skin.pitch_m() / cells_per_taxel as f64;
@@ -47,13 +48,13 @@ impl TaxelBins {
         }
     }
 
-    /// Mean over each taxel's whole cell (its sum × pitch² is the normal force) and over its electrode. Cells cut by
-    /// the electrode's border count with the area inside.
+    /// Means of the map `fine`: over each taxel's whole area (the sum of these × pitch² is the normal force), and over
+    /// its electrode. Grid squares cut by the electrode's border count with the area inside.
     ///
-    /// If the field is 0 outside `patch`, only the patch is read; the result has the same bits.
+    /// If the map is 0 outside `patch`, only the patch is read; the result has the same bits.
     ///
     /// # Panics
-    /// If `fine` does not have `(rows · cells) × (cols · cells)` values, or `patch` is not inside the field.
+    /// If `fine` does not have `(rows · cells) × (cols · cells)` values, or `patch` is not inside the map.
     #[must_use]
     pub fn means(&self, fine: &[f64], patch: Option<Patch>) -> [PressureMap; 2] {
         let patch = patch.unwrap_or_else(|| self.whole());

@@ -68,7 +68,7 @@ enum Foam {
 }
 
 impl TouchSkin {
-    /// A flat skin in the plane z = 0.
+    /// A flat skin in the plane z = 0, with its middle at the origin. Bodies touch it from above.
     ///
     /// # Errors
     /// [`ConfigError`] if a parameter is outside its range.
@@ -91,10 +91,15 @@ impl TouchSkin {
         ))
     }
 
-    /// A skin with the sample points `points`, whose taxels are those of `layout` in row-major order.
+    /// A skin of any shape, such as one round a robot's arm or on the surface of a mesh. `points` are sample points on
+    /// its surface, each with its normal, area and taxel ([`SurfacePoints`]), and `config` is the foam under them.
+    ///
+    /// `layout` says into how many rows and columns the taxels are arranged: taxel i of `points` is number i of
+    /// `layout`, counted row by row. Its pitch and electrodes have no influence on the pressures: areas are those of
+    /// the points.
     ///
     /// # Errors
-    /// [`ConfigError`] if a parameter is outside its range, or the points have another number of taxels.
+    /// [`ConfigError`] if a parameter is outside its range, or `points` do not have rows × columns taxels.
     pub fn curved(layout: SkinLayout, points: SurfacePoints, config: SurfaceConfig) -> Result<Self, ConfigError> {
         let (found, needed) = (points.taxels(), layout.taxels());
         spts_models::in_range("taxels", found as f64, found == needed, "rows × cols")?;

@@ -12,7 +12,7 @@ use spts::progress::Progress;
 use spts::recon::metrics::{SupportScore, pearson};
 use std::collections::BTreeMap;
 
-/// Differences between two data sets, over the rows in which both have a touch.
+/// How far the ground truth of one data set is from that of a reference, over the rows in which both have a touch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
     /// Number of rows compared.
@@ -25,18 +25,19 @@ pub struct Comparison {
     pub objects: BTreeMap<String, Errors>,
 }
 
-/// Distribution of differences over rows: 10th percentile, median and 90th percentile of each.
+/// Differences between the rows of a data set and the same rows of the reference. Each is computed row by row; kept are
+/// its 10th percentile, median and 90th percentile over the rows, in this order.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Errors {
     /// Rows that were compared.
     pub rows: u64,
-    /// Σ|p − q| / Σq of the pressures p and the reference's q: the relative difference in pressure.
+    /// Relative difference of the pressures: Σ|p − q| / Σq over the taxels, with the pressures p and the reference's q.
     pub pressure: [f64; 3],
-    /// The same for the conductances.
+    /// The same relative difference for the conductances.
     pub conductance: [f64; 3],
-    /// Pearson correlation of the conductances.
+    /// Pearson correlation of the conductances over the taxels: 1 for equal images.
     pub correlation: [f64; 3],
-    /// Intersection over union of the supports.
+    /// Intersection over union of the supports, the touched taxels: 1 for the same ones.
     pub support_iou: [f64; 3],
 }
 

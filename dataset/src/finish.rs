@@ -17,7 +17,7 @@ const STATISTICS_FILE: &str = "statistics.json";
 const CARD_FILE: &str = "README.md";
 const CROISSANT_FILE: &str = "croissant.json";
 
-/// Summary of a complete data set.
+/// Summary of a complete data set: what `spts dataset finish` prints.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finished {
     /// Number of rows.

@@ -60,7 +60,7 @@ pub struct Dataset {
     spec: Spec,
 }
 
-/// State of a data set.
+/// What a folder holds of a data set: what `spts dataset info` prints.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Info {
     /// Name.
@@ -81,7 +81,7 @@ pub struct Info {
     pub digest: Option<String>,
 }
 
-/// Summary of a run.
+/// What one run of `spts dataset make` has added to a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Made {
     /// Number of new rows.

@@ -27,7 +27,7 @@ impl Part {
     /// The part of a single worker: all files.
     pub const WHOLE: Self = Self { worker: 0, of: 1 };
 
-    /// Parses `worker/workers`.
+    /// Reads the text "i/n": worker i of n, counted from 0.
     ///
     /// # Errors
     /// [`DatasetError::Part`] if the text is not a valid part.
@@ -87,7 +87,7 @@ impl Part {
         Ok(Some(Self { worker, of }))
     }
 
-    /// The files of this part, out of `shards` files.
+    /// Numbers of the files that this worker makes, of the `shards` files of the data set, counted from 0.
     pub fn shards(self, shards: u64) -> impl Iterator<Item = u64> {
         (self.worker..shards).step_by(usize::try_from(self.of).unwrap_or(usize::MAX))
     }

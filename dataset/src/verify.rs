@@ -11,7 +11,7 @@ use serde::Serialize;
 use spts::progress::Progress;
 use std::collections::BTreeSet;
 
-/// Result of a verification.
+/// Which rows of a data set were made again, and which of them differ from the files.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Verified {
     /// Number of rows that were made again.

@@ -81,7 +81,8 @@ impl CellMode {
     }
 }
 
-/// State of one cell between two clock edges.
+/// Behaviour of one cell without time: the state that bus commands and clock edges change, and the code that it puts
+/// out.
 ///
 /// ```
 /// use spts_firmware::{Cell, CellMode};

@@ -1,15 +1,18 @@
-//! Change of the response from press to press.
+//! Conditioning: a taxel of Velostat conducts more from press to press of a session.
 
 use crate::config::{ConfigError, in_range, within};
 use serde::Deserialize;
 
-/// A taxel's gain at its k-th press of a session:
+/// Gain by which the conductance of a taxel is multiplied, as a function of how often the taxel has been pressed in
+/// this session. Velostat conducts least at the first press, and then more with the logarithm of the number of presses.
 ///
-/// c(1) = `first`·b(1), c(k) = b(k) = (1 + s·ln k)/(1 + s·ln `reference_press`).
+/// The gain c of press k, with the slope s = [`per_ln_press`](ConditioningConfig::per_ln_press), is
 ///
-/// The gain is 1 at the reference press, so the static law holds for a conditioned skin. A press begins when the
-/// pressure exceeds `touch_pa`, and ends when it falls below half of `touch_pa`. The gain changes only at the beginning
-/// of a press, while the conductance is small.
+/// c(1) = `first`·b(1), c(k) = b(k) for k > 1, where b(k) = (1 + s·ln k)/(1 + s·ln `reference_press`).
+///
+/// The gain is 1 at the reference press, so the static law of [`Velostat`](crate::Velostat) holds for a skin that has
+/// been pressed that often. A press begins when the pressure on the taxel exceeds `touch_pa`, and ends when it falls
+/// below half of `touch_pa`. The gain changes only at the beginning of a press, while the conductance is small.
 ///
 /// ```
 /// use spts_models::{Conditioning, ConditioningConfig};
@@ -28,14 +31,15 @@ pub struct Conditioning {
     config: ConditioningConfig,
 }
 
-/// Parameters of [`Conditioning`].
+/// Parameters of [`Conditioning`]: in a scene, the table `[transducer_parameters.conditioning]`.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ConditioningConfig {
-    /// Extra factor of the first press. Range (0, 1]; default 0.92. With the default slope, the first press has 0.82 of
-    /// the gain of the tenth (recorded: 0.64–0.96, median 0.80).
+    /// Extra factor of the gain at the first press. Range (0, 1]; default 0.92. With the default slope, the first press
+    /// has 0.82 of the gain of the tenth (recorded: 0.64–0.96, median 0.80).
     pub first: f64,
-    /// s, gain per ln(press). Range [0, 1]; default 0.055 (recorded: 0.024–0.094).
+    /// Slope s: growth of the gain for each unit of ln k, k being the number of the press. Range [0, 1]; default 0.055
+    /// (recorded: 0.024–0.094).
     pub per_ln_press: f64,
     /// Press at which the gain is 1. Range [1, 1e6]; default 10, the press from which the published ground truth comes.
     pub reference_press: u32,
@@ -72,7 +76,7 @@ impl TryFrom<ConditioningConfig> for Conditioning {
     }
 }
 
-/// Press counter of one taxel.
+/// State of one taxel: how often it has been pressed in this session, whether it is pressed now, and its gain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Presses {
     count: u32,
@@ -81,7 +85,7 @@ pub struct Presses {
 }
 
 impl Conditioning {
-    /// A taxel that has not been pressed in this session.
+    /// State of a taxel that has not been pressed in this session.
     #[must_use]
     pub fn fresh(&self) -> Presses {
         Presses {
@@ -91,7 +95,7 @@ impl Conditioning {
         }
     }
 
-    /// Gain of press number `press`, from 1.
+    /// Gain at press number `press` of a session, counted from 1.
     #[must_use]
     pub fn gain(&self, press: u32) -> f64 {
         let c = &self.config;
@@ -100,7 +104,7 @@ impl Conditioning {
         first * b(press) / b(c.reference_press)
     }
 
-    /// Applies `pressure_pa` to one taxel and returns its gain.
+    /// Tells one taxel that its pressure is now `pressure_pa`, Pa, updates its state `presses`, and returns its gain.
     pub fn respond(&self, pressure_pa: f64, presses: &mut Presses) -> f64 {
         if !presses.pressed && pressure_pa > self.config.touch_pa {
             presses.pressed = true;

@@ -4,7 +4,7 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("`{field}` = {} is outside {range}", Shown(*value))]
 pub struct ConfigError {
-    /// Name of the field, as it is written in a scene file.
+    /// Name of the parameter: its key in a scene file, such as `press.force_n`.
     pub field: String,
     /// The value.
     pub value: f64,
@@ -27,8 +27,8 @@ impl std::fmt::Display for Shown {
     }
 }
 
-/// Returns `value` if `ok` holds, and otherwise an error that names the field. Write `ok` as a comparison that fails
-/// for NaN.
+/// Returns `value` if `ok` holds, and otherwise an error that names `field`, the parameter's key in a scene file. Write
+/// `ok` as a comparison that fails for NaN.
 ///
 /// # Errors
 /// [`ConfigError`] if `ok` is false.
@@ -60,8 +60,12 @@ pub fn within(field: &str, value: f64, least: f64, most: f64, range: &'static st
     in_range(field, value, (least..=most).contains(&value), range).map(drop)
 }
 
-/// Adds the `section` to `message`, an error about one of its fields: "`section.field` = 3 is outside …". If `message`
-/// does not begin with a field, the result is "`section`: …".
+/// Names the section of a TOML file in an error about one of its keys. `message` is the error as the section's reader
+/// gives it; the result is one line.
+///
+/// - A message that begins with a key and its value, "`bits` = 40 is outside [1, 24]", becomes "`adc.bits` = 40 is
+///   outside [1, 24]" for the `section` "adc".
+/// - Any other message, such as "unknown field", becomes "`adc`: unknown field".
 #[must_use]
 pub fn in_section(section: &str, message: &str) -> String {
     let message = message.trim_end().replace('\n', "; ");

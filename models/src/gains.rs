@@ -27,7 +27,7 @@ pub struct TaxelGains {
     /// Rows and columns of the skin, if they are known. A skin of another shape then refuses the gains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shape: Option<[usize; 2]>,
-    /// Mean of the logarithm of a taxel's gain, one value a taxel in row-major order. Range [-5, 5].
+    /// Mean of the natural logarithm of a taxel's gain, one value a taxel in row-major order. Range [-5, 5].
     pub log_mean: Vec<f64>,
     /// Standard deviation of that logarithm: the uncertainty of the gain. Range [0, 2].
     pub log_sd: Vec<f64>,
@@ -40,7 +40,7 @@ impl TaxelGains {
     /// Reads gains from TOML text.
     ///
     /// # Errors
-    /// A message that names the field.
+    /// A message that names the key of the file that is wrong.
     pub fn from_toml(text: &str) -> Result<Self, String> {
         let gains: Self = toml::from_str(text).map_err(|e| explain_toml(&e))?;
         gains.check(gains.log_mean.len()).map_err(|e| e.to_string())?;
@@ -50,7 +50,7 @@ impl TaxelGains {
     /// Checks all values, and that there is one for each of `taxels` taxels.
     ///
     /// # Errors
-    /// [`ConfigError`] for the first field that is not valid.
+    /// [`ConfigError`] for the first value that is not valid.
     pub fn check(&self, taxels: usize) -> Result<(), ConfigError> {
         for (field, values, least, most, range) in [
             ("log_mean", &self.log_mean, -5.0, 5.0, "[-5, 5]"),
@@ -73,7 +73,7 @@ impl TaxelGains {
     /// Checks all values, and that they belong to `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] for the first field that is not valid.
+    /// [`ConfigError`] for the first value that is not valid.
     pub fn check_skin(&self, skin: &SkinLayout) -> Result<(), ConfigError> {
         for (field, found, needed) in [
             ("gains.shape[0]", self.shape.map(|s| s[0]), skin.rows()),
@@ -86,7 +86,8 @@ impl TaxelGains {
         self.check(skin.taxels())
     }
 
-    /// The gain exp(mean + sd·z) of every taxel for its standard normal number z.
+    /// The gain exp(mean + sd·z) of every taxel, in row-major order. `z` has one number a taxel: how many standard
+    /// deviations its logarithm lies above the mean.
     pub fn at<'a>(&'a self, z: impl Iterator<Item = f64> + 'a) -> impl Iterator<Item = f64> + 'a {
         let known = self.log_mean.iter().zip(&self.log_sd);
         known.zip(z).map(|((mean, sd), z)| (mean + sd * z).exp())
@@ -99,7 +100,9 @@ impl TaxelGains {
             .collect()
     }
 
-    /// Standard deviation of the logarithm of every taxel's gain in one session.
+    /// Standard deviation of the natural logarithm of every taxel's gain in a session that was not part of the
+    /// calibration, one value a taxel in row-major order: √(`log_sd`² + `mounting_log_sd`²), the uncertainty of the
+    /// fixed gain and the change from session to session together.
     pub fn session_log_sd(&self) -> impl Iterator<Item = f64> + '_ {
         self.log_sd.iter().map(|sd| sd.hypot(self.mounting_log_sd))
     }

@@ -156,7 +156,7 @@ impl SkinLayout {
         (self.electrode_m / CALIBRATED_ELECTRODE_M).powi(2)
     }
 
-    /// Area of one taxel cell, m².
+    /// Area of the skin that belongs to one taxel, pitch × pitch, m².
     #[must_use]
     pub fn cell_area_m2(&self) -> f64 {
         self.pitch_m * self.pitch_m

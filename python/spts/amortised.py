@@ -7,7 +7,7 @@
     spts decode SESSION --decoder amortised --weights mine.safetensors
 
 Needs `pip install 'spts-twin[train]'`. All numbers are functions of the spec and of the options: a machine of the same type with the
-same versions of jax writes the same file. The 9,000 steps of the shipped weights take about half an hour on two cores.
+same versions of jax writes the same file. The 9,000 steps of the shipped network take about half an hour on two cores.
 
 What is learned from is a data set of procedural shapes (`spts dataset specs --show unseen-shapes`) and nothing that was recorded.
 Every example is one press of it, in one of the symmetries of the grid, whose taxels get gains of their own; what they sum up to under
@@ -122,7 +122,7 @@ def cosine_rows(rows, cols, rng):
 
 
 def sizes(n, hidden, memory, steps):
-    """Shapes of all weights by name."""
+    """Shapes of all parameters of the network by name."""
     shapes = {}
     for t in range(steps):
         shapes[f"steps.{t}.w1"] = (4 * n + memory + 2, hidden)
@@ -135,7 +135,7 @@ def sizes(n, hidden, memory, steps):
 
 
 def train(data, *, steps=9_000, batch=512, hidden=160, memory=48, unrolled=3, rate=1e-3, seed=0, report=None):
-    """Weights by name and what describes them, learned from the :class:`spts.dataset.Dataset` `data`.
+    """Parameters of the network by name and what describes them, learned from the :class:`spts.dataset.Dataset` `data`.
 
     `report(step, steps, losses)` is called every hundredth of the steps with the mean cross-entropy of a taxel and the mean squared
     error of an image of length 1.
@@ -282,7 +282,7 @@ def main(arguments=None):
     parser.add_argument(
         "spec", nargs="?", default="unseen-shapes", help="name of a spec, or a file (default: unseen-shapes)"
     )
-    parser.add_argument("--out", required=True, help="file of the weights")
+    parser.add_argument("--out", required=True, help="file to write the trained network to")
     parser.add_argument(
         "--data", help="folder of the data set, made there if it is not there yet (default: a temporary one)"
     )

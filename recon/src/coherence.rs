@@ -85,7 +85,7 @@ pub fn welch_bound(dimension: usize, vectors: usize) -> f64 {
     ((n - m) / (m * (n - 1.0))).sqrt()
 }
 
-/// Summary of the singular values of a matrix.
+/// Rank and condition of a matrix, from its singular values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spectrum {
     /// Number of singular values above max(M, N)·ε·σ₁, the usual tolerance for rounding.

@@ -56,7 +56,7 @@ impl SupportScore {
     }
 }
 
-/// Running mean of support scores.
+/// Adds up support scores and gives their mean.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MeanScore {
     sum: SupportScore,

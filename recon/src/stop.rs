@@ -25,7 +25,7 @@ pub struct StopRule {
     most: usize,
 }
 
-/// How a series of measurements ended.
+/// After how many measurements a decoder stopped, and whether it was sure enough by then.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stopped {
     /// Number of measurements.

@@ -12,7 +12,7 @@ pub struct FidelityLevel {
     pub label: &'static str,
     /// Contact model, as `contact.model` in a scene.
     pub model: &'static str,
-    /// Whether an elastic field is solved at every time step (`true`) or for frames only (`false`).
+    /// Whether an elastic contact field is solved at every time step (`true`) or for frames only (`false`).
     pub coupled: Option<bool>,
     /// Whether MuJoCo simulates the dynamics; only then are there a time step and bounces.
     pub dynamic: bool,
@@ -114,9 +114,9 @@ pub struct MeasuredSetting {
     /// Name of the fidelity level; the column is called `rung`.
     #[serde(rename = "rung")]
     pub level: String,
-    /// Fine cells of the skin, as "60x60".
+    /// Squares of the grid over the whole skin, as "60x60".
     pub cells: String,
-    /// Fine cells along one side of a taxel.
+    /// Grid squares along one side of a taxel.
     pub cells_per_taxel: usize,
     /// Time step of the dynamics, s; the time between frames for a level without dynamics.
     pub timestep_s: f64,
@@ -136,12 +136,13 @@ pub struct MeasuredSetting {
     pub class_delta: f64,
 }
 
-/// A setting chosen from the table.
+/// The cheapest contact model, grid and time step that meet a wanted error, from the table that `spts fidelity`
+/// measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FidelityChoice {
     /// The fidelity level.
     pub level: &'static FidelityLevel,
-    /// Fine cells along one side of a taxel.
+    /// Grid squares along one side of a taxel.
     pub cells_per_taxel: usize,
     /// Time step of the dynamics, s.
     pub timestep_s: f64,

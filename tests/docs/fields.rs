@@ -82,6 +82,50 @@ fn the_reference_has_every_field_of_a_scene() {
     }
 }
 
+/// The keys that the rows of the table under `heading` begin with. A cell "`pose.x_m`, `.y_m`" has two of them.
+fn keys(page: &str, heading: &str) -> Vec<String> {
+    let mut keys = Vec::new();
+    for line in under(page, heading).lines() {
+        let first = line.strip_prefix("| ").and_then(|row| row.split(" | ").next());
+        let mut section = String::new();
+        for name in first.unwrap_or_default().split('`').skip(1).step_by(2) {
+            let key = if name.starts_with('.') {
+                format!("{section}{name}")
+            } else {
+                name.to_owned()
+            };
+            if let Some((before, _)) = key.split_once('.') {
+                before.clone_into(&mut section);
+            }
+            keys.push(key);
+        }
+    }
+    keys
+}
+
+#[test]
+fn the_reference_has_every_key_of_a_spec_and_no_other() {
+    // `contact`, `transducer` and `weights` have the fields that a scene has for them
+    const SECTIONS: [&str; 8] = ["split", "object", "pose", "press", "drop", "skin", "faults", "record"];
+    let listed = keys(&page("datasets.md"), "### Keys of a spec");
+    let folder = folder();
+    let valid = |text: &str| -> Vec<String> {
+        let spec = spts_dataset::Spec::from_toml(text, &toml::Table::new(), folder.path());
+        let error = spec.expect_err("the key is not known").to_string();
+        expected(&error).into_iter().map(str::to_owned).collect()
+    };
+    let mut known = valid(UNKNOWN);
+    known.retain(|key| !SECTIONS.contains(&key.as_str()));
+    for section in SECTIONS {
+        let inner = valid(&format!("[{section}]\n{UNKNOWN}"));
+        known.extend(inner.iter().map(|key| format!("{section}.{key}")));
+    }
+    let gaps: Vec<&String> = known.iter().filter(|key| !listed.contains(key)).collect();
+    assert!(gaps.is_empty(), "not on the page: {gaps:#?}");
+    let unknown: Vec<&String> = listed.iter().filter(|key| !known.contains(key)).collect();
+    assert!(unknown.is_empty(), "on the page alone: {unknown:#?}");
+}
+
 #[test]
 fn the_reference_has_every_field_of_a_profile() {
     let page = page("profiles.md");

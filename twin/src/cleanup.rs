@@ -30,7 +30,7 @@ const ATTEMPTS: usize = 20;
 /// Time between two such attempts.
 const PAUSE: Duration = Duration::from_millis(10);
 
-/// A resource that must not outlive the program.
+/// Something that is removed or ended when the program is stopped by a signal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Leftover {

@@ -11,7 +11,7 @@ use spts_models::{ConfigError, within};
 /// and 6 of 100 000 measurements lie beyond four.
 pub(super) const EXCURSION_SD: f64 = 4.0;
 
-/// A pressed skin, described independently of its size.
+/// How a skin is pressed, as far as the amplifier is concerned; independent of the number of taxels.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Skin {
@@ -72,7 +72,8 @@ impl Skin {
     }
 }
 
-/// Conditions under which the amplifier works.
+/// What the amplifier has to cope with: how the skin is pressed, the converter behind it, and the time between a change
+/// of the drives and the sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// The pressed skin.
@@ -83,7 +84,7 @@ pub struct Setting {
     pub available_s: f64,
 }
 
-/// Why a readout does not work.
+/// Why a readout does not work at a given size of the skin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Limit {

@@ -99,7 +99,7 @@ pub struct Amplifier {
 }
 
 impl Amplifier {
-    /// An amplifier made of these parts.
+    /// An amplifier of the operational amplifier `op_amp` with the feedback, bus and temperature in `network`.
     ///
     /// # Errors
     /// [`ConfigError`] that names the parameter outside its range.

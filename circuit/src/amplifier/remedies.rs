@@ -10,7 +10,7 @@ use spts_models::{ConfigError, in_range};
 /// Taxels of the skin as built, for which the feedback was chosen.
 const TAXELS_AS_BUILT: f64 = 100.0;
 
-/// A way to read a larger skin.
+/// A change of the readout by which one amplifier design serves a skin of more taxels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Remedy {
@@ -44,7 +44,7 @@ impl Remedy {
     }
 }
 
-/// A skin read with one of the remedies.
+/// A skin of some size read with one of the remedies: its parts, and whether it works.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Remedied {
     /// Taxels of the whole skin.

@@ -1,19 +1,20 @@
-//! Influence coefficients: displacement at the centre of one cell under unit pressure on another cell.
+//! Influence coefficients: displacement at the centre of one grid square under unit pressure on another one.
 
 use super::deficit::{Deficit, REACH};
 use super::kernel::{ElasticKernel, confined_stiffness_pa_per_m};
 use super::quadrature::gauss_legendre;
 use std::f64::consts::PI;
 
-/// Influence coefficients of square cells on a regular grid, m/Pa, by the offset between two cells.
+/// How far the surface of an elastic body yields at the centre of one grid square under 1 Pa on another one, m/Pa, by
+/// the rows and columns between the two.
 ///
 /// ```
 /// use spts_contact::{ElasticKernel, Influence};
 ///
 /// let kernel = ElasticKernel::HalfSpace { modulus_pa: 150e3, poisson: 0.2 };
 /// let influence = Influence::new(&kernel, [20, 20], 2.5e-3);
-/// // far from a cell its pressure acts as a point force: u = F (1 − ν²)/(π E r)
-/// let force_n = 2.5e-3 * 2.5e-3; // 1 Pa on the cell
+/// // far from a square its pressure acts as a point force: u = F (1 − ν²)/(π E r)
+/// let force_n = 2.5e-3 * 2.5e-3; // 1 Pa on the square
 /// let point_m = force_n * 0.96 / (std::f64::consts::PI * 150e3 * 15.0 * 2.5e-3);
 /// assert!((influence.at(0, 15) / point_m - 1.0).abs() < 1e-3);
 /// ```
@@ -38,11 +39,11 @@ struct Bulge {
 const WIDE_CELL: f64 = 2.0 * REACH;
 
 impl Influence {
-    /// Coefficients between cells of side `cell_m`, for offsets below `[rows, cols]`.
+    /// Coefficients between grid squares of side `cell_m`, m, for offsets below `shape`, `[rows, cols]`.
     ///
-    /// Half-space: A. E. H. Love's closed form (Phil. Trans. R. Soc. A 228 (1929) 377) at the cells' centres. Layer:
+    /// Half-space: A. E. H. Love's closed form (Phil. Trans. R. Soc. A 228 (1929) 377) at the squares' centres. Layer:
     /// the same plus g(r) = (1/2π) ∫ (C_layer − C_half-space) J₀(kr) k dk, smooth on the scale of h, averaged over the
-    /// cell. Cells of 50 thicknesses or more are independent columns of compliance 1/K.
+    /// square. Squares of 50 thicknesses or more are independent columns of compliance 1/K.
     #[must_use]
     pub fn new(kernel: &ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
         Self::with_deficit(kernel, deficit(kernel, shape, cell_m).as_ref(), shape, cell_m)
@@ -77,7 +78,7 @@ impl Influence {
         influence
     }
 
-    /// Coefficient between cells `row` rows and `col` columns apart, m/Pa.
+    /// Coefficient between grid squares `row` rows and `col` columns apart, m/Pa.
     ///
     /// # Panics
     /// If an offset is outside the table.
@@ -86,7 +87,7 @@ impl Influence {
         self.values[row * self.cols + col]
     }
 
-    /// Largest rise of the surface under unit pressure on one cell, m/Pa; 0 for a half-space.
+    /// Largest rise of the surface under unit pressure on one grid square, m/Pa; 0 for a half-space.
     #[must_use]
     pub fn bulge_m_per_pa(&self) -> f64 {
         self.bulge.one_m_per_pa

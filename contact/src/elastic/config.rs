@@ -21,7 +21,7 @@ pub struct ElasticConfig {
     pub thickness_m: f64,
     /// ε_max, strain at which no pores are left (1 − relative density); [0.3, 1]. Not used if `densification` is off.
     pub max_strain: f64,
-    /// Fine cells along one side of a taxel; [1, 64].
+    /// Squares of the grid on which contact is computed, along one side of a taxel; [1, 64].
     pub cells_per_taxel: usize,
     /// μ, friction coefficient; [0, 5].
     pub friction: f64,

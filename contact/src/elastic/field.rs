@@ -63,7 +63,7 @@ impl ElasticField {
     /// A bonded layer (if `bonded`) or a half-space under `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] if a parameter is outside its range, or the skin has more than 2²⁰ fine cells.
+    /// [`ConfigError`] if a parameter is outside its range, or the skin has more than 2²⁰ grid squares.
     pub fn new(mut config: ElasticConfig, bonded: bool, skin: &SkinLayout) -> Result<Self, ConfigError> {
         config.check(bonded, skin)?;
         config.densification.get_or_insert(bonded);

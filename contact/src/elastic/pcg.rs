@@ -22,7 +22,7 @@ pub(crate) struct Stop {
     pub(crate) iterations: usize,
 }
 
-/// Result of an iteration.
+/// How the elastic solver ended: the rigid approach, the iterations, and whether it converged.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// Rigid approach added to the given displacement, m; 0 when the displacement itself is prescribed.

@@ -1,4 +1,4 @@
-//! Contact of a rigid shape with an elastic body on a grid of square cells.
+//! Contact of a rigid shape with an elastic body, computed on a grid of squares.
 
 use super::kernel::ElasticKernel;
 use super::level::{Level, Window};
@@ -12,13 +12,14 @@ use std::sync::Arc;
 
 /// Solver for the contact of height maps with a half-space or a bonded layer.
 ///
-/// The surface is not periodic: pressure acts on the grid, and the body extends to infinity. Pressure is uniform on
-/// each cell; displacement is evaluated at its centre. Operators of the sizes used most recently (about two dozen) and
-/// all buffers are kept between calls, so only a new size allocates.
+/// The surface is divided into a grid of squares (in names: `cell`). It is not periodic: pressure acts on the grid, and
+/// the body extends to infinity. Pressure is uniform on each square; displacement is evaluated at its centre. Operators
+/// of the sizes used most recently (about two dozen) and all buffers are kept between calls, so only a new size
+/// allocates.
 ///
 /// ```
 /// use spts_contact::{ElasticKernel, ElasticSolver};
-/// // 20 N press a ball of radius 33.4 mm on a soft half-space, 32 × 32 cells on 45 mm
+/// // 20 N press a ball of radius 33.4 mm on a soft half-space, 32 × 32 squares on 45 mm
 /// let kernel = ElasticKernel::HalfSpace { modulus_pa: 150e3, poisson: 0.2 };
 /// let cell_m = 0.045 / 32.0;
 /// let mut solver = ElasticSolver::new(kernel, [32, 32], cell_m);
@@ -46,7 +47,7 @@ const MARGIN: usize = 2;
 const MAX_ITERATIONS: usize = 400;
 
 impl ElasticSolver {
-    /// A solver for up to `shape` (rows, columns) cells of side `cell_m`.
+    /// A solver for up to `shape` (rows, columns) grid squares of side `cell_m`, m.
     #[must_use]
     pub fn new(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
         let tables = tables(kernel, shape, cell_m);
@@ -72,7 +73,7 @@ impl ElasticSolver {
     }
 
     /// Makes the pressing body compliant: adds `series_m_per_pa` (1/K of its surface) to the own compliance of each
-    /// cell.
+    /// grid square.
     pub fn set_series(&mut self, series_m_per_pa: f64) {
         let mut changed = false;
         for level in &mut self.levels {
@@ -89,7 +90,7 @@ impl ElasticSolver {
         self.memory.clear();
     }
 
-    /// Presses the surface down by at least `target_m` (row-major on the cells of `patch`; negative infinity where
+    /// Presses the surface down by at least `target_m` (row-major on the squares of `patch`; negative infinity where
     /// there is no body): p ≥ 0, C p ≥ target, p (C p − target) = 0. [`ElasticSolver::pressure_pa`] returns the
     /// solution on the patch.
     ///
@@ -101,7 +102,7 @@ impl ElasticSolver {
     /// the solver's grid: pressure 0, not converged. A solution that has not converged is not kept for later starts.
     ///
     /// # Panics
-    /// If `target_m` does not have one value a cell of the patch.
+    /// If `target_m` does not have one value for each square of the patch.
     pub fn sink(&mut self, patch: Patch, target_m: &[f64], tolerance: f64) -> Outcome {
         let shape = [patch.rows, patch.cols].map(|[first, end]| end.saturating_sub(first));
         assert_eq!(
@@ -163,7 +164,7 @@ impl ElasticSolver {
     /// the force is not a positive number: pressure 0, not converged.
     ///
     /// # Panics
-    /// If `height_m` does not have one value a cell.
+    /// If `height_m` does not have one value for each grid square.
     pub fn press(&mut self, height_m: &[f64], force_n: f64, tolerance: f64) -> Outcome {
         assert_eq!(height_m.len(), self.shape[0] * self.shape[1], "one height a cell");
         let any = height_m.iter().any(|h| h.is_finite());
@@ -176,7 +177,8 @@ impl ElasticSolver {
         self.nested(0, self.shape, Some(force_n), tolerance)
     }
 
-    /// Pressure on the last shape or patch, Pa, row-major.
+    /// Pressure that the last call of [`Self::sink`] or [`Self::press`] has found, Pa: one value for each grid square,
+    /// row by row. After `sink` the squares are those of its patch, after `press` those of the whole grid.
     #[must_use]
     pub fn pressure_pa(&self) -> &[f64] {
         &self.levels[0].pressure

@@ -3,7 +3,7 @@
 use super::size::SOFT_MAX_TRIANGLES;
 use serde::Serialize;
 
-/// Repairs of a mesh, and its properties afterwards.
+/// What was repaired in a mesh when it was loaded, and the size of the mesh afterwards.
 ///
 /// ```
 /// use spts_contact::mesh::{cuboid, read_obj};
@@ -33,10 +33,11 @@ pub struct MeshReport {
     pub turned_triangles: usize,
     /// Whether the mesh, or a part of it, was inside out and has been turned.
     pub flipped: bool,
-    /// Small holes that were filled flat.
+    /// Number of holes of at most 5 % of the mesh's size that were closed with a flat surface.
     pub filled_holes: usize,
-    /// Holes that open upwards and were closed above everything. The mesh has to stay nearly upright, so that nothing
-    /// touches there.
+    /// Number of large holes in the upper side of the mesh, as of a bowl, that were closed. From the rim of each hole,
+    /// a wall goes straight up to a flat lid above the highest point of the mesh. While the mesh stands upright, walls
+    /// and lid touch nothing; a tilted press of such a mesh is refused.
     pub lids: usize,
     /// Number of triangles before decimation; `None` if the mesh was not decimated.
     pub decimated_from: Option<usize>,

@@ -10,7 +10,7 @@ use object::{OBJECT_COLUMNS, ObjectColumn};
 use row::ROW_COLUMNS;
 use serde::Serialize;
 
-/// A column, as shown by `spts dataset schema`.
+/// A column of a data set, as `spts dataset schema` shows it.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Column {
     /// Name.

@@ -21,7 +21,7 @@ pub struct ExportOptions {
     pub rows_per_tar: Option<u64>,
 }
 
-/// What a format has written.
+/// What a layout of another program reports after an export: rows of each split, and episodes.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Written {
     /// Number of rows in every split that is not empty.
@@ -30,7 +30,7 @@ pub struct Written {
     pub episodes: Option<u64>,
 }
 
-/// Summary of a complete export.
+/// Summary of a complete export of a data set: what `spts dataset export` prints.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Exported {
     /// Name of the format.

@@ -9,7 +9,7 @@ use crate::spec::{Choice, Spec};
 use spts_models::{ConductanceMap, PressureMap};
 use std::sync::Arc;
 
-/// One row of a data set.
+/// One row of a data set: a window of samples with its truth.
 #[derive(Clone, Copy)]
 pub struct Row<'a> {
     pub(super) index: u64,
@@ -57,7 +57,7 @@ impl<'a> Row<'a> {
         Arc::clone(&self.shapes[0].choice.name)
     }
 
-    /// Mean pressure over every taxel's cell, Pa.
+    /// Mean pressure over every taxel's area, Pa.
     #[must_use]
     pub fn pressure(&self) -> &'a PressureMap {
         &self.state().pressure

@@ -139,7 +139,7 @@ pub(super) fn check_moving(c: &SpecConfig) -> Result<(), SpecError> {
     let count = c.object.count.range();
     if count.iter().any(|count| super::whole(*count) != 1) {
         return Err(SpecError::Choice(format!(
-            "`object.count` = {}; valid: 1 where a press is followed in time (a course, a drop, or a field other than \
+            "`object.count` = {}; valid: 1 where a press is followed in time (a course, a drop, or a contact model other than \
              \"footprint\")",
             count[1]
         )));

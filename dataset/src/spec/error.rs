@@ -27,7 +27,7 @@ pub enum SpecError {
     /// A name that does not exist, or two values that contradict each other.
     #[error("{0}")]
     Choice(String),
-    /// The contact field is not valid.
+    /// The contact model is not valid.
     #[error(transparent)]
     Contact(#[from] ContactError),
     /// Transducer, readout, weights or faults are not valid.

@@ -84,7 +84,7 @@ impl Spec {
         &self.skin
     }
 
-    /// Name and parameters of the contact field.
+    /// Name and parameters of the contact model.
     #[must_use]
     pub fn contact(&self) -> (&str, &toml::Table) {
         (&self.contact.0, &self.contact.1)

@@ -10,11 +10,13 @@ use spts_eval::decoders::PublishedDecode;
 use spts_studies::budget::BudgetStudy;
 use std::path::PathBuf;
 
-/// Measures how much support accuracy, IoU and classification each effect of each stage costs.
+/// Measures how much image quality each imperfection of the twin costs: of the transducer, of the electronics, of the
+/// contact model.
 ///
-/// Presses objects on the twin once, and records the same presses with many chains: the whole chain; the whole chain
-/// without one effect (ablation); the ideal chain, which has the transducer's static law and y = Φx alone; and the
-/// ideal chain with one effect (addition).
+/// Presses objects on the twin once, and records the same presses with many chains, a chain being everything between
+/// the pressure and the samples: the whole chain; the whole chain without one effect (ablation); the ideal chain, which
+/// has the transducer's static law and y = Φx alone; and the ideal chain with one effect (addition). What is compared
+/// is support accuracy, IoU and classification.
 ///
 /// The effects are those of the readout profile's compressive table; spread, session, hysteresis, creep and
 /// conditioning of the transducer; every stage as a whole; and the contact model. All chains see the same presses and
@@ -27,18 +29,19 @@ use std::path::PathBuf;
   spts budget --taxels 400 --out out/budget_400
 
 Files in DIR:
-  budget.csv                 one line a stage, effect, mode, decode and M: changes of the scores, each with its standard error.
-                             in an ablation the cost is positive, in an addition negative
-  end_points.csv             scores of the whole chain, the ideal one and the raster scan, by three truths: a frame of the scan, as
-                             published; the noiseless image; and that image on a skin with the static law alone
+  budget.csv                 one line a stage, effect, mode, decode and M: changes of the scores, each with its standard
+                             error. In an ablation the cost is positive, in an addition negative
+  end_points.csv             scores of the whole chain, the ideal one and the raster scan, by three truths: a frame of
+                             the scan, as published; the noiseless image; and that image on a skin with the static law
+                             alone
   summary.md                 both as tables
   figures/budget_DECODE.png  IoU lost to each effect; contact_DECODE.png the same by the third truth
   provenance.json            seed, scenes, versions
 
-Dictionary, library and truth come from raster scans of each skin with the profile's raster table; all readouts of a skin share
-them. The standard errors are over sessions (10, or 3 with --quick). Each session has its own press, gains, noise and learned
-dictionary; the skin, its spread and its scan are the same. Another --seed is another skin. A * marks p < 1 % by Student's t test:
-of a hundred numbers that differ from 0 by chance alone, about one has a star.")]
+Dictionary, library and truth come from raster scans of each skin with the profile's raster table; all readouts of a
+skin share them. The standard errors are over sessions (10, or 3 with --quick). Each session has its own press, gains,
+noise and learned dictionary; the skin, its spread and its scan are the same. Another --seed is another skin. A * marks
+p < 1 % by Student's t test: of a hundred numbers that differ from 0 by chance alone, about one has a star.")]
 pub(super) struct BudgetCommand {
     /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml
     #[arg(long, value_name = "NAME|FILE.toml", default_value = DEFAULT_READOUT)]
@@ -47,8 +50,9 @@ pub(super) struct BudgetCommand {
     /// [default: 7, 20 and 50 a hundred taxels]
     #[arg(long, value_delimiter = ',', value_name = "M,…", value_parser = parse_measurements)]
     measurements: Vec<usize>,
-    /// Decodes. script_s20: the published script, which takes the weights for 0 and 1 and finds 20 atoms. script_m4:
-    /// the same with M/4 atoms. matched: M/4 atoms, with weights of ±1 and without the output of the idle skin
+    /// Variants of the published decoder to score with. script_s20: the published script, which takes the weights for 0
+    /// and 1 and composes an image of 20 atoms. script_m4: the same with M/4 atoms. matched: M/4 atoms, with weights of
+    /// ±1 and without the output of the idle skin
     #[arg(long, value_delimiter = ',', value_name = "DECODE,…", value_parser = parse_decode,
           default_values = ["matched", "script_s20"])]
     decode: Vec<PublishedDecode>,

@@ -36,10 +36,11 @@ use std::path::{Path, PathBuf};
   spts score recordings/ --learn-from my_gains.toml --decoder evidence
   spts decode recordings/ --skin my_gains.toml --decoder evidence
 
-Use the profile in a scene with `readout = \"my_skin.toml\"`, and the gains with `transducer_parameters.gains = \"my_gains.toml\"`:
-every seed then draws a skin that these recordings allow. The spec of a data set takes them as `transducer.gains`.")]
+Use the profile in a scene with `readout = \"my_skin.toml\"`, and the gains with `transducer_parameters.gains =
+\"my_gains.toml\"`: every seed then draws a skin that these recordings allow. The spec of a data set takes them as
+`transducer.gains`.")]
 pub(super) struct CalibrateCommand {
-    /// Directory of the recordings
+    /// Directory of the recordings: sessions, or the published ones (see `spts validate --help`)
     recordings: PathBuf,
     /// File of the profile [default: none, only the numbers are printed]
     #[arg(long, value_name = "FILE.toml", value_parser = parse_out)]
@@ -56,7 +57,7 @@ pub(super) struct CalibrateCommand {
     /// Root of the random numbers of simulated presses (--skin)
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed, requires = "skin")]
     seed: u64,
-    /// Presses that are used, 1-based, as FIRST-LAST [default: all]
+    /// Presses that are used, counted from 1, as FIRST-LAST [default: all]
     #[arg(long, value_name = "A-B", value_parser = parse_presses)]
     presses: Option<(usize, usize)>,
     #[command(flatten)]

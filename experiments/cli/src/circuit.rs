@@ -26,7 +26,8 @@ use std::path::PathBuf;
   spts circuit --taxel-pf 20 --pressed 0.1 --out out/soft
 
 Files in DIR (without --taxels):
-  circuit.csv                one line a size and readout, 100 … 1 000 000 taxels; volts are at the last amplifier's output
+  circuit.csv                one line a size and readout, 100 … 1 000 000 taxels; volts are at the last amplifier's
+                             output
   parameters.json            what they were computed with
   figures/circuit.png        settling, sum, signal to noise, noise by source; circuit.svg the same")]
 pub(super) struct CircuitCommand {

@@ -75,23 +75,25 @@ pub(super) struct CompareCommand {
     /// Compare the bent skin, touched by a finger, and nothing else
     #[arg(long, conflicts_with_all = ["no_curves", "causes", "profile", "gains", "images", "draws"])]
     arm: bool,
-    /// Simulated skins that press every recorded object; their scores are a band for the real skin's [default: none, 8
-    /// with --arm]
+    /// Number of simulated skins on which every recorded object is pressed; their scores are a band for the real
+    /// skin's; [2, 1000] [default: none; with --arm 8]
     #[arg(long, value_name = "N", visible_alias = "seeds", value_parser = clap::value_parser!(u64).range(2..=1000))]
     skins: Option<u64>,
     /// With --skins: also read the skin's own images out by the twin, to see where a difference comes from
     #[arg(long, requires = "skins")]
     causes: bool,
-    /// Which images the twin's readout is given
+    /// Images that the twin's readout is given: recorded are the skin's own, simulated those of a simulated skin
     #[arg(long, value_name = "KIND", value_parser = ["recorded", "simulated"], default_value = "recorded")]
     images: String,
-    /// Gains of the simulated skin, as `spts calibrate --skin` writes them [default: any skin]
+    /// Gains of the simulated skin's taxels, a file that `spts calibrate --skin` writes [default: gains drawn at
+    /// random]
     #[arg(long, value_name = "FILE.toml", conflicts_with = "skins")]
     gains: Option<PathBuf>,
-    /// Predict every session with a profile that was fitted to other ones: a file, or `others`
+    /// Predict every session with a profile that was fitted to other ones: a file, or `others` [default: calibrate on
+    /// the session's own odd presses]
     #[arg(long, value_name = "FILE.toml|others", conflicts_with = "skins")]
     profile: Option<String>,
-    /// Twins of every session, with --profile
+    /// Number of twins of every session, with --profile; [2, 1000]
     #[arg(long, value_name = "N", default_value_t = 8, requires = "profile", value_parser = clap::value_parser!(u64).range(2..=1000))]
     draws: u64,
     /// Root of the twin's random numbers

@@ -19,7 +19,7 @@ use spts_eval::{Labels, SessionSlip, Source, check_session, follow_slips, slips_
 use spts_models::{SkinLayout, Streams};
 use std::path::{Path, PathBuf};
 
-/// Decodes sessions: the image, class and place of what was pressed, from M measurements of the one wire.
+/// Decodes sessions: the image, class and place of what was pressed, from M samples of the one wire.
 ///
 /// SESSION is a folder with session.json, as `spts simulate` leaves one, a folder of such folders, or recordings of the
 /// real skin. Each session is decoded with its own rows of weights, whatever its layout. The decoders learn from raster
@@ -37,37 +37,40 @@ Files in DIR:
   windows.csv                one line a window
   SESSION.npz                for every M: phi_mM, y_mM, block_mM, window_mM and image_DECODER_mM; truth
 
---json prints {\"rows\": [{\"session\", \"block\", \"window\", \"decoder\", \"m\", \"start\", \"support\", \"iou\", \"correlation\", \"label\",
-\"label_true\", \"place\"}, ...]}, one entry a window; all numbers count from 0, and scores are null where no truth is known. Its `slips`,
-[{\"session\", \"block\", \"from\", \"rows\"}, ...], are the places from which on samples lagged behind their rows of weights, because the cells
-had missed clock edges. Such samples are put back on their rows before they are decoded; `start` counts rows then.")]
+--json prints {\"rows\": [{\"session\", \"block\", \"window\", \"decoder\", \"m\", \"start\", \"support\", \"iou\", \"correlation\",
+\"label\", \"label_true\", \"place\"}, ...]}, one entry a window; all numbers count from 0, and scores are null where no truth
+is known. Its `slips`, [{\"session\", \"block\", \"from\", \"rows\"}, ...], are the places from which on samples lagged behind
+their rows of weights, because the cells had missed clock edges. Such samples are put back on their rows before they are
+decoded; `start` counts rows then.")]
 pub(super) struct DecodeCommand {
     /// Session, folder of sessions, or recordings of the real skin
     session: PathBuf,
-    /// Only the sessions of these names
+    /// Only the sessions of these names [default: all in SESSION]
     #[arg(long = "session", value_name = "NAME,...", value_delimiter = ',')]
     only: Vec<String>,
     /// Decoders; see `spts score --list`
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "nn_lmmse")]
     decoder: Vec<String>,
-    /// Numbers of measurements [default: 7,20,50 on 100 taxels, and the same shares of other skins]
+    /// Numbers of samples M that an image is decoded from; each [1, 1000000] [default: 7,20,50 on 100 taxels, and the
+    /// same shares of other skins]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=1_000_000))]
     measurements: Vec<u32>,
-    /// Number of windows to decode in each block, one after the other from the beginning of the hold
+    /// Number of windows of M samples to decode in each block (press or drop), one after the other from the beginning
+    /// of the hold; [1, 100000]
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u32>(1..=100_000))]
     windows: u32,
-    /// Folder of the results [default: out/decode]
+    /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "out/decode")]
     out: PathBuf,
-    /// Root of the random numbers of learning
+    /// Root of the random numbers with which decoders learn
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
-    /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows
-    /// and columns than the published one [default: those that ship]
+    /// Trained network of the decoder `amortised`, a file that `python -m spts.amortised` writes; needed for a skin of
+    /// other rows and columns than the published one [default: the network that ships]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// Gains of this skin, as `spts calibrate --skin` writes them: learn from presses of the known objects that are
-    /// simulated with them, and from no recording
+    /// Gains of this skin's taxels, a file that `spts calibrate --skin` writes: learn from presses of the known objects
+    /// that are simulated with them, and from no recording [default: learn from the raster presses of SESSION]
     #[arg(long, value_name = "FILE.toml")]
     skin: Option<PathBuf>,
     #[command(flatten)]

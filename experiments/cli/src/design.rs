@@ -30,8 +30,9 @@ use std::path::PathBuf;
 Objects:
   small        procedural shapes of 20 to 40 mm
   large        procedural shapes of 40 to 90 mm
-  DATASET      the name of a data set's spec (spts dataset specs), a spec file ending in .toml, or a folder that `spts dataset
-               make` has written. Its sections [object] and [pose] say what is pressed: shapes or the seventeen objects, their sizes and their places. Single objects only, no meshes and no balls
+  DATASET      the name of a data set's spec (spts dataset specs), a spec file ending in .toml, or a folder that `spts
+               dataset make` has written. Its sections [object] and [pose] say what is pressed: shapes or the seventeen
+               objects, their sizes and their places. Single objects only, no meshes and no balls
 
 Files in DIR:
   design.json           the answer, as --json prints it
@@ -70,7 +71,7 @@ struct NewDesign {
     /// Intersection over union that the images have to reach on average; [0.01, 0.99]
     #[arg(long, value_name = "IOU", value_parser = within(0.01, 0.99, "[0.01, 0.99]"), default_value_t = 0.8)]
     iou: f64,
-    /// Exact number of wires; [1, 256], at most one a row of taxels
+    /// Exact number of wires; [1, 256], at most one a row of taxels [default: as few as suffice, up to --most-wires]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=256), conflicts_with = "most_wires")]
     wires: Option<usize>,
     /// Most wires that the design may have; it takes as few as suffice; [1, 256]

@@ -23,9 +23,9 @@ use std::path::{Path, PathBuf};
 pub(super) enum DeviceMode {
     /// One taxel after the other
     Raster,
-    /// Weights of 256 levels
+    /// All taxels at once, each with a weight of 256 levels
     Analog,
-    /// Weights +1 and −1
+    /// All taxels at once, each with the weight +1 or −1
     Binary,
 }
 
@@ -65,13 +65,15 @@ impl DeviceMode {
     }
 }
 
-/// Stands in for the hardware: host software reads this device as it reads the skin.
+/// Stands in for the skin's hardware: host software reads this virtual device as it reads the skin.
 ///
-/// It opens a pseudo-terminal, prints its name, and speaks the published host's protocol on it: it waits for `*`,
-/// answers `Sending.`, loads its cells, answers `Sent!.`, and sends block after block of 1,000 frames of 100 codes.
-/// Without SESSION an object is pressed again and again while the device measures. The press is of contact alone,
-/// without an arm, and takes a quarter of a second up and down. With SESSION it sends that recording, of the twin or of
-/// the real skin.
+/// The command opens a pseudo-terminal, prints its name, and speaks the published device's protocol on it: it waits for
+/// `*`, answers `Sending.`, loads the seeds into its cells, answers `Sent!.`, and sends block after block of 1,000
+/// frames of 100 codes of the converter.
+///
+/// Without SESSION, an object is pressed on a simulated skin again and again, a press a block; only the contact is
+/// simulated, not the arm, and the force rises and falls in about a quarter of a second. With SESSION, the device sends
+/// that recording, of the twin or of the real skin.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts device --pty                            T is pressed; the first line printed is the port, such as /dev/pts/5
@@ -81,24 +83,24 @@ impl DeviceMode {
 
 --json prints {\"port\", \"mode\", \"taxels\", \"blocks\"} on one line, and then serves.")]
 pub(super) struct DeviceCommand {
-    /// Session to be sent, in place of a press
+    /// Session that the device sends, a folder with session.json [default: an object is pressed]
     session: Option<PathBuf>,
-    /// Open a pseudo-terminal
+    /// Open a pseudo-terminal, the port of the device; it has to be given, as there is no other kind of port
     #[arg(long, required = true)]
     pty: bool,
-    /// What is measured
+    /// What the device measures at each clock edge
     #[arg(long, value_enum, default_value_t = DeviceMode::Binary)]
     mode: DeviceMode,
-    /// Object that is pressed
+    /// Object that is pressed: one of the seventeen that `spts simulate --list` shows, or finger
     #[arg(long, value_name = "NAME", default_value = "T", conflicts_with = "session")]
     object: String,
-    /// Force of the hold, N, [0.1, 1000]
+    /// Force while the object is held, N; [0.1, 1000]
     #[arg(long, value_name = "N", default_value = "20", value_parser = number, allow_hyphen_values = true, conflicts_with = "session")]
     force: f64,
-    /// Readout profile of the device
+    /// Readout profile of the device: as_built, as_published, as_designed, ideal, or FILE.toml
     #[arg(long, value_name = "PROFILE", default_value = "as_built", conflicts_with = "session")]
     readout: String,
-    /// Stop after so many blocks [default: those of SESSION, or no end]
+    /// Stop after so many blocks; [1, 1000000] [default: those of SESSION, or no end]
     #[arg(long, value_name = "N", value_parser = whole::<u64>(1..=1_000_000))]
     blocks: Option<u64>,
     /// Send as fast as the host reads, in place of real time

@@ -33,13 +33,13 @@ Files in DIR:
   figures/pareto.png         error against cost; figures/pressure.png the pressures themselves
   scenes/                    meshes that only this study has
 
-A scene can ask for an error instead of a fidelity level, with `tolerance = 0.05`. It then takes the cheapest level that, by
-the shipped table, meets this error on every scene of its kind.")]
+A scene can ask for an error instead of a fidelity level, with `tolerance = 0.05`. It then takes the cheapest level
+that, by the shipped table, meets this error on every scene of its kind.")]
 pub(super) struct FidelityCommand {
     /// sphere, punch, edge, T, tape, comb, drop, or FILE.toml; repeat for several [default: all seven]
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
-    /// Fine cells along one side of a taxel; each [1, 24] [default: 2,3,6,12,24]
+    /// Resolutions: grid squares along one side of a taxel; each [1, 24] [default: 2,3,6,12,24]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = whole::<u16>(1..=24))]
     cells: Vec<u16>,
     /// A short run of less than a minute: two resolutions, one time step

@@ -19,13 +19,21 @@ use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
-/// Runs the cell's firmware on emulated ATtiny412 controllers.
+/// Runs the firmware of the skin's cells on emulated ATtiny412 microcontrollers.
 ///
-/// Every cell of the skin is emulated: its instructions, its clock pin, its I2C address, its DAC. The image that is
-/// shipped sets the DAC first and computes the next value afterwards; the image `plain` computes first, as the
-/// published device does, and has the interrupt of a millisecond timer. A scene with `weights = "firmware"` takes its
-/// weights from cells like these.
+/// A cell is the microcontroller behind one taxel: at every edge of the clock line it puts out the next weight of its
+/// taxel, as a code of its DAC. Emulated are the instructions of every cell, its clock pin, its I2C address and its
+/// DAC.
+///
+/// Two firmware images ship. `shipped` sets the DAC at the edge and computes the next weight afterwards. `plain`
+/// computes first, as the published device does, and is interrupted by a timer every millisecond, so that its DAC is
+/// sometimes late. A scene with `weights = "firmware"` takes its weights from cells like these.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts firmware verify --cells 20
+  spts firmware timing
+  spts firmware weights --mode analog --out weights.npy
+  spts firmware trace --taxel 3")]
 pub(super) struct FirmwareCommand {
     #[command(subcommand)]
     command: FirmwareAction,
@@ -39,11 +47,14 @@ enum FirmwareAction {
     Trace(TraceCommand),
 }
 
-/// Compares every code that the cells put out with the twin's weights.
+/// Checks that emulated cells put out exactly the weights that the twin computes by formula.
 ///
-/// The exit status is 1 when a code differs or a cell gives a wrong reply over the bus. A code that comes after the
-/// sample counts as different: the image `plain` is sometimes late at the default clock. At a slower clock with a later
-/// sample it is not.
+/// After every clock edge, the DAC codes of all cells are read at the time of the converter's sample and compared with
+/// the formula. The cells' replies over the I2C bus are checked as well. The exit status is 1 when a code or a reply
+/// differs.
+///
+/// A code that comes after the sample counts as different. At the default clock the image `plain` is sometimes that
+/// late; with a slower clock and a later sample, as in the third example, it is not.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware verify
@@ -52,13 +63,13 @@ enum FirmwareAction {
   spts firmware verify --image my_cell.hex --seeding mixed --cells 112 --mode analog --mode binary
   spts firmware verify --mode pattern --period 13,20,25 --edges 1000000")]
 struct VerifyCommand {
-    /// Clock edges in every mode; [1, 1000000000]
+    /// Clock edges to check in every mode; [1, 1000000000]
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole::<u64>(1..=1_000_000_000))]
     edges: u64,
-    /// Mode; may be given several times [default: all]
+    /// Mode of the cells to check; may be given several times [default: all four]
     #[arg(long = "mode", value_name = "MODE")]
     modes: Vec<ModeName>,
-    /// Bits of the patterns of mode `pattern`, one run each; [1, 64]
+    /// Lengths of the patterns of mode `pattern`, in bits, one run for each; [1, 64]
     #[arg(long = "period", value_name = "BITS,...", value_delimiter = ',', default_values_t = [7, 20, 64], value_parser = bits())]
     periods: Vec<usize>,
     #[command(flatten)]
@@ -67,8 +78,8 @@ struct VerifyCommand {
     common: Common,
 }
 
-/// Measures the latency from clock edge to DAC, the largest clock rate and the late updates of an image, beside the
-/// images that ship.
+/// Measures how fast a firmware image is: the time from clock edge to DAC, the largest clock rate at which no edge is
+/// lost, and how many DAC updates come after the sample. The images that ship are shown beside it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware timing
@@ -77,9 +88,10 @@ struct VerifyCommand {
 Files in DIR:
   timing.csv                 one line an image and mode
   timing.json                the same, and the late updates
-  figures/firmware.png       lost edges against the clock's rate, late updates against the sample's delay; firmware.svg the same")]
+  figures/firmware.png       share of lost edges over the clock's rate, share of late DAC updates over the sample's
+                             delay; firmware.svg the same")]
 struct TimingCommand {
-    /// Image: shipped, plain, or a file in Intel's hex format; the other two are shown beside it
+    /// Firmware image to time: shipped, plain, or a file in Intel's hex format; those that ship are shown beside it
     #[arg(long, value_name = "IMAGE", default_value = "shipped")]
     image: String,
     /// Folder of the results
@@ -89,7 +101,8 @@ struct TimingCommand {
     common: Common,
 }
 
-/// Writes the weights that the cells put out: an array of doubles (edges, cells).
+/// Writes the weights that emulated cells put out, as a NumPy array of doubles with one row an edge and one column a
+/// cell.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware weights --out weights.npy
@@ -103,10 +116,10 @@ struct WeightsCommand {
     /// Clock edges: rows of the array; [1, 1000000]
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole::<u64>(1..=1_000_000))]
     edges: u64,
-    /// Mode
+    /// Mode of the cells
     #[arg(long, value_name = "MODE", default_value = "binary")]
     mode: ModeName,
-    /// Bits of the pattern of mode `pattern`; [1, 64]
+    /// Length of the pattern of mode `pattern`, in bits; [1, 64]
     #[arg(long, value_name = "BITS", default_value_t = 20, value_parser = bits())]
     period: usize,
     #[command(flatten)]
@@ -115,30 +128,31 @@ struct WeightsCommand {
     common: Common,
 }
 
-/// Prints what one cell does, instruction by instruction.
+/// Prints what one emulated cell does, instruction by instruction.
 ///
-/// Prints one line for each step: tick of the 20 MHz oscillator, byte address, instruction, changed registers. The cell
-/// is seeded over the bus and clocked. With --from-reset it is left alone, which shows images that fail before they can
-/// answer.
+/// One line is one instruction: tick of the 20 MHz oscillator, byte address, instruction, changed registers. The cell
+/// is first seeded over the bus and then clocked. With --from-reset it gets neither, which shows what an image does
+/// that fails before it can answer.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware trace
   spts firmware trace --taxel 56 --mode raster --edges 2 --image plain
   spts firmware trace --from-reset 5000 --image my_cell.hex")]
 struct TraceCommand {
-    /// Taxel, 0-based; its address is 8 more
+    /// Taxel of the cell, counted from 0; the cell's bus address is 8 more
     #[arg(long, value_name = "K", default_value_t = 0, value_parser = whole::<usize>(0..=111))]
     taxel: usize,
-    /// Show so many ticks of 50 ns from power-on, with neither bus nor clock; [1, 100000000]
+    /// Show this many ticks of 50 ns from power-on, with neither bus nor clock; [1, 100000000] [default: show --edges
+    /// edges after seeding]
     #[arg(long, value_name = "TICKS", conflicts_with_all = ["edges", "mode"], value_parser = whole::<u64>(1..=100_000_000))]
     from_reset: Option<u64>,
     /// Clock edges; [1, 10000]
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>(1..=10_000))]
     edges: u64,
-    /// Mode
+    /// Mode of the cells
     #[arg(long, value_name = "MODE", default_value = "binary")]
     mode: ModeName,
-    /// Bits of the pattern of mode `pattern`; [1, 64]
+    /// Length of the pattern of mode `pattern`, in bits; [1, 64]
     #[arg(long, value_name = "BITS", default_value_t = 20, value_parser = bits())]
     period: usize,
     #[command(flatten)]
@@ -148,20 +162,21 @@ struct TraceCommand {
 /// Which cells are run, and how.
 #[derive(Debug, Args)]
 struct CellOptions {
-    /// Cells on the bus; [1, 112]
+    /// Cells on the bus, addresses 8 and up; [1, 112]
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u8>(1..=112))]
     cells: u8,
-    /// Image: shipped, plain, or a file in Intel's hex format
+    /// Firmware image: shipped, plain, or a file in Intel's hex format
     #[arg(long, value_name = "IMAGE", default_value = "shipped")]
     image: String,
-    /// Seeds: the address in one byte as published, or 32 bits of it mixed
+    /// Seeds of the cells' random generators: address is the cell's bus address in one byte, as published; mixed is a
+    /// 32-bit hash of it
     #[arg(long, value_name = "SEEDING", default_value = "address")]
     seeding: SeedingName,
-    /// Clock edges a second; [1, 1000000]
+    /// Clock edges a second, rising and falling; every edge is a measurement; [1, 1000000]
     #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = within(1.0, 1e6, "[1, 1000000] Hz"))]
     edge_hz: f64,
-    /// Time from a clock edge to the sample, µs; less than a period [default: 11, or the same share of a period shorter
-    /// than the skin's]
+    /// Time from a clock edge to the sample, µs; [0, 1000000/HZ) for --edge-hz HZ [default: 11 µs up to 64300 Hz, the
+    /// skin's; above that the same share of a period: 9.8 µs at 72000 Hz]
     #[arg(long, value_name = "US", value_parser = number)]
     sample_us: Option<f64>,
 }

@@ -31,7 +31,7 @@ pub(super) struct LiveCommand {
     /// Object at the beginning: one of the seventeen, or finger
     #[arg(long, value_name = "NAME", default_value = "T")]
     object: String,
-    /// Specimen of the skin and its noise
+    /// Seed of the skin: which specimen it is, and its noise
     #[arg(long, value_name = "SEED", default_value_t = 0, value_parser = seed)]
     seed: u64,
     #[command(flatten)]

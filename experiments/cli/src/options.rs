@@ -112,7 +112,7 @@ pub(super) fn decoders_named(names: &[String]) -> Result<Vec<&'static DecoderSpe
     Ok(found)
 }
 
-/// The network whose weights are in the file at `path`.
+/// The trained network in the file at `path`.
 ///
 /// # Errors
 /// [`CliError::Usage`] when it holds none.

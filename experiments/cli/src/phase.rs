@@ -10,15 +10,17 @@ use spts_report::phase::write;
 use spts_studies::phase::{Method, PhaseStudy, methods};
 use std::path::PathBuf;
 
-/// Measures where in the plane of undersampling M/N and sparsity S/M each recovery algorithm finds planted signals.
+/// Measures how many samples each recovery algorithm needs for a sparse signal, beside theory: a phase diagram.
 ///
-/// A problem is a matrix of random ±1 (M × N), S coefficients of magnitude .5 to 1.5 at random places, and exact
-/// measurements. It counts as solved when the answer is within 1 % of the signal.
+/// Many random problems are made and solved. A problem has N unknowns, of which S are not zero and have magnitudes of
+/// .5 to 1.5, and M noiseless measurements with random weights of ±1. It counts as solved when the answer is within 1 %
+/// of the signal. The result is the share of solved problems over M/N (undersampling) and S/M (sparsity), and the S/M
+/// at which half of the problems are solved. No skin is simulated: this shows what an algorithm can do at best.
 ///
-/// The rates stand beside two theories for large N. One is the weak threshold of Donoho and Tanner: below it, the least
-/// sum (the lasso without a penalty) finds almost every signal. It is the law for nn_lasso. The other is the threshold
-/// below which only one non-negative signal fits the measurements. It is the law for nn_lmmse. For all other methods
-/// both are a reference only. lmmse and tv are not shown, because they do not look for few non-zeros.
+/// Two theories for large N are drawn beside the shares. One is the weak threshold of Donoho and Tanner: below it, the
+/// smallest sum of magnitudes identifies almost every signal. It predicts nn_lasso. The other is the threshold below
+/// which only one non-negative signal fits the measurements. It predicts nn_lmmse. For all other methods both are only
+/// a comparison. The methods lmmse and tv are left out, because they do not look for sparse signals.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts phase --quick
@@ -27,23 +29,26 @@ use std::path::PathBuf;
 
 Files in DIR:
   rates.csv                 one line a method, M and S: share of the problems that were solved
-  crossings.csv             one line a method and M: the S/M at which half of them are, its standard error, and the theory
+  crossings.csv             one line a method and M: the S/M at which half are solved, its standard error, and the
+                            theory
   phase.json                both
-  figures/phase.png         crossings over M/N beside the theory; phase_rates.png all rates, the theory outlined; .svg the same
+  figures/phase.png         the S/M at which half are solved, over M/N, beside the theory; phase_rates.png all shares,
+                            with the theory outlined; .svg the same
 
-A transition has a width of about N^(-1/2), and lies a little above its limit for small N. Rates once zero at two neighbouring S are
-taken as zero for all larger ones.")]
+For small N, the share falls from 1 to 0 over a range of S/M of about N^(-1/2), a little above the theory. Where it is
+zero at two neighbouring S, it is taken as zero for all larger S without a trial.")]
 pub(super) struct PhaseCommand {
-    /// Methods [default: all that apply]
+    /// Recovery algorithms, by the names in docs/decoders.md [default: all that look for sparse signals of these
+    /// --signs]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
     method: Vec<String>,
-    /// Signs of the planted coefficients; the methods with nn_ need positive ones
+    /// Signs of the coefficients that are not zero; methods whose names begin with nn_ need positive ones
     #[arg(long, value_enum, default_value = "positive")]
     signs: SignsArg,
-    /// Unknowns N; [20, 2000]
+    /// Number of unknowns N; [20, 2000]
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u16>(20..=2000))]
     n: u16,
-    /// Problems a point; [1, 100000] [default: 30, 12 with --quick]
+    /// Number of problems for each pair of M and S; [1, 100000] [default: 30, with --quick 12]
     #[arg(long, value_name = "COUNT", value_parser = whole::<u32>(1..=100_000))]
     trials: Option<u32>,
     /// M/N = .25, .5, .75 and 1 only, and fewer problems

@@ -26,8 +26,8 @@ use std::time::Duration;
   spts decode out/cup
   spts device --pty                            a device without the hardware, in another terminal
 
---json prints {\"session\", \"mode\", \"blocks\", \"measurements\", \"signal_v\"}; `signal_v` is the root mean square of a frame of the hold
-about the mean of the idle part, V, block by block.")]
+--json prints {\"session\", \"mode\", \"blocks\", \"measurements\", \"signal_v\"}; `signal_v` is the root mean square of a frame
+of the hold about the mean of the idle part, V, block by block.")]
 pub(super) struct RecordCommand {
     /// Serial port of the device
     #[arg(long, value_name = "PATH")]
@@ -35,31 +35,31 @@ pub(super) struct RecordCommand {
     /// Folder of the session
     #[arg(long, value_name = "DIR", default_value = "out/recorded")]
     out: PathBuf,
-    /// What is pressed: the class of the session
+    /// Name of the object that is pressed: the class of the session
     #[arg(long, value_name = "NAME", default_value = "unknown")]
     object: String,
-    /// What the device measures
+    /// What the device measures at each clock edge
     #[arg(long, value_enum, default_value_t = DeviceMode::Binary)]
     mode: DeviceMode,
     /// Readout profile of the device: clock, converter and seeds of the cells
     #[arg(long, value_name = "PROFILE", default_value = "as_built")]
     readout: String,
-    /// Blocks that are read
+    /// Number of blocks to read, a press each; [1, 10000]
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = whole::<u64>(1..=10_000))]
     blocks: u64,
-    /// Blocks at the beginning that only condition the skin
+    /// Number of blocks at the beginning that only condition the skin and are not scored; [0, 10000]
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<u64>(0..=10_000))]
     conditioning: u64,
-    /// Number of frames at the start of every block in which nothing touches the skin
+    /// Number of frames at the start of every block in which nothing touches the skin; [0, 1000]
     #[arg(long, value_name = "N", default_value_t = 150, value_parser = whole::<u64>(0..=1000))]
     idle: u64,
-    /// First frame of the hold, and the frame after its last
+    /// First frame of every block in which the object is held, and the frame after the last; each [0, 999]
     #[arg(long, value_name = "FIRST,END", default_value = "500,700", value_delimiter = ',', num_args = 1, value_parser = whole::<u32>(0..=999))]
     hold: Vec<u32>,
-    /// Speed of the port, baud; devices on USB ignore it
+    /// Speed of the port, baud; devices on USB ignore it; [50, 4000000]
     #[arg(long, value_name = "BAUD", default_value_t = 115_200, value_parser = whole::<u32>(50..=4_000_000))]
     baud: u32,
-    /// Longest silence of the device, s, [0.1, 86400]
+    /// Longest silence of the device before the recording fails, s; [0.1, 86400]
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0, value_parser = within(0.1, 86_400.0, "[0.1, 86400]"))]
     timeout: f64,
     #[command(flatten)]

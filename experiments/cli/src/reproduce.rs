@@ -8,23 +8,30 @@ use clap::Args;
 use spts_report::reproduce::{Reproduction, ReproductionSummary};
 use std::path::PathBuf;
 
-/// Simulates, learns, scores and draws everything, and writes a report.
+/// Simulates, learns, scores and draws everything, and writes a report that a browser shows.
 ///
 /// Presses 17 objects and bounces a ball on the twin, records them through the one-wire readout, learns dictionary and
-/// library from the simulated raster images only, scores the twin and, with --recordings, the real skin with the same
-/// code, and writes index.html, tables/*.csv, figures/*.svg and *.png, arrays/*.npy (pressure_pa, median_raster_v,
-/// dictionary, library, library_labels), summary.json and, with --save-recordings, a session folder for every object
-/// and for the ball in sessions/.
+/// library from the simulated raster images only, and scores the twin and, with --recordings, the real skin with the
+/// same code.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts reproduce --quick --out out/look
   spts reproduce --recordings recordings/ --out out/report --seed 7
-  spts reproduce --save-recordings --json")]
+  spts reproduce --save-recordings --json
+
+Files in DIR:
+  index.html                  the report
+  summary.json                its main numbers; timings.csv how long it took
+  tables/*.csv                the numbers of all tables
+  figures/*.svg, *.png        all figures
+  arrays/*.npy                pressure_pa, median_raster_v, dictionary, library, library_labels
+  sessions/                   with --save-recordings: a session folder for every object and for the ball")]
 pub(super) struct ReproduceCommand {
     /// A short run of about a minute: few presses, few numbers of measurements
     #[arg(long)]
     quick: bool,
-    /// Directory of recordings of the real skin to score beside the twin (see `spts validate --help`)
+    /// Directory of recordings of the real skin to score beside the twin (see `spts validate --help`) [default: the
+    /// twin alone]
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
     /// Folder of the report

@@ -58,19 +58,22 @@ use std::path::{Path, PathBuf};
   spts score --twin my_skin.toml --external 'mine=python3 my_decoder.py' --measurements 20,50
   spts score recordings/ --against board.json --tolerance 0.005 || echo regression
 
-An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\", \"learn\",
-\"classes\": {\"1\": \"brain\", ...}} and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once
-with a line {\"image\": [...]} or {\"label\": N} or both. A program that answers only labels has no scores of images. An image without
-a label is classified by the published classifier, as the images of the other decoders are. Where weights are not +1 or -1, phi has
-an array of numbers in place of each string of signs. When its input ends, the program has to end with status 0.
+An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\",
+\"learn\", \"classes\": {\"1\": \"brain\", ...}} and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and
+answers each at once with a line {\"image\": [...]} or {\"label\": N} or both. A program that answers only labels has no
+scores of images. An image without a label is classified by the published classifier, as the images of the other
+decoders are. Where weights are not +1 or -1, phi has an array of numbers in place of each string of signs. When its
+input ends, the program has to end with status 0.
 
-With {windows} and {answers} in its command, the program runs once for every press and M instead. It reads the .npz file {windows}, with
-phi (windows x M x taxels), y and volts, and writes the .npz file {answers}, with images (windows x taxels) or labels (windows; -1: unknown)
-or both. {learn} in the command, and `learn` in the header, is an .npz file with images and labels to learn from. Write placeholders
-without quotes: each becomes one word. The paths are also in the environment, as SPTS_WINDOWS, SPTS_ANSWERS and SPTS_LEARN.
+With {windows} and {answers} in its command, the program runs once for every press and M instead. It reads the .npz file
+{windows}, with phi (windows x M x taxels), y and volts, and writes the .npz file {answers}, with images (windows x
+taxels) or labels (windows; -1: unknown) or both. {learn} in the command, and `learn` in the header, is an .npz file
+with images and labels to learn from. Write placeholders without quotes: each becomes one word. The paths are also in
+the environment, as SPTS_WINDOWS, SPTS_ANSWERS and SPTS_LEARN.
 
-Every answer needs one finite value a taxel or a label that is in `classes`; nothing else may be written to standard output. A program
-that answers otherwise, ends with another status than 0 or is late (--external-timeout) is ended, and nothing is scored.
+Every answer needs one finite value a taxel or a label that is in `classes`; nothing else may be written to standard
+output. A program that answers otherwise, ends with another status than 0 or is late (--external-timeout) is ended, and
+nothing is scored.
 
 Files in DIR:
   board.json                 everything (--save writes the same); board.csv, objects.csv, localisation.csv
@@ -90,18 +93,19 @@ pub(super) struct ScoreCommand {
     /// Score sessions that the twin simulates now, instead of recordings: of the named scenes (press/NAME, or files
     /// that end in .toml, of any layout), or of five objects when none is named. Six presses of each are scored, or as
     /// many as the scene file says with `press.presses`; eight more are scanned, to learn from and as the truth
+    /// [default: score RECORDINGS]
     #[arg(long, value_name = "SCENE", num_args = 0..)]
     twin: Option<Vec<String>>,
     /// With --twin: fewer presses, except of scene files that say `press.presses`
     #[arg(long)]
     quick: bool,
-    /// Decoders, or `all`; see --list [default: the usual ones]
+    /// Decoders to score, or `all`; --list shows their names [default: those that --list marks with a star]
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     decoder: Vec<String>,
     /// List the decoders
     #[arg(long)]
     list: bool,
-    /// A program of your own, as COMMAND or NAME=COMMAND; repeat for several
+    /// A decoder of your own, a program given as COMMAND or NAME=COMMAND; repeat for several [default: none]
     #[arg(long, value_name = "COMMAND")]
     external: Vec<String>,
     /// Longest time that an external program may take for a window (for one run, with {windows} and {answers}), s,
@@ -130,8 +134,8 @@ pub(super) struct ScoreCommand {
     /// Wanted confidences, each in (0.5, 1) [default: 0.8,0.9,0.95,0.99 for classes; 0.6,0.7,0.8 for images]
     #[arg(long, value_name = "P,...", value_delimiter = ',', requires = "anytime", value_parser = number)]
     confidence: Vec<f64>,
-    /// Numbers of measurements; with --anytime the largest is the most that a window takes [default:
-    /// 5,7,10,13,20,25,50,100; with --in-time 5,7,10,20]
+    /// Numbers of samples M in a window; each [1, 10000]; with --anytime the largest is the most that a window takes
+    /// [default: 5,7,10,13,20,25,50,100; with --in-time 5,7,10,20]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=10_000))]
     measurements: Vec<u32>,
     /// Objects that are scored [default: all with a compressive session]
@@ -154,8 +158,8 @@ pub(super) struct ScoreCommand {
     /// that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
-    /// Weights of the decoder `amortised`, as `python -m spts.amortised` writes them; needed for a skin of other rows
-    /// and columns than the published one [default: those that ship]
+    /// Trained network of the decoder `amortised`, a file that `python -m spts.amortised` writes; needed for a skin of
+    /// other rows and columns than the published one [default: the network that ships]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// How the rows of a window come about; with both, every decoder is scored with each. `random`: measurements that
@@ -164,16 +168,16 @@ pub(super) struct ScoreCommand {
     /// has learned, and neither on the object nor on a sample; the order in time is lost. Chosen rows have no votes
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', default_value = "random", value_parser = sensing())]
     sensing: Vec<Sensing>,
-    /// Leave out the times, so that the output is the same from run to run
+    /// Leave the times of decoding out, so that the output is the same from run to run
     #[arg(long)]
     no_times: bool,
-    /// Write the board to FILE
+    /// Also write the score table to FILE, to compare a later one with it by --against [default: none]
     #[arg(long, value_name = "FILE")]
     save: Option<PathBuf>,
-    /// Compare the board with the earlier one in FILE
+    /// Compare the scores with the earlier score table in FILE, which --save wrote [default: none]
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
-    /// How much a score may fall below the earlier one, [0, 1]; distances may grow by as many taxels
+    /// How much a score may fall below that of --against, [0, 1]; distances may grow by as many taxels
     #[arg(
         long,
         value_name = "SHARE",

@@ -29,22 +29,24 @@ use std::path::{Path, PathBuf};
   spts seeds --seeds out/seeds/bytes_seeds.txt --mode analog
   spts seeds --taxels 400 --quick
 
-A seed FILE holds whole numbers in [0, 4294967295], decimal or with 0x, with spaces, commas or line ends between them and # before comments:
-one a taxel, row by row, of a square skin. A LIST is the same on the command line, with commas.
+A seed FILE holds whole numbers in [0, 4294967295], decimal or with 0x, with spaces, commas or line ends between them
+and # before comments: one a taxel, row by row, of a square skin. A LIST is the same on the command line, with commas.
 
 Files in DIR:
   facts.csv                 period, phases, constant rows, rank of the first N rows; one line a set
   windows.csv               one line a set and M: rank, condition, coherence, isometry
-  worth.csv                 one line a kind of images, noise, decoder, M and set: IoU, its gain over the given set, standard errors
+  worth.csv                 one line a kind of images, noise, decoder, M and set: IoU, its gain over the given set,
+                            standard errors
   seeds.json                all of them, and the seeds
-  NAME_seeds.txt            seeds of the sets mixed, searched and bytes, for --seeds and for seeds_file under [rows] of a scene
-  NAME_bus.csv              what the master writes to each cell to load them: mode and a byte of seed, or mode with 0x80 and four;
-                            up to 112 cells
+  NAME_seeds.txt            seeds of the sets mixed, searched and bytes, for --seeds and for seeds_file under [rows] of
+                            a scene
+  NAME_bus.csv              what the master writes to each cell to load them: mode and a byte of seed, or mode with 0x80
+                            and four; up to 112 cells
   readout_mixed.toml        the profile as_built with mixed addresses, for --readout
   figures/seeds.png         coherence and IoU over M; matrices.png the first rows; .svg the same
 
-Proposed are the searched seeds when they beat the mixed addresses by two standard errors on windows that the search did not see, and
-else the mixed addresses.")]
+Proposed are the searched seeds when they beat the mixed addresses by two standard errors on windows that the search did
+not see, and else the mixed addresses.")]
 pub(super) struct SeedsCommand {
     /// Set to judge: address, mixed, a FILE or a LIST
     #[arg(long, value_name = "SET", default_value = "address", allow_hyphen_values = true)]
@@ -52,26 +54,26 @@ pub(super) struct SeedsCommand {
     /// Taxels of the skin with address or mixed, N: a square number in [16, 1024]
     #[arg(long, value_name = "N", default_value = "100", value_parser = square(4..=32))]
     taxels: Side,
-    /// Rows of a window; each [1, 1000]
+    /// Numbers of rows M in a window; each [1, 1000]
     #[arg(long, value_delimiter = ',', value_name = "M,…", default_values = ["5", "7", "10", "13", "20"],
           value_parser = parse_measurements)]
     rows: Vec<usize>,
-    /// Weights of the cells
+    /// Weights that the cells put out: binary, ±1, or analog, eight bits
     #[arg(long, value_enum, default_value = "binary")]
     mode: ModeArg,
-    /// Folder of recordings, whose raster images are decoded too
+    /// Folder of recordings, whose raster images are decoded too [default: synthetic images alone]
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
-    /// Noise of a measurement over the image's norm; [0, 10]
+    /// Standard deviation of the noise of a sample, as a share of the image's Euclidean norm; [0, 10]
     #[arg(long, value_name = "SHARE", default_value_t = 0.06, value_parser = within(0.0, 10.0, "[0, 10]"))]
     noise: f64,
-    /// Sets that the search tries; [0, 1000000] [default: 2000, 200 with --quick]
+    /// Number of sets that the search for better seeds tries; [0, 1000000] [default: 2000, with --quick 200]
     #[arg(long, value_name = "COUNT", value_parser = whole::<u32>(0..=1_000_000))]
     budget: Option<u32>,
-    /// Windows that are judged; [1, 10000] [default: 64, 16 with --quick]
+    /// Number of windows that are judged; [1, 10000] [default: 64, with --quick 16]
     #[arg(long, value_name = "COUNT", value_parser = whole::<u32>(1..=10_000))]
     windows: Option<u32>,
-    /// Synthetic images; [2, 100000] [default: 400, 60 with --quick]
+    /// Number of synthetic images; [2, 100000] [default: 400, with --quick 60]
     #[arg(long, value_name = "COUNT", value_parser = whole::<u32>(2..=100_000))]
     images: Option<u32>,
     /// A short run of a few seconds: fewer windows and images, a short search

@@ -48,12 +48,14 @@ use toml::Value;
   spts simulate out/T/scene.toml --out out/again
 
 Files in DIR (N presses, F frames, the skin's rows R and columns C):
-  scene.toml                 the scene with every default; simulate it again for the same bytes. Files that it names lie beside it
+  scene.toml                 the scene with every default; simulate it again for the same bytes. Files that it names lie
+                             beside it
   manifest.json              what the run wrote, with sizes and SHA-256: a later run replaces these files and no others
   summary.json timing.json   what happened; how long it took on which machine
   frames.csv                 force, torque, pose, peak pressure, area of the loaded taxels, frame by frame
   time_s.npy                 F: time of the frames, s
-  pressure_pa.npy            N x F x R x C: mean over each taxel's cell, Pa; electrode_pressure_pa.npy over its electrode
+  pressure_pa.npy            N x F x R x C: mean over each taxel's area, Pa; electrode_pressure_pa.npy over its
+                             electrode
   conductance_s.npy          N x F x R x C: what the readout sees, S
   session.json               the recordings as a session, with raster_*.npy and compressive_*.npy: see docs/session.md
   decoded.png decoded.svg    pressure, the trace of the wire, images decoded from it at three M
@@ -68,7 +70,7 @@ pub(super) struct SimulateCommand {
     list: bool,
     /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The arm holds it at its origin; its -z side faces the
     /// skin. Small defects are repaired and large meshes are decimated, with a note. A mesh that cannot be repaired is
-    /// refused with the reason
+    /// refused with the reason [default: none]
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh file, 0.001 for millimetres; (0, 1000] [default: 1]
@@ -80,10 +82,10 @@ pub(super) struct SimulateCommand {
     /// Column of the object's origin, in taxels [default: the object's own place]
     #[arg(long, value_name = "COL", value_parser = number)]
     col: Option<f64>,
-    /// Rotation about the skin's normal, counter-clockwise from above, degrees; [-360, 360]
+    /// Rotation about the skin's normal, counter-clockwise from above, degrees; [-360, 360] [default: the object's own]
     #[arg(long, value_name = "DEG", value_parser = number)]
     rotation_deg: Option<f64>,
-    /// Tilt about the skin's x and y axes, degrees; each [-60, 60]
+    /// Tilt about the skin's x and y axes, degrees; each [-60, 60] [default: the object's own]
     #[arg(long, value_name = "X,Y", value_parser = parse_pair, allow_hyphen_values = true)]
     tilt_deg: Option<[f64; 2]>,
     /// Force on the plateau, N; [0.5, 100] [default: 20]
@@ -99,16 +101,17 @@ pub(super) struct SimulateCommand {
     /// the time between frames, 2 ms at most [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto")]
     timestep: Option<Timestep>,
-    /// Contact field: footprint, winkler, layer or half_space. taxel_bed and flex are made of MuJoCo's own parts, to
-    /// check the others: they take minutes for a press and cannot simulate a ball [default: winkler, or the scene
-    /// file's]
+    /// Contact model, which computes the pressure between object and skin: footprint, winkler, layer or half_space.
+    /// taxel_bed and flex are made of MuJoCo's own parts, to check the others: they take minutes for a press and cannot
+    /// simulate a ball [default: winkler, or the scene file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
-    /// Fine cells along one side of a taxel; [1, 64] [default: 6, or the scene file's]
+    /// Resolution of the contact: grid squares along one side of a taxel; [1, 64] [default: 6, or the scene file's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=64))]
     cells: Option<u32>,
-    /// Largest relative error of the taxels' pressures, [0.03, 1]: chooses the cheapest contact, cells and time step
-    /// that meet it, by the measurements of `spts fidelity`
+    /// Largest relative error of the taxels' pressures, [0.03, 1]: chooses the cheapest contact model, grid and
+    /// time step that meet it, by the measurements of `spts fidelity` [default: none; --contact, --cells and --timestep
+    /// say it]
     #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], value_parser = number)]
     tolerance: Option<f64>,
     /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]
@@ -121,18 +124,19 @@ pub(super) struct SimulateCommand {
     /// file's]
     #[arg(long, value_name = "NAME|FILE.toml")]
     readout: Option<String>,
-    /// Where the weights come from. model: the formula of the cells' generator. firmware: the output of emulated cells,
-    /// which is slower and gives the same recording as long as the cells keep up with the clock [default: model, or the
-    /// scene file's]
+    /// Where the weights of the taxels come from. model: the formula of the cells' generator. firmware: the output of
+    /// emulated cells (the microcontrollers behind the taxels), which is slower and gives the same recording as long as
+    /// the cells keep up with the clock [default: model, or the scene file's]
     #[arg(long, value_name = "NAME")]
     weights: Option<String>,
     /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting,
-    /// detached; TAXEL counts from 0, row by row. Parameters stand under [[faults]] in a scene or profile file
+    /// detached; TAXEL counts from 0, row by row. Parameters stand under [[faults]] in a scene or profile
+    /// file [default: none]
     #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
     faults: Vec<(String, u32)>,
-    /// Any field of the scene, repeatable: KEY is a dotted path, such as press.force_n, skin.rows or
-    /// transducer_parameters.temperature_c, VALUE is TOML, and a bare word is a string. The options above are short
-    /// forms of such fields
+    /// Sets any key of the scene file, repeatable: KEY is its dotted path, such as press.force_n, skin.rows or
+    /// transducer_parameters.temperature_c, VALUE is TOML, and a bare word is a string. docs/scenes.md has all keys.
+    /// The options above are short forms for some of them [default: none]
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
     set: Vec<Assignment>,
     /// Only the mechanics and the conductance, no recording
@@ -145,8 +149,9 @@ pub(super) struct SimulateCommand {
     /// is decoded from that trace in time
     #[arg(long, conflicts_with = "no_record")]
     animate: bool,
-    /// Folder for the results. Those of an earlier run are replaced, all at once; files that no run has written stay
-    /// [default: out/NAME; for a mesh out/ and the name of its file, with a number where another mesh has that name]
+    /// Folder for the results. When the run ends, it replaces the files that an earlier run has written there; all
+    /// other files in the folder stay [default: out/NAME, such as out/T for press/T; with --mesh cup.obj out/cup, or
+    /// out/cup_2, out/cup_3 and so on where out/cup has the results of another mesh]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]

@@ -24,10 +24,11 @@ use std::path::PathBuf;
 Every command that reads recordings takes one of these paths (see docs/session.md):
   session                    a folder with session.json
   folder of sessions         all folders with session.json in it, at most three levels down
-  published recordings       presses/NAME/NAME_raster.mat, NAME_random2.mat, NAME_random2_time.mat; bounces/random2_tennis.mat;
-                             robot_arm/; dictionary.mat, permuted_dictionary.mat, SRC_lib.mat
-  published repository       the root of its clone, or its Data_Analysis/ with Measurements_Collected/, Application_Data/,
-                             Dictionary_Learning/ and SRC_Library/
+  published recordings       presses/NAME/NAME_raster.mat, NAME_random2.mat, NAME_random2_time.mat;
+                             bounces/random2_tennis.mat; robot_arm/; dictionary.mat, permuted_dictionary.mat,
+                             SRC_lib.mat
+  published repository       the root of its clone, or its Data_Analysis/ with Measurements_Collected/,
+                             Application_Data/, Dictionary_Learning/ and SRC_Library/
 Only the last two have the dictionary and the library that `spts validate` needs. `spts score` scores sessions too.")]
 pub(super) struct ValidateCommand {
     /// Published recordings, or the published repository: see below

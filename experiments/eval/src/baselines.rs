@@ -5,7 +5,7 @@ use crate::training::Learned;
 use serde::Serialize;
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 
-/// Score of an image that uses no measurement.
+/// Scores that an image without any measurement gets on one object: a decoder has to be better.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BaselineRow {
     /// Object, or "mean".

@@ -21,7 +21,8 @@ pub const PUBLISHED_HOLD_S: [f64; 2] = [50_000.0 / PUBLISHED_RATE_HZ, 70_000.0 /
 /// With fewer presses than this, all of them are scored.
 const FEW_PRESSES: usize = 15;
 
-/// Frames and presses that are scored (from 0).
+/// Which presses and frames of a session are scored, in which windows, and against which true image. All numbers count
+/// from 0.
 ///
 /// ```
 /// use spts_eval::protocol::Protocol;

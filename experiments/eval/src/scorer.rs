@@ -97,7 +97,7 @@ impl<'a> ScoredPress<'a> {
     }
 }
 
-/// A decoder for one thread.
+/// A trained decoder at work in one thread, with the classifier for images of decoders that name no class.
 pub struct Scorer<'a> {
     algorithm: Box<dyn Algorithm + 'a>,
     classifier: &'a Src,

@@ -23,7 +23,7 @@ pub struct ScoredSkin {
     pub learned: Learned,
 }
 
-/// Scores of one skin.
+/// Scores of one skin by the published evaluation: what `spts validate` prints.
 #[derive(Debug, Clone, Serialize)]
 pub struct SkinScores {
     /// For every object, and for the mean over all objects (named "mean").

@@ -14,7 +14,7 @@ use spts_recon::Matrix;
 use spts_recon::dictionary::shifted;
 use std::path::{Path, PathBuf};
 
-/// All sessions of one folder, prepared for scoring.
+/// All sessions of one folder, real or simulated, prepared for scoring.
 #[derive(Debug, Clone)]
 pub struct Source {
     /// The folder that was opened.

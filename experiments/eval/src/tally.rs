@@ -9,7 +9,7 @@ use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 /// Times presses are drawn anew for a confidence interval.
 const RESAMPLES: usize = 1000;
 
-/// Scores of decoded windows.
+/// How good the decoded windows of one decoder are: images, and classes.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Scores {
     /// Support accuracy: share of taxels correctly above or below 0.23 of the maximum. `None`, like all image scores,

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Objects of the default set: those that the real skin was recorded with in both modes.
 const OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
 
-/// Which sessions the twin simulates.
+/// Which sessions the twin simulates for `spts score --twin`.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct TwinSessions {
     /// Scenes as in `spts simulate`: `press/NAME`, or files that end in .toml. Empty for the default set.

@@ -38,7 +38,7 @@ pub struct Press {
     y: Vec<f64>,
 }
 
-/// M consecutive measurements.
+/// The M samples that are decoded together, with their rows of the sensing matrix.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<'a> {
     /// Rows of weights, M × taxels.

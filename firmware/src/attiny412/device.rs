@@ -17,10 +17,10 @@ const WAKE_UP_CYCLES: u64 = 5;
 /// Pin of the clock line, PA3.
 const CLOCK_PIN: u8 = 3;
 
-/// An ATtiny412.
+/// An emulated ATtiny412 microcontroller with the peripherals that a cell uses.
 ///
-/// Time counts in ticks of the 20 MHz oscillator from power-on. A step is a whole instruction, so a device that runs
-/// until a tick may stop a few cycles after it. The start-up time after a reset is not emulated.
+/// Time counts in ticks of the 20 MHz oscillator (50 ns) from power-on. A step is a whole instruction, so a device that
+/// runs until a tick may stop a few cycles after it. The start-up time after a reset is not emulated.
 #[derive(Debug, Clone)]
 pub struct Device {
     core: Core,

@@ -1,6 +1,6 @@
 //! Accesses that neither the emulation nor the device responds to.
 
-/// An access without effect.
+/// Something that the firmware does and the emulation does not support; it has no effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Fault {

@@ -32,7 +32,7 @@ pub enum Event {
     Illegal,
 }
 
-/// One executed instruction.
+/// What executing one instruction took, and what it asks of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
     /// CPU cycles, with internal SRAM or I/O. Reading flash or EEPROM through the data space costs at least one more
@@ -42,7 +42,7 @@ pub struct Step {
     pub event: Event,
 }
 
-/// Registers of the CPU.
+/// The CPU of an AVR microcontroller: its registers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Core {
     /// r0…r31.

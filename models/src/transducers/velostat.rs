@@ -36,12 +36,15 @@ pub struct VelostatConfig {
     pub saturation_pa: f64,
     /// g₀, conductance without load, S. Range [0, 1]; default 0 (recorded idle signal: below 0.005 V a taxel).
     pub unloaded_s: f64,
-    /// Standard deviation of the logarithm of a taxel's fixed gain. Range [0, 2]; default 0.30 (recorded on flat
-    /// objects: 0.36–0.39, which includes the objects' own unevenness).
+    /// Standard deviation, from taxel to taxel, of the natural logarithm of a taxel's fixed gain, which is the same in
+    /// all sessions of a skin. Range [0, 2]; default 0.30: the gains of two thirds of the taxels lie within a factor of
+    /// 1.35 of the median (recorded on flat objects: 0.36–0.39, which includes the objects' own unevenness).
     pub spread_log_sd: f64,
-    /// Standard deviation of the logarithm by which a taxel's gain varies from session to session. Range [0, 2];
-    /// default 0.10. Between two sessions with one object the recorded gains change by √2 times this value: 0.12–0.16
-    /// for four objects and 0.31 for a fifth (`spts calibrate`, median 0.14).
+    /// Standard deviation of the natural logarithm of a second gain, which every taxel draws anew in each session,
+    /// because the skin is mounted anew. The conductance is multiplied by both gains. Range [0, 2]; default 0.10: in
+    /// two thirds of the cases, a factor between 0.90 and 1.11. The ratio of a taxel's gains in two sessions then has
+    /// √2 times this standard deviation; recorded with one object in two sessions: 0.12–0.16 for four objects and 0.31
+    /// for a fifth (`spts calibrate`, median 0.14).
     pub session_log_sd: f64,
     /// Gains of a calibrated skin. They replace `spread_log_sd` and `session_log_sd`; every seed then draws a skin that
     /// the calibrated one may be. A scene or the specification of a data set may instead name a file written by `spts
@@ -53,11 +56,11 @@ pub struct VelostatConfig {
     /// α, relative change of the resistance with temperature, 1/K. Range [-0.02, 0.02]; default 0.004 (estimate for
     /// carbon black in polyethylene near room temperature: 0.002–0.006; the sign may differ between samples).
     pub resistance_per_k: f64,
-    /// Hysteresis.
+    /// Hysteresis: the conductance is larger when the pressure falls than when it rises.
     pub hysteresis: HysteresisConfig,
-    /// Creep and delay.
+    /// Creep: the conductance grows while a load is held, and follows a change with a delay.
     pub creep: CreepConfig,
-    /// Conditioning from press to press.
+    /// Conditioning: the conductance grows from press to press of a session.
     pub conditioning: ConditioningConfig,
 }
 

@@ -33,7 +33,7 @@ pub fn vote_groups(decisions: &[Option<usize>], size: usize, cumulative: bool) -
         .collect()
 }
 
-/// Share of correct decisions, counted over several sequences.
+/// Counts the share of correct decisions over several sequences of windows.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct VoteScore {
     correct: f64,

@@ -1,6 +1,6 @@
 //! Selection of training images.
 
-/// Criteria for the training images.
+/// Which images a dictionary is learned from: those that are strong enough and not too much alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Selection {
     /// Threshold of the maximum above which an image is kept, in the unit of the images (V). Published: 0.25 V.

@@ -26,7 +26,7 @@ pub(super) struct NnFista {
     pub(super) max_iter: usize,
 }
 
-/// Result of a descent.
+/// How an iterative minimisation ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Descent {
     /// Number of iterations.

@@ -57,7 +57,7 @@ const PENALTY_SD: f64 = 0.5;
 /// Relative duality gap at which a descent stops, and its most iterations.
 const DESCENT: (f64, usize) = (1e-5, 120);
 
-/// Result of a [`RegionPursuit`].
+/// The image that a [`RegionPursuit`] has found, and what it took.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
     /// The image, row-major, ≥ 0.

@@ -5,7 +5,7 @@ use super::{LinearOperator, check_shape};
 use crate::matrix::ShapeError;
 use realfft::num_complex::Complex64;
 
-/// A small image, row-major.
+/// A small image, row-major, from which an image is composed by placing copies of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Atom {
     rows: usize,

@@ -42,7 +42,7 @@ fn within(field: &'static str, value: f64, ok: bool, range: &'static str) -> Res
     }
 }
 
-/// Weight of a penalty.
+/// How strongly a recovery penalises its unknowns, in place of fitting the samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Penalty {
     /// As given, in (0, ∞).

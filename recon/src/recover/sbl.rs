@@ -47,7 +47,8 @@ impl Sbl {
         max_iter: 10_000,
     };
 
-    /// Sparse Bayesian learning for measurements with `noise`.
+    /// Sparse Bayesian learning for samples whose noise has the standard deviation `noise`, with the default
+    /// [`Self::STOPPING`].
     ///
     /// # Errors
     /// [`ParameterError`] if `noise` is outside its range.

@@ -4,7 +4,7 @@ use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
-/// A search for seeds of low cost.
+/// A search for a set of seeds, one a taxel, whose rows have a low cost.
 pub struct Exchange<'a, E> {
     /// Number of sets that are tried. Half of them are drawn as a whole; the others come from the best of these by
     /// exchanging one seed at a time.

@@ -32,7 +32,7 @@ pub(super) enum Moments {
     Separable { rows: Matrix, cols: Matrix },
 }
 
-/// Differences that images may have from the expected ones.
+/// How much the images on the skin may differ from those for which rows are designed: by unknown gains and by shifts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Tolerances {
     /// Standard deviation of the logarithm of a taxel's gain, in [0, 3].

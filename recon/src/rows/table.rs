@@ -21,7 +21,7 @@ pub enum RowNeeds {
     Classes,
 }
 
-/// Levels of the weights.
+/// Weights that a designer's rows may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Levels {
     /// ±1.
@@ -30,7 +30,7 @@ pub enum Levels {
     Analog,
 }
 
-/// One line of the table.
+/// A designer of rows in the table [`DESIGNERS`]: its names, what it needs to know, and how it is built.
 #[derive(Clone, Copy)]
 pub struct Designer {
     /// Name on the command line and in files.
@@ -152,7 +152,7 @@ pub const DESIGNERS: &[Designer] = &[
     ),
 ];
 
-/// The designer called `name`.
+/// The designer called `name` in [`DESIGNERS`]; `None` if there is none.
 ///
 /// ```
 /// use spts_recon::rows::{DESIGNERS, RowNeeds, designer};

@@ -6,7 +6,7 @@ use crate::checks::within;
 use crate::classify::Component;
 use crate::matrix::Matrix;
 
-/// Rows to be designed.
+/// What a designer of rows is asked for: how many rows, for which images, with which noise and limit.
 #[derive(Debug, Clone, Copy)]
 pub struct RowTask<'a> {
     /// Number of rows M: the period of a repeated pattern, at least 1.
@@ -25,7 +25,7 @@ pub struct RowTask<'a> {
     pub seed: u64,
 }
 
-/// Designs rows of the sensing matrix.
+/// A way to choose rows of the sensing matrix for images that are expected.
 ///
 /// ```
 /// use spts_recon::rows::{Expected, RowTask, designer, posterior_trace};

@@ -16,7 +16,7 @@ pub struct TaxelBedConfig {
     pub stiffness_pa_per_m: f64,
     /// h, thickness of the foam, m; [1e-4, 10]. It has no effect, because the springs are linear.
     pub thickness_m: f64,
-    /// Fine cells along one side of a taxel; [1, 16].
+    /// Squares of the grid on which contact is computed, along one side of a taxel; [1, 16].
     pub cells_per_taxel: usize,
 }
 

@@ -76,7 +76,7 @@ pub enum MechanicsError {
         "`contact.model` = \"{model}\" needs a force and cannot stop a ball: use [press] instead of [drop], or another model"
     )]
     NeedsForce {
-        /// Name of the field.
+        /// Name of the contact field.
         model: String,
     },
     /// A drop onto a bent skin.
@@ -85,7 +85,7 @@ pub enum MechanicsError {
     /// A bent skin with a contact field without preloads.
     #[error("`contact.model` = \"{model}\" has no preload, which [bend] needs; valid: \"winkler\", \"footprint\"")]
     BentField {
-        /// Name of the field.
+        /// Name of the contact field.
         model: String,
     },
     /// A place for each press together with a place for all.
@@ -106,7 +106,7 @@ pub enum MechanicsError {
         tolerance: f64,
         /// "press" or "drop".
         task: &'static str,
-        /// Pitch of the skin, m. A large pitch needs more cells than a taxel can have.
+        /// Pitch of the skin, m. A large pitch needs more grid squares than a taxel can have.
         pitch_m: f64,
     },
     /// A scale together with an object, which has its own size.

@@ -50,7 +50,7 @@ use std::sync::Arc;
 /// at the joints) at the tool, along the skin's normal.
 pub const ARM_MASS_KG: f64 = 1.5;
 
-/// The task of a scene.
+/// What happens in a scene: presses by the arm, or drops of a ball.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Task<'a> {
     /// The arm presses an object.
@@ -64,7 +64,7 @@ const LONGEST_FRAME_INTERVAL_S: f64 = 0.1;
 /// What `frame_interval_s` may be, for errors.
 const FRAME_INTERVAL_RANGE: &str = "[timestep_s, 0.1] s for a press, [timestep_s, 2e-4] s for a drop";
 
-/// A valid scene with its mesh.
+/// The mechanical part of a scene, checked, with the mesh of its object: what presses on the skin, where and how hard.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mechanics {
     config: MechanicsConfig,
@@ -290,8 +290,8 @@ impl Mechanics {
         self.mesh_report.as_ref()
     }
 
-    /// Puts `field` under the preload of a bent skin before press `index`, and returns the resulting pressure of every
-    /// taxel, Pa. `None` for a flat skin, and for a field without preloads.
+    /// Puts the contact field `field` under the preload of a bent skin before press `index`, and returns the resulting
+    /// pressure of every taxel, Pa. `None` for a flat skin, and for a contact field without preloads.
     pub fn preload(&self, field: &mut dyn ContactField, index: u64) -> Option<Vec<f64>> {
         let bend = self.config.bend.as_ref()?;
         field.preload(&bend.strain(self.skin(), self.seed(), index))

@@ -28,11 +28,11 @@ use dynamics::Dynamics;
 use quasi_static::QuasiStaticPress;
 use spts_contact::Frame;
 
-/// One press or drop of a scene.
+/// A press or drop of a scene, simulated from frame to frame.
 ///
-/// MuJoCo simulates the dynamics with the contact field's wrench as an external force. If the scene's field computes
-/// the pose under a force ([`spts_contact::QuasiStatic`]), the force follows the same time course, and there are no
-/// time steps.
+/// MuJoCo simulates the dynamics with the contact field's wrench as an external force. If the scene's contact field
+/// computes the pose under a force ([`spts_contact::QuasiStatic`]), the force follows the same time course, and there
+/// are no time steps.
 pub struct World {
     scene: Mechanics,
     engine: Engine,

@@ -138,7 +138,7 @@ pub(crate) fn flange_and_jacobian(joints_rad: &[f64; 6]) -> (Isometry3<f64>, Mat
     (pose, jacobian)
 }
 
-/// Pose of the flange in world axes. Its z axis points out of the arm.
+/// Pose of the arm's flange in world axes, m, for these joint angles. Its z axis points out of the arm.
 ///
 /// ```
 /// use spts_sim::world::ur5::{HOME_RAD, flange};
@@ -156,7 +156,9 @@ pub fn flange(joints_rad: &[f64; 6]) -> Isometry3<f64> {
     pose
 }
 
-/// Jacobian of the point `tool` (in flange axes), world axes: rows 0–2 velocity, rows 3–5 angular velocity.
+/// How the point `tool` moves when the joints turn: a matrix with one column a joint. Rows 0–2 are the velocity of the
+/// point in world axes, m/s for 1 rad/s of the joint, and rows 3–5 the angular velocity. `tool` is given in flange
+/// axes, m.
 #[must_use]
 pub fn jacobian(joints_rad: &[f64; 6], tool: &Vector3<f64>) -> Matrix6<f64> {
     let tip = flange(joints_rad) * nalgebra::Point3::from(*tool);

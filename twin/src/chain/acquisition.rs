@@ -2,7 +2,8 @@
 
 use spts_circuit::Mode;
 
-/// How a session is recorded: mode, session number, and the time before and between its blocks.
+/// How a session is recorded: in which mode, as which session of the skin, and with how many frames before and between
+/// its blocks. A block is one press or drop; a frame is as many measurements as there are taxels.
 ///
 /// ```
 /// use spts::{Acquisition, Mode};
@@ -18,9 +19,9 @@ pub struct Acquisition {
     /// Number of the session. Sessions of one skin differ in their noise and, if the transducer varies between
     /// sessions, in their gains.
     pub session: u64,
-    /// Frames between loading the seeds and the first block.
+    /// Frames from the loading of the cells' seeds to the first block. They are not recorded.
     pub lead_frames: u64,
-    /// Unrecorded frames after each block.
+    /// Frames after each block that are not recorded.
     pub gap_frames: u64,
     /// Whether nothing touches the skin in the first 0.233 s of every block (15,000 measurements at 64.3 kHz).
     pub starts_idle: bool,
@@ -30,7 +31,8 @@ pub struct Acquisition {
 }
 
 impl Acquisition {
-    /// Presses as the published device records them: the arm needs about 57 frames to return.
+    /// The way in which the published device records presses: 57 frames are not recorded after each block, while the
+    /// arm returns, and a block begins with an untouched skin.
     #[must_use]
     pub fn presses(mode: Mode, session: u64) -> Self {
         Self {
@@ -43,14 +45,15 @@ impl Acquisition {
         }
     }
 
-    /// Touches as the published device records them, at unknown times; the same gaps as [`Acquisition::drops`].
+    /// The way in which the published device records touches by a finger: block follows block without a gap, as for
+    /// [`Acquisition::drops`], and nothing says when in a block the skin is touched.
     #[must_use]
     pub fn touches(mode: Mode, session: u64) -> Self {
         Self::drops(mode, session)
     }
 
-    /// Drops as the published device records them: blocks without gaps between them. The recording does not know when
-    /// the ball is released.
+    /// The way in which the published device records drops of a ball: block follows block without a gap, and nothing
+    /// says when in a block the ball lands.
     #[must_use]
     pub fn drops(mode: Mode, session: u64) -> Self {
         Self {

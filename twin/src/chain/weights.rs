@@ -2,7 +2,7 @@
 
 use super::error::ChainError;
 
-/// Where the weights of a recording come from.
+/// Where the weights of the taxels in a recording come from: a formula, or emulated cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WeightSource {
     /// Computed by the formula of the cells' generator.

@@ -6,7 +6,7 @@ use spts_recon::Matrix;
 use spts_recon::classify::Library;
 use std::path::PathBuf;
 
-/// All sessions in one folder.
+/// All sessions of one folder, and what was published with them.
 ///
 /// ```
 /// use spts::data::SessionSet;

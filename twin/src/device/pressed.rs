@@ -34,7 +34,7 @@ const DEEPEST_M: f64 = 0.05;
 /// Halvings of the depth when the one for the force is looked for.
 const HALVINGS: usize = 50;
 
-/// A source that presses an object once a block.
+/// Blocks of a virtual device on whose simulated skin an object is pressed once a block.
 pub struct Pressed {
     skin: TouchSkin,
     body: TouchBody,

@@ -7,7 +7,7 @@ use std::io::{self, Read, Write};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// One block as the device sends it.
+/// One block of samples as the device sends it over the serial port.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DeviceBlock {
     /// Frames since the seeds were loaded, at the end of the block.
@@ -16,7 +16,7 @@ pub struct DeviceBlock {
     pub codes: Vec<u32>,
 }
 
-/// A source of blocks for a virtual device.
+/// Where a virtual device gets its blocks from: a simulated press, or a recording.
 ///
 /// ```
 /// use spts::Mode;
@@ -69,7 +69,7 @@ pub enum DeviceError {
     Source(String),
 }
 
-/// A device on a port.
+/// A stand-in for the skin's hardware that speaks the published serial protocol on a port.
 pub struct VirtualDevice<P> {
     port: P,
     real_time: bool,

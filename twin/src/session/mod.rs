@@ -76,7 +76,7 @@ pub struct PressFacts {
     pub pose: Option<PressPose>,
     /// Normal force on the skin, N.
     pub force_n: Option<f64>,
-    /// Mean pressure over each taxel's cell, Pa.
+    /// Mean pressure over each taxel's area (pitch × pitch), Pa.
     pub pressure: Option<PressureMap>,
     /// Conductance of each taxel, S, as the readout saw it.
     pub conductance: Option<ConductanceMap>,
@@ -111,7 +111,7 @@ impl Recorded {
     }
 }
 
-/// Recordings of one object or event.
+/// Recordings of one object or event on one skin, raster and compressive, with what is known of every press.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Session {
     /// Name that identifies the session within a set. It must be valid as a file name; spaces are allowed.

@@ -32,7 +32,7 @@ pub struct Request {
 /// Scenes that ship as files: name and TOML.
 pub const NAMED_SCENES: &[(&str, &str)] = &[("arm", include_str!("arm.toml"))];
 
-/// A scene that is ready to run.
+/// A scene that has been read and checked and is ready to be simulated, with the files that belong to it.
 #[derive(Debug, Clone)]
 pub struct Prepared {
     /// The scene.

@@ -27,7 +27,7 @@ pub struct SimulatedPiece<'a> {
     pub compressive: Option<Recorded>,
 }
 
-/// The instant of the largest normal force.
+/// The frame with the largest normal force of all presses or drops of a run.
 #[derive(Debug, Clone)]
 pub struct Peak {
     /// Press or drop.

@@ -19,19 +19,20 @@ use std::path::PathBuf;
   spts dataset export lerobot out/shapes --out out/shapes_lerobot
   spts dataset export webdataset out/shapes --out out/shapes_tar --rows-per-tar 1000 --json
 
-lerobot: the spec needs `record.interval_s`, the time between the windows of a press, with a whole number of windows a second.
+lerobot: the spec needs `record.interval_s`, the time between the windows of a press, with a whole number of windows a
+  second.
   In Python: LeRobotDataset(\"local/shapes\", root=\"out/shapes_lerobot\")
 webdataset: train-000000.tar and so on; every row is NUMBER.json with its single values, and NUMBER.pressure.npy,
   .conductance.npy, .support.npy, .image.npy, .y.npy and .phi.npy as far as they are recorded.
   In Python: webdataset.WebDataset(\"out/shapes_tar/train-{000000..000009}.tar\").decode()")]
 pub(super) struct ExportCommand {
-    /// Format
+    /// Layout to write
     #[arg(value_name = "FORMAT", value_parser = formats())]
     format: String,
     /// Folder of the data set
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Folder of the export; missing or empty
+    /// Folder to write the export to; it must be missing or empty
     #[arg(long, value_name = "OUT")]
     out: PathBuf,
     /// Most rows of a tar file, for webdataset only; [1, 10^6] [default: 10000]

@@ -10,7 +10,7 @@ use spts_dataset::{Comparison, NAMED_SPECS, Spec, columns};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// Makes a sample of rows once more and compares them with the files, bit for bit.
+/// Checks a data set: makes some of its rows once more and compares them with the files, bit for bit.
 ///
 /// The exit status is 1 when a row differs.
 #[derive(Debug, Args)]
@@ -21,10 +21,10 @@ pub(super) struct VerifyCommand {
     /// Folder of the data set
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Rows that are compared; [1, 10^9]
+    /// Number of rows to make again and compare, chosen at random; [1, 10^9]
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u64>(1..=1_000_000_000))]
     rows: u64,
-    /// Seed of the choice of rows
+    /// Seed of the random choice of rows
     #[arg(long, value_name = "SEED", default_value_t = 0, value_parser = seed)]
     seed: u64,
     #[command(flatten)]
@@ -33,12 +33,13 @@ pub(super) struct VerifyCommand {
     common: Common,
 }
 
-/// Compares the truth of every row with that of the same row of another data set.
+/// Compares two data sets of the same touches: the true pressure and conductance of every row with those of the same
+/// row of a reference.
 ///
-/// It is meant for two data sets that differ in one thing, such as the contact field. Means of pressure and conductance
+/// It is meant for two data sets that differ in one thing, such as the contact model. Means of pressure and conductance
 /// are relative to the reference; rows without a touch are left out.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   spts dataset make presses-17 --rows 170 --set object.rows_per_shape=1 --out out/footprint
   spts dataset make presses-17 --rows 170 --set object.rows_per_shape=1 --set contact.model=layer --out out/layer
   spts dataset compare out/footprint out/layer")]
@@ -55,8 +56,11 @@ pub(super) struct CompareCommand {
     common: Common,
 }
 
-/// Says what a folder holds and how many of its files are made.
+/// Says what data set a folder holds, how many of its files are made, and whether it is finished.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts dataset info out/shapes
+  spts dataset info out/shapes --json")]
 pub(super) struct InfoCommand {
     /// Folder of the data set
     #[arg(value_name = "DIR")]
@@ -68,37 +72,47 @@ pub(super) struct InfoCommand {
     json: bool,
 }
 
-/// Prints the first rows, one JSON object a line.
+/// Prints the first rows of a data set, one JSON object a line.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts dataset head out/shapes
+  spts dataset head out/shapes --rows 1")]
 pub(super) struct HeadCommand {
     /// Folder of the data set
     #[arg(value_name = "DIR")]
     folder: PathBuf,
-    /// Rows; [1, 100000]
+    /// Number of rows to print; [1, 100000]
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = whole::<u64>(1..=100_000))]
     rows: u64,
     #[command(flatten)]
     files: Files,
 }
 
-/// Prints the columns of the data set that a spec makes.
+/// Prints the columns of the data set that a spec makes: name, type, unit and meaning, one column a line.
+///
+/// No row is made. The columns depend on the spec: `record.phi = true` in it adds the column `phi`, for example.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts dataset schema
+  spts dataset schema courses
+  spts dataset schema my_spec.toml --json")]
 pub(super) struct SchemaCommand {
-    /// Spec: a TOML file, or one of those that ship
+    /// Spec: a TOML file, or the name of one that ships (`spts dataset specs` lists them)
     #[arg(value_name = "SPEC", default_value = "random-shapes")]
     spec: String,
-    /// Print them as JSON on standard output
+    /// Print the columns as JSON on standard output
     #[arg(long)]
     json: bool,
 }
 
-/// Lists the specs that ship, or prints one of them.
+/// Lists the specs that ship, or prints one of them to begin your own with. A spec is a TOML file that describes a data
+/// set.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset specs
   spts dataset specs --show random-shapes > my_spec.toml")]
 pub(super) struct SpecsCommand {
-    /// Spec to print
+    /// Spec to print, by its name [default: list all]
     #[arg(long, value_name = "NAME")]
     show: Option<String>,
 }

@@ -12,10 +12,11 @@ use spts_dataset::{Dataset, Finished, Part, Spec};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Makes the rows of a data set.
+/// Makes the rows of a data set and writes them as Parquet files. A row is one window of samples of the wire, with the
+/// truth beside it.
 ///
-/// Files of this data set that are there and complete are skipped. A run that was stopped goes on with the same
-/// command. Without --shard all files are made and the data set is finished.
+/// Files of this data set that are there and complete are skipped: a run that was stopped goes on with the same
+/// command. Without --shard all files are made and the data set is finished, as by `spts dataset finish`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset make random-shapes --rows 100000 --out out/shapes
@@ -24,40 +25,45 @@ use std::time::Instant;
   spts dataset make random-shapes --set 'press.force_n={ uniform = [1, 100] }'
   spts dataset make my_spec.toml --out DIR --shard 2/8
 
-In a Slurm job array the worker is SLURM_ARRAY_TASK_ID less SLURM_ARRAY_TASK_MIN of SLURM_ARRAY_TASK_COUNT; in a Kubernetes indexed job
-it is JOB_COMPLETION_INDEX of --shards. Which files there are does not depend on the number of workers.
+In a Slurm job array the worker is SLURM_ARRAY_TASK_ID less SLURM_ARRAY_TASK_MIN of SLURM_ARRAY_TASK_COUNT; in a
+Kubernetes indexed job it is JOB_COMPLETION_INDEX of --shards. Which files there are does not depend on the number of
+workers.
 
 Files in DIR:
   data/part-*.parquet       the rows
   dataset.json spec.toml    what the data set is; written first
   statistics.json README.md croissant.json manifest.json    written by the last step, `finish`")]
 pub(super) struct MakeCommand {
-    /// Spec: a TOML file, or one of those that ship (`spts dataset specs`)
+    /// Spec, which says what is pressed and recorded: a TOML file, or the name of one that ships (`spts dataset specs`
+    /// lists them)
     #[arg(value_name = "SPEC")]
     spec: String,
     /// Folder of the data set [default: out/dataset/NAME]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Rows, in place of the spec's; [1, 10^12]
+    /// Number of rows; [1, 10^12] [default: the spec's]
     #[arg(long, value_name = "N", value_parser = whole::<u64>(1..=1_000_000_000_000))]
     rows: Option<u64>,
-    /// Root of every random number, in place of the spec's
+    /// Root of every random number; [0, 2^63) [default: the spec's]
     #[arg(long, value_name = "SEED", value_parser = seed)]
     seed: Option<u64>,
-    /// Changes a field of the spec: KEY is its dotted path, VALUE is TOML; repeatable
+    /// Changes one key of the spec file for this run: KEY is its dotted path, VALUE is TOML; repeatable.
+    /// docs/datasets.md has all keys [default: none]
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = str::parse::<Assignment>)]
     set: Vec<Assignment>,
-    /// Makes the share of worker i of n: the files k with k mod n = i
+    /// Make the files of worker i of n only, those whose number k has k mod n = i; count from 0 [default: what the
+    /// environment of a Slurm array or Kubernetes indexed job says, or else all files]
     #[arg(long, value_name = "i/n", conflicts_with = "shards")]
     shard: Option<String>,
-    /// Number of workers of a Kubernetes indexed job
+    /// Number of workers of a Kubernetes indexed job, which its environment does not say; [1, 10^9] [default: none]
     #[arg(long, value_name = "N", value_parser = whole::<u64>(1..=1_000_000_000))]
     shards: Option<u64>,
     #[command(flatten)]
     common: Common,
 }
 
-/// Checks that all files of a data set are there, and writes its statistics, card and manifest.
+/// Checks that all files of a data set are there, and writes its statistics, card and manifest. It is for data sets
+/// made by several workers; `spts dataset make` without --shard does it by itself.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset finish out/shapes
@@ -75,7 +81,7 @@ pub(super) struct FinishCommand {
 /// Where the files of a spec are.
 #[derive(Debug, Args)]
 pub(super) struct Files {
-    /// Folder in which to look for the files that the spec names
+    /// Folder in which files that the spec names by relative paths are looked for: meshes, profiles, gains
     #[arg(long, value_name = "DIR", default_value = ".")]
     files: PathBuf,
 }

@@ -29,7 +29,8 @@ use clap::{Args, Subcommand};
   spts dataset preview my_spec.toml                         a picture of 24 of its rows; of DIR the same
   spts dataset shapes                                       a picture of 100 procedural shapes
 
-In Python: pandas.read_parquet(\"DIR/data\"), polars.read_parquet(\"DIR/data/*.parquet\"), or datasets.load_dataset(\"parquet\", data_dir=\"DIR/data\")")]
+In Python: pandas.read_parquet(\"DIR/data\"), polars.read_parquet(\"DIR/data/*.parquet\"), or
+datasets.load_dataset(\"parquet\", data_dir=\"DIR/data\")")]
 pub(super) struct DatasetCommand {
     #[command(subcommand)]
     action: Action,

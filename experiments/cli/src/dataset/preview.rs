@@ -26,7 +26,7 @@ pub(super) struct PreviewCommand {
     /// Folder of the data set; or a spec: a TOML file, or one of those that ship
     #[arg(value_name = "DIR|SPEC")]
     source: String,
-    /// Rows; [1, 150]
+    /// Number of rows to draw; [1, 150]
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = whole::<u64>(1..=MOST_PREVIEW_ROWS))]
     rows: u64,
     /// Draws the rows at random with this seed [default: rows spread evenly]

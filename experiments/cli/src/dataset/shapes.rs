@@ -27,7 +27,7 @@ pub(super) struct ShapesCommand {
     /// Number of the first shape of every family
     #[arg(long, value_name = "SEED", default_value_t = 0, value_parser = seed)]
     seed: u64,
-    /// Shapes, spread evenly over the families; [1, 400]
+    /// Number of shapes, spread evenly over the families; [1, 400]
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<usize>(1..=MOST_SHAPES))]
     count: usize,
     /// Picture to write

@@ -12,10 +12,12 @@ use spts_report::sensing::{DESIGN_FILES, write_design};
 use spts_studies::sensing::{DesignImages, RowDesign};
 use std::path::PathBuf;
 
-/// Designs M rows for a skin, and writes them as a scene, a session and the cells need them.
+/// Designs M rows of the sensing matrix for a skin, and writes them in the forms that a scene, a session and the cells
+/// need.
 ///
-/// Designers that need a prior learn from simulated random shapes anywhere on the skin, unless --smooth or --recordings
-/// is given. See docs/rows.md.
+/// A row is one weight a taxel. Designed rows show more of what is expected on the skin than random ones. Some
+/// designers need to know what is expected, a prior: they learn it from simulated random shapes anywhere on the skin,
+/// unless --smooth or --recordings is given. docs/rows.md says which designer is good for what.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts sensing design
@@ -25,10 +27,10 @@ use std::path::PathBuf;
   spts simulate press/T --set rows.patterns_file=out/sensing/rows.txt --weights firmware
 
 Designers:
-  random, seeds_search                   what a generator can do
-  cosine_signs, hadamard, cake_cutting   know nothing but the grid
-  greedy, separable, analog              know the images; separable is for large skins, analog has 256 levels
-  classes                                knows templates, of --recordings
+  random, seeds_search                   pseudorandom rows; the best of many seeds
+  cosine_signs, hadamard, cake_cutting   need nothing but the rows and columns of the skin
+  greedy, separable, analog              need a prior of images; separable is for large skins, analog has 256 levels
+  classes                                needs templates of objects, of --recordings, and tells them apart
 
 Files in DIR:
   rows.txt            one line a row, + or − a taxel: for patterns_file under [rows] of a scene
@@ -38,35 +40,38 @@ Files in DIR:
   design.json         what the rows are like
   figures/rows.png    every row as a picture of the skin; rows.svg the same")]
 pub(super) struct DesignCommand {
-    /// Designer; see below
+    /// Way to choose the rows; see below
     #[arg(long, value_name = "NAME", default_value = "greedy", value_parser = designer_named())]
     designer: DesignerArg,
     /// Number of rows M; [1, 1024]
     #[arg(long, value_name = "M", default_value_t = 20, value_parser = whole::<usize>(1..=1024))]
     rows: usize,
-    /// Taxels of the skin, rows and columns, each [1, 1024] [default: 10x10]
+    /// Taxels of the skin, rows and columns, each [1, 1024]
     #[arg(long, value_name = "ROWSxCOLS", default_value = "10x10", value_parser = skin, conflicts_with = "recordings")]
     skin: [usize; 2],
     /// Prior: images are smooth over about this distance, in taxels, and nothing else is known of them; [0.01, 1000]
+    /// [default: random shapes]
     #[arg(long, value_name = "TAXELS", conflicts_with = "recordings", value_parser = within(0.01, 1000.0, "[0.01, 1000] taxels"))]
     smooth: Option<f64>,
-    /// Prior: images and templates of the raster presses in this folder, without those that are scored
+    /// Prior: images and templates of the raster presses in this folder, without those that are scored [default: random
+    /// shapes]
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
-    /// Noise of a measurement as a share of the root mean square of a random row's sum; [1e-6, 1000]
+    /// Noise of a sample that the designer reckons with, as a share of the root mean square of a random row's samples;
+    /// [1e-6, 1000]
     #[arg(long, value_name = "SHARE", default_value_t = RowTask::NOISE, value_parser = within(1e-6, 1e3, "[1e-6, 1000]"))]
     noise: f64,
-    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05,
-    /// 1000]
+    /// Upper limit of the samples of a designed row, so that the amplifier does not clip them: their root mean square,
+    /// as a multiple of that of a random row; [0.05, 1000] [default: no limit]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
-    /// Standard deviation of the logarithm of the taxels' gains, which nobody knows; [0, 3]
+    /// Standard deviation of the natural logarithm of the taxels' gains that the designer reckons with; [0, 3]
     #[arg(long, value_name = "SD", default_value_t = 0.0, value_parser = within(0.0, 3.0, "[0, 3]"))]
     gains: f64,
-    /// Images may be shifted by up to so many taxels; [0, 64]
+    /// Images that the designer reckons with may be shifted by up to so many taxels; [0, 64]
     #[arg(long, value_name = "TAXELS", default_value_t = 0, value_parser = whole::<usize>(0..=64))]
     shift: usize,
-    /// Order the rows so that cells change least, in place of the best rows first
+    /// Write the rows in the order in which the fewest weights change from row to row, in place of the best rows first
     #[arg(long)]
     fewest_flips: bool,
     /// Root of every random number

@@ -12,7 +12,13 @@ use spts_recon::rows::{DESIGNERS, Designer, designer};
 use study::StudyCommand;
 
 /// Designs the rows of the sensing matrix, and measures how much better than random rows they are.
+///
+/// A row is one weight a taxel: a sample is the sum of all taxels, each times its weight. The published cells draw
+/// their weights at random.
 #[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts sensing design --designer cosine_signs --rows 20
+  spts sensing study --quick")]
 pub(super) struct SensingCommand {
     #[command(subcommand)]
     command: SensingAction,

@@ -1,4 +1,4 @@
-//! `spts sensing study`: what designed rows are worth in the twin.
+//! `spts sensing study`: what designed rows of the sensing matrix are worth in the twin, and what they cost.
 
 use super::{DesignerArg, layout, named, skin};
 use crate::context::{Common, open_folder};
@@ -13,17 +13,23 @@ use spts_report::sensing::{STUDY_FILES, write_study};
 use spts_studies::sensing::SensingStudy;
 use std::path::PathBuf;
 
-/// Measures on simulated skins what designed rows are worth against random ones, and what they cost.
+/// Compares ways to choose the rows of the sensing matrix on simulated skins.
 ///
-/// Every repetition has a specimen of the skin, touches and noise of its own. Touches are procedural shapes and the
-/// seventeen objects, at random places, rotations and forces. Rows and decoder know none of them: both have the same
-/// prior, random outlines anywhere on the skin. The truth is the conductance of the taxels. Bands are 90 % intervals of
-/// the mean over the repetitions.
+/// A row is one weight a taxel, and M samples taken with M rows are decoded to one image. The study asks: how much
+/// better is the image with rows that a designer has chosen than with random rows, how many random rows would be as
+/// good, and which errors of the electronics grow with the chosen rows?
 ///
-/// Classes are the seventeen objects at their published places. Templates, and the rows of this part, come from twelve
-/// other skins.
+/// Images: every repetition simulates a skin with gains, noise and touches of its own. The touches are procedural
+/// shapes and the seventeen objects, at random places, rotations and forces. Neither the rows nor the decoder know
+/// them: both are made for random outlines anywhere on the skin. An image is scored against the conductance of the
+/// taxels.
 ///
-/// A cost is the error that one cause alone adds to the samples.
+/// Classes: `evidence` names which of the seventeen objects is pressed, at their published places. Its templates, and
+/// the rows of the designer `classes`, come from twelve other simulated skins.
+///
+/// Costs: each source of error alone, such as noise or late updates, as a share of the samples' root mean square.
+///
+/// Bands are 90 % intervals of the mean over the repetitions. `spts sensing design` writes the rows of one designer.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts sensing study
@@ -33,44 +39,50 @@ use std::path::PathBuf;
   spts sensing study --skin 16x16 --readout as_built
 
 Files in DIR:
-  study.csv             one line a kind of touches, readout, designer and M: IoU, its gain over random rows, bands, place, clipped samples
-  equal.csv             how many random rows each design is worth
-  classes.csv           share of the seventeen objects classified, one line a readout, designer and M
-  costs.csv             sums, headroom and errors by cause, in the order of design and in that of fewest flips
+  study.csv             one line a kind of touches, readout, designer and M: IoU, how much it exceeds that of random
+                        rows, bands, error of the place, share of clipped samples
+  equal.csv             how many random rows give the same IoU as the rows of each designer
+  classes.csv           share of the touches whose object is named rightly, one line a readout, designer and M
+  costs.csv             largest sample, headroom and errors by cause, for the rows in the designer's order and in the
+                        order in which the fewest weights change from row to row
   objects.csv           IoU of every object and of every family of shapes
   study.json            all of them
   figures/sensing.png   IoU over M with bands; sensing.svg the same")]
 pub(super) struct StudyCommand {
-    /// Designers that are compared; random is always one [default: all that need no classes]
+    /// Designers of rows to compare; `random` is always one of them, and where objects are named, `classes` too
+    /// [default: all of the list but classes]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…", value_parser = named(SensingStudy::designers()))]
     designers: Vec<DesignerArg>,
-    /// Numbers of measurements M; each [1, 1000] [default: 5,7,10,13,20,25,30,40,50; with --quick 7,13,20,40]
+    /// Numbers of samples M that an image is decoded from, each with M rows; [1, 1000] [default:
+    /// 5,7,10,13,20,25,30,40,50; with --quick 7,13,20,40]
     #[arg(long, value_delimiter = ',', value_name = "M,…", value_parser = parse_measurements)]
     measurements: Vec<usize>,
-    /// Readout profiles
+    /// Readout profiles: the electronics whose errors the samples have
     #[arg(long, value_delimiter = ',', value_name = "NAME,…", default_values = ["ideal", "as_built"],
           value_parser = PossibleValuesParser::new(PROFILES.iter().map(|(name, _)| *name)))]
     readout: Vec<String>,
-    /// Decoder for all rows: lmmse, or another decoder that makes images and needs no classes
+    /// Decoder that makes the images from all rows: one of those in docs/decoders.md that make images and need no
+    /// classes, such as lmmse
     #[arg(long, value_name = "NAME", default_value = "nn_lmmse")]
     decoder: String,
     /// Taxels of the skin, rows and columns; at most 2048 in all
     #[arg(long, value_name = "ROWSxCOLS", default_value = "10x10", value_parser = skin)]
     skin: [usize; 2],
-    /// Repetitions; [2, 1000] [default: 12, 4 with --quick]
+    /// Number of repetitions, each on a simulated skin of its own; [2, 1000] [default: 12, with --quick 4]
     #[arg(long, value_name = "COUNT", value_parser = whole::<usize>(2..=1000))]
     skins: Option<usize>,
-    /// Touches a repetition, of shapes and of objects each; [1, 10000] [default: 68, 34 with --quick]
+    /// Number of touches in a repetition: so many by shapes, and as many by objects; [1, 10000] [default: 68, with
+    /// --quick 34]
     #[arg(long, value_name = "COUNT", value_parser = whole::<usize>(1..=10_000))]
     touches: Option<usize>,
-    /// Largest root mean square of a row's sum, as a multiple of a random row's: headroom of the amplifier; [0.05,
-    /// 1000]
+    /// Upper limit of the samples of a designed row, so that the amplifier does not clip them: their root mean square,
+    /// as a multiple of that of a random row; [0.05, 1000] [default: no limit]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
-    /// Standard deviation of the logarithm of the taxels' gains that rows are designed for; [0, 3]
+    /// Standard deviation of the natural logarithm of the taxels' gains that the designers reckon with; [0, 3]
     #[arg(long, value_name = "SD", default_value_t = 0.0, value_parser = within(0.0, 3.0, "[0, 3]"))]
     gains: f64,
-    /// Fewer M, repetitions and touches
+    /// Fewer M, repetitions and touches: about a tenth of the time
     #[arg(long)]
     quick: bool,
     /// Root of every random number

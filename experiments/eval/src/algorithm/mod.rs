@@ -14,7 +14,7 @@ use spts_recon::classify::EvidenceError;
 use spts_recon::recover::{Gaussian, SequentialError};
 use std::sync::Arc;
 
-/// Answer of an algorithm to a window.
+/// What a decoder makes of one window of samples: an image, a class, or both.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Answer {
     /// Tactile image, one value a taxel, in any unit; empty if the algorithm makes none.
@@ -25,7 +25,7 @@ pub struct Answer {
     pub failed: bool,
 }
 
-/// Class found by an algorithm itself.
+/// The class that a decoder names by itself: which object it takes the touch for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Class {
     /// One of the labels.
@@ -62,7 +62,7 @@ pub enum DecodeError {
     External(#[from] ExternalError),
 }
 
-/// An algorithm ready to decode, with its own memory.
+/// A trained decoder at work in one thread, with memory of its own: windows of samples in, answers out.
 ///
 /// ```
 /// use spts_eval::algorithm::{Algorithm, Answer, DecodeError};
@@ -129,7 +129,7 @@ pub trait Algorithm {
     }
 }
 
-/// The property to which a confidence refers.
+/// What a decoder is sure of when it states a confidence: its class or its image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Subject {
@@ -139,7 +139,7 @@ pub enum Subject {
     Image,
 }
 
-/// Answer and confidence after the samples so far.
+/// A decoder's answer after the samples so far, and how sure it is of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Belief {
     /// Confidence of the algorithm in its answer, [0, 1].
@@ -174,14 +174,15 @@ pub trait Confidence {
     /// Starts the next window.
     fn begin(&mut self);
 
-    /// Adds the next sample of the window, given as a window of one measurement.
+    /// Takes the next sample of the window into account, and returns the answer so far and how sure the algorithm is of
+    /// it. `sample` is a window of one measurement: the sample and its row.
     ///
     /// # Errors
     /// [`DecodeError`].
     fn observe(&mut self, sample: &Window<'_>) -> Result<Belief, DecodeError>;
 }
 
-/// A trained algorithm, shared by all threads.
+/// A decoder that has learned from training data. All threads share it; each starts an [`Algorithm`] from it.
 ///
 /// ```
 /// use spts_eval::algorithm::{Algorithm, Answer, DecodeError, Trained};
@@ -230,7 +231,7 @@ pub trait Trained: Send + Sync {
     }
 }
 
-/// An algorithm outside the board's own table.
+/// A decoder of your own, to be scored beside those in the table of decoders: implement [`Contender::learn`].
 ///
 /// ```
 /// use spts_eval::external::ExternalCommand;

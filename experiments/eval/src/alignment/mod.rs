@@ -39,7 +39,7 @@ use track::Tracker;
 /// Most taxels of a skin whose recordings are checked: the search takes time with the square of their number.
 const MOST_TAXELS: usize = 1024;
 
-/// A slip of a session's compressive recording.
+/// A place in a session from which on the samples lag behind the rows that the recording states.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SessionSlip {
     /// Name of the session.

@@ -20,7 +20,7 @@ pub use text::table;
 
 use crate::algorithm::Subject;
 
-/// Wanted confidences.
+/// Confidences at which decoders stop in `spts score --anytime`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StopSettings {
     /// Wanted probabilities of the best class, each in (0.5, 1).

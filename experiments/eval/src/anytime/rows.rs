@@ -35,7 +35,7 @@ pub struct AnytimeRow {
     pub failed: usize,
 }
 
-/// One decoder with one stopping rule on one object.
+/// Results of `spts score --anytime` for one object, decoder and confidence.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct AnytimeObject {
     /// Algorithm.
@@ -59,7 +59,7 @@ pub struct AnytimeObject {
     pub windows: usize,
 }
 
-/// Results of `spts score --anytime`.
+/// Results of `spts score --anytime`: how many samples decoders need to be sure, and how often they are right then.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct AnytimeBoard {
     /// Means over the objects.

@@ -25,7 +25,7 @@ pub(crate) struct PressStops {
     pub(crate) failed: usize,
 }
 
-/// Number of samples, and the scores reached with them.
+/// How many samples a decoder took until it stopped, and how good its answers were.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct StopScores {
     /// Mean number of samples. A window that never reached the wanted confidence counts with all of its samples.

@@ -1,17 +1,18 @@
-//! What two boards do not have in common.
+//! Compares what two score tables have scored: their objects, decoders, numbers of measurements and so on.
 
 use super::rows::{BoardRow, ScoreBoard};
 use crate::place::PlaceRow;
 use serde::Serialize;
 
-/// One kind of thing that was scored, and which of them are on one of two boards alone.
+/// Names of one kind, such as decoders, that only one of two score tables has. Where there are any, means of the two
+/// tables are not over the same things.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Difference {
-    /// Kind in the plural, such as "decoders" or "numbers of measurements".
+    /// What is named, in the plural, such as "decoders" or "numbers of measurements".
     pub what: &'static str,
-    /// On the earlier board alone.
+    /// Names that only the earlier score table has.
     pub only_before: Vec<String>,
-    /// On the board of this run alone.
+    /// Names that only the score table of this run has.
     pub only_now: Vec<String>,
 }
 
@@ -48,7 +49,8 @@ fn left_out(row: &BoardRow) -> &'static str {
     }
 }
 
-/// The kinds of which the boards `before` and `now` do not have the same; empty for boards of the same settings.
+/// The kinds of names that differ between the score tables `before` and `now`; empty for two tables of the same
+/// settings.
 ///
 /// ```
 /// use spts_eval::board::{ScoreBoard, differences};

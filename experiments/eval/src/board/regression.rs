@@ -5,7 +5,7 @@ use crate::place::PlaceRow;
 use crate::sensing::Sensing;
 use serde::Serialize;
 
-/// A score that fell.
+/// A score that is lower than in an earlier score table, or is not there any more.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Regression {
     /// Decoder and conditions.

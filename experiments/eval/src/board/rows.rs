@@ -6,7 +6,7 @@ use crate::sensing::Sensing;
 use crate::tally::Scores;
 use serde::{Deserialize, Serialize};
 
-/// One decoder at one M: means over the objects.
+/// A row of the score table: one decoder at one M, means over the objects.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct BoardRow {
     /// Algorithm.
@@ -41,7 +41,7 @@ pub struct BoardRow {
     pub failed: usize,
 }
 
-/// One decoder at one M on one object.
+/// A row of the score table of single objects: one decoder at one M on one object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ObjectRow {
     /// Algorithm.
@@ -68,7 +68,7 @@ pub struct ObjectRow {
     pub class_single_ci: Option<[f64; 2]>,
 }
 
-/// Results of `spts score`.
+/// The score table, what `spts score` prints and saves: decoders side by side on the same windows.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ScoreBoard {
     /// Means over the objects.

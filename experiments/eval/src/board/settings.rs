@@ -15,7 +15,7 @@ use spts_circuit::Recording;
 use spts_recon::Matrix;
 use std::sync::Arc;
 
-/// Settings of a board.
+/// What `spts score` has to score: decoders, objects, numbers of measurements, and what the decoders learn from.
 pub struct BoardSettings {
     /// Algorithms.
     pub decoders: Vec<&'static DecoderSpec>,

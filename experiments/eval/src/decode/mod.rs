@@ -24,7 +24,7 @@ use spts_recon::classify::Src;
 use spts_recon::localise::centre_of_mass;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, pearson, support};
 
-/// Settings of `spts decode`.
+/// Settings of `spts decode`: decoders, numbers of measurements and windows.
 #[derive(Clone)]
 pub struct DecodeRequest {
     /// Decoders of the board.
@@ -46,7 +46,7 @@ pub struct LearnedDecoders {
     classes: Option<Labels>,
 }
 
-/// One decoded window.
+/// What one decoder made of one window of a session, and how good it is where the truth is known.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DecodedWindow {
     /// Name of the session.
@@ -78,7 +78,7 @@ pub struct DecodedWindow {
     pub image: Vec<f64>,
 }
 
-/// The decoded windows of one session.
+/// All decoded windows of one session, with the true images and what was measured.
 #[derive(Debug, Clone)]
 pub struct DecodedSession {
     /// Name of the session.
@@ -95,7 +95,7 @@ pub struct DecodedSession {
     pub measured: Vec<MeasuredWindow>,
 }
 
-/// The input of a decoder.
+/// The samples of one window with their rows of the sensing matrix: what a decoder is given.
 #[derive(Debug, Clone)]
 pub struct MeasuredWindow {
     /// Number of the block.

@@ -20,7 +20,7 @@ use crate::algorithm::Trained;
 use crate::training::{LearnError, TrainingData};
 use Needs::{Classes, Dictionary, Images, Network, Nothing, Shapes};
 
-/// Training data that an algorithm needs.
+/// Training data that a decoder needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Needs {
     /// Nothing.
@@ -33,7 +33,7 @@ pub enum Needs {
     Classes,
     /// Procedural shapes pressed in the simulation, for every source of training data.
     Shapes,
-    /// Only the weights of a network, which was trained on such shapes before.
+    /// Only the parameters of a network, which was trained on such shapes before.
     Network,
 }
 
@@ -45,7 +45,7 @@ impl Needs {
     }
 }
 
-/// One line of the table of algorithms.
+/// A decoder in the table [`DECODERS`]: its names, what it needs, and how it is trained.
 ///
 /// ```
 /// use spts_eval::decoders::{DECODERS, find};
@@ -186,7 +186,7 @@ pub const DECODERS: &[DecoderSpec] = &[
         .anytime(),
 ];
 
-/// The algorithm called `name`.
+/// The decoder called `name` in [`DECODERS`]; `None` if there is none.
 #[must_use]
 pub fn find(name: &str) -> Option<&'static DecoderSpec> {
     DECODERS.iter().find(|spec| spec.name == name)

@@ -23,7 +23,7 @@ const WINDOWS: usize = 12;
 /// Bound of the work: samples times the square of the number of taxels. About three seconds of one core.
 const WORK: f64 = 3e9;
 
-/// An image, and the window that completed it.
+/// The image of a contact that is followed in time, and the window of samples that was taken last for it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FollowedImage {
     /// Measurements of the block that were taken last.

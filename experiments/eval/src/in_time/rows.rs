@@ -46,7 +46,7 @@ pub struct InTimeRow {
     pub contacts: usize,
 }
 
-/// One decoder on one object.
+/// Results of `spts score --in-time` for one decoder on one object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InTimeObject {
     /// Object.
@@ -56,7 +56,7 @@ pub struct InTimeObject {
     pub row: InTimeRow,
 }
 
-/// Results of `spts score --in-time`.
+/// Results of `spts score --in-time`: images of contacts that are followed in time, at set times after the touch.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct InTimeBoard {
     /// Means over the objects.

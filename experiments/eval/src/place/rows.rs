@@ -11,7 +11,7 @@ fn ball() -> String {
     BALL.to_owned()
 }
 
-/// Localisation of contacts by one decoder at one M.
+/// How well one decoder at one M finds the place of a bouncing ball or of touches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlaceRow {
     /// Kind of contact: "ball", or the name of a session of touches.
@@ -33,7 +33,7 @@ pub struct PlaceRow {
     pub share_under_1px: f64,
 }
 
-/// One row of the published localisation.
+/// How well one variant of the published decoder at one M finds the place of the bouncing ball.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LocalisationRow {
     /// Decoding variant.

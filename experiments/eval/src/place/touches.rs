@@ -16,7 +16,7 @@ const SHORTEST_FRAMES: usize = 5;
 /// Frames before a touch that the untouched skin is not estimated from.
 const MARGIN_FRAMES: usize = 5;
 
-/// One touch: measurements `start..end` of a block.
+/// A touch found in a recording that does not say when it is touched: measurements `start..end` of a block.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedTouch {
     /// Block of the recording.

@@ -92,7 +92,9 @@ impl TrainingData {
         })
     }
 
-    /// Training data from `simulated` presses at gain 1, as skins with these `gains` would record them.
+    /// Training data for a skin whose gains are known. `simulated` are sessions pressed on a median skin, whose taxels
+    /// all have gain 1; `gains` turns them into what skins with these gains would record, each press with gains drawn
+    /// anew within their uncertainty. The sheet has `cols` columns.
     ///
     /// # Errors
     /// As [`Self::new`]; [`LearnError::Recording`] if a gain makes a sample infinite.

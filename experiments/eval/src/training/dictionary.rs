@@ -6,7 +6,7 @@ use spts_recon::dictionary::{DictionaryError, Ksvd, Selection, select};
 use spts_recon::{Matrix, MatrixView, SignTables};
 use std::ops::Range;
 
-/// A dictionary with look-up tables for rows of Φ·D.
+/// Images (atoms) that a sparse decoder composes its image of, with look-up tables for their sums under rows of ±1.
 ///
 /// ```
 /// use spts_eval::training::Dictionary;
@@ -61,7 +61,7 @@ impl Dictionary {
     }
 }
 
-/// Amount of training data for the published decoder.
+/// How much the published decoder learns from: presses, images, and sweeps of the dictionary learning.
 #[derive(Debug, Clone)]
 pub struct Learning {
     /// Raster presses of every object that are used for training.

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Reach of the shifted dictionary if none is published, taxels.
 pub const SHIFT_REACH: usize = 2;
 
-/// Training results of the published decoder.
+/// What the published decoder has learned from raster presses: dictionary and classifier.
 #[derive(Debug, Clone)]
 pub struct Learned {
     /// Dictionary.

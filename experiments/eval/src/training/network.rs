@@ -1,4 +1,4 @@
-//! Weights of the decoder `amortised`: those shipped with the program, or a file.
+//! The trained network of the decoder `amortised`: the one that is built into the program, or one from a file.
 
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
 use spts_recon::Matrix;
@@ -6,9 +6,9 @@ use spts_recon::recover::{Layer, Unrolled, UnrolledError, UnrolledStep, Unrolled
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
-/// The weights that ship, for the published skin; `python -m spts.amortised` makes them.
+/// The network that ships, for the published skin; `python -m spts.amortised` trains it.
 const SHIPPED: &[u8] = include_bytes!("../../assets/amortised.safetensors");
-/// Largest file of weights, bytes.
+/// Largest file of a network, bytes.
 const LARGEST: u64 = 1 << 30;
 /// What files say that they are.
 const KIND: &str = "spts amortised 1";
@@ -21,7 +21,7 @@ const KIND: &str = "spts amortised 1";
 /// let network = TrainedNetwork::shipped();
 /// assert!(network.on([10, 10]).is_ok());
 /// let error = network.on([12, 20]).err().expect("another sheet");
-/// assert!(error.to_string().contains("`amortised` has weights for 10 × 10 taxels"));
+/// assert!(error.to_string().contains("`amortised` is trained for 10 × 10 taxels"));
 /// ```
 #[derive(Debug, Clone)]
 pub struct TrainedNetwork {
@@ -31,7 +31,7 @@ pub struct TrainedNetwork {
     pub network: Arc<Unrolled>,
 }
 
-/// Why weights cannot be used.
+/// Why a trained network cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NetworkError {
@@ -39,14 +39,14 @@ pub enum NetworkError {
     #[error(transparent)]
     Read(#[from] spts_input::InputError),
     /// The file is not in safetensors format.
-    #[error("{path}: not a file of weights in safetensors format: {reason}")]
+    #[error("{path}: not a trained network in safetensors format: {reason}")]
     Format {
         /// The file.
         path: PathBuf,
         /// Cause.
         reason: String,
     },
-    /// The weights do not form a network.
+    /// The numbers in the file do not form a network.
     #[error("{path}: {source}")]
     Weights {
         /// The file.
@@ -54,14 +54,14 @@ pub enum NetworkError {
         /// Cause.
         source: UnrolledError,
     },
-    /// The weights are for another sheet.
+    /// The network is for another layout of taxels.
     #[error(
-        "`amortised` has weights for {} × {} taxels, and the skin has {} × {}: train a network for it (`python -m \
+        "`amortised` is trained for {} × {} taxels, and the skin has {} × {}: train a network for it (`python -m \
          spts.amortised --help`) and name its file with `--weights`",
         .weights[0], .weights[1], .skin[0], .skin[1]
     )]
     Shape {
-        /// Rows and columns for which the weights are.
+        /// Rows and columns of taxels for which the network was trained.
         weights: [usize; 2],
         /// Rows and columns of the skin.
         skin: [usize; 2],

@@ -41,7 +41,7 @@ const PRESSES: u64 = 600;
 const PITCH_M: f64 = 0.015;
 const MIDDLE: f64 = 4.5;
 
-/// Images of one object in many poses.
+/// Simulated images of one object in many places, rotations and tilts, to learn from.
 #[derive(Debug, Clone)]
 pub struct PosedObject {
     /// Name.

@@ -31,9 +31,11 @@ pub struct Skins {
     pub layout: SkinLayout,
     /// Number of skins. Every object is pressed once on each; [1, 10000].
     pub skins: usize,
-    /// Standard deviation of the logarithm of a taxel's gain, common to all sessions of a skin; [0, 2].
+    /// Standard deviation, from taxel to taxel, of the natural logarithm of a taxel's gain that is the same in all
+    /// sessions of a skin; [0, 2].
     pub spread_log_sd: f64,
-    /// Standard deviation of the logarithm of the gain's change from session to session; [0, 2].
+    /// Standard deviation of the natural logarithm of a taxel's gain that is drawn anew for each session of a skin; [0,
+    /// 2].
     pub session_log_sd: f64,
     /// Standard deviation of an object's position along each axis, m; [0, 0.01].
     pub position_sd_m: f64,

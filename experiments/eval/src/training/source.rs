@@ -15,7 +15,7 @@ pub const SHAPES: &str = "shapes";
 /// Name of [`TrainingSource::Calibrated`] with gains estimated from the scored recordings.
 pub const CALIBRATED: &str = "calibrated";
 
-/// A source of training data.
+/// What decoders learn from: the choices of `spts score --learn-from`.
 #[derive(Debug, Clone)]
 pub enum TrainingSource {
     /// Dictionary and library as published with the recordings, if they exist; everything else as

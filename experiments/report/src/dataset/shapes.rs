@@ -30,7 +30,8 @@ const HEIGHTS_MM: [f64; 6] = [0.0, 0.1, 0.3, 1.0, 4.0, 20.0];
 /// Width of the bar of heights, and of a step of it.
 const HEIGHT_BAR: f64 = 220.0;
 
-/// `count` shapes, spread evenly over `families`: of each the numbers from `seed` on.
+/// Builds `count` procedural shapes in the default ranges of size, spread evenly over `families`. The shapes of each
+/// family have the numbers `seed`, `seed` + 1 and so on.
 ///
 /// # Errors
 /// [`ShapeError`] when a family has no solid for a number.

@@ -29,7 +29,8 @@ pub enum DesignFolderError {
     },
 }
 
-/// The design in the folder `path`, with its profile and its pattern, to be checked with `seed`.
+/// Reads the folder `path` that `spts design` has written: the design, its readout profile and, if its rows are
+/// designed, their pattern. `seed` is the root of the random numbers of the check that is to be run on it.
 ///
 /// # Errors
 /// [`DesignFolderError`] with the name of the file that is missing or wrong.

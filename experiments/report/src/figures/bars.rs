@@ -7,10 +7,11 @@ use super::draw::{Anchor, Canvas, Point, Shape, TextStyle, save, text_width};
 use super::error::FigureError;
 use std::path::Path;
 
-/// A value and its standard error.
+/// The value that a bar shows, and its standard error, which is drawn as an error bar.
 pub type Bar = (f64, f64);
 
-/// Bars of one kind, which every row has one of.
+/// A kind of bar with its name and colour. Every row of the chart has one bar of each kind, such as one for each
+/// decoder.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BarGroup {
     /// Name in the legend.
@@ -19,14 +20,14 @@ pub struct BarGroup {
     pub style: Style,
 }
 
-/// One row.
+/// One row of the chart: a quantity, with its bars in every panel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BarRow {
     /// Words beside the bars.
     pub label: String,
     /// Whether the row sums up the ones below it, and is set off from them.
     pub heading: bool,
-    /// For every panel, a bar for every group, if there is one.
+    /// The bars: `values[panel][group]`; `None` where there is no bar.
     pub values: Vec<Vec<Option<Bar>>>,
 }
 

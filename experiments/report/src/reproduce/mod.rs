@@ -49,16 +49,16 @@ const FILES: &[&str] = &["index.html", "summary.json", "timings.csv"];
 /// Simulated skins that the real one is held against, object by object.
 const SKINS: u64 = 8;
 
-/// What to reproduce, and where to.
+/// Settings of the whole report that `spts reproduce` writes. [`Reproduction::run`] makes it.
 #[derive(Debug, Clone)]
 pub struct Reproduction {
     /// Root of every random number.
     pub seed: u64,
-    /// Short run.
+    /// Whether to make a short run of about a minute, with few presses and few numbers of measurements.
     pub quick: bool,
-    /// Recordings of the real skin.
+    /// Folder of recordings of the real skin, to score beside the twin; `None` to score the twin alone.
     pub recordings: Option<PathBuf>,
-    /// Folder of the report.
+    /// Folder that the report is written to.
     pub out: PathBuf,
     /// Whether the twin's recordings are written, as session folders.
     pub save_recordings: bool,
@@ -75,10 +75,10 @@ struct Scored<'a> {
     missing: &'a [String],
 }
 
-/// The machine-readable end of a report.
+/// What `summary.json` of a report holds: its most important numbers, and where they come from.
 #[derive(Debug, Clone, Serialize)]
 pub struct ReproductionSummary {
-    /// Headline figures.
+    /// The most important numbers.
     pub headline: Headline,
     /// Where they come from.
     pub provenance: Origin,

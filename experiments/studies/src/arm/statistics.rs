@@ -12,7 +12,8 @@ pub const LOADED_V: f64 = 0.1;
 /// Numbers of measurements for locating touches.
 pub const MEASUREMENTS: [usize; 3] = [7, 10, 25];
 
-/// Statistics of one recording.
+/// How a bent skin, recorded while a finger touches it, answers: its output without a touch, the size of a touch, and
+/// how far from the touched taxel the touch is located.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TouchStatistics {
     /// Number of touches found.

@@ -52,7 +52,8 @@ pub enum ArmError {
     },
 }
 
-/// Settings of the comparison.
+/// Settings of `spts compare --arm`: simulated skins bent round a robot's arm, beside a recording of a real one that is
+/// touched by a finger.
 #[derive(Debug, Clone, Copy)]
 pub struct ArmStudy<'a> {
     /// Folder of the recordings; its first session of touches is compared.
@@ -82,7 +83,7 @@ pub struct ArmBand {
     pub inside: bool,
 }
 
-/// Results of the comparison.
+/// Results of `spts compare --arm`: every statistic of the real bent skin, beside the band of the simulated ones.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ArmReport {
     /// Name of the recorded session.

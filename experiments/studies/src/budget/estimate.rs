@@ -6,7 +6,7 @@ use super::student::two_sided;
 /// Probability with which a mean of nothing but chance is taken to stand out.
 pub(super) const CHANCE: f64 = 0.01;
 
-/// A mean and its standard error.
+/// A mean over the sessions of a study, and its standard error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct MeanWithError {
     /// Mean.

@@ -47,7 +47,8 @@ pub const DEFAULT_OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "tri
 /// Numbers of measurements on the published skin. A larger skin uses the same shares of its taxels.
 pub const DEFAULT_MEASUREMENTS: [usize; 3] = [7, 20, 50];
 
-/// Settings of the budget study.
+/// Settings of `spts budget`, which measures how much each imperfection of transducer, readout and contact costs in
+/// image quality.
 #[derive(Debug, Clone)]
 pub struct BudgetStudy {
     /// Names of objects; "all" for every object, empty for [`DEFAULT_OBJECTS`].

@@ -6,7 +6,7 @@ use serde::Serialize;
 use spts::provenance::Provenance;
 use spts_eval::unique;
 
-/// Cost of every effect.
+/// Results of `spts budget`: what every effect costs, and the scores of the chains that are compared.
 #[derive(Debug, Clone, Serialize)]
 pub struct BudgetReport {
     /// One row for each effect, direction, decoding variant and M.

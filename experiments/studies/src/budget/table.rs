@@ -76,7 +76,7 @@ impl BudgetRow {
     }
 }
 
-/// Scores of an end point against one ground truth.
+/// Scores of a chain that the effects are compared with, such as the ideal one, against one ground truth.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EndPoint {
     /// "everything", "ideal", or "scan" for the raster frames to which the ground truth belongs.

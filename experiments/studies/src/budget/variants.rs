@@ -3,7 +3,7 @@
 use super::items::{BudgetItem, CONTACT, stages};
 use serde::Serialize;
 
-/// How the cost of an effect is found.
+/// How the cost of an effect is found: by taking it out of the whole chain, or by adding it to the ideal one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {

@@ -1,6 +1,7 @@
 //! Beat of a cell's timer with the common clock, found from its late flips.
 
-/// Beat of one cell's timer with the measurement clock.
+/// The late updates of one cell come periodically, because the cell's millisecond timer beats with the measurement
+/// clock: this is the period that was found.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Beat {
     /// Taxel, from 0.

@@ -8,7 +8,7 @@ const LOADED: f64 = 0.1;
 /// Fewest loaded taxels that have a spread.
 const FEWEST: usize = 3;
 
-/// Gain of one taxel.
+/// Gain of one taxel in a compressive session, relative to the raster session of the same object.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TaxelGain {
     /// Taxel, from 0, row-major.

@@ -36,7 +36,7 @@ pub(super) struct Counts {
     chance: f64,
 }
 
-/// Rate of late flips of one taxel.
+/// How often one cell sets a new weight too late for the sample.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct LateCell {
     /// Taxel, from 0.

@@ -9,7 +9,8 @@ use std::fmt;
 /// 0.64 and more of the later ones.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
 
-/// A press that is left out.
+/// A press that is left out of the calibration, because the object has almost missed the skin, while the other presses
+/// of the session have a contact.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MissedPress {
     /// Number of the press, from 1.

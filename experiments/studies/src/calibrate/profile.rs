@@ -37,7 +37,7 @@ pub const NOT_MODELLED: [&str; 2] = [
      from late updates, they are taken for these",
 ];
 
-/// Parameters of the readout, derived from the estimates.
+/// The readout as fitted to all sessions: what `spts calibrate` writes as a readout profile.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedReadout {
     /// Compressive parameters, in order of the profile.

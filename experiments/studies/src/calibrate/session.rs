@@ -48,7 +48,8 @@ pub(super) const NUMBERS: [Number; 22] = [
 /// Number of quantiles of the output that are compared.
 pub const QUANTILES: usize = 100;
 
-/// Estimates of one session.
+/// What the calibration finds in one session: parameters of the readout with their standard errors, faulty cells and
+/// gains.
 #[derive(Debug, Clone, Serialize)]
 pub struct SessionEstimates {
     /// Name of the session.

@@ -19,14 +19,15 @@ const MOUNTED_PRESSES: (usize, usize) = (1, 5);
 /// Simulated presses of every object: they differ by the arm's repeatability alone.
 const PRESSES: usize = 4;
 
-/// Settings of the skin's calibration.
+/// Settings of `spts calibrate --skin`, which estimates the gains of a skin's taxels.
 #[derive(Debug, Clone, Copy)]
 pub struct SkinStudy {
     /// Seed of the simulated presses.
     pub seed: u64,
 }
 
-/// Results of the skin's calibration.
+/// Results of `spts calibrate --skin`: the gains of a skin's taxels, and how well they predict objects that they were
+/// not estimated from.
 #[derive(Debug, Clone, Serialize)]
 pub struct SkinReport {
     /// Rows and columns.
@@ -204,7 +205,8 @@ impl SkinReport {
         })
     }
 
-    /// Factor by which every gain may be larger or smaller (90 % interval).
+    /// Uncertainty of the gains, one factor a taxel, row by row: with a probability of 90 %, the true gain lies between
+    /// the found one divided by the factor and the found one times the factor.
     pub fn bands(&self) -> impl Iterator<Item = f64> + '_ {
         self.skin.gains.log_sd.iter().map(|sd| (BAND_SD * sd).exp())
     }

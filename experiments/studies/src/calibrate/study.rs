@@ -14,7 +14,7 @@ use spts_circuit::{LevelSource, Recording};
 use spts_eval::SessionSlip;
 use std::path::Path;
 
-/// Selects sessions and presses.
+/// Settings of `spts calibrate`: which sessions and presses the readout is fitted to.
 #[derive(Debug, Clone, Default)]
 pub struct CalibrationStudy {
     /// The only session to use; `None` for all.
@@ -23,7 +23,7 @@ pub struct CalibrationStudy {
     pub presses: Option<(usize, usize)>,
 }
 
-/// Results of a calibration.
+/// Results of `spts calibrate`: the readout that recordings of a skin show, session by session and from all of them.
 #[derive(Debug, Clone, Serialize)]
 pub struct CalibrationReport {
     /// Estimates of every session.

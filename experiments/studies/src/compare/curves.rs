@@ -20,7 +20,7 @@ const METRICS: [Metric; 3] = [
     ("class_vote20", 0.05, |r| r.class_vote20),
 ];
 
-/// Distance of two curves.
+/// How far the twin's curve of a score over M is from the real skin's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CurveDistance {
     /// Score.

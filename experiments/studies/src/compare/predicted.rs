@@ -10,7 +10,7 @@ use serde::Serialize;
 use spts_circuit::Profile;
 use spts_models::Streams;
 
-/// The profile for a prediction.
+/// Which profile predicts a session: one fitted to the other sessions, or a given one.
 #[derive(Debug, Clone)]
 pub enum Predictor {
     /// A profile fitted to all presses of the other sessions.
@@ -19,7 +19,7 @@ pub enum Predictor {
     Profile(Box<Profile>),
 }
 
-/// Settings of the predictions.
+/// Settings of `spts compare --profile`: sessions are predicted by a profile that was not fitted to them.
 #[derive(Debug, Clone)]
 pub struct Prediction {
     /// The profile.

@@ -4,7 +4,7 @@ use super::ComparedSession;
 use crate::calibrate::SessionEstimates;
 use serde::Serialize;
 
-/// One statistic of one session.
+/// One statistic of a session, such as the noise, in the recordings of the real skin and in those of its twin.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Statistic {
     /// Object.

@@ -29,7 +29,7 @@ pub enum CompareError {
     Score(#[from] ScoreError),
 }
 
-/// The images for the twin's readout.
+/// The images that the twin's readout is given.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Images {
     /// Those measured on the skin.
@@ -42,7 +42,7 @@ pub enum Images {
     },
 }
 
-/// Settings of the comparison.
+/// Settings of `spts compare`, which compares the twin's recordings with those of the real skin.
 #[derive(Debug, Clone)]
 pub struct CompareStudy<'a> {
     /// Folder from which the sessions were read.
@@ -59,7 +59,7 @@ pub struct CompareStudy<'a> {
     pub seed: u64,
 }
 
-/// Results of a comparison.
+/// Results of `spts compare`: statistics and score curves of the twin beside those of the real skin.
 #[derive(Debug, Clone, Serialize)]
 pub struct CompareReport {
     /// Sessions.

@@ -26,7 +26,7 @@ pub struct DesignCheck {
     pub seed: u64,
 }
 
-/// One promised quantity, and its value in the check.
+/// One quantity that a design promises, such as the IoU, and its value in the check.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CheckedQuantity {
     /// Name.
@@ -39,7 +39,7 @@ pub struct CheckedQuantity {
     pub agrees: bool,
 }
 
-/// Results of a check.
+/// Results of `spts design check`: whether new simulated touches find what the design promised.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CheckReport {
     /// Whether all quantities lie in their bands.

@@ -42,7 +42,7 @@ pub struct Design {
     pub seed: u64,
 }
 
-/// The decoder of a design.
+/// The decoder that belongs to a designed skin, and what it takes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DecoderDesign {
@@ -61,7 +61,7 @@ pub struct DecoderDesign {
     pub products: usize,
 }
 
-/// Expected results of a check of the design.
+/// What a design promises: values with the bands in which a check has to find them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expectation {
@@ -83,7 +83,7 @@ pub struct Expectation {
     pub outside: f64,
 }
 
-/// Parts of the time from touch to image.
+/// The time from touch to image of a designed skin, part by part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LatencyParts {
     /// Requested latency, s.
@@ -97,7 +97,7 @@ pub struct LatencyParts {
     pub decode_estimate_s: f64,
 }
 
-/// Quantities that determine the cost.
+/// Numbers of parts of a designed skin, and the time to load its cells: what its price depends on.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CostDrivers {
     /// Cells, one a taxel.
@@ -118,7 +118,7 @@ pub struct CostDrivers {
     pub load_s: f64,
 }
 
-/// The limiting constraint.
+/// Which requirement keeps a designed skin from being better.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Binding {
@@ -148,7 +148,7 @@ impl Binding {
     }
 }
 
-/// An alternative design.
+/// A skin that differs from the design in one respect, with what it would reach.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alternative {
     /// Difference from the design, in words.
@@ -171,7 +171,7 @@ pub struct Alternative {
     pub place_mm: Option<f64>,
 }
 
-/// IoU as a function of the number of measurements.
+/// IoU over the number of measurements, for one number of wires and one kind of rows that the search tried.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignCurve {
     /// Wires.
@@ -182,7 +182,7 @@ pub struct DesignCurve {
     pub points: Vec<DesignPoint>,
 }
 
-/// One number of measurements.
+/// A number of measurements that the search tried, and the scores with it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DesignPoint {
     /// Measurements of every wire.
@@ -193,7 +193,8 @@ pub struct DesignPoint {
     pub place_px: f64,
 }
 
-/// Results of the search.
+/// Results of `spts design`: the skin that meets the requirements, its electronics, its promise, and what else was
+/// tried.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignReport {
     /// Whether the design is expected to reach the requested IoU within the latency.

@@ -12,7 +12,7 @@ pub(super) const PATTERN_ROWS: usize = spts_firmware::PATTERN_BITS;
 /// `greedy` is asked on wires of so many taxels at most: its time grows with their square.
 const GREEDY_TAXELS: usize = 256;
 
-/// Source of the rows.
+/// Where the rows of a designed skin come from.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RowSource {

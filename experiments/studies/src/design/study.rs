@@ -11,7 +11,7 @@ use spts::progress::Progress;
 use spts_models::SkinLayout;
 use spts_recon::matrix_free::SheetPrior;
 
-/// Number of wires of a design.
+/// How many wires a designed skin may have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WireChoice {
     /// Exactly this number.
@@ -20,7 +20,7 @@ pub enum WireChoice {
     UpTo(usize),
 }
 
-/// Requirements of a skin.
+/// What `spts design` is asked for: area, pitch, latency, image quality, wires and objects of a skin.
 ///
 /// ```
 /// use spts_studies::design::{DesignObjects, DesignStudy, WireChoice};

@@ -21,7 +21,7 @@ pub(super) struct Pressing {
     pub(super) square_s2: f64,
 }
 
-/// What determines the feedback resistance.
+/// What keeps the feedback resistance of a designed skin's amplifier from being larger.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FeedbackLimit {

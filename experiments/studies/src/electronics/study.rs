@@ -13,7 +13,8 @@ const SWEEP_TAXELS: [u32; 13] = [
 /// Largest capacitance of a bus, F, as [`Network`] says.
 const LARGEST_BUS_F: f64 = 1.0;
 
-/// Amplifier, skin, clock and converter for the closed forms.
+/// Settings of `spts circuit`: amplifier, skin, clock and converter, for which noise, settling and range follow from
+/// closed forms.
 ///
 /// ```
 /// use spts_studies::electronics::ElectronicsStudy;
@@ -122,7 +123,7 @@ impl ElectronicsStudy {
     }
 }
 
-/// Skins of all sizes, with every remedy.
+/// Results of `spts circuit`: skins of all sizes as built, and with every remedy for large skins.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ElectronicsReport {
     /// Time available for settling, s.

@@ -47,7 +47,7 @@ impl ExploreTrial {
     }
 }
 
-/// One size with one wiring.
+/// What a skin of one size needs with one kind of wiring: electronics, measurements, time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SizeRow {
     /// Taxels N.
@@ -139,7 +139,7 @@ impl CostFit {
     }
 }
 
-/// Results of an exploration.
+/// Results of `spts explore`: what skins of growing size need.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExploreReport {
     /// Every size in every way.

@@ -25,7 +25,7 @@ const FIRST_PER_CONTACT: usize = 8;
 /// The search ends at this share of the taxels, or at this many measurements where that is more.
 const MOST: (f64, usize) = (0.05, 1000);
 
-/// Sizes, scenes and seeds of an exploration.
+/// Settings of `spts explore`, which finds how many measurements large skins need.
 #[derive(Debug, Clone, Serialize)]
 pub struct ExploreStudy {
     /// Sides of the square skins, taxels.

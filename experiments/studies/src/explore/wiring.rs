@@ -11,7 +11,7 @@ use spts_models::ConfigError;
 /// Share of the converter's range that a fitted feedback uses: the sum is Gaussian, and scenes differ.
 const HEADROOM: f64 = 0.8;
 
-/// Wiring of a skin.
+/// How a skin is wired: ideal, on one wire, or on several.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Way {

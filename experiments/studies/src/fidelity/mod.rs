@@ -33,7 +33,7 @@ use spts::scene::Scene;
 use spts_sim::fidelity::MeasuredSetting;
 use std::path::Path;
 
-/// Settings of the fidelity study.
+/// Settings of `spts fidelity`, which measures cost and error of every contact model, resolution and time step.
 #[derive(Debug, Clone)]
 pub struct FidelityStudy {
     /// Names of built-in scenes, or scene files; empty for all built-in ones.

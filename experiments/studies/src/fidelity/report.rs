@@ -6,14 +6,14 @@ use serde::Serialize;
 use spts::provenance::Provenance;
 use spts_sim::fidelity::{LEVELS, MeasuredSetting};
 
-/// Cost and error of every setting of every scene.
+/// Results of `spts fidelity`: cost and error of every setting of every scene.
 #[derive(Debug, Clone, Serialize)]
 pub struct FidelityReport {
     /// One row for each scene, level, resolution and time step. The references have zero error.
     pub rows: Vec<MeasuredSetting>,
     /// Settings that could not be run, mostly because of a time step beyond the scene's limit.
     pub refusals: Vec<Refusal>,
-    /// Fine pressure in the middle of the scored span, one field for each row.
+    /// Pressure on the contact's grid in the middle of the scored span, one map for each row of `rows`.
     #[serde(skip)]
     pub fine: Vec<FinePressure>,
     /// Provenance of the rows.

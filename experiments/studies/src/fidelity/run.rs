@@ -7,14 +7,14 @@ use spts_sim::World;
 use spts_sim::world::{Bounce, SimError};
 use std::time::Instant;
 
-/// Pressure on the fine cells.
+/// Pressure on every square of the grid on which contact is computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FinePressure {
-    /// Rows of fine cells.
+    /// Rows of the grid.
     pub rows: usize,
-    /// Columns of fine cells.
+    /// Columns of the grid.
     pub cols: usize,
-    /// Pa, row-major.
+    /// Pressure on every square, Pa, row-major.
     pub pressure_pa: Vec<f64>,
 }
 

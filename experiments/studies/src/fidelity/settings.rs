@@ -2,7 +2,7 @@
 
 use spts_sim::fidelity::{FidelityLevel, LEVELS, REFERENCE};
 
-/// Levels × resolutions × time steps.
+/// Resolutions and time steps at which `spts fidelity` runs every contact model.
 ///
 /// ```
 /// use spts_studies::fidelity::SettingGrid;
@@ -13,7 +13,7 @@ use spts_sim::fidelity::{FidelityLevel, LEVELS, REFERENCE};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SettingGrid {
-    /// Fine cells along one side of a taxel.
+    /// Resolutions: grid squares along one side of a taxel.
     pub cells_per_taxel: Vec<usize>,
     /// Time steps of a press, s.
     pub press_steps_s: Vec<f64>,

@@ -3,7 +3,7 @@
 use super::FidelityReport;
 use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
 
-/// A setting; means over all scenes of one task.
+/// Cost and error of one contact model, resolution and time step: means over all scenes of one kind, presses or drops.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SettingMeans<'a> {
     /// Row of the first scene. All rows share its level, resolution and time step.

@@ -19,7 +19,7 @@ const EDGES: usize = 100_000;
 /// Time between two stretches, ticks: 57 frames, as in the recordings.
 const GAP_TICKS: u64 = 1_773_000;
 
-/// Late updates of a binary cell.
+/// How often an emulated cell in binary mode sets its new weight after the sample.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LateUpdates {
     /// Rate of the edges, Hz.

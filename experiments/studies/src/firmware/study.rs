@@ -15,7 +15,7 @@ const RATE_STEP_KHZ: usize = 10;
 /// Steps of progress of one image: modes, late updates, lost edges.
 const STAGES: usize = 3;
 
-/// Timing of one image.
+/// How fast one firmware image is: latency, largest clock rate, late updates and lost edges.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ImageTiming {
     /// Name of the image.
@@ -28,7 +28,7 @@ pub struct ImageTiming {
     pub lost: Vec<LostEdges>,
 }
 
-/// Missed edges at one rate.
+/// Share of the clock edges that a cell misses at one clock rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LostEdges {
     /// Rate of the edges, Hz.

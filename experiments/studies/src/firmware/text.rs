@@ -4,7 +4,7 @@ use super::study::ImageTiming;
 use super::verify::Verification;
 use spts_firmware::FIRST_ADDRESS;
 
-/// A verification, one line for each mode.
+/// What `spts firmware verify` prints: codes that differ, one line for each mode.
 #[must_use]
 pub fn verification_text(v: &Verification) -> String {
     let mut out = format!(
@@ -46,7 +46,8 @@ pub fn verification_text(v: &Verification) -> String {
     out
 }
 
-/// Timing tables.
+/// What `spts firmware timing` prints: a Markdown table with latency, shortest period and largest clock rate for every
+/// image and mode, then a line about the late updates of each image.
 #[must_use]
 pub fn timing_text(images: &[ImageTiming]) -> String {
     let mut out = String::from(

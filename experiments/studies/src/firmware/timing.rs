@@ -30,7 +30,7 @@ const START_TICKS: [u32; 7] = [400, 800, 1600, 3200, 6400, 12_800, 25_600];
 /// A clock that every cell follows.
 pub(super) const SLOW_HZ: f64 = 5_000.0;
 
-/// One mode of one image.
+/// How fast one firmware image is in one mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ModeTiming {
     /// Task of the cell.

@@ -14,7 +14,7 @@ use std::time::Instant;
 /// Edges between two comparisons, a step of progress: a megabyte of codes and its levels for a hundred cells.
 const CHUNK: usize = 4096;
 
-/// The first code that differs from the twin's.
+/// The first code of an emulated cell that differs from the weight that the twin computes by formula.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mismatch {
     /// Task of the cells.
@@ -32,7 +32,7 @@ pub struct Mismatch {
     pub expected_level: f64,
 }
 
-/// Results for one mode.
+/// How many codes and replies of emulated cells differ from the twin's in one mode.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModeVerification {
     /// Task of the cells.
@@ -44,7 +44,7 @@ pub struct ModeVerification {
     pub read_back_mismatches: usize,
 }
 
-/// Results for all modes.
+/// Results of `spts firmware verify`: whether emulated cells put out the weights that the twin computes by formula.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verification {
     /// Name of the image.

@@ -1,4 +1,4 @@
-//! The weights of emulated cells, block by block.
+//! The weights that emulated cells put out, block by block.
 
 use super::cells::EmulatedCells;
 use super::error::FirmwareError;
@@ -9,7 +9,8 @@ use spts_firmware::{Array, ArrayError, Clock};
 /// Edges of a block: a few megabytes of levels.
 const BLOCK: usize = 4096;
 
-/// The levels of all cells, one block of edges at a time.
+/// Reads the weights that emulated cells put out, in blocks of up to 4096 clock edges, so that any number of edges fits
+/// into memory.
 #[derive(Debug)]
 pub struct EmulatedWeights {
     array: Array,
@@ -23,7 +24,8 @@ pub struct EmulatedWeights {
 }
 
 impl EmulatedCells {
-    /// The levels of cells started with `task`, at the following [`EmulatedCells::edges`] edges.
+    /// Starts the cells with `task` and returns a reader of the weights that they put out at the following
+    /// [`EmulatedCells::edges`] clock edges.
     ///
     /// # Errors
     /// [`FirmwareError`] if a cell does not answer, or there are more edges than an array has rows.
@@ -43,19 +45,20 @@ impl EmulatedCells {
 }
 
 impl EmulatedWeights {
-    /// Number of edges and number of cells.
+    /// Number of clock edges in all, and number of cells.
     #[must_use]
     pub fn shape(&self) -> [usize; 2] {
         [self.edges, self.cells]
     }
 
-    /// Number of blocks.
+    /// Number of blocks that [`Self::next_block`] returns.
     #[must_use]
     pub fn blocks(&self) -> usize {
         self.edges.div_ceil(BLOCK)
     }
 
-    /// Levels in [−1, 1] of the next block, edge by edge and cell by cell; `None` after the last edge.
+    /// Clocks the cells through the next block. Returns their weights in [−1, 1], edges × cells, row-major; `None`
+    /// after the last edge.
     ///
     /// # Errors
     /// [`ArrayError`] if the cells cannot be clocked.

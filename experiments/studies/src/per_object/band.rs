@@ -11,7 +11,7 @@ pub type ScoreOf = (&'static str, fn(&Scores) -> Option<f64>);
 /// The scores that are compared: intersection over union of the supports, and the share of single windows classified.
 pub const SCORES: [ScoreOf; 2] = [("iou", |s| s.iou), ("class_single", |s| s.class_single)];
 
-/// One score of one object on one skin.
+/// One score of one object, such as its IoU, on one real or simulated skin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObjectScore {
     /// Decoder.
@@ -67,7 +67,7 @@ pub struct ObjectBand {
     pub skins: Vec<f64>,
 }
 
-/// Distance between twin and real skin in one score.
+/// How far the twin is from the real skin in one score, over all objects.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ScoreDistance {
     /// The images of the twin's recordings.

@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-/// Images that the twin reads out.
+/// Images that the twin's readout records, to see where a difference between twin and skin comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ReadoutImages {

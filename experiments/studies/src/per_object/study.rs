@@ -59,7 +59,8 @@ pub enum PerObjectError {
     ReadoutImages(#[from] LibraryError),
 }
 
-/// Settings of the comparison.
+/// Settings of `spts compare --skins`: every recorded object is pressed on many simulated skins, and scored like the
+/// real one.
 #[derive(Debug, Clone, Copy)]
 pub struct PerObjectStudy<'a> {
     /// Folder of the recordings.
@@ -72,7 +73,7 @@ pub struct PerObjectStudy<'a> {
     pub causes: bool,
 }
 
-/// Results of the comparison.
+/// Results of `spts compare --skins`: each object's score on the real skin beside the band of the simulated skins.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PerObjectReport {
     /// Number of simulated skins.

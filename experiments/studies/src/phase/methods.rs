@@ -18,7 +18,7 @@ const POSITIVE: [&str; 3] = ["nn_omp", "nn_lasso", "nn_lmmse"];
 /// Its bias stays below the 1 % that tell success from failure until the normal equations are conditioned to 1e3.
 const PENALTY: f64 = 1e-5;
 
-/// The theoretical curve for a method.
+/// Which theory predicts where a method stops to find sparse signals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Theory {
@@ -51,7 +51,7 @@ enum Builder {
     Unknowns(BuildRegularised),
 }
 
-/// A recovery algorithm in the diagram.
+/// A recovery algorithm whose phase diagram is measured.
 #[derive(Debug, Clone, Copy)]
 pub struct Method {
     /// Name, as in the tables of the reconstruction crate.

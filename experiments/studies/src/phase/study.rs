@@ -10,7 +10,8 @@ use spts_recon::recover::{PhasePoint, Signs};
 /// Number of cells along each axis of the diagram.
 pub const CELLS: usize = 20;
 
-/// Methods and problems of a phase diagram.
+/// Settings of `spts phase`, which measures for which undersampling M/N and sparsity S/M each recovery algorithm finds
+/// sparse signals.
 #[derive(Debug, Clone)]
 pub struct PhaseStudy {
     /// Algorithms.
@@ -27,7 +28,7 @@ pub struct PhaseStudy {
     pub seed: u64,
 }
 
-/// A point of the diagram.
+/// Share of the problems that one algorithm solves at one M and S.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RatePoint {
     /// Algorithm.
@@ -44,7 +45,7 @@ pub struct RatePoint {
     pub rate: f64,
 }
 
-/// Sparsity at which half of the problems are solved.
+/// Sparsity at which one algorithm solves half of the problems, for one M.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Crossing {
     /// Algorithm.
@@ -62,7 +63,7 @@ pub struct Crossing {
     pub theory: Theory,
 }
 
-/// Recovery rates over the diagram, and where they fall below one half.
+/// Results of `spts phase`: shares of solved problems, and where they fall below one half.
 #[derive(Debug, Clone, Serialize)]
 pub struct PhaseReport {
     /// Number of unknowns N.

@@ -12,7 +12,7 @@ const SHARES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
 /// Fewest and most measurements of those.
 const MEASUREMENTS: std::ops::RangeInclusive<usize> = 5..=2000;
 
-/// A method to read a skin over one wire.
+/// A method to read a skin over few wires, such as a raster scan or random signs; `spts readouts` compares them.
 ///
 /// ```
 /// use spts_studies::readouts::{READOUTS, readout};
@@ -28,7 +28,7 @@ pub trait WireReadout: Send + Sync {
     fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError>;
 }
 
-/// A readout prepared for one skin.
+/// A readout method with everything computed that depends only on the skin: it measures touches.
 pub trait PreparedReadout: Send + Sync {
     /// Largest magnitude of Σ wₖ·gₖ, S, over all its measurements of a skin with the conductances `conductance_s`, idle
     /// measurements included. The feedback resistance is chosen for it.
@@ -42,7 +42,8 @@ pub trait PreparedReadout: Send + Sync {
     fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError>;
 }
 
-/// An image, and the measurements that it needed.
+/// What a readout method answers for one touch and one number of measurements: the image, and how soon the touch was
+/// noticed and placed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reading {
     /// Number of measurements for the image.
@@ -56,7 +57,7 @@ pub struct Reading {
     pub placed: Option<f64>,
 }
 
-/// The skin for which readouts are prepared.
+/// The skin that readout methods are prepared for.
 pub struct ReadoutSkin {
     /// Rows, columns and pitch.
     pub layout: SkinLayout,

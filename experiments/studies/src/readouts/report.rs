@@ -48,7 +48,7 @@ impl ReadoutTrial {
     }
 }
 
-/// One readout on skins of one size.
+/// Results of one readout method on skins of one size.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadoutRow {
     /// Name.
@@ -76,7 +76,7 @@ impl ReadoutRow {
     }
 }
 
-/// All readouts on skins of all sizes.
+/// Results of `spts readouts`: all readout methods on skins of all sizes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReadoutsReport {
     /// The clock of every size.

@@ -130,14 +130,14 @@ impl WalshRows {
         Self { taxels }
     }
 
-    /// Number of rows: the next power of two.
+    /// Number of rows before they repeat: the smallest power of two that is at least the number of taxels.
     #[must_use]
     pub fn rows(self) -> usize {
         self.taxels.next_power_of_two()
     }
 
-    /// Σ wₖ·valuesₖ for every row, by the fast transform. Applied to the sums it is its own inverse, up to a factor of
-    /// the number of rows.
+    /// The noiseless sample of every row: Σ wₖ·valuesₖ over the taxels, with one value a taxel, by the fast Walsh
+    /// transform. Applied to its own result, divided by the number of rows, it gives the values back.
     #[must_use]
     pub fn transform(self, values: &[f64]) -> Vec<f64> {
         let mut sums = values.to_vec();

@@ -23,7 +23,7 @@ const TEMPLATE_PRESSES: usize = 2;
 /// Random shapes that, with one press of every object, calibrate the feedback and the clock.
 const CALIBRATION_SHAPES: usize = 16;
 
-/// Settings of the benchmark.
+/// Settings of `spts readouts`, which compares readout methods with few wires.
 #[derive(Clone)]
 pub struct ReadoutsStudy {
     /// Readouts.
@@ -38,7 +38,7 @@ pub struct ReadoutsStudy {
     pub seed: u64,
 }
 
-/// Parameters that document a study.
+/// The settings of a run of `spts readouts` as they are written to `parameters.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct ReadoutsParameters {
     readouts: Vec<&'static str>,

@@ -8,7 +8,7 @@ use super::random::RandomSigns;
 use super::raster::Raster;
 use super::readout::WireReadout;
 
-/// One line of the table.
+/// A readout method in the table [`READOUTS`]: its names, what it demands of a cell, and how it is built.
 ///
 /// ```
 /// use spts_studies::readouts::readout;

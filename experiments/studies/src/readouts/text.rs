@@ -47,8 +47,9 @@ impl ReadoutsReport {
             out.push('\n');
         }
         out.push_str(&format!(
-            "Bold: fewest M with a mean IoU of {GOOD_IOU} or, where there is none, with the best. \
-             ±: 90 % bands over the repetitions.\n"
+            "The M between ** is the smallest one with which the readout reaches a mean IoU of {GOOD_IOU}; if it never \
+             does, it is the M with the largest IoU. The number after ± is half the width of the 90 % band over the \
+             repetitions.\n"
         ));
         out
     }

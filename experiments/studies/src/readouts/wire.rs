@@ -17,7 +17,7 @@ const IDLE_BLOCK: u64 = 1 << 40;
 /// Mean time between false alarms that is accepted, s.
 pub const FALSE_ALARM_S: f64 = 10.0;
 
-/// A frame during a held touch.
+/// The samples of a few measurements during a held touch, and the threshold that tells a touch from noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WireFrame {
     /// Samples minus those of the idle skin at the same rows, V.

@@ -19,7 +19,7 @@ const HALVINGS: usize = 30;
 /// name, and the number that is drawn once a session.
 const SESSION: [(&str, &str); 2] = [("contact_noise", "fraction"), ("idle_noise", "sd_v")];
 
-/// The wire for skins of one size.
+/// Electronics and clock of the wire of a skin of one size, the same for all readout methods.
 #[derive(Debug, Clone)]
 pub struct SkinWire {
     /// Profile with the clock of this size. Its feedback is for sums with random signs.
@@ -34,7 +34,7 @@ pub struct SkinWire {
     pub idle_s: f64,
 }
 
-/// The wire of a readout.
+/// The wire of one readout method: that of the skin, with the feedback resistance that suits the method's sums.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadoutWire {
     /// Profile, which is the same in both modes.

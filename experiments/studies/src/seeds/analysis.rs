@@ -24,7 +24,7 @@ const ISOMETRY_WINDOWS: usize = 16;
 /// Supports that the isometry constant is bounded by.
 const ISOMETRY: IsometrySearch = IsometrySearch { random: 100, greedy: 2 };
 
-/// Properties that do not depend on a window.
+/// What can be said of a set of seeds without choosing a window: period, constant rows, rank.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SeedFacts {
     /// Name of the set.

@@ -35,7 +35,7 @@ pub struct SeedStudy {
     pub seed: u64,
 }
 
-/// Quality of the sets, and their benefit.
+/// Results of `spts seeds`: how good several sets of seeds are, and what they are worth in IoU.
 #[derive(Debug, Clone, Serialize)]
 pub struct SeedReport {
     /// Name of the given set.

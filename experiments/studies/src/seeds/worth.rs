@@ -26,7 +26,7 @@ const WINDOWS: usize = 4;
 /// Decoders of the table that are compared.
 const DECODERS: [&str; 2] = ["omp", "nn_lasso"];
 
-/// IoU of one set with one decoder and M.
+/// Image quality with one set of seeds, one decoder and one M.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WorthRow {
     /// Source of the images: synthetic or recorded.

@@ -22,7 +22,7 @@ const CAUSES: [(&str, &str, &str); 5] = [
     ("as_designed", "amplifier", "settling"),
 ];
 
-/// One designer's rows in one order.
+/// What one designer's rows cost in one order: size of the samples, changes of weights, and errors by cause.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CostRow {
     /// Designer of the rows.
@@ -41,7 +41,7 @@ pub struct CostRow {
     pub errors: Vec<CauseError>,
 }
 
-/// The error of one cause.
+/// Error of the samples due to one cause alone, such as late updates.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CauseError {
     /// Cause.

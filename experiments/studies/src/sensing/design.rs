@@ -23,7 +23,7 @@ const BUS_CELLS: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
 /// Random designs that a design is compared with.
 const RANDOM: u64 = 16;
 
-/// Images for which rows are designed.
+/// Images that rows are designed to see: the prior of a designer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum DesignImages {
     /// Smooth images, whose pixels are similar up to about this distance, taxels.
@@ -34,7 +34,7 @@ pub enum DesignImages {
     Recordings(PathBuf),
 }
 
-/// Settings of a row design.
+/// Settings of `spts sensing design`, which designs rows of the sensing matrix for a skin.
 #[derive(Clone)]
 pub struct RowDesign {
     /// The skin. Recordings define their own.
@@ -57,7 +57,7 @@ pub struct RowDesign {
     pub seed: u64,
 }
 
-/// The rows, with their properties.
+/// Results of `spts sensing design`: the rows, with what they are like.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RowDesignReport {
     /// Designer.

@@ -64,7 +64,7 @@ pub struct Equal {
     pub random_m: Option<f64>,
 }
 
-/// Results of the comparison.
+/// Results of `spts sensing study`: scores of designed and random rows, and what the rows cost.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SensingReport {
     /// Rows and columns of the skin.

@@ -17,7 +17,8 @@ use spts_recon::recover::ImagePrior;
 use spts_recon::rows::{DESIGNERS, Designer, Expected, RowNeeds, RowTask, Tolerances};
 use std::sync::Arc;
 
-/// Settings of the comparison.
+/// Settings of `spts sensing study`, which measures what designed rows of the sensing matrix are worth against random
+/// ones.
 #[derive(Clone)]
 pub struct SensingStudy {
     /// The skin.

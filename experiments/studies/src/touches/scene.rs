@@ -7,7 +7,7 @@ use spts_recon::localise::centre_of_mass;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 use std::sync::Arc;
 
-/// Kind of the pressed objects.
+/// What simulated touches are made with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TouchObjects {
     /// Procedural shapes of all families, a different one for every touch.
@@ -21,8 +21,8 @@ const MARGIN_M: f64 = 0.03;
 /// Objects lie within this share of the sheet's width and height at least, from the middle to both sides.
 const LEAST_SHARE: f64 = 0.3;
 
-/// Objects and skin: single objects at random places, rotations and forces (5 to 40 N), held still. All touches are on
-/// one specimen of the skin.
+/// Objects and skin of simulated touches: single objects at random places, rotations and forces (5 to 40 N), held
+/// still. All touches are on one specimen of the skin.
 ///
 /// ```
 /// use spts_models::SkinLayout;
@@ -52,7 +52,7 @@ pub struct TouchScene {
     pub specimen: Option<u64>,
 }
 
-/// One touch.
+/// One simulated touch: the conductances that it gives, and the touched taxels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Touch {
     /// Name of the object, or of the shape's family.

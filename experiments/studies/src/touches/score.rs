@@ -7,7 +7,7 @@ use spts_models::SkinLayout;
 use spts_recon::localise::{centre_of_mass, distance};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 
-/// Scores of an image of a touch.
+/// How well a decoded image shows a simulated touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TouchScore {
     /// Intersection over union of the supports.

@@ -69,7 +69,9 @@ impl AnytimeClassifier {
         self.preparation.push(&self.row)
     }
 
-    /// Adds the sample `y` of the first prepared row without one, and returns the decision.
+    /// Takes the next sample `y` into account and returns the decision after it: the most probable class, and how
+    /// probable it is. The sample belongs to the earliest row that was prepared ([`Self::prepare`]) and has no sample
+    /// yet.
     ///
     /// # Errors
     /// [`EvidenceError`] if `y` is not finite or beyond ±1e80, or no row is prepared for it. A row whose sample is lost

@@ -51,7 +51,7 @@ pub struct EvidenceClassifier {
     amplitude: AmplitudeRange,
 }
 
-/// Best outcome, and its probability.
+/// The most probable class after the samples so far, and its probability.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decision {
     /// Class, or `None` for the outcome "unknown".

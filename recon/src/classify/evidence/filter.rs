@@ -40,7 +40,8 @@ impl Shape {
 /// Largest value of a projected row; squares and their sums stay finite.
 const LARGEST_ROW: f64 = 1e12;
 
-/// Everything about the rows of a window that needs no sample. [`Preparation::clear`] keeps the memory.
+/// Everything about the rows of a window that can be computed before a sample is there. [`Preparation::clear`] removes
+/// the rows and keeps the memory.
 #[derive(Debug, Clone)]
 pub struct Preparation {
     shape: Shape,
@@ -91,13 +92,14 @@ impl Preparation {
         }
     }
 
-    /// Number of prepared rows.
+    /// Number of rows prepared for the window so far.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Prepares a measurement with the weights φ. `row` is φᵀ·[bank](super::EvidenceClassifier::bank).
+    /// Prepares the next measurement of the window, taken with the weights φ of the taxels. `row` is
+    /// φᵀ·[bank](super::EvidenceClassifier::bank): one number for each column of the bank.
     ///
     /// # Errors
     /// [`EvidenceError`] if the length differs from the bank's number of columns, or a value is not finite or beyond
@@ -181,7 +183,8 @@ impl Preparation {
     }
 }
 
-/// Evidence from the samples of a window so far.
+/// What the samples of a window say so far about each class: sums that every sample updates, and from which the
+/// classifier computes the probabilities of the classes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     shape: Shape,
@@ -224,7 +227,9 @@ impl Evidence {
         }
     }
 
-    /// Adds the next sample `y` of the window whose rows are in `preparation`.
+    /// Takes the next sample `y` into account, in the units of the templates times the amplitude. Samples come in the
+    /// order of the rows in `preparation`: the k-th call belongs to the k-th prepared row. The cost is one step of a
+    /// Kalman filter for each class.
     ///
     /// # Errors
     /// [`EvidenceError`] if `y` is not finite or beyond ±1e80, its row has not been prepared, or the preparation

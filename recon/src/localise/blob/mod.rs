@@ -77,7 +77,8 @@ struct Width {
     cols: Axis,
 }
 
-/// Blob templates, numbered by width, then row, then column.
+/// Finds the centre of a small round contact in the samples of a window. It compares them with Gaussian blobs at all
+/// centres of a grid and in several widths ([`BlobConfig`]), which are numbered by width, then row, then column.
 #[derive(Debug, Clone)]
 pub struct Localiser {
     rows: usize,
@@ -90,7 +91,7 @@ pub struct Localiser {
     cell: f64,
 }
 
-/// Position of a contact and its uncertainty.
+/// Where a contact is, how uncertain its place is, and the strength and width of the blob that fits best.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// Posterior mean of the centre, (row, col), taxels.
@@ -103,7 +104,9 @@ pub struct Estimate {
     pub width_px: f64,
 }
 
-/// Evidence of every blob from the measurements so far.
+/// What the samples of a window say so far about where the skin is touched: for every blob (a centre and a width) of a
+/// [`Localiser`], the sums from which [`Localiser::estimate`] computes how well that blob explains all samples. Made
+/// empty by [`Localiser::evidence`]; [`BlobEvidence::observe`] adds a sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BlobEvidence {
     count: f64,
@@ -147,15 +150,16 @@ impl Localiser {
         })
     }
 
-    /// Number of blobs.
+    /// Number of blobs: centres × widths.
     #[must_use]
     pub fn templates(&self) -> usize {
         self.variances.len()
     }
 
-    /// Computes φᵀb of every blob into `projected`, for one row φ of weights (`rows · cols` values, row-major). It
-    /// needs no sample. Blobs are separable, so the cost for each width is O(centres a column · (rows · cols + centres
-    /// a row · cols)).
+    /// Computes which sample every blob of amplitude 1 would give with one row φ of the sensing matrix: φᵀb for each
+    /// blob b, written into `projected`. `weights` is that row: `rows · cols` values, row-major. No sample is needed,
+    /// so that it can be done before the sample arrives. Blobs are separable, so the cost for each width is O(centres a
+    /// column · (rows · cols + centres a row · cols)).
     ///
     /// # Errors
     /// [`RangeError`] if `weights` has another length, or a value that is not finite or beyond ±1e12.
@@ -176,7 +180,7 @@ impl Localiser {
         Ok(())
     }
 
-    /// Empty evidence for these blobs.
+    /// Evidence of no sample, to begin a window with.
     #[must_use]
     pub fn evidence(&self) -> BlobEvidence {
         let zeros = vec![0.0; self.templates()];
@@ -285,7 +289,8 @@ fn weigh([count, yy]: [f64; 2], [yt, tt, variances, log_variances]: [&[f64]; 4],
 }
 
 impl BlobEvidence {
-    /// Adds one measurement `y`; `projected` is its row after [`Localiser::project`].
+    /// Takes one more sample `y` into account. `projected` is what [`Localiser::project`] makes of the sample's row of
+    /// the sensing matrix: one number for each blob.
     ///
     /// # Errors
     /// [`RangeError`] if `y` is not finite or beyond ±1e80, or `projected` belongs to other blobs. The evidence is then
@@ -303,7 +308,7 @@ impl BlobEvidence {
         Ok(())
     }
 
-    /// Removes all measurements.
+    /// Removes all samples, for a new window.
     pub fn clear(&mut self) {
         self.count = 0.0;
         self.yy = 0.0;

@@ -1,5 +1,5 @@
-//! Images by a small neural network, trained on many simulated ones: an unrolled iteration, each step with the exact
-//! residual.
+//! Images by a small neural network that has been trained on many simulated ones. The network is an unrolled iteration:
+//! each of its steps compares its image with the samples and corrects it.
 
 mod layer;
 mod support;
@@ -18,20 +18,33 @@ use crate::sign_rows::SignTables;
 use crate::workspace::Workspace;
 use std::sync::Arc;
 
-/// An amortised posterior: training stores what is common to all images, rows and numbers of samples in the weights, so
-/// a decode takes only a few matrix products.
+/// Decodes an image with a small neural network, which has been trained on many simulated images before: a decode then
+/// takes only a few matrix products.
 ///
-/// With ±1 rows Φ (M × N), S = Φ K Φᵀ + ν I = L Lᵀ, V = L⁻¹ Φ K, w = L⁻¹ y, s = |w|/√M and v = √(diag K − Σ V²):
+/// Input: M samples y, and their rows Φ of the sensing matrix (M × N for N taxels). Output: the image x, N values in
+/// the units of y; and for each taxel the probability p that it is touched, which means above 23 % of the image's
+/// maximum.
 ///
+/// The network starts from the linear estimate of the image. Each of its T steps computes the residual e, what the
+/// image leaves of the samples, and adds a correction z. The image then gets the smallest change after which the
+/// touched taxels are those with the largest expected intersection over union under p.
+///
+/// The formulas, for rows of ±1 (others are scaled to a root mean square of 1 first); max, tanh and √ act on each
+/// value:
+///
+/// S = Φ K Φᵀ + ν I = L Lᵀ, V = L⁻¹ Φ K, w = L⁻¹ y, s = |w|/√M, v = √(diag K − diag VᵀV);
 /// x = max(0, Vᵀ w/s), h = 0; T times: e = L⁻¹ (y/s − Φ x),
-/// z = W₂ max(0, W₁ [x, Vᵀ e, Vᵀ w/s, v, h, ln(M/20), |e|/√M] + b₁) + b₂, x ← max(0, x + z), h ← tanh z;
-/// p = 1/(1 + exp(−(Wₒ [h, x] + bₒ))), the probability that a taxel is above .23 of the maximum.
+/// \[z, g\] = W₂ max(0, W₁ [x, Vᵀ e, Vᵀ w/s, v, h, ln(M/20), |e|/√M] + b₁) + b₂, x ← max(0, x + z), h ← tanh g;
+/// p = 1/(1 + exp(−(Wₒ [h, x] + bₒ))); the image is s x.
 ///
-/// The image is s x, with the smallest change that gives it the support of largest expected intersection over union
-/// under p. Linear algebra uses double precision, the network single precision. Rows other than ±1 are scaled to a root
-/// mean square of 1.
-/// Source: K. Gregor, Y. LeCun, "Learning fast approximations of sparse coding", ICML 2010, for unrolling. The exact
-/// data term is the gain of the linear estimate in every step.
+/// K (N × N) are the second moments of the images, all scaled to length 1, and ν is the variance of a sample's noise at
+/// that scale. Vᵀ w is the linear estimate (LMMSE), s the length of the image that the samples suggest, and v the
+/// standard deviation of each taxel that the linear estimate leaves. h are P values that a step hands to the next one.
+/// The numbers that training has found are K, ν, the matrices W and the vectors b, W₁ to b₂ anew for each
+/// step: [`UnrolledWeights`]. The matrix
+/// products of the network use single precision, all else double precision.
+///
+/// Source: K. Gregor, Y. LeCun, "Learning fast approximations of sparse coding", ICML 2010, for unrolling.
 ///
 /// ```
 /// use spts_recon::recover::UnrolledWeights;
@@ -84,7 +97,7 @@ struct Scratch {
     order: Vec<usize>,
 }
 
-/// Result of a decode beside the image.
+/// Result of a decode beside the image: its support, the taxels that count as touched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touched {
     /// Number of taxels in the support.
@@ -94,7 +107,7 @@ pub struct Touched {
 }
 
 impl Unrolled {
-    /// A network with `weights`.
+    /// A network with the numbers that its training has found.
     #[must_use]
     pub fn new(weights: UnrolledWeights) -> Self {
         let tables = SignTables::new(weights.prior.view());

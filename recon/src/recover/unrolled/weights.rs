@@ -1,9 +1,9 @@
-//! The weights of an unrolled network.
+//! The numbers that training finds for an unrolled network.
 
 use super::layer::WIDTHS;
 use crate::matrix::Matrix;
 
-/// A dense layer: out = W u + b.
+/// A dense layer of a neural network: out = W u + b for the inputs u.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Layer {
     /// W in tiles of outputs, each inputs × width, so that a decode reads it sequentially.
@@ -13,7 +13,7 @@ pub struct Layer {
 }
 
 impl Layer {
-    /// A layer with `weights` (inputs × outputs, row-major) and one `bias` for each output.
+    /// A layer whose `weights` are the matrix W (inputs × outputs, row-major), with one `bias` b for each output.
     /// [`super::UnrolledWeights::new`] checks that layers fit together.
     #[must_use]
     pub fn new(weights: Vec<f32>, bias: Vec<f32>) -> Self {
@@ -51,16 +51,20 @@ impl Layer {
     }
 }
 
-/// One unrolled step: two layers.
+/// Parameters of one step of an [`super::Unrolled`] network, by which the step corrects the image: two dense layers,
+/// with max(0, ·) between them. The documentation there has the formulas. N is the number of taxels, P that of the
+/// values handed from step to step (`memory`), and H that of the hidden values, which is free.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct UnrolledStep {
-    /// 4 N + P + 2 inputs, H outputs.
+    /// W₁ and b₁: from 4 N + P + 2 inputs (x, Vᵀ e, Vᵀ w/s, v, h, ln(M/20), |e|/√M, in this order) to H hidden values.
     pub hidden: Layer,
-    /// H inputs, N + P outputs.
+    /// W₂ and b₂: from H hidden values to N + P outputs, which are the correction of the N taxels, and then the P
+    /// values for the next step.
     pub change: Layer,
 }
 
-/// All weights of an [`super::Unrolled`] network for N taxels, H hidden values and P values of memory.
+/// All numbers that training finds for an [`super::Unrolled`] network, whose documentation has the formulas. None of
+/// them is a weight of a taxel: those are the rows Φ of the problem.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnrolledWeights {
     /// K, second moments of images of length 1, N × N.

@@ -121,16 +121,18 @@ impl SkinGains {
     }
 }
 
-/// Comparison of a simulated image with that of a skin whose gains were estimated from other contacts.
+/// How well estimated gains predict an image that they were not estimated from: the image of a contact on the real
+/// skin, beside the simulation of the same contact.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct GainCheck {
     /// Number of taxels touched in the simulated contact.
     pub taxels: usize,
-    /// Correlation of the images.
+    /// Correlation of the skin's image with the simulated one, all gains 1.
     pub correlation: f64,
-    /// Correlation after applying the mean gains to the simulated image.
+    /// Correlation of the skin's image with the simulated one times the estimated gains.
     pub correlation_with_gains: f64,
-    /// Share of the touched taxels whose ratio lies in the predicted 90 % interval of gain, contact and mounting.
+    /// Share of the touched taxels whose ratio of skin to simulation lies in the 90 % interval that the uncertainties
+    /// of gain, contact and mounting predict; 0.9 is expected.
     pub inside: f64,
 }
 
@@ -138,7 +140,8 @@ pub struct GainCheck {
 pub const BAND_SD: f64 = 1.644_853_626_951_472_7;
 
 impl SkinGains {
-    /// Compares an image of the skin with the `simulated` one at gain 1; `None` if fewer than two taxels are touched.
+    /// Compares `skin`, an image from the real skin, with `simulated`, the same contact on a skin of gain 1; both have
+    /// one value a taxel. `None` if fewer than two taxels are touched.
     #[must_use]
     pub fn check(&self, skin: &[f64], simulated: &[f64]) -> Option<GainCheck> {
         let with_gains: Vec<f64> = simulated
