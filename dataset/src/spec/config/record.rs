@@ -3,7 +3,7 @@
 use crate::spec::Spec;
 use serde::Deserialize;
 
-/// Section `[record]`.
+/// Section `[record]`: which windows are recorded, and what is stored of them.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RecordConfig {
@@ -34,7 +34,7 @@ pub struct RecordConfig {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Label {
-    /// Mean pressure over the taxel's cell: `pressure_pa`.
+    /// Mean pressure over the taxel's area: `pressure_pa`.
     Pressure,
     /// Its conductance: `conductance_s`.
     Conductance,

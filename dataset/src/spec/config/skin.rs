@@ -4,7 +4,7 @@ use crate::spec::Draw;
 use serde::Deserialize;
 use spts_models::SkinLayout;
 
-/// Section `[skin]`.
+/// Section `[skin]`: layout of the skin, and how many specimens there are.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SkinConfig {

@@ -4,7 +4,7 @@ use crate::spec::Draw;
 use serde::Deserialize;
 use spts_sim::mechanics::DropConfig as BallConfig;
 
-/// Section `[object]`.
+/// Section `[object]`: what is pressed.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct ObjectConfig {
@@ -75,7 +75,7 @@ pub enum PoseOrigin {
     Placement,
 }
 
-/// Section `[press]`.
+/// Section `[press]`: how hard and how long an object is pressed.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PressConfig {
