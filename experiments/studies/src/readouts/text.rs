@@ -47,9 +47,8 @@ impl ReadoutsReport {
             out.push('\n');
         }
         out.push_str(&format!(
-            "The M between ** is the smallest one with which the readout reaches a mean IoU of {GOOD_IOU}; if it never \
-             does, it is the M with the largest IoU. The number after ± is half the width of the 90 % band over the \
-             repetitions.\n"
+            "Marked like **this** is, for every readout, the smallest M with a mean IoU of {GOOD_IOU} or, if there is none, \
+             the M with the largest IoU. The number after ± is half the width of the 90 % band over the repetitions.\n"
         ));
         out
     }
