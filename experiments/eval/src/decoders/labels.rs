@@ -12,8 +12,8 @@ const CONTROL: [&str; 2] = ["raster scan of M taxels", "raster"];
 /// ```
 /// use spts_eval::decoders::{label, short_label};
 ///
-/// assert_eq!(label("lmmse"), "linear estimate");
-/// assert_eq!(short_label("lmmse"), "LMMSE");
+/// assert_eq!(label("amortised"), "trained network");
+/// assert_eq!(short_label("amortised"), "amortised");
 /// assert_eq!(label("my program"), "my program");
 /// ```
 #[must_use]

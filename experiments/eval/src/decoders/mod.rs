@@ -152,22 +152,14 @@ pub const DECODERS: &[DecoderSpec] = &[
     spec("nn_lasso", "non-negative lasso", Dictionary, true, image::nn_lasso)
         .about("non-negative lasso on normalised columns"),
     spec("sbl", "sparse Bayes", Dictionary, false, image::sbl).about("sparse Bayesian learning"),
-    spec("lmmse", "linear estimate", Images, false, image::lmmse)
-        .short("LMMSE")
+    spec("lmmse", "LMMSE", Images, false, image::lmmse)
         .about("linear minimum mean square error, prior of images like those seen"),
-    spec(
-        "nn_lmmse",
-        "linear estimate, no negative pressure",
-        Images,
-        true,
-        image::nn_lmmse,
-    )
-    .short("non-negative LMMSE")
-    .about("linear minimum mean square error with non-negative taxels, prior for unseen objects")
-    .anytime(),
+    spec("nn_lmmse", "non-negative LMMSE", Images, true, image::nn_lmmse)
+        .about("linear minimum mean square error with non-negative taxels, prior for unseen objects")
+        .anytime(),
     spec(
         "nn_lmmse_seen",
-        "linear estimate, objects seen",
+        "non-negative LMMSE, objects seen",
         Images,
         false,
         image::nn_lmmse_seen,

@@ -69,7 +69,7 @@ const SCORED: [(&str, &str); 4] = [
     ),
     (
         "nn_lmmse",
-        "A decoder that knows how touched taxels usually go together, and that no pressure is negative. It needs no object to be known. Also called non-negative LMMSE.",
+        "Linear minimum mean square error with no negative pressure: a decoder that knows how touched taxels usually go together. It needs no object to be known.",
     ),
 ];
 
