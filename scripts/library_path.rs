@@ -3,6 +3,7 @@
 //! `make install` puts it.
 
 /// Says so to the linker on Linux; on other systems the twin is built without MuJoCo.
+#[allow(clippy::print_stdout, reason = "Cargo reads what a build script prints")]
 pub(crate) fn main() {
     println!("cargo::rerun-if-changed=Cargo.toml");
     if std::env::var("CARGO_CFG_TARGET_OS").is_ok_and(|system| system == "linux") {
