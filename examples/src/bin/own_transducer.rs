@@ -18,8 +18,8 @@ impl Transducer for Foil {
     /// Pressure on the electrodes in, conductance out. A material with memory would advance it by `dt_s` here.
     fn step(&mut self, pressure: &PressureMap, _dt_s: f64, out: &mut ConductanceMap) {
         for (g, p) in out.values_mut().iter_mut().zip(pressure.values()) {
-            // `max` takes 0 for NaN as well
-            let p = p.max(0.0).min(1e12);
+            // what is no number counts as no pressure
+            let p = if p.is_nan() { 0.0 } else { p.clamp(0.0, 1e12) };
             *g = self.most_s * p / (p + self.half_pa);
         }
     }
