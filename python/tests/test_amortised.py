@@ -82,5 +82,5 @@ def test_training_makes_the_same_file_twice(tmp_path):
 
 
 def test_a_skin_of_another_shape_needs_weights_of_its_own():
-    with pytest.raises(ValueError, match="weights for 10 × 10 taxels"):
+    with pytest.raises(ValueError, match="trained for 10 × 10 taxels"):
         spts.decode(np.ones((3, 24)), np.ones(3), shape=(4, 6), decoder="amortised")
