@@ -294,7 +294,7 @@ fn table(table: &Table) -> String {
     let files = table.files.iter().map(|file| {
         let stem = file.strip_suffix(".csv").unwrap_or(file);
         let words = if table.files.len() > 1 {
-            escape(&format!("{stem}.csv"))
+            escape(&format!("CSV: {}", stem.replace('_', " ")))
         } else {
             "CSV".to_owned()
         };

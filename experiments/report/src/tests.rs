@@ -104,8 +104,8 @@ fn every_file_of_a_table_is_linked() {
     let mut page = samples::page();
     page.sections[0].tables[0].files = vec!["one.csv".to_owned(), "two".to_owned()];
     let text = markup(&page);
-    assert!(text.contains("<a href=\"tables/one.csv\">one.csv</a>"), "{text}");
-    assert!(text.contains("<a href=\"tables/two.csv\">two.csv</a>"), "{text}");
+    assert!(text.contains("<a href=\"tables/one.csv\">CSV: one</a>"), "{text}");
+    assert!(text.contains("<a href=\"tables/two.csv\">CSV: two</a>"), "{text}");
 }
 
 /// Numbers are flush right, and a dash does not turn a column into words.
