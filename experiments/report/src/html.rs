@@ -4,8 +4,8 @@ use crate::figures::draw::escape;
 
 /// Style of the page, light and dark, screen and print.
 const STYLE: &str = include_str!("style.css");
-/// Number of rows from which a table is folded away; print shows all of them.
-const FOLDED_FROM: usize = 40;
+/// Most rows of a table that is not folded away; print shows all rows of any.
+const MOST_UNFOLDED: usize = 40;
 
 /// The whole report.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -309,7 +309,7 @@ fn table(table: &Table) -> String {
         row(&table.header, "th")
     );
     let count = table.rows.len();
-    let shown = if count > FOLDED_FROM {
+    let shown = if count > MOST_UNFOLDED {
         format!("<details>\n<summary>All {count} rows</summary>\n{whole}</details>\n")
     } else {
         whole

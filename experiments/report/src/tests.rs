@@ -1,6 +1,6 @@
 //! Tests of the page.
 
-use super::{Page, PageFigure, Section, Table, html};
+use super::{MOST_UNFOLDED, Page, PageFigure, Section, Table, html};
 use crate::figures::tests::check_markup;
 use crate::samples;
 
@@ -106,6 +106,23 @@ fn every_file_of_a_table_is_linked() {
     let text = markup(&page);
     assert!(text.contains("<a href=\"tables/one.csv\">CSV: one</a>"), "{text}");
     assert!(text.contains("<a href=\"tables/two.csv\">CSV: two</a>"), "{text}");
+}
+
+/// A long table is folded away with the number of its rows, a short one is not.
+#[test]
+fn long_tables_are_folded() {
+    let mut page = samples::page();
+    let table = &mut page.sections[0].tables[0];
+    table.rows = vec![table.header.clone(); MOST_UNFOLDED];
+    assert!(!markup(&page).contains("<details>"));
+    let table = &mut page.sections[0].tables[0];
+    table.rows.push(table.header.clone());
+    let text = markup(&page);
+    assert!(
+        text.contains(&format!("<summary>All {} rows</summary>", MOST_UNFOLDED + 1)),
+        "{text}"
+    );
+    check_markup(&text, &VOID).unwrap();
 }
 
 /// Numbers are flush right, and a dash does not turn a column into words.

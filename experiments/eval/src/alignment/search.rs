@@ -28,9 +28,11 @@ pub(super) fn search(chunk: &Chunk<'_>, lags: RangeInclusive<i64>, expected: i64
     fits.min_by(|a, b| a.residual.total_cmp(&b.residual).then(far(a.rows).cmp(&far(b.rows))))
 }
 
-/// ‖Φᵀy‖², times a constant, for every place of y among the rows `phi` of `taxels` weights each, Φ being the rows from
-/// that place on. A taxel's part at all places is the cross-correlation of its weights with y, the inverse transform of
-/// W · conj(Y). No place wraps around: the transforms are as long as `phi`.
+/// ‖Φᵀy‖² for every row of `phi` at which Φ can begin, times a constant; `phi` has `taxels` weights a row.
+///
+/// What one taxel adds is the square of the cross-correlation of its weights with y. By FFT that is the inverse
+/// transform of W · conj(Y), W and Y being the transforms of weights and samples. They are as long as `phi` or longer,
+/// so that no row wraps around.
 fn correlation_energies(phi: &[f64], taxels: usize, y: &[f64]) -> Vec<f64> {
     /// Lengths that are multiples of it are quick.
     const MULTIPLE: usize = 1024;

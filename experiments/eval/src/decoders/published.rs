@@ -42,12 +42,6 @@ impl PublishedDecode {
         self.line().name
     }
 
-    /// Name in plain words.
-    #[must_use]
-    pub fn label(self) -> &'static str {
-        self.line().label
-    }
-
     /// The decoder of this variant, with dictionary and library of `learned`.
     ///
     /// # Errors
