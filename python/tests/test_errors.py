@@ -179,3 +179,6 @@ def test_commands_of_the_full_program():
     said = subprocess.run([sys.executable, "-m", "spts", "simulate", "press/T"], capture_output=True, text=True)
     assert said.returncode == 2
     assert "simulate, reproduce, live and the studies are in the program that `make install` makes" in said.stderr
+    # a misspelt word of a command that is here is no command of the full program
+    said = subprocess.run([sys.executable, "-m", "spts", "dataset", "mke"], capture_output=True, text=True)
+    assert said.returncode == 2 and "make install" not in said.stderr, said.stderr

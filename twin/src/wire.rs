@@ -104,7 +104,7 @@ impl Wire {
         WeightRows::new(readout.weights(), readout.row(), count)
     }
 
-    /// Median output of the untouched skin, V.
+    /// Median of 2000 samples of the untouched skin, taken in [`Wire::new`], V.
     #[must_use]
     pub fn idle_v(&self, mode: Mode) -> f64 {
         self.lines[index(mode)].idle_v

@@ -23,8 +23,8 @@ const LEAST_VOLUME_FRACTION: f64 = 1e-6;
 /// Holes that open upwards are closed above everything, which leaves the underside unchanged. Parts may overlap: only
 /// the underside of their union touches.
 ///
-/// Refused are coordinates that are not finite, other sizes, larger holes that open downwards or sideways, surfaces
-/// with branches or with one side, and surfaces without an inside.
+/// These are refused: coordinates that are not finite, other sizes, larger holes that open downwards or sideways,
+/// surfaces with branches or with one side, and surfaces without an inside.
 ///
 /// The unit is never guessed: an object 40 units wide may be 40 mm, 40 cm or 40 inches wide, and each of these could
 /// press on a skin. The error suggests a scale that would fit.

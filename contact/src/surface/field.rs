@@ -121,8 +121,9 @@ impl SurfaceField {
         self.pressure_pa.fill(0.0);
     }
 
-    /// Presses `body`, whose mesh is that of `solid`, in addition to earlier bodies. Returns the wrench on it about its
-    /// centre of mass. If pose or velocity is not finite, the wrench is NaN and nothing is pressed.
+    /// Presses `body` on the skin, in addition to the bodies pressed since [`SurfaceField::clear`]. `solid` is made
+    /// from the mesh of `body`. Returns the wrench on `body` about its centre of mass. If a pose or velocity is not
+    /// finite, the wrench is NaN and nothing is pressed.
     pub fn press(&mut self, solid: &Solid, body: &PosedMesh<'_>) -> Wrench {
         if !body.is_finite() {
             return Wrench::UNKNOWN;

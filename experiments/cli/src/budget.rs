@@ -69,7 +69,8 @@ pub(super) struct BudgetCommand {
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "out/budget")]
     out: PathBuf,
-    /// Root of every random number: the skin, its noise and the arm's scatter follow from it
+    /// Root of every random number: of the skin's gains, the readout's noise, and the arm's deviations from press to
+    /// press
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     #[command(flatten)]

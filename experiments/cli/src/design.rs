@@ -90,10 +90,10 @@ struct NewDesign {
     common: Common,
 }
 
-/// Checks a design: simulates it with touches, specimens, parts and noise that it has not seen, and says whether the
-/// results are as it promised.
+/// Checks a design: simulates the designed skin with new touches, specimens, parts and noise, and says whether the
+/// results are as the design promised.
 ///
-/// The status is 0 when every quantity lies in its band, 1 when one does not, and 2 after an error.
+/// The exit status is 0 when every quantity lies in its promised band, 1 when one does not, and 2 after an error.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts design check out/design

@@ -16,9 +16,9 @@ use std::path::PathBuf;
 /// and time steps, on known shapes (sphere, punch, edge), on objects (T, tape, comb) and on a ball drop. The reference
 /// is `layer` at its finest.
 ///
-/// Two kinds of error are reported. One is the relative RMS error of the pressure, fine and per taxel. The other is
-/// what a user sees: the change of support accuracy, IoU and classification at M = 20, after transducer, readout and
-/// decoder.
+/// Two kinds of error are reported. One is the relative RMS error of the pressure, on the grid squares and per taxel.
+/// The other is what a user sees: the change of support accuracy, IoU and classification at M = 20, after transducer,
+/// readout and decoder.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts fidelity
@@ -31,10 +31,10 @@ Files in DIR:
   summary.md                 means over the scenes
   refused.csv                settings beyond a scene's limits, and why
   figures/pareto.png         error against cost; figures/pressure.png the pressures themselves
-  scenes/                    meshes that only this study has
+  scenes/                    meshes of the scenes that only this study has
 
-A scene can ask for an error instead of a fidelity level, with `tolerance = 0.05`. It then takes the cheapest level
-that, by the shipped table, meets this error on every scene of its kind.")]
+A scene file can limit the error instead of naming a fidelity level, with `tolerance = 0.05`. It then gets the cheapest
+level whose error, in the table that ships, is within this limit on every scene of the same kind (press or drop).")]
 pub(super) struct FidelityCommand {
     /// sphere, punch, edge, T, tape, comb, drop, or FILE.toml; repeat for several [default: all seven]
     #[arg(long, value_name = "SCENE")]
@@ -48,7 +48,8 @@ pub(super) struct FidelityCommand {
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "out/fidelity")]
     out: PathBuf,
-    /// Root of every random number: the skin, its noise and the arm's scatter follow from it
+    /// Root of every random number: of the skin's gains, the readout's noise, and the arm's deviations from press to
+    /// press
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     #[command(flatten)]

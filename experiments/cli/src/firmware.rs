@@ -22,8 +22,8 @@ use std::path::{Path, PathBuf};
 /// Runs the firmware of the skin's cells on emulated ATtiny412 microcontrollers.
 ///
 /// A cell is the microcontroller behind one taxel: at every edge of the clock line it puts out the next weight of its
-/// taxel, as a code of its DAC. Emulated are the instructions of every cell, its clock pin, its I2C address and its
-/// DAC.
+/// taxel, as a code of its DAC. The emulation runs the instructions of every cell, with its clock pin, its I2C address
+/// and its DAC.
 ///
 /// Two firmware images ship. `shipped` sets the DAC at the edge and computes the next weight afterwards. `plain`
 /// computes first, as the published device does, and is interrupted by a timer every millisecond, so that its DAC is
@@ -70,7 +70,7 @@ struct VerifyCommand {
     #[arg(long = "mode", value_name = "MODE")]
     modes: Vec<ModeName>,
     /// Lengths of the patterns of mode `pattern`, in bits, one run for each; [1, 64]
-    #[arg(long = "period", value_name = "BITS,...", value_delimiter = ',', default_values_t = [7, 20, 64], value_parser = bits())]
+    #[arg(long = "period", value_name = "BITS,...", value_delimiter = ',', default_value = "7,20,64", value_parser = bits())]
     periods: Vec<usize>,
     #[command(flatten)]
     cells: CellOptions,
@@ -108,7 +108,7 @@ struct TimingCommand {
   spts firmware weights --out weights.npy
   spts firmware weights --mode analog --edges 2000 --seeding mixed --out analog.npy
 
-In Python: y = numpy.load(\"weights.npy\") @ x")]
+In Python, for an image x with one value a cell: y = numpy.load(\"weights.npy\") @ x")]
 struct WeightsCommand {
     /// NumPy file to write
     #[arg(long, value_name = "FILE")]
@@ -131,8 +131,8 @@ struct WeightsCommand {
 /// Prints what one emulated cell does, instruction by instruction.
 ///
 /// One line is one instruction: tick of the 20 MHz oscillator, byte address, instruction, changed registers. The cell
-/// is first seeded over the bus and then clocked. With --from-reset it gets neither, which shows what an image does
-/// that fails before it can answer.
+/// is first seeded over the bus and then clocked. With --from-reset it is neither seeded nor clocked. Use --from-reset
+/// for an image that fails before it answers on the bus.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware trace
@@ -142,8 +142,8 @@ struct TraceCommand {
     /// Taxel of the cell, counted from 0; the cell's bus address is 8 more
     #[arg(long, value_name = "K", default_value_t = 0, value_parser = whole::<usize>(0..=111))]
     taxel: usize,
-    /// Show this many ticks of 50 ns from power-on, with neither bus nor clock; [1, 100000000] [default: show --edges
-    /// edges after seeding]
+    /// Trace this many ticks of 50 ns from power-on, without bus and clock; [1, 100000000] [default: trace the --edges
+    /// clock edges after seeding]
     #[arg(long, value_name = "TICKS", conflicts_with_all = ["edges", "mode"], value_parser = whole::<u64>(1..=100_000_000))]
     from_reset: Option<u64>,
     /// Clock edges; [1, 10000]
@@ -165,7 +165,7 @@ struct CellOptions {
     /// Cells on the bus, addresses 8 and up; [1, 112]
     #[arg(long, value_name = "N", default_value_t = 100, value_parser = whole::<u8>(1..=112))]
     cells: u8,
-    /// Firmware image: shipped, plain, or a file in Intel's hex format
+    /// Firmware image: shipped or plain (`spts firmware --help` describes them), or a file in Intel's hex format
     #[arg(long, value_name = "IMAGE", default_value = "shipped")]
     image: String,
     /// Seeds of the cells' random generators: address is the cell's bus address in one byte, as published; mixed is a
@@ -175,8 +175,8 @@ struct CellOptions {
     /// Clock edges a second, rising and falling; every edge is a measurement; [1, 1000000]
     #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = within(1.0, 1e6, "[1, 1000000] Hz"))]
     edge_hz: f64,
-    /// Time from a clock edge to the sample, µs; [0, 1000000/HZ) for --edge-hz HZ [default: 11 µs up to 64300 Hz, the
-    /// skin's; above that the same share of a period: 9.8 µs at 72000 Hz]
+    /// Time from a clock edge to the sample, µs; [0, 1000000/HZ) for --edge-hz HZ [default: 11 µs up to 64300 Hz, as on
+    /// the real skin; at a faster clock the same share of a period, such as 9.8 µs at 72000 Hz]
     #[arg(long, value_name = "US", value_parser = number)]
     sample_us: Option<f64>,
 }

@@ -26,12 +26,15 @@ pub fn refusal(error: &Error) -> Option<String> {
         }
         _ => {
             let said = error.render().to_string();
-            let said = said.split("\n\nUsage:").next().unwrap_or_default();
+            let (said, usage) = said.split_once("\n\nUsage: ").unwrap_or((&said, ""));
             let said = said.split("\n\nFor more information").next().unwrap_or_default();
             let said = said.strip_prefix("error: ").unwrap_or(said);
             let said = one_line(said).replace(":; ", ": ");
             let elsewhere = match error.kind() {
-                ErrorKind::InvalidSubcommand => COMMANDS_ELSEWHERE,
+                // of `spts` itself, and not of a command that is here
+                ErrorKind::InvalidSubcommand if usage.starts_with("spts <") || usage.starts_with("spts [") => {
+                    COMMANDS_ELSEWHERE
+                }
                 _ => "",
             };
             Some(format!("{said}{elsewhere}"))

@@ -10,9 +10,9 @@ use std::path::PathBuf;
 
 /// Simulates, learns, scores and draws everything, and writes a report that a browser shows.
 ///
-/// Presses 17 objects and bounces a ball on the twin, records them through the one-wire readout, learns dictionary and
-/// library from the simulated raster images only, and scores the twin and, with --recordings, the real skin with the
-/// same code.
+/// Presses 17 objects and bounces a ball on the twin, and records them through the one-wire readout. The decoders'
+/// dictionary and the classifier's library of example images are learned from the simulated raster images alone. The
+/// same code then scores the twin and, with --recordings, the real skin.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts reproduce --quick --out out/look
@@ -27,7 +27,7 @@ Files in DIR:
   arrays/*.npy                pressure_pa, median_raster_v, dictionary, library, library_labels
   sessions/                   with --save-recordings: a session folder for every object and for the ball")]
 pub(super) struct ReproduceCommand {
-    /// A short run of about a minute: few presses, few numbers of measurements
+    /// A short run of about a minute: few presses, few values of M
     #[arg(long)]
     quick: bool,
     /// Directory of recordings of the real skin to score beside the twin (see `spts validate --help`) [default: the
@@ -37,7 +37,8 @@ pub(super) struct ReproduceCommand {
     /// Folder of the report
     #[arg(long, value_name = "DIR", default_value = "out/report")]
     out: PathBuf,
-    /// Root of every random number: the skin, its noise and the arm's scatter follow from it
+    /// Root of every random number: of the skin's gains, the readout's noise, and the arm's deviations from press to
+    /// press
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
     /// Also write the twin's recordings as session folders in DIR/sessions (about 70 MB, with --quick about 20 MB); see

@@ -25,19 +25,22 @@ use std::path::{Path, PathBuf};
 /// Scores decoders side by side on recordings of a skin.
 ///
 /// Every decoder sees the same windows of M consecutive measurements of the scored presses, and is scored against the
-/// same true image. All presses are scored where there are fewer than 15, else ten after those that condition the skin.
+/// same true image. If a session has fewer than 15 presses, all are scored. Of a longer session, ten presses are
+/// scored; those before them condition the skin.
 ///
 /// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes
 /// of 20 windows, and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in
-/// which the measurements arrive; the place of the bouncing ball, as recorded and with the taxels relabelled so that it
-/// may be anywhere; and the place of touches, such as those of the skin around a robot's arm. A bent skin has an output
-/// even without a touch; the output of the frames before the touch is subtracted.
+/// which the measurements arrive; and the error of the place of the bouncing ball and of touches, such as those of the
+/// skin around a robot's arm. The ball's place is scored as recorded, where all drops fall on the middle of the skin,
+/// and with the taxels renumbered so that the contact moves over the whole skin. A bent skin has an output even without
+/// a touch; the output of the frames before the touch is subtracted.
 ///
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that
 /// are not scored. There is one exception, which the published evaluation has too: the published library holds raster
 /// frames of scored presses. Use `--learn-from raster` to classify without it.
-/// Gains in a file (`--learn-from FILE.toml`) may have been fitted to the scored objects too, and their mounting comes
-/// from compressive samples of presses 1-5; `calibrated` leaves out the scored object and all of those.
+/// With `--learn-from FILE.toml`, the gains in the file may have been fitted to the scored objects as well, and their
+/// mounting is estimated from compressive samples of presses 1-5. `--learn-from calibrated` uses neither the scored
+/// object nor a compressive sample.
 ///
 /// Where the cells have missed clock edges, the samples lag behind their rows of weights. The command finds such lags
 /// by fitting an image at every contact, puts the samples back on their rows, and says so in a note; `slips` of --json
@@ -60,7 +63,8 @@ use std::path::{Path, PathBuf};
 
 An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\",
 \"learn\", \"classes\": {\"1\": \"brain\", ...}} and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and
-answers each at once with a line {\"image\": [...]} or {\"label\": N} or both. A program that answers only labels has no
+answers each at once with a line {\"image\": [...]} or {\"label\": N} or both. m is the number of samples, volts the
+samples, and y the samples minus the output of the untouched skin, both in V. A program that answers only labels has no
 scores of images. An image without a label is classified by the published classifier, as the images of the other
 decoders are. Where weights are not +1 or -1, phi has an array of numbers in place of each string of signs. When its
 input ends, the program has to end with status 0.
@@ -80,7 +84,7 @@ Files in DIR:
   figures/                   reconstruction, classification and localisation over M and over time, .svg and .png
 With --anytime:
   anytime.json               everything; anytime.csv, objects.csv
-  figures/                   anytime: error of classes and images over the samples that are needed, .svg and .png
+  figures/                   anytime: error of classes and images over the number of samples used, .svg and .png
 With --in-time:
   in_time.json               everything; in_time.csv, objects.csv
   figures/                   in_time: IoU of presses and place of the ball over the time since the touch, .svg and .png
@@ -108,8 +112,8 @@ pub(super) struct ScoreCommand {
     /// A decoder of your own, a program given as COMMAND or NAME=COMMAND; repeat for several [default: none]
     #[arg(long, value_name = "COMMAND")]
     external: Vec<String>,
-    /// Longest time that an external program may take for a window (for one run, with {windows} and {answers}), s,
-    /// [0.1, 86400]
+    /// Time limit of an external program, s, [0.1, 86400]: for each window or, with {windows} and {answers}, for each
+    /// run
     #[arg(
         long,
         value_name = "SECONDS",
@@ -118,17 +122,17 @@ pub(super) struct ScoreCommand {
         allow_hyphen_values = true
     )]
     external_timeout: f64,
-    /// Stop at a wanted confidence instead: every decoder is given the samples of a window one by one, until it is sure
-    /// enough (--confidence) or has as many as the largest of --measurements. Printed are the samples that it needs and
-    /// how often it is right, beside those of fixed numbers of samples, which are the --measurements. Only decoders
-    /// that say how sure they are: `evidence` (the probability of its class), and `nn_lmmse` and `amortised` (the
-    /// expected IoU of the image)
+    /// Score decoding up to a wanted confidence, in place of windows of fixed length: every decoder is given the samples
+    /// of a window one by one, until its confidence reaches --confidence or it has the largest of --measurements. The
+    /// table shows how many samples it needed and how often it was right, beside the same for windows of each of
+    /// --measurements. Only decoders that state a confidence are scored: `evidence` (the probability of its class), and
+    /// `nn_lmmse` and `amortised` (the expected IoU of the image)
     #[arg(long, conflicts_with_all = ["external", "save", "against", "no_ball", "no_times"])]
     anytime: bool,
-    /// Follow contacts in time instead: every decoder is given all windows of a press or a drop in their order, from
-    /// before the touch on, and remembers what it has seen. Scored are its images at set times after the touch and
-    /// during the hold, beside those of the same windows alone. Only `nn_lmmse`, which has a Gaussian prior; --no-ball
-    /// leaves out the drops
+    /// Score images that follow a contact in time, in place of separate windows: the decoder is given all windows of a
+    /// press or a drop in order, from before the touch on, and remembers them. Its images are scored at set times after
+    /// the touch and during the hold, beside images of the same windows decoded one by one. Only for `nn_lmmse`, which
+    /// has a Gaussian prior; --no-ball leaves out the drops
     #[arg(long, conflicts_with_all = ["anytime", "external", "save", "against", "no_times"])]
     in_time: bool,
     /// Wanted confidences, each in (0.5, 1) [default: 0.8,0.9,0.95,0.99 for classes; 0.6,0.7,0.8 for images]
@@ -149,23 +153,23 @@ pub(super) struct ScoreCommand {
     left_out: bool,
     /// What to learn from; with several sources, every decoder learns from each. `published`: the dictionary and
     /// library beside the recordings, everything else from raster presses. `raster`: raster presses that are not
-    /// scored. `simulation`: simulated presses of the objects; places are known to half a taxel, rotations to 15°, and
-    /// tilts not at all. `simulation_fitted`: presses on 32 simulated skins, placed as was fitted to the published
-    /// recordings. `calibrated`: the same, on skins with gains drawn from what unscored presses of the other objects
-    /// tell of the scored skin's. FILE.toml: the same with the gains in this file, as `spts calibrate --skin` writes
-    /// them. `shapes`: procedural shapes pressed in the simulation, no object and nothing recorded; the decoders that
-    /// learn from nothing else, `mixture` and `amortised`, are then shown too. DIR: other recordings, such as those
-    /// that `spts reproduce --save-recordings` writes
+    /// scored. `simulation`: simulated presses of the objects, with places known to half a taxel, rotations known to
+    /// 15°, and unknown tilts. `simulation_fitted`: presses on 32 simulated skins, with places that were fitted to the
+    /// published recordings. `calibrated`: presses at the same places, simulated with the gains of the scored skin; the
+    /// gains are estimated from unscored raster presses of the other objects. FILE.toml: the same with the gains in this
+    /// file, which `spts calibrate --skin` writes. `shapes`: simulated presses of procedural shapes, with no object and
+    /// no recording; the decoders that learn from nothing else, `mixture` and `amortised`, are then shown too. DIR:
+    /// other recordings, such as those that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
     /// Trained network of the decoder `amortised`, a file that `python -m spts.amortised` writes; needed for a skin of
     /// other rows and columns than the published one [default: the network that ships]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
-    /// How the rows of a window come about; with both, every decoder is scored with each. `random`: measurements that
-    /// follow each other, at the rows that the cells put out. `chosen`: three windows a press, of rows chosen from
-    /// those of its hold (every third row, from the first, second and third on). The choice depends on what the decoder
-    /// has learned, and neither on the object nor on a sample; the order in time is lost. Chosen rows have no votes
+    /// How the measurements of a window are selected; with both, every decoder is scored with each. `random`:
+    /// consecutive measurements, with the rows that the cells put out. `chosen`: M measurements of the hold whose rows
+    /// suit what the decoder has learned; neither the object nor a sample influences the choice. Every press gives three
+    /// such windows, each from every third measurement. Chosen rows lose the order in time and have no votes
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', default_value = "random", value_parser = sensing())]
     sensing: Vec<Sensing>,
     /// Leave the times of decoding out, so that the output is the same from run to run
@@ -177,7 +181,8 @@ pub(super) struct ScoreCommand {
     /// Compare the scores with the earlier score table in FILE, which --save wrote [default: none]
     #[arg(long, value_name = "FILE")]
     against: Option<PathBuf>,
-    /// How much a score may fall below that of --against, [0, 1]; distances may grow by as many taxels
+    /// How much a score may fall below that of --against, a share in [0, 1]; distances may grow by the same number, in
+    /// taxels
     #[arg(
         long,
         value_name = "SHARE",

@@ -18,9 +18,9 @@ use std::path::{Path, PathBuf};
 /// The set is compared with three others: mixed addresses (a 32-bit hash of each cell's address), seeds from a search
 /// that lowers the mean square coherence of rows, and random bytes, which the published firmware can load.
 ///
-/// Then the same images and noise go through every set, at the same rows. The images are synthetic contacts, decoded
-/// with a dictionary that K-SVD learned from others; with --recordings, also raster images of presses that are not
-/// scored, decoded with the published dictionary.
+/// Then the same images and noise are measured with the rows of every set, and the decoded images are compared. The
+/// images are synthetic contacts, decoded with a dictionary that K-SVD learned from others. With --recordings, raster
+/// images of presses that are not scored are decoded as well, with the published dictionary.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts seeds
@@ -33,20 +33,21 @@ A seed FILE holds whole numbers in [0, 4294967295], decimal or with 0x, with spa
 and # before comments: one a taxel, row by row, of a square skin. A LIST is the same on the command line, with commas.
 
 Files in DIR:
-  facts.csv                 period, phases, constant rows, rank of the first N rows; one line a set
+  facts.csv                 period, rows until a taxel repeats another's weights, constant rows, rank of the first N
+                            rows; one line a set
   windows.csv               one line a set and M: rank, condition, coherence, isometry
   worth.csv                 one line a kind of images, noise, decoder, M and set: IoU, its gain over the given set,
                             standard errors
   seeds.json                all of them, and the seeds
   NAME_seeds.txt            seeds of the sets mixed, searched and bytes, for --seeds and for seeds_file under [rows] of
                             a scene
-  NAME_bus.csv              what the master writes to each cell to load them: mode and a byte of seed, or mode with 0x80
-                            and four; up to 112 cells
+  NAME_bus.csv              bytes that the bus master sends each cell to load its seed: the mode and one byte, or the
+                            mode with bit 0x80 set and four bytes; up to 112 cells
   readout_mixed.toml        the profile as_built with mixed addresses, for --readout
   figures/seeds.png         coherence and IoU over M; matrices.png the first rows; .svg the same
 
-Proposed are the searched seeds when they beat the mixed addresses by two standard errors on windows that the search did
-not see, and else the mixed addresses.")]
+The searched seeds are proposed if they beat the mixed addresses by two standard errors on windows that the search did
+not see. Otherwise the mixed addresses are proposed.")]
 pub(super) struct SeedsCommand {
     /// Set to judge: address, mixed, a FILE or a LIST
     #[arg(long, value_name = "SET", default_value = "address", allow_hyphen_values = true)]
@@ -55,10 +56,10 @@ pub(super) struct SeedsCommand {
     #[arg(long, value_name = "N", default_value = "100", value_parser = square(4..=32))]
     taxels: Side,
     /// Numbers of rows M in a window; each [1, 1000]
-    #[arg(long, value_delimiter = ',', value_name = "M,…", default_values = ["5", "7", "10", "13", "20"],
+    #[arg(long, value_delimiter = ',', value_name = "M,…", default_value = "5,7,10,13,20",
           value_parser = parse_measurements)]
     rows: Vec<usize>,
-    /// Weights that the cells put out: binary, ±1, or analog, eight bits
+    /// Weights that the cells put out: binary (±1) or analog (eight bits)
     #[arg(long, value_enum, default_value = "binary")]
     mode: ModeArg,
     /// Folder of recordings, whose raster images are decoded too [default: synthetic images alone]

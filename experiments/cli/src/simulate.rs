@@ -23,8 +23,8 @@ use spts_report::simulation::{FILES, SimulationFiles};
 use std::path::{Path, PathBuf};
 use toml::Value;
 
-/// Simulates one scene and records it through the readout: the arm presses an object on the skin, or a ball bounces on
-/// it.
+/// Simulates one scene and records it through the readout: a robot arm presses an object on the skin, or a ball bounces
+/// on it.
 ///
 /// SCENE is `press/NAME` for one of the objects below or `press/finger`, `press` for a mesh of your own, `bounce`,
 /// `arm` (a finger touches a skin that is wrapped round a robot's arm and under preload), or a scene file that ends in
@@ -68,9 +68,9 @@ pub(super) struct SimulateCommand {
     /// List the scenes and the objects, and simulate nothing; with --json as JSON
     #[arg(long, conflicts_with = "scene")]
     list: bool,
-    /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The arm holds it at its origin; its -z side faces the
-    /// skin. Small defects are repaired and large meshes are decimated, with a note. A mesh that cannot be repaired is
-    /// refused with the reason [default: none]
+    /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The robot arm holds the mesh at the mesh's origin, with
+    /// its -z side towards the skin. Small defects are repaired and large meshes are decimated, with a note. A mesh that
+    /// cannot be repaired is refused with the reason [default: none]
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh file, 0.001 for millimetres; (0, 1000] [default: 1]
@@ -109,9 +109,9 @@ pub(super) struct SimulateCommand {
     /// Resolution of the contact: grid squares along one side of a taxel; [1, 64] [default: 6, or the scene file's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=64))]
     cells: Option<u32>,
-    /// Largest relative error of the taxels' pressures, [0.03, 1]: chooses the cheapest contact model, grid and
-    /// time step that meet it, by the measurements of `spts fidelity` [default: none; --contact, --cells and --timestep
-    /// say it]
+    /// Largest relative error of the taxels' pressures, [0.03, 1]. The twin takes the cheapest contact model, grid and
+    /// time step whose error, as `spts fidelity` has measured it, is no larger [default: none; --contact, --cells and
+    /// --timestep choose them]
     #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], value_parser = number)]
     tolerance: Option<f64>,
     /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]
@@ -130,8 +130,8 @@ pub(super) struct SimulateCommand {
     #[arg(long, value_name = "NAME")]
     weights: Option<String>,
     /// Faulty cell, repeatable: NAME is one of dead, stuck, mis_seeded, overdriven, skipping_clocks, drifting,
-    /// detached; TAXEL counts from 0, row by row. Parameters stand under [[faults]] in a scene or profile
-    /// file [default: none]
+    /// detached; TAXEL counts from 0, row by row. A fault's parameters are set under [[faults]] in a scene or
+    /// profile file [default: none]
     #[arg(long = "fault", value_name = "NAME:TAXEL", value_parser = parse_fault)]
     faults: Vec<(String, u32)>,
     /// Sets any key of the scene file, repeatable: KEY is its dotted path, such as press.force_n, skin.rows or

@@ -24,7 +24,7 @@ pub struct Centred<A> {
 }
 
 impl<A> Centred<A> {
-    /// `inner` followed by subtraction of the mean.
+    /// The operator that applies `inner`, and subtracts from every measurement the mean of all measurements.
     #[must_use]
     pub fn new(inner: A) -> Self {
         Self { inner }

@@ -102,7 +102,7 @@ impl SignOperator {
         }
     }
 
-    /// Memory of the operator, bytes: 4 for each column, whatever the number of rows.
+    /// Memory of the operator, bytes: a constant, and 4 for each column, whatever the number of rows.
     #[must_use]
     pub fn bytes(&self) -> usize {
         size_of::<Self>() + self.seeds.capacity() * size_of::<u32>()

@@ -30,9 +30,9 @@ use spts_contact::Frame;
 
 /// A press or drop of a scene, simulated from frame to frame.
 ///
-/// MuJoCo simulates the dynamics with the contact field's wrench as an external force. If the scene's contact field
-/// computes the pose under a force ([`spts_contact::QuasiStatic`]), the force follows the same time course, and there
-/// are no time steps.
+/// MuJoCo simulates the dynamics, with the contact field's wrench as an external force. A contact field that computes
+/// the pose under a given force ([`spts_contact::QuasiStatic`]) needs no dynamics: the force follows the same course in
+/// time as in a press with dynamics, the field computes the pose at every frame, and there are no time steps.
 pub struct World {
     scene: Mechanics,
     engine: Engine,

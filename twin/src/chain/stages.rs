@@ -249,8 +249,9 @@ impl Chain {
         presses.iter().map(|frames| skin.conductance(frames)).collect()
     }
 
-    /// Conductance of every taxel at every frame of every press, in session number `session`. The skin rests between
-    /// presses.
+    /// Conductance of every taxel, S, at every frame of every press: a vector for each press, with a map for each
+    /// frame. `session` is the number of the session: the gains of its mounting are drawn by this number. The skin
+    /// rests between presses.
     #[must_use]
     pub fn conductance_maps(&self, presses: &[&[Frame]], session: u64) -> Vec<Vec<ConductanceMap>> {
         let mut skin = self.skin_session(session);

@@ -96,10 +96,12 @@ impl Scene {
         Self::new(SceneConfig::from_toml(text)?, folder)
     }
 
-    /// Reads a scene file. Files that it names are looked up beside it.
+    /// Reads a scene file. Relative paths in the scene start from the folder of that file. A scene without a name takes
+    /// the file's.
     ///
     /// # Errors
-    /// [`SceneError::InFile`], with the name of the file.
+    /// [`SceneError::InFile`], with the path of the file, if the file cannot be read, is not TOML, or its scene is not
+    /// valid.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
         let read = || {

@@ -38,7 +38,8 @@ pub struct Peak {
     pub at: Frame,
 }
 
-/// Number of samples at the end of a range, among all samples.
+/// Saturated samples of a recording: those at an end of the converter's or amplifier's range, and the number of all
+/// samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Saturated {
     /// Number of samples at an end of the range.

@@ -81,7 +81,7 @@ pub(super) struct FinishCommand {
 /// Where the files of a spec are.
 #[derive(Debug, Args)]
 pub(super) struct Files {
-    /// Folder in which files that the spec names by relative paths are looked for: meshes, profiles, gains
+    /// Folder of the meshes, profiles and gain files that the spec names by relative paths
     #[arg(long, value_name = "DIR", default_value = ".")]
     files: PathBuf,
 }

@@ -13,15 +13,15 @@ use std::path::{Path, PathBuf};
 
 /// Draws rows of a data set: true pressure, raster image and samples of each.
 ///
-/// Of a folder, the rows are those of the files that are there; the data set need not be finished. Of a spec, the rows
-/// are made for the picture, and nothing else is written. Every map has a colour scale of its own, and the colours of
-/// pressure go with its square root, so that light touches are seen as well as firm ones. The picture gives the ends of
-/// every scale.
+/// Given a folder, the command draws rows of the files that are there; the data set need not be finished. Given a spec,
+/// it makes the rows for the picture and writes nothing else. Every map has a colour scale of its own, and the picture
+/// gives the ends of every scale. Colours of pressure follow its square root, so that light touches are seen as well as
+/// firm ones.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts dataset preview out/shapes
   spts dataset preview random-shapes --out shapes.png      rows of a spec, before any data set is made
-  spts dataset preview my_spec.toml --rows 60 --seed 1     60 rows drawn at random")]
+  spts dataset preview my_spec.toml --rows 60 --seed 1     60 rows chosen at random")]
 pub(super) struct PreviewCommand {
     /// Folder of the data set; or a spec: a TOML file, or one of those that ship
     #[arg(value_name = "DIR|SPEC")]
@@ -29,7 +29,7 @@ pub(super) struct PreviewCommand {
     /// Number of rows to draw; [1, 150]
     #[arg(long, value_name = "N", default_value_t = 24, value_parser = whole::<u64>(1..=MOST_PREVIEW_ROWS))]
     rows: u64,
-    /// Draws the rows at random with this seed [default: rows spread evenly]
+    /// Seed with which the rows are chosen at random [default: rows spread evenly]
     #[arg(long, value_name = "SEED", value_parser = seed)]
     seed: Option<u64>,
     /// Picture to write [default: NAME-preview.png in the current folder]

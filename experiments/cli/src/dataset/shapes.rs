@@ -13,7 +13,7 @@ use std::path::PathBuf;
 /// Most shapes of a picture, which is then some 12,000 pixels high.
 const MOST_SHAPES: usize = 400;
 
-/// Draws procedural shapes of every family from below, all to one scale.
+/// Draws procedural shapes of every family, each seen from below, all to one scale.
 ///
 /// Sizes, reliefs and edges have the default ranges. A data set of the same families draws numbers of its own.
 #[derive(Debug, Args)]

@@ -30,11 +30,12 @@ Designers:
   random, seeds_search                   pseudorandom rows; the best of many seeds
   cosine_signs, hadamard, cake_cutting   need nothing but the rows and columns of the skin
   greedy, separable, analog              need a prior of images; separable is for large skins, analog has 256 levels
-  classes                                needs templates of objects, of --recordings, and tells them apart
+  classes                                needs templates of objects from --recordings; its rows tell the objects apart
 
 Files in DIR:
-  rows.txt            one line a row, + or − a taxel: for patterns_file under [rows] of a scene
-  weights.json        the same as the weights of a session
+  rows.txt            one line a row: + or - for each taxel, or codes 0 to 255 from analog; for patterns_file
+                      under [rows] of a scene
+  weights.json        the same rows as info.weights of a session: see docs/session.md
   bus.csv             what the master writes to each cell to load its pattern; up to 112 cells
   seeds.txt           seeds whose generators begin with these rows; up to 24 rows of ±1
   design.json         what the rows are like
@@ -57,18 +58,18 @@ pub(super) struct DesignCommand {
     /// shapes]
     #[arg(long, value_name = "DIR")]
     recordings: Option<PathBuf>,
-    /// Noise of a sample that the designer reckons with, as a share of the root mean square of a random row's samples;
-    /// [1e-6, 1000]
+    /// Standard deviation of a sample's noise that the design assumes, relative to the root mean square of a random
+    /// row's samples; [1e-6, 1000]
     #[arg(long, value_name = "SHARE", default_value_t = RowTask::NOISE, value_parser = within(1e-6, 1e3, "[1e-6, 1000]"))]
     noise: f64,
-    /// Upper limit of the samples of a designed row, so that the amplifier does not clip them: their root mean square,
-    /// as a multiple of that of a random row; [0.05, 1000] [default: no limit]
+    /// Largest root mean square of a designed row's samples, as a multiple of a random row's, so that the amplifier does
+    /// not clip; [0.05, 1000] [default: no limit]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
-    /// Standard deviation of the natural logarithm of the taxels' gains that the designer reckons with; [0, 3]
+    /// Spread of the taxels' gains that the design assumes: standard deviation of their natural logarithm; [0, 3]
     #[arg(long, value_name = "SD", default_value_t = 0.0, value_parser = within(0.0, 3.0, "[0, 3]"))]
     gains: f64,
-    /// Images that the designer reckons with may be shifted by up to so many taxels; [0, 64]
+    /// Largest shift of the images that the design allows for, in whole taxels; [0, 64]
     #[arg(long, value_name = "TAXELS", default_value_t = 0, value_parser = whole::<usize>(0..=64))]
     shift: usize,
     /// Write the rows in the order in which the fewest weights change from row to row, in place of the best rows first

@@ -58,7 +58,7 @@ pub(super) struct StudyCommand {
     #[arg(long, value_delimiter = ',', value_name = "M,…", value_parser = parse_measurements)]
     measurements: Vec<usize>,
     /// Readout profiles: the electronics whose errors the samples have
-    #[arg(long, value_delimiter = ',', value_name = "NAME,…", default_values = ["ideal", "as_built"],
+    #[arg(long, value_delimiter = ',', value_name = "NAME,…", default_value = "ideal,as_built",
           value_parser = PossibleValuesParser::new(PROFILES.iter().map(|(name, _)| *name)))]
     readout: Vec<String>,
     /// Decoder that makes the images from all rows: one of those in docs/decoders.md that make images and need no
@@ -75,11 +75,11 @@ pub(super) struct StudyCommand {
     /// --quick 34]
     #[arg(long, value_name = "COUNT", value_parser = whole::<usize>(1..=10_000))]
     touches: Option<usize>,
-    /// Upper limit of the samples of a designed row, so that the amplifier does not clip them: their root mean square,
-    /// as a multiple of that of a random row; [0.05, 1000] [default: no limit]
+    /// Largest root mean square of a designed row's samples, as a multiple of a random row's, so that the amplifier does
+    /// not clip; [0.05, 1000] [default: no limit]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
-    /// Standard deviation of the natural logarithm of the taxels' gains that the designers reckon with; [0, 3]
+    /// Spread of the taxels' gains that the designs assume: standard deviation of their natural logarithm; [0, 3]
     #[arg(long, value_name = "SD", default_value_t = 0.0, value_parser = within(0.0, 3.0, "[0, 3]"))]
     gains: f64,
     /// Fewer M, repetitions and touches: about a tenth of the time

@@ -25,29 +25,47 @@ pub(super) trait Locate {
 
 pub(super) type StartLocator = for<'a> fn(&'a Tools, &'a Press) -> Box<dyn Locate + 'a>;
 
-/// Label of the locator `name` in figures and printed tables.
+/// A locator under its names.
+pub(super) struct LocatorSpec {
+    /// Name in tables.
+    pub(super) name: &'static str,
+    /// Label in figures and printed tables.
+    label: &'static str,
+    pub(super) start: StartLocator,
+}
+
+/// Label of the locator `name` in figures and printed tables; an unknown name is its own label.
 #[must_use]
 pub fn locator_label(name: &str) -> &str {
-    match name {
-        "middle" => "middle of the sheet",
-        "script_s5" => "script, 5 atoms",
-        "blob" => "blob evidence",
-        "taxel" => "touched taxel",
-        _ => name,
-    }
+    LOCATORS
+        .iter()
+        .find(|spec| spec.name == name)
+        .map_or(name, |spec| spec.label)
 }
 
 /// Locator of a contact as small as a taxel; the ball's is larger.
 pub(super) const TAXEL: &str = "taxel";
 
 /// Every locator.
-pub(super) const LOCATORS: &[(&str, StartLocator)] = &[
-    ("middle", |tools, _| Box::new(Middle(middle(tools.shape)))),
-    ("script_s5", |tools, press| Box::new(Pursuit::new(tools, press, true))),
-    ("matched", |tools, press| Box::new(Pursuit::new(tools, press, false))),
-    ("blob", |tools, press| Box::new(Blob::new(tools, press))),
-    (TAXEL, |tools, _| Box::new(Taxel(tools.shape))),
+pub(super) const LOCATORS: &[LocatorSpec] = &[
+    spec("middle", "middle of the sheet", |tools, _| {
+        Box::new(Middle(middle(tools.shape)))
+    }),
+    spec("script_s5", "script, 5 atoms", |tools, press| {
+        Box::new(Pursuit::new(tools, press, true))
+    }),
+    spec("matched", "matched", |tools, press| {
+        Box::new(Pursuit::new(tools, press, false))
+    }),
+    spec("blob", "blob evidence", |tools, press| {
+        Box::new(Blob::new(tools, press))
+    }),
+    spec(TAXEL, "touched taxel", |tools, _| Box::new(Taxel(tools.shape))),
 ];
+
+const fn spec(name: &'static str, label: &'static str, start: StartLocator) -> LocatorSpec {
+    LocatorSpec { name, label, start }
+}
 
 /// Middle of a sheet.
 pub(super) fn middle(shape: [usize; 2]) -> [f64; 2] {

@@ -16,7 +16,7 @@ use crate::sensing::{Sensing, chosen_places};
 use crate::training::Dictionary;
 use contact::Contact;
 pub use locators::locator_label;
-use locators::{LOCATORS, Locate, StartLocator, TAXEL, Taxel, Tools, middle};
+use locators::{LOCATORS, Locate, LocatorSpec, TAXEL, Taxel, Tools, middle};
 use rayon::prelude::*;
 use rows::{BALL, Located};
 use spts_circuit::Recording;
@@ -38,7 +38,7 @@ pub(crate) fn localise(
     measurements: &[usize],
 ) -> Result<Vec<LocalisationRow>, ScoreError> {
     let asked = PlacesRequest {
-        locators: LOCATORS.iter().filter(|(name, _)| PUBLISHED.contains(name)).collect(),
+        locators: LOCATORS.iter().filter(|spec| PUBLISHED.contains(&spec.name)).collect(),
         relabelled: false,
         measurements,
         sensing: &[Sensing::Random],
@@ -61,7 +61,7 @@ pub(crate) fn places(
     sensing: &[Sensing],
 ) -> Result<Vec<PlaceRow>, ScoreError> {
     let asked = PlacesRequest {
-        locators: LOCATORS.iter().filter(|(name, _)| *name != TAXEL).collect(),
+        locators: LOCATORS.iter().filter(|spec| spec.name != TAXEL).collect(),
         relabelled: true,
         measurements,
         sensing,
@@ -85,7 +85,7 @@ pub(crate) fn touch_places(
 ) -> Result<Vec<PlaceRow>, ScoreError> {
     let usable = |name: &str| shifted.is_some() || !PUBLISHED.contains(&name);
     let asked = PlacesRequest {
-        locators: LOCATORS.iter().filter(|(name, _)| usable(name)).collect(),
+        locators: LOCATORS.iter().filter(|spec| usable(spec.name)).collect(),
         relabelled: false,
         measurements,
         sensing: &[Sensing::Random],
@@ -147,7 +147,7 @@ impl Tools {
 
 /// Which places are asked for.
 struct PlacesRequest<'a> {
-    locators: Vec<&'a (&'static str, StartLocator)>,
+    locators: Vec<&'a LocatorSpec>,
     /// Whether contacts are also relabelled.
     relabelled: bool,
     measurements: &'a [usize],
@@ -170,12 +170,12 @@ impl PlacesRequest<'_> {
             .flat_map(|&sensing| [(false, sensing), (true, sensing)]);
         let mut found = Vec::new();
         for (k, (relabelled, sensing)) in kinds.enumerate() {
-            for (l, (locator, _)) in self.locators.iter().enumerate() {
+            for (l, spec) in self.locators.iter().enumerate() {
                 for (i, &m) in self.measurements.iter().enumerate() {
                     let at = (k / 2 * self.locators.len() + l) * self.measurements.len() + i;
                     let of = views.iter().zip(&errors).filter(|(view, _)| view.0 == relabelled);
                     found.push(Located {
-                        locator,
+                        locator: spec.name,
                         m,
                         relabelled,
                         sensing,
@@ -197,8 +197,9 @@ impl PlacesRequest<'_> {
                 Sensing::Random => vec![press.clone()],
                 Sensing::Chosen => chosen_places(&press, tools.shape, most)?,
             };
-            for (_, start) in &self.locators {
-                let mut locators: Vec<Box<dyn Locate + '_>> = presses.iter().map(|press| start(tools, press)).collect();
+            for spec in &self.locators {
+                let mut locators: Vec<Box<dyn Locate + '_>> =
+                    presses.iter().map(|press| (spec.start)(tools, press)).collect();
                 for &m in self.measurements {
                     let mut errors = Vec::new();
                     for (press, locator) in presses.iter().zip(&mut locators) {

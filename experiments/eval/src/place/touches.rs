@@ -29,8 +29,9 @@ pub struct RecordedTouch {
     pub untouched: Untouched,
 }
 
-/// The touch of every block that has one: from the first to the last frame in which the output differs from that of the
-/// untouched skin. There must be no touch in the first 20 frames of a block.
+/// Finds one touch in every block that has one: from the first to the last frame in which the output differs from that
+/// of the untouched skin. A touch lasts for five frames or more. The first 20 frames of a block must be without a
+/// touch, because the output of the untouched skin is estimated from them; two touches in a block are found as one.
 #[must_use]
 pub fn find_touches(recording: &Recording) -> Vec<RecordedTouch> {
     let blocks = 0..recording.blocks().len();
@@ -95,7 +96,8 @@ impl RecordedTouch {
         (0..image.len()).max_by(|a, b| image[*a].total_cmp(&image[*b]))
     }
 
-    /// At most `most` measurements in the middle of the touch, minus the output of the untouched skin.
+    /// The middle of the touch as samples with their rows, V: at most `most` measurements. The output of the untouched
+    /// skin is subtracted.
     #[must_use]
     pub fn press(&self, recording: &Recording, most: usize) -> Press {
         let len = (self.end - self.start).min(most);

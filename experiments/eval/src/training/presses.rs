@@ -167,7 +167,8 @@ fn class_library(
     Library::new(&Matrix::from_column_slices(taxels(training), &slices), &labels)
 }
 
-/// Images for priors, taxels × images.
+/// Images that a decoder's prior is learned from, taxels × images, V: three raster images of every press, from early,
+/// middle and late in the hold.
 #[must_use]
 pub fn prior_images(training: &[TrainingPresses<'_>]) -> Matrix {
     let mut columns: Vec<&[f64]> = Vec::new();

@@ -4,6 +4,8 @@
 const PADDING: f64 = 0.04;
 /// Ticks of a logarithmic axis below which it takes those of a linear one.
 const LEAST_TICKS: usize = 3;
+/// Parts of a decade at which a logarithmic axis has ticks, from coarse to fine.
+const LEADS: [&[f64]; 3] = [&[1.0], &[1.0, 2.0, 5.0], &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0]];
 
 /// A linear or logarithmic axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,15 +129,27 @@ impl Axis {
             .collect()
     }
 
+    /// Whole decades, and as many parts of them as give [`LEAST_TICKS`] ticks, if any do.
     fn log_ticks(&self) -> Vec<(f64, String)> {
         let decades = self.high - self.low;
-        let leads: &[f64] = match decades {
-            d if d <= 0.7 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0],
-            d if d <= 2.6 => &[1.0, 2.0, 5.0],
-            _ => &[1.0],
+        let coarsest = match decades {
+            d if d <= 0.7 => 2,
+            d if d <= 2.6 => 1,
+            _ => 0,
         };
+        let ticks = |leads: &&[f64]| self.log_ticks_at(leads);
+        let mut tried = LEADS[coarsest..].iter().map(ticks);
+        let first = tried.next().unwrap_or_default();
+        if first.len() >= LEAST_TICKS {
+            return first;
+        }
+        tried.find(|ticks| ticks.len() >= LEAST_TICKS).unwrap_or(first)
+    }
+
+    /// Ticks at `leads` times powers of ten.
+    fn log_ticks_at(&self, leads: &[f64]) -> Vec<(f64, String)> {
         // At most nine decades are named.
-        let stride = (decades / 9.0).ceil().max(1.0);
+        let stride = ((self.high - self.low) / 9.0).ceil().max(1.0);
         let mut ticks = Vec::new();
         let mut decade = (self.low / stride).floor() * stride;
         while decade <= self.high {
@@ -206,6 +220,16 @@ mod tests {
             let ticks = labels(&axis);
             assert!(ticks.len() >= 3, "{low} {high} {ticks:?}");
         }
+    }
+
+    /// Nearly three decades with two whole ones inside: the ticks still cover all of the axis.
+    #[test]
+    fn ticks_cover_an_axis_that_begins_above_a_decade() {
+        let axis = Axis::new([1.2e-4, 0.095].into_iter(), true, None);
+        assert_eq!(
+            labels(&axis),
+            ["2·10⁻⁴", "5·10⁻⁴", "0.001", "0.002", "0.005", "0.01", "0.02", "0.05"]
+        );
     }
 
     #[test]

@@ -21,7 +21,7 @@ pub const GRID: Rgb = Rgb(0xe4, 0xe7, 0xeb);
 pub const CLAIM: Rgb = Rgb(0x76, 0x76, 0x76);
 /// A cell without a value.
 pub const MISSING: Rgb = Rgb(0xbd, 0xbd, 0xbd);
-/// Outline of the true taxels: far in hue from every colour of [`heat`].
+/// Outline around the taxels that are truly touched: far in hue from every colour of [`heat`].
 pub const OUTLINE: Rgb = Rgb(0x2e, 0xe6, 0xd6);
 
 /// Hues of alternatives: six of the palette of Okabe and Ito, without its black and its yellow.

@@ -1,4 +1,4 @@
-//! Intervals with a mark beside each: one row a quantity, one or several panels side by side, in lines.
+//! Intervals with a mark beside each: one row a quantity, panels side by side in lines, each line with its heading.
 
 use super::axis::Axis;
 use super::chart::Style;
@@ -30,6 +30,15 @@ pub struct IntervalPanel {
     pub intervals: Vec<Option<Interval>>,
 }
 
+/// Panels side by side.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IntervalLine {
+    /// Heading.
+    pub title: String,
+    /// Panels, from left to right.
+    pub panels: Vec<IntervalPanel>,
+}
+
 /// A figure of intervals, all between 0 and 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IntervalChart {
@@ -39,10 +48,8 @@ pub struct IntervalChart {
     pub legend: [String; 2],
     /// Words beside the rows.
     pub rows: Vec<String>,
-    /// Panels, line by line.
-    pub panels: Vec<IntervalPanel>,
-    /// Panels in a line.
-    pub columns: usize,
+    /// Lines, from above.
+    pub lines: Vec<IntervalLine>,
 }
 
 /// Writes the figure to `dir/name.svg` and `dir/name.png`.
@@ -53,9 +60,9 @@ pub fn save_intervals(chart: &IntervalChart, dir: &Path, name: &str) -> Result<(
     save(&layout(chart), dir, name)
 }
 
-/// Size of row labels and ticks.
+/// Size of row labels, ticks and panels' headings.
 const SIZE: f64 = 13.0;
-/// Size of headings.
+/// Size of the headings of figure and lines.
 const HEADING: f64 = 15.0;
 /// Free border.
 const BORDER: f64 = 14.0;
@@ -65,8 +72,8 @@ const GAP: f64 = 40.0;
 const ROW: f64 = 22.0;
 /// Width of a panel.
 const PANEL: f64 = 220.0;
-/// Height of a panel's heading, and of its ticks.
-const HEAD: f64 = 28.0;
+/// Height of the headings of a line and of its panels, and of the ticks.
+const HEAD: f64 = 52.0;
 const FOOT: f64 = 34.0;
 /// Thickness of a band.
 const BAND: f64 = 8.0;
@@ -75,26 +82,26 @@ const BAND: f64 = 8.0;
 pub(super) fn layout(chart: &IntervalChart) -> Canvas {
     let labels = chart.rows.iter().map(|row| text_width(row, SIZE, false));
     let margin = labels.fold(0.0, f64::max) + 2.0 * BORDER;
-    let columns = chart.columns.max(1);
+    let columns = chart.lines.iter().map(|line| line.panels.len()).max().unwrap_or(0);
     let (top, inner) = (3.0 * HEADING, ROW * chart.rows.len() as f64);
     let line = HEAD + inner + FOOT;
-    let lines = chart.panels.len().div_ceil(columns);
+    let bottom = top + line * chart.lines.len() as f64;
     let width = margin + columns as f64 * (PANEL + GAP);
-    let mut canvas = Canvas::new(width, top + line * lines as f64 + 2.0 * HEADING, &chart.title);
+    let mut canvas = Canvas::new(width, bottom + 2.0 * HEADING, &chart.title);
     let heading = TextStyle::new(HEADING, INK).bold();
     canvas.text((BORDER, BORDER + HEADING * 0.5), &chart.title, heading);
-    for (index, panel) in chart.panels.iter().enumerate() {
-        let (column, row) = (index % columns, index / columns);
-        let at = (margin + column as f64 * (PANEL + GAP), top + line * row as f64 + HEAD);
-        draw_panel(&mut canvas, panel, at, inner);
-        if column == 0 {
-            let style = TextStyle::new(SIZE, INK).anchored(Anchor::End);
-            for (k, label) in chart.rows.iter().enumerate() {
-                canvas.text((margin - BORDER, at.1 + ROW * (k as f64 + 0.5)), label, style);
-            }
+    let beside = TextStyle::new(SIZE, INK).anchored(Anchor::End);
+    for (l, of_line) in chart.lines.iter().enumerate() {
+        let y = top + line * l as f64 + HEAD;
+        canvas.text((BORDER, y - 0.75 * HEAD), &of_line.title, heading);
+        for (column, panel) in of_line.panels.iter().enumerate() {
+            draw_panel(&mut canvas, panel, (margin + column as f64 * (PANEL + GAP), y), inner);
+        }
+        for (k, label) in chart.rows.iter().enumerate() {
+            canvas.text((margin - BORDER, y + ROW * (k as f64 + 0.5)), label, beside);
         }
     }
-    legend(&mut canvas, chart, (margin, top + line * lines as f64 + 0.5 * HEADING));
+    legend(&mut canvas, chart, (margin, bottom + 0.5 * HEADING));
     canvas
 }
 
@@ -110,8 +117,8 @@ fn draw_panel(canvas: &mut Canvas, panel: &IntervalPanel, (left, top): Point, he
         canvas.text((x, top + height + 14.0), &label, tick);
     }
     canvas.frame((left, top), (PANEL, height), CLAIM, 1.0);
-    let heading = TextStyle::new(SIZE, INK).bold().anchored(Anchor::Middle);
-    canvas.text((left + 0.5 * PANEL, top - 0.5 * HEAD), &panel.title, heading);
+    let heading = TextStyle::new(SIZE, INK).anchored(Anchor::Middle);
+    canvas.text((left + 0.5 * PANEL, top - 0.25 * HEAD), &panel.title, heading);
     for (k, interval) in panel.intervals.iter().enumerate() {
         let y = top + ROW * (k as f64 + 0.5);
         if let Some(interval) = interval {
@@ -174,19 +181,21 @@ mod tests {
             title: "made up".to_owned(),
             legend: ["twin".to_owned(), "skin".to_owned()],
             rows: vec!["brain".to_owned(), "trig".to_owned()],
-            panels: vec![IntervalPanel {
+            lines: vec![IntervalLine {
                 title: "IoU".to_owned(),
-                intervals: vec![
-                    Some(Interval {
-                        low: 0.4,
-                        middle: 0.5,
-                        high: 0.6,
-                        mark,
-                    }),
-                    None,
-                ],
+                panels: vec![IntervalPanel {
+                    title: "M = 20".to_owned(),
+                    intervals: vec![
+                        Some(Interval {
+                            low: 0.4,
+                            middle: 0.5,
+                            high: 0.6,
+                            mark,
+                        }),
+                        None,
+                    ],
+                }],
             }],
-            columns: 1,
         }
     }
 

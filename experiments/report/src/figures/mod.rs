@@ -29,7 +29,7 @@ pub use chart::{Chart, Claim, Series, StatedRange, Style};
 pub use draw::encode_png;
 pub use error::FigureError;
 pub(crate) use heat_map::draw_heat;
-pub use intervals::{Interval, IntervalChart, IntervalPanel, save_intervals};
+pub use intervals::{Interval, IntervalChart, IntervalLine, IntervalPanel, save_intervals};
 pub use looks::{Stroke, decoder_variant};
 pub use panel::save_charts;
 pub use pressure::pressure_png;

@@ -1,14 +1,12 @@
 //! Tables and the figure of twin and skin object by object, for `spts compare` and the report.
 
 use crate::PageFigure;
-use crate::figures::{FigureError, Interval, IntervalChart, IntervalPanel, save_intervals};
+use crate::figures::{FigureError, Interval, IntervalChart, IntervalLine, IntervalPanel, save_intervals};
 use crate::labels::{object_label, object_list};
 use crate::{Section, Table};
 use spts::output::{OutputError, write_json, write_table};
-use spts_eval::decoders::{label, short_label};
-use spts_studies::per_object::{
-    DECODERS, MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES, ScoreDistance,
-};
+use spts_eval::decoders::label;
+use spts_studies::per_object::{MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES, ScoreDistance};
 use std::path::Path;
 
 /// Name of the figure.
@@ -41,21 +39,6 @@ fn score_label(score: &str) -> &str {
     }
 }
 
-/// In a word, for the heading of a panel.
-fn short_score(score: &str) -> &str {
-    match score {
-        "class_single" => "class",
-        other => score_label(other),
-    }
-}
-
-/// What the headings of panels call decoders, if it is not their label.
-fn short_labels() -> String {
-    let shorter = DECODERS.iter().filter(|name| label(name) != short_label(name));
-    let each = shorter.map(|name| format!("“{}” is the {}", short_label(name), label(name)));
-    each.collect::<Vec<_>>().join("; ")
-}
-
 fn of_twin(report: &PerObjectReport) -> impl Iterator<Item = &ObjectBand> {
     report.objects.iter().filter(|b| b.images == ReadoutImages::Twin)
 }
@@ -83,22 +66,22 @@ fn chart(report: &PerObjectReport) -> IntervalChart {
             })
         };
         IntervalPanel {
-            title: format!("{}, {}, M = {m}", short_score(score), short_label(decoder)),
+            title: format!("M = {m}"),
             intervals: rows.iter().map(interval).collect(),
         }
     };
-    let panels = lines
-        .iter()
-        .flat_map(|(score, decoder)| MEASUREMENTS.map(|m| panel(score, decoder, m)));
+    let line = |(score, decoder): &(&str, &str)| IntervalLine {
+        title: format!("{}, {}", label(decoder), score_label(score)),
+        panels: MEASUREMENTS.map(|m| panel(score, decoder, m)).into(),
+    };
     IntervalChart {
         title: format!("Twin and real skin, object by object; {} simulated skins", report.skins),
         legend: [
             "twin: mean, and where one more simulated skin lies (90 %)".to_owned(),
             "real skin".to_owned(),
         ],
-        panels: panels.collect(),
         rows: rows.iter().map(|name| object_label(name).to_owned()).collect(),
-        columns: MEASUREMENTS.len(),
+        lines: lines.iter().map(line).collect(),
     }
 }
 
@@ -117,11 +100,10 @@ pub(crate) fn section(report: &PerObjectReport) -> Section {
         figures: vec![PageFigure::new(
             FIGURE,
             "Panels by decoder and number of measurements: for every object a blue band of the simulated skins and a mark for the real skin.",
-            format!(
-                "Scores object by object. Blue: band and mean of the simulated skins. Circle: the real skin, a red square where it lies outside the \
-                 band. “IoU” is the overlap of decoded and true contact, “class” the share of single windows classified correctly. {}.",
-                short_labels()
-            ),
+            "Scores object by object. Blue: band and mean of the simulated skins. Circle: the real skin, a red square where it lies \
+             outside the band. “IoU” is the overlap of decoded and true contact, “single windows classified” the share of them that \
+             are classified correctly."
+                .to_owned(),
         )],
         tables: vec![distances(report), objects(report)],
     }

@@ -109,7 +109,8 @@ impl ElectronicsStudy {
         Amplifier::new(self.op_amp, network)
     }
 
-    /// All sizes from 100 to a million taxels, with every remedy.
+    /// Noise, settling and range of skins of thirteen sizes, from 100 to a million taxels: as built and with every
+    /// remedy.
     ///
     /// # Errors
     /// As [`ElectronicsStudy::of`].

@@ -100,9 +100,10 @@ impl ReadoutSkin {
     }
 }
 
-/// Mean number of measurements from the onset to the first one beyond the alarm threshold (`beyond`), for a repeated
-/// frame and an onset at a uniformly distributed moment: half a measurement until the next one, plus all up to the one
-/// beyond the threshold. `None` if there is none.
+/// Mean number of measurements from the onset of a touch to the first sample beyond the alarm threshold. `beyond` says
+/// of every measurement of a frame whether its sample is beyond the threshold. The frame is measured over and over, and
+/// the onset is at a uniformly distributed moment, so that half a measurement passes on average before the next one
+/// begins. `None` if no sample is beyond the threshold.
 #[must_use]
 pub fn until_noticed(beyond: &[bool]) -> Option<f64> {
     let first = beyond.iter().position(|b| *b)?;

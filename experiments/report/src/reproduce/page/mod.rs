@@ -114,7 +114,7 @@ fn summary(content: &PageContent<'_>) -> String {
         text.push_str(" This was a quick run with few presses and windows, so the scores scatter by a few per cent.");
     }
     if !content.missing.is_empty() {
-        text.push_str(" Skins are compared by what was recorded; what was not stands under Provenance.");
+        text.push_str(" Twin and real skin are compared by what both recorded; Provenance lists what is missing.");
     }
     text
 }
