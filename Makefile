@@ -8,7 +8,7 @@ ifneq ($(RECORDINGS),)
 export SPTS_RECORDINGS ?= $(abspath $(RECORDINGS))
 endif
 
-.PHONY: demo install test validate readers python book browser bench firmware setup clean
+.PHONY: demo install test validate readers wheel python book browser bench firmware setup clean
 
 demo: setup
 	./scripts/demo.sh "$(OUT)" $(if $(RECORDINGS),"$(RECORDINGS)")
@@ -38,18 +38,22 @@ readers: setup
 	cargo build --release --locked --quiet --workspace
 	"$(READERS)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
-# The Python package `spts`: its wheel, in out/wheels, installed into two virtual environments and tested there:
-# out/python has everything that it can work with, out/python-scenes the MuJoCo that its scenes need. Ten minutes the
-# first time, and then after a change; it fetches Python packages of about 500 MB once.
+# The wheel of the Python package `spts`, in out/wheels: two minutes after `make demo`.
+MATURIN ?= out/maturin
+WHEELS ?= out/wheels
+wheel: setup
+	./scripts/environment.sh "$(MATURIN)" python/build-requirements.txt
+	./scripts/wheel.sh "$(MATURIN)/bin/maturin" "$(WHEELS)"
+
+# The Python package installed into two virtual environments and tested there: out/python has everything that it can
+# work with, out/python-scenes the MuJoCo that its scenes need. It fetches Python packages of about 500 MB once.
 PYTHON ?= out/python
 PYTHON_SCENES ?= out/python-scenes
-WHEELS ?= out/wheels
-python: setup
+python: wheel
 	./scripts/environment.sh "$(PYTHON)" python/requirements.txt
 	./scripts/environment.sh "$(PYTHON_SCENES)" python/scenes/requirements.txt
 	"$(PYTHON)/bin/ruff" check --quiet --config python/pyproject.toml python scripts/python_speed.py
 	"$(PYTHON)/bin/ruff" format --quiet --check --config python/pyproject.toml python/spts python/tests scripts/python_speed.py
-	./scripts/wheel.sh "$(PYTHON)/bin/maturin" "$(WHEELS)"
 	"$(PYTHON)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	"$(PYTHON_SCENES)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	"$(PYTHON)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
