@@ -122,11 +122,11 @@ pub(super) struct ScoreCommand {
         allow_hyphen_values = true
     )]
     external_timeout: f64,
-    /// Score decoding up to a wanted confidence, in place of windows of fixed length: every decoder is given the samples
-    /// of a window one by one, until its confidence reaches --confidence or it has the largest of --measurements. The
-    /// table shows how many samples it needed and how often it was right, beside the same for windows of each of
-    /// --measurements. Only decoders that state a confidence are scored: `evidence` (the probability of its class), and
-    /// `nn_lmmse` and `amortised` (the expected IoU of the image)
+    /// Score decoding up to a wanted confidence, in place of windows of fixed length: every decoder is given the
+    /// samples of a window one by one, until its confidence reaches --confidence or it has the largest of
+    /// --measurements. The table shows how many samples it needed and how often it was right, beside the same for
+    /// windows of each of --measurements. Only decoders that state a confidence are scored: `evidence` (the probability
+    /// of its class), and `nn_lmmse` and `amortised` (the expected IoU of the image)
     #[arg(long, conflicts_with_all = ["external", "save", "against", "no_ball", "no_times"])]
     anytime: bool,
     /// Score images that follow a contact in time, in place of separate windows: the decoder is given all windows of a
@@ -156,10 +156,10 @@ pub(super) struct ScoreCommand {
     /// scored. `simulation`: simulated presses of the objects, with places known to half a taxel, rotations known to
     /// 15°, and unknown tilts. `simulation_fitted`: presses on 32 simulated skins, with places that were fitted to the
     /// published recordings. `calibrated`: presses at the same places, simulated with the gains of the scored skin; the
-    /// gains are estimated from unscored raster presses of the other objects. FILE.toml: the same with the gains in this
-    /// file, which `spts calibrate --skin` writes. `shapes`: simulated presses of procedural shapes, with no object and
-    /// no recording; the decoders that learn from nothing else, `mixture` and `amortised`, are then shown too. DIR:
-    /// other recordings, such as those that `spts reproduce --save-recordings` writes
+    /// gains are estimated from unscored raster presses of the other objects. FILE.toml: the same with the gains in
+    /// this file, which `spts calibrate --skin` writes. `shapes`: simulated presses of procedural shapes, with no
+    /// object and no recording; the decoders that learn from nothing else, `mixture` and `amortised`, are then shown
+    /// too. DIR: other recordings, such as those that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
     /// Trained network of the decoder `amortised`, a file that `python -m spts.amortised` writes; needed for a skin of
@@ -168,8 +168,8 @@ pub(super) struct ScoreCommand {
     weights: Option<PathBuf>,
     /// How the measurements of a window are selected; with both, every decoder is scored with each. `random`:
     /// consecutive measurements, with the rows that the cells put out. `chosen`: M measurements of the hold whose rows
-    /// suit what the decoder has learned; neither the object nor a sample influences the choice. Every press gives three
-    /// such windows, each from every third measurement. Chosen rows lose the order in time and have no votes
+    /// suit what the decoder has learned; neither the object nor a sample influences the choice. Every press gives
+    /// three such windows, each from every third measurement. Chosen rows lose the order in time and have no votes
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', default_value = "random", value_parser = sensing())]
     sensing: Vec<Sensing>,
     /// Leave the times of decoding out, so that the output is the same from run to run

@@ -62,8 +62,8 @@ pub(super) struct DesignCommand {
     /// row's samples; [1e-6, 1000]
     #[arg(long, value_name = "SHARE", default_value_t = RowTask::NOISE, value_parser = within(1e-6, 1e3, "[1e-6, 1000]"))]
     noise: f64,
-    /// Largest root mean square of a designed row's samples, as a multiple of a random row's, so that the amplifier does
-    /// not clip; [0.05, 1000] [default: no limit]
+    /// Largest root mean square of a designed row's samples, as a multiple of a random row's, so that the amplifier
+    /// does not clip; [0.05, 1000] [default: no limit]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
     /// Spread of the taxels' gains that the design assumes: standard deviation of their natural logarithm; [0, 3]

@@ -75,8 +75,8 @@ pub(super) struct StudyCommand {
     /// --quick 34]
     #[arg(long, value_name = "COUNT", value_parser = whole::<usize>(1..=10_000))]
     touches: Option<usize>,
-    /// Largest root mean square of a designed row's samples, as a multiple of a random row's, so that the amplifier does
-    /// not clip; [0.05, 1000] [default: no limit]
+    /// Largest root mean square of a designed row's samples, as a multiple of a random row's, so that the amplifier
+    /// does not clip; [0.05, 1000] [default: no limit]
     #[arg(long, value_name = "TIMES", value_parser = within(0.05, 1e3, "[0.05, 1000]"))]
     largest_sum: Option<f64>,
     /// Spread of the taxels' gains that the designs assume: standard deviation of their natural logarithm; [0, 3]

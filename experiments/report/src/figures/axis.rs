@@ -225,7 +225,7 @@ mod tests {
     /// Nearly three decades with two whole ones inside: the ticks still cover all of the axis.
     #[test]
     fn ticks_cover_an_axis_that_begins_above_a_decade() {
-        let axis = Axis::new([1.2e-4, 0.095].into_iter(), true, None);
+        let axis = Axis::new([1.6e-4, 0.07].into_iter(), true, None);
         assert_eq!(
             labels(&axis),
             ["2·10⁻⁴", "5·10⁻⁴", "0.001", "0.002", "0.005", "0.01", "0.02", "0.05"]
