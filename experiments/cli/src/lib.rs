@@ -60,11 +60,12 @@ pub use error::CliError;
 pub use progress::Bars;
 pub use refusal::refusal;
 use std::ffi::OsString;
+use std::io::IsTerminal as _;
 
 /// Digital twin of the single-pixel tactile skin: simulate contacts, record them through the one-wire readout,
 /// reconstruct and score them beside recordings of the real skin.
 #[derive(Debug, Parser)]
-#[command(name = "spts", version, propagate_version = true, max_term_width = 120)]
+#[command(name = "spts", version, propagate_version = true, max_term_width = WIDTH)]
 pub struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -81,6 +82,9 @@ enum Command {
     Device(device::DeviceCommand),
     Record(record::RecordCommand),
 }
+
+/// Most columns of a line of help.
+const WIDTH: usize = 120;
 
 /// Exit status for a command line that cannot be used.
 const REFUSED: u8 = 2;
@@ -115,7 +119,14 @@ impl Cli {
     /// # Errors
     /// [`clap::Error`] for help, the version, and a command line that cannot be used ([`refusal`]).
     pub fn from_arguments(arguments: impl IntoIterator<Item = OsString>) -> Result<Self, clap::Error> {
-        let matches = with_negative_numbers(Self::command()).try_get_matches_from(arguments)?;
+        let command = with_negative_numbers(Self::command());
+        let command = if std::io::stdout().is_terminal() {
+            command
+        } else {
+            // help that is written to a file or a pager is as wide as on a wide terminal
+            command.term_width(WIDTH)
+        };
+        let matches = command.try_get_matches_from(arguments)?;
         Self::from_arg_matches(&matches)
     }
 
