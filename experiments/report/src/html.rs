@@ -85,7 +85,7 @@ impl PageFigure {
         let (kind, shown, source, before) = if self.file.ends_with(".gif") {
             ("picture", stem.clone(), format!("figures/{stem}\""), self.standing())
         } else if self.file.ends_with(".png") {
-            let source = format!("figures/{stem}.png\" srcset=\"figures/{stem}.png 2x\"");
+            let source = format!("figures/{stem}.png\"");
             ("picture", format!("{stem}.png"), source, String::new())
         } else {
             (
