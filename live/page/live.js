@@ -4,7 +4,7 @@ import { colours, crosses, fitted, outline, taxels, trace, underside } from "/dr
 import { MARGIN, watch } from "/pad.js";
 
 const at = (id) => document.getElementById(id);
-/** Images whose brightest cell is below this are shown as dark as they are, V: that is noise. */
+/** Images whose brightest taxel is below this are shown as dark as they are, V: that is noise. */
 const FAINT_V = 0.2;
 /** The pressure that fills the scale at least, kPa. */
 const FAINT_KPA = 2;
