@@ -54,7 +54,7 @@ pub(super) struct BudgetCommand {
     /// and 1 and composes an image of 20 atoms. script_m4: the same with M/4 atoms. matched: M/4 atoms, with weights of
     /// ±1 and without the output of the idle skin
     #[arg(long, value_delimiter = ',', value_name = "DECODE,…", value_parser = parse_decode,
-          default_values = ["matched", "script_s20"])]
+          default_value = "matched,script_s20")]
     decode: Vec<PublishedDecode>,
     /// Objects that are pressed and told apart, or all [default: brain,center,eraser,rec,trig]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]

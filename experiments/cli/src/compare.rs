@@ -17,18 +17,18 @@ use spts_studies::compare::{CompareReport, CompareStudy, Images, Prediction, Pre
 use spts_studies::per_object::{PerObjectReport, PerObjectStudy};
 use std::path::{Path, PathBuf};
 
-/// Compares the twin with recordings of the skin it is the twin of.
+/// Compares the twin with recordings of the real skin.
 ///
-/// First calibrates the readout on the odd presses of every compressive session in RECORDINGS (see `spts validate
-/// --help` for the layout). Then measures the images of the even presses by least squares, sends them through the
-/// twin's readout at the same rows of weights, and applies the same estimators to both recordings. Last, scores both on
-/// the even ones of presses 6-15 and compares the curves, with the published dictionary and library, and with the
-/// skin's raster images as the truth.
+/// The command takes three steps. First it calibrates the readout on the odd presses of every compressive session in
+/// RECORDINGS (see `spts validate --help` for the layout). Then it measures the images of the even presses by least
+/// squares, sends them through the twin's readout with the same rows of weights, and computes the same statistics of
+/// both recordings. Last it scores both recordings on the even ones of presses 6-15 and compares the curves, with the
+/// published dictionary and library, and with the skin's raster images as the truth.
 ///
 /// With --skins N, N simulated skins press every object that the skin recorded compressively, and are scored like the
-/// skin: IoU and single windows classified at M = 7, 20 and 50, for `matched`, `nn_lmmse` and `evidence`. Printed are
-/// each object's real score beside the band in which one more simulated skin lies nine times in ten, and the mean over
-/// the objects of |twin − real|, in which errors of opposite sign do not cancel.
+/// skin: IoU and single windows classified at M = 7, 20 and 50, for `matched`, `nn_lmmse` and `evidence`. The table
+/// shows each object's real score beside the band in which one more simulated skin lies nine times in ten, and the mean
+/// over the objects of |twin − real|, in which errors of opposite sign do not cancel.
 ///
 /// With --images simulated, the twin is given the simulation's images in place of the skin's own: the same objects on a
 /// simulated skin, which may have gains that `spts calibrate --skin` found (--gains).

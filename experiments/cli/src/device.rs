@@ -2,7 +2,7 @@
 
 use super::context::{note, print};
 use super::error::CliError;
-use super::options::{number, seed, whole};
+use super::options::{number, pressed, seed, whole};
 use clap::Args;
 use rustix::fs::{Mode as Access, OFlags, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
@@ -13,7 +13,7 @@ use spts::circuit::CompressiveWeights;
 use spts::data::SessionSet;
 use spts::device::{BlockSource, Played, Pressed, PressedConfig, VirtualDevice};
 use spts::{Chain, ChainConfig, Mode, Session, SkinLayout};
-use spts_contact::objects::{OBJECTS, by_name};
+use spts_contact::objects::ObjectSpec;
 use std::fs::File;
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
@@ -77,7 +77,7 @@ impl DeviceMode {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts device --pty                            T is pressed; the first line printed is the port, such as /dev/pts/5
-  spts device --pty --mode raster --object ring --force 30 --fast
+  spts device --pty --mode raster --object tape --force 30 --fast
   spts device out/T --pty                      a session, as `spts simulate press/T --out out/T` leaves one
   spts record --port /dev/pts/5 --out out/rec  reads it, in another terminal
 
@@ -92,8 +92,8 @@ pub(super) struct DeviceCommand {
     #[arg(long, value_enum, default_value_t = DeviceMode::Binary)]
     mode: DeviceMode,
     /// Object that is pressed: one of the seventeen that `spts simulate --list` shows, or finger
-    #[arg(long, value_name = "NAME", default_value = "T", conflicts_with = "session")]
-    object: String,
+    #[arg(long, value_name = "NAME", default_value = "T", value_parser = pressed, conflicts_with = "session")]
+    object: &'static ObjectSpec,
     /// Force while the object is held, N; [0.1, 1000]
     #[arg(long, value_name = "N", default_value = "20", value_parser = number, allow_hyphen_values = true, conflicts_with = "session")]
     force: f64,
@@ -127,12 +127,8 @@ impl DeviceCommand {
     pub(super) fn run(&self) -> Result<(), CliError> {
         match &self.session {
             None => {
-                let object = by_name(&self.object).ok_or_else(|| {
-                    let known: Vec<&str> = OBJECTS.iter().map(|object| object.name).collect();
-                    CliError::Usage(format!("`--object` = {:?}; valid: {}", self.object, known.join(", ")))
-                })?;
                 let config = PressedConfig {
-                    object,
+                    object: self.object,
                     force_n: self.force,
                     mode: self.mode.readout(),
                     blocks: self.blocks,

@@ -42,7 +42,7 @@ Files in DIR:
 pub(super) struct ExploreCommand {
     /// Sizes of the skins, N: square numbers in [64, 1000000]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = square(8..=1000),
-          default_values = ["100", "1024", "10000", "102400", "230400"])]
+          default_value = "100,1024,10000,102400,230400")]
     taxels: Vec<Side>,
     /// Scenes a size; [1, 1000] [default: 4, with --quick 1]
     #[arg(long, value_name = "N", value_parser = whole::<u64>(1..=1000))]

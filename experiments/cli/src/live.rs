@@ -2,7 +2,7 @@
 
 use super::context::{Common, note, print};
 use super::error::CliError;
-use super::options::seed;
+use super::options::{pressed, seed};
 use clap::Args;
 use spts_live::{LiveConfig, Server};
 
@@ -28,9 +28,9 @@ pub(super) struct LiveCommand {
     /// Port on 127.0.0.1; 0 for any free one
     #[arg(long, value_name = "PORT", default_value_t = PORT)]
     port: u16,
-    /// Object at the beginning: one of the seventeen, or finger
-    #[arg(long, value_name = "NAME", default_value = "T")]
-    object: String,
+    /// Object at the beginning: one of the seventeen that `spts simulate --list` shows, or finger
+    #[arg(long, value_name = "NAME", default_value = "T", value_parser = pressed)]
+    object: &'static ObjectSpec,
     /// Seed of the skin: which specimen it is, and its noise
     #[arg(long, value_name = "SEED", default_value_t = 0, value_parser = seed)]
     seed: u64,
@@ -45,7 +45,7 @@ impl LiveCommand {
         let server = Server::bind(&LiveConfig {
             port: self.port,
             seed: self.seed,
-            object: self.object,
+            object: self.object.name.to_owned(),
         })?;
         let url = format!("http://{}/", server.address());
         if self.common.json {

@@ -2,6 +2,7 @@
 
 use super::error::CliError;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use spts_contact::objects::{FINGER, OBJECTS, ObjectSpec};
 use spts_eval::Sensing;
 use spts_eval::decoders::{DECODERS, DecoderSpec, find};
 use spts_eval::training::TrainedNetwork;
@@ -30,6 +31,15 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
 pub(super) fn seed(text: &str) -> Result<u64, String> {
     let seed = text.parse().ok().filter(|seed| i64::try_from(*seed).is_ok());
     seed.ok_or_else(|| "is outside the whole numbers in [0, 2^63)".to_owned())
+}
+
+/// Parser of an object that is pressed: one of the seventeen, or the finger.
+pub(super) fn pressed(text: &str) -> Result<&'static ObjectSpec, String> {
+    let mut known = OBJECTS.iter().chain([&FINGER]);
+    known.clone().find(|object| object.name == text).ok_or_else(|| {
+        let names: Vec<&str> = known.by_ref().map(|object| object.name).collect();
+        format!("valid: {}", names.join(", "))
+    })
 }
 
 /// Parser of a way in which rows come about.

@@ -9,7 +9,6 @@ use spts_eval::PublishedSkin;
 use spts_eval::SkinScores;
 use spts_eval::decoders::short_label;
 use spts_eval::place::locator_label;
-use spts_eval::protocol::MEASUREMENTS;
 use std::path::PathBuf;
 
 /// Scores recordings of the real skin.
@@ -33,9 +32,9 @@ Only the last two have the dictionary and the library that `spts validate` needs
 pub(super) struct ValidateCommand {
     /// Published recordings, or the published repository: see below
     recordings: PathBuf,
-    /// Numbers of measurements to score
-    #[arg(long, value_delimiter = ',', value_name = "M,…", default_values_t = MEASUREMENTS,
-          value_parser = parse_measurements)]
+    /// Numbers of measurements M to score; each [1, 1000]
+    #[arg(long, value_delimiter = ',', value_name = "M,…", value_parser = parse_measurements,
+          default_value = "2,3,5,7,10,13,15,20,25,30,40,50,75,100")]
     measurements: Vec<usize>,
     #[command(flatten)]
     common: Common,
@@ -119,4 +118,23 @@ fn table(report: &ValidationOutput) -> String {
     }
     out.pop();
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Cli;
+    use clap::CommandFactory as _;
+    use spts_eval::protocol::MEASUREMENTS;
+
+    /// What is scored without the option is what the report scores.
+    #[test]
+    fn the_default_numbers_of_measurements_are_those_of_the_protocol() {
+        let command = Cli::command();
+        let validate = command.find_subcommand("validate").unwrap();
+        let option = validate.get_arguments().find(|a| a.get_id() == "measurements").unwrap();
+        assert_eq!(
+            option.get_default_values()[0].to_str().unwrap(),
+            MEASUREMENTS.map(|m| m.to_string()).join(",")
+        );
+    }
 }
