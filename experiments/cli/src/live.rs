@@ -4,6 +4,7 @@ use super::context::{Common, note, print};
 use super::error::CliError;
 use super::options::{pressed, seed};
 use clap::Args;
+use spts_contact::objects::ObjectSpec;
 use spts_live::{LiveConfig, Server};
 
 /// Port that is easy to keep as a bookmark.
