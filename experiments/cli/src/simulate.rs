@@ -68,9 +68,9 @@ pub(super) struct SimulateCommand {
     /// List the scenes and the objects, and simulate nothing; with --json as JSON
     #[arg(long, conflicts_with = "scene")]
     list: bool,
-    /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The robot arm holds the mesh at the mesh's origin, with
-    /// its -z side towards the skin. Small defects are repaired and large meshes are decimated, with a note. A mesh that
-    /// cannot be repaired is refused with the reason [default: none]
+    /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The robot arm holds the mesh at the mesh's origin,
+    /// with its -z side towards the skin. Small defects are repaired and large meshes are decimated, with a note. A
+    /// mesh that cannot be repaired is refused with the reason [default: none]
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh file, 0.001 for millimetres; (0, 1000] [default: 1]
