@@ -13,11 +13,12 @@ use crate::rows::Rows;
 pub struct Batch<'a> {
     /// Time from one measurement to the next, s.
     pub period_s: f64,
-    /// Rf·Vd, V/S: conductance times this is a taxel's contribution to the output at level 1.
+    /// Rf·Vd, V/S: conductance times this is a taxel's contribution to the output at drive level 1, the weight +1.
     pub volts_per_siemens: f64,
-    /// Σx, sum of the taxels' contributions at level 1, V.
+    /// Σx, sum of the taxels' contributions at drive level 1, V.
     pub sum_v: &'a mut [f64],
-    /// √Σ(wᵢ·xᵢ)², V: with weights ±1 this is ‖x‖₂, in raster mode the scanned taxel's own contribution.
+    /// √Σ(wᵢ·xᵢ)², V, with the weight wᵢ of taxel i and its contribution xᵢ at drive level 1. With weights ±1 this is
+    /// ‖x‖₂; in raster mode it is the scanned taxel's own contribution.
     pub norm_v: &'a mut [f64],
     /// Output so far, V. It starts as Σ wᵢ·xᵢ, and every effect modifies it in turn.
     pub output_v: &'a mut [f64],
@@ -145,7 +146,7 @@ impl Batch<'_> {
         }
     }
 
-    /// Contribution of `taxel` at level 1 at measurement `i`, V.
+    /// Contribution of `taxel` to measurement `i` at drive level 1, V.
     #[must_use]
     #[inline]
     pub fn taxel_v(&self, taxel: usize, i: usize) -> f64 {

@@ -155,7 +155,7 @@ impl Converter {
         (self.volts(not_above).to_bits() == volts.to_bits()).then_some(not_above)
     }
 
-    /// Whether each of `volts`, apart from NaN, is the voltage of a code.
+    /// Whether this converter can have made `volts`: each of them is the voltage of one of its codes, or NaN.
     #[must_use]
     pub fn made(&self, volts: &[f64]) -> bool {
         volts.iter().all(|v| v.is_nan() || self.code(*v).is_some())

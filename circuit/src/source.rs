@@ -255,7 +255,7 @@ impl Interpolated {
         map
     }
 
-    /// The same source, shifted so that its time 0 is `start_s` of this one.
+    /// This source with its time shifted: time 0 of the result is the time `start_s` of this source, s.
     #[must_use]
     pub fn starting_at(&mut self, start_s: f64) -> Started<'_> {
         Started { source: self, start_s }

@@ -65,7 +65,7 @@ impl<'a> WeightRows<'a> {
         self.weights.taxels()
     }
 
-    /// The rows `start..start + len` of these.
+    /// The rows `start..start + len` of this range of rows, counted from its first.
     ///
     /// # Panics
     /// If there are fewer rows.

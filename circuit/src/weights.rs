@@ -22,7 +22,8 @@ const MAX_SEEDS: usize = 1 << 24;
 /// step from the seed.
 ///
 /// The levels come from the cells' generators, seeded by a rule ([`Weights::new`]) or with given seeds
-/// ([`Weights::with_seeds`]), or from a pattern ([`Weights::with_patterns`]). As text (JSON or TOML), in this order:
+/// ([`Weights::with_seeds`]), or from a pattern ([`Weights::with_patterns`]). The examples read
+/// them from text, JSON or TOML: seeds by a rule, given seeds, a pattern, and a raster scan.
 ///
 /// ```
 /// use spts_circuit::{Seeding, WeightMode, Weights};

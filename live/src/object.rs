@@ -4,12 +4,7 @@ use crate::error::LiveError;
 use serde::{Deserialize, Serialize};
 use spts_contact::PreparedMesh;
 use spts_contact::mesh::TriMesh;
-use spts_contact::objects::{FINGER, OBJECTS, ObjectSpec};
-
-/// Objects that can be chosen: all of the table, and the tip of a finger.
-pub(crate) fn choosable() -> impl Iterator<Item = &'static ObjectSpec> {
-    OBJECTS.iter().chain([&FINGER])
-}
+use spts_contact::objects::pressable;
 
 /// Side of a mesh that touches the skin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -63,8 +58,8 @@ impl LiveObject {
     /// # Errors
     /// [`LiveError::Unknown`] when there is none.
     pub fn named(name: &str) -> Result<Self, LiveError> {
-        let Some(spec) = choosable().find(|spec| spec.name == name) else {
-            let known: Vec<&str> = choosable().map(|spec| spec.name).collect();
+        let Some(spec) = pressable().find(|spec| spec.name == name) else {
+            let known: Vec<&str> = pressable().map(|spec| spec.name).collect();
             return Err(LiveError::Unknown {
                 field: "object",
                 name: name.to_owned(),
@@ -190,7 +185,7 @@ mod tests {
 
     #[test]
     fn every_object_can_be_chosen() {
-        for spec in choosable() {
+        for spec in pressable() {
             let object = LiveObject::named(spec.name).unwrap();
             assert!(!object.shape().corners_mm.is_empty(), "{}", spec.name);
         }

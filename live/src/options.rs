@@ -1,10 +1,10 @@
 //! What can be chosen, and its ranges.
 
 use crate::error::LiveError;
-use crate::object::choosable;
 use crate::settings::Settings;
 use serde::Serialize;
 use spts_circuit::{PROFILES, Profile};
+use spts_contact::objects::pressable;
 use spts_eval::decoders::{DECODERS, DecoderSpec, Needs, PublishedDecode};
 use spts_models::SkinLayout;
 use spts_recon::rows::{DESIGNERS, Designer, Levels, RowNeeds};
@@ -107,7 +107,7 @@ impl Options {
             about: String::new(),
             group: "",
         };
-        let objects = choosable().map(|spec| Choice {
+        let objects = pressable().map(|spec| Choice {
             name: spec.name,
             label: spec
                 .description

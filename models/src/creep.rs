@@ -59,17 +59,18 @@ pub enum CreepKind {
 pub struct CreepConfig {
     /// Series of the slow part: `log` (default) or `prony`.
     pub kind: CreepKind,
-    /// c, relative gain a decade of time. Range [0, 1]; default 0.04 (measured on the plateau of recorded presses). Of
-    /// `log` only.
+    /// c, relative gain a decade of time. Range [0, 1]; default 0.04 (measured on the plateau of recorded presses).
+    /// Used by `log` only.
     pub per_decade: f64,
-    /// Shortest time constant, s. Range [1e-6, end_s]; default 0.02. Of `log` only.
+    /// Shortest time constant, s. Range [1e-6, end_s]; default 0.02. Used by `log` only.
     pub start_s: f64,
-    /// Longest time constant, s. Range [start_s, 1e7]; default 200. Of `log` only.
+    /// Longest time constant, s. Range [start_s, 1e7]; default 200. Used by `log` only.
     pub end_s: f64,
     /// gⱼ, relative gains after a long time. At most 32, range [0, 1]; default 0.04 three times, which with the default
-    /// `tau_s` also gives 0.04 a decade, but over 2.5 decades only. Of `prony` only.
+    /// `tau_s` also gives 0.04 a decade, but over 2.5 decades only. Used by `prony`
+    /// only.
     pub shares: Vec<f64>,
-    /// τⱼ, s, as many as `shares`. Range [1e-6, 1e7]; default 0.02, 0.2 and 2. Of `prony` only.
+    /// τⱼ, s, as many as `shares`. Range [1e-6, 1e7]; default 0.02, 0.2 and 2. Used by `prony` only.
     pub tau_s: Vec<f64>,
     /// Pressure at which half of the creep is reached, Pa. Range (0, 1e9]; default 200 (estimate: any touch counts).
     pub load_pa: f64,
@@ -149,14 +150,15 @@ impl Creep {
         }
     }
 
-    /// Computes the decay factor of every branch for a step of `dt_s`.
+    /// Computes the decay factor of every branch for a step of `dt_s` seconds.
     pub fn set_step(&self, dt_s: f64, decays: &mut CreepDecays) {
         self.slow.decays(dt_s, &mut decays.slow);
         decays.fast = self.lag.decays(dt_s);
     }
 
-    /// Advances the `state` of one taxel by a step with the given `decays`, under `pressure_pa` and the elastic
-    /// conductance `elastic_s`. Returns the conductance at the end of the step, S.
+    /// Advances the `state` of one taxel, of [`Creep::branches`] values, by a step with the given `decays`. The taxel
+    /// is under the pressure `pressure_pa`, Pa, and would conduct `elastic_s`, S, without creep. Returns its
+    /// conductance at the end of the step, S.
     pub fn respond(&self, pressure_pa: f64, elastic_s: f64, decays: &CreepDecays, state: &mut [f64]) -> f64 {
         let Some((delayed_s, slow)) = state.split_last_mut() else {
             return elastic_s;

@@ -29,7 +29,8 @@ pub struct TaxelGains {
     pub shape: Option<[usize; 2]>,
     /// Mean of the natural logarithm of a taxel's gain, one value a taxel in row-major order. Range [-5, 5].
     pub log_mean: Vec<f64>,
-    /// Standard deviation of that logarithm: the uncertainty of the gain. Range [0, 2].
+    /// Standard deviation of the natural logarithm of a taxel's gain, one value a taxel: how uncertain the gain is.
+    /// Range [0, 2].
     pub log_sd: Vec<f64>,
     /// Standard deviation by which the logarithm of a taxel's gain changes between sessions, in each of which the skin
     /// is mounted anew. Range [0, 2].
@@ -50,7 +51,7 @@ impl TaxelGains {
     /// Checks all values, and that there is one for each of `taxels` taxels.
     ///
     /// # Errors
-    /// [`ConfigError`] for the first value that is not valid.
+    /// [`ConfigError`] for another number of values than `taxels`, or for the first value outside its range.
     pub fn check(&self, taxels: usize) -> Result<(), ConfigError> {
         for (field, values, least, most, range) in [
             ("log_mean", &self.log_mean, -5.0, 5.0, "[-5, 5]"),
@@ -73,7 +74,8 @@ impl TaxelGains {
     /// Checks all values, and that they belong to `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] for the first value that is not valid.
+    /// [`ConfigError`] for another shape or number of taxels than those of `skin`, or for the first value outside its
+    /// range.
     pub fn check_skin(&self, skin: &SkinLayout) -> Result<(), ConfigError> {
         for (field, found, needed) in [
             ("gains.shape[0]", self.shape.map(|s| s[0]), skin.rows()),
@@ -86,8 +88,8 @@ impl TaxelGains {
         self.check(skin.taxels())
     }
 
-    /// The gain exp(mean + sd·z) of every taxel, in row-major order. `z` has one number a taxel: how many standard
-    /// deviations its logarithm lies above the mean.
+    /// The gain exp(mean + sd·z) of every taxel, in row-major order. `z` has one number a taxel: by how many standard
+    /// deviations the logarithm of the taxel's gain exceeds its mean.
     pub fn at<'a>(&'a self, z: impl Iterator<Item = f64> + 'a) -> impl Iterator<Item = f64> + 'a {
         let known = self.log_mean.iter().zip(&self.log_sd);
         known.zip(z).map(|((mean, sd), z)| (mean + sd * z).exp())

@@ -24,11 +24,12 @@ use crate::grid::{ConductanceMap, PressureMap};
 /// # Ok::<(), spts_models::TransducerError>(())
 /// ```
 pub trait Transducer: Send + Sync {
-    /// Advances the state by `dt_s` seconds under `pressure` and writes the conductance at the end of the step.
+    /// Advances the state by `dt_s` seconds under `pressure`, Pa, and writes the conductance at the end of the step, S,
+    /// to `out`.
     ///
-    /// `pressure` and `out` have the shape of the skin. The pressure acts from the start of the step to its end, so
-    /// dividing a hold into several steps does not change the result. `dt_s` may be zero; `out` is then the
-    /// instantaneous conductance. Negative pressure and NaN count as zero.
+    /// `pressure` and `out` have the shape of the skin. The pressure is constant from the start of the step to its end:
+    /// one long step and several short ones under the same pressure give the same result. `dt_s` may be zero; `out` is
+    /// then the instantaneous conductance. Negative pressure and NaN count as zero.
     fn step(&mut self, pressure: &PressureMap, dt_s: f64, out: &mut ConductanceMap);
 
     /// Leaves the skin unloaded for `dt_s` seconds, as between two presses.

@@ -18,10 +18,10 @@ use serde::de::DeserializeOwned;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TransducerError {
-    /// An unknown key, a value of the wrong type, or one outside its range.
+    /// Parameters that cannot be read: an unknown key, a value of the wrong type, or one that its type refuses.
     #[error("{0}")]
     Parameters(String),
-    /// A value outside its range.
+    /// A value outside its range, or gains that do not belong to the skin.
     #[error(transparent)]
     Value(#[from] ConfigError),
     /// A name that is not in the table.

@@ -11,7 +11,7 @@ use spts_models::{ConfigError, within};
 /// and 6 of 100 000 measurements lie beyond four.
 pub(super) const EXCURSION_SD: f64 = 4.0;
 
-/// How a skin is pressed, as far as the amplifier is concerned; independent of the number of taxels.
+/// How a skin is pressed, as far as the amplifier is concerned. It holds for any number of taxels.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Skin {
@@ -131,11 +131,11 @@ pub struct Budget {
     pub noise_gain: f64,
     /// Frequency at which the response is down by 3 dB, Hz.
     pub bandwidth_hz: f64,
-    /// Quality factor of the response; it rings above ½.
+    /// Quality factor of the response. Above ½ the output rings after a step.
     pub quality: f64,
     /// Time for a step over the whole range to settle within half a step of the converter, s; without slewing.
     pub settle_s: f64,
-    /// Longest time that the slew rate adds, s: from one end of the excursion to the other.
+    /// Longest time that the slew rate adds, s: that of a change of the output by twice `excursion_v`.
     pub slew_s: f64,
     /// Noise by source, V rms.
     pub noise_v: AmplifierNoise,

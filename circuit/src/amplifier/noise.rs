@@ -34,7 +34,8 @@ pub struct AmplifierNoise {
 }
 
 impl AmplifierNoise {
-    /// Noise density at the output at `frequency_hz` ≥ 0, V/√Hz.
+    /// Noise density at the output at `frequency_hz` ≥ 0, V/√Hz, with the conductance `conductance_s` = ΣG of all
+    /// taxels on the bus, S.
     #[must_use]
     pub fn density(amplifier: &Amplifier, conductance_s: f64, frequency_hz: f64) -> Self {
         let response = AmplifierResponse::new(amplifier, conductance_s);
@@ -54,7 +55,8 @@ impl AmplifierNoise {
         )
     }
 
-    /// Rms over all frequencies, V. H is the transfer function from a current, and E = H·(S + 1/Rf + s C) that from the
+    /// Root mean square of the noise at the output over all frequencies, V, with the conductance `conductance_s` = S =
+    /// ΣG of all taxels on the bus. H is the transfer function from a current, and E = H·(S + 1/Rf + s C) that from the
     /// input voltage, to the output:
     ///
     /// ∫|H|² df = ωt²/(4 a₀ a₁), ∫|E|² df = ωt² ((S + 1/Rf)² + C a₀)/(4 a₀ a₁), C = Cb + Cf.

@@ -89,7 +89,7 @@ impl AmplifierResponse {
         -self.decay().sigma()
     }
 
-    /// Frequency at which the response is down by 3 dB, Hz: |a₀ − a₂ω² + i a₁ω|² = 2a₀².
+    /// Frequency f at which the response is down by 3 dB, Hz: it solves |a₀ − a₂ω² + i a₁ω|² = 2a₀² for ω = 2πf.
     #[must_use]
     pub fn bandwidth_hz(&self) -> f64 {
         let [a0, a1, a2] = self.a;

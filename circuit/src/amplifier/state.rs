@@ -5,7 +5,7 @@
 pub struct BusLoad {
     /// S = ΣGk, S. Range [0, 1e9].
     pub conductance_s: f64,
-    /// I = ΣGk·Vk, A; the output settles near −Rf·I. Range ± 1e9 V/Rf.
+    /// I = ΣGk·Vk, A. The output settles near −Rf·I, which must lie within ± 1e9 V.
     pub current_a: f64,
 }
 

@@ -87,8 +87,8 @@ impl Adc {
         self.offset_v - code * self.lsb_v
     }
 
-    /// The same scale as a [`Converter`], for a recording from which `subtract_v` (if given) is subtracted before
-    /// negative values are set to 0.
+    /// The scale of this effect as a [`Converter`], for a recording from which `subtract_v` (if given) is subtracted
+    /// before negative values are set to 0.
     ///
     /// # Errors
     /// [`ConfigError`] for a constant outside [−1e6, 1e6] V.

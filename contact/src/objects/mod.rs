@@ -22,7 +22,12 @@ pub use finger::FINGER;
 pub use spec::{ObjectSpec, Placement};
 pub use table::{BALL_STIFFNESS_PA_PER_M, OBJECTS};
 
-/// The object called `name`; `None` if there is none.
+/// Every object that can be pressed by name: those of [`OBJECTS`], and [`FINGER`].
+pub fn pressable() -> impl Iterator<Item = &'static ObjectSpec> {
+    OBJECTS.iter().chain([&FINGER])
+}
+
+/// The object of [`OBJECTS`] called `name`; `None` if there is none.
 #[must_use]
 pub fn by_name(name: &str) -> Option<&'static ObjectSpec> {
     OBJECTS.iter().find(|o| o.name == name)

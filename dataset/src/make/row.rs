@@ -51,7 +51,7 @@ impl<'a> Row<'a> {
         split(self.spec, self.press.number, self.shapes[0].number)
     }
 
-    /// Name of the first object that is pressed: of the object, of the mesh, or of the procedural shape's family.
+    /// Name of the first object that is pressed; of a procedural shape, the name of its family.
     #[must_use]
     pub fn name(&self) -> Arc<str> {
         Arc::clone(&self.shapes[0].choice.name)

@@ -175,8 +175,8 @@ struct CellOptions {
     /// Clock edges a second, rising and falling; every edge is a measurement; [1, 1000000]
     #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = within(1.0, 1e6, "[1, 1000000] Hz"))]
     edge_hz: f64,
-    /// Time from a clock edge to the sample, µs; [0, 1000000/HZ) for --edge-hz HZ [default: 11 µs up to 64300 Hz, as on
-    /// the real skin; at a faster clock the same share of a period, such as 9.8 µs at 72000 Hz]
+    /// Time from a clock edge to the sample, µs; [0, 1000000/HZ) for --edge-hz HZ [default: 11 µs up to 64300 Hz, as
+    /// on the real skin; at a faster clock the same share of a period, such as 9.8 µs at 72000 Hz]
     #[arg(long, value_name = "US", value_parser = number)]
     sample_us: Option<f64>,
 }

@@ -2,7 +2,7 @@
 
 use super::error::CliError;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use spts_contact::objects::{FINGER, OBJECTS, ObjectSpec};
+use spts_contact::objects::{ObjectSpec, pressable};
 use spts_eval::Sensing;
 use spts_eval::decoders::{DECODERS, DecoderSpec, find};
 use spts_eval::training::TrainedNetwork;
@@ -35,10 +35,9 @@ pub(super) fn seed(text: &str) -> Result<u64, String> {
 
 /// Parser of an object that is pressed: one of the seventeen, or the finger.
 pub(super) fn pressed(text: &str) -> Result<&'static ObjectSpec, String> {
-    let mut known = OBJECTS.iter().chain([&FINGER]);
-    known.clone().find(|object| object.name == text).ok_or_else(|| {
-        let names: Vec<&str> = known.by_ref().map(|object| object.name).collect();
-        format!("valid: {}", names.join(", "))
+    pressable().find(|object| object.name == text).ok_or_else(|| {
+        let names: Vec<&str> = pressable().map(|object| object.name).collect();
+        format!("is none of {}", names.join(", "))
     })
 }
 

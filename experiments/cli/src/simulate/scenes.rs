@@ -1,7 +1,7 @@
 //! `spts simulate --list`: what can be simulated.
 
 use serde::Serialize;
-use spts_contact::objects::{FINGER, OBJECTS};
+use spts_contact::objects::pressable;
 use std::fmt::Write as _;
 
 /// Everything that `SCENE` may be.
@@ -51,7 +51,7 @@ const SCENES: &[NamedScene] = &[
 
 impl SceneList {
     pub(super) fn new() -> Self {
-        let objects = OBJECTS.iter().chain([&FINGER]).map(|object| NamedObject {
+        let objects = pressable().map(|object| NamedObject {
             name: object.name,
             label: object.label,
             about: object.description,

@@ -2,7 +2,8 @@
 
 /// Share of the range left free beyond the data.
 const PADDING: f64 = 0.04;
-/// Ticks of a logarithmic axis below which it takes those of a linear one.
+/// Fewest ticks of a logarithmic axis. With fewer it takes finer parts of a decade, and at last the ticks of a linear
+/// axis.
 const LEAST_TICKS: usize = 3;
 /// Parts of a decade at which a logarithmic axis has ticks, from coarse to fine.
 const LEADS: [&[f64]; 3] = [&[1.0], &[1.0, 2.0, 5.0], &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0]];
@@ -129,7 +130,7 @@ impl Axis {
             .collect()
     }
 
-    /// Whole decades, and as many parts of them as give [`LEAST_TICKS`] ticks, if any do.
+    /// Ticks at the coarsest parts of a decade that give [`LEAST_TICKS`] of them.
     fn log_ticks(&self) -> Vec<(f64, String)> {
         let decades = self.high - self.low;
         let coarsest = match decades {
@@ -137,13 +138,10 @@ impl Axis {
             d if d <= 2.6 => 1,
             _ => 0,
         };
-        let ticks = |leads: &&[f64]| self.log_ticks_at(leads);
-        let mut tried = LEADS[coarsest..].iter().map(ticks);
-        let first = tried.next().unwrap_or_default();
-        if first.len() >= LEAST_TICKS {
-            return first;
-        }
-        tried.find(|ticks| ticks.len() >= LEAST_TICKS).unwrap_or(first)
+        let mut tried = LEADS[coarsest..].iter().map(|leads| self.log_ticks_at(leads));
+        tried
+            .find(|ticks| ticks.len() >= LEAST_TICKS)
+            .unwrap_or_else(|| self.log_ticks_at(LEADS[coarsest]))
     }
 
     /// Ticks at `leads` times powers of ten.

@@ -5,7 +5,7 @@ use crate::mechanics::error::{MAX_LIDDED_TILT_DEG, MechanicsError};
 use crate::mechanics::place::{Place, check as check_place, of_published};
 use spts_contact::PreparedMesh;
 use spts_contact::mesh::{MeshReport, load};
-use spts_contact::objects::{FINGER, OBJECTS, Placement, by_name};
+use spts_contact::objects::{Placement, pressable};
 use spts_models::{ConfigError, SkinLayout, in_range};
 use std::path::Path;
 
@@ -30,9 +30,8 @@ impl PressConfig {
                 if self.scale.is_some() {
                     return Err(MechanicsError::ScaledObject { name: name.clone() });
                 }
-                let finger = (name == FINGER.name).then_some(&FINGER);
-                let Some(object) = by_name(name).or(finger) else {
-                    let known: Vec<_> = OBJECTS.iter().chain([&FINGER]).map(|o| o.name).collect();
+                let Some(object) = pressable().find(|object| object.name == name) else {
+                    let known: Vec<_> = pressable().map(|object| object.name).collect();
                     return Err(MechanicsError::UnknownObject {
                         name: name.clone(),
                         known: known.join(", "),
