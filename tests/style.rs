@@ -1,12 +1,9 @@
-//! What keeps the sources readable: comments of a width that fits a screen, files of one idea each, and examples in the
-//! documentation.
+//! What keeps the sources readable: comments of a width that fits a screen, and examples in the documentation.
 
 use std::path::{Path, PathBuf};
 
 /// Largest width of a comment, columns; that of code is rustfmt's.
 const WIDTH: usize = 120;
-/// Most lines of a file of Rust or Python: one that needs more holds more than one idea.
-const LINES: usize = 400;
 /// Every library crate that users build on, and the least number of examples in its documentation.
 const EXAMPLES: [(&str, usize); 10] = [
     ("circuit", 25),
@@ -69,19 +66,6 @@ fn comments_fit_into_their_width() {
         }
     }
     assert!(wide.is_empty(), "comments of more than {WIDTH} columns: {wide:#?}");
-}
-
-#[test]
-fn files_hold_one_idea() {
-    let files = sources(&root(), &[".rs", ".py"]);
-    assert!(files.len() > 500, "{} sources", files.len());
-    let long: Vec<String> = files
-        .iter()
-        .map(|file| (file, std::fs::read_to_string(file).unwrap().lines().count()))
-        .filter(|(_, lines)| *lines > LINES)
-        .map(|(file, lines)| format!("{}: {lines}", file.display()))
-        .collect();
-    assert!(long.is_empty(), "files of more than {LINES} lines: {long:#?}");
 }
 
 #[test]

@@ -65,6 +65,7 @@ pub use wire::Wire;
 
 pub use spts_circuit::{Block, Mode, Profile, Recording, RecordingInfo, Seeding, WeightMode, Weights};
 pub use spts_contact::{Frame, Pose, Wrench};
+pub use spts_input::Refusal;
 pub use spts_models::{ConductanceMap, PressureMap, SkinLayout};
 
 pub use spts_circuit as circuit;

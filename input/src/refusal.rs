@@ -1,0 +1,81 @@
+//! The one error of what comes in from outside.
+
+use std::error::Error;
+use std::fmt::{self, Display};
+use std::sync::Arc;
+
+/// Why something was refused, as one sentence that names the field, its value and what is valid.
+///
+/// It is the error of everything whose cause nobody tells apart; an enum of its own has only what somebody matches.
+///
+/// ```
+/// use spts_input::Refusal;
+///
+/// let error = Refusal::range("force_n", 700.0, "[0.5, 100]").at("press");
+/// assert_eq!(error.to_string(), "press: `force_n` = 700 is outside [0.5, 100]");
+/// ```
+#[derive(Debug, Clone)]
+pub struct Refusal {
+    message: String,
+    source: Option<Arc<dyn Error + Send + Sync>>,
+}
+
+impl Refusal {
+    /// A refusal that says `message`.
+    #[must_use]
+    pub fn new(message: impl Into<String>) -> Self {
+        Self {
+            message: message.into(),
+            source: None,
+        }
+    }
+
+    /// The value of a field that is outside its valid range, such as "[0.5, 100]".
+    #[must_use]
+    pub fn range(field: &str, value: impl Display, range: impl Display) -> Self {
+        Self::new(format!("`{field}` = {value} is outside {range}"))
+    }
+
+    /// What `source` says, with `source` kept.
+    #[must_use]
+    pub fn from_error(source: impl Error + Send + Sync + 'static) -> Self {
+        Self {
+            message: source.to_string(),
+            source: Some(Arc::new(source)),
+        }
+    }
+
+    /// The same refusal with the place of the mistake before it: a file, or the section of one.
+    #[must_use]
+    pub fn at(self, place: impl Display) -> Self {
+        Self {
+            message: format!("{place}: {}", self.message),
+            ..self
+        }
+    }
+}
+
+impl Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl Error for Refusal {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        self.source.as_deref().map(|source| source as &(dyn Error + 'static))
+    }
+}
+
+/// Two refusals are equal if they say the same.
+impl PartialEq for Refusal {
+    fn eq(&self, other: &Self) -> bool {
+        self.message == other.message
+    }
+}
+
+impl From<super::InputError> for Refusal {
+    fn from(error: super::InputError) -> Self {
+        Self::from_error(error)
+    }
+}
