@@ -327,11 +327,6 @@ fn texts_that_grow() {
     let seeded = format!("{press}[rows]\nseeds_file = \"seeds.txt\"\n");
     write(here, "seeded.toml", &seeded);
     refused(here, &["simulate", "seeded.toml"], &["seeds.txt", "not a regular file"]);
-    refused(
-        here,
-        &["seeds", "--seeds", "seeds.txt"],
-        &["seeds.txt", "not a regular file"],
-    );
     std::fs::remove_file(here.join("seeds.txt")).unwrap();
     write(here, "seeds.txt", "x".repeat(1 << 23));
     refused(here, &["simulate", "seeded.toml"], &["seeds.txt", "seed = `xxx"]);

@@ -1,6 +1,6 @@
 //! The cell's firmware through its command.
 
-use crate::command::{files, spts, succeeds, words};
+use crate::command::{spts, succeeds, words};
 use serde_json::Value;
 use spts_circuit::{Seeding, WeightMode, Weights};
 use std::path::Path;
@@ -44,35 +44,6 @@ fn verify_finds_lost_edges_and_says_no() {
     let share = found["mismatches"].as_f64().unwrap() / (100.0 * 2000.0);
     assert!((0.4..0.6).contains(&share), "{share}");
     assert!(String::from_utf8_lossy(&output.stderr).starts_with("error: image shipped"));
-}
-
-/// 72 kHz with 30 % to spare in every mode, with a latency that does not depend on it; and the image that computes
-/// first, beside its timer: late updates at a rate comparable to the skin's, 0.18 % of the flips, at most 0.5 %. Their
-/// period must be that of the timer, 816 µs, whose line is known to a step of 0.01 in stretches 100,000 measurements
-/// long; that it is the skin's, too, is no test: the rate of 64.3 kHz was read off it.
-#[test]
-fn timing_has_margin_and_explains_late_updates() {
-    let dir = tempfile::tempdir().unwrap();
-    let found = json(dir.path(), &["timing", "--out", "timing"]);
-    let modes = found["modes"].as_array().unwrap();
-    assert_eq!(modes.len(), 4);
-    for mode in modes {
-        // a pattern is put out as fast as anything else
-        assert!(mode["latency_cycles"].as_u64().unwrap() <= 12 && mode["max_edge_hz"].as_f64().unwrap() >= 290e3);
-        assert!(mode["max_edge_hz"].as_f64().unwrap() >= 1.3 * 72e3, "{mode}");
-        assert_eq!(mode["latency_cycles"], modes[0]["latency_cycles"]);
-        assert_eq!(mode["latency_cycles"], mode["latency_cycles_min"]);
-    }
-    assert_eq!(found["late"]["late"], 0);
-    let plain = &found["compared_with"][0];
-    let share = plain["late"]["late_share"].as_f64().unwrap();
-    assert!((0.0009..0.005).contains(&share), "{share}");
-    let period = plain["late"]["period_measurements"].as_f64().unwrap();
-    assert!((period - 816e-6 * 64.3e3).abs() < 0.02, "{period}");
-    let files = files(&dir.path().join("timing"));
-    assert!(files.contains_key("figures/firmware.png") && files.contains_key("timing.json"));
-    let table = String::from_utf8(files["timing.csv"].clone()).unwrap();
-    assert_eq!(table.lines().count(), 1 + 2 * 4, "{table}");
 }
 
 #[test]

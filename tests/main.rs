@@ -78,7 +78,6 @@ mod rows;
 #[cfg(test)]
 mod score;
 #[cfg(test)]
-mod seeds;
 #[cfg(test)]
 mod setup;
 #[cfg(test)]

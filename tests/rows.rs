@@ -1,6 +1,6 @@
-//! Designed rows: chosen from those that a press was recorded with, on the real skin, and studied in the twin.
+//! Designed rows: chosen from those that a press was recorded with, on the real skin.
 
-use crate::command::{files, refused, succeeds, words};
+use crate::command::words;
 use crate::score::score;
 use serde_json::Value;
 
@@ -77,75 +77,4 @@ fn chosen_boards_are_reproducible_and_compared() {
     let second = on("2", &["--against", "older.json", "--tolerance", "0"]).unwrap();
     assert_eq!(first["rows"], second["rows"]);
     assert_eq!(second["regressions"], Value::Array(vec![]));
-}
-
-/// The study is the same for any number of threads, says what it compares, and finds on skins that it was not made on
-/// what the rows are for: 20 designed rows are worth 40 random ones on shapes and places that were never seen, cosine
-/// signs are better by .08 at least without a prior, and nothing is clipped.
-#[test]
-fn designed_rows_are_worth_twice_as_many_random_ones() {
-    let dir = tempfile::tempdir().unwrap();
-    let small = "--quick --designers cosine_signs,greedy --readout as_built --measurements 20,40 --json";
-    let run = |threads: &str| {
-        let own = ["sensing", "study", "--threads", threads, "--out", threads];
-        let output = succeeds(dir.path(), &[&own[..], &words(small)].concat());
-        serde_json::from_slice::<Value>(&output.stdout).unwrap()
-    };
-    let (one, three) = (run("1"), run("3"));
-    assert_eq!(one, three);
-    let written = files(&dir.path().join("1"));
-    assert!(
-        written == files(&dir.path().join("3")),
-        "the files depend on the number of threads"
-    );
-    for name in [
-        "study.csv",
-        "classes.csv",
-        "costs.csv",
-        "objects.csv",
-        "figures/sensing.png",
-    ] {
-        assert!(written.contains_key(name), "{name}");
-    }
-    let rows = one["rows"].as_array().unwrap();
-    assert_eq!(rows.len(), 2 * 2 * 3);
-    for touches in ["shapes", "objects"] {
-        let iou = |designer: &str, m: u64| {
-            let of = |r: &&Value| r["touches"] == touches && r["designer"] == designer && r["m"] == m;
-            rows.iter().find(of).unwrap()["iou"]["mean"].as_f64().unwrap()
-        };
-        let random = iou("random", 40);
-        assert!(
-            iou("greedy", 20) >= random,
-            "{touches}: {} against {random}",
-            iou("greedy", 20)
-        );
-        let gain = iou("cosine_signs", 20) - iou("random", 20);
-        assert!(gain >= 0.08, "{touches}: {gain}");
-    }
-    assert!(rows.iter().all(|r| r["clipped"] == 0.0));
-    let costs = one["costs"].as_array().unwrap();
-    assert!(
-        costs.iter().any(|c| c["order"] == "fewest flips") && costs.iter().all(|c| c["errors"][0]["share"].is_f64())
-    );
-}
-
-#[test]
-fn studies_of_rows_that_cannot_be_made_are_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    for (options, facts) in [
-        ("--designers classes", &["designers", "greedy"][..]),
-        ("--measurements 0", &["measurements", "0"]),
-        ("--skins 1", &["skins", "[2, 1000]"]),
-        ("--skin 100x100 --quick", &["10000", "2048"]),
-        ("--largest-sum NaN", &["largest-sum", "[0.05, 1000]"]),
-        ("--decoder all", &["decoder", "one"]),
-        ("--readout nothing", &["readout", "as_built"]),
-    ] {
-        refused(
-            dir.path(),
-            &[&["sensing", "study"], &words(options)[..]].concat(),
-            facts,
-        );
-    }
 }

@@ -97,7 +97,7 @@ impl CircuitCommand {
             let ways = study.of(taxels)?;
             let (as_built, remedies) = ways
                 .split_first()
-                .ok_or_else(|| CliError::Usage("no way to read a skin".to_owned()))?;
+                .ok_or_else(|| CliError::usage("no way to read a skin".to_owned()))?;
             let one = OneSize {
                 available_s,
                 one_wire_taxels,

@@ -133,7 +133,7 @@ impl CompareCommand {
         let simulated = self.images == "simulated";
         if self.gains.is_some() && !simulated {
             let message = "`--gains` is of a simulated skin; it needs `--images simulated`";
-            return Err(CliError::Usage(message.to_owned()));
+            return Err(CliError::usage(message.to_owned()));
         }
         let study = CompareStudy {
             images: if simulated {
@@ -184,7 +184,7 @@ impl CompareCommand {
             Predictor::Others
         } else {
             let path = Path::new(name);
-            let failed = |reason: String| CliError::Usage(format!("{name}: {reason}"));
+            let failed = |reason: String| CliError::usage(format!("{name}: {reason}"));
             let text = spts_input::read_text(path, MAX_TOML_BYTES).map_err(|e| failed(e.to_string()))?;
             let profile = Profile::from_toml(&text).map_err(|e| failed(e.to_string()))?;
             Predictor::Profile(Box::new(profile))

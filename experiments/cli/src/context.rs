@@ -26,19 +26,19 @@ impl Common {
     /// Sets up the thread pool.
     ///
     /// # Errors
-    /// [`CliError::Usage`] when the threads cannot be started.
+    /// [`CliError`] when the threads cannot be started.
     pub fn start(&self) -> Result<(), CliError> {
         let threads = self.threads.map_or(0, usize::from);
         rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build_global()
-            .map_err(|e| CliError::Usage(format!("`--threads` = {threads}: {e}")))
+            .map_err(|e| CliError::usage(format!("`--threads` = {threads}: {e}")))
     }
 
     /// Prints `value` as JSON if `--json` was given, else `text`.
     ///
     /// # Errors
-    /// [`CliError::Usage`] when standard output cannot be written to, or `value` has no JSON.
+    /// [`CliError`] when standard output cannot be written to, or `value` has no JSON.
     pub(super) fn print(&self, value: &impl Serialize, text: impl FnOnce() -> String) -> Result<(), CliError> {
         if self.json { print_json(value) } else { print(&text()) }
     }
@@ -112,12 +112,12 @@ pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
 /// Writes `text` and a line end to standard output. A reader that went away is not an error.
 ///
 /// # Errors
-/// [`CliError::Usage`] when standard output cannot be written to, as on a full disk.
+/// [`CliError`] when standard output cannot be written to, as on a full disk.
 pub(super) fn print(text: &str) -> Result<(), CliError> {
     let mut out = std::io::stdout().lock();
     match writeln!(out, "{}", plain(text)).and_then(|()| out.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(CliError::Usage(format!("standard output: {error}")))
+            Err(CliError::usage(format!("standard output: {error}")))
         }
         _ => Ok(()),
     }
@@ -126,9 +126,9 @@ pub(super) fn print(text: &str) -> Result<(), CliError> {
 /// Writes `value` as indented JSON to standard output.
 ///
 /// # Errors
-/// [`CliError::Usage`] when it has no JSON, as a map with keys that are no strings, and as [`print`].
+/// [`CliError`] when it has no JSON, as a map with keys that are no strings, and as [`print`].
 pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
-    let json = serde_json::to_string_pretty(value).map_err(|e| CliError::Usage(e.to_string()))?;
+    let json = serde_json::to_string_pretty(value).map_err(|e| CliError::usage(e.to_string()))?;
     print(&json)
 }
 

@@ -169,7 +169,7 @@ impl DecodeCommand {
         };
         if let Some(name) = self.only.iter().find(|name| set.named(name).is_none()) {
             let valid: Vec<&str> = names().collect();
-            return Err(CliError::Usage(format!(
+            return Err(CliError::usage(format!(
                 "{}: `--session` = {name:?}; valid: {}",
                 self.session.display(),
                 valid.join(", ")
@@ -182,7 +182,7 @@ impl DecodeCommand {
             sessions.filter(|s| self.only.contains(&s.name)).collect()
         };
         if chosen.is_empty() {
-            return Err(CliError::Usage(format!(
+            return Err(CliError::usage(format!(
                 "{}: no session has a compressive recording to decode",
                 self.session.display()
             )));
@@ -219,7 +219,7 @@ impl<'a> Training<'a> {
     }
 
     fn of(&self, layout: &SkinLayout) -> Result<(TrainingData, Option<&Labels>), CliError> {
-        let failed = |error: spts_eval::training::LearnError| CliError::Usage(error.to_string());
+        let failed = |error: spts_eval::training::LearnError| CliError::usage(error.to_string());
         if let Some(skin) = self.skin {
             let gains = skin_gains(skin, layout)?;
             let simulated = simulated_presses(*layout, true, self.seed)?;

@@ -159,7 +159,7 @@ impl NewDesign {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let (Some(area_m), Some(pitch_m), Some(latency_s)) = (self.area, self.resolution, self.latency) else {
-            return Err(CliError::Usage(
+            return Err(CliError::usage(
                 "--area, --resolution and --latency are needed".to_owned(),
             ));
         };

@@ -61,7 +61,7 @@ impl DeviceMode {
             ..ChainConfig::default()
         };
         let chain = Chain::new(&config, &SkinLayout::default(), seed, Path::new(""));
-        chain.map_err(|e| CliError::Study(Box::new(e)))
+        chain.map_err(CliError::from)
     }
 }
 
@@ -151,7 +151,7 @@ impl DeviceCommand {
 
     /// The recording of this mode of the only session of `set`.
     fn recording<'a>(&self, path: &Path, set: &'a SessionSet) -> Result<&'a spts::Recording, CliError> {
-        let refuse = |reason: String| CliError::Usage(format!("{}: {reason}", path.display()));
+        let refuse = |reason: String| CliError::usage(format!("{}: {reason}", path.display()));
         let [session] = set.sessions.as_slice() else {
             let names: Vec<&str> = set.sessions.iter().map(|s| s.name.as_str()).collect();
             return Err(refuse(format!(
@@ -167,7 +167,7 @@ impl DeviceCommand {
     }
 
     fn serve(&self, source: &mut dyn BlockSource, taxels: usize, blocks: Option<u64>) -> Result<(), CliError> {
-        let terminal = Terminal::open().map_err(|e| CliError::Usage(format!("`--pty`: {e}")))?;
+        let terminal = Terminal::open().map_err(|e| CliError::usage(format!("`--pty`: {e}")))?;
         let opened = Opened {
             port: &terminal.name,
             mode: self.mode.name(),
@@ -175,7 +175,7 @@ impl DeviceCommand {
             blocks,
         };
         if self.json {
-            let line = serde_json::to_string(&opened).map_err(|e| CliError::Usage(e.to_string()))?;
+            let line = serde_json::to_string(&opened).map_err(|e| CliError::usage(e.to_string()))?;
             print(&line)?;
         } else {
             print(&terminal.name)?;

@@ -1,20 +1,17 @@
 //! `spts firmware`: the cell's firmware on emulated controllers.
 
-use super::context::{Common, open_folder, print};
+use super::context::{Common, print};
 use super::error::CliError;
 use super::options::{number, whole, within};
 use super::progress::Bars;
 use clap::builder::TypedValueParser;
 use clap::{Args, Subcommand, ValueEnum};
-use serde::Serialize;
-use spts::output::{OutputError, check_writable};
+use spts::output::{NpyFile, OutputError, check_writable};
+use spts::progress::Progress as _;
 use spts_circuit::{Seeding, WeightMode};
 use spts_firmware::attiny412::TraceRecord;
-use spts_firmware::{Clock, PATTERN_BITS, SKIN_EDGE_HZ};
-use spts_report::firmware::{write_timing, write_weights};
-use spts_studies::firmware::{
-    CellTask, DESIGN_EDGE_HZ, EmulatedCells, ImageTiming, image, time_images, timing_text, verification_text,
-};
+use spts_firmware::{Clock, PATTERN_BITS};
+use spts_studies::firmware::{CellTask, DESIGN_EDGE_HZ, EmulatedCells, image, verification_text};
 use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
@@ -31,7 +28,6 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts firmware verify --cells 20
-  spts firmware timing
   spts firmware weights --mode analog --out weights.npy
   spts firmware trace --taxel 3")]
 pub(super) struct FirmwareCommand {
@@ -42,7 +38,6 @@ pub(super) struct FirmwareCommand {
 #[derive(Debug, Subcommand)]
 enum FirmwareAction {
     Verify(VerifyCommand),
-    Timing(TimingCommand),
     Weights(WeightsCommand),
     Trace(TraceCommand),
 }
@@ -74,29 +69,6 @@ struct VerifyCommand {
     periods: Vec<usize>,
     #[command(flatten)]
     cells: CellOptions,
-    #[command(flatten)]
-    common: Common,
-}
-
-/// Measures how fast a firmware image is: the time from clock edge to DAC, the largest clock rate at which no edge is
-/// lost, and how many DAC updates come after the sample. The images that ship are shown beside it.
-#[derive(Debug, Args)]
-#[command(after_help = "Examples:
-  spts firmware timing
-  spts firmware timing --image my_cell.hex --json
-
-Files in DIR:
-  timing.csv                 one line an image and mode
-  timing.json                the same, and the late updates
-  figures/firmware.png       share of lost edges over the clock's rate, share of late DAC updates over the sample's
-                             delay; firmware.svg the same")]
-struct TimingCommand {
-    /// Firmware image to time: shipped, plain, or a file in Intel's hex format; those that ship are shown beside it
-    #[arg(long, value_name = "IMAGE", default_value = "shipped")]
-    image: String,
-    /// Folder of the results
-    #[arg(long, value_name = "DIR", default_value = "out/firmware")]
-    out: PathBuf,
     #[command(flatten)]
     common: Common,
 }
@@ -232,7 +204,7 @@ impl CellOptions {
         if let Some(sample_us) = self.sample_us {
             clock.sample_delay_s = sample_us * 1e-6;
         }
-        clock.check().map_err(|e| CliError::Usage(e.to_string()))?;
+        clock.check().map_err(|e| CliError::usage(e.to_string()))?;
         Ok(clock)
     }
 }
@@ -242,7 +214,6 @@ impl FirmwareCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
         match self.command {
             FirmwareAction::Verify(command) => command.run(),
-            FirmwareAction::Timing(command) => command.run(),
             FirmwareAction::Weights(command) => command.run(),
             FirmwareAction::Trace(command) => command.run(),
         }
@@ -278,49 +249,26 @@ impl VerifyCommand {
     }
 }
 
-/// Timing as JSON: the image that was asked for, and the others.
-#[derive(Debug, Serialize)]
-struct TimingReport<'a> {
-    #[serde(flatten)]
-    image: &'a ImageTiming,
-    compared_with: &'a [ImageTiming],
-}
-
-impl TimingCommand {
-    fn run(self) -> Result<(), CliError> {
-        self.common.start()?;
-        let mut names = vec![self.image.as_str()];
-        names.extend(["shipped", "plain"].into_iter().filter(|name| *name != self.image));
-        let emulated = |name: &str| {
-            let cells = CellOptions {
-                cells: 100,
-                image: name.to_owned(),
-                seeding: SeedingName::Address,
-                edge_hz: SKIN_EDGE_HZ,
-                sample_us: None,
-            };
-            cells.emulated(0, CellTask::KINDS.to_vec())
-        };
-        let images: Vec<EmulatedCells> = names.into_iter().map(emulated).collect::<Result<_, _>>()?;
-        let out = open_folder(&self.out, spts_report::firmware::FILES)?;
-        let timings = time_images(&images, &Bars::default())?;
-        write_timing(&timings, out)?;
-        let Some((image, compared_with)) = timings.split_first() else {
-            return Ok(());
-        };
-        let picture = self.out.join("figures/firmware.png");
-        let text = || format!("{}\npicture: {}", timing_text(&timings), picture.display());
-        self.common.print(&TimingReport { image, compared_with }, text)
-    }
-}
-
 impl WeightsCommand {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let task = self.mode.task(self.period);
         check_array(&self.out)?;
         let cells = self.cells.emulated(self.edges, vec![task])?;
-        write_weights(cells.emulated_weights(task)?, &self.out, &Bars::default())?;
+        let mut weights = cells.emulated_weights(task)?;
+        let bars = Bars::default();
+        bars.stage("clocking the cells", Some(weights.blocks()));
+        let mut file = NpyFile::create(&self.out, &weights.shape())?;
+        let failed = |error| OutputError::Write {
+            path: self.out.clone(),
+            source: std::io::Error::other(error),
+        };
+        while let Some(levels) = weights.next_block().map_err(failed)? {
+            file.push(levels.iter().copied())?;
+            bars.step();
+        }
+        file.finish()?;
+        bars.end();
         let written = serde_json::json!({
             "file": self.out, "shape": [cells.edges, cells.cells], "mode": task.mode(), "period": task.period(),
             "image": cells.image_name,

@@ -2,8 +2,8 @@
 
 use crate::error::CliError;
 use crate::{
-    budget, calibrate, circuit, compare, design, explore, fidelity, firmware, live, phase, readouts, reproduce, seeds,
-    sensing, simulate, validate,
+    budget, calibrate, circuit, compare, design, explore, fidelity, firmware, live, readouts, reproduce, sensing,
+    simulate, validate,
 };
 use clap::Subcommand;
 
@@ -21,9 +21,7 @@ pub(super) enum FullCommand {
     Explore(explore::ExploreCommand),
     Firmware(firmware::FirmwareCommand),
     Live(live::LiveCommand),
-    Phase(phase::PhaseCommand),
     Readouts(readouts::ReadoutsCommand),
-    Seeds(seeds::SeedsCommand),
     Sensing(Box<sensing::SensingCommand>),
 }
 
@@ -43,9 +41,7 @@ impl FullCommand {
             Self::Explore(command) => command.run(),
             Self::Firmware(command) => command.run(),
             Self::Live(command) => command.run(),
-            Self::Phase(command) => command.run(),
             Self::Readouts(command) => command.run(),
-            Self::Seeds(command) => command.run(),
             Self::Sensing(command) => command.run(),
         }
     }

@@ -33,8 +33,6 @@ mod live;
     expect(dead_code, reason = "some belong to commands that are left out")
 )]
 mod options;
-#[cfg(feature = "full")]
-mod phase;
 mod progress;
 #[cfg(feature = "full")]
 mod readouts;
@@ -43,8 +41,6 @@ mod refusal;
 #[cfg(feature = "full")]
 mod reproduce;
 mod score;
-#[cfg(feature = "full")]
-mod seeds;
 #[cfg(feature = "full")]
 mod sensing;
 #[cfg(feature = "full")]
@@ -135,7 +131,7 @@ impl Cli {
     /// # Errors
     /// [`CliError`] with a message that names file, field and value.
     pub fn run(self) -> Result<(), CliError> {
-        spts::cleanup::end_on_signals().map_err(|e| CliError::Usage(format!("signal handlers: {e}")))?;
+        spts::cleanup::end_on_signals().map_err(|e| CliError::usage(format!("signal handlers: {e}")))?;
         match self.command {
             #[cfg(feature = "full")]
             Command::Full(command) => command.run(),

@@ -100,7 +100,7 @@ pub(super) fn within(
 /// The decoders with these names; `all` stands for every one.
 ///
 /// # Errors
-/// [`CliError::Usage`] for a name that no decoder has.
+/// [`CliError`] for a name that no decoder has.
 pub(super) fn decoders_named(names: &[String]) -> Result<Vec<&'static DecoderSpec>, CliError> {
     if names.iter().any(|n| n == "all") {
         return Ok(DECODERS.iter().collect());
@@ -108,7 +108,7 @@ pub(super) fn decoders_named(names: &[String]) -> Result<Vec<&'static DecoderSpe
     let one = |name: &String| {
         find(name).ok_or_else(|| {
             let valid: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
-            CliError::Usage(format!("`--decoder` = {name:?}; valid: all, {}", valid.join(", ")))
+            CliError::usage(format!("`--decoder` = {name:?}; valid: all, {}", valid.join(", ")))
         })
     };
     let mut found: Vec<&DecoderSpec> = Vec::new();
@@ -124,7 +124,7 @@ pub(super) fn decoders_named(names: &[String]) -> Result<Vec<&'static DecoderSpe
 /// The trained network in the file at `path`.
 ///
 /// # Errors
-/// [`CliError::Usage`] when it holds none.
+/// [`CliError`] when it holds none.
 pub(super) fn network(path: &Path) -> Result<TrainedNetwork, CliError> {
-    TrainedNetwork::open(path).map_err(|e| CliError::Usage(format!("`--weights`: {e}")))
+    TrainedNetwork::open(path).map_err(|e| CliError::usage(format!("`--weights`: {e}")))
 }

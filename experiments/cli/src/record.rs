@@ -82,21 +82,19 @@ struct Report {
 impl RecordCommand {
     pub(super) fn run(&self) -> Result<(), CliError> {
         let &[first, end] = self.hold.as_slice() else {
-            return Err(CliError::Usage(format!("`--hold` = {:?}; valid: FIRST,END", self.hold)));
+            return Err(CliError::usage(format!("`--hold` = {:?}; valid: FIRST,END", self.hold)));
         };
         if first >= end {
-            return Err(CliError::Usage(format!(
+            return Err(CliError::usage(format!(
                 "`--hold` = {first},{end}: the end is not behind the first frame"
             )));
         }
         let chain = self.mode.chain(&self.readout, 0)?;
-        let readout = chain
-            .readout(self.mode.readout(), 0)
-            .map_err(|e| CliError::Study(Box::new(e)))?;
+        let readout = chain.readout(self.mode.readout(), 0)?;
         let info = readout.info().clone();
         let converter = info
             .converter
-            .ok_or_else(|| CliError::Usage(format!("`--readout` = {:?} has no converter", self.readout)))?;
+            .ok_or_else(|| CliError::usage(format!("`--readout` = {:?} has no converter", self.readout)))?;
         let frame = info.measurements_per_frame;
         let frame_s = frame as f64 / info.sample_rate_hz;
         let session = self.session([f64::from(first) * frame_s, f64::from(end) * frame_s])?;
@@ -107,7 +105,7 @@ impl RecordCommand {
             let found = host.block(FRAMES * frame)?;
             if let Some(code) = found.codes.iter().find(|code| **code > converter.max_code()) {
                 let most = converter.max_code();
-                return Err(CliError::Usage(format!(
+                return Err(CliError::usage(format!(
                     "block {}: code {code} is outside [0, {most}]",
                     blocks.len()
                 )));
@@ -128,7 +126,7 @@ impl RecordCommand {
             .map(|block| self.signal_v(&block.volts, frame, first as usize))
             .collect();
         let count = blocks.len();
-        let recording = Recording::new(info, blocks).map_err(|e| CliError::Usage(format!("what was read: {e}")))?;
+        let recording = Recording::new(info, blocks).map_err(|e| CliError::usage(format!("what was read: {e}")))?;
         let recorded = Recorded {
             conditioning: usize::try_from(self.conditioning).unwrap_or_default().min(count),
             ..Recorded::new(recording)
@@ -143,7 +141,7 @@ impl RecordCommand {
                 ..session
             },
         };
-        session.write(&self.out).map_err(|e| CliError::Study(Box::new(e)))?;
+        session.write(&self.out)?;
         let report = Report {
             session: self.out.clone(),
             mode: self.mode.readout(),
@@ -155,7 +153,7 @@ impl RecordCommand {
     }
 
     fn open(&self) -> Result<SerialPort, CliError> {
-        let failed = |e: io::Error| CliError::Usage(format!("`--port` = {}: {e}", self.port.display()));
+        let failed = |e: io::Error| CliError::usage(format!("`--port` = {}: {e}", self.port.display()));
         let mut port = SerialPort::open(&self.port, self.baud).map_err(failed)?;
         port.set_read_timeout(Duration::from_secs_f64(self.timeout))
             .map_err(failed)?;
@@ -171,9 +169,9 @@ impl RecordCommand {
         if !self.out.join(SESSION_FILE).exists() {
             return Ok(new);
         }
-        let there = Session::read(&self.out).map_err(|e| CliError::Study(Box::new(e)))?;
+        let there = Session::read(&self.out)?;
         if there.object != self.object {
-            return Err(CliError::Usage(format!(
+            return Err(CliError::usage(format!(
                 "`--object` = {:?}: {} holds a session of {:?}",
                 self.object,
                 self.out.display(),

@@ -224,11 +224,11 @@ impl ScoreCommand {
         }
         if self.quick && self.twin.is_none() {
             let reason = "recordings have the presses they have; leave it out, or score the twin with `--twin`";
-            return Err(CliError::Usage(format!("`--quick`: {reason}")));
+            return Err(CliError::usage(format!("`--quick`: {reason}")));
         }
         let [least, most] = ExternalCommand::LIMIT_S;
         if !(least..=most).contains(&self.external_timeout) {
-            return Err(CliError::Usage(format!(
+            return Err(CliError::usage(format!(
                 "`--external-timeout` = {}; valid: [{least}, {most}] s",
                 self.external_timeout
             )));
@@ -290,13 +290,13 @@ impl ScoreCommand {
 fn explained(e: &ScoreError, source: &Source) -> CliError {
     match e {
         ScoreError::NoSession { .. } | ScoreError::Object { .. } => {
-            CliError::Usage(format!("{}: {e}", source.root.display()))
+            CliError::usage(format!("{}: {e}", source.root.display()))
         }
         ScoreError::External(ExternalError::Late { .. })
         | ScoreError::Decode(DecodeError::External(ExternalError::Late { .. })) => {
-            CliError::Usage(format!("{e}; `--external-timeout` sets another limit"))
+            CliError::usage(format!("{e}; `--external-timeout` sets another limit"))
         }
-        _ => CliError::Usage(e.to_string()),
+        _ => CliError::usage(e.to_string()),
     }
 }
 

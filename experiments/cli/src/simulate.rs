@@ -171,7 +171,7 @@ fn scene_help() -> String {
 fn path(path: &Path) -> Result<Value, CliError> {
     let text = path.to_str().map(Value::from);
     text.ok_or_else(|| {
-        CliError::Usage(format!(
+        CliError::usage(format!(
             "--mesh {}: the name of the file is not valid UTF-8",
             path.display()
         ))
@@ -321,7 +321,7 @@ struct Learned {
 
 impl Learned {
     fn new(layout: &SkinLayout) -> Result<Self, CliError> {
-        let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::Usage(e.to_string()))?;
+        let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::usage(e.to_string()))?;
         let request = DecodeRequest {
             decoders: find("nn_lmmse").into_iter().collect(),
             measurements: DecodeRequest::default_measurements(layout.taxels()),

@@ -10,7 +10,7 @@ use std::path::Path;
 /// # Errors
 /// [`CliError`] with the file and what is wrong with it.
 pub(crate) fn skin_gains(path: &Path, layout: &SkinLayout) -> Result<TaxelGains, CliError> {
-    let failed = |reason: String| CliError::Usage(format!("{}: {reason}", path.display()));
+    let failed = |reason: String| CliError::usage(format!("{}: {reason}", path.display()));
     let text = spts_input::read_text(path, MAX_TOML_BYTES).map_err(|error| failed(error.to_string()))?;
     let gains = TaxelGains::from_toml(&text).map_err(&failed)?;
     gains.check_skin(layout).map_err(|error| failed(error.to_string()))?;

@@ -12,18 +12,15 @@ mod error;
 pub mod explore;
 pub mod fidelity;
 pub mod figures;
-pub mod firmware;
 mod html;
 mod labels;
 mod origin;
 pub mod per_object;
-pub mod phase;
 pub mod readouts;
 pub mod reproduce;
 #[cfg(test)]
 pub(crate) mod samples;
 pub mod score;
-pub mod seeds;
 pub mod sensing;
 pub mod simulation;
 

@@ -243,7 +243,7 @@ impl SpecsCommand {
             Some((_, text)) => print(text.trim_end()),
             None => {
                 let known: Vec<&str> = NAMED_SPECS.iter().map(|(known, _)| *known).collect();
-                Err(CliError::Usage(format!(
+                Err(CliError::usage(format!(
                     "`--show` = {name}: valid: {}",
                     known.join(", ")
                 )))

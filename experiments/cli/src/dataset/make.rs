@@ -119,7 +119,7 @@ impl MakeCommand {
         for assignment in &self.set {
             assignment
                 .put_into(&mut overrides)
-                .map_err(|e| CliError::Usage(format!("`--set` {e}")))?;
+                .map_err(|e| CliError::usage(format!("`--set` {e}")))?;
         }
         let spec = Spec::load(&self.spec, &overrides)?;
         let part = match &self.shard {

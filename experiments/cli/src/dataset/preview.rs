@@ -76,7 +76,7 @@ impl PreviewCommand {
         let spec = source.spec();
         if !spec.config().record.labels.contains(&Label::Pressure) {
             let source = &self.source;
-            return Err(CliError::Usage(format!(
+            return Err(CliError::usage(format!(
                 "{source}: has no pressures to draw: `record.labels` leaves them out"
             )));
         }
@@ -86,7 +86,7 @@ impl PreviewCommand {
         };
         if held.is_empty() {
             let folder = folder.display();
-            return Err(CliError::Usage(format!(
+            return Err(CliError::usage(format!(
                 "{folder}: has no rows yet; run `spts dataset make` with this folder"
             )));
         }
@@ -111,7 +111,7 @@ impl PreviewCommand {
             Source::Spec(spec) => spec.rows(&wanted, PREVIEW_COLUMNS, each)?,
         }
         if let Some(error) = wrong {
-            return Err(CliError::Usage(format!("{}: {error}", self.source)));
+            return Err(CliError::usage(format!("{}: {error}", self.source)));
         }
         let preview = Preview {
             name: name.clone(),

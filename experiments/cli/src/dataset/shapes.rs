@@ -77,7 +77,7 @@ impl ShapesCommand {
         self.common.start()?;
         let families = self.chosen()?;
         check_writable(&self.out)?;
-        let shapes = drawn_shapes(&families, self.seed, self.count).map_err(|e| CliError::Usage(e.to_string()))?;
+        let shapes = drawn_shapes(&families, self.seed, self.count).map_err(|e| CliError::usage(e.to_string()))?;
         save_shapes(&shapes, &self.out)?;
         let report = Report {
             file: self.out,
@@ -93,7 +93,7 @@ impl ShapesCommand {
         let known = |name: &String| SHAPE_FAMILIES.iter().any(|family| family.name == name);
         if let Some(unknown) = self.families.iter().find(|name| !known(name)) {
             let names: Vec<&str> = SHAPE_FAMILIES.iter().map(|family| family.name).collect();
-            return Err(CliError::Usage(format!(
+            return Err(CliError::usage(format!(
                 "`--families` = {unknown}: valid: {}",
                 names.join(", ")
             )));

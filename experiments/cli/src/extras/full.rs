@@ -19,7 +19,7 @@ pub(crate) fn simulated_sessions(scenes: &[String], seed: u64, quick: bool) -> R
     let bar = progress(twin.steps(), "simulating presses");
     let set = twin.simulate(&|| bar.inc(1));
     bar.finish_and_clear();
-    Ok(Source::new(set.map_err(|e| CliError::Study(Box::new(e)))?)?)
+    Ok(Source::new(set?)?)
 }
 
 /// Simulated presses of every object on as many skins as the default says, made once for all sources that need them.
@@ -36,5 +36,5 @@ pub(crate) fn simulated_presses(layout: SkinLayout, median: bool, seed: u64) -> 
     let bar = progress(skins.skins * OBJECTS.len(), "simulated presses");
     let sessions = skins.press(seed, &|| bar.inc(1));
     bar.finish_and_clear();
-    sessions.map_err(|e| CliError::Usage(format!("simulated presses: {e}")))
+    sessions.map_err(|e| CliError::usage(format!("simulated presses: {e}")))
 }

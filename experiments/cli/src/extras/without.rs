@@ -18,14 +18,14 @@ pub(crate) const COMMANDS_ELSEWHERE: &str = "; this build has decode, score, dat
 
 /// Refuses.
 pub(crate) fn simulated_sessions(_: &[String], _: u64, _: bool) -> Result<Source, CliError> {
-    Err(CliError::Usage(
+    Err(CliError::usage(
         "`--twin`: this build has no physics engine; simulate with the program that `cargo build` makes".to_owned(),
     ))
 }
 
 /// Refuses.
 pub(crate) fn simulated_presses(_: SkinLayout, _: bool, _: u64) -> Result<Vec<ScoredSession>, CliError> {
-    Err(CliError::Usage(
+    Err(CliError::usage(
         "presses cannot be simulated: this build has no physics engine; valid for `--learn-from`: published, raster, or a folder \
          of recordings"
             .to_owned(),

@@ -21,7 +21,7 @@ impl ScoreCommand {
         let out = open_folder(path, FILES)?;
         let settings = self.settings()?;
         if let Some(spec) = settings.decoders.iter().find(|spec| !spec.anytime) {
-            return Err(CliError::Usage(ScoreError::no_confidence(spec.name).to_string()));
+            return Err(CliError::usage(ScoreError::no_confidence(spec.name).to_string()));
         }
         let source = self.source()?;
         let settings = BoardSettings {
@@ -44,7 +44,7 @@ impl ScoreCommand {
     /// The wanted confidences.
     fn wanted(&self) -> Result<StopSettings, CliError> {
         if let Some(outside) = self.confidence.iter().find(|p| !(**p > 0.5 && **p < 1.0)) {
-            return Err(CliError::Usage(format!(
+            return Err(CliError::usage(format!(
                 "`--confidence` = {outside} is outside (0.5, 1)"
             )));
         }

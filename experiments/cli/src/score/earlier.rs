@@ -76,7 +76,7 @@ const MAX_BOARD_BYTES: u64 = 1 << 25;
 /// The board in a file that `--save` wrote.
 pub(super) fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
     let usage = |e: &dyn std::fmt::Display| {
-        CliError::Usage(format!("{}: not a board as --save writes it: {e}", path.display()))
+        CliError::usage(format!("{}: not a board as --save writes it: {e}", path.display()))
     };
     let text = spts_input::read_text(path, MAX_BOARD_BYTES).map_err(|e| usage(&e))?;
     serde_json::from_str(&text).map_err(|e| usage(&e))

@@ -22,11 +22,11 @@ impl ScoreCommand {
         let out = open_folder(path, FILES)?;
         let settings = self.settings()?;
         if let Some(spec) = settings.decoders.iter().find(|spec| spec.name != "nn_lmmse") {
-            return Err(CliError::Usage(ScoreError::not_in_time(spec.name).to_string()));
+            return Err(CliError::usage(ScoreError::not_in_time(spec.name).to_string()));
         }
         if settings.sensing != [Sensing::Random] {
             let reason = "chosen rows have no order in time; leave it out with `--in-time`";
-            return Err(CliError::Usage(format!("`--sensing`: {reason}")));
+            return Err(CliError::usage(format!("`--sensing`: {reason}")));
         }
         let source = self.source()?;
         let settings = BoardSettings {

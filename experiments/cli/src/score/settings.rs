@@ -83,7 +83,7 @@ impl ScoreCommand {
         let names: Vec<&str> = names.collect();
         if let Some((k, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(*name)) {
             let option = if k < decoders.len() { "--decoder" } else { "--external" };
-            return Err(CliError::Usage(format!(
+            return Err(CliError::usage(format!(
                 "`{option}`: {name:?} is there twice; give every one a name of its own"
             )));
         }

@@ -85,5 +85,5 @@ fn posed_objects(layout: &SkinLayout, seed: u64) -> Result<Vec<PosedObject>, Cli
     let bar = progress(OBJECTS.len(), "simulated objects");
     let objects = PoseKnowledge::default().press(layout, seed, &|| bar.inc(1));
     bar.finish_and_clear();
-    objects.map_err(|e| CliError::Usage(format!("simulated objects: {e}")))
+    objects.map_err(|e| CliError::usage(format!("simulated objects: {e}")))
 }

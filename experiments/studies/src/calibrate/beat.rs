@@ -27,7 +27,7 @@ const FALSE_ALARM: f64 = 1e-3;
 const FEWEST: usize = 4;
 
 /// Beat of the cell of `taxel`, from its events of several presses; each press has a phase of its own.
-pub(crate) fn beat(taxel: usize, presses: &[Vec<u64>]) -> Option<Beat> {
+pub(super) fn beat(taxel: usize, presses: &[Vec<u64>]) -> Option<Beat> {
     let presses: Vec<&Vec<u64>> = presses.iter().filter(|rows| rows.len() >= FEWEST).collect();
     if presses.len() < 2 {
         return None;

@@ -30,7 +30,6 @@ mod tests;
 mod text;
 
 pub use beat::Beat;
-pub(crate) use beat::beat;
 pub use design::Reseeded;
 pub use error::CalibrateError;
 pub use faults::{CellFault, reseeded};

@@ -26,14 +26,14 @@ struct PatternWrite {
 }
 
 /// Files of `spts sensing design` outside of folders of their own.
-pub const DESIGN_FILES: &[&str] = &["rows.txt", "design.json", "weights.json", "bus.csv", "seeds.txt"];
+pub const FILES: &[&str] = &["rows.txt", "design.json", "weights.json", "bus.csv", "seeds.txt"];
 
 /// Writes the rows, what they are like, what is written to the cells, and a picture of every row into the folder `out`:
 /// all of them, or none.
 ///
 /// # Errors
 /// [`ReportError`] when a file cannot be written.
-pub fn write_design(report: &RowDesignReport, out: OutputFolder) -> Result<(), ReportError> {
+pub fn write(report: &RowDesignReport, out: OutputFolder) -> Result<(), ReportError> {
     write_all_or_none(out, |out| {
         write_bytes(&out.path("rows.txt"), report.patterns.to_text().as_bytes())?;
         write_json(&out.path("design.json"), report)?;

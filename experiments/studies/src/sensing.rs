@@ -1,18 +1,17 @@
-//! Designs rows for a skin, and describes them.
+//! Rows of the sensing matrix, designed for a skin.
 
-use super::cost::flips;
-use super::error::SensingError;
-use super::rows_for::{mode_of, patterns};
 use serde::Serialize;
 use spts_circuit::{Patterns, WeightMode, Weights, seeds_of_first_window};
 use spts_eval::Source;
-use spts_eval::training::{LearnError, TrainingData};
+use spts_eval::training::TrainingData;
 use spts_firmware::{FIRST_ADDRESS, LAST_BUS_ADDRESS, PATTERN_BITS, Pattern};
+use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::classify::{Component, TemplateModel};
 use spts_recon::recover::ImagePrior;
 use spts_recon::rows::{
-    DesignRows as _, Designer, Expected, Random, RowTask, Tolerances, fewest_flips, largest_sum, posterior_trace,
+    DesignRows as _, Designer, Expected, Levels, Random, RowTask, Tolerances, fewest_flips, largest_sum,
+    posterior_trace,
 };
 use std::path::PathBuf;
 
@@ -79,6 +78,8 @@ pub struct RowDesignReport {
     pub largest_sum: f64,
     /// Mean share of the cells whose level changes from one row to the next and from the last to the first.
     pub flips: f64,
+    /// Number of rows on which all taxels have the same level: they measure nothing but the total.
+    pub constant_rows: usize,
     /// Bytes written to a cell as a pattern; `None` if cells cannot store it.
     pub bytes_a_cell: Option<usize>,
     /// Time to load all cells over one bus of 400 kHz for each 112 cells, s; `None` if cells cannot store the pattern.
@@ -100,9 +101,9 @@ impl RowDesign {
     /// Designs the rows.
     ///
     /// # Errors
-    /// [`SensingError`] for a task out of range, recordings that cannot be read, or images from which no prior can be
+    /// [`Refusal`] for a task out of range, recordings that cannot be read, or images from which no prior can be
     /// made.
-    pub fn run(&self) -> Result<RowDesignReport, SensingError> {
+    pub fn run(&self) -> Result<RowDesignReport, Refusal> {
         let (expected, classes) = self.expected()?;
         let task = RowTask {
             classes: &classes,
@@ -111,16 +112,20 @@ impl RowDesign {
             seed: self.seed,
             ..RowTask::new(self.rows, &expected)
         };
-        let rows = (self.designer.build)().design(&task)?;
+        let rows = (self.designer.build)().design(&task).map_err(Refusal::from_error)?;
         let taxels = rows.ncols();
         let order = if self.fewest_flips {
             fewest_flips(rows.view(), &vec![1.0; taxels])
         } else {
             (0..rows.nrows()).collect()
         };
-        let mode = mode_of(self.designer);
-        let patterns = patterns(&rows, &order)?;
-        let weights = Weights::with_patterns(mode, patterns.clone())?;
+        let mode = match self.designer.levels {
+            Levels::Signs => WeightMode::Binary,
+            Levels::Analog => WeightMode::Analog,
+        };
+        let levels: Vec<f64> = order.iter().flat_map(|&r| rows.row(r)).copied().collect();
+        let patterns = Patterns::of_levels(order.len(), &levels).map_err(Refusal::from_error)?;
+        let weights = Weights::with_patterns(mode, patterns.clone()).map_err(Refusal::from_error)?;
         let seeds = match mode {
             WeightMode::Binary => seeds_of_first_window(&patterns).ok(),
             _ => None,
@@ -131,9 +136,12 @@ impl RowDesign {
                 largest_sum: None,
                 ..task
             };
-            posterior_trace(&task, &Random.design(&task)?)
+            Random.design(&task).and_then(|rows| posterior_trace(&task, &rows))
         };
-        let random = (0..RANDOM).map(random).collect::<Result<Vec<f64>, _>>()?;
+        let random = (0..RANDOM)
+            .map(random)
+            .collect::<Result<Vec<f64>, _>>()
+            .map_err(Refusal::from_error)?;
         let message = (mode == WeightMode::Binary && rows.nrows() <= PATTERN_BITS)
             .then(|| {
                 Pattern::new(rows.nrows(), 0)
@@ -147,10 +155,11 @@ impl RowDesign {
             skin: expected.shape(),
             m: rows.nrows(),
             levels: mode.name(),
-            variance_left: posterior_trace(&task, &rows)?,
+            variance_left: posterior_trace(&task, &rows).map_err(Refusal::from_error)?,
             variance_left_random: random.iter().sum::<f64>() / random.len() as f64,
             largest_sum: largest_sum(&expected, &rows),
-            flips: flips(&weights),
+            flips: flips(&patterns),
+            constant_rows: (0..rows.nrows()).filter(|&r| constant(rows.row(r))).count(),
             bytes_a_cell: message,
             load_s: message.map(|bytes| load_s(bytes, taxels)),
             seeds_found: seeds.is_some(),
@@ -161,22 +170,28 @@ impl RowDesign {
     }
 
     /// Images, and classes where there are some.
-    fn expected(&self) -> Result<(Expected, Vec<Component>), SensingError> {
+    fn expected(&self) -> Result<(Expected, Vec<Component>), Refusal> {
         let shape = [self.layout.rows(), self.layout.cols()];
+        let streams = Streams::new(self.seed);
         let (data, classes) = match &self.images {
-            DesignImages::Smooth(length) => return Ok((Expected::smooth(shape, *length)?, Vec::new())),
+            DesignImages::Smooth(length) => {
+                let expected = Expected::smooth(shape, *length).map_err(Refusal::from_error)?;
+                return Ok((expected, Vec::new()));
+            }
             DesignImages::Shapes => {
-                let data = TrainingData::for_layout(&self.layout, Streams::new(self.seed))?;
+                let data = TrainingData::for_layout(&self.layout, streams).map_err(Refusal::from_error)?;
                 (data, Vec::new())
             }
             DesignImages::Recordings(path) => {
-                let (data, _) = Source::open(path)?.training(Streams::new(self.seed))?;
+                let source = Source::open(path).map_err(Refusal::from_error)?;
+                let (data, _) = source.training(streams).map_err(Refusal::from_error)?;
                 let classes = TemplateModel::new(data.shape[1]).classes(&data.templates);
-                (data, classes.map_err(LearnError::from)?)
+                (data, classes.map_err(Refusal::from_error)?)
             }
         };
-        let prior = data.prior(ImagePrior::UNSEEN)?;
-        Ok((Expected::like(&prior, data.shape, self.tolerances)?, classes))
+        let prior = data.prior(ImagePrior::UNSEEN).map_err(Refusal::from_error)?;
+        let expected = Expected::like(&prior, data.shape, self.tolerances).map_err(Refusal::from_error)?;
+        Ok((expected, classes))
     }
 }
 
@@ -185,6 +200,61 @@ impl RowDesign {
 pub(crate) fn load_s(bytes: usize, cells: usize) -> f64 {
     let [ends, byte, rate_hz] = BUS;
     cells.min(BUS_CELLS) as f64 * (ends + byte * (bytes + 1) as f64) / rate_hz
+}
+
+/// Mean share of the cells whose code changes from one row of a pattern to the next, the first behind the last.
+fn flips(patterns: &Patterns) -> f64 {
+    let period = patterns.period() as u64;
+    let changes = |row: u64| {
+        let pairs = patterns.row(row).iter().zip(patterns.row(row + 1));
+        pairs.filter(|(a, b)| a != b).count()
+    };
+    (0..period).map(changes).sum::<usize>() as f64 / (period as f64 * patterns.taxels() as f64)
+}
+
+/// Whether all taxels have the same level.
+fn constant(row: &[f64]) -> bool {
+    row.iter().all(|level| level.to_bits() == row[0].to_bits())
+}
+
+impl RowDesignReport {
+    /// A summary in a few lines.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let [rows, cols] = self.skin;
+        let mut out = format!(
+            "{} rows of {} for {rows} × {cols} taxels\n\
+             of the expected images' variance {:.1} % is left, with random signs {:.1} %\n\
+             largest sum: {:.2} times that of a random row (root mean square); {:.0} % of the cells change from row to row\n",
+            self.m,
+            self.designer,
+            100.0 * self.variance_left,
+            100.0 * self.variance_left_random,
+            self.largest_sum,
+            100.0 * self.flips,
+        );
+        if self.constant_rows > 0 {
+            out.push_str(&format!(
+                "{} of the rows are constant: all taxels have the same level\n",
+                self.constant_rows
+            ));
+        }
+        out.push_str(&match (self.bytes_a_cell, self.load_s) {
+            (Some(bytes), Some(load_s)) => {
+                format!(
+                    "pattern: {bytes} bytes a cell, {:.1} ms for all at 400 kHz\n",
+                    1e3 * load_s
+                )
+            }
+            _ => "pattern: no cell holds it (at most 64 rows of ±1)\n".to_owned(),
+        });
+        out.push_str(if self.seeds_found {
+            "seeds: there are some that begin with these rows\n"
+        } else {
+            "seeds: none (at most 24 rows of ±1)\n"
+        });
+        out
+    }
 }
 
 #[cfg(test)]
@@ -227,7 +297,7 @@ mod tests {
             let rows = (0..10).flat_map(|row| report.patterns.row(row).to_vec());
             assert!(codes.iter().copied().eq(rows));
             // by hand: address, mode, number of bits and two bytes of ten bits
-            assert_eq!(report.bytes_a_cell, Some(4));
+            assert_eq!((report.bytes_a_cell, report.constant_rows), (Some(4), 0));
             assert!((report.load_s.unwrap() - 48.0 * 47.0 / 400e3).abs() < 1e-12);
         }
     }
@@ -241,7 +311,13 @@ mod tests {
         assert!(few.run().is_err());
         assert!(design("classes", DesignImages::Shapes).run().is_err());
         let nowhere = DesignImages::Recordings("nowhere".into());
-        assert!(matches!(design("greedy", nowhere).run(), Err(SensingError::Data(_))));
+        assert!(
+            design("greedy", nowhere)
+                .run()
+                .unwrap_err()
+                .to_string()
+                .contains("nowhere")
+        );
         let analog = design("analog", DesignImages::Smooth(1.5)).run().unwrap();
         assert_eq!(
             (analog.levels, analog.bytes_a_cell, analog.seeds_found),

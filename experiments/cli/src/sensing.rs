@@ -1,16 +1,78 @@
-//! `spts sensing design`: rows for a skin.
+//! `spts sensing`: rows of the sensing matrix that are designed.
 
-use super::{DesignerArg, designer_named, layout, skin};
-use crate::context::{Common, open_folder};
-use crate::error::CliError;
-use crate::options::{seed, whole, within};
-use crate::progress::Bars;
-use clap::Args;
+use super::context::{Common, open_folder};
+use super::error::CliError;
+use super::options::{seed, whole, within};
+use super::progress::Bars;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Subcommand};
+use spts::SkinLayout;
 use spts::progress::Progress as _;
-use spts_recon::rows::{RowTask, Tolerances};
-use spts_report::sensing::{DESIGN_FILES, write_design};
+use spts_recon::rows::{DESIGNERS, Designer, RowTask, Tolerances, designer};
+use spts_report::sensing::{FILES, write};
 use spts_studies::sensing::{DesignImages, RowDesign};
 use std::path::PathBuf;
+
+/// Designs the rows of the sensing matrix.
+///
+/// A row is one weight a taxel: a sample is the sum of all taxels, each times its weight. The published cells draw
+/// their weights at random.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts sensing design
+  spts sensing design --designer cosine_signs --rows 20")]
+pub(super) struct SensingCommand {
+    #[command(subcommand)]
+    command: SensingAction,
+}
+
+#[derive(Debug, Subcommand)]
+enum SensingAction {
+    Design(Box<DesignCommand>),
+}
+
+impl SensingCommand {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        match self.command {
+            SensingAction::Design(command) => command.run(),
+        }
+    }
+}
+
+/// A line of the table of designers.
+#[derive(Clone)]
+struct DesignerArg(&'static Designer);
+
+impl std::fmt::Debug for DesignerArg {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.0.name)
+    }
+}
+
+fn designer_named() -> impl TypedValueParser<Value = DesignerArg> {
+    let of = |name: String| DesignerArg(designer(&name).unwrap_or(&DESIGNERS[0]));
+    PossibleValuesParser::new(DESIGNERS.iter().map(|d| d.name)).map(of)
+}
+
+/// Most rows and columns of a skin.
+const MOST: usize = 1024;
+
+/// Rows and columns of a skin.
+fn skin(text: &str) -> Result<[usize; 2], String> {
+    let side = |word: &str| word.parse().ok().filter(|n| (1..=MOST).contains(n));
+    let found = text
+        .split_once(['x', '×'])
+        .and_then(|(r, c)| Some([side(r)?, side(c)?]));
+    found.ok_or_else(|| "is not ROWSxCOLS with both in [1, 1024]".to_owned())
+}
+
+/// A skin of so many rows and columns, with the published pitch.
+fn layout([rows, cols]: [usize; 2]) -> Result<SkinLayout, CliError> {
+    let published = SkinLayout::default();
+    SkinLayout::new(rows, cols, published.pitch_m(), published.electrode_m())
+        .map_err(|e| CliError::usage(format!("`--skin`: {e}")))
+}
 
 /// Designs M rows of the sensing matrix for a skin, and writes them in the forms that a scene, a session and the cells
 /// need.
@@ -40,7 +102,7 @@ Files in DIR:
   seeds.txt           seeds whose generators begin with these rows; up to 24 rows of ±1
   design.json         what the rows are like
   figures/rows.png    every row as a picture of the skin; rows.svg the same")]
-pub(super) struct DesignCommand {
+struct DesignCommand {
     /// Way to choose the rows; see below
     #[arg(long, value_name = "NAME", default_value = "greedy", value_parser = designer_named())]
     designer: DesignerArg,
@@ -86,10 +148,9 @@ pub(super) struct DesignCommand {
 }
 
 impl DesignCommand {
-    /// Runs the command.
-    pub(super) fn run(self) -> Result<(), CliError> {
+    fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = open_folder(&self.out, DESIGN_FILES)?;
+        let out = open_folder(&self.out, FILES)?;
         let design = RowDesign {
             layout: layout(self.skin)?,
             designer: self.designer.0,
@@ -112,7 +173,7 @@ impl DesignCommand {
         bars.stage("designing", None);
         let report = design.run()?;
         bars.end();
-        write_design(&report, out)?;
+        write(&report, out)?;
         let text = || format!("{}rows and pictures: {}", report.text(), self.out.display());
         self.common.print(&report, text)
     }
