@@ -1,11 +1,11 @@
 //! Known gains of the taxels of one skin.
 
-use crate::config::{ConfigError, in_range, within};
+use crate::check::{explain_toml, in_range, within};
 use crate::layout::SkinLayout;
 use crate::streams::Streams;
-use crate::toml_error::explain_toml;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::{Deserialize, Serialize};
+use spts_input::Refusal;
 
 /// Gains of the taxels of one skin, as far as they are known: an independent log-normal distribution for each taxel,
 /// plus the change from session to session. `spts calibrate --skin` writes them as TOML.
@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 /// let sheet = Velostat::new(config, &skin, Streams::new(1))?;
 /// let of_taxels: Vec<f64> = sheet.gains().collect();
 /// assert_eq!(of_taxels, [0.3_f64.exp(), (-0.3_f64).exp()]);
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,8 +51,8 @@ impl TaxelGains {
     /// Checks all values, and that there is one for each of `taxels` taxels.
     ///
     /// # Errors
-    /// [`ConfigError`] for another number of values than `taxels`, or for the first value outside its range.
-    pub fn check(&self, taxels: usize) -> Result<(), ConfigError> {
+    /// [`Refusal`] for another number of values than `taxels`, or for the first value outside its range.
+    pub fn check(&self, taxels: usize) -> Result<(), Refusal> {
         for (field, values, least, most, range) in [
             ("log_mean", &self.log_mean, -5.0, 5.0, "[-5, 5]"),
             ("log_sd", &self.log_sd, 0.0, 2.0, "[0, 2]"),
@@ -74,9 +74,9 @@ impl TaxelGains {
     /// Checks all values, and that they belong to `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] for another shape or number of taxels than those of `skin`, or for the first value outside its
+    /// [`Refusal`] for another shape or number of taxels than those of `skin`, or for the first value outside its
     /// range.
-    pub fn check_skin(&self, skin: &SkinLayout) -> Result<(), ConfigError> {
+    pub fn check_skin(&self, skin: &SkinLayout) -> Result<(), Refusal> {
         for (field, found, needed) in [
             ("gains.shape[0]", self.shape.map(|s| s[0]), skin.rows()),
             ("gains.shape[1]", self.shape.map(|s| s[1]), skin.cols()),
@@ -110,9 +110,39 @@ impl TaxelGains {
     }
 }
 
+// Differences between taxels.
+
+/// Log-normal gains of median 1: exp(σ·z), z standard normal, σ the standard deviation of the logarithm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Spread {
+    log_sd: f64,
+}
+
+impl Spread {
+    /// Spread with σ = `log_sd` in [0, 2]; `field` is its name in messages.
+    ///
+    /// # Errors
+    /// [`Refusal`] for a value outside its range.
+    pub(crate) fn new(field: &str, log_sd: f64) -> Result<Self, Refusal> {
+        within(field, log_sd, 0.0, 2.0, "[0, 2]")?;
+        Ok(Self { log_sd })
+    }
+
+    /// Gains of `taxels` taxels, drawn from item `index` of the streams' purpose `label`; all exactly 1 for σ = 0.
+    pub(crate) fn gains(self, taxels: usize, streams: Streams, label: &str, index: u64) -> Vec<f64> {
+        let mut rng = streams.rng(label, index);
+        let gain = |_| {
+            let normal: f64 = StandardNormal.sample(&mut rng);
+            (self.log_sd * normal).exp()
+        };
+        (0..taxels).map(gain).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use approx::assert_relative_eq;
 
     fn two() -> TaxelGains {
         TaxelGains {
@@ -173,5 +203,22 @@ mod tests {
             let said = TaxelGains::from_toml(text).unwrap_err();
             assert!(said.contains(part), "{said}");
         }
+    }
+
+    /// Standard errors of n taxels: σ/√n of the mean logarithm, σ/√(2n) of its standard deviation; five of each.
+    #[test]
+    fn gains_are_log_normal() {
+        let gains = Spread::new("x", 0.30).unwrap().gains(10_000, Streams::new(1), "x", 0);
+        let logs: Vec<f64> = gains.iter().map(|g| g.ln()).collect();
+        let mean = logs.iter().sum::<f64>() / 1e4;
+        let sd = (logs.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / 1e4).sqrt();
+        assert_relative_eq!(mean, 0.0, epsilon = 5.0 * 0.30 / 1e2);
+        assert_relative_eq!(sd, 0.30, epsilon = 5.0 * 0.30 / (2e4_f64).sqrt());
+    }
+
+    #[test]
+    fn no_spread_is_no_change() {
+        let gains = Spread::new("x", 0.0).unwrap().gains(10, Streams::new(1), "x", 0);
+        assert!(gains.iter().all(|g| g.to_bits() == 1.0_f64.to_bits()));
     }
 }

@@ -1,7 +1,9 @@
 //! Geometry of the skin.
 
-use crate::config::{ConfigError, in_range, within};
+use crate::check::{in_range, within};
 use serde::{Deserialize, Serialize};
+use spts_input::Refusal;
+use std::marker::PhantomData;
 
 /// A rectangular array of square taxels. The sheet lies in the plane z = 0 and is centred on the origin. Columns run
 /// along +x and rows along −y (row 0 is the far edge), so that a printed map looks like the skin seen from above.
@@ -44,8 +46,8 @@ impl Default for SkinLayoutConfig {
 }
 
 impl TryFrom<SkinLayoutConfig> for SkinLayout {
-    type Error = ConfigError;
-    fn try_from(c: SkinLayoutConfig) -> Result<Self, ConfigError> {
+    type Error = Refusal;
+    fn try_from(c: SkinLayoutConfig) -> Result<Self, Refusal> {
         let electrode_m = c.electrode_m.unwrap_or(Self::usual_electrode_m(c.pitch_m));
         // a pitch that is not valid has no electrode: the pitch is what is refused
         Self::new(c.rows, c.cols, c.pitch_m, electrode_m)
@@ -73,9 +75,9 @@ impl SkinLayout {
     /// A skin of `rows × cols` taxels at the pitch `pitch_m`, each with a square electrode of side `electrode_m`.
     ///
     /// # Errors
-    /// [`ConfigError`] for an empty or oversized array, a pitch outside [1e-6, 1] m, or an electrode outside
+    /// [`Refusal`] for an empty or oversized array, a pitch outside [1e-6, 1] m, or an electrode outside
     /// `(0, pitch_m]`.
-    pub fn new(rows: usize, cols: usize, pitch_m: f64, electrode_m: f64) -> Result<Self, ConfigError> {
+    pub fn new(rows: usize, cols: usize, pitch_m: f64, electrode_m: f64) -> Result<Self, Refusal> {
         in_range("rows", rows as f64, rows > 0, "[1, ∞)")?;
         in_range("cols", cols as f64, cols > 0, "[1, ∞)")?;
         let taxels = rows.saturating_mul(cols);
@@ -104,12 +106,12 @@ impl SkinLayout {
     /// let skin = SkinLayout::with_pitch(12, 20, 4.5e-3)?;
     /// assert!((skin.electrode_m() - 3e-3).abs() < 1e-15);
     /// assert_eq!(SkinLayout::with_pitch(10, 10, 15e-3)?, SkinLayout::default());
-    /// # Ok::<(), spts_models::ConfigError>(())
+    /// # Ok::<(), spts_input::Refusal>(())
     /// ```
     ///
     /// # Errors
     /// As [`SkinLayout::new`].
-    pub fn with_pitch(rows: usize, cols: usize, pitch_m: f64) -> Result<Self, ConfigError> {
+    pub fn with_pitch(rows: usize, cols: usize, pitch_m: f64) -> Result<Self, Refusal> {
         Self::new(rows, cols, pitch_m, Self::usual_electrode_m(pitch_m))
     }
 
@@ -176,6 +178,102 @@ impl SkinLayout {
             (col + 0.5) * self.pitch_m - 0.5 * width,
             0.5 * height - (row + 0.5) * self.pitch_m,
         ]
+    }
+}
+
+// Taxel maps with a unit tag.
+
+/// Unit tag: pascal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pascal {}
+
+/// Unit tag: siemens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Siemens {}
+
+/// A map with one value a taxel: shape `(rows, cols)`, row-major, all values in unit `U`.
+///
+/// ```
+/// use spts_models::PressureMap;
+///
+/// let mut pressure = PressureMap::zeros(10, 10);
+/// pressure.values_mut()[4 * 10 + 7] = 12e3; // row 4, column 7
+/// let cell_area_m2 = 15e-3 * 15e-3;
+/// assert!((pressure.sum() * cell_area_m2 - 2.7).abs() < 1e-12, "the force, N");
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid<U> {
+    rows: usize,
+    cols: usize,
+    values: Vec<f64>,
+    unit: PhantomData<U>,
+}
+
+/// Pressure on every taxel, Pa.
+pub type PressureMap = Grid<Pascal>;
+/// Conductance of every taxel, S.
+pub type ConductanceMap = Grid<Siemens>;
+
+impl<U> Grid<U> {
+    /// A map of zeros.
+    #[must_use]
+    pub fn zeros(rows: usize, cols: usize) -> Self {
+        Self::from_values(rows, cols, vec![0.0; rows * cols])
+    }
+
+    /// A map from row-major `values`.
+    ///
+    /// # Panics
+    /// If `values.len() != rows * cols`.
+    #[must_use]
+    pub fn from_values(rows: usize, cols: usize, values: Vec<f64>) -> Self {
+        assert_eq!(
+            values.len(),
+            rows * cols,
+            "a {rows} × {cols} map needs {} values",
+            rows * cols
+        );
+        Self {
+            rows,
+            cols,
+            values,
+            unit: PhantomData,
+        }
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    #[must_use]
+    pub fn cols(&self) -> usize {
+        self.cols
+    }
+
+    /// Values, row-major.
+    #[must_use]
+    pub fn values(&self) -> &[f64] {
+        &self.values
+    }
+
+    /// Values, row-major, for writing.
+    pub fn values_mut(&mut self) -> &mut [f64] {
+        &mut self.values
+    }
+
+    /// Sum of all values.
+    #[must_use]
+    pub fn sum(&self) -> f64 {
+        self.values.iter().sum()
+    }
+
+    /// Largest value, or −∞ for an empty map.
+    #[must_use]
+    pub fn max(&self) -> f64 {
+        self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
     }
 }
 

@@ -21,38 +21,28 @@
 //! # Ok::<(), spts_models::TransducerError>(())
 //! ```
 
-mod area;
-mod conditioning;
-mod config;
+mod check;
 mod conformance;
-mod creep;
 mod gains;
-mod grid;
-mod hysteresis;
-mod lag;
-mod law;
 mod layout;
-mod prony;
-mod spread;
+mod memory;
 mod streams;
-mod temperature;
-mod toml_error;
 mod transducer;
 mod transducers;
 
-pub use conditioning::{Conditioning, ConditioningConfig, Presses};
-pub use config::{ConfigError, in_range, in_section, within};
+pub use check::{explain_toml, in_range, in_section, parsed, within};
 pub use conformance::check_transducer;
-pub use creep::{Creep, CreepConfig, CreepDecays, CreepKind};
 pub use gains::TaxelGains;
-pub use grid::{ConductanceMap, Grid, Pascal, PressureMap, Siemens};
-pub use hysteresis::{Hysteresis, HysteresisConfig};
-pub use law::REFERENCE_PA;
-pub use layout::SkinLayout;
+pub use layout::{ConductanceMap, Grid, Pascal, PressureMap, Siemens, SkinLayout};
+pub use memory::{
+    Conditioning, ConditioningConfig, Creep, CreepConfig, CreepDecays, CreepKind, Hysteresis, HysteresisConfig, Presses,
+};
 pub use streams::Streams;
-pub use temperature::REFERENCE_C;
-pub use toml_error::explain_toml;
 pub use transducer::Transducer;
 pub use transducers::{
-    BuildTransducer, Linear, LinearConfig, TRANSDUCERS, TransducerError, Velostat, VelostatConfig, build_transducer,
+    BuildTransducer, Linear, LinearConfig, REFERENCE_C, REFERENCE_PA, TRANSDUCERS, TransducerError, Velostat,
+    VelostatConfig, build_transducer,
 };
+
+/// The error of a parameter outside its range.
+pub type ConfigError = spts_input::Refusal;

@@ -4,26 +4,21 @@ mod linear;
 mod velostat;
 
 pub use linear::{Linear, LinearConfig};
-pub use velostat::{Velostat, VelostatConfig};
+pub use velostat::{REFERENCE_C, REFERENCE_PA, Velostat, VelostatConfig};
 
-use crate::area::OnElectrode;
-use crate::config::ConfigError;
+use crate::check::parsed;
 use crate::layout::SkinLayout;
 use crate::streams::Streams;
-use crate::toml_error::explain_toml;
-use crate::transducer::Transducer;
-use serde::de::DeserializeOwned;
+use crate::transducer::{OnElectrode, Transducer};
+use spts_input::Refusal;
 
 /// Why a transducer cannot be built.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TransducerError {
-    /// Parameters that cannot be read: an unknown key, a value of the wrong type, or one that its type refuses.
-    #[error("{0}")]
-    Parameters(String),
-    /// A value outside its range, or gains that do not belong to the skin.
+    /// Parameters that cannot be read, a value outside its range, or gains that do not belong to the skin.
     #[error(transparent)]
-    Value(#[from] ConfigError),
+    Refused(#[from] Refusal),
     /// A name that is not in the table.
     #[error("`{name}` is not a transducer; known: {known}")]
     Unknown {
@@ -36,21 +31,19 @@ pub enum TransducerError {
 
 /// Builds a transducer for a skin from its parameters. `streams` determine what differs from skin to skin. The
 /// conductance is that of electrodes of 10 mm × 10 mm, whatever the skin has: [`build_transducer`] scales it.
-pub type BuildTransducer = fn(toml::Table, &SkinLayout, Streams) -> Result<Box<dyn Transducer>, TransducerError>;
+pub type BuildTransducer = fn(toml::Table, &SkinLayout, Streams) -> Result<Box<dyn Transducer>, Refusal>;
 
 /// Every transducer, by name.
 pub const TRANSDUCERS: &[(&str, BuildTransducer)] = &[
-    ("linear", |table, _, _| Ok(Box::new(parse::<Linear>(table)?))),
+    ("linear", |table, _, _| Ok(Box::new(parsed::<Linear>(table)?))),
     ("velostat", |table, skin, streams| {
-        Ok(Box::new(Velostat::new(parse::<VelostatConfig>(table)?, skin, streams)?))
+        Ok(Box::new(Velostat::new(
+            parsed::<VelostatConfig>(table)?,
+            skin,
+            streams,
+        )?))
     }),
 ];
-
-fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, TransducerError> {
-    table
-        .try_into()
-        .map_err(|e| TransducerError::Parameters(explain_toml(&e)))
-}
 
 /// Builds the transducer called `name` in [`TRANSDUCERS`], and scales its conductance with the area of the skin's
 /// electrodes ([`SkinLayout::relative_area`]).
@@ -71,20 +64,15 @@ pub fn build_transducer(
     skin: &SkinLayout,
     streams: Streams,
 ) -> Result<Box<dyn Transducer>, TransducerError> {
-    match TRANSDUCERS.iter().find(|(known, _)| *known == name) {
-        Some((_, build)) => {
-            let transducer = build(parameters, skin, streams)?;
-            Ok(OnElectrode::wrap(transducer, skin.relative_area()))
-        }
-        None => Err(TransducerError::Unknown {
+    let Some((_, build)) = TRANSDUCERS.iter().find(|(known, _)| *known == name) else {
+        let known: Vec<_> = TRANSDUCERS.iter().map(|(known, _)| *known).collect();
+        return Err(TransducerError::Unknown {
             name: name.to_owned(),
-            known: TRANSDUCERS
-                .iter()
-                .map(|(known, _)| *known)
-                .collect::<Vec<_>>()
-                .join(", "),
-        }),
-    }
+            known: known.join(", "),
+        });
+    };
+    let transducer = build(parameters, skin, streams)?;
+    Ok(OnElectrode::wrap(transducer, skin.relative_area()))
 }
 
 #[cfg(test)]

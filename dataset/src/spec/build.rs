@@ -9,7 +9,8 @@ use super::{
 use sha2::{Digest as _, Sha256};
 use spts_circuit::Mode;
 use spts_contact::build_contact;
-use spts_models::{ConfigError, SkinLayout, explain_toml, in_range};
+use spts_input::Refusal;
+use spts_models::{SkinLayout, explain_toml, in_range, in_section};
 use std::path::Path;
 
 /// Most rows of a data set.
@@ -210,11 +211,8 @@ fn merge(into: &mut toml::Table, from: &toml::Table) {
     }
 }
 
-fn in_skin(error: ConfigError) -> ConfigError {
-    ConfigError {
-        field: format!("skin.{}", error.field),
-        ..error
-    }
+fn in_skin(error: Refusal) -> Refusal {
+    Refusal::new(in_section("skin", &error.to_string()))
 }
 
 /// Gives the grids of presses and those of skins their turns.

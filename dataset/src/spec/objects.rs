@@ -8,7 +8,8 @@ use spts_contact::PreparedMesh;
 use spts_contact::mesh::load;
 use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_contact::shapes::{SHAPE_FAMILIES, ShapeRanges, build_shape};
-use spts_models::{ConfigError, Streams, in_range};
+use spts_input::Refusal;
+use spts_models::{Streams, in_range, in_section};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -85,10 +86,9 @@ impl Choices {
         ranges.size_m = config.size_m.unwrap_or(ranges.size_m);
         ranges.relief_m = config.relief_m.unwrap_or(ranges.relief_m);
         ranges.edge_m = config.edge_m.unwrap_or(ranges.edge_m);
-        ranges.check().map_err(|error| ConfigError {
-            field: format!("object.{}", error.field),
-            ..error
-        })?;
+        ranges
+            .check()
+            .map_err(|error| Refusal::new(in_section("object", &error.to_string())))?;
         let entries = match source {
             ObjectSource::Shapes => {
                 let known: Vec<&str> = SHAPE_FAMILIES.iter().map(|family| family.name).collect();

@@ -1,9 +1,10 @@
 //! The simplest transducer.
 
-use crate::config::{ConfigError, in_range};
-use crate::grid::{ConductanceMap, PressureMap};
+use crate::check::in_range;
+use crate::layout::{ConductanceMap, PressureMap};
 use crate::transducer::{Transducer, loaded_pa};
 use serde::Deserialize;
+use spts_input::Refusal;
 
 /// Conductance proportional to pressure, without memory: G = k·P.
 ///
@@ -39,8 +40,8 @@ impl Default for LinearConfig {
 }
 
 impl TryFrom<LinearConfig> for Linear {
-    type Error = ConfigError;
-    fn try_from(c: LinearConfig) -> Result<Self, ConfigError> {
+    type Error = Refusal;
+    fn try_from(c: LinearConfig) -> Result<Self, Refusal> {
         let k = c.slope_s_per_pa;
         in_range("slope_s_per_pa", k, k > 0.0 && k <= 1.0, "(0, 1]")?;
         Ok(Self { slope_s_per_pa: k })

@@ -1,18 +1,15 @@
 //! The piezoresistive sheet.
 
-use crate::conditioning::{Conditioning, ConditioningConfig, Presses};
-use crate::config::{ConfigError, within};
-use crate::creep::{Creep, CreepConfig, CreepDecays};
-use crate::gains::TaxelGains;
-use crate::grid::{ConductanceMap, PressureMap};
-use crate::hysteresis::{Hysteresis, HysteresisConfig};
-use crate::law::PressureLaw;
-use crate::layout::SkinLayout;
-use crate::spread::Spread;
+use crate::check::{in_range, within};
+use crate::gains::{Spread, TaxelGains};
+use crate::layout::{ConductanceMap, PressureMap, SkinLayout};
+use crate::memory::{
+    Conditioning, ConditioningConfig, Creep, CreepConfig, CreepDecays, Hysteresis, HysteresisConfig, Presses,
+};
 use crate::streams::Streams;
-use crate::temperature::{REFERENCE_C, conductance_factor};
 use crate::transducer::{Transducer, elapsed_s, loaded_pa};
 use serde::Deserialize;
+use spts_input::Refusal;
 
 /// Parameters of [`Velostat`]: the static law
 ///
@@ -100,7 +97,7 @@ impl Default for VelostatConfig {
 /// sheet.start_session(1);
 /// let change = |(a, b): (&f64, f64)| (b / a).ln().abs();
 /// assert!(before.iter().zip(sheet.gains()).map(change).fold(0.0, f64::max) > 0.05, "gains differ by session");
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Velostat {
@@ -136,8 +133,8 @@ impl Velostat {
     /// A fresh sheet on `skin` in session 0. The taxels' gains come from `streams`: equal streams give the same sheet.
     ///
     /// # Errors
-    /// [`ConfigError`] for a parameter outside its range.
-    pub fn new(config: VelostatConfig, skin: &SkinLayout, streams: Streams) -> Result<Self, ConfigError> {
+    /// [`Refusal`] for a parameter outside its range.
+    pub fn new(config: VelostatConfig, skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
         let c = config;
         within("unloaded_s", c.unloaded_s, 0.0, 1.0, "[0, 1]")?;
         let hysteresis = Hysteresis::try_from(c.hysteresis)?;
@@ -234,6 +231,73 @@ impl Transducer for Velostat {
         self.plays.fill(0.0);
         self.slow.fill(0.0);
     }
+}
+
+// The static law: conductance as a function of a constant pressure.
+
+/// Pressure at which [`VelostatConfig::reference_s`](crate::VelostatConfig::reference_s) is given, Pa.
+pub const REFERENCE_PA: f64 = 10e3;
+
+/// Power law of a saturating pressure:
+///
+/// G = G_ref · (S(P)/P_ref)ⁿ, S(P) = P/(1 + P/Ps), P_ref = 10 kPa.
+///
+/// For P ≪ Ps it is the power law A·Pⁿ with A = G_ref/P_refⁿ, as the resistance R = a·P⁻ᵇ of force-sensing resistors is
+/// usually written. Saturating the pressure, rather than dividing the power law by (1 + P/Ps), keeps the law monotone
+/// for every n < 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PressureLaw {
+    reference_s: f64,
+    exponent: f64,
+    saturation_pa: f64,
+}
+
+impl PressureLaw {
+    /// Law with G_ref in (0, 1] S, n in [0.05, 2] and Ps in [1, 1e12] Pa.
+    ///
+    /// # Errors
+    /// [`Refusal`] for a value outside its range.
+    pub(crate) fn new(reference_s: f64, exponent: f64, saturation_pa: f64) -> Result<Self, Refusal> {
+        let ok = reference_s > 0.0 && reference_s <= 1.0;
+        in_range("reference_s", reference_s, ok, "(0, 1]")?;
+        within("exponent", exponent, 0.05, 2.0, "[0.05, 2]")?;
+        within("saturation_pa", saturation_pa, 1.0, 1e12, "[1, 1e12]")?;
+        Ok(Self {
+            reference_s,
+            exponent,
+            saturation_pa,
+        })
+    }
+
+    /// Conductance under `pressure_pa` ≥ 0, S.
+    #[inline]
+    pub(crate) fn conductance_s(&self, pressure_pa: f64) -> f64 {
+        let p = pressure_pa / (1.0 + pressure_pa / self.saturation_pa);
+        self.reference_s * (p / REFERENCE_PA).powf(self.exponent)
+    }
+}
+
+// Change of the conductance with temperature.
+
+/// Temperature for which the law is given, °C.
+pub const REFERENCE_C: f64 = 25.0;
+
+/// Factor of the conductance at `temperature_c`, when the resistance has the temperature coefficient α =
+/// `resistance_per_k`:
+///
+/// G(T)/G(25 °C) = exp(−α·(T − 25 °C)).
+///
+/// It solves dR/dT = α·R; the linear form R = R₂₅·(1 + α·ΔT) is its first order. Carbon black in polyethylene has a
+/// positive coefficient (PTC): the matrix expands and parts the chains of particles. Exactly 1 at 25 °C. A sheet near
+/// the melting point of its matrix (> 100 °C, a PTC switch) is not described.
+///
+/// # Errors
+/// [`Refusal`] for a temperature outside [-45, 65] °C, the range of use of the sheet, or a coefficient outside
+/// [-0.02, 0.02] 1/K.
+pub(crate) fn conductance_factor(temperature_c: f64, resistance_per_k: f64) -> Result<f64, Refusal> {
+    within("temperature_c", temperature_c, -45.0, 65.0, "[-45, 65]")?;
+    within("resistance_per_k", resistance_per_k, -0.02, 0.02, "[-0.02, 0.02]")?;
+    Ok((-resistance_per_k * (temperature_c - REFERENCE_C)).exp())
 }
 
 #[cfg(test)]
@@ -344,5 +408,31 @@ mod tests {
         }
         assert!(peaks.windows(2).all(|w| w[0] < w[1]), "{peaks:?}");
         assert!((0.64..0.96).contains(&(peaks[0] / peaks[9])), "{peaks:?}");
+    }
+
+    /// The reference itself, the power law far below saturation (neglected: n·P/Ps = 5e-7) and the plateau far above it
+    /// (n·Ps/P).
+    #[test]
+    fn the_law_has_its_limits() {
+        let law = PressureLaw::new(1e-4, 0.5, 1e12).unwrap();
+        assert_relative_eq!(law.conductance_s(REFERENCE_PA), 1e-4, max_relative = 1e-8);
+        assert_relative_eq!(
+            law.conductance_s(4e4) / law.conductance_s(1e4),
+            2.0,
+            max_relative = 1e-7
+        );
+        let law = PressureLaw::new(1e-4, 0.5, 4e4).unwrap();
+        assert_relative_eq!(law.conductance_s(1e9), 2e-4, max_relative = 0.5 * 4e4 / 1e9);
+        assert!(law.conductance_s(0.0) <= 0.0);
+    }
+
+    /// First order in α·ΔT = 0.04: what is left is half its square.
+    #[test]
+    fn warmth_raises_the_resistance() {
+        assert_relative_eq!(conductance_factor(25.0, 0.02).unwrap(), 1.0, epsilon = 0.0);
+        let factor = conductance_factor(35.0, 0.004).unwrap();
+        assert_relative_eq!(factor, 1.0 / 1.04, max_relative = 0.5 * 0.04 * 0.04);
+        assert!(conductance_factor(35.0, -0.004).unwrap() > 1.0);
+        assert!(conductance_factor(f64::NAN, 0.004).is_err());
     }
 }
