@@ -223,7 +223,7 @@ fn refuses_what_it_cannot_do() {
     ];
     for (config, bonded, name) in cases {
         let error = ElasticField::new(config, bonded, &SkinLayout::default()).err().unwrap();
-        assert!(error.field.contains(name), "{error}");
+        assert!(error.to_string().contains(name), "{error}");
     }
     let wide = SkinLayout::new(1000, 1000, 1e-3, 5e-4).unwrap();
     let error = ElasticField::new(ElasticConfig::default(), true, &wide).err().unwrap();
