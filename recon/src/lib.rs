@@ -36,6 +36,7 @@ pub mod recover;
 pub mod rows;
 mod shifted;
 mod sign_rows;
+pub mod statistics;
 mod stop;
 mod table_kernels;
 mod workspace;

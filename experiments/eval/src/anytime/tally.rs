@@ -3,6 +3,7 @@
 use crate::tally::bootstrap;
 use serde::{Deserialize, Serialize};
 use spts_models::Streams;
+use spts_recon::statistics;
 
 /// How one window ended.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,10 +91,7 @@ pub(crate) fn mean(scores: &[StopScores], all: &StopScores) -> StopScores {
         let sum: Option<f64> = scores.iter().map(get).sum();
         sum.filter(|_| !scores.is_empty()).map(|sum| sum / scores.len() as f64)
     };
-    let those = |get: fn(&StopScores) -> Option<f64>| {
-        let there: Vec<f64> = scores.iter().filter_map(get).collect();
-        (!there.is_empty()).then(|| there.iter().sum::<f64>() / there.len() as f64)
-    };
+    let those = |get: fn(&StopScores) -> Option<f64>| statistics::mean(scores.iter().filter_map(get));
     StopScores {
         samples: every(|s| s.samples),
         samples_median: all.samples_median,

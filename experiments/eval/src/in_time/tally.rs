@@ -4,6 +4,7 @@ use super::follow::Followed;
 use crate::tally::bootstrap;
 use serde::{Deserialize, Serialize};
 use spts_models::Streams;
+use spts_recon::statistics::mean;
 
 /// When an image is scored.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,8 +101,7 @@ fn means(objects: &[Vec<&Sums>]) -> [Option<f64>; 8] {
             let [sum, count] = contacts.iter().fold([0.0; 2], |[s, n], c| [s + c[k][0], n + c[k][1]]);
             (count > 0.0).then(|| sum / count)
         });
-        let (sum, count) = each.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
-        (count > 0.0).then(|| sum / count)
+        mean(each)
     })
 }
 

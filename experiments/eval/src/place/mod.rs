@@ -23,6 +23,7 @@ use spts_circuit::Recording;
 use spts_recon::Matrix;
 use spts_recon::localise::{BlobConfig, Localiser, distance};
 use spts_recon::rows::RowError;
+use spts_recon::statistics::mean;
 
 /// The published locators.
 const PUBLISHED: [&str; 2] = ["script_s5", "matched"];
@@ -119,7 +120,7 @@ pub fn touch_errors_px(recording: &Recording, touches: &[RecordedTouch], measure
                 errors_px.push(distance(place, truth));
             }
         }
-        (!errors_px.is_empty()).then(|| errors_px.iter().sum::<f64>() / errors_px.len() as f64)
+        mean(&errors_px)
     };
     measurements.iter().map(|m| mean_px(*m)).collect()
 }

@@ -1,8 +1,8 @@
 //! Lines of the benchmark's table.
 
 use serde::Serialize;
+use spts_recon::statistics::Band;
 use spts_studies::readouts::{ReadoutRow, ReadoutTrial, ReadoutsReport};
-use spts_studies::touches::Band;
 
 /// A line of `readouts.csv`.
 #[derive(Debug, Serialize)]

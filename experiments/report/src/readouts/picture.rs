@@ -1,8 +1,8 @@
 //! The benchmark as a picture.
 
 use crate::figures::{Chart, Claim, Series, Style};
+use spts_recon::statistics::Band;
 use spts_studies::readouts::{GOOD_IOU, READOUTS, ReadoutRow, ReadoutTrial, ReadoutsReport, SizeWire};
-use spts_studies::touches::Band;
 
 /// Number of the readout in the table: its ink, the same in every panel.
 fn ink(row: &ReadoutRow) -> u8 {

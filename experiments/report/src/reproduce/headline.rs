@@ -169,10 +169,5 @@ impl Headline {
 
 /// Mean of the finite values, or `None` without one.
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for v in values.filter(|v| v.is_finite()) {
-        sum += v;
-        count += 1.0;
-    }
-    (count > 0.0).then(|| sum / count)
+    spts_recon::statistics::mean(values.filter(|v| v.is_finite()))
 }

@@ -6,6 +6,7 @@ use spts_circuit::Recording;
 use spts_eval::decoders::TrainedDecoder;
 use spts_eval::place::RecordedBounce;
 use spts_eval::{Press, ScoreError, Scorer};
+use spts_recon::statistics::quantile;
 
 /// Numbers of measurements a frame that are compared.
 pub(super) const TRACKING_MEASUREMENTS: [usize; 4] = [25, 50, 75, 100];
@@ -129,27 +130,19 @@ pub(super) fn over_bounces(traces: &[TraceRow], m: usize) -> Vec<CourseRow> {
     let groups: Vec<&[&TraceRow]> = of.chunk_by(|a, b| instant(a).total_cmp(&instant(b)).is_eq()).collect();
     let most = groups.iter().map(|g| g.len()).max().unwrap_or(0);
     let kept = groups.into_iter().filter(|g| 2 * g.len() >= most);
-    kept.map(|group| CourseRow {
-        m,
-        time_ms: group[0].time_ms,
-        bounces: group.len(),
-        low_v: quantile(group, 0.25),
-        median_v: quantile(group, 0.5),
-        high_v: quantile(group, 0.75),
+    kept.map(|group| {
+        let peaks: Vec<f64> = group.iter().map(|t| t.peak_v).collect();
+        let [low_v, median_v, high_v] = [0.25, 0.5, 0.75].map(|share| quantile(&peaks, share).unwrap_or_default());
+        CourseRow {
+            m,
+            time_ms: group[0].time_ms,
+            bounces: group.len(),
+            low_v,
+            median_v,
+            high_v,
+        }
     })
     .collect()
-}
-
-/// Quantile of the peaks of `sorted`, which is not empty, between neighbours by straight line.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a place in a list of bounces, never negative"
-)]
-fn quantile(sorted: &[&TraceRow], share: f64) -> f64 {
-    let place = share * (sorted.len() - 1) as f64;
-    let (below, part) = (place.floor() as usize, place.fract());
-    let above = (below + 1).min(sorted.len() - 1);
-    sorted[below].peak_v + part * (sorted[above].peak_v - sorted[below].peak_v)
 }
 
 #[cfg(test)]

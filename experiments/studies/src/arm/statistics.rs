@@ -4,6 +4,7 @@ use serde::Serialize;
 use spts_circuit::Recording;
 use spts_eval::place::{RecordedTouch, find_touches, touch_errors_px};
 use spts_recon::metrics::{median, pearson};
+use spts_recon::statistics::mean;
 
 /// Output above which a taxel of an untouched skin counts as loaded, V: five times the error of a taxel estimated from
 /// 2000 measurements with a noise of 0.15 V, and a fifth of the largest value on the published skin.
@@ -95,9 +96,4 @@ fn lost(touch: &RecordedTouch, recording: &Recording) -> Option<f64> {
 
 fn largest(image: &[f64]) -> f64 {
     image.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let values: Vec<f64> = values.collect();
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }

@@ -1,7 +1,7 @@
 //! Means over presses with their standard errors.
 
 use super::score::PressScores;
-use super::student::two_sided;
+use spts_recon::statistics::{Sample, mean, two_sided};
 
 /// Probability with which a mean of nothing but chance is taken to stand out.
 pub(super) const CHANCE: f64 = 0.01;
@@ -49,16 +49,13 @@ impl MeanWithError {
 /// others.
 pub(crate) fn estimate(values: &[Vec<f64>]) -> MeanWithError {
     let sessions = values.iter().map(Vec::len).min().unwrap_or(0);
-    let of_session = |k: usize| values.iter().map(|v| v[k]).sum::<f64>() / values.len() as f64;
+    let of_session = |k: usize| mean(values.iter().map(|v| v[k])).unwrap_or_default();
     let means: Vec<f64> = (0..sessions).map(of_session).collect();
-    let count = sessions.max(1) as f64;
-    let mean = means.iter().sum::<f64>() / count;
-    let deviation: f64 = means.iter().map(|v| (v - mean).powi(2)).sum();
-    MeanWithError {
-        mean,
-        se: (deviation / (count - 1.0).max(1.0) / count).sqrt(),
+    Sample::of(&means).map_or_else(MeanWithError::default, |sample| MeanWithError {
+        mean: sample.mean,
+        se: sample.standard_error(),
         sessions,
-    }
+    })
 }
 
 /// Scores of a chain: `[object][session][key]`.

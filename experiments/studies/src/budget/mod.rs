@@ -14,7 +14,6 @@ mod score;
 mod scorer;
 mod size;
 mod skin;
-pub(crate) mod student;
 mod table;
 mod text;
 mod variants;

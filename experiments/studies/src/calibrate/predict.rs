@@ -2,9 +2,12 @@
 
 use super::statistics::{mean, sd};
 use serde::Serialize;
+use spts_recon::statistics::student_t;
 
 /// Probability that a new session's value lies in the predicted span.
 pub const COVERAGE: f64 = 0.9;
+/// Probability that it does not.
+const OUTSIDE: f64 = 0.1;
 
 /// Span in which the value of a new session lies with probability [`COVERAGE`], given those of earlier sessions: mean ±
 /// t·s·√(1 + 1/n), with the standard deviation s (n − 1 degrees of freedom) and the two-sided quantile t of Student's
@@ -26,57 +29,15 @@ pub fn predicted(values: &[f64]) -> Option<(f64, f64)> {
         [] => None,
         [only] => Some((*only, *only)),
         _ => {
+            let t = student_t(OUTSIDE, u32::try_from(n - 1).unwrap_or(u32::MAX));
             let (n, freedom) = (n as f64, n as f64 - 1.0);
             // `sd` divides by n
             let s = sd(values) * (n / freedom).sqrt();
-            let half = student_t(COVERAGE, values.len() - 1) * s * (1.0 + 1.0 / n).sqrt();
+            let half = t * s * (1.0 + 1.0 / n).sqrt();
             let centre = mean(values);
             Some((centre - half, centre + half))
         }
     }
-}
-
-/// Probability that |t| ≤ `t` for Student's distribution with `freedom` ≥ 1 degrees of freedom, and `t` ≥ 0.
-///
-/// Source: M. Abramowitz, I. A. Stegun, *Handbook of Mathematical Functions* (1964), 26.7.3 and 26.7.4.
-fn within(t: f64, freedom: usize) -> f64 {
-    let theta = (t / (freedom as f64).sqrt()).atan();
-    let (sin, cos) = theta.sin_cos();
-    let odd = freedom % 2 == 1;
-    // sin θ·(1 + 1/2·cos² θ + 1·3/(2·4)·cos⁴ θ + …) for even degrees, sin θ·(cos θ + 2/3·cos³ θ + …) for odd ones
-    let mut exponent = usize::from(odd);
-    let mut term = if odd { cos } else { 1.0 };
-    let mut sum = if freedom == 1 { 0.0 } else { term };
-    while exponent + 4 <= freedom {
-        term *= (exponent + 1) as f64 / (exponent + 2) as f64 * cos * cos;
-        sum += term;
-        exponent += 2;
-    }
-    if odd {
-        (theta + sin * sum) * std::f64::consts::FRAC_2_PI
-    } else {
-        sin * sum
-    }
-}
-
-/// The t that |t| of Student's distribution with `freedom` ≥ 1 degrees of freedom exceeds with probability 1 −
-/// `probability`, in (0, 1): by bisection.
-fn student_t(probability: f64, freedom: usize) -> f64 {
-    let mut high = 1.0;
-    while within(high, freedom) < probability {
-        high *= 2.0;
-    }
-    let mut low = 0.0;
-    // a bisection of [0, high] ends at the spacing of f64 after at most 64 halvings
-    for _ in 0..64 {
-        let middle = 0.5 * (low + high);
-        if within(middle, freedom) < probability {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
 }
 
 /// One parameter: the value of each session compared with the span predicted from the other sessions.
@@ -161,30 +122,9 @@ pub(super) fn clipped((low, high): (f64, f64), [lowest, highest]: [f64; 2]) -> (
 #[cfg(test)]
 mod tests {
     use super::*;
-    use approx::{assert_abs_diff_eq, assert_relative_eq};
+    use approx::assert_abs_diff_eq;
     use rand::RngExt as _;
     use spts_models::Streams;
-
-    /// Quantiles t.95 and t.975 of published tables, which have three places.
-    #[test]
-    fn quantiles_are_those_of_the_tables() {
-        for (freedom, ninety, ninety_five) in [
-            (1, 6.314, 12.706),
-            (2, 2.920, 4.303),
-            (3, 2.353, 3.182),
-            (4, 2.132, 2.776),
-            (5, 2.015, 2.571),
-            (9, 1.833, 2.262),
-            (10, 1.812, 2.228),
-            (30, 1.697, 2.042),
-            (120, 1.658, 1.980),
-        ] {
-            assert_abs_diff_eq!(student_t(0.90, freedom), ninety, epsilon = 0.0005);
-            assert_abs_diff_eq!(student_t(0.95, freedom), ninety_five, epsilon = 0.0005);
-        }
-        // one degree is Cauchy's distribution: t = tan(π·p/2)
-        assert_relative_eq!(student_t(0.5, 1), 1.0, max_relative = 1e-14);
-    }
 
     /// s = 1 of [1, 2, 3]: 2 ± 2.920·√(4/3). A new Gaussian value falls inside with the probability the span is for.
     #[test]

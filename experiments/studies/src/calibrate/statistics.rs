@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 use spts_recon::metrics::median;
+use spts_recon::statistics::quantile;
 
 /// Number of robust standard deviations beyond which a value is an outlier.
 pub const OUTLIER_SD: f64 = 5.0;
@@ -43,20 +44,12 @@ pub(super) fn kurtosis(values: &[f64]) -> f64 {
 /// Quantiles of the finite values at (k + ½)/`count`, by linear interpolation between order statistics. Empty without
 /// values.
 #[must_use]
-#[expect(clippy::cast_possible_truncation, reason = "places within a list")]
 pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let mut sorted = finite(values);
     sorted.sort_unstable_by(f64::total_cmp);
-    let Some(last) = sorted.len().checked_sub(1) else {
-        return Vec::new();
-    };
-    let at = |k: usize| {
-        let place = (k as f64 + 0.5) / count as f64 * last as f64;
-        let below = place.floor() as usize;
-        let above = (below + 1).min(last);
-        sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
-    };
-    (0..count).map(at).collect()
+    (0..count)
+        .filter_map(|k| quantile(&sorted, (k as f64 + 0.5) / count as f64))
+        .collect()
 }
 
 /// A number with its uncertainty.

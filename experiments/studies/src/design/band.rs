@@ -1,34 +1,6 @@
 //! The band in which the result of a check is expected.
 
-use crate::budget::student::two_sided;
-use serde::{Deserialize, Serialize};
-
-/// The mean of a quantity, and the band in which the mean of another run of the same size is expected.
-///
-/// ```
-/// use spts_studies::design::Promise;
-///
-/// let iou = Promise { mean: 0.81, low: 0.78, high: 0.84 };
-/// assert!(iou.holds(0.80) && !iou.holds(0.70));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Promise {
-    /// Mean of the repetitions.
-    pub mean: f64,
-    /// Lower end of the band.
-    pub low: f64,
-    /// Upper end of the band.
-    pub high: f64,
-}
-
-impl Promise {
-    /// Whether `found` lies in the band.
-    #[must_use]
-    pub fn holds(&self, found: f64) -> bool {
-        (self.low..=self.high).contains(&found)
-    }
-}
+use spts_recon::statistics::{Band, Sample};
 
 /// Probability that the check of a correct design finds one of its quantities outside the band.
 pub const OUTSIDE: f64 = 0.01;
@@ -46,43 +18,11 @@ pub const OUTSIDE: f64 = 0.01;
 /// which is close enough to normal for that. With q quantities, α = 0.01/q for each leaves at most 1 % for all
 /// (Bonferroni). The band is for the check, and not a confidence interval of the mean, which would be √2 narrower.
 /// Source: G. J. Hahn, W. Q. Meeker, "Statistical Intervals" (1991), §4.8.
-pub(super) fn promise(repetitions: &[f64], quantities: usize, range: [f64; 2]) -> Option<Promise> {
-    let count = repetitions.len();
-    if count < 2 {
-        return None;
-    }
-    let mean = repetitions.iter().sum::<f64>() / count as f64;
-    let square: f64 = repetitions.iter().map(|v| (v - mean).powi(2)).sum();
-    let freedom = u32::try_from(count - 1).unwrap_or(u32::MAX);
-    let t = quantile(OUTSIDE / quantities.max(1) as f64, freedom);
-    let half = t * (square / (count - 1) as f64 * 2.0 / count as f64).sqrt();
-    let [least, most] = range;
-    Some(Promise {
-        mean,
-        low: (mean - half).max(least),
-        high: (mean + half).min(most),
-    })
-}
-
-/// Halvings that find a quantile to rounding.
-const HALVINGS: usize = 100;
-
-/// t with P(|T| > t) = `outside` for Student's t with `freedom` degrees of freedom, by bisection.
-fn quantile(outside: f64, freedom: u32) -> f64 {
-    let mut high = 1.0;
-    while two_sided(high, freedom) > outside && high < 1e12 {
-        high *= 2.0;
-    }
-    let mut low = 0.0;
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (low + high);
-        if two_sided(middle, freedom) > outside {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    low
+pub(super) fn promise(repetitions: &[f64], quantities: usize, range: [f64; 2]) -> Option<Band> {
+    let sample = Sample::of(repetitions).filter(|sample| sample.count > 1)?;
+    let t = sample.t(OUTSIDE / quantities.max(1) as f64);
+    let half = t * (sample.variance * 2.0 / sample.count as f64).sqrt();
+    Some(Band::around(sample.mean, half).within(range))
 }
 
 #[cfg(test)]
@@ -93,10 +33,8 @@ mod tests {
 
     #[test]
     fn a_band_by_hand() {
-        // t of 99 % with 2 degrees of freedom is 9.925 and with 11 it is 3.106 as tabulated, to half a digit
-        assert!((quantile(0.01, 2) - 9.925).abs() < 5e-4 && (quantile(0.01, 11) - 3.106).abs() < 5e-4);
         let p = promise(&[1.0, 2.0, 3.0], 1, [-100.0, 9.0]).unwrap();
-        // s = 1, √(2/3)
+        // s = 1, √(2/3); t of 99 % with 2 degrees of freedom is 9.925 as tabulated, to half a digit
         assert!((p.mean - 2.0).abs() < 1e-12 && (p.low - (2.0 - 9.925 * (2.0_f64 / 3.0).sqrt())).abs() < 1e-3);
         assert!((p.high - 9.0).abs() < 1e-12 && p.holds(3.0) && !p.holds(9.5) && !p.holds(f64::NAN));
         assert!(promise(&[1.0], 1, [0.0, 1.0]).is_none());

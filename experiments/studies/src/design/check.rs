@@ -1,7 +1,6 @@
 //! Checks a design with other touches.
 
 use super::answer::layout_of;
-use super::band::Promise;
 use super::bench::{Bench, draw, mean};
 use super::error::DesignError;
 use super::report::Design;
@@ -12,6 +11,7 @@ use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Profile, parse_patterns};
 use spts_models::Streams;
+use spts_recon::statistics::Band;
 
 /// A design, its files, and the seed of the check.
 #[derive(Debug, Clone)]
@@ -32,7 +32,7 @@ pub struct CheckedQuantity {
     /// Name.
     pub quantity: &'static str,
     /// Promised value and band.
-    pub promised: Promise,
+    pub promised: Band,
     /// Value in the check.
     pub found: f64,
     /// Whether the value lies in the band.
@@ -131,7 +131,7 @@ impl DesignCheck {
         )?;
         let scores = bench.score(&bench.measure(drawn, m)?, m, classes.as_ref())?;
         progress.end();
-        let quantity = |quantity, promised: Promise, found: f64| CheckedQuantity {
+        let quantity = |quantity, promised: Band, found: f64| CheckedQuantity {
             quantity,
             promised,
             found,

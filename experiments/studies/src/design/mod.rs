@@ -19,7 +19,7 @@ mod study;
 mod text;
 mod wire;
 
-pub use band::{OUTSIDE, Promise};
+pub use band::OUTSIDE;
 pub use check::{CheckReport, CheckedQuantity, DesignCheck};
 pub use error::DesignError;
 pub use objects::DesignObjects;

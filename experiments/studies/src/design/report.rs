@@ -1,10 +1,10 @@
 //! The design and its promise.
 
-use super::band::Promise;
 use super::objects::DesignObjects;
 use super::rows::RowSource;
 use super::wire::WireDesign;
 use serde::{Deserialize, Serialize};
+use spts_recon::statistics::Band;
 
 /// A designed skin: everything needed to simulate it again, and its expected performance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -66,13 +66,13 @@ pub struct DecoderDesign {
 #[serde(deny_unknown_fields)]
 pub struct Expectation {
     /// Intersection over union of image and touch.
-    pub iou: Promise,
+    pub iou: Band,
     /// Median distance between image and touch, taxels.
-    pub place_px: Promise,
+    pub place_px: Band,
     /// Median distance between image and touch, mm.
-    pub place_mm: Promise,
+    pub place_mm: Band,
     /// Share of the seventeen objects that are recognised; `None` if it cannot be determined.
-    pub class: Option<Promise>,
+    pub class: Option<Band>,
     /// Why it cannot be determined.
     pub no_class: Option<String>,
     /// Number of repetitions, each with its own specimen, parts, touches and noise.
@@ -188,7 +188,7 @@ pub struct DesignPoint {
     /// Measurements of every wire.
     pub m_per_wire: usize,
     /// Mean IoU and its band over the repetitions of the search.
-    pub iou: crate::touches::Band,
+    pub iou: Band,
     /// Median place error, taxels.
     pub place_px: f64,
 }

@@ -1,12 +1,12 @@
 //! A design and its check as text.
 
 use super::answer::counted;
-use super::band::Promise;
 use super::check::CheckReport;
 use super::report::{Alternative, DesignReport};
 use super::rows::RowSource;
 use super::wire::FeedbackLimit;
 use crate::electronics::ElectronicsStudy;
+use spts_recon::statistics::Band;
 
 impl DesignReport {
     /// The design as text.
@@ -222,7 +222,7 @@ impl CheckReport {
 }
 
 /// A mean and its band.
-fn promise(p: &Promise, digits: usize) -> String {
+fn promise(p: &Band, digits: usize) -> String {
     format!("{:.digits$} [{:.digits$}, {:.digits$}]", p.mean, p.low, p.high)
 }
 

@@ -1,8 +1,8 @@
 //! Results of the benchmark.
 
 use super::published::{PUBLISHED, PublishedSystem};
-use crate::touches::Band;
 use serde::Serialize;
+use spts_recon::statistics::Band;
 
 /// IoU from which an image counts as good: the wanted IoU of large skins in [`explore`](crate::explore).
 pub const GOOD_IOU: f64 = crate::explore::WANTED_IOU;

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_models::{SkinLayout, Streams};
+use spts_recon::statistics::mean;
 
 /// Pitch of every skin, m: that of the published one.
 const PITCH_M: f64 = 15e-3;
@@ -237,11 +238,6 @@ impl Means {
     }
 }
 
-/// Mean, when there is something.
-fn mean(values: &[f64]) -> Option<f64> {
-    (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-}
-
 /// Bands over the repetitions, one line a number of measurements.
 fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<ReadoutTrial> {
     let count = repetitions.first().map_or(0, |means| means.len());
@@ -251,9 +247,7 @@ fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<ReadoutTrial> {
             |value: &dyn Fn(&Means) -> Option<f64>| band(&means.iter().filter_map(|m| value(m)).collect::<Vec<f64>>());
         let measurements = means.first().map_or(0, |m| m.measurements);
         let touches = |m: &Means| (m.place_px.len() + m.lost).max(1) as f64;
-        let share = |part: &dyn Fn(&Means) -> usize| {
-            mean(&means.iter().map(|m| part(m) as f64 / touches(m)).collect::<Vec<f64>>())
-        };
+        let share = |part: &dyn Fn(&Means) -> usize| mean(means.iter().map(|m| part(m) as f64 / touches(m)));
         ReadoutTrial {
             measurements,
             frames_hz: 1.0 / (measurements as f64 * period_s),

@@ -1,7 +1,7 @@
 //! The benchmark as text tables.
 
 use super::report::{GOOD_IOU, ReadoutTrial, ReadoutsReport};
-use crate::touches::Band;
+use spts_recon::statistics::Band;
 
 /// "0.87 ± 0.03": mean and half width of a band.
 fn band(band: Option<Band>, scale: f64, digits: usize) -> String {

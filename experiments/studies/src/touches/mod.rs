@@ -28,5 +28,5 @@ mod wire;
 
 pub use error::TouchError;
 pub use scene::{Touch, TouchObjects, TouchScene};
-pub use score::{Band, TouchScore, band};
+pub use score::{TouchScore, band};
 pub use wire::TouchWire;
