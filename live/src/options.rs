@@ -7,7 +7,7 @@ use spts_circuit::{PROFILES, Profile};
 use spts_contact::objects::pressable;
 use spts_eval::decoders::{DECODERS, DecoderSpec, Needs, PublishedDecode};
 use spts_models::SkinLayout;
-use spts_recon::rows::{DESIGNERS, Designer, Levels, RowNeeds};
+use spts_recon::rows::{DESIGNERS, Designer, RowNeeds};
 
 /// Measurements of an image.
 pub const MEASUREMENTS: [usize; 2] = [5, 100];
@@ -184,10 +184,9 @@ fn decoders() -> impl Iterator<Item = &'static DecoderSpec> {
 
 /// Designers of rows of ±1 for images.
 fn designers() -> impl Iterator<Item = &'static Designer> {
-    let random = ["random", "seeds_search"];
-    DESIGNERS.iter().filter(move |designer| {
-        designer.levels == Levels::Signs && designer.needs != RowNeeds::Classes && !random.contains(&designer.name)
-    })
+    DESIGNERS
+        .iter()
+        .filter(|designer| designer.needs != RowNeeds::Classes && designer.name != RANDOM)
 }
 
 /// The decoder with this name.

@@ -8,7 +8,7 @@ A decoder takes windows of measurements, as `spts.windows` makes them, and answe
     images = est.predict(X)                     # (n, taxels)
     est.score(X, truths)                        # mean intersection over union
 
-There is one class a decoder: `Omp`, `NnLasso`, `NnLmmse`, `Sbl`, `Tv` and so on; `names()` lists them all.
+There is one class a decoder: `Omp`, `NnLasso`, `NnLmmse`, `Tv` and so on; `names()` lists them all.
 """
 
 from __future__ import annotations

@@ -8,12 +8,10 @@
 //! `FILE` holds little-endian 64-bit words: taxels N, atoms K, measurements M, sparsity S, windows W; the dictionary (N
 //! × K, `f64`); W × M rows of ⌈N/64⌉ words of signs; W × M measurements (`f64`). `MODE`: `form` forms Φ·D from `f64`
 //! tables, `form32` from `f32` tables; `decode` is what is left when the last sample arrives, Φ·D ready; `all` and
-//! `all32` do both for every window; `ols` and `nn_omp` decode with these; `shared` decodes all windows with the first
-//! window's Φ·D; `online` adds every measurement to what is known and decodes after the last one, the rows having been
-//! announced before (all measurements of a window are counted, although only the last one comes last).
+//! `all32` do both for every window; `shared` decodes all windows with the first window's Φ·D.
 
-use spts_recon::recover::{BatchOmp, NnOmp, Ols, Omp, OnlineOmp};
-use spts_recon::{Matrix, MatrixView, Problem, Recover, SignTables, Solution, TableFloat, Workspace};
+use spts_recon::recover::{BatchOmp, Omp};
+use spts_recon::{Matrix, MatrixView, Problem, Recover as _, SignTables, Solution, TableFloat, Workspace};
 use std::error::Error;
 use std::hint::black_box;
 use std::io::Write as _;
@@ -74,8 +72,8 @@ fn run(
 }
 
 /// Φ·D of every window, one after the other.
-fn formed<T: TableFloat>(windows: &Windows) -> Vec<f64> {
-    let tables = SignTables::<T>::new(windows.dictionary.view());
+fn formed(windows: &Windows) -> Vec<f64> {
+    let tables = SignTables::<f64>::new(windows.dictionary.view());
     let mut rows = vec![0.0; windows.y.len() * windows.dictionary.ncols()];
     tables.fill_rows(&windows.signs, &mut rows);
     rows
@@ -101,9 +99,9 @@ fn form_and<T: TableFloat>(windows: &Windows, repeats: usize, decode: bool) -> R
     Ok(supports)
 }
 
-fn decode(windows: &Windows, repeats: usize, pursuit: &dyn Recover) -> Result<Vec<Vec<usize>>, Box<dyn Error>> {
+fn decode(windows: &Windows, repeats: usize) -> Result<Vec<Vec<usize>>, Box<dyn Error>> {
     let (m, k) = (windows.m, windows.dictionary.ncols());
-    let rows = formed::<f64>(windows);
+    let (rows, pursuit) = (formed(windows), Omp::new(windows.sparsity));
     let (mut work, mut supports) = (Workspace::default(), Vec::new());
     for _ in 0..repeats {
         supports = run(windows, |index, _, y, solution| {
@@ -116,41 +114,13 @@ fn decode(windows: &Windows, repeats: usize, pursuit: &dyn Recover) -> Result<Ve
 
 fn shared(windows: &Windows, repeats: usize) -> Result<Vec<Vec<usize>>, Box<dyn Error>> {
     let (m, k) = (windows.m, windows.dictionary.ncols());
-    let rows = formed::<f64>(windows);
+    let rows = formed(windows);
     let pursuit = BatchOmp::new(MatrixView::new(m, k, &rows[..m * k])?, windows.sparsity)?;
     let (mut work, mut supports) = (Workspace::default(), Vec::new());
     for _ in 0..repeats {
         supports = run(windows, |_, _, y, solution| {
             Ok(pursuit.recover_into(y, &mut work, solution)?)
         })?;
-    }
-    Ok(supports)
-}
-
-/// Windows whose Gram matrices are in reach of the processor at a time, as that of the one that is measured is.
-const NEAR: usize = 8;
-
-fn online(windows: &Windows, repeats: usize) -> Result<Vec<Vec<usize>>, Box<dyn Error>> {
-    let (m, k) = (windows.m, windows.dictionary.ncols());
-    let rows = formed::<f64>(windows);
-    let (mut work, mut solution, mut supports) = (Workspace::default(), Solution::default(), Vec::new());
-    for (rows, ys) in rows.chunks(NEAR * m * k).zip(windows.y.chunks(NEAR * m)) {
-        let mut pursuits = vec![OnlineOmp::new(k, windows.sparsity); ys.len() / m];
-        for (pursuit, rows) in pursuits.iter_mut().zip(rows.chunks_exact(m * k)) {
-            pursuit.announce(MatrixView::new(m, k, rows)?)?;
-        }
-        for repeat in 0..repeats {
-            for (pursuit, y) in pursuits.iter_mut().zip(black_box(ys).chunks_exact(m)) {
-                pursuit.clear_measurements();
-                for &y in y {
-                    pursuit.measure(y)?;
-                }
-                pursuit.recover_into(&mut work, &mut solution)?;
-                if repeat == 0 {
-                    supports.push(black_box(&solution).support.clone());
-                }
-            }
-        }
     }
     Ok(supports)
 }
@@ -166,14 +136,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         "form32" => form_and::<f32>(&windows, repeats, false),
         "all" => form_and::<f64>(&windows, repeats, true),
         "all32" => form_and::<f32>(&windows, repeats, true),
-        "decode" => decode(&windows, repeats, &Omp::new(windows.sparsity)),
-        "ols" => decode(&windows, repeats, &Ols::new(windows.sparsity)),
-        "nn_omp" => decode(&windows, repeats, &NnOmp::new(windows.sparsity)),
+        "decode" => decode(&windows, repeats),
         "shared" => shared(&windows, repeats),
-        "online" => online(&windows, repeats),
-        other => {
-            Err(format!("mode {other}: not form, form32, all, all32, decode, ols, nn_omp, shared or online").into())
-        }
+        other => Err(format!("mode {other}: not form, form32, all, all32, decode or shared").into()),
     }?;
     writeln!(std::io::stdout(), "{{\"supports\": {supports:?}}}")?;
     Ok(())

@@ -217,28 +217,10 @@ fn gram_step_of(g: &[f64], done: &[f64], overlaps: &[f64], d: f64, p: f64, v: &m
     }
 }
 
-/// Takes the squares of `v` out of `remaining` and inverts what is left into `weights`; a weight of 0 stays 0, and
-/// becomes 0 when less than `least` of what the atom had before is left.
-#[inline(always)]
-fn deflate_of(v: &[f64], least: f64, remaining: &mut [f64], weights: &mut [f64]) {
-    for ((w, r), v) in weights.iter_mut().zip(remaining).zip(v) {
-        let rest = *r - v * v;
-        let usable = *w > 0.0 && rest > least * *r;
-        *r = rest;
-        *w = if usable { 1.0 / rest } else { 0.0 };
-    }
-}
-
 /// `out = Aᵀ y` for row-major `values` with as many rows as `y` has entries and as many columns as `out`.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn adjoint(values: &[f64], y: &[f64], out: &mut [f64]) {
     adjoint_of(values, y, out);
-}
-
-/// `out += Aᵀ y`, as [`adjoint`].
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn add_adjoint(values: &[f64], y: &[f64], out: &mut [f64]) {
-    column_sums_of(values, out.len(), 0, y, out, |w, v| w * v);
 }
 
 /// [`add_rows_of`].
@@ -293,18 +275,6 @@ pub(crate) fn best_magnitude(c: &[f64], w: &[f64]) -> Option<(usize, f64)> {
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn best_positive(c: &[f64], w: &[f64]) -> Option<(usize, f64)> {
     best_of(c, w, |c, w| c * w)
-}
-
-/// The index of the largest cₖ²·wₖ above 0, the first of equals, with its score.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn best_square(c: &[f64], w: &[f64]) -> Option<(usize, f64)> {
-    best_of(c, w, |c, w| c * c * w)
-}
-
-/// [`deflate_of`].
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn deflate(v: &[f64], least: f64, remaining: &mut [f64], weights: &mut [f64]) {
-    deflate_of(v, least, remaining, weights);
 }
 
 /// [`gram_step_of`].
@@ -374,10 +344,6 @@ mod tests {
             gram_step(&chosen, &a, &y, 0.7, 0.3, &mut v, &mut c);
             gram_step_of(&chosen, &a, &y, 0.7, 0.3, &mut v1, &mut c1);
             assert_eq!((bits(&v), bits(&c)), (bits(&v1), bits(&c1)), "{m} × {k}");
-            let (mut left, mut left1, mut z, mut z1) = (vec![0.5; k], vec![0.5; k], w.clone(), w.clone());
-            deflate(&v, 0.1, &mut left, &mut z);
-            deflate_of(&v, 0.1, &mut left1, &mut z1);
-            assert_eq!((bits(&left), bits(&z)), (bits(&left1), bits(&z1)), "{m} × {k}");
         }
     }
 

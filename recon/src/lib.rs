@@ -2,9 +2,9 @@
 //!
 //! The crate knows nothing about skins or circuits: its inputs are matrices and slices of `f64`, its outputs images and
 //! labels. [`recover`] reconstructs images, [`dictionary`] learns their atoms, [`classify`] identifies objects,
-//! [`localise`] finds contacts, and [`rows`] designs measurements. Three algorithms work while measurements arrive:
-//! [`recover::OnlineOmp`], [`recover::SequentialEstimate`] and [`classify::AnytimeClassifier`]. A [`StopRule`] ends the
-//! last two as soon as they are confident enough.
+//! [`localise`] finds contacts, and [`rows`] designs measurements. Two algorithms work while measurements arrive:
+//! [`recover::SequentialEstimate`] and [`classify::EvidenceClassifier`]. A [`StopRule`] ends them as soon as they are
+//! confident enough.
 //!
 //! ```
 //! use spts_recon::{Matrix, Problem, Recover as _, Workspace, recover::Omp};
@@ -21,7 +21,6 @@
 mod amplitude;
 mod checks;
 pub mod classify;
-pub mod coherence;
 pub mod dictionary;
 mod elementary;
 mod kernels;

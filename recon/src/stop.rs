@@ -4,7 +4,7 @@ use crate::recover::ParameterError;
 
 /// Stops a series of measurements at a wanted confidence: after at least one sample, and at most [`StopRule::most`].
 ///
-/// The confidence comes from the algorithm: the probability of the best class ([`crate::classify::AnytimeClassifier`]),
+/// The confidence comes from the algorithm: the probability of the best class ([`crate::classify::EvidenceClassifier`]),
 /// or the expected intersection over union of an image ([`crate::recover::SequentialEstimate`]).
 ///
 /// Source of the rule for classes: C. W. Baum, V. V. Veeravalli, "A sequential procedure for multihypothesis testing",

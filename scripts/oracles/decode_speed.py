@@ -3,16 +3,14 @@
 Every window has its own Φ of ±1 (M × N) and y = Φ·D·α + noise with S planted atoms of a random dictionary D (N × K). Orthogonal matching
 pursuit of S atoms on the columns of Φ·D scaled to length 1 (SPAMS: orthogonal least squares, which is what its `omp` is):
 
-    formed  Φ·D given for every window; ours twice: `decode` with all of the pursuit left to do, `online` with Gram matrix and lengths ready
-            before the samples, which are added one by one (peers cannot; they are compared with `decode`)
+    formed  Φ·D given for every window
     all     Φ·D formed from Φ, and its columns scaled where the program does not do it
     shared  all windows with the Φ·D of the first one, given at once
 
 The peers' Φ·D is one matrix product for all windows, the fastest way there is in numpy. Times are the thread's CPU time, medians over
 alternating rounds; their ratios are the result (float32 against our `f32` tables). Ours is the example `decode_time`, timed as a process of many repeats less a process of
-one. Supports are compared with scikit-learn's. Beside it the evidence classifier (example `evidence_time`, 17 classes, M = 20), which has no peer.
-
-    cargo build --release -p spts-recon --example decode_time --example evidence_time
+one. Supports are compared with scikit-learn's. 
+    cargo build --release -p spts-recon --example decode_time
     python scripts/oracles/decode_speed.py [--json] [--rounds 5] [--windows 1000]
 """
 
@@ -37,12 +35,11 @@ N, K, M, S = 100, 100, 25, 6
 NOISE = 0.01
 ROOT = pathlib.Path(__file__).parents[2]
 OURS = ROOT / "target/release/examples/decode_time"
-EVIDENCE = ROOT / "target/release/examples/evidence_time"
 # a round of ours lasts at least this long, s
 ROUND_S = 0.2
 # scikit-learn is timed on the first of this many windows
 FEW = 200
-OUR_MODES = ["form", "form32", "decode", "all", "all32", "ols", "nn_omp", "shared", "online"]
+OUR_MODES = ["form", "form32", "decode", "all", "all32", "shared"]
 
 
 class Windows:
@@ -161,7 +158,7 @@ def race(windows, rounds):
                 file = shared if mode == "shared" else own
                 many, supports = ours_seconds(file, mode, 1 + repeats[mode])
                 theirs["ours", mode] = 1e6 * (many - ours_seconds(file, mode, 1)[0]) / (repeats[mode] * windows.count)
-                if mode in ("decode", "all", "all32", "shared", "online"):
+                if mode in ("decode", "all", "all32", "shared"):
                     agreements[mode] = agreement(supports, shared_supports if mode == "shared" else own_supports)
             for key, value in theirs.items():
                 times.setdefault(key, []).append(value)
@@ -182,9 +179,8 @@ def main():
             ours += "32"
         ratio = us / times["ours", ours] if program != "ours" else None
         rows.append({"program": program, "task": task, "us": us, "times_ours": ratio})
-    evidence = json.loads(subprocess.run([EVIDENCE, "20", "200"], check=True, capture_output=True).stdout)
     if options.json:
-        print(json.dumps({"rows": rows, "agreement": agreements, "evidence_us": evidence}))
+        print(json.dumps({"rows": rows, "agreement": agreements}))
         return
     print(f"{'program':14} {'task':7} {'µs':>8} {'× ours':>7}")
     for row in rows:
@@ -192,10 +188,6 @@ def main():
         print(f"{row['program']:14} {row['task']:7} {row['us']:8.2f} {ratio}")
     for mode, share in agreements.items():
         print(f"supports of {mode} equal scikit-learn's: {100 * share:.1f} %")
-    print(
-        f"evidence, M = {evidence['m']}: {evidence['prepare']:.1f} µs before the samples, {evidence['samples']:.1f} for all of them, "
-        f"{evidence['last']:.1f} after the last one, {evidence['all']:.1f} in all, {evidence['image']:.1f} for the image"
-    )
 
 
 if __name__ == "__main__":

@@ -1,12 +1,11 @@
-"""Supports that scikit-learn and SPAMS find in random problems → tests/oracles/pursuits.json.
+"""Supports that scikit-learn finds in random problems → tests/oracles/pursuits.json.
 
-scikit-learn's `orthogonal_mp` is orthogonal matching pursuit, on the columns as they are and on columns of length 1; what SPAMS
-calls `omp` is orthogonal least squares. Supports are sorted: neither program tells the order.
+scikit-learn's `orthogonal_mp` is orthogonal matching pursuit, on the columns as they are and on columns of length 1.
+Supports are sorted: the program does not tell the order.
 
     python scripts/oracles/pursuits.py
 """
 
-import importlib.metadata
 import json
 import pathlib
 import warnings
@@ -14,7 +13,6 @@ import warnings
 import numpy as np
 import problems
 import sklearn
-import spams
 from sklearn.linear_model import orthogonal_mp
 
 COUNT = 1000
@@ -23,16 +21,14 @@ OUT = pathlib.Path(__file__).parents[2] / "tests/oracles/pursuits.json"
 
 def main():
     warnings.simplefilter("error")
-    rows = {"omp": [], "omp_normalized": [], "ols": []}
+    rows = {"omp": [], "omp_normalized": []}
     for index in range(COUNT):
         a, y, s = problems.problem(index)
         unit = a / np.linalg.norm(a, axis=0)
         rows["omp"].append(orthogonal_mp(a, y, n_nonzero_coefs=s))
         rows["omp_normalized"].append(orthogonal_mp(unit, y, n_nonzero_coefs=s))
-        code = spams.omp(np.asfortranarray(y[:, None]), np.asfortranarray(unit), L=s, eps=0.0, numThreads=1)
-        rows["ols"].append(code.toarray()[:, 0])
     supports = {name: [np.flatnonzero(code).tolist() for code in codes] for name, codes in rows.items()}
-    versions = {"scikit-learn": sklearn.__version__, "spams-bin": importlib.metadata.version("spams-bin"), "numpy": np.__version__}
+    versions = {"scikit-learn": sklearn.__version__, "numpy": np.__version__}
     lines = [f'  "{name}": [\n    ' + ",\n    ".join(chunks(codes)) + "\n  ]" for name, codes in supports.items()]
     OUT.write_text('{\n  "versions": ' + json.dumps(versions) + ",\n" + ",\n".join(lines) + "\n}\n")
 

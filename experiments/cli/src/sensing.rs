@@ -89,14 +89,13 @@ fn layout([rows, cols]: [usize; 2]) -> Result<SkinLayout, CliError> {
   spts simulate press/T --set rows.patterns_file=out/sensing/rows.txt --weights firmware
 
 Designers:
-  random, seeds_search                   pseudorandom rows; the best of many seeds
-  cosine_signs, hadamard, cake_cutting   need nothing but the rows and columns of the skin
-  greedy, separable, analog              need a prior of images; separable is for large skins, analog has 256 levels
-  classes                                needs templates of objects from --recordings; its rows tell the objects apart
+  random              pseudorandom rows
+  cosine_signs        needs nothing but the rows and columns of the skin
+  greedy, separable   need a prior of images; separable is for large skins
+  classes             needs templates of objects from --recordings; its rows tell the objects apart
 
 Files in DIR:
-  rows.txt            one line a row: + or - for each taxel, or codes 0 to 255 from analog; for patterns_file
-                      under [rows] of a scene
+  rows.txt            one line a row: + or - for each taxel; for patterns_file under [rows] of a scene
   weights.json        the same rows as info.weights of a session: see docs/session.md
   bus.csv             what the master writes to each cell to load its pattern; up to 112 cells
   seeds.txt           seeds whose generators begin with these rows; up to 24 rows of ±1

@@ -10,8 +10,7 @@ use spts_models::{SkinLayout, Streams};
 use spts_recon::classify::{Component, TemplateModel};
 use spts_recon::recover::ImagePrior;
 use spts_recon::rows::{
-    DesignRows as _, Designer, Expected, Levels, Random, RowTask, Tolerances, fewest_flips, largest_sum,
-    posterior_trace,
+    DesignRows as _, Designer, Expected, Random, RowTask, Tolerances, fewest_flips, largest_sum, posterior_trace,
 };
 use std::path::PathBuf;
 
@@ -68,7 +67,7 @@ pub struct RowDesignReport {
     pub skin: [usize; 2],
     /// Number of rows M.
     pub m: usize,
-    /// "binary", ±1, or "analog".
+    /// "binary": ±1.
     pub levels: &'static str,
     /// Share of the expected images' variance that remains after the M measurements.
     pub variance_left: f64,
@@ -119,17 +118,11 @@ impl RowDesign {
         } else {
             (0..rows.nrows()).collect()
         };
-        let mode = match self.designer.levels {
-            Levels::Signs => WeightMode::Binary,
-            Levels::Analog => WeightMode::Analog,
-        };
+        let mode = WeightMode::Binary;
         let levels: Vec<f64> = order.iter().flat_map(|&r| rows.row(r)).copied().collect();
         let patterns = Patterns::of_levels(order.len(), &levels).map_err(Refusal::from_error)?;
         let weights = Weights::with_patterns(mode, patterns.clone()).map_err(Refusal::from_error)?;
-        let seeds = match mode {
-            WeightMode::Binary => seeds_of_first_window(&patterns).ok(),
-            _ => None,
-        };
+        let seeds = seeds_of_first_window(&patterns).ok();
         let random = |seed: u64| {
             let task = RowTask {
                 seed: self.seed.wrapping_add(seed),
@@ -142,7 +135,7 @@ impl RowDesign {
             .map(random)
             .collect::<Result<Vec<f64>, _>>()
             .map_err(Refusal::from_error)?;
-        let message = (mode == WeightMode::Binary && rows.nrows() <= PATTERN_BITS)
+        let message = (rows.nrows() <= PATTERN_BITS)
             .then(|| {
                 Pattern::new(rows.nrows(), 0)
                     .ok()
@@ -317,11 +310,6 @@ mod tests {
                 .unwrap_err()
                 .to_string()
                 .contains("nowhere")
-        );
-        let analog = design("analog", DesignImages::Smooth(1.5)).run().unwrap();
-        assert_eq!(
-            (analog.levels, analog.bytes_a_cell, analog.seeds_found),
-            ("analog", None, false)
         );
     }
 }

@@ -1,13 +1,13 @@
-//! Classification of objects: from an image ([`Src`]), from a window of measurements ([`EvidenceClassifier`]), or
-//! measurement by measurement ([`AnytimeClassifier`]).
+//! Classification of objects: from an image ([`Src`]), or from measurements, one by one
+//! ([`EvidenceClassifier`]).
 
 mod evidence;
 mod src;
 mod vote;
 
 pub use evidence::{
-    AnytimeClassifier, ClusterModel, Clusters, Component, Decision, Evidence, EvidenceClassifier, EvidenceError,
-    ImageEstimator, Posterior, Preparation, TemplateModel,
+    ClusterModel, Clusters, Component, Decision, Evidence, EvidenceClassifier, EvidenceError, ImageEstimator,
+    Posterior, Preparation, TemplateModel,
 };
 pub use src::{Library, LibraryError, Src};
 pub use vote::{VoteScore, majority, vote_groups};

@@ -5,7 +5,7 @@ use super::training::{Training, transposed};
 use crate::kernels::axpy;
 use crate::matrix::Matrix;
 use crate::problem::Solution;
-use crate::recover::{BatchOmp, Choice};
+use crate::recover::BatchOmp;
 use crate::workspace::Workspace;
 use rayon::prelude::*;
 
@@ -17,10 +17,9 @@ pub(super) fn code(
     training: &Training,
     atoms: &Matrix,
     n_nonzero_coefs: usize,
-    choice: Choice,
     codes: &mut Vec<Solution>,
 ) -> Result<(), DictionaryError> {
-    let pursuit = BatchOmp::new(transposed(atoms).view(), n_nonzero_coefs)?.with_choice(choice);
+    let pursuit = BatchOmp::new(transposed(atoms).view(), n_nonzero_coefs)?;
     codes.resize_with(training.len(), Solution::default);
     codes
         .par_iter_mut()

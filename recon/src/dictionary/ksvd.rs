@@ -5,11 +5,9 @@ use super::error::DictionaryError;
 use super::replace::replace_useless;
 use super::training::{Training, at_least, set_unit, transposed};
 use super::users::Users;
-use crate::checks::within;
 use crate::kernels::{axpy, dot};
 use crate::matrix::Matrix;
 use crate::problem::Solution;
-use crate::recover::Choice;
 use rand_chacha::ChaCha8Rng;
 
 /// K-SVD alternates between sparse coding (a pursuit with `n_nonzero_coefs` atoms) and updates of single atoms. An
@@ -19,8 +17,7 @@ use rand_chacha::ChaCha8Rng;
 /// that no image uses, or that equals another up to sign, is replaced by the image with the largest error.
 /// Source: M. Aharon, M. Elad, A. Bruckstein, IEEE Trans. Signal Process. 54 (2006) 4311; R. Rubinstein, M. Zibulevsky,
 /// M. Elad, "Efficient implementation of the K-SVD algorithm using batch orthogonal matching pursuit", Technion
-/// CS-2008-08 (2008), with one power step an atom as the rank-one fit; momentum: T. Pock, S. Sabach, "Inertial proximal
-/// alternating linearized minimization for nonconvex and nonsmooth problems", SIAM J. Imaging Sci. 9 (2016) 1756.
+/// CS-2008-08 (2008), with one power step an atom as the rank-one fit.
 ///
 /// ```
 /// use rand::SeedableRng as _;
@@ -43,11 +40,6 @@ pub struct Ksvd {
     pub n_nonzero_coefs: usize,
     /// Number of sweeps.
     pub n_iter: usize,
-    /// Rule by which the pursuit selects atoms.
-    pub choice: Choice,
-    /// Share, in [0, 1), of an atom's last change that is added again before the images are coded. 0 is the published
-    /// algorithm. 0.5 to 0.7 reach the same error in about half the sweeps; close to 1 the sweeps no longer converge.
-    pub momentum: f64,
 }
 
 impl Default for Ksvd {
@@ -56,24 +48,11 @@ impl Default for Ksvd {
             n_components: 100,
             n_nonzero_coefs: 20,
             n_iter: 15,
-            choice: Choice::Correlation,
-            momentum: 0.0,
         }
     }
 }
 
 impl Ksvd {
-    /// Settings that reach a given error in the least time: orthogonal least squares and momentum 0.7; the others are
-    /// defaults.
-    #[must_use]
-    pub fn fast() -> Self {
-        Self {
-            choice: Choice::LeastSquares,
-            momentum: 0.7,
-            ..Self::default()
-        }
-    }
-
     /// Learns a dictionary from `images` of N values each. The result is N × number of atoms, with columns of length 1.
     ///
     /// With fewer images than atoms, the dictionary has one column for every image. The result depends only on the
@@ -85,27 +64,21 @@ impl Ksvd {
     pub fn learn(&self, images: &[Vec<f64>], rng: &mut ChaCha8Rng) -> Result<Matrix, DictionaryError> {
         at_least("n_components", self.n_components, 1)?;
         at_least("n_nonzero_coefs", self.n_nonzero_coefs, 1)?;
-        within("momentum", self.momentum, 0.0, LARGEST_MOMENTUM)?;
         let training = Training::new(images)?;
-        let atoms = training.draw(self.n_components, rng);
-        let mut last = atoms.clone();
         let mut sweep = Sweep {
-            atoms,
+            atoms: training.draw(self.n_components, rng),
             errors: Matrix::zeros(0, 0),
             codes: Vec::new(),
             users: Users::default(),
             direction: vec![0.0; training.rows.ncols()],
         };
         for _ in 0..self.n_iter {
-            sweep.move_on(self.momentum, &mut last);
-            sweep.code(&training, self.n_nonzero_coefs, self.choice)?;
+            sweep.code(&training, self.n_nonzero_coefs)?;
             for atom in 0..sweep.atoms.nrows() {
                 sweep.power_step(atom);
             }
             let used: Vec<usize> = (0..sweep.atoms.nrows()).map(|k| sweep.users.of(k).len()).collect();
-            for k in replace_useless(&training, &sweep.errors, &used, &mut sweep.atoms) {
-                last.row_mut(k).copy_from_slice(sweep.atoms.row(k));
-            }
+            replace_useless(&training, &sweep.errors, &used, &mut sweep.atoms);
         }
         Ok(transposed(&sweep.atoms))
     }
@@ -124,27 +97,12 @@ struct Sweep {
 }
 
 impl Sweep {
-    /// Leaves the atoms in `last` and moves each on by `momentum` times its change since the `last` that was.
-    fn move_on(&mut self, momentum: f64, last: &mut Matrix) {
-        if momentum == 0.0 {
-            return;
-        }
-        for k in 0..self.atoms.nrows() {
-            let (now, before) = (self.atoms.row(k), last.row_mut(k));
-            for ((d, n), b) in self.direction.iter_mut().zip(now).zip(before.iter()) {
-                *d = n + momentum * (n - b);
-            }
-            before.copy_from_slice(now);
-            set_unit(self.atoms.row_mut(k), &self.direction);
-        }
-    }
-
     /// Codes all images.
     ///
     /// # Errors
     /// [`DictionaryError::Coding`].
-    fn code(&mut self, training: &Training, n_nonzero_coefs: usize, choice: Choice) -> Result<(), DictionaryError> {
-        code(training, &self.atoms, n_nonzero_coefs, choice, &mut self.codes)?;
+    fn code(&mut self, training: &Training, n_nonzero_coefs: usize) -> Result<(), DictionaryError> {
+        code(training, &self.atoms, n_nonzero_coefs, &mut self.codes)?;
         self.errors = errors(training, &self.atoms, &self.codes);
         self.users.collect(&self.codes, self.atoms.nrows());
         Ok(())
@@ -183,12 +141,9 @@ impl Sweep {
     }
 }
 
-/// Largest momentum: the number before 1.
-const LARGEST_MOMENTUM: f64 = 1.0 - f64::EPSILON / 2.0;
-
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{closest, representation_error, unit_vector};
+    use super::super::tests::{closest, unit_vector};
     use super::*;
     use rand::{RngExt as _, SeedableRng as _};
 
@@ -203,7 +158,6 @@ mod tests {
             n_components: 1,
             n_nonzero_coefs: 1,
             n_iter: 25,
-            ..Ksvd::default()
         };
         let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
         // a power step shrinks the share of u₂ by (2/5)²: 25 of them by 1e-20
@@ -230,21 +184,16 @@ mod tests {
                 image
             })
             .collect();
-        for settings in [Ksvd::default(), Ksvd::fast()] {
-            let ksvd = Ksvd {
-                n_components: 50,
-                n_nonzero_coefs: 3,
-                n_iter: 80,
-                ..settings
-            };
-            let found: Vec<usize> = (1..=3)
-                .map(|seed| {
-                    let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(seed)).unwrap();
-                    atoms.iter().filter(|atom| 1.0 - closest(&d, atom) < 0.01).count()
-                })
-                .collect();
-            assert!(found.iter().all(|&n| n >= 42), "{ksvd:?}: {found:?} of 50 atoms");
-        }
+        let ksvd = Ksvd {
+            n_components: 50,
+            n_nonzero_coefs: 3,
+            n_iter: 80,
+        };
+        let found = [1, 2, 3].map(|seed| {
+            let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(seed)).unwrap();
+            atoms.iter().filter(|atom| 1.0 - closest(&d, atom) < 0.01).count()
+        });
+        assert!(found.iter().all(|&n| n >= 42), "{found:?} of 50 atoms");
     }
 
     /// A power step never leaves more than the codes before it, and the kept errors are those of the codes.
@@ -260,7 +209,7 @@ mod tests {
             users: Users::default(),
             direction: vec![0.0; 10],
         };
-        sweep.code(&training, 2, Choice::Correlation).unwrap();
+        sweep.code(&training, 2).unwrap();
         let square = |errors: &Matrix| dot(errors.view().values(), errors.view().values());
         let before = square(&sweep.errors);
         sweep.power_step(0);
@@ -270,48 +219,5 @@ mod tests {
         }
         let after = square(&recomputed);
         assert!(after <= before * (1.0 + 1e-13), "{after} against {before}");
-    }
-
-    #[test]
-    fn momentum_is_refused_from_one_on() {
-        for momentum in [-0.1, 1.0, f64::NAN] {
-            let ksvd = Ksvd {
-                momentum,
-                ..Ksvd::default()
-            };
-            let error = ksvd.learn(&[vec![1.0]], &mut ChaCha8Rng::seed_from_u64(1));
-            assert!(
-                matches!(error, Err(DictionaryError::Setting(_))),
-                "{momentum}: {error:?}"
-            );
-        }
-    }
-
-    /// Least squares and momentum reach in 10 sweeps what the published algorithm reaches in 20.
-    #[test]
-    fn the_fast_settings_need_fewer_sweeps() {
-        let mut rng = ChaCha8Rng::seed_from_u64(11);
-        let atoms: Vec<Vec<f64>> = (0..60).map(|_| unit_vector(30, &mut rng)).collect();
-        let images: Vec<Vec<f64>> = (0..600)
-            .map(|_| {
-                let mut image = vec![0.0; 30];
-                for _ in 0..5 {
-                    axpy(rng.random_range(0.5..1.5), &atoms[rng.random_range(0..60)], &mut image);
-                }
-                image
-            })
-            .collect();
-        let error = |settings: Ksvd, n_iter| {
-            let ksvd = Ksvd {
-                n_components: 40,
-                n_nonzero_coefs: 5,
-                n_iter,
-                ..settings
-            };
-            let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
-            representation_error(&images, &d, 5)
-        };
-        let (published, fast) = (error(Ksvd::default(), 20), error(Ksvd::fast(), 10));
-        assert!(fast < published, "fast {fast}, published {published}");
     }
 }

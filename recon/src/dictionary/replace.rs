@@ -12,26 +12,22 @@ const TWIN: f64 = 0.99;
 const REPRESENTED: f64 = 1e-20;
 
 /// Replaces atoms (rows) without users and, of two that are equal up to sign, the one with fewer users, by the images
-/// with the largest `errors`, each image once, and returns their indices. Stops when all images that are left are
-/// represented.
-pub(super) fn replace_useless(training: &Training, errors: &Matrix, used: &[usize], atoms: &mut Matrix) -> Vec<usize> {
+/// with the largest `errors`, each image once. Stops when all images that are left are represented.
+pub(super) fn replace_useless(training: &Training, errors: &Matrix, used: &[usize], atoms: &mut Matrix) {
     let useless = useless(atoms, used);
     if useless.is_empty() {
-        return useless;
+        return;
     }
     let squares: Vec<f64> = (0..errors.nrows()).map(|i| dot(errors.row(i), errors.row(i))).collect();
     let mut order: Vec<usize> = (0..errors.nrows()).collect();
     order.sort_by(|&a, &b| squares[b].total_cmp(&squares[a]).then(a.cmp(&b)));
-    let mut replaced = Vec::new();
     for (k, &image) in useless.into_iter().zip(&order) {
         let row = training.rows.row(image);
         if squares[image] <= REPRESENTED * dot(row, row) {
             break;
         }
         set_unit(atoms.row_mut(k), row);
-        replaced.push(k);
     }
-    replaced
 }
 
 /// Indices of the atoms without users, and of twins, in order.
@@ -59,7 +55,7 @@ mod tests {
             Matrix::from_rows(4, 3, vec![1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.6, 0.8, 0.0]).unwrap();
         // the first of the twins has fewer users, the last atom has none; images 2 and 1 have the largest errors
         let errors = Matrix::from_rows(4, 3, vec![0.0, 0.0, 0.0, 0.3, 0.0, 0.0, 0.4, 0.0, 0.0, 0.1, 0.0, 0.0]).unwrap();
-        assert_eq!(replace_useless(&training, &errors, &[1, 2, 3, 0], &mut atoms), [0, 3]);
+        replace_useless(&training, &errors, &[1, 2, 3, 0], &mut atoms);
         assert_eq!(atoms.row(0), [0.0, 0.0, 1.0]);
         assert_eq!(atoms.row(1), [-1.0, 0.0, 0.0]);
         assert_eq!(atoms.row(2), [0.0, 1.0, 0.0]);
@@ -70,7 +66,7 @@ mod tests {
     fn nothing_replaces_an_atom_when_everything_is_represented() {
         let training = Training::new(&[vec![1.0, 0.0], vec![2.0, 0.0]]).unwrap();
         let mut atoms = Matrix::from_rows(2, 2, vec![1.0, 0.0, 1.0, 0.0]).unwrap();
-        assert!(replace_useless(&training, &Matrix::zeros(2, 2), &[2, 0], &mut atoms).is_empty());
+        replace_useless(&training, &Matrix::zeros(2, 2), &[2, 0], &mut atoms);
         assert_eq!(atoms.row(1), [1.0, 0.0]);
     }
 }

@@ -46,21 +46,6 @@ impl SignGenerator {
         })
     }
 
-    /// Signs after one step from `seed`, two steps, and so on.
-    pub(crate) fn signs(self, seed: u32) -> impl Iterator<Item = f64> {
-        let Step {
-            multiplier,
-            increment,
-            shift,
-        } = self.step;
-        let states = std::iter::successors(Some(seed), move |s| {
-            Some(s.wrapping_mul(multiplier).wrapping_add(increment))
-        });
-        states
-            .skip(1)
-            .map(move |s| if s >> (63 - shift) & 1 == 1 { 1.0 } else { -1.0 })
-    }
-
     /// (a, c) of `steps` steps in one, by repeated squaring: O(log steps). The period divides 2³².
     fn jump(self, steps: u64) -> (u32, u32) {
         let then = |(a, c): (u32, u32), (b, d): (u32, u32)| (a.wrapping_mul(b), b.wrapping_mul(c).wrapping_add(d));

@@ -1,6 +1,6 @@
 //! Orthogonal matching pursuit for many measurements with one operator.
 
-use super::gram_pursuit::{Choice, GramPursuit};
+use super::factor::{CONVERGED, back_substitute};
 use super::greedy::Greedy;
 use super::scaling::unscale;
 use crate::kernels;
@@ -32,7 +32,6 @@ use crate::workspace::Workspace;
 #[derive(Debug, Clone)]
 pub struct BatchOmp {
     n_nonzero_coefs: usize,
-    choice: Choice,
     /// A, M × K, over `scale`.
     a: Matrix,
     /// Its columns, K × M.
@@ -68,19 +67,12 @@ impl BatchOmp {
         }
         Ok(Self {
             n_nonzero_coefs,
-            choice: Choice::default(),
             a,
             columns,
             gram,
             weights,
             scale: scaled.matrix_scale(),
         })
-    }
-
-    /// The same pursuit with another selection rule.
-    #[must_use]
-    pub fn with_choice(self, choice: Choice) -> Self {
-        Self { choice, ..self }
     }
 
     /// Solves A α ≈ `y` into `solution`. After an error the content of `solution` has no meaning.
@@ -103,7 +95,6 @@ impl BatchOmp {
         let pursuit = GramPursuit {
             gram: self.gram.view().values(),
             weights: &self.weights,
-            choice: self.choice,
             limit: self.n_nonzero_coefs.min(self.a.nrows()).min(k),
         };
         pursuit.run(kernels::dot(y, y), scratch, solution);
@@ -114,5 +105,98 @@ impl BatchOmp {
         }
         solution.residual_norm = kernels::dot(&scratch.residual, &scratch.residual).sqrt();
         unscale(solution, y_scale, self.scale)
+    }
+}
+
+/// Smallest share of an atom's square outside the span of the chosen ones.
+const DEPENDENT_SQUARE: f64 = 1e-10;
+
+/// Share of ‖y‖² below which the recurrence ‖r‖² ← ‖r‖² − p² holds rounding only.
+const CONVERGED_SQUARE: f64 = 1e-14;
+
+/// Scratch memory of a [`GramPursuit`].
+#[derive(Debug, Default)]
+pub(crate) struct GramScratch {
+    weights: Vec<f64>,
+    /// Aᵀ r: before the pursuit Aᵀ y.
+    correlation: Vec<f64>,
+    /// vᵢ, one after the other.
+    images: Vec<f64>,
+    /// Columns of R, one after the other; column n has n + 1 entries.
+    upper: Vec<f64>,
+    projections: Vec<f64>,
+    residual: Vec<f64>,
+}
+
+/// Pursuit that looks at G = Aᵀ A instead of A.
+///
+/// With the directions qᵢ of the chosen atoms, vᵢ = Aᵀ qᵢ follows from the row g of G that belongs to the new atom k,
+/// vₙ = (g − Σᵢ vᵢₖ vᵢ) / d with d² = ‖aₖ‖² − Σᵢ vᵢₖ², and the correlations from vₙ: a step costs O(n·K). (The source
+/// updates the correlations from the coefficients instead, Aᵀ r = Aᵀ y − G_S α, to the same effect.) d² is a
+/// difference, exact to a few 1e-16 of ‖a‖²: atoms with less than 1e-10 of their square outside the span of the chosen
+/// ones are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of ‖y‖². [`Omp`](super::Omp) resolves more.
+/// Source: R. Rubinstein, M. Zibulevsky, M. Elad, "Efficient implementation of the K-SVD algorithm using batch
+/// orthogonal matching pursuit", Technion CS-2008-08 (2008).
+#[derive(Debug, Clone, Copy)]
+struct GramPursuit<'a> {
+    /// G, K × K.
+    gram: &'a [f64],
+    /// Weight of every atom in the selection, length K.
+    weights: &'a [f64],
+    /// Largest number of atoms.
+    limit: usize,
+}
+
+impl GramPursuit<'_> {
+    /// Chooses the atoms and writes their coefficients. `scratch.correlation` holds Aᵀ y, `y_square` is ‖y‖².
+    fn run(&self, y_square: f64, scratch: &mut GramScratch, solution: &mut Solution) {
+        let support = &mut solution.support;
+        let mut residual_square = y_square;
+        scratch.weights.clear();
+        scratch.weights.extend_from_slice(self.weights);
+        scratch.images.resize(self.limit * self.weights.len(), 0.0);
+        scratch.upper.clear();
+        scratch.projections.clear();
+        support.clear();
+        while support.len() < self.limit && residual_square > CONVERGED_SQUARE * y_square {
+            let Some((atom, score)) = kernels::best_magnitude(&scratch.correlation, &scratch.weights) else {
+                break;
+            };
+            if score <= CONVERGED * y_square.sqrt() {
+                break;
+            }
+            // chosen, or in the span of the chosen ones: not again
+            scratch.weights[atom] = 0.0;
+            if let Some(projection) = self.push(atom, scratch, support.len()) {
+                residual_square -= projection * projection;
+                support.push(atom);
+            }
+        }
+        back_substitute(&scratch.upper, &scratch.projections, &mut solution.coefficients);
+    }
+
+    /// Appends `atom` as column `n` and returns the projection of `y` on its direction; the correlations follow when
+    /// there are steps to come. `None`, and nothing is changed, when it lies in the span of the others.
+    fn push(&self, atom: usize, scratch: &mut GramScratch, n: usize) -> Option<f64> {
+        let (k, start) = (self.weights.len(), scratch.upper.len());
+        let g = &self.gram[atom * k..(atom + 1) * k];
+        let (done, rest) = scratch.images.split_at_mut(n * k);
+        scratch.upper.extend(done.chunks_exact(k).map(|v| v[atom]));
+        let overlaps = &scratch.upper[start..];
+        let square = g[atom] - overlaps.iter().map(|r| r * r).sum::<f64>();
+        // not `<=`: a NaN must be passed over as well
+        if square.partial_cmp(&(DEPENDENT_SQUARE * g[atom])) != Some(std::cmp::Ordering::Greater) {
+            scratch.upper.truncate(start);
+            return None;
+        }
+        let length = square.sqrt();
+        let projection = scratch.correlation[atom] / length;
+        if n + 1 < self.limit {
+            let v = &mut rest[..k];
+            kernels::gram_step(g, done, overlaps, length, projection, v, &mut scratch.correlation);
+        }
+        scratch.upper.push(length);
+        scratch.projections.push(projection);
+        Some(projection)
     }
 }

@@ -95,12 +95,6 @@ impl Factor {
         kernels::dot(&self.residual, &self.residual).sqrt()
     }
 
-    /// Direction of the last column, length M, and the projection of `y` on it; `None` without columns.
-    pub(crate) fn last(&self, m: usize) -> Option<(&[f64], f64)> {
-        let start = self.atoms.len().checked_sub(1)? * self.stride;
-        Some((&self.basis[start..start + m], *self.projections.last()?))
-    }
-
     /// Least-squares coefficients; overwrites `alpha`.
     pub(crate) fn coefficients_into(&self, alpha: &mut Vec<f64>) {
         back_substitute(&self.upper, &self.projections, alpha);

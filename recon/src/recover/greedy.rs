@@ -1,7 +1,7 @@
 //! Parts that all greedy pursuits share: scratch memory, and writing the solution.
 
+use super::batch_omp::GramScratch;
 use super::factor::{CONVERGED, Factor};
-use super::gram_pursuit::GramScratch;
 use super::scaling::{Scaled, Scaling};
 use crate::kernels;
 use crate::problem::{Problem, RecoverError, Solution};
@@ -38,13 +38,9 @@ pub(crate) struct State {
     pub(crate) weights: Vec<f64>,
     /// Aᵀ r.
     pub(crate) correlation: Vec<f64>,
-    pub(crate) image: Vec<f64>,
     pub(crate) alpha: Vec<f64>,
     pub(crate) previous: Vec<f64>,
-    pub(crate) dense: Vec<f64>,
-    pub(crate) order: Vec<usize>,
     pub(crate) atoms: Vec<usize>,
-    pub(crate) kept: Vec<usize>,
 }
 
 impl State {
@@ -76,20 +72,4 @@ impl State {
         solution.residual_norm = self.factor.residual_norm();
         problem.unscale(solution)
     }
-}
-
-/// Leaves in `order` the indices of the `count` largest scores above 0, the first of equals first, in falling order of
-/// score.
-pub(crate) fn largest(scores: &[f64], count: usize, order: &mut Vec<usize>) {
-    order.clear();
-    if count == 0 {
-        return;
-    }
-    order.extend((0..scores.len()).filter(|&k| scores[k] > 0.0));
-    let falling = |a: &usize, b: &usize| scores[*b].total_cmp(&scores[*a]).then(a.cmp(b));
-    if count < order.len() {
-        order.select_nth_unstable_by(count - 1, falling);
-        order.truncate(count);
-    }
-    order.sort_unstable_by(falling);
 }

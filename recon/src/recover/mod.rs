@@ -2,38 +2,30 @@
 //! in [`RECOVER`]; one with a prior has a line in [`REGULARISED`]. [`conformance`] and [`conformance_regularised`] run
 //! on all of them.
 //!
-//! Four algorithms have another interface: [`BatchOmp`] uses one operator for many measurements, [`OnlineOmp`] and
-//! [`SequentialEstimate`] accept rows one by one, and [`TrackedImage`] follows a changing image from window to window.
+//! Three algorithms have another interface: [`BatchOmp`] uses one operator for many measurements,
+//! [`SequentialEstimate`] accepts rows one by one, and [`TrackedImage`] follows a changing image from window to window.
 
 mod batch_omp;
 mod cholesky;
 mod conformance;
-mod cosamp;
 mod descent;
 mod expected_iou;
 mod factor;
 mod fixed;
 mod gaussian;
-mod gram_pursuit;
 mod greedy;
-mod iht;
 mod image_prior;
 mod lmmse;
 mod nn_lasso;
 mod nn_lmmse;
 mod nn_omp;
 mod nnqp;
-mod ols;
 mod omp;
-mod online_omp;
 mod parameter;
-mod phase;
 mod prior;
 mod reference;
-mod sbl;
 mod scaling;
 mod sequential;
-mod threshold;
 mod tracked;
 mod tv;
 mod tv_grid;
@@ -41,26 +33,18 @@ mod unrolled;
 
 pub use batch_omp::BatchOmp;
 pub use conformance::{conformance, conformance_regularised};
-pub use cosamp::Cosamp;
 pub use fixed::{Fixed, FixedError, FixedWindow};
-pub use gram_pursuit::Choice;
-pub use iht::Iht;
 pub use image_prior::ImagePrior;
 pub use lmmse::Lmmse;
 pub use nn_lasso::NnLasso;
 pub use nn_lmmse::NnLmmse;
 pub use nn_omp::NnOmp;
-pub use ols::Ols;
 pub use omp::Omp;
-pub use online_omp::OnlineOmp;
 pub use parameter::{Noise, ParameterError, Penalty, Stopping};
-pub use phase::{PhasePoint, Signs};
 pub use prior::{Gaussian, PriorError};
 pub use reference::ReferenceOmp;
-pub use sbl::Sbl;
 pub(crate) use scaling::power_of_two;
 pub use sequential::{SequentialError, SequentialEstimate, SequentialGains};
-pub use threshold::{orthant_threshold, weak_threshold};
 pub use tracked::{Motion, TrackedImage};
 pub use tv::Tv;
 pub use unrolled::{Layer, Touched, Unrolled, UnrolledError, UnrolledStep, UnrolledWeights};
@@ -77,10 +61,7 @@ pub const RECOVER: &[(&str, Build)] = &[
         Box::new(ReferenceOmp::new(n_nonzero_coefs))
     }),
     ("omp", |n_nonzero_coefs| Box::new(Omp::new(n_nonzero_coefs))),
-    ("ols", |n_nonzero_coefs| Box::new(Ols::new(n_nonzero_coefs))),
     ("nn_omp", |n_nonzero_coefs| Box::new(NnOmp::new(n_nonzero_coefs))),
-    ("cosamp", |n_nonzero_coefs| Box::new(Cosamp::new(n_nonzero_coefs))),
-    ("iht", |n_nonzero_coefs| Box::new(Iht::new(n_nonzero_coefs))),
 ];
 
 /// Builds an algorithm for K unknowns, with weak regularisation.
@@ -111,6 +92,5 @@ pub const REGULARISED: &[(&str, BuildRegularised)] = &[
     ("unrolled", |k| {
         Ok(Box::new(Unrolled::new(UnrolledWeights::plain(k, 0.1 * WEAK)?)))
     }),
-    ("sbl", |_| Ok(Box::new(Sbl::new(Noise::Relative(WEAK))?))),
     ("tv", |k| Ok(Box::new(Tv::new(1, k, Penalty::Relative(WEAK))?))),
 ];

@@ -1,4 +1,4 @@
-//! Improves rows level by level.
+//! Improves rows sign by sign.
 
 use super::headroom::Headroom;
 
@@ -17,42 +17,33 @@ pub(super) trait Worth {
 /// Least gain of worth, as a share of it, for which a level is changed: rounding makes no progress.
 const LEAST_GAIN: f64 = 1e-9;
 
-/// Changes single levels of `row` to others of `levels` while its worth grows, at most `sweeps` times through all of
-/// them. A row whose sum is too large is brought within `headroom` first, by the changes that cost the least worth for
-/// what they take off the sum; `None` when that cannot be done.
+/// Turns single signs of `row` while its worth grows, at most `sweeps` times through all of them. A row whose sum is too
+/// large is brought within `headroom` first, by the turns that cost the least worth for what they take off the sum;
+/// `None` when that cannot be done.
 pub(super) fn climb(
     worth: &mut dyn Worth,
     mut headroom: Option<&mut Headroom>,
-    levels: &[f64],
     sweeps: usize,
     row: &mut [f64],
 ) -> Option<f64> {
     worth.start(row);
     if let Some(headroom) = headroom.as_deref_mut() {
         headroom.start(row);
-        settle(worth, headroom, levels, row)?;
+        settle(worth, headroom, row)?;
     }
     for _ in 0..sweeps {
         let mut changed = false;
         for (i, value) in row.iter_mut().enumerate() {
-            let now = worth.worth();
-            let (mut best, mut best_delta) = (now + LEAST_GAIN * now.abs(), 0.0);
-            for level in levels {
-                let delta = level - *value;
-                if delta == 0.0 || headroom.as_ref().is_some_and(|h| h.after(i, delta) > h.limit()) {
-                    continue;
-                }
-                let next = worth.after(i, delta);
-                if next > best {
-                    (best, best_delta) = (next, delta);
-                }
+            let (now, delta) = (worth.worth(), -2.0 * *value);
+            if headroom.as_ref().is_some_and(|h| h.after(i, delta) > h.limit()) {
+                continue;
             }
-            if best_delta != 0.0 {
-                worth.change(i, best_delta);
+            if worth.after(i, delta) > now + LEAST_GAIN * now.abs() {
+                worth.change(i, delta);
                 if let Some(headroom) = headroom.as_deref_mut() {
-                    headroom.change(i, best_delta);
+                    headroom.change(i, delta);
                 }
-                *value += best_delta;
+                *value = -*value;
                 changed = true;
             }
         }
@@ -64,22 +55,20 @@ pub(super) fn climb(
 }
 
 /// Brings `row` within `headroom`.
-fn settle(worth: &mut dyn Worth, headroom: &mut Headroom, levels: &[f64], row: &mut [f64]) -> Option<()> {
+fn settle(worth: &mut dyn Worth, headroom: &mut Headroom, row: &mut [f64]) -> Option<()> {
     while !headroom.kept() {
         let now = worth.worth();
         let (mut least, mut best) = (f64::INFINITY, None);
         for (i, value) in row.iter().enumerate() {
-            for level in levels {
-                let delta = level - value;
-                let taken = headroom.square() - headroom.after(i, delta);
-                // less is rounding
-                if delta == 0.0 || taken <= LEAST_GAIN * headroom.square() {
-                    continue;
-                }
-                let cost = (now - worth.after(i, delta)) / taken;
-                if cost < least {
-                    (least, best) = (cost, Some((i, delta)));
-                }
+            let delta = -2.0 * value;
+            let taken = headroom.square() - headroom.after(i, delta);
+            // less is rounding
+            if taken <= LEAST_GAIN * headroom.square() {
+                continue;
+            }
+            let cost = (now - worth.after(i, delta)) / taken;
+            if cost < least {
+                (least, best) = (cost, Some((i, delta)));
             }
         }
         let (i, delta) = best?;

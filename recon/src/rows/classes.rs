@@ -4,11 +4,12 @@ use super::ascent::{Worth, climb};
 use super::error::RowError;
 use super::greedy::unreachable_limit;
 use super::headroom::Headroom;
+use super::random::random_signs;
 use super::task::{DesignRows, RowTask};
 use crate::classify::Component;
 use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::Matrix;
-use rand::{RngExt as _, SeedableRng as _};
+use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
@@ -45,7 +46,7 @@ impl DesignRows for Classes {
             let climbed = starts.into_par_iter().map(|mut row| {
                 let mut headroom = headroom.clone();
                 let mut worth = Separation::new(&apart);
-                let found = climb(&mut worth, headroom.as_mut(), &[-1.0, 1.0], self.sweeps, &mut row);
+                let found = climb(&mut worth, headroom.as_mut(), self.sweeps, &mut row);
                 found.map(|worth| (worth, row))
             });
             let climbed: Vec<Option<(f64, Vec<f64>)>> = climbed.collect();
@@ -202,7 +203,7 @@ impl Apart {
         });
         let mut starts: Vec<Vec<f64>> = differences.collect();
         while starts.len() < count.max(1) {
-            starts.push((0..n).map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 }).collect());
+            starts.push(random_signs(n, rng));
         }
         starts
     }

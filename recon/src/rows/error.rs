@@ -1,7 +1,6 @@
 //! Errors of row design.
 
 use crate::checks::RangeError;
-use crate::coherence::CoherenceError;
 use crate::recover::PriorError;
 
 /// Why rows cannot be designed or selected.
@@ -50,7 +49,4 @@ pub enum RowError {
     /// Images from which no Gaussian prior can be made.
     #[error(transparent)]
     Prior(#[from] PriorError),
-    /// A matrix whose coherence cannot be computed.
-    #[error(transparent)]
-    Coherence(#[from] CoherenceError),
 }

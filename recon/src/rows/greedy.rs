@@ -4,6 +4,7 @@ use super::ascent::{Worth, climb};
 use super::covariance::Posterior;
 use super::error::RowError;
 use super::headroom::Headroom;
+use super::random::random_signs;
 use super::task::{DesignRows, RowTask};
 use crate::checks::within;
 use crate::kernels::{adjoint, axpy, dot};
@@ -15,10 +16,8 @@ use rayon::prelude::*;
 /// Rows that reduce the trace of the posterior covariance P of the expected images most, one after the other. The
 /// reduction by a row a is |P a|² / (aᵀP a + σ²). The search for a row starts from the signs of P's leading
 /// eigenvectors, of pairs of them, and of random vectors; single levels then change as long as the reduction grows.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Greedy {
-    /// Possible levels of a weight.
-    pub levels: Vec<f64>,
     /// Number of initial rows that are tried.
     pub starts: usize,
     /// Largest number of sweeps over all taxels for each of them.
@@ -32,15 +31,9 @@ const LEADING: usize = 8;
 /// Power iterations before the first row, and before every other one, which begins with the vectors of the last.
 const ITERATIONS: [usize; 2] = [30, 3];
 
-impl Greedy {
-    /// Rows of ±1.
-    #[must_use]
-    pub fn signs() -> Self {
-        Self {
-            levels: vec![-1.0, 1.0],
-            starts: 24,
-            sweeps: 4,
-        }
+impl Default for Greedy {
+    fn default() -> Self {
+        Self { starts: 24, sweeps: 4 }
     }
 }
 
@@ -60,7 +53,7 @@ impl DesignRows for Greedy {
             let climbed = starts.into_par_iter().map(|mut row| {
                 let mut headroom = headroom.clone();
                 let mut worth = Fall::new(&posterior);
-                let found = climb(&mut worth, headroom.as_mut(), &self.levels, self.sweeps, &mut row);
+                let found = climb(&mut worth, headroom.as_mut(), self.sweeps, &mut row);
                 found.map(|worth| (worth, row))
             });
             let climbed: Vec<Option<(f64, Vec<f64>)>> = climbed.collect();
@@ -81,8 +74,7 @@ impl DesignRows for Greedy {
 
 impl Greedy {
     fn starts_of(&self, leading: &Leading, n: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
-        let largest = self.levels.iter().copied().fold(0.0, f64::max);
-        let signs = |v: &[f64]| v.iter().map(|x| if *x < 0.0 { -largest } else { largest }).collect();
+        let signs = |v: &[f64]| v.iter().map(|x| if *x < 0.0 { -1.0 } else { 1.0 }).collect();
         let vectors: Vec<&[f64]> = leading.vectors.chunks_exact(n).collect();
         let mut starts: Vec<Vec<f64>> = vectors.iter().map(|v| signs(v)).collect();
         for pair in vectors.windows(2) {
@@ -90,10 +82,7 @@ impl Greedy {
             starts.push(signs(&sum));
         }
         while starts.len() < self.starts {
-            let row: Vec<f64> = (0..n)
-                .map(|_| if rng.random::<bool>() { largest } else { -largest })
-                .collect();
-            starts.push(row);
+            starts.push(random_signs(n, rng));
         }
         starts.truncate(self.starts.max(1));
         starts
@@ -265,7 +254,7 @@ mod tests {
             noise: 0.01,
             ..RowTask::new(8, &expected)
         };
-        let rows = Greedy::signs().design(&task).unwrap();
+        let rows = Greedy::default().design(&task).unwrap();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| variances[*b].total_cmp(&variances[*a]));
         for (r, &k) in order[..8].iter().enumerate() {
@@ -299,7 +288,7 @@ mod tests {
     fn signs_come_near_the_bound() {
         let expected = Expected::smooth([8, 8], 1.5).unwrap();
         let task = RowTask::new(12, &expected);
-        let rows = Greedy::signs().design(&task).unwrap();
+        let rows = Greedy::default().design(&task).unwrap();
         let c = expected.covariance();
         let dense = nalgebra::DMatrix::from_row_slice(64, 64, c.view().values());
         let eigen: Vec<f64> = dense.symmetric_eigenvalues().iter().map(|v| v.max(0.0)).collect();

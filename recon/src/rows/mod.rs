@@ -19,7 +19,6 @@
 //! # Ok::<(), spts_recon::rows::RowError>(())
 //! ```
 
-mod analog;
 mod ascent;
 mod choose;
 mod classes;
@@ -27,14 +26,11 @@ mod conformance;
 mod cosine;
 mod covariance;
 mod error;
-mod exchange;
 mod expected;
 mod greedy;
-mod hadamard;
 mod headroom;
 mod order;
 mod random;
-mod seeds;
 mod separable;
 mod table;
 mod task;
@@ -45,14 +41,11 @@ pub use conformance::conformance;
 pub use cosine::CosineSigns;
 pub use covariance::posterior_trace;
 pub use error::RowError;
-pub use exchange::{Exchange, exchange};
 pub use expected::{Expected, Tolerances};
 pub use greedy::Greedy;
-pub use hadamard::Hadamard;
 pub use headroom::largest_sum;
 pub use order::fewest_flips;
 pub use random::Random;
-pub use seeds::SeedsSearch;
 pub use separable::Separable;
-pub use table::{DESIGNERS, Designer, Levels, RowNeeds, designer};
+pub use table::{DESIGNERS, Designer, RowNeeds, designer};
 pub use task::{DesignRows, RowTask};

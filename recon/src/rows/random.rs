@@ -19,21 +19,21 @@ impl DesignRows for Random {
         task.check(1 << 20, "so many rows are of no use")?;
         let n = task.expected.taxels();
         let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
-        let mut row = || (0..n).map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 }).collect();
         if task.largest_sum.is_none() {
-            let values: Vec<Vec<f64>> = (0..task.rows).map(|_| row()).collect();
             let mut rows = Matrix::zeros(task.rows, n);
-            values
-                .iter()
-                .enumerate()
-                .for_each(|(r, v)| rows.row_mut(r).copy_from_slice(v));
+            (0..task.rows).for_each(|r| rows.row_mut(r).copy_from_slice(&random_signs(n, &mut rng)));
             return Ok(rows);
         }
         let draws = task.rows * DRAWS;
         take(
             task,
-            (0..draws).map(|_| row()),
+            (0..draws).map(|_| random_signs(n, &mut rng)),
             "no more of the rows that were drawn keep to the headroom",
         )
     }
+}
+
+/// `n` independent random signs.
+pub(super) fn random_signs(n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    (0..n).map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 }).collect()
 }

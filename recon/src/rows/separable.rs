@@ -30,7 +30,7 @@ impl DesignRows for Separable {
                     covariance: covariance.clone(),
                 },
             };
-            let designed = Greedy::signs().design(&RowTask {
+            let designed = Greedy::default().design(&RowTask {
                 rows: n.min(task.rows),
                 expected: &along,
                 classes: &[],

@@ -4,7 +4,7 @@ use allocation_counter::measure;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use spts_recon::classify::{EvidenceClassifier, ImageEstimator, Library, Posterior, Src, TemplateModel};
-use spts_recon::recover::{BatchOmp, OnlineOmp, RECOVER, REGULARISED};
+use spts_recon::recover::{BatchOmp, RECOVER, REGULARISED};
 use spts_recon::{AmplitudeRange, Matrix, Problem, Recover, Solution, Workspace};
 
 const K: usize = 40;
@@ -37,15 +37,6 @@ fn no_decode_allocates() {
         let mut decode = || shared.recover_into(&y, &mut work, &mut solution).unwrap();
         decode();
         assert_eq!(measure(decode).count_total, 0, "shared operator, M = {m}");
-        let mut online = OnlineOmp::new(K, 6);
-        let mut window = || {
-            online.clear();
-            online.announce(a.view()).unwrap();
-            y.iter().for_each(|&y| online.measure(y).unwrap());
-            online.recover_into(&mut work, &mut solution).unwrap();
-        };
-        window();
-        assert_eq!(measure(window).count_total, 0, "measurement by measurement, M = {m}");
     }
 }
 

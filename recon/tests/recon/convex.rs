@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
-use spts_recon::recover::{Fixed, Gaussian, Lmmse, NnLasso, NnLmmse, Noise, Penalty, Sbl, Tv};
+use spts_recon::recover::{Fixed, Gaussian, Lmmse, NnLasso, NnLmmse, Noise, Penalty, Tv};
 use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
 use std::sync::Arc;
 
@@ -192,64 +192,6 @@ fn orthonormal_columns_have_closed_forms() {
     let expected: Vec<f64> = c.iter().map(|c| c.max(0.0) / 1.09).collect();
     let method = NnLmmse::new(white, noise).unwrap();
     assert_near(&solve(&method, &a, &y).0, &expected, 1e-12, "non-negative lmmse");
-    // γ = c² − σ² where that is above zero, and then w = c γ / (γ + σ²) = c − σ²/c
-    let expected: Vec<f64> = c
-        .iter()
-        .map(|c| if c * c > 0.09 { c - 0.09 / c } else { 0.0 })
-        .collect();
-    assert!(expected.contains(&0.0) && expected.iter().any(|w| *w != 0.0));
-    let method = Sbl::new(noise).unwrap();
-    assert_near(&solve(&method, &a, &y).0, &expected, 1e-9, "sparse Bayesian learning");
-}
-
-/// log p(y) must not grow along any variance: q² ≤ s for absent columns, q² = s + γ s² for present ones (Tipping &
-/// Faul, eq. 20), from C built afresh. Present variances are read off the answer: w = γ aᵀ C⁻¹ y fixes γ by iteration,
-/// so the fixed point of the re-estimation γ = w² + Σₖₖ is used instead (their eq. 24, EM form).
-#[test]
-fn sparse_bayesian_learning_ends_at_a_maximum() {
-    let (m, k, sigma) = (20, 50, 0.1_f64);
-    let (a, y) = problem(23, m, k);
-    let mut method = Sbl::new(Noise::Absolute(sigma)).unwrap();
-    method.stopping.tol = 1e-12;
-    let (w, solution) = solve(&method, &a, &y);
-    assert!(solution.support.len() < m, "{} columns", solution.support.len());
-    // γ = w² + Σₖₖ, iterated to its fixed point on the support that was found
-    let sub = a.select_columns(&solution.support);
-    let mut gamma = DVector::from_vec(solution.coefficients.iter().map(|w| w * w).collect());
-    let evidence = |gamma: &DVector<f64>| {
-        &sub * DMatrix::from_diagonal(gamma) * sub.transpose() + sigma.powi(2) * DMatrix::identity(m, m)
-    };
-    let y = DVector::from_vec(y);
-    for _ in 0..200_000 {
-        let inverse = evidence(&gamma).cholesky().unwrap().inverse();
-        let next = DVector::from_fn(gamma.len(), |i, _| {
-            let column = sub.column(i);
-            let (s, q) = (
-                (column.transpose() * &inverse * column)[0],
-                (column.transpose() * &inverse * &y)[0],
-            );
-            (gamma[i] * q).powi(2) + gamma[i] - gamma[i].powi(2) * s
-        });
-        let change = (&next - &gamma).amax();
-        gamma = next;
-        if change < 1e-13 {
-            break;
-        }
-    }
-    let inverse = evidence(&gamma).cholesky().unwrap().inverse();
-    for (column, &w) in w.iter().enumerate() {
-        let atom = a.column(column);
-        let (s, q) = (
-            (atom.transpose() * &inverse * atom)[0],
-            (atom.transpose() * &inverse * &y)[0],
-        );
-        if let Some(slot) = solution.support.iter().position(|&i| i == column) {
-            // gains of 1e-12 nats leave about √1e-12 in a variance
-            assert!((gamma[slot] * q - w).abs() < 1e-4 * w.abs().max(0.1), "column {column}");
-        } else {
-            assert!(q * q <= s * (1.0 + 1e-4), "column {column}: {} above {s}", q * q);
-        }
-    }
 }
 
 /// Two plateaus of n₁ and n₂ pixels, a < b, seen directly: each moves towards the other by λ over its size while they

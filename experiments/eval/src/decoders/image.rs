@@ -6,7 +6,7 @@ use crate::algorithm::{Algorithm, Answer, Confidence, DecodeError, Subject, Trai
 use crate::training::{Dictionary, LearnError, TrainingData};
 use crate::windows::Window;
 use spts_recon::recover::{
-    Cosamp, Gaussian, Iht, ImagePrior, Lmmse, NnLasso, NnLmmse, NnOmp, Noise, Ols, Omp, Penalty, ReferenceOmp, Sbl, Tv,
+    Gaussian, ImagePrior, Lmmse, NnLasso, NnLmmse, NnOmp, Noise, Omp, Penalty, ReferenceOmp, Tv,
 };
 use spts_recon::{MatrixView, Problem, Recover, Solution, Workspace};
 use std::sync::Arc;
@@ -94,30 +94,13 @@ pub(super) fn omp(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
     on_atoms(data, Weights::Signs, |m| Box::new(Omp::new(quarter(m))))
 }
 
-pub(super) fn ols(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    on_atoms(data, Weights::Signs, |m| Box::new(Ols::new(quarter(m))))
-}
-
 pub(super) fn nn_omp(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
     on_atoms(data, Weights::Signs, |m| Box::new(NnOmp::new(quarter(m))))
-}
-
-pub(super) fn cosamp(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    on_atoms(data, Weights::Signs, |m| Box::new(Cosamp::new(quarter(m))))
-}
-
-pub(super) fn iht(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    on_atoms(data, Weights::Signs, |m| Box::new(Iht::new(quarter(m))))
 }
 
 pub(super) fn nn_lasso(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
     let lasso = NnLasso::new(LASSO)?.with_normalised_columns();
     on_atoms(data, Weights::Signs, move |_| Box::new(lasso))
-}
-
-pub(super) fn sbl(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    let sbl = Sbl::new(NOISE)?;
-    on_atoms(data, Weights::Signs, move |_| Box::new(sbl))
 }
 
 pub(super) fn lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {

@@ -144,14 +144,10 @@ pub const DECODERS: &[DecoderSpec] = &[
     SCRIPT_M4,
     MATCHED,
     spec("omp", "OMP", Dictionary, true, image::omp).about("orthogonal matching pursuit, columns normalised"),
-    spec("ols", "OLS", Dictionary, false, image::ols).about("orthogonal least squares"),
     spec("nn_omp", "non-negative OMP", Dictionary, true, image::nn_omp)
         .about("non-negative orthogonal matching pursuit"),
-    spec("cosamp", "CoSaMP", Dictionary, false, image::cosamp).about("compressive sampling matching pursuit"),
-    spec("iht", "IHT", Dictionary, false, image::iht).about("normalised iterative hard thresholding"),
     spec("nn_lasso", "non-negative lasso", Dictionary, true, image::nn_lasso)
         .about("non-negative lasso on normalised columns"),
-    spec("sbl", "sparse Bayes", Dictionary, false, image::sbl).about("sparse Bayesian learning"),
     spec("lmmse", "LMMSE", Images, false, image::lmmse)
         .about("linear minimum mean square error, prior of images like those seen"),
     spec("nn_lmmse", "non-negative LMMSE", Images, true, image::nn_lmmse)

@@ -115,8 +115,7 @@ impl EvidenceClassifier {
     }
 
     /// Means and deformations of all components, N × K. [`Preparation::push`] needs rows of Φ times this matrix. For
-    /// weights ±1, [`SignTables`](crate::SignTables) compute these products, and [`super::AnytimeClassifier`] combines
-    /// all steps.
+    /// weights ±1, [`SignTables`](crate::SignTables) compute these products.
     #[must_use]
     pub fn bank(&self) -> &Matrix {
         &self.bank

@@ -62,12 +62,6 @@ pub enum EvidenceError {
         /// Number of prepared rows.
         prepared: usize,
     },
-    /// A row arrived with its sample while earlier rows wait for theirs.
-    #[error("a row arrived with its sample, but {waiting} rows prepared before it still wait for theirs")]
-    RowsWaiting {
-        /// Number of prepared rows without a sample.
-        waiting: usize,
-    },
 }
 
 impl Component {

@@ -3,10 +3,8 @@
 //! Model: x = s·u, u ~ N(t, F Fᵀ + D), with a template t, its likely deformations F, independent deviations D, and an
 //! amplitude s of unknown size. [`TemplateModel`] builds such classes from a few images, [`ClusterModel`] from many.
 //! [`EvidenceClassifier`] compares them. [`Preparation`] holds what is computed before a sample arrives, and
-//! [`Evidence`] the result of the samples so far. [`AnytimeClassifier`] combines all of these for weights ±1, with one
-//! call a sample. [`ImageEstimator`] computes the image that belongs to a decision.
+//! [`Evidence`] the result of the samples so far. [`ImageEstimator`] computes the image that belongs to a decision.
 
-mod anytime;
 mod classifier;
 mod clusters;
 mod component;
@@ -18,7 +16,6 @@ mod templates;
 #[cfg(test)]
 mod tests;
 
-pub use anytime::AnytimeClassifier;
 pub use classifier::{Decision, EvidenceClassifier, Posterior};
 pub use clusters::{ClusterModel, Clusters};
 pub use component::{Component, EvidenceError};

@@ -1,6 +1,6 @@
 //! The filter and the classifier against their definitions, in dense linear algebra.
 
-pub(super) mod planted;
+mod planted;
 
 use super::*;
 use crate::recover::Gaussian;

@@ -7,14 +7,13 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 /// A window of `amplitude` times an image through ±1 weights, with noise.
-pub(in super::super) struct PlantedWindow {
-    pub(in super::super) signs: Vec<u64>,
-    pub(in super::super) phi: Matrix,
-    pub(in super::super) y: Vec<f64>,
+struct PlantedWindow {
+    phi: Matrix,
+    y: Vec<f64>,
 }
 
 impl PlantedWindow {
-    pub(in super::super) fn new(seed: u64, m: usize, image: &[f64], amplitude: f64, noise: f64) -> Self {
+    fn new(seed: u64, m: usize, image: &[f64], amplitude: f64, noise: f64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let signs: Vec<u64> = (0..m).map(|_| rng.random()).collect();
         let weights = signs
@@ -25,11 +24,11 @@ impl PlantedWindow {
         let y = (0..m)
             .map(|r| amplitude * (signal(phi.row(r)) + noise * normal(&mut rng)))
             .collect();
-        Self { signs, phi, y }
+        Self { phi, y }
     }
 }
 
-pub(in super::super) fn planted() -> (EvidenceClassifier, Vec<Vec<f64>>) {
+pub(super) fn planted() -> (EvidenceClassifier, Vec<Vec<f64>>) {
     let shape = |taxels: &[usize]| {
         (0..36)
             .map(|i| if taxels.contains(&i) { 1.0 } else { 0.0 })
