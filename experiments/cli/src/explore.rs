@@ -6,7 +6,7 @@ use super::options::{Side, seed, sorted, square, whole};
 use super::progress::Bars;
 use clap::{Args, ValueEnum};
 use spts_circuit::Seeding;
-use spts_report::explore::write;
+use spts_report::explore;
 use spts_studies::explore::ExploreStudy;
 use std::path::PathBuf;
 
@@ -73,7 +73,7 @@ impl ExploreCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = open_folder(&self.out, spts_report::explore::FILES)?;
+        let out = open_folder(&self.out, explore::FILES)?;
         let study = ExploreStudy {
             sides: sorted(
                 self.taxels
@@ -90,8 +90,14 @@ impl ExploreCommand {
             seed: self.seed,
         };
         let report = study.run(&Bars::default())?;
-        write(&study, &report, out)?;
-        let text = || format!("{}\ntables and pictures: {}", report.text(), self.out.display());
+        explore::write(&study, &report, out)?;
+        let text = || {
+            format!(
+                "{}\ntables and pictures: {}",
+                explore::text(&report),
+                self.out.display()
+            )
+        };
         self.common.print(&report, text)
     }
 }

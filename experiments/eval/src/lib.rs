@@ -26,6 +26,7 @@ mod sensing;
 mod session;
 mod skin;
 mod source;
+mod table;
 mod tally;
 mod timing;
 pub mod training;
@@ -46,6 +47,7 @@ pub use sensing::{RowChooser, Sensing};
 pub use session::ScoredSession;
 pub use skin::{ScoredSkin, SkinScores};
 pub use source::{PublishedSkin, Source, check_session};
+pub use table::{Cell, Table, TextTable, escape};
 pub use tally::{Scores, Tally};
 pub use timing::decode_us;
 #[cfg(feature = "mujoco")]

@@ -6,7 +6,6 @@ mod measure;
 mod report;
 pub(crate) mod scene;
 mod study;
-mod text;
 pub(crate) mod wiring;
 
 pub use error::ExploreError;
