@@ -1,10 +1,11 @@
-//! Interface of the readout effects, the deviations of the real circuit from y = Φx.
+//! Interfaces of the readout effects, the deviations of the real circuit from y = Φx, and of faults of single cells.
 
-use crate::batch::Batch;
-use crate::weights::Weights;
-use crate::weights_error::WeightsError;
+use crate::batch::{Batch, CellRun};
+use crate::weights::{Weights, WeightsError};
+use rand::RngExt as _;
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use spts_models::{ConfigError, Streams, explain_toml};
+use spts_models::{ConfigError, Streams, explain_toml, in_range};
 
 /// Inputs of an effect that are constant during a session.
 #[derive(Debug, Clone)]
@@ -120,6 +121,117 @@ pub enum ProfileError {
         /// All known names.
         known: String,
     },
+}
+
+/// One fault of a profile's `[[faults]]` list.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct FaultConfig {
+    /// Name in [`FAULTS`](crate::FAULTS).
+    pub name: String,
+    /// Taxel, 0-based and row-major. Range [0, taxels − 1].
+    pub taxel: u32,
+    /// Parameters of this fault; each has a default.
+    #[serde(flatten)]
+    pub parameters: toml::Table,
+}
+
+/// A fault of one cell. Its effect on a row is a function of the session, the taxel and the row.
+///
+/// ```
+/// use spts_circuit::{CellRun, Fault};
+///
+/// /// A taxel that conducts half as well as it should.
+/// struct Worn;
+///
+/// impl Fault for Worn {
+///     fn drives(&self) -> bool {
+///         false // the level is still the generator's
+///     }
+///     fn apply(&mut self, run: &mut CellRun<'_>) {
+///         run.gains.iter_mut().for_each(|gain| *gain *= 0.5);
+///     }
+/// }
+/// let (mut levels, mut gains) = ([1.0, -1.0], [1.0, 1.0]);
+/// Worn.apply(&mut CellRun { first_row: 0, period_s: 1.55e-5, levels: &mut levels, gains: &mut gains });
+/// assert_eq!(gains, [0.5, 0.5]);
+/// ```
+pub trait Fault: Send {
+    /// Whether the fault determines the level of the cell. A cell has at most one such fault.
+    fn drives(&self) -> bool {
+        true
+    }
+
+    /// Modifies levels and gains. A run may begin at any row.
+    fn apply(&mut self, run: &mut CellRun<'_>);
+}
+
+/// Builds a fault of a taxel from its parameters.
+pub type BuildFault = fn(toml::Table, u32, &EffectSession) -> Result<Box<dyn Fault>, ProfileError>;
+
+/// Either one value, or `[low, high]`, from which a value is drawn uniformly once for each session (or for each taxel
+/// or device, if the effect says so).
+///
+/// The spans of the shipped profile are prediction intervals: a new session of the real skin lies inside nine times in
+/// ten. Because values are drawn uniformly inside, simulated sessions leave out the most extreme tenth.
+///
+/// ```
+/// use spts_circuit::Span;
+/// use spts_models::Streams;
+///
+/// #[derive(serde::Deserialize)]
+/// struct Noise {
+///     sd_v: Span,
+/// }
+/// let noise: Noise = toml::from_str("sd_v = [0.01, 0.03]")?;
+/// let drawn_v = noise.sd_v.draw(&mut Streams::new(1).rng("session", 0));
+/// assert!((0.01..0.03).contains(&drawn_v));
+/// # Ok::<(), toml::de::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(untagged)]
+pub enum Span {
+    /// The same in every session.
+    Fixed(f64),
+    /// Uniform between two values.
+    Between([f64; 2]),
+}
+
+impl Span {
+    fn ends(self) -> [f64; 2] {
+        match self {
+            Self::Fixed(v) => [v, v],
+            Self::Between(ends) => ends,
+        }
+    }
+
+    /// Checks that both ends lie in `[min, max]` and are in order.
+    ///
+    /// # Errors
+    /// [`ConfigError`] with `field` and `range`.
+    pub fn within(self, field: &str, min: f64, max: f64, range: &'static str) -> Result<Self, ConfigError> {
+        let [low, high] = self.ends();
+        in_range(field, low, low >= min && low <= max, range)?;
+        in_range(field, high, high >= low && high <= max, range)?;
+        Ok(self)
+    }
+
+    /// A value drawn after both ends are checked, as [`Span::within`] and [`Span::draw`] do.
+    pub(crate) fn drawn(
+        self,
+        field: &str,
+        [min, max]: [f64; 2],
+        range: &'static str,
+        rng: &mut impl rand::Rng,
+    ) -> Result<f64, ConfigError> {
+        Ok(self.within(field, min, max, range)?.draw(rng))
+    }
+
+    /// Draws one value. One number of `rng` is used in either case.
+    pub fn draw(self, rng: &mut impl rand::Rng) -> f64 {
+        let [low, high] = self.ends();
+        let u: f64 = rng.random();
+        low + (high - low) * u
+    }
 }
 
 /// Builds an effect from its parameters.

@@ -42,68 +42,31 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod acquire_error;
 pub mod amplifier;
 mod batch;
-mod cell_run;
-mod code_kernels;
-mod code_rows;
-mod codes;
 mod converter;
 mod effect;
 mod effects;
 mod engine;
-mod fault;
 mod faults;
-mod first_window;
-mod kernels;
-mod lcg;
-mod level_source;
-mod mode;
-mod pattern_text;
-mod patterns;
 mod profile;
 mod readout;
 mod recording;
-mod recording_error;
-mod recording_info;
-mod rows;
-mod saturation;
-mod seed_text;
-mod seeding;
-mod slip;
 mod source;
-mod span;
-mod weight_rows;
 mod weights;
-mod weights_config;
-mod weights_error;
 
-pub use acquire_error::AcquireError;
-pub use batch::Batch;
-pub use cell_run::CellRun;
-pub use codes::{CellCodes, CodesError, check_codes};
-pub use converter::{CodeScale, Converter, ConverterConfig};
-pub use effect::{BlockStart, BuildEffect, Effect, EffectSession, ProfileError};
-pub use effects::{Adc, EFFECTS, build_chain, check_effect};
-pub use fault::{BuildFault, Fault, FaultConfig};
+pub use batch::{Batch, CellRun};
+pub use converter::{Adc, CodeScale, Converter, ConverterConfig};
+pub use effect::{BlockStart, BuildEffect, BuildFault, Effect, EffectSession, Fault, FaultConfig, ProfileError, Span};
+pub use effects::{EFFECTS, build_chain, check_effect};
+pub use engine::AcquireError;
 pub use faults::{FAULTS, build_faults};
-pub use first_window::{FirstWindowError, seeds_of_first_window};
-pub use lcg::{INCREMENT, Jump, MULTIPLIER};
-pub use level_source::LevelSource;
-pub use mode::{Mode, WeightMode};
-pub use pattern_text::{MAX_PATTERNS_BYTES, PatternTextError, parse_patterns};
-pub use patterns::Patterns;
 pub use profile::{CompressiveWeights, PROFILES, Profile};
 pub use readout::Readout;
-pub use recording::{Block, Recording};
-pub use recording_error::RecordingError;
-pub use recording_info::RecordingInfo;
-pub use seed_text::{MAX_SEEDS_BYTES, SeedTextError, parse_seeds};
-pub use seeding::{FIRST_ADDRESS, Seeding};
-pub use slip::Slip;
+pub use recording::{Block, Recording, RecordingError, RecordingInfo, Slip};
 pub use source::{ConductanceSource, Constant, Interpolated, Segment, SourceError, Started};
-pub use span::Span;
-pub use weight_rows::WeightRows;
-pub use weights::{WeightClock, Weights};
-pub use weights_error::WeightsError;
+pub use weights::{
+    CellCodes, CodesError, FIRST_ADDRESS, FirstWindowError, INCREMENT, Jump, LevelSource, MAX_PATTERNS_BYTES,
+    MAX_SEEDS_BYTES, MULTIPLIER, Mode, PatternTextError, Patterns, SeedTextError, Seeding, WeightClock, WeightMode,
+    WeightRows, Weights, WeightsError, check_codes, parse_patterns, parse_seeds, seeds_of_first_window,
+};

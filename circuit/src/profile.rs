@@ -1,16 +1,10 @@
 //! Named parameter sets of the whole readout.
 
 use crate::converter::Converter;
-use crate::effect::{Effect, EffectSession, ProfileError};
+use crate::effect::{Effect, EffectSession, FaultConfig, ProfileError};
 use crate::effects::{build_chain, converter, rail_v};
-use crate::fault::FaultConfig;
 use crate::faults::build_faults;
-use crate::level_source::LevelSource;
-use crate::mode::{Mode, WeightMode};
-use crate::patterns::Patterns;
-use crate::seeding::Seeding;
-use crate::weights::Weights;
-use crate::weights_error::WeightsError;
+use crate::weights::{LevelSource, Mode, Patterns, Seeding, WeightMode, Weights, WeightsError};
 use serde::{Deserialize, Serialize};
 use spts_models::{SkinLayout, Streams, explain_toml, within};
 

@@ -1,16 +1,11 @@
-//! The device: clock, cells, summing amplifier and converter.
+//! The device: clock, cells, summing amplifier and converter, from a source of conductance to volts.
 
-use crate::acquire_error::AcquireError;
-use crate::codes::{CellCodes, CodesError};
 use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
-use crate::engine::Engine;
-use crate::mode::Mode;
+use crate::engine::{AcquireError, Engine};
 use crate::profile::Profile;
-use crate::recording::{Block, Recording};
-use crate::recording_error::RecordingError;
-use crate::recording_info::RecordingInfo;
+use crate::recording::{Block, Recording, RecordingError, RecordingInfo};
 use crate::source::ConductanceSource;
-use crate::weights::Weights;
+use crate::weights::{CellCodes, CodesError, Mode, Weights};
 use spts_models::{SkinLayout, Streams};
 
 /// The readout of one skin in one mode for one session. The clock, and with it the row of the weight matrix, continues
@@ -250,9 +245,8 @@ impl Readout {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::codes::code_of;
-    use crate::lcg::Jump;
     use crate::source::Interpolated;
+    use crate::weights::{Jump, code_of};
     use spts_models::ConductanceMap;
 
     /// Pieces shorter and longer than a batch, and one measurement long.

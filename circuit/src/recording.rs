@@ -1,13 +1,161 @@
 //! Recordings: the interface between a skin, real or simulated, and everything that decodes it.
 
 use crate::converter::Converter;
-use crate::mode::Mode;
-use crate::recording_error::RecordingError;
-use crate::recording_info::RecordingInfo;
-use crate::weight_rows::WeightRows;
-use crate::weights::Weights;
+use crate::weights::{Mode, WeightMode, WeightRows, Weights};
+use serde::{Deserialize, Serialize};
 use spts_models::SkinLayout;
 use std::ops::Range;
+
+/// Why data do not form a valid recording.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// A dimension is zero.
+    #[error("`{field}` = 0 is outside [1, ∞)")]
+    Empty {
+        /// Name of the dimension.
+        field: &'static str,
+    },
+    /// The sample rate is not a positive number.
+    #[error("`sample_rate_hz` = {value} is outside (0, ∞)")]
+    SampleRate {
+        /// The value, Hz.
+        value: f64,
+    },
+    /// A block whose length differs from the first one, or is not a whole number of frames.
+    #[error("block {block} has {len} samples; expected {frames} frames of {measurements}")]
+    BlockLength {
+        /// 0-based block.
+        block: usize,
+        /// Number of its samples.
+        len: usize,
+        /// Frames a block.
+        frames: usize,
+        /// Measurements a frame.
+        measurements: usize,
+    },
+    /// A block that would begin before the seeds were loaded.
+    #[error(
+        "block {block} has `frame_position` = {frame_position}, outside [{frames}, ∞): the block is {frames} frames long"
+    )]
+    FramePosition {
+        /// 0-based block.
+        block: usize,
+        /// Its frame position.
+        frame_position: u64,
+        /// Frames a block.
+        frames: usize,
+    },
+    /// A block so late that the number of its last weight row exceeds 64 bits.
+    #[error("block {block} has `frame_position` = {frame_position}, outside [{frames}, {limit}]")]
+    RowCount {
+        /// 0-based block.
+        block: usize,
+        /// Its frame position.
+        frame_position: u64,
+        /// Frames a block.
+        frames: usize,
+        /// Largest frame position for this number of measurements a frame.
+        limit: u64,
+    },
+    /// A block that is idle for longer than it lasts.
+    #[error("block {block} has `idle_frames` = {idle_frames}, outside [0, {frames}]")]
+    IdleFrames {
+        /// 0-based block.
+        block: usize,
+        /// Its idle frames.
+        idle_frames: usize,
+        /// Frames a block.
+        frames: usize,
+    },
+    /// Weights of another skin.
+    #[error("`weights` are those of {weights} taxels; `layout` has {layout}")]
+    Taxels {
+        /// Taxels of the weights.
+        weights: usize,
+        /// Taxels of the layout.
+        layout: usize,
+    },
+    /// An infinite sample.
+    #[error("block {block}, sample {sample} = {value} V is not finite; NaN marks a lost sample")]
+    Infinite {
+        /// 0-based block.
+        block: usize,
+        /// 0-based sample within the block.
+        sample: usize,
+        /// The value.
+        value: f64,
+    },
+}
+
+/// Metadata of a recording: everything that a decoder needs beside the samples.
+///
+/// ```
+/// use spts_circuit::{Mode, RecordingInfo, Seeding, WeightMode, Weights};
+/// use spts_models::SkinLayout;
+///
+/// let weights = Weights::new(WeightMode::Raster, Seeding::Address, 100);
+/// let info = RecordingInfo::new(SkinLayout::default(), weights, 64_300.0);
+/// assert_eq!((info.mode(), info.measurements_per_frame), (Mode::Raster, 100));
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordingInfo {
+    /// Layout of the recorded skin.
+    pub layout: SkinLayout,
+    /// Weights that the cells were meant to put out, one for each taxel. They also determine the readout: raster
+    /// weights mean a raster scan.
+    pub weights: Weights,
+    /// Measurements a second, Hz. Range (0, ∞).
+    pub sample_rate_hz: f64,
+    /// Measurements in a frame. Range [1, ∞); 100 in the published recordings.
+    pub measurements_per_frame: usize,
+    /// Scale of the converter; `None` if no converter acted or its scale is not known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub converter: Option<Converter>,
+}
+
+impl RecordingInfo {
+    /// Metadata of a skin whose frames have one measurement for each taxel, without a converter.
+    #[must_use]
+    pub fn new(layout: SkinLayout, weights: Weights, sample_rate_hz: f64) -> Self {
+        Self {
+            measurements_per_frame: layout.taxels(),
+            layout,
+            weights,
+            sample_rate_hz,
+            converter: None,
+        }
+    }
+
+    /// The readout that made the recording.
+    #[must_use]
+    pub fn mode(&self) -> Mode {
+        match self.weights.mode() {
+            WeightMode::Raster => Mode::Raster,
+            WeightMode::Analog | WeightMode::Binary => Mode::Compressive,
+        }
+    }
+
+    /// Checks what does not depend on the samples.
+    pub(crate) fn check(&self) -> Result<(), RecordingError> {
+        if self.measurements_per_frame == 0 {
+            return Err(RecordingError::Empty {
+                field: "measurements_per_frame",
+            });
+        }
+        if self.weights.taxels() != self.layout.taxels() {
+            return Err(RecordingError::Taxels {
+                weights: self.weights.taxels(),
+                layout: self.layout.taxels(),
+            });
+        }
+        let value = self.sample_rate_hz;
+        (value > 0.0 && value.is_finite())
+            .then_some(())
+            .ok_or(RecordingError::SampleRate { value })
+    }
+}
 
 /// One press: consecutive frames without a gap.
 #[derive(Debug, Clone, PartialEq)]
@@ -245,11 +393,137 @@ impl Recording {
     }
 }
 
+impl Recording {
+    /// Number of saturated samples: those at an end of the converter's range, and those within one code of `rail_v`,
+    /// the amplifier's largest output, V, if it is given. Missing samples do not count.
+    ///
+    /// If negative voltages were set to 0, an output below the range cannot be distinguished from 0.
+    ///
+    /// ```
+    /// use spts_circuit::{Block, Recording, RecordingInfo, Seeding, WeightMode, Weights};
+    /// use spts_models::SkinLayout;
+    ///
+    /// let weights = Weights::new(WeightMode::Raster, Seeding::Address, 4);
+    /// let info = RecordingInfo::new(SkinLayout::with_pitch(1, 4, 5e-3)?, weights, 1e3);
+    /// let block = Block { frame_position: 1, idle_frames: None, volts: vec![0.0, 3.0, 15.0, -15.0] };
+    /// let recording = Recording::new(info, vec![block])?;
+    /// assert_eq!((recording.saturated(None), recording.saturated(Some(15.0))), (0, 2));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn saturated(&self, rail_v: Option<f64>) -> usize {
+        let blocks = self.blocks().iter();
+        blocks.map(|block| self.info().saturated(&block.volts, rail_v)).sum()
+    }
+}
+
+impl RecordingInfo {
+    /// As [`Recording::saturated`], for samples outside a recording.
+    #[must_use]
+    pub fn saturated(&self, volts: &[f64], rail_v: Option<f64>) -> usize {
+        let converter = self.converter.as_ref();
+        let step_v = converter.map_or(0.0, |c| c.volts(0) - c.volts(1));
+        let subtracted_v = converter.map_or(0.0, Converter::subtracted_v);
+        let ends = converter.map(Ends::of);
+        let at_end = |v: f64| {
+            let output_v = v + subtracted_v;
+            ends.is_some_and(|ends| ends.reached(v)) || rail_v.is_some_and(|rail_v| output_v.abs() >= rail_v - step_v)
+        };
+        volts.iter().filter(|v| v.is_finite() && at_end(**v)).count()
+    }
+}
+
+/// Volts of the first and the last code.
+#[derive(Clone, Copy)]
+struct Ends {
+    first: u64,
+    /// `None` if the last codes are all set to 0 V.
+    last: Option<u64>,
+}
+
+impl Ends {
+    fn of(converter: &Converter) -> Self {
+        let [last, before] = [0, 1].map(|k| converter.volts(converter.max_code().saturating_sub(k)).to_bits());
+        Self {
+            first: converter.volts(0).to_bits(),
+            last: (last != before).then_some(last),
+        }
+    }
+
+    fn reached(self, v: f64) -> bool {
+        let bits = v.to_bits();
+        bits == self.first || self.last == Some(bits)
+    }
+}
+
+/// From measurement `from` of a block on, the cells are `rows` clock edges behind the count of measurements:
+/// measurement i has the row that belongs to measurement i − `rows`. This holds until the next slip of the block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Slip {
+    /// Block of the recording, from 0.
+    pub block: usize,
+    /// First measurement of the block that lags.
+    pub from: usize,
+    /// Total number of rows by which the measurements lag; negative if the cells are ahead.
+    pub rows: i64,
+}
+
+impl Recording {
+    /// The same recording with every sample moved to the row with which it was taken, so that [`Recording::rows`] is
+    /// correct again. Positions without a sample are marked as lost (NaN). If edges were missed within a block, the
+    /// cells repeated some rows; the first sample of such a row is kept. Samples that move out of their block are
+    /// dropped. `slips` must be in order of block and measurement.
+    ///
+    /// ```
+    /// use spts_circuit::{Block, Recording, RecordingInfo, Seeding, Slip, WeightMode, Weights};
+    /// use spts_models::SkinLayout;
+    ///
+    /// let layout = SkinLayout::new(1, 2, 5e-3, 3e-3)?;
+    /// let info = RecordingInfo::new(layout, Weights::new(WeightMode::Binary, Seeding::Mixed, 2), 64_300.0);
+    /// let block = Block { frame_position: 9, idle_frames: None, volts: vec![0.0, 1.0, 1.5, 2.0, 3.0, 4.0] };
+    /// let recording = Recording::new(info, vec![block])?;
+    /// // one edge was missed before the third measurement
+    /// let aligned = recording.realigned(&[Slip { block: 0, from: 2, rows: 1 }]);
+    /// assert_eq!(aligned.blocks()[0].volts[..5], [0.0, 1.0, 2.0, 3.0, 4.0]);
+    /// assert!(aligned.blocks()[0].volts[5].is_nan());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn realigned(&self, slips: &[Slip]) -> Self {
+        let mut blocks = self.blocks().to_vec();
+        for (number, block) in blocks.iter_mut().enumerate() {
+            let of_block: Vec<&Slip> = slips.iter().filter(|slip| slip.block == number).collect();
+            if !of_block.is_empty() {
+                put_back(block, &of_block);
+            }
+        }
+        self.with_samples_of(blocks)
+    }
+}
+
+fn put_back(block: &mut Block, slips: &[&Slip]) {
+    let len = block.volts.len();
+    let mut volts = vec![f64::NAN; len];
+    let mut taken = vec![false; len];
+    for (i, &sample) in block.volts.iter().enumerate() {
+        let rows = slips.iter().rfind(|slip| slip.from <= i).map_or(0, |slip| slip.rows);
+        let place = i64::try_from(i).ok().and_then(|i| i.checked_sub(rows));
+        let place = place.and_then(|place| usize::try_from(place).ok());
+        if let Some(place) = place.filter(|&place| place < len && !taken[place]) {
+            volts[place] = sample;
+            taken[place] = true;
+        }
+    }
+    block.volts = volts;
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mode::WeightMode;
-    use crate::seeding::Seeding;
+    use crate::weights::Seeding;
+    use crate::{Constant, Profile, Readout};
+    use spts_models::{ConductanceMap, Streams};
 
     fn info(side: usize, mode: WeightMode, sample_rate_hz: f64) -> RecordingInfo {
         let layout = SkinLayout::new(side, side, 15e-3, 10e-3).unwrap();
@@ -336,5 +610,38 @@ mod tests {
             new(1.0, vec![bad]),
             Err(RecordingError::Infinite { sample: 2, .. })
         ));
+    }
+
+    /// One taxel of a 10-bit converter of 32 V − 64.5 V: what is beyond is counted, in the mode in which it happens,
+    /// and so is what a rail of 15 V cuts off.
+    #[test]
+    fn samples_beyond_the_range_are_counted() {
+        let skin = SkinLayout::with_pitch(1, 4, 15e-3).unwrap();
+        let count = |effects: &str, mode, volts: f64| {
+            let ideal = crate::PROFILES[0].1;
+            let adc = |mode: &str, divider: f64, offset_v: f64| {
+                format!("[{mode}.adc]\nbits = 10\nreference_v = 3.3\ndivider = {divider:?}\noffset_v = {offset_v:?}\n")
+            };
+            let adcs = [adc("compressive", 20.0, 32.0), adc("raster", 3.0, 4.3)].concat();
+            let profile = Profile::from_toml(&format!("{ideal}\n{adcs}{effects}")).unwrap();
+            let siemens = volts / profile.volts_per_siemens();
+            let map = ConductanceMap::from_values(1, 4, vec![siemens, 0.0, 0.0, 0.0]);
+            let mut source = Constant::new(map).unwrap();
+            let mut readout = Readout::new(&profile, mode, &skin, Streams::new(1), 0).unwrap();
+            let block = readout.acquire(&mut source, 400).unwrap();
+            let recording = readout.recording(vec![block]).unwrap();
+            recording.saturated(profile.rail_v(mode).unwrap())
+        };
+        assert_eq!(count("", Mode::Compressive, 20.0), 0);
+        assert_eq!(count("", Mode::Compressive, 40.0), 400);
+        assert_eq!(
+            count("[compressive.rails]\nlimit_v = 15.0", Mode::Compressive, 20.0),
+            400
+        );
+        assert_eq!(count("[compressive.rails]\nlimit_v = 15.0", Mode::Compressive, 14.0), 0);
+        // a frame of a raster has one measurement of the taxel
+        assert_eq!(count("", Mode::Raster, 5.0), 100);
+        assert_eq!(count("[raster.clamp]\nsubtract_v = -0.1", Mode::Raster, 5.0), 100);
+        assert_eq!(count("[raster.clamp]\nsubtract_v = -0.1", Mode::Raster, 4.0), 0);
     }
 }

@@ -1,6 +1,6 @@
 //! Conductance of the skin as a function of time.
 
-use crate::acquire_error::AcquireError;
+use crate::engine::AcquireError;
 use spts_models::ConductanceMap;
 
 /// Largest conductance, S. A short bar of copper has 1e5; far beyond, squares would leave the range of f64.

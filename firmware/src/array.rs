@@ -1,22 +1,68 @@
-//! Emulated cells on one bus and one clock line.
-
-mod bus;
-mod clock;
-mod error;
-mod master;
-
-use rayon::prelude::*;
+//! Emulated cells on one bus and one clock line, and the master of the bus.
 
 use crate::attiny412::{Device, OSCILLATOR_HZ};
-use crate::cell::{CellMode, FIRST_ADDRESS, LAST_BUS_ADDRESS};
+use crate::avr::ProgramError;
+use crate::cell::{CellMode, FIRST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, Pattern};
 use crate::image::Image;
-use crate::pattern::Pattern;
-use bus::Stage;
-use clock::{Follower, Train, ticks};
+use rayon::prelude::*;
 
-pub use bus::{BusError, BusEvent, BusReply};
-pub use clock::{Clock, SKIN_EDGE_HZ, SKIN_SAMPLE_DELAY_S};
-pub use error::ArrayError;
+/// Why an array cannot be built or run.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ArrayError {
+    /// No cell, or more cells than addresses.
+    #[error("{cells} cells do not fit on one bus; the range is [1, 112]")]
+    Cells {
+        /// Number of cells.
+        cells: usize,
+    },
+    /// The number of seeds differs from that of the cells.
+    #[error("{seeds} seeds for {cells} cells")]
+    Seeds {
+        /// Seeds given.
+        seeds: usize,
+        /// Cells of the array.
+        cells: usize,
+    },
+    /// The number of patterns differs from that of the cells.
+    #[error("{patterns} patterns for {cells} cells")]
+    Patterns {
+        /// Patterns given.
+        patterns: usize,
+        /// Cells of the array.
+        cells: usize,
+    },
+    /// The number of codes is not a multiple of the number of cells.
+    #[error("`codes` has {codes} entries, which is no multiple of the {cells} cells")]
+    Codes {
+        /// Entries given.
+        codes: usize,
+        /// Cells of the array.
+        cells: usize,
+    },
+    /// A clock out of range.
+    #[error("`{field}` = {value} is outside {range}")]
+    Clock {
+        /// Field of [`Clock`].
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// Valid range.
+        range: &'static str,
+    },
+    /// A duration out of range.
+    #[error("`time_s` = {time_s} is outside [0, 86400] s")]
+    Idle {
+        /// Duration, s.
+        time_s: f64,
+    },
+    /// The image does not fit into flash.
+    #[error(transparent)]
+    Program(#[from] ProgramError),
+    /// A transaction failed.
+    #[error(transparent)]
+    Bus(#[from] BusError),
+}
 
 /// Cells that fit on a bus.
 const CELLS_MAX: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
@@ -141,7 +187,7 @@ impl Array {
     }
 
     /// Clocks the cells and fills `codes`, row-major (edge, cell), with the DAC code on each cell's pin when the edge
-    /// is sampled. A pin that is not driven counts as [`NEUTRAL_CODE`](crate::NEUTRAL_CODE).
+    /// is sampled. A pin that is not driven counts as [`NEUTRAL_CODE`].
     ///
     /// The first edge comes one period after the last event, which may be the start or bus traffic. A further call with
     /// the same clock continues without a gap and first returns the codes that a [free-running clock](Self::run_clock)
@@ -258,6 +304,499 @@ impl Array {
             for (code, sampled) in column.zip(follower.codes.drain(..rows)) {
                 *code = sampled;
             }
+        }
+    }
+}
+
+/// Rate of the clock line's edges, and the delay from an edge to the sampling of the codes.
+///
+/// ```
+/// use spts_firmware::Clock;
+///
+/// assert!(Clock::at(64.3e3).check().is_ok());
+/// let late = Clock { edge_hz: 64.3e3, sample_delay_s: 20e-6 }; // longer than the period of 15.6 µs
+/// assert!(late.check().unwrap_err().to_string().starts_with("`sample_delay_s` = 0.00002"));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clock {
+    /// Edges per second, rising and falling counted equally. Range [1, 1e6].
+    pub edge_hz: f64,
+    /// Time from an edge to the sampling of the codes, s, rounded to oscillator ticks of 50 ns. Range [0, 1/`edge_hz`),
+    /// and at least one tick less than the shortest distance between two edges.
+    pub sample_delay_s: f64,
+}
+
+/// Rate of the recordings of the skin, edges per second.
+pub const SKIN_EDGE_HZ: f64 = 64.3e3;
+/// Time from an edge to the converter's sample in the published acquisition code, s.
+pub const SKIN_SAMPLE_DELAY_S: f64 = 11e-6;
+
+impl Default for Clock {
+    /// The skin's: 64.3 thousand measurements a second, sampled 11 µs behind the edge.
+    fn default() -> Self {
+        Self {
+            edge_hz: SKIN_EDGE_HZ,
+            sample_delay_s: SKIN_SAMPLE_DELAY_S,
+        }
+    }
+}
+
+impl Clock {
+    /// The skin's clock at another rate. Codes are sampled 11 µs after the edge or, if the period is too short for
+    /// that, after the same share of the period.
+    #[must_use]
+    pub fn at(edge_hz: f64) -> Self {
+        Self {
+            edge_hz,
+            sample_delay_s: SKIN_SAMPLE_DELAY_S * (SKIN_EDGE_HZ / edge_hz).min(1.0),
+        }
+    }
+
+    /// Checks that the clock line can run at this rate and delay.
+    ///
+    /// # Errors
+    /// [`ArrayError::Clock`], with the field out of range.
+    pub fn check(&self) -> Result<(), ArrayError> {
+        let error = |field, value, range| Err(ArrayError::Clock { field, value, range });
+        if !(1.0..=1e6).contains(&self.edge_hz) {
+            return error("edge_hz", self.edge_hz, "[1, 1e6]");
+        }
+        // edges are the whole part of the period apart, or one tick more, and an edge must not come before the sample;
+        // a period that is whole but for rounding counts as whole
+        let in_range = (0.0..1.0 / self.edge_hz).contains(&self.sample_delay_s);
+        let shortest = (OSCILLATOR_HZ / self.edge_hz * (1.0 + 1e-14)).floor();
+        if !in_range || ticks(self.sample_delay_s) as f64 >= shortest {
+            return error(
+                "sample_delay_s",
+                self.sample_delay_s,
+                "[0, 1/edge_hz) in whole ticks of 50 ns",
+            );
+        }
+        Ok(())
+    }
+}
+
+/// A clock that started at tick `origin`. Edge k = 1, 2, … comes at the tick nearest to `origin` + k/f: errors do not
+/// add up.
+#[derive(Debug, Clone, Copy)]
+struct Train {
+    clock: Clock,
+    origin: u64,
+    sample_delay: u64,
+    /// Whether the clock runs freely, also during bus traffic.
+    free: bool,
+}
+
+impl Train {
+    fn new(clock: Clock, origin: u64, free: bool) -> Self {
+        Self {
+            clock,
+            origin,
+            sample_delay: ticks(clock.sample_delay_s),
+            free,
+        }
+    }
+
+    fn edge_tick(&self, edge: u64) -> u64 {
+        self.origin + ticks(edge as f64 / self.clock.edge_hz)
+    }
+
+    fn sample_tick(&self, edge: u64) -> u64 {
+        self.edge_tick(edge) + self.sample_delay
+    }
+}
+
+/// Oscillator ticks nearest to a time.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "times are non-negative and end centuries before 2^53 ticks"
+)]
+fn ticks(time_s: f64) -> u64 {
+    (time_s * OSCILLATOR_HZ).round() as u64
+}
+
+/// How far a cell has followed the clock line, and the codes sampled from it.
+#[derive(Debug, Clone, Default)]
+struct Follower {
+    /// Number of edges so far.
+    edges: u64,
+    /// Tick of the last edge.
+    edge_tick: u64,
+    /// Tick of the next edge, once computed.
+    next_tick: Option<u64>,
+    /// Number of edges whose codes have been sampled.
+    sampled: u64,
+    high: bool,
+    /// Sampled codes that have not been fetched.
+    codes: Vec<u8>,
+}
+
+/// What the clock brings next.
+enum Next {
+    Edge,
+    Sample,
+}
+
+impl Follower {
+    /// Starts counting edges anew; the line keeps its level.
+    fn restart(&mut self) {
+        self.edges = 0;
+        self.next_tick = None;
+        self.sampled = 0;
+        self.codes.clear();
+    }
+
+    /// The last edge, if its code has not been sampled yet.
+    fn unsampled(&self) -> Option<u64> {
+        (self.sampled < self.edges).then_some(self.edges)
+    }
+
+    /// Runs `device` to `tick` through the edges and samples on the way. With `released`, only until its I²C client
+    /// does not hold the bus; returns whether it does not.
+    fn follow(&mut self, device: &mut Device, train: Option<&Train>, tick: u64, released: bool) -> bool {
+        while let Some((next, at)) = train.map(|t| self.next(t)).filter(|(_, at)| *at <= tick) {
+            if released && device.run_until_released(at) {
+                return true;
+            }
+            device.run_until(at);
+            match next {
+                Next::Edge => {
+                    self.high = !self.high;
+                    device.set_clock(self.high);
+                    self.edges += 1;
+                    self.edge_tick = at;
+                    self.next_tick = None;
+                }
+                Next::Sample => {
+                    self.codes.push(device.dac_output_at(at).unwrap_or(NEUTRAL_CODE));
+                    self.sampled = self.edges;
+                }
+            }
+        }
+        if released {
+            device.run_until_released(tick)
+        } else {
+            device.run_until(tick);
+            true
+        }
+    }
+
+    fn next(&mut self, train: &Train) -> (Next, u64) {
+        let edge = self.edges + 1;
+        let edge = *self.next_tick.get_or_insert_with(|| train.edge_tick(edge));
+        let sample = self.edge_tick + train.sample_delay;
+        // the delay is shorter than the period
+        if self.sampled < self.edges {
+            (Next::Sample, sample)
+        } else {
+            (Next::Edge, edge)
+        }
+    }
+}
+
+/// Why a transaction failed.
+///
+/// ```
+/// use spts_firmware::{Array, Image};
+///
+/// let mut array = Array::new(2, &Image::shipped())?; // addresses 8 and 9
+/// let error = array.write(10, &[2, 8]).unwrap_err();
+/// assert_eq!(error.to_string(), "no cell acknowledges address 10");
+/// # Ok::<(), spts_firmware::ArrayError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BusError {
+    /// No cell acknowledges the address.
+    #[error("no cell acknowledges address {address}")]
+    NoAcknowledge {
+        /// Address on the bus.
+        address: u8,
+    },
+    /// An address of more than seven bits. Nothing was sent.
+    #[error("bus address {address} is outside [0, 127]")]
+    Address {
+        /// The address.
+        address: u8,
+    },
+    /// An incomplete byte of no bit, or of all bits. Nothing was sent.
+    #[error("`bits` = {bits} of an incomplete byte is outside [1, 7]")]
+    Bits {
+        /// The number of bits.
+        bits: u8,
+    },
+    /// The cell did not acknowledge a byte.
+    #[error("the cell at address {address} refuses byte {index} of the write")]
+    Refused {
+        /// Address on the bus.
+        address: u8,
+        /// Position of the byte in the write, from 0.
+        index: usize,
+    },
+    /// A cell holds the clock low. The bus is blocked until that cell is reset.
+    #[error("the cell at address {address} has held the bus clock low for 25 ms")]
+    Stuck {
+        /// Address of the cell.
+        address: u8,
+    },
+}
+
+/// An event that a bus master can cause.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BusEvent {
+    /// START, or repeated START within a transaction.
+    Start,
+    /// A byte from the master. The first byte after a START holds an address (upper seven bits) and a direction (1 =
+    /// read).
+    Write(u8),
+    /// A byte to the master, which acknowledges it or not.
+    Read {
+        /// Whether the master asks for another byte.
+        acknowledge: bool,
+    },
+    /// The first bits, 1 to 7, of an incomplete byte. Until the next START or STOP no byte reaches a cell.
+    Bits(u8),
+    /// STOP.
+    Stop,
+}
+
+/// What the master received.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BusReply {
+    /// Whether a byte from the master was acknowledged.
+    Acknowledged(bool),
+    /// A byte to the master; 255 if no cell sends.
+    Byte(u8),
+}
+
+/// Where a transaction stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum Stage {
+    /// Whole bytes.
+    #[default]
+    Bytes,
+    /// A START whose address has not come yet.
+    Started,
+    /// Within an incomplete byte.
+    Broken,
+}
+
+/// Bit time at 400 kHz (ticks of 50 ns).
+const BIT_TICKS: u64 = 50;
+/// Longest time for which a cell may hold the clock low (ticks): 25 ms, the limit of SMBus, section "Clock low
+/// time-out".
+const STRETCH_LIMIT_TICKS: u64 = 500_000;
+
+impl Array {
+    /// Writes `bytes` to the cell at `address`: START, address, bytes, STOP at 400 kHz. All cells receive the traffic.
+    ///
+    /// # Errors
+    /// [`BusError`] if no cell answers or the cell refuses a byte (STOP follows in both cases), or a cell blocks the
+    /// bus.
+    pub fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), BusError> {
+        self.open(address, 0)?;
+        for (index, byte) in bytes.iter().enumerate() {
+            if !self.send(*byte)? {
+                self.stop()?;
+                return Err(BusError::Refused { address, index });
+            }
+        }
+        self.stop()
+    }
+
+    /// Reads `out.len()` bytes from the cell at `address`: START, address, bytes (the last one not acknowledged), STOP.
+    /// An empty `out` sends nothing.
+    ///
+    /// # Errors
+    /// [`BusError`] if no cell answers, or a cell blocks the bus.
+    pub fn read(&mut self, address: u8, out: &mut [u8]) -> Result<(), BusError> {
+        let Some(last) = out.len().checked_sub(1) else {
+            return Ok(());
+        };
+        self.open(address, 1)?;
+        for (k, byte) in out.iter_mut().enumerate() {
+            *byte = self.receive(k < last)?;
+        }
+        self.stop()
+    }
+
+    /// Sends any sequence of bus events. Returns a reply for every byte. A missing acknowledgement does not end the
+    /// sequence.
+    ///
+    /// # Errors
+    /// [`BusError::Bits`] for a number of bits out of range, [`BusError::Stuck`] if a cell blocks the bus.
+    pub fn transact(&mut self, events: &[BusEvent]) -> Result<Vec<BusReply>, BusError> {
+        let odd = events.iter().find_map(|event| match *event {
+            BusEvent::Bits(bits) if !(1..=7).contains(&bits) => Some(bits),
+            _ => None,
+        });
+        if let Some(bits) = odd {
+            return Err(BusError::Bits { bits });
+        }
+        self.drop_paused_clock();
+        let mut replies = vec![];
+        for event in events {
+            match *event {
+                BusEvent::Start => self.begin()?,
+                BusEvent::Write(byte) => replies.push(BusReply::Acknowledged(self.send(byte)?)),
+                BusEvent::Read { acknowledge } => replies.push(BusReply::Byte(self.receive(acknowledge)?)),
+                BusEvent::Bits(bits) => self.break_off(bits)?,
+                BusEvent::Stop => self.stop()?,
+            }
+        }
+        Ok(replies)
+    }
+
+    /// START and an address that has to be acknowledged.
+    fn open(&mut self, address: u8, direction: u8) -> Result<(), BusError> {
+        if address > 0x7f {
+            return Err(BusError::Address { address });
+        }
+        self.drop_paused_clock();
+        self.begin()?;
+        if self.send(address << 1 | direction)? {
+            return Ok(());
+        }
+        self.stop()?;
+        Err(BusError::NoAcknowledge { address })
+    }
+
+    fn begin(&mut self) -> Result<(), BusError> {
+        self.wait_for_clock()?;
+        self.pass(1);
+        self.stage = Stage::Started;
+        for cell in &mut self.cells {
+            cell.hear_start();
+        }
+        Ok(())
+    }
+
+    /// A byte from the master; whether it was acknowledged.
+    fn send(&mut self, byte: u8) -> Result<bool, BusError> {
+        self.wait_for_clock()?;
+        self.pass(8);
+        for cell in &mut self.cells {
+            match self.stage {
+                Stage::Started => cell.hear_address(byte),
+                Stage::Bytes => cell.hear_byte(byte),
+                Stage::Broken => {}
+            }
+        }
+        if self.stage == Stage::Started {
+            self.stage = Stage::Bytes;
+        }
+        self.wait_for_clock()?;
+        self.pass(1);
+        // wired: one cell that pulls the line low is enough
+        Ok(self
+            .cells
+            .iter_mut()
+            .fold(false, |any, cell| cell.take_acknowledge() | any))
+    }
+
+    /// A byte to the master.
+    fn receive(&mut self, acknowledge: bool) -> Result<u8, BusError> {
+        self.wait_for_clock()?;
+        self.pass(8);
+        if self.stage == Stage::Broken {
+            self.pass(1);
+            return Ok(u8::MAX);
+        }
+        let byte = self.cells.iter().fold(u8::MAX, |bus, cell| bus & cell.byte_sent());
+        self.pass(1);
+        for cell in &mut self.cells {
+            cell.hear_answer(byte, acknowledge);
+        }
+        Ok(byte)
+    }
+
+    fn break_off(&mut self, bits: u8) -> Result<(), BusError> {
+        self.wait_for_clock()?;
+        self.pass(u64::from(bits));
+        self.stage = Stage::Broken;
+        Ok(())
+    }
+
+    fn stop(&mut self) -> Result<(), BusError> {
+        self.wait_for_clock()?;
+        self.pass(1);
+        for cell in &mut self.cells {
+            cell.hear_stop(self.stage != Stage::Bytes);
+        }
+        self.stage = Stage::Bytes;
+        // bus free time
+        self.pass(1);
+        Ok(())
+    }
+
+    fn pass(&mut self, bits: u64) {
+        self.advance(self.now + bits * BIT_TICKS);
+    }
+
+    /// Waits until no cell holds the clock low.
+    fn wait_for_clock(&mut self) -> Result<(), BusError> {
+        let (now, limit) = (self.now, self.now + STRETCH_LIMIT_TICKS);
+        let mut released_at = now;
+        let mut stuck = None;
+        for (k, (cell, follower)) in self.cells.iter_mut().zip(&mut self.followers).enumerate() {
+            if !cell.holds_clock() {
+                continue;
+            }
+            if follower.follow(cell, self.train.as_ref(), limit, true) {
+                released_at = released_at.max(cell.now());
+            } else {
+                stuck.get_or_insert(k);
+                released_at = limit;
+            }
+        }
+        self.advance(released_at);
+        match stuck {
+            None => Ok(()),
+            Some(k) => Err(BusError::Stuck {
+                address: Self::address(k),
+            }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 20 MHz / 72 kHz = 277.7…; a rounded period of 278 would be 22 222 ticks late after 100 000 edges.
+    #[test]
+    fn edges_do_not_drift() {
+        let clock = Clock {
+            edge_hz: 72e3,
+            sample_delay_s: 10e-6,
+        };
+        let train = Train::new(clock, 1000, false);
+        assert_eq!(train.edge_tick(1), 1278);
+        assert_eq!(train.edge_tick(2), 1556);
+        assert_eq!(train.edge_tick(100_000), 1000 + 27_777_778);
+        assert_eq!(train.sample_tick(1), 1478);
+    }
+
+    #[test]
+    fn impossible_clocks_are_refused() {
+        let clock = |edge_hz, sample_delay_s| Clock {
+            edge_hz,
+            sample_delay_s,
+        };
+        for bad in [
+            clock(0.0, 0.0),
+            clock(f64::NAN, 0.0),
+            clock(2e6, 0.0),
+            clock(1e5, 1e-5),
+            // the tick of the next edge
+            clock(1e5, 9.99e-6),
+            clock(72e3, 277.0 * 50e-9),
+            clock(1e5, -1e-9),
+        ] {
+            assert!(bad.check().is_err(), "{bad:?}");
+        }
+        for good in [clock(1e5, 9.95e-6), clock(72e3, 276.0 * 50e-9), Clock::default()] {
+            good.check().unwrap();
         }
     }
 }

@@ -30,11 +30,10 @@ pub mod attiny412;
 pub mod avr;
 mod cell;
 mod image;
-mod pattern;
 
 pub use array::{Array, ArrayError, BusError, BusEvent, BusReply, Clock, SKIN_EDGE_HZ, SKIN_SAMPLE_DELAY_S};
 pub use cell::{
-    AddressError, Cell, CellMode, FIRST_ADDRESS, LAST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, REPLY_BYTES,
+    AddressError, Cell, CellMode, FIRST_ADDRESS, LAST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, PATTERN_BITS, Pattern,
+    PatternError, REPLY_BYTES,
 };
 pub use image::{FLASH_BYTES, Image, ImageError};
-pub use pattern::{PATTERN_BITS, Pattern, PatternError};

@@ -25,22 +25,12 @@
 //! ```
 
 mod budget;
-mod decay;
-mod linear;
-mod noise;
+mod motion;
 mod parts;
-mod ramp;
-mod remedies;
 mod response;
-mod root;
-mod settling;
-mod state;
 mod transient;
 
-pub use budget::{Budget, Limit, Setting, Skin};
-pub use noise::AmplifierNoise;
-pub use parts::{Amplifier, Network, OpAmp};
-pub use remedies::{Remedied, Remedy, fewest_wires, remedied};
-pub use response::AmplifierResponse;
-pub use state::BusLoad;
+pub use budget::{Budget, Limit, Remedied, Remedy, Setting, Skin, fewest_wires, remedied};
+pub use parts::{Amplifier, BusLoad, Network, OpAmp};
+pub use response::{AmplifierNoise, AmplifierResponse};
 pub use transient::Transient;

@@ -1,9 +1,7 @@
 //! Bus and output as functions of time, for time steps from zero to hours.
 
-use super::linear::{Exit, Linear, rest};
-use super::parts::Amplifier;
-use super::ramp::{Ramp, demand_v_per_s};
-use super::state::{BusLoad, State};
+use super::motion::{Decay, crossing};
+use super::parts::{Amplifier, BusLoad, State};
 
 /// What the output does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,4 +171,215 @@ impl Transient {
         self.state = ramp.after(t);
         (t, Phase::Linear)
     }
+}
+
+/// Share by which the slew rate or a rail has to be exceeded before it acts: rounding alone must not switch phases.
+const MARGIN: f64 = 1e-9;
+/// The same in shares of the numbers that cancel in rate and output: some dozens of roundings.
+const ROUNDING: f64 = 1e-14;
+
+/// What ends a linear phase early.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Exit {
+    /// The output exceeds the slew rate; `true` if upwards.
+    Slew(bool),
+    /// The output reaches a rail; `true` for the upper one.
+    Rail(bool),
+}
+
+/// x′ = M (x − x∞) with x = (v, o), and its closed-form solution
+///
+/// x(t) = x∞ + e^(σt) [cosh(√δ t) + sinh(√δ t)/√δ · (M − σ)] (x₀ − x∞), σ = tr M / 2, δ = σ² − det M.
+///
+/// Source: the exponential of a 2 × 2 matrix by the theorem of Cayley and Hamilton.
+pub(super) struct Linear {
+    decay: Decay,
+    m: [[f64; 2]; 2],
+    rest: State,
+}
+
+impl Linear {
+    pub(super) fn new(amplifier: &Amplifier, load: BusLoad) -> Self {
+        let (unity, pole) = (amplifier.unity_rad_per_s(), amplifier.pole_rad_per_s());
+        let (feedback_ohm, feedback_f) = (amplifier.network().feedback_ohm, amplifier.network().feedback_f);
+        let (bus_s, capacitance_f) = (amplifier.bus_s(load.conductance_s), amplifier.capacitance_f());
+        let m = [
+            [
+                -(feedback_f * unity + bus_s) / capacitance_f,
+                (1.0 / feedback_ohm - feedback_f * pole) / capacitance_f,
+            ],
+            [-unity, -pole],
+        ];
+        let product = (pole * bus_s + unity / feedback_ohm) / capacitance_f;
+        let delta = (0.5 * (m[0][0] - m[1][1])).powi(2) + m[0][1] * m[1][0];
+        Self {
+            decay: Decay::new(0.5 * (m[0][0] + m[1][1]), product, delta),
+            m,
+            rest: rest(amplifier, load),
+        }
+    }
+
+    /// State after `t` seconds in this phase.
+    pub(super) fn after(&self, state: State, t: f64) -> State {
+        let (v, o) = (state.sum_v - self.rest.sum_v, state.output_v - self.rest.output_v);
+        let (c, s) = self.decay.at(t);
+        let [[vv, vo], [ov, oo]] = self.m;
+        let sigma = self.decay.sigma();
+        State {
+            sum_v: self.rest.sum_v + c * v + s * ((vv - sigma) * v + vo * o),
+            output_v: self.rest.output_v + c * o + s * (ov * v + (oo - sigma) * o),
+        }
+    }
+
+    /// First time within `dt_s` at which the output changes faster than `slew_v_per_s` or leaves ± `rail_v`.
+    ///
+    /// Output and rate both are free motions of the same two modes. Between its extrema, which are known in closed
+    /// form, each is monotone; and because they decay, none goes beyond its first two extrema and its end. So it is
+    /// enough to look at those, and to search where a limit is passed between one and the next.
+    pub(super) fn exit(&self, state: State, dt_s: f64, slew_v_per_s: f64, rail_v: f64) -> Option<(f64, Exit)> {
+        let d = [state.sum_v - self.rest.sum_v, state.output_v - self.rest.output_v];
+        let first = self.derivative(d);
+        let second = self.derivative(first);
+        let third = self.derivative(second);
+        let rate = |t: f64| self.decay.value(first[1], second[1], t);
+        let output = |t: f64| self.rest.output_v + self.decay.value(d[1], first[1], t);
+        let [a, b] = self.decay.zeros(first[1], second[1]);
+        let [c, e] = self.decay.zeros(second[1], third[1]);
+        // an extremum that its cancelling modes hide from `zeros` is where the fast one has died away
+        let mut nodes = [a, b, c, e, self.decay.fast_gone_s(), dt_s].map(|t| t.min(dt_s));
+        nodes.sort_unstable_by(f64::total_cmp);
+        let [ov, oo] = self.m[1];
+        let slew_limit = slew_v_per_s * (1.0 + MARGIN) + ROUNDING * (ov * d[0]).abs().max((oo * d[1]).abs());
+        let rail_limit = rail_v * (1.0 + MARGIN) + ROUNDING * self.rest.output_v.abs().max(d[1].abs());
+        let mut from = 0.0;
+        for to in nodes {
+            if to <= from {
+                continue;
+            }
+            let (fast, far) = (rate(to), output(to));
+            let slews = (fast.abs() > slew_limit).then(|| {
+                let t = crossing(&|t| fast.signum() * rate(t) - slew_v_per_s, from, to);
+                (t, Exit::Slew(fast > 0.0))
+            });
+            let hits = (far.abs() > rail_limit).then(|| {
+                let t = crossing(&|t| far.signum() * output(t) - rail_v, from, to);
+                (t, Exit::Rail(far > 0.0))
+            });
+            let earlier = match (slews, hits) {
+                (Some(s), Some(h)) => Some(if s.0 < h.0 { s } else { h }),
+                (s, h) => s.or(h),
+            };
+            if earlier.is_some() {
+                return earlier;
+            }
+            from = to;
+        }
+        None
+    }
+
+    fn derivative(&self, x: [f64; 2]) -> [f64; 2] {
+        self.m.map(|row| row[0] * x[0] + row[1] * x[1])
+    }
+}
+
+/// Where the linear system comes to rest, rails or not:
+///
+/// o∞ = ((1 + Rf·S)·Vos − Rf·I) / (1 + (1 + Rf·S)/A0), v∞ = Vos − o∞/A0.
+pub(super) fn rest(amplifier: &Amplifier, load: BusLoad) -> State {
+    let (network, dc_gain) = (amplifier.network(), amplifier.op_amp().dc_gain);
+    let noise_gain = network.feedback_ohm * amplifier.bus_s(load.conductance_s);
+    let output_v =
+        (noise_gain * network.offset_v - network.feedback_ohm * load.current_a) / (1.0 + noise_gain / dc_gain);
+    State {
+        sum_v: network.offset_v - output_v / dc_gain,
+        output_v,
+    }
+}
+
+/// Output at the constant rate r; the bus follows v′ = −k v + b + c t, k = (S + 1/Rf)/C.
+pub(super) struct Ramp<'a> {
+    amplifier: &'a Amplifier,
+    start: State,
+    /// r, V/s: ± the slew rate, or 0 at a rail.
+    rate: f64,
+    /// +1 or −1: direction in which the output is driven.
+    sign: f64,
+    /// k, 1/s.
+    decay_per_s: f64,
+    /// v′ at the start, V/s.
+    slope: f64,
+    /// c, V/s².
+    forcing: f64,
+}
+
+impl<'a> Ramp<'a> {
+    /// Phase from `start` on: driven up or down, with the output at `rate`.
+    pub(super) fn new(amplifier: &'a Amplifier, load: BusLoad, start: State, rate: f64, up: bool) -> Self {
+        let network = amplifier.network();
+        let (bus_s, capacitance_f) = (amplifier.bus_s(load.conductance_s), amplifier.capacitance_f());
+        let current_a =
+            network.feedback_f * rate - bus_s * start.sum_v + start.output_v / network.feedback_ohm + load.current_a;
+        Self {
+            amplifier,
+            start,
+            rate,
+            sign: if up { 1.0 } else { -1.0 },
+            decay_per_s: bus_s / capacitance_f,
+            slope: current_a / capacitance_f,
+            forcing: rate / (network.feedback_ohm * capacitance_f),
+        }
+    }
+
+    /// State after `t` seconds: v = v₀ + v₀′ φ₁ + c φ₂ with φ₁ = (1 − e^(−kt))/k and φ₂ = (t − φ₁)/k.
+    pub(super) fn after(&self, t: f64) -> State {
+        let x = self.decay_per_s * t;
+        let lost = -(-x).exp_m1();
+        let first = lost / self.decay_per_s;
+        // (x − (1 − e^(−x)))/x², where the difference would lose digits by its series: the term left out is x⁴/360 of
+        // the first
+        let second = if x < 1e-3 {
+            t * t * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x / 120.0)))
+        } else {
+            (t - first) / self.decay_per_s
+        };
+        State {
+            sum_v: self.start.sum_v + self.slope * first + self.forcing * second,
+            output_v: self.start.output_v + self.rate * t,
+        }
+    }
+
+    /// First time within `dt_s` at which the output is no longer driven at more than `least_v_per_s` in the phase's
+    /// direction.
+    ///
+    /// The demand is a straight line and an exponential: it has one extremum at most, and is monotone on either side of
+    /// it.
+    pub(super) fn release(&self, dt_s: f64, least_v_per_s: f64) -> Option<f64> {
+        let excess = |t: f64| self.sign * demand_v_per_s(self.amplifier, self.after(t)) - least_v_per_s;
+        let mut from = 0.0;
+        for to in [self.extremum().min(dt_s), dt_s] {
+            if to <= from {
+                continue;
+            }
+            if excess(to) < 0.0 {
+                let inside = excess(from) > 0.0;
+                return Some(if inside { crossing(&excess, from, to) } else { from });
+            }
+            from = to;
+        }
+        None
+    }
+
+    /// Time at which v′ = −r/A0, where the demand has its extremum; infinite where it has none after the start.
+    fn extremum(&self) -> f64 {
+        let drift = self.rate / self.amplifier.op_amp().dc_gain;
+        let steady = self.forcing / self.decay_per_s;
+        let t = (-(self.slope + drift) / (steady + drift)).ln_1p() / self.decay_per_s;
+        if t > 0.0 { t } else { f64::INFINITY }
+    }
+}
+
+/// Rate that the operational amplifier asks of its output: ωt (Vos − v) − ωp o, V/s.
+pub(super) fn demand_v_per_s(amplifier: &Amplifier, state: State) -> f64 {
+    amplifier.unity_rad_per_s() * (amplifier.network().offset_v - state.sum_v)
+        - amplifier.pole_rad_per_s() * state.output_v
 }

@@ -2,9 +2,7 @@
 
 use crate::amplifier::{Amplifier, AmplifierNoise, BusLoad, Network, OpAmp, Transient};
 use crate::batch::Batch;
-use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
-use crate::span::Span;
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError, Span, parse};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
@@ -74,12 +72,12 @@ pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<d
     in_range("sample_s", c.sample_s, sampled, "[0, 1/sample_rate_hz]")?;
     let updated = (0.0..=c.sample_s).contains(&c.update_s);
     in_range("update_s", c.update_s, updated, "[0, sample_s]")?;
-    let offset_v = c.offset_v.within("offset_v", -1.0, 1.0, "[−1, 1]")?;
+    let rng = &mut session.device.rng("amplifier/offset", 0);
     let network = Network {
         feedback_ohm: session.feedback_ohm,
         feedback_f: c.feedback_f,
         bus_f: c.bus_f,
-        offset_v: offset_v.draw(&mut session.device.rng("amplifier/offset", 0)),
+        offset_v: c.offset_v.drawn("offset_v", [-1.0, 1.0], "[−1, 1]", rng)?,
         temperature_k: c.temperature_k,
     };
     let amplifier = Amplifier::new(c.op_amp, network)?;

@@ -1,12 +1,8 @@
 //! The cells' converters from code to drive voltage.
 
 use crate::batch::{Batch, Scratch};
-use crate::codes::{FULL_SCALE, NEUTRAL, code_of};
-use crate::effect::parse;
-use crate::effect::{Effect, EffectSession, ProfileError};
-use crate::mode::{ANALOG_SCALE, WeightMode};
-use crate::seeding::finalise;
-use crate::span::Span;
+use crate::effect::{Effect, EffectSession, ProfileError, Span, parse};
+use crate::weights::{ANALOG_SCALE, FULL_SCALE, NEUTRAL, WeightMode, code_of, finalise};
 use rand::RngExt as _;
 use serde::Deserialize;
 use spts_models::within;

@@ -1,17 +1,15 @@
 //! Taxels that still have their previous level when the output is sampled.
 
-use super::late_queue::LateQueue;
-use super::late_raster::LateRaster;
 use crate::batch::Batch;
-use crate::effect::parse;
-use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
-use crate::mode::WeightMode;
-use crate::span::Span;
+use crate::effect::{BlockStart, Effect, EffectSession, ProfileError, Span, parse};
+use crate::weights::WeightMode;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
 use spts_models::{Streams, in_range, within};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 
 /// Each cell's millisecond timer beats against the common clock: every `period_measurements` its interrupt collides
 /// with an edge and may delay the update past the moment of sampling. The output then errs by (previous − new
@@ -32,11 +30,11 @@ struct Config {
     period_sd_measurements: f64,
 }
 
-pub(super) struct Cell {
+struct Cell {
     phase: f64,
     period: f64,
     /// Probability that a collision of timer and clock makes the cell late.
-    pub(super) late: f64,
+    late: f64,
     /// ln(1 − late).
     ln_in_time: f64,
     /// Number of the next collision at which the cell is late.
@@ -64,7 +62,7 @@ impl Cell {
     }
 
     /// Whether a collision acts on `row`.
-    pub(super) fn collides(&self, row: u64) -> bool {
+    fn collides(&self, row: u64) -> bool {
         row_of(self.phase + self.first_collision(row) * self.period) == row
     }
 
@@ -101,8 +99,8 @@ struct LateUpdates {
     streams: Streams,
     cells: Vec<Cell>,
     rng: ChaCha8Rng,
-    /// Row of the next late update of every cell.
-    queue: LateQueue,
+    /// Row of the next late update of every cell, the earliest first, and of equal ones the cell of the lowest number.
+    queue: BinaryHeap<Reverse<(u64, usize)>>,
 }
 
 pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
@@ -143,30 +141,87 @@ pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<d
         streams: session.streams,
         cells,
         rng,
-        queue: LateQueue::default(),
+        queue: BinaryHeap::new(),
     }))
 }
 
 impl Effect for LateUpdates {
     fn begin_block(&mut self, start: &BlockStart) {
         self.rng = self.streams.rng("late-updates", start.block);
-        self.queue.begin(start.first_row, self.cells.len());
+        self.queue.clear();
         for (k, cell) in self.cells.iter_mut().enumerate() {
             cell.collision = cell.first_collision(start.first_row);
-            self.queue.put(k, cell.advance(&mut self.rng));
+            self.queue.push(Reverse((cell.advance(&mut self.rng), k)));
         }
     }
 
     fn apply(&mut self, batch: &mut Batch<'_>) {
-        let (cells, rng) = (&mut self.cells, &mut self.rng);
         for (i, row) in (batch.row(0)..batch.row(batch.len())).enumerate() {
-            self.queue.take(row, |k| {
+            while let Some(mut next) = self.queue.peek_mut().filter(|next| next.0.0 <= row) {
+                let k = next.0.1;
                 let held = batch.previous_level(k, i) - batch.level(k, i);
                 batch.output_v[i] += held * batch.taxel_v(k, i);
-                let cell = &mut cells[k];
+                let cell = &mut self.cells[k];
                 cell.collision += 1.0;
-                cell.advance(rng)
-            });
+                *next = Reverse((cell.advance(&mut self.rng), k));
+            }
+        }
+    }
+}
+
+/// The same process as that of any weights. A cell that puts out again what it held cannot be late, so that only those
+/// that change are looked at: whether their timer collides with this edge, and whether that makes them late.
+struct LateRaster {
+    session: Streams,
+    /// Streams of the block.
+    block: Streams,
+    cells: Vec<Cell>,
+    /// Scratch: the cells that may change in a row.
+    changing: Vec<usize>,
+}
+
+impl LateRaster {
+    fn new(session: Streams, cells: Vec<Cell>) -> Self {
+        Self {
+            session,
+            block: session,
+            cells,
+            changing: Vec::new(),
+        }
+    }
+}
+
+impl Effect for LateRaster {
+    fn begin_block(&mut self, start: &BlockStart) {
+        self.block = self.session.child("late-updates", start.block);
+    }
+
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        let count = self.cells.len() as u64;
+        for (i, row) in (batch.row(0)..batch.row(batch.len())).enumerate() {
+            let scanned = [row % count, (row + count - 1) % count];
+            self.changing.clear();
+            if batch.rows.are_given() {
+                // whatever put them out, any cell may change
+                self.changing.extend(0..self.cells.len());
+            } else {
+                let scanned = scanned.iter().filter_map(|k| usize::try_from(*k).ok());
+                self.changing.extend(scanned);
+                // cells that missed clocks or have faults change at other times
+                self.changing.extend(batch.cells.iter().map(|cell| cell.taxel));
+                self.changing.sort_unstable();
+                self.changing.dedup();
+            }
+            for &k in &self.changing {
+                let held = batch.previous_level(k, i) - batch.level(k, i);
+                let cell = &self.cells[k];
+                if held.abs() > 0.0 && cell.late > 0.0 && cell.collides(row) {
+                    let draw: f64 = self.block.child("row", row).rng("cell", k as u64).random();
+                    if draw < cell.late {
+                        batch.output_v[i] += held * batch.taxel_v(k, i);
+                    }
+                }
+            }
         }
     }
 }
@@ -175,10 +230,8 @@ impl Effect for LateUpdates {
 mod tests {
     use super::*;
     use crate::engine::Engine;
-    use crate::mode::WeightMode;
-    use crate::seeding::Seeding;
     use crate::source::Constant;
-    use crate::weights::Weights;
+    use crate::weights::{Seeding, Weights};
     use spts_models::ConductanceMap;
 
     /// Cells of which every collision makes a late one.
@@ -198,7 +251,7 @@ mod tests {
             streams: Streams::new(0),
             cells: always_late(),
             rng: Streams::new(0).rng("late-updates", 0),
-            queue: LateQueue::default(),
+            queue: BinaryHeap::new(),
         }
     }
 

@@ -1,14 +1,11 @@
-//! One device: core, memory map and time.
+//! One device: core, memory map and time; and its trace, instruction by instruction, for debugging.
 
-use std::sync::Arc;
-
-use super::ccp::Access;
-use super::cpuint::Accepted;
-use super::fault::{Fault, Faults};
-use super::rstctrl::ResetCause;
+use super::pins::PORT_VECTOR;
 use super::space::{FLASH_LEN, RAM_END, Space};
-use super::trace::{Observer, Silent, Sink, TraceRecord, TraceStep, instruction};
-use crate::avr::{Core, Event, Op, Program, ProgramError};
+use super::system::{Accepted, Access, Fault, Faults, ResetCause};
+use crate::avr::{Core, Event, Op, Program, ProgramError, disassemble, sreg};
+use std::fmt;
+use std::sync::Arc;
 
 /// Frequency of the main oscillator (Hz): one tick.
 pub const OSCILLATOR_HZ: f64 = 20e6;
@@ -284,7 +281,7 @@ impl Device {
     fn take_interrupt<O: Observer>(&mut self, observer: &mut O) -> bool {
         let Some(accepted) = self.pending else { return false };
         let ticks_per_cycle = self.space.clkctrl.ticks_per_cycle();
-        if self.asleep && self.core.sreg & crate::avr::sreg::I != 0 {
+        if self.asleep && self.core.sreg & sreg::I != 0 {
             self.asleep = false;
             self.hear(observer, TraceStep::Wake);
             self.now += WAKE_UP_CYCLES * ticks_per_cycle;
@@ -300,7 +297,7 @@ impl Device {
                 vector: accepted.source,
             },
         );
-        self.port_interrupts += u64::from(accepted.source == super::port::VECTOR);
+        self.port_interrupts += u64::from(accepted.source == PORT_VECTOR);
         self.space.cpuint.enter(accepted);
         let cycles = self.core.interrupt(accepted.entry, &mut self.space);
         self.now += u64::from(cycles) * ticks_per_cycle;
@@ -370,5 +367,108 @@ impl Device {
     /// Acknowledge bit that the client gave to the last byte, once.
     pub(crate) fn take_acknowledge(&mut self) -> bool {
         self.space.twi.take_acknowledge()
+    }
+}
+
+/// One step of a traced device.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TraceRecord {
+    /// Oscillator tick at which the step starts.
+    pub tick: u64,
+    /// Content of the step.
+    pub step: TraceStep,
+}
+
+/// Content of a step of a traced device.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum TraceStep {
+    /// An instruction.
+    Instruction {
+        /// Word address.
+        pc: u16,
+        /// Text in the syntax of a disassembler.
+        text: String,
+        /// Changed registers, by name, with the new value: r0…r31, SP, SREG.
+        changes: Vec<(String, u16)>,
+    },
+    /// An interrupt is executed.
+    Interrupt {
+        /// Vector number.
+        vector: u8,
+    },
+    /// The CPU wakes up.
+    Wake,
+    /// The device is reset.
+    Reset {
+        /// Why.
+        cause: ResetCause,
+    },
+}
+
+impl fmt::Display for TraceRecord {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:>10}  ", self.tick)?;
+        match &self.step {
+            TraceStep::Instruction { pc, text, changes } => {
+                write!(f, "{:04x}  {text:<28}", 2 * u32::from(*pc))?;
+                for (name, value) in changes {
+                    write!(f, " {name}={value:02x}")?;
+                }
+                Ok(())
+            }
+            TraceStep::Interrupt { vector } => write!(f, "----  interrupt {vector}"),
+            TraceStep::Wake => write!(f, "----  wake"),
+            TraceStep::Reset { cause } => write!(f, "----  reset: {cause:?}"),
+        }
+    }
+}
+
+/// Hears what a running device does.
+trait Observer {
+    /// Whether anything is heard; without, the calls cost nothing.
+    const ON: bool;
+    /// A step.
+    fn hear(&mut self, record: TraceRecord);
+}
+
+/// Hears nothing.
+struct Silent;
+
+impl Observer for Silent {
+    const ON: bool = false;
+    fn hear(&mut self, _: TraceRecord) {}
+}
+
+/// Passes every step on.
+struct Sink<F>(F);
+
+impl<F: FnMut(&TraceRecord)> Observer for Sink<F> {
+    const ON: bool = true;
+    fn hear(&mut self, record: TraceRecord) {
+        (self.0)(&record);
+    }
+}
+
+/// The instruction that took the core from `before` to `after`.
+fn instruction(tick: u64, program: &Program, before: &Core, after: &Core) -> TraceRecord {
+    let registers = before.registers.iter().zip(&after.registers).enumerate();
+    let mut changes: Vec<(String, u16)> = registers
+        .filter(|(_, (old, new))| old != new)
+        .map(|(k, (_, new))| (format!("r{k}"), u16::from(*new)))
+        .collect();
+    if before.sp != after.sp {
+        changes.push(("SP".into(), after.sp));
+    }
+    if before.sreg != after.sreg {
+        changes.push(("SREG".into(), u16::from(after.sreg)));
+    }
+    TraceRecord {
+        tick,
+        step: TraceStep::Instruction {
+            pc: before.pc,
+            text: disassemble(program, before.pc),
+            changes,
+        },
     }
 }

@@ -1,6 +1,6 @@
 //! The ATtiny412: an AVRxt core with the peripherals that a cell uses, on the time base of its 20 MHz oscillator.
 //!
-//! One peripheral a file, with the register addresses of the manufacturer's device description. Emulated: memory map
+//! Peripherals have the register addresses of the manufacturer's device description. Emulated: memory map
 //! (I/O, SRAM, EEPROM, mapped flash, signature), CPUINT with both levels, configuration change protection, CLKCTRL's
 //! prescaler, PORTA with pin-change interrupts and its mirror, TWI0 as a client byte by byte, DAC0, VREF, idle sleep,
 //! EEPROM writes, RSTCTRL and the overflow of TCA0. What a program touches beside these is recorded as a [`Fault`] and
@@ -21,25 +21,14 @@
 //! # Ok::<(), spts_firmware::avr::ProgramError>(())
 //! ```
 
-mod ccp;
-mod clkctrl;
-mod cpuint;
-mod dac;
 mod device;
-mod fault;
-mod nvmctrl;
-mod port;
-mod rstctrl;
-mod slpctrl;
+mod pins;
 mod space;
+mod system;
 mod tca;
 #[cfg(test)]
 mod tests;
-mod trace;
 mod twi;
-mod vref;
 
-pub use device::{Device, OSCILLATOR_HZ};
-pub use fault::{Fault, Faults};
-pub use rstctrl::ResetCause;
-pub use trace::{TraceRecord, TraceStep};
+pub use device::{Device, OSCILLATOR_HZ, TraceRecord, TraceStep};
+pub use system::{Fault, Faults, ResetCause};

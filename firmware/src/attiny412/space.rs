@@ -1,21 +1,14 @@
-//! Memory map: the peripheral at each address.
+//! Memory map: the peripheral at each address; memory controller and EEPROM.
 
-use std::sync::Arc;
-
-use crate::avr::{DataSpace, Program};
-
-use super::ccp::{Access, Ccp};
-use super::clkctrl::{self, Clkctrl};
-use super::cpuint::{self, Cpuint};
-use super::dac::{self, Dac};
-use super::fault::{Fault, Faults};
-use super::nvmctrl::{self, Nvmctrl};
-use super::port::{self, Port};
-use super::rstctrl::{self, ResetCause, Rstctrl};
-use super::slpctrl::{self, Slpctrl};
+use super::pins::{DAC, DAC_LEN, Dac, PORT, PORT_LEN, PORT_VECTOR, Port, VPORT_LEN, VREF, VREF_LEN, Vref};
+use super::system::{
+    Access, CLKCTRL, CLKCTRL_LEN, CPUINT, CPUINT_LEN, Ccp, Clkctrl, Cpuint, Fault, Faults, Key, RSTCTRL, RSTCTRL_LEN,
+    ResetCause, Rstctrl, SLPCTRL_CTRLA, Slpctrl,
+};
 use super::tca::{self, Tca};
 use super::twi::{self, Twi};
-use super::vref::{self, Vref};
+use crate::avr::{DataSpace, Program};
+use std::sync::Arc;
 
 /// Size of the SRAM (bytes).
 const SRAM_LEN: usize = 256;
@@ -35,16 +28,16 @@ const FLASH: u16 = 0x8000;
 pub(super) const FLASH_LEN: u16 = 0x1000;
 
 // last address of each block
-const CLKCTRL_END: u16 = clkctrl::BASE + clkctrl::LEN - 1;
-const CPUINT_END: u16 = cpuint::BASE + cpuint::LEN - 1;
-const DAC_END: u16 = dac::BASE + dac::LEN - 1;
-const NVMCTRL_END: u16 = nvmctrl::BASE + nvmctrl::LEN - 1;
-const EEPROM_END: u16 = nvmctrl::EEPROM_BASE + 0x7f;
-const PORT_END: u16 = port::BASE + port::LEN - 1;
-const RSTCTRL_END: u16 = rstctrl::BASE + rstctrl::LEN - 1;
+const CLKCTRL_END: u16 = CLKCTRL + CLKCTRL_LEN - 1;
+const CPUINT_END: u16 = CPUINT + CPUINT_LEN - 1;
+const DAC_END: u16 = DAC + DAC_LEN - 1;
+const NVMCTRL_END: u16 = NVMCTRL + NVMCTRL_LEN - 1;
+const EEPROM_END: u16 = EEPROM_BASE + 0x7f;
+const PORT_END: u16 = PORT + PORT_LEN - 1;
+const RSTCTRL_END: u16 = RSTCTRL + RSTCTRL_LEN - 1;
 const TCA_END: u16 = tca::BASE + tca::LEN - 1;
 const TWI_END: u16 = twi::BASE + twi::LEN - 1;
-const VREF_END: u16 = vref::BASE + vref::LEN - 1;
+const VREF_END: u16 = VREF + VREF_LEN - 1;
 const SIGNATURE_END: u16 = SIGNATURE + 2;
 const FLASH_END: u16 = FLASH + FLASH_LEN - 1;
 
@@ -122,7 +115,7 @@ impl Space {
 
     /// Interrupts asked for, bit = vector number.
     pub(super) fn requests(&self) -> u32 {
-        let port = u32::from(self.port.flags() != 0) << port::VECTOR;
+        let port = u32::from(self.port.flags() != 0) << PORT_VECTOR;
         let tca = u32::from(self.tca.requests()) << tca::VECTOR;
         let twi = u32::from(self.twi.requests()) << twi::VECTOR;
         port | tca | twi
@@ -146,13 +139,13 @@ impl Space {
         let value = match address {
             GPIO..=GPIO_END => Some(self.gpio[usize::from(address - GPIO)]),
             CCP => Some(self.ccp.read()),
-            rstctrl::BASE..=RSTCTRL_END => Some(self.rstctrl.read(address)),
-            slpctrl::CTRLA => Some(self.slpctrl.read()),
-            clkctrl::BASE..=CLKCTRL_END => self.clkctrl.read(address),
-            vref::BASE..=VREF_END => self.vref.read(address),
-            cpuint::BASE..=CPUINT_END => self.cpuint.read(address),
-            port::BASE..=PORT_END => self.port.read(address),
-            dac::BASE..=DAC_END => Some(self.dac.read(address)),
+            RSTCTRL..=RSTCTRL_END => Some(self.rstctrl.read(address)),
+            SLPCTRL_CTRLA => Some(self.slpctrl.read()),
+            CLKCTRL..=CLKCTRL_END => self.clkctrl.read(address),
+            VREF..=VREF_END => self.vref.read(address),
+            CPUINT..=CPUINT_END => self.cpuint.read(address),
+            PORT..=PORT_END => self.port.read(address),
+            DAC..=DAC_END => Some(self.dac.read(address)),
             twi::BASE..=TWI_END => {
                 self.attention = true;
                 self.twi.read(address)
@@ -162,11 +155,11 @@ impl Space {
                 self.attention = true;
                 self.tca.read(address)
             }
-            nvmctrl::BASE..=NVMCTRL_END => {
+            NVMCTRL..=NVMCTRL_END => {
                 self.ccp.end_by(Access::Memory);
                 self.nvmctrl.read(address, self.now)
             }
-            nvmctrl::EEPROM_BASE..=EEPROM_END => {
+            EEPROM_BASE..=EEPROM_END => {
                 self.wait_for_memory();
                 self.nvmctrl.read(address, self.now)
             }
@@ -199,19 +192,19 @@ impl Space {
                 self.ccp.write(value);
                 Ok(())
             }
-            rstctrl::BASE..=RSTCTRL_END => self.rstctrl.write(address, value, &self.ccp),
-            slpctrl::CTRLA => self.slpctrl.write(value),
-            clkctrl::BASE..=CLKCTRL_END => {
+            RSTCTRL..=RSTCTRL_END => self.rstctrl.write(address, value, &self.ccp),
+            SLPCTRL_CTRLA => self.slpctrl.write(value),
+            CLKCTRL..=CLKCTRL_END => {
                 self.advance_timer(self.now);
                 self.clkctrl.write(address, value, &self.ccp)
             }
-            vref::BASE..=VREF_END => {
+            VREF..=VREF_END => {
                 self.vref.write(address, value);
                 Ok(())
             }
-            cpuint::BASE..=CPUINT_END => self.cpuint.write(address, value, &self.ccp),
-            port::BASE..=PORT_END if self.port.write(address, value) => Ok(()),
-            dac::BASE..=DAC_END => {
+            CPUINT..=CPUINT_END => self.cpuint.write(address, value, &self.ccp),
+            PORT..=PORT_END if self.port.write(address, value) => Ok(()),
+            DAC..=DAC_END => {
                 self.dac.write(address, value);
                 Ok(())
             }
@@ -220,12 +213,12 @@ impl Space {
                 self.advance_timer(self.now);
                 self.tca.write(address, value, self.now)
             }
-            nvmctrl::BASE..=NVMCTRL_END => {
+            NVMCTRL..=NVMCTRL_END => {
                 let outcome = self.nvmctrl.write(address, value, self.now, &self.ccp);
                 self.ccp.end_by(Access::Memory);
                 outcome
             }
-            nvmctrl::EEPROM_BASE..=EEPROM_END => {
+            EEPROM_BASE..=EEPROM_END => {
                 self.wait_for_memory();
                 self.nvmctrl.write(address, value, self.now, &self.ccp)
             }
@@ -249,7 +242,7 @@ impl DataSpace for Space {
     fn read(&mut self, address: u16) -> u8 {
         if address >> 8 == SRAM_PAGE {
             self.sram[usize::from(address & 0xff)]
-        } else if address < port::VPORT_LEN {
+        } else if address < VPORT_LEN {
             self.port.read_mirror(address)
         } else {
             self.read_io(address)
@@ -261,7 +254,7 @@ impl DataSpace for Space {
         if address >> 8 == SRAM_PAGE {
             self.sram[usize::from(address & 0xff)] = value;
             self.ccp.end_by(Access::Store);
-        } else if address < port::VPORT_LEN {
+        } else if address < VPORT_LEN {
             self.port.write_mirror(address, value);
             self.ccp.end_by(Access::Store);
             self.attention = true;
@@ -285,4 +278,151 @@ impl DataSpace for Space {
 /// Bytes that no program would leave behind: each differs from its neighbours.
 fn power_on_pattern() -> [u8; SRAM_LEN] {
     std::array::from_fn(|k| (k.to_le_bytes()[0]).wrapping_mul(0x9d) ^ 0xa5)
+}
+
+/// First address of the registers.
+pub(super) const NVMCTRL: u16 = 0x1000;
+/// Addresses from the first on.
+pub(super) const NVMCTRL_LEN: u16 = 0x0a;
+/// First address of the EEPROM.
+pub(super) const EEPROM_BASE: u16 = 0x1400;
+/// Size of the EEPROM (bytes).
+pub(super) const EEPROM_LEN: usize = 128;
+
+const NVM_CTRLA: u16 = NVMCTRL;
+const NVM_CTRLB: u16 = NVMCTRL + 1;
+const NVM_STATUS: u16 = NVMCTRL + 2;
+const EEBUSY: u8 = 0x02;
+const PAGE: usize = 32;
+/// Ticks of an erase or a write, and of both: 2 ms and 4 ms at 20 MHz. Source: DS40002287, electrical characteristics.
+const ERASE_OR_WRITE_TICKS: u64 = 40_000;
+
+mod command {
+    pub(super) const NONE: u8 = 0;
+    pub(super) const WRITE: u8 = 1;
+    pub(super) const ERASE: u8 = 2;
+    pub(super) const ERASE_WRITE: u8 = 3;
+    pub(super) const CLEAR_BUFFER: u8 = 4;
+    pub(super) const ERASE_EEPROM: u8 = 6;
+}
+
+/// EEPROM with its page buffer. The flash cannot be written.
+#[derive(Debug, Clone)]
+pub(super) struct Nvmctrl {
+    eeprom: [u8; EEPROM_LEN],
+    /// Bytes waiting in the page buffer, by position in the page.
+    buffer: [Option<u8>; PAGE],
+    page: usize,
+    busy_until: u64,
+}
+
+impl Nvmctrl {
+    /// EEPROM that starts with `bytes`; the rest is erased.
+    pub(super) fn new(bytes: &[u8]) -> Self {
+        let mut eeprom = [0xff; EEPROM_LEN];
+        for (cell, byte) in eeprom.iter_mut().zip(bytes) {
+            *cell = *byte;
+        }
+        Self {
+            eeprom,
+            buffer: [None; PAGE],
+            page: 0,
+            busy_until: 0,
+        }
+    }
+
+    /// After a reset the buffer is empty; the EEPROM stays.
+    pub(super) fn after_reset(&self) -> Self {
+        Self::new(&self.eeprom)
+    }
+
+    /// Content of the EEPROM.
+    pub(super) fn eeprom(&self) -> &[u8] {
+        &self.eeprom
+    }
+
+    pub(super) fn read(&self, address: u16, now: u64) -> Option<u8> {
+        match address {
+            NVM_CTRLA | NVM_CTRLB => Some(0),
+            NVM_STATUS => Some(if now < self.busy_until { EEBUSY } else { 0 }),
+            _ => self.eeprom.get(usize::from(address.checked_sub(EEPROM_BASE)?)).copied(),
+        }
+    }
+
+    pub(super) fn write(&mut self, address: u16, value: u8, now: u64, ccp: &Ccp) -> Result<(), Fault> {
+        match address {
+            NVM_CTRLA => {
+                ccp.check(Key::Spm, address)?;
+                self.run(value, now)
+            }
+            EEPROM_BASE.. => {
+                let place = usize::from(address - EEPROM_BASE);
+                self.page = place / PAGE;
+                self.buffer[place % PAGE] = Some(value);
+                Ok(())
+            }
+            _ => Err(Fault::Write { address, value }),
+        }
+    }
+
+    fn run(&mut self, value: u8, now: u64) -> Result<(), Fault> {
+        let address = NVM_CTRLA;
+        if now < self.busy_until {
+            return Err(Fault::Unsupported { address, value });
+        }
+        match value {
+            command::NONE | command::CLEAR_BUFFER => {}
+            command::WRITE => self.apply(|old, new| old & new),
+            command::ERASE => self.apply(|_, _| 0xff),
+            command::ERASE_WRITE => self.apply(|_, new| new),
+            command::ERASE_EEPROM => self.eeprom.fill(0xff),
+            _ => return Err(Fault::Unsupported { address, value }),
+        }
+        self.busy_until = now
+            + match value {
+                command::NONE | command::CLEAR_BUFFER => 0,
+                command::ERASE_WRITE => 2 * ERASE_OR_WRITE_TICKS,
+                _ => ERASE_OR_WRITE_TICKS,
+            };
+        if value != command::NONE {
+            self.buffer = [None; PAGE];
+        }
+        Ok(())
+    }
+
+    /// Only bytes that are in the buffer change.
+    fn apply(&mut self, byte: impl Fn(u8, u8) -> u8) {
+        let cells = self.eeprom.iter_mut().skip(self.page * PAGE);
+        for (cell, waiting) in cells.zip(&self.buffer) {
+            if let Some(new) = waiting {
+                *cell = byte(*cell, *new);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_buffered_bytes_are_written_and_only_by_command() {
+        let mut ccp = Ccp::default();
+        let mut memory = Nvmctrl::new(&[8, 1]);
+        memory.write(EEPROM_BASE, 0x0f, 0, &ccp).unwrap();
+        memory.write(EEPROM_BASE + 33, 0x33, 0, &ccp).unwrap();
+        assert!(memory.write(NVM_CTRLA, command::ERASE_WRITE, 0, &ccp).is_err());
+        ccp.write(0x9d);
+        memory.write(NVM_CTRLA, command::CLEAR_BUFFER, 0, &ccp).unwrap();
+        memory.write(EEPROM_BASE, 0x3c, 0, &ccp).unwrap();
+        memory.write(NVM_CTRLA, command::ERASE_WRITE, 10, &ccp).unwrap();
+        assert_eq!(memory.read(EEPROM_BASE, 10), Some(0x3c));
+        assert_eq!(memory.read(EEPROM_BASE + 1, 10), Some(1));
+        assert_eq!(memory.read(EEPROM_BASE + 33, 10), Some(0xff));
+        assert_eq!(memory.read(NVM_STATUS, 80_009), Some(EEBUSY));
+        assert_eq!(memory.read(NVM_STATUS, 80_010), Some(0));
+        memory.write(EEPROM_BASE, 0x0f, 80_010, &ccp).unwrap();
+        memory.write(NVM_CTRLA, command::WRITE, 80_010, &ccp).unwrap();
+        assert_eq!(memory.after_reset().eeprom()[0], 0x0c);
+    }
 }

@@ -1,6 +1,6 @@
 //! Timer TCA0 in normal mode: counts up to PER and sets its overflow flag.
 
-use super::fault::Fault;
+use super::system::Fault;
 
 /// First address.
 pub(super) const BASE: u16 = 0x0a00;

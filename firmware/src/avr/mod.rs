@@ -33,19 +33,33 @@
 //! assert_eq!(core.registers[24], 144);
 //! ```
 
-mod alu;
 mod core;
-mod decode;
-mod disassemble;
-mod execute;
 mod op;
 mod program;
-pub mod sreg;
 
 pub use self::core::{Core, Event, INTERRUPT_ENTRY_CYCLES, Step};
-pub use self::disassemble::disassemble;
 pub use self::op::Op;
-pub use self::program::{Program, ProgramError};
+pub use self::program::{Program, ProgramError, disassemble};
+
+/// Bits of the status register.
+pub mod sreg {
+    /// Carry.
+    pub const C: u8 = 1 << 0;
+    /// Zero.
+    pub const Z: u8 = 1 << 1;
+    /// Negative.
+    pub const N: u8 = 1 << 2;
+    /// Two's complement overflow.
+    pub const V: u8 = 1 << 3;
+    /// Sign, N ⊕ V.
+    pub const S: u8 = 1 << 4;
+    /// Half carry.
+    pub const H: u8 = 1 << 5;
+    /// Bit copy storage.
+    pub const T: u8 = 1 << 6;
+    /// Global interrupt enable.
+    pub const I: u8 = 1 << 7;
+}
 
 /// Everything in the data space except the core's own SPL, SPH and SREG (0x3D…0x3F): I/O, SRAM, EEPROM and mapped
 /// flash.

@@ -1,4 +1,4 @@
-//! Flash memory, decoded once.
+//! Flash memory, decoded once, and its instructions as text in avr-objdump's syntax.
 
 use super::op::Op;
 
@@ -100,4 +100,181 @@ impl Program {
     pub const fn wrap(&self, pc: u16) -> u16 {
         pc & self.mask
     }
+}
+
+/// The instruction at word address `pc` of `program`, such as `ldi r24, 0xC8`. The target of a jump follows a
+/// semicolon, as a byte address.
+///
+/// Mnemonics and operands are spelled as in avr-objdump (ROL r1 is `adc r1, r1`). Words that are not instructions of
+/// the core are `.word`.
+///
+/// ```
+/// use spts_firmware::avr::{Program, disassemble};
+///
+/// let program = Program::from_words(&[0xEC88, 0x9588]);
+/// assert_eq!(disassemble(&program, 0), "ldi r24, 0xC8");
+/// assert_eq!(disassemble(&program, 1), "sleep");
+/// ```
+#[must_use]
+pub fn disassemble(program: &Program, pc: u16) -> String {
+    let op = program.op(pc);
+    let text = if program.word(pc) == LPM_IMPLIED {
+        "lpm".to_owned()
+    } else {
+        instruction(op)
+    };
+    match offset(op) {
+        None => text,
+        Some(offset) => {
+            let target = program.wrap(pc.wrapping_add(1).wrapping_add_signed(offset));
+            format!("{text} ; {:#x}", 2 * u32::from(target))
+        }
+    }
+}
+
+/// LPM without operands: r0 and Z.
+const LPM_IMPLIED: u16 = 0x95C8;
+
+fn offset(op: Op) -> Option<i16> {
+    match op {
+        Op::Rjmp { offset } | Op::Rcall { offset } => Some(offset),
+        Op::Brbs { offset, .. } | Op::Brbc { offset, .. } => Some(offset.into()),
+        _ => None,
+    }
+}
+
+fn instruction(op: Op) -> String {
+    match op {
+        Op::Nop => plain("nop"),
+        Op::Ijmp => plain("ijmp"),
+        Op::Icall => plain("icall"),
+        Op::Ret => plain("ret"),
+        Op::Reti => plain("reti"),
+        Op::Sleep => plain("sleep"),
+        Op::Break => plain("break"),
+        Op::Wdr => plain("wdr"),
+        Op::Bset { mask } => plain(["sec", "sez", "sen", "sev", "ses", "seh", "set", "sei"][number(mask)]),
+        Op::Bclr { mask } => plain(["clc", "clz", "cln", "clv", "cls", "clh", "clt", "cli"][number(mask)]),
+
+        Op::Movw { d, r } => registers("movw", d, r),
+        Op::Muls { d, r } => registers("muls", d, r),
+        Op::Mulsu { d, r } => registers("mulsu", d, r),
+        Op::Fmul { d, r } => registers("fmul", d, r),
+        Op::Fmuls { d, r } => registers("fmuls", d, r),
+        Op::Fmulsu { d, r } => registers("fmulsu", d, r),
+        Op::Mul { d, r } => registers("mul", d, r),
+        Op::Cpc { d, r } => registers("cpc", d, r),
+        Op::Cp { d, r } => registers("cp", d, r),
+        Op::Sbc { d, r } => registers("sbc", d, r),
+        Op::Sub { d, r } => registers("sub", d, r),
+        Op::Add { d, r } => registers("add", d, r),
+        Op::Adc { d, r } => registers("adc", d, r),
+        Op::Cpse { d, r } => registers("cpse", d, r),
+        Op::And { d, r } => registers("and", d, r),
+        Op::Eor { d, r } => registers("eor", d, r),
+        Op::Or { d, r } => registers("or", d, r),
+        Op::Mov { d, r } => registers("mov", d, r),
+
+        Op::Cpi { d, k } => immediate("cpi", d, k),
+        Op::Sbci { d, k } => immediate("sbci", d, k),
+        Op::Subi { d, k } => immediate("subi", d, k),
+        Op::Ori { d, k } => immediate("ori", d, k),
+        Op::Andi { d, k } => immediate("andi", d, k),
+        Op::Ldi { d, k } => immediate("ldi", d, k),
+        Op::Adiw { d, k } => small("adiw", d, k),
+        Op::Sbiw { d, k } => small("sbiw", d, k),
+        Op::In { d, a } => small("in", d, a),
+
+        Op::Com { d } => register("com", d),
+        Op::Neg { d } => register("neg", d),
+        Op::Swap { d } => register("swap", d),
+        Op::Inc { d } => register("inc", d),
+        Op::Dec { d } => register("dec", d),
+        Op::Asr { d } => register("asr", d),
+        Op::Lsr { d } => register("lsr", d),
+        Op::Ror { d } => register("ror", d),
+        Op::Push { r } => register("push", r),
+        Op::Pop { d } => register("pop", d),
+
+        Op::Bld { d, mask } => format!("bld r{d}, {}", number(mask)),
+        Op::Bst { d, mask } => format!("bst r{d}, {}", number(mask)),
+        Op::Sbrc { r, mask } => format!("sbrc r{r}, {}", number(mask)),
+        Op::Sbrs { r, mask } => format!("sbrs r{r}, {}", number(mask)),
+        Op::Cbi { a, mask } => format!("cbi {a:#04x}, {}", number(mask)),
+        Op::Sbi { a, mask } => format!("sbi {a:#04x}, {}", number(mask)),
+        Op::Sbic { a, mask } => format!("sbic {a:#04x}, {}", number(mask)),
+        Op::Sbis { a, mask } => format!("sbis {a:#04x}, {}", number(mask)),
+        Op::Out { a, r } => format!("out {a:#04x}, r{r}"),
+
+        Op::Ldd { d, p, q: 0 } => format!("ld r{d}, {}", pointer(p)),
+        Op::Ldd { d, p, q } => format!("ldd r{d}, {}+{q}", pointer(p)),
+        Op::LdIncrement { d, p } => format!("ld r{d}, {}+", pointer(p)),
+        Op::LdDecrement { d, p } => format!("ld r{d}, -{}", pointer(p)),
+        Op::Std { r, p, q: 0 } => format!("st {}, r{r}", pointer(p)),
+        Op::Std { r, p, q } => format!("std {}+{q}, r{r}", pointer(p)),
+        Op::StIncrement { r, p } => format!("st {}+, r{r}", pointer(p)),
+        Op::StDecrement { r, p } => format!("st -{}, r{r}", pointer(p)),
+        Op::Lds { d, k } => format!("lds r{d}, 0x{k:04X}"),
+        Op::Sts { r, k } => format!("sts 0x{k:04X}, r{r}"),
+        Op::Lpm { d } => format!("lpm r{d}, Z"),
+        Op::LpmIncrement { d } => format!("lpm r{d}, Z+"),
+
+        Op::Jmp { k } => absolute("jmp", k),
+        Op::Call { k } => absolute("call", k),
+        Op::Rjmp { offset } => relative("rjmp", offset),
+        Op::Rcall { offset } => relative("rcall", offset),
+        Op::Brbs { mask, offset } => relative(BRANCHES_IF_SET[number(mask)], offset.into()),
+        Op::Brbc { mask, offset } => relative(BRANCHES_IF_CLEAR[number(mask)], offset.into()),
+        Op::Illegal { word } => format!(".word {word:#06x}"),
+    }
+}
+
+const BRANCHES_IF_SET: [&str; 8] = ["brcs", "breq", "brmi", "brvs", "brlt", "brhs", "brts", "brie"];
+const BRANCHES_IF_CLEAR: [&str; 8] = ["brcc", "brne", "brpl", "brvc", "brge", "brhc", "brtc", "brid"];
+
+/// Number of the bit in a one-bit mask.
+const fn number(mask: u8) -> usize {
+    mask.trailing_zeros() as usize & 7
+}
+
+const fn pointer(p: u8) -> char {
+    match p {
+        26 => 'X',
+        28 => 'Y',
+        _ => 'Z',
+    }
+}
+
+fn plain(mnemonic: &str) -> String {
+    mnemonic.to_owned()
+}
+
+fn register(mnemonic: &str, d: u8) -> String {
+    format!("{mnemonic} r{d}")
+}
+
+fn registers(mnemonic: &str, d: u8, r: u8) -> String {
+    format!("{mnemonic} r{d}, r{r}")
+}
+
+fn immediate(mnemonic: &str, d: u8, k: u8) -> String {
+    format!("{mnemonic} r{d}, 0x{k:02X}")
+}
+
+/// avr-objdump writes 6-bit operands in lower case.
+fn small(mnemonic: &str, d: u8, k: u8) -> String {
+    format!("{mnemonic} r{d}, {k:#04x}")
+}
+
+/// Byte address; zero has no prefix, as in C's `%#x`.
+fn absolute(mnemonic: &str, k: u16) -> String {
+    match k {
+        0 => format!("{mnemonic} 0"),
+        k => format!("{mnemonic} {:#x}", 2 * u32::from(k)),
+    }
+}
+
+/// Bytes from the following instruction.
+fn relative(mnemonic: &str, offset: i16) -> String {
+    format!("{mnemonic} .{:+}", 2 * i32::from(offset))
 }

@@ -1,29 +1,19 @@
 //! The table of effects, in signal order.
 
-mod adc;
 mod amplifier;
-mod clamp;
-mod clock_pattern;
-mod contact_noise;
 mod dac;
-mod drive_offset;
-mod idle_noise;
-mod late_queue;
-mod late_raster;
 mod late_updates;
-mod memory;
 mod missed_clocks;
-mod rails;
+mod output;
+mod signal;
 
-pub use adc::Adc;
+pub(crate) use missed_clocks::SkippingClocks;
 
-use crate::converter::Converter;
+use crate::converter::{Adc, Converter};
 use crate::effect::{BlockStart, BuildEffect, Effect, EffectSession, ProfileError, parse};
 use crate::engine::Engine;
-use crate::mode::{Mode, WeightMode};
-use crate::seeding::Seeding;
 use crate::source::Interpolated;
-use crate::weights::Weights;
+use crate::weights::{Mode, Seeding, WeightMode, Weights};
 use spts_models::{ConductanceMap, Streams, in_section};
 
 /// Every effect by name, in signal order: the cells' digital timing, the summed analog signal, the converter, and the
@@ -32,15 +22,15 @@ pub const EFFECTS: &[(&str, BuildEffect)] = &[
     ("missed_clocks", missed_clocks::build),
     ("late_updates", late_updates::build),
     ("dac", dac::build),
-    ("drive_offset", drive_offset::build),
-    ("memory", memory::build),
-    ("clock_pattern", clock_pattern::build),
-    ("contact_noise", contact_noise::build),
+    ("drive_offset", signal::drive_offset),
+    ("memory", signal::memory),
+    ("clock_pattern", signal::clock_pattern),
+    ("contact_noise", signal::contact_noise),
     ("amplifier", amplifier::build),
-    ("idle_noise", idle_noise::build),
-    ("rails", rails::build),
-    ("adc", adc::build),
-    ("clamp", clamp::build),
+    ("idle_noise", signal::idle_noise),
+    ("rails", output::rails),
+    ("adc", output::adc),
+    ("clamp", output::clamp),
 ];
 
 /// Builds the effects named in `chain`, each with its table of parameters, in signal order rather than the order of the
@@ -102,7 +92,7 @@ pub(crate) fn converter(chain: &toml::Table, mode: Mode) -> Result<Option<Conver
     let Some(adc) = of_chain(chain, mode, "adc", parse::<Adc>)? else {
         return Ok(None);
     };
-    let subtract_v = of_chain(chain, mode, "clamp", clamp::subtract_v)?;
+    let subtract_v = of_chain(chain, mode, "clamp", output::subtract_v)?;
     Ok(Some(adc.converter(subtract_v)?))
 }
 
@@ -113,7 +103,7 @@ pub(crate) fn converter(chain: &toml::Table, mode: Mode) -> Result<Option<Conver
 /// [`ProfileError`] for parameters that are refused.
 pub(crate) fn rail_v(chain: &toml::Table, mode: Mode) -> Result<Option<f64>, ProfileError> {
     let amplifier_v = of_chain(chain, mode, "amplifier", amplifier::rail_v)?;
-    let rails_v = of_chain(chain, mode, "rails", rails::limit_v)?;
+    let rails_v = of_chain(chain, mode, "rails", output::limit_v)?;
     Ok(amplifier_v.into_iter().chain(rails_v).reduce(f64::min))
 }
 

@@ -1,18 +1,18 @@
-//! PORTA and its mirror VPORTA.
+//! Pins: PORTA with its mirror VPORTA, DAC0, whose output is pin PA6, and the voltage references.
 
 /// First address.
-pub(super) const BASE: u16 = 0x0400;
+pub(super) const PORT: u16 = 0x0400;
 /// Addresses from the first on.
-pub(super) const LEN: u16 = 0x18;
+pub(super) const PORT_LEN: u16 = 0x18;
 /// Addresses of the mirror, from 0.
 pub(super) const VPORT_LEN: u16 = 4;
 
 /// Interrupt vector.
-pub(super) const VECTOR: u8 = 3;
+pub(super) const PORT_VECTOR: u8 = 3;
 /// Pins that the package brings out: PA0…PA3, PA6, PA7.
 const PINS: u8 = 0xcf;
 
-const PINCTRL: u16 = BASE + 0x10;
+const PINCTRL: u16 = PORT + 0x10;
 const PINCTRL_MASK: u8 = 0x8f;
 const INVEN: u8 = 0x80;
 
@@ -106,7 +106,7 @@ impl Port {
     }
 
     pub(super) fn read(&self, address: u16) -> Option<u8> {
-        match address - BASE {
+        match address - PORT {
             0..=3 => Some(self.dir),
             4..=7 => Some(self.out),
             8 => Some(self.input),
@@ -119,7 +119,7 @@ impl Port {
     /// Whether the address is a register.
     pub(super) fn write(&mut self, address: u16, value: u8) -> bool {
         let pins = value & PINS;
-        match address - BASE {
+        match address - PORT {
             0 => self.dir = pins,
             1 => self.dir |= pins,
             2 => self.dir &= !pins,
@@ -179,6 +179,113 @@ impl Senses {
     }
 }
 
+/// First address.
+pub(super) const DAC: u16 = 0x0680;
+/// Addresses from the first on.
+pub(super) const DAC_LEN: u16 = 2;
+
+const DAC_CTRLA: u16 = DAC;
+const ENABLE: u8 = 0x01;
+const OUTEN: u8 = 0x40;
+const RUNSTDBY: u8 = 0x80;
+
+/// Code on the pin: `None` while the DAC does not drive it.
+type Output = Option<u8>;
+
+/// Registers of DAC0 and when its output last changed.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Dac {
+    ctrla: u8,
+    data: u8,
+    before: Output,
+    written_at: u64,
+    /// Whether the present instruction has written to the DAC.
+    fresh: bool,
+}
+
+impl Dac {
+    pub(super) fn read(&self, address: u16) -> u8 {
+        if address == DAC_CTRLA { self.ctrla } else { self.data }
+    }
+
+    pub(super) fn write(&mut self, address: u16, value: u8) {
+        self.before = self.output();
+        self.fresh = true;
+        if address == DAC_CTRLA {
+            self.ctrla = value & (ENABLE | OUTEN | RUNSTDBY);
+        } else {
+            self.data = value;
+        }
+    }
+
+    /// The instruction that wrote ends at `tick`.
+    pub(super) fn settle(&mut self, tick: u64) {
+        if self.fresh {
+            self.fresh = false;
+            self.written_at = tick;
+        }
+    }
+
+    /// Registers after a reset; what was on the pin before it is remembered.
+    pub(super) fn after_reset(&self) -> Self {
+        Self {
+            before: self.output(),
+            fresh: true,
+            written_at: self.written_at,
+            ..Self::default()
+        }
+    }
+
+    /// DATA register.
+    pub(super) fn data(&self) -> u8 {
+        self.data
+    }
+
+    /// Tick at the end of the last instruction that wrote to the DAC.
+    pub(super) fn written_at(&self) -> u64 {
+        self.written_at
+    }
+
+    /// Code on the pin now.
+    pub(super) fn output(&self) -> Output {
+        (self.ctrla & (ENABLE | OUTEN) == ENABLE | OUTEN).then_some(self.data)
+    }
+
+    /// Code on the pin at `tick`, no earlier than the last write but one.
+    pub(super) fn output_at(&self, tick: u64) -> Output {
+        if self.written_at > tick {
+            self.before
+        } else {
+            self.output()
+        }
+    }
+}
+
+/// First address.
+pub(super) const VREF: u16 = 0x00a0;
+/// Addresses from the first on.
+pub(super) const VREF_LEN: u16 = 2;
+
+/// Registers of VREF.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Vref {
+    registers: [u8; 2],
+}
+
+impl Vref {
+    pub(super) fn read(&self, address: u16) -> Option<u8> {
+        self.registers.get(usize::from(address - VREF)).copied()
+    }
+
+    pub(super) fn write(&mut self, address: u16, value: u8) {
+        let mask = [0x77, 0x03];
+        let k = usize::from(address - VREF);
+        if let (Some(register), Some(mask)) = (self.registers.get_mut(k), mask.get(k)) {
+            *register = value & mask;
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -233,21 +340,39 @@ mod tests {
         port.set_pin(2, true);
         port.write_mirror(3, 8);
         assert_eq!(port.flags(), 4, "flags of other pins stay");
-        port.write(BASE + 9, 4);
+        port.write(PORT + 9, 4);
         assert_eq!(port.flags(), 0);
     }
 
     #[test]
     fn the_mirror_shows_the_port_and_toggles_by_its_input() {
         let mut port = Port::default();
-        port.write(BASE + 1, 0x40);
-        port.write(BASE + 5, 0x40);
+        port.write(PORT + 1, 0x40);
+        port.write(PORT + 5, 0x40);
         assert_eq!((0..3).map(|k| port.read_mirror(k)).collect::<Vec<_>>(), [0x40; 3]);
         port.write_mirror(2, 0x40);
-        assert_eq!(port.read(BASE + 8), Some(0));
+        assert_eq!(port.read(PORT + 8), Some(0));
         port.write(PINCTRL + 6, INVEN);
-        assert_eq!(port.read(BASE + 8), Some(0x40));
-        assert_eq!(port.read(BASE + 0x0a), None);
-        assert!(!port.write(BASE + 0x0f, 1));
+        assert_eq!(port.read(PORT + 8), Some(0x40));
+        assert_eq!(port.read(PORT + 0x0a), None);
+        assert!(!port.write(PORT + 0x0f, 1));
+    }
+
+    #[test]
+    fn a_code_is_out_from_the_end_of_the_write() {
+        let mut dac = Dac::default();
+        dac.write(DAC_CTRLA, ENABLE);
+        dac.write(DAC + 1, 9);
+        dac.settle(90);
+        assert_eq!(dac.output(), None);
+        dac.write(DAC_CTRLA, ENABLE | OUTEN);
+        dac.settle(100);
+        dac.write(DAC + 1, 200);
+        dac.settle(150);
+        dac.settle(160);
+        assert_eq!(
+            (dac.output_at(149), dac.output_at(150), dac.written_at()),
+            (Some(9), Some(200), 150)
+        );
     }
 }

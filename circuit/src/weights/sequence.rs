@@ -1,0 +1,923 @@
+//! Drive levels of every taxel at every measurement: modes, codes, patterns, and the rows of the weight matrix.
+
+use super::lcg::{ANALOG_SCALE, Jump, Seeding, Seeds, analog, binary};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Why weights are not valid.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum WeightsError {
+    /// A list that is empty or too long.
+    #[error("`{field}` has {len} entries; valid: [1, {most}]")]
+    Length {
+        /// Name of the list.
+        field: &'static str,
+        /// Number of its entries.
+        len: usize,
+        /// Largest number of entries.
+        most: usize,
+    },
+    /// A list for another skin.
+    #[error("`{field}` is for {found} taxels; expected {taxels}")]
+    Taxels {
+        /// Name of the list.
+        field: &'static str,
+        /// Number of taxels of the list.
+        found: usize,
+        /// Number of taxels of the skin.
+        taxels: usize,
+    },
+    /// A number of codes that is not a multiple of the period.
+    #[error("`patterns.codes` has {len} entries, not a positive multiple of `patterns.period` = {period}")]
+    Rows {
+        /// Number of codes.
+        len: usize,
+        /// Rows of the pattern.
+        period: usize,
+    },
+    /// A code that a binary cell does not have.
+    #[error("`patterns.codes`[{index}] = {code} is no binary level; valid: 0 (level −1) and 255 (level +1)")]
+    Code {
+        /// Position in the list, from 0.
+        index: usize,
+        /// The code.
+        code: u8,
+    },
+    /// A key that the mode does not use.
+    #[error("`{field}` does not go with `mode` = {:?}; valid modes: \"analog\" and \"binary\"", .mode.name())]
+    Mode {
+        /// Name of the key.
+        field: &'static str,
+        /// The mode.
+        mode: WeightMode,
+    },
+    /// No source of the levels, or several.
+    #[error("weights need exactly one of `seeding`, `seeds` and `patterns`; found: {found}")]
+    Source {
+        /// The keys that were given.
+        found: String,
+    },
+    /// The number of taxels is not given, and there is no list from which it follows.
+    #[error("`taxels` is missing; valid: [1, 2^32 − 1]")]
+    NoTaxels,
+}
+
+/// The two ways to read the skin: one taxel after the other, or all taxels weighted and added.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Mode {
+    /// One taxel a measurement, in row-major order.
+    Raster,
+    /// All taxels at once, with pseudorandom weights.
+    Compressive,
+}
+
+impl Mode {
+    /// Name of the profile section that lists the effects of this readout.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Raster => "raster",
+            Self::Compressive => "compressive",
+        }
+    }
+}
+
+/// Kind of the levels that the cells put out.
+///
+/// ```
+/// use spts_circuit::WeightMode;
+///
+/// // the cell with seed 8 at its first three rows
+/// let levels: Vec<f64> = (0..3).map(|row| WeightMode::Binary.level_from_seed(8, row)).collect();
+/// assert!(levels.iter().all(|level| level.abs() == 1.0));
+/// let analog = WeightMode::Analog.level_from_seed(8, 0);
+/// assert_eq!(analog.signum(), levels[0], "both use the generator's top byte");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WeightMode {
+    /// One taxel after another: level 1 (code 255) on the scanned one and 0 (code 126, mid-scale) on the others.
+    Raster,
+    /// Eight-bit pseudorandom levels: the top byte of the generator.
+    Analog,
+    /// Pseudorandom ±1: code 255 when the top byte is 128 or more, code 0 otherwise.
+    Binary,
+}
+
+impl WeightMode {
+    /// Level that a generator in `state` stands for; in raster mode no cell uses its generator, and the level is 0.
+    #[inline]
+    pub(crate) fn level(self, state: u32) -> f64 {
+        match self {
+            Self::Raster => 0.0,
+            Self::Analog => analog(state),
+            Self::Binary => binary(state),
+        }
+    }
+
+    /// Level at `row` (counted from loading the seeds) of a cell with the generator seed `seed`. In raster mode no cell
+    /// uses its seed, and the level is 0.
+    #[must_use]
+    pub fn level_from_seed(self, seed: u32, row: u64) -> f64 {
+        self.level(Jump::new(row.wrapping_add(1)).apply(seed))
+    }
+
+    /// The readout that uses these levels.
+    #[must_use]
+    pub fn readout(self) -> Mode {
+        match self {
+            Self::Raster => Mode::Raster,
+            Self::Analog | Self::Binary => Mode::Compressive,
+        }
+    }
+
+    /// Name, as used in profiles and tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Raster => "raster",
+            Self::Analog => "analog",
+            Self::Binary => "binary",
+        }
+    }
+}
+
+/// Code of level 1.
+pub(crate) const FULL_SCALE: u8 = 255;
+/// Code of level 0.
+pub(crate) const NEUTRAL: u8 = 126;
+
+impl WeightMode {
+    /// Drive level of DAC code k in this mode: (k − 127.5)/127.5, and 0 for the neutral code 126, to which the
+    /// amplifier's bias is trimmed. In analog mode 126 is an ordinary level, because the generator's top byte can be
+    /// 126.
+    #[must_use]
+    pub fn code_level(self, code: u8) -> f64 {
+        if code == NEUTRAL && self != Self::Analog {
+            return 0.0;
+        }
+        (f64::from(code) - ANALOG_SCALE) / ANALOG_SCALE
+    }
+}
+
+/// Nearest code of a level, the neutral one of level 0.
+#[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
+pub(crate) fn code_of(level: f64) -> u8 {
+    if level == 0.0 {
+        NEUTRAL
+    } else {
+        (ANALOG_SCALE * (1.0 + level)).round() as u8
+    }
+}
+
+/// Most codes in a pattern.
+const MAX_CODES: usize = 1 << 30;
+
+/// Levels that the cells repeat: row r of the weights is row r mod `period` of the pattern.
+///
+/// As text: `{"period": 2, "codes": [0, 255, 255, 0]}`, with the codes in row-major order.
+///
+/// ```
+/// use spts_circuit::{Patterns, WeightMode, Weights};
+///
+/// let patterns = Patterns::new(2, vec![0, 255, 255, 0])?;
+/// let weights = Weights::with_patterns(WeightMode::Binary, patterns)?;
+/// assert_eq!([weights.level(0, 6), weights.level(1, 6), weights.level(0, 7)], [-1.0, 1.0, 1.0]);
+/// # Ok::<(), spts_circuit::WeightsError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "PatternsConfig", into = "PatternsConfig")]
+pub struct Patterns {
+    taxels: usize,
+    codes: Vec<u8>,
+}
+
+/// Text of [`Patterns`].
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PatternsConfig {
+    period: usize,
+    codes: Vec<u8>,
+}
+
+impl TryFrom<PatternsConfig> for Patterns {
+    type Error = WeightsError;
+    fn try_from(config: PatternsConfig) -> Result<Self, WeightsError> {
+        Self::new(config.period, config.codes)
+    }
+}
+
+impl From<Patterns> for PatternsConfig {
+    fn from(patterns: Patterns) -> Self {
+        Self {
+            period: patterns.period(),
+            codes: patterns.codes,
+        }
+    }
+}
+
+impl Patterns {
+    /// A pattern of `period` rows of DAC codes in row-major order. Code k is level (k − 127.5)/127.5. The number of
+    /// taxels is the number of codes divided by `period`.
+    ///
+    /// # Errors
+    /// [`WeightsError`] for no code, more than 2³⁰ codes, or a number of codes that is not a multiple of `period`.
+    pub fn new(period: usize, codes: Vec<u8>) -> Result<Self, WeightsError> {
+        let len = codes.len();
+        if !(1..=MAX_CODES).contains(&len) {
+            return Err(WeightsError::Length {
+                field: "patterns.codes",
+                len,
+                most: MAX_CODES,
+            });
+        }
+        match len.checked_div(period) {
+            Some(taxels) if taxels > 0 && taxels * period == len => Ok(Self { taxels, codes }),
+            _ => Err(WeightsError::Rows { len, period }),
+        }
+    }
+
+    /// A pattern of `period` rows, from `levels` in [−1, 1], row-major. Every cell puts out the code nearest to its
+    /// level.
+    ///
+    /// ```
+    /// use spts_circuit::Patterns;
+    ///
+    /// assert_eq!(Patterns::of_levels(1, &[-1.0, 1.0])?.row(0), [0, 255]);
+    /// # Ok::<(), spts_circuit::WeightsError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Patterns::new`].
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "float to integer casts saturate"
+    )]
+    pub fn of_levels(period: usize, levels: &[f64]) -> Result<Self, WeightsError> {
+        let code = |level: &f64| (127.5 * (1.0 + level)).round() as u8;
+        Self::new(period, levels.iter().map(code).collect())
+    }
+
+    /// Number of rows after which the pattern repeats.
+    #[must_use]
+    pub fn period(&self) -> usize {
+        self.codes.len() / self.taxels
+    }
+
+    /// Number of taxels: the length of a row.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.taxels
+    }
+
+    /// Codes of row `row`, one a taxel. Rows beyond the period repeat.
+    #[must_use]
+    pub fn row(&self, row: u64) -> &[u8] {
+        let first = usize::try_from(row % self.period() as u64).unwrap_or(0) * self.taxels;
+        &self.codes[first..first + self.taxels]
+    }
+
+    /// Writes the codes of as many consecutive rows as `out` holds, starting with `first_row`.
+    pub(crate) fn fill(&self, first_row: u64, out: &mut [u8]) {
+        for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.taxels)) {
+            out.copy_from_slice(self.row(row));
+        }
+    }
+
+    /// Checks that cells in `mode` can put out every code.
+    pub(crate) fn check(&self, mode: WeightMode) -> Result<(), WeightsError> {
+        match mode {
+            WeightMode::Raster => Err(WeightsError::Mode {
+                field: "patterns",
+                mode,
+            }),
+            WeightMode::Analog => Ok(()),
+            WeightMode::Binary => match self.codes.iter().position(|code| !matches!(code, 0 | 255)) {
+                None => Ok(()),
+                Some(index) => Err(WeightsError::Code {
+                    index,
+                    code: self.codes[index],
+                }),
+            },
+        }
+    }
+}
+
+/// Where the levels of [`Weights`](crate::Weights) come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LevelSource {
+    /// The cells' generators, seeded by a rule.
+    Seeding(Seeding),
+    /// The cells' generators, with a given seed for each taxel.
+    Seeds(Arc<[u32]>),
+    /// Given codes.
+    Patterns(Arc<Patterns>),
+}
+
+impl LevelSource {
+    /// Seeds of the taxels; `None` when the levels come from a pattern.
+    #[inline]
+    pub(crate) fn seeds(&self) -> Option<Seeds<'_>> {
+        match self {
+            Self::Seeding(seeding) => Some(Seeds::Rule(*seeding)),
+            Self::Seeds(seeds) => Some(Seeds::Given(seeds)),
+            Self::Patterns(_) => None,
+        }
+    }
+}
+
+/// Most taxels that seeds are listed for.
+const MAX_SEEDS: usize = 1 << 24;
+
+/// Drive levels of a skin of `taxels` taxels. Row `r` holds the level of every taxel at measurement `r`; rows are
+/// counted from 0 in clock edges since loading the seeds.
+///
+/// A level is the drive divided by its full scale. DAC code k drives (k − 127.5)/127.5: codes 0 and 255 are −1 and +1,
+/// and the analog levels lie between them. The neutral code 126 of the raster scan counts as 0, because the amplifier's
+/// bias is trimmed to it (the effect `drive_offset` models the remainder). Row 0 is the generator's state after ONE
+/// step from the seed.
+///
+/// The levels come from the cells' generators, seeded by a rule ([`Weights::new`]) or with given seeds
+/// ([`Weights::with_seeds`]), or from a pattern ([`Weights::with_patterns`]). The examples read
+/// them from text, JSON or TOML: seeds by a rule, given seeds, a pattern, and a raster scan.
+///
+/// ```
+/// use spts_circuit::{Seeding, WeightMode, Weights};
+///
+/// let mixed: Weights =
+///     serde_json::from_str(r#"{"mode": "binary", "taxels": 100, "generator": "lcg", "seeding": "mixed"}"#)?;
+/// assert_eq!(mixed, Weights::new(WeightMode::Binary, Seeding::Mixed, 100));
+///
+/// let seeded: Weights = serde_json::from_str(r#"{"mode": "analog", "generator": "lcg", "seeds": [17, 4, 90]}"#)?;
+/// assert_eq!((seeded.taxels(), seeded.seed(2)), (3, Some(90)));
+///
+/// let patterned: Weights =
+///     serde_json::from_str(r#"{"mode": "binary", "patterns": {"period": 2, "codes": [0, 255, 255, 0]}}"#)?;
+/// assert_eq!(patterned.level(1, 2), 1.0);
+///
+/// let raster: Weights = serde_json::from_str(r#"{"mode": "raster", "taxels": 100}"#)?;
+/// assert_eq!(raster.level(7, 107), 1.0);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
+///
+/// `generator` may be omitted. `taxels` may be given together with a list and is then checked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Weights {
+    mode: WeightMode,
+    source: LevelSource,
+    taxels: u32,
+}
+
+impl Weights {
+    /// Weights of `taxels` taxels whose generators are seeded by a rule.
+    #[must_use]
+    pub fn new(mode: WeightMode, seeding: Seeding, taxels: u32) -> Self {
+        Self {
+            mode,
+            source: LevelSource::Seeding(seeding),
+            taxels,
+        }
+    }
+
+    /// Weights with one generator seed for each taxel.
+    ///
+    /// # Errors
+    /// [`WeightsError`] for no seed, more than 2²⁴ seeds, or the raster mode, which uses no seeds.
+    pub fn with_seeds(mode: WeightMode, seeds: impl Into<Arc<[u32]>>) -> Result<Self, WeightsError> {
+        let (field, seeds) = ("seeds", seeds.into());
+        if mode == WeightMode::Raster {
+            return Err(WeightsError::Mode { field, mode });
+        }
+        match u32::try_from(seeds.len()) {
+            Ok(taxels) if (1..=MAX_SEEDS).contains(&seeds.len()) => Ok(Self {
+                mode,
+                source: LevelSource::Seeds(seeds),
+                taxels,
+            }),
+            _ => Err(WeightsError::Length {
+                field,
+                len: seeds.len(),
+                most: MAX_SEEDS,
+            }),
+        }
+    }
+
+    /// Weights that repeat `patterns`. In analog mode every code is a level; in binary mode 0 is −1 and 255 is +1.
+    ///
+    /// # Errors
+    /// [`WeightsError`] for other codes in binary mode, or for the raster mode, which scans its taxels in order.
+    pub fn with_patterns(mode: WeightMode, patterns: Patterns) -> Result<Self, WeightsError> {
+        patterns.check(mode)?;
+        let taxels = u32::try_from(patterns.taxels()).unwrap_or(u32::MAX);
+        Ok(Self {
+            mode,
+            source: LevelSource::Patterns(Arc::new(patterns)),
+            taxels,
+        })
+    }
+
+    /// Number of taxels: the length of a row, and the period of the raster.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.taxels as usize
+    }
+
+    /// Kind of the levels.
+    #[must_use]
+    pub fn mode(&self) -> WeightMode {
+        self.mode
+    }
+
+    /// Source of the levels.
+    #[must_use]
+    pub fn source(&self) -> &LevelSource {
+        &self.source
+    }
+
+    /// The pattern that the levels repeat; `None` if they come from generators.
+    #[must_use]
+    pub fn patterns(&self) -> Option<&Patterns> {
+        match &self.source {
+            LevelSource::Patterns(patterns) => Some(patterns),
+            _ => None,
+        }
+    }
+
+    /// Seed of taxel `taxel`; `None` if the levels come from a pattern, or there is no such taxel.
+    #[must_use]
+    pub fn seed(&self, taxel: usize) -> Option<u32> {
+        (taxel < self.taxels()).then_some(())?;
+        Some(self.seeds()?.seed(taxel))
+    }
+
+    /// Seeds of the taxels; `None` when the levels come from a pattern.
+    #[inline]
+    pub(crate) fn seeds(&self) -> Option<Seeds<'_>> {
+        self.source.seeds()
+    }
+
+    /// Level of `taxel` at `row`, in O(log row).
+    ///
+    /// # Panics
+    /// If the levels come from a list or a pattern without such a taxel.
+    #[must_use]
+    pub fn level(&self, taxel: u32, row: u64) -> f64 {
+        match (self.mode, &self.source) {
+            (WeightMode::Raster, _) => f64::from(row.checked_rem(u64::from(self.taxels)) == Some(u64::from(taxel))),
+            (mode, LevelSource::Patterns(patterns)) => mode.code_level(patterns.row(row)[taxel as usize]),
+            (mode, LevelSource::Seeding(seeding)) => mode.level_from_seed(seeding.seed(taxel), row),
+            (mode, LevelSource::Seeds(seeds)) => mode.level_from_seed(seeds[taxel as usize], row),
+        }
+    }
+
+    /// Writes the levels of `taxel` at as many consecutive rows as `out` holds, starting with `first_row`.
+    pub(crate) fn fill_levels(&self, taxel: u32, first_row: u64, out: &mut [f64]) {
+        let (Some(seeds), WeightMode::Analog | WeightMode::Binary) = (self.seeds(), self.mode) else {
+            for (out, row) in out.iter_mut().zip(first_row..) {
+                *out = self.level(taxel, row);
+            }
+            return;
+        };
+        let mut state = Jump::new(first_row).apply(seeds.seed(taxel as usize));
+        for out in out {
+            state = Jump::ONE.apply(state);
+            *out = self.mode.level(state);
+        }
+    }
+
+    /// Fills `out` with consecutive rows from `first_row` on, row-major.
+    ///
+    /// # Panics
+    /// If the length of `out` is not a whole number of rows.
+    pub fn fill_rows(&self, first_row: u64, out: &mut [f64]) {
+        assert!(
+            out.len().is_multiple_of(self.taxels().max(1)),
+            "{} values are not a whole number of rows of {}",
+            out.len(),
+            self.taxels
+        );
+        let mut clock = self.clock(first_row);
+        for row in out.chunks_exact_mut(self.taxels().max(1)) {
+            clock.next_row(row);
+        }
+    }
+
+    /// Fills `out` with the DAC codes of the levels at consecutive rows from `first_row` on, row-major.
+    ///
+    /// # Panics
+    /// If the length of `out` is not a whole number of rows.
+    pub fn fill_codes(&self, first_row: u64, out: &mut [u8]) {
+        let taxels = self.taxels().max(1);
+        assert!(
+            out.len().is_multiple_of(taxels),
+            "{} codes are not a whole number of rows of {}",
+            out.len(),
+            self.taxels
+        );
+        let (mut clock, mut row) = (self.clock(first_row), vec![0.0; self.taxels()]);
+        for out in out.chunks_exact_mut(taxels) {
+            clock.next_row(&mut row);
+            for (out, level) in out.iter_mut().zip(&row) {
+                *out = code_of(*level);
+            }
+        }
+    }
+
+    /// A clock whose next row is `row`.
+    #[must_use]
+    pub fn clock(&self, row: u64) -> WeightClock {
+        let jump = Jump::new(row);
+        let states = match (self.mode, self.seeds()) {
+            (WeightMode::Raster, _) | (_, None) => Vec::new(),
+            (_, Some(seeds)) => (0..self.taxels()).map(|k| jump.apply(seeds.seed(k))).collect(),
+        };
+        WeightClock {
+            weights: self.clone(),
+            row,
+            states,
+        }
+    }
+}
+
+/// Iterates over rows; holds the generator state of every cell.
+#[derive(Debug, Clone)]
+pub struct WeightClock {
+    weights: Weights,
+    row: u64,
+    states: Vec<u32>,
+}
+
+impl WeightClock {
+    /// Writes the next row and advances. `out` has one entry a taxel.
+    pub fn next_row(&mut self, out: &mut [f64]) {
+        let mode = self.weights.mode;
+        if let Some(patterns) = self.weights.patterns() {
+            for (out, code) in out.iter_mut().zip(patterns.row(self.row)) {
+                *out = mode.code_level(*code);
+            }
+            self.row += 1;
+            return;
+        }
+        match mode {
+            WeightMode::Raster => {
+                out.fill(0.0);
+                let taxels = u64::from(self.weights.taxels).max(1);
+                if let Some(level) = usize::try_from(self.row % taxels).ok().and_then(|k| out.get_mut(k)) {
+                    *level = 1.0;
+                }
+            }
+            WeightMode::Analog => self.step_into(out, analog),
+            WeightMode::Binary => self.step_into(out, binary),
+        }
+        self.row += 1;
+    }
+
+    #[inline(always)]
+    fn step_into(&mut self, out: &mut [f64], level: impl Fn(u32) -> f64) {
+        for (state, out) in self.states.iter_mut().zip(out) {
+            *state = Jump::ONE.apply(*state);
+            *out = level(*state);
+        }
+    }
+}
+
+/// Consecutive rows of the weight matrix Φ, one for each measurement. No row is stored; the matrix of a large skin can
+/// be filled piece by piece with [`WeightRows::chunks`].
+///
+/// ```
+/// use spts_circuit::{Seeding, WeightMode, WeightRows, Weights};
+///
+/// let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, 100);
+/// let rows = WeightRows::new(&weights, 24_300, 20);
+/// let phi = rows.to_vec();
+/// assert_eq!(phi.len(), 20 * 100);
+/// // the same rows in two pieces
+/// let pieces: Vec<f64> = rows.chunks(13).flat_map(|piece| piece.to_vec()).collect();
+/// assert_eq!(phi, pieces);
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct WeightRows<'a> {
+    weights: &'a Weights,
+    first_row: u64,
+    len: usize,
+}
+
+impl<'a> WeightRows<'a> {
+    /// The `len` rows of `weights` from row `first_row` on, counted from loading the seeds.
+    #[must_use]
+    pub fn new(weights: &'a Weights, first_row: u64, len: usize) -> Self {
+        Self {
+            weights,
+            first_row,
+            len,
+        }
+    }
+
+    /// The weights to which the rows belong.
+    #[must_use]
+    pub fn weights(&self) -> &'a Weights {
+        self.weights
+    }
+
+    /// Number of the first row, counted from loading the seeds.
+    #[must_use]
+    pub fn first_row(&self) -> u64 {
+        self.first_row
+    }
+
+    /// Number of rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Number of taxels: the length of a row.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.weights.taxels()
+    }
+
+    /// The rows `start..start + len` of this range of rows, counted from its first.
+    ///
+    /// # Panics
+    /// If there are fewer rows.
+    #[must_use]
+    pub fn slice(&self, start: usize, len: usize) -> Self {
+        assert!(start + len <= self.len, "rows {start}..{} of {}", start + len, self.len);
+        Self::new(self.weights, self.first_row + start as u64, len)
+    }
+
+    /// The rows in pieces of `len`; the last piece may be shorter.
+    ///
+    /// # Panics
+    /// If `len` is 0.
+    pub fn chunks(self, len: usize) -> impl Iterator<Item = Self> {
+        let starts = (0..self.len).step_by(len);
+        starts.map(move |start| self.slice(start, len.min(self.len - start)))
+    }
+
+    /// Writes the levels, each in [−1, 1], row-major.
+    ///
+    /// # Panics
+    /// If `out` does not have one entry for each row and taxel.
+    pub fn fill(&self, out: &mut [f64]) {
+        let expected = self.len * self.taxels();
+        assert_eq!(out.len(), expected, "one entry a row and taxel");
+        self.weights.fill_rows(self.first_row, out);
+    }
+
+    /// The levels, each in [−1, 1], row-major.
+    #[must_use]
+    pub fn to_vec(&self) -> Vec<f64> {
+        let mut rows = vec![0.0; self.len * self.taxels()];
+        self.fill(&mut rows);
+        rows
+    }
+
+    /// Packed signs of binary weights, ⌈taxels/64⌉ words a row: bit k of a row is set if taxel k has the weight +1.
+    /// `None` if the weights are not binary.
+    #[must_use]
+    pub fn sign_bits(&self) -> Option<Vec<u64>> {
+        (self.weights.mode() == WeightMode::Binary).then(|| {
+            let (mut bits, mut row) = (Vec::new(), vec![0.0; self.taxels()]);
+            let mut clock = self.clock();
+            for _ in 0..self.len {
+                clock.next_row(&mut row);
+                let word = |levels: &[f64]| levels.iter().rev().fold(0, |word, w| word << 1 | u64::from(*w > 0.0));
+                bits.extend(row.chunks(64).map(word));
+            }
+            bits
+        })
+    }
+
+    /// Iterates over rows, from the first one on and beyond the last.
+    #[must_use]
+    pub fn clock(&self) -> WeightClock {
+        self.weights.clock(self.first_row)
+    }
+}
+
+/// Most rows of a window. All 2²⁴ windows of so many are in the sequence, the last one 271,551,075 steps behind state
+/// 0.
+const MOST_ROWS: usize = 24;
+/// Number of states of a generator, and so of seeds.
+const STATES: u64 = 1 << 32;
+
+/// Why there are no seeds for a window.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FirstWindowError {
+    /// Too many rows.
+    #[error("a window of {rows} rows is outside [1, {MOST_ROWS}]")]
+    Rows {
+        /// Rows of the window.
+        rows: usize,
+    },
+    /// A level that no generator puts out in binary mode.
+    #[error("row {row}, taxel {taxel}: code {code} is not 0 or 255, what a generator puts out in binary mode")]
+    Code {
+        /// Row, 0-based.
+        row: usize,
+        /// Taxel, 0-based.
+        taxel: usize,
+        /// Code.
+        code: u8,
+    },
+}
+
+/// Seeds, one a taxel, with which the cells' generators put out `window` in binary mode at rows 0 to M − 1 after the
+/// seeds are loaded. Later rows are pseudorandom. The search is exact: it enumerates the states of the generator and
+/// stops when every taxel has a seed.
+///
+/// ```
+/// use spts_circuit::{WeightMode, Weights, parse_patterns, seeds_of_first_window};
+///
+/// let wanted = parse_patterns("++-\n-+-\n---\n+-+")?;
+/// let weights = Weights::with_seeds(WeightMode::Binary, seeds_of_first_window(&wanted)?)?;
+/// assert_eq!([0, 1, 2, 3].map(|row| weights.level(0, row)), [1.0, -1.0, -1.0, 1.0]);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`FirstWindowError`] for more than 24 rows, or levels other than ±1.
+pub fn seeds_of_first_window(window: &Patterns) -> Result<Vec<u32>, FirstWindowError> {
+    let rows = window.period();
+    if rows > MOST_ROWS {
+        return Err(FirstWindowError::Rows { rows });
+    }
+    let words = words(window)?;
+    let mut seeds: BTreeMap<u32, u32> = words.iter().map(|word| (*word, 0)).collect();
+    let mut wanted = vec![0_u64; (1_usize << rows).div_ceil(64)];
+    for word in seeds.keys() {
+        wanted[*word as usize / 64] |= 1 << (word % 64);
+    }
+    let mut left = seeds.len();
+    let mask = (1_u32 << rows) - 1;
+    // the sequence is a cycle: so many steps on is M steps back
+    let back = Jump::new(STATES - rows as u64);
+    let (mut state, mut word) = (0, 0);
+    for step in 1.. {
+        if left == 0 {
+            break;
+        }
+        state = Jump::ONE.apply(state);
+        word = (word << 1 | state >> 31) & mask;
+        let bits = &mut wanted[word as usize / 64];
+        if *bits >> (word % 64) & 1 == 1 && step >= rows {
+            *bits &= !(1 << (word % 64));
+            seeds.insert(word, back.apply(state));
+            left -= 1;
+        }
+    }
+    Ok(words.iter().map(|word| seeds[word]).collect())
+}
+
+/// Levels of every taxel, the one of row 0 in the highest bit.
+fn words(window: &Patterns) -> Result<Vec<u32>, FirstWindowError> {
+    let mut words = vec![0; window.taxels()];
+    for row in 0..window.period() {
+        for (taxel, (word, &code)) in words.iter_mut().zip(window.row(row as u64)).enumerate() {
+            if !matches!(code, 0 | 255) {
+                return Err(FirstWindowError::Code { row, taxel, code });
+            }
+            *word = *word << 1 | u32::from(code > 0);
+        }
+    }
+    Ok(words)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Every level that a sound cell has is the level of the code that it stands for, bit for bit.
+    #[test]
+    fn codes_and_levels_are_inverse() {
+        for mode in [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary] {
+            let weights = Weights::new(mode, Seeding::Address, 100);
+            for row in 0..100 {
+                let level = weights.level(31, row);
+                assert_eq!(mode.code_level(code_of(level)).to_bits(), level.to_bits(), "{mode:?}");
+            }
+            for code in 0..=u8::MAX {
+                assert_eq!(code_of(mode.code_level(code)), code, "{mode:?}");
+            }
+        }
+    }
+
+    const DEVICE: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];
+
+    #[test]
+    fn a_skin_without_taxels_has_no_weights() {
+        for mode in DEVICE {
+            let weights = Weights::new(mode, Seeding::Address, 0);
+            let mut sums = [f64::NAN; 3];
+            weights.weighted_sums(7, &[], &mut sums);
+            assert!(sums.iter().all(|sum| sum.abs() < f64::MIN_POSITIVE), "{mode:?}");
+            weights.fill_rows(7, &mut []);
+            assert!(weights.level(0, 7).abs() <= 1.0);
+        }
+        assert!(Weights::new(WeightMode::Raster, Seeding::Address, 0).level(0, 0).abs() < f64::MIN_POSITIVE);
+    }
+
+    proptest! {
+        #[test]
+        fn levels_of_a_taxel_are_its_column(first in 0_u64..1_000_000_000_000, taxels in 1_u32..130) {
+            for mode in DEVICE {
+                let weights = Weights::new(mode, Seeding::Mixed, taxels);
+                let (taxel, mut column) = (taxels / 2, [f64::NAN; 9]);
+                weights.fill_levels(taxel, first, &mut column);
+                let expected: Vec<f64> = (first..first + 9).map(|row| weights.level(taxel, row)).collect();
+                prop_assert_eq!(column.to_vec(), expected);
+            }
+        }
+
+        #[test]
+        fn any_row_equals_its_levels(first in 0_u64..1_000_000_000_000, taxels in 1_u32..130) {
+            for mode in DEVICE {
+                for seeding in [Seeding::Address, Seeding::Mixed] {
+                    let weights = Weights::new(mode, seeding, taxels);
+                    let mut rows = vec![f64::NAN; 3 * weights.taxels()];
+                    weights.fill_rows(first, &mut rows);
+                    let expected: Vec<f64> =
+                        (0..3).flat_map(|r| (0..taxels).map(move |k| (k, first + r))).map(|(k, r)| weights.level(k, r)).collect();
+                    prop_assert_eq!(rows, expected);
+                }
+            }
+        }
+    }
+
+    fn codes(weights: &Weights, rows: usize) -> Vec<u8> {
+        let mut codes = vec![0; rows * weights.taxels()];
+        weights.fill_codes(0, &mut codes);
+        codes
+    }
+
+    /// Windows of another kind than a generator's: of a square wave a taxel.
+    #[test]
+    fn the_seeds_give_the_window() {
+        for rows in [1, 2, 20, 24] {
+            let taxels = 50;
+            let wanted: Vec<u8> = (0..rows * taxels)
+                .map(|k| {
+                    if (k / taxels + k % taxels) / (1 + k % 7) % 2 == 0 {
+                        0
+                    } else {
+                        255
+                    }
+                })
+                .collect();
+            let seeds = seeds_of_first_window(&Patterns::new(rows, wanted.clone()).unwrap()).unwrap();
+            let weights = Weights::with_seeds(WeightMode::Binary, seeds).unwrap();
+            assert_eq!(codes(&weights, rows), wanted, "{rows} rows");
+        }
+    }
+
+    #[test]
+    fn windows_that_cannot_be_are_refused() {
+        let refused = |rows, codes: Vec<u8>| seeds_of_first_window(&Patterns::new(rows, codes).unwrap()).unwrap_err();
+        assert_eq!(refused(25, vec![0; 25]), FirstWindowError::Rows { rows: 25 });
+        assert!(matches!(
+            refused(2, vec![0, 0, 0, 1]),
+            FirstWindowError::Code { row: 1, taxel: 1, .. }
+        ));
+    }
+
+    /// What a generator does put out is found again, whatever the seed was.
+    #[test]
+    fn a_window_of_a_generator_is_found_again() {
+        let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, 30);
+        let window = codes(&weights, 22);
+        let seeds = seeds_of_first_window(&Patterns::new(22, window.clone()).unwrap()).unwrap();
+        let again = Weights::with_seeds(WeightMode::Binary, seeds).unwrap();
+        assert_eq!(codes(&again, 22), window);
+    }
+    /// The search ends for any window.
+    #[test]
+    fn every_window_is_in_the_sequence() {
+        let (mut seen, mut left) = (vec![0_u64; 1 << (MOST_ROWS - 6)], 1_u32 << MOST_ROWS);
+        let (mut state, mut word, mut step) = (0, 0_u32, 0_usize);
+        while left > 0 {
+            state = Jump::ONE.apply(state);
+            word = (word << 1 | state >> 31) & ((1 << MOST_ROWS) - 1);
+            step += 1;
+            let bits = &mut seen[word as usize / 64];
+            if step >= MOST_ROWS && *bits >> (word % 64) & 1 == 0 {
+                *bits |= 1 << (word % 64);
+                left -= 1;
+            }
+        }
+        assert_eq!(step, 271_551_075);
+    }
+}

@@ -1,0 +1,306 @@
+//! Weights, seeds and patterns as text.
+
+use super::lcg::Seeding;
+use super::sequence::{LevelSource, Patterns, WeightMode, Weights, WeightsError};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use std::fmt::Write as _;
+
+/// Text of [`Weights`].
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WeightsConfig {
+    mode: WeightMode,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    taxels: Option<u32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    generator: Option<Generator>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    seeding: Option<Seeding>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    seeds: Option<Vec<u32>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    patterns: Option<Patterns>,
+}
+
+/// The generators that cells have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Generator {
+    /// The firmware's linear congruential generator; see [`Jump`](crate::Jump).
+    Lcg,
+}
+
+impl From<&Weights> for WeightsConfig {
+    fn from(weights: &Weights) -> Self {
+        let mut config = Self {
+            mode: weights.mode(),
+            taxels: None,
+            generator: Some(Generator::Lcg),
+            seeding: None,
+            seeds: None,
+            patterns: None,
+        };
+        match weights.source() {
+            LevelSource::Seeding(seeding) => {
+                config.seeding = Some(*seeding);
+                config.taxels = u32::try_from(weights.taxels()).ok();
+            }
+            LevelSource::Seeds(seeds) => config.seeds = Some(seeds.to_vec()),
+            LevelSource::Patterns(patterns) => {
+                config.generator = None;
+                config.patterns = Some(Patterns::clone(patterns));
+            }
+        }
+        config
+    }
+}
+
+impl TryFrom<WeightsConfig> for Weights {
+    type Error = WeightsError;
+    fn try_from(config: WeightsConfig) -> Result<Self, WeightsError> {
+        let mode = config.mode;
+        if config.generator.is_some() && config.patterns.is_some() {
+            let found = "`generator`, `patterns`".to_owned();
+            return Err(WeightsError::Source { found });
+        }
+        let (weights, field) = match (config.seeding, config.seeds, config.patterns) {
+            (None, None, None) if mode == WeightMode::Raster => {
+                let taxels = config.taxels.ok_or(WeightsError::NoTaxels)?;
+                return Ok(Self::new(mode, Seeding::Address, taxels));
+            }
+            (Some(seeding), None, None) => {
+                let taxels = config.taxels.ok_or(WeightsError::NoTaxels)?;
+                return Ok(Self::new(mode, seeding, taxels));
+            }
+            (None, Some(seeds), None) => (Self::with_seeds(mode, seeds)?, "seeds"),
+            (None, None, Some(patterns)) => (Self::with_patterns(mode, patterns)?, "patterns"),
+            (seeding, seeds, patterns) => {
+                let given = [
+                    seeding.map(|_| "`seeding`"),
+                    seeds.map(|_| "`seeds`"),
+                    patterns.map(|_| "`patterns`"),
+                ];
+                let given: Vec<&str> = given.into_iter().flatten().collect();
+                let found = if given.is_empty() {
+                    "none".to_owned()
+                } else {
+                    given.join(", ")
+                };
+                return Err(WeightsError::Source { found });
+            }
+        };
+        match config.taxels {
+            Some(taxels) if taxels as usize != weights.taxels() => Err(WeightsError::Taxels {
+                field,
+                found: weights.taxels(),
+                taxels: taxels as usize,
+            }),
+            _ => Ok(weights),
+        }
+    }
+}
+
+impl Serialize for Weights {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        WeightsConfig::from(self).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Weights {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Self::try_from(WeightsConfig::deserialize(deserializer)?).map_err(de::Error::custom)
+    }
+}
+
+/// Size of the largest file of seeds that is read, bytes: a million seeds in any notation.
+pub const MAX_SEEDS_BYTES: u64 = 1 << 24;
+/// Characters of a wrong word that an error repeats: a few more than a seed has.
+const SHOWN: usize = 20;
+
+/// A word that is not a seed.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("line {line}: seed = `{word}` is not one of the whole numbers in [0, 4294967295]")]
+pub struct SeedTextError {
+    /// Line, from 1.
+    pub line: usize,
+    /// The word, shortened.
+    pub word: String,
+}
+
+/// Reads seeds, one a taxel in row-major order: whole numbers in [0, 4294967295], decimal or hexadecimal (0x…),
+/// separated by spaces, commas or line ends. A # starts a comment. A JSON list of numbers is accepted, too.
+///
+/// ```
+/// use spts_circuit::parse_seeds;
+///
+/// assert_eq!(parse_seeds("# two cells\n8\n0x09\n")?, [8, 9]);
+/// assert_eq!(parse_seeds("[8, 9]")?, [8, 9]);
+/// assert_eq!(parse_seeds("8\n-1").unwrap_err().line, 2);
+/// # Ok::<(), spts_circuit::SeedTextError>(())
+/// ```
+///
+/// # Errors
+/// [`SeedTextError`] for the first word that is not a seed.
+pub fn parse_seeds(text: &str) -> Result<Vec<u32>, SeedTextError> {
+    let trimmed = text.trim();
+    let json = trimmed.starts_with('[') && trimmed.ends_with(']');
+    let between = |c: char| matches!(c, ',' | ' ' | '\t' | '\r') || (json && matches!(c, '[' | ']'));
+    let mut seeds = Vec::new();
+    for (index, line) in text.lines().enumerate() {
+        let line = line.split('#').next().unwrap_or_default();
+        for word in line.split(between).filter(|word| !word.is_empty()) {
+            let seed = match word.strip_prefix("0x") {
+                Some(digits) => u32::from_str_radix(digits, 16),
+                None => word.parse(),
+            };
+            let seed = seed.map_err(|_| SeedTextError {
+                line: index + 1,
+                word: word.chars().take(SHOWN).collect(),
+            })?;
+            seeds.push(seed);
+        }
+    }
+    Ok(seeds)
+}
+
+/// Size of the largest file of patterns that is read, bytes.
+pub const MAX_PATTERNS_BYTES: u64 = 1 << 26;
+/// Why a text is not a valid pattern.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PatternTextError {
+    /// A word that is neither signs nor a code.
+    #[error("line {line}: `{word}` is neither a row of + and − signs nor one of the codes in [0, 255]")]
+    Word {
+        /// Line, from 1.
+        line: usize,
+        /// The word, shortened.
+        word: String,
+    },
+    /// A row whose length differs from that of the rows before it.
+    #[error("line {line}: a row of {found} taxels; the rows before it have {taxels}")]
+    Length {
+        /// Line, from 1.
+        line: usize,
+        /// Number of taxels in the row.
+        found: usize,
+        /// Number of taxels in the first row.
+        taxels: usize,
+    },
+    /// No row, or too many rows.
+    #[error(transparent)]
+    Patterns(#[from] WeightsError),
+}
+
+/// Reads a pattern: one line for each row of the sensing matrix, in order of output. A row has one sign for each taxel
+/// (`+` is code 255, level +1; `−` is code 0, level −1), or codes in [0, 255] separated by spaces or commas. The
+/// keyboard's hyphen also counts as `−`. A `#` starts a comment.
+///
+/// ```
+/// use spts_circuit::parse_patterns;
+///
+/// let patterns = parse_patterns("# two rows, three taxels\n+-+\n0 255 128\n")?;
+/// assert_eq!((patterns.row(0), patterns.row(1)), (&[255, 0, 255][..], &[0, 255, 128][..]));
+/// assert!(parse_patterns("+-\n+").is_err());
+/// # Ok::<(), spts_circuit::PatternTextError>(())
+/// ```
+///
+/// # Errors
+/// [`PatternTextError`] for the first word that is neither, rows of different lengths, or a text without rows.
+pub fn parse_patterns(text: &str) -> Result<Patterns, PatternTextError> {
+    let (mut codes, mut rows, mut taxels) = (Vec::new(), 0, None);
+    for (index, line) in text.lines().enumerate() {
+        let before = codes.len();
+        for word in line.split('#').next().unwrap_or_default().split([',', ' ', '\t', '\r']) {
+            if word.is_empty() {
+                continue;
+            }
+            if let Some(signs) = signs(word) {
+                codes.extend(signs);
+                continue;
+            }
+            let code = word.parse().map_err(|_| PatternTextError::Word {
+                line: index + 1,
+                word: word.chars().take(SHOWN).collect(),
+            })?;
+            codes.push(code);
+        }
+        let found = codes.len() - before;
+        if found == 0 {
+            continue;
+        }
+        rows += 1;
+        let first = *taxels.get_or_insert(found);
+        if found != first {
+            return Err(PatternTextError::Length {
+                line: index + 1,
+                found,
+                taxels: first,
+            });
+        }
+    }
+    Ok(Patterns::new(rows, codes)?)
+}
+
+/// Codes of a word of signs.
+fn signs(word: &str) -> Option<Vec<u8>> {
+    let code = |c| match c {
+        '+' => Some(255),
+        '-' | '−' => Some(0),
+        _ => None,
+    };
+    word.chars().map(code).collect()
+}
+
+impl Patterns {
+    /// The pattern as text for [`parse_patterns`]: signs if all codes are 0 or 255, otherwise codes.
+    #[must_use]
+    pub fn to_text(&self) -> String {
+        let rows = (0..self.period() as u64).map(|row| self.row(row));
+        let binary = rows.clone().flatten().all(|code| matches!(code, 0 | 255));
+        let mut out = String::new();
+        for row in rows {
+            for (taxel, code) in row.iter().enumerate() {
+                if binary {
+                    out.push(if *code == 0 { '-' } else { '+' });
+                } else {
+                    // a String takes everything
+                    let _ = write!(out, "{}{code}", if taxel == 0 { "" } else { " " });
+                }
+            }
+            out.push('\n');
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_read_back() {
+        for codes in [vec![0, 255, 255, 255, 0, 0], vec![0, 1, 2, 128, 254, 255]] {
+            for period in [1, 2, 3] {
+                let patterns = Patterns::new(period, codes.clone()).unwrap();
+                assert_eq!(parse_patterns(&patterns.to_text()), Ok(patterns));
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_no_pattern_is_refused_with_its_line() {
+        for (text, said) in [
+            ("", "`patterns.codes` has 0 entries"),
+            ("# nothing", "`patterns.codes` has 0 entries"),
+            ("+-\n\n+-+", "line 3: a row of 3 taxels; the rows before it have 2"),
+            ("+-\n256 1", "line 2: `256`"),
+            ("+x-", "line 1: `+x-`"),
+            ("1 -1", "line 1: `-1`"),
+            ("nan", "line 1: `nan`"),
+        ] {
+            let error = parse_patterns(text).unwrap_err().to_string();
+            assert!(error.contains(said), "{text:?}: {error}");
+        }
+    }
+}
