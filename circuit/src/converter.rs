@@ -1,7 +1,8 @@
 //! The analog-to-digital converter, and the scale between its codes and recorded volts.
 
 use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, in_range, within};
+use spts_input::Refusal;
+use spts_models::{in_range, within};
 
 /// Quantises to `bits` bits. The amplifier's output reaches the converter inverted through a divider:
 ///
@@ -39,8 +40,8 @@ struct AdcConfig {
 }
 
 impl TryFrom<AdcConfig> for Adc {
-    type Error = ConfigError;
-    fn try_from(c: AdcConfig) -> Result<Self, ConfigError> {
+    type Error = Refusal;
+    fn try_from(c: AdcConfig) -> Result<Self, Refusal> {
         in_range("bits", f64::from(c.bits), (1..=24).contains(&c.bits), "[1, 24]")?;
         within("reference_v", c.reference_v, 1e-3, 1e3, "[1e-3, 1e3]")?;
         within("divider", c.divider, 1e-3, 1e3, "[1e-3, 1e3]")?;
@@ -87,8 +88,8 @@ impl Adc {
     /// before negative values are set to 0.
     ///
     /// # Errors
-    /// [`ConfigError`] for a constant outside [−1e6, 1e6] V.
-    pub fn converter(&self, subtract_v: Option<f64>) -> Result<Converter, ConfigError> {
+    /// [`Refusal`] for a constant outside [−1e6, 1e6] V.
+    pub fn converter(&self, subtract_v: Option<f64>) -> Result<Converter, Refusal> {
         #[expect(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
@@ -123,7 +124,7 @@ impl Adc {
 /// assert!((volts - 4.55).abs() < 1e-9);
 /// assert_eq!(converter.code(volts), Some(300));
 /// assert_eq!(converter.code(4.56), None, "between two codes");
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "ConverterConfig", into = "ConverterConfig")]
@@ -164,8 +165,8 @@ pub enum CodeScale {
 }
 
 impl TryFrom<ConverterConfig> for Converter {
-    type Error = ConfigError;
-    fn try_from(config: ConverterConfig) -> Result<Self, ConfigError> {
+    type Error = Refusal;
+    fn try_from(config: ConverterConfig) -> Result<Self, Refusal> {
         Self::new(config)
     }
 }
@@ -180,8 +181,8 @@ impl Converter {
     /// A converter with these parameters.
     ///
     /// # Errors
-    /// [`ConfigError`] for a parameter outside its range.
-    pub fn new(config: ConverterConfig) -> Result<Self, ConfigError> {
+    /// [`Refusal`] for a parameter outside its range.
+    pub fn new(config: ConverterConfig) -> Result<Self, Refusal> {
         within("offset_v", config.offset_v, -1e6, 1e6, "[−1e6, 1e6]")?;
         within(
             "max_code",

@@ -1,11 +1,12 @@
 //! Interfaces of the readout effects, the deviations of the real circuit from y = Φx, and of faults of single cells.
 
 use crate::batch::{Batch, CellRun};
-use crate::weights::{Weights, WeightsError};
+use crate::weights::Weights;
 use rand::RngExt as _;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use spts_models::{ConfigError, Streams, explain_toml, in_range};
+use spts_input::Refusal;
+use spts_models::{Streams, explain_toml, in_range};
 
 /// Inputs of an effect that are constant during a session.
 #[derive(Debug, Clone)]
@@ -64,65 +65,6 @@ pub trait Effect: Send {
     fn apply(&mut self, batch: &mut Batch<'_>);
 }
 
-/// Why a profile or an effect cannot be built.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProfileError {
-    /// Text that is not TOML, an unknown key, or a value of the wrong type.
-    #[error("{0}")]
-    Syntax(String),
-    /// A value outside its range.
-    #[error(transparent)]
-    Value(#[from] ConfigError),
-    /// Weights that are not valid, or belong to another skin.
-    #[error(transparent)]
-    Weights(#[from] WeightsError),
-    /// An effect that is not in the table.
-    #[error("`{name}` is not an effect; known: {known}")]
-    UnknownEffect {
-        /// Name in the profile, with the mode to which it belongs.
-        name: String,
-        /// All known names.
-        known: String,
-    },
-    /// Parameters that an effect refuses.
-    #[error("{reason}")]
-    Effect {
-        /// Name of the effect.
-        effect: &'static str,
-        /// The message, beginning with the field, such as `compressive.adc.bits`.
-        reason: String,
-    },
-    /// A fault that is not in the table.
-    #[error("`faults[{index}].name` = \"{name}\" is not a fault; known: {known}")]
-    UnknownFault {
-        /// Position in the list, from 0.
-        index: usize,
-        /// Name in the profile.
-        name: String,
-        /// All known names.
-        known: String,
-    },
-    /// A fault that cannot be injected.
-    #[error("{reason} (fault `{fault}` of taxel {taxel})")]
-    Fault {
-        /// Name of the fault.
-        fault: String,
-        /// Taxel.
-        taxel: u32,
-        /// The message, beginning with the field, such as `faults[1].taxel`.
-        reason: String,
-    },
-    /// A profile that is not in the table.
-    #[error("`{name}` is not a readout profile; known: {known}")]
-    UnknownProfile {
-        /// Name asked for.
-        name: String,
-        /// All known names.
-        known: String,
-    },
-}
-
 /// One fault of a profile's `[[faults]]` list.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct FaultConfig {
@@ -166,7 +108,7 @@ pub trait Fault: Send {
 }
 
 /// Builds a fault of a taxel from its parameters.
-pub type BuildFault = fn(toml::Table, u32, &EffectSession) -> Result<Box<dyn Fault>, ProfileError>;
+pub type BuildFault = fn(toml::Table, u32, &EffectSession) -> Result<Box<dyn Fault>, Refusal>;
 
 /// Either one value, or `[low, high]`, from which a value is drawn uniformly once for each session (or for each taxel
 /// or device, if the effect says so).
@@ -207,8 +149,8 @@ impl Span {
     /// Checks that both ends lie in `[min, max]` and are in order.
     ///
     /// # Errors
-    /// [`ConfigError`] with `field` and `range`.
-    pub fn within(self, field: &str, min: f64, max: f64, range: &'static str) -> Result<Self, ConfigError> {
+    /// [`Refusal`] with `field` and `range`.
+    pub fn within(self, field: &str, min: f64, max: f64, range: &'static str) -> Result<Self, Refusal> {
         let [low, high] = self.ends();
         in_range(field, low, low >= min && low <= max, range)?;
         in_range(field, high, high >= low && high <= max, range)?;
@@ -222,7 +164,7 @@ impl Span {
         [min, max]: [f64; 2],
         range: &'static str,
         rng: &mut impl rand::Rng,
-    ) -> Result<f64, ConfigError> {
+    ) -> Result<f64, Refusal> {
         Ok(self.within(field, min, max, range)?.draw(rng))
     }
 
@@ -235,9 +177,9 @@ impl Span {
 }
 
 /// Builds an effect from its parameters.
-pub type BuildEffect = fn(toml::Table, &EffectSession) -> Result<Box<dyn Effect>, ProfileError>;
+pub type BuildEffect = fn(toml::Table, &EffectSession) -> Result<Box<dyn Effect>, Refusal>;
 
 /// Parameters of an effect from its table.
-pub(crate) fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, ProfileError> {
-    table.try_into().map_err(|e| ProfileError::Syntax(explain_toml(&e)))
+pub(crate) fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
+    table.try_into().map_err(|e| Refusal::new(explain_toml(&e)))
 }

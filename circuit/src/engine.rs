@@ -2,49 +2,9 @@
 
 use crate::batch::{Batch, Cells};
 use crate::effect::Effect;
-use crate::recording::RecordingError;
 use crate::source::{ConductanceSource, Segment};
-use crate::weights::{ANALOG_SCALE, CellCodes, CodesError, LANES, Lines, Rows, Sums, WeightMode, Weights};
-
-/// Why a block cannot be acquired.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum AcquireError {
-    /// The source belongs to another skin.
-    #[error("the source has {source_taxels} taxels; the readout {taxels}")]
-    Taxels {
-        /// Taxels of the source.
-        source_taxels: usize,
-        /// Taxels of the readout.
-        taxels: usize,
-    },
-    /// The number of measurements is zero, or not a whole number of frames.
-    #[error("{measurements} measurements are not a positive whole number of frames of {frame}")]
-    PartialFrame {
-        /// Measurements asked for.
-        measurements: usize,
-        /// Measurements a frame.
-        frame: usize,
-    },
-    /// The source returned a segment that does not contain the requested time, or belongs to another skin.
-    #[error("at {time_s} s the source gives {taxels} taxels from {start_s} s to {end_s} s")]
-    Segment {
-        /// Requested time, s since the start of the block.
-        time_s: f64,
-        /// Start of the segment, s.
-        start_s: f64,
-        /// End of the segment, s.
-        end_s: f64,
-        /// Taxels of the segment.
-        taxels: usize,
-    },
-    /// The cells have no codes, or belong to another skin.
-    #[error("cells: {0}")]
-    Codes(#[from] CodesError),
-    /// The blocks do not form a valid recording.
-    #[error(transparent)]
-    Recording(#[from] RecordingError),
-}
+use crate::weights::{ANALOG_SCALE, CellCodes, LANES, Lines, Rows, Sums, WeightMode, Weights};
+use spts_input::Refusal;
 
 /// Most measurements in a batch: the sums of one fit into the first-level cache.
 const BATCH: usize = 128;
@@ -107,15 +67,14 @@ impl Engine {
     /// Fills `volts` with measurements of `source` from row `first_row` on.
     ///
     /// # Errors
-    /// [`AcquireError::Segment`] when the source hands out a segment that does not hold the time asked for;
-    /// [`AcquireError::Codes`] when there are no codes.
+    /// [`Refusal`] when the source hands out a segment that does not hold the time asked for, or there are no codes.
     pub(crate) fn run(
         &mut self,
         effects: &mut [Box<dyn Effect>],
         first_row: u64,
         source: &mut dyn ConductanceSource,
         volts: &mut [f64],
-    ) -> Result<(), AcquireError> {
+    ) -> Result<(), Refusal> {
         let mut done = 0;
         while done < volts.len() {
             let time_s = self.time_s(done);
@@ -129,7 +88,10 @@ impl Engine {
                 }
                 let row = first_row + done as u64;
                 match &mut self.codes {
-                    Some(codes) => self.rows.go_to_codes(&mut **codes, row, len)?,
+                    Some(codes) => self
+                        .rows
+                        .go_to_codes(&mut **codes, row, len)
+                        .map_err(|e| e.at("cells"))?,
                     None => self.rows.go_to(row, len),
                 }
                 let mut batch = self.sum(&segment, &moments, &mut volts[done..done + len]);

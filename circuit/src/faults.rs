@@ -1,10 +1,11 @@
 //! The table of faults of single cells, and the effect that applies them to the signal.
 
 use crate::batch::{Batch, CellRun};
-use crate::effect::{BuildFault, Effect, EffectSession, Fault, FaultConfig, ProfileError, parse};
+use crate::effect::{BuildFault, Effect, EffectSession, Fault, FaultConfig, parse};
 use crate::effects::SkippingClocks;
 use crate::weights::WeightMode;
 use serde::Deserialize;
+use spts_input::Refusal;
 use spts_models::{in_section, within};
 
 /// Every fault by name.
@@ -28,9 +29,9 @@ fn known() -> String {
 /// cells put out.
 ///
 /// # Errors
-/// [`ProfileError`] for an unknown fault, a taxel that the skin does not have, parameters outside their range, or a
+/// [`Refusal`] for an unknown fault, a taxel that the skin does not have, parameters outside their range, or a
 /// second fault that determines the level of the same cell.
-pub fn build_faults(configs: &[FaultConfig], session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub fn build_faults(configs: &[FaultConfig], session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let mut cells: Vec<FaultyCell> = Vec::new();
     for (index, config) in configs.iter().enumerate() {
         let taxel = config.taxel as usize;
@@ -55,13 +56,13 @@ pub fn build_faults(configs: &[FaultConfig], session: &EffectSession) -> Result<
     Ok(Box::new(Faults { cells }))
 }
 
-fn build_fault(index: usize, config: &FaultConfig, session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
+fn build_fault(index: usize, config: &FaultConfig, session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
     let Some((_, build)) = FAULTS.iter().find(|(name, _)| *name == config.name) else {
-        return Err(ProfileError::UnknownFault {
-            index,
-            name: config.name.clone(),
-            known: known(),
-        });
+        return Err(Refusal::new(format!(
+            "`faults[{index}].name` = \"{}\" is not a fault; known: {}",
+            config.name,
+            known()
+        )));
     };
     let taxels = session.weights.taxels();
     if config.taxel as usize >= taxels {
@@ -75,12 +76,9 @@ fn build_fault(index: usize, config: &FaultConfig, session: &EffectSession) -> R
     build(config.parameters.clone(), config.taxel, session).map_err(|e| refused(index, config, &e.to_string()))
 }
 
-fn refused(index: usize, config: &FaultConfig, reason: &str) -> ProfileError {
-    ProfileError::Fault {
-        fault: config.name.clone(),
-        taxel: config.taxel,
-        reason: in_section(&format!("faults[{index}]"), reason),
-    }
+fn refused(index: usize, config: &FaultConfig, reason: &str) -> Refusal {
+    let reason = in_section(&format!("faults[{index}]"), reason);
+    Refusal::new(format!("{reason} (fault `{}` of taxel {})", config.name, config.taxel))
 }
 
 struct FaultyCell {
@@ -130,12 +128,12 @@ fn high() -> f64 {
 }
 
 /// The cell's output stays at mid-scale, level 0, as before its first clock edge.
-fn dead(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
+fn dead(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
     parse::<Nothing>(table)?;
     Ok(Box::new(Stuck { level: 0.0 }))
 }
 
-fn stuck(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
+fn stuck(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
     let stuck: Stuck = parse(table)?;
     within("level", stuck.level, -1.0, 1.0, "[−1, 1]")?;
     Ok(Box::new(stuck))
@@ -166,7 +164,7 @@ struct MisSeeded {
     seed: u32,
 }
 
-fn mis_seeded(table: toml::Table, _taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
+fn mis_seeded(table: toml::Table, _taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
     let (mode, seed) = (session.weights.mode(), parse::<MisSeededConfig>(table)?.seed);
     Ok(Box::new(MisSeeded { mode, seed }))
 }
@@ -214,7 +212,7 @@ struct Overdriven {
     config: OverdrivenConfig,
 }
 
-fn overdriven(table: toml::Table, _taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
+fn overdriven(table: toml::Table, _taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
     let config: OverdrivenConfig = parse(table)?;
     for (field, value) in [("gain", config.gain), ("carry", config.carry)] {
         within(field, value, -100.0, 100.0, "[−100, 100]")?;
@@ -257,7 +255,7 @@ fn measured() -> f64 {
     4e-5
 }
 
-fn skipping_clocks(table: toml::Table, taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
+fn skipping_clocks(table: toml::Table, taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
     let config: SkippingConfig = parse(table)?;
     Ok(Box::new(SkippingClocks::new(session, taxel, config.probability)?))
 }
@@ -271,7 +269,7 @@ impl Fault for SkippingClocks {
 /// The taxel contributes nothing, neither to the weighted sum nor to Σx nor to the contact noise.
 struct Detached;
 
-fn detached(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
+fn detached(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
     parse::<Nothing>(table)?;
     Ok(Box::new(Detached))
 }
@@ -299,7 +297,7 @@ fn slow_loss() -> f64 {
     -0.01
 }
 
-fn drifting(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, ProfileError> {
+fn drifting(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
     let drifting: Drifting = parse(table)?;
     let rate = drifting.rate_per_s;
     within("rate_per_s", rate, -10.0, 10.0, "[−10, 10]")?;

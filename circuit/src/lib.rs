@@ -57,16 +57,15 @@ mod weights;
 
 pub use batch::{Batch, CellRun};
 pub use converter::{Adc, CodeScale, Converter, ConverterConfig};
-pub use effect::{BlockStart, BuildEffect, BuildFault, Effect, EffectSession, Fault, FaultConfig, ProfileError, Span};
+pub use effect::{BlockStart, BuildEffect, BuildFault, Effect, EffectSession, Fault, FaultConfig, Span};
 pub use effects::{EFFECTS, build_chain, check_effect};
-pub use engine::AcquireError;
 pub use faults::{FAULTS, build_faults};
 pub use profile::{CompressiveWeights, PROFILES, Profile};
 pub use readout::Readout;
-pub use recording::{Block, Recording, RecordingError, RecordingInfo, Slip};
-pub use source::{ConductanceSource, Constant, Interpolated, Segment, SourceError, Started};
+pub use recording::{Block, Recording, RecordingInfo, Slip};
+pub use source::{ConductanceSource, Constant, Interpolated, Segment, Started};
 pub use weights::{
-    CellCodes, CodesError, FIRST_ADDRESS, FirstWindowError, INCREMENT, Jump, LevelSource, MAX_PATTERNS_BYTES,
-    MAX_SEEDS_BYTES, MULTIPLIER, Mode, PatternTextError, Patterns, SeedTextError, Seeding, WeightClock, WeightMode,
-    WeightRows, Weights, WeightsError, check_codes, parse_patterns, parse_seeds, seeds_of_first_window,
+    CellCodes, FIRST_ADDRESS, INCREMENT, Jump, LevelSource, MAX_PATTERNS_BYTES, MAX_SEEDS_BYTES, MULTIPLIER, Mode,
+    Patterns, Seeding, WeightClock, WeightMode, WeightRows, Weights, check_codes, parse_patterns, parse_seeds,
+    seeds_of_first_window,
 };

@@ -1,11 +1,14 @@
 //! Named parameter sets of the whole readout.
 
 use crate::converter::Converter;
-use crate::effect::{Effect, EffectSession, FaultConfig, ProfileError};
+use crate::effect::{Effect, EffectSession, FaultConfig};
 use crate::effects::{build_chain, converter, rail_v};
 use crate::faults::build_faults;
-use crate::weights::{LevelSource, Mode, Patterns, Seeding, WeightMode, Weights, WeightsError};
+use crate::weights::{
+    LevelSource, Mode, Patterns, Seeding, WeightMode, Weights, check_taxels, not_in_mode, one_source,
+};
 use serde::{Deserialize, Serialize};
+use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams, explain_toml, within};
 
 /// Every profile by name, as TOML. Each parameter has its source beside it.
@@ -37,7 +40,7 @@ pub enum CompressiveWeights {
 /// profile.validate(100)?;
 /// assert!((profile.volts_per_siemens() - 4300.0).abs() < 1e-9);
 /// assert_eq!(profile.weights(Mode::Compressive, 100)?.taxels(), 100);
-/// # Ok::<(), spts_circuit::ProfileError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -85,14 +88,14 @@ impl Profile {
     /// The profile called `name` in [`PROFILES`].
     ///
     /// # Errors
-    /// [`ProfileError::UnknownProfile`] if there is none.
-    pub fn named(name: &str) -> Result<Self, ProfileError> {
+    /// [`Refusal`] if there is none.
+    pub fn named(name: &str) -> Result<Self, Refusal> {
         let Some((_, text)) = PROFILES.iter().find(|(known, _)| *known == name) else {
             let known: Vec<&str> = PROFILES.iter().map(|(known, _)| *known).collect();
-            return Err(ProfileError::UnknownProfile {
-                name: name.to_owned(),
-                known: known.join(", "),
-            });
+            return Err(Refusal::new(format!(
+                "`{name}` is not a readout profile; known: {}",
+                known.join(", ")
+            )));
         };
         Self::from_toml(text)
     }
@@ -100,13 +103,13 @@ impl Profile {
     /// Reads a profile from TOML text. [`Profile::validate`] checks its values; building a readout checks them again.
     ///
     /// # Errors
-    /// [`ProfileError`] for text that is not TOML, an unknown key, or a value of the wrong type.
-    pub fn from_toml(text: &str) -> Result<Self, ProfileError> {
+    /// [`Refusal`] for text that is not TOML, an unknown key, or a value of the wrong type.
+    pub fn from_toml(text: &str) -> Result<Self, Refusal> {
         toml::from_str(text).map_err(|error| {
             // of a text that is TOML the table knows the field, which the text does not
             let table: Option<toml::Table> = toml::from_str(text).ok();
             let in_table = table.and_then(|table| table.try_into::<Self>().err());
-            ProfileError::Syntax(match in_table {
+            Refusal::new(match in_table {
                 Some(error) => explain_toml(&error),
                 None => error.to_string().trim_end().to_owned(),
             })
@@ -117,8 +120,8 @@ impl Profile {
     /// `feedback_scales` of the result is off. At 10 mm nothing changes, to the bit.
     ///
     /// # Errors
-    /// [`ProfileError::Value`] if the scaled Rf is outside [1e-3, 1e9] Ω.
-    pub fn on(&self, layout: &SkinLayout) -> Result<Self, ProfileError> {
+    /// [`Refusal`] if the scaled Rf is outside [1e-3, 1e9] Ω.
+    pub fn on(&self, layout: &SkinLayout) -> Result<Self, Refusal> {
         let scale = if self.feedback_scales {
             layout.relative_area()
         } else {
@@ -138,8 +141,8 @@ impl Profile {
     /// 10 mm × 10 mm.
     ///
     /// # Errors
-    /// [`ProfileError`] that names the value and its range.
-    pub fn validate(&self, taxels: u32) -> Result<(), ProfileError> {
+    /// [`Refusal`] that names the value and its range.
+    pub fn validate(&self, taxels: u32) -> Result<(), Refusal> {
         within("sample_rate_hz", self.sample_rate_hz, 1.0, 1e9, "[1, 1e9]")?;
         within("drive_v", self.drive_v, 1e-3, 1e3, "[1e-3, 1e3]")?;
         within("feedback_ohm", self.feedback_ohm, 1e-3, 1e9, "[1e-3, 1e9]")?;
@@ -162,8 +165,8 @@ impl Profile {
     /// The faults and then the effects of `mode`, in signal order.
     ///
     /// # Errors
-    /// [`ProfileError`] for an unknown effect or fault, or parameters that it refuses.
-    pub fn effects(&self, mode: Mode, session: &EffectSession) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
+    /// [`Refusal`] for an unknown effect or fault, or parameters that it refuses.
+    pub fn effects(&self, mode: Mode, session: &EffectSession) -> Result<Vec<Box<dyn Effect>>, Refusal> {
         let mut effects = Vec::new();
         if !self.faults.is_empty() {
             effects.push(build_faults(&self.faults, session)?);
@@ -181,9 +184,9 @@ impl Profile {
     /// The weights of `taxels` taxels in `mode`.
     ///
     /// # Errors
-    /// [`ProfileError::Weights`] if `seeds` or `patterns` are not valid or have another number of taxels, or if more
+    /// [`Refusal`] if `seeds` or `patterns` are not valid or have another number of taxels, or if more
     /// than one of `seeding = "mixed"`, `seeds` and `patterns` is given.
-    pub fn weights(&self, mode: Mode, taxels: u32) -> Result<Weights, ProfileError> {
+    pub fn weights(&self, mode: Mode, taxels: u32) -> Result<Weights, Refusal> {
         let weight_mode = match (mode, self.weights) {
             (Mode::Raster, _) => return Ok(Weights::new(WeightMode::Raster, self.seeding, taxels)),
             (Mode::Compressive, CompressiveWeights::Binary) => WeightMode::Binary,
@@ -202,32 +205,22 @@ impl Profile {
                     patterns.as_ref().map(|_| "`patterns`"),
                 ];
                 let given: Vec<&str> = mixed.into_iter().chain(listed.into_iter().flatten()).collect();
-                return Err(WeightsError::Source {
-                    found: given.join(", "),
-                }
-                .into());
+                return Err(one_source(&given.join(", ")));
             }
         };
-        if weights.taxels() != taxels as usize {
-            return Err(WeightsError::Taxels {
-                field,
-                found: weights.taxels(),
-                taxels: taxels as usize,
-            }
-            .into());
-        }
+        check_taxels(&weights, field, taxels)?;
         Ok(weights)
     }
 
     /// The profile with `weights` in its compressive mode, replacing earlier ones.
     ///
     /// # Errors
-    /// [`ProfileError::Weights`] for raster weights.
-    pub fn with_weights(&self, weights: &Weights) -> Result<Self, ProfileError> {
+    /// [`Refusal`] for raster weights.
+    pub fn with_weights(&self, weights: &Weights) -> Result<Self, Refusal> {
         let mode = match weights.mode() {
             WeightMode::Binary => CompressiveWeights::Binary,
             WeightMode::Analog => CompressiveWeights::Analog,
-            mode @ WeightMode::Raster => return Err(WeightsError::Mode { field: "weights", mode }.into()),
+            mode @ WeightMode::Raster => return Err(not_in_mode("weights", mode)),
         };
         let (seeding, seeds, patterns) = match weights.source() {
             LevelSource::Seeding(seeding) => (*seeding, None, None),
@@ -246,8 +239,8 @@ impl Profile {
     /// Scale of the converter of `mode`; `None` if the profile has no converter in this mode.
     ///
     /// # Errors
-    /// [`ProfileError`] for parameters that the converter refuses.
-    pub fn converter(&self, mode: Mode) -> Result<Option<Converter>, ProfileError> {
+    /// [`Refusal`] for parameters that the converter refuses.
+    pub fn converter(&self, mode: Mode) -> Result<Option<Converter>, Refusal> {
         converter(self.chain(mode), mode)
     }
 
@@ -255,8 +248,8 @@ impl Profile {
     /// `amplifier`; `None` without either effect.
     ///
     /// # Errors
-    /// [`ProfileError`] for parameters that an effect refuses.
-    pub fn rail_v(&self, mode: Mode) -> Result<Option<f64>, ProfileError> {
+    /// [`Refusal`] for parameters that an effect refuses.
+    pub fn rail_v(&self, mode: Mode) -> Result<Option<f64>, Refusal> {
         rail_v(self.chain(mode), mode)
     }
 

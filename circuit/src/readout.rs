@@ -1,11 +1,12 @@
 //! The device: clock, cells, summing amplifier and converter, from a source of conductance to volts.
 
-use crate::effect::{BlockStart, Effect, EffectSession, ProfileError};
-use crate::engine::{AcquireError, Engine};
+use crate::effect::{BlockStart, Effect, EffectSession};
+use crate::engine::Engine;
 use crate::profile::Profile;
-use crate::recording::{Block, Recording, RecordingError, RecordingInfo};
+use crate::recording::{Block, Recording, RecordingInfo};
 use crate::source::ConductanceSource;
-use crate::weights::{CellCodes, CodesError, Mode, Weights};
+use crate::weights::{CellCodes, Mode, Weights};
+use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
 
 /// The readout of one skin in one mode for one session. The clock, and with it the row of the weight matrix, continues
@@ -39,14 +40,14 @@ impl Readout {
     /// feedback is scaled for others ([`Profile::on`]).
     ///
     /// # Errors
-    /// [`ProfileError`] for an unknown effect, or a value outside its range.
+    /// [`Refusal`] for an unknown effect, or a value outside its range.
     pub fn new(
         profile: &Profile,
         mode: Mode,
         layout: &SkinLayout,
         device: Streams,
         session: u64,
-    ) -> Result<Self, ProfileError> {
+    ) -> Result<Self, Refusal> {
         let taxels = u32::try_from(layout.taxels()).unwrap_or(u32::MAX);
         let profile = &profile.on(layout)?;
         profile.validate(taxels)?;
@@ -82,11 +83,12 @@ impl Readout {
     /// replaces the code.
     ///
     /// # Errors
-    /// [`CodesError::Taxels`] if the number of cells differs from that of taxels.
-    pub fn with_codes(self, codes: Box<dyn CellCodes>) -> Result<Self, CodesError> {
+    /// [`Refusal`] if the number of cells differs from that of taxels.
+    pub fn with_codes(self, codes: Box<dyn CellCodes>) -> Result<Self, Refusal> {
         let (cells, taxels) = (codes.taxels(), self.measurements_per_frame());
         if cells != taxels {
-            return Err(CodesError::Taxels { cells, taxels });
+            let readout = format!("the readout has {taxels} taxels");
+            return Err(Refusal::new(format!("the codes are those of {cells} cells; {readout}")));
         }
         Ok(Self {
             engine: self.engine.with_codes(codes),
@@ -142,15 +144,13 @@ impl Readout {
     /// for every measurement.
     ///
     /// # Errors
-    /// [`AcquireError`] if the source has another number of taxels or returns an invalid segment, `measurements` is not
+    /// [`Refusal`] if the source has another number of taxels or returns an invalid segment, `measurements` is not
     /// a whole number of frames, or the cells have no codes.
-    pub fn acquire(&mut self, source: &mut dyn ConductanceSource, measurements: usize) -> Result<Block, AcquireError> {
+    pub fn acquire(&mut self, source: &mut dyn ConductanceSource, measurements: usize) -> Result<Block, Refusal> {
         let taxels = self.measurements_per_frame();
         if measurements == 0 || !measurements.is_multiple_of(taxels) {
-            return Err(AcquireError::PartialFrame {
-                measurements,
-                frame: taxels,
-            });
+            let whole = format!("a positive whole number of frames of {taxels}");
+            return Err(Refusal::new(format!("{measurements} measurements are not {whole}")));
         }
         let volts = self.measure(source, measurements)?;
         Ok(Block {
@@ -165,11 +165,7 @@ impl Readout {
     ///
     /// # Errors
     /// As [`Readout::acquire`], except for incomplete frames.
-    pub fn measure(
-        &mut self,
-        source: &mut dyn ConductanceSource,
-        measurements: usize,
-    ) -> Result<Vec<f64>, AcquireError> {
+    pub fn measure(&mut self, source: &mut dyn ConductanceSource, measurements: usize) -> Result<Vec<f64>, Refusal> {
         let mut volts = vec![0.0; measurements];
         self.begin();
         self.go_on(source, &mut volts)?;
@@ -201,13 +197,13 @@ impl Readout {
     ///
     /// # Errors
     /// As [`Readout::measure`].
-    pub fn go_on(&mut self, source: &mut dyn ConductanceSource, volts: &mut [f64]) -> Result<(), AcquireError> {
+    pub fn go_on(&mut self, source: &mut dyn ConductanceSource, volts: &mut [f64]) -> Result<(), Refusal> {
         let taxels = self.measurements_per_frame();
         if source.taxels() != taxels {
-            return Err(AcquireError::Taxels {
-                source_taxels: source.taxels(),
-                taxels,
-            });
+            let found = source.taxels();
+            return Err(Refusal::new(format!(
+                "the source has {found} taxels; the readout {taxels}"
+            )));
         }
         self.engine.run(&mut self.effects, self.row, source, volts)?;
         self.row += volts.len() as u64;
@@ -224,20 +220,20 @@ impl Readout {
         presses: &mut [S],
         measurements: usize,
         gap_frames: u64,
-    ) -> Result<Recording, AcquireError> {
+    ) -> Result<Recording, Refusal> {
         let mut blocks = Vec::with_capacity(presses.len());
         for press in presses {
             blocks.push(self.acquire(press, measurements)?);
             self.skip(gap_frames);
         }
-        Ok(self.recording(blocks)?)
+        self.recording(blocks)
     }
 
     /// A recording of `blocks`, which this readout acquired.
     ///
     /// # Errors
-    /// [`RecordingError`] if the blocks do not fit together.
-    pub fn recording(&self, blocks: Vec<Block>) -> Result<Recording, RecordingError> {
+    /// [`Refusal`] if the blocks do not fit together.
+    pub fn recording(&self, blocks: Vec<Block>) -> Result<Recording, Refusal> {
         Recording::new(self.info.clone(), blocks)
     }
 }
@@ -268,7 +264,7 @@ mod tests {
             self.0.taxels()
         }
 
-        fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+        fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
             for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.0.taxels())) {
                 for (taxel, code) in (0_u32..).zip(out) {
                     let any = Jump::new(row).apply(taxel).to_le_bytes()[2];

@@ -3,90 +3,9 @@
 use crate::converter::Converter;
 use crate::weights::{Mode, WeightMode, WeightRows, Weights};
 use serde::{Deserialize, Serialize};
+use spts_input::Refusal;
 use spts_models::SkinLayout;
 use std::ops::Range;
-
-/// Why data do not form a valid recording.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RecordingError {
-    /// A dimension is zero.
-    #[error("`{field}` = 0 is outside [1, ∞)")]
-    Empty {
-        /// Name of the dimension.
-        field: &'static str,
-    },
-    /// The sample rate is not a positive number.
-    #[error("`sample_rate_hz` = {value} is outside (0, ∞)")]
-    SampleRate {
-        /// The value, Hz.
-        value: f64,
-    },
-    /// A block whose length differs from the first one, or is not a whole number of frames.
-    #[error("block {block} has {len} samples; expected {frames} frames of {measurements}")]
-    BlockLength {
-        /// 0-based block.
-        block: usize,
-        /// Number of its samples.
-        len: usize,
-        /// Frames a block.
-        frames: usize,
-        /// Measurements a frame.
-        measurements: usize,
-    },
-    /// A block that would begin before the seeds were loaded.
-    #[error(
-        "block {block} has `frame_position` = {frame_position}, outside [{frames}, ∞): the block is {frames} frames long"
-    )]
-    FramePosition {
-        /// 0-based block.
-        block: usize,
-        /// Its frame position.
-        frame_position: u64,
-        /// Frames a block.
-        frames: usize,
-    },
-    /// A block so late that the number of its last weight row exceeds 64 bits.
-    #[error("block {block} has `frame_position` = {frame_position}, outside [{frames}, {limit}]")]
-    RowCount {
-        /// 0-based block.
-        block: usize,
-        /// Its frame position.
-        frame_position: u64,
-        /// Frames a block.
-        frames: usize,
-        /// Largest frame position for this number of measurements a frame.
-        limit: u64,
-    },
-    /// A block that is idle for longer than it lasts.
-    #[error("block {block} has `idle_frames` = {idle_frames}, outside [0, {frames}]")]
-    IdleFrames {
-        /// 0-based block.
-        block: usize,
-        /// Its idle frames.
-        idle_frames: usize,
-        /// Frames a block.
-        frames: usize,
-    },
-    /// Weights of another skin.
-    #[error("`weights` are those of {weights} taxels; `layout` has {layout}")]
-    Taxels {
-        /// Taxels of the weights.
-        weights: usize,
-        /// Taxels of the layout.
-        layout: usize,
-    },
-    /// An infinite sample.
-    #[error("block {block}, sample {sample} = {value} V is not finite; NaN marks a lost sample")]
-    Infinite {
-        /// 0-based block.
-        block: usize,
-        /// 0-based sample within the block.
-        sample: usize,
-        /// The value.
-        value: f64,
-    },
-}
 
 /// Metadata of a recording: everything that a decoder needs beside the samples.
 ///
@@ -138,22 +57,20 @@ impl RecordingInfo {
     }
 
     /// Checks what does not depend on the samples.
-    pub(crate) fn check(&self) -> Result<(), RecordingError> {
+    pub(crate) fn check(&self) -> Result<(), Refusal> {
         if self.measurements_per_frame == 0 {
-            return Err(RecordingError::Empty {
-                field: "measurements_per_frame",
-            });
+            return Err(Refusal::range("measurements_per_frame", 0, "[1, ∞)"));
         }
-        if self.weights.taxels() != self.layout.taxels() {
-            return Err(RecordingError::Taxels {
-                weights: self.weights.taxels(),
-                layout: self.layout.taxels(),
-            });
+        let (weights, layout) = (self.weights.taxels(), self.layout.taxels());
+        if weights != layout {
+            return Err(Refusal::new(format!(
+                "`weights` are those of {weights} taxels; `layout` has {layout}"
+            )));
         }
-        let value = self.sample_rate_hz;
-        (value > 0.0 && value.is_finite())
-            .then_some(())
-            .ok_or(RecordingError::SampleRate { value })
+        let rate_hz = self.sample_rate_hz;
+        let ok = rate_hz > 0.0 && rate_hz.is_finite();
+        ok.then_some(())
+            .ok_or_else(|| Refusal::range("sample_rate_hz", rate_hz, "(0, ∞)"))
     }
 }
 
@@ -189,7 +106,7 @@ pub struct Block {
 /// let phi = recording.rows(0, measurements.clone()).to_vec();
 /// let y = &recording.blocks()[0].volts[measurements];
 /// assert_eq!((phi.len(), y.len()), (20 * 100, 20));
-/// # Ok::<(), spts_circuit::RecordingError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
@@ -202,56 +119,47 @@ impl Recording {
     /// A recording of `blocks`, all equally long, with the metadata `info`.
     ///
     /// # Errors
-    /// [`RecordingError`] for no block, measurement or frame; a sample rate that is not positive; weights of another
+    /// [`Refusal`] for no block, measurement or frame; a sample rate that is not positive; weights of another
     /// skin; blocks of different lengths or an incomplete frame; an infinite sample; or a block that begins before the
     /// seeds are loaded, ends beyond the largest row number, or is idle for longer than it lasts.
-    pub fn new(info: RecordingInfo, blocks: Vec<Block>) -> Result<Self, RecordingError> {
+    pub fn new(info: RecordingInfo, blocks: Vec<Block>) -> Result<Self, Refusal> {
         info.check()?;
         let measurements = info.measurements_per_frame;
         let Some(first) = blocks.first() else {
-            return Err(RecordingError::Empty { field: "blocks" });
+            return Err(Refusal::range("blocks", 0, "[1, ∞)"));
         };
         let frames = first.volts.len() / measurements;
         if frames == 0 {
-            return Err(RecordingError::Empty { field: "frames" });
+            return Err(Refusal::range("frames", 0, "[1, ∞)"));
         }
         for (block, b) in blocks.iter().enumerate() {
-            if b.volts.len() != frames * measurements {
-                return Err(RecordingError::BlockLength {
-                    block,
-                    len: b.volts.len(),
-                    frames,
-                    measurements,
-                });
+            let refuse = |what: String| Err(Refusal::new(format!("block {block}{what}")));
+            let (len, position) = (b.volts.len(), b.frame_position);
+            if len != frames * measurements {
+                return refuse(format!(
+                    " has {len} samples; expected {frames} frames of {measurements}"
+                ));
             }
-            if b.frame_position < frames as u64 {
-                return Err(RecordingError::FramePosition {
-                    block,
-                    frame_position: b.frame_position,
-                    frames,
-                });
+            if position < frames as u64 {
+                let why = format!("the block is {frames} frames long");
+                return refuse(format!(
+                    " has `frame_position` = {position}, outside [{frames}, ∞): {why}"
+                ));
             }
-            if b.frame_position.checked_mul(measurements as u64).is_none() {
-                return Err(RecordingError::RowCount {
-                    block,
-                    frame_position: b.frame_position,
-                    frames,
-                    limit: u64::MAX / measurements as u64,
-                });
+            let limit = u64::MAX / measurements as u64;
+            if position > limit {
+                return refuse(format!(
+                    " has `frame_position` = {position}, outside [{frames}, {limit}]"
+                ));
             }
-            if let Some(idle_frames) = b.idle_frames.filter(|idle| *idle > frames) {
-                return Err(RecordingError::IdleFrames {
-                    block,
-                    idle_frames,
-                    frames,
-                });
+            if let Some(idle) = b.idle_frames.filter(|idle| *idle > frames) {
+                return refuse(format!(" has `idle_frames` = {idle}, outside [0, {frames}]"));
             }
             if let Some(sample) = b.volts.iter().position(|v| v.is_infinite()) {
-                return Err(RecordingError::Infinite {
-                    block,
-                    sample,
-                    value: b.volts[sample],
-                });
+                let value = b.volts[sample];
+                return refuse(format!(
+                    ", sample {sample} = {value} V is not finite; NaN marks a lost sample"
+                ));
             }
         }
         Ok(Self { info, frames, blocks })
@@ -261,7 +169,7 @@ impl Recording {
     ///
     /// # Errors
     /// As [`Recording::new`].
-    pub fn with_blocks(&self, blocks: Vec<Block>) -> Result<Self, RecordingError> {
+    pub fn with_blocks(&self, blocks: Vec<Block>) -> Result<Self, Refusal> {
         let mut info = self.info.clone();
         let made = |converter: &Converter| blocks.iter().all(|block| converter.made(&block.volts));
         info.converter = info.converter.filter(made);
@@ -554,62 +462,47 @@ mod tests {
 
     #[test]
     fn contradictions_are_refused() {
-        let new = |rate, blocks| Recording::new(info(2, WeightMode::Raster, rate), blocks);
         let other = RecordingInfo {
             layout: SkinLayout::default(),
             ..info(2, WeightMode::Binary, 1.0)
         };
-        assert_eq!(
-            Recording::new(other, vec![block(1, 100)]),
-            Err(RecordingError::Taxels {
-                weights: 4,
-                layout: 100
-            })
-        );
+        let said = Recording::new(other, vec![block(1, 100)]).unwrap_err().to_string();
+        assert_eq!(said, "`weights` are those of 4 taxels; `layout` has 100");
+        let new = |rate, blocks| Recording::new(info(2, WeightMode::Raster, rate), blocks);
+        let idle_frames = Some(3);
         let idle = Block {
-            idle_frames: Some(3),
+            idle_frames,
             ..block(2, 8)
         };
-        assert!(matches!(
-            new(1.0, vec![idle]),
-            Err(RecordingError::IdleFrames { idle_frames: 3, .. })
-        ));
-        assert!(matches!(
-            new(1.0, vec![]),
-            Err(RecordingError::Empty { field: "blocks" })
-        ));
-        assert!(matches!(
-            new(1.0, vec![block(1, 3)]),
-            Err(RecordingError::Empty { field: "frames" })
-        ));
-        assert!(matches!(
-            new(f64::NAN, vec![block(1, 4)]),
-            Err(RecordingError::SampleRate { .. })
-        ));
-        assert!(matches!(
-            new(1.0, vec![block(0, 4)]),
-            Err(RecordingError::FramePosition { .. })
-        ));
-        let limit = u64::MAX / 4;
-        assert!(new(1.0, vec![block(limit, 8)]).is_ok());
-        let said = new(1.0, vec![block(limit + 1, 8)]).unwrap_err().to_string();
-        let expected = format!("block 0 has `frame_position` = {}, outside [2, {limit}]", limit + 1);
-        assert_eq!(said, expected);
-        assert!(matches!(
-            new(1.0, vec![block(2, 8), block(9, 7)]),
-            Err(RecordingError::BlockLength {
-                block: 1,
-                len: 7,
-                frames: 2,
-                ..
-            })
-        ));
         let mut bad = block(1, 4);
         bad.volts[2] = f64::INFINITY;
-        assert!(matches!(
-            new(1.0, vec![bad]),
-            Err(RecordingError::Infinite { sample: 2, .. })
-        ));
+        let limit = u64::MAX / 4;
+        assert!(new(1.0, vec![block(limit, 8)]).is_ok());
+        let late = format!("block 0 has `frame_position` = {}, outside [2, {limit}]", limit + 1);
+        for (rate, blocks, expected) in [
+            (1.0, vec![idle], "block 0 has `idle_frames` = 3, outside [0, 2]"),
+            (1.0, vec![], "`blocks` = 0 is outside [1, ∞)"),
+            (1.0, vec![block(1, 3)], "`frames` = 0 is outside [1, ∞)"),
+            (f64::NAN, vec![block(1, 4)], "`sample_rate_hz` = NaN is outside (0, ∞)"),
+            (
+                1.0,
+                vec![block(0, 4)],
+                "block 0 has `frame_position` = 0, outside [1, ∞): the block is 1 frames long",
+            ),
+            (1.0, vec![block(limit + 1, 8)], &late),
+            (
+                1.0,
+                vec![block(2, 8), block(9, 7)],
+                "block 1 has 7 samples; expected 2 frames of 4",
+            ),
+            (
+                1.0,
+                vec![bad],
+                "block 0, sample 2 = inf V is not finite; NaN marks a lost sample",
+            ),
+        ] {
+            assert_eq!(new(rate, blocks).unwrap_err().to_string(), expected);
+        }
     }
 
     /// One taxel of a 10-bit converter of 32 V − 64.5 V: what is beyond is counted, in the mode in which it happens,

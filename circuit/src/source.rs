@@ -1,6 +1,6 @@
 //! Conductance of the skin as a function of time.
 
-use crate::engine::AcquireError;
+use spts_input::Refusal;
 use spts_models::ConductanceMap;
 
 /// Largest conductance, S. A short bar of copper has 1e5; far beyond, squares would leave the range of f64.
@@ -21,7 +21,7 @@ pub struct Segment<'a> {
 
 impl Segment<'_> {
     /// Checks that the segment belongs to a skin of `taxels` taxels and holds `time_s`.
-    pub(crate) fn check(&self, time_s: f64, taxels: usize) -> Result<(), AcquireError> {
+    pub(crate) fn check(&self, time_s: f64, taxels: usize) -> Result<(), Refusal> {
         let len = |values: &[f64]| values.len() == taxels;
         let held = match self.end_conductance_s {
             None => true,
@@ -30,12 +30,9 @@ impl Segment<'_> {
         if len(self.conductance_s) && held && time_s < self.end_s {
             return Ok(());
         }
-        Err(AcquireError::Segment {
-            time_s,
-            start_s: self.start_s,
-            end_s: self.end_s,
-            taxels: self.conductance_s.len(),
-        })
+        let (taxels, start_s, end_s) = (self.conductance_s.len(), self.start_s, self.end_s);
+        let source = format!("the source gives {taxels} taxels from {start_s} s to {end_s} s");
+        Err(Refusal::new(format!("at {time_s} s {source}")))
     }
 }
 
@@ -73,67 +70,28 @@ pub trait ConductanceSource {
     fn segment(&mut self, time_s: f64) -> Segment<'_>;
 }
 
-/// Why maps do not form a conductance source.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SourceError {
-    /// No map, or a map without taxels.
-    #[error("a conductance series needs at least one map with at least one taxel")]
-    Empty,
-    /// Different numbers of times and maps.
-    #[error("{times} times for {maps} maps")]
-    Length {
-        /// Number of times.
-        times: usize,
-        /// Number of maps.
-        maps: usize,
-    },
-    /// A map of another shape than the first one.
-    #[error("map {index} has {taxels} taxels; expected {expected}")]
-    Shape {
-        /// 0-based map.
-        index: usize,
-        /// Number of its taxels.
-        taxels: usize,
-        /// Taxels of the first map.
-        expected: usize,
-    },
-    /// A time that is not finite, or not after the previous one.
-    #[error("time {index} is {time_s} s, not finite and after the time before it")]
-    Time {
-        /// 0-based map.
-        index: usize,
-        /// The time, s.
-        time_s: f64,
-    },
-    /// A conductance that is negative, too large or NaN.
-    #[error("map {index}, taxel {taxel} has conductance {value_s} S, outside [0, 1e12]")]
-    Conductance {
-        /// 0-based map.
-        index: usize,
-        /// 0-based taxel.
-        taxel: usize,
-        /// The conductance, S.
-        value_s: f64,
-    },
+/// No map, or a map without taxels.
+fn empty() -> Refusal {
+    Refusal::new("a conductance series needs at least one map with at least one taxel")
 }
 
-fn check(index: usize, map: &ConductanceMap, expected: usize) -> Result<(), SourceError> {
+fn check(index: usize, map: &ConductanceMap, expected: usize) -> Result<(), Refusal> {
     let values = map.values();
     if values.len() != expected {
-        return Err(SourceError::Shape {
-            index,
-            taxels: values.len(),
-            expected,
-        });
+        let taxels = values.len();
+        return Err(Refusal::new(format!(
+            "map {index} has {taxels} taxels; expected {expected}"
+        )));
     }
     match values.iter().position(|g| !(0.0..=MAX_CONDUCTANCE_S).contains(g)) {
         None => Ok(()),
-        Some(taxel) => Err(SourceError::Conductance {
-            index,
-            taxel,
-            value_s: values[taxel],
-        }),
+        Some(taxel) => {
+            let value_s = values[taxel];
+            let place = format!("map {index}, taxel {taxel}");
+            Err(Refusal::new(format!(
+                "{place} has conductance {value_s} S, outside [0, 1e12]"
+            )))
+        }
     }
 }
 
@@ -147,10 +105,10 @@ impl Constant {
     /// A source that always returns `map`.
     ///
     /// # Errors
-    /// [`SourceError`] for an empty map, or a conductance outside [0, 1e12] S.
-    pub fn new(map: ConductanceMap) -> Result<Self, SourceError> {
+    /// [`Refusal`] for an empty map, or a conductance outside [0, 1e12] S.
+    pub fn new(map: ConductanceMap) -> Result<Self, Refusal> {
         if map.values().is_empty() {
-            return Err(SourceError::Empty);
+            return Err(empty());
         }
         check(0, &map, map.values().len())?;
         Ok(Self { map })
@@ -193,7 +151,7 @@ fn held(end_s: f64, map: &ConductanceMap) -> Segment<'_> {
 /// let press = Interpolated::new(vec![0.0, 0.1], vec![map(0.0), map(2e-4)])?;
 /// assert!((press.at(0.05).values()[0] - 1e-4).abs() < 1e-16);
 /// assert_eq!(press.at(9.0), map(2e-4), "held after the last map");
-/// # Ok::<(), spts_circuit::SourceError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Interpolated {
@@ -207,24 +165,23 @@ impl Interpolated {
     /// A source through `maps[k]` at `times_s[k]`.
     ///
     /// # Errors
-    /// [`SourceError`] for an empty series, different lengths or shapes, times that do not increase, or conductances
+    /// [`Refusal`] for an empty series, different lengths or shapes, times that do not increase, or conductances
     /// outside [0, 1e12] S.
-    pub fn new(times_s: Vec<f64>, maps: Vec<ConductanceMap>) -> Result<Self, SourceError> {
+    pub fn new(times_s: Vec<f64>, maps: Vec<ConductanceMap>) -> Result<Self, Refusal> {
         if times_s.len() != maps.len() {
-            return Err(SourceError::Length {
-                times: times_s.len(),
-                maps: maps.len(),
-            });
+            let (times, maps) = (times_s.len(), maps.len());
+            return Err(Refusal::new(format!("{times} times for {maps} maps")));
         }
         let taxels = maps.first().map_or(0, |m| m.values().len());
         if taxels == 0 {
-            return Err(SourceError::Empty);
+            return Err(empty());
         }
         for (index, map) in maps.iter().enumerate() {
             check(index, map, taxels)?;
             let time_s = times_s[index];
             if !time_s.is_finite() || (index > 0 && time_s <= times_s[index - 1]) {
-                return Err(SourceError::Time { index, time_s });
+                let needed = "not finite and after the time before it";
+                return Err(Refusal::new(format!("time {index} is {time_s} s, {needed}")));
             }
         }
         Ok(Self {
@@ -371,28 +328,20 @@ mod tests {
 
     #[test]
     fn bad_series_are_refused() {
-        assert_eq!(Interpolated::new(vec![], vec![]).unwrap_err(), SourceError::Empty);
+        let said = |times_s: &[f64], maps: Vec<ConductanceMap>| {
+            Interpolated::new(times_s.to_vec(), maps).unwrap_err().to_string()
+        };
         let twice = || vec![map(0.0, 0.0), map(1.0, 1.0)];
-        assert!(matches!(
-            Interpolated::new(vec![0.0], twice()),
-            Err(SourceError::Length { .. })
-        ));
-        assert!(matches!(
-            Interpolated::new(vec![0.0, 0.0], twice()),
-            Err(SourceError::Time { index: 1, .. })
-        ));
-        assert!(matches!(
-            Interpolated::new(vec![0.0, f64::NAN], twice()),
-            Err(SourceError::Time { index: 1, .. })
-        ));
-        assert!(matches!(
-            Constant::new(map(0.0, -1.0)),
-            Err(SourceError::Conductance { taxel: 1, .. })
-        ));
+        assert!(said(&[], vec![]).contains("at least one map"));
+        assert_eq!(said(&[0.0], twice()), "1 times for 2 maps");
+        for time_s in [0.0, f64::NAN] {
+            let needed = "not finite and after the time before it";
+            assert_eq!(said(&[0.0, time_s], twice()), format!("time 1 is {time_s} s, {needed}"));
+        }
+        for (a, b, taxel, value) in [(0.0, -1.0, 1, "-1"), (f64::NAN, 0.0, 0, "NaN")] {
+            let expected = format!("map 0, taxel {taxel} has conductance {value} S, outside [0, 1e12]");
+            assert_eq!(Constant::new(map(a, b)).unwrap_err().to_string(), expected);
+        }
         assert!(Constant::new(map(1e300, 0.0)).is_err());
-        assert!(matches!(
-            Constant::new(map(f64::NAN, 0.0)),
-            Err(SourceError::Conductance { taxel: 0, .. })
-        ));
     }
 }

@@ -1,68 +1,10 @@
 //! Emulated cells on one bus and one clock line, and the master of the bus.
 
 use crate::attiny412::{Device, OSCILLATOR_HZ};
-use crate::avr::ProgramError;
 use crate::cell::{CellMode, FIRST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, Pattern};
 use crate::image::Image;
 use rayon::prelude::*;
-
-/// Why an array cannot be built or run.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ArrayError {
-    /// No cell, or more cells than addresses.
-    #[error("{cells} cells do not fit on one bus; the range is [1, 112]")]
-    Cells {
-        /// Number of cells.
-        cells: usize,
-    },
-    /// The number of seeds differs from that of the cells.
-    #[error("{seeds} seeds for {cells} cells")]
-    Seeds {
-        /// Seeds given.
-        seeds: usize,
-        /// Cells of the array.
-        cells: usize,
-    },
-    /// The number of patterns differs from that of the cells.
-    #[error("{patterns} patterns for {cells} cells")]
-    Patterns {
-        /// Patterns given.
-        patterns: usize,
-        /// Cells of the array.
-        cells: usize,
-    },
-    /// The number of codes is not a multiple of the number of cells.
-    #[error("`codes` has {codes} entries, which is no multiple of the {cells} cells")]
-    Codes {
-        /// Entries given.
-        codes: usize,
-        /// Cells of the array.
-        cells: usize,
-    },
-    /// A clock out of range.
-    #[error("`{field}` = {value} is outside {range}")]
-    Clock {
-        /// Field of [`Clock`].
-        field: &'static str,
-        /// Its value.
-        value: f64,
-        /// Valid range.
-        range: &'static str,
-    },
-    /// A duration out of range.
-    #[error("`time_s` = {time_s} is outside [0, 86400] s")]
-    Idle {
-        /// Duration, s.
-        time_s: f64,
-    },
-    /// The image does not fit into flash.
-    #[error(transparent)]
-    Program(#[from] ProgramError),
-    /// A transaction failed.
-    #[error(transparent)]
-    Bus(#[from] BusError),
-}
+use spts_input::Refusal;
 
 /// Cells that fit on a bus.
 const CELLS_MAX: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
@@ -93,10 +35,12 @@ impl Array {
     /// `cells` cells that run `image`, 1 ms after power-on.
     ///
     /// # Errors
-    /// [`ArrayError::Cells`] for no cell or more than 112, [`ArrayError::Program`] for an image larger than the flash.
-    pub fn new(cells: usize, image: &Image) -> Result<Self, ArrayError> {
+    /// [`Refusal`] for no cell or more than 112, or an image larger than the flash.
+    pub fn new(cells: usize, image: &Image) -> Result<Self, Refusal> {
         if cells == 0 || cells > CELLS_MAX {
-            return Err(ArrayError::Cells { cells });
+            return Err(Refusal::new(format!(
+                "{cells} cells do not fit on one bus; the range is [1, 112]"
+            )));
         }
         let program = Device::program(image.flash())?;
         let cell = |k| Device::new(program.clone(), &[Self::address(k)]);
@@ -139,8 +83,8 @@ impl Array {
     /// Starts a session as the bus master does: writes `mode` and its address to every cell.
     ///
     /// # Errors
-    /// [`BusError`] if a cell does not answer.
-    pub fn start(&mut self, mode: CellMode) -> Result<(), BusError> {
+    /// [`Refusal`] if a cell does not answer.
+    pub fn start(&mut self, mode: CellMode) -> Result<(), Refusal> {
         for k in 0..self.cells.len() {
             let address = Self::address(k);
             self.write(address, &mode.pair(address))?;
@@ -151,16 +95,9 @@ impl Array {
     /// Like [`start`](Self::start), with 32-bit seeds, one for each cell.
     ///
     /// # Errors
-    /// [`ArrayError::Seeds`] if the number of seeds differs from that of the cells, [`ArrayError::Bus`] if a cell does
-    /// not answer.
-    pub fn start_with_seeds(&mut self, mode: CellMode, seeds: &[u32]) -> Result<(), ArrayError> {
-        let cells = self.cells.len();
-        if seeds.len() != cells {
-            return Err(ArrayError::Seeds {
-                seeds: seeds.len(),
-                cells,
-            });
-        }
+    /// [`Refusal`] if the number of seeds differs from that of the cells, or a cell does not answer.
+    pub fn start_with_seeds(&mut self, mode: CellMode, seeds: &[u32]) -> Result<(), Refusal> {
+        self.one_a_cell(seeds.len(), "seeds")?;
         for (k, seed) in seeds.iter().enumerate() {
             self.write(Self::address(k), &mode.extended(*seed))?;
         }
@@ -170,20 +107,19 @@ impl Array {
     /// Starts every cell with its pattern.
     ///
     /// # Errors
-    /// [`ArrayError::Patterns`] if the number of patterns differs from that of the cells, [`ArrayError::Bus`] if a cell
-    /// does not answer.
-    pub fn start_with_patterns(&mut self, patterns: &[Pattern]) -> Result<(), ArrayError> {
-        let cells = self.cells.len();
-        if patterns.len() != cells {
-            return Err(ArrayError::Patterns {
-                patterns: patterns.len(),
-                cells,
-            });
-        }
+    /// [`Refusal`] if the number of patterns differs from that of the cells, or a cell does not answer.
+    pub fn start_with_patterns(&mut self, patterns: &[Pattern]) -> Result<(), Refusal> {
+        self.one_a_cell(patterns.len(), "patterns")?;
         for (k, pattern) in patterns.iter().enumerate() {
             self.write(Self::address(k), &pattern.message())?;
         }
         Ok(())
+    }
+
+    fn one_a_cell(&self, given: usize, what: &str) -> Result<(), Refusal> {
+        let cells = self.cells.len();
+        let told = || Refusal::new(format!("{given} {what} for {cells} cells"));
+        (given == cells).then_some(()).ok_or_else(told)
     }
 
     /// Clocks the cells and fills `codes`, row-major (edge, cell), with the DAC code on each cell's pin when the edge
@@ -194,15 +130,14 @@ impl Array {
     /// has produced. A call with another clock starts again and drops unfetched codes.
     ///
     /// # Errors
-    /// [`ArrayError::Clock`] for a clock out of range, [`ArrayError::Codes`] if the length of `codes` is not a whole
-    /// number of rows.
-    pub fn clock(&mut self, clock: Clock, codes: &mut [u8]) -> Result<(), ArrayError> {
+    /// [`Refusal`] for a clock out of range, or if the length of `codes` is not a whole number of rows.
+    pub fn clock(&mut self, clock: Clock, codes: &mut [u8]) -> Result<(), Refusal> {
         let cells = self.cells.len();
         if !codes.len().is_multiple_of(cells) {
-            return Err(ArrayError::Codes {
-                codes: codes.len(),
-                cells,
-            });
+            let given = format!("`codes` has {} entries", codes.len());
+            return Err(Refusal::new(format!(
+                "{given}, which is no multiple of the {cells} cells"
+            )));
         }
         let train = match self.train {
             Some(train) if train.clock == clock => train,
@@ -222,8 +157,8 @@ impl Array {
     /// earlier clock are dropped.
     ///
     /// # Errors
-    /// [`ArrayError::Clock`] for a clock out of range.
-    pub fn run_clock(&mut self, clock: Clock) -> Result<(), ArrayError> {
+    /// [`Refusal`] for a clock out of range.
+    pub fn run_clock(&mut self, clock: Clock) -> Result<(), Refusal> {
         self.start_train(clock, true).map(|_| ())
     }
 
@@ -249,10 +184,10 @@ impl Array {
     /// Lets `time_s` seconds pass without bus traffic, at most a day.
     ///
     /// # Errors
-    /// [`ArrayError::Idle`] for a time out of range.
-    pub fn idle(&mut self, time_s: f64) -> Result<(), ArrayError> {
+    /// [`Refusal`] for a time out of range.
+    pub fn idle(&mut self, time_s: f64) -> Result<(), Refusal> {
         if !(0.0..=IDLE_MAX_S).contains(&time_s) {
-            return Err(ArrayError::Idle { time_s });
+            return Err(Refusal::new(format!("`time_s` = {time_s} is outside [0, 86400] s")));
         }
         self.drop_paused_clock();
         self.advance(self.now + ticks(time_s));
@@ -265,7 +200,7 @@ impl Array {
         FIRST_ADDRESS + low
     }
 
-    fn start_train(&mut self, clock: Clock, free: bool) -> Result<Train, ArrayError> {
+    fn start_train(&mut self, clock: Clock, free: bool) -> Result<Train, Refusal> {
         clock.check()?;
         self.stop_clock();
         let train = Train::new(clock, self.now, free);
@@ -355,9 +290,9 @@ impl Clock {
     /// Checks that the clock line can run at this rate and delay.
     ///
     /// # Errors
-    /// [`ArrayError::Clock`], with the field out of range.
-    pub fn check(&self) -> Result<(), ArrayError> {
-        let error = |field, value, range| Err(ArrayError::Clock { field, value, range });
+    /// [`Refusal`], with the field out of range.
+    pub fn check(&self) -> Result<(), Refusal> {
+        let error = |field, value: f64, range| Err(Refusal::range(field, value, range));
         if !(1.0..=1e6).contains(&self.edge_hz) {
             return error("edge_hz", self.edge_hz, "[1, 1e6]");
         }
@@ -494,53 +429,6 @@ impl Follower {
     }
 }
 
-/// Why a transaction failed.
-///
-/// ```
-/// use spts_firmware::{Array, Image};
-///
-/// let mut array = Array::new(2, &Image::shipped())?; // addresses 8 and 9
-/// let error = array.write(10, &[2, 8]).unwrap_err();
-/// assert_eq!(error.to_string(), "no cell acknowledges address 10");
-/// # Ok::<(), spts_firmware::ArrayError>(())
-/// ```
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum BusError {
-    /// No cell acknowledges the address.
-    #[error("no cell acknowledges address {address}")]
-    NoAcknowledge {
-        /// Address on the bus.
-        address: u8,
-    },
-    /// An address of more than seven bits. Nothing was sent.
-    #[error("bus address {address} is outside [0, 127]")]
-    Address {
-        /// The address.
-        address: u8,
-    },
-    /// An incomplete byte of no bit, or of all bits. Nothing was sent.
-    #[error("`bits` = {bits} of an incomplete byte is outside [1, 7]")]
-    Bits {
-        /// The number of bits.
-        bits: u8,
-    },
-    /// The cell did not acknowledge a byte.
-    #[error("the cell at address {address} refuses byte {index} of the write")]
-    Refused {
-        /// Address on the bus.
-        address: u8,
-        /// Position of the byte in the write, from 0.
-        index: usize,
-    },
-    /// A cell holds the clock low. The bus is blocked until that cell is reset.
-    #[error("the cell at address {address} has held the bus clock low for 25 ms")]
-    Stuck {
-        /// Address of the cell.
-        address: u8,
-    },
-}
-
 /// An event that a bus master can cause.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BusEvent {
@@ -590,15 +478,25 @@ const STRETCH_LIMIT_TICKS: u64 = 500_000;
 impl Array {
     /// Writes `bytes` to the cell at `address`: START, address, bytes, STOP at 400 kHz. All cells receive the traffic.
     ///
+    /// ```
+    /// use spts_firmware::{Array, Image};
+    ///
+    /// let mut array = Array::new(2, &Image::shipped())?; // addresses 8 and 9
+    /// let error = array.write(10, &[2, 8]).unwrap_err();
+    /// assert_eq!(error.to_string(), "no cell acknowledges address 10");
+    /// # Ok::<(), spts_input::Refusal>(())
+    /// ```
+    ///
     /// # Errors
-    /// [`BusError`] if no cell answers or the cell refuses a byte (STOP follows in both cases), or a cell blocks the
+    /// [`Refusal`] if no cell answers or the cell refuses a byte (STOP follows in both cases), or a cell blocks the
     /// bus.
-    pub fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), BusError> {
+    pub fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), Refusal> {
         self.open(address, 0)?;
         for (index, byte) in bytes.iter().enumerate() {
             if !self.send(*byte)? {
                 self.stop()?;
-                return Err(BusError::Refused { address, index });
+                let refused = format!("refuses byte {index} of the write");
+                return Err(Refusal::new(format!("the cell at address {address} {refused}")));
             }
         }
         self.stop()
@@ -608,8 +506,8 @@ impl Array {
     /// An empty `out` sends nothing.
     ///
     /// # Errors
-    /// [`BusError`] if no cell answers, or a cell blocks the bus.
-    pub fn read(&mut self, address: u8, out: &mut [u8]) -> Result<(), BusError> {
+    /// [`Refusal`] if no cell answers, or a cell blocks the bus.
+    pub fn read(&mut self, address: u8, out: &mut [u8]) -> Result<(), Refusal> {
         let Some(last) = out.len().checked_sub(1) else {
             return Ok(());
         };
@@ -624,14 +522,16 @@ impl Array {
     /// sequence.
     ///
     /// # Errors
-    /// [`BusError::Bits`] for a number of bits out of range, [`BusError::Stuck`] if a cell blocks the bus.
-    pub fn transact(&mut self, events: &[BusEvent]) -> Result<Vec<BusReply>, BusError> {
+    /// [`Refusal`] for a number of bits out of range, or if a cell blocks the bus.
+    pub fn transact(&mut self, events: &[BusEvent]) -> Result<Vec<BusReply>, Refusal> {
         let odd = events.iter().find_map(|event| match *event {
             BusEvent::Bits(bits) if !(1..=7).contains(&bits) => Some(bits),
             _ => None,
         });
         if let Some(bits) = odd {
-            return Err(BusError::Bits { bits });
+            return Err(Refusal::new(format!(
+                "`bits` = {bits} of an incomplete byte is outside [1, 7]"
+            )));
         }
         self.drop_paused_clock();
         let mut replies = vec![];
@@ -648,9 +548,9 @@ impl Array {
     }
 
     /// START and an address that has to be acknowledged.
-    fn open(&mut self, address: u8, direction: u8) -> Result<(), BusError> {
+    fn open(&mut self, address: u8, direction: u8) -> Result<(), Refusal> {
         if address > 0x7f {
-            return Err(BusError::Address { address });
+            return Err(Refusal::new(format!("bus address {address} is outside [0, 127]")));
         }
         self.drop_paused_clock();
         self.begin()?;
@@ -658,10 +558,10 @@ impl Array {
             return Ok(());
         }
         self.stop()?;
-        Err(BusError::NoAcknowledge { address })
+        Err(Refusal::new(format!("no cell acknowledges address {address}")))
     }
 
-    fn begin(&mut self) -> Result<(), BusError> {
+    fn begin(&mut self) -> Result<(), Refusal> {
         self.wait_for_clock()?;
         self.pass(1);
         self.stage = Stage::Started;
@@ -672,7 +572,7 @@ impl Array {
     }
 
     /// A byte from the master; whether it was acknowledged.
-    fn send(&mut self, byte: u8) -> Result<bool, BusError> {
+    fn send(&mut self, byte: u8) -> Result<bool, Refusal> {
         self.wait_for_clock()?;
         self.pass(8);
         for cell in &mut self.cells {
@@ -695,7 +595,7 @@ impl Array {
     }
 
     /// A byte to the master.
-    fn receive(&mut self, acknowledge: bool) -> Result<u8, BusError> {
+    fn receive(&mut self, acknowledge: bool) -> Result<u8, Refusal> {
         self.wait_for_clock()?;
         self.pass(8);
         if self.stage == Stage::Broken {
@@ -710,14 +610,14 @@ impl Array {
         Ok(byte)
     }
 
-    fn break_off(&mut self, bits: u8) -> Result<(), BusError> {
+    fn break_off(&mut self, bits: u8) -> Result<(), Refusal> {
         self.wait_for_clock()?;
         self.pass(u64::from(bits));
         self.stage = Stage::Broken;
         Ok(())
     }
 
-    fn stop(&mut self) -> Result<(), BusError> {
+    fn stop(&mut self) -> Result<(), Refusal> {
         self.wait_for_clock()?;
         self.pass(1);
         for cell in &mut self.cells {
@@ -734,7 +634,7 @@ impl Array {
     }
 
     /// Waits until no cell holds the clock low.
-    fn wait_for_clock(&mut self) -> Result<(), BusError> {
+    fn wait_for_clock(&mut self) -> Result<(), Refusal> {
         let (now, limit) = (self.now, self.now + STRETCH_LIMIT_TICKS);
         let mut released_at = now;
         let mut stuck = None;
@@ -752,9 +652,10 @@ impl Array {
         self.advance(released_at);
         match stuck {
             None => Ok(()),
-            Some(k) => Err(BusError::Stuck {
-                address: Self::address(k),
-            }),
+            Some(k) => Err(Refusal::new(format!(
+                "the cell at address {} has held the bus clock low for 25 ms",
+                Self::address(k)
+            ))),
         }
     }
 }

@@ -1,5 +1,7 @@
 //! One cell as a behavioural model, and the bits that it can repeat.
 
+use spts_input::Refusal;
+
 /// Lowest address.
 pub const FIRST_ADDRESS: u8 = 8;
 /// Highest address of the raster scan, whose count restarts here.
@@ -23,14 +25,6 @@ const EXTENDED: u8 = 0x80;
 const UNSEEDED: u8 = 0xff;
 /// What a read finds behind the end of the reply: nobody pulls the line low.
 const IDLE_BUS: u8 = 0xff;
-
-/// An address that no cell can have.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("address {address} is outside [8, 119]")]
-pub struct AddressError {
-    /// The address.
-    pub address: u8,
-}
 
 /// Mode of a cell that was started with a seed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,7 +84,7 @@ impl CellMode {
 /// let codes: Vec<u8> = (0..100).map(|_| cell.edge()).collect();
 /// assert!(codes.iter().all(|code| [0, 255].contains(code)));
 /// assert!(codes.contains(&0) && codes.contains(&255));
-/// # Ok::<(), spts_firmware::AddressError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Cell {
@@ -115,10 +109,10 @@ impl Cell {
     /// A cell after power-up, without a seed.
     ///
     /// # Errors
-    /// [`AddressError`] outside 8…119.
-    pub fn new(address: u8) -> Result<Self, AddressError> {
+    /// [`Refusal`] outside 8…119.
+    pub fn new(address: u8) -> Result<Self, Refusal> {
         if !(FIRST_ADDRESS..=LAST_BUS_ADDRESS).contains(&address) {
-            return Err(AddressError { address });
+            return Err(Refusal::new(format!("address {address} is outside [8, 119]")));
         }
         Ok(Self {
             address,
@@ -288,14 +282,6 @@ pub struct Pattern {
     word: u64,
 }
 
-/// A number of bits that a cell cannot store.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("number of bits of a pattern = {bits} is outside [1, 64]")]
-pub struct PatternError {
-    /// The number of bits.
-    pub bits: usize,
-}
-
 /// Number of bits that a cell can store.
 pub const PATTERN_BITS: usize = 64;
 /// Mode byte that announces a pattern.
@@ -305,19 +291,21 @@ impl Pattern {
     /// The lowest `bits` bits of `word`, starting with the lowest.
     ///
     /// # Errors
-    /// [`PatternError`] outside 1…64.
-    pub fn new(bits: usize, word: u64) -> Result<Self, PatternError> {
+    /// [`Refusal`] outside 1…64.
+    pub fn new(bits: usize, word: u64) -> Result<Self, Refusal> {
         match u8::try_from(bits) {
             Ok(length) if (1..=PATTERN_BITS).contains(&bits) => Ok(Self { length, word }),
-            _ => Err(PatternError { bits }),
+            _ => Err(Refusal::new(format!(
+                "number of bits of a pattern = {bits} is outside [1, 64]"
+            ))),
         }
     }
 
     /// The given bits; the first one is put out at the first edge.
     ///
     /// # Errors
-    /// [`PatternError`] for no bit, or more than 64.
-    pub fn of_bits(bits: impl IntoIterator<Item = bool>) -> Result<Self, PatternError> {
+    /// [`Refusal`] for no bit, or more than 64.
+    pub fn of_bits(bits: impl IntoIterator<Item = bool>) -> Result<Self, Refusal> {
         let (mut count, mut word) = (0, 0);
         for bit in bits {
             if count < PATTERN_BITS {
@@ -409,7 +397,7 @@ mod tests {
     #[test]
     fn what_is_not_a_whole_known_pair_changes_nothing() {
         for address in [7, 120] {
-            assert_eq!(Cell::new(address), Err(AddressError { address }));
+            assert!(Cell::new(address).is_err());
         }
         let fresh = Cell::new(50).unwrap();
         for ignored in [
@@ -479,13 +467,10 @@ mod tests {
     #[test]
     fn only_what_a_cell_holds_is_a_pattern() {
         for bits in [0, 65, 256, 257, usize::MAX] {
-            assert_eq!(Pattern::new(bits, 1), Err(PatternError { bits }));
+            let said = Pattern::new(bits, 1).unwrap_err().to_string();
+            assert_eq!(said, format!("number of bits of a pattern = {bits} is outside [1, 64]"));
         }
-        assert_eq!(
-            Pattern::of_bits(std::iter::repeat_n(true, 65)),
-            Err(PatternError { bits: 65 })
-        );
-        assert_eq!(Pattern::of_bits([]), Err(PatternError { bits: 0 }));
+        assert!(Pattern::of_bits(std::iter::repeat_n(true, 65)).is_err() && Pattern::of_bits([]).is_err());
     }
 
     /// By hand: bits 1, 0, 0, 0, 0, 0, 0, 0, 1 are the bytes 0x01 and 0x01.

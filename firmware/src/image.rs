@@ -1,78 +1,16 @@
 //! Flash images of the cells.
 
-use std::io;
-use std::path::{Path, PathBuf};
+use spts_input::Refusal;
+use std::fmt::Display;
+use std::path::Path;
 
-use ihex::{ReaderError, Record};
+use ihex::Record;
 
 /// Size of the flash of an ATtiny412, bytes.
 pub const FLASH_BYTES: usize = 4096;
 
 /// Longest file that is read: hex text of one byte a record would be a fifth of it.
 const FILE_BYTES: u64 = 1 << 18;
-
-/// Why Intel hex text is not an image of an ATtiny412.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ImageError {
-    /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
-    Read {
-        /// The file.
-        path: PathBuf,
-        /// Cause reported by the system.
-        source: io::Error,
-    },
-    /// The text of the file is not valid.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What is wrong.
-        source: Box<ImageError>,
-    },
-    /// A line that is not a record.
-    #[error("line {line}: {source}")]
-    Record {
-        /// Line, from 1.
-        line: usize,
-        /// What is wrong.
-        source: ReaderError,
-    },
-    /// Data outside flash.
-    #[error("line {line}: data record of {bytes} bytes at {address:#x} is outside flash [0x0, 0x1000)")]
-    Outside {
-        /// Line, from 1.
-        line: usize,
-        /// First address of the record.
-        address: usize,
-        /// Length of the record.
-        bytes: usize,
-    },
-    /// Two records with the same address.
-    #[error("line {line}: data record repeats address {address:#x}")]
-    Overlap {
-        /// Line of the second, from 1.
-        line: usize,
-        /// The address.
-        address: usize,
-    },
-    /// Text after the end-of-file record.
-    #[error("line {line}: record after the end-of-file record")]
-    BehindEnd {
-        /// Line, from 1.
-        line: usize,
-    },
-    /// The end-of-file record is missing.
-    #[error("line {line}: end-of-file record is missing")]
-    NoEnd {
-        /// Last line, from 1.
-        line: usize,
-    },
-    /// There is no data record.
-    #[error("no data record")]
-    Empty,
-}
 
 /// The content of every cell's flash.
 ///
@@ -112,8 +50,8 @@ impl Image {
     /// Reads an image from Intel hex text.
     ///
     /// # Errors
-    /// [`ImageError`], with the line.
-    pub fn from_hex(text: &str) -> Result<Self, ImageError> {
+    /// [`Refusal`], with the line.
+    pub fn from_hex(text: &str) -> Result<Self, Refusal> {
         let mut flash: Vec<Option<u8>> = vec![None; FLASH_BYTES];
         let (mut base, mut ended, mut last) = (0, false, 0);
         let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
@@ -121,9 +59,9 @@ impl Image {
             let line = line + 1;
             last = line;
             if ended {
-                return Err(ImageError::BehindEnd { line });
+                return Err(at_line(line, "record after the end-of-file record"));
             }
-            match Record::from_record_string(record).map_err(|source| ImageError::Record { line, source })? {
+            match Record::from_record_string(record).map_err(|e| at_line(line, e))? {
                 Record::Data { offset, value } => place(&mut flash, line, base + usize::from(offset), &value)?,
                 Record::EndOfFile => ended = true,
                 Record::ExtendedSegmentAddress(segment) => base = usize::from(segment) << 4,
@@ -133,10 +71,10 @@ impl Image {
             }
         }
         if flash.iter().all(Option::is_none) {
-            return Err(ImageError::Empty);
+            return Err(Refusal::new("no data record"));
         }
         if !ended {
-            return Err(ImageError::NoEnd { line: last });
+            return Err(at_line(last, "end-of-file record is missing"));
         }
         let flash = flash.into_iter().map(|byte| byte.unwrap_or(u8::MAX)).collect();
         Ok(Self { flash })
@@ -145,17 +83,11 @@ impl Image {
     /// Reads an image from an Intel hex file.
     ///
     /// # Errors
-    /// [`ImageError`], with the file and, if it could be read, the line.
-    pub fn read(path: &Path) -> Result<Self, ImageError> {
-        let unreadable = |source| ImageError::Read {
-            path: path.to_path_buf(),
-            source,
-        };
-        let text = read_text(path).map_err(unreadable)?;
-        Self::from_hex(&text).map_err(|source| ImageError::File {
-            path: path.to_path_buf(),
-            source: Box::new(source),
-        })
+    /// [`Refusal`], with the file and, if it could be read, the line.
+    pub fn read(path: &Path) -> Result<Self, Refusal> {
+        let text = spts_input::read_text(path, FILE_BYTES).map_err(Refusal::from_error);
+        let image = text.and_then(|text| Self::from_hex(&text));
+        image.map_err(|e| e.at(path.display()))
     }
 
     /// All of flash, [`FLASH_BYTES`] long. Bytes that are not part of the image are erased, 255.
@@ -165,19 +97,20 @@ impl Image {
     }
 }
 
-/// Text of a regular file that is not larger than any hex file of such a flash.
-fn read_text(path: &Path) -> io::Result<String> {
-    Ok(spts_input::read_text(path, FILE_BYTES)?)
+fn at_line(line: usize, what: impl Display) -> Refusal {
+    Refusal::new(format!("line {line}: {what}"))
 }
 
-fn place(flash: &mut [Option<u8>], line: usize, address: usize, value: &[u8]) -> Result<(), ImageError> {
+fn place(flash: &mut [Option<u8>], line: usize, address: usize, value: &[u8]) -> Result<(), Refusal> {
     let bytes = value.len();
-    let outside = ImageError::Outside { line, address, bytes };
-    let target = flash.get_mut(address..address + bytes).ok_or(outside)?;
+    let outside = || {
+        let record = format!("data record of {bytes} bytes at {address:#x}");
+        at_line(line, format!("{record} is outside flash [0x0, 0x1000)"))
+    };
+    let target = flash.get_mut(address..address + bytes).ok_or_else(outside)?;
     for (k, (byte, new)) in target.iter_mut().zip(value).enumerate() {
         if byte.replace(*new).is_some() {
-            let address = address + k;
-            return Err(ImageError::Overlap { line, address });
+            return Err(at_line(line, format!("data record repeats address {:#x}", address + k)));
         }
     }
     Ok(())

@@ -22,7 +22,7 @@
 //! array.clock(Clock::default(), &mut codes)?;
 //! // with seeds this close together, the first binary measurement is all zeros
 //! assert_eq!(codes, [0; 100]);
-//! # Ok::<(), spts_firmware::ArrayError>(())
+//! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
 mod array;
@@ -31,9 +31,8 @@ pub mod avr;
 mod cell;
 mod image;
 
-pub use array::{Array, ArrayError, BusError, BusEvent, BusReply, Clock, SKIN_EDGE_HZ, SKIN_SAMPLE_DELAY_S};
+pub use array::{Array, BusEvent, BusReply, Clock, SKIN_EDGE_HZ, SKIN_SAMPLE_DELAY_S};
 pub use cell::{
-    AddressError, Cell, CellMode, FIRST_ADDRESS, LAST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, PATTERN_BITS, Pattern,
-    PatternError, REPLY_BYTES,
+    Cell, CellMode, FIRST_ADDRESS, LAST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, PATTERN_BITS, Pattern, REPLY_BYTES,
 };
-pub use image::{FLASH_BYTES, Image, ImageError};
+pub use image::{FLASH_BYTES, Image};

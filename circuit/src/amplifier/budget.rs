@@ -5,7 +5,8 @@ use super::parts::{Amplifier, Network};
 use super::response::{AmplifierNoise, AmplifierResponse};
 use crate::converter::Adc;
 use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, in_range, within};
+use spts_input::Refusal;
+use spts_models::{in_range, within};
 
 /// Excursion of the sum that has to fit, in standard deviations: the sum of many taxels with random signs is Gaussian,
 /// and 6 of 100 000 measurements lie beyond four.
@@ -42,8 +43,8 @@ impl Skin {
     /// Checks that every value is in its range.
     ///
     /// # Errors
-    /// [`ConfigError`] that names the value outside its range.
-    pub fn validate(&self) -> Result<(), ConfigError> {
+    /// [`Refusal`] that names the value outside its range.
+    pub fn validate(&self) -> Result<(), Refusal> {
         within("pressed_share", self.pressed_share, 0.0, 1.0, "[0, 1]")?;
         within("pressed_s", self.pressed_s, 0.0, 1.0, "[0, 1]")?;
         within("idle_s", self.idle_s, 0.0, 1.0, "[0, 1]")?;
@@ -313,14 +314,14 @@ pub struct Remedied {
 /// ```
 ///
 /// # Errors
-/// [`ConfigError`] for zero taxels, a sub-array of fewer than 2 inputs, or a scaled feedback below its range.
+/// [`Refusal`] for zero taxels, a sub-array of fewer than 2 inputs, or a scaled feedback below its range.
 pub fn remedied(
     amplifier: &Amplifier,
     taxels: u32,
     sub_array: u32,
     remedy: Remedy,
     setting: &Setting,
-) -> Result<Remedied, ConfigError> {
+) -> Result<Remedied, Refusal> {
     in_range("taxels", f64::from(taxels), taxels > 0, "[1, 4294967295]")?;
     in_range("sub_array", f64::from(sub_array), sub_array > 1, "[2, 4294967295]")?;
     setting.skin.validate()?;
@@ -336,7 +337,7 @@ pub fn remedied(
     }
 }
 
-fn with_feedback(amplifier: &Amplifier, feedback_ohm: f64) -> Result<Amplifier, ConfigError> {
+fn with_feedback(amplifier: &Amplifier, feedback_ohm: f64) -> Result<Amplifier, Refusal> {
     let network = Network {
         feedback_ohm,
         ..*amplifier.network()
@@ -370,12 +371,12 @@ fn wired(amplifier: &Amplifier, taxels: u32, wires: u32, remedy: Remedy, setting
 pub fn fewest_wires(
     taxels: u32,
     setting: &Setting,
-    on_bus: &dyn Fn(u32) -> Result<Amplifier, ConfigError>,
-) -> Result<Remedied, ConfigError> {
+    on_bus: &dyn Fn(u32) -> Result<Amplifier, Refusal>,
+) -> Result<Remedied, Refusal> {
     in_range("taxels", f64::from(taxels), taxels > 0, "[1, 4294967295]")?;
     setting.skin.validate()?;
     let works =
-        |n: u32| -> Result<bool, ConfigError> { Ok(Budget::new(&on_bus(n)?, f64::from(n), setting).limit.is_none()) };
+        |n: u32| -> Result<bool, Refusal> { Ok(Budget::new(&on_bus(n)?, f64::from(n), setting).limit.is_none()) };
     let mut wires = 1;
     while wires < taxels {
         let (fewest, most) = (taxels / wires, taxels.div_ceil(wires));
@@ -401,7 +402,7 @@ pub fn fewest_wires(
 }
 
 /// A tree of amplifiers. Inputs of the upper levels are resistors of Rf/gain to a feedback of Rf.
-fn sub_arrays(amplifier: &Amplifier, taxels: u32, sub_array: u32, setting: &Setting) -> Result<Remedied, ConfigError> {
+fn sub_arrays(amplifier: &Amplifier, taxels: u32, sub_array: u32, setting: &Setting) -> Result<Remedied, Refusal> {
     let mut count = taxels.div_ceil(sub_array);
     let budget = Budget::new(amplifier, f64::from(taxels) / f64::from(count), setting);
     let (op_amp, feedback_ohm) = (amplifier.op_amp(), amplifier.network().feedback_ohm);

@@ -21,7 +21,7 @@
 //! transient.advance(load, 10e-6);
 //! assert!((transient.output_v() + 0.06).abs() < 1e-6);
 //! assert!((AmplifierResponse::new(&amplifier, load.conductance_s).noise_gain() - 3.0).abs() < 1e-12);
-//! # Ok::<(), spts_models::ConfigError>(())
+//! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
 mod budget;

@@ -1,7 +1,8 @@
 //! The parts of the amplifier, and what is on its bus.
 
 use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, within};
+use spts_input::Refusal;
+use spts_models::within;
 
 /// Smallest capacitance of a bus, F. A bus that is said to have none gets this much, and one set of equations serves
 /// both cases. It is no more than a placeholder as long as ωt·Rf·1 aF ≪ 1, which is the square of the quality factor
@@ -102,8 +103,8 @@ impl Amplifier {
     /// An amplifier of the operational amplifier `op_amp` with the feedback, bus and temperature in `network`.
     ///
     /// # Errors
-    /// [`ConfigError`] that names the parameter outside its range.
-    pub fn new(op_amp: OpAmp, network: Network) -> Result<Self, ConfigError> {
+    /// [`Refusal`] that names the parameter outside its range.
+    pub fn new(op_amp: OpAmp, network: Network) -> Result<Self, Refusal> {
         within("gain_bandwidth_hz", op_amp.gain_bandwidth_hz, 1.0, 1e12, "[1, 1e12]")?;
         within("dc_gain", op_amp.dc_gain, 10.0, 1e9, "[10, 1e9]")?;
         within("slew_v_per_s", op_amp.slew_v_per_s, 1.0, 1e15, "[1, 1e15]")?;

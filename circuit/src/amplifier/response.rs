@@ -20,7 +20,7 @@ use std::f64::consts::{PI, TAU};
 /// let large = AmplifierResponse::new(&amplifier, 10_000.0 * 1e-4);
 /// assert!((small.noise_gain() - 11.0).abs() < 1e-9);
 /// assert!(large.bandwidth_hz() < small.bandwidth_hz() / 50.0, "more taxels, less bandwidth");
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AmplifierResponse {
@@ -186,7 +186,7 @@ const FLICKER_FROM_HZ: f64 = 1.0;
 /// let noise = AmplifierNoise::rms(&amplifier, 0.01);
 /// assert!(noise.voltage > noise.feedback, "the operational amplifier's voltage noise is amplified by 1 + Rf·ΣG");
 /// assert!(noise.total() < 1e-3, "less than 1 mV, far below the converter's step");
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AmplifierNoise {

@@ -31,7 +31,7 @@ const PHASES: u32 = 100_000;
 /// let load = BusLoad { conductance_s: 0.01, current_a: -2e-3 };
 /// transient.advance(load, 15e-6); // one measurement
 /// assert!((transient.output_v() - 2.0).abs() < 0.01, "settled at −Rf·I");
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Transient {

@@ -2,10 +2,11 @@
 
 use crate::amplifier::{Amplifier, AmplifierNoise, BusLoad, Network, OpAmp, Transient};
 use crate::batch::Batch;
-use crate::effect::{BlockStart, Effect, EffectSession, ProfileError, Span, parse};
+use crate::effect::{BlockStart, Effect, EffectSession, Span, parse};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
+use spts_input::Refusal;
 use spts_models::{Streams, in_range};
 
 /// The output as [`Transient`] has it when it is sampled: what is left of the measurements before, slewing, rails,
@@ -61,11 +62,11 @@ struct Summing {
 }
 
 /// Rail of the operational amplifier, V, from the effect's parameters.
-pub(super) fn rail_v(table: toml::Table) -> Result<f64, ProfileError> {
+pub(super) fn rail_v(table: toml::Table) -> Result<f64, Refusal> {
     Ok(parse::<Config>(table)?.op_amp.rail_v)
 }
 
-pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let c: Config = parse(table)?;
     let period_s = 1.0 / session.sample_rate_hz;
     let sampled = (0.0..=period_s).contains(&c.sample_s);

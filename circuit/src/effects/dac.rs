@@ -1,10 +1,11 @@
 //! The cells' converters from code to drive voltage.
 
 use crate::batch::{Batch, Scratch};
-use crate::effect::{Effect, EffectSession, ProfileError, Span, parse};
+use crate::effect::{Effect, EffectSession, Span, parse};
 use crate::weights::{ANALOG_SCALE, FULL_SCALE, NEUTRAL, WeightMode, code_of, finalise};
 use rand::RngExt as _;
 use serde::Deserialize;
+use spts_input::Refusal;
 use spts_models::within;
 
 /// What each cell's eight-bit converter makes of its code c, in steps of `reference_v`/256 at its output:
@@ -56,7 +57,7 @@ struct Dac {
     scratch: Scratch,
 }
 
-pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let c: Config = parse(table)?;
     within("reference_v", c.reference_v, 0.5, 5.5, "[0.5, 5.5]")?;
     within("floor_v", c.floor_v, 0.0, 0.5 * c.reference_v, "[0, 0.5·reference_v]")?;

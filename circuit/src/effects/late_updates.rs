@@ -1,12 +1,13 @@
 //! Taxels that still have their previous level when the output is sampled.
 
 use crate::batch::Batch;
-use crate::effect::{BlockStart, Effect, EffectSession, ProfileError, Span, parse};
+use crate::effect::{BlockStart, Effect, EffectSession, Span, parse};
 use crate::weights::WeightMode;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
+use spts_input::Refusal;
 use spts_models::{Streams, in_range, within};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -103,7 +104,7 @@ struct LateUpdates {
     queue: BinaryHeap<Reverse<(u64, usize)>>,
 }
 
-pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let config: Config = parse(table)?;
     let period = config.period_measurements;
     in_range("period_measurements", period, (2.0..1e9).contains(&period), "[2, 1e9)")?;

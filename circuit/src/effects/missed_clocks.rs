@@ -1,12 +1,13 @@
 //! Cells that miss clock edges and then lag behind their sequences, individually or all together.
 
 use crate::batch::{Batch, CellRun};
-use crate::effect::{BlockStart, Effect, EffectSession, ProfileError, Span, parse};
+use crate::effect::{BlockStart, Effect, EffectSession, Span, parse};
 use crate::weights::Weights;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Binomial, Distribution as _};
 use serde::Deserialize;
+use spts_input::Refusal;
 use spts_models::{Streams, within};
 
 /// Every cell misses an edge now and then and is from then on one measurement behind, until it is seeded again: after n
@@ -61,7 +62,7 @@ struct MissedClocks {
     common: Vec<i64>,
 }
 
-pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let config: Config = parse(table)?;
     let probability = config.probability.within("probability", 0.0, 1.0, "[0, 1]")?;
     within("all_probability", config.all_probability, 0.0, 1.0, "[0, 1]")?;
@@ -200,15 +201,14 @@ impl SkippingClocks {
     /// The cell of `taxel`; it misses an edge with `probability`, range [0, 1].
     ///
     /// # Errors
-    /// [`ProfileError`] for a probability out of range.
-    pub(crate) fn new(session: &EffectSession, taxel: u32, probability: f64) -> Result<Self, ProfileError> {
+    /// [`Refusal`] for a probability out of range.
+    pub(crate) fn new(session: &EffectSession, taxel: u32, probability: f64) -> Result<Self, Refusal> {
         within("probability", probability, 0.0, 1.0, "[0, 1]")?;
         let mut cell = Self {
             weights: session.weights.clone(),
             taxel,
             streams: session.streams.child(LABEL, u64::from(taxel)),
-            missed_of_a_stretch: Binomial::new(STRETCH, probability)
-                .map_err(|e| ProfileError::Syntax(e.to_string()))?,
+            missed_of_a_stretch: Binomial::new(STRETCH, probability).map_err(|e| Refusal::from_error(e))?,
             stretch: 0,
             missed_before: 0,
             missed: Vec::new(),

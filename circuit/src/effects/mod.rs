@@ -10,10 +10,11 @@ mod signal;
 pub(crate) use missed_clocks::SkippingClocks;
 
 use crate::converter::{Adc, Converter};
-use crate::effect::{BlockStart, BuildEffect, Effect, EffectSession, ProfileError, parse};
+use crate::effect::{BlockStart, BuildEffect, Effect, EffectSession, parse};
 use crate::engine::Engine;
 use crate::source::Interpolated;
 use crate::weights::{Mode, Seeding, WeightMode, Weights};
+use spts_input::Refusal;
 use spts_models::{ConductanceMap, Streams, in_section};
 
 /// Every effect by name, in signal order: the cells' digital timing, the summed analog signal, the converter, and the
@@ -44,19 +45,20 @@ pub const EFFECTS: &[(&str, BuildEffect)] = &[
 /// let mut without = profile.clone();
 /// without.compressive.remove("adc"); // the ablation of the converter
 /// assert!(without.converter(Mode::Compressive)?.is_none());
-/// # Ok::<(), spts_circuit::ProfileError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 ///
 /// # Errors
-/// [`ProfileError`] for an unknown effect, or parameters that it refuses.
-pub fn build_chain(chain: &toml::Table, session: &EffectSession) -> Result<Vec<Box<dyn Effect>>, ProfileError> {
+/// [`Refusal`] for an unknown effect, or parameters that it refuses.
+pub fn build_chain(chain: &toml::Table, session: &EffectSession) -> Result<Vec<Box<dyn Effect>>, Refusal> {
     let mode = session.weights.mode().readout();
     if let Some(name) = chain.keys().find(|k| EFFECTS.iter().all(|(name, _)| name != k)) {
         let known: Vec<&str> = EFFECTS.iter().map(|(name, _)| *name).collect();
-        return Err(ProfileError::UnknownEffect {
-            name: format!("{}.{name}", mode.name()),
-            known: known.join(", "),
-        });
+        return Err(Refusal::new(format!(
+            "`{}.{name}` is not an effect; known: {}",
+            mode.name(),
+            known.join(", ")
+        )));
     }
     let mut effects = Vec::new();
     for &(name, build) in EFFECTS {
@@ -70,16 +72,13 @@ fn of_chain<T>(
     chain: &toml::Table,
     mode: Mode,
     name: &'static str,
-    build: impl FnOnce(toml::Table) -> Result<T, ProfileError>,
-) -> Result<Option<T>, ProfileError> {
-    let refuse = |reason: String| ProfileError::Effect {
-        effect: name,
-        reason: in_section(&format!("{}.{name}", mode.name()), &reason),
-    };
+    build: impl FnOnce(toml::Table) -> Result<T, Refusal>,
+) -> Result<Option<T>, Refusal> {
+    let refuse = |reason: &str| Refusal::new(in_section(&format!("{}.{name}", mode.name()), reason));
     match chain.get(name) {
         None => Ok(None),
-        Some(toml::Value::Table(parameters)) => build(parameters.clone()).map(Some).map_err(|e| refuse(e.to_string())),
-        Some(_) => Err(refuse("expected a table of parameters".to_owned())),
+        Some(toml::Value::Table(parameters)) => build(parameters.clone()).map(Some).map_err(|e| refuse(&e.to_string())),
+        Some(_) => Err(refuse("expected a table of parameters")),
     }
 }
 
@@ -87,8 +86,8 @@ fn of_chain<T>(
 /// converter. Nothing acts after them.
 ///
 /// # Errors
-/// [`ProfileError`] for parameters that are refused.
-pub(crate) fn converter(chain: &toml::Table, mode: Mode) -> Result<Option<Converter>, ProfileError> {
+/// [`Refusal`] for parameters that are refused.
+pub(crate) fn converter(chain: &toml::Table, mode: Mode) -> Result<Option<Converter>, Refusal> {
     let Some(adc) = of_chain(chain, mode, "adc", parse::<Adc>)? else {
         return Ok(None);
     };
@@ -100,8 +99,8 @@ pub(crate) fn converter(chain: &toml::Table, mode: Mode) -> Result<Option<Conver
 /// either.
 ///
 /// # Errors
-/// [`ProfileError`] for parameters that are refused.
-pub(crate) fn rail_v(chain: &toml::Table, mode: Mode) -> Result<Option<f64>, ProfileError> {
+/// [`Refusal`] for parameters that are refused.
+pub(crate) fn rail_v(chain: &toml::Table, mode: Mode) -> Result<Option<f64>, Refusal> {
     let amplifier_v = of_chain(chain, mode, "amplifier", amplifier::rail_v)?;
     let rails_v = of_chain(chain, mode, "rails", output::limit_v)?;
     Ok(amplifier_v.into_iter().chain(rails_v).reduce(f64::min))

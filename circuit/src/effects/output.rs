@@ -2,8 +2,9 @@
 
 use crate::batch::Batch;
 use crate::converter::Adc;
-use crate::effect::{Effect, EffectSession, ProfileError, parse};
+use crate::effect::{Effect, EffectSession, parse};
 use serde::Deserialize;
+use spts_input::Refusal;
 use spts_models::{in_range, within};
 
 /// The output stays within ± `limit_v`.
@@ -15,7 +16,7 @@ struct Rails {
 }
 
 /// Largest output, V, from the effect's parameters.
-pub(super) fn limit_v(table: toml::Table) -> Result<f64, ProfileError> {
+pub(super) fn limit_v(table: toml::Table) -> Result<f64, Refusal> {
     let limit_v = parse::<Rails>(table)?.limit_v;
     Ok(in_range(
         "limit_v",
@@ -25,7 +26,7 @@ pub(super) fn limit_v(table: toml::Table) -> Result<f64, ProfileError> {
     )?)
 }
 
-pub(super) fn rails(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn rails(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let limit_v = limit_v(table)?;
     Ok(Box::new(Rails { limit_v }))
 }
@@ -38,7 +39,7 @@ impl Effect for Rails {
     }
 }
 
-pub(super) fn adc(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn adc(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     Ok(Box::new(parse::<Adc>(table)?))
 }
 
@@ -59,13 +60,13 @@ struct Clamp {
 }
 
 /// Constant that is subtracted, V, from the effect's parameters.
-pub(super) fn subtract_v(table: toml::Table) -> Result<f64, ProfileError> {
+pub(super) fn subtract_v(table: toml::Table) -> Result<f64, Refusal> {
     let subtract_v = parse::<Clamp>(table)?.subtract_v;
     within("subtract_v", subtract_v, -1e6, 1e6, "[−1e6, 1e6]")?;
     Ok(subtract_v)
 }
 
-pub(super) fn clamp(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn clamp(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let subtract_v = subtract_v(table)?;
     Ok(Box::new(Clamp { subtract_v }))
 }

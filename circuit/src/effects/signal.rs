@@ -1,10 +1,11 @@
 //! What is added to the summed signal: offsets, a remainder of earlier measurements, and noise.
 
 use crate::batch::Batch;
-use crate::effect::{BlockStart, Effect, EffectSession, ProfileError, Span, parse};
+use crate::effect::{BlockStart, Effect, EffectSession, Span, parse};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
+use spts_input::Refusal;
 use spts_models::Streams;
 
 /// y += c + a·Σx: a constant, and a share of the sum of all taxels, because the two drive levels are not exactly
@@ -30,7 +31,7 @@ struct DriveOffset {
     asymmetry: f64,
 }
 
-pub(super) fn drive_offset(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn drive_offset(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let c: DriveOffsetConfig = parse(table)?;
     let rng = &mut session.streams.rng("drive-offset", 0);
     Ok(Box::new(DriveOffset {
@@ -64,7 +65,7 @@ struct Memory {
     past_v: [f64; 2],
 }
 
-pub(super) fn memory(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn memory(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let c: MemoryConfig = parse(table)?;
     let rng = &mut session.streams.rng("memory", 0);
     let mut tap = |field, span: Span| span.drawn(field, [-0.4, 0.4], "[−0.4, 0.4]", rng);
@@ -103,7 +104,7 @@ struct ClockPattern {
     amplitude_v: f64,
 }
 
-pub(super) fn clock_pattern(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn clock_pattern(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let rng = &mut session.streams.rng("clock-pattern", 0);
     let span = parse::<ClockPatternConfig>(table)?.amplitude_v;
     let amplitude_v = span.drawn("amplitude_v", [-2.0, 2.0], "[−2, 2]", rng)?;
@@ -147,14 +148,14 @@ struct Noise {
     rng: ChaCha8Rng,
 }
 
-pub(super) fn contact_noise(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn contact_noise(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let rng = &mut session.streams.rng("contact-noise/session", 0);
     let span = parse::<ContactNoiseConfig>(table)?.fraction;
     let fraction = span.drawn("fraction", [0.0, 1.0], "[0, 1]", rng)?;
     Ok(Box::new(Noise::new(session, "contact-noise", fraction, true)))
 }
 
-pub(super) fn idle_noise(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, ProfileError> {
+pub(super) fn idle_noise(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let rng = &mut session.streams.rng("idle-noise/session", 0);
     let sd_v = parse::<IdleNoiseConfig>(table)?
         .sd_v

@@ -3,6 +3,7 @@
 use super::kernels::{Drives, Jumps, LANES, Lines, Sums, analog_sums, signed_sums, signed_sums_2};
 use super::lcg::{ANALOG_SCALE, Jump};
 use super::sequence::{FULL_SCALE, NEUTRAL, WeightMode, Weights};
+use spts_input::Refusal;
 use std::convert::Infallible;
 
 /// Codes that the cells of a skin put out, row by row. A readout drives its taxels with them
@@ -11,7 +12,8 @@ use std::convert::Infallible;
 /// The content of a row depends only on its number, not on the rows requested before; [`check_codes`] checks this.
 ///
 /// ```
-/// use spts_circuit::{CellCodes, CodesError, check_codes};
+/// use spts_circuit::{CellCodes, check_codes};
+/// use spts_input::Refusal;
 ///
 /// /// Cells that all switch between the lowest and the highest code.
 /// struct Blinking;
@@ -20,7 +22,7 @@ use std::convert::Infallible;
 ///     fn taxels(&self) -> usize {
 ///         4
 ///     }
-///     fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+///     fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
 ///         for (row, codes) in (first_row..).zip(out.chunks_exact_mut(4)) {
 ///             codes.fill(if row % 2 == 0 { 0 } else { 255 });
 ///         }
@@ -38,30 +40,8 @@ pub trait CellCodes: Send {
     /// whole number of rows. Without a seek, the readout requests rows in increasing order.
     ///
     /// # Errors
-    /// [`CodesError`] if the cells cannot reach these rows.
-    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError>;
-}
-
-/// Why codes are not available.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CodesError {
-    /// The cells belong to another skin.
-    #[error("the codes are those of {cells} cells; the readout has {taxels} taxels")]
-    Taxels {
-        /// Number of cells that put out codes.
-        cells: usize,
-        /// Number of taxels of the readout.
-        taxels: usize,
-    },
-    /// The cells cannot put out a row.
-    #[error("no codes from row {row} on: {reason}")]
-    Row {
-        /// First requested row.
-        row: u64,
-        /// Cause.
-        reason: String,
-    },
+    /// [`Refusal`] if the cells cannot reach these rows.
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal>;
 }
 
 /// Checks the property that every source of codes must have: rows are the same when requested at once, in pieces of
@@ -298,7 +278,7 @@ impl Rows {
         source: &mut dyn CellCodes,
         first_row: u64,
         len: usize,
-    ) -> Result<(), CodesError> {
+    ) -> Result<(), Refusal> {
         let (mode, taxels) = (self.weights.mode(), self.weights.taxels());
         let given = self.given.get_or_insert_with(|| Box::new(CodeRows::new(mode, taxels)));
         (self.first_row, self.summed) = (first_row, true);

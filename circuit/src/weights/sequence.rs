@@ -2,67 +2,9 @@
 
 use super::lcg::{ANALOG_SCALE, Jump, Seeding, Seeds, analog, binary};
 use serde::{Deserialize, Serialize};
+use spts_input::Refusal;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// Why weights are not valid.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum WeightsError {
-    /// A list that is empty or too long.
-    #[error("`{field}` has {len} entries; valid: [1, {most}]")]
-    Length {
-        /// Name of the list.
-        field: &'static str,
-        /// Number of its entries.
-        len: usize,
-        /// Largest number of entries.
-        most: usize,
-    },
-    /// A list for another skin.
-    #[error("`{field}` is for {found} taxels; expected {taxels}")]
-    Taxels {
-        /// Name of the list.
-        field: &'static str,
-        /// Number of taxels of the list.
-        found: usize,
-        /// Number of taxels of the skin.
-        taxels: usize,
-    },
-    /// A number of codes that is not a multiple of the period.
-    #[error("`patterns.codes` has {len} entries, not a positive multiple of `patterns.period` = {period}")]
-    Rows {
-        /// Number of codes.
-        len: usize,
-        /// Rows of the pattern.
-        period: usize,
-    },
-    /// A code that a binary cell does not have.
-    #[error("`patterns.codes`[{index}] = {code} is no binary level; valid: 0 (level −1) and 255 (level +1)")]
-    Code {
-        /// Position in the list, from 0.
-        index: usize,
-        /// The code.
-        code: u8,
-    },
-    /// A key that the mode does not use.
-    #[error("`{field}` does not go with `mode` = {:?}; valid modes: \"analog\" and \"binary\"", .mode.name())]
-    Mode {
-        /// Name of the key.
-        field: &'static str,
-        /// The mode.
-        mode: WeightMode,
-    },
-    /// No source of the levels, or several.
-    #[error("weights need exactly one of `seeding`, `seeds` and `patterns`; found: {found}")]
-    Source {
-        /// The keys that were given.
-        found: String,
-    },
-    /// The number of taxels is not given, and there is no list from which it follows.
-    #[error("`taxels` is missing; valid: [1, 2^32 − 1]")]
-    NoTaxels,
-}
 
 /// The two ways to read the skin: one taxel after the other, or all taxels weighted and added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -173,6 +115,38 @@ pub(crate) fn code_of(level: f64) -> u8 {
     }
 }
 
+/// A list `field` of `len` entries, where [1, `most`] are valid.
+fn wrong_length(field: &str, len: usize, most: usize) -> Refusal {
+    Refusal::new(format!("`{field}` has {len} entries; valid: [1, {most}]"))
+}
+
+/// A key `field` that `mode` does not use.
+pub(crate) fn not_in_mode(field: &str, mode: WeightMode) -> Refusal {
+    let valid = "valid modes: \"analog\" and \"binary\"";
+    Refusal::new(format!(
+        "`{field}` does not go with `mode` = {:?}; {valid}",
+        mode.name()
+    ))
+}
+
+/// Weights with no source of the levels, or several: the keys `found`.
+pub(crate) fn one_source(found: &str) -> Refusal {
+    Refusal::new(format!(
+        "weights need exactly one of `seeding`, `seeds` and `patterns`; found: {found}"
+    ))
+}
+
+/// Checks that `weights` from the list `field` are for a skin of `taxels` taxels.
+pub(crate) fn check_taxels(weights: &Weights, field: &str, taxels: u32) -> Result<(), Refusal> {
+    if weights.taxels() == taxels as usize {
+        return Ok(());
+    }
+    let found = weights.taxels();
+    Err(Refusal::new(format!(
+        "`{field}` is for {found} taxels; expected {taxels}"
+    )))
+}
+
 /// Most codes in a pattern.
 const MAX_CODES: usize = 1 << 30;
 
@@ -186,7 +160,7 @@ const MAX_CODES: usize = 1 << 30;
 /// let patterns = Patterns::new(2, vec![0, 255, 255, 0])?;
 /// let weights = Weights::with_patterns(WeightMode::Binary, patterns)?;
 /// assert_eq!([weights.level(0, 6), weights.level(1, 6), weights.level(0, 7)], [-1.0, 1.0, 1.0]);
-/// # Ok::<(), spts_circuit::WeightsError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "PatternsConfig", into = "PatternsConfig")]
@@ -204,8 +178,8 @@ struct PatternsConfig {
 }
 
 impl TryFrom<PatternsConfig> for Patterns {
-    type Error = WeightsError;
-    fn try_from(config: PatternsConfig) -> Result<Self, WeightsError> {
+    type Error = Refusal;
+    fn try_from(config: PatternsConfig) -> Result<Self, Refusal> {
         Self::new(config.period, config.codes)
     }
 }
@@ -224,19 +198,17 @@ impl Patterns {
     /// taxels is the number of codes divided by `period`.
     ///
     /// # Errors
-    /// [`WeightsError`] for no code, more than 2³⁰ codes, or a number of codes that is not a multiple of `period`.
-    pub fn new(period: usize, codes: Vec<u8>) -> Result<Self, WeightsError> {
+    /// [`Refusal`] for no code, more than 2³⁰ codes, or a number of codes that is not a multiple of `period`.
+    pub fn new(period: usize, codes: Vec<u8>) -> Result<Self, Refusal> {
         let len = codes.len();
         if !(1..=MAX_CODES).contains(&len) {
-            return Err(WeightsError::Length {
-                field: "patterns.codes",
-                len,
-                most: MAX_CODES,
-            });
+            return Err(wrong_length("patterns.codes", len, MAX_CODES));
         }
         match len.checked_div(period) {
             Some(taxels) if taxels > 0 && taxels * period == len => Ok(Self { taxels, codes }),
-            _ => Err(WeightsError::Rows { len, period }),
+            _ => Err(Refusal::new(format!(
+                "`patterns.codes` has {len} entries, not a positive multiple of `patterns.period` = {period}"
+            ))),
         }
     }
 
@@ -247,7 +219,7 @@ impl Patterns {
     /// use spts_circuit::Patterns;
     ///
     /// assert_eq!(Patterns::of_levels(1, &[-1.0, 1.0])?.row(0), [0, 255]);
-    /// # Ok::<(), spts_circuit::WeightsError>(())
+    /// # Ok::<(), spts_input::Refusal>(())
     /// ```
     ///
     /// # Errors
@@ -257,7 +229,7 @@ impl Patterns {
         clippy::cast_sign_loss,
         reason = "float to integer casts saturate"
     )]
-    pub fn of_levels(period: usize, levels: &[f64]) -> Result<Self, WeightsError> {
+    pub fn of_levels(period: usize, levels: &[f64]) -> Result<Self, Refusal> {
         let code = |level: &f64| (127.5 * (1.0 + level)).round() as u8;
         Self::new(period, levels.iter().map(code).collect())
     }
@@ -289,19 +261,17 @@ impl Patterns {
     }
 
     /// Checks that cells in `mode` can put out every code.
-    pub(crate) fn check(&self, mode: WeightMode) -> Result<(), WeightsError> {
+    pub(crate) fn check(&self, mode: WeightMode) -> Result<(), Refusal> {
         match mode {
-            WeightMode::Raster => Err(WeightsError::Mode {
-                field: "patterns",
-                mode,
-            }),
+            WeightMode::Raster => Err(not_in_mode("patterns", mode)),
             WeightMode::Analog => Ok(()),
             WeightMode::Binary => match self.codes.iter().position(|code| !matches!(code, 0 | 255)) {
                 None => Ok(()),
-                Some(index) => Err(WeightsError::Code {
-                    index,
-                    code: self.codes[index],
-                }),
+                Some(index) => {
+                    let (code, valid) = (self.codes[index], "0 (level −1) and 255 (level +1)");
+                    let place = format!("`patterns.codes`[{index}] = {code}");
+                    Err(Refusal::new(format!("{place} is no binary level; valid: {valid}")))
+                }
             },
         }
     }
@@ -386,11 +356,11 @@ impl Weights {
     /// Weights with one generator seed for each taxel.
     ///
     /// # Errors
-    /// [`WeightsError`] for no seed, more than 2²⁴ seeds, or the raster mode, which uses no seeds.
-    pub fn with_seeds(mode: WeightMode, seeds: impl Into<Arc<[u32]>>) -> Result<Self, WeightsError> {
+    /// [`Refusal`] for no seed, more than 2²⁴ seeds, or the raster mode, which uses no seeds.
+    pub fn with_seeds(mode: WeightMode, seeds: impl Into<Arc<[u32]>>) -> Result<Self, Refusal> {
         let (field, seeds) = ("seeds", seeds.into());
         if mode == WeightMode::Raster {
-            return Err(WeightsError::Mode { field, mode });
+            return Err(not_in_mode(field, mode));
         }
         match u32::try_from(seeds.len()) {
             Ok(taxels) if (1..=MAX_SEEDS).contains(&seeds.len()) => Ok(Self {
@@ -398,19 +368,15 @@ impl Weights {
                 source: LevelSource::Seeds(seeds),
                 taxels,
             }),
-            _ => Err(WeightsError::Length {
-                field,
-                len: seeds.len(),
-                most: MAX_SEEDS,
-            }),
+            _ => Err(wrong_length(field, seeds.len(), MAX_SEEDS)),
         }
     }
 
     /// Weights that repeat `patterns`. In analog mode every code is a level; in binary mode 0 is −1 and 255 is +1.
     ///
     /// # Errors
-    /// [`WeightsError`] for other codes in binary mode, or for the raster mode, which scans its taxels in order.
-    pub fn with_patterns(mode: WeightMode, patterns: Patterns) -> Result<Self, WeightsError> {
+    /// [`Refusal`] for other codes in binary mode, or for the raster mode, which scans its taxels in order.
+    pub fn with_patterns(mode: WeightMode, patterns: Patterns) -> Result<Self, Refusal> {
         patterns.check(mode)?;
         let taxels = u32::try_from(patterns.taxels()).unwrap_or(u32::MAX);
         Ok(Self {
@@ -713,28 +679,6 @@ const MOST_ROWS: usize = 24;
 /// Number of states of a generator, and so of seeds.
 const STATES: u64 = 1 << 32;
 
-/// Why there are no seeds for a window.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum FirstWindowError {
-    /// Too many rows.
-    #[error("a window of {rows} rows is outside [1, {MOST_ROWS}]")]
-    Rows {
-        /// Rows of the window.
-        rows: usize,
-    },
-    /// A level that no generator puts out in binary mode.
-    #[error("row {row}, taxel {taxel}: code {code} is not 0 or 255, what a generator puts out in binary mode")]
-    Code {
-        /// Row, 0-based.
-        row: usize,
-        /// Taxel, 0-based.
-        taxel: usize,
-        /// Code.
-        code: u8,
-    },
-}
-
 /// Seeds, one a taxel, with which the cells' generators put out `window` in binary mode at rows 0 to M − 1 after the
 /// seeds are loaded. Later rows are pseudorandom. The search is exact: it enumerates the states of the generator and
 /// stops when every taxel has a seed.
@@ -749,11 +693,13 @@ pub enum FirstWindowError {
 /// ```
 ///
 /// # Errors
-/// [`FirstWindowError`] for more than 24 rows, or levels other than ±1.
-pub fn seeds_of_first_window(window: &Patterns) -> Result<Vec<u32>, FirstWindowError> {
+/// [`Refusal`] for more than 24 rows, or levels other than ±1.
+pub fn seeds_of_first_window(window: &Patterns) -> Result<Vec<u32>, Refusal> {
     let rows = window.period();
     if rows > MOST_ROWS {
-        return Err(FirstWindowError::Rows { rows });
+        return Err(Refusal::new(format!(
+            "a window of {rows} rows is outside [1, {MOST_ROWS}]"
+        )));
     }
     let words = words(window)?;
     let mut seeds: BTreeMap<u32, u32> = words.iter().map(|word| (*word, 0)).collect();
@@ -783,12 +729,14 @@ pub fn seeds_of_first_window(window: &Patterns) -> Result<Vec<u32>, FirstWindowE
 }
 
 /// Levels of every taxel, the one of row 0 in the highest bit.
-fn words(window: &Patterns) -> Result<Vec<u32>, FirstWindowError> {
+fn words(window: &Patterns) -> Result<Vec<u32>, Refusal> {
     let mut words = vec![0; window.taxels()];
     for row in 0..window.period() {
         for (taxel, (word, &code)) in words.iter_mut().zip(window.row(row as u64)).enumerate() {
             if !matches!(code, 0 | 255) {
-                return Err(FirstWindowError::Code { row, taxel, code });
+                let found = format!("row {row}, taxel {taxel}: code {code}");
+                let needed = "0 or 255, what a generator puts out in binary mode";
+                return Err(Refusal::new(format!("{found} is not {needed}")));
             }
             *word = *word << 1 | u32::from(code > 0);
         }
@@ -887,11 +835,12 @@ mod tests {
     #[test]
     fn windows_that_cannot_be_are_refused() {
         let refused = |rows, codes: Vec<u8>| seeds_of_first_window(&Patterns::new(rows, codes).unwrap()).unwrap_err();
-        assert_eq!(refused(25, vec![0; 25]), FirstWindowError::Rows { rows: 25 });
-        assert!(matches!(
-            refused(2, vec![0, 0, 0, 1]),
-            FirstWindowError::Code { row: 1, taxel: 1, .. }
-        ));
+        assert_eq!(
+            refused(25, vec![0; 25]).to_string(),
+            "a window of 25 rows is outside [1, 24]"
+        );
+        let said = refused(2, vec![0, 0, 0, 1]).to_string();
+        assert!(said.starts_with("row 1, taxel 1: code 1 is not 0 or 255"), "{said}");
     }
 
     /// What a generator does put out is found again, whatever the seed was.

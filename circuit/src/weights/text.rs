@@ -1,8 +1,9 @@
 //! Weights, seeds and patterns as text.
 
 use super::lcg::Seeding;
-use super::sequence::{LevelSource, Patterns, WeightMode, Weights, WeightsError};
+use super::sequence::{LevelSource, Patterns, WeightMode, Weights, check_taxels, one_source};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use spts_input::Refusal;
 use std::fmt::Write as _;
 
 /// Text of [`Weights`].
@@ -56,20 +57,20 @@ impl From<&Weights> for WeightsConfig {
 }
 
 impl TryFrom<WeightsConfig> for Weights {
-    type Error = WeightsError;
-    fn try_from(config: WeightsConfig) -> Result<Self, WeightsError> {
+    type Error = Refusal;
+    fn try_from(config: WeightsConfig) -> Result<Self, Refusal> {
         let mode = config.mode;
+        let missing = || Refusal::new("`taxels` is missing; valid: [1, 2^32 − 1]");
         if config.generator.is_some() && config.patterns.is_some() {
-            let found = "`generator`, `patterns`".to_owned();
-            return Err(WeightsError::Source { found });
+            return Err(one_source("`generator`, `patterns`"));
         }
         let (weights, field) = match (config.seeding, config.seeds, config.patterns) {
             (None, None, None) if mode == WeightMode::Raster => {
-                let taxels = config.taxels.ok_or(WeightsError::NoTaxels)?;
+                let taxels = config.taxels.ok_or_else(missing)?;
                 return Ok(Self::new(mode, Seeding::Address, taxels));
             }
             (Some(seeding), None, None) => {
-                let taxels = config.taxels.ok_or(WeightsError::NoTaxels)?;
+                let taxels = config.taxels.ok_or_else(missing)?;
                 return Ok(Self::new(mode, seeding, taxels));
             }
             (None, Some(seeds), None) => (Self::with_seeds(mode, seeds)?, "seeds"),
@@ -81,22 +82,14 @@ impl TryFrom<WeightsConfig> for Weights {
                     patterns.map(|_| "`patterns`"),
                 ];
                 let given: Vec<&str> = given.into_iter().flatten().collect();
-                let found = if given.is_empty() {
-                    "none".to_owned()
-                } else {
-                    given.join(", ")
-                };
-                return Err(WeightsError::Source { found });
+                let found = given.join(", ");
+                return Err(one_source(if given.is_empty() { "none" } else { &found }));
             }
         };
-        match config.taxels {
-            Some(taxels) if taxels as usize != weights.taxels() => Err(WeightsError::Taxels {
-                field,
-                found: weights.taxels(),
-                taxels: taxels as usize,
-            }),
-            _ => Ok(weights),
+        if let Some(taxels) = config.taxels {
+            check_taxels(&weights, field, taxels)?;
         }
+        Ok(weights)
     }
 }
 
@@ -117,14 +110,10 @@ pub const MAX_SEEDS_BYTES: u64 = 1 << 24;
 /// Characters of a wrong word that an error repeats: a few more than a seed has.
 const SHOWN: usize = 20;
 
-/// A word that is not a seed.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: seed = `{word}` is not one of the whole numbers in [0, 4294967295]")]
-pub struct SeedTextError {
-    /// Line, from 1.
-    pub line: usize,
-    /// The word, shortened.
-    pub word: String,
+/// A wrong word, shortened, in the line `index`, from 0.
+fn wrong(index: usize, word: &str, before: &str, after: &str) -> Refusal {
+    let word: String = word.chars().take(SHOWN).collect();
+    Refusal::new(format!("line {}: {before}{word}{after}", index + 1))
 }
 
 /// Reads seeds, one a taxel in row-major order: whole numbers in [0, 4294967295], decimal or hexadecimal (0x…),
@@ -135,13 +124,13 @@ pub struct SeedTextError {
 ///
 /// assert_eq!(parse_seeds("# two cells\n8\n0x09\n")?, [8, 9]);
 /// assert_eq!(parse_seeds("[8, 9]")?, [8, 9]);
-/// assert_eq!(parse_seeds("8\n-1").unwrap_err().line, 2);
-/// # Ok::<(), spts_circuit::SeedTextError>(())
+/// assert!(parse_seeds("8\n-1").unwrap_err().to_string().starts_with("line 2: seed = `-1`"));
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 ///
 /// # Errors
-/// [`SeedTextError`] for the first word that is not a seed.
-pub fn parse_seeds(text: &str) -> Result<Vec<u32>, SeedTextError> {
+/// [`Refusal`] for the first word that is not a seed.
+pub fn parse_seeds(text: &str) -> Result<Vec<u32>, Refusal> {
     let trimmed = text.trim();
     let json = trimmed.starts_with('[') && trimmed.ends_with(']');
     let between = |c: char| matches!(c, ',' | ' ' | '\t' | '\r') || (json && matches!(c, '[' | ']'));
@@ -153,9 +142,13 @@ pub fn parse_seeds(text: &str) -> Result<Vec<u32>, SeedTextError> {
                 Some(digits) => u32::from_str_radix(digits, 16),
                 None => word.parse(),
             };
-            let seed = seed.map_err(|_| SeedTextError {
-                line: index + 1,
-                word: word.chars().take(SHOWN).collect(),
+            let seed = seed.map_err(|_| {
+                wrong(
+                    index,
+                    word,
+                    "seed = `",
+                    "` is not one of the whole numbers in [0, 4294967295]",
+                )
             })?;
             seeds.push(seed);
         }
@@ -165,33 +158,6 @@ pub fn parse_seeds(text: &str) -> Result<Vec<u32>, SeedTextError> {
 
 /// Size of the largest file of patterns that is read, bytes.
 pub const MAX_PATTERNS_BYTES: u64 = 1 << 26;
-/// Why a text is not a valid pattern.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PatternTextError {
-    /// A word that is neither signs nor a code.
-    #[error("line {line}: `{word}` is neither a row of + and − signs nor one of the codes in [0, 255]")]
-    Word {
-        /// Line, from 1.
-        line: usize,
-        /// The word, shortened.
-        word: String,
-    },
-    /// A row whose length differs from that of the rows before it.
-    #[error("line {line}: a row of {found} taxels; the rows before it have {taxels}")]
-    Length {
-        /// Line, from 1.
-        line: usize,
-        /// Number of taxels in the row.
-        found: usize,
-        /// Number of taxels in the first row.
-        taxels: usize,
-    },
-    /// No row, or too many rows.
-    #[error(transparent)]
-    Patterns(#[from] WeightsError),
-}
-
 /// Reads a pattern: one line for each row of the sensing matrix, in order of output. A row has one sign for each taxel
 /// (`+` is code 255, level +1; `−` is code 0, level −1), or codes in [0, 255] separated by spaces or commas. The
 /// keyboard's hyphen also counts as `−`. A `#` starts a comment.
@@ -202,12 +168,12 @@ pub enum PatternTextError {
 /// let patterns = parse_patterns("# two rows, three taxels\n+-+\n0 255 128\n")?;
 /// assert_eq!((patterns.row(0), patterns.row(1)), (&[255, 0, 255][..], &[0, 255, 128][..]));
 /// assert!(parse_patterns("+-\n+").is_err());
-/// # Ok::<(), spts_circuit::PatternTextError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 ///
 /// # Errors
-/// [`PatternTextError`] for the first word that is neither, rows of different lengths, or a text without rows.
-pub fn parse_patterns(text: &str) -> Result<Patterns, PatternTextError> {
+/// [`Refusal`] for the first word that is neither, rows of different lengths, or a text without rows.
+pub fn parse_patterns(text: &str) -> Result<Patterns, Refusal> {
     let (mut codes, mut rows, mut taxels) = (Vec::new(), 0, None);
     for (index, line) in text.lines().enumerate() {
         let before = codes.len();
@@ -219,9 +185,13 @@ pub fn parse_patterns(text: &str) -> Result<Patterns, PatternTextError> {
                 codes.extend(signs);
                 continue;
             }
-            let code = word.parse().map_err(|_| PatternTextError::Word {
-                line: index + 1,
-                word: word.chars().take(SHOWN).collect(),
+            let code = word.parse().map_err(|_| {
+                wrong(
+                    index,
+                    word,
+                    "`",
+                    "` is neither a row of + and − signs nor one of the codes in [0, 255]",
+                )
             })?;
             codes.push(code);
         }
@@ -232,14 +202,14 @@ pub fn parse_patterns(text: &str) -> Result<Patterns, PatternTextError> {
         rows += 1;
         let first = *taxels.get_or_insert(found);
         if found != first {
-            return Err(PatternTextError::Length {
-                line: index + 1,
-                found,
-                taxels: first,
-            });
+            let expected = format!("the rows before it have {first}");
+            return Err(Refusal::new(format!(
+                "line {}: a row of {found} taxels; {expected}",
+                index + 1
+            )));
         }
     }
-    Ok(Patterns::new(rows, codes)?)
+    Patterns::new(rows, codes)
 }
 
 /// Codes of a word of signs.

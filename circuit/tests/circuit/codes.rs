@@ -1,11 +1,12 @@
 //! A readout on codes that come from outside.
 
 use crate::effects::assert_close;
-use crate::readout::{press_v, profile, skin, strip};
+use crate::readout::{press_v, profile, skin, start, strip};
 use spts_circuit::{
-    AcquireError, Block, CellCodes, CodesError, CompressiveWeights, Interpolated, Jump, Mode, PROFILES, Profile,
-    Readout, Seeding, WeightMode, check_codes,
+    Block, CellCodes, CompressiveWeights, Interpolated, Jump, Mode, PROFILES, Profile, Readout, Seeding, WeightMode,
+    check_codes,
 };
+use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 
 /// Cells whose code is a function of row and taxel.
@@ -19,7 +20,7 @@ impl<F: Fn(u64, u32) -> u8 + Send> CellCodes for Cells<F> {
         self.taxels
     }
 
-    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
         for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.taxels)) {
             for (taxel, code) in (0..).zip(out) {
                 *code = (self.code)(row, taxel);
@@ -168,14 +169,10 @@ fn any_codes_give_their_sums() {
         noisy.weights = quiet.weights;
         let weights = quiet.weights(mode, 100).unwrap();
         let y = |profile: &Profile, code: fn(u64, u32) -> u8| {
-            let readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(3), 0).unwrap();
+            let readout = start(profile, mode, 3);
             let cells = Box::new(Cells { taxels: 100, code });
-            readout
-                .with_codes(cells)
-                .unwrap()
-                .acquire(&mut skin(&x), 2000)
-                .unwrap()
-                .volts
+            let mut readout = readout.with_codes(cells).unwrap();
+            readout.acquire(&mut skin(&x), 2000).unwrap().volts
         };
         for code in [
             any_code as fn(u64, u32) -> u8,
@@ -183,7 +180,7 @@ fn any_codes_give_their_sums() {
             |_, taxel| if taxel == 50 { 255 } else { 0 },
         ] {
             let (quiet_v, noisy_v) = (y(&quiet, code), y(&noisy, code));
-            let mut sound = Readout::new(&noisy, mode, &SkinLayout::default(), Streams::new(3), 0).unwrap();
+            let mut sound = start(&noisy, mode, 3);
             let sound_v = sound.acquire(&mut skin(&x), 2000).unwrap().volts;
             for (row, (quiet_v, noisy_v)) in quiet_v.iter().zip(&noisy_v).enumerate() {
                 let dot = |w: &dyn Fn(u32) -> f64| {
@@ -230,7 +227,7 @@ fn cells_out_of_order_are_the_faults() {
             faulty.faults = Profile::from_toml(&format!("{}\n{list}", PROFILES[0].1))
                 .unwrap()
                 .faults;
-            let readout = |profile| Readout::new(profile, mode, &SkinLayout::default(), Streams::new(2), 0).unwrap();
+            let readout = |profile| start(profile, mode, 2);
             let weights = analog.weights(mode, 100).unwrap().mode();
             let code = move |row, taxel| match fault {
                 "dead" if taxel == 41 => 126,
@@ -260,15 +257,12 @@ impl CellCodes for Tired {
         100
     }
 
-    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
         out.fill(255);
         if first_row + out.len() as u64 / 100 <= 300 {
             return Ok(());
         }
-        Err(CodesError::Row {
-            row: first_row,
-            reason: "tired".to_owned(),
-        })
+        Err(Refusal::new(format!("no codes from row {first_row} on: tired")))
     }
 }
 
@@ -276,16 +270,12 @@ impl CellCodes for Tired {
 fn codes_that_cannot_be_had_are_an_error() {
     let readout = |taxels| Readout::new(&profile(""), Mode::Compressive, &strip(taxels), Streams::new(0), 0).unwrap();
     let refused = readout(99).with_codes(Box::new(Tired)).map(drop).unwrap_err();
-    assert_eq!(refused, CodesError::Taxels { cells: 100, taxels: 99 });
-    assert!(refused.to_string().contains("100 cells; the readout has 99 taxels"));
+    let expected = "the codes are those of 100 cells; the readout has 99 taxels";
+    assert_eq!(refused.to_string(), expected);
     let mut readout = readout(100).with_codes(Box::new(Tired)).unwrap();
     assert!(readout.acquire(&mut skin(&press_v()), 200).is_ok());
     let error = readout.acquire(&mut skin(&press_v()), 200).unwrap_err();
-    assert!(
-        matches!(error, AcquireError::Codes(CodesError::Row { row: 200.., .. })),
-        "{error}"
-    );
-    assert!(error.to_string().contains("tired"));
+    assert!(error.to_string().starts_with("cells: no codes from row 2"), "{error}");
     // the readout can be used on
     readout.seek(0, 1);
     assert!(readout.acquire(&mut skin(&press_v()), 100).is_ok());

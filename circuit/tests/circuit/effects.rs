@@ -1,19 +1,19 @@
-//! What each effect does is found again in what the readout recorded.
+//! What each effect does is found again in what the readout recorded; every effect keeps what effects promise and refuses
+//! nonsense; and leaving an effect out of a profile switches it off, and nothing else.
 
-use crate::readout::{press_v, profile, skin};
+use crate::readout::{press_v, profile, samples, skin, start};
 use nalgebra::{DMatrix, DVector};
-use spts_circuit::{Mode, Profile, Readout, Recording, Slip};
-use spts_models::SkinLayout;
-use spts_models::Streams;
+use spts_circuit::{
+    Adc, EFFECTS, EffectSession, Mode, Profile, Readout, Recording, Seeding, Slip, WeightMode, Weights, build_chain,
+    check_effect,
+};
+use spts_models::{SkinLayout, Streams};
 
 const MEASUREMENTS: usize = 100_000;
 
 /// A recording with `effects` next to the ideal one of the same press.
 fn against_ideal(effects: &str, mode: Mode) -> (Vec<f64>, Vec<f64>) {
-    let acquire = |profile: &Profile| {
-        let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(11), 0).unwrap();
-        readout.acquire(&mut skin(&press_v()), MEASUREMENTS).unwrap().volts
-    };
+    let acquire = |profile: &Profile| samples(profile, mode, 11, &press_v(), MEASUREMENTS);
     (acquire(&profile(effects)), acquire(&profile("")))
 }
 
@@ -94,17 +94,7 @@ fn late_updates_have_their_rate_size_and_beat() {
     let x = 0.5;
     let mut x_v = vec![0.0; 100];
     x_v[40] = x;
-    let run = |effects: &str| {
-        let mut readout = Readout::new(
-            &profile(effects),
-            Mode::Compressive,
-            &SkinLayout::default(),
-            Streams::new(2),
-            0,
-        )
-        .unwrap();
-        readout.acquire(&mut skin(&x_v), 10 * MEASUREMENTS).unwrap().volts
-    };
+    let run = |effects: &str| samples(&profile(effects), Mode::Compressive, 2, &x_v, 10 * MEASUREMENTS);
     let (y, ideal) = (run(effects), run(""));
     let flips = ideal.windows(2).filter(|w| w[0] * w[1] < 0.0).count();
     let mut late = Vec::new();
@@ -153,14 +143,7 @@ fn volts_lie_on_the_converter_s_grid() {
         (Mode::Compressive, 32.0, 3.3 / 1023.0 * 11140.0 / 570.0),
         (Mode::Raster, 4.4, 3.3 / 1023.0 * 508.0 / 165.0),
     ] {
-        let mut readout = Readout::new(
-            &Profile::named("as_built").unwrap(),
-            mode,
-            &SkinLayout::default(),
-            Streams::new(0),
-            0,
-        )
-        .unwrap();
+        let mut readout = start(&Profile::named("as_built").unwrap(), mode, 0);
         for y in readout.acquire(&mut skin(&press_v()), 10_000).unwrap().volts {
             let code = (offset - y) / lsb;
             // cut-off raster values are 0 exactly; the others are 0.1 V up because a constant is subtracted
@@ -192,7 +175,7 @@ fn missed_clocks_add_up_to_their_rate() {
     for taxel in 0..100 {
         let mut x = vec![0.0; 100];
         x[taxel] = 1.0;
-        let mut readout = Readout::new(&missing, Mode::Raster, &SkinLayout::default(), Streams::new(2), 0).unwrap();
+        let mut readout = start(&missing, Mode::Raster, 2);
         readout.skip(SKIPPED);
         let y = readout.acquire(&mut skin(&x), 300).unwrap().volts;
         let answer = y.iter().rposition(|y| *y > 0.5).unwrap();
@@ -236,5 +219,323 @@ fn edges_that_all_cells_miss_shift_the_rows() {
             .zip(volts(&sound))
             .all(|(a, b)| (a - b).abs() < 1e-9);
         assert_eq!(same, block == 0, "block {block}");
+    }
+}
+
+/// The parameters of `as_built`, or of `as_designed` for what only that has, for the DAC the limits of its data sheet,
+/// and for missed clocks so many that no cell stays in step.
+fn parameters(name: &str) -> toml::Table {
+    if name == "dac" {
+        return toml::from_str(DATA_SHEET).unwrap();
+    }
+    if name == "missed_clocks" {
+        return toml::from_str("probability = [0.0, 0.3]").unwrap();
+    }
+    let [built, designed] = ["as_built", "as_designed"].map(|name| Profile::named(name).unwrap());
+    let tables = [&built.compressive, &built.raster, &designed.compressive];
+    let table = tables.iter().find_map(|effects| effects.get(name)).unwrap();
+    table.as_table().unwrap().clone()
+}
+
+const DATA_SHEET: &str = "reference_v = 4.34\nfloor_v = 0.2\noffset_v = [-0.04, 0.0]\ngain_lsb = [-10.0, 10.0]\n\
+                          inl_lsb = [-1.2, 1.2]\ndnl_lsb = 1.0";
+
+#[test]
+fn every_effect_conforms() {
+    for (name, build) in EFFECTS {
+        eprintln!("{name}");
+        check_effect(&|session| build(parameters(name), session).unwrap());
+    }
+    // all cells together, by chance and at places of both signs, beside edges that cells miss on their own
+    let all = "probability = [0.0, 0.3]\nall_probability = 0.01\nall_at = [{block = 0, edges = 34}, \
+               {block = 5, measurement = 501, edges = -2}, {block = 5, measurement = 700, edges = 500}]";
+    let (_, build) = EFFECTS.iter().find(|(name, _)| *name == "missed_clocks").unwrap();
+    check_effect(&|session| build(toml::from_str(all).unwrap(), session).unwrap());
+}
+
+#[test]
+fn nonsense_is_refused_with_its_name() {
+    let session = EffectSession {
+        device: Streams::new(0),
+        streams: Streams::new(0),
+        weights: Weights::new(WeightMode::Binary, Seeding::Address, 100),
+        feedback_ohm: 1e3,
+        sample_rate_hz: 67e3,
+    };
+    let error = |text: &str| {
+        build_chain(&toml::from_str(text).unwrap(), &session)
+            .map(|_| ())
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(error("[hum]").contains("known: missed_clocks, late_updates, "));
+    assert!(error("adc = 10").contains("expected a table"));
+    assert!(error("[rails]\nlimit = 3.0").contains("limit"));
+    for line in NONSENSE.trim().lines() {
+        let [effect, parameters, field] = line.split(" | ").collect::<Vec<_>>()[..] else {
+            panic!("{line}")
+        };
+        let message = error(&format!("[{effect}]\n{}", parameters.replace("; ", "\n")));
+        assert!(
+            message.contains(field) && message.contains("is outside"),
+            "{line}: {message}"
+        );
+    }
+}
+
+/// An effect, its parameters, and words of the error.
+const NONSENSE: &str = "
+rails | limit_v = nan | limit_v
+rails | limit_v = -1.0 | limit_v
+dac | reference_v = 4.34; floor_v = 3.0; offset_v = 0.0; gain_lsb = 0.0; inl_lsb = 0.0; dnl_lsb = 0.0 | .floor_v` = 3 is outside [0, 0.5·reference_v]
+dac | reference_v = 4.34; floor_v = 0.2; offset_v = 0.0; gain_lsb = 0.0; inl_lsb = 0.0; dnl_lsb = 1.5 | .dnl_lsb` = 1.5 is outside [0, 1]
+memory | h1 = 0.1; h2 = inf | h2
+missed_clocks | probability = [0.0, 1.5] | .probability` = 1.5 is outside [0, 1]
+missed_clocks | all_probability = -0.1 | .all_probability` = -0.1 is outside [0, 1]
+missed_clocks | all_at = [{block = 1, edges = 1_000_001}] | .all_at[0].edges` = 1000001 is outside
+memory | h1 = [0.2, 0.1]; h2 = 0.0 | h1
+idle_noise | sd_v = -0.1 | sd_v
+contact_noise | fraction = nan | fraction
+drive_offset | constant_v = [0.0, nan]; asymmetry = 0.0 | constant_v
+late_updates | rate = 0.5; period_measurements = 52.0; period_sd_measurements = 0.2 | rate
+amplifier | update_s = 8e-6; sample_s = 16e-6 | sample_s
+amplifier | update_s = 8e-6; sample_s = 7e-6 | update_s
+amplifier | update_s = 0.0; sample_s = 1e-6; bus_f = -1e-9 | .bus_f` = -1e-9 is outside [0, 1]
+amplifier | update_s = 0.0; sample_s = 1e-6; op_amp = { slew_v_per_s = 0.0 } | slew_v_per_s
+amplifier | update_s = 0.0; sample_s = 1e-6; offset_v = [1e-3, -1e-3] | offset_v
+adc | bits = 0; reference_v = 3.3; divider = 1.0; offset_v = 0.0 | bits
+adc | bits = 10; reference_v = 2e3; divider = 1.0; offset_v = 0.0 | .reference_v` = 2000 is outside [1e-3, 1e3]
+adc | bits = 10; reference_v = 3.3; divider = 2e3; offset_v = 0.0 | .divider` = 2000 is outside [1e-3, 1e3]
+adc | bits = 10; reference_v = 3.3; divider = 1e-4; offset_v = 0.0 | .divider` = 0.0001 is outside [1e-3, 1e3]
+adc | bits = 10; reference_v = 3.3; divider = 1.0; offset_v = -2e6 | .offset_v` = -2000000 is outside [−1e6, 1e6]
+adc | bits = 10; reference_v = 1e300; divider = 1e300; offset_v = 0.0 | reference_v
+rails | limit_v = 2e6 | .limit_v` = 2000000 is outside (0, 1e6]
+clamp | subtract_v = -2e6 | .subtract_v` = -2000000 is outside [−1e6, 1e6]
+late_updates | rate = 0.0; period_measurements = 1.5; period_sd_measurements = 0.0 | .period_measurements` = 1.5 is outside [2, 1e9)
+late_updates | rate = 0.0; period_measurements = 50.0; period_sd_measurements = 6.0 | .period_sd_measurements` = 6 is outside [0, period_measurements/10]
+";
+
+/// Parameters with which each effect of `as_built` does nothing.
+const NEUTRAL: &[(&str, &str)] = &[
+    (
+        "late_updates",
+        "rate = 0.0\nperiod_measurements = 52.44\nperiod_sd_measurements = 0.2",
+    ),
+    ("drive_offset", "constant_v = 0.0\nasymmetry = 0.0"),
+    ("memory", "h1 = 0.0\nh2 = 0.0"),
+    ("clock_pattern", "amplitude_v = 0.0"),
+    ("contact_noise", "fraction = 0.0"),
+    ("idle_noise", "sd_v = 0.0"),
+    ("rails", "limit_v = 1e6"),
+];
+/// What follows on the rails has no neutral parameters.
+const LAST: [&str; 2] = ["adc", "clamp"];
+
+fn chain(profile: &mut Profile, mode: Mode) -> &mut toml::Table {
+    match mode {
+        Mode::Raster => &mut profile.raster,
+        Mode::Compressive => &mut profile.compressive,
+    }
+}
+
+fn pressed(profile: &Profile, mode: Mode) -> Vec<f64> {
+    samples(profile, mode, 2, &press_v(), 10_000)
+}
+
+/// Noise and draws of the other effects stay what they were, bit for bit.
+#[test]
+fn leaving_out_is_switching_off() {
+    for mode in [Mode::Compressive, Mode::Raster] {
+        let full = Profile::named("as_built").unwrap();
+        for name in chain(&mut full.clone(), mode).keys() {
+            let Some((_, parameters)) = NEUTRAL.iter().find(|(known, _)| known == name) else {
+                assert!(LAST.contains(&name.as_str()), "{name} has no neutral parameters");
+                continue;
+            };
+            let (mut without, mut neutral) = (full.clone(), full.clone());
+            chain(&mut without, mode).remove(name);
+            let parameters: toml::Table = toml::from_str(parameters).unwrap();
+            chain(&mut neutral, mode).insert(name.clone(), parameters.into());
+            assert!(pressed(&without, mode) == pressed(&neutral, mode), "{mode:?}: {name}");
+            if name != "rails" {
+                assert!(
+                    pressed(&without, mode) != pressed(&full, mode),
+                    "{mode:?}: {name} does nothing"
+                );
+            }
+        }
+    }
+}
+
+/// Converter and clamp act on the finished output and on nothing else.
+#[test]
+fn converter_and_clamp_are_functions_of_the_output() {
+    for mode in [Mode::Compressive, Mode::Raster] {
+        let full = Profile::named("as_built").unwrap();
+        let mut analog = full.clone();
+        let adc: Adc = chain(&mut analog, mode).remove("adc").unwrap().try_into().unwrap();
+        let clamp = chain(&mut analog, mode).remove("clamp");
+        let subtract_v = clamp.map(|c| c["subtract_v"].as_float().unwrap());
+        for (y, u) in pressed(&full, mode).iter().zip(pressed(&analog, mode)) {
+            let quantised = adc.volts(adc.code(u));
+            let expected = subtract_v.map_or(quantised, |v| (quantised - v).max(0.0));
+            assert_eq!(
+                y.to_bits(),
+                expected.to_bits(),
+                "{mode:?}: {y} V, expected {expected} V"
+            );
+        }
+    }
+}
+
+// The cells' converters against their own formula.
+
+fn dac(mode: &str, parameters: &str) -> String {
+    format!("[{mode}.dac]\nreference_v = 4.34\n{parameters}")
+}
+
+fn analog(effects: &str) -> Profile {
+    let mut profile = profile(effects);
+    profile.weights = spts_circuit::CompressiveWeights::Analog;
+    profile
+}
+
+fn volts(profile: &Profile, mode: Mode, x_v: &[f64], rows: usize) -> Vec<f64> {
+    samples(profile, mode, 3, x_v, rows)
+}
+
+/// Without nonlinearity a code becomes max(floor, c + offset + gain·c/255) steps, in every mode.
+#[test]
+fn offset_gain_and_floor_are_exact() {
+    let parameters = "floor_v = 0.2\noffset_v = -0.01\ngain_lsb = -1.0\ninl_lsb = 0.0\ndnl_lsb = 0.0";
+    let lsb_v = 4.34 / 256.0;
+    let actual = |level: f64, code: f64| {
+        let steps = f64::max(0.2 / lsb_v, code - 0.01 / lsb_v - code / 255.0);
+        level + (steps - code) / 127.5
+    };
+    let x = press_v();
+    let binary = profile(&dac("compressive", parameters));
+    let analog = analog(&dac("compressive", parameters));
+    let raster = profile(&dac("raster", parameters));
+    for (profile, mode) in [
+        (binary, Mode::Compressive),
+        (analog, Mode::Compressive),
+        (raster, Mode::Raster),
+    ] {
+        let weights = profile.weights(mode, 100).unwrap();
+        for (y, row) in volts(&profile, mode, &x, 1000).iter().zip(0_u64..) {
+            let level = |k: u32| {
+                let level = weights.level(k, row);
+                match mode {
+                    Mode::Raster => actual(level, if level > 0.5 { 255.0 } else { 126.0 }),
+                    Mode::Compressive => actual(level, (127.5 * (1.0 + level)).round()),
+                }
+            };
+            let expected: f64 = (0_u32..100).zip(&x).map(|(k, x)| level(k) * x).sum();
+            // a hundred roundings of values up to 10
+            assert_close(*y, expected, 1000.0 * f64::EPSILON);
+        }
+    }
+}
+
+/// The floor alone makes the drive asymmetric: y gains half the error of the low level times Σx, less what the weights
+/// lose.
+#[test]
+fn a_floor_is_an_asymmetry() {
+    let parameters = "floor_v = 0.2\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 0.0";
+    let x = press_v();
+    let (y, u) = (
+        volts(&profile(&dac("compressive", parameters)), Mode::Compressive, &x, 1000),
+        volts(&profile(""), Mode::Compressive, &x, 1000),
+    );
+    let half = 0.5 * 0.2 / (4.34 / 256.0) / 127.5;
+    let sum: f64 = x.iter().sum();
+    for (y, u) in y.iter().zip(&u) {
+        assert_close(*y, (1.0 - half) * u + half * sum, 1000.0 * f64::EPSILON);
+    }
+}
+
+/// The curve of one cell, code by code, from a skin of one taxel.
+#[test]
+fn nonlinearity_stays_within_its_bounds() {
+    const INL: f64 = 0.3;
+    const DNL: f64 = 0.25;
+    let parameters = format!("floor_v = 0.0\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = {INL}\ndnl_lsb = {DNL}");
+    let mut x = vec![0.0; 100];
+    x[17] = 1.0;
+    let profile = analog(&dac("compressive", &parameters));
+    let weights = profile.weights(Mode::Compressive, 100).unwrap();
+    let mut curve = [f64::NAN; 256];
+    let y = volts(&profile, Mode::Compressive, &x, 20_000);
+    for (code, error) in (0_u32..).zip(&mut curve) {
+        let level = f64::from(code) / 127.5 - 1.0;
+        for (y, row) in y.iter().zip(0_u64..) {
+            if (weights.level(17, row) - level).abs() < 1e-9 {
+                let found = 127.5 * (1.0 + y) - f64::from(code);
+                // the same code gives the same output: 127.5 roundings of 1
+                assert!(error.is_nan() || (*error - found).abs() < 1e-12);
+                *error = found;
+            }
+        }
+    }
+    assert!(curve.iter().all(|e| e.is_finite()), "20 000 rows hold every code");
+    assert!(curve[0].abs() < 1e-12 && curve[255].abs() < 1e-12);
+    let worst = curve.iter().fold(0.0_f64, |w, e| w.max(e.abs()));
+    let step = curve.windows(2).fold(0.0_f64, |w, e| w.max((e[1] - e[0]).abs()));
+    assert!((INL - 0.5 * DNL..=INL + 0.5 * DNL).contains(&worst), "INL {worst}");
+    assert!((0.5 * DNL..=DNL + 4.0 * INL / 255.0).contains(&step), "DNL {step}");
+}
+
+/// A faulty cell's own code goes through its converter: one that is stuck at level 1 drives as code 255 does.
+#[test]
+fn faulty_cells_have_converters_too() {
+    let parameters = "floor_v = 0.2\noffset_v = [-0.04, 0.0]\ngain_lsb = [-10.0, 10.0]\ninl_lsb = 0.3\ndnl_lsb = 0.25";
+    let mut x = vec![0.0; 100];
+    x[40] = 1.0;
+    let high = |profile: &Profile| {
+        volts(profile, Mode::Compressive, &x, 300)
+            .into_iter()
+            .fold(f64::MIN, f64::max)
+    };
+    let sound = profile(&dac("compressive", parameters));
+    let faulty = profile(&format!(
+        "[[faults]]\nname = \"stuck\"\ntaxel = 40\n{}",
+        dac("compressive", parameters)
+    ));
+    let expected = high(&sound);
+    for y in volts(&faulty, Mode::Compressive, &x, 300) {
+        assert_close(y, expected, 8.0 * f64::EPSILON);
+    }
+}
+
+/// A cell's converter is a part: what codes 126 and 255 give in a raster scan of one session is what they give in
+/// compressive rows of another, and another device's differ.
+#[test]
+fn sessions_and_modes_share_the_converters() {
+    let parameters =
+        "floor_v = 0.0\noffset_v = [-0.04, 0.0]\ngain_lsb = [-10.0, 10.0]\ninl_lsb = [-0.3, 0.3]\ndnl_lsb = 0.25";
+    let profile = analog(&format!(
+        "{}\n{}",
+        dac("compressive", parameters),
+        dac("raster", parameters)
+    ));
+    let weights = profile.weights(Mode::Compressive, 100).unwrap();
+    let mut x = vec![0.0; 100];
+    x[23] = 1.0;
+    let level = |mode: Mode, device: u64, session: u64, row: usize| {
+        let mut readout = Readout::new(&profile, mode, &SkinLayout::default(), Streams::new(device), session).unwrap();
+        readout.acquire(&mut skin(&x), 20_000).unwrap().volts[row]
+    };
+    // codes 126 and 255 as errors of their levels; the raster counts 126 as level 0
+    for (code, scan, nominal) in [(126.0, 0, 0.0), (255.0, 23, 1.0)] {
+        let row_of_code = |row: &u64| (127.5 * (1.0 + weights.level(23, *row)) - code).abs() < 1e-6;
+        let row = usize::try_from((0..20_000).find(row_of_code).unwrap()).unwrap();
+        let raster = level(Mode::Raster, 3, 0, scan) - nominal;
+        for session in [0, 1] {
+            let compressive = level(Mode::Compressive, 3, session, row) - (code - 127.5) / 127.5;
+            // roundings of values up to 1
+            assert_close(compressive, raster, 16.0 * f64::EPSILON);
+        }
+        assert!((level(Mode::Raster, 4, 0, scan) - nominal - raster).abs() > 1e-6);
     }
 }

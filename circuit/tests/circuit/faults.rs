@@ -1,15 +1,13 @@
 //! What a faulty cell does, against sums with its own levels.
 
 use crate::effects::assert_close;
-use crate::readout::{press_v, profile, skin};
-use spts_circuit::{Mode, Profile, Readout, Weights};
-use spts_models::SkinLayout;
-use spts_models::Streams;
+use crate::readout::{press_v, profile, skin, start};
+use spts_circuit::{Mode, Profile, WeightMode, Weights};
 
 const ROWS: usize = 2000;
 
 fn volts(profile: &Profile, mode: Mode, skip: u64) -> Vec<f64> {
-    let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(11), 0).unwrap();
+    let mut readout = start(profile, mode, 11);
     readout.skip(skip);
     readout.acquire(&mut skin(&press_v()), ROWS).unwrap().volts
 }
@@ -50,7 +48,7 @@ fn a_stuck_cell_holds_its_level() {
 #[test]
 fn a_mis_seeded_cell_runs_on_its_own_sequence() {
     assert_forward("name = \"mis_seeded\"\ntaxel = 56", |w, k, row| {
-        if k == 56 && w.mode() != spts_circuit::WeightMode::Raster {
+        if k == 56 && w.mode() != WeightMode::Raster {
             w.mode().level_from_seed(2, row)
         } else {
             w.level(k, row)
@@ -116,14 +114,7 @@ fn a_detached_taxel_is_not_there() {
     let with = profile(&format!("[[faults]]\nname = \"detached\"\ntaxel = 40\n{effects}"));
     let mut x = press_v();
     x[40] = 0.0;
-    let mut without = Readout::new(
-        &profile(effects),
-        Mode::Compressive,
-        &SkinLayout::default(),
-        Streams::new(11),
-        0,
-    )
-    .unwrap();
+    let mut without = start(&profile(effects), Mode::Compressive, 11);
     let expected = without.acquire(&mut skin(&x), ROWS).unwrap().volts;
     for (y, expected) in volts(&with, Mode::Compressive, 0).iter().zip(&expected) {
         // roundings of sums of a hundred values up to 10, and of the norm's difference of squares
@@ -138,7 +129,7 @@ fn effects_see_the_faulty_levels() {
     let mut x = vec![0.0; 100];
     x[7] = 1.0;
     let faulty = profile(&format!("[[faults]]\nname = \"stuck\"\ntaxel = 7\n{late}"));
-    let mut readout = Readout::new(&faulty, Mode::Compressive, &SkinLayout::default(), Streams::new(1), 0).unwrap();
+    let mut readout = start(&faulty, Mode::Compressive, 1);
     let y = readout.acquire(&mut skin(&x), 20_000).unwrap().volts;
     // the very first measurement may be late: before it the cell was at mid-scale
     assert!(y[1..].iter().all(|y| (y - 1.0).abs() < 4.0 * f64::EPSILON));
@@ -153,8 +144,7 @@ fn missed_clocks_respect_faults() {
     x[7] = 1.0;
     let run = |fault: &str, effects: &str| {
         let profile = profile(&format!("{fault}\n{effects}"));
-        let mut readout =
-            Readout::new(&profile, Mode::Compressive, &SkinLayout::default(), Streams::new(1), 0).unwrap();
+        let mut readout = start(&profile, Mode::Compressive, 1);
         readout.acquire(&mut skin(&x), 1000).unwrap().volts
     };
     let on_taxel = |name: &str| format!("[[faults]]\nname = \"{name}\"\ntaxel = 7");

@@ -3,7 +3,8 @@
 use super::pins::PORT_VECTOR;
 use super::space::{FLASH_LEN, RAM_END, Space};
 use super::system::{Accepted, Access, Fault, Faults, ResetCause};
-use crate::avr::{Core, Event, Op, Program, ProgramError, disassemble, sreg};
+use crate::avr::{Core, Event, Op, Program, disassemble, sreg};
+use spts_input::Refusal;
 use std::fmt;
 use std::sync::Arc;
 
@@ -62,8 +63,8 @@ impl Device {
     /// The flash of an ATtiny412, starting with `flash`.
     ///
     /// # Errors
-    /// [`ProgramError::TooLong`] for more than 4096 bytes.
-    pub fn program(flash: &[u8]) -> Result<Arc<Program>, ProgramError> {
+    /// [`Refusal::TooLong`] for more than 4096 bytes.
+    pub fn program(flash: &[u8]) -> Result<Arc<Program>, Refusal> {
         Program::new(flash, usize::from(FLASH_LEN)).map(Arc::new)
     }
 

@@ -18,7 +18,7 @@
 //! cell.trace_until(20_000, |record| listing.push(record.to_string()));
 //! assert!(cell.is_asleep() && cell.dac_output() == Some(126));
 //! assert!(listing[0].contains("rjmp"));
-//! # Ok::<(), spts_firmware::avr::ProgramError>(())
+//! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
 mod device;

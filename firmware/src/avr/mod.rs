@@ -39,7 +39,7 @@ mod program;
 
 pub use self::core::{Core, Event, INTERRUPT_ENTRY_CYCLES, Step};
 pub use self::op::Op;
-pub use self::program::{Program, ProgramError, disassemble};
+pub use self::program::{Program, disassemble};
 
 /// Bits of the status register.
 pub mod sreg {

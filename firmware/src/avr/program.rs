@@ -1,26 +1,7 @@
 //! Flash memory, decoded once, and its instructions as text in avr-objdump's syntax.
 
 use super::op::Op;
-
-/// Why a flash cannot be built.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ProgramError {
-    /// The size is out of range.
-    #[error("flash has {bytes} bytes, but it must be a power of two from 2 to 131072")]
-    Size {
-        /// Size, bytes.
-        bytes: usize,
-    },
-    /// The program is larger than the flash.
-    #[error("program has {program} bytes, but flash has {flash}")]
-    TooLong {
-        /// Size of the program, bytes.
-        program: usize,
-        /// Size of the flash, bytes.
-        flash: usize,
-    },
-}
+use spts_input::Refusal;
 
 /// Program memory: its bytes and, word by word, its instructions. Devices with the same image share it by `Arc`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -35,18 +16,21 @@ impl Program {
     /// A flash of `flash_bytes` that starts with `image`; the rest is erased, 0xFF.
     ///
     /// # Errors
-    /// [`ProgramError`] if the flash is not a power of two from 2 bytes to 128 KiB, or the image does not fit.
-    pub fn new(image: &[u8], flash_bytes: usize) -> Result<Self, ProgramError> {
+    /// [`Refusal`] if the flash is not a power of two from 2 bytes to 128 KiB, or the image does not fit.
+    pub fn new(image: &[u8], flash_bytes: usize) -> Result<Self, Refusal> {
         let words = flash_bytes / 2;
         let mask = match u16::try_from(words.wrapping_sub(1)) {
             Ok(mask) if flash_bytes.is_power_of_two() => mask,
-            _ => return Err(ProgramError::Size { bytes: flash_bytes }),
+            _ => {
+                let needed = "it must be a power of two from 2 to 131072";
+                return Err(Refusal::new(format!("flash has {flash_bytes} bytes, but {needed}")));
+            }
         };
         if image.len() > flash_bytes {
-            return Err(ProgramError::TooLong {
-                program: image.len(),
-                flash: flash_bytes,
-            });
+            let program = image.len();
+            return Err(Refusal::new(format!(
+                "program has {program} bytes, but flash has {flash_bytes}"
+            )));
         }
         let mut bytes = vec![0xFF; flash_bytes].into_boxed_slice();
         bytes[..image.len()].copy_from_slice(image);

@@ -1,9 +1,9 @@
 //! Cells under a running clock.
 
 use spts_firmware::attiny412::ResetCause;
-use spts_firmware::{Array, ArrayError, BusEvent, Cell, CellMode, Clock, Image, NEUTRAL_CODE};
+use spts_firmware::{Array, BusEvent, Cell, CellMode, Clock, Image, NEUTRAL_CODE};
 
-use crate::helpers::{CLOCK, MODES, assert_agrees, clocked, expected, seeded, spec_state, state};
+use crate::helpers::{CLOCK, MODES, assert_agrees, clocked, expected, said, seeded, spec_state, state};
 
 #[test]
 fn all_addresses_and_modes_run_as_specified() {
@@ -24,27 +24,28 @@ fn all_addresses_and_modes_run_as_specified() {
 #[test]
 fn sizes_out_of_range_are_refused() {
     for cells in [0, 113] {
-        let error = Array::new(cells, &Image::shipped()).unwrap_err();
-        assert_eq!(error, ArrayError::Cells { cells });
+        let needed = format!("{cells} cells do not fit on one bus; the range is [1, 112]");
+        assert_eq!(said(Array::new(cells, &Image::shipped())), needed);
     }
     let (mut array, _) = seeded(3, CellMode::Raster);
-    let error = array.clock(CLOCK, &mut [0; 4]).unwrap_err();
-    assert_eq!(error, ArrayError::Codes { codes: 4, cells: 3 });
-    let error = array.start_with_seeds(CellMode::Binary, &[1, 2]).unwrap_err();
-    assert_eq!(error, ArrayError::Seeds { seeds: 2, cells: 3 });
-    for time_s in [-1e-9, 86_401.0, f64::INFINITY] {
-        assert_eq!(array.idle(time_s), Err(ArrayError::Idle { time_s }));
+    let needed = "`codes` has 4 entries, which is no multiple of the 3 cells";
+    assert_eq!(said(array.clock(CLOCK, &mut [0; 4])), needed);
+    assert_eq!(
+        said(array.start_with_seeds(CellMode::Binary, &[1, 2])),
+        "2 seeds for 3 cells"
+    );
+    for time_s in [-1e-9, 86_401.0, f64::INFINITY, f64::NAN] {
+        assert_eq!(
+            said(array.idle(time_s)),
+            format!("`time_s` = {time_s} is outside [0, 86400] s")
+        );
     }
-    assert!(array.idle(f64::NAN).is_err());
     let late = Clock {
         sample_delay_s: 14e-6,
         ..CLOCK
     };
-    let error = array.clock(late, &mut [0; 3]).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "`sample_delay_s` = 0.000014 is outside [0, 1/edge_hz) in whole ticks of 50 ns"
-    );
+    let needed = "`sample_delay_s` = 0.000014 is outside [0, 1/edge_hz) in whole ticks of 50 ns";
+    assert_eq!(said(array.clock(late, &mut [0; 3])), needed);
 }
 
 /// Edges run on while one cell after another is seeded anew. The others never miss one, and the new sequence of each

@@ -59,3 +59,8 @@ pub(crate) fn assert_agrees(array: &mut Array, cells: &mut [Cell]) {
         assert_eq!(cell.faults().first(), None);
     }
 }
+
+/// The message of what was refused.
+pub(crate) fn said<T: std::fmt::Debug>(result: Result<T, spts_input::Refusal>) -> String {
+    result.unwrap_err().to_string()
+}

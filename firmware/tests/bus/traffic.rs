@@ -1,27 +1,28 @@
 //! What a master can say.
 
 use spts_firmware::attiny412::{Device, ResetCause};
-use spts_firmware::{Array, BusError, BusEvent, BusReply, Cell, CellMode, Image};
+use spts_firmware::{Array, BusEvent, BusReply, Cell, CellMode, Image};
 
-use crate::helpers::{CLOCK, assert_agrees, clocked, expected, seeded, spec_state, state};
+use crate::helpers::{CLOCK, assert_agrees, clocked, expected, said, seeded, spec_state, state};
 
 #[test]
 fn a_foreign_address_is_heard_by_all_and_taken_by_none() {
     let (mut array, mut cells) = seeded(3, CellMode::Analog);
     for address in (0..128).filter(|a| !(8..11).contains(a)) {
-        let silence = Err(BusError::NoAcknowledge { address });
-        assert_eq!(array.write(address, &[2, 77]), silence);
-        assert_eq!(array.read(address, &mut [0]), silence);
+        let silence = format!("no cell acknowledges address {address}");
+        assert_eq!(said(array.write(address, &[2, 77])), silence);
+        assert_eq!(said(array.read(address, &mut [0])), silence);
     }
     // a master that talks on although nobody answers
     let mut events = vec![BusEvent::Start];
     events.extend([50 << 1, 2, 8].map(BusEvent::Write));
     events.push(BusEvent::Stop);
     assert_eq!(array.transact(&events).unwrap(), [BusReply::Acknowledged(false); 3]);
-    assert_eq!(array.write(136, &[2, 77]), Err(BusError::Address { address: 136 }));
+    assert_eq!(said(array.write(136, &[2, 77])), "bus address 136 is outside [0, 127]");
     for bits in [0, 8, u8::MAX] {
         let events = [BusEvent::Start, BusEvent::Bits(bits), BusEvent::Stop];
-        assert_eq!(array.transact(&events), Err(BusError::Bits { bits }));
+        let odd = format!("`bits` = {bits} of an incomplete byte is outside [1, 7]");
+        assert_eq!(said(array.transact(&events)), odd);
     }
     assert_agrees(&mut array, &mut cells);
 }
@@ -130,12 +131,12 @@ fn a_cell_that_holds_the_clock_is_reported() {
     ]);
     let mut array = Array::new(2, &mute).unwrap();
     array.run_clock(CLOCK).unwrap();
-    let stuck = Err(BusError::Stuck { address: 9 });
-    assert_eq!(array.write(9, &[1, 2]), stuck);
-    assert_eq!(array.write(50, &[]), stuck, "the bus stays blocked for all");
-    assert_eq!(array.read(9, &mut [0]), stuck);
+    let stuck = "the cell at address 9 has held the bus clock low for 25 ms";
+    assert_eq!(said(array.write(9, &[1, 2])), stuck);
+    assert_eq!(said(array.write(50, &[])), stuck, "the bus stays blocked for all");
+    assert_eq!(said(array.read(9, &mut [0])), stuck);
     array.cell_mut(9).unwrap().reset(ResetCause::External);
-    assert_eq!(array.write(50, &[]), Err(BusError::NoAcknowledge { address: 50 }));
+    assert_eq!(said(array.write(50, &[])), "no cell acknowledges address 50");
 }
 
 /// A program that gathers in SRAM every flag that TWI0.SSTATUS ever shows.
@@ -191,7 +192,7 @@ fn two_cells_with_one_address_collide_without_hanging() {
     array.write(9, &CellMode::Analog.pair(9)).unwrap();
     let codes = clocked(&mut array, 40);
     assert!(codes.chunks(3).all(|row| row[1] == row[2]), "both took the seed");
-    assert_eq!(array.read(10, &mut [0]), Err(BusError::NoAcknowledge { address: 10 }));
+    assert_eq!(said(array.read(10, &mut [0])), "no cell acknowledges address 10");
     cells[1].receive(&CellMode::Analog.pair(9));
     let own: Vec<u8> = codes.iter().skip(1).step_by(3).copied().collect();
     assert_eq!(own, expected(&mut cells[1..2], 40));
