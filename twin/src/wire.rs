@@ -46,7 +46,8 @@ impl Wire {
         let layout = chain.skin();
         let shape = [layout.rows(), layout.cols()];
         let mut skin = chain.skin_session(session);
-        let mut felt = Constant::new(skin.hold(&PressureMap::zeros(shape[0], shape[1]), 0.0))?;
+        let mut felt =
+            Constant::new(skin.hold(&PressureMap::zeros(shape[0], shape[1]), 0.0)).map_err(ChainError::Source)?;
         let mut line = |mode| {
             let mut readout = chain.readout(mode, session)?;
             let idle = readout.measure(&mut felt, IDLE)?;
@@ -74,14 +75,14 @@ impl Wire {
     pub fn feel(&mut self, electrode_pressure: &PressureMap, dt_s: f64) -> Result<(), ChainError> {
         let found = [electrode_pressure.rows(), electrode_pressure.cols()];
         assert_eq!(found, self.shape, "shape of the pressure");
-        self.felt = Constant::new(self.skin.hold(electrode_pressure, dt_s))?;
+        self.felt = Constant::new(self.skin.hold(electrode_pressure, dt_s)).map_err(ChainError::Source)?;
         Ok(())
     }
 
     /// Fills `volts` with consecutive measurements, V.
     ///
     /// # Errors
-    /// [`ChainError::Acquire`] if the cells put out nothing.
+    /// [`ChainError::Readout`] if the cells put out nothing.
     pub fn measure(&mut self, mode: Mode, volts: &mut [f64]) -> Result<(), ChainError> {
         let line = &mut self.lines[index(mode)];
         Ok(line.readout.go_on(&mut self.felt, volts)?)

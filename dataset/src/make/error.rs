@@ -2,8 +2,8 @@
 
 use crate::spec::SpecError;
 use spts::ChainError;
-use spts_circuit::{AcquireError, SourceError};
 use spts_contact::EquilibriumError;
+use spts_input::Refusal;
 #[cfg(feature = "mujoco")]
 use spts_sim::SimError;
 
@@ -50,10 +50,7 @@ pub enum RowCause {
     /// Skin or readout is not valid.
     #[error(transparent)]
     Chain(#[from] ChainError),
-    /// The readout refuses the conductance.
+    /// The conductance is not valid, or the readout refuses it.
     #[error(transparent)]
-    Acquire(#[from] AcquireError),
-    /// The conductance is not valid.
-    #[error(transparent)]
-    Source(#[from] SourceError),
+    Refused(#[from] Refusal),
 }

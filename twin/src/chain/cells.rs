@@ -1,9 +1,10 @@
 //! Emulated cells of a skin: what their firmware puts out, row by row.
 
-use spts_circuit::{CellCodes, CodesError, Patterns, WeightMode, Weights};
+use spts_circuit::{CellCodes, Patterns, WeightMode, Weights};
 use spts_firmware::{
-    Array, ArrayError, CellMode, Clock, FIRST_ADDRESS, Image, LAST_ADDRESS, LAST_BUS_ADDRESS, PATTERN_BITS, Pattern,
+    Array, CellMode, Clock, FIRST_ADDRESS, Image, LAST_ADDRESS, LAST_BUS_ADDRESS, PATTERN_BITS, Pattern,
 };
+use spts_input::Refusal;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -44,7 +45,7 @@ pub enum CellsError {
     },
     /// The emulated array refused its configuration.
     #[error(transparent)]
-    Array(#[from] ArrayError),
+    Array(#[from] Refusal),
 }
 
 /// Emulated cells that run the shipped firmware. One bus serves up to 112 cells; the cells are seeded over the bus and
@@ -149,7 +150,7 @@ impl FirmwareCells {
     }
 
     /// Clocks as many rows as `out` holds.
-    fn clock(&mut self, out: &mut [u8]) -> Result<(), ArrayError> {
+    fn clock(&mut self, out: &mut [u8]) -> Result<(), Refusal> {
         let rows = out.len() / self.taxels;
         if let [only] = &mut self.buses[..] {
             only.clock(self.clock, out)?;
@@ -169,7 +170,7 @@ impl FirmwareCells {
     }
 
     /// Goes to where the next edge brings `row`.
-    fn go_to(&mut self, row: u64) -> Result<(), ArrayError> {
+    fn go_to(&mut self, row: u64) -> Result<(), Refusal> {
         if row < self.row {
             self.buses.clone_from(&self.seeded);
             self.row = 0;
@@ -236,7 +237,7 @@ pub fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Resu
     let mut array = Array::new(cells, image)?;
     for (address, taxel) in (FIRST_ADDRESS..).zip(first..first + cells) {
         let message = start_message(weights, taxel, address)?;
-        array.write(address, &message).map_err(ArrayError::from)?;
+        array.write(address, &message)?;
     }
     Ok(array)
 }
@@ -246,12 +247,9 @@ impl CellCodes for FirmwareCells {
         self.taxels
     }
 
-    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
         let clocked = self.go_to(first_row).and_then(|()| self.clock(out));
-        clocked.map_err(|error| CodesError::Row {
-            row: first_row,
-            reason: error.to_string(),
-        })?;
+        clocked.map_err(|error| error.at(format!("no codes from row {first_row} on")))?;
         self.count_unlike(first_row, out);
         Ok(())
     }

@@ -1,6 +1,6 @@
 //! Errors of the chain from transducer to recording.
 
-use spts_circuit::ProfileError;
+use spts_input::Refusal;
 use spts_models::{TransducerError, in_section};
 use std::path::{Path, PathBuf};
 
@@ -73,15 +73,12 @@ pub enum ChainError {
         /// Cause.
         source: std::io::Error,
     },
-    /// The readout cannot be set up.
+    /// The readout cannot be set up, or could not make the recording.
     #[error("readout: {0}")]
-    Readout(#[from] ProfileError),
+    Readout(#[from] Refusal),
     /// A conductance that the readout cannot use.
     #[error("conductance: {0}")]
-    Source(#[from] spts_circuit::SourceError),
-    /// The readout could not make the recording.
-    #[error("readout: {0}")]
-    Acquire(#[from] spts_circuit::AcquireError),
+    Source(#[source] Refusal),
     /// A press that is too long to record.
     #[error("`duration_s` = {duration_s}: {measurements:.0} measurements a press are outside [1, {limit:.0}]")]
     TooLong {
@@ -110,19 +107,11 @@ impl ChainError {
     }
 
     /// What is wrong with the readout profile, which is in the file `path` unless it goes by a name.
-    pub(super) fn profile(path: Option<&Path>, error: &ProfileError) -> Self {
-        match error {
-            ProfileError::UnknownProfile { name, known } => Self::UnknownProfile {
-                name: name.clone(),
-                known: known.clone(),
-            },
-            other => {
-                let message = in_section("readout", &other.to_string());
-                Self::Profile(match path {
-                    Some(path) => format!("{}: {message}", path.display()),
-                    None => message,
-                })
-            }
-        }
+    pub(super) fn profile(path: Option<&Path>, error: &Refusal) -> Self {
+        let message = in_section("readout", &error.to_string());
+        Self::Profile(match path {
+            Some(path) => format!("{}: {message}", path.display()),
+            None => message,
+        })
     }
 }

@@ -88,7 +88,7 @@ impl SkinSession {
     /// [`ChainError::Source`] if the frames are not in order of time.
     pub fn conductance(&mut self, frames: &[Frame]) -> Result<Interpolated, ChainError> {
         let times_s = frames.iter().map(|frame| frame.time_s).collect();
-        Ok(Interpolated::new(times_s, self.press(frames))?)
+        Interpolated::new(times_s, self.press(frames)).map_err(ChainError::Source)
     }
 }
 

@@ -65,7 +65,10 @@ impl Chain {
             ..self.profile().clone()
         };
         let mut readout = Readout::new(&profile, Mode::Compressive, &one, self.streams(), 0)?;
-        let volts = readout.measure(&mut Constant::new(conductance)?, MEASUREMENTS)?;
+        let volts = readout.measure(
+            &mut Constant::new(conductance).map_err(ChainError::Source)?,
+            MEASUREMENTS,
+        )?;
         let mut weights = vec![0.0; MEASUREMENTS];
         readout.weights().fill_rows(0, &mut weights);
         let converter = readout.info().converter;

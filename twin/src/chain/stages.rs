@@ -6,8 +6,9 @@ use super::config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
 use super::error::ChainError;
 use super::rows::RowsFile;
 use super::weights::{DEFAULT_WEIGHTS, WeightSource};
-use spts_circuit::{AcquireError, FaultConfig, Interpolated, Mode, Profile, ProfileError, Readout, Recording};
+use spts_circuit::{FaultConfig, Interpolated, Mode, PROFILES, Profile, Readout, Recording};
 use spts_contact::Frame;
+use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transducer, explain_toml, in_section};
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -70,9 +71,16 @@ impl Chain {
         let readout = config.readout.as_deref().unwrap_or(DEFAULT_READOUT);
         let profile_file = ProfileFile::of(readout, folder)?;
         let path = profile_file.as_ref().map(|file| file.path.as_path());
-        let in_file = |error: ProfileError| ChainError::profile(path, &error);
+        let in_file = |error: Refusal| ChainError::profile(path, &error);
         let profile = match &profile_file {
             Some(file) => Profile::from_toml(&file.text),
+            None if PROFILES.iter().all(|(known, _)| *known != readout) => {
+                let known: Vec<&str> = PROFILES.iter().map(|(known, _)| *known).collect();
+                return Err(ChainError::UnknownProfile {
+                    name: readout.to_owned(),
+                    known: known.join(", "),
+                });
+            }
             None => Profile::named(readout),
         };
         let (profile, rows_file) = config.rows.applied(profile.map_err(in_file)?, skin, folder)?;
@@ -158,7 +166,7 @@ impl Chain {
                 let weights = self.profile.weights(mode, taxels(&self.skin))?;
                 let cells = FirmwareCells::new(&weights, self.profile.sample_rate_hz)?;
                 let cells = cells.counting(Arc::clone(&self.unlike_codes));
-                Ok(readout.with_codes(Box::new(cells)).map_err(AcquireError::from)?)
+                Ok(readout.with_codes(Box::new(cells))?)
             }
         }
     }

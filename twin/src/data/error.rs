@@ -86,7 +86,7 @@ pub enum DataError {
         /// File.
         path: PathBuf,
         /// Cause.
-        source: spts_circuit::RecordingError,
+        source: spts_input::Refusal,
     },
     /// A session that cannot be scored.
     #[error("{path}: session {session}: `{field}` = {value}; scoring needs {needed}", path = path.display())]

@@ -97,7 +97,7 @@ pub enum SessionError {
         /// Which of the two recordings.
         mode: &'static str,
         /// Cause.
-        source: spts_circuit::RecordingError,
+        source: spts_input::Refusal,
     },
     /// The folder cannot be written.
     #[error(transparent)]

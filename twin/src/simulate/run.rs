@@ -6,7 +6,7 @@ use super::summary::PressSummary;
 use crate::chain::ChainError;
 use crate::record::{PressFrames, Twin, TwinError, TwinSession};
 use crate::session::{Recorded, Session};
-use spts_circuit::{AcquireError, Interpolated, Mode, Recording};
+use spts_circuit::{Interpolated, Mode, Recording};
 use spts_contact::Frame;
 use std::time::{Duration, Instant};
 
@@ -208,7 +208,7 @@ fn keep_first(kept: &mut Option<Recorded>, piece: Option<&Recorded>) -> Result<(
     presses.extend_from_slice(&piece.presses[..more]);
     let recording = Recording::new(piece.recording.info().clone(), blocks);
     *kept = Some(Recorded {
-        recording: recording.map_err(|e| TwinError::from(ChainError::from(AcquireError::from(e))))?,
+        recording: recording.map_err(|e| TwinError::from(ChainError::from(e)))?,
         conditioning: 0,
         presses,
     });

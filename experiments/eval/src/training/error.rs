@@ -55,7 +55,7 @@ pub enum LearnError {
     Network(#[source] Box<NetworkError>),
     /// A gain makes a sample infinite.
     #[error("gains: {0}")]
-    Recording(#[from] spts_circuit::RecordingError),
+    Recording(#[from] spts_input::Refusal),
 }
 
 impl From<ShapesError> for LearnError {

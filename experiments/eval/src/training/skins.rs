@@ -10,9 +10,10 @@ use spts::chain::{Acquisition, DEFAULT_READOUT};
 use spts::record::{Twin, TwinError};
 use spts::scene::{PressConfig, Scene, SceneConfig};
 use spts::session::{Event, Recorded};
-use spts_circuit::{Block, Mode, Recording, RecordingError};
+use spts_circuit::{Block, Mode, Recording};
 use spts_contact::WinklerConfig;
 use spts_contact::objects::{OBJECTS, ObjectSpec};
+use spts_input::Refusal;
 use spts_models::{ConfigError, SkinLayout, Streams, VelostatConfig, in_range};
 use std::path::Path;
 
@@ -105,7 +106,7 @@ pub enum SkinsError {
         /// Name of the object.
         object: &'static str,
         /// Cause.
-        source: RecordingError,
+        source: Refusal,
     },
 }
 
@@ -222,10 +223,10 @@ fn scattered(factor: f64, streams: Streams, label: &str, index: u64) -> f64 {
 }
 
 /// One session of the blocks of all `recordings`.
-fn joined(recordings: Vec<Recording>) -> Result<Recording, RecordingError> {
+fn joined(recordings: Vec<Recording>) -> Result<Recording, Refusal> {
     let blocks: Vec<Block> = recordings.iter().flat_map(|r| r.blocks().iter().cloned()).collect();
     let Some(first) = recordings.first() else {
-        return Err(RecordingError::Empty { field: "blocks" });
+        return Err(Refusal::range("blocks", 0, "[1, ∞)"));
     };
     first.with_blocks(blocks)
 }

@@ -2,7 +2,7 @@
 
 use super::profile::FittedReadout;
 use spts::chain::DEFAULT_READOUT;
-use spts_circuit::{PROFILES, Profile, ProfileError};
+use spts_circuit::{PROFILES, Profile};
 
 /// Why fitted values are not a valid profile.
 #[derive(Debug, thiserror::Error)]
@@ -16,7 +16,7 @@ pub enum FittedError {
     Text(#[from] toml::ser::Error),
     /// The readout refuses the profile.
     #[error(transparent)]
-    Profile(#[from] ProfileError),
+    Profile(#[from] spts_input::Refusal),
 }
 
 /// The profile of `readings` and its text, for a skin of `taxels` taxels. Undetermined parameters are taken from the

@@ -46,18 +46,15 @@ pub enum ReplayError {
     /// The fitted values are not a valid profile.
     #[error("the fitted profile: {0}")]
     Fitted(#[from] FittedError),
-    /// The readout refuses the profile.
+    /// The readout refuses the profile, or could not record.
     #[error("readout: {0}")]
-    Profile(#[from] spts_circuit::ProfileError),
+    Readout(#[from] spts_input::Refusal),
     /// The fitted image is not a valid conductance.
     #[error("conductance: {0}")]
-    Source(#[from] spts_circuit::SourceError),
-    /// The readout could not record.
-    #[error("readout: {0}")]
-    Acquire(#[from] spts_circuit::AcquireError),
+    Source(#[source] spts_input::Refusal),
     /// The blocks do not form a valid recording.
     #[error(transparent)]
-    Recording(#[from] spts_circuit::RecordingError),
+    Recording(spts_input::Refusal),
 }
 
 /// Conductance of a press as a function of time, by the number of the press.
@@ -88,7 +85,7 @@ pub fn replay(
     for (block, recorded) in anew {
         all[block] = recorded;
     }
-    Ok(real.with_blocks(all)?)
+    real.with_blocks(all).map_err(ReplayError::Recording)
 }
 
 fn press(
@@ -150,5 +147,5 @@ fn conductance(
         let siemens = image.iter().map(|x| x.max(0.0) / profile.volts_per_siemens());
         maps.push(ConductanceMap::from_values(1, real.taxels(), siemens.collect()));
     }
-    Ok(Interpolated::new(times_s, maps)?)
+    Interpolated::new(times_s, maps).map_err(ReplayError::Source)
 }

@@ -71,12 +71,9 @@ pub enum DesignError {
     /// Touches that cannot be drawn or measured.
     #[error(transparent)]
     Touch(#[from] TouchError),
-    /// A value outside the range of the skin, the amplifier or the readout.
+    /// A value outside the range of the skin, the amplifier, the readout or the weights.
     #[error(transparent)]
     Config(#[from] spts_models::ConfigError),
-    /// A readout that cannot be built.
-    #[error(transparent)]
-    Profile(#[from] spts_circuit::ProfileError),
     /// A profile lacks a stage that the design changes.
     #[error("profile {profile}: no `{name}`")]
     NoStage {
@@ -88,9 +85,6 @@ pub enum DesignError {
     /// A profile cannot be written as text.
     #[error("profile: {0}")]
     ProfileText(#[from] toml::ser::Error),
-    /// Rows that are not valid weights.
-    #[error(transparent)]
-    Weights(#[from] spts_circuit::WeightsError),
     /// Rows that cannot be designed.
     #[error(transparent)]
     Rows(#[from] spts_recon::rows::RowError),

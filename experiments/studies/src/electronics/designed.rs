@@ -13,7 +13,7 @@ impl ElectronicsStudy {
     /// # Errors
     /// [`ElectronicsError`] if the profile has no amplifier or no converter.
     pub fn as_designed() -> Result<Self, ElectronicsError> {
-        let profile = Profile::named("as_designed")?;
+        let profile = Profile::named("as_designed").map_err(ElectronicsError::Profile)?;
         let stage = |stage: &'static str| {
             let table = profile.compressive.get(stage).cloned();
             table.ok_or(ElectronicsError::NoStage { stage })

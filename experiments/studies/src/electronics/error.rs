@@ -6,7 +6,7 @@
 pub enum ElectronicsError {
     /// The profile `as_designed` is not usable.
     #[error("profile as_designed: {0}")]
-    Profile(#[from] spts_circuit::ProfileError),
+    Profile(#[source] spts_input::Refusal),
     /// The profile `as_designed` lacks a stage.
     #[error("profile as_designed: no `compressive.{stage}`")]
     NoStage {

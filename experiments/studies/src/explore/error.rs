@@ -9,12 +9,9 @@ pub enum ExploreError {
     /// The electronics of as_designed cannot be used.
     #[error(transparent)]
     Electronics(#[from] ElectronicsError),
-    /// The amplifier of a wire cannot be built.
+    /// The amplifier or the readout of a wire cannot be built, or the wire cannot be measured.
     #[error(transparent)]
-    Amplifier(#[from] spts_models::ConfigError),
-    /// The readout of a wire cannot be built.
-    #[error(transparent)]
-    Profile(#[from] spts_circuit::ProfileError),
+    Refused(#[from] spts_input::Refusal),
     /// A profile lacks an effect, or the effect lacks a value.
     #[error("profile {profile}: no `compressive.{name}`")]
     NoEffect {
@@ -26,12 +23,6 @@ pub enum ExploreError {
     /// There are more taxels on a wire than seeds.
     #[error("taxels of a wire: {0}")]
     Cells(#[from] std::num::TryFromIntError),
-    /// The conductance of the taxels is not valid.
-    #[error(transparent)]
-    Source(#[from] spts_circuit::SourceError),
-    /// A wire cannot be measured.
-    #[error(transparent)]
-    Acquire(#[from] spts_circuit::AcquireError),
     /// The cells' generator has no operator.
     #[error(transparent)]
     Generator(#[from] spts_recon::RangeError),

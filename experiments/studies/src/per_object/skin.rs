@@ -186,7 +186,11 @@ impl ReadoutOfImages {
             let idle = map(vec![0.0; image.len()]);
             Interpolated::new(times_s.clone(), vec![idle.clone(), idle, map(image.clone())])
         };
-        let mut presses = images.iter().map(press).collect::<Result<Vec<_>, _>>()?;
+        let mut presses = images
+            .iter()
+            .map(press)
+            .collect::<Result<Vec<_>, _>>()
+            .map_err(PerObjectError::Source)?;
         let session = self.session + u64::from(mode == Mode::Compressive);
         let mut readout = Readout::new(&self.profile, mode, &self.layout, self.streams, session)?;
         let recording = readout.record(&mut presses, FRAMES * self.layout.taxels(), GAP)?;

@@ -10,11 +10,11 @@ use serde::Serialize;
 use spts::data::DataError;
 use spts::progress::Progress;
 use spts::record::TwinError;
-use spts_circuit::{AcquireError, ProfileError, SourceError};
 use spts_contact::objects::OBJECTS;
 use spts_eval::board::{BoardSettings, ObjectRow, find};
 use spts_eval::training::{SkinGainsError, TrainingPresses, TrainingSource, templates};
 use spts_eval::{ScoreError, Sensing, Source};
+use spts_input::Refusal;
 use spts_recon::classify::LibraryError;
 use std::path::Path;
 
@@ -42,15 +42,12 @@ pub enum PerObjectError {
     /// The sessions cannot be scored.
     #[error(transparent)]
     Score(#[from] ScoreError),
-    /// The readout refuses its profile.
+    /// The readout refuses its profile, or could not record.
     #[error("readout: {0}")]
-    Profile(#[from] ProfileError),
+    Readout(#[from] Refusal),
     /// An image is not a valid conductance.
     #[error("conductance: {0}")]
-    Source(#[from] SourceError),
-    /// The readout could not record.
-    #[error("readout: {0}")]
-    Acquire(#[from] AcquireError),
+    Source(#[source] Refusal),
     /// The gains of the skin are not known.
     #[error("gains of the skin: {0}")]
     Gains(#[from] SkinGainsError),

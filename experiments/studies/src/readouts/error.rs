@@ -14,18 +14,12 @@ pub enum ReadoutsError {
     /// The wire of a size cannot be built.
     #[error(transparent)]
     Wiring(#[from] ExploreError),
-    /// The amplifier or the skin cannot be built.
+    /// The amplifier, the skin or the readout of a wire cannot be built, or the cells do not fit the wire.
     #[error(transparent)]
     Config(#[from] spts_models::ConfigError),
     /// A touch cannot be drawn or measured.
     #[error(transparent)]
     Touch(#[from] TouchError),
-    /// The readout of a wire cannot be built.
-    #[error(transparent)]
-    Profile(#[from] spts_circuit::ProfileError),
-    /// The cells do not fit the wire.
-    #[error(transparent)]
-    Codes(#[from] spts_circuit::CodesError),
     /// The rows cannot be designed.
     #[error(transparent)]
     Rows(#[from] spts_recon::rows::RowError),

@@ -1,6 +1,7 @@
 //! Outputs of cells that replace those of their generators.
 
-use spts_circuit::{CellCodes, CodesError};
+use spts_circuit::CellCodes;
+use spts_input::Refusal;
 use std::sync::Arc;
 
 /// DAC codes of the levels −1, 0 and +1.
@@ -97,7 +98,7 @@ impl CellCodes for StoredRows {
         self.taxels
     }
 
-    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
         for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.taxels)) {
             let levels = self.row(repeated(row, self.len()));
             out.iter_mut().zip(levels).for_each(|(out, level)| *out = code(*level));
@@ -161,7 +162,7 @@ impl CellCodes for WalshRows {
         self.taxels
     }
 
-    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), CodesError> {
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
         for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.taxels)) {
             let row = repeated(row, self.rows());
             for (k, out) in out.iter_mut().enumerate() {

@@ -10,13 +10,7 @@ pub enum TouchError {
     /// A touch cannot be pressed.
     #[error(transparent)]
     Row(#[from] spts_dataset::RowError),
-    /// The readout cannot be built.
+    /// The readout cannot be built, or cannot measure the conductance of the taxels.
     #[error(transparent)]
-    Profile(#[from] spts_circuit::ProfileError),
-    /// A touch cannot be measured.
-    #[error(transparent)]
-    Acquire(#[from] spts_circuit::AcquireError),
-    /// The conductance of the taxels is not valid.
-    #[error(transparent)]
-    Source(#[from] spts_circuit::SourceError),
+    Refused(#[from] spts_input::Refusal),
 }

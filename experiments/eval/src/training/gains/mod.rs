@@ -8,7 +8,8 @@ use crate::session::ScoredSession;
 use mixed::{Effects, MixedModel, Ratio};
 use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
-use spts_circuit::{Block, RecordingError};
+use spts_circuit::Block;
+use spts_input::Refusal;
 use spts_models::{Streams, TaxelGains, VelostatConfig};
 use spts_recon::classify::Library;
 use spts_recon::metrics::pearson;
@@ -184,12 +185,12 @@ impl SkinGains {
 /// that their mean image is close to that of the mean gains. The result depends only on `streams`.
 ///
 /// # Errors
-/// [`RecordingError`] if a gain makes a sample infinite.
+/// [`Refusal`] if a gain makes a sample infinite.
 pub fn on_skins_with(
     gains: &TaxelGains,
     sessions: &[ScoredSession],
     streams: Streams,
-) -> Result<Vec<ScoredSession>, RecordingError> {
+) -> Result<Vec<ScoredSession>, Refusal> {
     let session_gains = TaxelGains {
         log_sd: gains.session_log_sd().collect(),
         ..gains.clone()
