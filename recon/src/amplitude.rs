@@ -1,7 +1,7 @@
 //! Integrates over an unknown amplitude: y = s·(t + noise), where the scale of `s` is not known.
 
 use crate::checks::{RangeError, within};
-use crate::elementary::{exp, ln};
+use crate::kernels::{exp, ln};
 use multiversion::multiversion;
 
 /// Range of the amplitude `s`. The prior density of ln s is constant over it.

@@ -20,9 +20,9 @@
 
 mod amplitude;
 mod checks;
+mod cholesky;
 pub mod classify;
 pub mod dictionary;
-mod elementary;
 mod kernels;
 pub mod localise;
 mod matrix;
@@ -33,18 +33,14 @@ mod problem;
 pub mod raster;
 pub mod recover;
 pub mod rows;
-mod shifted;
-mod sign_rows;
+mod sign_tables;
 pub mod statistics;
 mod stop;
-mod table_kernels;
-mod workspace;
 
 pub use amplitude::AmplitudeRange;
 pub use checks::RangeError;
 pub use matrix::{Matrix, MatrixView, ShapeError};
 pub use operator::LinearOperator;
-pub use problem::{Problem, Recover, RecoverError, Solution};
-pub use sign_rows::{SignTables, TableFloat};
+pub use problem::{Problem, Recover, RecoverError, Solution, Workspace};
+pub use sign_tables::{SignTables, TableFloat};
 pub use stop::{StopRule, Stopped};
-pub use workspace::Workspace;

@@ -17,12 +17,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod detect;
-mod fista;
-mod grain;
 mod pursuit;
 mod sheet;
 
-pub use fista::Descent;
-pub use pursuit::{Found, RegionPursuit};
+pub use pursuit::{Descent, Found, RegionPursuit};
 pub use sheet::{SheetDecoder, SheetError, SheetNoise, SheetPrior};

@@ -1,10 +1,7 @@
 //! Reconstructs many small contacts on a large skin.
 
-use super::detect::{Detection, Detector, dilate, is_nothing};
-use super::fista::{Descent, NnFista, check, subtract};
-use super::grain::Grains;
-use crate::kernels::norm;
-use crate::operator::{Atom, Composition, LinearOperator, SelectColumns};
+use crate::kernels::{axpy, dot, norm};
+use crate::operator::{Atom, Composition, LinearOperator, SelectColumns, ShiftedDictionary};
 use crate::problem::RecoverError;
 
 /// Finds contacts, smooth patches of a few taxels, in measurements y = Φ x + noise of a large image x ≥ 0. It needs
@@ -265,12 +262,404 @@ impl<'a, A: SelectColumns> Search<'a, A> {
     }
 }
 
+/// Matched filters: blobs at every place.
+pub(super) struct Detector {
+    blobs: ShiftedDictionary,
+    /// The same with every value squared.
+    squares: ShiftedDictionary,
+    taxels: usize,
+}
+
+/// A place, and how far its correlation stands out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Detection {
+    pub(super) place: usize,
+    /// Value in standard deviations of what chance gives.
+    pub(super) score: f64,
+}
+
+impl Detector {
+    /// Filters for `blobs` in images of `rows` × `cols`.
+    pub(super) fn new(rows: usize, cols: usize, blobs: &[Atom]) -> Self {
+        let squares: Vec<Atom> = blobs.iter().map(Atom::squared).collect();
+        Self {
+            blobs: ShiftedDictionary::new(rows, cols, blobs),
+            squares: ShiftedDictionary::new(rows, cols, &squares),
+            taxels: rows * cols,
+        }
+    }
+
+    /// Score that chance reaches `false_alarms` times in all places and blobs together: the z of a normal tail,
+    /// P(Z > z) ≤ e^(−z²/2)/2.
+    pub(super) fn threshold(&self, false_alarms: f64) -> f64 {
+        (2.0 * (0.5 * self.blobs.ncols() as f64 / false_alarms).ln())
+            .max(0.0)
+            .sqrt()
+    }
+
+    /// Places whose best blob scores more than `threshold`, in increasing order. `correlation` is Φᵀ r of a residual,
+    /// `variance` what chance gives its entries
+    /// ([`SelectColumns::chance_variance`](crate::operator::SelectColumns::chance_variance)).
+    pub(super) fn detect(&self, correlation: &[f64], variance: &[f64], threshold: f64) -> Vec<Detection> {
+        let (mut scores, mut variances) = (vec![0.0; self.blobs.ncols()], vec![0.0; self.blobs.ncols()]);
+        self.blobs.apply_adjoint(correlation, &mut scores);
+        self.squares.apply_adjoint(variance, &mut variances);
+        let largest = variances.iter().copied().fold(0.0, f64::max);
+        let mut best = vec![0.0_f64; self.taxels];
+        for (scores, variances) in scores
+            .chunks_exact(self.taxels)
+            .zip(variances.chunks_exact(self.taxels))
+        {
+            for (best, (score, variance)) in best.iter_mut().zip(scores.iter().zip(variances)) {
+                // where the edge leaves next to nothing of a blob, or a wire next to nothing of the residual, there is
+                // but rounding
+                if *variance > ROUNDING * largest {
+                    *best = best.max(score / variance.sqrt());
+                }
+            }
+        }
+        let above = best.iter().enumerate().filter(|(_, score)| **score > threshold);
+        above.map(|(place, &score)| Detection { place, score }).collect()
+    }
+
+    /// Numbers of bytes that the filters and one detection hold: both sets of spectra, and two numbers a place and
+    /// blob.
+    pub(super) fn bytes(&self) -> usize {
+        4 * self.blobs.ncols() * size_of::<f64>() + 3 * self.taxels * size_of::<f64>()
+    }
+}
+
+/// Variance over the largest one below which transforms leave but rounding.
+const ROUNDING: f64 = 1e-10;
+
+/// Adds every place within `reach` taxels of one that is `marked`; with a reach of 2.5, the 21 places of a rounded
+/// square.
+pub(super) fn dilate((rows, cols): (usize, usize), marked: &[usize], reach: f64, out: &mut [bool]) {
+    #[expect(clippy::cast_possible_truncation, reason = "a reach is a few taxels")]
+    let side = reach.max(0.0).floor() as isize;
+    let near = |dr: isize, dc: isize| (dr * dr + dc * dc) as f64 <= reach * reach;
+    for &place in marked {
+        let (r, c) = (place / cols, place % cols);
+        for (dr, dc) in (-side..=side).flat_map(|dr| (-side..=side).map(move |dc| (dr, dc))) {
+            if let (Some(r), Some(c)) = (r.checked_add_signed(dr), c.checked_add_signed(dc))
+                && r < rows
+                && c < cols
+                && near(dr, dc)
+            {
+                out[r * cols + c] = true;
+            }
+        }
+    }
+}
+
+/// Length of a residual beyond which it counts as nothing: rounding of the measurements.
+pub(super) fn is_nothing(residual: &[f64], y: &[f64]) -> bool {
+    norm(residual) <= 1e-12 * norm(y)
+}
+
+/// Bumps reach this many standard deviations: e^−4.5 of the peak.
+const REACH_SD: f64 = 3.0;
+
+/// Dictionary of one bump, a Gaussian of unit sum, at some places of an image; its rows are the taxels that the bumps
+/// touch.
+#[derive(Debug)]
+pub(super) struct Grains {
+    /// Places, increasing.
+    places: Vec<usize>,
+    /// Taxels covered by a bump, in increasing order.
+    taxels: Vec<usize>,
+    /// For every place, the rows of its taxels and the bump's value there.
+    entries: Vec<Vec<(usize, f64)>>,
+}
+
+impl Grains {
+    /// Bumps with the standard deviation `sd_taxels` ≥ 0 at `places`, in increasing order, of an image of `rows` ×
+    /// `cols`. With 0, a bump is a taxel.
+    pub(super) fn new((rows, cols): (usize, usize), places: Vec<usize>, sd_taxels: f64) -> Self {
+        let bump = bump(sd_taxels);
+        let around = |place: usize| {
+            let (r, c) = (place / cols, place % cols);
+            let inside = move |&(dr, dc, v): &(isize, isize, f64)| {
+                let (r, c) = (r.checked_add_signed(dr)?, c.checked_add_signed(dc)?);
+                (r < rows && c < cols).then_some((r * cols + c, v))
+            };
+            bump.iter().filter_map(inside)
+        };
+        let mut touched = vec![false; rows * cols];
+        places
+            .iter()
+            .flat_map(|p| around(*p))
+            .for_each(|(taxel, _)| touched[taxel] = true);
+        let taxels: Vec<usize> = (0..rows * cols).filter(|k| touched[*k]).collect();
+        let mut row_of = vec![0; rows * cols];
+        taxels.iter().enumerate().for_each(|(row, taxel)| row_of[*taxel] = row);
+        let entries = places
+            .iter()
+            .map(|p| around(*p).map(|(taxel, v)| (row_of[taxel], v)).collect())
+            .collect();
+        Self {
+            places,
+            taxels,
+            entries,
+        }
+    }
+
+    /// Places of the columns.
+    pub(super) fn places(&self) -> &[usize] {
+        &self.places
+    }
+
+    /// Taxels of the rows.
+    pub(super) fn taxels(&self) -> &[usize] {
+        &self.taxels
+    }
+
+    /// Length of a bump that no edge cuts.
+    pub(super) fn length(sd_taxels: f64) -> f64 {
+        bump(sd_taxels).iter().map(|(_, _, v)| v * v).sum::<f64>().sqrt()
+    }
+
+    /// Numbers of bytes that the dictionary holds.
+    pub(super) fn bytes(&self) -> usize {
+        let entries: usize = self.entries.iter().map(Vec::len).sum();
+        entries * size_of::<(usize, f64)>() + (self.places.len() + self.taxels.len()) * size_of::<usize>()
+    }
+}
+
+/// Offsets and values of a bump of unit sum.
+fn bump(sd_taxels: f64) -> Vec<(isize, isize, f64)> {
+    #[expect(clippy::cast_possible_truncation, reason = "a bump is a few taxels wide")]
+    let reach = (REACH_SD * sd_taxels).floor() as isize;
+    let height = |d: isize| match d {
+        0 => 1.0,
+        _ => (-0.5 * (d as f64 / sd_taxels).powi(2)).exp(),
+    };
+    let line = || -reach..=reach;
+    let mut bump: Vec<_> = line()
+        .flat_map(|r| line().map(move |c| (r, c, height(r) * height(c))))
+        .collect();
+    let sum: f64 = bump.iter().map(|(_, _, v)| v).sum();
+    bump.iter_mut().for_each(|(_, _, v)| *v /= sum);
+    bump
+}
+
+impl LinearOperator for Grains {
+    fn nrows(&self) -> usize {
+        self.taxels.len()
+    }
+
+    fn ncols(&self) -> usize {
+        self.places.len()
+    }
+
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        y.fill(0.0);
+        for (entries, x) in self.entries.iter().zip(x) {
+            entries.iter().for_each(|&(row, v)| y[row] += v * x);
+        }
+    }
+
+    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
+        for (entries, x) in self.entries.iter().zip(x) {
+            *x = entries.iter().map(|&(row, v)| v * y[row]).sum();
+        }
+    }
+}
+
+/// Iterations between two looks at the duality gap, which costs half an iteration.
+const BETWEEN_LOOKS: usize = 8;
+
+/// Largest number of times that a step is halved: 2⁻⁶⁰ of the first guess.
+const HALVINGS: usize = 60;
+
+/// min ½ ‖y − A x‖² + λ Σ x subject to x ≥ 0, with products of A alone: one with A and one with Aᵀ an iteration.
+///
+/// The step is found by halving, so that nothing has to be known of A; the momentum starts anew whenever it points
+/// uphill. Stops when the duality gap is `tol` of ½ ‖y‖².
+/// Source: A. Beck, M. Teboulle, SIAM J. Imaging Sci. 2 (2009) 183; B. O'Donoghue, E. Candès, Found. Comput. Math. 15
+/// (2015) 715.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct NnFista {
+    /// λ, in units of y·A. Range (0, ∞); at 0 the duality gap says nothing.
+    pub(super) penalty: f64,
+    /// Duality gap over ½ ‖y‖². Range (0, 1].
+    pub(super) tol: f64,
+    /// Largest number of iterations.
+    pub(super) max_iter: usize,
+}
+
+/// How an iterative minimisation ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Descent {
+    /// Number of iterations.
+    pub iterations: usize,
+    /// Duality gap divided by ½ ‖y‖² at the last check.
+    pub gap: f64,
+    /// Whether the gap is at most `tol`.
+    pub converged: bool,
+}
+
+/// Where the descent is.
+struct State {
+    x: Vec<f64>,
+    /// A x.
+    ax: Vec<f64>,
+}
+
+impl State {
+    fn at(a: &impl LinearOperator, x: Vec<f64>) -> Self {
+        let mut ax = vec![0.0; a.nrows()];
+        a.apply(&x, &mut ax);
+        Self { x, ax }
+    }
+
+    /// `self` + `momentum` · (`self` − `before`): linear, so that no product is needed.
+    fn beyond(&self, before: &Self, momentum: f64) -> Self {
+        let beyond =
+            |now: &[f64], before: &[f64]| now.iter().zip(before).map(|(n, b)| n + momentum * (n - b)).collect();
+        Self {
+            x: beyond(&self.x, &before.x),
+            ax: beyond(&self.ax, &before.ax),
+        }
+    }
+
+    /// Aᵀ (y − A x).
+    fn slope(&self, a: &impl LinearOperator, y: &[f64]) -> Vec<f64> {
+        let residual: Vec<f64> = y.iter().zip(&self.ax).map(|(y, v)| y - v).collect();
+        let mut slope = vec![0.0; a.ncols()];
+        a.apply_adjoint(&residual, &mut slope);
+        slope
+    }
+}
+
+impl NnFista {
+    /// Moves `x` from where it starts to the minimiser, as near as `tol` and `max_iter` allow; entries below 0 start at
+    /// 0.
+    ///
+    /// # Errors
+    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as A has rows, [`RecoverError::NotFinite`] for a NaN or
+    /// an infinity.
+    ///
+    /// # Panics
+    /// When `x` is not as long as A has columns.
+    pub(super) fn descend(&self, a: &impl LinearOperator, y: &[f64], x: &mut [f64]) -> Result<Descent, RecoverError> {
+        check(a, y)?;
+        assert_eq!(x.len(), a.ncols(), "a start for every column");
+        let mut now = State::at(a, x.iter().map(|v| v.max(0.0)).collect());
+        let mut ahead = State {
+            x: now.x.clone(),
+            ax: now.ax.clone(),
+        };
+        let (mut curvature, mut pace) = (first_curvature(a, y), 1.0_f64);
+        let mut descent = Descent {
+            iterations: 0,
+            gap: f64::INFINITY,
+            converged: false,
+        };
+        while descent.iterations <= self.max_iter {
+            if descent.iterations.is_multiple_of(BETWEEN_LOOKS) || descent.iterations == self.max_iter {
+                descent.gap = self.gap(&now, &now.slope(a, y), y);
+                descent.converged = descent.gap <= self.tol;
+            }
+            if descent.converged || descent.iterations == self.max_iter {
+                break;
+            }
+            let slope = ahead.slope(a, y);
+            let next = self.step(a, &ahead, &slope, &mut curvature);
+            // uphill: the gradient of the step and the way that was gone point alike
+            let uphill: f64 = (ahead.x.iter().zip(&next.x).zip(&now.x))
+                .map(|((ahead, next), now)| (ahead - next) * (next - now))
+                .sum();
+            let faster = if uphill > 0.0 {
+                1.0
+            } else {
+                0.5 * (1.0 + (1.0 + 4.0 * pace * pace).sqrt())
+            };
+            let momentum = if uphill > 0.0 { 0.0 } else { (pace - 1.0) / faster };
+            pace = faster;
+            ahead = next.beyond(&now, momentum);
+            now = next;
+            descent.iterations += 1;
+        }
+        x.copy_from_slice(&now.x);
+        Ok(descent)
+    }
+
+    /// max(0, x + (slope − λ)/L) with L doubled until ‖A Δ‖² ≤ L ‖Δ‖².
+    fn step(&self, a: &impl LinearOperator, from: &State, slope: &[f64], curvature: &mut f64) -> State {
+        let mut halvings = 0;
+        loop {
+            let moved = |(x, s): (&f64, &f64)| (x + (s - self.penalty) / *curvature).max(0.0);
+            let next = State::at(a, from.x.iter().zip(slope).map(moved).collect());
+            let square =
+                |now: &[f64], before: &[f64]| -> f64 { now.iter().zip(before).map(|(n, b)| (n - b).powi(2)).sum() };
+            if halvings == HALVINGS || square(&next.ax, &from.ax) <= *curvature * square(&next.x, &from.x) {
+                return next;
+            }
+            *curvature *= 2.0;
+            halvings += 1;
+        }
+    }
+
+    /// Primal minus dual objective over ½ ‖y‖², with the residual, shrunk until it is feasible, as the dual point.
+    fn gap(&self, now: &State, slope: &[f64], y: &[f64]) -> f64 {
+        let whole = 0.5 * dot(y, y);
+        if whole <= 0.0 {
+            return 0.0;
+        }
+        let steepest = slope.iter().copied().fold(0.0, f64::max);
+        let shrink = if steepest > self.penalty {
+            self.penalty / steepest
+        } else {
+            1.0
+        };
+        let residual: Vec<f64> = y.iter().zip(&now.ax).map(|(y, v)| y - v).collect();
+        let rest: f64 = y.iter().zip(&residual).map(|(y, r)| (y - shrink * r).powi(2)).sum();
+        let primal = 0.5 * dot(&residual, &residual) + self.penalty * now.x.iter().sum::<f64>();
+        ((primal - (whole - 0.5 * rest)) / whole).max(0.0)
+    }
+}
+
+/// ‖A g‖² / ‖g‖² along the first gradient g = Aᵀ y: not above the largest curvature, and of its order.
+fn first_curvature(a: &impl LinearOperator, y: &[f64]) -> f64 {
+    let (mut gradient, mut image) = (vec![0.0; a.ncols()], vec![0.0; a.nrows()]);
+    a.apply_adjoint(y, &mut gradient);
+    a.apply(&gradient, &mut image);
+    let curvature = dot(&image, &image) / dot(&gradient, &gradient);
+    if curvature.is_normal() { curvature } else { 1.0 }
+}
+
+/// Shapes and values that a recovery can work with.
+pub(super) fn check(a: &impl LinearOperator, y: &[f64]) -> Result<(), RecoverError> {
+    if y.len() != a.nrows() {
+        return Err(RecoverError::ShapeMismatch {
+            rows: a.nrows(),
+            len: y.len(),
+        });
+    }
+    match y.iter().position(|v| !v.is_finite()) {
+        Some(index) => Err(RecoverError::NotFinite { index, value: y[index] }),
+        None => Ok(()),
+    }
+}
+
+/// y −= A x.
+pub(super) fn subtract(a: &impl LinearOperator, x: &[f64], y: &mut [f64]) {
+    let mut image = vec![0.0; y.len()];
+    a.apply(x, &mut image);
+    axpy(-1.0, &image, y);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::matrix::Matrix;
     use crate::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
-    use crate::operator::{ShiftedDictionary, SignGenerator, SignOperator, SubArrays};
-    use rand::{RngExt as _, SeedableRng as _};
+    use crate::operator::{SignGenerator, SignOperator, SubArrays, check_operator};
+    use crate::problem::{Problem, Recover as _, Workspace};
+    use crate::recover::{NnLasso, Penalty};
+    use proptest::prelude::*;
+    use rand::SeedableRng as _;
     use rand_chacha::ChaCha8Rng;
 
     const SIDE: usize = 60;
@@ -372,5 +761,101 @@ mod tests {
                 .iter()
                 .all(|v| v.is_finite())
         );
+    }
+
+    #[test]
+    fn a_blob_is_found_where_it_is() {
+        let blobs = [Atom::cap(1.0), Atom::cap(3.0)];
+        let detector = Detector::new(12, 9, &blobs);
+        let mut image = vec![0.0; 12 * 9];
+        let mut x = vec![0.0; 2 * 12 * 9];
+        x[108 + 4 * 9 + 5] = 2.0;
+        ShiftedDictionary::new(12, 9, &blobs).apply(&x, &mut image);
+        let found = detector.detect(&image, &[1.0; 108], 0.5);
+        let best = found.iter().max_by(|a, b| a.score.total_cmp(&b.score)).unwrap();
+        // the score of the blob itself is its length times 2
+        let length = norm(blobs[1].values());
+        assert_eq!(best.place, 4 * 9 + 5);
+        assert!(
+            (best.score - 2.0 * length).abs() < 1e-9,
+            "{} against {}",
+            best.score,
+            2.0 * length
+        );
+    }
+
+    #[test]
+    fn chance_stays_below_the_threshold() {
+        let detector = Detector::new(100, 100, &[Atom::cap(0.0)]);
+        // P(Z > z) = 1e-2/1e4: z = 4.75; the bound is above it
+        let z = detector.threshold(0.01);
+        assert!((4.75..5.2).contains(&z), "{z}");
+    }
+
+    #[test]
+    fn dilation_is_round() {
+        let mut out = vec![false; 49];
+        dilate((7, 7), &[24], 2.5, &mut out);
+        assert_eq!(out.iter().filter(|v| **v).count(), 21);
+        let mut out = vec![false; 49];
+        dilate((7, 7), &[0], 1.0, &mut out);
+        assert_eq!(out.iter().filter(|v| **v).count(), 3);
+    }
+
+    #[test]
+    fn bumps_have_unit_sum_and_are_cut_at_the_edges() {
+        let grains = Grains::new((5, 6), vec![0, 14], 0.6);
+        check_operator(&grains);
+        // one taxel of reach: 4 taxels in the corner, 9 inside
+        assert_eq!(grains.taxels(), [0, 1, 6, 7, 8, 9, 13, 14, 15, 19, 20, 21]);
+        let mut image = vec![0.0; 12];
+        grains.apply(&[0.0, 1.0], &mut image);
+        assert!((image.iter().sum::<f64>() - 1.0).abs() < 1e-15);
+        let single = Grains::new((5, 6), vec![3], 0.0);
+        assert_eq!((single.taxels(), single.nrows()), (&[3][..], 1));
+        assert!((Grains::length(0.0) - 1.0).abs() < 1e-15);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        /// Against coordinate descent with Newton steps on the active set.
+        #[test]
+        fn it_is_the_non_negative_lasso(values in prop::collection::vec(-1.0..1.0, 12 * 20), y in prop::collection::vec(-1.0..1.0, 12)) {
+            let a = Matrix::from_rows(12, 20, values).unwrap();
+            // the other program's penalty is a measurement's share
+            let penalty = 0.05;
+            let fista = NnFista { penalty, tol: 1e-12, max_iter: 200_000 };
+            let mut x = vec![0.0; 20];
+            prop_assert!(fista.descend(&a, &y, &mut x).unwrap().converged);
+            let problem = Problem::new(a.view(), &y).unwrap();
+            let lasso = NnLasso::new(Penalty::Absolute(penalty / 12.0)).unwrap();
+            let solution = lasso.recover(&problem, &mut Workspace::default()).unwrap();
+            let objective = |x: &[f64]| {
+                let mut r = y.clone();
+                subtract(&a, x, &mut r);
+                0.5 * dot(&r, &r) + penalty * x.iter().sum::<f64>()
+            };
+            let mut exact = vec![0.0; 20];
+            solution.scatter(&mut exact);
+            // the gaps of both: 1e-12 and 1e-9 of ½ ‖y‖² ≤ 6
+            prop_assert!((objective(&x) - objective(&exact)).abs() <= 1e-8, "{} against {}", objective(&x), objective(&exact));
+        }
+    }
+
+    #[test]
+    fn bad_measurements_are_refused() {
+        let a = Matrix::from_rows(2, 1, vec![1.0, 1.0]).unwrap();
+        let fista = NnFista {
+            penalty: 0.1,
+            tol: 1e-6,
+            max_iter: 10,
+        };
+        assert!(matches!(
+            fista.descend(&a, &[1.0], &mut [0.0]),
+            Err(RecoverError::ShapeMismatch { rows: 2, len: 1 })
+        ));
+        assert!(fista.descend(&a, &[1.0, f64::NAN], &mut [0.0]).is_err());
+        let mut x = [3.0];
+        assert!(fista.descend(&a, &[0.0, 0.0], &mut x).unwrap().converged);
     }
 }

@@ -15,22 +15,15 @@
 //! # Ok::<(), spts_recon::RangeError>(())
 //! ```
 
-mod centred;
-mod composition;
-mod conformance;
-mod dense;
-mod fft2;
 mod shifted;
 mod sign;
-mod sign_kernels;
-mod sub_arrays;
 
-pub use centred::{Centred, centre};
-pub(crate) use composition::Composition;
-pub use conformance::check_operator;
 pub use shifted::{Atom, ShiftedDictionary};
 pub use sign::{SignGenerator, SignOperator};
-pub use sub_arrays::SubArrays;
+
+use crate::kernels::{self, dot, norm};
+use crate::matrix::{Matrix, MatrixView};
+use rayon::prelude::*;
 
 /// A linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ up to rounding.
 ///
@@ -130,4 +123,414 @@ fn check_shape(a: &impl LinearOperator, x: &[f64], y: &[f64]) {
         x.len(),
         y.len()
     );
+}
+
+impl LinearOperator for MatrixView<'_> {
+    fn nrows(&self) -> usize {
+        (*self).nrows()
+    }
+
+    fn ncols(&self) -> usize {
+        (*self).ncols()
+    }
+
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        for (out, row) in y.iter_mut().zip(self.values().chunks_exact(x.len().max(1))) {
+            *out = row.iter().zip(x).map(|(a, b)| a * b).sum();
+        }
+    }
+
+    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
+        kernels::adjoint(self.values(), y, x);
+    }
+}
+
+impl LinearOperator for Matrix {
+    fn nrows(&self) -> usize {
+        self.nrows()
+    }
+
+    fn ncols(&self) -> usize {
+        self.ncols()
+    }
+
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        self.view().apply(x, y);
+    }
+
+    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
+        self.view().apply_adjoint(y, x);
+    }
+}
+
+impl SelectColumns for Matrix {
+    type Selected = Self;
+
+    fn select_columns(&self, columns: &[usize]) -> Self {
+        let columns: Vec<Vec<f64>> = columns.iter().map(|&k| self.column(k)).collect();
+        let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+        Self::from_column_slices(self.nrows(), &slices)
+    }
+
+    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
+        check_shape(self, variance, r);
+        for (k, variance) in variance.iter_mut().enumerate() {
+            *variance = self.column(k).iter().zip(r).map(|(a, r)| (a * r).powi(2)).sum();
+        }
+    }
+}
+
+/// P∘A, where P subtracts the mean: P y = y − Σy/M. For measurements y = A x + c with an unknown constant c, such as
+/// the offset of asymmetric drives, P y = P A x holds exactly. This costs one measurement.
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::operator::{Centred, LinearOperator as _, centre};
+///
+/// let a = Matrix::from_rows(3, 2, vec![1.0, 1.0, 1.0, -1.0, -1.0, 1.0])?;
+/// let (x, mut y, mut expected) = ([2.0, 1.0], [0.0; 3], [0.0; 3]);
+/// a.apply(&x, &mut y);
+/// y.iter_mut().for_each(|y| *y += 0.7); // an unknown offset
+/// centre(&mut y);
+/// Centred::new(a).apply(&x, &mut expected);
+/// assert!(y.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12));
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Centred<A> {
+    inner: A,
+}
+
+impl<A> Centred<A> {
+    /// The operator that applies `inner`, and subtracts from every measurement the mean of all measurements.
+    #[must_use]
+    pub fn new(inner: A) -> Self {
+        Self { inner }
+    }
+
+    /// The operator without the subtraction.
+    #[must_use]
+    pub fn inner(&self) -> &A {
+        &self.inner
+    }
+}
+
+/// Subtracts the mean of `y`, to match a [`Centred`] operator.
+pub fn centre(y: &mut [f64]) {
+    let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
+    y.iter_mut().for_each(|v| *v -= mean);
+}
+
+impl<A: LinearOperator> LinearOperator for Centred<A> {
+    fn nrows(&self) -> usize {
+        self.inner.nrows()
+    }
+
+    fn ncols(&self) -> usize {
+        self.inner.ncols()
+    }
+
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        self.inner.apply(x, y);
+        centre(y);
+    }
+
+    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
+        check_shape(self, x, y);
+        let mut y = y.to_vec();
+        centre(&mut y);
+        self.inner.apply_adjoint(&y, x);
+    }
+}
+
+impl<A: SelectColumns> SelectColumns for Centred<A> {
+    type Selected = Centred<A::Selected>;
+
+    fn select_columns(&self, columns: &[usize]) -> Self::Selected {
+        Centred::new(self.inner.select_columns(columns))
+    }
+
+    /// That of the centred `r`.
+    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
+        let mut r = r.to_vec();
+        centre(&mut r);
+        self.inner.chance_variance(&r, variance);
+    }
+}
+
+/// Φ∘D: first `inner`, then `outer`; the product of the two is not formed. Every call takes memory for what lies
+/// between them.
+#[derive(Debug, Clone)]
+pub(crate) struct Composition<A, B> {
+    outer: A,
+    inner: B,
+}
+
+impl<A: LinearOperator, B: LinearOperator> Composition<A, B> {
+    /// `outer` after `inner`.
+    ///
+    /// # Panics
+    /// When `outer` has not as many columns as `inner` has rows.
+    pub(crate) fn new(outer: A, inner: B) -> Self {
+        assert_eq!(
+            outer.ncols(),
+            inner.nrows(),
+            "columns of the outer operator against rows of the inner one"
+        );
+        Self { outer, inner }
+    }
+}
+
+impl<A: LinearOperator, B: LinearOperator> LinearOperator for Composition<A, B> {
+    fn nrows(&self) -> usize {
+        self.outer.nrows()
+    }
+
+    fn ncols(&self) -> usize {
+        self.inner.ncols()
+    }
+
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        check_shape(self, x, y);
+        let mut between = vec![0.0; self.inner.nrows()];
+        self.inner.apply(x, &mut between);
+        self.outer.apply(&between, y);
+    }
+
+    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
+        check_shape(self, x, y);
+        let mut between = vec![0.0; self.inner.nrows()];
+        self.outer.apply_adjoint(y, &mut between);
+        self.inner.apply_adjoint(&between, x);
+    }
+}
+
+/// Block-diagonal operator. Each sub-array has its own rows (a wire) and the next range of columns.
+///
+/// ```
+/// use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator, SubArrays};
+///
+/// // 200 taxels on two wires, 20 measurements of each
+/// let wire = |seeds| SignOperator::new(SignGenerator::NUMERICAL_RECIPES, seeds, 0, 20);
+/// let skin = SubArrays::new(vec![wire((8..108).collect()), wire((108..208).collect())]);
+/// assert_eq!((skin.nrows(), skin.ncols()), (40, 200));
+/// let (mut image, mut y) = ([0.0; 200], [0.0; 40]);
+/// image[150] = 1.0; // on the second wire
+/// skin.apply(&image, &mut y);
+/// assert!(y[..20].iter().all(|v| *v == 0.0) && y[20..].iter().all(|v| v.abs() == 1.0));
+/// ```
+#[derive(Debug, Clone)]
+pub struct SubArrays<A> {
+    parts: Vec<A>,
+}
+
+impl<A: LinearOperator + Sync> SubArrays<A> {
+    /// The given sub-arrays, in order of their columns.
+    #[must_use]
+    pub fn new(parts: Vec<A>) -> Self {
+        Self { parts }
+    }
+
+    /// The sub-arrays.
+    #[must_use]
+    pub fn parts(&self) -> &[A] {
+        &self.parts
+    }
+
+    /// Every part with its own pieces of `input` and `output`.
+    fn each(&self, input: &[f64], output: &mut [f64], of: fn(&A) -> (usize, usize), run: fn(&A, &[f64], &mut [f64])) {
+        let mut pieces = Vec::with_capacity(self.parts.len());
+        let (mut input, mut output) = (input, output);
+        for part in &self.parts {
+            let (from, to) = of(part);
+            let (piece_in, rest_in) = input.split_at(from);
+            let (piece_out, rest_out) = output.split_at_mut(to);
+            pieces.push((part, piece_in, piece_out));
+            (input, output) = (rest_in, rest_out);
+        }
+        pieces.into_par_iter().for_each(|(part, from, to)| run(part, from, to));
+    }
+}
+
+impl<A: LinearOperator + Sync> LinearOperator for SubArrays<A> {
+    fn nrows(&self) -> usize {
+        self.parts.iter().map(LinearOperator::nrows).sum()
+    }
+
+    fn ncols(&self) -> usize {
+        self.parts.iter().map(LinearOperator::ncols).sum()
+    }
+
+    fn apply(&self, x: &[f64], y: &mut [f64]) {
+        check_shape(self, x, y);
+        self.each(x, y, |part| (part.ncols(), part.nrows()), A::apply);
+    }
+
+    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
+        check_shape(self, x, y);
+        self.each(y, x, |part| (part.nrows(), part.ncols()), A::apply_adjoint);
+    }
+}
+
+/// The columns have to be in increasing order, so that those of a part stay together.
+impl<A: SelectColumns + Sync> SelectColumns for SubArrays<A>
+where
+    A::Selected: Sync,
+{
+    type Selected = SubArrays<A::Selected>;
+
+    fn select_columns(&self, columns: &[usize]) -> Self::Selected {
+        assert!(
+            columns.is_sorted(),
+            "columns of sub-arrays are taken in increasing order"
+        );
+        let (mut first, mut parts) = (0, Vec::with_capacity(self.parts.len()));
+        let mut left = columns;
+        for part in &self.parts {
+            let end = first + part.ncols();
+            let (own, rest) = left.split_at(left.partition_point(|&k| k < end));
+            let own: Vec<usize> = own.iter().map(|k| k - first).collect();
+            parts.push(part.select_columns(&own));
+            (first, left) = (end, rest);
+        }
+        assert!(left.is_empty(), "column {} of {first}", left[0]);
+        SubArrays { parts }
+    }
+
+    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
+        check_shape(self, variance, r);
+        self.each(r, variance, |part| (part.nrows(), part.ncols()), A::chance_variance);
+    }
+}
+
+/// Numbers in (−1, 1) that are the same at every call.
+fn values(n: usize, phase: f64) -> Vec<f64> {
+    (0_u32..).map(|k| (1.7 * f64::from(k) + phase).sin()).take(n).collect()
+}
+
+/// Rounding that a product of `nrows` × `ncols` weights may leave of what it adds up, `whole`: one unit for every
+/// addition on the longest way, which no order of summing exceeds, and a transform's constant.
+fn rounding(nrows: usize, ncols: usize, whole: f64) -> f64 {
+    16.0 * (nrows + ncols) as f64 * f64::EPSILON * whole.max(f64::MIN_POSITIVE)
+}
+
+/// Checks that `a` is linear, that ⟨A x, y⟩ = ⟨x, Aᵀ y⟩, and that results do not depend on the earlier content of
+/// output slices.
+///
+/// # Panics
+/// If a property fails; the message holds the numbers.
+pub fn check_operator(a: &impl LinearOperator) {
+    let (m, n) = (a.nrows(), a.ncols());
+    let (x, z, y) = (values(n, 0.0), values(n, 1.0), values(m, 2.0));
+    let apply = |x: &[f64]| {
+        let mut out = vec![f64::NAN; m];
+        a.apply(x, &mut out);
+        out
+    };
+    let mut aty = vec![f64::NAN; n];
+    a.apply_adjoint(&y, &mut aty);
+    let (ax, az) = (apply(&x), apply(&z));
+    let (lhs, rhs) = (dot(&ax, &y), dot(&aty, &x));
+    let whole = norm(&ax) * norm(&y) + norm(&aty) * norm(&x);
+    let allowed = rounding(m, n, whole);
+    assert!(
+        (lhs - rhs).abs() <= allowed,
+        "⟨Ax, y⟩ = {lhs}, ⟨x, Aᵀy⟩ = {rhs}, allowed {allowed:e}"
+    );
+
+    let sum: Vec<f64> = x.iter().zip(&z).map(|(x, z)| 2.0 * x - z).collect();
+    let off: Vec<f64> = apply(&sum)
+        .iter()
+        .zip(ax.iter().zip(&az))
+        .map(|(s, (x, z))| s - (2.0 * x - z))
+        .collect();
+    let allowed = rounding(
+        m,
+        n,
+        norm(&ax) + norm(&az) + norm(&x) * norm(&aty) / norm(&y).max(f64::MIN_POSITIVE),
+    );
+    assert!(
+        norm(&off) <= allowed,
+        "not linear by {:e}, allowed {allowed:e}",
+        norm(&off)
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn adjoint(a in prop::collection::vec(-1.0..1.0, 12 * 7)) {
+            check_operator(&MatrixView::new(12, 7, &a).unwrap());
+            let a = Matrix::from_rows(12, 7, a).unwrap();
+            check_operator(&a);
+            let some = a.select_columns(&[6, 0]);
+            let (r, mut variance): (Vec<f64>, _) = ((0..12).map(f64::from).collect(), [f64::NAN; 7]);
+            a.chance_variance(&r, &mut variance);
+            let squares: f64 = a.column(3).iter().zip(&r).map(|(a, r)| a * a * r * r).sum();
+            // a dozen roundings of numbers below 121
+            prop_assert!((variance[3] - squares).abs() < 1e-11);
+            prop_assert_eq!((some.nrows(), some.column(0), some.column(1)), (12, a.column(6), a.column(0)));
+        }
+    }
+
+    #[test]
+    fn a_constant_makes_no_difference() {
+        let a = Matrix::from_rows(3, 2, vec![1.0, 2.0, -1.0, 0.5, 0.0, 3.0]).unwrap();
+        let centred = Centred::new(&a);
+        check_operator(&centred);
+        let (mut y, mut with) = ([0.0; 3], [0.0; 3]);
+        centred.apply(&[2.0, -1.0], &mut y);
+        a.apply(&[2.0, -1.0], &mut with);
+        with.iter_mut().for_each(|v| *v += 7.0);
+        centre(&mut with);
+        // sums of three numbers below 11
+        assert!(y.iter().zip(&with).all(|(a, b)| (a - b).abs() < 1e-14));
+    }
+
+    #[test]
+    fn it_is_the_product_of_the_matrices() {
+        let a = Matrix::from_rows(2, 3, vec![1.0, 2.0, -1.0, 0.5, 0.0, 3.0]).unwrap();
+        let b = Matrix::from_rows(3, 2, vec![1.0, -2.0, 0.0, 4.0, 2.0, 1.0]).unwrap();
+        let both = Composition::new(&a, &b);
+        check_operator(&both);
+        let mut y = [0.0; 2];
+        both.apply(&[1.0, 1.0], &mut y);
+        // b·(1, 1) = (−1, 4, 3): exact in binary
+        assert_eq!(y.map(f64::to_bits), [4.0_f64, 8.5].map(f64::to_bits));
+    }
+
+    #[test]
+    #[should_panic(expected = "columns of the outer operator")]
+    fn shapes_that_do_not_fit_are_refused() {
+        let _ = Composition::new(Matrix::zeros(2, 3), Matrix::zeros(2, 3));
+    }
+
+    fn parts() -> SubArrays<Matrix> {
+        let first = Matrix::from_rows(1, 2, vec![1.0, 2.0]).unwrap();
+        let second = Matrix::from_rows(2, 1, vec![3.0, -1.0]).unwrap();
+        SubArrays::new(vec![first, second])
+    }
+
+    #[test]
+    fn it_is_block_diagonal() {
+        let a = parts();
+        check_operator(&a);
+        assert_eq!((a.nrows(), a.ncols()), (3, 3));
+        let mut y = [0.0; 3];
+        a.apply(&[1.0, 1.0, 2.0], &mut y);
+        assert_eq!(y.map(f64::to_bits), [3.0_f64, 6.0, -2.0].map(f64::to_bits));
+    }
+
+    #[test]
+    fn columns_keep_their_wires() {
+        let some = parts().select_columns(&[1, 2]);
+        let mut y = [0.0; 3];
+        some.apply(&[1.0, 1.0], &mut y);
+        assert_eq!(y.map(f64::to_bits), [2.0_f64, 3.0, -1.0].map(f64::to_bits));
+        assert_eq!(parts().select_columns(&[]).nrows(), 3);
+    }
 }

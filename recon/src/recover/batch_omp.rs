@@ -1,12 +1,12 @@
 //! Orthogonal matching pursuit for many measurements with one operator.
 
-use super::factor::{CONVERGED, back_substitute};
-use super::greedy::Greedy;
-use super::scaling::unscale;
 use crate::kernels;
 use crate::matrix::{Matrix, MatrixView};
+use crate::problem::Workspace;
+use crate::problem::unscale;
 use crate::problem::{Problem, RecoverError, Solution};
-use crate::workspace::Workspace;
+use crate::recover::pursuit::Greedy;
+use crate::recover::pursuit::{CONVERGED, back_substitute};
 
 /// Orthogonal matching pursuit with a precomputed Gram matrix G = Aᵀ A, for many `y` measured with the same A.
 ///

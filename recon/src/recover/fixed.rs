@@ -2,12 +2,12 @@
 
 use super::gaussian::{smallest_variance, variance};
 use super::nnqp::{self, Hessian, Lowered};
-use super::parameter::{Noise, ParameterError};
 use super::prior::Gaussian;
-use super::scaling::{divide_into, operator_scale, power_of_two};
 use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::MatrixView;
 use crate::problem::RecoverError;
+use crate::problem::{divide_into, operator_scale, power_of_two};
+use crate::recover::prior::{Noise, ParameterError};
 use nalgebra::{DMatrix, SymmetricEigen};
 use std::sync::Arc;
 

@@ -6,46 +6,27 @@
 //! [`SequentialEstimate`] accepts rows one by one, and [`TrackedImage`] follows a changing image from window to window.
 
 mod batch_omp;
-mod cholesky;
 mod conformance;
-mod descent;
-mod expected_iou;
-mod factor;
 mod fixed;
 mod gaussian;
-mod greedy;
-mod image_prior;
-mod lmmse;
 mod nn_lasso;
-mod nn_lmmse;
-mod nn_omp;
 mod nnqp;
-mod omp;
-mod parameter;
 mod prior;
+mod pursuit;
 mod reference;
-mod scaling;
 mod sequential;
-mod tracked;
 mod tv;
-mod tv_grid;
 mod unrolled;
 
 pub use batch_omp::BatchOmp;
 pub use conformance::{conformance, conformance_regularised};
 pub use fixed::{Fixed, FixedError, FixedWindow};
-pub use image_prior::ImagePrior;
-pub use lmmse::Lmmse;
+pub use gaussian::{Lmmse, NnLmmse};
 pub use nn_lasso::NnLasso;
-pub use nn_lmmse::NnLmmse;
-pub use nn_omp::NnOmp;
-pub use omp::Omp;
-pub use parameter::{Noise, ParameterError, Penalty, Stopping};
-pub use prior::{Gaussian, PriorError};
+pub use prior::{Gaussian, ImagePrior, Noise, ParameterError, Penalty, PriorError, Stopping};
+pub use pursuit::{NnOmp, Omp};
 pub use reference::ReferenceOmp;
-pub(crate) use scaling::power_of_two;
-pub use sequential::{SequentialError, SequentialEstimate, SequentialGains};
-pub use tracked::{Motion, TrackedImage};
+pub use sequential::{Motion, SequentialError, SequentialEstimate, SequentialGains, TrackedImage};
 pub use tv::Tv;
 pub use unrolled::{Layer, Touched, Unrolled, UnrolledError, UnrolledStep, UnrolledWeights};
 

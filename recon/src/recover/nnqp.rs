@@ -1,6 +1,6 @@
 //! Strictly convex quadratic programs with non-negative unknowns.
 
-use super::cholesky;
+use crate::cholesky;
 use crate::kernels;
 use crate::problem::RecoverError;
 

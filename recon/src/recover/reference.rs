@@ -1,11 +1,11 @@
 //! Orthogonal matching pursuit as in the published decoder.
 
-use super::factor::{CONVERGED, DEPENDENT};
 use crate::kernels::{axpy, norm};
 use crate::matrix::MatrixView;
 use crate::operator::LinearOperator as _;
+use crate::problem::Workspace;
 use crate::problem::{Problem, Recover, RecoverError, Solution};
-use crate::workspace::Workspace;
+use crate::recover::pursuit::{CONVERGED, DEPENDENT};
 
 /// Orthogonal matching pursuit with the behaviour of the published code: atoms are NOT normalised, the coefficients are
 /// the least-squares solution on the selected atoms, and the pursuit ends at `n_nonzero_coefs` atoms or as soon as

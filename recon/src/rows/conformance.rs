@@ -1,13 +1,13 @@
 //! Properties that every designer of rows must have.
 
-use super::covariance::posterior_trace;
-use super::error::RowError;
 use super::expected::{Expected, Tolerances};
-use super::table::{Designer, RowNeeds};
-use super::task::{DesignRows, RowTask};
 use crate::classify::Component;
 use crate::matrix::Matrix;
 use crate::recover::Gaussian;
+use crate::rows::RowError;
+use crate::rows::greedy::posterior_trace;
+use crate::rows::{DesignRows, RowTask};
+use crate::rows::{Designer, RowNeeds};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
@@ -201,7 +201,7 @@ fn sees_more_than_chance(designer: &Designer, method: &dyn DesignRows) {
         let trace = method.design(&task).and_then(|rows| posterior_trace(&task, &rows));
         trace.unwrap_or_else(|e| panic!("{}: {e}", designer.name))
     };
-    let random: Vec<f64> = (0..8).map(|seed| left(&super::random::Random, seed)).collect();
+    let random: Vec<f64> = (0..8).map(|seed| left(&crate::rows::simple::Random, seed)).collect();
     let worst = random.iter().copied().fold(0.0, f64::max);
     let own = left(method, 1);
     // rows of chance scatter by a few per cent about their mean

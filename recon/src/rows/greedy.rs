@@ -1,14 +1,12 @@
 //! Rows designed one after the other, each for the largest reduction of the posterior variance.
 
-use super::ascent::{Worth, climb};
-use super::covariance::Posterior;
-use super::error::RowError;
-use super::headroom::Headroom;
-use super::random::random_signs;
-use super::task::{DesignRows, RowTask};
 use crate::checks::within;
 use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::Matrix;
+use crate::rows::expected::Headroom;
+use crate::rows::simple::random_signs;
+use crate::rows::{DesignRows, RowError, RowTask};
+use nalgebra::DMatrix;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -219,12 +217,202 @@ impl Leading {
     }
 }
 
+/// Worth of a row, kept up to date while single levels change.
+pub(super) trait Worth {
+    /// Takes `row` as it is.
+    fn start(&mut self, row: &[f64]);
+    /// The worth of the row.
+    fn worth(&self) -> f64;
+    /// Its worth after level i has changed by `delta`.
+    fn after(&mut self, i: usize, delta: f64) -> f64;
+    /// Changes level i by `delta`.
+    fn change(&mut self, i: usize, delta: f64);
+}
+
+/// Least gain of worth, as a share of it, for which a level is changed: rounding makes no progress.
+const LEAST_GAIN: f64 = 1e-9;
+
+/// Turns single signs of `row` while its worth grows, at most `sweeps` times through all of them. A row whose sum is too
+/// large is brought within `headroom` first, by the turns that cost the least worth for what they take off the sum;
+/// `None` when that cannot be done.
+pub(super) fn climb(
+    worth: &mut dyn Worth,
+    mut headroom: Option<&mut Headroom>,
+    sweeps: usize,
+    row: &mut [f64],
+) -> Option<f64> {
+    worth.start(row);
+    if let Some(headroom) = headroom.as_deref_mut() {
+        headroom.start(row);
+        settle(worth, headroom, row)?;
+    }
+    for _ in 0..sweeps {
+        let mut changed = false;
+        for (i, value) in row.iter_mut().enumerate() {
+            let (now, delta) = (worth.worth(), -2.0 * *value);
+            if headroom.as_ref().is_some_and(|h| h.after(i, delta) > h.limit()) {
+                continue;
+            }
+            if worth.after(i, delta) > now + LEAST_GAIN * now.abs() {
+                worth.change(i, delta);
+                if let Some(headroom) = headroom.as_deref_mut() {
+                    headroom.change(i, delta);
+                }
+                *value = -*value;
+                changed = true;
+            }
+        }
+        if !changed {
+            break;
+        }
+    }
+    Some(worth.worth())
+}
+
+/// Brings `row` within `headroom`.
+fn settle(worth: &mut dyn Worth, headroom: &mut Headroom, row: &mut [f64]) -> Option<()> {
+    while !headroom.kept() {
+        let now = worth.worth();
+        let (mut least, mut best) = (f64::INFINITY, None);
+        for (i, value) in row.iter().enumerate() {
+            let delta = -2.0 * value;
+            let taken = headroom.square() - headroom.after(i, delta);
+            // less is rounding
+            if taken <= LEAST_GAIN * headroom.square() {
+                continue;
+            }
+            let cost = (now - worth.after(i, delta)) / taken;
+            if cost < least {
+                (least, best) = (cost, Some((i, delta)));
+            }
+        }
+        let (i, delta) = best?;
+        worth.change(i, delta);
+        headroom.change(i, delta);
+        row[i] += delta;
+    }
+    Some(())
+}
+
+/// Posterior covariance P of Gaussian images, row by row: P ← P − P a aᵀP / (aᵀP a + σ²), and its square.
+#[derive(Debug, Clone)]
+pub(super) struct Posterior {
+    pub(super) n: usize,
+    /// P, N × N.
+    pub(super) p: Vec<f64>,
+    /// P², N × N.
+    pub(super) square: Vec<f64>,
+    /// σ².
+    pub(super) variance: f64,
+    u: Vec<f64>,
+    w: Vec<f64>,
+}
+
+impl Posterior {
+    /// Before any measurement: P = `covariance`.
+    pub(super) fn new(covariance: Matrix, variance: f64) -> Self {
+        let n = covariance.nrows();
+        let p = covariance.view().values().to_vec();
+        let mut square = vec![0.0; n * n];
+        // P is symmetric: (P²)ᵢⱼ is the product of two rows
+        square.par_chunks_exact_mut(n).enumerate().for_each(|(i, out)| {
+            let row = &p[i * n..(i + 1) * n];
+            out.iter_mut()
+                .zip(p.chunks_exact(n))
+                .for_each(|(out, other)| *out = dot(row, other));
+        });
+        Self {
+            n,
+            p,
+            square,
+            variance,
+            u: vec![0.0; n],
+            w: vec![0.0; n],
+        }
+    }
+
+    /// Measures the row `a`.
+    pub(super) fn observe(&mut self, a: &[f64]) {
+        let n = self.n;
+        adjoint(&self.p, a, &mut self.u);
+        adjoint(&self.p, &self.u, &mut self.w);
+        let (u, w) = (&self.u, &self.w);
+        let d = dot(a, u) + self.variance;
+        let uu = dot(u, u) / (d * d);
+        let rows = self.p.par_chunks_exact_mut(n).zip(self.square.par_chunks_exact_mut(n));
+        rows.enumerate().with_min_len(64).for_each(|(i, (p, square))| {
+            axpy(-u[i] / d, u, p);
+            axpy(uu * u[i] - w[i] / d, u, square);
+            axpy(-u[i] / d, w, square);
+        });
+    }
+
+    pub(super) fn trace(&self) -> f64 {
+        (0..self.n).map(|i| self.p[i * (self.n + 1)]).sum()
+    }
+}
+
+/// Share of the expected images' variance that remains after the measurements `rows` (M × N): the trace of the
+/// posterior covariance divided by that of the prior.
+///
+/// tr P = tr C − ‖L⁻¹ A C‖², L Lᵀ = A C Aᵀ + σ² I. The cost is O(M²N) plus M products with C; for separable images such
+/// a product costs O(N) times the sides of the grid.
+///
+/// # Errors
+/// [`RowError`] if the task is out of range, or the rows have another number of taxels.
+pub fn posterior_trace(task: &RowTask<'_>, rows: &Matrix) -> Result<f64, RowError> {
+    task.check(usize::MAX, "")?;
+    let expected = task.expected;
+    let (m, n) = (rows.nrows(), rows.ncols());
+    if n != expected.taxels() {
+        let [rows, cols] = expected.shape();
+        return Err(RowError::Shape { pixels: n, rows, cols });
+    }
+    let mut cross = vec![0.0; m * n];
+    cross
+        .par_chunks_exact_mut(n)
+        .enumerate()
+        .for_each(|(r, out)| expected.times_covariance(rows.row(r), out));
+    let row = |r: usize| &cross[r * n..(r + 1) * n];
+    let mut system = DMatrix::from_fn(m, m, |i, j| if i < j { 0.0 } else { dot(row(i), rows.row(j)) });
+    // rounding of the sums is what a noise of this size is lost in
+    let floor = f64::EPSILON * m as f64 * (0..m).map(|i| system[(i, i)]).fold(0.0, f64::max);
+    (0..m).for_each(|i| system[(i, i)] += task.variance().max(floor));
+    let before = expected.variance();
+    // only the lower triangle is read
+    let Some(factor) = system.cholesky() else {
+        let mut posterior = Posterior::new(expected.covariance(), task.variance());
+        (0..m).for_each(|r| posterior.observe(rows.row(r)));
+        return Ok(posterior.trace() / before);
+    };
+    // row by row
+    let factor = factor.l().transpose();
+    let factor = factor.as_slice();
+    let gone: f64 = (0..n)
+        .into_par_iter()
+        .with_min_len(64)
+        .map_init(
+            || vec![0.0; m],
+            |column, taxel| {
+                for i in 0..m {
+                    let lower = &factor[i * m..=i * m + i];
+                    column[i] = (cross[i * n + taxel] - dot(&lower[..i], &column[..i])) / lower[i];
+                }
+                column.iter().map(|v| v * v).sum::<f64>()
+            },
+        )
+        .collect::<Vec<f64>>()
+        .iter()
+        .sum();
+    Ok((1.0 - gone / before).max(0.0))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::covariance::posterior_trace;
-    use super::super::expected::{Expected, Tolerances};
     use super::*;
     use crate::recover::Gaussian;
+    use crate::rows::expected::{Expected, Tolerances};
+    use crate::rows::greedy::posterior_trace;
 
     fn hadamard(n: usize, r: usize, c: usize) -> f64 {
         debug_assert!(n.is_power_of_two());
@@ -314,5 +502,35 @@ mod tests {
             .iter()
             .map(|l| l / (1.0 + l * (low - 1.0 / l.max(1e-300)).max(0.0)))
             .sum()
+    }
+
+    /// Against the batch form of the posterior: P = C − C Aᵀ (A C Aᵀ + σ² I)⁻¹ A C.
+    #[test]
+    fn row_by_row_is_all_at_once() {
+        let expected = Expected::smooth([4, 5], 1.3).unwrap();
+        let task = RowTask::new(6, &expected);
+        let a = DMatrix::from_fn(6, 20, |i, j| if (i * 7 + j * j + i * j) % 3 == 0 { -1.0 } else { 1.0 });
+        let c = DMatrix::from_row_slice(20, 20, expected.covariance().view().values());
+        let system = &a * &c * a.transpose() + DMatrix::identity(6, 6) * task.variance();
+        let left = &c - &c * a.transpose() * system.try_inverse().unwrap() * &a * &c;
+        let mut posterior = Posterior::new(expected.covariance(), task.variance());
+        let rows = Matrix::from_rows(6, 20, a.transpose().as_slice().to_vec()).unwrap();
+        (0..6).for_each(|r| posterior.observe(rows.row(r)));
+        let squared = &left * &left;
+        for i in 0..20 {
+            for j in 0..20 {
+                // a few hundred products of numbers up to 1, and up to 10 in the square
+                assert!((posterior.p[i * 20 + j] - left[(i, j)]).abs() < 1e-12);
+                assert!((posterior.square[i * 20 + j] - squared[(i, j)]).abs() < 1e-11);
+            }
+        }
+        let share = posterior_trace(&task, &rows).unwrap();
+        assert!((share - left.trace() / c.trace()).abs() < 1e-13);
+        // the same moments as one matrix
+        let prior = crate::recover::Gaussian::new(vec![0.0; 20], expected.covariance()).unwrap();
+        let dense = Expected::like(&prior, [4, 5], Default::default()).unwrap();
+        let again = posterior_trace(&RowTask::new(6, &dense), &rows).unwrap();
+        // its diagonal is raised by 1e-9 of itself
+        assert!((share - again).abs() < 1e-8, "{share} {again}");
     }
 }

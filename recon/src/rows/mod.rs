@@ -19,33 +19,334 @@
 //! # Ok::<(), spts_recon::rows::RowError>(())
 //! ```
 
-mod ascent;
-mod choose;
 mod classes;
 mod conformance;
-mod cosine;
-mod covariance;
-mod error;
 mod expected;
 mod greedy;
-mod headroom;
-mod order;
-mod random;
-mod separable;
-mod table;
-mod task;
+mod simple;
 
-pub use choose::{choose_for_classes, choose_for_images};
-pub use classes::Classes;
+pub use classes::{Classes, choose_for_classes, choose_for_images};
 pub use conformance::conformance;
-pub use cosine::CosineSigns;
-pub use covariance::posterior_trace;
-pub use error::RowError;
-pub use expected::{Expected, Tolerances};
-pub use greedy::Greedy;
-pub use headroom::largest_sum;
-pub use order::fewest_flips;
-pub use random::Random;
-pub use separable::Separable;
-pub use table::{DESIGNERS, Designer, RowNeeds, designer};
-pub use task::{DesignRows, RowTask};
+pub use expected::{Expected, Tolerances, largest_sum};
+pub use greedy::{Greedy, posterior_trace};
+pub use simple::{CosineSigns, Random, Separable};
+
+use crate::checks::{RangeError, within};
+use crate::classify::Component;
+use crate::matrix::{Matrix, MatrixView};
+use crate::recover::PriorError;
+use RowNeeds::{Moments, Nothing};
+
+/// Why rows cannot be designed or selected.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RowError {
+    /// A parameter is outside its range.
+    #[error(transparent)]
+    Range(#[from] RangeError),
+    /// More rows are requested than exist.
+    #[error("`rows` = {rows} is outside [1, {most}]: {reason}")]
+    Rows {
+        /// Requested number of rows.
+        rows: usize,
+        /// Largest possible number of rows.
+        most: usize,
+        /// Reason for the limit.
+        reason: &'static str,
+    },
+    /// The expected images do not fit the grid.
+    #[error("images of {pixels} taxels on a grid of {rows} × {cols}")]
+    Shape {
+        /// Taxels of the images.
+        pixels: usize,
+        /// Rows of the grid.
+        rows: usize,
+        /// Columns of the grid.
+        cols: usize,
+    },
+    /// The designer needs classes to distinguish.
+    #[error("`classes` has {labels} classes; rows that tell classes apart need at least 2")]
+    Classes {
+        /// Number of different labels.
+        labels: usize,
+    },
+    /// No row respects the headroom.
+    #[error(
+        "no row of levels ±1 has a sum below `largest_sum` = {limit:.3} of a random row's; the smallest has {least:.3}"
+    )]
+    Headroom {
+        /// The limit, relative to a random row's root mean square.
+        limit: f64,
+        /// The smallest value found.
+        least: f64,
+    },
+    /// Images from which no Gaussian prior can be made.
+    #[error(transparent)]
+    Prior(#[from] PriorError),
+}
+
+/// What a designer of rows is asked for: how many rows, for which images, with which noise and limit.
+#[derive(Debug, Clone, Copy)]
+pub struct RowTask<'a> {
+    /// Number of rows M: the period of a repeated pattern, at least 1.
+    pub rows: usize,
+    /// Expected images.
+    pub expected: &'a Expected,
+    /// Gaussian classes, for designers that distinguish classes; empty for all others.
+    pub classes: &'a [Component],
+    /// Standard deviation of a measurement's noise relative to the root mean square of a random row's sum, in [1e-6,
+    /// 1e3].
+    pub noise: f64,
+    /// Headroom: largest root mean square of a row's sum over the expected images, relative to a random row's, in
+    /// [0.05, 1000]. `None` for no limit.
+    pub largest_sum: Option<f64>,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+/// A way to choose rows of the sensing matrix for images that are expected.
+///
+/// ```
+/// use spts_recon::rows::{Expected, RowTask, designer, posterior_trace};
+///
+/// let smooth = Expected::smooth([6, 6], 1.5)?;
+/// let task = RowTask::new(8, &smooth);
+/// let design = |name| (designer(name).expect("in the table").build)().design(&task);
+/// let (designed, random) = (design("greedy")?, design("random")?);
+/// assert!(posterior_trace(&task, &designed)? < posterior_trace(&task, &random)?);
+/// # Ok::<(), spts_recon::rows::RowError>(())
+/// ```
+pub trait DesignRows: Send + Sync {
+    /// Designs an M × N sensing matrix with every level in [−1, 1]. The most useful rows come first, so that the first
+    /// few are a design of their own. Equal tasks have equal results for any number of threads.
+    ///
+    /// # Errors
+    /// [`RowError`] if the task is out of range, or no row respects its headroom.
+    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, RowError>;
+}
+
+impl<'a> RowTask<'a> {
+    /// Default noise of a measurement: contact noise, and what a prior does not describe.
+    pub const NOISE: f64 = 0.15;
+
+    /// A task for `rows` rows and the images `expected`, without a limit of the sums.
+    #[must_use]
+    pub fn new(rows: usize, expected: &'a Expected) -> Self {
+        Self {
+            rows,
+            expected,
+            classes: &[],
+            noise: Self::NOISE,
+            largest_sum: None,
+            seed: 1,
+        }
+    }
+
+    /// Checks all numbers; at most `most` rows, because of `reason`.
+    pub(super) fn check(&self, most: usize, reason: &'static str) -> Result<(), RowError> {
+        within("noise", self.noise, 1e-6, 1e3)?;
+        if let Some(limit) = self.largest_sum {
+            within("largest_sum", limit, 0.05, 1e3)?;
+        }
+        if self.rows == 0 || self.rows > most {
+            return Err(RowError::Rows {
+                rows: self.rows,
+                most,
+                reason,
+            });
+        }
+        Ok(())
+    }
+
+    /// σ²: variance of a measurement's noise, in the unit of the images.
+    pub(super) fn variance(&self) -> f64 {
+        self.noise * self.noise * self.expected.random_square()
+    }
+
+    /// The largest mean square of a row's sum, in the unit of the images.
+    pub(super) fn largest_square(&self) -> Option<f64> {
+        self.largest_sum
+            .map(|limit| limit * limit * self.expected.random_square())
+    }
+}
+
+/// What a designer needs to know about the images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowNeeds {
+    /// Only the grid.
+    Nothing,
+    /// Their second moments.
+    Moments,
+    /// Classes to distinguish.
+    Classes,
+}
+
+/// A designer of rows in the table [`DESIGNERS`]: its names, what it needs to know, and how it is built.
+#[derive(Clone, Copy)]
+pub struct Designer {
+    /// Name on the command line and in files.
+    pub name: &'static str,
+    /// Name in figures and printed tables.
+    pub label: &'static str,
+    /// What it needs to know about the images.
+    pub needs: RowNeeds,
+    /// Description.
+    pub about: &'static str,
+    /// Builds the designer.
+    pub build: fn() -> Box<dyn DesignRows>,
+}
+
+const fn line(
+    name: &'static str,
+    label: &'static str,
+    needs: RowNeeds,
+    about: &'static str,
+    build: fn() -> Box<dyn DesignRows>,
+) -> Designer {
+    Designer {
+        name,
+        label,
+        needs,
+        about,
+        build,
+    }
+}
+
+/// Every designer: name, label, needs, description, builder.
+pub const DESIGNERS: &[Designer] = &[
+    line("random", "random", Nothing, "independent random signs", || {
+        Box::new(Random)
+    }),
+    line(
+        "cosine_signs",
+        "cosine signs",
+        Nothing,
+        "signs of two-dimensional cosines, low frequencies first",
+        || Box::new(CosineSigns),
+    ),
+    line(
+        "greedy",
+        "greedy",
+        Moments,
+        "row by row, the one that lowers the posterior variance most",
+        || Box::new(Greedy::default()),
+    ),
+    line(
+        "separable",
+        "separable",
+        Moments,
+        "products of greedy rows along the two axes, for sheets of any size",
+        || Box::new(Separable),
+    ),
+    line(
+        "classes",
+        "for classes",
+        RowNeeds::Classes,
+        "row by row, the one that lowers the bound of classification errors most",
+        || Box::new(Classes::default()),
+    ),
+];
+
+/// The designer called `name` in [`DESIGNERS`]; `None` if there is none.
+///
+/// ```
+/// use spts_recon::rows::{DESIGNERS, RowNeeds, designer};
+///
+/// assert_eq!(designer("cosine_signs").map(|d| d.needs), Some(RowNeeds::Nothing));
+/// assert!(DESIGNERS.iter().all(|d| designer(d.name).is_some()));
+/// ```
+#[must_use]
+pub fn designer(name: &str) -> Option<&'static Designer> {
+    DESIGNERS.iter().find(|d| d.name == name)
+}
+
+/// Orders `rows` (M × N) so that levels change least from one row to the next and from the last to the first. The cost
+/// is the sum over taxels of `weights` times the squared change, because late cells and a settling amplifier cause
+/// errors at changes. The order begins with row 0. It is built from nearest neighbours and improved by reversing
+/// sections while this helps (G. A. Croes, Oper. Res. 6 (1958) 791).
+///
+/// ```
+/// use spts_recon::Matrix;
+/// use spts_recon::rows::fewest_flips;
+///
+/// let rows = Matrix::from_rows(4, 2, vec![1.0, 1.0, -1.0, -1.0, 1.0, -1.0, -1.0, 1.0])?;
+/// let order = fewest_flips(rows.view(), &[1.0, 1.0]);
+/// let flips = |a: usize, b: usize| rows.row(a).iter().zip(rows.row(b)).filter(|(a, b)| a != b).count();
+/// assert!((0..4).all(|k| flips(order[k], order[(k + 1) % 4]) == 1));
+/// # Ok::<(), spts_recon::ShapeError>(())
+/// ```
+///
+/// # Panics
+/// If the number of weights differs from that of the taxels.
+#[must_use]
+pub fn fewest_flips(rows: MatrixView<'_>, weights: &[f64]) -> Vec<usize> {
+    let (m, n) = (rows.nrows(), rows.ncols());
+    assert_eq!(weights.len(), n, "weights");
+    let row = |r: usize| &rows.values()[r * n..(r + 1) * n];
+    let distance = |a: usize, b: usize| {
+        let pairs = row(a).iter().zip(row(b)).zip(weights);
+        pairs.map(|((a, b), w)| w * (a - b) * (a - b)).sum::<f64>()
+    };
+    let table: Vec<f64> = (0..m * m).map(|k| distance(k / m, k % m)).collect();
+    let between = |a: usize, b: usize| table[a * m + b];
+    let mut order: Vec<usize> = Vec::with_capacity(m);
+    let mut left: Vec<usize> = (0..m).collect();
+    while !left.is_empty() {
+        let next = match order.last() {
+            None => 0,
+            Some(&last) => {
+                let each = (0..left.len()).map(|k| (between(last, left[k]), k));
+                each.fold((f64::INFINITY, 0), |a, b| if b.0 < a.0 { b } else { a }).1
+            }
+        };
+        order.push(left.remove(next));
+    }
+    let mut gained = true;
+    while gained {
+        gained = false;
+        for i in 1..m {
+            for j in i + 1..m {
+                let (before, after) = (order[i - 1], order[(j + 1) % m]);
+                let now = between(before, order[i]) + between(order[j], after);
+                let turned = between(before, order[j]) + between(order[i], after);
+                if turned < now * (1.0 - 1e-12) {
+                    order[i..=j].reverse();
+                    gained = true;
+                }
+            }
+        }
+    }
+    order
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_designer_conforms() {
+        for designer in DESIGNERS {
+            conformance(designer);
+        }
+    }
+
+    /// Rows that differ in one taxel each make a loop of four flips; the taxel without weight does not count.
+    #[test]
+    fn a_loop_of_single_flips_is_found() {
+        let rows = [[1.0, 1.0, 1.0], [-1.0, -1.0, -1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, -1.0]];
+        let matrix = Matrix::from_rows(4, 3, rows.concat()).unwrap();
+        let order = fewest_flips(matrix.view(), &[1.0, 1.0, 0.0]);
+        assert_eq!(order[0], 0);
+        let flips: f64 = (0..4)
+            .map(|k| {
+                let (a, b) = (rows[order[k]], rows[order[(k + 1) % 4]]);
+                (0..2).map(|i| (a[i] - b[i]).abs() / 2.0).sum::<f64>()
+            })
+            .sum();
+        assert!((flips - 4.0).abs() < 1e-12, "{order:?}: {flips}");
+        assert_eq!(
+            fewest_flips(Matrix::from_rows(1, 3, vec![1.0; 3]).unwrap().view(), &[1.0; 3]),
+            [0]
+        );
+    }
+}
