@@ -7,8 +7,7 @@ use spts::output::OutputError;
 use spts::record::TwinError;
 use spts_eval::ScoreError;
 use spts_eval::training::LearnError;
-use spts_studies::compare::CompareError;
-use spts_studies::per_object::PerObjectError;
+use spts_input::Refusal;
 
 /// Why the report cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -29,12 +28,9 @@ pub enum ReproduceError {
     /// A skin cannot be scored.
     #[error(transparent)]
     Score(#[from] ScoreError),
-    /// The readout cannot be compared with the recordings.
+    /// Twin and skin cannot be compared.
     #[error(transparent)]
-    Compare(#[from] CompareError),
-    /// Twin and skin cannot be held against each other object by object.
-    #[error(transparent)]
-    PerObject(#[from] PerObjectError),
+    Compare(#[from] Refusal),
     /// The report's folder or one of its tables cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),

@@ -1,7 +1,7 @@
 //! Errors of the design study.
 
-use crate::electronics::ElectronicsError;
 use crate::touches::TouchError;
+use spts_input::Refusal;
 
 /// Why there is no [`DesignReport`](super::DesignReport), or a design cannot be checked.
 #[derive(Debug, thiserror::Error)]
@@ -67,7 +67,7 @@ pub enum DesignError {
     },
     /// The electronics of as_designed cannot be used.
     #[error(transparent)]
-    Electronics(#[from] ElectronicsError),
+    Electronics(#[from] Refusal),
     /// Touches that cannot be drawn or measured.
     #[error(transparent)]
     Touch(#[from] TouchError),

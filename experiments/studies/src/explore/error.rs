@@ -1,6 +1,6 @@
 //! Errors of the exploration.
 
-use crate::electronics::ElectronicsError;
+use spts_input::Refusal;
 
 /// Why there is no [`ExploreReport`](super::ExploreReport).
 #[derive(Debug, thiserror::Error)]
@@ -8,10 +8,13 @@ use crate::electronics::ElectronicsError;
 pub enum ExploreError {
     /// The electronics of as_designed cannot be used.
     #[error(transparent)]
-    Electronics(#[from] ElectronicsError),
-    /// The amplifier or the readout of a wire cannot be built, or the wire cannot be measured.
+    Electronics(#[from] Refusal),
+    /// The amplifier of a wire cannot be built.
     #[error(transparent)]
-    Refused(#[from] spts_input::Refusal),
+    Amplifier(#[from] spts_models::ConfigError),
+    /// The readout of a wire cannot be built.
+    #[error(transparent)]
+    Profile(#[from] spts_circuit::ProfileError),
     /// A profile lacks an effect, or the effect lacks a value.
     #[error("profile {profile}: no `compressive.{name}`")]
     NoEffect {
@@ -23,6 +26,12 @@ pub enum ExploreError {
     /// There are more taxels on a wire than seeds.
     #[error("taxels of a wire: {0}")]
     Cells(#[from] std::num::TryFromIntError),
+    /// The conductance of the taxels is not valid.
+    #[error(transparent)]
+    Source(#[from] spts_circuit::SourceError),
+    /// A wire cannot be measured.
+    #[error(transparent)]
+    Acquire(#[from] spts_circuit::AcquireError),
     /// The cells' generator has no operator.
     #[error(transparent)]
     Generator(#[from] spts_recon::RangeError),

@@ -1,37 +1,37 @@
 //! `spts fidelity`: cost and error of every fidelity level of the contact, up to the error of the scores.
 //!
-//! Every scene is run with every level, at several resolutions and time steps (`settings`), and compared with the
-//! reference level at its finest: pressures (`compare`) and, after transducer, readout and decoder, scores (`scores`).
-
-mod compare;
-mod error;
-mod report;
-mod run;
-mod scenes;
-mod scores;
-mod settings;
-#[cfg(test)]
-mod tests;
-mod text;
-
-pub use error::FidelityError;
-pub use report::FidelityReport;
-pub use run::FinePressure;
-pub use scenes::{FidelityScene, SCENES};
-pub use settings::SettingGrid;
-pub use text::{SettingMeans, setting_means};
+//! Every scene is run with every level, at several resolutions and time steps, and compared with the reference level
+//! at its finest: pressures and, after transducer, readout and decoder, scores.
 
 use rayon::prelude::*;
-use run::ContactRun;
-use scores::{ChainScores, ReferenceScores};
 use serde::Serialize;
-use settings::ContactSetting;
+use spts::chain::Acquisition;
+use spts::output::write_bytes;
 use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
 use spts::record::TwinError;
-use spts::scene::Scene;
-use spts_sim::fidelity::MeasuredSetting;
-use std::path::Path;
+use spts::scene::{DropConfig, PressConfig, Scene, SceneConfig, Task};
+use spts_circuit::Mode;
+use spts_contact::Frame;
+use spts_contact::mesh::{TriMesh, cylinder, extrude, sphere};
+use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
+use spts_eval::training::Learned;
+use spts_eval::{Press, ScoreError, Scorer, Tally, Window};
+use spts_input::Refusal;
+use spts_models::Streams;
+use spts_recon::Matrix;
+use spts_recon::classify::Library;
+use spts_recon::dictionary::{Ksvd, Selection, select};
+use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
+use spts_sim::World;
+use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting, REFERENCE};
+use spts_sim::world::{Bounce, SimError};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+mod text;
+
+pub use text::{SettingMeans, setting_means};
 
 /// Settings of `spts fidelity`, which measures cost and error of every contact model, resolution and time step.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ pub struct FidelityStudy {
 
 /// A setting of a scene that could not be run, and why.
 #[derive(Debug, Clone, Serialize)]
-pub struct Refusal {
+pub struct RefusedSetting {
     /// Name of the scene.
     pub scene: String,
     /// Name of the fidelity level.
@@ -73,9 +73,9 @@ impl FidelityStudy {
     /// must exist.
     ///
     /// # Errors
-    /// [`FidelityError`] if a scene is not usable, a reference cannot be run, or a mesh cannot be written.
-    pub fn run(&self, meshes: &Path, progress: &dyn Progress) -> Result<FidelityReport, FidelityError> {
-        let scenes = scenes::build(&self.scenes, self.seed, meshes)?;
+    /// [`Refusal`] if a scene is not usable, a reference cannot be run, or a mesh cannot be written.
+    pub fn run(&self, meshes: &Path, progress: &dyn Progress) -> Result<FidelityReport, Refusal> {
+        let scenes = build(&self.scenes, self.seed, meshes)?;
         let runs: usize = scenes.iter().map(|s| self.grid.settings(s.is_drop()).len()).sum();
         progress.stage("running contact models", Some(scenes.len() + runs));
         let references = scenes
@@ -84,7 +84,7 @@ impl FidelityStudy {
                 let setting = self.grid.reference(scene.is_drop());
                 let at_reference = scene.at(setting)?;
                 let [learned, scored] =
-                    [(0, run::ONCE), (1, run::TIMED)].map(|(index, runs)| run::run(&at_reference, index, runs));
+                    [(0, ONCE), (1, TIMED)].map(|(index, runs)| run_contact(&at_reference, index, runs));
                 progress.step();
                 Ok(Reference {
                     learned: learned?,
@@ -93,11 +93,12 @@ impl FidelityStudy {
                     scene,
                 })
             })
-            .collect::<Result<Vec<_>, TwinError>>()?;
-        let others: Vec<(Scene, ContactRun)> = scenes::others(&references, self.seed, meshes)?
+            .collect::<Result<Vec<_>, TwinError>>()
+            .map_err(Refusal::from_error)?;
+        let others: Vec<(Scene, ContactRun)> = others(&references, self.seed, meshes)?
             .into_par_iter()
             .filter_map(|scene| {
-                let run = run::run(&scene, 0, run::ONCE).ok()?;
+                let run = run_contact(&scene, 0, ONCE).ok()?;
                 Some((scene, run))
             })
             .collect();
@@ -115,9 +116,9 @@ impl FidelityStudy {
                 progress.step();
                 result
             })
-            .collect::<Result<_, FidelityError>>()?;
+            .collect::<Result<_, Refusal>>()?;
         progress.end();
-        let hash = provenance_hash(&references)?;
+        let hash = provenance_hash(&references).map_err(Refusal::from_error)?;
         let mut report = FidelityReport::new(Provenance::new(self.seed, hash));
         for result in results {
             report.add(result);
@@ -125,7 +126,7 @@ impl FidelityStudy {
         for reference in &references {
             let setting = self.grid.reference(reference.scene.is_drop());
             let scored = &reference.scored;
-            let taxel_rms_rel = compare::taxel_error(scored, scored);
+            let taxel_rms_rel = taxel_error(scored, scored);
             report.add(row(reference, scored, setting, taxel_rms_rel, [0.0; 3]));
         }
         Ok(report)
@@ -140,7 +141,7 @@ fn provenance_hash(references: &[Reference]) -> Result<String, TwinError> {
 
 enum SettingResult {
     Measured(Box<MeasuredSetting>, FinePressure),
-    Refused(Refusal),
+    Refused(RefusedSetting),
 }
 
 /// Runs one setting of the scene with the index `label` and compares it with its reference.
@@ -149,9 +150,9 @@ fn measure(
     label: usize,
     setting: ContactSetting,
     learned: &ReferenceScores,
-) -> Result<SettingResult, FidelityError> {
+) -> Result<SettingResult, Refusal> {
     let refused = |error: &dyn std::fmt::Display| {
-        SettingResult::Refused(Refusal {
+        SettingResult::Refused(RefusedSetting {
             scene: reference.scene.name.clone(),
             level: setting.level.name,
             cells_per_taxel: setting.cells_per_taxel,
@@ -163,11 +164,11 @@ fn measure(
         Ok(scene) => scene,
         Err(error) => return Ok(refused(&error)),
     };
-    let found = match run::run(&scene, 1, run::TIMED) {
+    let found = match run_contact(&scene, 1, TIMED) {
         Ok(found) => found,
         Err(error) => return Ok(refused(&error)),
     };
-    let taxel_rms_rel = compare::taxel_error(&found, &reference.scored);
+    let taxel_rms_rel = taxel_error(&found, &reference.scored);
     if !taxel_rms_rel.is_finite() {
         return Ok(refused(&"the ball meets nothing, or the reference nothing like it"));
     }
@@ -195,11 +196,815 @@ fn row(
         timestep_s: setting.timestep_s,
         cost_us_per_step: found.cost_us_per_step,
         cost_s_per_s: found.cost_s_per_s,
-        pressure_rms_rel: compare::fine_error(&found.fine, &reference.scored.fine),
+        pressure_rms_rel: fine_error(&found.fine, &reference.scored.fine),
         taxel_rms_rel,
         support_delta,
         iou_delta,
         class_delta,
     };
     SettingResult::Measured(Box::new(row), found.fine.clone())
+}
+
+/// Resolutions and time steps at which `spts fidelity` runs every contact model.
+///
+/// ```
+/// use spts_studies::fidelity::SettingGrid;
+///
+/// let (quick, full) = (SettingGrid::quick(), SettingGrid::full());
+/// assert!(quick.cells_per_taxel.len() <= full.cells_per_taxel.len());
+/// assert!(full.reference_cells > *full.cells_per_taxel.first().expect("resolutions"));
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct SettingGrid {
+    /// Resolutions: grid squares along one side of a taxel.
+    pub cells_per_taxel: Vec<usize>,
+    /// Time steps of a press, s.
+    pub press_steps_s: Vec<f64>,
+    /// Time steps of a drop, s.
+    pub drop_steps_s: Vec<f64>,
+    /// Resolution of the reference.
+    pub reference_cells: usize,
+}
+
+/// A level at a resolution and a time step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ContactSetting {
+    level: &'static FidelityLevel,
+    cells_per_taxel: usize,
+    timestep_s: f64,
+}
+
+/// Time between the frames of a press, s: the one step of a level without dynamics.
+const FRAME_S: f64 = 2e-3;
+
+impl SettingGrid {
+    /// The settings of the shipped table.
+    #[must_use]
+    pub fn full() -> Self {
+        Self {
+            cells_per_taxel: vec![2, 3, 6, 12, 24],
+            press_steps_s: vec![2.5e-4, 5e-4, 1e-3, 2e-3],
+            drop_steps_s: vec![5e-5, 1e-4, 2e-4],
+            reference_cells: 24,
+        }
+    }
+
+    /// Settings that take less than a minute.
+    #[must_use]
+    pub fn quick() -> Self {
+        Self {
+            cells_per_taxel: vec![2, 6],
+            press_steps_s: vec![5e-4],
+            drop_steps_s: vec![1e-4],
+            reference_cells: 6,
+        }
+    }
+
+    fn steps_s(&self, drop: bool) -> &[f64] {
+        if drop { &self.drop_steps_s } else { &self.press_steps_s }
+    }
+
+    /// The reference: its level at its finest.
+    fn reference(&self, drop: bool) -> ContactSetting {
+        ContactSetting {
+            level: FidelityLevel::named(REFERENCE).unwrap_or(&LEVELS[0]),
+            cells_per_taxel: self.reference_cells,
+            timestep_s: self.steps_s(drop).iter().copied().fold(f64::INFINITY, f64::min),
+        }
+    }
+
+    /// Everything that is compared with the reference: that itself is left out, and a drop has no level without
+    /// dynamics.
+    fn settings(&self, drop: bool) -> Vec<ContactSetting> {
+        let mut settings = Vec::new();
+        for level in LEVELS {
+            let steps_s = if level.dynamic { self.steps_s(drop) } else { &[FRAME_S] };
+            if drop && !level.dynamic {
+                continue;
+            }
+            for &cells_per_taxel in &self.cells_per_taxel {
+                settings.extend(steps_s.iter().map(|&timestep_s| ContactSetting {
+                    level,
+                    cells_per_taxel,
+                    timestep_s,
+                }));
+            }
+        }
+        settings.retain(|setting| *setting != self.reference(drop));
+        settings
+    }
+}
+
+/// Names of the built-in scenes.
+pub const SCENES: [&str; 7] = ["sphere", "punch", "edge", "T", "tape", "comb", "drop"];
+
+/// A scene of the study, to be run with any level.
+#[derive(Debug, Clone)]
+pub struct FidelityScene {
+    /// Name in the table.
+    pub name: String,
+    config: SceneConfig,
+    folder: PathBuf,
+}
+
+/// Presses or drops of a scene: one to learn from and one to score.
+const REPEATS: usize = 2;
+
+impl FidelityScene {
+    /// Whether the scene is a drop.
+    #[must_use]
+    pub fn is_drop(&self) -> bool {
+        self.config.drop.is_some()
+    }
+
+    /// The scene on a level.
+    fn at(&self, setting: ContactSetting) -> Result<Scene, TwinError> {
+        let mut config = self.config.clone();
+        setting.level.apply(&mut config.contact, setting.cells_per_taxel);
+        config.timestep_s = Some(setting.timestep_s.into());
+        Ok(Scene::new(config, &self.folder)?)
+    }
+}
+
+/// The built-in scenes called `names`, or read from files; all built-in ones when there is no name. Meshes that only
+/// the study has are written to `folder`.
+fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<FidelityScene>, Refusal> {
+    let all: Vec<String> = SCENES.iter().map(|&name| name.to_owned()).collect();
+    let names = if names.is_empty() { &all } else { names };
+    let mut scenes: Vec<FidelityScene> = Vec::new();
+    for name in names {
+        let scene = if Path::new(name).extension().is_some_and(|e| e == "toml") {
+            from_file(Path::new(name))?
+        } else {
+            built_in(name, seed, folder)?
+        };
+        if scenes.iter().any(|s| s.name == scene.name) {
+            return Err(Refusal::new(format!("`--scene {name}`: named twice")));
+        }
+        scenes.push(scene);
+    }
+    Ok(scenes)
+}
+
+/// What else might be pressed: the built-in scenes that were not asked for, with everything at its default but the
+/// skin, which is that of the references. Those that such a skin cannot bear are left out.
+fn others(references: &[Reference], seed: u64, folder: &Path) -> Result<Vec<Scene>, Refusal> {
+    let Some(first) = references.first() else {
+        return Ok(Vec::new());
+    };
+    let skin = *first.at_reference.skin();
+    if let Some(other) = references.iter().find(|r| *r.at_reference.skin() != skin) {
+        return Err(Refusal::new(format!(
+            "`--scene`: `{}` and `{}` have different skins; study them one at a time",
+            first.scene.name, other.scene.name
+        )));
+    }
+    let left = SCENES
+        .iter()
+        .filter(|name| references.iter().all(|r| r.scene.name != **name));
+    let scenes = left.map(|name| {
+        let scene = built_in(name, seed, folder)?;
+        let config = SceneConfig { skin, ..scene.config };
+        Ok(Scene::new(config, folder).ok())
+    });
+    Ok(scenes
+        .collect::<Result<Vec<_>, Refusal>>()?
+        .into_iter()
+        .flatten()
+        .collect())
+}
+
+fn built_in(name: &str, seed: u64, folder: &Path) -> Result<FidelityScene, Refusal> {
+    let mut press = PressConfig {
+        presses: REPEATS,
+        ..PressConfig::default()
+    };
+    let mut ball = None;
+    match name {
+        "T" | "tape" | "comb" => press.object = Some(name.to_owned()),
+        "drop" => {
+            // one bounce from the full height, and the start of the next
+            let drops = REPEATS;
+            ball = Some(DropConfig {
+                drops,
+                duration_s: 0.7,
+                ..DropConfig::default()
+            });
+        }
+        _ => {
+            let Some(mesh) = shape(name) else {
+                return Err(Refusal::new(format!(
+                    "`--scene {name}` is not one of {}, or a file that ends in .toml",
+                    SCENES.join(", ")
+                )));
+            };
+            let file = format!("{name}.obj");
+            write_bytes(&folder.join(&file), mesh.to_obj(name).as_bytes()).map_err(Refusal::from_error)?;
+            press.mesh = Some(file);
+            [press.row, press.col] = PLACE.map(Some);
+            press.rotation_deg = Some(ROTATION_DEG);
+        }
+    }
+    Ok(FidelityScene {
+        name: name.to_owned(),
+        config: SceneConfig {
+            seed,
+            press: ball.is_none().then_some(press),
+            drop: ball,
+            ..SceneConfig::default()
+        },
+        folder: folder.to_owned(),
+    })
+}
+
+/// Where the shapes are pressed, row and column, and how they are turned: off every symmetry of taxels and cells.
+const PLACE: [f64; 2] = [4.35, 4.6];
+const ROTATION_DEG: f64 = 31.0;
+
+/// A rigid sphere of a tennis ball's size, a flat round punch, or a blunt edge.
+fn shape(name: &str) -> Option<TriMesh> {
+    match name {
+        "sphere" => Some(sphere(33.4e-3, 48, 96)),
+        "punch" => Some(cylinder(20e-3, 15e-3, 96)),
+        "edge" => {
+            // a prism of 60 mm, its sides at 60° to the vertical, laid on its edge
+            let (half_m, height_m) = (17.3e-3, 10e-3);
+            let section = [[0.0, 0.0], [half_m, height_m], [-half_m, height_m]];
+            let prism = extrude(&section, &[], 60e-3).translated([0.0, 0.0, -30e-3]);
+            Some(prism.rotated_x(std::f64::consts::FRAC_PI_2))
+        }
+        _ => None,
+    }
+}
+
+/// A user's scene: its first two presses or drops, without what the levels decide.
+fn from_file(path: &Path) -> Result<FidelityScene, Refusal> {
+    let scene = Scene::load(path)
+        .map_err(TwinError::from)
+        .map_err(Refusal::from_error)?;
+    let mut config = scene.config().clone();
+    match scene.task() {
+        Task::Press(press) => {
+            let press = press.clone();
+            config.press = Some(PressConfig {
+                presses: REPEATS,
+                ..press
+            });
+        }
+        Task::Drop(ball) => {
+            let ball = ball.clone();
+            config.drop = Some(DropConfig { drops: REPEATS, ..ball });
+        }
+    }
+    // the levels bring their own
+    config.frame_interval_s = None;
+    Ok(FidelityScene {
+        name: path
+            .file_stem()
+            .map_or_else(String::new, |s| s.to_string_lossy().into_owned()),
+        config,
+        folder: path.parent().unwrap_or(Path::new("")).to_owned(),
+    })
+}
+
+/// Pressure on every square of the grid on which contact is computed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FinePressure {
+    /// Rows of the grid.
+    pub rows: usize,
+    /// Columns of the grid.
+    pub cols: usize,
+    /// Pressure on every square, Pa, row-major.
+    pub pressure_pa: Vec<f64>,
+}
+
+impl FinePressure {
+    /// "rows x cols", as in "60x60".
+    fn shape(&self) -> String {
+        format!("{}x{}", self.rows, self.cols)
+    }
+}
+
+/// What one run gave.
+#[derive(Debug, Clone)]
+struct ContactRun {
+    frames: Vec<Frame>,
+    bounces: Vec<Bounce>,
+    fine: FinePressure,
+    /// Span of the scores, s: plateau of a press, first contact of a drop.
+    span_s: [f64; 2],
+    cost_us_per_step: f64,
+    cost_s_per_s: f64,
+}
+
+/// Runs that are needed when nobody asks for the cost, and those that are timed at most.
+const ONCE: usize = 1;
+const TIMED: usize = 5;
+/// Time after which no further run is started, s.
+const ENOUGH_S: f64 = 0.3;
+
+/// Runs press or drop `index` of `scene`. The cost is that of the quickest of at most `most_runs` runs, set-up
+/// included; long runs are made once.
+fn run_contact(scene: &Scene, index: usize, most_runs: usize) -> Result<ContactRun, TwinError> {
+    let (mut least_s, mut spent_s) = (f64::INFINITY, 0.0);
+    let mut last = None;
+    for _ in 0..most_runs {
+        let start = Instant::now();
+        let mut world = World::repeat(scene.mechanics(), index)?;
+        let frames = world.frames().collect::<Result<Vec<Frame>, _>>()?;
+        let wall_s = start.elapsed().as_secs_f64();
+        last = Some((frames, world.bounces().to_vec()));
+        least_s = wall_s.min(least_s);
+        spent_s += wall_s;
+        if spent_s > ENOUGH_S {
+            break;
+        }
+    }
+    let (frames, bounces) = last.unwrap_or_default();
+    let span_s = match scene.task() {
+        Task::Press(press) => press.plateau_s(),
+        Task::Drop(_) => bounces.first().map_or([0.0, scene.duration_s()], |b| {
+            // the ends, where hardly anything touches, say little about the shape
+            [b.start_s + 0.15 * b.contact_s, b.start_s + 0.85 * b.contact_s]
+        }),
+    };
+    Ok(ContactRun {
+        fine: fine(scene, &frames, span_s)?,
+        bounces,
+        span_s,
+        cost_us_per_step: 1e6 * least_s * scene.mechanics().timestep_s() / scene.duration_s(),
+        cost_s_per_s: least_s / scene.duration_s(),
+        frames,
+    })
+}
+
+/// Fine pressure in the middle of the span.
+fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<FinePressure, TwinError> {
+    let mut field = scene.mechanics().build_contact().map_err(SimError::from)?;
+    let cells = field.cells_per_taxel();
+    let (rows, cols) = (scene.skin().rows() * cells, scene.skin().cols() * cells);
+    let middle_s = 0.5 * (start_s + end_s);
+    let Some(frame) = nearest(frames, middle_s).map(|i| &frames[i]) else {
+        return Ok(FinePressure {
+            rows,
+            cols,
+            pressure_pa: vec![0.0; rows * cols],
+        });
+    };
+    let body = scene.mechanics().posed(&frame.pose);
+    let mut pressure_pa = field.respond(&body).pressure_pa.to_vec();
+    let force_n = frame.wrench.force_n[2];
+    if let Some(refined) = field.refine(&body, force_n) {
+        pressure_pa.copy_from_slice(refined);
+    } else if let Some(reason) = field.failure() {
+        let time_s = frame.time_s;
+        return Err(SimError::NoPressure {
+            force_n,
+            time_s,
+            reason,
+        }
+        .into());
+    }
+    Ok(FinePressure {
+        rows,
+        cols,
+        pressure_pa,
+    })
+}
+
+/// Index of the frame nearest to `time_s`; `None` without a frame.
+fn nearest(frames: &[Frame], time_s: f64) -> Option<usize> {
+    let after = frames.partition_point(|f| f.time_s < time_s);
+    let Some(before) = after.checked_sub(1) else {
+        return (!frames.is_empty()).then_some(0);
+    };
+    let Some(next) = frames.get(after) else {
+        return Some(before);
+    };
+    let nearer = time_s - frames[before].time_s <= next.time_s - time_s;
+    Some(if nearer { before } else { after })
+}
+
+/// Sums of a relative root mean square.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    error: f64,
+    reference: f64,
+}
+
+impl Sums {
+    fn add(&mut self, value: f64, reference: f64) {
+        self.error += (value - reference).powi(2);
+        self.reference += reference * reference;
+    }
+
+    /// 0 when nothing was expected and nothing found.
+    fn relative(self) -> f64 {
+        if self.error <= 0.0 {
+            0.0
+        } else {
+            (self.error / self.reference).sqrt()
+        }
+    }
+}
+
+/// Error of a fine field on the grid of the reference: every cell of it takes the value of the cell its centre falls
+/// into.
+fn fine_error(found: &FinePressure, reference: &FinePressure) -> f64 {
+    let mut sums = Sums::default();
+    let at = |i: usize, cells: usize, of: usize| (2 * i + 1) * cells / (2 * of);
+    for row in 0..reference.rows {
+        let line = at(row, found.rows, reference.rows) * found.cols;
+        for col in 0..reference.cols {
+            let value = found.pressure_pa[line + at(col, found.cols, reference.cols)];
+            sums.add(value, reference.pressure_pa[row * reference.cols + col]);
+        }
+    }
+    sums.relative()
+}
+
+/// Times at which drops are compared, s: finer than any contact's structure.
+const DROP_SAMPLE_S: f64 = 5e-5;
+
+/// Error of the taxels' pressures, over all frames of a press, or over the first contact of a drop, both counted from
+/// when the force first passes half its peak: what a step's delay adds to the flight is no error of the contact.
+fn taxel_error(found: &ContactRun, reference: &ContactRun) -> f64 {
+    let mut sums = Sums::default();
+    if let Some(contact) = reference.bounces.first() {
+        let (Some(middle_s), Some(found_s)) = (half_rise_s(reference), half_rise_s(found)) else {
+            return f64::INFINITY;
+        };
+        let (mut time_s, end_s) = (
+            contact.start_s - DROP_SAMPLE_S,
+            contact.start_s + 1.2 * contact.contact_s,
+        );
+        while time_s <= end_s {
+            let expected = pressure_at(&reference.frames, time_s);
+            let values = pressure_at(&found.frames, time_s - middle_s + found_s);
+            for (value, expected) in values.iter().zip(&expected) {
+                sums.add(*value, *expected);
+            }
+            time_s += DROP_SAMPLE_S;
+        }
+        return sums.relative();
+    }
+    for frame in &reference.frames {
+        let values = pressure_at(&found.frames, frame.time_s);
+        for (value, expected) in values.iter().zip(frame.pressure.values()) {
+            sums.add(*value, *expected);
+        }
+    }
+    sums.relative()
+}
+
+/// When the force of the first contact passes half its peak, between frames by linear interpolation, s.
+fn half_rise_s(run: &ContactRun) -> Option<f64> {
+    let half_n = 0.5 * run.bounces.first()?.peak_force_n;
+    let force_n = |f: &Frame| f.wrench.force_n[2];
+    let pair = run.frames.windows(2).find(|w| force_n(&w[1]) >= half_n)?;
+    let share = (half_n - force_n(&pair[0])) / (force_n(&pair[1]) - force_n(&pair[0]));
+    Some(pair[0].time_s + share * (pair[1].time_s - pair[0].time_s))
+}
+
+/// Pressure of every taxel at `time_s`, between frames by linear interpolation, Pa.
+fn pressure_at(frames: &[Frame], time_s: f64) -> Vec<f64> {
+    let after = frames.partition_point(|f| f.time_s < time_s);
+    let values = |f: &Frame| f.pressure.values().to_vec();
+    match (frames.get(after.wrapping_sub(1)), frames.get(after)) {
+        // a sample at a frame's own time is that frame, bit for bit
+        (_, Some(b)) if b.time_s <= time_s => values(b),
+        (Some(a), Some(b)) => {
+            let share = (time_s - a.time_s) / (b.time_s - a.time_s);
+            let pairs = a.pressure.values().iter().zip(b.pressure.values());
+            pairs.map(|(a, b)| a + share * (b - a)).collect()
+        }
+        (Some(only), None) | (None, Some(only)) => values(only),
+        (None, None) => Vec::new(),
+    }
+}
+
+/// Measurements of a window.
+const M: usize = 20;
+/// Most windows scored of one recording, spread evenly over the span.
+const WINDOWS: usize = 300;
+/// Library images of a scene.
+const LIBRARY_IMAGES: usize = 10;
+/// Training images of a scene at most.
+const TRAINING_IMAGES: usize = 120;
+/// Sweeps of the dictionary learning.
+const SWEEPS: usize = 10;
+/// Presses that condition the sheet before the one that is recorded.
+const PRESSES_BEFORE: usize = 2;
+/// Share of the time to the first touch that is idle for sure.
+const IDLE: f64 = 0.8;
+
+/// Scores of one run.
+#[derive(Debug, Clone, Copy)]
+struct ChainScores {
+    /// Support accuracy.
+    support: f64,
+    /// Intersection over union.
+    iou: f64,
+    /// Share of windows classified correctly.
+    class: f64,
+}
+
+/// Images of a run: conductance above that of the idle skin, relative to its peak, frame by frame.
+type Images = Vec<Vec<f64>>;
+
+/// What every level is scored with: what the decoder has learned, and the truth and the scores of every reference.
+struct ReferenceScores {
+    decoder: TrainedDecoder,
+    truths: Vec<Truth>,
+    references: Vec<ChainScores>,
+}
+
+/// The reference of a scene: when its frames were, what was pressed at them, and when the scores are taken.
+struct Truth {
+    run: ContactRun,
+    masks: Vec<Vec<bool>>,
+}
+
+impl ReferenceScores {
+    /// Learns from the first repeats of the references, and from `others`, which stand for what else might be pressed,
+    /// and scores the references' second ones.
+    fn learn(references: &[Reference], others: &[(Scene, ContactRun)], seed: u64) -> Result<Self, Refusal> {
+        let (mut training, mut library, mut labels) = (Images::new(), Images::new(), Vec::new());
+        let known = references.iter().map(|r| (&r.at_reference, &r.learned));
+        for (label, (scene, run)) in known.chain(others.iter().map(|(s, r)| (s, r))).enumerate() {
+            let images = images(scene, run).map_err(Refusal::from_error)?;
+            let stride = images.len().div_ceil(TRAINING_IMAGES).max(1);
+            training.extend(images.iter().step_by(stride).cloned());
+            let full: Vec<&Vec<f64>> = images.iter().filter(|image| peak(image) > 0.7).collect();
+            for k in 0..LIBRARY_IMAGES.min(full.len()) {
+                library.push(full[k * full.len() / LIBRARY_IMAGES.min(full.len())].clone());
+                labels.push(label);
+            }
+        }
+        let streams = Streams::new(seed);
+        // relative to the peak, published thresholds of 0.25 V on images of a few volts become a tenth
+        let selection = Selection {
+            min_peak: 0.1,
+            ..Selection::default()
+        };
+        let chosen: Images = select(&training, &selection)
+            .into_iter()
+            .map(|i| training[i].clone())
+            .collect();
+        let ksvd = Ksvd {
+            n_iter: SWEEPS,
+            ..Ksvd::default()
+        };
+        let dictionary = ksvd
+            .learn(&chosen, &mut streams.rng("ksvd", 0))
+            .map_err(|e| Refusal::new(format!("no training data for the dictionary: {e}")))?;
+        let columns: Vec<&[f64]> = library.iter().map(Vec::as_slice).collect();
+        let library = Library::new(&Matrix::from_column_slices(dictionary.nrows(), &columns), &labels)
+            .map_err(|e| Refusal::new(format!("no training data for the library: {e}")))?;
+        let cols = references.first().map_or(1, |r| r.at_reference.skin().cols());
+        let learned = Learned::new(dictionary, None, library, cols);
+        let mut learned = Self {
+            decoder: PublishedDecode::Matched
+                .decoder(&learned)
+                .map_err(Refusal::from_error)?,
+            truths: Vec::new(),
+            references: Vec::new(),
+        };
+        for (label, reference) in references.iter().enumerate() {
+            learned
+                .truths
+                .push(Truth::new(&reference.at_reference, &reference.scored).map_err(Refusal::from_error)?);
+            let scores = learned.score(&reference.at_reference, &reference.scored, label)?;
+            learned.references.push(scores);
+        }
+        Ok(learned)
+    }
+
+    /// Scores of the reference of the scene with the index `label`.
+    fn reference(&self, label: usize) -> ChainScores {
+        self.references[label]
+    }
+
+    /// Records and decodes `run`, of the scene with the index `label`.
+    fn score(&self, scene: &Scene, run: &ContactRun, label: usize) -> Result<ChainScores, Refusal> {
+        let truth = &self.truths[label];
+        let of_task = match scene.task() {
+            Task::Press(_) => Acquisition::presses,
+            Task::Drop(_) => Acquisition::drops,
+        };
+        let acquisition = Acquisition {
+            conditioning_presses: PRESSES_BEFORE,
+            ..of_task(Mode::Compressive, label as u64)
+        };
+        let recording = scene
+            .chain()
+            .record(&[&run.frames], scene.duration_s(), &acquisition)
+            .map_err(Refusal::from_error)?;
+        let volts = &recording.blocks()[0].volts;
+        let rate_hz = recording.sample_rate_hz();
+        #[expect(clippy::cast_possible_truncation, reason = "cut to the recording's length")]
+        let index = |time_s: f64| (time_s * rate_hz).clamp(0.0, volts.len() as f64) as usize;
+        let [start, end] = truth.run.span_s.map(index);
+        let first_s = truth.run.frames.iter().find(|f| f.wrench.force_n[2] > 0.0);
+        let quiet = index(IDLE * first_s.map_or(scene.duration_s(), |f| f.time_s));
+        let idle = volts[..quiet].iter().sum::<f64>() / quiet.max(1) as f64;
+        let press = Press::within(&recording, 0, start..end, idle);
+        let stride = (press.len() / WINDOWS).max(M);
+        let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = press.windows(0..press.len(), M, stride).unzip();
+        let mut scorer = Scorer::new(&self.decoder);
+        let answers = scorer
+            .answers(&windows)
+            .map_err(ScoreError::from)
+            .map_err(Refusal::from_error)?;
+        let mut tally = Tally::default();
+        for (window, answer) in starts.iter().zip(&answers) {
+            let time_s = (start + window + M / 2) as f64 / rate_hz;
+            if let Some(expected) = truth.mask(time_s) {
+                tally.image(&answer.image, expected);
+            }
+        }
+        let decisions: Vec<Option<usize>> = answers.iter().map(|a| scorer.class(a)).collect();
+        tally.decisions(&decisions, label, decisions.len());
+        let scores = tally.scores();
+        Ok(ChainScores {
+            support: scores.support.unwrap_or(0.0),
+            iou: scores.iou.unwrap_or(0.0),
+            class: scores.class_single.unwrap_or(0.0),
+        })
+    }
+}
+
+impl Truth {
+    fn new(scene: &Scene, run: &ContactRun) -> Result<Self, TwinError> {
+        let images = images(scene, run)?;
+        let masks = images.iter().map(|image| {
+            let mut mask = Vec::new();
+            support(image, SUPPORT_THRESHOLD, &mut mask);
+            mask
+        });
+        Ok(Self {
+            masks: masks.collect(),
+            run: run.clone(),
+        })
+    }
+
+    fn mask(&self, time_s: f64) -> Option<&[bool]> {
+        let index = nearest(&self.run.frames, time_s)?;
+        self.masks.get(index).map(Vec::as_slice)
+    }
+}
+
+/// Conductance of every frame above that of the first, with nothing on the skin, relative to the run's peak.
+fn images(scene: &Scene, run: &ContactRun) -> Result<Images, TwinError> {
+    let same: Vec<&[spts_contact::Frame]> = vec![&run.frames; PRESSES_BEFORE + 1];
+    let maps = scene.chain().conductance_maps(&same, 0).pop().unwrap_or_default();
+    let idle = maps.first().map_or_else(Vec::new, |map| map.values().to_vec());
+    let above = maps.iter().map(|map| {
+        let pairs = map.values().iter().zip(&idle);
+        pairs.map(|(g, g0)| (g - g0).max(0.0)).collect::<Vec<f64>>()
+    });
+    let mut images: Images = above.collect();
+    let full = images.iter().map(|image| peak(image)).fold(0.0, f64::max);
+    if full > 0.0 {
+        images.iter_mut().flatten().for_each(|v| *v /= full);
+    }
+    Ok(images)
+}
+
+fn peak(image: &[f64]) -> f64 {
+    image.iter().copied().fold(0.0, f64::max)
+}
+
+/// Results of `spts fidelity`: cost and error of every setting of every scene.
+#[derive(Debug, Clone, Serialize)]
+pub struct FidelityReport {
+    /// One row for each scene, level, resolution and time step. The references have zero error.
+    pub rows: Vec<MeasuredSetting>,
+    /// Settings that could not be run, mostly because of a time step beyond the scene's limit.
+    pub refusals: Vec<RefusedSetting>,
+    /// Pressure on the contact's grid in the middle of the scored span, one map for each row of `rows`.
+    #[serde(skip)]
+    pub fine: Vec<FinePressure>,
+    /// Provenance of the rows.
+    #[serde(skip)]
+    pub provenance: Provenance,
+}
+
+impl FidelityReport {
+    /// A report without rows.
+    fn new(provenance: Provenance) -> Self {
+        Self {
+            rows: Vec::new(),
+            refusals: Vec::new(),
+            fine: Vec::new(),
+            provenance,
+        }
+    }
+
+    /// Takes the result of one setting in. Rows stay sorted: scene by scene as they come, levels from cheap to dear,
+    /// then resolution and step.
+    fn add(&mut self, result: SettingResult) {
+        match result {
+            SettingResult::Refused(refusal) => self.refusals.push(refusal),
+            SettingResult::Measured(row, fine) => {
+                let scenes: Vec<&str> = self.rows.iter().map(|r| r.scene.as_str()).collect();
+                let key = |r: &MeasuredSetting| {
+                    (
+                        scenes.iter().position(|s| *s == r.scene).unwrap_or(usize::MAX),
+                        LEVELS.iter().position(|level| level.name == r.level),
+                        r.cells_per_taxel,
+                        r.timestep_s.to_bits(),
+                    )
+                };
+                let at = self.rows.partition_point(|r| key(r) <= key(&row));
+                self.rows.insert(at, *row);
+                self.fine.insert(at, fine);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// Four dynamic levels and one without, counted by hand; one of them is the reference.
+    #[test]
+    fn every_level_resolution_and_step() {
+        let grid = SettingGrid::full();
+        assert_eq!(grid.settings(false).len(), 4 * 5 * 4 + 5 - 1);
+        assert_eq!(grid.settings(true).len(), 4 * 5 * 3 - 1);
+        assert!(grid.settings(true).iter().all(|s| s.level.dynamic));
+    }
+
+    /// Two cells against four of half the size: the values 1 and 3 against 1, 2, 3, 4 leave errors 0, −1, 0, −1.
+    #[test]
+    fn coarse_fields_are_compared_on_the_fine_grid() {
+        let coarse = FinePressure {
+            rows: 1,
+            cols: 2,
+            pressure_pa: vec![1.0, 3.0],
+        };
+        let fine = FinePressure {
+            rows: 1,
+            cols: 4,
+            pressure_pa: vec![1.0, 2.0, 3.0, 4.0],
+        };
+        assert_relative_eq!(
+            fine_error(&coarse, &fine),
+            (2.0_f64 / 30.0).sqrt(),
+            max_relative = 1e-15
+        );
+        assert!(fine_error(&fine, &fine) <= 0.0);
+    }
+
+    /// A study of two scenes on the levels at one coarse and the reference's own resolution.
+    fn study(scenes: &[&str]) -> FidelityReport {
+        let meshes = tempfile::tempdir().unwrap();
+        let study = FidelityStudy {
+            scenes: scenes.iter().map(|&s| s.to_owned()).collect(),
+            grid: SettingGrid {
+                cells_per_taxel: vec![2],
+                press_steps_s: vec![5e-4],
+                drop_steps_s: vec![1e-4],
+                reference_cells: 4,
+            },
+            seed: 1,
+        };
+        study.run(meshes.path(), &()).unwrap()
+    }
+
+    /// The reference has no error; every other level has one, and the layer's own coarser resolution a smaller one than the
+    /// half-space, which has no base under it.
+    #[test]
+    fn errors_are_ordered() {
+        let report = study(&["T", "drop"]);
+        let row = |scene: &str, level: &str, cells: usize| {
+            let found = |r: &&MeasuredSetting| r.scene == scene && r.level == level && r.cells_per_taxel == cells;
+            report.rows.iter().find(found).unwrap()
+        };
+        for scene in ["T", "drop"] {
+            let reference = row(scene, "layer", 4);
+            assert!(
+                reference.taxel_rms_rel <= 0.0 && reference.pressure_rms_rel <= 0.0,
+                "{reference:?}"
+            );
+            let (layer, half_space) = (row(scene, "layer", 2), row(scene, "half_space", 2));
+            assert!(
+                layer.taxel_rms_rel > 0.0 && layer.taxel_rms_rel < half_space.taxel_rms_rel,
+                "{layer:?} {half_space:?}"
+            );
+            assert!(row(scene, "winkler", 2).cost_us_per_step > 0.0);
+        }
+        assert!(report.rows.iter().all(|r| r.scene != "drop" || r.level != "footprint"));
+    }
+
+    #[test]
+    fn unknown_scenes_are_refused_by_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let names = ["spher".to_owned()];
+        let error = build(&names, 1, dir.path()).unwrap_err().to_string();
+        assert!(error.contains("spher") && error.contains("sphere, punch"), "{error}");
+    }
 }

@@ -1,8 +1,8 @@
 //! Errors of the readouts study.
 
-use crate::electronics::ElectronicsError;
 use crate::explore::ExploreError;
 use crate::touches::TouchError;
+use spts_input::Refusal;
 
 /// Why there is no [`ReadoutsReport`](super::ReadoutsReport).
 #[derive(Debug, thiserror::Error)]
@@ -10,7 +10,7 @@ use crate::touches::TouchError;
 pub enum ReadoutsError {
     /// The electronics of as_designed cannot be used.
     #[error(transparent)]
-    Electronics(#[from] ElectronicsError),
+    Electronics(#[from] Refusal),
     /// The wire of a size cannot be built.
     #[error(transparent)]
     Wiring(#[from] ExploreError),

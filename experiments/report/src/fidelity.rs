@@ -1,17 +1,79 @@
-//! Pictures of the study: what an error costs, and what the pressures look like.
+//! The files of a fidelity study.
 
 use crate::figures::colour::heat;
-use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow};
+use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow, save_charts, save_sheet};
+use crate::{Origin, ReportError, write_all_or_none};
+use serde::Serialize;
+use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts_eval::unique;
 use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
-use spts_studies::fidelity::{FinePressure, SettingMeans, setting_means};
+use spts_studies::fidelity::{FidelityReport, FinePressure, SettingMeans, setting_means};
+
+/// A line without what depends on the machine.
+#[derive(Debug, Serialize)]
+struct ErrorRow<'a> {
+    scene: &'a str,
+    #[serde(rename = "rung")]
+    level: &'a str,
+    cells: &'a str,
+    timestep_s: f64,
+    pressure_rms_rel: f64,
+    taxel_rms_rel: f64,
+    support_delta: f64,
+    iou_delta: f64,
+    class_delta: f64,
+}
+
+/// Files outside of folders of their own.
+pub const FILES: &[&str] = &[
+    "errors.csv",
+    "fidelity.csv",
+    "refused.csv",
+    "summary.md",
+    "provenance.json",
+];
+
+/// Writes the tables, their summary, the figures and the provenance of `report` beside the scenes that wait in `out`.
+///
+/// # Errors
+/// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
+pub fn write(report: &FidelityReport, out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        let errors: Vec<ErrorRow<'_>> = report.rows.iter().map(ErrorRow::from).collect();
+        write_table(&out.path("errors.csv"), &errors)?;
+        write_table(&out.path("fidelity.csv"), &report.rows)?;
+        write_table(&out.path("refused.csv"), &report.refusals)?;
+        write_bytes(&out.path("summary.md"), report.text().as_bytes())?;
+        let folder = out.folder("figures")?;
+        save_charts(&pareto(&report.rows), &folder, "pareto")?;
+        save_sheet(&pressures(&report.rows, &report.fine), &folder, "pressure")?;
+        write_json(&out.path("provenance.json"), &Origin::here(report.provenance.clone()))?;
+        Ok(())
+    })
+}
+
+impl<'a> From<&'a MeasuredSetting> for ErrorRow<'a> {
+    fn from(row: &'a MeasuredSetting) -> Self {
+        Self {
+            scene: &row.scene,
+            level: &row.level,
+            cells: &row.cells,
+            timestep_s: row.timestep_s,
+            pressure_rms_rel: row.pressure_rms_rel,
+            taxel_rms_rel: row.taxel_rms_rel,
+            support_delta: row.support_delta,
+            iou_delta: row.iou_delta,
+            class_delta: row.class_delta,
+        }
+    }
+}
 
 /// A quantity of the setting_means.
 type Quantity = fn(&SettingMeans<'_>) -> f64;
 
 /// Error against cost: one panel a kind of scene and quantity, one curve a level over its resolutions, at the time step
 /// that a scene takes by itself.
-pub(super) fn pareto(rows: &[MeasuredSetting]) -> Vec<Chart> {
+fn pareto(rows: &[MeasuredSetting]) -> Vec<Chart> {
     let quantities: [(&str, Quantity); 2] = [
         ("taxel pressure, relative RMS error", |o| o.taxel_rms_rel),
         ("IoU of the support, size of the change", |o| o.iou_change),
@@ -65,7 +127,7 @@ const SHOWN: f64 = 0.9;
 
 /// Fine pressure of every scene on every level at its finest measured step, at 6 × 6 cells a taxel or the finest there
 /// is.
-pub(super) fn pressures(rows: &[MeasuredSetting], fine: &[FinePressure]) -> Sheet {
+fn pressures(rows: &[MeasuredSetting], fine: &[FinePressure]) -> Sheet {
     let scenes = unique(rows.iter().map(|row| row.scene.as_str()));
     let tile = |scene: &str, level: &FidelityLevel| {
         let of = |row: &&(&MeasuredSetting, &FinePressure)| row.0.scene == scene && row.0.level == level.name;
