@@ -10,4 +10,4 @@ mod study;
 mod text;
 
 pub use statistics::{LOADED_V, MEASUREMENTS, STATISTICS, StatisticOf, TouchStatistics};
-pub use study::{ArmBand, ArmError, ArmReport, ArmStudy};
+pub use study::{ArmBand, ArmReport, ArmStudy};

@@ -6,14 +6,15 @@ use crate::calibrate::predicted;
 use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::Serialize;
-use spts::data::{DataError, SessionSet};
+use spts::data::SessionSet;
 use spts::progress::Progress;
-use spts::record::{Twin, TwinError};
+use spts::record::Twin;
 use spts::session::{Event, Session};
 use spts::simulate::{Request, SimulateError};
 use spts_circuit::{Mode, Recording};
+use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Scene of the twin.
 const SCENE: &str = "arm";
@@ -21,36 +22,6 @@ const SCENE: &str = "arm";
 const TOUCHES: usize = 6;
 /// Touches keep this distance from the outer taxels, taxels.
 const MARGIN: usize = 1;
-
-/// Why the bent skin cannot be compared.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ArmError {
-    /// The recordings cannot be used.
-    #[error(transparent)]
-    Data(#[from] DataError),
-    /// There is no recording of touches of a bent skin.
-    #[error(
-        "{}: no compressive session of touches in which the skin is under preload; such sessions lie in robot_arm/",
-        recordings.display()
-    )]
-    NoTouches {
-        /// Folder of the recordings.
-        recordings: PathBuf,
-    },
-    /// The scene is not valid.
-    #[error(transparent)]
-    Scene(#[from] SimulateError),
-    /// The simulation failed.
-    #[error(transparent)]
-    Twin(#[from] TwinError),
-    /// No touch was found on a simulated skin.
-    #[error("no touch was found on the simulated skin of seed {seed}")]
-    NotFound {
-        /// Its seed.
-        seed: u64,
-    },
-}
 
 /// Settings of `spts compare --arm`: simulated skins bent round a robot's arm, beside a recording of a real one that is
 /// touched by a finger.
@@ -100,9 +71,9 @@ impl ArmStudy<'_> {
     /// Simulates and compares. The result depends only on the recordings and the seed.
     ///
     /// # Errors
-    /// [`ArmError`] without a recording of touches on a preloaded skin, or if the simulation fails.
-    pub fn run(&self, progress: &dyn Progress) -> Result<ArmReport, ArmError> {
-        let set = SessionSet::open(self.recordings)?;
+    /// [`Refusal`] without a recording of touches on a preloaded skin, or if the simulation fails.
+    pub fn run(&self, progress: &dyn Progress) -> Result<ArmReport, Refusal> {
+        let set = SessionSet::open(self.recordings).map_err(Refusal::from_error)?;
         let of_touches = |session: &&Session| session.event == Event::Touch;
         let measured = |session: &Session| {
             let recording = session.compressive()?;
@@ -111,20 +82,22 @@ impl ArmStudy<'_> {
         };
         let real = set.sessions.iter().filter(of_touches).find_map(measured);
         let Some((session, layout, real)) = real else {
-            return Err(ArmError::NoTouches {
-                recordings: self.recordings.to_owned(),
-            });
+            return Err(Refusal::new(format!(
+                "{}: no compressive session of touches in which the skin is under preload; such sessions lie in robot_arm/",
+                self.recordings.display()
+            )));
         };
         let skins = usize::try_from(self.skins).unwrap_or(usize::MAX);
         progress.stage("touching simulated skins", Some(skins));
         let twins = (0..self.skins).into_par_iter().map(|k| {
             // a seed is a whole number below 2^63
             let seed = self.seed.wrapping_add(k) & (u64::MAX >> 1);
-            let found = TouchStatistics::of(&touched(&layout, seed)?).ok_or(ArmError::NotFound { seed });
+            let found = TouchStatistics::of(&touched(&layout, seed)?)
+                .ok_or_else(|| Refusal::new(format!("no touch was found on the simulated skin of seed {seed}")));
             progress.step();
             found
         });
-        let twins = twins.collect::<Result<Vec<TouchStatistics>, ArmError>>()?;
+        let twins = twins.collect::<Result<Vec<TouchStatistics>, Refusal>>()?;
         progress.end();
         Ok(ArmReport {
             session,
@@ -145,7 +118,7 @@ impl ArmReport {
 
 /// Compressive recording of a bent skin of this `layout` that follows from `seed`, touched at places that follow from
 /// it too.
-fn touched(layout: &SkinLayout, seed: u64) -> Result<Recording, ArmError> {
+fn touched(layout: &SkinLayout, seed: u64) -> Result<Recording, Refusal> {
     let mut rng = Streams::new(seed).rng("arm/places", 0);
     let mut within = |taxels: usize| {
         let margin = MARGIN.min((taxels - 1) / 2);
@@ -164,11 +137,17 @@ fn touched(layout: &SkinLayout, seed: u64) -> Result<Recording, ArmError> {
     let assignments = assignments.iter().map(|text| text.parse());
     let request = Request {
         scene: SCENE.to_owned(),
-        assignments: assignments.collect::<Result<_, _>>().map_err(SimulateError::from)?,
+        assignments: assignments
+            .collect::<Result<_, _>>()
+            .map_err(SimulateError::from)
+            .map_err(Refusal::from_error)?,
     };
-    let twin = Twin::new(&request.prepare()?.scene)?;
-    let presses = twin.presses(0..TOUCHES, &|| ())?;
-    Ok(twin.recorded(&presses, &twin.acquisition(Mode::Compressive))?.recording)
+    let twin = Twin::new(&request.prepare().map_err(Refusal::from_error)?.scene).map_err(Refusal::from_error)?;
+    let presses = twin.presses(0..TOUCHES, &|| ()).map_err(Refusal::from_error)?;
+    Ok(twin
+        .recorded(&presses, &twin.acquisition(Mode::Compressive))
+        .map_err(Refusal::from_error)?
+        .recording)
 }
 
 fn bands(real: &TouchStatistics, twins: &[TouchStatistics]) -> Vec<ArmBand> {

@@ -5,7 +5,6 @@
 //! with every readout to be compared (`variants`) under the same noise, decoded and scored (`scorer`). The differences
 //! are the budget (`table`).
 
-mod error;
 pub(crate) mod estimate;
 mod items;
 mod mechanics;
@@ -18,7 +17,6 @@ mod table;
 mod text;
 mod variants;
 
-pub use error::BudgetError;
 pub use estimate::MeanWithError;
 pub use items::CONTACT;
 pub use report::BudgetReport;
@@ -39,6 +37,7 @@ use spts_circuit::Profile;
 use spts_contact::objects::{OBJECTS, ObjectSpec, by_name};
 use spts_eval::decoders::PublishedDecode;
 use spts_eval::protocol::PUBLISHED_TAXELS;
+use spts_input::Refusal;
 use variants::{EVERYTHING, Variant, Variants};
 
 /// Objects that the published recordings contain in both modes.
@@ -70,8 +69,8 @@ impl BudgetStudy {
     /// Presses, records and scores everything.
     ///
     /// # Errors
-    /// [`BudgetError`] if an object, a number of measurements or the readout is not valid, or the simulation fails.
-    pub fn run(&self, progress: &dyn Progress) -> Result<BudgetReport, BudgetError> {
+    /// [`Refusal`] if an object, a number of measurements or the readout is not valid, or the simulation fails.
+    pub fn run(&self, progress: &dyn Progress) -> Result<BudgetReport, Refusal> {
         let size = if self.quick {
             BudgetSize::quick()
         } else {
@@ -86,13 +85,15 @@ impl BudgetStudy {
             seed: self.seed,
         };
         let scenes = objects.iter().map(|object| setup.scene(object, &size, false));
-        let scenes = scenes.collect::<Result<Vec<_>, TwinError>>()?;
+        let scenes = scenes
+            .collect::<Result<Vec<_>, TwinError>>()
+            .map_err(Refusal::from_error)?;
         let Some(first) = scenes.first() else {
-            return Err(BudgetError::NoObject);
+            return Err(Refusal::new("`--objects` names no object"));
         };
         let profile = first.chain().profile().clone();
         let hashes = scenes.iter().map(spts::Scene::hash).collect::<Result<Vec<_>, _>>();
-        let hash = combined_hash(&hashes.map_err(TwinError::from)?);
+        let hash = combined_hash(&hashes.map_err(TwinError::from).map_err(Refusal::from_error)?);
         let items = items::items(&profile);
         let variants = Variants::new(&items);
         progress.stage("pressing", Some(2 * objects.len() * size.presses()));
@@ -105,7 +106,10 @@ impl BudgetStudy {
             items: &items,
             keys: &keys,
             seed: self.seed,
-            pressed: [columns?, layer?],
+            pressed: [
+                columns.map_err(Refusal::from_error)?,
+                layer.map_err(Refusal::from_error)?,
+            ],
         };
         let (scores, scan) = chains.score(&variants, progress)?;
         let taxels = self.side * self.side;
@@ -116,7 +120,7 @@ impl BudgetStudy {
         })
     }
 
-    fn objects(&self) -> Result<Vec<&'static ObjectSpec>, BudgetError> {
+    fn objects(&self) -> Result<Vec<&'static ObjectSpec>, Refusal> {
         if self.objects.iter().any(|name| name == "all") {
             return Ok(OBJECTS.iter().collect());
         }
@@ -130,13 +134,13 @@ impl BudgetStudy {
         for name in names {
             let Some(object) = by_name(name) else {
                 let known: Vec<&str> = OBJECTS.iter().map(|o| o.name).collect();
-                return Err(BudgetError::UnknownObject {
-                    name: name.clone(),
-                    known: known.join(", "),
-                });
+                return Err(Refusal::new(format!(
+                    "`--objects`: `{name}` is neither \"all\" nor one of {}",
+                    known.join(", ")
+                )));
             };
             if objects.iter().any(|o| o.name == object.name) {
-                return Err(BudgetError::RepeatedObject { name: name.clone() });
+                return Err(Refusal::new(format!("`--objects`: `{name}` is there twice")));
             }
             objects.push(object);
         }
@@ -144,7 +148,7 @@ impl BudgetStudy {
     }
 
     /// Every decode with every M. An M of which no vote fits into a press is refused.
-    fn keys(&self, size: &BudgetSize) -> Result<Vec<(PublishedDecode, usize)>, BudgetError> {
+    fn keys(&self, size: &BudgetSize) -> Result<Vec<(PublishedDecode, usize)>, Refusal> {
         let taxels = self.side * self.side;
         let share = |m: usize| (m * taxels).div_ceil(PUBLISHED_TAXELS);
         let measurements = if self.measurements.is_empty() {
@@ -154,7 +158,9 @@ impl BudgetStudy {
         };
         let most = size.most_measurements(taxels);
         if let Some(&m) = measurements.iter().find(|&&m| m > most) {
-            return Err(BudgetError::TooManyMeasurements { m, most, taxels });
+            return Err(Refusal::new(format!(
+                "`--measurements`: {m} is outside [1, {most}] on a skin of {taxels} taxels: a press has no room for a vote of windows of {m}"
+            )));
         }
         let of_decode = |&decode| measurements.iter().map(move |&m| (decode, m)).collect::<Vec<_>>();
         Ok(self.decodes.iter().flat_map(of_decode).collect())
@@ -174,11 +180,7 @@ struct Chains<'a> {
 
 impl Chains<'_> {
     /// Scores of every chain, in their order, and of the whole chain's scan.
-    fn score(
-        &self,
-        variants: &Variants,
-        progress: &dyn Progress,
-    ) -> Result<(Vec<ScoreTable>, ScoreTable), BudgetError> {
+    fn score(&self, variants: &Variants, progress: &dyn Progress) -> Result<(Vec<ScoreTable>, ScoreTable), Refusal> {
         let objects = self.pressed[0].len();
         let jobs = variants.list.len() * objects * self.size.sessions;
         progress.stage("recording and scoring", Some(jobs));
@@ -229,7 +231,7 @@ impl Chains<'_> {
         skin: &LearnedSkin,
         profiles: &[Profile],
         progress: &dyn Progress,
-    ) -> Result<Vec<ScoreTable>, BudgetError> {
+    ) -> Result<Vec<ScoreTable>, Refusal> {
         let scorer = PressScorer::new(skin, self.keys, self.size)?;
         let (objects, sessions) = (skin.objects.len(), self.size.sessions);
         let flat = (0..profiles.len() * objects * sessions)
@@ -240,7 +242,7 @@ impl Chains<'_> {
                 progress.step();
                 found
             })
-            .collect::<Result<Vec<_>, BudgetError>>()?;
+            .collect::<Result<Vec<_>, Refusal>>()?;
         let of_profile = |presses: &[_]| presses.chunks(sessions).map(<[_]>::to_vec).collect();
         Ok(flat.chunks(objects * sessions).map(of_profile).collect())
     }

@@ -1,12 +1,12 @@
 //! Records and scores one press with one readout.
 
-use super::error::BudgetError;
 use super::score::PressScores;
 use super::size::{BudgetSize, compressive_acquisition};
 use super::skin::LearnedSkin;
 use spts_circuit::Profile;
 use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
 use spts_eval::{Press, ScoreError, Scorer, Tally, Window, idle_mean};
+use spts_input::Refusal;
 
 /// What all readouts of a skin share: its decoders, one set a session.
 pub(super) struct PressScorer<'a> {
@@ -20,40 +20,37 @@ impl<'a> PressScorer<'a> {
     /// Scores presses on `skin` by every decode and M of `keys`.
     ///
     /// # Errors
-    /// [`BudgetError`] when a decode cannot use what was learned.
+    /// [`Refusal`] when a decode cannot use what was learned.
     pub(super) fn new(
         skin: &'a LearnedSkin,
         keys: &'a [(PublishedDecode, usize)],
         size: &BudgetSize,
-    ) -> Result<Self, BudgetError> {
+    ) -> Result<Self, Refusal> {
         let decoders = skin.learned.iter().map(PublishedDecode::decoders);
         Ok(Self {
             skin,
             keys,
             votes: size.votes,
-            decoders: decoders.collect::<Result<_, _>>()?,
+            decoders: decoders.collect::<Result<_, _>>().map_err(Refusal::from_error)?,
         })
     }
 
     /// Records compressive session `session` of object `object` with `profile` and scores it, key by key. Noise depends
     /// on object and session alone, so that two profiles are compared under the same noise.
-    pub(super) fn score(
-        &self,
-        profile: &Profile,
-        object: usize,
-        session: usize,
-    ) -> Result<Vec<PressScores>, BudgetError> {
+    pub(super) fn score(&self, profile: &Profile, object: usize, session: usize) -> Result<Vec<PressScores>, Refusal> {
         let (skin, object) = (self.skin, &self.skin.objects[object]);
-        let chain = skin.chain.with_profile(profile.clone())?;
+        let chain = skin.chain.with_profile(profile.clone()).map_err(Refusal::from_error)?;
         let frames = skin.protocol.first_frame + skin.protocol.frames;
         let mut sources = [object.sources[session].clone()];
         let taxels = skin.learned[session].dictionary.atoms.nrows();
         let duration_s = (frames * taxels) as f64 / chain.sample_rate_hz();
-        let recording = chain.record_sources(
-            &mut sources,
-            duration_s,
-            &compressive_acquisition(object.label, session),
-        )?;
+        let recording = chain
+            .record_sources(
+                &mut sources,
+                duration_s,
+                &compressive_acquisition(object.label, session),
+            )
+            .map_err(Refusal::from_error)?;
         let per_frame = recording.measurements_per_frame();
         let (idle_v, vote) = (idle_mean(&recording, 0), skin.protocol.vote);
         let [first, end] =
@@ -66,7 +63,10 @@ impl<'a> PressScorer<'a> {
                     // vote by vote, because the weights of a whole press on a large skin fill the memory
                     let press = Press::within(&recording, 0, start..start + vote * m, idle_v);
                     let windows: Vec<Window<'_>> = press.windows(0..press.len(), m, m).map(|(_, w)| w).collect();
-                    let answers = scorer.answers(&windows).map_err(ScoreError::from)?;
+                    let answers = scorer
+                        .answers(&windows)
+                        .map_err(ScoreError::from)
+                        .map_err(Refusal::from_error)?;
                     for answer in &answers {
                         for (tally, truth) in tallies.iter_mut().zip(&object.masks) {
                             tally.image(&answer.image, truth);

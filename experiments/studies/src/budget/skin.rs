@@ -1,11 +1,11 @@
 //! One skin: its conductance in every press, the training of its decoder, and its ground truths.
 
-use super::error::BudgetError;
 use super::estimate::ScoreTable;
 use super::items::{PARTS, without_parts};
 use super::mechanics::Pressed;
 use super::score::PressScores;
 use super::size::{BudgetSize, compressive_acquisition, raster_acquisition};
+use spts_input::Refusal;
 
 use rayon::prelude::*;
 use spts::chain::{Acquisition, Chain, ChainConfig, ChainError};
@@ -58,14 +58,9 @@ pub(super) struct LearnedObject {
 impl LearnedSkin {
     /// Presses all objects on a skin without the transducer's parts `off`, scans the first presses and learns from
     /// them.
-    pub(super) fn prepare(
-        pressed: &[Pressed],
-        off: &[&str],
-        size: &BudgetSize,
-        seed: u64,
-    ) -> Result<Self, BudgetError> {
+    pub(super) fn prepare(pressed: &[Pressed], off: &[&str], size: &BudgetSize, seed: u64) -> Result<Self, Refusal> {
         let Some(first) = pressed.first() else {
-            return Err(BudgetError::NoObject);
+            return Err(Refusal::new("`--objects` names no object"));
         };
         let chain = chain(&first.scene, off)?;
         let every_part: Vec<&str> = PARTS.iter().map(|(name, _)| *name).collect();
@@ -75,14 +70,17 @@ impl LearnedSkin {
         let objects = pressed
             .par_iter()
             .map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol))
-            .collect::<Result<Vec<_>, TwinError>>()?;
+            .collect::<Result<Vec<_>, TwinError>>()
+            .map_err(Refusal::from_error)?;
         let sessions: Vec<ScoredSession> = objects.iter().map(|o| o.session(protocol)).collect();
         let streams = Streams::new(seed);
         let learned = (0..size.sessions).into_par_iter().map(|session| {
             let streams = streams.child("learning", session as u64);
             Learned::learn(&sessions, &size.learning, layout.cols(), streams)
         });
-        let learned = learned.collect::<Result<Vec<_>, LearnError>>()?;
+        let learned = learned
+            .collect::<Result<Vec<_>, LearnError>>()
+            .map_err(Refusal::from_error)?;
         Ok(Self {
             chain,
             learned,
@@ -114,13 +112,13 @@ impl LearnedSkin {
 }
 
 /// Chain of `scene` without the transducer's parts `off`.
-fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, BudgetError> {
+fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, Refusal> {
     let config = ChainConfig {
-        transducer_parameters: without_parts(off)?,
+        transducer_parameters: without_parts(off).map_err(Refusal::from_error)?,
         ..scene.config().chain()
     };
     let chain = Chain::new(&config, scene.skin(), scene.seed(), Path::new(""));
-    Ok(chain.map_err(TwinError::from)?)
+    Ok(chain.map_err(TwinError::from).map_err(Refusal::from_error)?)
 }
 
 impl LearnedObject {

@@ -7,7 +7,6 @@
 
 mod beat;
 mod design;
-mod error;
 mod faults;
 mod fit;
 mod gains;
@@ -31,7 +30,6 @@ mod text;
 
 pub use beat::Beat;
 pub use design::Reseeded;
-pub use error::CalibrateError;
 pub use faults::{CellFault, reseeded};
 pub use fit::WINDOW_FRAMES;
 pub(crate) use fit::{FitRequest, fit_windows};
@@ -43,7 +41,7 @@ pub use parameters::FittedParameter;
 pub use predict::{COVERAGE, PredictedInside, PredictedNumber, predicted};
 pub use press::PressNumbers;
 pub use profile::{FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED};
-pub use profile_text::{FittedError, fitted_profile};
+pub use profile_text::fitted_profile;
 pub use session::{QUANTILES, SessionEstimates};
 pub use skin::{Mounting, ObjectCheck, SkinReport, SkinStudy};
 pub use statistics::{Estimated, OUTLIER_SD, quantiles};

@@ -1,14 +1,14 @@
 //! Estimates the gains of a skin's taxels from raster presses of objects that the simulation knows.
 
-use super::error::CalibrateError;
-use super::session::SessionEstimates;
 use super::statistics::middle;
 use super::study::CalibrationStudy;
+use super::{SessionEstimates, read};
 use serde::Serialize;
 use spts::data::DataError;
 use spts::progress::Progress;
 use spts_eval::training::{BAND_SD, GainCheck, SkinGains, Skins, TrainingPresses, templates};
 use spts_eval::{ScoredSession, Source};
+use spts_input::Refusal;
 use spts_models::{TaxelGains, VelostatConfig};
 use spts_recon::classify::Library;
 use std::path::Path;
@@ -67,12 +67,12 @@ impl SkinStudy {
     /// Fits the gains to the recordings in `root`. Scored raster presses are used only if there are no others.
     ///
     /// # Errors
-    /// [`CalibrateError`] if the recordings are not usable, or the simulation knows none of their objects.
-    pub fn run(&self, root: &Path, progress: &dyn Progress) -> Result<SkinReport, CalibrateError> {
-        let source = Source::open(root)?;
+    /// [`Refusal`] if the recordings are not usable, or the simulation knows none of their objects.
+    pub fn run(&self, root: &Path, progress: &dyn Progress) -> Result<SkinReport, Refusal> {
+        let source = Source::open(root).map_err(Refusal::from_error)?;
         if source.sessions.iter().all(|s| s.raster.is_none()) {
-            return Err(CalibrateError::Skin(format!(
-                "{}: no session of presses has a raster recording to fit them to",
+            return Err(Refusal::new(format!(
+                "gains of the skin: {}: no session of presses has a raster recording to fit them to",
                 root.display()
             )));
         }
@@ -93,10 +93,10 @@ impl SkinStudy {
         );
         let simulated = skins.press(self.seed, &|| progress.step());
         progress.end();
-        let simulated = images(&simulated.map_err(|e| CalibrateError::Skin(e.to_string()))?, &|_| true)?;
-        let estimate = |used: &dyn Fn(&ScoredSession) -> bool| -> Result<SkinGains, CalibrateError> {
+        let simulated = images(&simulated.map_err(unknown_gains)?, &|_| true)?;
+        let estimate = |used: &dyn Fn(&ScoredSession) -> bool| -> Result<SkinGains, Refusal> {
             let skin = images(&source.sessions, used)?;
-            SkinGains::estimate(&skin, &simulated, mounting_log_sd).map_err(|e| CalibrateError::Skin(e.to_string()))
+            SkinGains::estimate(&skin, &simulated, mounting_log_sd).map_err(unknown_gains)
         };
         let mut objects = Vec::new();
         for session in source.sessions.iter().filter(|s| s.raster.is_some() && !s.again) {
@@ -130,11 +130,15 @@ impl SkinStudy {
     }
 }
 
+fn unknown_gains(error: impl std::error::Error + Send + Sync + 'static) -> Refusal {
+    Refusal::from_error(error).at("gains of the skin")
+}
+
 /// Mean raster images of the sessions that are `used`, from presses that are not scored where there are any.
-fn images(sessions: &[ScoredSession], used: &dyn Fn(&ScoredSession) -> bool) -> Result<Library, CalibrateError> {
+fn images(sessions: &[ScoredSession], used: &dyn Fn(&ScoredSession) -> bool) -> Result<Library, Refusal> {
     let used = sessions.iter().filter(|s| used(s));
     let presses: Vec<TrainingPresses<'_>> = used.filter_map(presses).collect();
-    templates(&presses).map_err(|e| CalibrateError::Skin(e.to_string()))
+    templates(&presses).map_err(unknown_gains)
 }
 
 /// Whether `session` has raster presses, and all of them are scored.
@@ -149,16 +153,17 @@ fn presses(session: &ScoredSession) -> Option<TrainingPresses<'_>> {
 }
 
 /// What a mounting changes, from every session with both recordings of one object.
-fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Mounting>, CalibrateError> {
+fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Mounting>, Refusal> {
     let study = CalibrationStudy {
         session: None,
         presses: Some(MOUNTED_PRESSES),
     };
-    let sessions: Vec<SessionEstimates> = match study.run(root, progress) {
-        Ok(report) => report.sessions,
-        Err(CalibrateError::Data(DataError::NoCompressive { .. } | DataError::Unfit { .. })) => Vec::new(),
-        Err(error) => return Err(error),
+    let pairs = match read(root) {
+        Ok(pairs) => pairs,
+        Err(DataError::NoCompressive { .. } | DataError::Unfit { .. }) => return Ok(Vec::new()),
+        Err(error) => return Err(Refusal::from_error(error)),
     };
+    let sessions = study.fit_all(pairs, progress)?.sessions;
     let mounting = |session: SessionEstimates| {
         let both = session.gains?;
         Some(Mounting {
@@ -174,14 +179,14 @@ impl SkinReport {
     /// The gains as TOML, for scenes, specifications of data sets, `spts score --learn-from` and `spts decode --skin`.
     ///
     /// # Errors
-    /// [`CalibrateError::Skin`], which no gains should cause.
-    pub fn toml(&self) -> Result<String, CalibrateError> {
+    /// [`Refusal`], which no gains should cause.
+    pub fn toml(&self) -> Result<String, Refusal> {
         let [rows, cols] = self.shape;
         let gains = TaxelGains {
             shape: Some(self.shape),
             ..self.skin.gains.clone()
         };
-        let gains = toml::to_string(&gains).map_err(|e| CalibrateError::Skin(e.to_string()))?;
+        let gains = toml::to_string(&gains).map_err(unknown_gains)?;
         Ok(format!(
             "# Gains of the taxels of a skin of {rows} x {cols} taxels, row by row: mean and standard deviation of their logarithms,\n\
              # and what a mounting changes. Objects in the raster presses that they are fitted to: {}; spread over the skin {:.3}, error of a\n\

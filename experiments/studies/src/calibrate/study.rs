@@ -1,6 +1,5 @@
 //! The whole calibration: from recordings to estimates and a readout profile.
 
-use super::error::CalibrateError;
 use super::parameters::predicted_inside;
 use super::predict::PredictedInside;
 use super::profile::{FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED};
@@ -12,6 +11,7 @@ use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{LevelSource, Recording};
 use spts_eval::SessionSlip;
+use spts_input::Refusal;
 use std::path::Path;
 
 /// Settings of `spts calibrate`: which sessions and presses the readout is fitted to.
@@ -47,19 +47,26 @@ impl CalibrationStudy {
     /// Fits the sessions in the folder `recordings`.
     ///
     /// # Errors
-    /// [`CalibrateError`] if the recordings are not usable, the session does not exist, sessions differ in their
+    /// [`Refusal`] if the recordings are not usable, the session does not exist, sessions differ in their
     /// weights or rate, or no press of a session can be fitted.
-    pub fn run(&self, recordings: &Path, progress: &dyn Progress) -> Result<CalibrationReport, CalibrateError> {
-        let mut pairs = read(recordings)?;
+    pub fn run(&self, recordings: &Path, progress: &dyn Progress) -> Result<CalibrationReport, Refusal> {
+        self.fit_all(read(recordings).map_err(Refusal::from_error)?, progress)
+    }
+
+    /// Fits the sessions `pairs`.
+    pub(super) fn fit_all(
+        &self,
+        mut pairs: Vec<SessionPair>,
+        progress: &dyn Progress,
+    ) -> Result<CalibrationReport, Refusal> {
         if let Some(name) = &self.session {
             let known: Vec<&str> = pairs.iter().map(|pair| pair.session.as_str()).collect();
             let known = known.join(", ");
             pairs.retain(|pair| pair.session == *name);
             if pairs.is_empty() {
-                return Err(CalibrateError::NoSession {
-                    name: name.clone(),
-                    known,
-                });
+                return Err(Refusal::new(format!(
+                    "`--session` = {name}: no compressive session of it; there are: {known}"
+                )));
             }
         }
         alike(&pairs)?;
@@ -81,32 +88,34 @@ impl CalibrationStudy {
         })
     }
 
-    fn fit(&self, pair: &SessionPair) -> Result<SessionEstimates, CalibrateError> {
+    fn fit(&self, pair: &SessionPair) -> Result<SessionEstimates, Refusal> {
         let presses = pair.compressive.blocks().len();
         let (first, last) = self.presses.unwrap_or((1, presses));
         let blocks: Vec<usize> = (first - 1..last.min(presses)).collect();
         let found = SessionEstimates::of(pair, &pair.compressive, &blocks);
-        found.ok_or_else(|| CalibrateError::NoPress {
-            session: pair.session.clone(),
-            first,
-            last,
-            presses,
+        found.ok_or_else(|| {
+            Refusal::new(format!(
+                "{} compressive: no press of {first}-{last} can be fitted; the session has presses 1-{presses}",
+                pair.session
+            ))
         })
     }
 }
 
 /// Checks that one profile can describe all `pairs`.
-fn alike(pairs: &[SessionPair]) -> Result<(), CalibrateError> {
+fn alike(pairs: &[SessionPair]) -> Result<(), Refusal> {
     let Some((first, others)) = pairs.split_first() else {
         return Ok(());
     };
     for other in others {
-        let differ = |field, value: &dyn Fn(&Recording) -> String| CalibrateError::Differ {
-            field,
-            session: other.session.clone(),
-            value: value(&other.compressive),
-            first: first.session.clone(),
-            first_value: value(&first.compressive),
+        let differ = |field: &str, value: &dyn Fn(&Recording) -> String| {
+            Refusal::new(format!(
+                "{} compressive: `{field}` = {}; {} has {}, and one profile has one: choose a session with `--session`",
+                other.session,
+                value(&other.compressive),
+                first.session,
+                value(&first.compressive)
+            ))
         };
         if other.compressive.weights().source() != first.compressive.weights().source() {
             return Err(differ("weights", &|r| source(r.weights().source())));
@@ -135,10 +144,11 @@ impl CalibrationReport {
     /// The fitted readout profile as TOML. Undetermined parameters are taken from the default readout.
     ///
     /// # Errors
-    /// [`CalibrateError::Fitted`] if a value is outside its range.
-    pub fn profile_toml(&self) -> Result<String, CalibrateError> {
+    /// [`Refusal`] if a value is outside its range.
+    pub fn profile_toml(&self) -> Result<String, Refusal> {
         let taxels = u32::try_from(self.taxels).unwrap_or(u32::MAX);
-        let (_, text) = fitted_profile(&self.profile, taxels)?;
+        let (_, text) =
+            fitted_profile(&self.profile, taxels).map_err(|e| Refusal::from_error(e).at("the fitted profile"))?;
         Ok(text)
     }
 

@@ -1,7 +1,6 @@
 //! Consequences of a design: costs, the limiting constraint, alternatives, and files to simulate it.
 
 use super::bench::{Bench, draw, mean};
-use super::error::DesignError;
 use super::report::{Alternative, Binding, CostDrivers, Design, DesignReport, LatencyParts};
 use super::rows::{BandRows, RowSource};
 use super::search::Tried;
@@ -9,6 +8,7 @@ use super::study::{DesignStudy, Ground, WireChoice};
 use super::wire::FeedbackLimit;
 use crate::sensing::load_s;
 use spts_firmware::{FIRST_ADDRESS, LAST_BUS_ADDRESS, Pattern};
+use spts_input::Refusal;
 use spts_models::SkinLayout;
 
 /// Multiplications a second of the estimate of the decoder's time: one core, one lane.
@@ -32,7 +32,7 @@ impl DesignStudy {
         chosen: Tried,
         others: Vec<Tried>,
         design: Design,
-    ) -> Result<DesignReport, DesignError> {
+    ) -> Result<DesignReport, Refusal> {
         let reached = chosen.reached.is_some();
         let acquisition_s = design.m_per_wire as f64 * design.wire.period_s;
         let (binding, binding_reason) = self.binding(&design, &chosen, &others, reached, acquisition_s);
@@ -145,7 +145,7 @@ impl DesignStudy {
     }
 
     /// Twice the wires, half the measurements.
-    fn more_wires(&self, ground: &Ground, design: &Design) -> Result<Option<Alternative>, DesignError> {
+    fn more_wires(&self, ground: &Ground, design: &Design) -> Result<Option<Alternative>, Refusal> {
         let wires = 2 * design.wires;
         if wires > design.rows || design.m_per_wire < 8 {
             return Ok(None);
@@ -161,7 +161,7 @@ impl DesignStudy {
     }
 
     /// A coarser pitch, the same measurements.
-    fn coarser(&self, design: &Design) -> Result<Option<Alternative>, DesignError> {
+    fn coarser(&self, design: &Design) -> Result<Option<Alternative>, Refusal> {
         let coarse = Self {
             pitch_m: COARSER * self.pitch_m,
             ..self.clone()
@@ -183,7 +183,7 @@ impl DesignStudy {
         wires: usize,
         source: &RowSource,
         m: usize,
-    ) -> Result<Option<Alternative>, DesignError> {
+    ) -> Result<Option<Alternative>, Refusal> {
         let wired = self.wired(ground, wires, source)?;
         if m > wired.most {
             return Ok(None);
@@ -295,7 +295,7 @@ pub(super) fn counted(count: usize, what: &str) -> String {
 }
 
 /// The layout of a design.
-pub(super) fn layout_of(design: &Design) -> Result<SkinLayout, DesignError> {
+pub(super) fn layout_of(design: &Design) -> Result<SkinLayout, Refusal> {
     Ok(SkinLayout::new(
         design.rows,
         design.cols,

@@ -1,7 +1,6 @@
 //! Sends touches through the circuit of a design, decodes and scores them.
 
 use super::classes::Classes;
-use super::error::DesignError;
 use super::objects::DesignObjects;
 use super::rows::BandRows;
 use super::wire::Pressing;
@@ -9,6 +8,7 @@ use crate::touches::{Touch, TouchScore, TouchWire};
 use rand::RngExt as _;
 use rayon::prelude::*;
 use spts_circuit::Profile;
+use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 use spts_recon::matrix_free::{SheetDecoder, SheetNoise, SheetPrior};
 
@@ -41,7 +41,7 @@ pub(super) fn draw(
     label: &'static str,
     seed: u64,
     count: usize,
-) -> Result<Vec<(Vec<Touch>, Streams)>, DesignError> {
+) -> Result<Vec<(Vec<Touch>, Streams)>, Refusal> {
     let touches = TOUCHES[usize::from(objects.seventeen)];
     (0..count as u64)
         .into_par_iter()
@@ -94,8 +94,8 @@ impl Bench {
         profile: Profile,
         prior: SheetPrior,
         places: usize,
-    ) -> Result<Self, DesignError> {
-        let decoder = SheetDecoder::new(prior, SheetNoise::default(), rows.bands.len())?;
+    ) -> Result<Self, Refusal> {
+        let decoder = SheetDecoder::new(prior, SheetNoise::default(), rows.bands.len()).map_err(Refusal::from_error)?;
         Ok(Self {
             layout,
             rows,
@@ -113,11 +113,11 @@ impl Bench {
     }
 
     /// Gets the decoder ready for `measurements` of every wire.
-    pub(super) fn prepare(&mut self, measurements: usize) -> Result<(), DesignError> {
+    pub(super) fn prepare(&mut self, measurements: usize) -> Result<(), Refusal> {
         let done = self.decoder.measurements() / self.rows.bands.len();
         if measurements > done {
             let (rows, wires) = self.rows.rows(done..measurements);
-            self.decoder.extend(&rows, &wires)?;
+            self.decoder.extend(&rows, &wires).map_err(Refusal::from_error)?;
         }
         Ok(())
     }
@@ -127,8 +127,8 @@ impl Bench {
         &self,
         drawn: Vec<(Vec<Touch>, Streams)>,
         measurements: usize,
-    ) -> Result<Vec<Repetition>, DesignError> {
-        let one = |(touches, streams): (Vec<Touch>, Streams)| -> Result<Repetition, DesignError> {
+    ) -> Result<Vec<Repetition>, Refusal> {
+        let one = |(touches, streams): (Vec<Touch>, Streams)| -> Result<Repetition, Refusal> {
             let cols = self.layout.cols();
             let wires = self.rows.bands.len();
             let mut volts = vec![vec![0.0; wires * measurements]; touches.len()];
@@ -160,7 +160,7 @@ impl Bench {
         repetitions: &[Repetition],
         measurements: usize,
         classes: Option<&Classes>,
-    ) -> Result<Vec<RepetitionScore>, DesignError> {
+    ) -> Result<Vec<RepetitionScore>, Refusal> {
         let count = measurements * self.rows.bands.len();
         let places = self.places(measurements);
         let rows = classes.map(|classes| classes.rows(&self.rows.rows(0..measurements).0));
@@ -174,8 +174,8 @@ impl Bench {
                     .map(move |(t, v)| (r, t, &v[..count]))
             })
             .collect();
-        let one = |(r, touch, volts): (usize, &Touch, &[f64])| -> Result<_, DesignError> {
-            let image = self.decoder.non_negative(volts, places)?;
+        let one = |(r, touch, volts): (usize, &Touch, &[f64])| -> Result<_, Refusal> {
+            let image = self.decoder.non_negative(volts, places).map_err(Refusal::from_error)?;
             let right = match (classes, &rows) {
                 (Some(classes), Some(rows)) => Some(classes.is_right(rows, volts, &touch.name)?),
                 _ => None,

@@ -2,7 +2,6 @@
 
 use super::answer::layout_of;
 use super::bench::{Bench, draw, mean};
-use super::error::DesignError;
 use super::report::Design;
 use super::rows::{BandRows, RowSource, bands};
 use super::study::{DesignStudy, WireChoice};
@@ -10,6 +9,7 @@ use rand::RngExt as _;
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Profile, parse_patterns};
+use spts_input::Refusal;
 use spts_models::Streams;
 use spts_recon::statistics::Band;
 
@@ -59,14 +59,11 @@ impl DesignCheck {
     /// promise is based, and with the same number of them.
     ///
     /// # Errors
-    /// [`DesignError`] if the design is not valid, or its files do not belong to it.
-    pub fn run(&self, progress: &dyn Progress) -> Result<CheckReport, DesignError> {
+    /// [`Refusal`] if the design is not valid, or its files do not belong to it.
+    pub fn run(&self, progress: &dyn Progress) -> Result<CheckReport, Refusal> {
         let design = &self.design;
         let layout = layout_of(design)?;
-        let refused = |what: &str, reason: String| DesignError::NoDesign {
-            what: what.to_owned(),
-            reason,
-        };
+        let refused = |what: &str, reason: String| Refusal::new(format!("{what}: {reason}"));
         let expected = &design.expected;
         if design.wires == 0 || design.wires > design.rows || design.m_per_wire == 0 || expected.repetitions < 2 {
             return Err(refused(

@@ -1,8 +1,8 @@
 //! Classification of the seventeen objects.
 
-use super::error::DesignError;
 use crate::touches::Touch;
 use rayon::prelude::*;
+use spts_input::Refusal;
 use spts_recon::classify::{EvidenceClassifier, Library, Posterior, TemplateModel};
 use spts_recon::{AmplitudeRange, Matrix};
 use std::sync::Arc;
@@ -24,7 +24,7 @@ pub(super) struct Classes {
 
 impl Classes {
     /// Classes from mean images of `touches` on a skin of `cols` columns.
-    pub(super) fn new(touches: &[&Touch], cols: usize) -> Result<Self, DesignError> {
+    pub(super) fn new(touches: &[&Touch], cols: usize) -> Result<Self, Refusal> {
         let mut names: Vec<Arc<str>> = touches.iter().map(|t| Arc::clone(&t.name)).collect();
         names.sort_unstable();
         names.dedup();
@@ -44,14 +44,20 @@ impl Classes {
         let slices: Vec<&[f64]> = means.iter().map(Vec::as_slice).collect();
         let taxels = slices.first().map_or(0, |m| m.len());
         let labels: Vec<usize> = (0..names.len()).collect();
-        let templates = Library::new(&Matrix::from_column_slices(taxels, &slices), &labels)?;
+        let templates =
+            Library::new(&Matrix::from_column_slices(taxels, &slices), &labels).map_err(Refusal::from_error)?;
         let model = TemplateModel {
             gains: vec![GAIN_SD; taxels],
             rank: RANK,
             ..TemplateModel::new(cols)
         };
-        let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
-        let classifier = EvidenceClassifier::new(&model.classes(&templates)?, amplitude, UNKNOWN_PRIOR)?;
+        let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1]).map_err(Refusal::from_error)?;
+        let classifier = EvidenceClassifier::new(
+            &model.classes(&templates).map_err(Refusal::from_error)?,
+            amplitude,
+            UNKNOWN_PRIOR,
+        )
+        .map_err(Refusal::from_error)?;
         Ok(Self { classifier, names })
     }
 
@@ -67,12 +73,12 @@ impl Classes {
     }
 
     /// Whether the most probable class of the samples `volts` is the object called `name`.
-    pub(super) fn is_right(&self, rows: &[Vec<f64>], volts: &[f64], name: &str) -> Result<bool, DesignError> {
+    pub(super) fn is_right(&self, rows: &[Vec<f64>], volts: &[f64], name: &str) -> Result<bool, Refusal> {
         let mut preparation = self.classifier.preparation();
         let mut evidence = self.classifier.evidence();
         for (row, v) in rows.iter().zip(volts) {
-            preparation.push(row)?;
-            evidence.observe(&preparation, *v)?;
+            preparation.push(row).map_err(Refusal::from_error)?;
+            evidence.observe(&preparation, *v).map_err(Refusal::from_error)?;
         }
         let decision = self
             .classifier

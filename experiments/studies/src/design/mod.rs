@@ -9,7 +9,6 @@ mod band;
 mod bench;
 mod check;
 mod classes;
-mod error;
 mod objects;
 mod promised;
 mod report;
@@ -21,7 +20,6 @@ mod wire;
 
 pub use band::OUTSIDE;
 pub use check::{CheckReport, CheckedQuantity, DesignCheck};
-pub use error::DesignError;
 pub use objects::DesignObjects;
 pub use report::{
     Alternative, Binding, CostDrivers, DecoderDesign, Design, DesignCurve, DesignPoint, DesignReport, Expectation,

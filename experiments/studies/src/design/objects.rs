@@ -1,9 +1,9 @@
 //! The objects for which a skin is designed.
 
-use super::error::DesignError;
 use crate::touches::{TouchObjects, TouchScene};
 use serde::{Deserialize, Serialize};
 use spts_dataset::{ObjectSource, PoseOrigin, Spec};
+use spts_input::Refusal;
 use spts_models::SkinLayout;
 use std::path::Path;
 
@@ -22,7 +22,7 @@ const OBJECT_SIZES_M: [f64; 2] = [0.03, 0.1];
 /// assert_eq!(DesignObjects::named("small")?.size_m, [20e-3, 40e-3]);
 /// let error = DesignObjects::named("huge").unwrap_err();
 /// assert!(error.to_string().starts_with("`objects` = \"huge\""));
-/// # Ok::<(), spts_studies::design::DesignError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -45,9 +45,9 @@ impl DesignObjects {
     /// places are used. Its skin, forces, readout and numbers are not.
     ///
     /// # Errors
-    /// [`DesignError::Objects`] for a specification that cannot be read, or has meshes, balls or several simultaneous
+    /// [`Refusal`] for a specification that cannot be read, or has meshes, balls or several simultaneous
     /// objects.
-    pub fn named(name: &str) -> Result<Self, DesignError> {
+    pub fn named(name: &str) -> Result<Self, Refusal> {
         let shapes = |size_m| Self {
             name: name.to_owned(),
             seventeen: false,
@@ -57,9 +57,10 @@ impl DesignObjects {
         if let Some((_, size_m)) = SIZES_M.iter().find(|(known, _)| *known == name) {
             return Ok(shapes(*size_m));
         }
-        let refused = |reason: String| DesignError::Objects {
-            name: name.to_owned(),
-            reason,
+        let refused = |reason: String| {
+            Refusal::new(format!(
+                "`objects` = {name:?}: {reason}; valid: small, large, the name of a data set's spec (presses-17, random-shapes, …), a spec file that ends in .toml, or the folder of a data set"
+            ))
         };
         let path = Path::new(name);
         let file = if path.is_dir() {

@@ -3,12 +3,12 @@
 use super::band::{OUTSIDE, promise};
 use super::bench::{RepetitionScore, TOUCHES, draw};
 use super::classes::Classes;
-use super::error::DesignError;
 use super::report::{DecoderDesign, Design, Expectation};
 use super::rows::{BandRows, RowSource};
 use super::search::Tried;
 use super::study::{DesignStudy, Ground};
 use crate::touches::Touch;
+use spts_input::Refusal;
 
 /// Repetitions that the promise rests on.
 const PROMISED: usize = 16;
@@ -28,7 +28,7 @@ const PROMISES: [&str; 5] = [
 impl DesignStudy {
     /// What the chosen design promises, from touches and specimens that the search has not seen. Where that is short of
     /// the IoU, there are more measurements.
-    pub(super) fn promised(&self, ground: &Ground, mut tried: Tried) -> Result<(Tried, Design), DesignError> {
+    pub(super) fn promised(&self, ground: &Ground, mut tried: Tried) -> Result<(Tried, Design), Refusal> {
         let wires = tried.curve.wires;
         let classes = self.classes(ground)?;
         let mut m = tried.chosen();
@@ -60,7 +60,7 @@ impl DesignStudy {
     }
 
     /// Classes of the seventeen objects, where they can be told apart.
-    pub(super) fn classes(&self, ground: &Ground) -> Result<Option<Classes>, DesignError> {
+    pub(super) fn classes(&self, ground: &Ground) -> Result<Option<Classes>, Refusal> {
         if self.no_class(ground).is_some() {
             return Ok(None);
         }
@@ -84,12 +84,9 @@ impl DesignStudy {
         }
     }
 
-    fn expectation(&self, ground: &Ground, scores: &[RepetitionScore]) -> Result<Expectation, DesignError> {
+    fn expectation(&self, ground: &Ground, scores: &[RepetitionScore]) -> Result<Expectation, Refusal> {
         let of = |values: Vec<f64>, quantities: usize, range: [f64; 2]| {
-            promise(&values, quantities, range).ok_or_else(|| DesignError::NoDesign {
-                what: "promise".to_owned(),
-                reason: "fewer than two repetitions".to_owned(),
-            })
+            promise(&values, quantities, range).ok_or_else(|| Refusal::new("promise: fewer than two repetitions"))
         };
         let class: Option<Vec<f64>> = scores.iter().map(|s| s.class).collect();
         let quantities = if class.is_some() { 3 } else { 2 };

@@ -1,8 +1,9 @@
 //! Rows of the sensing matrix of a design.
 
-use super::error::DesignError;
+use super::wire::too_many_taxels;
 use serde::{Deserialize, Serialize};
 use spts_circuit::{Patterns, Seeding, WeightMode, Weights};
+use spts_input::Refusal;
 use spts_recon::matrix_free::SheetPrior;
 use spts_recon::rows::{Expected, RowTask, designer};
 use std::ops::Range;
@@ -77,34 +78,35 @@ impl BandRows {
         wires: usize,
         measurements: usize,
         seed: u64,
-    ) -> Result<Self, DesignError> {
+    ) -> Result<Self, Refusal> {
         let [rows, cols] = prior.shape();
         let bands = bands(rows, wires);
         match source {
             RowSource::Generator => Self::generator(bands, cols),
             RowSource::Designer(name) => {
                 let height = bands.first().map_or(0, Range::len);
-                let expected = Expected::smooth([height, cols], length(prior))?;
+                let expected = Expected::smooth([height, cols], length(prior)).map_err(Refusal::from_error)?;
                 let task = RowTask {
                     seed,
                     ..RowTask::new(measurements, &expected)
                 };
-                let found = designer(name).ok_or_else(|| DesignError::NoDesign {
-                    what: "rows".to_owned(),
-                    reason: format!("no designer {name:?}"),
-                })?;
-                let matrix = (found.build)().design(&task)?;
+                let found = designer(name).ok_or_else(|| Refusal::new(format!("rows: no designer {name:?}")))?;
+                let matrix = (found.build)().design(&task).map_err(Refusal::from_error)?;
                 let signs = (0..matrix.nrows()).flat_map(|r| matrix.row(r).to_vec());
                 let codes = signs.map(|v| if v > 0.0 { u8::MAX } else { 0 }).collect();
-                Self::pattern(&Patterns::new(matrix.nrows(), codes)?, bands, cols)
+                Self::pattern(
+                    &Patterns::new(matrix.nrows(), codes).map_err(Refusal::from_error)?,
+                    bands,
+                    cols,
+                )
             }
         }
     }
 
     /// Every wire with the same generators.
-    fn generator(bands: Vec<Range<usize>>, cols: usize) -> Result<Self, DesignError> {
-        let weights = bands.iter().map(|band| -> Result<Weights, DesignError> {
-            let taxels = u32::try_from(band.len() * cols)?;
+    fn generator(bands: Vec<Range<usize>>, cols: usize) -> Result<Self, Refusal> {
+        let weights = bands.iter().map(|band| -> Result<Weights, Refusal> {
+            let taxels = u32::try_from(band.len() * cols).map_err(too_many_taxels)?;
             Ok(Weights::new(WeightMode::Binary, Seeding::Mixed, taxels))
         });
         Ok(Self {
@@ -115,14 +117,14 @@ impl BandRows {
     }
 
     /// Every wire with the same pattern, that of the highest band; a band that is a row lower has its first taxels.
-    pub(super) fn pattern(pattern: &Patterns, bands: Vec<Range<usize>>, cols: usize) -> Result<Self, DesignError> {
-        let weights = bands.iter().map(|band| -> Result<Weights, DesignError> {
+    pub(super) fn pattern(pattern: &Patterns, bands: Vec<Range<usize>>, cols: usize) -> Result<Self, Refusal> {
+        let weights = bands.iter().map(|band| -> Result<Weights, Refusal> {
             let rows = (0..pattern.period() as u64).flat_map(|row| {
                 let codes = pattern.row(row);
                 codes[..codes.len().min(band.len() * cols)].to_vec()
             });
-            let patterns = Patterns::new(pattern.period(), rows.collect())?;
-            Ok(Weights::with_patterns(WeightMode::Binary, patterns)?)
+            let patterns = Patterns::new(pattern.period(), rows.collect()).map_err(Refusal::from_error)?;
+            Ok(Weights::with_patterns(WeightMode::Binary, patterns).map_err(Refusal::from_error)?)
         });
         Ok(Self {
             cols,

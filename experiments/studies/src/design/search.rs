@@ -1,13 +1,13 @@
 //! The search for rows and wires: more and more measurements, until the images are as good as wanted.
 
 use super::bench::{Bench, Repetition, draw, mean, pressing};
-use super::error::DesignError;
 use super::report::{DesignCurve, DesignPoint};
 use super::rows::{BandRows, RowSource, bands};
 use super::study::{DesignStudy, Ground, WireChoice};
 use super::wire::WireDesign;
 use crate::touches::{Touch, band};
 use spts_circuit::Profile;
+use spts_input::Refusal;
 
 /// Fewest measurements of a wire that are looked at.
 const FEWEST: usize = 6;
@@ -57,7 +57,7 @@ pub(super) struct Wired {
 
 impl DesignStudy {
     /// Looks at more and more wires, until some rows reach the IoU.
-    pub(super) fn search(&self, ground: &Ground) -> Result<Vec<Tried>, DesignError> {
+    pub(super) fn search(&self, ground: &Ground) -> Result<Vec<Tried>, Refusal> {
         let rows = ground.layout.rows();
         let numbers: Vec<usize> = match self.wires {
             WireChoice::Exactly(wires) => vec![wires],
@@ -82,7 +82,7 @@ impl DesignStudy {
     }
 
     /// Electronics and decoder of `wires` wires with rows of `source`: nothing measured yet.
-    pub(super) fn wired(&self, ground: &Ground, wires: usize, source: &RowSource) -> Result<Wired, DesignError> {
+    pub(super) fn wired(&self, ground: &Ground, wires: usize, source: &RowSource) -> Result<Wired, Refusal> {
         let layout = &ground.layout;
         let bands = bands(layout.rows(), wires);
         let taxels = bands.first().map_or(0, std::ops::Range::len) * layout.cols();
@@ -94,16 +94,16 @@ impl DesignStudy {
             pressing(&touches, &bands, layout.cols()),
             alike,
         )?;
-        let profile = Profile::from_toml(&wire.profile(!alike)?)?;
+        let profile = Profile::from_toml(&wire.profile(!alike)?).map_err(Refusal::from_error)?;
         #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
         let in_time = (self.latency_s / wire.period_s * (1.0 + 1e-9)) as usize;
         if in_time < FEWEST {
-            return Err(DesignError::Latency {
-                latency_s: self.latency_s,
-                least_s: FEWEST as f64 * wire.period_s,
-                least: FEWEST,
-                rate_hz: wire.rate_hz,
-            });
+            return Err(Refusal::new(format!(
+                "`latency` = {:.6} s is outside [{:.6}, ∞): {FEWEST} measurements take that long at {:.0} Hz",
+                self.latency_s,
+                FEWEST as f64 * wire.period_s,
+                wire.rate_hz
+            )));
         }
         let held = MOST.0.min(MOST.1 / (2 * layout.taxels())) / wires;
         let most = in_time.min(source.most_rows(taxels)).min(taxels).min(held).max(1);
@@ -116,7 +116,7 @@ impl DesignStudy {
     }
 
     /// Raises M until the IoU is reached or there is no more.
-    fn look(&self, ground: &Ground, wires: usize, source: RowSource) -> Result<Tried, DesignError> {
+    fn look(&self, ground: &Ground, wires: usize, source: RowSource) -> Result<Tried, Refusal> {
         let wired = self.wired(ground, wires, &source)?;
         let rows = BandRows::new(&source, &ground.prior, wires, wired.most, self.seed)?;
         let places = self.objects.places(&ground.layout);
@@ -166,7 +166,7 @@ impl DesignStudy {
     }
 
     /// Halves what is between the last M that does not do and the first that does.
-    fn refine(&self, tried: &mut Tried, measured: &[Repetition]) -> Result<(), DesignError> {
+    fn refine(&self, tried: &mut Tried, measured: &[Repetition]) -> Result<(), Refusal> {
         let points = &mut tried.curve.points;
         for _ in 0..HALVINGS {
             let Some(high) = tried.reached else { return Ok(()) };
@@ -188,7 +188,7 @@ impl DesignStudy {
 }
 
 /// IoU and place at `m` measurements.
-fn point(bench: &mut Bench, measured: &[Repetition], m: usize) -> Result<Option<DesignPoint>, DesignError> {
+fn point(bench: &mut Bench, measured: &[Repetition], m: usize) -> Result<Option<DesignPoint>, Refusal> {
     bench.prepare(m)?;
     let scores = bench.score(measured, m, None)?;
     let iou: Vec<f64> = scores.iter().map(|s| s.iou).collect();

@@ -1,13 +1,13 @@
 //! What is asked of a skin, and the way to its design: learn, search, promise, compare.
 
 use super::bench::draw;
-use super::error::DesignError;
 use super::objects::DesignObjects;
 use super::report::DesignReport;
 use super::search::best;
 use crate::electronics::ElectronicsStudy;
 use crate::touches::Touch;
 use spts::progress::Progress;
+use spts_input::Refusal;
 use spts_models::SkinLayout;
 use spts_recon::matrix_free::SheetPrior;
 
@@ -35,7 +35,7 @@ pub enum WireChoice {
 ///     seed: 1,
 /// };
 /// assert_eq!(study.layout()?.taxels(), 32 * 32);
-/// # Ok::<(), spts_studies::design::DesignError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct DesignStudy {
@@ -72,8 +72,8 @@ impl DesignStudy {
     /// Designs the skin. The result depends only on the settings, not on the number of threads.
     ///
     /// # Errors
-    /// [`DesignError`] for an input outside its range, or if touches cannot be drawn, measured or decoded.
-    pub fn run(&self, progress: &dyn Progress) -> Result<DesignReport, DesignError> {
+    /// [`Refusal`] for an input outside its range, or if touches cannot be drawn, measured or decoded.
+    pub fn run(&self, progress: &dyn Progress) -> Result<DesignReport, Refusal> {
         let layout = self.layout()?;
         progress.stage("learning", None);
         let ground = self.ground(layout)?;
@@ -92,13 +92,13 @@ impl DesignStudy {
     /// Layout of the skin.
     ///
     /// # Errors
-    /// [`DesignError::Range`], [`DesignError::Taxels`] and [`DesignError::Wires`].
-    pub fn layout(&self) -> Result<SkinLayout, DesignError> {
+    /// [`Refusal`] for an input outside its range, or a skin that is too small, too large or has fewer rows than wires.
+    pub fn layout(&self) -> Result<SkinLayout, Refusal> {
         let within = |field, value: f64, least: f64, most: f64, range| {
             if (least..=most).contains(&value) {
                 Ok(())
             } else {
-                Err(DesignError::Range { field, value, range })
+                Err(Refusal::range(field, value, range))
             }
         };
         for side_m in self.area_m {
@@ -110,27 +110,31 @@ impl DesignStudy {
         // whole taxels in the area, to rounding
         let [cols, rows] = self.area_m.map(|side_m| (side_m / self.pitch_m + 1e-6).floor());
         if ![rows, cols].iter().all(|side| (2.0..=MOST_SIDE).contains(side)) {
-            return Err(DesignError::Taxels { rows, cols });
+            return Err(Refusal::new(format!(
+                "`area` / `resolution`: {rows:.0} × {cols:.0} taxels are outside [2, 256] a side"
+            )));
         }
         #[expect(clippy::cast_possible_truncation, reason = "at most 256")]
         let (rows, cols) = (rows as usize, cols as usize);
         let (WireChoice::Exactly(wires) | WireChoice::UpTo(wires)) = self.wires;
         if wires == 0 || (wires > rows && matches!(self.wires, WireChoice::Exactly(_))) {
-            return Err(DesignError::Wires { wires, rows });
+            return Err(Refusal::new(format!(
+                "`wires` = {wires} is outside [1, {rows}]: every wire reads whole rows of the skin"
+            )));
         }
         let electrode_m = SkinLayout::usual_electrode_m(self.pitch_m);
         Ok(SkinLayout::new(rows, cols, self.pitch_m, electrode_m)?)
     }
 
     /// Learns what images are like.
-    pub(super) fn ground(&self, layout: SkinLayout) -> Result<Ground, DesignError> {
+    pub(super) fn ground(&self, layout: SkinLayout) -> Result<Ground, Refusal> {
         let drawn = draw(&self.objects, &layout, "design/learned", self.seed, LEARNED)?;
         let learned: Vec<Touch> = drawn.into_iter().flat_map(|(touches, _)| touches).collect();
         let images = learned.iter().map(|t| t.conductance_s.values());
         Ok(Ground {
             layout,
             electronics: ElectronicsStudy::as_designed()?,
-            prior: SheetPrior::like(images, [layout.rows(), layout.cols()])?,
+            prior: SheetPrior::like(images, [layout.rows(), layout.cols()]).map_err(Refusal::from_error)?,
             learned,
         })
     }

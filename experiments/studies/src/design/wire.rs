@@ -1,10 +1,10 @@
 //! Amplifier, clock and converter of a wire.
 
-use super::error::DesignError;
 use crate::electronics::ElectronicsStudy;
 use serde::{Deserialize, Serialize};
 use spts_circuit::amplifier::{Amplifier, Budget, Network, Setting, Skin};
 use spts_circuit::{PROFILES, Profile};
+use spts_input::Refusal;
 use toml::{Table, Value};
 
 /// Share of the range that the sums of the touches use that were drawn: others press harder.
@@ -79,7 +79,7 @@ impl WireDesign {
         taxels: usize,
         pressing: Pressing,
         alike: bool,
-    ) -> Result<Self, DesignError> {
+    ) -> Result<Self, Refusal> {
         let Pressing { sum_s, square_s2 } = pressing;
         let skin = Skin {
             pressed_share: (sum_s * sum_s / square_s2 / taxels as f64).min(1.0),
@@ -91,7 +91,7 @@ impl WireDesign {
             adc: electronics.adc,
             available_s: electronics.available_s()?,
         };
-        let budget = |feedback_ohm: f64, setting: &Setting| -> Result<Budget, DesignError> {
+        let budget = |feedback_ohm: f64, setting: &Setting| -> Result<Budget, Refusal> {
             let network = Network {
                 feedback_ohm,
                 ..electronics.network
@@ -104,7 +104,7 @@ impl WireDesign {
         let as_designed = budget(designed_ohm, &setting)?;
         // sums are proportional to the feedback
         let most_ohm = designed_ohm * HEADROOM * as_designed.range_v / excursion_of(&as_designed);
-        let fits = |feedback_ohm: f64, setting: &Setting| -> Result<bool, DesignError> {
+        let fits = |feedback_ohm: f64, setting: &Setting| -> Result<bool, Refusal> {
             let b = budget(feedback_ohm, setting)?;
             // a step of the converter that is larger than a taxel costs image and stops nothing, and no feedback
             // changes the current that the sum takes: `limit` names both
@@ -151,7 +151,7 @@ impl WireDesign {
 
     /// Readout profile of the wire as TOML: as_designed with this feedback and clock. What the parts do not explain is
     /// as the recordings of the device show it: contact noise, late updates and idle noise of as_built.
-    pub(super) fn profile(&self, mixed: bool) -> Result<String, DesignError> {
+    pub(super) fn profile(&self, mixed: bool) -> Result<String, Refusal> {
         let (mut table, built) = (profile_table("as_designed")?, profile_table("as_built")?);
         table.insert("sample_rate_hz".to_owned(), self.rate_hz.into());
         table.insert("feedback_ohm".to_owned(), self.feedback_ohm.into());
@@ -166,22 +166,16 @@ impl WireDesign {
                 .map(|(effect, value)| (effect.clone(), value.clone()))
                 .collect();
             let effects = table.get_mut(mode).and_then(Value::as_table_mut);
-            let effects = effects.ok_or(DesignError::NoStage {
-                profile: "as_designed",
-                name: "compressive or raster",
-            })?;
+            let effects = effects.ok_or_else(|| no_stage("as_designed", "compressive or raster"))?;
             effects.extend(measured);
             let amplifier = effects.get_mut("amplifier").and_then(Value::as_table_mut);
-            let amplifier = amplifier.ok_or(DesignError::NoStage {
-                profile: "as_designed",
-                name: "amplifier",
-            })?;
+            let amplifier = amplifier.ok_or_else(|| no_stage("as_designed", "amplifier"))?;
             let update_s = amplifier.get("update_s").and_then(Value::as_float).unwrap_or(0.0);
             amplifier.insert("sample_s".to_owned(), (update_s + self.available_s).into());
         }
-        let text = toml::to_string(&table)?;
-        let profile = Profile::from_toml(&text)?;
-        profile.validate(1)?;
+        let text = toml::to_string(&table).map_err(|e| Refusal::from_error(e).at("profile"))?;
+        let profile = Profile::from_toml(&text).map_err(Refusal::from_error)?;
+        profile.validate(1).map_err(Refusal::from_error)?;
         Ok(text)
     }
 }
@@ -189,29 +183,36 @@ impl WireDesign {
 /// Effects of as_built that the parts of as_designed do not explain.
 const MEASURED: [&str; 3] = ["contact_noise", "late_updates", "idle_noise"];
 
+/// A stage that a profile lacks, as an error.
+fn no_stage(profile: &str, name: &str) -> Refusal {
+    Refusal::new(format!("profile {profile}: no `{name}`"))
+}
+
+/// Taxels of a wire that no number of 32 bits counts, as an error.
+pub(super) fn too_many_taxels(error: std::num::TryFromIntError) -> Refusal {
+    Refusal::from_error(error).at("taxels of a wire")
+}
+
 /// A shipped profile as a table.
-fn profile_table(name: &'static str) -> Result<Table, DesignError> {
+fn profile_table(name: &'static str) -> Result<Table, Refusal> {
     let found = PROFILES.iter().find(|(known, _)| *known == name);
     found
         .and_then(|(_, text)| text.parse().ok())
-        .ok_or(DesignError::NoStage {
-            profile: name,
-            name: "text",
-        })
+        .ok_or_else(|| no_stage(name, "text"))
 }
 
-fn stage<'a>(profile: &'a Table, name: &'static str) -> Result<&'a Table, DesignError> {
-    profile.get(name).and_then(Value::as_table).ok_or(DesignError::NoStage {
-        profile: "as_built",
-        name,
-    })
+fn stage<'a>(profile: &'a Table, name: &'static str) -> Result<&'a Table, Refusal> {
+    profile
+        .get(name)
+        .and_then(Value::as_table)
+        .ok_or_else(|| no_stage("as_built", name))
 }
 
 /// Resolution of a profile's converter.
-fn bits(profile: &Table) -> Result<u32, DesignError> {
+fn bits(profile: &Table) -> Result<u32, Refusal> {
     let adc = stage(profile, "compressive")?.get("adc").and_then(Value::as_table);
     let bits = adc.and_then(|adc| adc.get("bits")).and_then(Value::as_integer);
-    Ok(u32::try_from(bits.unwrap_or_default())?)
+    u32::try_from(bits.unwrap_or_default()).map_err(too_many_taxels)
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
 //! Measurements of the wires of a large skin, and the corresponding operator.
 
-use super::error::ExploreError;
 use super::scene::ExploreScene;
 use super::wiring::Wiring;
 use rayon::prelude::*;
 use spts_circuit::{Constant, INCREMENT, MULTIPLIER, Mode, Readout};
+use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 use spts_recon::operator::{Centred, SignGenerator, SignOperator, SubArrays, centre};
 
@@ -32,12 +32,7 @@ pub(super) struct MeasuredWires {
 impl MeasuredWires {
     /// The skin `wiring` under `scene`; no measurement yet. The idle skin was recorded from the same rows on in a
     /// session before: it holds what the cells and the idle conductance add.
-    pub(super) fn new(
-        wiring: &Wiring,
-        scene: &ExploreScene,
-        idle_s: f64,
-        streams: Streams,
-    ) -> Result<Self, ExploreError> {
+    pub(super) fn new(wiring: &Wiring, scene: &ExploreScene, idle_s: f64, streams: Streams) -> Result<Self, Refusal> {
         let (taxels, skin) = (scene.image_s.len(), SkinLayout::default());
         let mut wires = Vec::with_capacity(wiring.wires);
         for w in 0..wiring.wires {
@@ -45,10 +40,13 @@ impl MeasuredWires {
             // one wire's taxels, whatever their places
             let layout = SkinLayout::new(1, band.len(), skin.pitch_m(), skin.electrode_m())?;
             let device = streams.child("explore/wire", w as u64);
-            let line = |session: u64, conductance_s: Vec<f64>| -> Result<(Readout, Constant), ExploreError> {
+            let line = |session: u64, conductance_s: Vec<f64>| -> Result<(Readout, Constant), Refusal> {
                 let readout = Readout::new(&wiring.profile, Mode::Compressive, &layout, device, session);
                 let map = ConductanceMap::from_values(1, conductance_s.len(), conductance_s);
-                Ok((readout?, Constant::new(map)?))
+                Ok((
+                    readout.map_err(Refusal::from_error)?,
+                    Constant::new(map).map_err(Refusal::from_error)?,
+                ))
             };
             let conductance_s = scene.image_s[band.clone()].iter().map(|g| g + idle_s).collect();
             let pressed = line(1, conductance_s)?;
@@ -60,13 +58,13 @@ impl MeasuredWires {
                 volts: Vec::new(),
             });
         }
-        let generator = SignGenerator::new(MULTIPLIER, INCREMENT, SIGN_BIT)?;
+        let generator = SignGenerator::new(MULTIPLIER, INCREMENT, SIGN_BIT).map_err(Refusal::from_error)?;
         Ok(Self { wires, generator })
     }
 
     /// The first `rows` measurements of every wire, V, wire after wire, and their operator; the mean of every wire is
     /// taken off, which holds what the drives' asymmetry makes of all that is pressed.
-    pub(super) fn first(&mut self, rows: usize) -> Result<(Wired, Vec<f64>), ExploreError> {
+    pub(super) fn first(&mut self, rows: usize) -> Result<(Wired, Vec<f64>), Refusal> {
         self.wires.par_iter_mut().try_for_each(|wire| wire.extend(rows))?;
         let operator = |wire: &Wire| Centred::new(SignOperator::new(self.generator, wire.seeds.clone(), 0, rows));
         let phi = SubArrays::new(self.wires.iter().map(operator).collect());
@@ -82,14 +80,17 @@ impl MeasuredWires {
 
 impl Wire {
     /// Measures on until there are `rows` measurements.
-    fn extend(&mut self, rows: usize) -> Result<(), ExploreError> {
+    fn extend(&mut self, rows: usize) -> Result<(), Refusal> {
         let more = rows.saturating_sub(self.volts.len());
         if more == 0 {
             return Ok(());
         }
         let run = |(readout, source): &mut (Readout, Constant)| readout.measure(source, more);
         let (pressed, idle) = rayon::join(|| run(&mut self.pressed), || run(&mut self.idle));
-        let (pressed, idle) = (pressed?, idle?);
+        let (pressed, idle) = (
+            pressed.map_err(Refusal::from_error)?,
+            idle.map_err(Refusal::from_error)?,
+        );
         self.volts.extend(pressed.iter().zip(&idle).map(|(p, i)| p - i));
         Ok(())
     }

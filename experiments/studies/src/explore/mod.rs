@@ -1,6 +1,5 @@
 //! Number of measurements that a large skin needs, on one or several wires, including the limits of the electronics.
 
-mod error;
 mod fit;
 mod measure;
 mod report;
@@ -8,7 +7,6 @@ pub(crate) mod scene;
 mod study;
 pub(crate) mod wiring;
 
-pub use error::ExploreError;
 pub use fit::PowerLaw;
 pub use report::{CostFit, ExploreReport, ExploreTrial, SizeRow};
 pub use study::{ExploreStudy, WANTED_IOU, WANTED_LOCATED};

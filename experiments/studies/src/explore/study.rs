@@ -1,6 +1,5 @@
 //! Searches the number of measurements that a skin of every size needs.
 
-use super::error::ExploreError;
 use super::measure::MeasuredWires;
 use super::report::{ExploreReport, ExploreTrial, SizeRow};
 use super::scene::{ExploreScene, located, scene};
@@ -9,6 +8,7 @@ use crate::electronics::ElectronicsStudy;
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::Seeding;
+use spts_input::Refusal;
 use spts_models::Streams;
 use spts_recon::matrix_free::RegionPursuit;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
@@ -44,8 +44,8 @@ impl ExploreStudy {
     /// Explores every size with every wiring. All values except times are the same for any number of threads.
     ///
     /// # Errors
-    /// [`ExploreError`] if the electronics cannot be built, or a wire cannot be measured.
-    pub fn run(&self, progress: &dyn Progress) -> Result<ExploreReport, ExploreError> {
+    /// [`Refusal`] if the electronics cannot be built, or a wire cannot be measured.
+    pub fn run(&self, progress: &dyn Progress) -> Result<ExploreReport, Refusal> {
         let electronics = ElectronicsStudy::as_designed()?;
         progress.stage("exploring", Some(self.sides.len() * Way::ALL.len()));
         let mut rows = Vec::new();
@@ -77,7 +77,7 @@ impl ExploreStudy {
         wiring: &Wiring,
         scenes: &[ExploreScene],
         electronics: &ElectronicsStudy,
-    ) -> Result<SizeRow, ExploreError> {
+    ) -> Result<SizeRow, Refusal> {
         let streams = Streams::new(self.seed);
         let mut measured = Vec::with_capacity(scenes.len());
         for (index, scene) in (0..).zip(scenes) {
@@ -107,8 +107,8 @@ impl ExploreStudy {
 /// Half an octave below the least M that reaches an aim.
 fn refine(
     trials: &mut Vec<ExploreTrial>,
-    mut at: impl FnMut(usize) -> Result<ExploreTrial, ExploreError>,
-) -> Result<(), ExploreError> {
+    mut at: impl FnMut(usize) -> Result<ExploreTrial, Refusal>,
+) -> Result<(), Refusal> {
     for aim in [ExploreTrial::has_iou, ExploreTrial::has_located] {
         let least = trials.iter().filter(|t| aim(t)).map(|t| t.rows_per_wire).min();
         let between = least.map(half_octave_below);
@@ -140,7 +140,7 @@ fn trial(
     scenes: &[ExploreScene],
     measured: &mut [MeasuredWires],
     rows: usize,
-) -> Result<ExploreTrial, ExploreError> {
+) -> Result<ExploreTrial, Refusal> {
     let pursuit = RegionPursuit {
         max_rounds: MAX_ROUNDS,
         ..RegionPursuit::new(side, side)
@@ -151,7 +151,7 @@ fn trial(
     for (scene, measured) in scenes.iter().zip(measured) {
         let (phi, volts) = measured.first(rows)?;
         let time = Instant::now();
-        let found = pursuit.recover(&phi, &volts, None)?;
+        let found = pursuit.recover(&phi, &volts, None).map_err(Refusal::from_error)?;
         sum.decode_s += share * time.elapsed().as_secs_f64();
         support(&scene.image_s, SUPPORT_THRESHOLD, &mut truth);
         support(&found.image, SUPPORT_THRESHOLD, &mut mask);

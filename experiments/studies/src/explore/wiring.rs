@@ -1,11 +1,11 @@
 //! Ways to wire a large skin, as profiles of its readout.
 
-use super::error::ExploreError;
 use super::scene::ExploreScene;
 use crate::electronics::ElectronicsStudy;
 use serde::Serialize;
 use spts_circuit::amplifier::{Amplifier, Budget, Limit, Network, Setting, Skin, fewest_wires};
 use spts_circuit::{Profile, Seeding};
+use spts_input::Refusal;
 use spts_models::ConfigError;
 
 /// Share of the converter's range that a fitted feedback uses: the sum is Gaussian, and scenes differ.
@@ -80,7 +80,7 @@ pub(crate) fn wirings(
     scene: &ExploreScene,
     seeding: Seeding,
     electronics: &ElectronicsStudy,
-) -> Result<Vec<Wiring>, ExploreError> {
+) -> Result<Vec<Wiring>, Refusal> {
     let setting = Setting {
         skin: pressed_skin(scene, electronics),
         adc: electronics.adc,
@@ -141,44 +141,39 @@ fn fitted(designed: &Amplifier, taxels: u32, setting: &Setting) -> Result<Amplif
 
 /// as_designed with this feedback and clock, and with what the parts do not explain as the recordings show it: contact
 /// noise and late updates.
-fn profile(
-    way: Way,
-    feedback_ohm: f64,
-    available_s: f64,
-    period_s: f64,
-    seeding: Seeding,
-) -> Result<Profile, ExploreError> {
+fn profile(way: Way, feedback_ohm: f64, available_s: f64, period_s: f64, seeding: Seeding) -> Result<Profile, Refusal> {
     if way == Way::Ideal {
         return Ok(Profile {
             seeding,
-            ..Profile::named("ideal")?
+            ..Profile::named("ideal").map_err(Refusal::from_error)?
         });
     }
-    let built = Profile::named("as_built")?;
+    let built = Profile::named("as_built").map_err(Refusal::from_error)?;
     let mut profile = Profile {
         seeding,
         feedback_ohm,
         sample_rate_hz: 1.0 / period_s,
-        ..Profile::named("as_designed")?
+        ..Profile::named("as_designed").map_err(Refusal::from_error)?
     };
     for effect in ["contact_noise", "late_updates"] {
-        let table = built.compressive.get(effect).ok_or(ExploreError::NoEffect {
-            profile: "as_built",
-            name: effect,
-        })?;
+        let table = built
+            .compressive
+            .get(effect)
+            .ok_or_else(|| no_effect("as_built", effect))?;
         profile.compressive.insert(effect.to_owned(), table.clone());
     }
     let amplifier = profile
         .compressive
         .get_mut("amplifier")
         .and_then(toml::Value::as_table_mut);
-    let lacking = |name| ExploreError::NoEffect {
-        profile: "as_designed",
-        name,
-    };
-    let amplifier = amplifier.ok_or(lacking("amplifier"))?;
+    let lacking = |name| no_effect("as_designed", name);
+    let amplifier = amplifier.ok_or_else(|| lacking("amplifier"))?;
     let update_s = amplifier.get("update_s").and_then(toml::Value::as_float);
-    let sample_s = update_s.ok_or(lacking("amplifier.update_s"))? + available_s;
+    let sample_s = update_s.ok_or_else(|| lacking("amplifier.update_s"))? + available_s;
     amplifier.insert("sample_s".to_owned(), sample_s.into());
     Ok(profile)
+}
+/// An effect that a profile lacks, or a value of it, as an error.
+fn no_effect(profile: &str, name: &str) -> Refusal {
+    Refusal::new(format!("profile {profile}: no `compressive.{name}`"))
 }

@@ -1,8 +1,8 @@
 //! Scans taxels one by one, guided by the contacts found.
 
-use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
 use super::wire::{HeldWire, WireFrame};
+use spts_input::Refusal;
 use std::collections::VecDeque;
 
 /// Adaptive sub-sampling: single taxels on ever finer grids until one is touched; then its neighbours, and theirs,
@@ -23,7 +23,7 @@ struct Grids {
 }
 
 impl WireReadout for Adaptive {
-    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError> {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
         let (rows, cols) = (skin.layout.rows(), skin.layout.cols());
         Ok(Box::new(Grids {
             rows,
@@ -136,7 +136,7 @@ impl PreparedReadout for Grids {
         conductance_s.iter().copied().fold(0.0, f64::max)
     }
 
-    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError> {
+    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal> {
         // all taxels are measured once, and the samples are those at the taxels that are asked for
         let frame = wire.scan()?;
         let beyond: Vec<bool> = self.order.iter().map(|k| frame.volts[*k] > frame.alarm_v).collect();

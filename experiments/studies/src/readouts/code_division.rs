@@ -1,9 +1,9 @@
 //! Code division: every taxel has a code that is orthogonal to all others.
 
-use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
 use super::rows::WalshRows;
 use super::wire::HeldWire;
+use spts_input::Refusal;
 
 /// All taxels at once, taxel k with the k-th Walsh function as its code, and each one correlated with its code: as many
 /// chips as the next power of two holds. Nothing is known of the images.
@@ -16,7 +16,7 @@ struct Coded {
 }
 
 impl WireReadout for CodeDivision {
-    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError> {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
         let taxels = skin.layout.taxels();
         Ok(Box::new(Coded {
             walsh: WalshRows::new(taxels),
@@ -31,7 +31,7 @@ impl PreparedReadout for Coded {
         sums.iter().fold(0.0, |largest, sum| largest.max(sum.abs()))
     }
 
-    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError> {
+    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal> {
         let [low, high] = wire.levels();
         let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
         let chips = self.walsh.rows();

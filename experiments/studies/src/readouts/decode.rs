@@ -1,10 +1,10 @@
 //! Decodes images from few rows of ±1 that are the same in every frame.
 
-use super::error::ReadoutsError;
 use super::polish::{contact_taxels, non_negative};
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, until_noticed};
 use super::rows::StoredRows;
 use super::wire::HeldWire;
+use spts_input::Refusal;
 use spts_recon::Matrix;
 use spts_recon::matrix_free::{RegionPursuit, SheetDecoder, SheetNoise, SheetPrior};
 use spts_recon::operator::{Centred, LinearOperator, SelectColumns, centre};
@@ -48,7 +48,7 @@ enum Decoder {
 }
 
 /// The estimate under the skin's prior from the first `count` rows.
-fn gaussian(skin: &ReadoutSkin, rows: &StoredRows, count: usize) -> Result<Decoder, ReadoutsError> {
+fn gaussian(skin: &ReadoutSkin, rows: &StoredRows, count: usize) -> Result<Decoder, Refusal> {
     let (prior, taxels) = (skin.prior()?, rows.taxels());
     let mut matrix = Matrix::zeros(count, taxels);
     let (mut product, mut square) = (vec![0.0; taxels], 0.0);
@@ -60,17 +60,24 @@ fn gaussian(skin: &ReadoutSkin, rows: &StoredRows, count: usize) -> Result<Decod
         prior.covariance().apply(row, &mut product);
         square += row.iter().zip(&product).map(|(a, b)| a * b).sum::<f64>() / count as f64;
     }
-    let fixed = Fixed::new(matrix.view(), prior, NOISE)?;
+    let fixed = Fixed::new(matrix.view(), prior, NOISE).map_err(Refusal::from_error)?;
     Ok(Decoder::Gaussian(Box::new(fixed), square.sqrt()))
 }
 
 /// The decoder of a large sheet on which images are alike over `length` taxels, its rows prepared.
-fn sheet(rows: &StoredRows, shape: [usize; 2], length: f64) -> Result<SheetDecoder, ReadoutsError> {
-    let mut decoder = SheetDecoder::new(SheetPrior::smooth(shape, length)?, SheetNoise::default(), 1)?;
+fn sheet(rows: &StoredRows, shape: [usize; 2], length: f64) -> Result<SheetDecoder, Refusal> {
+    let mut decoder = SheetDecoder::new(
+        SheetPrior::smooth(shape, length).map_err(Refusal::from_error)?,
+        SheetNoise::default(),
+        1,
+    )
+    .map_err(Refusal::from_error)?;
     let levels: Vec<f64> = (0..rows.len())
         .flat_map(|r| rows.row(r).iter().map(|w| f64::from(*w)))
         .collect();
-    decoder.extend(&levels, &vec![0; rows.len()])?;
+    decoder
+        .extend(&levels, &vec![0; rows.len()])
+        .map_err(Refusal::from_error)?;
     Ok(decoder)
 }
 
@@ -81,7 +88,7 @@ fn places(count: usize) -> usize {
 }
 
 impl FewRows {
-    pub(super) fn new(skin: &ReadoutSkin, rows: StoredRows, kind: Rows) -> Result<Self, ReadoutsError> {
+    pub(super) fn new(skin: &ReadoutSkin, rows: StoredRows, kind: Rows) -> Result<Self, Refusal> {
         let (taxels, shape) = (rows.taxels(), [skin.layout.rows(), skin.layout.cols()]);
         let sheet = match kind {
             Rows::Smooth(length) if taxels > WHOLE_IMAGES => Some(Arc::new(sheet(&rows, shape, length)?)),
@@ -101,7 +108,7 @@ impl FewRows {
 
     /// The image that the first samples show; where it takes time to keep it from being negative, not yet so if
     /// `quick`.
-    fn image(&self, decoder: &Decoder, samples: &[f64], quick: bool) -> Result<Vec<f64>, ReadoutsError> {
+    fn image(&self, decoder: &Decoder, samples: &[f64], quick: bool) -> Result<Vec<f64>, Refusal> {
         match decoder {
             Decoder::Gaussian(fixed, expected) => {
                 let rms = (samples.iter().map(|v| v * v).sum::<f64>() / samples.len() as f64).sqrt();
@@ -110,12 +117,12 @@ impl FewRows {
                     .iter()
                     .for_each(|v| window.push(v * expected / rms.max(f64::MIN_POSITIVE)));
                 Ok(if quick {
-                    window.image()?.to_vec()
+                    window.image().map_err(Refusal::from_error)?.to_vec()
                 } else {
-                    window.non_negative()?.to_vec()
+                    window.non_negative().map_err(Refusal::from_error)?.to_vec()
                 })
             }
-            Decoder::Sheet(sheet, places) => Ok(sheet.non_negative(samples, *places)?),
+            Decoder::Sheet(sheet, places) => Ok(sheet.non_negative(samples, *places).map_err(Refusal::from_error)?),
             Decoder::Patches => {
                 let [rows, cols] = self.shape;
                 let pursuit = RegionPursuit {
@@ -128,7 +135,10 @@ impl FewRows {
                 });
                 let mut centred = samples.to_vec();
                 centre(&mut centred);
-                let mut image = pursuit.recover(&phi, &centred, None)?.image;
+                let mut image = pursuit
+                    .recover(&phi, &centred, None)
+                    .map_err(Refusal::from_error)?
+                    .image;
                 // a pursuit's bumps are wider than a taxel
                 if let Some(taxels) = contact_taxels(&image, samples.len()) {
                     let mut columns = phi.inner().select_columns(&taxels);
@@ -151,7 +161,7 @@ impl PreparedReadout for FewRows {
         sums.iter().fold(0.0, |largest, sum| largest.max(sum.abs()))
     }
 
-    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError> {
+    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal> {
         let [low, high] = wire.levels();
         let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
         let frame = wire.signs(&self.rows, self.rows.len())?;

@@ -1,9 +1,9 @@
 //! Signs designed for the expected images.
 
 use super::decode::{FewRows, Rows, WHOLE_IMAGES};
-use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, ReadoutSkin, WireReadout};
 use super::rows::StoredRows;
+use spts_input::Refusal;
 use spts_recon::rows::{DesignRows as _, Expected, RowTask, Separable, Tolerances};
 
 /// Distance over which images of larger skins are alike, taxels.
@@ -15,16 +15,18 @@ const SMOOTH_TAXELS: f64 = 1.5;
 pub(super) struct DesignedSigns;
 
 impl WireReadout for DesignedSigns {
-    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError> {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
         let taxels = skin.layout.taxels();
         let most = skin.measurements().last().copied().unwrap_or(1);
         let shape = [skin.layout.rows(), skin.layout.cols()];
         let expected = if taxels <= WHOLE_IMAGES {
-            Expected::like(&*skin.prior()?, shape, Tolerances::default())?
+            Expected::like(&*skin.prior()?, shape, Tolerances::default()).map_err(Refusal::from_error)?
         } else {
-            Expected::smooth(shape, SMOOTH_TAXELS)?
+            Expected::smooth(shape, SMOOTH_TAXELS).map_err(Refusal::from_error)?
         };
-        let designed = Separable.design(&RowTask::new(most, &expected))?;
+        let designed = Separable
+            .design(&RowTask::new(most, &expected))
+            .map_err(Refusal::from_error)?;
         let signs = designed
             .view()
             .values()

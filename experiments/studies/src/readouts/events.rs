@@ -1,12 +1,12 @@
 //! Event-driven code division: a taxel that changes sends its own signature at any time.
 
-use super::error::ReadoutsError;
 use super::messages::{Message, Sender, receive};
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout};
 use super::rows::StoredRows;
 use super::wire::HeldWire;
 use rand::RngExt as _;
 use spts_circuit::amplifier::Skin;
+use spts_input::Refusal;
 
 /// Slots of a signature that are tried.
 const SLOTS: [usize; 4] = [128, 256, 512, 1024];
@@ -34,7 +34,7 @@ struct Signatures {
 }
 
 impl WireReadout for Events {
-    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError> {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
         let taxels = skin.layout.taxels();
         Ok(Box::new(Signatures {
             taxels,
@@ -74,7 +74,7 @@ impl PreparedReadout for Signatures {
         at_once.min(senders.max(1.0)) * self.sender_s
     }
 
-    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError> {
+    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal> {
         let (event_s, largest_s) = (EVENT * wire.idle_s(), LARGEST * wire.pressed_s());
         let values = wire.own_values_s();
         let senders: Vec<Sender> = (0..self.taxels)

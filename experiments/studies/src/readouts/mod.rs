@@ -15,7 +15,7 @@
 //!     seed: 1,
 //! };
 //! println!("{}", study.run(&())?.text());
-//! # Ok::<(), spts_studies::readouts::ReadoutsError>(())
+//! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
 mod adaptive;
@@ -24,7 +24,6 @@ mod code_division;
 mod conformance;
 mod decode;
 mod designed;
-mod error;
 mod events;
 mod messages;
 mod polish;
@@ -42,7 +41,6 @@ mod wiring;
 
 pub use classify::Templates;
 pub use conformance::conformance;
-pub use error::ReadoutsError;
 pub use published::{PUBLISHED, PublishedSystem};
 pub use readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
 pub use report::{GOOD_IOU, ReadoutRow, ReadoutTrial, ReadoutsReport, SizeWire};

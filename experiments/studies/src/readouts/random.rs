@@ -1,17 +1,17 @@
 //! Few rows of pseudorandom signs.
 
 use super::decode::{FewRows, Rows};
-use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, ReadoutSkin, WireReadout};
 use super::rows::StoredRows;
 use spts_circuit::{Seeding, WeightMode, Weights};
+use spts_input::Refusal;
 
 /// The published cells' own rows: pseudorandom ±1 from mixed seeds, the first M of them over and over.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RandomSigns;
 
 impl WireReadout for RandomSigns {
-    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError> {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
         let taxels = skin.layout.taxels();
         let most = skin.measurements().last().copied().unwrap_or(1);
         let count = u32::try_from(taxels).unwrap_or(u32::MAX);

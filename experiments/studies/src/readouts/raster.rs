@@ -1,8 +1,8 @@
 //! Scans one taxel after another.
 
-use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
 use super::wire::HeldWire;
+use spts_input::Refusal;
 
 /// A raster scan: measurement k is taxel k, and the image is the samples of the contacts.
 #[derive(Debug, Clone, Copy)]
@@ -14,7 +14,7 @@ struct Scan {
 }
 
 impl WireReadout for Raster {
-    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError> {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
         Ok(Box::new(Scan {
             cols: skin.layout.cols(),
         }))
@@ -26,7 +26,7 @@ impl PreparedReadout for Scan {
         conductance_s.iter().copied().fold(0.0, f64::max)
     }
 
-    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError> {
+    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal> {
         let frame = wire.scan()?;
         let beyond: Vec<bool> = frame.volts.iter().map(|v| *v > frame.alarm_v).collect();
         // the taxel whose sample is beyond the alarm is the place

@@ -1,8 +1,8 @@
 //! Interface of readouts.
 
-use super::error::ReadoutsError;
 use super::wire::HeldWire;
 use spts_eval::training::TrainingData;
+use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::recover::{Gaussian, ImagePrior};
 use std::sync::{Arc, OnceLock};
@@ -24,8 +24,8 @@ pub trait WireReadout: Send + Sync {
     /// Computes rows, gains and everything else that depends only on the skin.
     ///
     /// # Errors
-    /// [`ReadoutsError`] if the readout does not support this skin.
-    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, ReadoutsError>;
+    /// [`Refusal`] if the readout does not support this skin.
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal>;
 }
 
 /// A readout method with everything computed that depends only on the skin: it measures touches.
@@ -38,8 +38,8 @@ pub trait PreparedReadout: Send + Sync {
     /// tested, in increasing order; every touch has the same number of readings.
     ///
     /// # Errors
-    /// [`ReadoutsError`] if the wire cannot be measured, or an image cannot be recovered.
-    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, ReadoutsError>;
+    /// [`Refusal`] if the wire cannot be measured, or an image cannot be recovered.
+    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal>;
 }
 
 /// What a readout method answers for one touch and one number of measurements: the image, and how soon the touch was
@@ -80,12 +80,15 @@ impl ReadoutSkin {
     /// Prior of the images on this skin without any recording: random shapes anywhere.
     ///
     /// # Errors
-    /// [`ReadoutsError`] for a skin of more than [`TrainingData::MOST_TAXELS`].
-    pub fn prior(&self) -> Result<Arc<Gaussian>, ReadoutsError> {
+    /// [`Refusal`] for a skin of more than [`TrainingData::MOST_TAXELS`].
+    pub fn prior(&self) -> Result<Arc<Gaussian>, Refusal> {
         if let Some(prior) = self.prior.get() {
             return Ok(Arc::clone(prior));
         }
-        let prior = TrainingData::for_layout(&self.layout, self.streams)?.prior(ImagePrior::UNSEEN)?;
+        let prior = TrainingData::for_layout(&self.layout, self.streams)
+            .map_err(Refusal::from_error)?
+            .prior(ImagePrior::UNSEEN)
+            .map_err(Refusal::from_error)?;
         Ok(Arc::clone(self.prior.get_or_init(|| prior)))
     }
 

@@ -1,7 +1,6 @@
 //! The benchmark: every readout with the same skins, touches, wire, noise and clock.
 
 use super::classify::Templates;
-use super::error::ReadoutsError;
 use super::readout::{PreparedReadout, Reading, ReadoutSkin};
 use super::report::{ReadoutRow, ReadoutTrial, ReadoutsReport, SizeWire};
 use super::table::ReadoutLine;
@@ -12,6 +11,7 @@ use rand::RngExt as _;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts::progress::Progress;
+use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::statistics::mean;
 
@@ -90,8 +90,8 @@ impl ReadoutsStudy {
     /// Runs every readout on every skin. All values are the same for any number of threads.
     ///
     /// # Errors
-    /// [`ReadoutsError`] if a skin cannot be built, touched or measured.
-    pub fn run(&self, progress: &dyn Progress) -> Result<ReadoutsReport, ReadoutsError> {
+    /// [`Refusal`] if a skin cannot be built, touched or measured.
+    pub fn run(&self, progress: &dyn Progress) -> Result<ReadoutsReport, Refusal> {
         let a_size = self.readouts.len() * (1 + self.repetitions);
         progress.stage("comparing readouts", Some(self.sides.len() * a_size));
         let mut report = ReadoutsReport::default();
@@ -103,7 +103,7 @@ impl ReadoutsStudy {
     }
 
     /// All readouts on skins of one size.
-    fn size(&self, side: usize, report: &mut ReadoutsReport, progress: &dyn Progress) -> Result<(), ReadoutsError> {
+    fn size(&self, side: usize, report: &mut ReadoutsReport, progress: &dyn Progress) -> Result<(), Refusal> {
         let layout = SkinLayout::with_pitch(side, side, PITCH_M)?;
         let calibration = self.calibration(layout)?;
         let sum = |touch: &Touch| touch.conductance_s.values().iter().sum::<f64>();
@@ -160,7 +160,7 @@ impl ReadoutsStudy {
     }
 
     /// Touches that set feedback and clock, on a specimen of their own.
-    fn calibration(&self, layout: SkinLayout) -> Result<Vec<Touch>, ReadoutsError> {
+    fn calibration(&self, layout: SkinLayout) -> Result<Vec<Touch>, Refusal> {
         let seed = Streams::new(self.seed).rng("readouts/calibration", 0).random();
         let shapes = TouchScene::new(layout, TouchObjects::Shapes, CALIBRATION_SHAPES, seed);
         let objects = TouchScene {
@@ -172,7 +172,7 @@ impl ReadoutsStudy {
         Ok(touches)
     }
 
-    fn repetition(&self, layout: SkinLayout, index: u64) -> Result<Repetition, ReadoutsError> {
+    fn repetition(&self, layout: SkinLayout, index: u64) -> Result<Repetition, Refusal> {
         let device = Streams::new(self.seed).child("readouts/repetition", index);
         let seed = |label: &str| device.rng(label, 0).random();
         let specimen = Some(seed("specimen"));
@@ -202,7 +202,7 @@ fn measure(
     skin: &SkinWire,
     layout: SkinLayout,
     repetition: &Repetition,
-) -> Result<(f64, Vec<Means>), ReadoutsError> {
+) -> Result<(f64, Vec<Means>), Refusal> {
     let wire = skin.fitted(largest_sum_s, repetition.device.child("session", 0))?;
     let conductances = [skin.idle_s, skin.pressed_s()];
     let mut session = WireSession::new(&wire, layout, repetition.device, skin.period_s, conductances);

@@ -1,11 +1,11 @@
 //! The common wire as a readout sees it.
 
-use super::error::ReadoutsError;
 use super::rows::StoredRows;
 use super::wiring::ReadoutWire;
 use crate::touches::{Touch, TouchWire};
 use rand_distr::{Distribution as _, StandardNormal};
 use spts_circuit::{CellCodes, CompressiveWeights, Mode, Profile, Readout};
+use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 
 /// Frames of the idle skin that the reference is the mean of.
@@ -121,8 +121,8 @@ impl<'a> WireSession<'a> {
         conductance_s: &[f64],
         number: u64,
         measurements: usize,
-        build: impl FnOnce(&Self) -> Result<Readout, ReadoutsError>,
-    ) -> Result<WireFrame, ReadoutsError> {
+        build: impl FnOnce(&Self) -> Result<Readout, Refusal>,
+    ) -> Result<WireFrame, Refusal> {
         let (mut wire, idle) = match self.frames.take() {
             Some(frames) if frames.1.volts.len() == measurements => frames,
             _ => {
@@ -144,7 +144,7 @@ impl<'a> WireSession<'a> {
     }
 
     /// Frames of the idle skin: their mean, and how far single ones are from it.
-    fn idle(&self, wire: &mut TouchWire, measurements: usize) -> Result<Idle, ReadoutsError> {
+    fn idle(&self, wire: &mut TouchWire, measurements: usize) -> Result<Idle, Refusal> {
         let frames = IDLE_FRAMES.max(IDLE_MEASUREMENTS.div_ceil(measurements));
         let mut volts = vec![0.0; measurements];
         let mut squares = 0.0;
@@ -193,33 +193,36 @@ impl HeldWire<'_, '_> {
     /// A raster frame: sample k has taxel k at level 1, and all others at 0.
     ///
     /// # Errors
-    /// [`ReadoutsError`] if the readout cannot be built.
-    pub fn scan(&mut self) -> Result<WireFrame, ReadoutsError> {
+    /// [`Refusal`] if the readout cannot be built.
+    pub fn scan(&mut self) -> Result<WireFrame, Refusal> {
         let taxels = self.session.layout.taxels();
         let touch = self.touch.conductance_s.values();
         self.session.frame(touch, self.number, taxels, |session| {
             let (profile, layout) = (&session.wire.profile, &session.layout);
-            Ok(Readout::new(profile, Mode::Raster, layout, session.device, 0)?)
+            Ok(Readout::new(profile, Mode::Raster, layout, session.device, 0).map_err(Refusal::from_error)?)
         })
     }
 
     /// A frame of `measurements` rows of ±1. All frames of a session must have the same kind of rows.
     ///
     /// # Errors
-    /// [`ReadoutsError`] if the rows belong to another skin.
+    /// [`Refusal`] if the rows belong to another skin.
     pub fn signs<R: CellCodes + Clone + 'static>(
         &mut self,
         rows: &R,
         measurements: usize,
-    ) -> Result<WireFrame, ReadoutsError> {
+    ) -> Result<WireFrame, Refusal> {
         let touch = self.touch.conductance_s.values();
         self.session.frame(touch, self.number, measurements, |session| {
             let profile = Profile {
                 weights: CompressiveWeights::Binary,
                 ..session.wire.profile.clone()
             };
-            let readout = Readout::new(&profile, Mode::Compressive, &session.layout, session.device, 0)?;
-            Ok(readout.with_codes(Box::new(rows.clone()))?)
+            let readout = Readout::new(&profile, Mode::Compressive, &session.layout, session.device, 0)
+                .map_err(Refusal::from_error)?;
+            Ok(readout
+                .with_codes(Box::new(rows.clone()))
+                .map_err(Refusal::from_error)?)
         })
     }
 
@@ -246,19 +249,20 @@ impl HeldWire<'_, '_> {
     /// conductance of a fully pressed taxel, and all other cells are off. `None` is a silent wire.
     ///
     /// # Errors
-    /// [`ReadoutsError`] if the readout cannot be built.
-    pub fn transmissions(
-        &mut self,
-        chips: Option<&StoredRows>,
-        measurements: usize,
-    ) -> Result<WireFrame, ReadoutsError> {
+    /// [`Refusal`] if the readout cannot be built.
+    pub fn transmissions(&mut self, chips: Option<&StoredRows>, measurements: usize) -> Result<WireFrame, Refusal> {
         let session = &*self.session;
         let published = SkinLayout::default();
-        let line = |chips: &StoredRows| -> Result<TouchWire, ReadoutsError> {
+        let line = |chips: &StoredRows| -> Result<TouchWire, Refusal> {
             // the cells that transmit, whatever their places
             let layout = SkinLayout::new(1, chips.taxels(), published.pitch_m(), published.electrode_m())?;
-            let readout = Readout::new(&session.wire.profile, Mode::Raster, &layout, session.device, 0)?;
-            Ok(TouchWire::of(readout.with_codes(Box::new(chips.clone()))?))
+            let readout = Readout::new(&session.wire.profile, Mode::Raster, &layout, session.device, 0)
+                .map_err(Refusal::from_error)?;
+            Ok(TouchWire::of(
+                readout
+                    .with_codes(Box::new(chips.clone()))
+                    .map_err(Refusal::from_error)?,
+            ))
         };
         let silent = StoredRows::new(1, vec![0]);
         let idle = line(&silent)?.volts(ConductanceMap::zeros(1, 1), IDLE_BLOCK, 0, IDLE_MEASUREMENTS)?;

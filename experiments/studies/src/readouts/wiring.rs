@@ -1,12 +1,12 @@
 //! The wire for skins of one size: one clock for all readouts, and for each the largest feedback for which its sums
 //! fit.
 
-use super::error::ReadoutsError;
 use crate::electronics::ElectronicsStudy;
 use crate::explore::scene::ExploreScene;
 use crate::explore::wiring::{Way, pressed_skin, wirings};
 use spts_circuit::amplifier::{Amplifier, Budget, Network, Setting};
 use spts_circuit::{Profile, Seeding, Span};
+use spts_input::Refusal;
 use spts_models::Streams;
 
 /// Share of the range that the largest sum of the touches used for calibration takes: others are larger.
@@ -53,8 +53,8 @@ impl SkinWire {
     /// [`explore`](crate::explore).
     ///
     /// # Errors
-    /// [`ReadoutsError`] if the electronics cannot be built.
-    pub fn new(taxels: u32, largest_s: &[f64]) -> Result<Self, ReadoutsError> {
+    /// [`Refusal`] if the electronics cannot be built.
+    pub fn new(taxels: u32, largest_s: &[f64]) -> Result<Self, Refusal> {
         let electronics = ElectronicsStudy::as_designed()?;
         let scene = ExploreScene {
             image_s: largest_s.to_vec(),
@@ -62,10 +62,7 @@ impl SkinWire {
         };
         let wirings = wirings(taxels, &scene, Seeding::Mixed, &electronics)?;
         let fitted = wirings.into_iter().find(|wiring| wiring.way == Way::Fitted);
-        let fitted = fitted.ok_or(ReadoutsError::NoNumber {
-            effect: "amplifier",
-            number: "feedback",
-        })?;
+        let fitted = fitted.ok_or_else(|| no_number("amplifier", "feedback"))?;
         Ok(Self {
             setting: Setting {
                 skin: pressed_skin(&scene, &electronics),
@@ -92,8 +89,8 @@ impl SkinWire {
     /// period.
     ///
     /// # Errors
-    /// [`ReadoutsError`] if the amplifier cannot be built, or a profile lacks a value.
-    pub fn fitted(&self, largest_sum_s: f64, session: Streams) -> Result<ReadoutWire, ReadoutsError> {
+    /// [`Refusal`] if the amplifier cannot be built, or a profile lacks a value.
+    pub fn fitted(&self, largest_sum_s: f64, session: Streams) -> Result<ReadoutWire, Refusal> {
         let range_v = self.budget(self.amplifier.network().feedback_ohm)?.range_v;
         let fits = HEADROOM * range_v / (self.base.drive_v * largest_sum_s.max(f64::MIN_POSITIVE));
         let mut feedback_ohm = fits.min(LARGEST_OHM);
@@ -112,7 +109,7 @@ impl SkinWire {
         self.with_feedback(feedback_ohm, session)
     }
 
-    fn budget(&self, feedback_ohm: f64) -> Result<Budget, ReadoutsError> {
+    fn budget(&self, feedback_ohm: f64) -> Result<Budget, Refusal> {
         let network = Network {
             feedback_ohm,
             ..*self.amplifier.network()
@@ -121,24 +118,25 @@ impl SkinWire {
         Ok(Budget::new(&amplifier, f64::from(self.taxels), &self.setting))
     }
 
-    fn settles(&self, feedback_ohm: f64) -> Result<bool, ReadoutsError> {
+    fn settles(&self, feedback_ohm: f64) -> Result<bool, Refusal> {
         let budget = self.budget(feedback_ohm)?;
         Ok(budget.settle_s + budget.slew_s <= self.setting.available_s * (1.0 + 1e-9))
     }
 
     /// The profile with what a session draws fixed, so that it is the same for all readouts and in both modes.
-    fn with_feedback(&self, feedback_ohm: f64, session: Streams) -> Result<ReadoutWire, ReadoutsError> {
-        let built = Profile::named("as_built")?;
+    fn with_feedback(&self, feedback_ohm: f64, session: Streams) -> Result<ReadoutWire, Refusal> {
+        let built = Profile::named("as_built").map_err(Refusal::from_error)?;
         let mut profile = Profile {
             feedback_ohm,
             ..self.base.clone()
         };
         let mut contact_noise = 0.0;
         for (effect, number) in SESSION {
-            let lacking = ReadoutsError::NoNumber { effect, number };
             let span = built.compressive.get(effect).and_then(|table| table.get(number));
             let span: Option<Span> = span.and_then(|value| value.clone().try_into().ok());
-            let drawn = span.ok_or(lacking)?.draw(&mut session.rng(effect, 0));
+            let drawn = span
+                .ok_or_else(|| no_number(effect, number))?
+                .draw(&mut session.rng(effect, 0));
             if effect == "contact_noise" {
                 contact_noise = drawn;
             }
@@ -157,7 +155,7 @@ impl SkinWire {
 }
 
 /// Middle levels of the codes 0 and 255 of the profile's converters: (c + errors − 127.5)/127.5, in steps.
-fn levels(profile: &Profile) -> Result<[f64; 2], ReadoutsError> {
+fn levels(profile: &Profile) -> Result<[f64; 2], Refusal> {
     let number = |number: &'static str| {
         let value = profile.compressive.get("dac").and_then(|table| table.get(number));
         let middle = match value {
@@ -168,12 +166,19 @@ fn levels(profile: &Profile) -> Result<[f64; 2], ReadoutsError> {
             }
             _ => None,
         };
-        middle.ok_or(ReadoutsError::NoNumber { effect: "dac", number })
+        middle.ok_or_else(|| no_number("dac", number))
     };
     let step_v = number("reference_v")? / 256.0;
     let (offset, gain) = (number("offset_v")? / step_v, number("gain_lsb")?);
     let low = offset.max(number("floor_v")? / step_v);
     Ok([low / 127.5 - 1.0, 1.0 + (offset + gain) / 127.5])
+}
+
+/// An effect that a profile lacks, or a value of it, as an error.
+fn no_number(effect: &str, number: &str) -> Refusal {
+    Refusal::new(format!(
+        "profile as_built or as_designed: no `compressive.{effect}.{number}`"
+    ))
 }
 
 #[cfg(test)]

@@ -21,12 +21,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod error;
 mod scene;
 mod score;
 mod wire;
 
-pub use error::TouchError;
 pub use scene::{Touch, TouchObjects, TouchScene};
 pub use score::{TouchScore, band};
 pub use wire::TouchWire;

@@ -1,7 +1,7 @@
 //! Objects, skin and touches.
 
-use super::error::TouchError;
 use spts_dataset::{Maker, Spec};
+use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout};
 use spts_recon::localise::centre_of_mass;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
@@ -31,7 +31,7 @@ const LEAST_SHARE: f64 = 0.3;
 /// let touches = TouchScene::new(SkinLayout::default(), TouchObjects::Objects, 3, 1).draw()?;
 /// assert_eq!(touches.len(), 3);
 /// assert!(touches.iter().all(|touch| touch.conductance_s.max() > 0.0));
-/// # Ok::<(), spts_studies::touches::TouchError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TouchScene {
@@ -83,16 +83,16 @@ impl TouchScene {
     /// Presses all touches. The result depends only on the scene.
     ///
     /// # Errors
-    /// [`TouchError`] if the skin or a size is out of range, or a touch cannot be pressed.
-    pub fn draw(&self) -> Result<Vec<Touch>, TouchError> {
+    /// [`Refusal`] if the skin or a size is out of range, or a touch cannot be pressed.
+    pub fn draw(&self) -> Result<Vec<Touch>, Refusal> {
         if self.touches == 0 {
             return Ok(Vec::new());
         }
-        let spec = Spec::from_toml(&self.spec(), &toml::Table::new(), ".".as_ref())?;
+        let spec = Spec::from_toml(&self.spec(), &toml::Table::new(), ".".as_ref()).map_err(Refusal::from_error)?;
         let mut maker = Maker::new(&spec);
         (0..self.touches as u64)
             .map(|index| {
-                let row = maker.row(index)?;
+                let row = maker.row(index).map_err(Refusal::from_error)?;
                 let conductance_s = row.conductance().clone();
                 let mut mask = Vec::new();
                 support(conductance_s.values(), SUPPORT_THRESHOLD, &mut mask);

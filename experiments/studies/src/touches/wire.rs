@@ -1,8 +1,8 @@
 //! Measures touches.
 
-use super::error::TouchError;
 use super::scene::Touch;
 use spts_circuit::{Constant, Mode, Profile, Readout, Weights};
+use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 
 /// Measurements of the untouched skin, whose mean is taken off.
@@ -23,7 +23,7 @@ const IDLE_BLOCK: u64 = 1 << 40;
 /// let mut wire = TouchWire::new(&profile, &weights, &layout, Streams::new(1))?;
 /// let touch = &TouchScene::new(layout, TouchObjects::Objects, 1, 1).draw()?[0];
 /// assert_eq!(wire.measure(touch, 0, 0, 20)?.len(), 20);
-/// # Ok::<(), spts_studies::touches::TouchError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 pub struct TouchWire {
     readout: Readout,
@@ -37,16 +37,19 @@ impl TouchWire {
     /// numbers.
     ///
     /// # Errors
-    /// [`TouchError`] if the readout cannot be built.
-    pub fn new(profile: &Profile, weights: &Weights, layout: &SkinLayout, device: Streams) -> Result<Self, TouchError> {
-        let profile = profile.with_weights(weights)?;
-        let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0)?;
-        let mut untouched = Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols()))?;
+    /// [`Refusal`] if the readout cannot be built.
+    pub fn new(profile: &Profile, weights: &Weights, layout: &SkinLayout, device: Streams) -> Result<Self, Refusal> {
+        let profile = profile.with_weights(weights).map_err(Refusal::from_error)?;
+        let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0).map_err(Refusal::from_error)?;
+        let mut untouched =
+            Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols())).map_err(Refusal::from_error)?;
         readout.seek_row(IDLE_BLOCK, 0);
-        let idle = readout.measure(&mut untouched, IDLE_MEASUREMENTS)?;
+        let idle = readout
+            .measure(&mut untouched, IDLE_MEASUREMENTS)
+            .map_err(Refusal::from_error)?;
         Ok(Self {
             readout,
-            rail_v: profile.rail_v(Mode::Compressive)?,
+            rail_v: profile.rail_v(Mode::Compressive).map_err(Refusal::from_error)?,
             clipped: 0,
             idle_v: idle.iter().sum::<f64>() / IDLE_MEASUREMENTS as f64,
         })
@@ -67,31 +70,34 @@ impl TouchWire {
     /// `number` determines the noise.
     ///
     /// # Errors
-    /// [`TouchError`] if the skin has another size.
+    /// [`Refusal`] if the skin has another size.
     pub fn volts(
         &mut self,
         conductance_s: ConductanceMap,
         number: u64,
         first_row: u64,
         measurements: usize,
-    ) -> Result<Vec<f64>, TouchError> {
-        let mut source = Constant::new(conductance_s)?;
+    ) -> Result<Vec<f64>, Refusal> {
+        let mut source = Constant::new(conductance_s).map_err(Refusal::from_error)?;
         self.readout.seek_row(number, first_row);
-        Ok(self.readout.measure(&mut source, measurements)?)
+        Ok(self
+            .readout
+            .measure(&mut source, measurements)
+            .map_err(Refusal::from_error)?)
     }
 
     /// Samples of `touch` at the rows `first_row..first_row + measurements`, minus the mean of the untouched skin, V.
     /// `number` determines the noise.
     ///
     /// # Errors
-    /// [`TouchError`] if the touch is on a skin of another size.
+    /// [`Refusal`] if the touch is on a skin of another size.
     pub fn measure(
         &mut self,
         touch: &Touch,
         number: u64,
         first_row: u64,
         measurements: usize,
-    ) -> Result<Vec<f64>, TouchError> {
+    ) -> Result<Vec<f64>, Refusal> {
         let mut volts = self.volts(touch.conductance_s.clone(), number, first_row, measurements)?;
         self.clipped += self.readout.info().saturated(&volts, self.rail_v);
         volts.iter_mut().for_each(|v| *v -= self.idle_v);
