@@ -5,57 +5,43 @@
 //! their scatter gives the standard error. A profile from several sessions has spans in which a new session is
 //! expected.
 
-mod beat;
-mod design;
-mod faults;
-mod fit;
-mod gains;
+use cells::{self, CellFault, Overdriven, SessionGains, gains};
+use late::{Beat, Counts, LateCell, MissedPress, beat, missed};
+use predict::PredictedInside;
+use press::{PressAnalysis, PressNumbers, analyse};
+use profile::{FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED, fitted_profile, predicted_inside};
+use rayon::prelude::*;
+use serde::Serialize;
+use spts::data::{DataError, SessionSet};
+use spts::progress::Progress;
+use spts::session::Recorded;
+use spts_circuit::{LevelSource, Recording, WeightMode, Weights};
+use spts_eval::protocol::{PLATEAU, Protocol};
+use spts_eval::{SessionSlip, follow_slips};
+use spts_input::Refusal;
+use statistics::{ConverterSteps, Estimated, mean, middle, quantiles, steps};
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::Path;
+
+mod cells;
 mod late;
-mod memory;
-mod missed;
-mod overdriven;
-mod parameters;
 mod predict;
 mod press;
 mod profile;
-mod profile_text;
-mod session;
 mod skin;
 mod statistics;
-mod steps;
-mod study;
 #[cfg(test)]
 mod tests;
-mod text;
 
-pub use beat::Beat;
-pub use design::Reseeded;
-pub use faults::{CellFault, reseeded};
-pub use fit::WINDOW_FRAMES;
-pub(crate) use fit::{FitRequest, fit_windows};
-pub use gains::{SessionGains, TaxelGain};
-pub use late::LateCell;
-pub use missed::MissedPress;
-pub use overdriven::Overdriven;
-pub use parameters::FittedParameter;
+pub use cells::{CellFault, Overdriven, SessionGains, TaxelGain, reseeded};
+pub use late::{Beat, LateCell, MissedPress};
 pub use predict::{COVERAGE, PredictedInside, PredictedNumber, predicted};
-pub use press::PressNumbers;
-pub use profile::{FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED};
-pub use profile_text::fitted_profile;
-pub use session::{QUANTILES, SessionEstimates};
+pub(crate) use press::{FitRequest, fit_windows};
+pub use press::{PressNumbers, Reseeded, WINDOW_FRAMES};
+pub use profile::{FittedParameter, FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED, fitted_profile};
 pub use skin::{Mounting, ObjectCheck, SkinReport, SkinStudy};
-pub use statistics::{Estimated, OUTLIER_SD, quantiles};
-pub use steps::ConverterSteps;
-pub use study::{CalibrationReport, CalibrationStudy};
-pub use text::table;
-
-use spts::data::{DataError, SessionSet};
-use spts::session::Recorded;
-use spts_circuit::{Recording, WeightMode};
-use spts_eval::protocol::{PLATEAU, Protocol};
-use spts_eval::{SessionSlip, follow_slips};
-use std::ops::Range;
-use std::path::Path;
+pub use statistics::{ConverterSteps, Estimated, OUTLIER_SD, quantiles};
 
 /// Both recordings of a session; the raster recording may be missing.
 #[derive(Debug, Clone)]
@@ -143,4 +129,460 @@ fn held_frames(recorded: &Recorded, hold_s: Option<[f64; 2]>) -> Option<Range<us
     } else {
         held
     })
+}
+
+/// Settings of `spts calibrate`: which sessions and presses the readout is fitted to.
+#[derive(Debug, Clone, Default)]
+pub struct CalibrationStudy {
+    /// The only session to use; `None` for all.
+    pub session: Option<String>,
+    /// First and last press to use, from 1; `None` for all.
+    pub presses: Option<(usize, usize)>,
+}
+
+/// Results of `spts calibrate`: the readout that recordings of a skin show, session by session and from all of them.
+#[derive(Debug, Clone, Serialize)]
+pub struct CalibrationReport {
+    /// Estimates of every session.
+    pub sessions: Vec<SessionEstimates>,
+    /// Parameters of the readout, from all sessions.
+    pub profile: FittedReadout,
+    /// Whether each session lies in the spans predicted from the others; `None` for fewer than three sessions.
+    pub predicted_inside: Option<PredictedInside>,
+    /// Slips of the recordings, which have been realigned.
+    pub slips: Vec<SessionSlip>,
+    /// Parameters that recordings of presses cannot distinguish, and why.
+    pub not_identifiable: [&'static str; NOT_IDENTIFIABLE.len()],
+    /// Effects in the recordings that the readout does not model.
+    pub not_modelled: [&'static str; NOT_MODELLED.len()],
+    /// Number of taxels of the largest skin.
+    #[serde(skip)]
+    taxels: usize,
+}
+
+impl CalibrationStudy {
+    /// Fits the sessions in the folder `recordings`.
+    ///
+    /// # Errors
+    /// [`Refusal`] if the recordings are not usable, the session does not exist, sessions differ in their
+    /// weights or rate, or no press of a session can be fitted.
+    pub fn run(&self, recordings: &Path, progress: &dyn Progress) -> Result<CalibrationReport, Refusal> {
+        self.fit_all(read(recordings).map_err(Refusal::from_error)?, progress)
+    }
+
+    /// Fits the sessions `pairs`.
+    pub(super) fn fit_all(
+        &self,
+        mut pairs: Vec<SessionPair>,
+        progress: &dyn Progress,
+    ) -> Result<CalibrationReport, Refusal> {
+        if let Some(name) = &self.session {
+            let known: Vec<&str> = pairs.iter().map(|pair| pair.session.as_str()).collect();
+            let known = known.join(", ");
+            pairs.retain(|pair| pair.session == *name);
+            if pairs.is_empty() {
+                return Err(Refusal::new(format!(
+                    "`--session` = {name}: no compressive session of it; there are: {known}"
+                )));
+            }
+        }
+        alike(&pairs)?;
+        progress.stage("fitting sessions", Some(pairs.len()));
+        let mut sessions = Vec::new();
+        for pair in &pairs {
+            sessions.push(self.fit(pair)?);
+            progress.step();
+        }
+        progress.end();
+        Ok(CalibrationReport {
+            profile: FittedReadout::of(&sessions),
+            predicted_inside: predicted_inside(&sessions),
+            sessions,
+            slips: pairs.iter().flat_map(|pair| pair.slips.clone()).collect(),
+            not_identifiable: NOT_IDENTIFIABLE,
+            not_modelled: NOT_MODELLED,
+            taxels: pairs.iter().map(|p| p.compressive.taxels()).max().unwrap_or(0),
+        })
+    }
+
+    fn fit(&self, pair: &SessionPair) -> Result<SessionEstimates, Refusal> {
+        let presses = pair.compressive.blocks().len();
+        let (first, last) = self.presses.unwrap_or((1, presses));
+        let blocks: Vec<usize> = (first - 1..last.min(presses)).collect();
+        let found = SessionEstimates::of(pair, &pair.compressive, &blocks);
+        found.ok_or_else(|| {
+            Refusal::new(format!(
+                "{} compressive: no press of {first}-{last} can be fitted; the session has presses 1-{presses}",
+                pair.session
+            ))
+        })
+    }
+}
+
+/// Checks that one profile can describe all `pairs`.
+fn alike(pairs: &[SessionPair]) -> Result<(), Refusal> {
+    let Some((first, others)) = pairs.split_first() else {
+        return Ok(());
+    };
+    for other in others {
+        let differ = |field: &str, value: &dyn Fn(&Recording) -> String| {
+            Refusal::new(format!(
+                "{} compressive: `{field}` = {}; {} has {}, and one profile has one: choose a session with `--session`",
+                other.session,
+                value(&other.compressive),
+                first.session,
+                value(&first.compressive)
+            ))
+        };
+        if other.compressive.weights().source() != first.compressive.weights().source() {
+            return Err(differ("weights", &|r| source(r.weights().source())));
+        }
+        let rate = |pair: &SessionPair| pair.compressive.sample_rate_hz().to_bits();
+        if rate(other) != rate(first) {
+            return Err(differ("sample_rate_hz", &|r| r.sample_rate_hz().to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// Where the weights come from, in short.
+fn source(source: &LevelSource) -> String {
+    match source {
+        LevelSource::Seeding(seeding) => format!("seeding {seeding:?}").to_lowercase(),
+        LevelSource::Seeds(seeds) => match &seeds[..] {
+            [a, b, c, _, ..] => format!("seeds [{a}, {b}, {c}, …]"),
+            seeds => format!("seeds {seeds:?}"),
+        },
+        LevelSource::Patterns(patterns) => format!("patterns of period {}", patterns.period()),
+    }
+}
+
+impl CalibrationReport {
+    /// The fitted readout profile as TOML. Undetermined parameters are taken from the default readout.
+    ///
+    /// # Errors
+    /// [`Refusal`] if a value is outside its range.
+    pub fn profile_toml(&self) -> Result<String, Refusal> {
+        let taxels = u32::try_from(self.taxels).unwrap_or(u32::MAX);
+        let (_, text) =
+            fitted_profile(&self.profile, taxels).map_err(|e| Refusal::from_error(e).at("the fitted profile"))?;
+        Ok(text)
+    }
+
+    /// The estimates as a text table, with what the recordings cannot determine.
+    #[must_use]
+    pub fn text(&self) -> String {
+        format!(
+            "{}\n{}not identifiable from these recordings:\n- {}\nin the recordings, not modelled:\n- {}",
+            table(&self.sessions),
+            self.predicted_inside
+                .as_ref()
+                .map_or_else(String::new, |found| predictions(found) + "\n"),
+            NOT_IDENTIFIABLE.join("\n- "),
+            NOT_MODELLED.join("\n- ")
+        )
+    }
+}
+
+/// A number of [`PressNumbers`]: name, unit, value.
+type Number = (&'static str, &'static str, fn(&PressNumbers) -> f64);
+
+/// Every number of a press.
+pub(super) const NUMBERS: [Number; 22] = [
+    ("idle_mean", "V", |p| p.idle_mean_v),
+    ("idle_sd", "V", |p| p.idle_sd_v),
+    ("idle_noise", "V", |p| p.idle_noise_v),
+    ("idle_parity", "V", |p| p.idle_parity_v),
+    ("idle_sum", "V", |p| p.idle_sum_v),
+    ("residual", "V", |p| p.residual_v),
+    ("clean_residual", "V", |p| p.clean_v),
+    ("core_residual", "V", |p| p.core_v),
+    ("h1", "", |p| p.h1),
+    ("h2", "", |p| p.h2),
+    ("h3", "", |p| p.h3),
+    ("offset", "V", |p| p.offset_v),
+    ("parity", "V", |p| p.parity_v),
+    ("sum", "V", |p| p.sum_v),
+    ("norm", "V", |p| p.norm_v),
+    ("constant", "V", |p| p.constant_v),
+    ("asymmetry", "", |p| p.asymmetry),
+    ("outliers_5sd", "", |p| p.outliers),
+    ("kurtosis", "", |p| p.kurtosis),
+    ("late_per_flip", "", |p| p.late_per_flip),
+    ("unexplained_outliers", "", |p| p.unexplained),
+    ("contact_fraction", "", |p| p.contact_fraction),
+];
+
+/// Number of quantiles of the output that are compared.
+pub const QUANTILES: usize = 100;
+
+/// What the calibration finds in one session: parameters of the readout with their standard errors, faulty cells and
+/// gains.
+#[derive(Debug, Clone, Serialize)]
+pub struct SessionEstimates {
+    /// Name of the session.
+    pub session: String,
+    /// Presses that were used, from 1.
+    pub presses: Vec<usize>,
+    /// Presses that missed and were left out.
+    pub missed: Vec<MissedPress>,
+    /// Median over the presses and standard error, by name.
+    pub numbers: BTreeMap<&'static str, Estimated>,
+    /// Grid of the converter; `None` if the values are not on a grid.
+    pub steps: Option<ConverterSteps>,
+    /// Rate of late flips of the taxels with enough load to be distinguished.
+    pub late_cells: Vec<LateCell>,
+    /// Beats of the cells whose late updates can be distinguished.
+    pub beats: Vec<Beat>,
+    /// Cells that do not run their own sequence.
+    pub faults: Vec<CellFault>,
+    /// Mis-seeded cells whose output is not ±1.
+    pub overdriven: Vec<Overdriven>,
+    /// Image of the plateau, median over the presses, V.
+    pub image_v: Vec<f64>,
+    /// Taxels compared with the raster session; `None` without one, or if too few taxels are loaded.
+    pub gains: Option<SessionGains>,
+    /// Quantiles of the output on the plateau, V.
+    #[serde(skip)]
+    pub output_quantiles_v: Vec<f64>,
+    /// Clean residuals of all presses, V.
+    #[serde(skip)]
+    pub clean_v: Vec<f64>,
+    /// Weights of the recording.
+    #[serde(skip)]
+    pub weights: Weights,
+    /// Measurements a second of the recording, Hz.
+    #[serde(skip)]
+    pub sample_rate_hz: f64,
+}
+
+impl SessionEstimates {
+    /// Median over the presses of the value `name`; NaN if there is none.
+    #[must_use]
+    pub fn value(&self, name: &str) -> f64 {
+        self.numbers.get(name).map_or(f64::NAN, |e| e.value)
+    }
+
+    /// Estimates from the given presses of `recording`, the compressive recording of `pair` or one like it. The raster
+    /// recording of `pair` shows to which cell a foreign sequence belongs, and is the reference for the taxels. Presses
+    /// that missed are left out. `None` if no press determines an image.
+    #[must_use]
+    pub fn of(pair: &SessionPair, recording: &Recording, blocks: &[usize]) -> Option<Self> {
+        let hold = &pair.hold;
+        let raster = pair.raster.as_ref();
+        let contact = raster.and_then(|(raster, hold)| mean_contact(raster, hold));
+        let faults = faults::find(recording, hold, contact.as_deref(), blocks);
+        let cells = faults::reseeded(&faults);
+        let overdriven: Vec<Overdriven> = cells
+            .iter()
+            .filter_map(|cell| overdriven::fit(recording, hold, blocks, *cell))
+            .collect();
+        let analysed: Vec<(usize, PressAnalysis)> = blocks
+            .par_iter()
+            .filter_map(|&block| Some((block, analyse(recording, hold, block, &cells, &overdriven)?)))
+            .collect();
+        if analysed.is_empty() {
+            return None;
+        }
+        let numbers: Vec<(usize, PressNumbers)> =
+            analysed.iter().map(|(block, press)| (*block, press.numbers)).collect();
+        let missed = missed(&numbers);
+        if !missed.is_empty() {
+            // their outliers and residuals reach the faults, too: everything is found anew without them
+            let hit = |block: &usize| missed.iter().all(|m| m.press != block + 1);
+            let kept: Vec<usize> = blocks.iter().copied().filter(hit).collect();
+            let mut found = Self::of(pair, recording, &kept)?;
+            found.missed.extend(missed);
+            found.missed.sort_by_key(|m| m.press);
+            return Some(found);
+        }
+        let values = |get: fn(&PressNumbers) -> f64| -> Vec<f64> {
+            analysed.iter().map(|(_, press)| get(&press.numbers)).collect()
+        };
+        let image_v = middle_image(&analysed);
+        let faulty: Vec<usize> = cells.iter().map(|cell| cell.taxel as usize).collect();
+        let used: Vec<usize> = analysed.iter().map(|(block, _)| *block).collect();
+        Some(Self {
+            session: pair.session.clone(),
+            presses: used.iter().map(|block| block + 1).collect(),
+            missed,
+            numbers: NUMBERS
+                .iter()
+                .map(|(name, _, get)| (*name, Estimated::median_of(&values(*get))))
+                .collect(),
+            steps: steps(recording, &used),
+            late_cells: late_cells(&analysed),
+            beats: beats(&analysed),
+            overdriven,
+            faults,
+            gains: contact.and_then(|raster_v| gains(&image_v, &raster_v, &faulty)),
+            image_v,
+            output_quantiles_v: quantiles(&plateau_volts(recording, hold, &used), QUANTILES),
+            clean_v: analysed.into_iter().flat_map(|(_, press)| press.clean_v).collect(),
+            weights: recording.weights().clone(),
+            sample_rate_hz: recording.sample_rate_hz(),
+        })
+    }
+}
+
+/// Mean over the presses of the raster images in the frames `hold`, less their idle mean, V. Lost samples do not count.
+/// `None` when it is not known which of the frames are idle.
+fn mean_contact(raster: &Recording, hold: &Range<usize>) -> Option<Vec<f64>> {
+    let idle = raster.blocks().iter().map(|block| Some(0..block.idle_frames?));
+    let idle = idle.collect::<Option<Vec<Range<usize>>>>()?;
+    let plateaus = vec![hold.clone(); raster.blocks().len()];
+    let of = |taxel: usize, frames: &[Range<usize>]| -> f64 {
+        let blocks = frames.iter().cloned().enumerate();
+        let values = blocks.flat_map(|(block, frames)| frames.map(move |frame| raster.volts(block, frame)[taxel]));
+        mean(&values.collect::<Vec<_>>())
+    };
+    Some((0..raster.taxels()).map(|k| of(k, &plateaus) - of(k, &idle)).collect())
+}
+
+/// Median over the presses of every taxel's image, V.
+fn middle_image(analysed: &[(usize, PressAnalysis)]) -> Vec<f64> {
+    let taxels = analysed.first().map_or(0, |(_, press)| press.image.len());
+    (0..taxels)
+        .map(|k| middle(&analysed.iter().map(|(_, press)| press.image[k]).collect::<Vec<_>>()))
+        .collect()
+}
+
+/// Counts of all presses together, of the taxels that are loaded enough.
+fn late_cells(analysed: &[(usize, PressAnalysis)]) -> Vec<LateCell> {
+    let taxels = analysed.first().map_or(0, |(_, press)| press.late.len());
+    (0..taxels)
+        .filter_map(|k| {
+            let sum = analysed
+                .iter()
+                .fold(Counts::default(), |sum, (_, press)| sum.plus(press.late[k]));
+            sum.cell(k)
+        })
+        .collect()
+}
+
+/// Most cells that a beat is looked for in, the loaded ones first: others' late updates cannot be told apart.
+const BEATING_CELLS: usize = 16;
+
+fn beats(analysed: &[(usize, PressAnalysis)]) -> Vec<Beat> {
+    let image = middle_image(analysed);
+    let mut taxels: Vec<usize> = (0..image.len()).collect();
+    taxels.sort_by(|a, b| image[*b].total_cmp(&image[*a]));
+    let rows = |taxel: usize, press: &PressAnalysis| -> Vec<u64> {
+        press
+            .events
+            .iter()
+            .filter(|(k, _)| *k == taxel)
+            .map(|(_, row)| *row)
+            .collect()
+    };
+    taxels
+        .into_par_iter()
+        .take(BEATING_CELLS)
+        .filter_map(|k| beat(k, &analysed.iter().map(|(_, press)| rows(k, press)).collect::<Vec<_>>()))
+        .collect()
+}
+
+/// Output in the frames `hold` of the given presses, V.
+fn plateau_volts(recording: &Recording, hold: &Range<usize>, blocks: &[usize]) -> Vec<f64> {
+    let per_frame = recording.measurements_per_frame();
+    let range = hold.start * per_frame..hold.end * per_frame;
+    blocks
+        .iter()
+        .flat_map(|&block| recording.blocks()[block].volts[range.clone()].iter().copied())
+        .collect()
+}
+
+/// One line for each value and one column for each session: median ± standard error over the presses. Then beats, steps
+/// and faults.
+#[must_use]
+pub fn table(sessions: &[SessionEstimates]) -> String {
+    let mut out = format!("{:<22}", "");
+    sessions
+        .iter()
+        .for_each(|s| out.push_str(&format!("{:>20}", s.session)));
+    for (name, unit, _) in NUMBERS {
+        let label = if unit.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{name} [{unit}]")
+        };
+        out.push_str(&format!("\n{label:<22}"));
+        for session in sessions {
+            out.push_str(&format!(
+                "{:>20}",
+                session.numbers.get(name).map_or_else(String::new, show)
+            ));
+        }
+    }
+    for s in sessions {
+        let beats: Vec<String> = s
+            .beats
+            .iter()
+            .map(|b| format!("{:.2} (taxel {})", b.period_measurements, b.taxel))
+            .collect();
+        out.push_str(&format!("\n{}: {} presses", s.session, s.presses.len()));
+        match s.steps {
+            Some(steps) => out.push_str(&format!(", step {:.4} mV", 1e3 * steps.step_v)),
+            None => out.push_str(", values on no grid"),
+        }
+        out.push_str(&format!(
+            ", beats [measurements]: {}",
+            if beats.is_empty() {
+                "none seen".to_owned()
+            } else {
+                beats.join(", ")
+            }
+        ));
+        if let Some(gains) = &s.gains {
+            out.push_str(&format!(
+                "\n{}: gains of {} taxels against the raster session: log-sd {:.3} ± {:.3}",
+                s.session,
+                gains.taxels.len(),
+                gains.log_sd,
+                gains.standard_error
+            ));
+        }
+        for fault in &s.faults {
+            out.push_str(&format!("\n{}: {fault}", s.session));
+        }
+        for cell in &s.overdriven {
+            out.push_str(&format!("\n{}: {cell}", s.session));
+        }
+        for press in &s.missed {
+            out.push_str(&format!("\n{}: {press}", s.session));
+        }
+        if s.presses.len() == 1 {
+            out.push_str(&format!(
+                "\n{}: one press only: no number has an uncertainty",
+                s.session
+            ));
+        }
+    }
+    out
+}
+
+fn show(e: &Estimated) -> String {
+    match (e.n, e.standard_error) {
+        (0, _) => "not identified".to_owned(),
+        (_, None) => format!("{:.4}", e.value),
+        (_, Some(error)) => format!("{:.4} ± {error:.4}", e.value),
+    }
+}
+
+/// How many sessions lie in the spans that the others predict, parameter by parameter.
+pub(super) fn predictions(found: &PredictedInside) -> String {
+    let mut out = format!(
+        "each session left out, inside the {:.0} % span that the others predict: {:.0} % of all numbers (between the others' smallest and \
+         largest: {:.0} %)",
+        100.0 * found.coverage,
+        100.0 * found.share,
+        100.0 * found.share_of_range
+    );
+    for n in &found.numbers {
+        out.push_str(&format!("\n- {}: {} of {}", n.name, n.inside, n.sessions));
+        if !n.outside.is_empty() {
+            out.push_str(&format!(", not {}", n.outside.join(", ")));
+        }
+    }
+    out
 }

@@ -1,6 +1,7 @@
 //! Prediction of new sessions: spans for their values, and whether these hold.
 
-use super::statistics::{mean, sd};
+use super::statistics::mean;
+use super::statistics::sd;
 use serde::Serialize;
 use spts_recon::statistics::student_t;
 

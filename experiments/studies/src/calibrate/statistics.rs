@@ -1,6 +1,9 @@
 //! Robust statistics, moments, quantiles and the error of a mean.
 
+use super::press::FitWindow;
+use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
+use spts_circuit::Recording;
 use spts_recon::metrics::median;
 use spts_recon::statistics::quantile;
 
@@ -118,10 +121,98 @@ pub(super) fn range(values: &[f64]) -> Option<(f64, f64)> {
     Some((low, values.iter().copied().fold(low, f64::max)))
 }
 
+/// Number of taps that are fitted; the third says whether two are enough.
+pub(super) const TAPS: usize = 3;
+
+/// Taps h₁, h₂, h₃ of the windows together, without outliers. The image's own fit takes the share p/n of any
+/// disturbance; that share is put back.
+pub(super) fn taps(windows: &[FitWindow]) -> [f64; TAPS] {
+    let (mut normal, mut moments) = (Matrix3::zeros(), Vector3::zeros());
+    let mut left_over = 0.0;
+    for window in windows {
+        let limit = OUTLIER_SD * robust_sd(&window.residual_v).unwrap_or(0.0);
+        for i in TAPS..window.residual_v.len() {
+            let r = window.residual_v[i];
+            // NaN, a lost sample, is not within the limit
+            if r.abs() <= limit {
+                let past = Vector3::new(window.model_v[i - 1], window.model_v[i - 2], window.model_v[i - 3]);
+                normal += past * past.transpose();
+                moments += past * r;
+            }
+        }
+        left_over += window.left_over.powi(2);
+    }
+    let Some(factor) = normal.cholesky() else {
+        return [0.0; TAPS];
+    };
+    let share = left_over / windows.len() as f64;
+    (factor.solve(&moments) / share).into()
+}
+
+/// Residual of a window less what `taps` explain, V; the first [`TAPS`] measurements, whose past is outside, are left
+/// out.
+pub(super) fn without_memory(window: &FitWindow, taps: [f64; TAPS]) -> Vec<f64> {
+    (TAPS..window.residual_v.len())
+        .map(|i| {
+            let past: f64 = (0..TAPS).map(|k| taps[k] * window.model_v[i - 1 - k]).sum();
+            window.residual_v[i] - past
+        })
+        .collect()
+}
+
+/// Grid of the values of a recording: y = `origin_v` + k·`step_v`.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct ConverterSteps {
+    /// LSB, V: the largest step such that every difference of two values is a multiple of it.
+    pub step_v: f64,
+    /// One of the values, V.
+    pub origin_v: f64,
+}
+
+/// Two differences agree when they are closer than this share of the range: rounding of the file's numbers.
+const RELATIVE: f64 = 1e-9;
+/// Most codes a converter may span.
+const MOST_CODES: f64 = 16_777_216.0;
+
+/// Steps of the values of the given blocks; `None` when they are not on a grid, or are all equal.
+pub(super) fn steps(recording: &Recording, blocks: &[usize]) -> Option<ConverterSteps> {
+    let mut values: Vec<f64> = blocks
+        .iter()
+        .flat_map(|&block| &recording.blocks()[block].volts)
+        .copied()
+        .filter(|v| v.is_finite())
+        .collect();
+    values.sort_unstable_by(f64::total_cmp);
+    values.dedup();
+    let (first, last) = (*values.first()?, *values.last()?);
+    let range = last - first;
+    let rounding = RELATIVE * first.abs().max(last.abs());
+    // Euclid's algorithm on the differences, rounding errors taken for 0
+    let mut divisor = 0.0_f64;
+    for pair in values.windows(2) {
+        let (mut a, mut b) = (pair[1] - pair[0], divisor);
+        while b > rounding {
+            (a, b) = (b, a % b);
+            b = if divisor > 0.0 && a - b < rounding { 0.0 } else { b };
+        }
+        if a > rounding {
+            divisor = a;
+        }
+    }
+    let codes = (range / divisor).round();
+    // the whole range over its number of steps: the rounding of one difference does not matter
+    (divisor > 0.0 && (1.0..=MOST_CODES).contains(&codes)).then(|| ConverterSteps {
+        step_v: range / codes,
+        origin_v: first,
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
+    use spts_circuit::{Block, RecordingInfo, Seeding, WeightMode, Weights};
+    use spts_models::SkinLayout;
 
     #[test]
     fn moments_of_a_hand_counted_list() {
@@ -165,5 +256,28 @@ mod tests {
         assert_relative_eq!(estimate.standard_error.unwrap(), expected, max_relative = 1e-15);
         assert_eq!(Estimated::median_of(&[2.0]).standard_error, None);
         assert!(Estimated::median_of(&[]).value.is_nan());
+    }
+
+    #[test]
+    fn the_step_is_found_where_no_two_values_are_neighbours() {
+        let lsb = 3.3 / 1023.0 * 11140.0 / 570.0;
+        let volts: Vec<f64> = [10, 16, 25, 31, 100, 40]
+            .iter()
+            .map(|k| 32.0 - f64::from(*k) * lsb)
+            .collect();
+        let block = |frame_position, volts| Block {
+            frame_position,
+            idle_frames: None,
+            volts,
+        };
+        // a press that is not asked for does not matter
+        let other = (0..6).map(|k| 0.1 * lsb * f64::from(k)).collect();
+        let blocks = vec![block(1, other), block(2, volts)];
+        let layout = SkinLayout::new(2, 3, 15e-3, 10e-3).unwrap();
+        let weights = Weights::new(WeightMode::Binary, Seeding::Address, 6);
+        let recording = Recording::new(RecordingInfo::new(layout, weights, 64_300.0), blocks).unwrap();
+        let found = steps(&recording, &[1]).unwrap();
+        // differences 6, 9, 6, 9, 60 steps: gcd 3. Seven roundings of numbers near 32
+        assert!((found.step_v - 3.0 * lsb).abs() < 1e-13, "{found:?}");
     }
 }

@@ -1,11 +1,21 @@
 //! Consequences of a design: costs, the limiting constraint, alternatives, and files to simulate it.
 
-use super::bench::{Bench, draw, mean};
-use super::report::{Alternative, Binding, CostDrivers, Design, DesignReport, LatencyParts};
-use super::rows::{BandRows, RowSource};
+use super::Alternative;
+use super::Binding;
+use super::CostDrivers;
+use super::Design;
+use super::DesignReport;
+use super::DesignStudy;
+use super::Ground;
+use super::LatencyParts;
+use super::WireChoice;
+use super::search::Bench;
 use super::search::Tried;
-use super::study::{DesignStudy, Ground, WireChoice};
+use super::search::draw;
+use super::search::mean;
+use super::wire::BandRows;
 use super::wire::FeedbackLimit;
+use super::wire::RowSource;
 use crate::sensing::load_s;
 use spts_firmware::{FIRST_ADDRESS, LAST_BUS_ADDRESS, Pattern};
 use spts_input::Refusal;

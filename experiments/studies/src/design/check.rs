@@ -1,10 +1,15 @@
 //! Checks a design with other touches.
 
+use super::Design;
+use super::DesignStudy;
+use super::WireChoice;
 use super::answer::layout_of;
-use super::bench::{Bench, draw, mean};
-use super::report::Design;
-use super::rows::{BandRows, RowSource, bands};
-use super::study::{DesignStudy, WireChoice};
+use super::search::Bench;
+use super::search::draw;
+use super::search::mean;
+use super::wire::BandRows;
+use super::wire::RowSource;
+use super::wire::bands;
 use rand::RngExt as _;
 use serde::Serialize;
 use spts::progress::Progress;

@@ -1,13 +1,16 @@
 //! The search for rows and wires: more and more measurements, until the images are as good as wanted.
 
-use super::bench::{Bench, Repetition, draw, mean, pressing};
-use super::report::{DesignCurve, DesignPoint};
-use super::rows::{BandRows, RowSource, bands};
-use super::study::{DesignStudy, Ground, WireChoice};
-use super::wire::WireDesign;
-use crate::touches::{Touch, band};
+use super::objects::{Classes, DesignObjects};
+use super::wire::{BandRows, Pressing, RowSource, WireDesign, bands};
+use super::{DecoderDesign, Design, DesignCurve, DesignPoint, DesignStudy, Expectation, Ground, WireChoice};
+use crate::touches::{Touch, TouchScore, TouchWire, band};
+use rand::RngExt as _;
+use rayon::prelude::*;
 use spts_circuit::Profile;
 use spts_input::Refusal;
+use spts_models::{ConductanceMap, SkinLayout, Streams};
+use spts_recon::matrix_free::{SheetDecoder, SheetNoise, SheetPrior};
+use spts_recon::statistics::{Band, Sample};
 
 /// Fewest measurements of a wire that are looked at.
 const FEWEST: usize = 6;
@@ -208,4 +211,417 @@ pub(super) fn best(tried: &[Tried]) -> usize {
         let better = |a: &usize, b: &usize| tried[*a].iou().total_cmp(&tried[*b].iou()).then(b.cmp(a));
         (0..tried.len()).max_by(better).unwrap_or_default()
     })
+}
+
+/// Touches of a repetition of procedural shapes, and of the seventeen objects, each once.
+pub(super) const TOUCHES: [usize; 2] = [8, 17];
+
+/// Touches on one specimen of the skin, and their samples.
+#[derive(Debug)]
+pub(super) struct Repetition {
+    pub(super) touches: Vec<Touch>,
+    /// Samples of every touch, V: by measurement, then by wire.
+    volts: Vec<Vec<f64>>,
+}
+
+/// What a repetition found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RepetitionScore {
+    /// Mean IoU.
+    pub(super) iou: f64,
+    /// Median distance of the centres, taxels. A touch without an image counts with the skin's diagonal.
+    pub(super) place_px: f64,
+    /// Share of correctly classified objects, where objects are classified.
+    pub(super) class: Option<f64>,
+}
+
+/// Draws the touches of `count` repetitions, each with a seed of its own under `label`.
+pub(super) fn draw(
+    objects: &DesignObjects,
+    layout: &SkinLayout,
+    label: &'static str,
+    seed: u64,
+    count: usize,
+) -> Result<Vec<(Vec<Touch>, Streams)>, Refusal> {
+    let touches = TOUCHES[usize::from(objects.seventeen)];
+    (0..count as u64)
+        .into_par_iter()
+        .map(|index| {
+            let streams = Streams::new(seed).child(label, index);
+            let scene = objects.scene(layout, touches, streams.rng("design/touches", 0).random::<u64>() >> 1);
+            Ok((scene.draw()?, streams))
+        })
+        .collect()
+}
+
+/// ΣG and ΣG² of the fullest touch on one of the bands.
+pub(super) fn pressing(touches: &[&Touch], bands: &[std::ops::Range<usize>], cols: usize) -> Pressing {
+    let mut most = Pressing {
+        sum_s: f64::MIN_POSITIVE,
+        square_s2: f64::MIN_POSITIVE,
+    };
+    for touch in touches {
+        for band in bands {
+            let values = &touch.conductance_s.values()[band.start * cols..band.end * cols];
+            let (sum, square) = values.iter().fold((0.0, 0.0), |(s, q), g| (s + g, q + g * g));
+            most.sum_s = most.sum_s.max(sum);
+            most.square_s2 = most.square_s2.max(square);
+        }
+    }
+    most
+}
+
+/// A design with its decoder, which learns rows as they are asked for.
+pub(super) struct Bench {
+    pub(super) layout: SkinLayout,
+    pub(super) rows: BandRows,
+    profile: Profile,
+    pub(super) decoder: SheetDecoder,
+    places: usize,
+}
+
+/// Taxels that are solved for with M measurements of a wire: this share of M. With as many taxels as measurements,
+/// noise is fitted. The share is interpolated: M/2, M and 3M/2 were compared, on 48 touches of each of a few skins.
+const PLACES_SHARE: f64 = 0.75;
+/// Fewest taxels that are solved for.
+const FEWEST_PLACES: usize = 4;
+
+impl Bench {
+    /// A design on `layout` with these rows and this readout, whose decoder expects images as `prior` says and solves
+    /// for at most `places` taxels.
+    pub(super) fn new(
+        layout: SkinLayout,
+        rows: BandRows,
+        profile: Profile,
+        prior: SheetPrior,
+        places: usize,
+    ) -> Result<Self, Refusal> {
+        let decoder = SheetDecoder::new(prior, SheetNoise::default(), rows.bands.len()).map_err(Refusal::from_error)?;
+        Ok(Self {
+            layout,
+            rows,
+            profile,
+            decoder,
+            places,
+        })
+    }
+
+    /// Taxels that are solved for with `measurements` of every wire.
+    pub(super) fn places(&self, measurements: usize) -> usize {
+        #[expect(clippy::cast_possible_truncation, reason = "thousands of measurements")]
+        let of_rows = (PLACES_SHARE * measurements as f64).round() as usize;
+        self.places.min(of_rows.max(FEWEST_PLACES))
+    }
+
+    /// Gets the decoder ready for `measurements` of every wire.
+    pub(super) fn prepare(&mut self, measurements: usize) -> Result<(), Refusal> {
+        let done = self.decoder.measurements() / self.rows.bands.len();
+        if measurements > done {
+            let (rows, wires) = self.rows.rows(done..measurements);
+            self.decoder.extend(&rows, &wires).map_err(Refusal::from_error)?;
+        }
+        Ok(())
+    }
+
+    /// Measures what was drawn, `measurements` times on every wire.
+    pub(super) fn measure(
+        &self,
+        drawn: Vec<(Vec<Touch>, Streams)>,
+        measurements: usize,
+    ) -> Result<Vec<Repetition>, Refusal> {
+        let one = |(touches, streams): (Vec<Touch>, Streams)| -> Result<Repetition, Refusal> {
+            let cols = self.layout.cols();
+            let wires = self.rows.bands.len();
+            let mut volts = vec![vec![0.0; wires * measurements]; touches.len()];
+            for (wire, (band, weights)) in self.rows.bands.iter().zip(&self.rows.weights).enumerate() {
+                let layout = SkinLayout::new(band.len(), cols, self.layout.pitch_m(), self.layout.electrode_m())?;
+                let device = streams.child("design/wire", wire as u64);
+                let mut line = TouchWire::new(&self.profile, weights, &layout, device)?;
+                for ((number, touch), volts) in (0..).zip(&touches).zip(&mut volts) {
+                    let own = touch.conductance_s.values()[band.start * cols..band.end * cols].to_vec();
+                    let part = Touch {
+                        conductance_s: ConductanceMap::from_values(band.len(), cols, own),
+                        support: Vec::new(),
+                        ..touch.clone()
+                    };
+                    let samples = line.measure(&part, number, 0, measurements)?;
+                    for (k, v) in samples.into_iter().enumerate() {
+                        volts[k * wires + wire] = v;
+                    }
+                }
+            }
+            Ok(Repetition { touches, volts })
+        };
+        drawn.into_par_iter().map(one).collect()
+    }
+
+    /// Scores of the first `measurements` of every wire, repetition by repetition.
+    pub(super) fn score(
+        &self,
+        repetitions: &[Repetition],
+        measurements: usize,
+        classes: Option<&Classes>,
+    ) -> Result<Vec<RepetitionScore>, Refusal> {
+        let count = measurements * self.rows.bands.len();
+        let places = self.places(measurements);
+        let rows = classes.map(|classes| classes.rows(&self.rows.rows(0..measurements).0));
+        let touches: Vec<(usize, &Touch, &[f64])> = repetitions
+            .iter()
+            .enumerate()
+            .flat_map(|(r, rep)| {
+                rep.touches
+                    .iter()
+                    .zip(&rep.volts)
+                    .map(move |(t, v)| (r, t, &v[..count]))
+            })
+            .collect();
+        let one = |(r, touch, volts): (usize, &Touch, &[f64])| -> Result<_, Refusal> {
+            let image = self.decoder.non_negative(volts, places).map_err(Refusal::from_error)?;
+            let right = match (classes, &rows) {
+                (Some(classes), Some(rows)) => Some(classes.is_right(rows, volts, &touch.name)?),
+                _ => None,
+            };
+            Ok((r, TouchScore::of(&image, touch, &self.layout), right))
+        };
+        let scores = touches.into_par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
+        let far = (self.layout.rows() as f64).hypot(self.layout.cols() as f64);
+        let of = |repetition: usize| {
+            let own: Vec<_> = scores.iter().filter(|(r, _, _)| *r == repetition).collect();
+            let share = 1.0 / own.len().max(1) as f64;
+            let right = own.iter().map(|(_, _, right)| *right).collect::<Option<Vec<bool>>>();
+            RepetitionScore {
+                iou: own.iter().map(|(_, s, _)| share * s.iou).sum(),
+                place_px: median(own.iter().map(|(_, s, _)| s.place_px.unwrap_or(far)).collect()),
+                class: right.map(|right| share * right.iter().filter(|right| **right).count() as f64),
+            }
+        };
+        Ok((0..repetitions.len()).map(of).collect())
+    }
+}
+
+/// Mean of a quantity over repetitions.
+pub(super) fn mean(scores: &[RepetitionScore], of: impl Fn(&RepetitionScore) -> f64) -> f64 {
+    scores.iter().map(of).sum::<f64>() / scores.len().max(1) as f64
+}
+
+/// The middle one, or the mean of both.
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    if n == 0 {
+        return 0.0;
+    }
+    0.5 * (values[(n - 1) / 2] + values[n / 2])
+}
+
+/// Repetitions that the promise rests on.
+const PROMISED: usize = 16;
+/// Measurements are raised by this factor when the promise falls short of what the search found, so many times.
+const RAISE: (f64, usize) = (1.2, 4);
+/// Most taxels with classes: their templates are dense.
+const MOST_CLASS_TAXELS: usize = 2048;
+/// Labels of the promises' touches: every attempt has its own.
+const PROMISES: [&str; 5] = [
+    "design/promised",
+    "design/promised/1",
+    "design/promised/2",
+    "design/promised/3",
+    "design/promised/4",
+];
+
+impl DesignStudy {
+    /// What the chosen design promises, from touches and specimens that the search has not seen. Where that is short of
+    /// the IoU, there are more measurements.
+    pub(super) fn promised(&self, ground: &Ground, mut tried: Tried) -> Result<(Tried, Design), Refusal> {
+        let wires = tried.curve.wires;
+        let classes = self.classes(ground)?;
+        let mut m = tried.chosen();
+        for raise in 0.. {
+            let rows = match tried.source {
+                RowSource::Generator => tried.bench.rows.clone(),
+                // the pattern that the cells repeat has as many rows as are measured
+                RowSource::Designer(_) => BandRows::new(&tried.source, &ground.prior, wires, m, self.seed)?,
+            };
+            tried.bench.rows = rows;
+            tried.bench.prepare(m)?;
+            let label = PROMISES[usize::min(raise, PROMISES.len() - 1)];
+            let drawn = draw(&self.objects, &ground.layout, label, self.seed, PROMISED)?;
+            let measured = tried.bench.measure(drawn, m)?;
+            let scores = tried.bench.score(&measured, m, classes.as_ref())?;
+            let expected = self.expectation(ground, &scores)?;
+            let short = expected.iou.mean < self.iou && tried.reached.is_some();
+            if short && m < tried.most && raise < RAISE.1 {
+                #[expect(clippy::cast_possible_truncation, reason = "thousands of measurements")]
+                let more = (m as f64 * RAISE.0).ceil() as usize;
+                m = more.min(tried.most);
+                continue;
+            }
+            tried.reached = (!short && tried.reached.is_some()).then_some(m);
+            let design = self.design(ground, &tried, m, expected);
+            return Ok((tried, design));
+        }
+        unreachable!("the range has no end")
+    }
+
+    /// Classes of the seventeen objects, where they can be told apart.
+    pub(super) fn classes(&self, ground: &Ground) -> Result<Option<Classes>, Refusal> {
+        if self.no_class(ground).is_some() {
+            return Ok(None);
+        }
+        let touches: Vec<&Touch> = ground.learned.iter().collect();
+        Classes::new(&touches, ground.layout.cols()).map(Some)
+    }
+
+    /// Why classes cannot be told apart.
+    fn no_class(&self, ground: &Ground) -> Option<String> {
+        let taxels = ground.layout.taxels();
+        if !self.objects.seventeen {
+            Some("procedural shapes have no classes".to_owned())
+        } else if !self.objects.placed {
+            Some("the classifier knows the seventeen objects at their published places only".to_owned())
+        } else if taxels > MOST_CLASS_TAXELS {
+            Some(format!(
+                "{taxels} taxels: templates are for {MOST_CLASS_TAXELS} at most"
+            ))
+        } else {
+            None
+        }
+    }
+
+    fn expectation(&self, ground: &Ground, scores: &[RepetitionScore]) -> Result<Expectation, Refusal> {
+        let of = |values: Vec<f64>, quantities: usize, range: [f64; 2]| {
+            promise(&values, quantities, range).ok_or_else(|| Refusal::new("promise: fewer than two repetitions"))
+        };
+        let class: Option<Vec<f64>> = scores.iter().map(|s| s.class).collect();
+        let quantities = if class.is_some() { 3 } else { 2 };
+        let place = |scale: f64| scores.iter().map(|s| scale * s.place_px).collect::<Vec<f64>>();
+        let open = [0.0, f64::MAX];
+        Ok(Expectation {
+            iou: of(scores.iter().map(|s| s.iou).collect(), quantities, [0.0, 1.0])?,
+            place_px: of(place(1.0), quantities, open)?,
+            place_mm: of(place(1e3 * ground.layout.pitch_m()), quantities, open)?,
+            class: class.map(|class| of(class, quantities, [0.0, 1.0])).transpose()?,
+            no_class: self.no_class(ground),
+            repetitions: scores.len(),
+            touches: TOUCHES[usize::from(self.objects.seventeen)],
+            outside: OUTSIDE,
+        })
+    }
+
+    fn design(&self, ground: &Ground, tried: &Tried, m: usize, expected: Expectation) -> Design {
+        let layout = &ground.layout;
+        let (rows, cols, wires) = (layout.rows(), layout.cols(), tried.curve.wires);
+        let decoder = &tried.bench.decoder;
+        let prior = &ground.prior;
+        Design {
+            rows,
+            cols,
+            taxels: layout.taxels(),
+            pitch_m: layout.pitch_m(),
+            electrode_m: layout.electrode_m(),
+            objects: self.objects.clone(),
+            wires,
+            sub_arrays: tried.bench.rows.bands.iter().map(|band| band.len() * cols).collect(),
+            wire: tried.wire.clone(),
+            row_source: tried.source.clone(),
+            m_per_wire: m,
+            m: m * wires,
+            decoder: DecoderDesign {
+                name: "SheetDecoder".to_owned(),
+                places: tried.bench.places(m),
+                covariance_along_rows: (0..cols).map(|d| prior.covariance(0, d)).collect(),
+                covariance_along_cols: (0..rows).map(|d| prior.covariance(0, d * cols)).collect(),
+                bytes: decoder.bytes(m * wires),
+                products: decoder.products(m * wires, tried.bench.places(m)),
+            },
+            expected,
+            seed: self.seed,
+        }
+    }
+}
+
+/// Probability that the check of a correct design finds one of its quantities outside the band.
+pub const OUTSIDE: f64 = 0.01;
+
+/// The promise of a quantity that `repetitions` have found, for a check of as many repetitions, one of `quantities`
+/// that are checked together; `range` is where the quantity can lie at all. `None` for fewer than two repetitions.
+///
+/// Repetitions are independent and alike: each has a specimen of the skin, parts of the device, touches and noise of
+/// its own. Their mean of R and the check's mean of R differ with a variance of σ² (1/R + 1/R), so that with the
+/// standard deviation s of the R repetitions
+///
+/// (check − mean) / (s √(2/R)) has Student's t with R − 1 degrees of freedom,
+///
+/// and mean ± t s √(2/R) holds the check with the probability 1 − α. A repetition is itself a mean of several touches,
+/// which is close enough to normal for that. With q quantities, α = 0.01/q for each leaves at most 1 % for all
+/// (Bonferroni). The band is for the check, and not a confidence interval of the mean, which would be √2 narrower.
+/// Source: G. J. Hahn, W. Q. Meeker, "Statistical Intervals" (1991), §4.8.
+pub(super) fn promise(repetitions: &[f64], quantities: usize, range: [f64; 2]) -> Option<Band> {
+    let sample = Sample::of(repetitions).filter(|sample| sample.count > 1)?;
+    let t = sample.t(OUTSIDE / quantities.max(1) as f64);
+    let half = t * (sample.variance * 2.0 / sample.count as f64).sqrt();
+    Some(Band::around(sample.mean, half).within(range))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::rows::RowSource;
+
+    #[test]
+    fn the_middle_of_numbers() {
+        assert!((median(vec![5.0, 1.0, 2.0]) - 2.0).abs() < 1e-15);
+        assert!((median(vec![4.0, 1.0]) - 2.5).abs() < 1e-15 && median(Vec::new()).abs() < 1e-15);
+    }
+
+    /// An ideal wire with as many measurements as taxels shows touches nearly as they are, on one wire and on two; and
+    /// any number of threads finds the same.
+    #[test]
+    fn ideal_wires_show_touches() {
+        let layout = SkinLayout::new(8, 8, 0.015, 0.01).unwrap();
+        let objects = DesignObjects::named("large").unwrap();
+        for wires in [1, 2] {
+            let run = |threads: usize| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| {
+                    let drawn = draw(&objects, &layout, "test", 1, 2).unwrap();
+                    let images: Vec<Touch> = drawn.iter().flat_map(|(t, _)| t.clone()).collect();
+                    let prior = SheetPrior::like(images.iter().map(|t| t.conductance_s.values()), [8, 8]).unwrap();
+                    let rows = BandRows::new(&RowSource::Generator, &prior, wires, 64, 1).unwrap();
+                    let ideal = Profile::named("ideal").unwrap();
+                    let mut bench = Bench::new(layout, rows, ideal, prior, 64).unwrap();
+                    bench.prepare(64 / wires).unwrap();
+                    let measured = bench.measure(drawn, 64 / wires).unwrap();
+                    bench.score(&measured, 64 / wires, None).unwrap()
+                })
+            };
+            let scores = run(1);
+            assert!(mean(&scores, |s| s.iou) > 0.85, "{scores:?}");
+            assert!(mean(&scores, |s| s.place_px) < 0.3, "{scores:?}");
+            assert_eq!(scores, run(3));
+        }
+    }
+
+    #[test]
+    fn a_band_by_hand() {
+        let p = promise(&[1.0, 2.0, 3.0], 1, [-100.0, 9.0]).unwrap();
+        // s = 1, √(2/3); t of 99 % with 2 degrees of freedom is 9.925 as tabulated, to half a digit
+        assert!((p.mean - 2.0).abs() < 1e-12 && (p.low - (2.0 - 9.925 * (2.0_f64 / 3.0).sqrt())).abs() < 1e-3);
+        assert!((p.high - 9.0).abs() < 1e-12 && p.holds(3.0) && !p.holds(9.5) && !p.holds(f64::NAN));
+        assert!(promise(&[1.0], 1, [0.0, 1.0]).is_none());
+    }
+
+    /// 2,000 designs of twelve repetitions and as many checks, of uniform numbers: 1 % of the checks lie outside, ±
+    /// four standard deviations of the count.
+    #[test]
+    fn one_check_in_a_hundred_lies_outside() {
+        let mut rng = Streams::new(1).rng("band", 0);
+        let mut run = || -> Vec<f64> { (0..12).map(|_| (0..8).map(|_| rng.random::<f64>()).sum()).collect() };
+        let outside = (0..2000).filter(|_| {
+            let p = promise(&run(), 1, [-1e9, 1e9]).unwrap();
+            !p.holds(run().iter().sum::<f64>() / 12.0)
+        });
+        let count = outside.count();
+        assert!((2..=38).contains(&count), "{count} of 2000");
+    }
 }

@@ -1,10 +1,11 @@
 //! A design and its check as text.
 
+use super::Alternative;
+use super::DesignReport;
 use super::answer::counted;
 use super::check::CheckReport;
-use super::report::{Alternative, DesignReport};
-use super::rows::RowSource;
 use super::wire::FeedbackLimit;
+use super::wire::RowSource;
 use crate::electronics::ElectronicsStudy;
 use spts_recon::statistics::Band;
 

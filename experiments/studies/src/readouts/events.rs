@@ -1,12 +1,12 @@
 //! Event-driven code division: a taxel that changes sends its own signature at any time.
 
-use super::messages::{Message, Sender, receive};
-use super::readout::{PreparedReadout, Reading, ReadoutSkin, WireReadout};
 use super::rows::StoredRows;
 use super::wire::HeldWire;
+use super::{PreparedReadout, Reading, ReadoutSkin, WireReadout};
 use rand::RngExt as _;
 use spts_circuit::amplifier::Skin;
 use spts_input::Refusal;
+use spts_models::Streams;
 
 /// Slots of a signature that are tried.
 const SLOTS: [usize; 4] = [128, 256, 512, 1024];
@@ -108,6 +108,229 @@ impl PreparedReadout for Signatures {
     }
 }
 
+/// Rounds of the search, which ends when it finds nothing else.
+const ROUNDS: usize = 6;
+/// Steps of conjugate gradients for the amplitudes of a round.
+const STEPS: usize = 40;
+/// Weight of amplitudes beside their misfit: those that no sample tells apart stay small.
+const RIDGE: f64 = 0.1;
+/// A message counts as sent when its amplitude is more than half of what it should be.
+const PRESENT: f64 = 0.5;
+
+/// A pulse: slot and sign.
+type Pulse = (u16, i8);
+
+/// Signatures of all taxels, and how messages are made of them.
+pub(super) struct Message {
+    slots: usize,
+    /// Pulses of every taxel, in the order of their slots.
+    signatures: Vec<Vec<Pulse>>,
+}
+
+/// A transmission.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Sender {
+    /// Sending taxel.
+    pub(super) taxel: usize,
+    /// First slot of the message.
+    pub(super) start: usize,
+    /// Value that is sent, in [0, [`Message::LEVELS`]).
+    pub(super) value: u8,
+}
+
+impl Message {
+    /// Bits of a value.
+    pub(super) const BITS: usize = 4;
+    /// Values.
+    pub(super) const LEVELS: u8 = 1 << Self::BITS;
+    /// Share of the slots with a pulse.
+    pub(super) const DENSITY: f64 = 1.0 / 16.0;
+
+    /// Signatures of `taxels` taxels: in every sixteen of the `slots` slots one pulse of either sign, at random.
+    pub(super) fn new(taxels: usize, slots: usize, streams: Streams) -> Self {
+        let signature = |taxel: usize| {
+            let mut rng = streams
+                .child("readouts/signatures", slots as u64)
+                .rng("taxel", taxel as u64);
+            let starts = (0_u16..).step_by(16).take(slots / 16);
+            starts
+                .map(|start| (start + rng.random_range(0..16_u16), if rng.random() { 1 } else { -1 }))
+                .collect()
+        };
+        Self {
+            slots,
+            signatures: (0..taxels).map(signature).collect(),
+        }
+    }
+
+    /// Slots of a signature.
+    pub(super) fn slots(&self) -> usize {
+        self.slots
+    }
+
+    /// Slots of a message: the signature alone, then once a bit.
+    pub(super) fn len(&self) -> usize {
+        (1 + Self::BITS) * self.slots
+    }
+
+    /// Pulses of piece `piece` of a message of `taxel` that starts at `start`: 0 is the signature, then the bits, the
+    /// lowest first.
+    fn pulses(&self, taxel: usize, start: usize, piece: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let first = start + piece * self.slots;
+        let pulses = self.signatures[taxel].iter();
+        pulses.map(move |(slot, sign)| (first + usize::from(*slot), f64::from(*sign)))
+    }
+
+    /// Levels of the senders at `count` slots, slot after slot.
+    pub(super) fn chips(&self, senders: &[Sender], count: usize) -> Vec<i8> {
+        let mut chips = vec![0; count * senders.len()];
+        for (k, sender) in senders.iter().enumerate() {
+            for piece in 0..=Self::BITS {
+                let inverted = piece > 0 && sender.value >> (piece - 1) & 1 == 0;
+                for (slot, sign) in self.pulses(sender.taxel, sender.start, piece) {
+                    if let Some(chip) = chips.get_mut(slot * senders.len() + k) {
+                        *chip = if (sign > 0.0) == inverted { -1 } else { 1 };
+                    }
+                }
+            }
+        }
+        chips
+    }
+}
+
+/// Who sent what in `samples`, in which a pulse has height 1, when messages start in the first `spread` slots: a
+/// subspace pursuit. As many taxels as the energy of the samples stands for join those of the round before, each at the
+/// moment at which its signature correlates most; the amplitudes of all their pieces are solved for together, and those
+/// stay whose signature is there.
+/// Source: W. Dai, O. Milenkovic, IEEE Trans. Inf. Theory 55 (2009) 2230, with known amplitudes in place of a known
+/// number.
+pub(super) fn receive(message: &Message, spread: usize, samples: &[f64]) -> Vec<Sender> {
+    let pulses = message.slots as f64 * Message::DENSITY * (1 + Message::BITS) as f64;
+    let energy: f64 = samples.iter().map(|v| v * v).sum();
+    #[expect(clippy::cast_possible_truncation, reason = "at most the number of samples")]
+    let count = ((energy / pulses).round() as usize).min(samples.len() / 16);
+    let mut kept: Vec<(usize, usize)> = Vec::new();
+    let (mut amplitudes, mut residual) = (Vec::new(), samples.to_vec());
+    for _ in 0..ROUNDS {
+        let mut tried = kept.clone();
+        tried.extend(strongest(message, spread, &residual, &kept, count));
+        let solved = solve(message, &tried, samples);
+        let present: Vec<usize> = (0..tried.len()).filter(|k| solved[k * PIECES] > PRESENT).collect();
+        let found: Vec<(usize, usize)> = present.iter().map(|k| tried[*k]).collect();
+        amplitudes = solve(message, &found, samples);
+        residual.copy_from_slice(samples);
+        add(message, &found, &amplitudes, -1.0, &mut residual);
+        let same = found == kept;
+        kept = found;
+        if same {
+            break;
+        }
+    }
+    let value =
+        |pieces: &[f64]| (0..Message::BITS).fold(0, |value, bit| value | u8::from(pieces[1 + bit] > 0.0) << bit);
+    let mut senders: Vec<Sender> = kept
+        .iter()
+        .zip(amplitudes.chunks_exact(PIECES))
+        .filter(|(_, pieces)| pieces[0] > PRESENT)
+        .map(|((taxel, start), pieces)| Sender {
+            taxel: *taxel,
+            start: *start,
+            value: value(pieces),
+        })
+        .collect();
+    senders.sort_by_key(|sender| sender.taxel);
+    senders
+}
+
+/// Pieces of a message.
+const PIECES: usize = 1 + Message::BITS;
+
+/// The `count` taxels, none of those `kept`, whose signatures correlate most with the residual, each at its best start.
+fn strongest(
+    message: &Message,
+    spread: usize,
+    residual: &[f64],
+    kept: &[(usize, usize)],
+    count: usize,
+) -> Vec<(usize, usize)> {
+    let mut best: Vec<(f64, usize, usize)> = Vec::new();
+    let mut sums = vec![0.0; spread];
+    for taxel in (0..message.signatures.len()).filter(|taxel| kept.iter().all(|(k, _)| k != taxel)) {
+        sums.fill(0.0);
+        for (slot, sign) in message.pulses(taxel, 0, 0) {
+            let window = residual.get(slot..slot + spread).unwrap_or_default();
+            sums.iter_mut().zip(window).for_each(|(sum, v)| *sum += sign * v);
+        }
+        let start = (0..spread).reduce(|a, b| if sums[b] > sums[a] { b } else { a });
+        if let Some(start) = start {
+            best.push((sums[start], taxel, start));
+        }
+    }
+    best.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    best.iter()
+        .take(count)
+        .map(|(_, taxel, start)| (*taxel, *start))
+        .collect()
+}
+
+/// Adds `factor` times the pieces with these amplitudes to `samples`.
+fn add(message: &Message, senders: &[(usize, usize)], amplitudes: &[f64], factor: f64, samples: &mut [f64]) {
+    for ((taxel, start), pieces) in senders.iter().zip(amplitudes.chunks_exact(PIECES)) {
+        for (piece, amplitude) in pieces.iter().enumerate() {
+            for (slot, sign) in message.pulses(*taxel, *start, piece) {
+                if let Some(sample) = samples.get_mut(slot) {
+                    *sample += factor * amplitude * sign;
+                }
+            }
+        }
+    }
+}
+
+/// What the samples correlate with every piece.
+fn correlate(message: &Message, senders: &[(usize, usize)], samples: &[f64]) -> Vec<f64> {
+    let mut sums = Vec::with_capacity(senders.len() * PIECES);
+    for (taxel, start) in senders {
+        for piece in 0..PIECES {
+            let pulses = message.pulses(*taxel, *start, piece);
+            sums.push(
+                pulses
+                    .map(|(slot, sign)| sign * samples.get(slot).copied().unwrap_or(0.0))
+                    .sum(),
+            );
+        }
+    }
+    sums
+}
+
+/// Amplitudes of all pieces by least squares with a small ridge: conjugate gradients on the normal equations.
+fn solve(message: &Message, senders: &[(usize, usize)], samples: &[f64]) -> Vec<f64> {
+    let mut rest = correlate(message, senders, samples);
+    let mut amplitudes = vec![0.0; rest.len()];
+    let mut direction = rest.clone();
+    let square = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>();
+    let first = square(&rest);
+    let mut before = first;
+    for _ in 0..STEPS {
+        if before <= 1e-16 * first {
+            break;
+        }
+        let mut forward = vec![0.0; samples.len()];
+        add(message, senders, &direction, 1.0, &mut forward);
+        let mut product = correlate(message, senders, &forward);
+        product.iter_mut().zip(&direction).for_each(|(p, d)| *p += RIDGE * d);
+        let step = before / direction.iter().zip(&product).map(|(d, p)| d * p).sum::<f64>();
+        amplitudes.iter_mut().zip(&direction).for_each(|(a, d)| *a += step * d);
+        rest.iter_mut().zip(&product).for_each(|(r, p)| *r -= step * p);
+        let now = square(&rest);
+        direction
+            .iter_mut()
+            .zip(&rest)
+            .for_each(|(d, r)| *d = r + now / before * *d);
+        before = now;
+    }
+    amplitudes
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -126,5 +349,44 @@ mod tests {
             );
         }
         assert_eq!((value(0.0, largest_s), value(1.0, largest_s)), (0, 15));
+    }
+
+    fn samples(message: &Message, senders: &[Sender], count: usize) -> Vec<f64> {
+        let chips = message.chips(senders, count);
+        let slots = chips.chunks(senders.len().max(1));
+        let mut samples: Vec<f64> = slots.map(|s| s.iter().map(|c| f64::from(*c)).sum()).collect();
+        samples.resize(count, 0.0);
+        samples
+    }
+
+    /// Twenty of a thousand, at moments of their own, in signatures of 512 slots: far above what 20 unknown taxels and
+    /// moments need, 2 · 20 · ln(1000 · 64/20) = 323 slots.
+    #[test]
+    fn overlapping_messages_are_told_apart() {
+        let message = Message::new(1000, 512, Streams::new(3));
+        let senders: Vec<Sender> = (0..20_u8)
+            .map(|k| Sender {
+                taxel: 47 * usize::from(k) + 3,
+                start: usize::from(k) * 29 % 64,
+                value: k % 16,
+            })
+            .collect();
+        let mut heard = samples(&message, &senders, 64 + message.len());
+        assert_eq!(receive(&message, 64, &heard), senders);
+        // and through noise of a fifth of a pulse
+        let mut rng = Streams::new(4).rng("noise", 0);
+        heard.iter_mut().for_each(|v| *v += 0.35 * rng.random_range(-1.0..1.0));
+        assert_eq!(receive(&message, 64, &heard), senders);
+    }
+
+    #[test]
+    fn silence_is_nobody() {
+        let message = Message::new(100, 128, Streams::new(3));
+        assert_eq!(receive(&message, 64, &vec![0.0; 64 + message.len()]), []);
+        let mut rng = Streams::new(4).rng("noise", 0);
+        let noise: Vec<f64> = (0..64 + message.len())
+            .map(|_| 0.2 * rng.random_range(-1.0..1.0))
+            .collect();
+        assert_eq!(receive(&message, 64, &noise), []);
     }
 }

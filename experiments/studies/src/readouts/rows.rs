@@ -1,7 +1,11 @@
 //! Outputs of cells that replace those of their generators.
 
-use spts_circuit::CellCodes;
+use super::decode::{FewRows, Rows, WHOLE_IMAGES};
+use super::wire::HeldWire;
+use super::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
+use spts_circuit::{CellCodes, Seeding, WeightMode, Weights};
 use spts_input::Refusal;
+use spts_recon::rows::{DesignRows as _, Expected, RowTask, Separable, Tolerances};
 use std::sync::Arc;
 
 /// DAC codes of the levels −1, 0 and +1.
@@ -170,6 +174,138 @@ impl CellCodes for WalshRows {
             }
         }
         Ok(())
+    }
+}
+
+/// A raster scan: measurement k is taxel k, and the image is the samples of the contacts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Raster;
+
+/// A scan of a sheet of so many columns.
+struct Scan {
+    cols: usize,
+}
+
+impl WireReadout for Raster {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
+        Ok(Box::new(Scan {
+            cols: skin.layout.cols(),
+        }))
+    }
+}
+
+impl PreparedReadout for Scan {
+    fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
+        conductance_s.iter().copied().fold(0.0, f64::max)
+    }
+
+    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal> {
+        let frame = wire.scan()?;
+        let beyond: Vec<bool> = frame.volts.iter().map(|v| *v > frame.alarm_v).collect();
+        // the taxel whose sample is beyond the alarm is the place
+        let noticed = until_noticed(&beyond);
+        Ok(vec![Reading {
+            measurements: frame.volts.len(),
+            image: frame.contacts(self.cols),
+            noticed,
+            placed: noticed,
+        }])
+    }
+}
+
+/// All taxels at once, taxel k with the k-th Walsh function as its code, and each one correlated with its code: as many
+/// chips as the next power of two holds. Nothing is known of the images.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CodeDivision;
+
+struct Coded {
+    walsh: WalshRows,
+    taxels: usize,
+}
+
+impl WireReadout for CodeDivision {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
+        let taxels = skin.layout.taxels();
+        Ok(Box::new(Coded {
+            walsh: WalshRows::new(taxels),
+            taxels,
+        }))
+    }
+}
+
+impl PreparedReadout for Coded {
+    fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
+        let sums = self.walsh.transform(conductance_s);
+        sums.iter().fold(0.0, |largest, sum| largest.max(sum.abs()))
+    }
+
+    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal> {
+        let [low, high] = wire.levels();
+        let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
+        let chips = self.walsh.rows();
+        let frame = wire.signs(&self.walsh, chips)?;
+        // y = middle · Σx + half · H x, and row 0 of H is all ones
+        let sum = frame.volts.first().map_or(0.0, |first| first / (middle + half));
+        let plain: Vec<f64> = frame.volts.iter().map(|v| (v - middle * sum) / half).collect();
+        let mut image = WalshRows::new(chips).transform(&plain);
+        image.truncate(self.taxels);
+        image.iter_mut().for_each(|v| *v = (*v / chips as f64).max(0.0));
+        let beyond: Vec<bool> = frame.volts.iter().map(|v| v.abs() > frame.alarm_v).collect();
+        Ok(vec![Reading {
+            measurements: chips,
+            image,
+            noticed: until_noticed(&beyond),
+            placed: Some(chips as f64 - 0.5),
+        }])
+    }
+}
+
+/// The published cells' own rows: pseudorandom ±1 from mixed seeds, the first M of them over and over.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RandomSigns;
+
+impl WireReadout for RandomSigns {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
+        let taxels = skin.layout.taxels();
+        let most = skin.measurements().last().copied().unwrap_or(1);
+        let count = u32::try_from(taxels).unwrap_or(u32::MAX);
+        let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, count);
+        let mut levels = vec![0.0; most * taxels];
+        weights.fill_rows(0, &mut levels);
+        let levels = levels.iter().map(|level| if *level > 0.0 { 1 } else { -1 }).collect();
+        let rows = StoredRows::new(taxels, levels);
+        Ok(Box::new(FewRows::new(skin, rows, Rows::Random)?))
+    }
+}
+
+/// Distance over which images of larger skins are alike, taxels.
+const SMOOTH_TAXELS: f64 = 1.5;
+
+/// Rows of ±1 in pattern mode: products of two rows along the axes of the skin. Each of the two lowers what is left of
+/// the expected images' variance most. They make the best images of `spts sensing study`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DesignedSigns;
+
+impl WireReadout for DesignedSigns {
+    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
+        let taxels = skin.layout.taxels();
+        let most = skin.measurements().last().copied().unwrap_or(1);
+        let shape = [skin.layout.rows(), skin.layout.cols()];
+        let expected = if taxels <= WHOLE_IMAGES {
+            Expected::like(&*skin.prior()?, shape, Tolerances::default()).map_err(Refusal::from_error)?
+        } else {
+            Expected::smooth(shape, SMOOTH_TAXELS).map_err(Refusal::from_error)?
+        };
+        let designed = Separable
+            .design(&RowTask::new(most, &expected))
+            .map_err(Refusal::from_error)?;
+        let signs = designed
+            .view()
+            .values()
+            .iter()
+            .map(|level| if *level > 0.0 { 1 } else { -1 });
+        let rows = StoredRows::new(taxels, signs.collect());
+        Ok(Box::new(FewRows::new(skin, rows, Rows::Smooth(SMOOTH_TAXELS))?))
     }
 }
 

@@ -1,11 +1,7 @@
 //! The benchmark: every readout with the same skins, touches, wire, noise and clock.
 
-use super::classify::Templates;
-use super::readout::{PreparedReadout, Reading, ReadoutSkin};
-use super::report::{ReadoutRow, ReadoutTrial, ReadoutsReport, SizeWire};
-use super::table::ReadoutLine;
-use super::wire::WireSession;
-use super::wiring::SkinWire;
+use super::wire::{SkinWire, WireSession};
+use super::{PreparedReadout, Reading, ReadoutLine, ReadoutSkin};
 use crate::touches::{Touch, TouchObjects, TouchScene, TouchScore, band};
 use rand::RngExt as _;
 use rayon::prelude::*;
@@ -13,7 +9,8 @@ use serde::Serialize;
 use spts::progress::Progress;
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
-use spts_recon::statistics::mean;
+use spts_recon::statistics::{Band, mean};
+use std::sync::Arc;
 
 /// Pitch of every skin, m: that of the published one.
 const PITCH_M: f64 = 15e-3;
@@ -261,4 +258,360 @@ fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<ReadoutTrial> {
         }
     };
     (0..count).map(trial).collect()
+}
+
+/// IoU from which an image counts as good: the wanted IoU of large skins in [`explore`](crate::explore).
+pub const GOOD_IOU: f64 = crate::explore::WANTED_IOU;
+
+/// The clock for skins of one size, the same for all readouts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SizeWire {
+    /// Taxels N.
+    pub taxels: usize,
+    /// Duration of a measurement, s.
+    pub period_s: f64,
+}
+
+/// One readout with one number of measurements; bands over the repetitions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ReadoutTrial {
+    /// Number of measurements for an image, M.
+    pub measurements: usize,
+    /// Images a second with the common clock.
+    pub frames_hz: f64,
+    /// Intersection over union of the supports, for shapes at random places.
+    pub iou: Option<Band>,
+    /// Distance of the centres, taxels, for the shapes with a non-empty image.
+    pub place_px: Option<Band>,
+    /// Share of the seventeen objects that are classified correctly.
+    pub accuracy: Option<Band>,
+    /// Mean time from a touch at a random moment to a sample beyond the alarm threshold, s, for the touches that are
+    /// noticed.
+    pub noticed_s: Option<Band>,
+    /// Mean time from a touch until its place is known, s.
+    pub placed_s: Option<Band>,
+    /// Share of the shapes with an empty image.
+    pub lost: f64,
+    /// Share of the shapes without a sample beyond the alarm threshold.
+    pub unnoticed: f64,
+}
+
+impl ReadoutTrial {
+    /// Whether the mean IoU is good.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        self.iou.is_some_and(|iou| iou.mean >= GOOD_IOU)
+    }
+}
+
+/// Results of one readout method on skins of one size.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReadoutRow {
+    /// Name.
+    pub readout: &'static str,
+    /// Name in figures.
+    #[serde(skip)]
+    pub label: &'static str,
+    /// Number of measured wires.
+    pub wires: usize,
+    /// Taxels N.
+    pub taxels: usize,
+    /// Largest feedback resistance for which its sums fit, Ω.
+    pub feedback_ohm: f64,
+    /// One entry for each number of measurements, in increasing order.
+    pub trials: Vec<ReadoutTrial>,
+}
+
+impl ReadoutRow {
+    /// The trial with the fewest measurements and a good image; otherwise the one with the best IoU.
+    #[must_use]
+    pub fn deciding(&self) -> Option<&ReadoutTrial> {
+        let iou = |t: &ReadoutTrial| t.iou.map_or(0.0, |iou| iou.mean);
+        let best = self.trials.iter().max_by(|a, b| iou(a).total_cmp(&iou(b)));
+        self.trials.iter().find(|t| t.is_good()).or(best)
+    }
+}
+
+/// Results of `spts readouts`: all readout methods on skins of all sizes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ReadoutsReport {
+    /// The clock of every size.
+    pub wires: Vec<SizeWire>,
+    /// Ordered by size, then in the order of the table.
+    pub rows: Vec<ReadoutRow>,
+    /// Figures stated by published systems.
+    pub published: &'static [PublishedSystem],
+}
+
+impl Default for ReadoutsReport {
+    fn default() -> Self {
+        Self {
+            wires: Vec::new(),
+            rows: Vec::new(),
+            published: PUBLISHED,
+        }
+    }
+}
+
+/// Shifts that are tried along either axis, taxels.
+const REACH: isize = 1;
+
+/// Images of known objects from other presses on the same skin. An image is classified by the most similar one.
+#[derive(Debug, Clone)]
+pub struct Templates {
+    rows: usize,
+    cols: usize,
+    known: Vec<Known>,
+}
+
+/// One object.
+#[derive(Debug, Clone)]
+struct Known {
+    name: Arc<str>,
+    /// Indices and values of non-zero taxels, normalised to length 1.
+    taxels: Vec<(usize, f64)>,
+}
+
+impl Templates {
+    /// Templates from `touches` on a skin of `rows` × `cols`: the mean of all touches of an object, normalised to
+    /// length 1.
+    #[must_use]
+    pub fn new(touches: &[Touch], rows: usize, cols: usize) -> Self {
+        let mut sums: Vec<(Arc<str>, Vec<f64>)> = Vec::new();
+        for touch in touches {
+            let values = touch.conductance_s.values();
+            let length = values.iter().map(|v| v * v).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+            match sums.iter_mut().find(|(name, _)| *name == touch.name) {
+                Some((_, sum)) => sum.iter_mut().zip(values).for_each(|(sum, v)| *sum += v / length),
+                None => sums.push((touch.name.clone(), values.iter().map(|v| v / length).collect())),
+            }
+        }
+        let known = sums.into_iter().map(|(name, sum)| {
+            let length = sum.iter().map(|v| v * v).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+            let taxels = sum.iter().enumerate().filter(|(_, v)| **v > 0.0);
+            Known {
+                name,
+                taxels: taxels.map(|(k, v)| (k, v / length)).collect(),
+            }
+        });
+        Self {
+            rows,
+            cols,
+            known: known.collect(),
+        }
+    }
+
+    /// The object whose template, shifted by up to a taxel along each axis, correlates most with `image`. The length of
+    /// `image` does not matter. `None` for an empty image.
+    #[must_use]
+    pub fn name(&self, image: &[f64]) -> Option<&str> {
+        let shifts = (-REACH..=REACH).flat_map(|r| (-REACH..=REACH).map(move |c| (r, c)));
+        let scores = self.known.iter().map(|known| {
+            let score = |shift| self.correlation(known, image, shift);
+            (shifts.clone().map(score).fold(0.0, f64::max), &*known.name)
+        });
+        let best = scores.reduce(|a, b| if b.0 > a.0 { b } else { a });
+        best.filter(|(score, _)| *score > 0.0).map(|(_, name)| name)
+    }
+
+    /// Σ template·image with the template moved by `shift`; what leaves the skin counts nothing.
+    fn correlation(&self, known: &Known, image: &[f64], (down, right): (isize, isize)) -> f64 {
+        let moved = |k: usize, by: isize, most: usize| k.checked_add_signed(by).filter(|k| *k < most);
+        let terms = known.taxels.iter().filter_map(|(k, v)| {
+            let row = moved(k / self.cols, down, self.rows)?;
+            let col = moved(k % self.cols, right, self.cols)?;
+            Some(v * image[row * self.cols + col])
+        });
+        terms.sum()
+    }
+}
+
+/// A published system.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PublishedSystem {
+    /// Name.
+    pub name: &'static str,
+    /// Taxels.
+    pub taxels: usize,
+    /// Images a second, as stated; for events, the inverse of the stated latency.
+    pub frames_hz: f64,
+    /// Signal wires, as text.
+    pub wires: &'static str,
+    /// The stated figure.
+    pub stated: &'static str,
+    /// Source.
+    pub source: &'static str,
+}
+
+/// Published systems, from few taxels to many.
+pub const PUBLISHED: &[PublishedSystem] = &[
+    PublishedSystem {
+        name: "CDMA skin",
+        taxels: 16,
+        frames_hz: 78.0,
+        wires: "1",
+        stated: "measured",
+        source: "arXiv 2509.10888",
+    },
+    PublishedSystem {
+        name: "SPTS",
+        taxels: 100,
+        frames_hz: 3500.0,
+        wires: "1, and a bus",
+        stated: "measured, M = 20",
+        source: "arXiv 2511.16898",
+    },
+    PublishedSystem {
+        name: "ACES",
+        taxels: 240,
+        frames_hz: 1000.0,
+        wires: "1",
+        stated: "measured, 1 ms an event",
+        source: "Science Robotics 4 (2019) eaax2198",
+    },
+    PublishedSystem {
+        name: "ACTS, adaptive",
+        taxels: 1024,
+        frames_hz: 1000.0,
+        wires: "rows and columns",
+        stated: "measured, the most",
+        source: "arXiv 2410.13847",
+    },
+    PublishedSystem {
+        name: "ACTS, raster",
+        taxels: 1024,
+        frames_hz: 56.0,
+        wires: "rows and columns",
+        stated: "measured",
+        source: "arXiv 2410.13847",
+    },
+    PublishedSystem {
+        name: "Hollis",
+        taxels: 4096,
+        frames_hz: 100.0,
+        wires: "not stated",
+        stated: "simulated, M = 1024, at least",
+        source: "arXiv 1705.05247",
+    },
+    PublishedSystem {
+        name: "TUM H1",
+        taxels: 7560,
+        frames_hz: 250.0,
+        wires: "47 patches",
+        stated: "measured, sensors of several kinds",
+        source: "G. Cheng et al., Proc. IEEE 107 (2019) 2034",
+    },
+    PublishedSystem {
+        name: "BYU fabric",
+        taxels: 8000,
+        frames_hz: 50.0,
+        wires: "SPI, daisy-chained",
+        stated: "measured, at least, on 1 m²",
+        source: "arXiv 2508.20959",
+    },
+];
+
+/// "0.87 ± 0.03": mean and half width of a band.
+fn band(band: Option<Band>, scale: f64, digits: usize) -> String {
+    band.map_or_else(
+        || "–".to_owned(),
+        |b| {
+            format!(
+                "{:.digits$} ± {:.digits$}",
+                scale * b.mean,
+                scale * 0.5 * (b.high - b.low)
+            )
+        },
+    )
+}
+
+impl ReadoutsReport {
+    /// One Markdown table for each size.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut out = String::new();
+        for wire in &self.wires {
+            out.push_str(&format!(
+                "{} taxels, {:.2} µs a measurement\n\n\
+                 | readout | wires | Rf, kΩ | M | images/s | IoU | place, px | class \
+                 | touch noticed, ms | and placed, ms |\n\
+                 |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|\n",
+                wire.taxels,
+                1e6 * wire.period_s
+            ));
+            for row in self.rows.iter().filter(|row| row.taxels == wire.taxels) {
+                for trial in &row.trials {
+                    let mark = if row.deciding() == Some(trial) { "**" } else { "" };
+                    out.push_str(&format!(
+                        "| {} | {} | {:.2} | {mark}{}{mark} | {} |\n",
+                        row.label,
+                        row.wires,
+                        1e-3 * row.feedback_ohm,
+                        trial.measurements,
+                        cells(trial)
+                    ));
+                }
+            }
+            out.push('\n');
+        }
+        out.push_str(&format!(
+            "Marked like **this** is, for every readout, the smallest M with a mean IoU of {GOOD_IOU} or, if there is none, \
+             the M with the largest IoU. The number after ± is half the width of the 90 % band over the repetitions.\n"
+        ));
+        out
+    }
+}
+
+/// The columns of a trial after M.
+fn cells(t: &ReadoutTrial) -> String {
+    let notes = [(t.lost, "no image"), (t.unnoticed, "not noticed")];
+    let [lost, unnoticed] = notes.map(|(share, what)| {
+        if share > 0.0 {
+            format!(" ({:.0} % {what})", 100.0 * share)
+        } else {
+            String::new()
+        }
+    });
+    format!(
+        "{:.0} | {} | {}{lost} | {} | {}{unnoticed} | {}",
+        t.frames_hz,
+        band(t.iou, 1.0, 2),
+        band(t.place_px, 1.0, 2),
+        band(t.accuracy, 1.0, 2),
+        band(t.noticed_s, 1e3, 3),
+        band(t.placed_s, 1e3, 2),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Other presses of the seventeen objects are named from their images as they are, also a taxel further.
+    #[test]
+    fn other_presses_are_named() {
+        let scene = TouchScene {
+            placed: true,
+            specimen: Some(5),
+            ..TouchScene::new(SkinLayout::default(), TouchObjects::Objects, 34, 1)
+        };
+        let templates = Templates::new(&scene.draw().unwrap(), 10, 10);
+        let others = TouchScene {
+            seed: 2,
+            touches: 17,
+            ..scene
+        }
+        .draw()
+        .unwrap();
+        let right = |shift: usize| {
+            let named = others.iter().filter(|touch| {
+                let mut image = touch.conductance_s.values().to_vec();
+                image.rotate_right(shift);
+                templates.name(&image) == Some(&*touch.name)
+            });
+            named.count()
+        };
+        assert!(right(0) >= 15 && right(1) >= 10, "{} and {} of 17", right(0), right(1));
+        assert_eq!(templates.name(&[0.0; 100]), None);
+    }
 }
