@@ -152,7 +152,7 @@ pub(super) fn find(
 /// frames.
 const TOUCHED: f64 = 0.1;
 /// First lag that is not the memory's.
-const TAPS: u64 = super::memory::TAPS as u64 + 1;
+const TAPS: u64 = super::statistics::TAPS as u64 + 1;
 
 /// The taxel of the contact that shows least of what the raster session has there, none of `taken`.
 fn missing(image: &[f64], raster: &[f64], taken: &[u32]) -> Option<u32> {

@@ -5,11 +5,10 @@
 //! their scatter gives the standard error. A profile from several sessions has spans in which a new session is
 //! expected.
 
-use cells::{self, CellFault, Overdriven, SessionGains, gains};
-use late::{Beat, Counts, LateCell, MissedPress, beat, missed};
-use predict::PredictedInside;
-use press::{PressAnalysis, PressNumbers, analyse};
-use profile::{FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED, fitted_profile, predicted_inside};
+use cells::gains;
+use late::{Counts, beat, missed};
+use press::{PressAnalysis, analyse};
+use profile::predicted_inside;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts::data::{DataError, SessionSet};
@@ -19,7 +18,7 @@ use spts_circuit::{LevelSource, Recording, WeightMode, Weights};
 use spts_eval::protocol::{PLATEAU, Protocol};
 use spts_eval::{SessionSlip, follow_slips};
 use spts_input::Refusal;
-use statistics::{ConverterSteps, Estimated, mean, middle, quantiles, steps};
+use statistics::{mean, middle, steps};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::Path;
@@ -371,11 +370,11 @@ impl SessionEstimates {
         let hold = &pair.hold;
         let raster = pair.raster.as_ref();
         let contact = raster.and_then(|(raster, hold)| mean_contact(raster, hold));
-        let faults = faults::find(recording, hold, contact.as_deref(), blocks);
-        let cells = faults::reseeded(&faults);
+        let faults = cells::find(recording, hold, contact.as_deref(), blocks);
+        let cells = reseeded(&faults);
         let overdriven: Vec<Overdriven> = cells
             .iter()
-            .filter_map(|cell| overdriven::fit(recording, hold, blocks, *cell))
+            .filter_map(|cell| cells::fit(recording, hold, blocks, *cell))
             .collect();
         let analysed: Vec<(usize, PressAnalysis)> = blocks
             .par_iter()

@@ -6,7 +6,6 @@
 
 use crate::electronics::ElectronicsStudy;
 use crate::touches::Touch;
-use objects::DesignObjects;
 use search::{best, draw};
 use serde::{Deserialize, Serialize};
 use spts::progress::Progress;
@@ -14,7 +13,6 @@ use spts_input::Refusal;
 use spts_models::SkinLayout;
 use spts_recon::matrix_free::SheetPrior;
 use spts_recon::statistics::Band;
-use wire::{RowSource, WireDesign};
 
 mod answer;
 mod check;

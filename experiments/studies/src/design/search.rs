@@ -566,7 +566,7 @@ pub(super) fn promise(repetitions: &[f64], quantities: usize, range: [f64; 2]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::rows::RowSource;
+    use crate::design::RowSource;
 
     #[test]
     fn the_middle_of_numbers() {

@@ -11,7 +11,7 @@ use spts_models::Streams;
 use spts_recon::matrix_free::RegionPursuit;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 use std::time::Instant;
-use wiring::{Way, Wiring, wirings};
+use wiring::{Wiring, wirings};
 
 pub(crate) mod scene;
 pub(crate) mod wiring;

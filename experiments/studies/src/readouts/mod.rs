@@ -27,7 +27,6 @@ use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 use spts_recon::recover::{Gaussian, ImagePrior};
 use std::sync::{Arc, OnceLock};
-use wire::{HeldWire, SkinWire, WireSession};
 
 mod adaptive;
 mod decode;
@@ -343,7 +342,6 @@ fn on_skin(line: &ReadoutLine, [rows, cols]: [usize; 2]) {
 
 #[cfg(test)]
 mod tests {
-    use super::table::READOUTS;
     use super::*;
 
     /// By hand: with one sample of four beyond, 1, 2, 3 or 4 measurements, less the half that passes before the first.

@@ -512,7 +512,7 @@ pub const PUBLISHED: &[PublishedSystem] = &[
 ];
 
 /// "0.87 ± 0.03": mean and half width of a band.
-fn band(band: Option<Band>, scale: f64, digits: usize) -> String {
+fn with_half(band: Option<Band>, scale: f64, digits: usize) -> String {
     band.map_or_else(
         || "–".to_owned(),
         |b| {
@@ -575,11 +575,11 @@ fn cells(t: &ReadoutTrial) -> String {
     format!(
         "{:.0} | {} | {}{lost} | {} | {}{unnoticed} | {}",
         t.frames_hz,
-        band(t.iou, 1.0, 2),
-        band(t.place_px, 1.0, 2),
-        band(t.accuracy, 1.0, 2),
-        band(t.noticed_s, 1e3, 3),
-        band(t.placed_s, 1e3, 2),
+        with_half(t.iou, 1.0, 2),
+        with_half(t.place_px, 1.0, 2),
+        with_half(t.accuracy, 1.0, 2),
+        with_half(t.noticed_s, 1e3, 3),
+        with_half(t.placed_s, 1e3, 2),
     )
 }
 
