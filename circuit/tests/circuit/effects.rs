@@ -137,33 +137,6 @@ fn the_next_scanned_taxel_undershoots() {
     assert_close(e[68], 0.015 * x[66], 8.0 * f64::EPSILON);
 }
 
-#[test]
-fn volts_lie_on_the_converter_s_grid() {
-    for (mode, offset, lsb) in [
-        (Mode::Compressive, 32.0, 3.3 / 1023.0 * 11140.0 / 570.0),
-        (Mode::Raster, 4.4, 3.3 / 1023.0 * 508.0 / 165.0),
-    ] {
-        let mut readout = start(&Profile::named("as_built").unwrap(), mode, 0);
-        for y in readout.acquire(&mut skin(&press_v()), 10_000).unwrap().volts {
-            let code = (offset - y) / lsb;
-            // cut-off raster values are 0 exactly; the others are 0.1 V up because a constant is subtracted
-            assert!(
-                y.abs() < 1e-300 || (code - code.round()).abs() < 1e-9,
-                "{mode:?}: {y} V is between codes"
-            );
-        }
-    }
-}
-
-#[test]
-fn rails_hold() {
-    let (y, u) = against_ideal("[compressive.rails]\nlimit_v = 2.0", Mode::Compressive);
-    assert!(u.iter().any(|u| u.abs() > 2.0));
-    for (y, u) in y.iter().zip(&u) {
-        assert_close(*y, u.clamp(-2.0, 2.0), 0.0);
-    }
-}
-
 /// In a raster scan a cell that has missed n edges answers n measurements late. After R edges it has missed R·p of
 /// them, p between 0 and 2e-4: over a hundred cells as many as the sum of their p says, to which their spread adds
 /// R·2e-4/√12 a cell.

@@ -4,14 +4,10 @@
 #[cfg(test)]
 mod build;
 #[cfg(test)]
-mod committed;
+mod bus;
 #[cfg(test)]
 mod conformance;
-#[cfg(test)]
-mod faults;
 #[cfg(test)]
 mod mutations;
 #[cfg(test)]
 mod timing;
-#[cfg(test)]
-mod traffic;

@@ -61,7 +61,7 @@ def main():
     arguments = parser.parse_args()
     if arguments.digest:
         version = importlib.metadata.version("yasimavr")
-        print("# FNV-1a of the final states of the random programs 0, 1, ... of tests/isa/generate.rs,")
+        print("# FNV-1a of the final states of the random programs 0, 1, ... of tests/isa/oracle.rs,")
         print(f"# by oracle/reference.py --digest on yasimavr {version}, ATtiny402.")
     with open(arguments.file, encoding="ascii") as programs:
         for line in programs:
