@@ -352,47 +352,28 @@ mod tests {
         check_effect(&|session| build_faults(&configs, session).unwrap());
     }
 
+    /// Faults, with semicolons for line ends, and what the error says.
+    const NONSENSE: &str = r#"
+name = "lame"; taxel = 1 | `faults[0].name` = "lame" | known: dead, stuck
+name = "dead"; taxel = 100 | `faults[0].taxel` = 100 | [0, 99]
+name = "dead"; taxel = 1; seed = 2 | fault `dead` of taxel 1 | seed
+name = "stuck"; taxel = 1; level = 1.5 | `faults[0].level` = 1.5 | [−1, 1]
+name = "mis_seeded"; taxel = 1; seed = -1 | mis_seeded | `faults[0].seed` = -1: a whole number in [0, 2^32)
+name = "overdriven"; taxel = 1; gain = 101.0 | `faults[0].gain` = 101 | [−100, 100]
+name = "skipping_clocks"; taxel = 1; probability = nan | probability | [0, 1]
+name = "drifting"; taxel = 1; rate_per_s = 11.0 | rate_per_s | [−10, 10]
+name = "dead"; taxel = 1; [[faults]]; name = "stuck"; taxel = 1 | fault `stuck` of taxel 1 | another fault
+"#;
+
     #[test]
     fn nonsense_is_refused_with_fault_and_taxel() {
-        for (text, facts) in [
-            (
-                "name = \"lame\"\ntaxel = 1",
-                ["`faults[0].name` = \"lame\"", "known: dead, stuck"],
-            ),
-            ("name = \"dead\"\ntaxel = 100", ["`faults[0].taxel` = 100", "[0, 99]"]),
-            (
-                "name = \"dead\"\ntaxel = 1\nseed = 2",
-                ["fault `dead` of taxel 1", "seed"],
-            ),
-            (
-                "name = \"stuck\"\ntaxel = 1\nlevel = 1.5",
-                ["`faults[0].level` = 1.5", "[−1, 1]"],
-            ),
-            (
-                "name = \"mis_seeded\"\ntaxel = 1\nseed = -1",
-                ["mis_seeded", "`faults[0].seed` = -1: a whole number in [0, 2^32)"],
-            ),
-            (
-                "name = \"overdriven\"\ntaxel = 1\ngain = 101.0",
-                ["`faults[0].gain` = 101", "[−100, 100]"],
-            ),
-            (
-                "name = \"skipping_clocks\"\ntaxel = 1\nprobability = nan",
-                ["probability", "[0, 1]"],
-            ),
-            (
-                "name = \"drifting\"\ntaxel = 1\nrate_per_s = 11.0",
-                ["rate_per_s", "[−10, 10]"],
-            ),
-            (
-                "name = \"dead\"\ntaxel = 1\n[[faults]]\nname = \"stuck\"\ntaxel = 1",
-                ["fault `stuck` of taxel 1", "another fault"],
-            ),
-        ] {
-            let error = build_faults(&faults(&format!("[[faults]]\n{text}")), &session(WeightMode::Binary));
+        for line in NONSENSE.trim().lines() {
+            let mut parts = line.split(" | ");
+            let text = format!("[[faults]]\n{}", parts.next().unwrap().replace("; ", "\n"));
+            let error = build_faults(&faults(&text), &session(WeightMode::Binary));
             let message = error.map(|_| ()).unwrap_err().to_string();
-            for fact in facts {
-                assert!(message.contains(fact), "{text}: {message}");
+            for fact in parts {
+                assert!(message.contains(fact), "{line}: {message}");
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Emulated cells on one bus and one clock line, and the master of the bus.
 
 use crate::attiny412::{Device, OSCILLATOR_HZ};
-use crate::cell::{CellMode, FIRST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE, Pattern};
+use crate::cell::{CellMode, FIRST_ADDRESS, LAST_BUS_ADDRESS, NEUTRAL_CODE};
 use crate::image::Image;
 use rayon::prelude::*;
 use spts_input::Refusal;
@@ -97,29 +97,14 @@ impl Array {
     /// # Errors
     /// [`Refusal`] if the number of seeds differs from that of the cells, or a cell does not answer.
     pub fn start_with_seeds(&mut self, mode: CellMode, seeds: &[u32]) -> Result<(), Refusal> {
-        self.one_a_cell(seeds.len(), "seeds")?;
+        let (given, cells) = (seeds.len(), self.cells.len());
+        if given != cells {
+            return Err(Refusal::new(format!("{given} seeds for {cells} cells")));
+        }
         for (k, seed) in seeds.iter().enumerate() {
             self.write(Self::address(k), &mode.extended(*seed))?;
         }
         Ok(())
-    }
-
-    /// Starts every cell with its pattern.
-    ///
-    /// # Errors
-    /// [`Refusal`] if the number of patterns differs from that of the cells, or a cell does not answer.
-    pub fn start_with_patterns(&mut self, patterns: &[Pattern]) -> Result<(), Refusal> {
-        self.one_a_cell(patterns.len(), "patterns")?;
-        for (k, pattern) in patterns.iter().enumerate() {
-            self.write(Self::address(k), &pattern.message())?;
-        }
-        Ok(())
-    }
-
-    fn one_a_cell(&self, given: usize, what: &str) -> Result<(), Refusal> {
-        let cells = self.cells.len();
-        let told = || Refusal::new(format!("{given} {what} for {cells} cells"));
-        (given == cells).then_some(()).ok_or_else(told)
     }
 
     /// Clocks the cells and fills `codes`, row-major (edge, cell), with the DAC code on each cell's pin when the edge

@@ -449,29 +449,20 @@ mod tests {
     use super::*;
     use crate::weights::Seeding;
 
-    /// Against the rows themselves; two orders of n additions of values below 10 differ by less than n roundings of
-    /// 10·n.
+    /// The sums have the same bits however the rows are divided among calls.
     #[test]
-    fn sums_are_the_rows_times_the_values() {
-        for taxels in [1_u32, 5, 64, 100, 131] {
-            let n = taxels as usize;
-            let values: Vec<f64> = (0..n).map(|k| (0.7 * k as f64).sin() * 10.0).collect();
+    fn the_cut_into_runs_does_not_show() {
+        for taxels in [1, 5, 64, 100, 131] {
+            let values: Vec<f64> = (0..taxels).map(|k| (0.7 * f64::from(k)).sin() * 10.0).collect();
             for mode in [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary] {
                 for seeding in [Seeding::Address, Seeding::Mixed] {
                     let weights = Weights::new(mode, seeding, taxels);
-                    let (mut rows, mut sums) = (vec![0.0; 300 * n], vec![0.0; 300]);
-                    weights.fill_rows(77, &mut rows);
+                    let (mut sums, mut again) = ([0.0; 300], [0.0; 300]);
                     weights.weighted_sums(77, &values, &mut sums);
-                    for (row, sum) in rows.chunks(n).zip(&sums) {
-                        let expected: f64 = row.iter().zip(&values).map(|(w, v)| w * v).sum();
-                        let tolerance = (n * n) as f64 * 10.0 * f64::EPSILON;
-                        assert!((sum - expected).abs() <= tolerance, "{sum} V, expected {expected} V");
-                    }
-                    let mut again = vec![0.0; 300];
                     for (i, out) in again.chunks_mut(7).enumerate() {
                         weights.weighted_sums(77 + 7 * i as u64, &values, out);
                     }
-                    assert!(sums == again, "the cut shows: {mode:?}, {seeding:?}, {taxels} taxels");
+                    assert!(sums == again, "{mode:?}, {seeding:?}, {taxels} taxels");
                 }
             }
         }

@@ -1,6 +1,5 @@
 //! One device: core, memory map and time; and its trace, instruction by instruction, for debugging.
 
-use super::pins::PORT_VECTOR;
 use super::space::{FLASH_LEN, RAM_END, Space};
 use super::system::{Accepted, Access, Fault, Faults, ResetCause};
 use crate::avr::{Core, Event, Op, Program, disassemble, sreg};
@@ -30,8 +29,6 @@ pub struct Device {
     pending: Option<Accepted>,
     /// Tick of the next event that is not caused by an instruction.
     next_event: u64,
-    /// Number of PORTA interrupts executed.
-    port_interrupts: u64,
 }
 
 /// When to stop running.
@@ -56,7 +53,6 @@ impl Device {
             asleep: false,
             pending: None,
             next_event: u64::MAX,
-            port_interrupts: 0,
         }
     }
 
@@ -86,12 +82,6 @@ impl Device {
         self.core.instructions
     }
 
-    /// Number of PORTA interrupts since power-on: the clock edges that the program has handled.
-    #[must_use]
-    pub fn port_interrupts(&self) -> u64 {
-        self.port_interrupts
-    }
-
     /// Whether the CPU sleeps.
     #[must_use]
     pub fn is_asleep(&self) -> bool {
@@ -114,12 +104,6 @@ impl Device {
     #[must_use]
     pub fn faults(&self) -> Faults {
         self.space.faults
-    }
-
-    /// Register DAC0.DATA.
-    #[must_use]
-    pub fn dac_code(&self) -> u8 {
-        self.space.dac.data()
     }
 
     /// DAC code on pin PA6; `None` if the DAC does not drive the pin.
@@ -298,7 +282,6 @@ impl Device {
                 vector: accepted.source,
             },
         );
-        self.port_interrupts += u64::from(accepted.source == PORT_VECTOR);
         self.space.cpuint.enter(accepted);
         let cycles = self.core.interrupt(accepted.entry, &mut self.space);
         self.now += u64::from(cycles) * ticks_per_cycle;

@@ -236,11 +236,6 @@ impl Dac {
         }
     }
 
-    /// DATA register.
-    pub(super) fn data(&self) -> u8 {
-        self.data
-    }
-
     /// Tick at the end of the last instruction that wrote to the DAC.
     pub(super) fn written_at(&self) -> u64 {
         self.written_at

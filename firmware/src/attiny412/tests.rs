@@ -1,10 +1,8 @@
 //! The device as a whole, on programs of a few words.
 
-use std::sync::Arc;
-
 use super::space::Space;
 use super::{Device, Fault, ResetCause, TraceStep};
-use crate::avr::{DataSpace, Program};
+use crate::avr::DataSpace;
 
 /// Out of reset the prescaler divides by six.
 const RESET_DIVISION: u64 = 6;
@@ -313,15 +311,4 @@ fn a_software_reset_keeps_sram_and_tells_its_cause() {
     assert_eq!(device.core().registers[19], 0x77);
     device.reset(ResetCause::PowerOn);
     assert_ne!(device.sram()[0x10], 0x77);
-}
-
-#[test]
-fn devices_are_small_and_share_their_flash() {
-    let program: Arc<Program> = Device::program(&[]).unwrap();
-    let device = Device::new(Arc::clone(&program), &[]);
-    let clones: Vec<Device> = vec![device; 10];
-    // two references each
-    assert_eq!(Arc::strong_count(&program), 21);
-    assert!(size_of_val(&clones[0]) < 1024);
-    assert!(Device::program(&[0; 4097]).is_err());
 }

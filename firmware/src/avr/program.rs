@@ -127,67 +127,33 @@ fn offset(op: Op) -> Option<i16> {
     }
 }
 
+/// The mnemonic is the name of the variant, but where the manual has several for one.
 fn instruction(op: Op) -> String {
+    let name = format!("{op:?}").to_lowercase();
+    let name = name.split(' ').next().unwrap_or_default();
     match op {
-        Op::Nop => plain("nop"),
-        Op::Ijmp => plain("ijmp"),
-        Op::Icall => plain("icall"),
-        Op::Ret => plain("ret"),
-        Op::Reti => plain("reti"),
-        Op::Sleep => plain("sleep"),
-        Op::Break => plain("break"),
-        Op::Wdr => plain("wdr"),
-        Op::Bset { mask } => plain(["sec", "sez", "sen", "sev", "ses", "seh", "set", "sei"][number(mask)]),
-        Op::Bclr { mask } => plain(["clc", "clz", "cln", "clv", "cls", "clh", "clt", "cli"][number(mask)]),
+        Op::Nop | Op::Ijmp | Op::Icall | Op::Ret | Op::Reti | Op::Sleep | Op::Break | Op::Wdr => name.to_owned(),
+        Op::Bset { mask } => ["sec", "sez", "sen", "sev", "ses", "seh", "set", "sei"][number(mask)].to_owned(),
+        Op::Bclr { mask } => ["clc", "clz", "cln", "clv", "cls", "clh", "clt", "cli"][number(mask)].to_owned(),
 
-        Op::Movw { d, r } => registers("movw", d, r),
-        Op::Muls { d, r } => registers("muls", d, r),
-        Op::Mulsu { d, r } => registers("mulsu", d, r),
-        Op::Fmul { d, r } => registers("fmul", d, r),
-        Op::Fmuls { d, r } => registers("fmuls", d, r),
-        Op::Fmulsu { d, r } => registers("fmulsu", d, r),
-        Op::Mul { d, r } => registers("mul", d, r),
-        Op::Cpc { d, r } => registers("cpc", d, r),
-        Op::Cp { d, r } => registers("cp", d, r),
-        Op::Sbc { d, r } => registers("sbc", d, r),
-        Op::Sub { d, r } => registers("sub", d, r),
-        Op::Add { d, r } => registers("add", d, r),
-        Op::Adc { d, r } => registers("adc", d, r),
-        Op::Cpse { d, r } => registers("cpse", d, r),
-        Op::And { d, r } => registers("and", d, r),
-        Op::Eor { d, r } => registers("eor", d, r),
-        Op::Or { d, r } => registers("or", d, r),
-        Op::Mov { d, r } => registers("mov", d, r),
+        Op::Movw { d, r } | Op::Muls { d, r } | Op::Mulsu { d, r } | Op::Mul { d, r } => registers(name, d, r),
+        Op::Fmul { d, r } | Op::Fmuls { d, r } | Op::Fmulsu { d, r } | Op::Mov { d, r } => registers(name, d, r),
+        Op::Cpc { d, r } | Op::Cp { d, r } | Op::Cpse { d, r } | Op::Sbc { d, r } => registers(name, d, r),
+        Op::Sub { d, r } | Op::Add { d, r } | Op::Adc { d, r } | Op::And { d, r } => registers(name, d, r),
+        Op::Eor { d, r } | Op::Or { d, r } => registers(name, d, r),
 
-        Op::Cpi { d, k } => immediate("cpi", d, k),
-        Op::Sbci { d, k } => immediate("sbci", d, k),
-        Op::Subi { d, k } => immediate("subi", d, k),
-        Op::Ori { d, k } => immediate("ori", d, k),
-        Op::Andi { d, k } => immediate("andi", d, k),
-        Op::Ldi { d, k } => immediate("ldi", d, k),
-        Op::Adiw { d, k } => small("adiw", d, k),
-        Op::Sbiw { d, k } => small("sbiw", d, k),
-        Op::In { d, a } => small("in", d, a),
+        Op::Cpi { d, k } | Op::Sbci { d, k } | Op::Subi { d, k } => format!("{name} r{d}, 0x{k:02X}"),
+        Op::Ori { d, k } | Op::Andi { d, k } | Op::Ldi { d, k } => format!("{name} r{d}, 0x{k:02X}"),
+        // avr-objdump writes 6-bit operands in lower case
+        Op::Adiw { d, k } | Op::Sbiw { d, k } | Op::In { d, a: k } => format!("{name} r{d}, {k:#04x}"),
 
-        Op::Com { d } => register("com", d),
-        Op::Neg { d } => register("neg", d),
-        Op::Swap { d } => register("swap", d),
-        Op::Inc { d } => register("inc", d),
-        Op::Dec { d } => register("dec", d),
-        Op::Asr { d } => register("asr", d),
-        Op::Lsr { d } => register("lsr", d),
-        Op::Ror { d } => register("ror", d),
-        Op::Push { r } => register("push", r),
-        Op::Pop { d } => register("pop", d),
+        Op::Com { d } | Op::Neg { d } | Op::Swap { d } | Op::Inc { d } | Op::Dec { d } => format!("{name} r{d}"),
+        Op::Asr { d } | Op::Lsr { d } | Op::Ror { d } | Op::Pop { d } | Op::Push { r: d } => format!("{name} r{d}"),
 
-        Op::Bld { d, mask } => format!("bld r{d}, {}", number(mask)),
-        Op::Bst { d, mask } => format!("bst r{d}, {}", number(mask)),
-        Op::Sbrc { r, mask } => format!("sbrc r{r}, {}", number(mask)),
-        Op::Sbrs { r, mask } => format!("sbrs r{r}, {}", number(mask)),
-        Op::Cbi { a, mask } => format!("cbi {a:#04x}, {}", number(mask)),
-        Op::Sbi { a, mask } => format!("sbi {a:#04x}, {}", number(mask)),
-        Op::Sbic { a, mask } => format!("sbic {a:#04x}, {}", number(mask)),
-        Op::Sbis { a, mask } => format!("sbis {a:#04x}, {}", number(mask)),
+        Op::Bld { d, mask } | Op::Bst { d, mask } => format!("{name} r{d}, {}", number(mask)),
+        Op::Sbrc { r, mask } | Op::Sbrs { r, mask } => format!("{name} r{r}, {}", number(mask)),
+        Op::Cbi { a, mask } | Op::Sbi { a, mask } => format!("{name} {a:#04x}, {}", number(mask)),
+        Op::Sbic { a, mask } | Op::Sbis { a, mask } => format!("{name} {a:#04x}, {}", number(mask)),
         Op::Out { a, r } => format!("out {a:#04x}, r{r}"),
 
         Op::Ldd { d, p, q: 0 } => format!("ld r{d}, {}", pointer(p)),
@@ -203,10 +169,10 @@ fn instruction(op: Op) -> String {
         Op::Lpm { d } => format!("lpm r{d}, Z"),
         Op::LpmIncrement { d } => format!("lpm r{d}, Z+"),
 
-        Op::Jmp { k } => absolute("jmp", k),
-        Op::Call { k } => absolute("call", k),
-        Op::Rjmp { offset } => relative("rjmp", offset),
-        Op::Rcall { offset } => relative("rcall", offset),
+        // byte address; zero has no prefix, as in C's `%#x`
+        Op::Jmp { k: 0 } | Op::Call { k: 0 } => format!("{name} 0"),
+        Op::Jmp { k } | Op::Call { k } => format!("{name} {:#x}", 2 * u32::from(k)),
+        Op::Rjmp { offset } | Op::Rcall { offset } => relative(name, offset),
         Op::Brbs { mask, offset } => relative(BRANCHES_IF_SET[number(mask)], offset.into()),
         Op::Brbc { mask, offset } => relative(BRANCHES_IF_CLEAR[number(mask)], offset.into()),
         Op::Illegal { word } => format!(".word {word:#06x}"),
@@ -229,33 +195,8 @@ const fn pointer(p: u8) -> char {
     }
 }
 
-fn plain(mnemonic: &str) -> String {
-    mnemonic.to_owned()
-}
-
-fn register(mnemonic: &str, d: u8) -> String {
-    format!("{mnemonic} r{d}")
-}
-
 fn registers(mnemonic: &str, d: u8, r: u8) -> String {
     format!("{mnemonic} r{d}, r{r}")
-}
-
-fn immediate(mnemonic: &str, d: u8, k: u8) -> String {
-    format!("{mnemonic} r{d}, 0x{k:02X}")
-}
-
-/// avr-objdump writes 6-bit operands in lower case.
-fn small(mnemonic: &str, d: u8, k: u8) -> String {
-    format!("{mnemonic} r{d}, {k:#04x}")
-}
-
-/// Byte address; zero has no prefix, as in C's `%#x`.
-fn absolute(mnemonic: &str, k: u16) -> String {
-    match k {
-        0 => format!("{mnemonic} 0"),
-        k => format!("{mnemonic} {:#x}", 2 * u32::from(k)),
-    }
 }
 
 /// Bytes from the following instruction.
