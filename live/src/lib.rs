@@ -16,33 +16,21 @@
 //! }
 //! let shown = session.step()?;
 //! assert!(shown.force_n > 19.0 && shown.pressure_kpa.iter().sum::<f64>() > 50.0);
-//! # Ok::<(), spts_live::LiveError>(())
+//! # Ok::<(), spts::Refusal>(())
 //! ```
 
-mod connection;
-mod error;
-mod frame;
-mod mesh;
 mod object;
-mod options;
-mod origin;
 mod presser;
-mod request;
 mod server;
 mod session;
 mod settings;
-mod shelf;
 mod wires;
 
-pub use error::LiveError;
-pub use frame::{Frame, LineFrame, PanelFrame};
-pub use mesh::{MeshUnit, UploadedMesh};
-pub use object::{LiveObject, Shape, Side};
-pub use options::{FORCE_N, MEASUREMENTS, NOISE_FACTOR};
-pub use request::Request;
+pub use object::{LiveObject, MeshUnit, Shape, Side, UploadedMesh};
 pub use server::{LiveConfig, Server};
-pub use session::LiveSession;
-pub use shelf::Shelf;
+pub use session::{Frame, LineFrame, LiveSession, PanelFrame, Request};
+pub use settings::{FORCE_N, MEASUREMENTS, NOISE_FACTOR};
+pub use wires::Shelf;
 
 /// Time between two updates, s, on the skin and for whoever looks at it.
 pub const UPDATE_S: f64 = 0.025;

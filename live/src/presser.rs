@@ -1,8 +1,8 @@
 //! The object on the skin: a force is asked for, a pressure is answered.
 
-use crate::error::LiveError;
 use crate::object::LiveObject;
 use crate::settings::Press;
+use spts::Refusal;
 use spts_contact::{ContactError, ContactField, EquilibriumError, Holder, Load, PosedMesh, TaxelBins, build_contact};
 use spts_models::{PressureMap, SkinLayout};
 
@@ -54,7 +54,7 @@ impl Presser {
         &self.object
     }
 
-    pub(crate) fn turn(&mut self, degrees: f64) -> Result<(), LiveError> {
+    pub(crate) fn turn(&mut self, degrees: f64) -> Result<(), Refusal> {
         spts_models::within("degrees", degrees, -360.0, 360.0, "[−360, 360]")?;
         self.degrees = degrees;
         Ok(())

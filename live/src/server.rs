@@ -1,22 +1,28 @@
-//! The server: one static page, and a WebSocket for everything that moves.
+//! The server: pages of this machine that it served itself, each with a session of its own.
+//!
+//! A name that a foreign page has resolve to 127.0.0.1 (DNS rebinding) stands in `Host`, and the page that a browser
+//! sends a request for stands in `Origin`: both have to be this server.
 
-use crate::connection::serve;
-use crate::error::LiveError;
-use crate::mesh::MOST_MESH_BYTES;
-use crate::object::LiveObject;
-use crate::origin::own_pages_only;
-use crate::shelf::Shelf;
+use crate::UPDATE_S;
+use crate::object::{LiveObject, MOST_MESH_BYTES, MeshUnit, UploadedMesh};
+use crate::session::{Frame, LiveSession, Request, message};
+use crate::wires::Shelf;
 use axum::Router;
-use axum::extract::State;
-use axum::extract::ws::WebSocketUpgrade;
-use axum::http::{StatusCode, header};
-use axum::middleware::from_fn_with_state;
+use axum::body::{Body, Bytes};
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::extract::{Request as HttpRequest, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{any, get};
 use axum::serve::ListenerExt as _;
+use serde::Serialize;
+use spts::Refusal;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 use tokio::sync::Semaphore;
+use tokio::sync::mpsc::{Receiver, Sender, channel};
 
 /// Most pages at a time.
 const MOST_PAGES: usize = 8;
@@ -44,13 +50,13 @@ pub struct LiveConfig {
 }
 
 /// What all pages share.
-pub(crate) struct Shared {
-    pub(crate) shelf: Arc<Shelf>,
-    pub(crate) seed: u64,
-    pub(crate) object: String,
-    pub(crate) pages: Arc<Semaphore>,
+struct Shared {
+    shelf: Arc<Shelf>,
+    seed: u64,
+    object: String,
+    pages: Arc<Semaphore>,
     /// One mesh is read at a time.
-    pub(crate) meshes: Arc<Semaphore>,
+    meshes: Arc<Semaphore>,
 }
 
 /// A server that listens.
@@ -64,12 +70,14 @@ impl Server {
     /// Listens on 127.0.0.1.
     ///
     /// # Errors
-    /// [`LiveError::Unknown`] for an object that is not there, [`LiveError::Port`] for a port that is taken.
-    pub fn bind(config: &LiveConfig) -> Result<Self, LiveError> {
+    /// [`Refusal`] for an object that is not there, [`Refusal`] for a port that is taken.
+    pub fn bind(config: &LiveConfig) -> Result<Self, Refusal> {
         LiveObject::named(&config.object)?;
-        let refused = |source| LiveError::Port {
-            port: config.port,
-            source,
+        let refused = |e: std::io::Error| {
+            Refusal::new(format!(
+                "`--port` = {}: {e}; `--port 0` takes any free one",
+                config.port
+            ))
         };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, config.port)).map_err(refused)?;
         listener.set_nonblocking(true).map_err(refused)?;
@@ -95,10 +103,10 @@ impl Server {
     /// Serves until the program ends.
     ///
     /// # Errors
-    /// [`LiveError::Server`] when the operating system does not let it go on.
-    pub fn run(self) -> Result<(), LiveError> {
+    /// [`Refusal`] when the operating system does not let it go on.
+    pub fn run(self) -> Result<(), Refusal> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build();
-        let runtime = runtime.map_err(LiveError::Server)?;
+        let runtime = runtime.map_err(ended)?;
         let mut router = Router::new().route("/socket", any(socket));
         for (path, kind, text) in FILES {
             router = router.route(path, get(move || async move { ([(header::CONTENT_TYPE, kind)], text) }));
@@ -107,12 +115,16 @@ impl Server {
             .with_state(self.shared)
             .layer(from_fn_with_state(self.address.port(), own_pages_only));
         runtime.block_on(async move {
-            let listener = tokio::net::TcpListener::from_std(self.listener).map_err(LiveError::Server)?;
+            let listener = tokio::net::TcpListener::from_std(self.listener).map_err(ended)?;
             // an update is sent at once, and does not wait for the page to take the one before
             let listener = listener.tap_io(|stream| drop(stream.set_nodelay(true)));
-            axum::serve(listener, router).await.map_err(LiveError::Server)
+            axum::serve(listener, router).await.map_err(ended)
         })
     }
+}
+
+fn ended(error: std::io::Error) -> Refusal {
+    Refusal::from_error(error).at("the server ended")
 }
 
 async fn socket(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade) -> Response {
@@ -127,4 +139,338 @@ async fn socket(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade) ->
             serve(socket, shared).await;
             drop(place);
         })
+}
+
+/// Names under which the server may be asked for, the port aside.
+const NAMES: [&str; 3] = ["127.0.0.1", "localhost", "[::1]"];
+
+/// Headers of every answer: nothing of it is loaded from elsewhere, shown in a frame, or kept.
+const SAFE: [(HeaderName, &str); 6] = [
+    (
+        header::CONTENT_SECURITY_POLICY,
+        "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
+         base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    ),
+    (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (header::X_FRAME_OPTIONS, "DENY"),
+    (header::REFERRER_POLICY, "no-referrer"),
+    (header::CACHE_CONTROL, "no-store"),
+    (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+];
+
+/// Lets requests through that are meant for the server at this port and come from its own page; an upgrade to a
+/// WebSocket has to say where it comes from.
+async fn own_pages_only(State(port): State<u16>, request: HttpRequest<Body>, next: Next) -> Response {
+    let mut response = match refusal(request.headers(), request.uri().authority().map(|a| a.as_str()), port) {
+        None => next.run(request).await,
+        Some(reason) => (StatusCode::FORBIDDEN, format!("{reason}\n")).into_response(),
+    };
+    for (name, value) in SAFE {
+        response.headers_mut().insert(name, HeaderValue::from_static(value));
+    }
+    response
+}
+
+/// Why a request is refused.
+fn refusal(headers: &HeaderMap, authority: Option<&str>, port: u16) -> Option<String> {
+    let hosts: Vec<Option<&str>> = headers.get_all(header::HOST).iter().map(|v| v.to_str().ok()).collect();
+    let own_host = matches!(hosts.as_slice(), [Some(host)] if is_own(host, port));
+    if !own_host || authority.is_some_and(|authority| !is_own(authority, port)) {
+        return Some(format!(
+            "This server answers at http://127.0.0.1:{port}/ alone: the header Host is another one."
+        ));
+    }
+    let origins: Vec<Option<&str>> = headers
+        .get_all(header::ORIGIN)
+        .iter()
+        .map(|v| v.to_str().ok())
+        .collect();
+    let own_origin = match origins.as_slice() {
+        [] => !headers.contains_key(header::UPGRADE),
+        [Some(origin)] => origin.strip_prefix("http://").is_some_and(|host| is_own(host, port)),
+        _ => false,
+    };
+    (!own_origin)
+        .then(|| "This server speaks with its own page alone: the header Origin is missing or another one.".to_owned())
+}
+
+fn is_own(host: &str, port: u16) -> bool {
+    // a browser leaves out port 80
+    let (name, asked) = match host.rsplit_once(':') {
+        Some((name, digits)) if !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()) => {
+            (name, digits.parse::<u16>().ok())
+        }
+        _ => (host, Some(80)),
+    };
+    asked == Some(port) && NAMES.iter().any(|known| known.eq_ignore_ascii_case(name))
+}
+
+/// Requests that wait for the next update; a page that sends more has to wait.
+const WAITING: usize = 256;
+/// Messages to the page that wait to be sent; updates beyond them are left out.
+const UNSENT: usize = 4;
+/// Time in which a page has to take a message.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// What a session is told.
+enum Told {
+    Request(Request),
+    Mesh(Result<Box<UploadedMesh>, Refusal>),
+    Refused(Refusal),
+}
+
+/// What a page is told beside frames and shapes.
+#[derive(Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+enum Note<'a> {
+    /// Something that was refused.
+    Error { text: &'a str },
+    /// A mesh that presses from now on.
+    Mesh { name: &'a str, notes: &'a [String] },
+}
+
+fn nameless() -> Refusal {
+    message("bytes without a name")
+}
+
+/// Serves one page until it is closed.
+async fn serve(mut socket: WebSocket, shared: Arc<Shared>) {
+    let (told, requests) = channel(WAITING);
+    let (shown, mut messages) = channel(UNSENT);
+    let ours = Arc::clone(&shared);
+    let thread = std::thread::Builder::new().name("session".to_owned());
+    if thread.spawn(move || run(&ours, requests, &shown)).is_err() {
+        return;
+    }
+    let mut announced = None;
+    loop {
+        tokio::select! {
+            message = messages.recv() => {
+                let Some(text) = message else { return };
+                let sent = tokio::time::timeout(PATIENCE, socket.send(Message::text(text))).await;
+                if !matches!(sent, Ok(Ok(()))) {
+                    return;
+                }
+            }
+            message = socket.recv() => {
+                let told_now = match message {
+                    None | Some(Err(_) | Ok(Message::Close(_))) => return,
+                    Some(Ok(Message::Text(text))) => match Request::from_json(&text) {
+                        Ok(Request::Mesh { name, unit }) => {
+                            announced = Some((name, unit));
+                            continue;
+                        }
+                        Ok(request) => Told::Request(request),
+                        Err(error) => Told::Refused(error),
+                    },
+                    Some(Ok(Message::Binary(bytes))) => match announced.take() {
+                        Some(announced) => {
+                            match read_mesh(&shared, announced, bytes, told.clone()) {
+                                Ok(()) => continue,
+                                Err(error) => Told::Refused(error),
+                            }
+                        }
+                        None => Told::Refused(nameless()),
+                    },
+                    Some(Ok(_)) => continue,
+                };
+                // a session that takes nothing for so long waits for this page to take what it was told
+                let taken = tokio::time::timeout(PATIENCE, told.send(told_now)).await;
+                if !matches!(taken, Ok(Ok(()))) {
+                    return;
+                }
+            }
+        }
+    }
+}
+
+/// Reads a mesh beside everything else; the session is told of it.
+fn read_mesh(
+    shared: &Shared,
+    (name, unit): (String, MeshUnit),
+    bytes: Bytes,
+    told: Sender<Told>,
+) -> Result<(), Refusal> {
+    let Ok(place) = Arc::clone(&shared.meshes).try_acquire_owned() else {
+        return Err(message(
+            "another mesh is being read; drop it again in a moment".to_owned(),
+        ));
+    };
+    tokio::task::spawn_blocking(move || {
+        let read = || UploadedMesh::read(&name, unit, &bytes).map(Box::new);
+        // the page waits for an answer, whatever became of its mesh
+        let mesh = std::panic::catch_unwind(read).unwrap_or_else(|_| Err(message(format!("{name}: cannot be read"))));
+        drop((place, bytes));
+        // a page that was closed needs none
+        let _ = told.blocking_send(Told::Mesh(mesh));
+    });
+    Ok(())
+}
+
+/// The session of a page: an update every [`UPDATE_S`], until the page is gone.
+fn run(shared: &Shared, mut requests: Receiver<Told>, shown: &Sender<String>) {
+    let begun = LiveSession::new(Arc::clone(&shared.shelf), shared.seed, &shared.object);
+    let mut session = match begun {
+        Ok(session) => session,
+        Err(error) => {
+            tell_error(shown, &error);
+            return;
+        }
+    };
+    let greeting = tell(shown, &session.options()).and_then(|()| tell(shown, &session.shape()));
+    let mut due = Instant::now();
+    let mut open = greeting.is_some();
+    while open {
+        let (told, gone) = take_all(&mut requests);
+        open = !gone && obey(&mut session, told, shown).is_some();
+        open = open
+            && match session.step() {
+                Ok(frame) => show(shown, &frame),
+                Err(error) => tell_error(shown, &error).is_some(),
+            };
+        due = (due + Duration::from_secs_f64(UPDATE_S)).max(Instant::now());
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
+    }
+}
+
+/// What was told since the last update, and whether nothing will be any more.
+fn take_all(requests: &mut Receiver<Told>) -> (Vec<Told>, bool) {
+    use tokio::sync::mpsc::error::TryRecvError;
+    let mut told = Vec::new();
+    // no more than fit: a page that never stops does not keep the skin from being updated
+    while told.len() < WAITING {
+        match requests.try_recv() {
+            Ok(one) => told.push(one),
+            Err(TryRecvError::Empty) => break,
+            Err(TryRecvError::Disconnected) => return (told, true),
+        }
+    }
+    (told, false)
+}
+
+/// Does all that was told; of several objects that are chosen the last one alone. Of several refusals the page sees the
+/// last one. `None` when the page is gone.
+fn obey(session: &mut LiveSession, told: Vec<Told>, shown: &Sender<String>) -> Option<()> {
+    let mut refused = None;
+    let mut shape = None;
+    let is_object = |one: &Told| matches!(one, Told::Request(Request::Object { .. } | Request::Side { .. }));
+    let last_object = told.iter().rposition(is_object);
+    for (k, one) in told.into_iter().enumerate() {
+        // an object that another one follows at once need not be made
+        if is_object(&one) && Some(k) != last_object {
+            continue;
+        }
+        let done = match one {
+            Told::Refused(error) => Err(error),
+            Told::Request(request) => session.apply(request),
+            Told::Mesh(Err(error)) => Err(error),
+            Told::Mesh(Ok(mesh)) => {
+                let note = Note::Mesh {
+                    name: &mesh.name,
+                    notes: &mesh.notes,
+                };
+                tell(shown, &note)?;
+                Ok(Some(session.press_with(Arc::from(mesh))))
+            }
+        };
+        match done {
+            Ok(new) => shape = new.or(shape),
+            Err(error) => refused = Some(error),
+        }
+    }
+    shape.map_or(Some(()), |shape| tell(shown, &shape))?;
+    refused.map_or(Some(()), |error| tell_error(shown, &error))
+}
+
+/// Shows a frame, unless earlier ones are not sent yet. False when the page is gone.
+fn show(shown: &Sender<String>, frame: &Frame) -> bool {
+    use tokio::sync::mpsc::error::TrySendError;
+    // the text is made only where it is sent
+    match shown.try_reserve() {
+        Ok(place) => {
+            place.send(json(frame));
+            true
+        }
+        Err(TrySendError::Full(())) => true,
+        Err(TrySendError::Closed(())) => false,
+    }
+}
+
+/// Sends a message; waits until it can be sent. `None` when the page is gone.
+fn tell(shown: &Sender<String>, message: &impl Serialize) -> Option<()> {
+    shown.blocking_send(json(message)).ok()
+}
+
+fn tell_error(shown: &Sender<String>, error: &Refusal) -> Option<()> {
+    tell(
+        shown,
+        &Note::Error {
+            text: &error.to_string(),
+        },
+    )
+}
+
+fn json(message: &impl Serialize) -> String {
+    // structures with names of fields have a JSON
+    serde_json::to_string(message).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(headers: &[(&str, &str)]) -> bool {
+        let mut map = HeaderMap::new();
+        for (name, value) in headers {
+            map.append(HeaderName::from_bytes(name.as_bytes()).unwrap(), value.parse().unwrap());
+        }
+        refusal(&map, None, 7117).is_some()
+    }
+
+    #[test]
+    fn own_hosts_and_origins_alone_are_let_in() {
+        let upgrade = ("upgrade", "websocket");
+        for host in ["127.0.0.1:7117", "localhost:7117", "LOCALHOST:7117", "[::1]:7117"] {
+            let host = ("host", host);
+            assert!(!refused(&[host]), "{host:?}");
+            assert!(
+                !refused(&[host, upgrade, ("origin", "http://localhost:7117")]),
+                "{host:?}"
+            );
+            assert!(refused(&[host, upgrade]), "{host:?}");
+        }
+        for host in [
+            "evil.example:7117",
+            "127.0.0.1",
+            "127.0.0.1:7118",
+            "127.0.0.1:071170",
+            "127.0.0.1.evil.example:7117",
+            "evil@127.0.0.1:7117",
+            "localhost.:7117",
+            "::1:7117",
+            "[::1]",
+            "",
+        ] {
+            assert!(refused(&[("host", host)]), "{host:?}");
+        }
+        assert!(refused(&[]));
+        assert!(refused(&[("host", "127.0.0.1:7117"), ("host", "evil.example")]));
+        for origin in [
+            "null",
+            "http://evil.example",
+            "https://127.0.0.1:7117",
+            "http://127.0.0.1",
+            "http://127.0.0.1:7117.evil.example",
+            "http://127.0.0.1:7117/",
+            "file://",
+        ] {
+            assert!(refused(&[("host", "127.0.0.1:7117"), ("origin", origin)]), "{origin:?}");
+        }
+    }
+
+    /// A browser that asks for port 80 does not write it.
+    #[test]
+    fn port_80_need_not_be_written() {
+        assert!(is_own("localhost", 80) && !is_own("localhost", 8080) && is_own("[::1]", 80));
+    }
 }
