@@ -67,7 +67,7 @@ fn evidence(c: &mut Criterion) {
                 for y in black_box(&y) {
                     evidence.observe(&preparation, *y)?;
                 }
-                Ok::<_, spts_recon::classify::EvidenceError>(classifier.decide(&preparation, &evidence, &mut posterior))
+                Ok::<_, spts_input::Refusal>(classifier.decide(&preparation, &evidence, &mut posterior))
             });
         });
     }

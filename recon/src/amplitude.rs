@@ -1,8 +1,10 @@
 //! Integrates over an unknown amplitude: y = s·(t + noise), where the scale of `s` is not known.
 
-use crate::checks::{RangeError, within};
+use crate::checks::out_of_range;
+use crate::checks::within;
 use crate::kernels::{exp, ln};
 use multiversion::multiversion;
+use spts_input::Refusal;
 
 /// Range of the amplitude `s`. The prior density of ln s is constant over it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,8 +29,8 @@ impl AmplitudeRange {
     /// Amplitudes from `min` to `max`, in units of y per unit of the templates.
     ///
     /// # Errors
-    /// [`RangeError`] unless 1e-60 ≤ `min` < `max` ≤ 1e60.
-    pub fn new(min: f64, max: f64) -> Result<Self, RangeError> {
+    /// [`Refusal`] unless 1e-60 ≤ `min` < `max` ≤ 1e60.
+    pub fn new(min: f64, max: f64) -> Result<Self, Refusal> {
         within("min", min, LIMITS[0], LIMITS[1])?;
         within("max", max, LIMITS[0], LIMITS[1])?;
         if min < max {
@@ -37,12 +39,7 @@ impl AmplitudeRange {
                 ln_max: max.ln(),
             })
         } else {
-            Err(RangeError {
-                field: "max",
-                value: max,
-                min,
-                max: LIMITS[1],
-            })
+            Err(out_of_range("max", max, min, LIMITS[1]))
         }
     }
 }

@@ -1,26 +1,19 @@
-//! Checks of parameters and measurements that several modules share.
+//! Checks of parameters and measurements, and sentences for what several modules refuse.
 
-/// A parameter outside its range.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-#[error("`{field}` = {value:e} is outside [{min:e}, {max:e}]")]
-pub struct RangeError {
-    /// Name of the parameter.
-    pub field: &'static str,
-    /// Its value.
-    pub value: f64,
-    /// Smallest valid value.
-    pub min: f64,
-    /// Largest valid value.
-    pub max: f64,
-}
+use spts_input::Refusal;
 
 /// `value` when it lies in [`min`, `max`]; a NaN lies nowhere.
-pub(crate) fn within(field: &'static str, value: f64, min: f64, max: f64) -> Result<f64, RangeError> {
+pub(crate) fn within(field: &str, value: f64, min: f64, max: f64) -> Result<f64, Refusal> {
     if value >= min && value <= max {
         Ok(value)
     } else {
-        Err(RangeError { field, value, min, max })
+        Err(out_of_range(field, value, min, max))
     }
+}
+
+/// A parameter outside its range.
+pub(crate) fn out_of_range(field: &str, value: f64, min: f64, max: f64) -> Refusal {
+    Refusal::range(field, format_args!("{value:e}"), format_args!("[{min:e}, {max:e}]"))
 }
 
 /// Largest measurement that evidence is computed from: its square still has room for sums and for small noise.
@@ -32,7 +25,56 @@ const SMALLEST: f64 = 1e-80;
 /// The measurement `y` as evidence uses it: values below 1e-80 count as zero.
 ///
 /// # Errors
-/// [`RangeError`] for a NaN, an infinity, or more than 1e80.
-pub(crate) fn measurement(y: f64) -> Result<f64, RangeError> {
+/// A NaN, an infinity, or more than 1e80.
+pub(crate) fn measurement(y: f64) -> Result<f64, Refusal> {
     within("y", y, -LARGEST, LARGEST).map(|y| if y.abs() < SMALLEST { 0.0 } else { y })
+}
+
+/// Another number of measurements than of rows.
+pub(crate) fn shape_mismatch(rows: usize, len: usize) -> Refusal {
+    Refusal::new(format!("operator has {rows} rows but `y` has {len} entries"))
+}
+
+/// No measurement, or no unknown.
+pub(crate) fn empty(rows: usize, cols: usize) -> Refusal {
+    Refusal::new(format!("operator has shape {rows} × {cols}; both must be at least 1"))
+}
+
+/// An operator for another number of unknowns.
+pub(crate) fn other_columns(cols: usize, expected: usize) -> Refusal {
+    Refusal::new(format!(
+        "operator has {cols} columns; the method was built for {expected}"
+    ))
+}
+
+/// A measurement that is a NaN or an infinity.
+pub(crate) fn not_finite(index: usize, value: f64) -> Refusal {
+    Refusal::new(format!("`y[{index}]` = {value} is not finite"))
+}
+
+/// A coefficient beyond the range of numbers, as with measurements of 1e300 and an operator of 1e-300.
+pub(crate) fn overflow(atom: usize) -> Refusal {
+    Refusal::new(format!(
+        "the coefficient of atom {atom} exceeds the range of 64-bit numbers"
+    ))
+}
+
+/// Normal equations that cannot be solved.
+pub(crate) fn not_positive_definite(pivot: usize) -> Refusal {
+    Refusal::new(format!(
+        "the matrix of the normal equations is not positive definite at pivot {pivot}"
+    ))
+}
+
+/// An iteration that ended before its tolerance, with the relative error that it reached.
+pub(crate) fn not_converged(iterations: usize, error: f64, tol: f64) -> Refusal {
+    Refusal::new(format!(
+        "no convergence in {iterations} iterations (relative error {error:.3e}, tolerance {tol:.3e})"
+    ))
+}
+
+/// Whether `result` is refused, with a sentence that has this part.
+#[cfg(test)]
+pub(crate) fn says<T>(result: &Result<T, Refusal>, part: &str) -> bool {
+    result.as_ref().is_err_and(|error| error.to_string().contains(part))
 }

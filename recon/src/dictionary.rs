@@ -2,46 +2,16 @@
 
 pub use crate::matrix::shifted;
 
-use crate::checks::{RangeError, within};
+use crate::checks::within;
 use crate::kernels::{axpy, dot};
 use crate::matrix::Matrix;
 use crate::problem::power_of_two;
-use crate::problem::{RecoverError, Solution, Workspace};
+use crate::problem::{Solution, Workspace};
 use crate::recover::BatchOmp;
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
-
-/// Why no dictionary was learned.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum DictionaryError {
-    /// There is no training image.
-    #[error("no training image is left after preprocessing")]
-    NoImages,
-    /// Training images of different sizes.
-    #[error("training image {index} has {len} values, the first has {expected}")]
-    Shape {
-        /// Number of the image, from 0.
-        index: usize,
-        /// Its length.
-        len: usize,
-        /// Length of the first image.
-        expected: usize,
-    },
-    /// A training image that is zero, not finite, or far too small.
-    #[error("training image {index} is zero, not finite, or less than 1e-150 of the strongest one")]
-    Degenerate {
-        /// Number of the image, from 0.
-        index: usize,
-    },
-    /// A setting out of range.
-    #[error(transparent)]
-    Setting(#[from] RangeError),
-    /// The pursuit failed on the training images.
-    #[error("coding the training images: {0}")]
-    Coding(#[from] RecoverError),
-}
+use spts_input::Refusal;
 
 /// Which images a dictionary is learned from: those that are strong enough and not too much alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,7 +89,7 @@ pub fn select(images: &[Vec<f64>], selection: &Selection) -> Vec<usize> {
 /// let ksvd = Ksvd { n_components: 4, n_nonzero_coefs: 1, ..Ksvd::default() };
 /// let dictionary = ksvd.learn(&images, &mut rand_chacha::ChaCha8Rng::seed_from_u64(1))?;
 /// assert_eq!((dictionary.nrows(), dictionary.ncols()), (3, 4));
-/// # Ok::<(), spts_recon::dictionary::DictionaryError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ksvd {
@@ -149,8 +119,8 @@ impl Ksvd {
     /// change it.
     ///
     /// # Errors
-    /// [`DictionaryError`] if there is no image, an image is not usable, or a setting is out of range.
-    pub fn learn(&self, images: &[Vec<f64>], rng: &mut ChaCha8Rng) -> Result<Matrix, DictionaryError> {
+    /// [`Refusal`] if there is no image, an image is not usable, or a setting is out of range.
+    pub fn learn(&self, images: &[Vec<f64>], rng: &mut ChaCha8Rng) -> Result<Matrix, Refusal> {
         at_least("n_components", self.n_components, 1)?;
         at_least("n_nonzero_coefs", self.n_nonzero_coefs, 1)?;
         let training = Training::new(images)?;
@@ -189,8 +159,8 @@ impl Sweep {
     /// Codes all images.
     ///
     /// # Errors
-    /// [`DictionaryError::Coding`].
-    fn code(&mut self, training: &Training, n_nonzero_coefs: usize) -> Result<(), DictionaryError> {
+    /// [`Refusal`].
+    fn code(&mut self, training: &Training, n_nonzero_coefs: usize) -> Result<(), Refusal> {
         code(training, &self.atoms, n_nonzero_coefs, &mut self.codes)?;
         self.errors = errors(training, &self.atoms, &self.codes);
         self.users.collect(&self.codes, self.atoms.nrows());
@@ -233,22 +203,23 @@ impl Sweep {
 /// Codes `codes` of all images by a pursuit of `n_nonzero_coefs` atoms, on all threads.
 ///
 /// # Errors
-/// [`DictionaryError::Coding`].
+/// [`Refusal`].
 pub(super) fn code(
     training: &Training,
     atoms: &Matrix,
     n_nonzero_coefs: usize,
     codes: &mut Vec<Solution>,
-) -> Result<(), DictionaryError> {
-    let pursuit = BatchOmp::new(transposed(atoms).view(), n_nonzero_coefs)?;
+) -> Result<(), Refusal> {
+    let failed = |error: Refusal| error.at("coding the training images");
+    let pursuit = BatchOmp::new(transposed(atoms).view(), n_nonzero_coefs).map_err(failed)?;
     codes.resize_with(training.len(), Solution::default);
     codes
         .par_iter_mut()
         .enumerate()
         .try_for_each_init(Workspace::default, |workspace, (image, code)| {
             pursuit.recover_into(training.rows.row(image), workspace, code)
-        })?;
-    Ok(())
+        })
+        .map_err(failed)
 }
 
 /// What the codes leave of every image, X − A D as rows.
@@ -274,19 +245,24 @@ const SMALLEST_SQUARE: f64 = 1e-300;
 
 impl Training {
     /// # Errors
-    /// [`DictionaryError::NoImages`], [`DictionaryError::Shape`], [`DictionaryError::Degenerate`].
-    pub(super) fn new(images: &[Vec<f64>]) -> Result<Self, DictionaryError> {
-        let expected = images.first().ok_or(DictionaryError::NoImages)?.len();
+    /// [`Refusal`], [`Refusal`], [`Refusal`].
+    pub(super) fn new(images: &[Vec<f64>]) -> Result<Self, Refusal> {
+        let expected = images
+            .first()
+            .ok_or(Refusal::new("no training image is left after preprocessing"))?
+            .len();
         let mut values = Vec::with_capacity(images.len() * expected);
         for (index, image) in images.iter().enumerate() {
             let len = image.len();
             if len != expected {
-                return Err(DictionaryError::Shape { index, len, expected });
+                return Err(Refusal::new(format!(
+                    "training image {index} has {len} values, the first has {expected}"
+                )));
             }
             values.extend_from_slice(image);
         }
         if let Some(at) = values.iter().position(|v| !v.is_finite()) {
-            return Err(DictionaryError::Degenerate { index: at / expected });
+            return Err(degenerate(at / expected));
         }
         let scale = power_of_two(&values);
         let mut rows = Matrix::zeros(images.len(), expected);
@@ -296,7 +272,7 @@ impl Training {
                 *scaled = value / scale;
             }
             if dot(row, row) < SMALLEST_SQUARE {
-                return Err(DictionaryError::Degenerate { index });
+                return Err(degenerate(index));
             }
         }
         Ok(Self { rows })
@@ -336,8 +312,8 @@ pub(super) fn set_unit(out: &mut [f64], direction: &[f64]) -> bool {
 /// A count of settings, at least `least`.
 ///
 /// # Errors
-/// [`RangeError`].
-pub(super) fn at_least(field: &'static str, value: usize, least: usize) -> Result<(), RangeError> {
+/// [`Refusal`].
+pub(super) fn at_least(field: &'static str, value: usize, least: usize) -> Result<(), Refusal> {
     within(field, value as f64, least as f64, f64::MAX).map(|_| ())
 }
 
@@ -422,9 +398,16 @@ fn useless(atoms: &Matrix, used: &[usize]) -> Vec<usize> {
     (0..used.len()).filter(|&k| !of_use[k]).collect()
 }
 
+fn degenerate(index: usize) -> Refusal {
+    Refusal::new(format!(
+        "training image {index} is zero, not finite, or less than 1e-150 of the strongest one"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checks::says;
     use rand::{RngExt as _, SeedableRng as _};
     use rayon::ThreadPoolBuilder;
 
@@ -590,7 +573,7 @@ mod tests {
                 .collect()
         }
 
-        fn attempt(&self, settings: [usize; 3], images: &[Vec<f64>], seed: u64) -> Result<Matrix, DictionaryError> {
+        fn attempt(&self, settings: [usize; 3], images: &[Vec<f64>], seed: u64) -> Result<Matrix, Refusal> {
             let [n_components, n_nonzero_coefs, n_iter] = settings;
             let ksvd = Ksvd {
                 n_components,
@@ -673,7 +656,7 @@ mod tests {
                 mixed.extend(scaled(weak));
                 match self.attempt([10, 2, 4], &mixed, 5) {
                     Ok(d) => assert!(d.view().values().iter().all(|v| v.is_finite()), "{weak:e}"),
-                    Err(e) => assert_eq!(e, DictionaryError::Degenerate { index: 60 }, "{weak:e}"),
+                    Err(e) => assert!(e.to_string().contains("training image 60 is zero"), "{weak:e}"),
                 }
             }
         }
@@ -706,27 +689,19 @@ mod tests {
             for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
                 let mut image = vec![1.0; 6];
                 image[5] = bad;
-                assert_eq!(with(image), Err(DictionaryError::Degenerate { index: 3 }), "{bad}");
+                assert!(says(&with(image), "training image 3 is zero"), "{bad}");
             }
-            assert_eq!(
-                with(vec![0.0; 6]),
-                Err(DictionaryError::Degenerate { index: 3 }),
-                "a zero image"
-            );
-            let short = DictionaryError::Shape {
-                index: 3,
-                len: 5,
-                expected: 6,
-            };
-            assert_eq!(with(vec![1.0; 5]), Err(short), "a short image");
-            assert_eq!(self.attempt([4, 1, 2], &[], 7), Err(DictionaryError::NoImages), "");
-            assert_eq!(
-                self.attempt([4, 1, 2], &[vec![], vec![]], 7),
-                Err(DictionaryError::Degenerate { index: 0 }),
-                "images without values"
-            );
-            let none = self.attempt([0, 1, 2], &images, 7);
-            assert!(matches!(none, Err(DictionaryError::Setting(_))), "no atoms: {none:?}");
+            assert!(says(&with(vec![0.0; 6]), "training image 3 is zero"));
+            assert!(says(
+                &with(vec![1.0; 5]),
+                "training image 3 has 5 values, the first has 6"
+            ));
+            assert!(says(&self.attempt([4, 1, 2], &[], 7), "no training image"));
+            assert!(says(
+                &self.attempt([4, 1, 2], &[vec![], vec![]], 7),
+                "training image 0 is zero"
+            ));
+            assert!(says(&self.attempt([0, 1, 2], &images, 7), "is outside"));
         }
     }
 

@@ -15,7 +15,7 @@
 //! let solution = Omp::new(1).recover(&Problem::new(a.view(), &y)?, &mut Workspace::default())?;
 //! assert_eq!(solution.support, [1]);
 //! assert!((solution.coefficients[0] - 3.0).abs() < 1e-12);
-//! # Ok::<(), spts_recon::RecoverError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod amplitude;
@@ -29,6 +29,7 @@ mod matrix;
 pub mod matrix_free;
 pub mod metrics;
 pub mod operator;
+mod posterior;
 mod problem;
 pub mod raster;
 pub mod recover;
@@ -38,9 +39,8 @@ pub mod statistics;
 mod stop;
 
 pub use amplitude::AmplitudeRange;
-pub use checks::RangeError;
-pub use matrix::{Matrix, MatrixView, ShapeError};
+pub use matrix::{Matrix, MatrixView};
 pub use operator::LinearOperator;
-pub use problem::{Problem, Recover, RecoverError, Solution, Workspace};
+pub use problem::{Problem, Recover, Solution, Workspace};
 pub use sign_tables::{SignTables, TableFloat};
 pub use stop::{StopRule, Stopped};

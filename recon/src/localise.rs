@@ -17,12 +17,13 @@
 //! }
 //! let [row, col] = localiser.estimate(&mut evidence).position_px;
 //! assert!((row - 1.0).abs() < 0.5 && (col - 2.0).abs() < 0.5);
-//! # Ok::<(), spts_recon::RangeError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 use crate::amplitude::Moments;
-use crate::checks::{RangeError, measurement, within};
+use crate::checks::{measurement, within};
 use multiversion::multiversion;
+use spts_input::Refusal;
 
 /// Centre of mass of an image, as (row, col) in taxels: Σ vᵢ rᵢ / Σ vᵢ over the positive values above `threshold` ·
 /// max. `None` if there are none. The threshold keeps noise from shifting the centre.
@@ -166,8 +167,8 @@ impl Localiser {
     /// The blobs of `config`.
     ///
     /// # Errors
-    /// [`RangeError`] if a number is out of range, or there is no width (`widths_px` = 0).
-    pub fn new(config: &BlobConfig) -> Result<Self, RangeError> {
+    /// [`Refusal`] if a number is out of range, or there is no width (`widths_px` = 0).
+    pub fn new(config: &BlobConfig) -> Result<Self, Refusal> {
         within("rows", config.rows as f64, 1.0, 1e4)?;
         within("cols", config.cols as f64, 1.0, 1e4)?;
         within("step_px", config.step_px, 0.05, 10.0)?;
@@ -208,8 +209,8 @@ impl Localiser {
     /// column · (rows · cols + centres a row · cols)).
     ///
     /// # Errors
-    /// [`RangeError`] if `weights` has another length, or a value that is not finite or beyond ±1e12.
-    pub fn project(&self, weights: &[f64], projected: &mut Vec<f64>) -> Result<(), RangeError> {
+    /// [`Refusal`] if `weights` has another length, or a value that is not finite or beyond ±1e12.
+    pub fn project(&self, weights: &[f64], projected: &mut Vec<f64>) -> Result<(), Refusal> {
         let taxels = (self.rows * self.cols) as f64;
         within("number of weights", weights.len() as f64, taxels, taxels)?;
         if let Some(&bad) = weights.iter().find(|w| w.is_nan() || w.abs() > 1e12) {
@@ -339,9 +340,9 @@ impl BlobEvidence {
     /// the sensing matrix: one number for each blob.
     ///
     /// # Errors
-    /// [`RangeError`] if `y` is not finite or beyond ±1e80, or `projected` belongs to other blobs. The evidence is then
+    /// [`Refusal`] if `y` is not finite or beyond ±1e80, or `projected` belongs to other blobs. The evidence is then
     /// unchanged.
-    pub fn observe(&mut self, projected: &[f64], y: f64) -> Result<(), RangeError> {
+    pub fn observe(&mut self, projected: &[f64], y: f64) -> Result<(), Refusal> {
         let expected = self.yt.len() as f64;
         within("number of projections", projected.len() as f64, expected, expected)?;
         let y = measurement(y)?;

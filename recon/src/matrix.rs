@@ -1,6 +1,7 @@
 //! Dense row-major matrices. A window of consecutive measurements is a slice of rows.
 
 use nalgebra::DMatrix;
+use spts_input::Refusal;
 
 /// Dense matrix, row-major.
 ///
@@ -10,7 +11,7 @@ use nalgebra::DMatrix;
 /// let a = Matrix::from_rows(2, 3, vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0])?;
 /// assert_eq!((a.row(1), a.column(2)), (&[4.0, 5.0, 6.0][..], vec![3.0, 6.0]));
 /// assert_eq!(Matrix::from_columns(2, 3, &[1.0, 4.0, 2.0, 5.0, 3.0, 6.0])?, a);
-/// # Ok::<(), spts_recon::ShapeError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrix {
@@ -27,18 +28,6 @@ pub struct MatrixView<'a> {
     values: &'a [f64],
 }
 
-/// The number of values differs from that of the shape.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("a {nrows} × {ncols} matrix needs {} values, got {len}", nrows * ncols)]
-pub struct ShapeError {
-    /// Number of rows.
-    pub nrows: usize,
-    /// Number of columns.
-    pub ncols: usize,
-    /// Number of values given.
-    pub len: usize,
-}
-
 impl Matrix {
     /// Matrix of zeros.
     #[must_use]
@@ -53,27 +42,23 @@ impl Matrix {
     /// A matrix with row-major `values`.
     ///
     /// # Errors
-    /// [`ShapeError`] if `values` does not hold `nrows · ncols` numbers.
-    pub fn from_rows(nrows: usize, ncols: usize, values: Vec<f64>) -> Result<Self, ShapeError> {
+    /// [`Refusal`] if `values` does not hold `nrows · ncols` numbers.
+    pub fn from_rows(nrows: usize, ncols: usize, values: Vec<f64>) -> Result<Self, Refusal> {
         let len = values.len();
         if nrows.checked_mul(ncols) == Some(len) {
             Ok(Self { nrows, ncols, values })
         } else {
-            Err(ShapeError { nrows, ncols, len })
+            Err(matrix_shape(nrows, ncols, len))
         }
     }
 
     /// A matrix with column-major `values`, the layout of MATLAB files.
     ///
     /// # Errors
-    /// [`ShapeError`] if `values` does not hold `nrows · ncols` numbers.
-    pub fn from_columns(nrows: usize, ncols: usize, values: &[f64]) -> Result<Self, ShapeError> {
+    /// [`Refusal`] if `values` does not hold `nrows · ncols` numbers.
+    pub fn from_columns(nrows: usize, ncols: usize, values: &[f64]) -> Result<Self, Refusal> {
         if nrows.checked_mul(ncols) != Some(values.len()) {
-            return Err(ShapeError {
-                nrows,
-                ncols,
-                len: values.len(),
-            });
+            return Err(matrix_shape(nrows, ncols, values.len()));
         }
         let mut out = Self::zeros(nrows, ncols);
         for (c, column) in values.chunks_exact(nrows.max(1)).enumerate() {
@@ -190,16 +175,12 @@ impl<'a> MatrixView<'a> {
     /// View of row-major `values`.
     ///
     /// # Errors
-    /// [`ShapeError`] if `values` does not hold `nrows · ncols` numbers.
-    pub fn new(nrows: usize, ncols: usize, values: &'a [f64]) -> Result<Self, ShapeError> {
+    /// [`Refusal`] if `values` does not hold `nrows · ncols` numbers.
+    pub fn new(nrows: usize, ncols: usize, values: &'a [f64]) -> Result<Self, Refusal> {
         if nrows.checked_mul(ncols) == Some(values.len()) {
             Ok(Self { nrows, ncols, values })
         } else {
-            Err(ShapeError {
-                nrows,
-                ncols,
-                len: values.len(),
-            })
+            Err(matrix_shape(nrows, ncols, values.len()))
         }
     }
 
@@ -262,7 +243,7 @@ impl<'a> MatrixView<'a> {
 /// let everywhere = shifted(&Matrix::from_columns(9, 1, &image)?, 3, 1);
 /// assert_eq!(everywhere.ncols(), 9);
 /// assert!(everywhere.column_sums().iter().all(|sum| *sum == 5.0));
-/// # Ok::<(), spts_recon::ShapeError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[must_use]
 pub fn shifted(dictionary: &Matrix, cols: usize, reach: usize) -> Matrix {
@@ -288,6 +269,14 @@ pub fn shifted(dictionary: &Matrix, cols: usize, reach: usize) -> Matrix {
     }
     let slices: Vec<&[f64]> = atoms.iter().map(Vec::as_slice).collect();
     Matrix::from_column_slices(dictionary.nrows(), &slices)
+}
+
+/// Another number of values than the shape needs.
+pub(crate) fn matrix_shape(nrows: usize, ncols: usize, len: usize) -> Refusal {
+    Refusal::new(format!(
+        "a {nrows} × {ncols} matrix needs {} values, got {len}",
+        nrows * ncols
+    ))
 }
 
 #[cfg(test)]

@@ -1,7 +1,9 @@
 //! The recovery problem, its scaling, the trait of its solvers, and the memory that they share.
 
+use crate::checks::{empty, not_finite, overflow, shape_mismatch};
 use crate::kernels;
 use crate::matrix::MatrixView;
+use spts_input::Refusal;
 use std::any::{Any, TypeId};
 use std::fmt;
 
@@ -16,23 +18,17 @@ impl<'a> Problem<'a> {
     /// A problem with the operator `matrix` (M × K) and the measurements `y` (length M).
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] if the lengths differ, [`RecoverError::Empty`] if there is no measurement or no
-    /// atom, [`RecoverError::NotFinite`] if `y` holds a NaN or an infinity.
-    pub fn new(matrix: MatrixView<'a>, y: &'a [f64]) -> Result<Self, RecoverError> {
+    /// [`Refusal`] if the lengths differ, [`Refusal`] if there is no measurement or no
+    /// atom, [`Refusal`] if `y` holds a NaN or an infinity.
+    pub fn new(matrix: MatrixView<'a>, y: &'a [f64]) -> Result<Self, Refusal> {
         if matrix.nrows() != y.len() {
-            return Err(RecoverError::ShapeMismatch {
-                rows: matrix.nrows(),
-                len: y.len(),
-            });
+            return Err(shape_mismatch(matrix.nrows(), y.len()));
         }
         if y.is_empty() || matrix.ncols() == 0 {
-            return Err(RecoverError::Empty {
-                rows: matrix.nrows(),
-                cols: matrix.ncols(),
-            });
+            return Err(empty(matrix.nrows(), matrix.ncols()));
         }
         if let Some((index, &value)) = y.iter().enumerate().find(|(_, v)| !v.is_finite()) {
-            return Err(RecoverError::NotFinite { index, value });
+            return Err(not_finite(index, value));
         }
         Ok(Self { matrix, y })
     }
@@ -74,15 +70,15 @@ impl Solution {
     /// Makes this the entries of `x` that are not zero, in the order of their indices, times `scale`.
     ///
     /// # Errors
-    /// [`RecoverError::Overflow`] when an entry is beyond the range of numbers.
-    pub(crate) fn set_dense(&mut self, x: &[f64], scale: f64, residual_norm: f64) -> Result<(), RecoverError> {
+    /// [`Refusal`] when an entry is beyond the range of numbers.
+    pub(crate) fn set_dense(&mut self, x: &[f64], scale: f64, residual_norm: f64) -> Result<(), Refusal> {
         self.support.clear();
         self.coefficients.clear();
         self.residual_norm = residual_norm.min(f64::MAX);
         for (atom, &value) in x.iter().enumerate().filter(|(_, v)| **v != 0.0) {
             let coefficient = value * scale;
             if !coefficient.is_finite() {
-                return Err(RecoverError::Overflow { atom });
+                return Err(overflow(atom));
             }
             self.support.push(atom);
             self.coefficients.push(coefficient);
@@ -121,92 +117,17 @@ impl Solution {
     }
 }
 
-/// Why a problem has no solution.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RecoverError {
-    /// The sizes of operator and measurements differ.
-    #[error("operator has {rows} rows but `y` has {len} entries")]
-    ShapeMismatch {
-        /// Rows of the operator.
-        rows: usize,
-        /// Length of `y`.
-        len: usize,
-    },
-    /// There is no measurement, or no atom.
-    #[error("operator has shape {rows} × {cols}; both must be at least 1")]
-    Empty {
-        /// Rows of the operator.
-        rows: usize,
-        /// Columns of the operator.
-        cols: usize,
-    },
-    /// An entry of the operator is NaN or infinite.
-    #[error("operator[{row}, {col}] = {value} is not finite")]
-    OperatorNotFinite {
-        /// Row of the entry.
-        row: usize,
-        /// Column of the entry.
-        col: usize,
-        /// The value.
-        value: f64,
-    },
-    /// The method was built for another number of unknowns.
-    #[error("operator has {cols} columns; the method was built for {expected}")]
-    Columns {
-        /// Columns of the operator.
-        cols: usize,
-        /// Number of unknowns of the prior or the grid.
-        expected: usize,
-    },
-    /// The normal equations cannot be solved.
-    #[error("the matrix of the normal equations is not positive definite at pivot {pivot}")]
-    NotPositiveDefinite {
-        /// First pivot that is not above zero.
-        pivot: usize,
-    },
-    /// The iteration ended before it reached the tolerance.
-    #[error("no convergence in {iterations} iterations (relative error {error:.3e}, tolerance {tol:.3e})")]
-    NotConverged {
-        /// Number of iterations.
-        iterations: usize,
-        /// Relative error reached, as the method defines it.
-        error: f64,
-        /// Required relative error.
-        tol: f64,
-    },
-    /// A measurement is NaN or infinite.
-    #[error("`y[{index}]` = {value} is not finite")]
-    NotFinite {
-        /// Index of the measurement.
-        index: usize,
-        /// The value.
-        value: f64,
-    },
-    /// A measurement minus the prior mean's prediction exceeds the range of numbers.
-    #[error("`y[{index}]` minus the prior mean's prediction exceeds the range of 64-bit numbers")]
-    InnovationOverflow {
-        /// Index of the measurement.
-        index: usize,
-    },
-    /// A coefficient exceeds the range of numbers, as with measurements of 1e300 and an operator of 1e-300.
-    #[error("the coefficient of atom {atom} exceeds the range of 64-bit numbers")]
-    Overflow {
-        /// Column of the operator.
-        atom: usize,
-    },
-}
-
 /// A sparse-recovery algorithm.
 ///
 /// ```
-/// use spts_recon::{Matrix, Problem, Recover, RecoverError, Solution, Workspace};
+/// use spts_input::Refusal;
+/// use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
 ///
 /// /// The atom (of length 1) that correlates most with the measurements.
 /// struct Single;
 ///
 /// impl Recover for Single {
-///     fn recover_into(&self, p: &Problem<'_>, _: &mut Workspace, best: &mut Solution) -> Result<(), RecoverError> {
+///     fn recover_into(&self, p: &Problem<'_>, _: &mut Workspace, best: &mut Solution) -> Result<(), Refusal> {
 ///         *best = Solution::default();
 ///         let mut atom = vec![0.0; p.y().len()];
 ///         for k in 0..p.matrix().ncols() {
@@ -222,26 +143,26 @@ pub enum RecoverError {
 /// let a = Matrix::from_rows(2, 2, vec![1.0, 0.0, 0.0, 1.0]).unwrap();
 /// let solution = Single.recover(&Problem::new(a.view(), &[0.2, 3.0])?, &mut Workspace::default())?;
 /// assert_eq!(solution.support, [1]);
-/// # Ok::<(), RecoverError>(())
+/// # Ok::<(), Refusal>(())
 /// ```
 pub trait Recover: Send + Sync {
     /// Solves `problem` into `solution`, whose memory is reused. After an error the content of `solution` has no
     /// meaning.
     ///
     /// # Errors
-    /// [`RecoverError`] if the problem cannot be solved. A valid [`Problem`] never causes a panic.
+    /// [`Refusal`] if the problem cannot be solved. A valid [`Problem`] never causes a panic.
     fn recover_into(
         &self,
         problem: &Problem<'_>,
         workspace: &mut Workspace,
         solution: &mut Solution,
-    ) -> Result<(), RecoverError>;
+    ) -> Result<(), Refusal>;
 
     /// Solves `problem`.
     ///
     /// # Errors
     /// As [`Self::recover_into`].
-    fn recover(&self, problem: &Problem<'_>, workspace: &mut Workspace) -> Result<Solution, RecoverError> {
+    fn recover(&self, problem: &Problem<'_>, workspace: &mut Workspace) -> Result<Solution, Refusal> {
         let mut solution = Solution::default();
         self.recover_into(problem, workspace, &mut solution)?;
         Ok(solution)
@@ -282,8 +203,8 @@ impl Scaling {
     /// Scales `problem` if it has to be.
     ///
     /// # Errors
-    /// [`RecoverError::OperatorNotFinite`].
-    pub(crate) fn apply<'a>(&'a mut self, problem: &Problem<'a>) -> Result<Scaled<'a>, RecoverError> {
+    /// [`Refusal`].
+    pub(crate) fn apply<'a>(&'a mut self, problem: &Problem<'a>) -> Result<Scaled<'a>, Refusal> {
         let (a, y) = (problem.matrix(), problem.y());
         self.ones.resize(a.nrows(), 1.0);
         self.squares.resize(a.ncols(), 0.0);
@@ -317,20 +238,20 @@ impl Scaling {
     /// Measurements alone, divided by the power of two that is returned if they have to be.
     ///
     /// # Errors
-    /// [`RecoverError::NotFinite`].
-    pub(crate) fn measurements<'a>(&'a mut self, y: &'a [f64]) -> Result<(&'a [f64], f64), RecoverError> {
+    /// [`Refusal`].
+    pub(crate) fn measurements<'a>(&'a mut self, y: &'a [f64]) -> Result<(&'a [f64], f64), Refusal> {
         scale_measurements(y, &mut self.y)
     }
 }
 
-fn scale_measurements<'a>(y: &'a [f64], copy: &'a mut Vec<f64>) -> Result<(&'a [f64], f64), RecoverError> {
+fn scale_measurements<'a>(y: &'a [f64], copy: &'a mut Vec<f64>) -> Result<(&'a [f64], f64), Refusal> {
     if ORDINARY.contains(&kernels::dot(y, y)) {
         return Ok((y, 1.0));
     }
     let scale = power_of_two(y);
     if !scale.is_finite() {
         let index = first_not_finite(y);
-        return Err(RecoverError::NotFinite { index, value: y[index] });
+        return Err(not_finite(index, y[index]));
     }
     divide_into(y, scale, copy);
     Ok((copy, scale))
@@ -351,8 +272,8 @@ impl Scaled<'_> {
     /// Takes the scaling back out of a solution.
     ///
     /// # Errors
-    /// [`RecoverError::Overflow`] when a coefficient is beyond the range of numbers.
-    pub(crate) fn unscale(&self, solution: &mut Solution) -> Result<(), RecoverError> {
+    /// [`Refusal`] when a coefficient is beyond the range of numbers.
+    pub(crate) fn unscale(&self, solution: &mut Solution) -> Result<(), Refusal> {
         unscale(solution, self.y_scale, self.matrix_scale)
     }
 }
@@ -360,9 +281,9 @@ impl Scaled<'_> {
 /// Takes powers of two back out of a solution.
 ///
 /// # Errors
-/// [`RecoverError::Overflow`] when a coefficient is beyond the range of numbers.
+/// [`Refusal`] when a coefficient is beyond the range of numbers.
 #[expect(clippy::float_cmp, reason = "1 is what an unscaled problem has, to the bit")]
-pub(crate) fn unscale(solution: &mut Solution, y_scale: f64, matrix_scale: f64) -> Result<(), RecoverError> {
+pub(crate) fn unscale(solution: &mut Solution, y_scale: f64, matrix_scale: f64) -> Result<(), Refusal> {
     if y_scale == 1.0 && matrix_scale == 1.0 {
         return Ok(());
     }
@@ -376,7 +297,7 @@ pub(crate) fn unscale(solution: &mut Solution, y_scale: f64, matrix_scale: f64) 
             *coefficient * y_scale / matrix_scale
         };
         if !coefficient.is_finite() {
-            return Err(RecoverError::Overflow { atom });
+            return Err(overflow(atom));
         }
     }
     Ok(())
@@ -404,18 +325,19 @@ pub(crate) fn power_of_two(values: &[f64]) -> f64 {
 /// [`power_of_two`] of the operator's entries.
 ///
 /// # Errors
-/// [`RecoverError::OperatorNotFinite`] for a NaN or an infinity.
-pub(super) fn operator_scale(a: MatrixView<'_>) -> Result<f64, RecoverError> {
+/// [`Refusal`] for a NaN or an infinity.
+pub(super) fn operator_scale(a: MatrixView<'_>) -> Result<f64, Refusal> {
     let scale = power_of_two(a.values());
     if scale.is_finite() {
         return Ok(scale);
     }
     let index = first_not_finite(a.values());
-    Err(RecoverError::OperatorNotFinite {
-        row: index / a.ncols(),
-        col: index % a.ncols(),
-        value: a.values()[index],
-    })
+    Err(Refusal::new(format!(
+        "operator[{row}, {col}] = {value} is not finite",
+        row = index / a.ncols(),
+        col = index % a.ncols(),
+        value = a.values()[index]
+    )))
 }
 
 /// Writes `values` over `scale`, a power of two.
@@ -480,6 +402,7 @@ impl fmt::Debug for Workspace {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checks::says;
 
     #[test]
     fn scaling_brings_squares_into_range_and_back() {
@@ -511,10 +434,7 @@ mod tests {
             let a = [1.0, 0.0, 0.0, bad];
             let problem = Problem::new(MatrixView::new(2, 2, &a).unwrap(), &[1.0, 1.0]).unwrap();
             let error = Scaling::default().apply(&problem).map(|_| ());
-            assert!(
-                matches!(error, Err(RecoverError::OperatorNotFinite { row: 1, col: 1, .. })),
-                "{error:?}"
-            );
+            assert!(says(&error, "operator[1, 1]"), "{error:?}");
         }
     }
 
@@ -531,10 +451,7 @@ mod tests {
         }
         let a = [1.0, 2.0, f64::NAN, 4.0, f64::INFINITY, 6.0];
         let error = operator_scale(MatrixView::new(3, 2, &a).unwrap()).unwrap_err();
-        assert!(
-            matches!(error, RecoverError::OperatorNotFinite { row: 1, col: 0, .. }),
-            "{error}"
-        );
+        assert!(error.to_string().contains("operator[1, 0]"), "{error}");
     }
 
     #[test]

@@ -3,11 +3,14 @@
 use crate::matrix::MatrixView;
 use multiversion::multiversion;
 
-/// Precision of the tables: `f64`, or `f32` with half the memory traffic.
-pub trait TableFloat: Copy + Send + Sync + Gather {}
+/// Precision of the tables, with its own compiled loop: `f64`, or `f32` with half the memory traffic.
+pub trait TableFloat: Copy + Default + Into<f64> + std::ops::AddAssign + Send + Sync {
+    /// The nearest number of this precision.
+    fn nearest(value: f64) -> Self;
 
-impl TableFloat for f32 {}
-impl TableFloat for f64 {}
+    /// Rows of Φ·D from tables: `words` words of `signs` and `ncols` numbers of `out` each, `groups` look-ups a row.
+    fn gather(values: &[Self], signs: &[u64], words: usize, groups: usize, ncols: usize, out: &mut [f64]);
+}
 
 /// Tables of Σₖ ±D\[k\] over groups of 8 rows of a dictionary D (N × K). A row of Φ·D is then the sum of ⌈N/8⌉ table
 /// rows: N/8 additions for each atom instead of N multiplications and additions.
@@ -25,7 +28,7 @@ impl TableFloat for f64 {}
 /// let mut row = [0.0];
 /// tables.fill_rows(&[0b101], &mut row); // the signs +, −, +
 /// assert_eq!(row, [1.0 - 2.0 + 4.0]);
-/// # Ok::<(), spts_recon::ShapeError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct SignTables<T> {
@@ -101,14 +104,14 @@ fn fill_group(dictionary: MatrixView<'_>, first: usize, sums: &mut [f64]) {
 }
 
 /// Weights of one look-up: the bits of a byte.
-pub(crate) const GROUP: usize = 8;
+const GROUP: usize = 8;
 
 /// Table rows of one group of weights.
-pub(crate) const ENTRIES: usize = 1 << GROUP;
+const ENTRIES: usize = 1 << GROUP;
 
 /// Sums `B` columns from `c` of the table rows that the bytes of `signs` choose.
 #[inline(always)]
-fn block<T: Gather, const B: usize>(values: &[T], signs: &[u64], groups: usize, ncols: usize, c: usize) -> [T; B] {
+fn block<T: TableFloat, const B: usize>(values: &[T], signs: &[u64], groups: usize, ncols: usize, c: usize) -> [T; B] {
     let mut sums = [T::default(); B];
     for (group, table) in values.chunks_exact(ENTRIES * ncols).take(groups).enumerate() {
         let byte = (signs[group / 8] >> (8 * (group % 8))) & 0xff;
@@ -124,7 +127,7 @@ fn block<T: Gather, const B: usize>(values: &[T], signs: &[u64], groups: usize, 
 
 /// Rows of Φ·D: `words` words of `signs` and `ncols` numbers of `out` each.
 #[inline(always)]
-fn gather_of<T: Gather>(values: &[T], signs: &[u64], words: usize, groups: usize, ncols: usize, out: &mut [f64]) {
+fn gather_of<T: TableFloat>(values: &[T], signs: &[u64], words: usize, groups: usize, ncols: usize, out: &mut [f64]) {
     for (signs, out) in signs.chunks_exact(words).zip(out.chunks_exact_mut(ncols)) {
         let mut c = 0;
         let (wide, rest) = out.as_chunks_mut::<64>();
@@ -149,15 +152,6 @@ fn gather_of<T: Gather>(values: &[T], signs: &[u64], words: usize, groups: usize
     }
 }
 
-/// Precision of the tables, with its own compiled loop.
-pub trait Gather: Copy + Default + Into<f64> + std::ops::AddAssign {
-    /// The nearest number of this precision.
-    fn nearest(value: f64) -> Self;
-
-    /// Rows of Φ·D from tables: `words` words of `signs` and `ncols` numbers of `out` each, `groups` look-ups a row.
-    fn gather(values: &[Self], signs: &[u64], words: usize, groups: usize, ncols: usize, out: &mut [f64]);
-}
-
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 fn gather_f32(values: &[f32], signs: &[u64], words: usize, groups: usize, ncols: usize, out: &mut [f64]) {
     gather_of(values, signs, words, groups, ncols, out);
@@ -168,7 +162,7 @@ fn gather_f64(values: &[f64], signs: &[u64], words: usize, groups: usize, ncols:
     gather_of(values, signs, words, groups, ncols, out);
 }
 
-impl Gather for f32 {
+impl TableFloat for f32 {
     #[expect(clippy::cast_possible_truncation, reason = "rounding is what is asked for")]
     fn nearest(value: f64) -> Self {
         value as Self
@@ -179,7 +173,7 @@ impl Gather for f32 {
     }
 }
 
-impl Gather for f64 {
+impl TableFloat for f64 {
     fn nearest(value: f64) -> Self {
         value
     }

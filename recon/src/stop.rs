@@ -1,6 +1,6 @@
 //! Decides when enough has been measured.
 
-use crate::recover::ParameterError;
+use spts_input::Refusal;
 
 /// Stops a series of measurements at a wanted confidence: after at least one sample, and at most [`StopRule::most`].
 ///
@@ -17,7 +17,7 @@ use crate::recover::ParameterError;
 /// assert_eq!(rule.after(1, 0.90), None);
 /// assert_eq!(rule.after(2, 0.97), Some(Stopped { measurements: 2, reached: true }));
 /// assert_eq!(rule.after(3, 0.90), Some(Stopped { measurements: 3, reached: false }));
-/// # Ok::<(), spts_recon::recover::ParameterError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopRule {
@@ -39,21 +39,13 @@ impl StopRule {
     /// least 1.
     ///
     /// # Errors
-    /// [`ParameterError`] if one of them is outside its range.
-    pub fn new(confidence: f64, most: usize) -> Result<Self, ParameterError> {
+    /// [`Refusal`] if one of them is outside its range.
+    pub fn new(confidence: f64, most: usize) -> Result<Self, Refusal> {
         if !(confidence > 0.5 && confidence < 1.0) {
-            return Err(ParameterError {
-                field: "confidence",
-                value: confidence,
-                range: "(0.5, 1)",
-            });
+            return Err(Refusal::range("confidence", confidence, "(0.5, 1)"));
         }
         if most == 0 {
-            return Err(ParameterError {
-                field: "most",
-                value: 0.0,
-                range: "[1, ∞)",
-            });
+            return Err(Refusal::range("most", 0.0, "[1, ∞)"));
         }
         Ok(Self { confidence, most })
     }
@@ -88,9 +80,9 @@ mod tests {
     fn rules_outside_their_range_are_refused() {
         for confidence in [0.5, 1.0, -1.0, 0.0, 1e100, f64::NAN, f64::INFINITY] {
             let refused = StopRule::new(confidence, 10).unwrap_err();
-            assert_eq!((refused.field, refused.range), ("confidence", "(0.5, 1)"));
+            assert!(refused.to_string().ends_with("is outside (0.5, 1)"), "{refused}");
         }
-        assert_eq!(StopRule::new(0.9, 0).unwrap_err().field, "most");
+        assert!(StopRule::new(0.9, 0).unwrap_err().to_string().contains("`most` = 0"));
     }
 
     #[test]

@@ -3,8 +3,7 @@
 use crate::algorithm::{DecodeError, ExternalError};
 use crate::decoders::DECODERS;
 use crate::training::LearnError;
-use spts_recon::RangeError;
-use spts_recon::recover::ParameterError;
+use spts_input::Refusal;
 
 /// Why there are no scores.
 #[derive(Debug, thiserror::Error)]
@@ -39,9 +38,6 @@ pub enum ScoreError {
         /// The decoder.
         decoder: String,
     },
-    /// A wanted confidence is outside its range.
-    #[error(transparent)]
-    Confidence(#[from] ParameterError),
     /// An object without a compressive session.
     #[error("object {name:?} has no compressive session; valid: {valid}")]
     Object {
@@ -67,16 +63,16 @@ pub enum ScoreError {
     Learn(#[from] LearnError),
     /// No rows can be chosen.
     #[error("rows: {0}")]
-    Rows(#[from] spts_recon::rows::RowError),
+    Rows(#[source] Refusal),
     /// An external program cannot be started.
     #[error(transparent)]
     External(#[from] ExternalError),
     /// An algorithm failed.
     #[error(transparent)]
     Decode(#[from] DecodeError),
-    /// The grid of the localisation is not valid.
+    /// A wanted confidence outside its range, or no valid grid for the localisation.
     #[error(transparent)]
-    Place(#[from] RangeError),
+    Refused(#[from] Refusal),
 }
 
 impl ScoreError {

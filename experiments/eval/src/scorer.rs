@@ -7,9 +7,9 @@ use crate::sensing::RowChooser;
 use crate::session::ScoredSession;
 use crate::tally::Tally;
 use crate::windows::{Press, Window};
+use spts_input::Refusal;
 use spts_recon::Workspace;
 use spts_recon::classify::Src;
-use spts_recon::rows::RowError;
 
 /// A press, and what is scored of it.
 #[derive(Debug)]
@@ -45,8 +45,8 @@ impl<'a> ScoredPress<'a> {
     /// them only when `classes` are scored.
     ///
     /// # Errors
-    /// [`RowError`] when the rows have another number of taxels than what the chooser knows.
-    pub(crate) fn chosen(&self, chooser: &RowChooser, most: usize, classes: bool) -> Result<Self, RowError> {
+    /// [`Refusal`] when the rows have another number of taxels than what the chooser knows.
+    pub(crate) fn chosen(&self, chooser: &RowChooser, most: usize, classes: bool) -> Result<Self, Refusal> {
         let measured = match &self.measured {
             Measured::Recorded(press) => Measured::Chosen(chooser.windows(press, most, classes)?),
             Measured::Chosen(windows) => Measured::Chosen(windows.clone()),

@@ -1,7 +1,8 @@
 //! Gaussian components learned from many images of a class: clusters of similar images.
 
 use crate::checks::within;
-use crate::classify::evidence::{Component, EvidenceError};
+use crate::classify::evidence::Component;
+use crate::classify::evidence::no_contact;
 use crate::classify::templates::principal;
 use crate::kernels::{axpy, dot, norm};
 use crate::matrix::Matrix;
@@ -10,6 +11,7 @@ use nalgebra::DMatrix;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use spts_input::Refusal;
 
 /// Builds a mixture of Gaussians from many images, such as those of an object in all poses, or of many possible shapes.
 ///
@@ -61,12 +63,12 @@ impl ClusterModel {
     /// are ignored. The result depends only on `rng` and the images.
     ///
     /// # Errors
-    /// [`EvidenceError`] if a parameter is out of range, or no image is left.
-    pub fn learn(&self, images: &Matrix, label: usize, rng: &mut ChaCha8Rng) -> Result<Clusters, EvidenceError> {
+    /// [`Refusal`] if a parameter is out of range, or no image is left.
+    pub fn learn(&self, images: &Matrix, label: usize, rng: &mut ChaCha8Rng) -> Result<Clusters, Refusal> {
         self.check()?;
         let units = unit_images(images);
         if units.is_empty() {
-            return Err(EvidenceError::NoContact { index: 0 });
+            return Err(no_contact(0));
         }
         let centres = seeds(&units, self.clusters.min(units.len()), rng);
         let members = members(&units, centres);
@@ -74,12 +76,12 @@ impl ClusterModel {
             .par_iter()
             .filter(|own| !own.is_empty())
             .map(|own| self.component(&units, own, label))
-            .collect::<Result<_, EvidenceError>>()?;
+            .collect::<Result<_, Refusal>>()?;
         let (components, priors) = parts.into_iter().unzip();
         Ok(Clusters { components, priors })
     }
 
-    fn check(&self) -> Result<(), EvidenceError> {
+    fn check(&self) -> Result<(), Refusal> {
         within("clusters", self.clusters as f64, 1.0, 10_000.0)?;
         within("gain", self.gain, 0.0, 10.0)?;
         within("floor", self.floor, 1e-6, 10.0)?;
@@ -87,12 +89,7 @@ impl ClusterModel {
         Ok(())
     }
 
-    fn component(
-        &self,
-        units: &[Vec<f64>],
-        own: &[usize],
-        label: usize,
-    ) -> Result<(Component, Gaussian), EvidenceError> {
+    fn component(&self, units: &[Vec<f64>], own: &[usize], label: usize) -> Result<(Component, Gaussian), Refusal> {
         let (n, count) = (units[0].len(), own.len() as f64);
         let mean = mean(units, own);
         let centred = DMatrix::from_fn(n, own.len(), |i, k| units[own[k]][i] - mean[i]);
@@ -118,11 +115,11 @@ impl ClusterModel {
 ///
 /// # Errors
 /// As [`ClusterModel::learn`].
-pub(super) fn wide(model: &ClusterModel, images: &Matrix, label: usize) -> Result<Clusters, EvidenceError> {
+pub(super) fn wide(model: &ClusterModel, images: &Matrix, label: usize) -> Result<Clusters, Refusal> {
     model.check()?;
     let units = unit_images(images);
     if units.is_empty() {
-        return Err(EvidenceError::NoContact { index: 0 });
+        return Err(no_contact(0));
     }
     let all: Vec<usize> = (0..units.len()).collect();
     let (mut component, prior) = model.component(&units, &all, label)?;
@@ -144,13 +141,8 @@ impl Clusters {
     /// (0, 1), is the weight of that component.
     ///
     /// # Errors
-    /// As [`ClusterModel::learn`]; [`EvidenceError::Range`] for a weight out of range.
-    pub fn with_wide(
-        model: &ClusterModel,
-        images: &Matrix,
-        apart: f64,
-        rng: &mut ChaCha8Rng,
-    ) -> Result<Self, EvidenceError> {
+    /// As [`ClusterModel::learn`]; [`Refusal`] for a weight out of range.
+    pub fn with_wide(model: &ClusterModel, images: &Matrix, apart: f64, rng: &mut ChaCha8Rng) -> Result<Self, Refusal> {
         within("apart", apart, 1e-9, 1.0 - 1e-9)?;
         let mut all = model.learn(images, 0, rng)?;
         for component in &mut all.components {
@@ -248,6 +240,7 @@ fn mean(units: &[Vec<f64>], own: &[usize]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checks::says;
     use rand::SeedableRng as _;
 
     const MODEL: ClusterModel = ClusterModel {
@@ -304,12 +297,12 @@ mod tests {
     #[test]
     fn images_without_a_contact_are_refused() {
         let refused = MODEL.learn(&Matrix::zeros(3, 2), 0, &mut ChaCha8Rng::seed_from_u64(1));
-        assert_eq!(refused.unwrap_err(), EvidenceError::NoContact { index: 0 });
+        assert!(refused.unwrap_err().to_string().contains("image 0 has no value"));
         let refused = ClusterModel {
             gain: f64::NAN,
             ..MODEL
         }
         .learn(&Matrix::zeros(3, 2), 0, &mut ChaCha8Rng::seed_from_u64(1));
-        assert!(matches!(refused, Err(EvidenceError::Range(_))));
+        assert!(says(&refused, "is outside"));
     }
 }

@@ -6,11 +6,12 @@
 //! [`Evidence`] the result of the samples so far. [`ImageEstimator`] computes the image that belongs to a decision.
 
 use crate::amplitude::{AmplitudeRange, Marginals};
-use crate::checks::{RangeError, within};
+use crate::checks::within;
 use crate::classify::filter::{Evidence, LANES, Preparation, Shape};
 use crate::matrix::{Matrix, MatrixView};
-use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
-use crate::recover::{Gaussian, Lmmse, NnLmmse, Noise, ParameterError, PriorError};
+use crate::problem::{Problem, Recover as _, Solution, Workspace};
+use crate::recover::{Gaussian, Lmmse, NnLmmse, Noise};
+use spts_input::Refusal;
 use std::sync::Arc;
 
 /// Images u ~ N(`mean`, F Fᵀ), observed through y/s = Φ u + e, e ~ N(0, `noise_variance`·I).
@@ -35,57 +36,14 @@ pub struct Component {
 /// Images are given in units of the amplitude; what is beyond this is surely not.
 const LARGEST: f64 = 1e6;
 
-/// Why evidence cannot be computed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum EvidenceError {
-    /// There is no component, or components have no taxels.
-    #[error("there is no component, or none with a taxel")]
-    Empty,
-    /// An argument has the wrong length.
-    #[error("{what} has {len} values, expected {expected}")]
-    Shape {
-        /// Which argument.
-        what: &'static str,
-        /// Its length.
-        len: usize,
-        /// Expected length.
-        expected: usize,
-    },
-    /// A parameter or a measurement is out of range.
-    #[error(transparent)]
-    Range(#[from] RangeError),
-    /// Images from which no Gaussian prior can be made.
-    #[error(transparent)]
-    Prior(#[from] PriorError),
-    /// A template image has no value above zero.
-    #[error("image {index} has no value above zero")]
-    NoContact {
-        /// Number of the image, from 0.
-        index: usize,
-    },
-    /// A sample arrived before its row was prepared.
-    #[error("measurement {index} arrived, but only {prepared} rows are prepared")]
-    NotPrepared {
-        /// Index of the measurement.
-        index: usize,
-        /// Number of prepared rows.
-        prepared: usize,
-    },
-}
-
 impl Component {
     /// Checks lengths against `taxels` and every number against its range.
-    pub(super) fn check(&self, taxels: usize) -> Result<(), EvidenceError> {
+    pub(super) fn check(&self, taxels: usize) -> Result<(), Refusal> {
         within("weight", self.weight, 1e-12, 1e12)?;
         within("noise_variance", self.noise_variance, 1e-12, 1e12)?;
         for (what, values) in std::iter::once(("mean", &self.mean)).chain(self.factors.iter().map(|f| ("factor", f))) {
             if values.len() != taxels {
-                return Err(EvidenceError::Shape {
-                    what,
-                    len: values.len(),
-                    expected: taxels,
-                });
+                return Err(other_length(what, values.len(), taxels));
             }
             for &v in values {
                 within(what, v, -LARGEST, LARGEST)?;
@@ -167,12 +125,12 @@ impl EvidenceClassifier {
     /// equally.
     ///
     /// # Errors
-    /// [`EvidenceError`] if there is no component, their sizes differ, or a number is out of range.
-    pub fn new(components: &[Component], amplitude: AmplitudeRange, unknown_prior: f64) -> Result<Self, EvidenceError> {
+    /// [`Refusal`] if there is no component, their sizes differ, or a number is out of range.
+    pub fn new(components: &[Component], amplitude: AmplitudeRange, unknown_prior: f64) -> Result<Self, Refusal> {
         within("unknown_prior", unknown_prior, 1e-12, 0.999)?;
         let taxels = components.first().map_or(0, |c| c.mean.len());
         if taxels == 0 {
-            return Err(EvidenceError::Empty);
+            return Err(Refusal::new("there is no component, or none with a taxel"));
         }
         for component in components {
             component.check(taxels)?;
@@ -370,8 +328,8 @@ impl ImageEstimator {
     /// measurements whose noise has the standard deviation `noise` at amplitude 1.
     ///
     /// # Errors
-    /// [`ParameterError`] if `noise` is outside (0, ∞).
-    pub fn new(priors: Vec<Gaussian>, noise: f64) -> Result<Self, ParameterError> {
+    /// [`Refusal`] if `noise` is outside (0, ∞).
+    pub fn new(priors: Vec<Gaussian>, noise: f64) -> Result<Self, Refusal> {
         let lmmse = |prior| Lmmse::new(Arc::new(prior), Noise::Absolute(noise));
         Ok(Self {
             components: priors.into_iter().map(lmmse).collect::<Result<_, _>>()?,
@@ -384,7 +342,7 @@ impl ImageEstimator {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn non_negative(priors: Vec<Gaussian>, noise: f64, most: usize) -> Result<Self, ParameterError> {
+    pub fn non_negative(priors: Vec<Gaussian>, noise: f64, most: usize) -> Result<Self, Refusal> {
         let nn_lmmse = |prior| NnLmmse::new(Arc::new(prior), Noise::Absolute(noise));
         Ok(Self {
             components: Vec::new(),
@@ -402,7 +360,7 @@ impl ImageEstimator {
     /// Computes `image` (one value a taxel, in units of `y`) for the window `y` = Φ x with the decision `posterior`.
     ///
     /// # Errors
-    /// [`RecoverError`] if the sizes of Φ, `y` and the taxels do not match, or are zero, or a value is not finite.
+    /// [`Refusal`] if the sizes of Φ, `y` and the taxels do not match, or are zero, or a value is not finite.
     ///
     /// # Panics
     /// If `posterior` belongs to another classifier, or `image` has another length than the priors' means.
@@ -413,7 +371,7 @@ impl ImageEstimator {
         y: &[f64],
         workspace: &mut Workspace,
         image: &mut [f64],
-    ) -> Result<(), RecoverError> {
+    ) -> Result<(), Refusal> {
         assert_eq!(posterior.weights.len(), self.len(), "a prior a component");
         // the components need the rest of the workspace meanwhile
         let mut scratch = std::mem::take(workspace.scratch::<ImageScratch>());
@@ -435,7 +393,7 @@ impl ImageEstimator {
             order,
         }: &mut ImageScratch,
         image: &mut [f64],
-    ) -> Result<(), RecoverError> {
+    ) -> Result<(), Refusal> {
         image.fill(0.0);
         let least = self.least_weight(posterior, order);
         let mut total = 0.0;
@@ -472,4 +430,14 @@ impl ImageEstimator {
         let weight = order.get(most - 1).or(order.last()).copied().unwrap_or(0.0);
         weight.max(SMALLEST_WEIGHT)
     }
+}
+
+/// An argument of the wrong length.
+pub(super) fn other_length(what: &str, len: usize, expected: usize) -> Refusal {
+    Refusal::new(format!("{what} has {len} values, expected {expected}"))
+}
+
+/// An image without a value above zero.
+pub(super) fn no_contact(index: usize) -> Refusal {
+    Refusal::new(format!("image {index} has no value above zero"))
 }

@@ -8,9 +8,10 @@
 
 use crate::amplitude::{AmplitudeRange, Marginals};
 use crate::checks::{measurement, within};
-use crate::classify::evidence::EvidenceError;
+use crate::classify::evidence::other_length;
 use crate::kernels::ln;
 use multiversion::multiversion;
+use spts_input::Refusal;
 
 /// Sizes shared by everything that belongs to one classifier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,15 +104,11 @@ impl Preparation {
     /// φᵀ·[bank](super::EvidenceClassifier::bank): one number for each column of the bank.
     ///
     /// # Errors
-    /// [`EvidenceError`] if the length differs from the bank's number of columns, or a value is not finite or beyond
+    /// [`Refusal`] if the length differs from the bank's number of columns, or a value is not finite or beyond
     /// ±1e12.
-    pub fn push(&mut self, row: &[f64]) -> Result<(), EvidenceError> {
+    pub fn push(&mut self, row: &[f64]) -> Result<(), Refusal> {
         if row.len() != self.shape.row() {
-            return Err(EvidenceError::Shape {
-                what: "row",
-                len: row.len(),
-                expected: self.shape.row(),
-            });
+            return Err(other_length("row", row.len(), self.shape.row()));
         }
         // without a branch a value, which would keep the check from running in SIMD lanes
         if !row.iter().fold(true, |fine, v| fine & (v.abs() <= LARGEST_ROW)) {
@@ -233,22 +230,19 @@ impl Evidence {
     /// Kalman filter for each class.
     ///
     /// # Errors
-    /// [`EvidenceError`] if `y` is not finite or beyond ±1e80, its row has not been prepared, or the preparation
+    /// [`Refusal`] if `y` is not finite or beyond ±1e80, its row has not been prepared, or the preparation
     /// belongs to another classifier. The evidence is then unchanged.
-    pub fn observe(&mut self, preparation: &Preparation, y: f64) -> Result<(), EvidenceError> {
+    pub fn observe(&mut self, preparation: &Preparation, y: f64) -> Result<(), Refusal> {
         let (n, lanes) = (self.count, self.shape.lanes());
         if preparation.shape != self.shape {
-            return Err(EvidenceError::Shape {
-                what: "preparation",
-                len: preparation.shape.row(),
-                expected: self.shape.row(),
-            });
+            return Err(other_length("preparation", preparation.shape.row(), self.shape.row()));
         }
         if n >= preparation.rows {
-            return Err(EvidenceError::NotPrepared {
-                index: n,
-                prepared: preparation.rows,
-            });
+            return Err(Refusal::new(format!(
+                "measurement {index} arrived, but only {prepared} rows are prepared",
+                index = n,
+                prepared = preparation.rows
+            )));
         }
         let y = measurement(y)?;
         let (row, gains) = (self.shape.row(), self.shape.rank * lanes);

@@ -9,13 +9,14 @@ mod templates;
 mod tests;
 
 pub use clusters::{ClusterModel, Clusters};
-pub use evidence::{Component, Decision, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior};
+pub use evidence::{Component, Decision, EvidenceClassifier, ImageEstimator, Posterior};
 pub use filter::{Evidence, Preparation};
 pub use templates::TemplateModel;
 
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover as _, Solution, Workspace};
 use crate::recover::ReferenceOmp;
+use spts_input::Refusal;
 
 /// Labelled images: column `k` of `images` belongs to class `labels[k]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,34 +25,19 @@ pub struct Library {
     labels: Vec<usize>,
 }
 
-/// Why images and labels are not a valid library.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum LibraryError {
-    /// The number of labels differs from that of the images.
-    #[error("library has {columns} images but {labels} labels")]
-    Labels {
-        /// Columns of the image matrix.
-        columns: usize,
-        /// Number of labels.
-        labels: usize,
-    },
-    /// All images are zero.
-    #[error("library holds no image that is different from zero")]
-    Empty,
-}
-
 impl Library {
     /// A library of `images` (N × number of images). Images that are zero everywhere are dropped, because they can
     /// represent nothing.
     ///
     /// # Errors
-    /// [`LibraryError`] if the number of labels differs from that of the images, or no image is left.
-    pub fn new(images: &Matrix, labels: &[usize]) -> Result<Self, LibraryError> {
+    /// [`Refusal`] if the number of labels differs from that of the images, or no image is left.
+    pub fn new(images: &Matrix, labels: &[usize]) -> Result<Self, Refusal> {
         if images.ncols() != labels.len() {
-            return Err(LibraryError::Labels {
-                columns: images.ncols(),
-                labels: labels.len(),
-            });
+            return Err(Refusal::new(format!(
+                "library has {columns} images but {labels} labels",
+                columns = images.ncols(),
+                labels = labels.len()
+            )));
         }
         let columns: Vec<(Vec<f64>, usize)> = labels
             .iter()
@@ -60,7 +46,7 @@ impl Library {
             .filter(|(column, _)| column.iter().any(|v| *v != 0.0))
             .collect();
         if columns.is_empty() {
-            return Err(LibraryError::Empty);
+            return Err(Refusal::new("library holds no image that is different from zero"));
         }
         let slices: Vec<&[f64]> = columns.iter().map(|(c, _)| c.as_slice()).collect();
         Ok(Self {
@@ -143,8 +129,8 @@ impl Src {
     /// Class of `image`; `None` for an image that no library image correlates with (such as an empty one).
     ///
     /// # Errors
-    /// [`RecoverError`] if the size of the image differs from the library's, or a value is not finite.
-    pub fn classify(&self, image: &[f64], work: &mut Workspace) -> Result<Option<usize>, RecoverError> {
+    /// [`Refusal`] if the size of the image differs from the library's, or a value is not finite.
+    pub fn classify(&self, image: &[f64], work: &mut Workspace) -> Result<Option<usize>, Refusal> {
         let mut scratch = std::mem::take(work.scratch::<SrcScratch>());
         let problem = Problem::new(self.library.images.view(), image);
         let found = problem.and_then(|problem| self.pursuit.recover_into(&problem, work, &mut scratch.solution));

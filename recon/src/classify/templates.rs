@@ -2,10 +2,13 @@
 
 use crate::checks::within;
 use crate::classify::Library;
-use crate::classify::evidence::{Component, EvidenceError};
+use crate::classify::evidence::Component;
+use crate::classify::evidence::no_contact;
+use crate::classify::evidence::other_length;
 use crate::matrix::{Matrix, shifted};
 use crate::recover::Gaussian;
 use nalgebra::DMatrix;
+use spts_input::Refusal;
 
 /// Builds Gaussian classes from images: u ~ N(t, Σ), where t is the image scaled to a maximum of 1, a the blurred
 /// image, and
@@ -84,7 +87,7 @@ impl TemplateModel {
         }
     }
 
-    fn check(&self, taxels: usize) -> Result<(), EvidenceError> {
+    fn check(&self, taxels: usize) -> Result<(), Refusal> {
         within("mismatch", self.mismatch, 0.0, 10.0)?;
         within("blur_px", self.blur_px, 0.0, 100.0)?;
         within("smooth_share", self.smooth_share, 0.0, 1.0)?;
@@ -92,21 +95,13 @@ impl TemplateModel {
         within("floor", self.floor, 0.0, 10.0)?;
         within("noise", self.noise, 1e-6, 1e5)?;
         if !self.gains.is_empty() && self.gains.len() != taxels {
-            return Err(EvidenceError::Shape {
-                what: "gains",
-                len: self.gains.len(),
-                expected: taxels,
-            });
+            return Err(other_length("gains", self.gains.len(), taxels));
         }
         for &gain in &self.gains {
             within("gains", gain, 0.0, 10.0)?;
         }
         if self.cols == 0 || taxels == 0 || !taxels.is_multiple_of(self.cols) {
-            return Err(EvidenceError::Shape {
-                what: "image",
-                len: taxels,
-                expected: self.cols,
-            });
+            return Err(other_length("image", taxels, self.cols));
         }
         Ok(())
     }
@@ -114,9 +109,9 @@ impl TemplateModel {
     /// One component for every image of `library` and every shift.
     ///
     /// # Errors
-    /// [`EvidenceError`] if a parameter is out of range, the images do not fit the grid, or an image has no value above
+    /// [`Refusal`] if a parameter is out of range, the images do not fit the grid, or an image has no value above
     /// zero.
-    pub fn classes(&self, library: &Library) -> Result<Vec<Component>, EvidenceError> {
+    pub fn classes(&self, library: &Library) -> Result<Vec<Component>, Refusal> {
         let places = self.places(library, self.reach)?;
         Ok(places
             .into_iter()
@@ -127,8 +122,8 @@ impl TemplateModel {
     /// The components of [`Self::classes`] as full Gaussians, in the same order, for [`super::ImageEstimator`].
     ///
     /// # Errors
-    /// As [`Self::classes`]; [`EvidenceError::Prior`] if there is no deviation, as with `floor` = 0 and `mismatch` = 0.
-    pub fn image_priors(&self, library: &Library) -> Result<Vec<Gaussian>, EvidenceError> {
+    /// As [`Self::classes`]; [`Refusal`] if there is no deviation, as with `floor` = 0 and `mismatch` = 0.
+    pub fn image_priors(&self, library: &Library) -> Result<Vec<Gaussian>, Refusal> {
         let places = self.places(library, self.reach)?.into_iter();
         places
             .map(|(_, mean)| {
@@ -142,11 +137,11 @@ impl TemplateModel {
     }
 
     /// Every image of `library` with its label, scaled to a maximum of 1, at every place in `reach`.
-    fn places(&self, library: &Library, reach: usize) -> Result<Vec<(usize, Vec<f64>)>, EvidenceError> {
+    fn places(&self, library: &Library, reach: usize) -> Result<Vec<(usize, Vec<f64>)>, Refusal> {
         self.check(library.images().nrows())?;
         let mut out = Vec::new();
         for (index, &label) in library.labels().iter().enumerate() {
-            let image = peak_one(&library.images().column(index)).ok_or(EvidenceError::NoContact { index })?;
+            let image = peak_one(&library.images().column(index)).ok_or(no_contact(index))?;
             let places = shifted(&Matrix::from_column_slices(image.len(), &[&image]), self.cols, reach);
             out.extend((0..places.ncols()).map(|k| (label, places.column(k))));
         }
@@ -170,7 +165,7 @@ impl TemplateModel {
     ///
     /// # Errors
     /// As [`Self::classes`].
-    pub fn unknown(&self, library: &Library) -> Result<Component, EvidenceError> {
+    pub fn unknown(&self, library: &Library) -> Result<Component, Refusal> {
         let (mean, covariance) = self.moments(library)?;
         let (factors, rest) = principal(covariance, self.rank);
         let independent = mean.len() as f64 * self.floor.powi(2);
@@ -187,7 +182,7 @@ impl TemplateModel {
     ///
     /// # Errors
     /// As [`Self::image_priors`].
-    pub fn unknown_prior(&self, library: &Library) -> Result<Gaussian, EvidenceError> {
+    pub fn unknown_prior(&self, library: &Library) -> Result<Gaussian, Refusal> {
         let (mean, mut covariance) = self.moments(library)?;
         for i in 0..mean.len() {
             covariance[(i, i)] += self.floor.powi(2);
@@ -196,7 +191,7 @@ impl TemplateModel {
     }
 
     /// Mean and covariance of all images, each at its place and one taxel to every side.
-    fn moments(&self, library: &Library) -> Result<(Vec<f64>, DMatrix<f64>), EvidenceError> {
+    fn moments(&self, library: &Library) -> Result<(Vec<f64>, DMatrix<f64>), Refusal> {
         let all = self.places(library, 1)?;
         let (n, count) = (library.images().nrows(), all.len() as f64);
         let mean: Vec<f64> = (0..n)
@@ -281,6 +276,7 @@ pub(super) fn principal(covariance: DMatrix<f64>, rank: usize) -> (Vec<Vec<f64>>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checks::says;
 
     fn image(rows: usize, cols: usize) -> Vec<f64> {
         (0..rows * cols).map(|i| if i % 3 == 0 { 2.0 } else { 0.0 }).collect()
@@ -309,7 +305,10 @@ mod tests {
             mismatch: 0.0,
             ..model.clone()
         };
-        assert!(matches!(flat.image_priors(&library), Err(EvidenceError::Prior(_))));
+        assert!(says(
+            &flat.image_priors(&library),
+            "covariance is not positive definite"
+        ));
     }
 
     #[test]
@@ -367,7 +366,7 @@ mod tests {
             );
         }
         let negative = Library::new(&Matrix::from_column_slices(4, &[&[-1.0; 4]]), &[1]).unwrap();
-        assert_eq!(good.classes(&negative), Err(EvidenceError::NoContact { index: 0 }));
+        assert!(says(&good.classes(&negative), "image 0 has no value"));
     }
 
     fn library() -> Library {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::AmplitudeRange;
+use crate::checks::says;
 use crate::recover::Gaussian;
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
@@ -213,19 +214,16 @@ fn refuses_what_it_cannot_use() {
     let (classifier, _) = planted();
     let (mut preparation, mut evidence) = (classifier.preparation(), classifier.evidence());
     let before = evidence.clone();
-    assert!(matches!(
-        evidence.observe(&preparation, 1.0),
-        Err(EvidenceError::NotPrepared { index: 0, prepared: 0 })
+    assert!(says(
+        &evidence.observe(&preparation, 1.0),
+        "measurement 0 arrived, but only 0 rows"
     ));
     let width = classifier.bank().ncols();
     assert!(preparation.push(&vec![1.0; width - 1]).is_err());
     assert!(preparation.push(&vec![f64::NAN; width]).is_err());
     preparation.push(&vec![1.0; width]).unwrap();
     for y in [f64::NAN, f64::NEG_INFINITY, 1e300] {
-        assert!(
-            matches!(evidence.observe(&preparation, y), Err(EvidenceError::Range(_))),
-            "{y}"
-        );
+        assert!(says(&evidence.observe(&preparation, y), "is outside"), "{y}");
     }
     assert_eq!(evidence, before);
     let mut rng = ChaCha8Rng::seed_from_u64(7);
@@ -236,7 +234,7 @@ fn refuses_what_it_cannot_use() {
         "another classifier's preparation"
     );
     let new = |c: &[Component]| EvidenceClassifier::new(c, range(), 0.1);
-    assert_eq!(new(&[]).unwrap_err(), EvidenceError::Empty);
+    assert!(new(&[]).unwrap_err().to_string().contains("there is no component"));
     for bad in [
         Component {
             noise_variance: 0.0,
@@ -446,11 +444,8 @@ fn takes_the_class_whose_images_explain_it() {
 #[test]
 fn refuses_labels_that_do_not_fit() {
     let images = Matrix::zeros(4, 2);
-    assert_eq!(
-        Library::new(&images, &[1]),
-        Err(LibraryError::Labels { columns: 2, labels: 1 })
-    );
-    assert_eq!(Library::new(&images, &[1, 2]), Err(LibraryError::Empty));
+    assert!(says(&Library::new(&images, &[1]), "library has 2 images but 1 labels"));
+    assert!(says(&Library::new(&images, &[1, 2]), "library holds no image"));
 }
 
 #[test]

@@ -21,4 +21,4 @@ mod pursuit;
 mod sheet;
 
 pub use pursuit::{Descent, Found, RegionPursuit};
-pub use sheet::{SheetDecoder, SheetError, SheetNoise, SheetPrior};
+pub use sheet::{SheetDecoder, SheetNoise, SheetPrior};

@@ -1,8 +1,9 @@
 //! Reconstructs many small contacts on a large skin.
 
+use crate::checks::{not_finite, other_columns, overflow, shape_mismatch};
 use crate::kernels::{axpy, dot, norm};
 use crate::operator::{Atom, Composition, LinearOperator, SelectColumns, ShiftedDictionary};
-use crate::problem::RecoverError;
+use spts_input::Refusal;
 
 /// Finds contacts, smooth patches of a few taxels, in measurements y = Φ x + noise of a large image x ≥ 0. It needs
 /// only two products with the whole Φ in each round.
@@ -29,7 +30,7 @@ use crate::problem::RecoverError;
 /// let found = RegionPursuit::new(20, 20).recover(&phi, &y, None)?;
 /// let distance = image.iter().zip(&found.image).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
 /// assert!(distance < 0.05 * image.iter().map(|a| a * a).sum::<f64>(), "{distance}");
-/// # Ok::<(), spts_recon::RecoverError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RegionPursuit {
@@ -88,18 +89,15 @@ impl RegionPursuit {
     /// Reconstructs the image of `y`. `start` may be a similar image, such as the previous one of a series.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] if the length of `y` differs from the rows of Φ, [`RecoverError::Columns`] if Φ
-    /// does not have one column a taxel or the size of `start` differs, [`RecoverError::NotFinite`] for a NaN or an
-    /// infinity, [`RecoverError::Overflow`] if the image exceeds the range of numbers.
-    pub fn recover<A: SelectColumns>(&self, phi: &A, y: &[f64], start: Option<&[f64]>) -> Result<Found, RecoverError> {
+    /// [`Refusal`] if the length of `y` differs from the rows of Φ, [`Refusal`] if Φ
+    /// does not have one column a taxel or the size of `start` differs, [`Refusal`] for a NaN or an
+    /// infinity, [`Refusal`] if the image exceeds the range of numbers.
+    pub fn recover<A: SelectColumns>(&self, phi: &A, y: &[f64], start: Option<&[f64]>) -> Result<Found, Refusal> {
         check(phi, y)?;
         let taxels = self.rows * self.cols;
         for columns in [phi.ncols(), start.map_or(taxels, <[f64]>::len)] {
             if columns != taxels {
-                return Err(RecoverError::Columns {
-                    cols: columns,
-                    expected: taxels,
-                });
+                return Err(other_columns(columns, taxels));
             }
         }
         // squares of the largest and the smallest numbers there are would not be
@@ -118,7 +116,7 @@ impl RegionPursuit {
         found.image.iter_mut().for_each(|v| *v *= scale);
         found.residual_norm *= scale;
         match found.image.iter().position(|v| !v.is_finite()) {
-            Some(atom) => Err(RecoverError::Overflow { atom }),
+            Some(atom) => Err(overflow(atom)),
             None => Ok(found),
         }
     }
@@ -215,7 +213,7 @@ impl<'a, A: SelectColumns> Search<'a, A> {
     }
 
     /// The image on the candidates.
-    fn solve(&mut self) -> Result<(), RecoverError> {
+    fn solve(&mut self) -> Result<(), Refusal> {
         let places: Vec<usize> = (0..self.candidates.len()).filter(|&k| self.candidates[k]).collect();
         let grains = Grains::new((self.pursuit.rows, self.pursuit.cols), places, GRAIN_SD_TAXELS);
         let columns = self.phi.select_columns(grains.taxels());
@@ -537,12 +535,12 @@ impl NnFista {
     /// 0.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`] when `y` is not as long as A has rows, [`RecoverError::NotFinite`] for a NaN or
+    /// [`Refusal`] when `y` is not as long as A has rows, [`Refusal`] for a NaN or
     /// an infinity.
     ///
     /// # Panics
     /// When `x` is not as long as A has columns.
-    pub(super) fn descend(&self, a: &impl LinearOperator, y: &[f64], x: &mut [f64]) -> Result<Descent, RecoverError> {
+    pub(super) fn descend(&self, a: &impl LinearOperator, y: &[f64], x: &mut [f64]) -> Result<Descent, Refusal> {
         check(a, y)?;
         assert_eq!(x.len(), a.ncols(), "a start for every column");
         let mut now = State::at(a, x.iter().map(|v| v.max(0.0)).collect());
@@ -630,15 +628,12 @@ fn first_curvature(a: &impl LinearOperator, y: &[f64]) -> f64 {
 }
 
 /// Shapes and values that a recovery can work with.
-pub(super) fn check(a: &impl LinearOperator, y: &[f64]) -> Result<(), RecoverError> {
+pub(super) fn check(a: &impl LinearOperator, y: &[f64]) -> Result<(), Refusal> {
     if y.len() != a.nrows() {
-        return Err(RecoverError::ShapeMismatch {
-            rows: a.nrows(),
-            len: y.len(),
-        });
+        return Err(shape_mismatch(a.nrows(), y.len()));
     }
     match y.iter().position(|v| !v.is_finite()) {
-        Some(index) => Err(RecoverError::NotFinite { index, value: y[index] }),
+        Some(index) => Err(not_finite(index, y[index])),
         None => Ok(()),
     }
 }
@@ -653,6 +648,7 @@ pub(super) fn subtract(a: &impl LinearOperator, x: &[f64], y: &mut [f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checks::says;
     use crate::matrix::Matrix;
     use crate::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
     use crate::operator::{SignGenerator, SignOperator, SubArrays, check_operator};
@@ -739,18 +735,15 @@ mod tests {
         }
         let mut y = vec![1.0; 200];
         y[7] = f64::INFINITY;
-        assert!(matches!(
-            pursuit.recover(&phi, &y, None),
-            Err(RecoverError::NotFinite { index: 7, .. })
-        ));
-        assert!(matches!(
-            pursuit.recover(&phi, &[1.0; 3], None),
-            Err(RecoverError::ShapeMismatch { .. })
+        assert!(says(&pursuit.recover(&phi, &y, None), "`y[7]`"));
+        assert!(says(
+            &pursuit.recover(&phi, &[1.0; 3], None),
+            "rows but `y` has 3 entries"
         ));
         let other = RegionPursuit::new(SIDE, 2);
-        assert!(matches!(
-            other.recover(&phi, &[1.0; 200], None),
-            Err(RecoverError::Columns { .. })
+        assert!(says(
+            &other.recover(&phi, &[1.0; 200], None),
+            "the method was built for 120"
         ));
         let single = signs(SIDE * SIDE, 1, &mut rng);
         assert!(
@@ -850,9 +843,9 @@ mod tests {
             tol: 1e-6,
             max_iter: 10,
         };
-        assert!(matches!(
-            fista.descend(&a, &[1.0], &mut [0.0]),
-            Err(RecoverError::ShapeMismatch { rows: 2, len: 1 })
+        assert!(says(
+            &fista.descend(&a, &[1.0], &mut [0.0]),
+            "operator has 2 rows but `y` has 1 entries"
         ));
         assert!(fista.descend(&a, &[1.0, f64::NAN], &mut [0.0]).is_err());
         let mut x = [3.0];

@@ -1,31 +1,16 @@
 //! Gaussian estimates of large sheets.
 
-use crate::checks::{RangeError, within};
+use crate::checks::within;
+use crate::checks::{not_finite, not_positive_definite, shape_mismatch};
 use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover as _, RecoverError, Solution, Workspace};
-use crate::recover::{Gaussian, NnLmmse, Noise, ParameterError, PriorError};
+use crate::problem::{Problem, Recover as _, Solution, Workspace};
+use crate::recover::no_images;
+use crate::recover::{Gaussian, NnLmmse, Noise};
 use rayon::prelude::*;
+use spts_input::Refusal;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Why no image can be computed.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SheetError {
-    /// A noise level outside its range.
-    #[error(transparent)]
-    Noise(#[from] RangeError),
-    /// Rows or measurements of the wrong size.
-    #[error(transparent)]
-    Recover(#[from] RecoverError),
-    /// The selected taxels have no valid prior.
-    #[error(transparent)]
-    Prior(#[from] PriorError),
-    /// A noise level that the non-negative estimate does not accept.
-    #[error(transparent)]
-    Parameter(#[from] ParameterError),
-}
 
 /// Share of the variance that every taxel has for itself at least: keeps factors of the covariance positive.
 const FLOOR: f64 = 1e-3;
@@ -39,7 +24,7 @@ const FLOOR: f64 = 1e-3;
 /// let prior = SheetPrior::smooth([100, 200], 3.0)?;
 /// assert_eq!(prior.taxels(), 20_000);
 /// assert!((prior.covariance(0, 3) - (-0.5_f64).exp()).abs() < 1e-3, "3 taxels apart in a row");
-/// # Ok::<(), spts_recon::recover::PriorError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SheetPrior {
@@ -52,14 +37,10 @@ impl SheetPrior {
     /// two taxels at distance d is exp(−d²/2ℓ²).
     ///
     /// # Errors
-    /// [`PriorError`] for an empty grid, or if `length` is outside [0.01, 1000].
-    pub fn smooth(shape: [usize; 2], length: f64) -> Result<Self, PriorError> {
+    /// [`Refusal`] for an empty grid, or if `length` is outside [0.01, 1000].
+    pub fn smooth(shape: [usize; 2], length: f64) -> Result<Self, Refusal> {
         if !(0.01..=1000.0).contains(&length) {
-            return Err(PriorError::Parameter(ParameterError {
-                field: "length",
-                value: length,
-                range: "[0.01, 1000]",
-            }));
+            return Err(Refusal::range("length", length, "[0.01, 1000]"));
         }
         check_shape(shape, 1)?;
         let lags = |n: usize| (0..n).map(|d| (-0.5 * (d as f64 / length).powi(2)).exp()).collect();
@@ -71,8 +52,8 @@ impl SheetPrior {
     /// image counts equally, whatever its scale; images that are zero are ignored.
     ///
     /// # Errors
-    /// [`PriorError::Images`] if every image is zero, or one does not fit the grid.
-    pub fn like<'a>(images: impl IntoIterator<Item = &'a [f64]>, shape: [usize; 2]) -> Result<Self, PriorError> {
+    /// [`Refusal`] if every image is zero, or one does not fit the grid.
+    pub fn like<'a>(images: impl IntoIterator<Item = &'a [f64]>, shape: [usize; 2]) -> Result<Self, Refusal> {
         let [rows, cols] = shape;
         check_shape(shape, 0)?;
         let mut sums = shape.map(|n| vec![0.0; n]);
@@ -162,11 +143,11 @@ impl SheetPrior {
     }
 }
 
-fn of_images(images: usize, pixels: usize, cols: usize) -> PriorError {
-    PriorError::Images { images, pixels, cols }
+fn of_images(images: usize, pixels: usize, cols: usize) -> Refusal {
+    no_images(images, pixels, cols)
 }
 
-fn check_shape([rows, cols]: [usize; 2], images: usize) -> Result<(), PriorError> {
+fn check_shape([rows, cols]: [usize; 2], images: usize) -> Result<(), Refusal> {
     if rows.checked_mul(cols).is_none_or(|taxels| taxels == 0) {
         return Err(of_images(images, 0, cols));
     }
@@ -242,8 +223,8 @@ impl SheetDecoder {
     /// A decoder without rows, for a sheet that is divided evenly among `wires` wires.
     ///
     /// # Errors
-    /// [`SheetError::Noise`] for a noise level outside its range.
-    pub fn new(prior: SheetPrior, noise: SheetNoise, wires: usize) -> Result<Self, SheetError> {
+    /// [`Refusal`] for a noise level outside its range.
+    pub fn new(prior: SheetPrior, noise: SheetNoise, wires: usize) -> Result<Self, Refusal> {
         within("own", noise.own, 1e-6, 1e3)?;
         within("common", noise.common, 0.0, 1e3)?;
         Ok(Self {
@@ -282,22 +263,15 @@ impl SheetDecoder {
     /// Adds `rows` (row-major, N values each). `wires` holds the number of each row's wire, from 0.
     ///
     /// # Errors
-    /// [`SheetError::Recover`] if a row has no valid wire, is not finite, or depends linearly on earlier rows.
-    pub fn extend(&mut self, rows: &[f64], wires: &[usize]) -> Result<(), SheetError> {
+    /// [`Refusal`] if a row has no valid wire, is not finite, or depends linearly on earlier rows. No row is
+    /// added then.
+    pub fn extend(&mut self, rows: &[f64], wires: &[usize]) -> Result<(), Refusal> {
         let taxels = self.prior.taxels();
         if rows.len() != wires.len() * taxels || wires.iter().any(|wire| *wire >= self.count) {
-            return Err(RecoverError::ShapeMismatch {
-                rows: wires.len(),
-                len: rows.len() / taxels.max(1),
-            }
-            .into());
+            return Err(shape_mismatch(wires.len(), rows.len() / taxels.max(1)));
         }
         if let Some(index) = rows.iter().position(|v| !v.is_finite()) {
-            return Err(RecoverError::NotFinite {
-                index,
-                value: rows[index],
-            }
-            .into());
+            return Err(not_finite(index, rows[index]));
         }
         let first = self.measurements();
         self.rows.extend_from_slice(rows);
@@ -326,13 +300,26 @@ impl SheetDecoder {
             })
             .collect();
         for system in systems.into_iter().flatten() {
-            self.factorise(system)?;
+            if let Err(error) = self.factorise(system) {
+                self.truncate(first);
+                return Err(error);
+            }
         }
         Ok(())
     }
 
+    /// Forgets all but the first `rows` rows.
+    fn truncate(&mut self, rows: usize) {
+        let taxels = self.prior.taxels();
+        self.rows.truncate(rows * taxels);
+        self.cross.truncate(rows * taxels);
+        self.wires.truncate(rows);
+        self.spans.truncate(rows);
+        self.factor.truncate(rows * (rows + 1) / 2);
+    }
+
     /// Adds a row of Φ C Φᵀ to the factor.
-    fn factorise(&mut self, mut system: Vec<f64>) -> Result<(), SheetError> {
+    fn factorise(&mut self, mut system: Vec<f64>) -> Result<(), Refusal> {
         let i = system.len() - 1;
         let square = self.square_of_a_sum();
         let common = self.noise.common.powi(2) * square;
@@ -347,8 +334,8 @@ impl SheetDecoder {
             system[j] = (system[j] - dot(&system[..j], &row[..j])) / row[j];
         }
         let pivot = system[i] - dot(&system[..i], &system[..i]);
-        if pivot.is_nan() || pivot <= 0.0 {
-            return Err(RecoverError::NotPositiveDefinite { pivot: i }.into());
+        if !pivot.is_finite() || pivot <= 0.0 {
+            return Err(not_positive_definite(i));
         }
         system[i] = pivot.sqrt();
         self.factor.extend_from_slice(&system);
@@ -363,18 +350,14 @@ impl SheetDecoder {
     /// The linear estimate from measurements of the first rows, N values.
     ///
     /// # Errors
-    /// [`SheetError::Recover`] if there are no measurements, more measurements than rows, or one that is not finite.
-    pub fn linear(&self, y: &[f64]) -> Result<Vec<f64>, SheetError> {
+    /// [`Refusal`] if there are no measurements, more measurements than rows, or one that is not finite.
+    pub fn linear(&self, y: &[f64]) -> Result<Vec<f64>, Refusal> {
         let m = y.len();
         if m > self.measurements() || m == 0 {
-            return Err(RecoverError::ShapeMismatch {
-                rows: self.measurements(),
-                len: m,
-            }
-            .into());
+            return Err(shape_mismatch(self.measurements(), m));
         }
         if let Some(index) = y.iter().position(|v| !v.is_finite()) {
-            return Err(RecoverError::NotFinite { index, value: y[index] }.into());
+            return Err(not_finite(index, y[index]));
         }
         let row = |i: usize| &self.factor[i * (i + 1) / 2..(i + 1) * (i + 2) / 2];
         let mut shares = y.to_vec();
@@ -405,7 +388,7 @@ impl SheetDecoder {
     ///
     /// # Errors
     /// As [`SheetDecoder::linear`], and if the iteration fails because of rounding.
-    pub fn non_negative(&self, y: &[f64], most: usize) -> Result<Vec<f64>, SheetError> {
+    pub fn non_negative(&self, y: &[f64], most: usize) -> Result<Vec<f64>, Refusal> {
         let linear = self.linear(y)?;
         let taxels = self.prior.taxels();
         let mut places: Vec<usize> = (0..taxels).collect();
@@ -421,7 +404,7 @@ impl SheetDecoder {
     }
 
     /// The non-negative program on `places`.
-    fn solve(&self, y: &[f64], places: &[usize]) -> Result<Vec<f64>, SheetError> {
+    fn solve(&self, y: &[f64], places: &[usize]) -> Result<Vec<f64>, Refusal> {
         let (m, n, taxels) = (y.len(), places.len(), self.prior.taxels());
         let scale = y.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
         if scale == 0.0 {
@@ -593,5 +576,16 @@ mod tests {
         decoder.extend(&[1.0; 4], &[0]).unwrap();
         assert!(decoder.linear(&[1.0, 2.0]).is_err() && decoder.linear(&[]).is_err());
         assert!(decoder.linear(&[f64::INFINITY]).is_err());
+        // the second of these rows has a square beyond the range of numbers: none of them stays
+        let before = decoder.linear(&[1.0]).unwrap();
+        assert!(
+            decoder
+                .extend(&[1.0, -1.0, 1.0, -1.0, 1e200, 1e200, 1e200, 1e200], &[0, 0])
+                .is_err()
+        );
+        assert_eq!((decoder.measurements(), decoder.linear(&[1.0]).unwrap()), (1, before));
+        assert!(decoder.linear(&[1.0, 2.0]).is_err());
+        decoder.extend(&[1.0, -1.0, 1.0, -1.0], &[0]).unwrap();
+        assert!(decoder.linear(&[1.0, 2.0]).is_ok());
     }
 }

@@ -12,7 +12,7 @@
 //! phi.apply(&image, &mut y);
 //! // one pressed taxel: every measurement is its pressure or the negative of it
 //! assert!(y.iter().all(|v| (v.abs() - 1.5).abs() < 1e-15));
-//! # Ok::<(), spts_recon::RangeError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod shifted;
@@ -194,7 +194,7 @@ impl SelectColumns for Matrix {
 /// centre(&mut y);
 /// Centred::new(a).apply(&x, &mut expected);
 /// assert!(y.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12));
-/// # Ok::<(), spts_recon::ShapeError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Centred<A> {

@@ -1,10 +1,11 @@
 //! Small atoms at every place of an image, by Fourier transforms.
 
-use crate::matrix::ShapeError;
+use crate::matrix::matrix_shape;
 use crate::operator::{LinearOperator, check_shape};
 use realfft::num_complex::Complex64;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
+use spts_input::Refusal;
 use std::sync::Arc;
 
 /// A small image, row-major, from which an image is composed by placing copies of it.
@@ -19,17 +20,13 @@ impl Atom {
     /// Atom from row-major values.
     ///
     /// # Errors
-    /// [`ShapeError`] if `values` does not hold `rows · cols` numbers.
-    pub fn new(rows: usize, cols: usize, values: Vec<f64>) -> Result<Self, ShapeError> {
+    /// [`Refusal`] if `values` does not hold `rows · cols` numbers.
+    pub fn new(rows: usize, cols: usize, values: Vec<f64>) -> Result<Self, Refusal> {
         let len = values.len();
         if rows.checked_mul(cols) == Some(len) {
             Ok(Self { rows, cols, values })
         } else {
-            Err(ShapeError {
-                nrows: rows,
-                ncols: cols,
-                len,
-            })
+            Err(matrix_shape(rows, cols, len))
         }
     }
 
@@ -99,7 +96,7 @@ impl Atom {
 /// place[2 * 5 + 3] = 10.0; // row 2, column 3
 /// dictionary.apply(&place, &mut image);
 /// assert!((image[2 * 5 + 3] - 20.0).abs() < 1e-9 && (image[2 * 5 + 4] - 10.0).abs() < 1e-9);
-/// # Ok::<(), spts_recon::ShapeError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct ShiftedDictionary {
     rows: usize,

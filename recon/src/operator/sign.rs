@@ -1,10 +1,11 @@
 //! Rows of ±1 computed from pseudorandom generators.
 
-use crate::checks::{RangeError, within};
+use crate::checks::within;
 use crate::kernels::dot;
 use crate::operator::{LinearOperator, SelectColumns};
 use multiversion::multiversion;
 use rayon::prelude::*;
+use spts_input::Refusal;
 
 /// Columns whose states and values stay in the first-level cache: 1024 · (4 + 8) bytes.
 const BLOCK: usize = 1024 / LANES;
@@ -33,8 +34,8 @@ impl SignGenerator {
     /// otherwise.
     ///
     /// # Errors
-    /// [`RangeError`] for a `bit` beyond 31.
-    pub fn new(multiplier: u32, increment: u32, bit: u32) -> Result<Self, RangeError> {
+    /// [`Refusal`] for a `bit` beyond 31.
+    pub fn new(multiplier: u32, increment: u32, bit: u32) -> Result<Self, Refusal> {
         within("bit", f64::from(bit), 0.0, 31.0)?;
         let shift = 63 - bit;
         Ok(Self {

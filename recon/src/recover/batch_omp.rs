@@ -4,9 +4,10 @@ use crate::kernels;
 use crate::matrix::{Matrix, MatrixView};
 use crate::problem::Workspace;
 use crate::problem::unscale;
-use crate::problem::{Problem, RecoverError, Solution};
+use crate::problem::{Problem, Solution};
 use crate::recover::pursuit::Greedy;
 use crate::recover::pursuit::{CONVERGED, back_substitute};
+use spts_input::Refusal;
 
 /// Orthogonal matching pursuit with a precomputed Gram matrix G = Aᵀ A, for many `y` measured with the same A.
 ///
@@ -47,8 +48,8 @@ impl BatchOmp {
     /// they had length 1. Costs O(M·K²).
     ///
     /// # Errors
-    /// [`RecoverError::Empty`] for a matrix without rows or columns, [`RecoverError::OperatorNotFinite`].
-    pub fn new(matrix: MatrixView<'_>, n_nonzero_coefs: usize) -> Result<Self, RecoverError> {
+    /// [`Refusal`] for a matrix without rows or columns, [`Refusal`].
+    pub fn new(matrix: MatrixView<'_>, n_nonzero_coefs: usize) -> Result<Self, Refusal> {
         let zero = vec![0.0; matrix.nrows()];
         let mut workspace = Workspace::default();
         let problem = Problem::new(matrix, &zero)?;
@@ -78,14 +79,9 @@ impl BatchOmp {
     /// Solves A α ≈ `y` into `solution`. After an error the content of `solution` has no meaning.
     ///
     /// # Errors
-    /// [`RecoverError::ShapeMismatch`], [`RecoverError::NotFinite`], and [`RecoverError::Overflow`] if a coefficient
+    /// [`Refusal`], [`Refusal`], and [`Refusal`] if a coefficient
     /// exceeds the range of numbers.
-    pub fn recover_into(
-        &self,
-        y: &[f64],
-        workspace: &mut Workspace,
-        solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
+    pub fn recover_into(&self, y: &[f64], workspace: &mut Workspace, solution: &mut Solution) -> Result<(), Refusal> {
         let problem = Problem::new(self.a.view(), y)?;
         let greedy = workspace.scratch::<Greedy>();
         let (y, y_scale) = greedy.scaling.measurements(problem.y())?;

@@ -1,10 +1,12 @@
 //! Properties that every recovery algorithm must have.
 
+use crate::checks::not_finite;
 use crate::matrix::Matrix;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace};
+use crate::problem::{Problem, Recover, Solution, Workspace};
 use crate::recover::{Build, BuildRegularised};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use spts_input::Refusal;
 
 /// Scales at which squares, and products of two of them, leave the range of numbers.
 const SCALES: [f64; 5] = [1e-300, 1e-150, 1.0, 1e150, 1e300];
@@ -53,7 +55,7 @@ impl<'a> Suite<'a> {
     }
 
     /// A sound solution or an error. It is the same in a used and in a fresh workspace.
-    fn attempt(&mut self, method: &dyn Recover, a: &Matrix, y: &[f64]) -> Result<Solution, RecoverError> {
+    fn attempt(&mut self, method: &dyn Recover, a: &Matrix, y: &[f64]) -> Result<Solution, Refusal> {
         let name = self.name;
         let problem = Problem::new(a.view(), y)?;
         let fresh = method.recover(&problem, &mut Workspace::default());
@@ -134,21 +136,17 @@ impl<'a> Suite<'a> {
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             let entry = std::mem::replace(&mut a.row_mut(3)[7], bad);
             if let Err(error) = self.attempt(method, &a, &y) {
-                let named = matches!(error, RecoverError::OperatorNotFinite { row: 3, col: 7, .. });
+                let error = error.to_string();
                 assert!(
-                    named || matches!(error, RecoverError::Overflow { .. }),
-                    "{}: an operator that holds {bad} gave {error:?}",
+                    error.starts_with("operator[3, 7] = ") || error.starts_with("the coefficient of atom "),
+                    "{}: an operator that holds {bad} gave {error}",
                     self.name
                 );
             }
             a.row_mut(3)[7] = entry;
             let value = std::mem::replace(&mut y[4], bad);
-            let error = self.attempt(method, &a, &y);
-            assert!(
-                matches!(error, Err(RecoverError::NotFinite { index: 4, .. })),
-                "{}: y[4] = {bad} gave {error:?}",
-                self.name
-            );
+            let error = self.attempt(method, &a, &y).map(|_| ());
+            assert_eq!(error, Err(not_finite(4, bad)), "{}: y[4] = {bad}", self.name);
             y[4] = value;
         }
     }

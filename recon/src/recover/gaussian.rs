@@ -1,11 +1,13 @@
 //! Estimates of images under a Gaussian prior: linear, and non-negative.
 
-use crate::cholesky::{self, NotPositiveDefinite};
+use crate::checks::{not_positive_definite, other_columns, overflow};
+use crate::cholesky;
 use crate::kernels::{add_gram, adjoint, axpy, dot, norm};
 use crate::matrix::MatrixView;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace, divide_into, operator_scale, power_of_two};
+use crate::problem::{Problem, Recover, Solution, Workspace, divide_into, operator_scale, power_of_two};
 use crate::recover::nnqp::{self, Hessian};
-use crate::recover::prior::{Gaussian, Noise, ParameterError};
+use crate::recover::prior::{Gaussian, Noise};
+use spts_input::Refusal;
 use std::sync::Arc;
 
 /// Smallest noise variance, as a share of ‖A‖² tr(C) / (M N), the mean variance that the signal gives a measurement
@@ -55,14 +57,11 @@ impl<'p, 'w> Model<'p, 'w> {
         prior: &'p Gaussian,
         noise: Noise,
         work: &'w mut GaussianScratch,
-    ) -> Result<Self, RecoverError> {
+    ) -> Result<Self, Refusal> {
         let (a, y) = (problem.matrix(), problem.y());
         let (m, n) = (a.nrows(), a.ncols());
         if n != prior.len() {
-            return Err(RecoverError::Columns {
-                cols: n,
-                expected: prior.len(),
-            });
+            return Err(other_columns(n, prior.len()));
         }
         let scale = operator_scale(a)?;
         divide_into(a.values(), scale, &mut work.operator);
@@ -71,7 +70,9 @@ impl<'p, 'w> Model<'p, 'w> {
         for (index, (&y, row)) in work.y.iter().zip(work.operator.chunks_exact(n)).enumerate() {
             let value = y - dot(row, prior.mean());
             if !value.is_finite() {
-                return Err(RecoverError::InnovationOverflow { index });
+                return Err(Refusal::new(format!(
+                    "`y[{index}]` minus the prior mean's prediction exceeds the range of 64-bit numbers"
+                )));
             }
             work.innovation.push(value);
         }
@@ -178,8 +179,8 @@ impl Lmmse {
     /// The estimate under `prior` for measurements with `noise`.
     ///
     /// # Errors
-    /// [`ParameterError`] if `noise` is outside its range.
-    pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, ParameterError> {
+    /// [`Refusal`] if `noise` is outside its range.
+    pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, Refusal> {
         Ok(Self {
             prior,
             noise: noise.checked()?,
@@ -193,7 +194,7 @@ impl Recover for Lmmse {
         problem: &Problem<'_>,
         workspace: &mut Workspace,
         solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
+    ) -> Result<(), Refusal> {
         let mut model = Model::new(problem, &self.prior, self.noise, workspace.scratch::<GaussianScratch>())?;
         estimate(&mut model)?;
         let residual_norm = model.residual_norm();
@@ -202,7 +203,7 @@ impl Recover for Lmmse {
 }
 
 /// x̂ → `x`.
-fn estimate(model: &mut Model<'_, '_>) -> Result<(), RecoverError> {
+fn estimate(model: &mut Model<'_, '_>) -> Result<(), Refusal> {
     let in_data_space = model.m <= model.n;
     if in_data_space {
         model.data_space();
@@ -214,7 +215,7 @@ fn estimate(model: &mut Model<'_, '_>) -> Result<(), RecoverError> {
         model.project();
     }
     let (size, n, work) = (model.m.min(model.n), model.n, &mut *model.work);
-    cholesky::factor(&mut work.system, size).map_err(not_positive_definite)?;
+    cholesky::factor(&mut work.system, size).map_err(|e| not_positive_definite(e.pivot))?;
     cholesky::solve(&work.system, size, &mut work.weights);
     work.x.clear();
     work.x.extend_from_slice(model.prior.mean());
@@ -226,10 +227,6 @@ fn estimate(model: &mut Model<'_, '_>) -> Result<(), RecoverError> {
         axpy(1.0, &work.weights, &mut work.x);
     }
     Ok(())
-}
-
-fn not_positive_definite(error: NotPositiveDefinite) -> RecoverError {
-    RecoverError::NotPositiveDefinite { pivot: error.pivot }
 }
 
 /// Most probable x ≥ 0 given y = A x + n, with x ~ N(μ, C) truncated to x ≥ 0, and n ~ N(0, σ² I):
@@ -268,8 +265,8 @@ impl NnLmmse {
     /// The estimate under `prior` for measurements with `noise`.
     ///
     /// # Errors
-    /// [`ParameterError`] if `noise` is outside its range.
-    pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, ParameterError> {
+    /// [`Refusal`] if `noise` is outside its range.
+    pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, Refusal> {
         Ok(Self {
             prior,
             noise: noise.checked()?,
@@ -305,7 +302,7 @@ impl Recover for NnLmmse {
         problem: &Problem<'_>,
         workspace: &mut Workspace,
         solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
+    ) -> Result<(), Refusal> {
         let mut model = Model::new(problem, &self.prior, self.noise, workspace.scratch::<GaussianScratch>())?;
         guess(&mut model);
         let (variance, work) = (model.variance, &mut *model.work);
@@ -317,7 +314,7 @@ impl Recover for NnLmmse {
         let scale = power_of_two(&work.weights);
         if !scale.is_finite() {
             let atom = work.weights.iter().position(|h| !h.is_finite()).unwrap_or_default();
-            return Err(RecoverError::Overflow { atom });
+            return Err(overflow(atom));
         }
         work.weights.iter_mut().for_each(|h| *h /= scale);
         let hessian = Hessian {

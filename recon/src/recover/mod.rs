@@ -20,17 +20,19 @@ mod unrolled;
 
 pub use batch_omp::BatchOmp;
 pub use conformance::{conformance, conformance_regularised};
-pub use fixed::{Fixed, FixedError, FixedWindow};
+pub use fixed::{Fixed, FixedWindow};
 pub use gaussian::{Lmmse, NnLmmse};
 pub use nn_lasso::NnLasso;
-pub use prior::{Gaussian, ImagePrior, Noise, ParameterError, Penalty, PriorError, Stopping};
+pub(crate) use prior::no_images;
+pub use prior::{Gaussian, ImagePrior, Noise, Penalty, Stopping};
 pub use pursuit::{NnOmp, Omp};
 pub use reference::ReferenceOmp;
-pub use sequential::{Motion, SequentialError, SequentialEstimate, SequentialGains, TrackedImage};
+pub use sequential::{Motion, SequentialEstimate, SequentialGains, TrackedImage};
 pub use tv::Tv;
-pub use unrolled::{Layer, Touched, Unrolled, UnrolledError, UnrolledStep, UnrolledWeights};
+pub use unrolled::{Layer, Touched, Unrolled, UnrolledStep, UnrolledWeights};
 
 use crate::problem::Recover;
+use spts_input::Refusal;
 use std::sync::Arc;
 
 /// Builds an algorithm for a target sparsity (`n_nonzero_coefs`).
@@ -49,7 +51,7 @@ pub const RECOVER: &[(&str, Build)] = &[
 ///
 /// # Errors
 /// A message, if K or a parameter is outside its range.
-pub type BuildRegularised = fn(usize) -> Result<Box<dyn Recover>, Box<dyn std::error::Error>>;
+pub type BuildRegularised = fn(usize) -> Result<Box<dyn Recover>, Refusal>;
 
 /// Share of the largest correlation that the penalties of [`REGULARISED`] have, and of the root mean square of `y` or
 /// of the prior deviation that its noises have.

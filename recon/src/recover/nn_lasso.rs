@@ -1,9 +1,11 @@
 //! Non-negative lasso.
 
+use crate::checks::not_converged;
 use crate::cholesky::{self, NotPositiveDefinite};
 use crate::kernels::{axpy, dot, norm};
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace, divide_into, operator_scale, power_of_two};
-use crate::recover::prior::{ParameterError, Penalty, Stopping};
+use crate::problem::{Problem, Recover, Solution, Workspace, divide_into, operator_scale, power_of_two};
+use crate::recover::prior::{Penalty, Stopping};
+use spts_input::Refusal;
 
 /// Non-negative lasso:
 ///
@@ -47,8 +49,8 @@ impl NnLasso {
     /// A lasso with the penalty `alpha`.
     ///
     /// # Errors
-    /// [`ParameterError`] if `alpha` is outside its range.
-    pub fn new(alpha: Penalty) -> Result<Self, ParameterError> {
+    /// [`Refusal`] if `alpha` is outside its range.
+    pub fn new(alpha: Penalty) -> Result<Self, Refusal> {
         Ok(Self {
             alpha: alpha.checked()?,
             normalise: false,
@@ -66,11 +68,7 @@ impl NnLasso {
     }
 
     /// The problem near 1, and what its coefficients must be multiplied by.
-    fn set_up<'w>(
-        &self,
-        problem: &Problem<'_>,
-        workspace: &'w mut Workspace,
-    ) -> Result<(Descent<'w>, f64), RecoverError> {
+    fn set_up<'w>(&self, problem: &Problem<'_>, workspace: &'w mut Workspace) -> Result<(Descent<'w>, f64), Refusal> {
         let (a, y) = (problem.matrix(), problem.y());
         let (a_scale, y_scale) = (operator_scale(a)?, power_of_two(y));
         let m = a.nrows();
@@ -119,7 +117,7 @@ impl Recover for NnLasso {
         problem: &Problem<'_>,
         workspace: &mut Workspace,
         solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
+    ) -> Result<(), Refusal> {
         let (mut descent, x_scale) = self.set_up(problem, workspace)?;
         descent.run(self.stopping)?;
         descent.write(x_scale, power_of_two(problem.y()), solution)
@@ -199,7 +197,7 @@ impl<'w> Descent<'w> {
         self.refresh();
     }
 
-    pub(super) fn run(&mut self, Stopping { tol, max_iter }: Stopping) -> Result<(), RecoverError> {
+    pub(super) fn run(&mut self, Stopping { tol, max_iter }: Stopping) -> Result<(), Refusal> {
         if self.largest == 0.0 {
             // no column points towards y
             return Ok(());
@@ -211,11 +209,7 @@ impl<'w> Descent<'w> {
                 return Ok(());
             }
             if iterations >= max_iter {
-                return Err(RecoverError::NotConverged {
-                    iterations,
-                    error: gap,
-                    tol,
-                });
+                return Err(not_converged(iterations, gap, tol));
             }
             self.choose_working_set();
             iterations += self.solve_working_set();
@@ -416,7 +410,7 @@ impl<'w> Descent<'w> {
         worst
     }
 
-    pub(super) fn write(&mut self, x_scale: f64, y_scale: f64, solution: &mut Solution) -> Result<(), RecoverError> {
+    pub(super) fn write(&mut self, x_scale: f64, y_scale: f64, solution: &mut Solution) -> Result<(), Refusal> {
         let residual_norm = norm(&self.work.residual) * y_scale;
         for (x, length) in self.work.x.iter_mut().zip(&self.work.lengths) {
             if *x > 0.0 {

@@ -1,8 +1,9 @@
 //! Strictly convex quadratic programs with non-negative unknowns.
 
+use crate::checks::{not_converged, not_positive_definite};
 use crate::cholesky;
 use crate::kernels;
-use crate::problem::RecoverError;
+use spts_input::Refusal;
 
 /// Conditions hold to this share of the largest term: what rounding leaves of them.
 const TOL: f64 = 1e-12;
@@ -158,7 +159,7 @@ pub(super) fn minimise(
     linear: &[f64],
     x: &mut [f64],
     work: &mut Buffers,
-) -> Result<(), RecoverError> {
+) -> Result<(), Refusal> {
     let n = linear.len();
     let largest = linear.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     work.free.clear();
@@ -186,7 +187,7 @@ pub(super) fn minimise(
 /// As [`minimise`], from x = 0: frees the most violated unknown, and goes towards the minimum on the free ones as far
 /// as none of them falls below zero. The objective falls in every round, so that no set comes twice.
 /// Source: C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems" (1974), ch. 23, algorithm NNLS.
-fn active_set(hessian: &impl Quadratic, linear: &[f64], x: &mut [f64], work: &mut Buffers) -> Result<(), RecoverError> {
+fn active_set(hessian: &impl Quadratic, linear: &[f64], x: &mut [f64], work: &mut Buffers) -> Result<(), Refusal> {
     let n = linear.len();
     let largest = linear.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     work.free.clear();
@@ -229,15 +230,15 @@ fn active_set(hessian: &impl Quadratic, linear: &[f64], x: &mut [f64], work: &mu
             None => return Ok(()),
         }
     }
-    Err(RecoverError::NotConverged {
-        iterations: limit,
-        error: work.violation.iter().copied().fold(0.0, f64::max),
-        tol: TOL,
-    })
+    Err(not_converged(
+        limit,
+        work.violation.iter().copied().fold(0.0, f64::max),
+        TOL,
+    ))
 }
 
 /// x = H_FF⁻¹ h_F on the free unknowns, zero elsewhere.
-fn solve_free(hessian: &impl Quadratic, linear: &[f64], x: &mut [f64], work: &mut Buffers) -> Result<(), RecoverError> {
+fn solve_free(hessian: &impl Quadratic, linear: &[f64], x: &mut [f64], work: &mut Buffers) -> Result<(), Refusal> {
     let n = linear.len();
     work.indices.clear();
     work.indices.extend((0..n).filter(|&i| work.free[i]));
@@ -246,9 +247,7 @@ fn solve_free(hessian: &impl Quadratic, linear: &[f64], x: &mut [f64], work: &mu
     hessian.face(n, &work.indices, &mut work.faces, &mut work.factor);
     work.point.clear();
     work.point.extend(work.indices.iter().map(|&i| linear[i]));
-    cholesky::factor(&mut work.factor, size).map_err(|e| RecoverError::NotPositiveDefinite {
-        pivot: work.indices[e.pivot],
-    })?;
+    cholesky::factor(&mut work.factor, size).map_err(|e| not_positive_definite(work.indices[e.pivot]))?;
     cholesky::solve(&work.factor, size, &mut work.point);
     x.fill(0.0);
     for (&i, &value) in work.indices.iter().zip(&work.point) {

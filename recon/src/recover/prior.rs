@@ -3,6 +3,7 @@
 use crate::kernels::{dot, norm};
 use crate::matrix::{Matrix, shifted};
 use nalgebra::DMatrix;
+use spts_input::Refusal;
 
 /// Gaussian prior x ~ N(μ, C) of N unknowns.
 ///
@@ -24,56 +25,6 @@ pub struct Gaussian {
     natural: Vec<f64>,
 }
 
-/// Why mean and covariance do not define a Gaussian.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum PriorError {
-    /// The size of the covariance does not match the mean.
-    #[error("covariance has shape {rows} × {cols} but `mean` has {len} entries")]
-    Shape {
-        /// Rows of the covariance.
-        rows: usize,
-        /// Columns of the covariance.
-        cols: usize,
-        /// Length of the mean.
-        len: usize,
-    },
-    /// An entry of mean or covariance is NaN or infinite.
-    #[error("`{field}` holds a value that is not finite")]
-    NotFinite {
-        /// `mean` or `covariance`.
-        field: &'static str,
-    },
-    /// C ≠ Cᵀ.
-    #[error("covariance[{row}, {col}] = {value} but its mirror image is {mirror}")]
-    NotSymmetric {
-        /// Row.
-        row: usize,
-        /// Column.
-        col: usize,
-        /// The entry.
-        value: f64,
-        /// The entry mirrored at the diagonal.
-        mirror: f64,
-    },
-    /// The covariance has a direction without variance.
-    #[error("covariance is not positive definite; a positive `floor` or noise makes it so")]
-    NotPositiveDefinite,
-    /// No image, or images that do not fit the grid.
-    #[error("{images} images of {pixels} pixels do not make a prior on a grid of {cols} columns")]
-    Images {
-        /// Number of images.
-        images: usize,
-        /// Pixels an image.
-        pixels: usize,
-        /// Columns of the grid.
-        cols: usize,
-    },
-    /// A parameter of the image prior is outside its range.
-    #[error(transparent)]
-    Parameter(#[from] ParameterError),
-}
-
 /// Rounding that a symmetric matrix may show across its diagonal, as a share of the entry's bound √(Cᵢᵢ Cⱼⱼ): sums of
 /// some 10⁵ terms in different order.
 const ASYMMETRY: f64 = 1e-10;
@@ -82,27 +33,35 @@ impl Gaussian {
     /// A prior with `mean` (length N) and `covariance` (N × N, positive definite).
     ///
     /// # Errors
-    /// [`PriorError`] if they do not define a Gaussian.
-    pub fn new(mean: Vec<f64>, covariance: Matrix) -> Result<Self, PriorError> {
+    /// [`Refusal`] if they do not define a Gaussian.
+    pub fn new(mean: Vec<f64>, covariance: Matrix) -> Result<Self, Refusal> {
         let n = mean.len();
         if n == 0 || covariance.nrows() != n || covariance.ncols() != n {
-            return Err(PriorError::Shape {
-                rows: covariance.nrows(),
-                cols: covariance.ncols(),
-                len: n,
-            });
+            return Err(Refusal::new(format!(
+                "covariance has shape {rows} × {cols} but `mean` has {len} entries",
+                rows = covariance.nrows(),
+                cols = covariance.ncols(),
+                len = n
+            )));
         }
         let values = covariance.view().values();
         for (field, values) in [("mean", mean.as_slice()), ("covariance", values)] {
             if !values.iter().all(|v| v.is_finite()) {
-                return Err(PriorError::NotFinite { field });
+                return Err(Refusal::new(format!("`{field}` holds a value that is not finite")));
             }
         }
         check_symmetry(&covariance)?;
         let dense = DMatrix::from_row_slice(n, n, values);
-        let inverse = dense.cholesky().ok_or(PriorError::NotPositiveDefinite)?.inverse();
+        let inverse = dense
+            .cholesky()
+            .ok_or(Refusal::new(
+                "covariance is not positive definite; a positive `floor` or noise makes it so",
+            ))?
+            .inverse();
         if !inverse.iter().all(|v| v.is_finite()) {
-            return Err(PriorError::NotPositiveDefinite);
+            return Err(Refusal::new(
+                "covariance is not positive definite; a positive `floor` or noise makes it so",
+            ));
         }
         let precision = Matrix::from(&inverse);
         let natural = (0..n).map(|i| dot(precision.row(i), &mean)).collect();
@@ -117,8 +76,8 @@ impl Gaussian {
     /// A prior of `n` independent unknowns with mean 0 and standard deviation `deviation`.
     ///
     /// # Errors
-    /// [`PriorError`] if `n` is 0, or `deviation` is outside (0, ∞).
-    pub fn white(n: usize, deviation: f64) -> Result<Self, PriorError> {
+    /// [`Refusal`] if `n` is 0, or `deviation` is outside (0, ∞).
+    pub fn white(n: usize, deviation: f64) -> Result<Self, Refusal> {
         let mut covariance = Matrix::zeros(n, n);
         for i in 0..n {
             covariance.row_mut(i)[i] = deviation * deviation;
@@ -155,18 +114,15 @@ impl Gaussian {
     }
 }
 
-fn check_symmetry(covariance: &Matrix) -> Result<(), PriorError> {
+fn check_symmetry(covariance: &Matrix) -> Result<(), Refusal> {
     for row in 0..covariance.nrows() {
         for col in 0..row {
             let (value, mirror) = (covariance.row(row)[col], covariance.row(col)[row]);
             let bound = (covariance.row(row)[row].abs() * covariance.row(col)[col].abs()).sqrt();
             if (value - mirror).abs() > ASYMMETRY * bound {
-                return Err(PriorError::NotSymmetric {
-                    row,
-                    col,
-                    value,
-                    mirror,
-                });
+                return Err(Refusal::new(format!(
+                    "covariance[{row}, {col}] = {value} but its mirror image is {mirror}"
+                )));
             }
         }
     }
@@ -233,21 +189,20 @@ impl ImagePrior {
     /// C = Σ v x xᵀ − μ μᵀ + floor² I with μ = Σ v x, or μ = 0 if not centred. The weights v sum to 1.
     ///
     /// # Errors
-    /// [`PriorError`] if every image is zero, one is not finite, the grid does not fit, or a parameter is outside its
+    /// [`Refusal`] if every image is zero, one is not finite, the grid does not fit, or a parameter is outside its
     /// range.
-    pub fn learn(&self, images: &Matrix, cols: usize) -> Result<Gaussian, PriorError> {
+    pub fn learn(&self, images: &Matrix, cols: usize) -> Result<Gaussian, Refusal> {
         self.check()?;
         let pixels = images.nrows();
         if !images.view().values().iter().all(|v| v.is_finite()) {
-            return Err(PriorError::NotFinite { field: "images" });
+            return Err(Refusal::new(format!(
+                "`{field}` holds a value that is not finite",
+                field = "images"
+            )));
         }
         let clean = self.clean(images);
         if clean.ncols() == 0 || cols == 0 || !pixels.is_multiple_of(cols) {
-            return Err(PriorError::Images {
-                images: clean.ncols(),
-                pixels,
-                cols,
-            });
+            return Err(no_images(clean.ncols(), pixels, cols));
         }
         let (mut mean, mut covariance) = (vec![0.0; pixels], Matrix::zeros(pixels, pixels));
         add_moments(&clean, self.stay, &mut mean, &mut covariance);
@@ -268,7 +223,7 @@ impl ImagePrior {
         Gaussian::new(mean, covariance)
     }
 
-    fn check(&self) -> Result<(), ParameterError> {
+    fn check(&self) -> Result<(), Refusal> {
         non_negative_share("stay", self.stay)?;
         below_one("threshold", self.threshold)?;
         positive("floor", self.floor)?;
@@ -315,43 +270,31 @@ fn add_moments(columns: &Matrix, weight: f64, mean: &mut [f64], second: &mut Mat
     }
 }
 
-/// A parameter outside its range.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("`{field}` = {value} is outside {range}")]
-pub struct ParameterError {
-    /// Name of the parameter.
-    pub field: &'static str,
-    /// Its value.
-    pub value: f64,
-    /// Valid range.
-    pub range: &'static str,
-}
-
 /// `value` when it is finite and above zero.
-pub(super) fn positive(field: &'static str, value: f64) -> Result<f64, ParameterError> {
+pub(super) fn positive(field: &'static str, value: f64) -> Result<f64, Refusal> {
     within(field, value, value > 0.0 && value.is_finite(), "(0, ∞)")
 }
 
 /// `value` when it is in (0, 1].
-pub(super) fn share(field: &'static str, value: f64) -> Result<f64, ParameterError> {
+pub(super) fn share(field: &'static str, value: f64) -> Result<f64, Refusal> {
     within(field, value, value > 0.0 && value <= 1.0, "(0, 1]")
 }
 
 /// `value` when it is in [0, 1].
-pub(super) fn non_negative_share(field: &'static str, value: f64) -> Result<f64, ParameterError> {
+pub(super) fn non_negative_share(field: &'static str, value: f64) -> Result<f64, Refusal> {
     within(field, value, (0.0..=1.0).contains(&value), "[0, 1]")
 }
 
 /// `value` when it is in [0, 1).
-pub(super) fn below_one(field: &'static str, value: f64) -> Result<f64, ParameterError> {
+pub(super) fn below_one(field: &'static str, value: f64) -> Result<f64, Refusal> {
     within(field, value, (0.0..1.0).contains(&value), "[0, 1)")
 }
 
-fn within(field: &'static str, value: f64, ok: bool, range: &'static str) -> Result<f64, ParameterError> {
+fn within(field: &'static str, value: f64, ok: bool, range: &'static str) -> Result<f64, Refusal> {
     if ok {
         Ok(value)
     } else {
-        Err(ParameterError { field, value, range })
+        Err(Refusal::range(field, value, range))
     }
 }
 
@@ -369,8 +312,8 @@ impl Penalty {
     /// The penalty when it is in its range.
     ///
     /// # Errors
-    /// [`ParameterError`] when it is not.
-    pub(super) fn checked(self) -> Result<Self, ParameterError> {
+    /// [`Refusal`] when it is not.
+    pub(super) fn checked(self) -> Result<Self, Refusal> {
         match self {
             Self::Absolute(value) => positive("alpha", value)?,
             Self::Relative(value) => share("alpha", value)?,
@@ -392,8 +335,8 @@ impl Noise {
     /// The noise when it is in its range.
     ///
     /// # Errors
-    /// [`ParameterError`] when it is not.
-    pub(super) fn checked(self) -> Result<Self, ParameterError> {
+    /// [`Refusal`] when it is not.
+    pub(super) fn checked(self) -> Result<Self, Refusal> {
         match self {
             Self::Absolute(value) | Self::Relative(value) => positive("noise", value)?,
         };
@@ -410,7 +353,7 @@ impl Noise {
 }
 
 /// Stopping criterion of an iteration: it ends when its error, as the method defines it, is at most `tol`, or fails
-/// with [`RecoverError::NotConverged`](crate::RecoverError::NotConverged) after `max_iter` iterations.
+/// with a refusal after `max_iter` iterations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stopping {
     /// Largest error, in (0, ∞). If the method cannot reach it, as with 0 or NaN, it fails.
@@ -419,9 +362,17 @@ pub struct Stopping {
     pub max_iter: usize,
 }
 
+/// No image, or images that do not fit the grid.
+pub(crate) fn no_images(images: usize, pixels: usize, cols: usize) -> Refusal {
+    Refusal::new(format!(
+        "{images} images of {pixels} pixels do not make a prior on a grid of {cols} columns"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checks::says;
 
     #[test]
     fn the_precision_is_the_inverse() {
@@ -435,19 +386,16 @@ mod tests {
     #[test]
     fn what_is_no_gaussian_is_refused() {
         let matrix = |v: [f64; 4]| Matrix::from_rows(2, 2, v.to_vec()).unwrap();
-        let new = |mean: &[f64], v| Gaussian::new(mean.to_vec(), matrix(v)).unwrap_err();
+        let new = |mean: &[f64], v| Gaussian::new(mean.to_vec(), matrix(v));
         let unit = [1.0, 0.0, 0.0, 1.0];
-        assert!(matches!(new(&[0.0], unit), PriorError::Shape { len: 1, .. }));
-        assert!(matches!(
-            new(&[f64::NAN, 0.0], unit),
-            PriorError::NotFinite { field: "mean" }
+        assert!(says(&new(&[0.0], unit), "`mean` has 1 entries"));
+        assert!(says(&new(&[f64::NAN, 0.0], unit), "`mean` holds"));
+        assert!(says(&new(&[0.0; 2], [1.0, 0.5, 0.4, 1.0]), "covariance[1, 0]"));
+        assert!(says(
+            &new(&[0.0; 2], [1.0, 2.0, 2.0, 1.0]),
+            "covariance is not positive definite"
         ));
-        assert!(matches!(
-            new(&[0.0; 2], [1.0, 0.5, 0.4, 1.0]),
-            PriorError::NotSymmetric { row: 1, col: 0, .. }
-        ));
-        assert_eq!(new(&[0.0; 2], [1.0, 2.0, 2.0, 1.0]), PriorError::NotPositiveDefinite);
-        assert_eq!(Gaussian::white(2, 0.0).unwrap_err(), PriorError::NotPositiveDefinite);
+        assert!(says(&Gaussian::white(2, 0.0), "covariance is not positive definite"));
     }
 
     fn pixel(height: f64) -> Matrix {
@@ -514,11 +462,11 @@ mod tests {
             (&Matrix::zeros(4, 0), 2),
         ] {
             let refused = ImagePrior::UNSEEN.learn(images, cols);
-            assert!(matches!(refused, Err(PriorError::Images { .. })), "{refused:?}");
+            assert!(says(&refused, "do not make a prior"), "{refused:?}");
         }
         let broken = Matrix::from_rows(4, 1, vec![1.0, f64::NAN, 0.0, 0.0]).unwrap();
         let refused = ImagePrior::SEEN.learn(&broken, 2).unwrap_err();
-        assert_eq!(refused, PriorError::NotFinite { field: "images" });
+        assert!(refused.to_string().contains("`images` holds"));
         let unseen = ImagePrior::UNSEEN;
         for (prior, field) in [
             (ImagePrior { stay: 1.1, ..unseen }, "stay"),
@@ -531,11 +479,8 @@ mod tests {
             ),
             (ImagePrior { floor: 0.0, ..unseen }, "floor"),
         ] {
-            let refused = prior.learn(&image, 2).unwrap_err();
-            assert!(
-                matches!(&refused, PriorError::Parameter(p) if p.field == field),
-                "{refused}"
-            );
+            let refused = prior.learn(&image, 2);
+            assert!(says(&refused, &format!("`{field}` = ")), "{refused:?}");
         }
     }
 
@@ -543,7 +488,7 @@ mod tests {
     fn parameters_are_refused_by_name() {
         for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let error = Noise::Absolute(value).checked().unwrap_err();
-            assert_eq!((error.field, error.range), ("noise", "(0, ∞)"));
+            assert!(error.to_string().ends_with("is outside (0, ∞)"), "{error}");
             assert!(Penalty::Relative(value).checked().is_err());
         }
         assert!(Penalty::Relative(1.5).checked().is_err());

@@ -3,8 +3,9 @@
 use crate::kernels;
 use crate::kernels::LANES;
 use crate::matrix::MatrixView;
-use crate::problem::{Problem, Recover, RecoverError, Scaled, Scaling, Solution, Workspace};
+use crate::problem::{Problem, Recover, Scaled, Scaling, Solution, Workspace};
 use crate::recover::batch_omp::GramScratch;
+use spts_input::Refusal;
 
 /// Orthogonal matching pursuit. Each step selects argmaxₖ |aₖᵀ r| / ‖aₖ‖₂ and makes the residual r orthogonal to all
 /// selected atoms. The coefficients are the least-squares solution on them.
@@ -33,7 +34,7 @@ impl Recover for Omp {
         problem: &Problem<'_>,
         workspace: &mut Workspace,
         solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
+    ) -> Result<(), Refusal> {
         let (problem, state, limit) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(&mut state.weights);
         state.factor.start(problem.y, limit);
@@ -142,7 +143,7 @@ impl Recover for NnOmp {
         problem: &Problem<'_>,
         workspace: &mut Workspace,
         solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
+    ) -> Result<(), Refusal> {
         let (problem, state, limit) = workspace.scratch::<Greedy>().begin(problem, self.n_nonzero_coefs)?;
         problem.weights_into(&mut state.weights);
         state.factor.start(problem.y, limit);
@@ -189,12 +190,12 @@ impl Greedy {
     /// The problem scaled, the memory beside it, and the columns that a pursuit may use at most.
     ///
     /// # Errors
-    /// [`RecoverError::OperatorNotFinite`].
+    /// [`Refusal`].
     pub(crate) fn begin<'a>(
         &'a mut self,
         problem: &Problem<'a>,
         n_nonzero_coefs: usize,
-    ) -> Result<(Scaled<'a>, &'a mut State, usize), RecoverError> {
+    ) -> Result<(Scaled<'a>, &'a mut State, usize), Refusal> {
         let problem = self.scaling.apply(problem)?;
         let limit = n_nonzero_coefs.min(problem.a.nrows()).min(problem.a.ncols());
         Ok((problem, &mut self.state, limit))
@@ -235,8 +236,8 @@ impl State {
     /// Writes the least-squares solution on the columns of the factorisation.
     ///
     /// # Errors
-    /// [`RecoverError::Overflow`].
-    pub(crate) fn finish(&self, problem: &Scaled<'_>, solution: &mut Solution) -> Result<(), RecoverError> {
+    /// [`Refusal`].
+    pub(crate) fn finish(&self, problem: &Scaled<'_>, solution: &mut Solution) -> Result<(), Refusal> {
         solution.support.clear();
         solution.support.extend_from_slice(self.factor.atoms());
         self.factor.coefficients_into(&mut solution.coefficients);

@@ -1,11 +1,13 @@
 //! Orthogonal matching pursuit as in the published decoder.
 
+use crate::checks::overflow;
 use crate::kernels::{axpy, norm};
 use crate::matrix::MatrixView;
 use crate::operator::LinearOperator as _;
 use crate::problem::Workspace;
-use crate::problem::{Problem, Recover, RecoverError, Solution};
+use crate::problem::{Problem, Recover, Solution};
 use crate::recover::pursuit::{CONVERGED, DEPENDENT};
+use spts_input::Refusal;
 
 /// Orthogonal matching pursuit with the behaviour of the published code: atoms are NOT normalised, the coefficients are
 /// the least-squares solution on the selected atoms, and the pursuit ends at `n_nonzero_coefs` atoms or as soon as
@@ -47,7 +49,7 @@ impl Recover for ReferenceOmp {
         problem: &Problem<'_>,
         workspace: &mut Workspace,
         solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
+    ) -> Result<(), Refusal> {
         let (a, y) = (problem.matrix(), problem.y());
         let limit = self.n_nonzero_coefs.min(a.nrows()).min(a.ncols());
         let mut pursuit = Pursuit::start(a, y, limit, workspace.scratch());
@@ -71,11 +73,7 @@ impl Recover for ReferenceOmp {
         pursuit.coefficients(support.len(), &mut solution.coefficients);
         solution.residual_norm = residual_norm;
         let beyond = solution.coefficients.iter().position(|c| !c.is_finite());
-        beyond.map_or(Ok(()), |n| {
-            Err(RecoverError::Overflow {
-                atom: solution.support[n],
-            })
-        })
+        beyond.map_or(Ok(()), |n| Err(overflow(solution.support[n])))
     }
 }
 

@@ -1,11 +1,13 @@
 //! Linear Gaussian estimates with their posterior covariance: sample by sample, and of an image that changes in time.
 
-use crate::checks::{RangeError, within};
-use crate::kernels::{adjoint, axpy, dot};
+use crate::checks::within;
+use crate::kernels::{axpy, dot};
 use crate::matrix::MatrixView;
+use crate::posterior::GaussianPosterior;
 use crate::recover::gaussian::SMALLEST_VARIANCE;
-use crate::recover::prior::{Gaussian, Noise, ParameterError, positive};
+use crate::recover::prior::{Gaussian, Noise, positive};
 use libm::erfc;
+use spts_input::Refusal;
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::sync::Arc;
 
@@ -54,10 +56,8 @@ pub struct SequentialGains {
     precisions: Vec<f64>,
     /// Diagonals of P: before the first row, and after each. (M + 1) × N.
     variances: Vec<f64>,
-    /// P after the last row, N × N.
-    covariance: Vec<f64>,
-    /// P a, and later the same divided by √q.
-    product: Vec<f64>,
+    /// P after the last row, and P a divided by √q.
+    posterior: GaussianPosterior,
 }
 
 /// The estimate from the samples so far. Memory is kept from window to window, and a sample allocates nothing.
@@ -72,50 +72,6 @@ pub struct SequentialEstimate {
     unknown_scale: bool,
 }
 
-/// Why a row or a sample is refused. Nothing has changed then.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SequentialError {
-    /// The noise is outside its range.
-    #[error(transparent)]
-    Parameter(#[from] ParameterError),
-    /// A prior with a mean, while the scale of the image is unknown.
-    #[error("a prior of unknown scale has mean 0, but `mean[{index}]` = {value}")]
-    Mean {
-        /// Index of the first entry that is not zero.
-        index: usize,
-        /// Its value.
-        value: f64,
-    },
-    /// The number of weights in a row differs from the number of pixels.
-    #[error("the row has {cols} weights, expected {expected}")]
-    Columns {
-        /// Weights of the row.
-        cols: usize,
-        /// Pixels of the image.
-        expected: usize,
-    },
-    /// A weight or a sample that is not a number, or too large.
-    #[error(transparent)]
-    Range(#[from] RangeError),
-    /// A variance or a squared innovation exceeds the range of numbers.
-    #[error("row {index} makes {what} overflow")]
-    Overflow {
-        /// Number of the row.
-        index: usize,
-        /// Which quantity.
-        what: &'static str,
-    },
-    /// A sample arrived before its row.
-    #[error("sample {index} arrived, but only {prepared} rows are there")]
-    NotPrepared {
-        /// Number of the sample.
-        index: usize,
-        /// Number of rows.
-        prepared: usize,
-    },
-}
-
 /// Largest weight and largest sample: their squares stay finite.
 pub(super) const LARGEST: f64 = 1e100;
 
@@ -123,12 +79,12 @@ impl SequentialGains {
     /// Gains under `prior`, without rows.
     ///
     /// # Errors
-    /// [`SequentialError`] if `noise` is outside its range, or relative while the prior has a mean.
-    pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, SequentialError> {
+    /// [`Refusal`] if `noise` is outside its range, or relative while the prior has a mean.
+    pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, Refusal> {
         let noise = noise.checked()?;
         if let (Noise::Relative(_), Some(index)) = (noise, prior.mean().iter().position(|v| *v != 0.0)) {
             let value = prior.mean()[index];
-            return Err(SequentialError::Mean { index, value });
+            return Err(with_mean(index, value));
         }
         let n = prior.len();
         let diagonal: Vec<f64> = (0..n).map(|i| prior.covariance().row(i)[i]).collect();
@@ -140,8 +96,7 @@ impl SequentialGains {
             gains: Vec::new(),
             precisions: Vec::new(),
             variances: diagonal,
-            covariance: prior.covariance().view().values().to_vec(),
-            product: vec![0.0; n],
+            posterior: GaussianPosterior::new(prior.covariance().view().values().to_vec(), n),
             prior,
         })
     }
@@ -149,15 +104,12 @@ impl SequentialGains {
     /// Adds the weights of the next measurement, each in ±1e100.
     ///
     /// # Errors
-    /// [`SequentialError`] if the row does not fit the image, a weight is not a number or out of range, or a variance
+    /// [`Refusal`] if the row does not fit the image, a weight is not a number or out of range, or a variance
     /// overflows.
-    pub fn push(&mut self, row: &[f64]) -> Result<(), SequentialError> {
+    pub fn push(&mut self, row: &[f64]) -> Result<(), Refusal> {
         let n = self.prior.len();
         if row.len() != n {
-            return Err(SequentialError::Columns {
-                cols: row.len(),
-                expected: n,
-            });
+            return Err(other_weights(row.len(), n));
         }
         for &weight in row {
             within("weight", weight, -LARGEST, LARGEST)?;
@@ -168,19 +120,14 @@ impl SequentialGains {
             Noise::Absolute(deviation) => deviation * deviation,
             Noise::Relative(share) => share * share * signal,
         };
-        // P is symmetric
-        adjoint(&self.covariance, row, &mut self.product);
-        let variance = dot(row, &self.product).max(0.0) + noise.max(SMALLEST_VARIANCE * signal);
+        let variance = self.posterior.project(row).max(0.0) + noise.max(SMALLEST_VARIANCE * signal);
         if !variance.is_finite() {
             let what = "the variance of its measurement";
-            return Err(SequentialError::Overflow { index, what });
+            return Err(row_overflow(index, what));
         }
         // a row without a weight says nothing
         let precision = if variance > 0.0 { 1.0 / variance.sqrt() } else { 0.0 };
-        self.product.iter_mut().for_each(|u| *u *= precision);
-        for (line, &u) in self.covariance.chunks_exact_mut(n).zip(&self.product) {
-            axpy(-u, &self.product, line);
-        }
+        self.posterior.lower_scaled(precision);
         self.keep(row, precision);
         Ok(())
     }
@@ -196,20 +143,22 @@ impl SequentialGains {
         }
         self.precisions[at] = precision;
         self.rows[at * n..][..n].copy_from_slice(row);
-        for (gain, u) in self.gains[at * n..][..n].iter_mut().zip(&self.product) {
+        for (gain, u) in self.gains[at * n..][..n].iter_mut().zip(&self.posterior.product) {
             *gain = u * precision;
         }
-        let variances = &mut self.variances[(at + 1) * n..][..n];
-        for (i, (variance, line)) in variances.iter_mut().zip(self.covariance.chunks_exact(n)).enumerate() {
-            *variance = line[i];
-        }
+        let variances = self.variances[(at + 1) * n..][..n].iter_mut();
+        variances
+            .zip(self.posterior.variances())
+            .for_each(|(to, variance)| *to = variance);
         self.count += 1;
     }
 
     /// Removes all rows and keeps the memory.
     pub fn clear(&mut self) {
         self.count = 0;
-        self.covariance.copy_from_slice(self.prior.covariance().view().values());
+        self.posterior
+            .covariance
+            .copy_from_slice(self.prior.covariance().view().values());
     }
 
     /// Number of rows.
@@ -221,7 +170,7 @@ impl SequentialGains {
     /// Posterior covariance after the last row at scale 1, N × N.
     #[must_use]
     pub fn covariance(&self) -> &[f64] {
-        &self.covariance
+        &self.posterior.covariance
     }
 
     /// Posterior variances of the pixels after the first `rows` rows, at scale 1.
@@ -254,28 +203,22 @@ impl SequentialEstimate {
     /// Adds the sample `y`, in ±1e100, of the first row in `gains` without one: x̂ ← x̂ + g (y − aᵀ x̂).
     ///
     /// # Errors
-    /// [`SequentialError`] if there is no row for the sample, the gains belong to another image, `y` is not a number or
+    /// [`Refusal`] if there is no row for the sample, the gains belong to another image, `y` is not a number or
     /// out of range, or its squared innovation overflows.
-    pub fn observe(&mut self, gains: &SequentialGains, y: f64) -> Result<(), SequentialError> {
+    pub fn observe(&mut self, gains: &SequentialGains, y: f64) -> Result<(), Refusal> {
         let (n, at) = (self.mean.len(), self.count);
         if gains.prior.len() != n {
-            return Err(SequentialError::Columns {
-                cols: gains.prior.len(),
-                expected: n,
-            });
+            return Err(other_weights(gains.prior.len(), n));
         }
         if at >= gains.count {
-            return Err(SequentialError::NotPrepared {
-                index: at,
-                prepared: gains.count,
-            });
+            return Err(row_missing(at, gains.count));
         }
         let y = within("y", y, -LARGEST, LARGEST)?;
         let innovation = y - dot(&gains.rows[at * n..][..n], &self.mean);
         let squares = self.squares + (innovation * gains.precisions[at]).powi(2);
         if !squares.is_finite() {
             let what = "the squared innovation of its sample";
-            return Err(SequentialError::Overflow { index: at, what });
+            return Err(row_overflow(at, what));
         }
         axpy(innovation, &gains.gains[at * n..][..n], &mut self.mean);
         self.squares = squares;
@@ -386,8 +329,8 @@ pub struct TrackedImage {
     mean_variance: f64,
     /// û.
     shape: Vec<f64>,
-    /// P, N × N.
-    covariance: Vec<f64>,
+    /// P, and P a divided by √q.
+    posterior: GaussianPosterior,
     /// Diagonal of P.
     variances: Vec<f64>,
     /// s û.
@@ -395,8 +338,6 @@ pub struct TrackedImage {
     /// s.
     strength: f64,
     sums: Sums,
-    /// P a, and later the same divided by √q.
-    product: Vec<f64>,
 }
 
 /// Sums over the samples, weighted by exp(−age/T).
@@ -417,18 +358,18 @@ impl TrackedImage {
     /// An image with the prior only.
     ///
     /// # Errors
-    /// [`SequentialError`] if a field of `motion` is outside its range, or the prior has a mean.
-    pub fn new(prior: Arc<Gaussian>, motion: Motion) -> Result<Self, SequentialError> {
+    /// [`Refusal`] if a field of `motion` is outside its range, or the prior has a mean.
+    pub fn new(prior: Arc<Gaussian>, motion: Motion) -> Result<Self, Refusal> {
         positive("memory", motion.memory)?;
         positive("strength_memory", motion.strength_memory)?;
         positive("noise", motion.noise)?;
         if !(motion.idle_noise >= 0.0 && motion.idle_noise <= LARGEST) {
             let (field, value, range) = ("idle_noise", motion.idle_noise, "[0, 1e100]");
-            return Err(ParameterError { field, value, range }.into());
+            return Err(Refusal::range(field, value, range));
         }
         if let Some(index) = prior.mean().iter().position(|v| *v != 0.0) {
             let value = prior.mean()[index];
-            return Err(SequentialError::Mean { index, value });
+            return Err(with_mean(index, value));
         }
         let n = prior.len();
         let variances: Vec<f64> = (0..n).map(|i| prior.covariance().row(i)[i]).collect();
@@ -436,12 +377,11 @@ impl TrackedImage {
             motion,
             mean_variance: variances.iter().sum::<f64>() / n as f64,
             shape: vec![0.0; n],
-            covariance: prior.covariance().view().values().to_vec(),
+            posterior: GaussianPosterior::new(prior.covariance().view().values().to_vec(), n),
             variances,
             image: vec![0.0; n],
             strength: 0.0,
             sums: Sums::default(),
-            product: vec![0.0; n],
             prior,
         })
     }
@@ -449,7 +389,9 @@ impl TrackedImage {
     /// Removes all samples and keeps the memory.
     pub fn clear(&mut self) {
         self.shape.fill(0.0);
-        self.covariance.copy_from_slice(self.prior.covariance().view().values());
+        self.posterior
+            .covariance
+            .copy_from_slice(self.prior.covariance().view().values());
         self.image.fill(0.0);
         self.strength = 0.0;
         self.sums = Sums::default();
@@ -460,17 +402,17 @@ impl TrackedImage {
     /// window. Weights and samples are in ±1e100.
     ///
     /// # Errors
-    /// [`SequentialError`] if the window does not fit the image, holds a value that is not a number or out of range, or
+    /// [`Refusal`] if the window does not fit the image, holds a value that is not a number or out of range, or
     /// a variance overflows. In the last case the image must be cleared; otherwise it is unchanged.
-    pub fn observe(&mut self, elapsed: f64, phi: MatrixView<'_>, y: &[f64]) -> Result<(), SequentialError> {
+    pub fn observe(&mut self, elapsed: f64, phi: MatrixView<'_>, y: &[f64]) -> Result<(), Refusal> {
         let n = self.prior.len();
         if phi.ncols() != n {
             let (cols, expected) = (phi.ncols(), n);
-            return Err(SequentialError::Columns { cols, expected });
+            return Err(other_weights(cols, expected));
         }
         if phi.nrows() != y.len() {
             let (index, prepared) = (y.len(), phi.nrows());
-            return Err(SequentialError::NotPrepared { index, prepared });
+            return Err(row_missing(index, prepared));
         }
         within("elapsed", elapsed, 0.0, f64::MAX)?;
         for &weight in phi.values() {
@@ -496,7 +438,7 @@ impl TrackedImage {
         let forgotten = -(-2.0 * elapsed / self.motion.memory).exp_m1();
         self.shape.iter_mut().for_each(|u| *u *= kept);
         let covariance = self.prior.covariance().view();
-        for (p, c) in self.covariance.iter_mut().zip(covariance.values()) {
+        for (p, c) in self.posterior.covariance.iter_mut().zip(covariance.values()) {
             *p = kept * kept * *p + forgotten * c;
         }
     }
@@ -517,7 +459,7 @@ impl TrackedImage {
     }
 
     /// Updates the shape with every sample.
-    fn take(&mut self, phi: MatrixView<'_>, y: &[f64]) -> Result<(), SequentialError> {
+    fn take(&mut self, phi: MatrixView<'_>, y: &[f64]) -> Result<(), Refusal> {
         let inverse = 1.0 / self.strength;
         // without an output there is nothing to learn of the shape
         if !inverse.is_finite() {
@@ -527,35 +469,24 @@ impl TrackedImage {
         let noise = self.motion.noise.powi(2) * (self.sums.squares / self.sums.count) + self.motion.idle_noise.powi(2);
         let noise = noise * inverse * inverse;
         for (index, (row, y)) in phi.values().chunks_exact(n).zip(y).enumerate() {
-            adjoint(&self.covariance, row, &mut self.product);
             let least = SMALLEST_VARIANCE * self.mean_variance * dot(row, row);
-            let variance = dot(row, &self.product).max(0.0) + noise.max(least);
+            let variance = self.posterior.project(row).max(0.0) + noise.max(least);
             let innovation = y * inverse - dot(row, &self.shape);
             if !(variance.is_finite() && innovation.is_finite()) {
                 let what = "the variance of its measurement";
-                return Err(SequentialError::Overflow { index, what });
+                return Err(row_overflow(index, what));
             }
             // a row without a weight says nothing
             let precision = if variance > 0.0 { 1.0 / variance.sqrt() } else { 0.0 };
-            self.product.iter_mut().for_each(|u| *u *= precision);
-            axpy(innovation * precision, &self.product, &mut self.shape);
-            for (line, &u) in self.covariance.chunks_exact_mut(n).zip(&self.product) {
-                axpy(-u, &self.product, line);
-            }
+            self.posterior.lower_scaled(precision);
+            axpy(innovation * precision, &self.posterior.product, &mut self.shape);
         }
         Ok(())
     }
 
     fn keep_variances(&mut self) {
-        let n = self.prior.len();
-        for (i, (variance, line)) in self
-            .variances
-            .iter_mut()
-            .zip(self.covariance.chunks_exact(n))
-            .enumerate()
-        {
-            *variance = line[i];
-        }
+        self.variances.clear();
+        self.variances.extend(self.posterior.variances());
     }
 
     /// Image s û, length N, in the unit of the samples. It may have negative values.
@@ -573,7 +504,7 @@ impl TrackedImage {
     /// Posterior covariance P of the shape, N × N.
     #[must_use]
     pub fn covariance(&self) -> &[f64] {
-        &self.covariance
+        &self.posterior.covariance
     }
 
     /// Expected intersection over union, in [0, 1], of the image's support with the true one, as
@@ -619,6 +550,24 @@ fn probability_above(level: f64, mean: f64, deviation: f64) -> f64 {
     } else {
         0.0
     }
+}
+
+fn with_mean(index: usize, value: f64) -> Refusal {
+    Refusal::new(format!(
+        "a prior of unknown scale has mean 0, but `mean[{index}]` = {value}"
+    ))
+}
+
+fn other_weights(cols: usize, expected: usize) -> Refusal {
+    Refusal::new(format!("the row has {cols} weights, expected {expected}"))
+}
+
+fn row_missing(index: usize, prepared: usize) -> Refusal {
+    Refusal::new(format!("sample {index} arrived, but only {prepared} rows are there"))
+}
+
+fn row_overflow(index: usize, what: &str) -> Refusal {
+    Refusal::new(format!("row {index} makes {what} overflow"))
 }
 
 #[cfg(test)]

@@ -1,10 +1,12 @@
 //! Total variation with non-negativity.
 
+use crate::checks::{not_converged, other_columns};
 use crate::kernels::{axpy, dot, norm};
 use crate::matrix::MatrixView;
 use crate::operator::LinearOperator as _;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace, divide_into, operator_scale, power_of_two};
-use crate::recover::prior::{ParameterError, Penalty, Stopping};
+use crate::problem::{Problem, Recover, Solution, Workspace, divide_into, operator_scale, power_of_two};
+use crate::recover::prior::{Penalty, Stopping};
+use spts_input::Refusal;
 
 /// Non-negative image with small total variation:
 ///
@@ -63,8 +65,8 @@ impl Tv {
     /// Images of `rows` × `cols` pixels (row-major) with the penalty `alpha`.
     ///
     /// # Errors
-    /// [`ParameterError`] if `alpha` is outside its range.
-    pub fn new(rows: usize, cols: usize, alpha: Penalty) -> Result<Self, ParameterError> {
+    /// [`Refusal`] if `alpha` is outside its range.
+    pub fn new(rows: usize, cols: usize, alpha: Penalty) -> Result<Self, Refusal> {
         Ok(Self {
             grid: Grid { rows, cols },
             alpha: alpha.checked()?,
@@ -79,13 +81,10 @@ impl Recover for Tv {
         problem: &Problem<'_>,
         workspace: &mut Workspace,
         solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
+    ) -> Result<(), Refusal> {
         let (a, y) = (problem.matrix(), problem.y());
         if a.ncols() != self.grid.pixels() {
-            return Err(RecoverError::Columns {
-                cols: a.ncols(),
-                expected: self.grid.pixels(),
-            });
+            return Err(other_columns(a.ncols(), self.grid.pixels()));
         }
         let (a_power, y_power) = (operator_scale(a)?, power_of_two(y));
         let work = workspace.scratch::<TvScratch>();
@@ -225,7 +224,7 @@ impl<'w> Hybrid<'w> {
     }
 
     /// Leaves the answer in `mean`.
-    fn run(&mut self, Stopping { tol, max_iter }: Stopping) -> Result<(), RecoverError> {
+    fn run(&mut self, Stopping { tol, max_iter }: Stopping) -> Result<(), Refusal> {
         let (mut run, mut at_restart) = (0_usize, f64::INFINITY);
         let mut iteration = 0;
         loop {
@@ -242,11 +241,7 @@ impl<'w> Hybrid<'w> {
                     return Ok(());
                 }
                 if iteration >= max_iter {
-                    return Err(RecoverError::NotConverged {
-                        iterations: iteration,
-                        error: best,
-                        tol,
-                    });
+                    return Err(not_converged(iteration, best, tol));
                 }
                 self.rebalance();
                 self.work.start.copy_from(&self.work.now);

@@ -1,13 +1,15 @@
 //! Images by a small neural network that has been trained on many simulated ones. The network is an unrolled iteration:
 //! each of its steps compares its image with the samples and corrects it.
 
+use crate::checks::{other_columns, overflow};
 use crate::cholesky::{factor, solve_lower};
 use crate::kernels::{adjoint, column_squares, dot, norm};
 use crate::matrix::{Matrix, MatrixView};
 use crate::metrics::SUPPORT_THRESHOLD;
-use crate::problem::{Problem, Recover, RecoverError, Solution, Workspace, divide_into, operator_scale, power_of_two};
+use crate::problem::{Problem, Recover, Solution, Workspace, divide_into, operator_scale, power_of_two};
 use crate::sign_tables::SignTables;
 use multiversion::multiversion;
+use spts_input::Refusal;
 use std::sync::Arc;
 
 /// Decodes an image with a small neural network, which has been trained on many simulated images before: a decode then
@@ -45,7 +47,7 @@ use std::sync::Arc;
 /// let weights = UnrolledWeights::plain(100, 1e-3)?;
 /// assert_eq!(weights.taxels(), 100);
 /// assert!(UnrolledWeights::plain(100, -1.0).is_err());
-/// # Ok::<(), spts_recon::recover::UnrolledError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Unrolled {
@@ -118,7 +120,7 @@ impl Unrolled {
     /// each taxel exceeds .23 of the image's maximum. Both are zero if `y` or all rows are zero.
     ///
     /// # Errors
-    /// [`RecoverError`] if the rows have another number of taxels or an entry that is not finite, or a taxel exceeds
+    /// [`Refusal`] if the rows have another number of taxels or an entry that is not finite, or a taxel exceeds
     /// the range of numbers.
     pub fn estimate(
         &self,
@@ -126,7 +128,7 @@ impl Unrolled {
         workspace: &mut Workspace,
         image: &mut Vec<f64>,
         probabilities: &mut Vec<f64>,
-    ) -> Result<Touched, RecoverError> {
+    ) -> Result<Touched, Refusal> {
         let work = workspace.scratch::<Scratch>();
         let found = self.decode(problem, work)?;
         image.clear();
@@ -137,13 +139,10 @@ impl Unrolled {
     }
 
     /// Image and probabilities into `work`.
-    fn decode(&self, problem: &Problem<'_>, work: &mut Scratch) -> Result<Touched, RecoverError> {
+    fn decode(&self, problem: &Problem<'_>, work: &mut Scratch) -> Result<Touched, Refusal> {
         let (a, n) = (problem.matrix(), self.taxels());
         if a.ncols() != n {
-            return Err(RecoverError::Columns {
-                cols: a.ncols(),
-                expected: n,
-            });
+            return Err(other_columns(a.ncols(), n));
         }
         let size = work.scale_rows(operator_scale(a)?, problem)?;
         let y_scale = power_of_two(problem.y());
@@ -167,7 +166,7 @@ impl Unrolled {
             // two products: the scales lie up to 10^600 apart
             *x = *x * s * y_scale / size;
             if !x.is_finite() {
-                return Err(RecoverError::Overflow { atom });
+                return Err(overflow(atom));
             }
         }
         Ok(Touched { taxels, expected_iou })
@@ -268,7 +267,7 @@ impl Unrolled {
 impl Scratch {
     /// The rows, scaled to a root mean square of 1, and their signs where all are ±1; returns what they were divided
     /// by, 0 for rows that are all zero.
-    fn scale_rows(&mut self, power: f64, problem: &Problem<'_>) -> Result<f64, RecoverError> {
+    fn scale_rows(&mut self, power: f64, problem: &Problem<'_>) -> Result<f64, Refusal> {
         let (a, n) = (problem.matrix(), problem.matrix().ncols());
         divide_into(a.values(), power, &mut self.rows);
         if self.set_signs(n) {
@@ -337,7 +336,7 @@ impl Recover for Unrolled {
         problem: &Problem<'_>,
         workspace: &mut Workspace,
         solution: &mut Solution,
-    ) -> Result<(), RecoverError> {
+    ) -> Result<(), Refusal> {
         let work = workspace.scratch::<Scratch>();
         self.decode(problem, work)?;
         let n = self.taxels();
@@ -377,23 +376,22 @@ impl Layer {
         Self { weights: tiles, bias }
     }
 
-    fn check(&self, name: &str, inputs: usize, outputs: usize) -> Result<(), UnrolledError> {
+    fn check(&self, name: &str, inputs: usize, outputs: usize) -> Result<(), Refusal> {
         for (what, len, expected) in [
             ("weights", self.weights.len(), inputs * outputs),
             ("biases", self.bias.len(), outputs),
         ] {
             if len != expected {
-                return Err(UnrolledError::Length {
-                    what: format!("{what} of {name}"),
-                    len,
-                    expected,
-                });
+                return Err(other_count(&format!("{what} of {name}"), len, expected));
             }
         }
         if self.weights.iter().chain(&self.bias).all(|w| w.is_finite()) {
             Ok(())
         } else {
-            Err(UnrolledError::NotFinite { what: name.to_owned() })
+            Err(Refusal::new(format!(
+                "{what} have a number that is not finite",
+                what = name.to_owned()
+            )))
         }
     }
 }
@@ -423,38 +421,6 @@ pub struct UnrolledWeights {
     pub(super) memory: usize,
 }
 
-/// Why numbers are not a valid network.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum UnrolledError {
-    /// An array whose length does not match the others.
-    #[error("{what} have {len} numbers, expected {expected}")]
-    Length {
-        /// Name of the array.
-        what: String,
-        /// Its length.
-        len: usize,
-        /// Expected length.
-        expected: usize,
-    },
-    /// A NaN or an infinity.
-    #[error("{what} have a number that is not finite")]
-    NotFinite {
-        /// Name of the array.
-        what: String,
-    },
-    /// A number outside its range.
-    #[error("`{field}` = {value} is outside {range}")]
-    Range {
-        /// Its name.
-        field: &'static str,
-        /// Its value.
-        value: f64,
-        /// Valid range.
-        range: &'static str,
-    },
-}
-
 /// Most taxels: the moments of their images take O(N²).
 const MOST_TAXELS: usize = 4096;
 /// Steps of [`UnrolledWeights::plain`].
@@ -469,19 +435,14 @@ impl UnrolledWeights {
     /// `noise_variance` the variance of the noise, both for images of length 1.
     ///
     /// # Errors
-    /// [`UnrolledError`] if the layers do not fit together, a number is not finite, or the prior is not valid.
-    pub fn new(
-        prior: Matrix,
-        noise_variance: f64,
-        steps: Vec<UnrolledStep>,
-        output: Layer,
-    ) -> Result<Self, UnrolledError> {
+    /// [`Refusal`] if the layers do not fit together, a number is not finite, or the prior is not valid.
+    pub fn new(prior: Matrix, noise_variance: f64, steps: Vec<UnrolledStep>, output: Layer) -> Result<Self, Refusal> {
         let n = prior.nrows();
         let range = |field, value, valid, range| {
             if valid {
                 Ok(())
             } else {
-                Err(UnrolledError::Range { field, value, range })
+                Err(Refusal::range(field, value, range))
             }
         };
         range(
@@ -492,9 +453,10 @@ impl UnrolledWeights {
         )?;
         range("steps", steps.len() as f64, steps.len() <= 100, "[0, 100]")?;
         if !prior.view().values().iter().all(|v| v.is_finite()) {
-            return Err(UnrolledError::NotFinite {
-                what: "the prior".to_owned(),
-            });
+            return Err(Refusal::new(format!(
+                "{what} have a number that is not finite",
+                what = "the prior".to_owned()
+            )));
         }
         let trace: f64 = (0..n).map(|i| prior.row(i)[i]).sum();
         let [least, most] = MOMENTS;
@@ -512,11 +474,7 @@ impl UnrolledWeights {
         )?;
         let memory = (output.weights.len() / n)
             .checked_sub(n)
-            .ok_or_else(|| UnrolledError::Length {
-                what: "weights of the output".to_owned(),
-                len: output.weights.len(),
-                expected: n * n,
-            })?;
+            .ok_or_else(|| other_count("weights of the output", output.weights.len(), n * n))?;
         for (t, step) in steps.iter().enumerate() {
             let hidden = step.hidden.bias.len();
             step.hidden
@@ -537,8 +495,8 @@ impl UnrolledWeights {
     /// residual and sets negative values to zero; taxels above a quarter of the image's length count as touched.
     ///
     /// # Errors
-    /// [`UnrolledError`] if the number of taxels or the noise is out of range.
-    pub fn plain(taxels: usize, noise_variance: f64) -> Result<Self, UnrolledError> {
+    /// [`Refusal`] if the number of taxels or the noise is out of range.
+    pub fn plain(taxels: usize, noise_variance: f64) -> Result<Self, Refusal> {
         let n = taxels;
         let mut prior = Matrix::zeros(n, n);
         let (mut weights, mut hidden, mut change) =
@@ -669,9 +627,14 @@ pub(super) fn agree(image: &mut [f64], order: &[usize], count: usize) {
     }
 }
 
+fn other_count(what: &str, len: usize, expected: usize) -> Refusal {
+    Refusal::new(format!("{what} have {len} numbers, expected {expected}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checks::says;
     use crate::metrics::support;
     use nalgebra::{DMatrix, DVector};
     use rand::{RngExt as _, SeedableRng as _};
@@ -858,7 +821,7 @@ mod tests {
                 );
             }
         }
-        assert!(matches!(solve(1e-300, 1e300), Err(RecoverError::Overflow { .. })));
+        assert!(says(&solve(1e-300, 1e300), "the coefficient of atom"));
         assert!(solve(1.0, 0.0).unwrap().iter().all(|x| *x == 0.0));
         assert!(solve(0.0, 1.0).unwrap().iter().all(|x| *x == 0.0));
     }

@@ -3,13 +3,16 @@
 use crate::classify::Component;
 use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::{Matrix, MatrixView};
+use crate::posterior::GaussianPosterior;
 use crate::rows::expected::Headroom;
 use crate::rows::greedy::{Worth, climb, unreachable_limit};
+use crate::rows::other_grid;
 use crate::rows::simple::random_signs;
-use crate::rows::{DesignRows, RowError, RowTask};
+use crate::rows::{DesignRows, RowTask};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use spts_input::Refusal;
 
 /// Rows of ±1 that distinguish Gaussian classes of unknown amplitude, designed one after the other.
 ///
@@ -32,7 +35,7 @@ impl Default for Classes {
 }
 
 impl DesignRows for Classes {
-    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, RowError> {
+    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
         task.check(1 << 16, "so many rows are of no use")?;
         let n = task.expected.taxels();
         let mut apart = Apart::new(task.classes, task.expected.shape())?;
@@ -67,8 +70,7 @@ impl DesignRows for Classes {
 pub(super) struct Apart {
     n: usize,
     labels: Vec<Option<usize>>,
-    /// Posterior covariance, N × N.
-    p: Vec<f64>,
+    posterior: GaussianPosterior,
     /// ν.
     variance: f64,
     /// Part of the templates that the rows do not explain, K × N.
@@ -97,20 +99,19 @@ fn apart(own: f64, both: f64, other: f64) -> f64 {
 }
 
 impl Apart {
-    pub(super) fn new(classes: &[Component], shape: [usize; 2]) -> Result<Self, RowError> {
+    pub(super) fn new(classes: &[Component], shape: [usize; 2]) -> Result<Self, Refusal> {
         let mut labels: Vec<Option<usize>> = classes.iter().map(|c| c.label).collect();
         labels.sort_unstable();
         labels.dedup();
         if labels.len() < 2 {
-            return Err(RowError::Classes { labels: labels.len() });
+            return Err(Refusal::new(format!(
+                "`classes` has {labels} classes; rows that tell classes apart need at least 2",
+                labels = labels.len()
+            )));
         }
         let n = shape[0] * shape[1];
         if let Some(other) = classes.iter().find(|c| c.mean.len() != n) {
-            return Err(RowError::Shape {
-                pixels: other.mean.len(),
-                rows: shape[0],
-                cols: shape[1],
-            });
+            return Err(other_grid(other.mean.len(), shape[0], shape[1]));
         }
         let share = 1.0 / classes.len() as f64;
         let mut p = vec![0.0; n * n];
@@ -125,7 +126,7 @@ impl Apart {
             n,
             pairs: pairs.filter(differ).collect(),
             labels: classes.iter().map(|c| c.label).collect(),
-            p,
+            posterior: GaussianPosterior::new(p, n),
             variance: share * classes.iter().map(|c| c.noise_variance).sum::<f64>(),
             residual: classes.iter().flat_map(|c| c.mean.iter().copied()).collect(),
             products: vec![0.0; classes.len() * classes.len()],
@@ -135,9 +136,8 @@ impl Apart {
     /// Measures the row `a`.
     pub(super) fn observe(&mut self, a: &[f64]) -> Observed {
         let (n, count) = (self.n, self.labels.len());
-        let mut u = vec![0.0; n];
-        adjoint(&self.p, a, &mut u);
-        let s = dot(a, &u) + self.variance;
+        let s = self.posterior.project(a) + self.variance;
+        let u = self.posterior.product.clone();
         let sums: Vec<f64> = self.residual.chunks_exact(n).map(|t| dot(t, a)).collect();
         for (k, row) in self.products.chunks_exact_mut(count).enumerate() {
             axpy(sums[k] / s, &sums, row);
@@ -145,9 +145,7 @@ impl Apart {
         for (t, sum) in self.residual.chunks_exact_mut(n).zip(&sums) {
             axpy(-sum / s, &u, t);
         }
-        for (i, row) in self.p.chunks_exact_mut(n).enumerate() {
-            axpy(-u[i] / s, &u, row);
-        }
+        self.posterior.lower(s);
         let mut pairs = std::mem::take(&mut self.pairs);
         pairs.sort_by(|a, b| self.distance(*a).total_cmp(&self.distance(*b)));
         self.pairs = pairs;
@@ -179,7 +177,7 @@ impl Apart {
     /// Sums of the row `a` over the residual templates, and aᵀP a.
     pub(super) fn seen(&self, a: &[f64]) -> (Vec<f64>, f64) {
         let sums = self.residual.chunks_exact(self.n).map(|t| dot(t, a)).collect();
-        let rows = self.p.chunks_exact(self.n).zip(a);
+        let rows = self.posterior.covariance.chunks_exact(self.n).zip(a);
         (sums, rows.map(|(row, a_i)| a_i * dot(row, a)).sum())
     }
 
@@ -230,13 +228,13 @@ impl<'a> Separation<'a> {
     }
 
     fn apa_after(&self, i: usize, delta: f64) -> f64 {
-        self.apa + delta * (2.0 * self.u[i] + delta * self.apart.p[i * (self.apart.n + 1)])
+        self.apa + delta * (2.0 * self.u[i] + delta * self.apart.posterior.covariance[i * (self.apart.n + 1)])
     }
 }
 
 impl Worth for Separation<'_> {
     fn start(&mut self, row: &[f64]) {
-        adjoint(&self.apart.p, row, &mut self.u);
+        adjoint(&self.apart.posterior.covariance, row, &mut self.u);
         self.apa = dot(row, &self.u);
         let templates = self.apart.residual.chunks_exact(self.apart.n);
         self.sums
@@ -271,7 +269,7 @@ impl Worth for Separation<'_> {
         for (sum, t) in self.sums.iter_mut().zip(self.apart.residual.chunks_exact(n)) {
             *sum += delta * t[i];
         }
-        axpy(delta, &self.apart.p[i * n..(i + 1) * n], &mut self.u);
+        axpy(delta, &self.apart.posterior.covariance[i * n..(i + 1) * n], &mut self.u);
     }
 }
 
@@ -297,8 +295,8 @@ impl Worth for Separation<'_> {
 /// ```
 ///
 /// # Errors
-/// [`RowError`] if the task is out of range, the candidates have another number of taxels, or there are too few.
-pub fn choose_for_images(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<Vec<usize>, RowError> {
+/// [`Refusal`] if the task is out of range, the candidates have another number of taxels, or there are too few.
+pub fn choose_for_images(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<Vec<usize>, Refusal> {
     let n = check(task, candidates)?;
     let covariance = task.expected.covariance();
     let variance = task.variance();
@@ -338,8 +336,8 @@ pub fn choose_for_images(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Resu
 /// see `classes` in [`super::DESIGNERS`].
 ///
 /// # Errors
-/// As [`choose_for_images`], and [`RowError::Classes`] for fewer than two classes.
-pub fn choose_for_classes(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<Vec<usize>, RowError> {
+/// As [`choose_for_images`], and [`Refusal`] for fewer than two classes.
+pub fn choose_for_classes(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<Vec<usize>, Refusal> {
     let n = check(task, candidates)?;
     let mut apart = Apart::new(task.classes, task.expected.shape())?;
     let rows: Vec<&[f64]> = candidates.values().chunks_exact(n).collect();
@@ -370,14 +368,10 @@ pub fn choose_for_classes(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Res
 }
 
 /// Number of taxels.
-fn check(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<usize, RowError> {
+fn check(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<usize, Refusal> {
     let [rows, cols] = task.expected.shape();
     if candidates.ncols() != rows * cols {
-        return Err(RowError::Shape {
-            pixels: candidates.ncols(),
-            rows,
-            cols,
-        });
+        return Err(other_grid(candidates.ncols(), rows, cols));
     }
     task.check(candidates.nrows(), "there are no more candidates")?;
     Ok(rows * cols)
@@ -386,6 +380,7 @@ fn check(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<usize, RowErr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::checks::says;
     use crate::rows::expected::Expected;
     use crate::rows::greedy::posterior_trace;
     use crate::rows::simple::Random;
@@ -416,7 +411,7 @@ mod tests {
         assert!(alike(0, 1) && alike(2, 3) && !alike(0, 2), "{row:?}");
         let one = [component(1, [1.0; 4])];
         let refused = Classes::default().design(&RowTask { classes: &one, ..task });
-        assert_eq!(refused, Err(RowError::Classes { labels: 1 }));
+        assert!(says(&refused, "`classes` has 1 classes"));
     }
 
     /// Row by row against the metric's definition.
@@ -473,7 +468,7 @@ mod tests {
             }
         }
         let refused = choose_for_images(&RowTask::new(61, &expected), candidates.view());
-        assert!(matches!(refused, Err(RowError::Rows { most: 60, .. })), "{refused:?}");
+        assert!(says(&refused, "outside [1, 60]"), "{refused:?}");
     }
     /// The same for classes: what is kept for every candidate is what a look at it afresh says.
     #[test]

@@ -4,7 +4,11 @@ use crate::checks::within;
 use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::Matrix;
 use crate::recover::Gaussian;
-use crate::rows::{RowError, RowTask};
+use crate::rows::RowTask;
+use crate::rows::headroom_unreachable;
+use crate::rows::other_grid;
+use crate::rows::too_many_rows;
+use spts_input::Refusal;
 
 /// Second moments of the images that rows are designed for.
 ///
@@ -37,7 +41,8 @@ pub(super) enum Moments {
 pub struct Tolerances {
     /// Standard deviation of the logarithm of a taxel's gain, in [0, 3].
     pub gain_log_sd: f64,
-    /// Largest shift of the images, taxels, at most 64; all shifts are equally likely.
+    /// Largest shift of the images, taxels, at most 64, and less on sheets of thousands of taxels; all shifts are equally
+    /// likely.
     pub shift: usize,
 }
 
@@ -45,14 +50,16 @@ pub struct Tolerances {
 const FLOOR: f64 = 1e-9;
 /// Largest gain spread and shift.
 const MOST: (f64, usize) = (3.0, 64);
+/// Most products in an average over shifts, some ten seconds: a shift adds up all pairs of taxels.
+const MOST_PRODUCTS: f64 = 2e10;
 
 impl Expected {
     /// Smooth images on a grid of `shape` = [rows, columns]: Cᵢⱼ = exp(−dᵢⱼ²/2ℓ²) with the distance d in taxels, and
     /// mean 0. The covariance is separable, so two small matrices describe grids of any size.
     ///
     /// # Errors
-    /// [`RowError::Range`] unless `length` ℓ is in [0.01, 1000] taxels, [`RowError::Shape`] for an empty grid.
-    pub fn smooth(shape: [usize; 2], length: f64) -> Result<Self, RowError> {
+    /// [`Refusal`] unless `length` ℓ is in [0.01, 1000] taxels, [`Refusal`] for an empty grid.
+    pub fn smooth(shape: [usize; 2], length: f64) -> Result<Self, Refusal> {
         within("length", length, 0.01, 1000.0)?;
         check_shape(shape, shape[0] * shape[1])?;
         let axis = |n: usize| {
@@ -79,11 +86,11 @@ impl Expected {
     /// shifts, with zeros moving in.
     ///
     /// # Errors
-    /// [`RowError::Shape`] if the prior does not fit the grid, [`RowError::Range`] for tolerances out of range.
-    pub fn like(prior: &Gaussian, shape: [usize; 2], tolerances: Tolerances) -> Result<Self, RowError> {
+    /// [`Refusal`] if the prior does not fit the grid, [`Refusal`] for tolerances out of range.
+    pub fn like(prior: &Gaussian, shape: [usize; 2], tolerances: Tolerances) -> Result<Self, Refusal> {
         check_shape(shape, prior.mean().len())?;
         within("gain_log_sd", tolerances.gain_log_sd, 0.0, MOST.0)?;
-        within("shift", tolerances.shift as f64, 0.0, MOST.1 as f64)?;
+        within("shift", tolerances.shift as f64, 0.0, most_shift(shape) as f64)?;
         let n = prior.mean().len();
         let mean = prior.mean().to_vec();
         let mut second = prior.covariance().clone();
@@ -217,13 +224,9 @@ impl Expected {
     }
 }
 
-fn check_shape(shape: [usize; 2], pixels: usize) -> Result<(), RowError> {
+fn check_shape(shape: [usize; 2], pixels: usize) -> Result<(), Refusal> {
     if pixels == 0 || shape[0].checked_mul(shape[1]) != Some(pixels) {
-        return Err(RowError::Shape {
-            pixels,
-            rows: shape[0],
-            cols: shape[1],
-        });
+        return Err(other_grid(pixels, shape[0], shape[1]));
     }
     Ok(())
 }
@@ -252,28 +255,49 @@ fn kronecker(a: &Matrix, b: &Matrix) -> Matrix {
     out
 }
 
-/// Mean and second moments of images at all shifts up to `reach`, averaged.
+/// Shifts, out of `reach` to either side, that leave something of `side` taxels on the sheet: `reach` is none.
+fn shifts(side: usize, reach: usize) -> std::ops::RangeInclusive<usize> {
+    (reach + 1).saturating_sub(side)..=(reach + side - 1).min(2 * reach)
+}
+
+/// Largest shift of images of `shape` whose average takes [`MOST_PRODUCTS`] at most.
+fn most_shift(shape: [usize; 2]) -> usize {
+    let square = ((shape[0] * shape[1]) as f64).powi(2);
+    let products = |reach: usize| {
+        shape
+            .map(|side| shifts(side, reach).count() as f64)
+            .iter()
+            .product::<f64>()
+            * square
+    };
+    (0..=MOST.1)
+        .rev()
+        .find(|reach| products(*reach) <= MOST_PRODUCTS)
+        .unwrap_or(0)
+}
+
+/// Mean and second moments of images at all shifts up to `reach`, averaged; zeros move in.
 fn moved(shape: [usize; 2], reach: usize, mean: &[f64], second: &Matrix) -> (Vec<f64>, Matrix) {
     let [rows, cols] = shape;
     let n = rows * cols;
     let weight = 1.0 / ((2 * reach + 1) * (2 * reach + 1)) as f64;
     let (mut out_mean, mut out) = (vec![0.0; n], Matrix::zeros(n, n));
-    for (dr, dc) in (0..=2 * reach).flat_map(|dr| (0..=2 * reach).map(move |dc| (dr, dc))) {
-        // where the taxel came from; none from outside
-        let source: Vec<Option<usize>> = (0..n)
-            .map(|i| {
-                let (r, c) = ((i / cols + reach).wrapping_sub(dr), (i % cols + reach).wrapping_sub(dc));
-                (r < rows && c < cols).then(|| r * cols + c)
-            })
-            .collect();
-        for i in 0..n {
-            let Some(from) = source[i] else { continue };
-            out_mean[i] += weight * mean[from];
-            let row = out.row_mut(i);
-            for (v, from_j) in row.iter_mut().zip(&source) {
-                if let Some(j) = from_j {
-                    *v += weight * second.row(from)[*j];
-                }
+    // the places that a shift reaches from the sheet
+    let reached =
+        |side: usize, shift: usize| shift.saturating_sub(reach)..side.min((side + shift).saturating_sub(reach));
+    for (dr, dc) in shifts(rows, reach).flat_map(|dr| shifts(cols, reach).map(move |dc| (dr, dc))) {
+        let (down, across) = (reached(rows, dr), reached(cols, dc));
+        let from = |r: usize, c: usize| (r + reach - dr) * cols + c + reach - dc;
+        for (r, c) in down.clone().flat_map(|r| across.clone().map(move |c| (r, c))) {
+            let (to, source) = (r * cols + c, second.row(from(r, c)));
+            out_mean[to] += weight * mean[from(r, c)];
+            for r in down.clone() {
+                let (first, source) = (r * cols + across.start, &source[from(r, across.start)..]);
+                axpy(
+                    weight,
+                    &source[..across.len()],
+                    &mut out.row_mut(to)[first..first + across.len()],
+                );
             }
         }
     }
@@ -346,7 +370,7 @@ pub(super) fn take(
     task: &RowTask<'_>,
     candidates: impl Iterator<Item = Vec<f64>>,
     reason: &'static str,
-) -> Result<Matrix, RowError> {
+) -> Result<Matrix, Refusal> {
     let n = task.expected.taxels();
     let limit = task.largest_square();
     let (mut kept, mut least): (Vec<Vec<f64>>, f64) = (Vec::new(), f64::INFINITY);
@@ -368,15 +392,10 @@ pub(super) fn take(
     }
     if kept.len() < task.rows {
         return Err(match task.largest_sum {
-            Some(limit) if kept.is_empty() => RowError::Headroom {
-                limit,
-                least: (least / task.expected.random_square()).sqrt(),
-            },
-            _ => RowError::Rows {
-                rows: task.rows,
-                most: kept.len(),
-                reason,
-            },
+            Some(limit) if kept.is_empty() => {
+                headroom_unreachable(limit, (least / task.expected.random_square()).sqrt())
+            }
+            _ => too_many_rows(task.rows, kept.len(), reason),
         });
     }
     let mut rows = Matrix::zeros(task.rows, n);
@@ -416,6 +435,36 @@ mod tests {
         }
     }
 
+    /// Against the average written shift by shift, pair by pair, bit for bit; shifts beyond the sheet leave nothing.
+    #[test]
+    fn moments_are_averaged_over_all_shifts() {
+        for (shape, reach) in [([2_usize, 3_usize], 1), ([3, 2], 2), ([1, 4], 9), ([2, 2], 64)] {
+            let n = shape[0] * shape[1];
+            let mean: Vec<f64> = (0..n).map(|i| 0.3 + i as f64).collect();
+            let second = Matrix::from_rows(n, n, (0..n * n).map(|k| (k as f64).sin()).collect()).unwrap();
+            let weight = 1.0 / ((2 * reach + 1) * (2 * reach + 1)) as f64;
+            let (mut expected_mean, mut expected) = (vec![0.0; n], vec![0.0; n * n]);
+            for (dr, dc) in (0..=2 * reach).flat_map(|dr| (0..=2 * reach).map(move |dc| (dr, dc))) {
+                let source = |i: usize| {
+                    let (r, c) = (
+                        (i / shape[1] + reach).wrapping_sub(dr),
+                        (i % shape[1] + reach).wrapping_sub(dc),
+                    );
+                    (r < shape[0] && c < shape[1]).then(|| r * shape[1] + c)
+                };
+                for (i, from) in (0..n).filter_map(|i| Some((i, source(i)?))) {
+                    expected_mean[i] += weight * mean[from];
+                    for (j, other) in (0..n).filter_map(|j| Some((j, source(j)?))) {
+                        expected[i * n + j] += weight * second.row(from)[other];
+                    }
+                }
+            }
+            let found = moved(shape, reach, &mean, &second);
+            assert_eq!((found.0, found.1.view().values()), (expected_mean, &expected[..]));
+        }
+        assert_eq!([[10, 10], [64, 64], [200, 200]].map(most_shift), [64, 16, 1]);
+    }
+
     #[test]
     fn smooth_images_are_separable() {
         let expected = Expected::smooth([3, 4], 1.5).unwrap();
@@ -449,9 +498,9 @@ mod tests {
             let tolerances = Tolerances { gain_log_sd, shift };
             Expected::like(&prior, shape, tolerances).map(|_| ()).unwrap_err()
         };
-        assert!(matches!(like([2, 2], 0.0, 0), RowError::Shape { pixels: 6, .. }));
-        assert!(matches!(like([2, 3], f64::NAN, 0), RowError::Range(e) if e.field == "gain_log_sd"));
-        assert!(matches!(like([2, 3], 0.0, 65), RowError::Range(e) if e.field == "shift"));
+        assert!(like([2, 2], 0.0, 0).to_string().contains("images of 6 taxels"));
+        assert!(like([2, 3], f64::NAN, 0).to_string().contains("`gain_log_sd` = "));
+        assert!(like([2, 3], 0.0, 65).to_string().contains("`shift` = "));
         assert!(Expected::smooth([0, 3], 1.0).is_err() && Expected::smooth([2, 3], 0.0).is_err());
     }
 }

@@ -3,13 +3,17 @@
 use crate::checks::within;
 use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::Matrix;
+use crate::posterior::GaussianPosterior;
 use crate::rows::expected::Headroom;
+use crate::rows::headroom_unreachable;
+use crate::rows::other_grid;
 use crate::rows::simple::random_signs;
-use crate::rows::{DesignRows, RowError, RowTask};
+use crate::rows::{DesignRows, RowTask};
 use nalgebra::DMatrix;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use spts_input::Refusal;
 
 /// Rows that reduce the trace of the posterior covariance P of the expected images most, one after the other. The
 /// reduction by a row a is |P a|² / (aᵀP a + σ²). The search for a row starts from the signs of P's leading
@@ -36,21 +40,21 @@ impl Default for Greedy {
 }
 
 impl DesignRows for Greedy {
-    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, RowError> {
+    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
         task.check(1 << 20, "so many rows are of no use")?;
         let n = task.expected.taxels();
         within("taxels", n as f64, 1.0, MOST_TAXELS as f64)?;
-        let mut posterior = Posterior::new(task.expected.covariance(), task.variance());
+        let mut covariances = Covariances::new(task.expected.covariance(), task.variance());
         let headroom = Headroom::of(task);
         let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
         let mut leading = Leading::new(n, &mut rng);
         let mut rows = Matrix::zeros(task.rows, n);
         for r in 0..task.rows {
-            leading.iterate(&posterior.p, ITERATIONS[usize::from(r > 0)]);
+            leading.iterate(&covariances.posterior.covariance, ITERATIONS[usize::from(r > 0)]);
             let starts = self.starts_of(&leading, n, &mut rng);
             let climbed = starts.into_par_iter().map(|mut row| {
                 let mut headroom = headroom.clone();
-                let mut worth = Fall::new(&posterior);
+                let mut worth = Fall::new(&covariances);
                 let found = climb(&mut worth, headroom.as_mut(), self.sweeps, &mut row);
                 found.map(|worth| (worth, row))
             });
@@ -63,7 +67,7 @@ impl DesignRows for Greedy {
             let Some((_, row)) = best else {
                 return Err(unreachable_limit(task, headroom));
             };
-            posterior.observe(&row);
+            covariances.observe(&row);
             rows.row_mut(r).copy_from_slice(&row);
         }
         Ok(rows)
@@ -88,7 +92,7 @@ impl Greedy {
 }
 
 /// The smallest sum that can be had, for an error.
-pub(super) fn unreachable_limit(task: &RowTask<'_>, headroom: Option<Headroom>) -> RowError {
+pub(super) fn unreachable_limit(task: &RowTask<'_>, headroom: Option<Headroom>) -> Refusal {
     let mut row: Vec<f64> = (0..task.expected.taxels())
         .map(|i| if i % 2 == 0 { 1.0 } else { -1.0 })
         .collect();
@@ -105,15 +109,15 @@ pub(super) fn unreachable_limit(task: &RowTask<'_>, headroom: Option<Headroom>) 
             row[next.1] *= -1.0;
         }
     });
-    RowError::Headroom {
-        limit: task.largest_sum.unwrap_or_default(),
-        least: (square.max(0.0) / task.expected.random_square()).sqrt(),
-    }
+    headroom_unreachable(
+        task.largest_sum.unwrap_or_default(),
+        (square.max(0.0) / task.expected.random_square()).sqrt(),
+    )
 }
 
 /// |P a|² / (aᵀP a + σ²).
 struct Fall<'a> {
-    posterior: &'a Posterior,
+    covariances: &'a Covariances,
     /// P a
     u: Vec<f64>,
     /// P² a
@@ -123,10 +127,10 @@ struct Fall<'a> {
 }
 
 impl<'a> Fall<'a> {
-    fn new(posterior: &'a Posterior) -> Self {
-        let n = posterior.n;
+    fn new(covariances: &'a Covariances) -> Self {
+        let n = covariances.n;
         Self {
-            posterior,
+            covariances,
             u: vec![0.0; n],
             w: vec![0.0; n],
             uu: 0.0,
@@ -135,22 +139,22 @@ impl<'a> Fall<'a> {
     }
 
     fn parts(&self, i: usize, delta: f64) -> (f64, f64) {
-        let diagonal = i * (self.posterior.n + 1);
+        let diagonal = i * (self.covariances.n + 1);
         (
-            self.uu + delta * (2.0 * self.w[i] + delta * self.posterior.square[diagonal]),
-            self.apa + delta * (2.0 * self.u[i] + delta * self.posterior.p[diagonal]),
+            self.uu + delta * (2.0 * self.w[i] + delta * self.covariances.square[diagonal]),
+            self.apa + delta * (2.0 * self.u[i] + delta * self.covariances.posterior.covariance[diagonal]),
         )
     }
 
     fn of(&self, (uu, apa): (f64, f64)) -> f64 {
-        uu / (apa.max(0.0) + self.posterior.variance)
+        uu / (apa.max(0.0) + self.covariances.variance)
     }
 }
 
 impl Worth for Fall<'_> {
     fn start(&mut self, row: &[f64]) {
-        adjoint(&self.posterior.p, row, &mut self.u);
-        adjoint(&self.posterior.square, row, &mut self.w);
+        adjoint(&self.covariances.posterior.covariance, row, &mut self.u);
+        adjoint(&self.covariances.square, row, &mut self.w);
         (self.uu, self.apa) = (dot(&self.u, &self.u), dot(row, &self.u));
     }
 
@@ -163,10 +167,14 @@ impl Worth for Fall<'_> {
     }
 
     fn change(&mut self, i: usize, delta: f64) {
-        let n = self.posterior.n;
+        let n = self.covariances.n;
         (self.uu, self.apa) = self.parts(i, delta);
-        axpy(delta, &self.posterior.p[i * n..(i + 1) * n], &mut self.u);
-        axpy(delta, &self.posterior.square[i * n..(i + 1) * n], &mut self.w);
+        axpy(
+            delta,
+            &self.covariances.posterior.covariance[i * n..(i + 1) * n],
+            &mut self.u,
+        );
+        axpy(delta, &self.covariances.square[i * n..(i + 1) * n], &mut self.w);
     }
 }
 
@@ -294,23 +302,21 @@ fn settle(worth: &mut dyn Worth, headroom: &mut Headroom, row: &mut [f64]) -> Op
     Some(())
 }
 
-/// Posterior covariance P of Gaussian images, row by row: P ← P − P a aᵀP / (aᵀP a + σ²), and its square.
+/// Posterior covariance P of Gaussian images, and its square.
 #[derive(Debug, Clone)]
-pub(super) struct Posterior {
-    pub(super) n: usize,
-    /// P, N × N.
-    pub(super) p: Vec<f64>,
+struct Covariances {
+    n: usize,
+    posterior: GaussianPosterior,
     /// P², N × N.
-    pub(super) square: Vec<f64>,
+    square: Vec<f64>,
     /// σ².
-    pub(super) variance: f64,
-    u: Vec<f64>,
+    variance: f64,
     w: Vec<f64>,
 }
 
-impl Posterior {
+impl Covariances {
     /// Before any measurement: P = `covariance`.
-    pub(super) fn new(covariance: Matrix, variance: f64) -> Self {
+    fn new(covariance: Matrix, variance: f64) -> Self {
         let n = covariance.nrows();
         let p = covariance.view().values().to_vec();
         let mut square = vec![0.0; n * n];
@@ -323,32 +329,25 @@ impl Posterior {
         });
         Self {
             n,
-            p,
+            posterior: GaussianPosterior::new(p, n),
             square,
             variance,
-            u: vec![0.0; n],
             w: vec![0.0; n],
         }
     }
 
     /// Measures the row `a`.
-    pub(super) fn observe(&mut self, a: &[f64]) {
-        let n = self.n;
-        adjoint(&self.p, a, &mut self.u);
-        adjoint(&self.p, &self.u, &mut self.w);
-        let (u, w) = (&self.u, &self.w);
-        let d = dot(a, u) + self.variance;
+    fn observe(&mut self, a: &[f64]) {
+        let d = self.posterior.project(a) + self.variance;
+        adjoint(&self.posterior.covariance, &self.posterior.product, &mut self.w);
+        let (u, w) = (&self.posterior.product, &self.w);
         let uu = dot(u, u) / (d * d);
-        let rows = self.p.par_chunks_exact_mut(n).zip(self.square.par_chunks_exact_mut(n));
-        rows.enumerate().with_min_len(64).for_each(|(i, (p, square))| {
-            axpy(-u[i] / d, u, p);
+        let rows = self.square.par_chunks_exact_mut(self.n);
+        rows.enumerate().with_min_len(64).for_each(|(i, square)| {
             axpy(uu * u[i] - w[i] / d, u, square);
             axpy(-u[i] / d, w, square);
         });
-    }
-
-    pub(super) fn trace(&self) -> f64 {
-        (0..self.n).map(|i| self.p[i * (self.n + 1)]).sum()
+        self.posterior.lower(d);
     }
 }
 
@@ -359,14 +358,14 @@ impl Posterior {
 /// a product costs O(N) times the sides of the grid.
 ///
 /// # Errors
-/// [`RowError`] if the task is out of range, or the rows have another number of taxels.
-pub fn posterior_trace(task: &RowTask<'_>, rows: &Matrix) -> Result<f64, RowError> {
+/// [`Refusal`] if the task is out of range, or the rows have another number of taxels.
+pub fn posterior_trace(task: &RowTask<'_>, rows: &Matrix) -> Result<f64, Refusal> {
     task.check(usize::MAX, "")?;
     let expected = task.expected;
     let (m, n) = (rows.nrows(), rows.ncols());
     if n != expected.taxels() {
         let [rows, cols] = expected.shape();
-        return Err(RowError::Shape { pixels: n, rows, cols });
+        return Err(other_grid(n, rows, cols));
     }
     let mut cross = vec![0.0; m * n];
     cross
@@ -381,9 +380,9 @@ pub fn posterior_trace(task: &RowTask<'_>, rows: &Matrix) -> Result<f64, RowErro
     let before = expected.variance();
     // only the lower triangle is read
     let Some(factor) = system.cholesky() else {
-        let mut posterior = Posterior::new(expected.covariance(), task.variance());
-        (0..m).for_each(|r| posterior.observe(rows.row(r)));
-        return Ok(posterior.trace() / before);
+        let mut covariances = Covariances::new(expected.covariance(), task.variance());
+        (0..m).for_each(|r| covariances.observe(rows.row(r)));
+        return Ok(covariances.posterior.variances().sum::<f64>() / before);
     };
     // row by row
     let factor = factor.l().transpose();
@@ -513,15 +512,15 @@ mod tests {
         let c = DMatrix::from_row_slice(20, 20, expected.covariance().view().values());
         let system = &a * &c * a.transpose() + DMatrix::identity(6, 6) * task.variance();
         let left = &c - &c * a.transpose() * system.try_inverse().unwrap() * &a * &c;
-        let mut posterior = Posterior::new(expected.covariance(), task.variance());
+        let mut covariances = Covariances::new(expected.covariance(), task.variance());
         let rows = Matrix::from_rows(6, 20, a.transpose().as_slice().to_vec()).unwrap();
-        (0..6).for_each(|r| posterior.observe(rows.row(r)));
+        (0..6).for_each(|r| covariances.observe(rows.row(r)));
         let squared = &left * &left;
         for i in 0..20 {
             for j in 0..20 {
                 // a few hundred products of numbers up to 1, and up to 10 in the square
-                assert!((posterior.p[i * 20 + j] - left[(i, j)]).abs() < 1e-12);
-                assert!((posterior.square[i * 20 + j] - squared[(i, j)]).abs() < 1e-11);
+                assert!((covariances.posterior.covariance[i * 20 + j] - left[(i, j)]).abs() < 1e-12);
+                assert!((covariances.square[i * 20 + j] - squared[(i, j)]).abs() < 1e-11);
             }
         }
         let share = posterior_trace(&task, &rows).unwrap();

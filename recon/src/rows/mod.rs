@@ -16,7 +16,7 @@
 //! let random = build("random")().design(&task)?;
 //! let left = |rows| posterior_trace(&task, rows).unwrap();
 //! assert!(left(&designed) < 0.7 * left(&random));
-//! # Ok::<(), spts_recon::rows::RowError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod classes;
@@ -31,59 +31,11 @@ pub use expected::{Expected, Tolerances, largest_sum};
 pub use greedy::{Greedy, posterior_trace};
 pub use simple::{CosineSigns, Random, Separable};
 
-use crate::checks::{RangeError, within};
+use crate::checks::within;
 use crate::classify::Component;
 use crate::matrix::{Matrix, MatrixView};
-use crate::recover::PriorError;
 use RowNeeds::{Moments, Nothing};
-
-/// Why rows cannot be designed or selected.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RowError {
-    /// A parameter is outside its range.
-    #[error(transparent)]
-    Range(#[from] RangeError),
-    /// More rows are requested than exist.
-    #[error("`rows` = {rows} is outside [1, {most}]: {reason}")]
-    Rows {
-        /// Requested number of rows.
-        rows: usize,
-        /// Largest possible number of rows.
-        most: usize,
-        /// Reason for the limit.
-        reason: &'static str,
-    },
-    /// The expected images do not fit the grid.
-    #[error("images of {pixels} taxels on a grid of {rows} × {cols}")]
-    Shape {
-        /// Taxels of the images.
-        pixels: usize,
-        /// Rows of the grid.
-        rows: usize,
-        /// Columns of the grid.
-        cols: usize,
-    },
-    /// The designer needs classes to distinguish.
-    #[error("`classes` has {labels} classes; rows that tell classes apart need at least 2")]
-    Classes {
-        /// Number of different labels.
-        labels: usize,
-    },
-    /// No row respects the headroom.
-    #[error(
-        "no row of levels ±1 has a sum below `largest_sum` = {limit:.3} of a random row's; the smallest has {least:.3}"
-    )]
-    Headroom {
-        /// The limit, relative to a random row's root mean square.
-        limit: f64,
-        /// The smallest value found.
-        least: f64,
-    },
-    /// Images from which no Gaussian prior can be made.
-    #[error(transparent)]
-    Prior(#[from] PriorError),
-}
+use spts_input::Refusal;
 
 /// What a designer of rows is asked for: how many rows, for which images, with which noise and limit.
 #[derive(Debug, Clone, Copy)]
@@ -114,15 +66,15 @@ pub struct RowTask<'a> {
 /// let design = |name| (designer(name).expect("in the table").build)().design(&task);
 /// let (designed, random) = (design("greedy")?, design("random")?);
 /// assert!(posterior_trace(&task, &designed)? < posterior_trace(&task, &random)?);
-/// # Ok::<(), spts_recon::rows::RowError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait DesignRows: Send + Sync {
     /// Designs an M × N sensing matrix with every level in [−1, 1]. The most useful rows come first, so that the first
     /// few are a design of their own. Equal tasks have equal results for any number of threads.
     ///
     /// # Errors
-    /// [`RowError`] if the task is out of range, or no row respects its headroom.
-    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, RowError>;
+    /// [`Refusal`] if the task is out of range, or no row respects its headroom.
+    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal>;
 }
 
 impl<'a> RowTask<'a> {
@@ -143,17 +95,13 @@ impl<'a> RowTask<'a> {
     }
 
     /// Checks all numbers; at most `most` rows, because of `reason`.
-    pub(super) fn check(&self, most: usize, reason: &'static str) -> Result<(), RowError> {
+    pub(super) fn check(&self, most: usize, reason: &'static str) -> Result<(), Refusal> {
         within("noise", self.noise, 1e-6, 1e3)?;
         if let Some(limit) = self.largest_sum {
             within("largest_sum", limit, 0.05, 1e3)?;
         }
         if self.rows == 0 || self.rows > most {
-            return Err(RowError::Rows {
-                rows: self.rows,
-                most,
-                reason,
-            });
+            return Err(too_many_rows(self.rows, most, reason));
         }
         Ok(())
     }
@@ -273,7 +221,7 @@ pub fn designer(name: &str) -> Option<&'static Designer> {
 /// let order = fewest_flips(rows.view(), &[1.0, 1.0]);
 /// let flips = |a: usize, b: usize| rows.row(a).iter().zip(rows.row(b)).filter(|(a, b)| a != b).count();
 /// assert!((0..4).all(|k| flips(order[k], order[(k + 1) % 4]) == 1));
-/// # Ok::<(), spts_recon::ShapeError>(())
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
 /// # Panics
@@ -317,6 +265,23 @@ pub fn fewest_flips(rows: MatrixView<'_>, weights: &[f64]) -> Vec<usize> {
         }
     }
     order
+}
+
+/// Images that do not fit the grid.
+fn other_grid(pixels: usize, rows: usize, cols: usize) -> Refusal {
+    Refusal::new(format!("images of {pixels} taxels on a grid of {rows} × {cols}"))
+}
+
+/// More rows than there are.
+fn too_many_rows(rows: usize, most: usize, reason: &str) -> Refusal {
+    Refusal::new(format!("`rows` = {rows} is outside [1, {most}]: {reason}"))
+}
+
+/// No row that respects the headroom.
+fn headroom_unreachable(limit: f64, least: f64) -> Refusal {
+    Refusal::new(format!(
+        "no row of levels ±1 has a sum below `largest_sum` = {limit:.3} of a random row's; the smallest has {least:.3}"
+    ))
 }
 
 #[cfg(test)]

@@ -3,9 +3,10 @@
 use crate::matrix::Matrix;
 use crate::rows::expected::{Expected, Moments, take};
 use crate::rows::greedy::Greedy;
-use crate::rows::{DesignRows, RowError, RowTask};
+use crate::rows::{DesignRows, RowTask};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use spts_input::Refusal;
 
 /// Independent random signs, the reference for all other designs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,7 +16,7 @@ pub struct Random;
 const DRAWS: usize = 1000;
 
 impl DesignRows for Random {
-    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, RowError> {
+    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
         task.check(1 << 20, "so many rows are of no use")?;
         let n = task.expected.taxels();
         let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
@@ -45,7 +46,7 @@ pub(super) fn random_signs(n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
 pub struct CosineSigns;
 
 impl DesignRows for CosineSigns {
-    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, RowError> {
+    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
         let shape = task.expected.shape();
         let reason = "a sheet has as many cosines as taxels, and some of them may not keep to the headroom";
         task.check(task.expected.taxels(), reason)?;
@@ -90,7 +91,7 @@ pub(super) fn products<'a>(
 pub struct Separable;
 
 impl DesignRows for Separable {
-    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, RowError> {
+    fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
         let shape = task.expected.shape();
         let reason = "a sheet has as many products of rows as taxels, and some of them may not keep to the headroom";
         task.check(task.expected.taxels(), reason)?;

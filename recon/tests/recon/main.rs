@@ -2,22 +2,12 @@
 
 // `cfg(test)` marks the helpers as test code for the lints, too
 #[cfg(test)]
-mod allocation;
+mod estimates;
 #[cfg(test)]
-mod convex;
-#[cfg(test)]
-mod exhaustive;
-#[cfg(test)]
-mod extremes;
-#[cfg(test)]
-mod fixed;
-#[cfg(test)]
-mod phase;
+mod helpers;
 #[cfg(test)]
 mod pursuits;
 #[cfg(test)]
-mod scales;
+mod robust;
 #[cfg(test)]
 mod sequential;
-#[cfg(test)]
-mod tracked;

@@ -9,9 +9,8 @@ use crate::labels::Labels;
 use crate::training::TrainingData;
 use crate::windows::Window;
 use serde::{Deserialize, Serialize};
-use spts_recon::RecoverError;
-use spts_recon::classify::EvidenceError;
-use spts_recon::recover::{Gaussian, SequentialError};
+use spts_input::Refusal;
+use spts_recon::recover::Gaussian;
 use std::sync::Arc;
 
 /// What a decoder makes of one window of samples: an image, a class, or both.
@@ -50,13 +49,7 @@ impl Class {
 pub enum DecodeError {
     /// The decoder cannot solve it. The window scores as an empty image without a class.
     #[error(transparent)]
-    Recover(#[from] RecoverError),
-    /// The classifier cannot process it. The window scores as an empty image without a class.
-    #[error(transparent)]
-    Evidence(#[from] EvidenceError),
-    /// The confidence of an image cannot be computed.
-    #[error(transparent)]
-    Sequential(#[from] SequentialError),
+    Refused(#[from] Refusal),
     /// An external program failed. This ends the run.
     #[error(transparent)]
     External(#[from] ExternalError),

@@ -173,9 +173,9 @@ mod tests {
     use crate::algorithm::{Algorithm, Trained};
     use crate::training::TrainingData;
     use crate::windows::{Press, PressRows};
+    use spts_input::Refusal;
     use spts_models::Streams;
     use spts_recon::Matrix;
-    use spts_recon::classify::EvidenceError;
     use std::sync::Arc;
 
     /// Is as sure as the samples say, is of class `samples so far`, and loses itself at a sample of −1.
@@ -207,7 +207,7 @@ mod tests {
             assert_eq!((sample.y.len(), sample.phi.nrows()), (1, 1));
             self.0 += 1;
             if sample.y[0] < 0.0 {
-                return Err(EvidenceError::Empty.into());
+                return Err(Refusal::new("lost").into());
             }
             Ok(Belief {
                 confidence: sample.y[0],

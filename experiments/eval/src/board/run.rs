@@ -167,7 +167,11 @@ impl Run<'_> {
             let at = match each.position(|(other, with, _)| Arc::ptr_eq(other, chooser) && *with == classes) {
                 Some(at) => at,
                 None => {
-                    chosen.push((chooser, classes, press.chosen(chooser, self.most(), classes)?));
+                    chosen.push((
+                        chooser,
+                        classes,
+                        press.chosen(chooser, self.most(), classes).map_err(ScoreError::Rows)?,
+                    ));
                     chosen.len() - 1
                 }
             };

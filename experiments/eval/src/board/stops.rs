@@ -24,7 +24,7 @@ impl TrainedBoard<'_> {
     /// every press.
     ///
     /// # Errors
-    /// [`ScoreError::NoConfidence`] for a decoder that states no confidence, [`ScoreError::Confidence`] for a
+    /// [`ScoreError::NoConfidence`] for a decoder that states no confidence, [`ScoreError::Refused`] for a
     /// confidence outside (0.5, 1), [`ScoreError::Rows`] if no rows can be chosen.
     pub fn stops(&self, settings: &StopSettings, done: &(dyn Fn() + Sync)) -> Result<AnytimeBoard, ScoreError> {
         let stopped = self.stopped(settings)?;

@@ -6,7 +6,7 @@ use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::training::{
     LearnError, PUBLISHED, RASTER, SHAPES, SkinGains, TrainedNetwork, TrainingData, TrainingPresses, TrainingSource,
-    gain_sds, on_skins_with, templates,
+    gain_sds, in_gains, in_library, on_skins_with, templates,
 };
 use spts_models::{Streams, TaxelGains, VelostatConfig};
 use std::borrow::Cow;
@@ -155,7 +155,7 @@ impl<'a> TrainingSets<'a> {
                     Some(gains) => Cow::Borrowed(gains),
                     None => Cow::Owned(self.gains_by_others(simulated, scored)?),
                 };
-                let shown = on_skins_with(&gains, simulated, self.streams.child("calibrated", 0))?;
+                let shown = on_skins_with(&gains, simulated, self.streams.child("calibrated", 0)).map_err(in_gains)?;
                 self.learn(&shown, TrainingPresses::all, gain_sds(&gains), scored)
             }
         }
@@ -172,7 +172,12 @@ impl<'a> TrainingSets<'a> {
         let skin: Vec<TrainingPresses<'_>> = others.filter_map(TrainingPresses::unscored).collect();
         let twin: Vec<TrainingPresses<'_>> = simulated.iter().filter_map(TrainingPresses::all).collect();
         let mounting = VelostatConfig::default().session_log_sd;
-        Ok(SkinGains::estimate(&templates(&skin)?, &templates(&twin)?, mounting)?.gains)
+        Ok(SkinGains::estimate(
+            &templates(&skin).map_err(in_library)?,
+            &templates(&twin).map_err(in_library)?,
+            mounting,
+        )?
+        .gains)
     }
 
     /// The same γ for every taxel.

@@ -2,13 +2,13 @@
 
 use super::bank::Bank;
 use crate::algorithm::{Algorithm, Answer, Belief, Class, Confidence, DecodeError, Subject, Trained};
-use crate::training::{LearnError, TrainingData, simulated_gain_sd};
+use crate::training::{LearnError, TrainingData, in_parameter, in_range, in_templates, simulated_gain_sd};
 use crate::windows::Window;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
+use spts_input::Refusal;
 use spts_recon::classify::{
-    ClusterModel, Clusters, Evidence, EvidenceClassifier, EvidenceError, ImageEstimator, Posterior, Preparation,
-    TemplateModel,
+    ClusterModel, Clusters, Evidence, EvidenceClassifier, ImageEstimator, Posterior, Preparation, TemplateModel,
 };
 use spts_recon::{AmplitudeRange, Matrix, Workspace};
 
@@ -57,12 +57,13 @@ pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError>
         model.gains.clone_from(&data.gain_sd);
         model.rank = OTHER_SKIN_RANK;
     }
-    let components = model.classes(&data.templates)?;
-    let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
-    let classifier = EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR)?;
+    let components = model.classes(&data.templates).map_err(in_templates)?;
+    let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1]).map_err(in_range)?;
+    let classifier = EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR).map_err(in_templates)?;
     Ok(Box::new(Classes {
         bank: Bank::new(classifier.bank()),
-        images: ImageEstimator::new(model.image_priors(&data.templates)?, IMAGE_NOISE)?,
+        images: ImageEstimator::new(model.image_priors(&data.templates).map_err(in_templates)?, IMAGE_NOISE)
+            .map_err(in_parameter)?,
         classifier,
     }))
 }
@@ -81,13 +82,17 @@ fn posed(images: &Matrix, labels: &[usize]) -> Result<Box<dyn Trained>, LearnErr
             .collect();
         let slices: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
         let own = Matrix::from_column_slices(images.nrows(), &slices);
-        all.add(model.learn(&own, label, &mut ChaCha8Rng::seed_from_u64(SEED))?);
+        all.add(
+            model
+                .learn(&own, label, &mut ChaCha8Rng::seed_from_u64(SEED))
+                .map_err(in_templates)?,
+        );
     }
-    let amplitude = AmplitudeRange::new(LENGTHS_V[0], LENGTHS_V[1])?;
-    let classifier = EvidenceClassifier::new(&all.components, amplitude, UNKNOWN_PRIOR)?;
+    let amplitude = AmplitudeRange::new(LENGTHS_V[0], LENGTHS_V[1]).map_err(in_range)?;
+    let classifier = EvidenceClassifier::new(&all.components, amplitude, UNKNOWN_PRIOR).map_err(in_templates)?;
     Ok(Box::new(Classes {
         bank: Bank::new(classifier.bank()),
-        images: ImageEstimator::new(all.priors, model.noise)?,
+        images: ImageEstimator::new(all.priors, model.noise).map_err(in_parameter)?,
         classifier,
     }))
 }
@@ -126,13 +131,13 @@ struct AtWork<'a> {
 
 impl AtWork<'_> {
     /// Takes a window of its own.
-    fn take(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
+    fn take(&mut self, window: &Window<'_>) -> Result<(), Refusal> {
         self.preparation.clear();
         self.extend(window)
     }
 
     /// Takes more measurements of the same window.
-    fn extend(&mut self, window: &Window<'_>) -> Result<(), EvidenceError> {
+    fn extend(&mut self, window: &Window<'_>) -> Result<(), Refusal> {
         let bank = self.classes.classifier.bank();
         let columns = bank.ncols().max(1);
         self.classes.bank.project(bank, window, &mut self.rows);

@@ -3,7 +3,7 @@
 use super::quarter;
 use super::sure::ImageConfidence;
 use crate::algorithm::{Algorithm, Answer, Confidence, DecodeError, Subject, Trained};
-use crate::training::{Dictionary, LearnError, TrainingData};
+use crate::training::{Dictionary, LearnError, TrainingData, in_parameter, in_prior};
 use crate::windows::Window;
 use spts_recon::recover::{
     Gaussian, ImagePrior, Lmmse, NnLasso, NnLmmse, NnOmp, Noise, Omp, Penalty, ReferenceOmp, Tv,
@@ -99,30 +99,30 @@ pub(super) fn nn_omp(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError
 }
 
 pub(super) fn nn_lasso(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    let lasso = NnLasso::new(LASSO)?.with_normalised_columns();
+    let lasso = NnLasso::new(LASSO).map_err(in_parameter)?.with_normalised_columns();
     on_atoms(data, Weights::Signs, move |_| Box::new(lasso))
 }
 
 pub(super) fn lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    on_taxels(Lmmse::new(data.prior(ImagePrior::SEEN)?, NOISE)?)
+    on_taxels(Lmmse::new(data.prior(ImagePrior::SEEN)?, NOISE).map_err(in_parameter)?)
 }
 
 pub(super) fn nn_lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
     let prior = data.prior(ImagePrior::UNSEEN)?;
-    let confidence = ImageConfidence::new(Arc::clone(&prior), NOISE)?;
+    let confidence = ImageConfidence::new(Arc::clone(&prior), NOISE).map_err(in_prior)?;
     Ok(Box::new(ImageDecoder {
         confidence: Some(confidence),
         prior: Some(Arc::clone(&prior)),
-        ..taxels(NnLmmse::new(prior, NOISE)?)
+        ..taxels(NnLmmse::new(prior, NOISE).map_err(in_parameter)?)
     }))
 }
 
 pub(super) fn nn_lmmse_seen(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    on_taxels(NnLmmse::new(data.prior(ImagePrior::SEEN)?, NOISE)?)
+    on_taxels(NnLmmse::new(data.prior(ImagePrior::SEEN)?, NOISE).map_err(in_parameter)?)
 }
 
 pub(super) fn tv(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    on_taxels(Tv::new(data.shape[0], data.shape[1], VARIATION)?)
+    on_taxels(Tv::new(data.shape[0], data.shape[1], VARIATION).map_err(in_parameter)?)
 }
 
 impl Trained for ImageDecoder {

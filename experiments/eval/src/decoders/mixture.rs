@@ -2,7 +2,7 @@
 
 use super::bank::Bank;
 use crate::algorithm::{Algorithm, Answer, DecodeError, Trained};
-use crate::training::{LearnError, TrainingData};
+use crate::training::{LearnError, TrainingData, in_parameter, in_range, in_templates};
 use crate::windows::Window;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
@@ -35,13 +35,14 @@ struct Mixture {
 }
 
 pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    let clusters = Clusters::with_wide(&MODEL, data.alike(), APART, &mut ChaCha8Rng::seed_from_u64(SEED))?;
-    let amplitude = AmplitudeRange::new(LENGTHS_V[0], LENGTHS_V[1])?;
+    let clusters =
+        Clusters::with_wide(&MODEL, data.alike(), APART, &mut ChaCha8Rng::seed_from_u64(SEED)).map_err(in_templates)?;
+    let amplitude = AmplitudeRange::new(LENGTHS_V[0], LENGTHS_V[1]).map_err(in_range)?;
     // every component has the same label, so that no unknown one is weighed
-    let classifier = EvidenceClassifier::new(&clusters.components, amplitude, 0.5)?;
+    let classifier = EvidenceClassifier::new(&clusters.components, amplitude, 0.5).map_err(in_templates)?;
     Ok(Box::new(Mixture {
         bank: Bank::new(classifier.bank()),
-        images: ImageEstimator::non_negative(clusters.priors, MODEL.noise, SOLVED)?,
+        images: ImageEstimator::non_negative(clusters.priors, MODEL.noise, SOLVED).map_err(in_parameter)?,
         classifier,
     }))
 }

@@ -2,8 +2,9 @@
 
 use crate::algorithm::{Belief, Confidence, DecodeError};
 use crate::windows::Window;
+use spts_input::Refusal;
 use spts_recon::metrics::SUPPORT_THRESHOLD;
-use spts_recon::recover::{Gaussian, Noise, SequentialError, SequentialEstimate, SequentialGains};
+use spts_recon::recover::{Gaussian, Noise, SequentialEstimate, SequentialGains};
 use std::sync::Arc;
 
 /// Expected IoU of the linear estimate under the prior of a decoder, by its posterior covariance.
@@ -17,8 +18,8 @@ impl ImageConfidence {
     /// Confidence under `prior` for measurements with `noise`.
     ///
     /// # Errors
-    /// [`SequentialError`] when they do not go together.
-    pub(super) fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, SequentialError> {
+    /// [`Refusal`] when they do not go together.
+    pub(super) fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, Refusal> {
         let gains = SequentialGains::new(prior, noise)?;
         let estimate = SequentialEstimate::new(&gains);
         Ok(Self { gains, estimate })

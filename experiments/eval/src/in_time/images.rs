@@ -69,7 +69,7 @@ pub fn followed_images(
     let untouched = untouched(session, recording, block);
     let press = untouched.press(recording, block, from..last);
     let noise_v = idle_noise(recording, block, &untouched, first);
-    let failed = |error| DecodeSessionError::Decode(DecodeError::Sequential(error));
+    let failed = |error| DecodeSessionError::Decode(DecodeError::Refused(error));
     let prior = find(DECODER).map(|spec| (spec.train)(training));
     let prior = prior.transpose().map_err(|source| DecodeSessionError::Training {
         decoder: DECODER,

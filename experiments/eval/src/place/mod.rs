@@ -20,9 +20,9 @@ use locators::{LOCATORS, Locate, LocatorSpec, TAXEL, Taxel, Tools, middle};
 use rayon::prelude::*;
 use rows::{BALL, Located};
 use spts_circuit::Recording;
+use spts_input::Refusal;
 use spts_recon::Matrix;
 use spts_recon::localise::{BlobConfig, Localiser, distance};
-use spts_recon::rows::RowError;
 use spts_recon::statistics::mean;
 
 /// The published locators.
@@ -31,7 +31,7 @@ const PUBLISHED: [&str; 2] = ["script_s5", "matched"];
 /// Rows of the published locators at every M of `measurements`, of the contacts as recorded.
 ///
 /// # Errors
-/// [`ScoreError::Place`] when the sheet is no grid of `cols` columns.
+/// [`ScoreError::Refused`] when the sheet is no grid of `cols` columns.
 pub(crate) fn localise(
     recording: &Recording,
     shifted: &Matrix,
@@ -53,7 +53,7 @@ pub(crate) fn localise(
 /// `sensing`.
 ///
 /// # Errors
-/// [`ScoreError::Place`] when the sheet is no grid of `cols` columns, [`ScoreError::Rows`] when no rows can be chosen.
+/// [`ScoreError::Refused`] when the sheet is no grid of `cols` columns, [`ScoreError::Rows`] when no rows can be chosen.
 pub(crate) fn places(
     recording: &Recording,
     shifted: Matrix,
@@ -77,7 +77,7 @@ pub(crate) fn places(
 /// that need one have no rows.
 ///
 /// # Errors
-/// [`ScoreError::Place`] when the sheet is no grid of `cols` columns.
+/// [`ScoreError::Refused`] when the sheet is no grid of `cols` columns.
 pub(crate) fn touch_places(
     name: &str,
     recording: &Recording,
@@ -164,7 +164,8 @@ impl PlacesRequest<'_> {
         let errors: Vec<Vec<Vec<f64>>> = views
             .par_iter()
             .map(|&(_, contact, shift)| self.errors(tools, contact, shift))
-            .collect::<Result<_, RowError>>()?;
+            .collect::<Result<_, Refusal>>()
+            .map_err(ScoreError::Rows)?;
         let kinds = self
             .sensing
             .iter()
@@ -189,7 +190,7 @@ impl PlacesRequest<'_> {
     }
 
     /// Distances by every kind of windows, locator and M.
-    fn errors(&self, tools: &Tools, contact: &Contact, shift: [usize; 2]) -> Result<Vec<Vec<f64>>, RowError> {
+    fn errors(&self, tools: &Tools, contact: &Contact, shift: [usize; 2]) -> Result<Vec<Vec<f64>>, Refusal> {
         let (press, truth) = (contact.relabelled(shift), contact.moved(shift));
         let most = self.measurements.iter().copied().max().unwrap_or(1);
         let mut found = Vec::with_capacity(self.sensing.len() * self.locators.len() * self.measurements.len());

@@ -1,11 +1,12 @@
 //! Selects rows among those with which a press was recorded.
 
-use crate::training::{LearnError, TrainingData};
+use crate::training::{LearnError, TrainingData, in_rows, in_templates};
 use crate::windows::Press;
+use spts_input::Refusal;
 use spts_recon::classify::{Component, TemplateModel};
 use spts_recon::localise::BlobConfig;
 use spts_recon::recover::ImagePrior;
-use spts_recon::rows::{Expected, RowError, RowTask, Tolerances, choose_for_classes, choose_for_images};
+use spts_recon::rows::{Expected, RowTask, Tolerances, choose_for_classes, choose_for_images};
 use spts_recon::{Matrix, MatrixView};
 
 /// Windows of a press: candidates are every so many rows, beginning with each of the first so many.
@@ -36,12 +37,14 @@ impl RowChooser {
         labels.sort_unstable();
         labels.dedup();
         let classes = if labels.len() > 1 {
-            TemplateModel::new(data.shape[1]).classes(templates)?
+            TemplateModel::new(data.shape[1])
+                .classes(templates)
+                .map_err(in_templates)?
         } else {
             Vec::new()
         };
         Ok(Self {
-            images: Expected::like(&prior, data.shape, Tolerances::default())?,
+            images: Expected::like(&prior, data.shape, Tolerances::default()).map_err(in_rows)?,
             classes,
         })
     }
@@ -50,8 +53,8 @@ impl RowChooser {
     /// classes; without `classes`, those for images again.
     ///
     /// # Errors
-    /// [`RowError`] when the rows have another number of taxels than the images.
-    pub(crate) fn windows(&self, press: &Press, most: usize, classes: bool) -> Result<[Vec<Press>; 2], RowError> {
+    /// [`Refusal`] when the rows have another number of taxels than the images.
+    pub(crate) fn windows(&self, press: &Press, most: usize, classes: bool) -> Result<[Vec<Press>; 2], Refusal> {
         let [share, of] = CANDIDATES;
         let pool = (press.len() * share / of).max(1).min(press.len());
         let task = task(&self.images, &self.classes);
@@ -80,8 +83,8 @@ fn task<'a>(expected: &'a Expected, classes: &'a [Component]) -> RowTask<'a> {
 /// Windows of `press` whose rows tell places of blobs, of up to `most` measurements each.
 ///
 /// # Errors
-/// [`RowError`] when the rows do not fill the sheet.
-pub(crate) fn chosen_places(press: &Press, shape: [usize; 2], most: usize) -> Result<Vec<Press>, RowError> {
+/// [`Refusal`] when the rows do not fill the sheet.
+pub(crate) fn chosen_places(press: &Press, shape: [usize; 2], most: usize) -> Result<Vec<Press>, Refusal> {
     let blobs = blobs(shape);
     let how = ImagePrior {
         reach: 0,
@@ -122,8 +125,8 @@ fn chosen(
     press: &Press,
     pool: usize,
     most: usize,
-    choose: impl Fn(MatrixView<'_>, usize) -> Result<Vec<usize>, RowError>,
-) -> Result<Vec<Press>, RowError> {
+    choose: impl Fn(MatrixView<'_>, usize) -> Result<Vec<usize>, Refusal>,
+) -> Result<Vec<Press>, Refusal> {
     let mut windows = Vec::with_capacity(OFFSETS);
     for offset in 0..OFFSETS {
         let candidates: Vec<usize> = (offset..pool)

@@ -1,7 +1,7 @@
 //! Training data: everything that an algorithm may know before it gets a compressive measurement.
 
 use super::dictionary::{Dictionary, learn_dictionary};
-use super::error::LearnError;
+use super::error::{LearnError, in_dictionary, in_gains, in_library, in_prior};
 use super::gains::{gain_sds, on_skins_with};
 use super::layout;
 use super::learned::Learned;
@@ -68,7 +68,7 @@ impl TrainingData {
     /// request.
     ///
     /// # Errors
-    /// [`LearnError::Library`] if there is no training image.
+    /// [`LearnError::Refused`] if there is no training image.
     pub fn new(
         training: &[TrainingPresses<'_>],
         cols: usize,
@@ -78,8 +78,8 @@ impl TrainingData {
         let images = prior_images(training);
         Ok(Self {
             shape: [images.nrows() / cols.max(1), cols],
-            library: library(training)?,
-            templates: templates(training)?,
+            library: library(training).map_err(in_library)?,
+            templates: templates(training).map_err(in_library)?,
             images,
             gain_sd,
             random_shapes: false,
@@ -97,14 +97,14 @@ impl TrainingData {
     /// anew within their uncertainty. The sheet has `cols` columns.
     ///
     /// # Errors
-    /// As [`Self::new`]; [`LearnError::Recording`] if a gain makes a sample infinite.
+    /// As [`Self::new`]; [`LearnError::Refused`] if a gain makes a sample infinite.
     pub fn of_skin(
         simulated: &[ScoredSession],
         gains: &TaxelGains,
         cols: usize,
         streams: Streams,
     ) -> Result<Self, LearnError> {
-        let shown = on_skins_with(gains, simulated, streams.child("calibrated", 0))?;
+        let shown = on_skins_with(gains, simulated, streams.child("calibrated", 0)).map_err(in_gains)?;
         let training: Vec<TrainingPresses<'_>> = shown.iter().filter_map(TrainingPresses::all).collect();
         Self::new(&training, cols, gain_sds(gains), streams)
     }
@@ -113,7 +113,7 @@ impl TrainingData {
     /// is learned with `streams` on request. Negative values are used as they are.
     ///
     /// # Errors
-    /// [`LearnError::Library`] if all images are zero.
+    /// [`LearnError::Refused`] if all images are zero.
     ///
     /// # Panics
     /// If the number of labels differs from that of the images.
@@ -138,8 +138,9 @@ impl TrainingData {
         let slices: Vec<&[f64]> = means.iter().map(Vec::as_slice).collect();
         Ok(Self {
             shape: [images.nrows() / cols.max(1), cols],
-            library: Library::new(&images, labels)?,
-            templates: Library::new(&Matrix::from_column_slices(images.nrows(), &slices), &classes)?,
+            library: Library::new(&images, labels).map_err(in_library)?,
+            templates: Library::new(&Matrix::from_column_slices(images.nrows(), &slices), &classes)
+                .map_err(in_library)?,
             images,
             gain_sd: Vec::new(),
             random_shapes: false,
@@ -156,7 +157,7 @@ impl TrainingData {
     /// of blobs, and no classes.
     ///
     /// # Errors
-    /// [`LearnError::TooLarge`] for more than [`TrainingData::MOST_TAXELS`], [`LearnError::Library`] if the images are
+    /// [`LearnError::TooLarge`] for more than [`TrainingData::MOST_TAXELS`], [`LearnError::Refused`] if the images are
     /// not usable.
     pub fn for_layout(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
         let (taxels, most) = (skin.taxels(), Self::MOST_TAXELS);
@@ -165,7 +166,7 @@ impl TrainingData {
         }
         let images = layout::images(skin, streams);
         let mean: Vec<f64> = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
-        let library = Library::new(&Matrix::from_column_slices(images.nrows(), &[&mean]), &[0])?;
+        let library = Library::new(&Matrix::from_column_slices(images.nrows(), &[&mean]), &[0]).map_err(in_library)?;
         Ok(Self {
             shape: [skin.rows(), skin.cols()],
             templates: library.clone(),
@@ -286,13 +287,14 @@ impl TrainingData {
     /// The given dictionary, or one learned by K-SVD with the published preprocessing.
     ///
     /// # Errors
-    /// [`LearnError::Dictionary`].
+    /// [`LearnError::Refused`].
     pub fn dictionary(&self) -> Result<Arc<Dictionary>, LearnError> {
         if let Some(dictionary) = self.dictionary.get() {
             return Ok(Arc::clone(dictionary));
         }
         let candidates = self.candidates.as_ref().clone();
-        let atoms = learn_dictionary(candidates, &(Selection::default(), Ksvd::default()), self.streams)?;
+        let atoms = learn_dictionary(candidates, &(Selection::default(), Ksvd::default()), self.streams)
+            .map_err(in_dictionary)?;
         let learned = Arc::new(Dictionary::new(atoms));
         Ok(Arc::clone(self.dictionary.get_or_init(|| learned)))
     }
@@ -300,7 +302,7 @@ impl TrainingData {
     /// A prior of the images, cleaned and shifted as `how` says.
     ///
     /// # Errors
-    /// [`LearnError::Prior`].
+    /// [`LearnError::Refused`].
     pub fn prior(&self, how: ImagePrior) -> Result<Arc<Gaussian>, LearnError> {
         let how = if self.random_shapes {
             ImagePrior {
@@ -312,6 +314,6 @@ impl TrainingData {
         } else {
             how
         };
-        Ok(Arc::new(how.learn(&self.images, self.shape[1])?))
+        Ok(Arc::new(how.learn(&self.images, self.shape[1]).map_err(in_prior)?))
     }
 }

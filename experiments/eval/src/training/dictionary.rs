@@ -1,8 +1,9 @@
 //! Dictionaries: atoms with look-up tables for rows of Φ·D, and how they are learned.
 
 use rand::seq::SliceRandom as _;
+use spts_input::Refusal;
 use spts_models::Streams;
-use spts_recon::dictionary::{DictionaryError, Ksvd, Selection, select};
+use spts_recon::dictionary::{Ksvd, Selection, select};
 use spts_recon::{Matrix, MatrixView, SignTables};
 use std::ops::Range;
 
@@ -92,7 +93,7 @@ pub(super) fn learn_dictionary(
     mut candidates: Vec<Vec<f64>>,
     (selection, ksvd): &(Selection, Ksvd),
     streams: Streams,
-) -> Result<Matrix, DictionaryError> {
+) -> Result<Matrix, Refusal> {
     // the limit on their number then treats all objects, presses and frames alike
     candidates.shuffle(&mut streams.rng("training", 0));
     let chosen: Vec<Vec<f64>> = select(&candidates, selection)

@@ -3,10 +3,7 @@
 use super::gains::SkinGainsError;
 use super::network::NetworkError;
 use super::shapes::ShapesError;
-use spts_recon::RangeError;
-use spts_recon::classify::LibraryError;
-use spts_recon::dictionary::DictionaryError;
-use spts_recon::recover::{ParameterError, PriorError, SequentialError};
+use spts_input::Refusal;
 
 /// Why a decoder cannot be trained.
 #[derive(Debug, thiserror::Error)]
@@ -20,30 +17,9 @@ pub enum LearnError {
         /// Largest number of taxels.
         most: usize,
     },
-    /// No raster image is strong enough for a dictionary.
-    #[error("dictionary: {0}")]
-    Dictionary(#[from] DictionaryError),
-    /// There is no raster image for the library.
-    #[error("library: {0}")]
-    Library(#[from] LibraryError),
-    /// There is no raster image for the prior.
-    #[error("prior: {0}")]
-    Prior(#[from] PriorError),
-    /// A parameter of a decoder is out of its range.
-    #[error("parameter: {0}")]
-    Parameter(#[from] ParameterError),
-    /// No classifier can be made from the templates.
-    #[error("templates: {0}")]
-    Evidence(#[from] spts_recon::classify::EvidenceError),
-    /// No sequential estimate can be made from the prior.
-    #[error("prior: {0}")]
-    Sequential(#[from] SequentialError),
-    /// No rows can be selected for the training data.
-    #[error("rows: {0}")]
-    Rows(#[from] spts_recon::rows::RowError),
-    /// A range is not valid.
-    #[error("range: {0}")]
-    Range(#[from] RangeError),
+    /// What a decoder learns from, or one of its parameters, is refused.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
     /// The gains of the skin are not known.
     #[error("gains: {0}")]
     Gains(#[from] SkinGainsError),
@@ -53,9 +29,6 @@ pub enum LearnError {
     /// The network cannot be used.
     #[error("{0}")]
     Network(#[source] Box<NetworkError>),
-    /// A gain makes a sample infinite.
-    #[error("gains: {0}")]
-    Recording(#[from] spts_input::Refusal),
 }
 
 impl From<ShapesError> for LearnError {
@@ -68,4 +41,24 @@ impl From<NetworkError> for LearnError {
     fn from(error: NetworkError) -> Self {
         Self::Network(Box::new(error))
     }
+}
+
+macro_rules! places {
+    ($($name:ident, $place:literal;)*) => {$(
+        #[doc = concat!("The refusal, said of \"", $place, "\".")]
+        pub(crate) fn $name(refusal: Refusal) -> LearnError {
+            refusal.at($place).into()
+        }
+    )*};
+}
+
+places! {
+    in_dictionary, "dictionary";
+    in_library, "library";
+    in_prior, "prior";
+    in_parameter, "parameter";
+    in_templates, "templates";
+    in_rows, "rows";
+    in_range, "range";
+    in_gains, "gains";
 }

@@ -1,7 +1,7 @@
 //! Training results of the published decoder: a dictionary and a library.
 
 use super::dictionary::{Dictionary, Learning, learn_dictionary};
-use super::error::LearnError;
+use super::error::{LearnError, in_dictionary, in_library};
 use super::presses::{TrainingPresses, library, training_images};
 use crate::session::ScoredSession;
 use spts_models::Streams;
@@ -54,8 +54,14 @@ impl Learned {
             .iter()
             .filter_map(|s| TrainingPresses::within(s, &learning.presses))
             .collect();
-        let dictionary = learn_dictionary(training_images(&training), &learning.dictionary(), streams)?;
-        Ok(Self::new(dictionary, None, library(&training)?, cols))
+        let dictionary =
+            learn_dictionary(training_images(&training), &learning.dictionary(), streams).map_err(in_dictionary)?;
+        Ok(Self::new(
+            dictionary,
+            None,
+            library(&training).map_err(in_library)?,
+            cols,
+        ))
     }
 
     /// The same with the shifted dictionary in place of the dictionary.

@@ -17,6 +17,7 @@ mod source;
 pub use data::TrainingData;
 pub use dictionary::{Dictionary, Learning};
 pub use error::LearnError;
+pub(crate) use error::{in_gains, in_library, in_parameter, in_prior, in_range, in_rows, in_templates};
 pub use gains::{BAND_SD, GainCheck, SkinGains, SkinGainsError, gain_sds, on_skins_with, simulated_gain_sd};
 pub use learned::{Learned, SHIFT_REACH};
 pub use network::{NetworkError, TrainedNetwork};

@@ -1,8 +1,9 @@
 //! The trained network of the decoder `amortised`: the one that is built into the program, or one from a file.
 
 use safetensors::{Dtype, SafeTensors, tensor::TensorView};
+use spts_input::Refusal;
 use spts_recon::Matrix;
-use spts_recon::recover::{Layer, Unrolled, UnrolledError, UnrolledStep, UnrolledWeights};
+use spts_recon::recover::{Layer, Unrolled, UnrolledStep, UnrolledWeights};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, LazyLock};
 
@@ -52,7 +53,7 @@ pub enum NetworkError {
         /// The file.
         path: PathBuf,
         /// Cause.
-        source: UnrolledError,
+        source: Refusal,
     },
     /// The network is for another layout of taxels.
     #[error(

@@ -3,8 +3,9 @@
 use crate::protocol::{PLATEAU, PUBLISHED_RATE_HZ, PUBLISHED_TAXELS};
 use crate::session::ScoredSession;
 use spts_circuit::Recording;
+use spts_input::Refusal;
 use spts_recon::Matrix;
-use spts_recon::classify::{Library, LibraryError};
+use spts_recon::classify::Library;
 use std::ops::Range;
 
 /// Frames of a press that dictionary learning looks at: the rise, the plateau and the lift.
@@ -139,23 +140,23 @@ pub fn training_images(training: &[TrainingPresses<'_>]) -> Vec<Vec<f64>> {
 /// Ten plateau images of every object.
 ///
 /// # Errors
-/// [`LibraryError`] if all images are zero.
-pub fn library(training: &[TrainingPresses<'_>]) -> Result<Library, LibraryError> {
+/// [`Refusal`] if all images are zero.
+pub fn library(training: &[TrainingPresses<'_>]) -> Result<Library, Refusal> {
     class_library(training, |t| t.plateau_images().map(<[f64]>::to_vec).collect())
 }
 
 /// One mean image for each object. An object without a press is left out.
 ///
 /// # Errors
-/// [`LibraryError`] if all images are zero.
-pub fn templates(training: &[TrainingPresses<'_>]) -> Result<Library, LibraryError> {
+/// [`Refusal`] if all images are zero.
+pub fn templates(training: &[TrainingPresses<'_>]) -> Result<Library, Refusal> {
     class_library(training, |t| vec![t.mean_image()])
 }
 
 fn class_library(
     training: &[TrainingPresses<'_>],
     images_of: impl Fn(&TrainingPresses<'_>) -> Vec<Vec<f64>>,
-) -> Result<Library, LibraryError> {
+) -> Result<Library, Refusal> {
     let (mut images, mut labels) = (Vec::new(), Vec::new());
     for t in training {
         for image in images_of(t) {

@@ -1,9 +1,11 @@
-//! The regularised algorithms against closed forms and against scikit-learn and scipy (`scripts/oracles/convex.py`).
+//! The regularised algorithms against closed forms, against scikit-learn and scipy (`scripts/oracles/convex.py`), and those
+//! for one sensing matrix against those that are given it with every window.
 
+use crate::helpers::{assert_near, drawn, says, solve};
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 use spts_recon::recover::{Fixed, Gaussian, Lmmse, NnLasso, NnLmmse, Noise, Penalty, Tv};
-use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
+use spts_recon::{Matrix, Problem, Recover as _, Workspace};
 use std::sync::Arc;
 
 /// The generator that the script's problems are made of.
@@ -30,16 +32,6 @@ fn problem(seed: u32, m: usize, k: usize) -> (DMatrix<f64>, Vec<f64>) {
     (a, y.as_slice().to_vec())
 }
 
-fn solve(method: &dyn Recover, a: &DMatrix<f64>, y: &[f64]) -> (Vec<f64>, Solution) {
-    let rows = Matrix::from(a);
-    let solution = method
-        .recover(&Problem::new(rows.view(), y).unwrap(), &mut Workspace::default())
-        .unwrap();
-    let mut x = vec![0.0; a.ncols()];
-    solution.scatter(&mut x);
-    (x, solution)
-}
-
 fn oracle() -> Value {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/oracles/convex.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
@@ -53,17 +45,6 @@ fn numbers(value: &Value) -> Vec<f64> {
 fn case(value: &Value) -> (u32, usize, usize) {
     let get = |key: &str| value[key].as_u64().unwrap();
     (get("seed") as u32, get("m") as usize, get("k") as usize)
-}
-
-fn assert_near(got: &[f64], expected: &[f64], tolerance: f64, what: &str) {
-    assert_eq!(got.len(), expected.len(), "{what}");
-    let largest = expected.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
-    for (i, (g, e)) in got.iter().zip(expected).enumerate() {
-        assert!(
-            (g - e).abs() <= tolerance * largest,
-            "{what}: entry {i} is {g}, expected {e}"
-        );
-    }
 }
 
 /// ‖y − A w‖² / (2M) + α Σ w.
@@ -80,7 +61,7 @@ fn lasso_equals_scikit_learn() {
         let alpha = recorded["alpha"].as_f64().unwrap();
         let mut method = NnLasso::new(Penalty::Absolute(alpha)).unwrap();
         method.stopping.tol = 1e-13;
-        let (w, _) = solve(&method, &a, &y);
+        let w = solve(&method, &Matrix::from(&a), &y);
         let expected = numbers(&recorded["w"]);
         let objective = |w: &[f64]| lasso(&a, &y, w, alpha);
         // the gap bounds how far ours is above the smallest objective; the other program's can only be above it as well
@@ -104,7 +85,7 @@ fn non_negative_lmmse_equals_scipy() {
         let noise = Noise::Absolute(recorded["noise"].as_f64().unwrap());
         let fixed = Fixed::new(Matrix::from(&a).view(), Arc::clone(&prior), noise).unwrap();
         let method = NnLmmse::new(prior, noise).unwrap();
-        let (x, _) = solve(&method, &a, &y);
+        let x = solve(&method, &Matrix::from(&a), &y);
         // condition of the whole problem below 1e5 in the covariance and 1e4 in A/σ: 1e9·ε with a margin of 10
         assert_near(&x, &numbers(&recorded["x"]), 1e-6, &format!("case {seed}"));
         let mut window = fixed.window();
@@ -132,7 +113,10 @@ fn lmmse_equals_the_explicit_formula() {
         let (a, y) = problem(3, m, k);
         let (gaussian, c, mean) = prior(5, k);
         let method = Lmmse::new(gaussian, Noise::Absolute(deviation)).unwrap();
-        let (x, solution) = solve(&method, &a, &y);
+        let rows = Matrix::from(&a);
+        let solution = method.recover(&Problem::new(rows.view(), &y).unwrap(), &mut Workspace::default());
+        let (solution, mut x) = (solution.unwrap(), vec![0.0; 12]);
+        solution.scatter(&mut x);
         let inverse = (&a * &c * a.transpose() + deviation.powi(2) * DMatrix::identity(m, m))
             .try_inverse()
             .unwrap();
@@ -153,7 +137,7 @@ fn non_negative_lmmse_satisfies_its_conditions() {
         let (gaussian, c, mean) = prior(13, k);
         let deviation = 0.1_f64;
         let method = NnLmmse::new(gaussian, Noise::Absolute(deviation)).unwrap();
-        let (x, _) = solve(&method, &a, &y);
+        let x = solve(&method, &Matrix::from(&a), &y);
         let precision = c.try_inverse().unwrap() * deviation.powi(2);
         let x = DVector::from_vec(x);
         let linear = a.transpose() * DVector::from_vec(y.clone()) + &precision * mean;
@@ -185,13 +169,18 @@ fn orthonormal_columns_have_closed_forms() {
     method.stopping.tol = 1e-14;
     let expected: Vec<f64> = c.iter().map(|c| (c - 12.0 * alpha).max(0.0)).collect();
     // a gap of 1e-14 in an objective of unit curvature is 1e-7 in a coefficient
-    assert_near(&solve(&method, &a, &y).0, &expected, 1e-6, "lasso");
+    assert_near(&solve(&method, &Matrix::from(&a), &y), &expected, 1e-6, "lasso");
     // max(c, 0) over 1 + σ²
     let noise = Noise::Absolute(0.3);
     let white = Arc::new(Gaussian::white(k, 1.0).unwrap());
     let expected: Vec<f64> = c.iter().map(|c| c.max(0.0) / 1.09).collect();
     let method = NnLmmse::new(white, noise).unwrap();
-    assert_near(&solve(&method, &a, &y).0, &expected, 1e-12, "non-negative lmmse");
+    assert_near(
+        &solve(&method, &Matrix::from(&a), &y),
+        &expected,
+        1e-12,
+        "non-negative lmmse",
+    );
 }
 
 /// Two plateaus of n₁ and n₂ pixels, a < b, seen directly: each moves towards the other by λ over its size while they
@@ -216,7 +205,12 @@ fn total_variation_of_two_plateaus() {
             let mut method = Tv::new(rows, cols, Penalty::Absolute(alpha)).unwrap();
             method.stopping.tol = 1e-11;
             // a gap of 1e-11 ‖y‖² / 2 in an objective of unit curvature is below 1e-4 in a pixel
-            assert_near(&solve(&method, &a, &y).0, &expected, 1e-4, &format!("{low} and {high}"));
+            assert_near(
+                &solve(&method, &Matrix::from(&a), &y),
+                &expected,
+                1e-4,
+                &format!("{low} and {high}"),
+            );
         }
         assert_eq!(n1 + n2, 10);
     }
@@ -230,7 +224,7 @@ fn lasso_gaps_are_at_most_1e_8() {
         let (a, y) = problem(seed, m, k);
         for share in [0.5, 0.1, 0.01, 1e-4] {
             let method = NnLasso::new(Penalty::Relative(share)).unwrap();
-            let (w, _) = solve(&method, &a, &y);
+            let w = solve(&method, &Matrix::from(&a), &y);
             let (v, y) = (DVector::from_vec(w), DVector::from_column_slice(&y));
             let largest = (a.transpose() * &y).max();
             let residual = &y - &a * &v;
@@ -242,4 +236,93 @@ fn lasso_gaps_are_at_most_1e_8() {
             assert!(gap <= 1e-8 + 1e-13, "seed {seed}, share {share}: gap {gap:e}");
         }
     }
+}
+
+/// The same images for any shape, noise and mean; a window that is used again is as new.
+#[test]
+fn both_estimates_are_those_of_any_operator() {
+    for (m, n) in [(1, 1), (1, 9), (5, 9), (20, 60), (30, 30), (50, 20)] {
+        for (noise, mean) in [
+            (Noise::Relative(0.12), 0.0),
+            (Noise::Relative(0.5), 0.3),
+            (Noise::Absolute(0.2), 0.0),
+            (Noise::Absolute(0.05), -0.4),
+        ] {
+            let (prior, a, y) = drawn(m as u64, m, n, mean);
+            let fixed = Fixed::new(a.view(), Arc::clone(&prior), noise).unwrap();
+            assert_eq!((fixed.measurements(), fixed.pixels()), (m, n));
+            let linear = solve(&Lmmse::new(Arc::clone(&prior), noise).unwrap(), &a, &y);
+            let non_negative = solve(&NnLmmse::new(prior, noise).unwrap(), &a, &y);
+            let mut window = fixed.window();
+            for round in 0..3 {
+                let what = format!("{m} × {n}, {noise:?}, mean {mean}, round {round}");
+                window.clear();
+                // beyond the last measurement nothing is taken
+                window.extend(&[&y[..], &[7.0]].concat());
+                // condition of covariance and A/σ below 1e6 together
+                assert_near(window.image().unwrap(), &linear, 1e-9, &what);
+                assert_near(window.non_negative().unwrap(), &non_negative, 1e-8, &what);
+                assert_near(window.image().unwrap(), &linear, 1e-9, &what);
+            }
+        }
+    }
+}
+
+/// Hardly any noise and almost nothing else, a silent skin, large and small numbers of the operator and of the samples.
+#[test]
+fn estimates_stay_finite_at_the_extremes() {
+    for noise in [1e-12, 1e-6, 1.0, 1e6] {
+        let scales = [(1.0, 1.0), (1e60, 1.0), (1e-60, 1e-60), (1.0, 1e90), (1.0, 0.0)];
+        for (which, (operator_scale, sample_scale)) in scales.into_iter().enumerate() {
+            for known in [false, true] {
+                let (prior, a, y) = drawn(3, 10, 24, 0.0);
+                let a: Vec<f64> = a.view().values().iter().map(|w| w * operator_scale).collect();
+                let a = Matrix::from_rows(10, 24, a).unwrap();
+                let y: Vec<f64> = y.iter().map(|v| v * sample_scale).collect();
+                let noise = if known {
+                    Noise::Absolute(noise * operator_scale * sample_scale.max(1e-9))
+                } else {
+                    Noise::Relative(noise)
+                };
+                let fixed = Fixed::new(a.view(), Arc::clone(&prior), noise).unwrap();
+                let mut window = fixed.window();
+                window.extend(&y);
+                let what = format!("{noise:?}, {operator_scale}, {sample_scale}");
+                assert!(window.image().unwrap().iter().all(|x| x.is_finite()), "{what}");
+                let image = window.non_negative().unwrap().to_vec();
+                assert!(image.iter().all(|x| x.is_finite() && *x >= 0.0), "{what}");
+                if which == 0 && !known {
+                    let expected = solve(&NnLmmse::new(prior, noise).unwrap(), &a, &y);
+                    // at a noise variance of 1e-12 of the signal's, and below, systems have a condition of 1e12
+                    let deviation = if let Noise::Relative(share) = noise { share } else { 1.0 };
+                    let tolerance = if deviation < 1e-3 { 1e-3 } else { 1e-8 };
+                    assert_near(&image, &expected, tolerance, &what);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_no_window_is_refused() {
+    let (prior, a, y) = drawn(5, 4, 6, 0.0);
+    let other = Arc::new(Gaussian::white(5, 1.0).unwrap());
+    let noise = Noise::Relative(0.1);
+    assert!(says(
+        &Fixed::new(a.view(), other, noise),
+        "operator has 6 columns; the method was built for 5"
+    ));
+    for bad in [Noise::Relative(0.0), Noise::Absolute(f64::NAN)] {
+        assert!(Fixed::new(a.view(), Arc::clone(&prior), bad).is_err(), "{bad:?}");
+    }
+    let fixed = Fixed::new(a.view(), prior, noise).unwrap();
+    let mut window = fixed.window();
+    window.extend(&y[..3]);
+    assert!(says(&window.image(), "operator has 4 rows but `y` has 3 entries"));
+    window.push(f64::NAN);
+    assert!(says(&window.image(), "`y[3]`"));
+    assert!(says(&window.non_negative(), "`y[3]`"));
+    window.clear();
+    window.extend(&y);
+    assert!(window.non_negative().is_ok());
 }

@@ -1,0 +1,307 @@
+//! Every algorithm of both tables at the edge of sense, at scales where squares overflow or vanish, and without
+//! allocations.
+
+use crate::helpers::says;
+use allocation_counter::measure;
+use proptest::prelude::*;
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+use spts_input::Refusal;
+use spts_recon::classify::{EvidenceClassifier, ImageEstimator, Library, Posterior, Src, TemplateModel};
+use spts_recon::recover::{BatchOmp, Build, RECOVER, REGULARISED};
+use spts_recon::{AmplitudeRange, Matrix, MatrixView, Problem, Recover, SignTables, Solution, Workspace};
+
+/// Both tables, for K unknowns and S atoms.
+fn methods(k: usize, n_nonzero_coefs: usize) -> Vec<(&'static str, Box<dyn Recover>)> {
+    let pursuits = RECOVER.iter().map(|(name, build)| (*name, build(n_nonzero_coefs)));
+    let regularised = REGULARISED.iter().map(|(name, build)| (*name, build(k).unwrap()));
+    pursuits.chain(regularised).collect()
+}
+
+fn is_finite(solution: &Solution) -> bool {
+    solution.residual_norm.is_finite() && solution.coefficients.iter().all(|c| c.is_finite())
+}
+
+/// An error that scales alone can bring about.
+fn is_out_of_range(error: &Refusal) -> bool {
+    let error = error.to_string();
+    error.contains("exceeds the range of 64-bit numbers") || error.starts_with("operator[")
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// M from 1 to above K, S to above both, columns that are zero or there twice, and scales from one end of the range
+    /// to the other.
+    #[test]
+    fn any_shape_and_scale_gives_finite_numbers_or_an_error(
+        seed in any::<u64>(), m in 1_usize..24, k in 1_usize..16, s in 0_usize..30, twins in any::<bool>(), zeros in any::<bool>(),
+        a_exponent in -300_i32..=300, y_exponent in -300_i32..=300,
+    ) {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = |len: usize, exponent: i32| -> Vec<f64> {
+            let scale = 10.0_f64.powi(exponent);
+            (0..len).map(|_| scale * rng.random_range(-1.0..1.0)).collect()
+        };
+        let mut a = Matrix::from_rows(m, k, draw(m * k, a_exponent)).unwrap();
+        let y = draw(m, y_exponent);
+        if twins {
+            a.set_column(k - 1, &a.column(0));
+        }
+        if zeros {
+            a.set_column(k / 2, &vec![0.0; m]);
+        }
+        let problem = Problem::new(a.view(), &y).unwrap();
+        for (name, method) in methods(k, s) {
+            match method.recover(&problem, &mut Workspace::default()) {
+                Ok(solution) => prop_assert!(is_finite(&solution), "{name}: {solution:?}"),
+                Err(error) => prop_assert!(is_out_of_range(&error), "{name}: {error}"),
+            }
+        }
+    }
+}
+
+/// ±1 weights of the skin's generators: 1664525·s + 1013904223 mod 2³² from seeds 8…107, positive where the top byte is
+/// at least 128. Rows 1, 46 and 63 are constant, so that the first 100 × 100 are of low rank.
+fn generator_rows(m: usize) -> (Vec<f64>, Vec<u64>) {
+    let mut states: Vec<u32> = (8..108).collect();
+    let (mut rows, mut signs) = (Vec::new(), Vec::new());
+    for _ in 0..m {
+        let mut words = [0_u64; 2];
+        for (n, state) in states.iter_mut().enumerate() {
+            *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let positive = *state >> 31 == 1;
+            words[n / 64] |= u64::from(positive) << (n % 64);
+            rows.push(if positive { 1.0 } else { -1.0 });
+        }
+        signs.extend(words);
+    }
+    (rows, signs)
+}
+
+#[test]
+fn a_rank_deficient_sequence_is_decoded() {
+    let (rows, _) = generator_rows(100);
+    let a = Matrix::from_rows(100, 100, rows).unwrap();
+    let dense = nalgebra::DMatrix::from_row_slice(100, 100, a.view().values());
+    assert!(dense.rank(1e-9) < 100);
+    let mut x = vec![0.0; 100];
+    for taxel in [33, 34, 43, 44, 45, 54] {
+        x[taxel] = 1.0;
+    }
+    let y: Vec<f64> = (0..100)
+        .map(|r| a.row(r).iter().zip(&x).map(|(w, x)| w * x).sum())
+        .collect();
+    for (name, method) in methods(100, 100) {
+        let solution = method.recover(&Problem::new(a.view(), &y).unwrap(), &mut Workspace::default());
+        let solution = solution.unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert!(is_finite(&solution), "{name}");
+        // every method explains what was measured without noise: the weakest penalties and noises of the tables are
+        // 1e-3
+        let length = y.iter().map(|v| v * v).sum::<f64>().sqrt();
+        assert!(
+            solution.residual_norm <= 0.05 * length,
+            "{name}: {}",
+            solution.residual_norm
+        );
+    }
+}
+
+/// Rows from `f32` tables differ by some 1e-6 of a column's magnitude, so that answers differ by that times the
+/// condition.
+#[test]
+fn single_precision_tables_give_the_answers_of_double_precision() {
+    let (m, n, k, s) = (60, 100, 40, 4);
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    let dictionary = Matrix::from_rows(n, k, (0..n * k).map(|_| rng.random_range(-1.0..1.0)).collect()).unwrap();
+    let (_, signs) = generator_rows(m);
+    let (mut double, mut single) = (vec![0.0; m * k], vec![0.0; m * k]);
+    SignTables::<f64>::new(dictionary.view()).fill_rows(&signs, &mut double);
+    SignTables::<f32>::new(dictionary.view()).fill_rows(&signs, &mut single);
+    let (double, single) = [&double, &single].map(|v| MatrixView::new(m, k, v).unwrap()).into();
+    let mut alpha = vec![0.0; k];
+    for atom in [3, 11, 20, 37] {
+        alpha[atom] = rng.random_range(0.5..1.5);
+    }
+    let y: Vec<f64> = (0..m)
+        .map(|r| double.rows(r, 1).values().iter().zip(&alpha).map(|(a, x)| a * x).sum())
+        .collect();
+    for (name, method) in methods(k, s) {
+        let solve = |a| {
+            let mut x = vec![0.0; k];
+            let solution = method.recover(&Problem::new(a, &y).unwrap(), &mut Workspace::default());
+            solution.unwrap_or_else(|e| panic!("{name}: {e}")).scatter(&mut x);
+            x
+        };
+        for (a, b) in solve(double).iter().zip(solve(single)) {
+            // 60 measurements of 40 unknowns: condition below 100; iterations that stop at a gap of 1e-6 know 1e-3 of
+            // the answer
+            assert!((a - b).abs() <= 1e-2, "{name}: {a} from f64, {b} from f32");
+        }
+    }
+}
+
+fn drawn(m: usize, k: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let mut values = |n: usize| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect();
+    (values(m * k), values(m))
+}
+
+/// The pursuits that scale their problem first.
+fn scaling() -> impl Iterator<Item = &'static (&'static str, Build)> {
+    RECOVER.iter().filter(|(name, _)| *name != "reference")
+}
+
+/// By a power of two the answer keeps every digit.
+#[test]
+fn operators_and_measurements_of_any_scale_are_the_same_problem() {
+    let (m, k, s) = (20, 60, 5);
+    let (values, y) = drawn(m, k);
+    let scaled = |v: &[f64], e: i32| -> Vec<f64> { v.iter().map(|v| v * 2.0_f64.powi(e)).collect() };
+    for (name, build) in scaling() {
+        let solve = |a_exponent, y_exponent| {
+            let a = Matrix::from_rows(m, k, scaled(&values, a_exponent)).unwrap();
+            let y = scaled(&y, y_exponent);
+            build(s).recover(&Problem::new(a.view(), &y).unwrap(), &mut Workspace::default())
+        };
+        let unit = solve(0, 0).unwrap();
+        for (a_exponent, y_exponent) in [
+            (-900, 0),
+            (900, 0),
+            (-900, -900),
+            (900, 900),
+            (0, 1000),
+            (0, -900),
+            (500, -400),
+        ] {
+            let got = solve(a_exponent, y_exponent).unwrap();
+            assert_eq!(got.support, unit.support, "{name}: A·2^{a_exponent}, y·2^{y_exponent}");
+            for (g, e) in got.coefficients.iter().zip(&unit.coefficients) {
+                let back = g * 2.0_f64.powi(a_exponent - y_exponent);
+                // iterations may end one step apart
+                assert!((back - e).abs() <= 1e-9 * e.abs(), "{name}: {back}, expected {e}");
+            }
+        }
+        assert!(says(&solve(-1000, 1000), "the coefficient of atom"), "{name}");
+    }
+}
+
+#[test]
+fn a_shared_operator_of_any_scale_is_the_same_problem() {
+    let (m, k) = (20, 60);
+    let (values, y) = drawn(m, k);
+    let solve = |a_scale: f64, y_scale: f64| {
+        let a = Matrix::from_rows(m, k, values.iter().map(|v| v * a_scale).collect()).unwrap();
+        let y: Vec<f64> = y.iter().map(|v| v * y_scale).collect();
+        let mut solution = Solution::default();
+        let result = BatchOmp::new(a.view(), 5)
+            .unwrap()
+            .recover_into(&y, &mut Workspace::default(), &mut solution);
+        result.map(|()| solution)
+    };
+    let unit = solve(1.0, 1.0).unwrap();
+    for scale in [2.0_f64.powi(-900), 2.0_f64.powi(900)] {
+        let got = solve(scale, scale).unwrap();
+        assert_eq!(
+            (got.support, got.coefficients),
+            (unit.support.clone(), unit.coefficients.clone())
+        );
+    }
+    assert!(says(&solve(1e-300, 1e300), "the coefficient of atom"));
+    let zero = solve(1.0, 0.0).unwrap();
+    assert!(zero.support.is_empty() && zero.residual_norm == 0.0);
+}
+
+#[test]
+fn an_operator_that_is_not_finite_is_refused() {
+    let (mut values, y) = drawn(20, 60);
+    values[67] = f64::NAN;
+    let a = Matrix::from_rows(20, 60, values).unwrap();
+    for (name, build) in scaling() {
+        let problem = Problem::new(a.view(), &y).unwrap();
+        let found = build(3).recover(&problem, &mut Workspace::default());
+        assert!(says(&found, "operator[1, 7] = NaN"), "{name}");
+    }
+    assert!(says(&BatchOmp::new(a.view(), 3), "operator[1, 7] = NaN"));
+    assert!(says(
+        &BatchOmp::new(Matrix::zeros(0, 3).view(), 3),
+        "operator has shape 0 × 3"
+    ));
+}
+
+/// Unknowns where allocations are counted.
+const K: usize = 40;
+
+/// Allocations of a decode that has been done before.
+fn assert_none(name: &str, method: &dyn Recover, a: &Matrix, y: &[f64]) {
+    let problem = Problem::new(a.view(), y).unwrap();
+    let (mut work, mut solution) = (Workspace::default(), Solution::default());
+    method.recover_into(&problem, &mut work, &mut solution).unwrap();
+    let again = measure(|| method.recover_into(&problem, &mut work, &mut solution).unwrap());
+    assert_eq!(again.count_total, 0, "{name}, M = {}", a.nrows());
+}
+
+#[test]
+fn no_decode_allocates() {
+    // the counter counts
+    assert!(measure(|| drop(std::hint::black_box(vec![0_u8; 64]))).count_total > 0);
+    let mut rng = ChaCha8Rng::seed_from_u64(31);
+    for m in [1, 20, 60] {
+        let mut draw = |len: usize| -> Vec<f64> { (0..len).map(|_| rng.random_range(-1.0..1.0)).collect() };
+        let (a, y) = (Matrix::from_rows(m, K, draw(m * K)).unwrap(), draw(m));
+        for (name, build) in RECOVER {
+            assert_none(name, &*build(6), &a, &y);
+        }
+        for (name, build) in REGULARISED {
+            assert_none(name, &*build(K).unwrap(), &a, &y);
+        }
+        let (mut work, mut solution) = (Workspace::default(), Solution::default());
+        let shared = BatchOmp::new(a.view(), 6).unwrap();
+        let mut decode = || shared.recover_into(&y, &mut work, &mut solution).unwrap();
+        decode();
+        assert_eq!(measure(decode).count_total, 0, "shared operator, M = {m}");
+    }
+}
+
+#[test]
+fn no_classification_allocates() {
+    let mut rng = ChaCha8Rng::seed_from_u64(32);
+    let mut draw = |len: usize| -> Vec<f64> { (0..len).map(|_| rng.random_range(0.0..1.0)).collect() };
+    let (images, image) = (Matrix::from_rows(30, K, draw(30 * K)).unwrap(), draw(30));
+    let labels: Vec<usize> = (0..K).map(|k| k / 4).collect();
+    let library = Library::new(&images, &labels).unwrap();
+    let mut work = Workspace::default();
+    let classifier = Src::new(library, 10);
+    classifier.classify(&image, &mut work).unwrap();
+    let again = measure(|| {
+        classifier.classify(&image, &mut work).unwrap();
+    });
+    assert_eq!(again.count_total, 0);
+}
+
+#[test]
+fn no_image_of_a_decision_allocates() {
+    let mut rng = ChaCha8Rng::seed_from_u64(33);
+    let mut draw = |len: usize| -> Vec<f64> { (0..len).map(|_| rng.random_range(0.1..1.0)).collect() };
+    let (images, phi, y) = (
+        Matrix::from_rows(36, 3, draw(36 * 3)).unwrap(),
+        Matrix::from_rows(20, 36, draw(20 * 36)).unwrap(),
+        draw(20),
+    );
+    let (library, model) = (Library::new(&images, &[1, 2, 3]).unwrap(), TemplateModel::new(6));
+    let range = AmplitudeRange::new(0.1, 10.0).unwrap();
+    let classifier = EvidenceClassifier::new(&model.classes(&library).unwrap(), range, 0.05).unwrap();
+    let estimator = ImageEstimator::new(model.image_priors(&library).unwrap(), 0.1).unwrap();
+    // before the first sample every component has its share
+    let mut posterior = Posterior::default();
+    classifier.decide(&classifier.preparation(), &classifier.evidence(), &mut posterior);
+    let (mut work, mut image) = (Workspace::default(), vec![0.0; 36]);
+    let mut decode = || {
+        estimator
+            .estimate(&posterior, phi.view(), &y, &mut work, &mut image)
+            .unwrap();
+    };
+    decode();
+    assert_eq!(measure(decode).count_total, 0);
+    assert!(image.iter().any(|v| *v != 0.0));
+}
