@@ -169,8 +169,8 @@ fn energy_never_grows() {
                                 assert!(!bounces.is_empty() || mass_kg > 1.0, "{drop:?} does not bounce");
                                 carried += 1;
                             }
-                            Err(MechanicsError::Drop { source, .. }) => {
-                                let told = source.to_string();
+                            Err(MechanicsError::Refused(told)) => {
+                                let told = told.to_string();
                                 assert!(mass_kg > 1.0 && told.contains("absorbs at most"), "{drop:?}: {told}");
                             }
                             Err(error) => {

@@ -56,6 +56,8 @@ mod foreign_bytes;
 #[cfg(test)]
 mod in_time;
 #[cfg(test)]
+mod mujoco_contact;
+#[cfg(test)]
 mod mutations;
 #[cfg(test)]
 mod ngspice;

@@ -1,8 +1,7 @@
 //! Force as a function of depth for a body at rest. Simulations need it before they move the body.
 
-use crate::body::PosedMesh;
-use crate::equilibrium::{EquilibriumError, depth_limit_m};
-use crate::field::ContactField;
+use crate::field::{ContactField, EquilibriumError, PosedMesh, depth_limit_m};
+use spts_input::Refusal;
 
 /// Static force–depth curve of one body in one orientation.
 ///
@@ -81,23 +80,20 @@ fn depth_of(force_at: &mut impl FnMut(f64) -> f64, wanted_n: f64, deep_m: f64) -
 }
 
 impl DepthCurve {
-    /// The curve of a body that has not been pressed yet.
+    /// The curve of a body that has not been pressed yet: no depth and no force, whatever is asked of it.
     #[must_use]
     pub fn empty() -> Self {
+        let nothing = vec![0.0; 2];
         Self {
-            depth_m: Vec::new(),
-            force_n: Vec::new(),
+            depth_m: nothing.clone(),
+            force_n: nothing,
         }
     }
 
     /// The curve of `body` up to the force `force_n`. The body's velocity and height are ignored.
     ///
     /// # Errors
-    /// [`EquilibriumError`] if no depth up to the body's height plus 5 cm gives that force: [`Beside`] if no depth
-    /// gives any force, [`NoAnswer`] if the field has no answer.
-    ///
-    /// [`Beside`]: EquilibriumError::Beside
-    /// [`NoAnswer`]: EquilibriumError::NoAnswer
+    /// [`EquilibriumError`] if no depth up to the body's height plus 5 cm gives that force, or the field has no answer.
     pub fn up_to_force(
         field: &mut dyn ContactField,
         body: &PosedMesh<'_>,
@@ -123,7 +119,7 @@ impl DepthCurve {
                 break;
             }
             if reached_n.is_nan() {
-                return Err(EquilibriumError::NoAnswer { depth_m: deep_m });
+                return Err(EquilibriumError::no_answer(deep_m));
             }
             if deep_m >= limit_m {
                 let (wanted_n, depth_m) = (force_n, deep_m);
@@ -134,7 +130,7 @@ impl DepthCurve {
                         depth_m,
                     }
                 } else {
-                    EquilibriumError::Beside { depth_m }
+                    EquilibriumError::beside(depth_m)
                 });
             }
             deep_m = (2.0 * deep_m).min(limit_m);
@@ -147,7 +143,7 @@ impl DepthCurve {
         let depth_m: Vec<f64> = depths.collect();
         let mut force: Vec<f64> = depth_m.iter().map(|&d| force_at(d)).collect();
         if let Some(i) = force.iter().position(|f| f.is_nan()) {
-            return Err(EquilibriumError::NoAnswer { depth_m: depth_m[i] });
+            return Err(EquilibriumError::no_answer(depth_m[i]));
         }
         force[0] = 0.0;
         Ok(Self {
@@ -196,11 +192,11 @@ impl DepthCurve {
             }
         }
         match found.1 {
-            (_, reached_j, Some(depth_m)) if reached_j < energy_j => Err(EquilibriumError::Energy {
-                reached_j,
-                wanted_j: energy_j,
-                depth_m,
-            }),
+            (_, reached_j, Some(depth_m)) if reached_j < energy_j => Err(Refusal::new(format!(
+                "the contact absorbs at most {reached_j:.4e} J, down to {depth_m:.4} m depth, and {energy_j:.4e} J are \
+                 needed"
+            ))
+            .into()),
             (curve, ..) => Ok(curve),
         }
     }
@@ -254,18 +250,32 @@ impl DepthCurve {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::columns::{WinklerConfig, WinklerLayer};
+    use crate::columns::WinklerLayer;
+    use crate::foam::Foam;
     use crate::mesh::TriMesh;
     use approx::assert_relative_eq;
     use spts_models::SkinLayout;
 
+    #[test]
+    fn an_empty_curve_answers() {
+        let curve = DepthCurve::empty();
+        let answers = [
+            curve.depth_m(3.0),
+            curve.depth_m(f64::INFINITY),
+            curve.compliance_m_per_n(3.0),
+            curve.stiffness_n_per_m(),
+            curve.energy_j(),
+        ];
+        assert_eq!(answers.map(f64::to_bits), [0; 5]);
+    }
+
     /// A 30 mm square plate on a thick layer of K = 1e7 Pa/m: 12 whole cells a side, k = K A = 9000 N/m.
     #[test]
     fn plate_is_a_linear_spring() {
-        let config = WinklerConfig {
+        let config = Foam {
             stiffness_pa_per_m: 1e7,
             thickness_m: 10.0,
-            ..WinklerConfig::default()
+            ..Foam::default()
         };
         let mut layer = WinklerLayer::new(config, &SkinLayout::default()).unwrap();
         let vertices = vec![
@@ -287,7 +297,7 @@ mod tests {
         assert_relative_eq!(curve.energy_j(), 0.5 * 20.0 * 20.0 / 9000.0, max_relative = 1e-3);
         let away = PosedMesh::at_rest(&mesh, [0.5, 0.0, 0.0]);
         let error = DepthCurve::up_to_force(&mut layer, &away, 20.0).unwrap_err();
-        assert!(matches!(error, EquilibriumError::Beside { .. }), "{error}");
+        assert!(error.to_string().contains("lies beside the skin"), "{error}");
         // the deepest point, 5 cm below a flat plate, carries less than 9000 N/m · 0.05 m / (1 − 0.05/8.5) = 452.7 N
         // and absorbs less than half of that times the depth
         let error = DepthCurve::up_to_force(&mut layer, &body, 1000.0).unwrap_err();
@@ -297,9 +307,9 @@ mod tests {
         assert_relative_eq!(depth_m, 0.05, max_relative = 1e-12);
         assert_relative_eq!(reached_n, 452.7, max_relative = 1e-3);
         let error = DepthCurve::up_to_energy(&mut layer, &body, 20.0).unwrap_err();
-        let EquilibriumError::Energy { reached_j, .. } = error else {
-            panic!("{error}")
-        };
+        let said = error.to_string();
+        let rest = said.strip_prefix("the contact absorbs at most ").unwrap();
+        let reached_j: f64 = rest.split_once(" J").unwrap().0.parse().unwrap();
         assert_relative_eq!(reached_j, 0.5 * 452.7 * 0.05, max_relative = 3e-3);
         // energy between the curve of the last power of 1.5 N, 438 N, and the deepest one
         assert!(DepthCurve::up_to_energy(&mut layer, &body, 0.999 * reached_j).is_ok());

@@ -18,25 +18,18 @@
 //! let answer = field.respond(&PosedMesh::at_rest(&ball, [0.0, 0.0, -2e-3]));
 //! let (force_n, sum_pa) = (answer.wrench.force_n[2], answer.pressure_pa.iter().sum::<f64>());
 //! assert!(force_n > 1.0 && (sum_pa * cell_m * cell_m - force_n).abs() < 1e-9 * force_n);
-//! # Ok::<(), spts_contact::ContactError>(())
+//! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
-mod body;
 mod columns;
-mod conformance;
 mod depth_curve;
 mod elastic;
 mod envelope;
-mod equilibrium;
 mod field;
-pub mod frame;
-pub mod limits;
+mod foam;
 pub mod mesh;
 pub mod objects;
-mod patch;
 mod prepared;
-mod quasi_static;
-mod response;
 pub mod shapes;
 mod surface;
 mod table;
@@ -44,22 +37,19 @@ mod taxels;
 mod touch;
 mod traction;
 
-pub use body::PosedMesh;
-pub use columns::{WinklerConfig, WinklerLayer};
-pub use conformance::{Nonconformity, conformance};
+pub use columns::WinklerLayer;
 pub use depth_curve::DepthCurve;
 pub use elastic::{
     ElasticConfig, ElasticField, ElasticKernel, ElasticSolver, Influence, Outcome, confined_stiffness_pa_per_m,
     modulus_of_confined_pa,
 };
-pub use equilibrium::EquilibriumError;
-pub use field::ContactField;
-pub use frame::{Frame, Pose, Wrench};
-pub use patch::Patch;
+pub use field::{
+    Balance, ContactField, EquilibriumError, Frame, Holder, Load, Patch, Pose, PosedMesh, QuasiStatic, Response, Seat,
+    Wrench,
+};
+pub use foam::Foam;
 pub use prepared::PreparedMesh;
-pub use quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
-pub use response::Response;
-pub use surface::{Solid, SurfaceConfig, SurfaceField, SurfacePoints, Winding};
-pub use table::{CONTACT_FIELDS, ContactBuild, ContactError, ContactTable, build_contact, build_contact_from};
+pub use surface::{Solid, SurfaceField, SurfacePoints, Winding};
+pub use table::{CONTACT_FIELDS, ContactBuild, ContactTable, build_contact, build_contact_from};
 pub use taxels::TaxelBins;
 pub use touch::{TouchBody, TouchSkin};

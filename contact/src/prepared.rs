@@ -12,15 +12,15 @@ pub(crate) const BLOCK: usize = 16;
 /// [`TriMesh`](crate::mesh::TriMesh).
 ///
 /// ```
-/// use spts_contact::{ContactField, PosedMesh, PreparedMesh, WinklerConfig, WinklerLayer, mesh::sphere};
+/// use spts_contact::{ContactField, PosedMesh, PreparedMesh, Foam, WinklerLayer, mesh::sphere};
 /// use spts_models::SkinLayout;
 ///
 /// let ball = PreparedMesh::from(sphere(33.4e-3, 24, 48));
-/// let mut field = WinklerLayer::new(WinklerConfig::default(), &SkinLayout::default())?;
+/// let mut field = WinklerLayer::new(Foam::default(), &SkinLayout::default())?;
 /// field.expect(&ball);
 /// let answer = field.respond(&PosedMesh::at_rest(&ball, [0.0, 0.0, -2e-3]));
 /// assert!(answer.wrench.force_n[2] > 1.0);
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, Default)]
 pub struct PreparedMesh(Arc<Sorted>);
@@ -76,6 +76,11 @@ impl PartialEq for PreparedMesh {
 }
 
 impl PreparedMesh {
+    /// Whether both share their data, which cannot change.
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
     pub(crate) fn sorted(&self) -> &Sorted {
         &self.0
     }

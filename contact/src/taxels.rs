@@ -1,6 +1,6 @@
 //! Averages of the pressure on the fine grid over taxels.
 
-use crate::patch::Patch;
+use crate::field::Patch;
 use spts_models::{PressureMap, SkinLayout};
 
 /// Averages a map with several grid squares a taxel over each taxel, once over its whole area and once over its
@@ -16,7 +16,7 @@ use spts_models::{PressureMap, SkinLayout};
 /// let [taxel, electrode] = TaxelBins::new(&skin, 3).means(&fine_pa, None);
 /// assert!((taxel.values()[0] - 1e3).abs() < 1e-9);
 /// assert!((electrode.values()[0] - 2.25e3).abs() < 1e-9, "the electrode is 10 mm wide");
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct TaxelBins {

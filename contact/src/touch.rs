@@ -1,13 +1,14 @@
 //! Several bodies on one skin, flat or curved.
 
-use crate::body::PosedMesh;
-use crate::columns::{FoamLaw, WinklerConfig, WinklerLayer};
-use crate::field::ContactField as _;
-use crate::frame::Wrench;
+use crate::columns::WinklerLayer;
+use crate::envelope::KnownBody;
+use crate::field::{ContactField as _, PosedMesh, Wrench};
+use crate::foam::{Foam, FoamLaw};
 use crate::prepared::PreparedMesh;
-use crate::surface::{Solid, SurfaceConfig, SurfaceField, SurfacePoints};
+use crate::surface::{Solid, SurfaceField, SurfacePoints};
 use crate::taxels::TaxelBins;
-use spts_models::{ConfigError, PressureMap, SkinLayout};
+use spts_input::Refusal;
+use spts_models::{PressureMap, SkinLayout, in_range};
 
 /// A body that may touch a skin: its mesh, prepared for any skin.
 #[derive(Debug, Clone)]
@@ -31,10 +32,10 @@ impl From<PreparedMesh> for TouchBody {
 /// A flat skin is a [`WinklerLayer`], any other a [`SurfaceField`]. Pressures of several bodies at one place add up.
 ///
 /// ```
-/// use spts_contact::{PosedMesh, PreparedMesh, TouchBody, TouchSkin, WinklerConfig, mesh::cylinder};
+/// use spts_contact::{PosedMesh, PreparedMesh, TouchBody, TouchSkin, Foam, mesh::cylinder};
 /// use spts_models::SkinLayout;
 ///
-/// let mut skin = TouchSkin::flat(SkinLayout::default(), WinklerConfig::default())?;
+/// let mut skin = TouchSkin::flat(SkinLayout::default(), Foam::default())?;
 /// let finger = TouchBody::from(PreparedMesh::from(cylinder(8e-3, 30e-3, 32)));
 /// let at = |x_m| (&finger, PosedMesh::at_rest(&finger.mesh, [x_m, 0.0, -1e-3]));
 /// let mut wrenches = Vec::new();
@@ -42,90 +43,85 @@ impl From<PreparedMesh> for TouchBody {
 /// let cell_area_m2 = 15e-3 * 15e-3;
 /// let sum_n = skin.pressure().sum() * cell_area_m2;
 /// assert!((sum_n - wrenches[0].force_n[2] - wrenches[1].force_n[2]).abs() < 1e-9 * sum_n);
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct TouchSkin {
     layout: SkinLayout,
     foam: Foam,
+    surface: Surface,
     pressure: PressureMap,
     electrode_pressure: PressureMap,
     touched_m2: f64,
-    stiffness_pa_per_m: f64,
-    /// Depth at which no pores are left, m.
-    max_depth_m: f64,
-    damping_s: f64,
 }
 
 #[derive(Debug, Clone)]
-enum Foam {
-    Flat {
-        layer: Box<WinklerLayer>,
-        bins: TaxelBins,
-        cell_area_m2: f64,
-    },
+enum Surface {
+    Flat(Box<FlatSkin>),
     Curved(Box<SurfaceField>),
+}
+
+/// A flat skin, and what makes the next touch fast.
+#[derive(Debug, Clone)]
+struct FlatSkin {
+    layer: WinklerLayer,
+    bins: TaxelBins,
+    cell_area_m2: f64,
+    /// Squares along a row of the grid.
+    width: usize,
+    /// What the layer knows of the body at each place of the list: one that only moves up and down is not rasterised
+    /// again.
+    known: Vec<KnownBody>,
+    /// Number of the touch in which each square of the grid was pressed last: one that two bodies press counts once.
+    pressed: Vec<u64>,
+    touches: u64,
 }
 
 impl TouchSkin {
     /// A flat skin in the plane z = 0, with its middle at the origin. Bodies touch it from above.
     ///
     /// # Errors
-    /// [`ConfigError`] if a parameter is outside its range.
-    pub fn flat(layout: SkinLayout, config: WinklerConfig) -> Result<Self, ConfigError> {
-        let layer = WinklerLayer::new(config, &layout)?;
-        let cells = config.cells_per_taxel;
+    /// [`Refusal`] if a parameter is outside its range.
+    pub fn flat(layout: SkinLayout, foam: Foam) -> Result<Self, Refusal> {
+        let cells = foam.cells_per_taxel;
         let cell_m = layout.pitch_m() / cells as f64;
-        let foam = Foam::Flat {
+        let flat = FlatSkin {
+            layer: WinklerLayer::new(foam, &layout)?,
             bins: TaxelBins::new(&layout, cells),
-            layer: Box::new(layer),
             cell_area_m2: cell_m * cell_m,
+            width: layout.cols() * cells,
+            known: Vec::new(),
+            pressed: vec![0; layout.taxels() * cells * cells],
+            touches: 0,
         };
-        let max_depth_m = config.max_strain * config.thickness_m;
-        Ok(Self::with(
-            layout,
-            foam,
-            config.stiffness_pa_per_m,
-            max_depth_m,
-            config.damping_s,
-        ))
+        Ok(Self::with(layout, foam, Surface::Flat(Box::new(flat))))
     }
 
     /// A skin of any shape, such as one round a robot's arm or on the surface of a mesh. `points` are sample points on
-    /// its surface, each with its normal, area and taxel ([`SurfacePoints`]), and `config` is the foam under them.
+    /// its surface, each with its normal, area and taxel ([`SurfacePoints`]), and `foam` is what is under them.
     ///
     /// `layout` says into how many rows and columns the taxels are arranged: taxel i of `points` is number i of
     /// `layout`, counted row by row. Its pitch and electrodes have no influence on the pressures: areas are those of
     /// the points.
     ///
     /// # Errors
-    /// [`ConfigError`] if a parameter is outside its range, or `points` do not have rows × columns taxels.
-    pub fn curved(layout: SkinLayout, points: SurfacePoints, config: SurfaceConfig) -> Result<Self, ConfigError> {
+    /// [`Refusal`] if a parameter is outside its range, or `points` do not have rows × columns taxels.
+    pub fn curved(layout: SkinLayout, points: SurfacePoints, foam: Foam) -> Result<Self, Refusal> {
         let (found, needed) = (points.taxels(), layout.taxels());
-        spts_models::in_range("taxels", found as f64, found == needed, "rows × cols")?;
-        let field = SurfaceField::new(config, points)?;
-        let foam = Foam::Curved(Box::new(field));
-        let max_depth_m = config.max_strain * config.thickness_m;
-        Ok(Self::with(
-            layout,
-            foam,
-            config.stiffness_pa_per_m,
-            max_depth_m,
-            config.damping_s,
-        ))
+        in_range("taxels", found as f64, found == needed, "rows × cols")?;
+        let field = SurfaceField::new(foam, points)?;
+        Ok(Self::with(layout, foam, Surface::Curved(Box::new(field))))
     }
 
-    fn with(layout: SkinLayout, foam: Foam, stiffness_pa_per_m: f64, max_depth_m: f64, damping_s: f64) -> Self {
+    fn with(layout: SkinLayout, foam: Foam, surface: Surface) -> Self {
         let zeros = || PressureMap::zeros(layout.rows(), layout.cols());
         Self {
             pressure: zeros(),
             electrode_pressure: zeros(),
             touched_m2: 0.0,
-            stiffness_pa_per_m,
-            max_depth_m,
-            damping_s,
             layout,
             foam,
+            surface,
         }
     }
 
@@ -138,9 +134,9 @@ impl TouchSkin {
     /// Centre of every taxel on the free surface, m, and the normal there, in row-major order.
     #[must_use]
     pub fn taxel_centres(&self) -> Vec<([f64; 3], [f64; 3])> {
-        match &self.foam {
-            Foam::Curved(field) => field.points().taxel_centres(),
-            Foam::Flat { .. } => {
+        match &self.surface {
+            Surface::Curved(field) => field.points().taxel_centres(),
+            Surface::Flat(_) => {
                 let flat = SurfacePoints::flat(&self.layout, 1);
                 flat.map(|points| points.taxel_centres()).unwrap_or_default()
             }
@@ -150,9 +146,9 @@ impl TouchSkin {
     /// Area of every taxel, m², in row-major order.
     #[must_use]
     pub fn taxel_areas_m2(&self) -> Vec<f64> {
-        match &self.foam {
-            Foam::Curved(field) => field.points().taxel_areas_m2().to_vec(),
-            Foam::Flat { .. } => vec![self.layout.pitch_m().powi(2); self.layout.taxels()],
+        match &self.surface {
+            Surface::Curved(field) => field.points().taxel_areas_m2().to_vec(),
+            Surface::Flat(_) => vec![self.layout.pitch_m().powi(2); self.layout.taxels()],
         }
     }
 
@@ -179,14 +175,15 @@ impl TouchSkin {
     /// used everywhere. The slope of p = K δ/(1 − δ/δ_m) at the pressure p is K (1 + p/(K δ_m))².
     #[must_use]
     pub fn stiffness_n_per_m(&self) -> f64 {
-        let share = self.pressure.max() / (self.stiffness_pa_per_m * self.max_depth_m);
-        self.touched_m2 * self.stiffness_pa_per_m * (1.0 + share).powi(2).min(FoamLaw::SOLID_RATIO)
+        let stiffness_pa_per_m = self.foam.stiffness_pa_per_m;
+        let share = self.pressure.max() / (stiffness_pa_per_m * self.foam.max_depth_m());
+        self.touched_m2 * stiffness_pa_per_m * (1.0 + share).powi(2).min(FoamLaw::SOLID_RATIO)
     }
 
     /// Damping time of the foam, s.
     #[must_use]
     pub fn damping_s(&self) -> f64 {
-        self.damping_s
+        self.foam.damping_s
     }
 
     /// Removes everything from the skin and places `bodies` on it, each with the mesh of its [`TouchBody`]. Writes the
@@ -194,33 +191,13 @@ impl TouchSkin {
     /// is not finite gets a wrench of NaN and presses nothing.
     pub fn touch(&mut self, bodies: &[(&TouchBody, PosedMesh<'_>)], wrenches: &mut Vec<Wrench>) {
         wrenches.clear();
-        match &mut self.foam {
-            Foam::Flat {
-                layer,
-                bins,
-                cell_area_m2,
-            } => {
+        match &mut self.surface {
+            Surface::Flat(flat) => {
                 self.pressure.values_mut().fill(0.0);
                 self.electrode_pressure.values_mut().fill(0.0);
-                let mut cells = 0;
-                for (body, posed) in bodies {
-                    layer.expect(&body.mesh);
-                    let answer = layer.respond(posed);
-                    wrenches.push(answer.wrench);
-                    let maps = bins.means(answer.pressure_pa, answer.patch);
-                    for (sum, map) in [&mut self.pressure, &mut self.electrode_pressure]
-                        .into_iter()
-                        .zip(&maps)
-                    {
-                        for (sum, p) in sum.values_mut().iter_mut().zip(map.values()) {
-                            *sum += p;
-                        }
-                    }
-                    cells += answer.pressure_pa.iter().filter(|p| **p > 0.0).count();
-                }
-                self.touched_m2 = cells as f64 * *cell_area_m2;
+                self.touched_m2 = flat.touch(bodies, wrenches, [&mut self.pressure, &mut self.electrode_pressure]);
             }
-            Foam::Curved(field) => {
+            Surface::Curved(field) => {
                 field.clear();
                 wrenches.extend(bodies.iter().map(|(body, posed)| field.press(&body.solid, posed)));
                 field.points().means(field.pressure_pa(), self.pressure.values_mut());
@@ -230,5 +207,101 @@ impl TouchSkin {
                 self.touched_m2 = field.touched_m2();
             }
         }
+    }
+}
+
+impl FlatSkin {
+    /// Adds the pressures under `bodies` to `maps`. The area under pressure, m².
+    fn touch(
+        &mut self,
+        bodies: &[(&TouchBody, PosedMesh<'_>)],
+        wrenches: &mut Vec<Wrench>,
+        mut maps: [&mut PressureMap; 2],
+    ) -> f64 {
+        self.touches += 1;
+        self.known
+            .resize_with(bodies.len().max(self.known.len()), KnownBody::default);
+        let mut cells = 0_usize;
+        for ((body, posed), known) in bodies.iter().zip(&mut self.known) {
+            self.layer.swap_known(known);
+            self.layer.expect(&body.mesh);
+            let answer = self.layer.respond(posed);
+            wrenches.push(answer.wrench);
+            for (sum, map) in maps.iter_mut().zip(self.bins.means(answer.pressure_pa, answer.patch)) {
+                for (sum, p) in sum.values_mut().iter_mut().zip(map.values()) {
+                    *sum += p;
+                }
+            }
+            for line in answer.patch.unwrap_or_default().lines(self.width) {
+                for (p, last) in answer.pressure_pa[line.clone()].iter().zip(&mut self.pressed[line]) {
+                    let is_new = *p > 0.0 && *last != self.touches;
+                    cells += usize::from(is_new);
+                    *last = if is_new { self.touches } else { *last };
+                }
+            }
+            self.layer.swap_known(known);
+        }
+        cells as f64 * self.cell_area_m2
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{cuboid, sphere};
+
+    fn body(mesh: crate::mesh::TriMesh) -> TouchBody {
+        TouchBody::from(PreparedMesh::from(mesh))
+    }
+
+    /// Two bodies that go up and down and sideways, on a skin that knows them and on a fresh one: the same bits.
+    #[test]
+    fn what_is_known_of_a_body_does_not_show() {
+        let fresh = || TouchSkin::flat(SkinLayout::default(), Foam::default()).unwrap();
+        let (ball, block) = (body(sphere(20e-3, 16, 32)), body(cuboid([30e-3, 30e-3, 10e-3])));
+        let mut used = fresh();
+        let steps = [
+            (0.0, -1e-3),
+            (0.0, -1.2e-3),
+            (0.0, -1.2e-3),
+            (2e-3, -1.2e-3),
+            (2e-3, 1e-3),
+            (2e-3, -2e-3),
+        ];
+        for (k, (x_m, z_m)) in steps.into_iter().enumerate() {
+            let mut bodies = vec![
+                (&ball, PosedMesh::at_rest(&ball.mesh, [x_m, 0.0, z_m])),
+                (&block, PosedMesh::at_rest(&block.mesh, [-40e-3, 0.0, 0.5 * z_m])),
+            ];
+            // the list in another order, and one body alone
+            bodies.rotate_left(k / 4);
+            bodies.truncate(2 - k / 5);
+            let mut other = fresh();
+            let (mut found, mut expected) = (Vec::new(), Vec::new());
+            used.touch(&bodies, &mut found);
+            other.touch(&bodies, &mut expected);
+            assert_eq!(found, expected, "step {k}");
+            assert_eq!(used.pressure(), other.pressure(), "step {k}");
+            assert_eq!(used.electrode_pressure(), other.electrode_pressure(), "step {k}");
+            assert_eq!(used.touched_m2().to_bits(), other.touched_m2().to_bits(), "step {k}");
+        }
+    }
+
+    /// A block in one place twice presses twice as hard on the same area; beside itself, as hard on twice the area.
+    #[test]
+    fn area_under_two_bodies_counts_once() {
+        let mut skin = TouchSkin::flat(SkinLayout::default(), Foam::default()).unwrap();
+        let block = body(cuboid([30e-3, 30e-3, 10e-3]));
+        let mut touched_m2 = |places: &[f64]| {
+            let at = |x_m: &f64| (&block, PosedMesh::at_rest(&block.mesh, [*x_m, 0.0, -1e-3]));
+            skin.touch(&places.iter().map(at).collect::<Vec<_>>(), &mut Vec::new());
+            skin.touched_m2()
+        };
+        // whole cells of 2.5 mm
+        assert!((touched_m2(&[0.0]) - 9e-4).abs() < 1e-12);
+        assert!((touched_m2(&[0.0, 0.0]) - 9e-4).abs() < 1e-12);
+        assert!((touched_m2(&[0.0, 15e-3]) - 13.5e-4).abs() < 1e-12);
+        assert!((touched_m2(&[-30e-3, 30e-3]) - 18e-4).abs() < 1e-12);
+        assert!(touched_m2(&[]) <= 0.0);
     }
 }

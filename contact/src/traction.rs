@@ -1,18 +1,8 @@
 //! Computes the wrench on the body from the pressure on cells. Friction and lever arms are handled only here.
 
-use crate::body::PosedMesh;
 use crate::envelope::Envelope;
-use crate::frame::Wrench;
-use crate::patch::Patch;
-
-/// Coulomb friction, regularised: t = −μ p v_t / √(|v_t|² + v_reg²).
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Friction {
-    /// μ.
-    pub(crate) coefficient: f64,
-    /// v_reg, m/s.
-    pub(crate) speed_m_per_s: f64,
-}
+use crate::field::{Patch, PosedMesh, Wrench};
+use crate::foam::Foam;
 
 /// Velocity of the body at `r` from its centre of mass, m/s.
 #[inline]
@@ -25,7 +15,7 @@ pub(crate) fn velocity_at(body: &PosedMesh<'_>, r: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Traction on a body, summed row by row.
+/// Traction on a body, summed row by row. Coulomb friction is regularised: t = −μ p v_t / √(|v_t|² + v_reg²).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Tractions {
     centre_m: [f64; 3],
@@ -43,16 +33,16 @@ pub(crate) struct Tractions {
 
 impl Tractions {
     #[inline]
-    pub(crate) fn new(body: &PosedMesh<'_>, friction: Friction) -> Self {
+    pub(crate) fn new(body: &PosedMesh<'_>, foam: &Foam) -> Self {
         let (velocity_m_per_s, spin_rad_per_s) = (body.velocity_m_per_s, body.angular_velocity_rad_per_s);
         let mut rates = velocity_m_per_s.iter().chain(&spin_rad_per_s);
         Self {
             centre_m: body.centre_of_mass_m,
             velocity_m_per_s,
             spin_rad_per_s,
-            friction: friction.coefficient,
-            regular: friction.speed_m_per_s * friction.speed_m_per_s,
-            rubs: friction.coefficient > 0.0 && rates.any(|v| v.abs() > 0.0),
+            friction: foam.friction,
+            regular: foam.friction_speed_m_per_s * foam.friction_speed_m_per_s,
+            rubs: foam.friction > 0.0 && rates.any(|v| v.abs() > 0.0),
             force_pa: [0.0; 3],
             torque: [0.0; 3],
         }
@@ -125,13 +115,13 @@ pub(crate) fn wrench(
     patch: Patch,
     pressure_pa: &[f64],
     body: &PosedMesh<'_>,
-    friction: Friction,
+    foam: &Foam,
     depth_m: impl Fn(usize, usize) -> f64,
 ) -> Wrench {
     if !body.is_finite() {
         return Wrench::UNKNOWN;
     }
-    let mut tractions = Tractions::new(body, friction);
+    let mut tractions = Tractions::new(body, foam);
     let [mut x_m, mut z_m, mut tx, mut ty] = [[0.0; BLOCK]; 4];
     for (row, line) in (patch.rows[0]..).zip(pressure_pa.chunks_exact(patch.width().max(1))) {
         for (first, cells) in (patch.cols[0]..).step_by(BLOCK).zip(line.chunks(BLOCK)) {

@@ -2,7 +2,7 @@
 #![expect(unsafe_code, reason = "a global allocator that counts is unsafe to implement")]
 
 use spts_contact::mesh::sphere;
-use spts_contact::{ContactField as _, PosedMesh, WinklerConfig, WinklerLayer};
+use spts_contact::{ContactField as _, Foam, PosedMesh, WinklerLayer};
 use spts_models::SkinLayout;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -59,7 +59,7 @@ fn counted(work: impl FnOnce()) -> u64 {
 fn winkler_steps_without_allocating() {
     // the counter counts
     assert!(counted(|| drop(std::hint::black_box(vec![0_u8; 64]))) > 0);
-    let mut field = WinklerLayer::new(WinklerConfig::default(), &SkinLayout::default()).unwrap();
+    let mut field = WinklerLayer::new(Foam::default(), &SkinLayout::default()).unwrap();
     let ball = sphere(0.0334, 24, 48);
     let mut respond = |step: u32| {
         let t = f64::from(step) / 1000.0;

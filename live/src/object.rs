@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use spts::Refusal;
 use spts_contact::PreparedMesh;
-use spts_contact::mesh::{MeshError, MeshReport, TriMesh, read_glb, read_obj, read_stl};
+use spts_contact::mesh::{MeshError, MeshReport, TriMesh, read_glb, read_obj, read_stl, unknown_extension};
 use spts_contact::objects::pressable;
 
 /// Side of a mesh that touches the skin.
@@ -191,10 +191,7 @@ impl UploadedMesh {
             "stl" => read_stl,
             "obj" => read_obj,
             "glb" => read_glb,
-            _ => {
-                let unknown = MeshError::UnknownExtension { file: name, extension };
-                return Err(Refusal::from_error(unknown));
-            }
+            _ => return Err(Refusal::from_error(unknown_extension(&name, &extension))),
         };
         let scale = match unit {
             MeshUnit::Guess if extension == "glb" => 1.0,

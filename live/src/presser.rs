@@ -3,7 +3,7 @@
 use crate::object::LiveObject;
 use crate::settings::Press;
 use spts::Refusal;
-use spts_contact::{ContactError, ContactField, EquilibriumError, Holder, Load, PosedMesh, TaxelBins, build_contact};
+use spts_contact::{ContactField, EquilibriumError, Holder, Load, PosedMesh, TaxelBins, build_contact};
 use spts_models::{PressureMap, SkinLayout};
 
 /// Time in which the force follows what is asked for, s.
@@ -26,7 +26,7 @@ pub(crate) struct Presser {
 }
 
 impl Presser {
-    pub(crate) fn new(skin: &SkinLayout, object: LiveObject) -> Result<Self, ContactError> {
+    pub(crate) fn new(skin: &SkinLayout, object: LiveObject) -> Result<Self, Refusal> {
         let field = build_contact("footprint", toml::Table::new(), skin)?;
         let zeros = || PressureMap::zeros(skin.rows(), skin.cols());
         let mut presser = Self {
@@ -105,7 +105,7 @@ impl Presser {
         };
         // the field is one that balances a load
         let Some(field) = self.field.quasi_static() else {
-            return Err(EquilibriumError::Load { force_n });
+            return Err(EquilibriumError::load(force_n));
         };
         let response = field.carry(&body, &load)?.response;
         [self.pressure, self.electrode_pressure] = self.bins.means(response.pressure_pa, response.patch);

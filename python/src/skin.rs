@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use shape::{surface, triples_out, winding};
 use spts::SkinLayout;
-use spts::contact::{SurfaceConfig, SurfacePoints, TouchSkin, WinklerConfig};
+use spts::contact::{Foam, SurfacePoints, TouchSkin};
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -81,8 +81,8 @@ impl Skin {
             electrode.unwrap_or(SkinLayout::usual_electrode_m(pitch)),
         )
         .map_err(refuse)?;
-        let default = WinklerConfig::default();
-        let config = WinklerConfig {
+        let default = Foam::default();
+        let foam = Foam {
             stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
             thickness_m: thickness.unwrap_or(default.thickness_m),
             damping_s: damping.unwrap_or(default.damping_s),
@@ -90,7 +90,7 @@ impl Skin {
             cells_per_taxel: whole("cells", cells)?,
             ..default
         };
-        Ok(Self::of(TouchSkin::flat(layout, config).map_err(refuse)?))
+        Ok(Self::of(TouchSkin::flat(layout, foam).map_err(refuse)?))
     }
 
     /// Skin of `rows` x `cols` taxels around an axis of a cylinder.
@@ -346,10 +346,10 @@ impl Skin {
     }
 
     /// Skin at `points`; a taxel's electrode has the usual share of a square of their mean area.
-    fn curved(points: SurfacePoints, [rows, cols]: [usize; 2], config: SurfaceConfig) -> PyResult<Self> {
+    fn curved(points: SurfacePoints, [rows, cols]: [usize; 2], foam: Foam) -> PyResult<Self> {
         let mean_area_m2 = points.taxel_areas_m2().iter().sum::<f64>() / points.taxels() as f64;
         let layout = SkinLayout::with_pitch(rows, cols, mean_area_m2.sqrt()).map_err(refuse)?;
-        Ok(Self::of(TouchSkin::curved(layout, points, config).map_err(refuse)?))
+        Ok(Self::of(TouchSkin::curved(layout, points, foam).map_err(refuse)?))
     }
 
     fn locked(&self) -> MutexGuard<'_, State> {

@@ -7,11 +7,9 @@
 //! let frames = world.frames().collect::<Result<Vec<_>, _>>()?;
 //! let peak_pa = frames.iter().map(|f| f.pressure.max()).fold(0.0, f64::max);
 //! assert!(peak_pa > 1e3 && world.bounces()[0].restitution() < 1.0);
-//! # Ok::<(), spts_sim::SimError>(())
+//! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
-#[cfg(feature = "engine")]
-pub mod checks;
 pub mod fidelity;
 pub mod mechanics;
 #[cfg(feature = "engine")]
@@ -21,4 +19,4 @@ pub mod world;
 
 pub use mechanics::Mechanics;
 #[cfg(feature = "engine")]
-pub use world::{SimError, World};
+pub use world::World;

@@ -1,11 +1,14 @@
 //! Pictures of a simulation, drawn off-screen by MuJoCo through EGL.
 
-use crate::world::model::compile;
-use crate::world::visual::{BODY_GEOM, MAX_PADS, PAD_RGB, Visuals, pad_name};
-use crate::world::{MAX_PIXELS, SimError, World};
+use crate::world::World;
+use crate::world::model::{BODY_GEOM, MAX_PADS, PAD_RGB, Visuals, compile, pad_name};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera};
 use mujoco_rs::renderer::MjRenderer;
 use spts_contact::Frame;
+use spts_input::Refusal;
+
+/// Largest width or height of a picture, pixels.
+const MAX_PIXELS: usize = 8192;
 
 /// Position of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,10 +55,12 @@ impl Renderer {
     /// A renderer for the scene of `world`.
     ///
     /// # Errors
-    /// [`SimError`] if the size is outside [1, 8192], or MuJoCo rejects the model.
-    pub fn new(world: &World, width: usize, height: usize) -> Result<Self, SimError> {
+    /// [`Refusal`] if the size is outside [1, 8192], or MuJoCo rejects the model.
+    pub fn new(world: &World, width: usize, height: usize) -> Result<Self, Refusal> {
         if ![width, height].iter().all(|side| (1..=MAX_PIXELS).contains(side)) {
-            return Err(SimError::PictureSize { width, height });
+            return Err(Refusal::new(format!(
+                "picture of {width} × {height} is outside [1, {MAX_PIXELS}] pixels a side"
+            )));
         }
         let thickness_m = world.scene().build_contact()?.thickness_m();
         let visuals = Visuals::new(world.scene(), thickness_m, width, height);
@@ -76,9 +81,13 @@ impl Renderer {
     /// `full_scale_pa`, and a close-up shows them through the body.
     ///
     /// # Errors
-    /// [`SimError::Render`] if EGL is missing.
-    pub fn draw(&mut self, world: &World, camera: Camera, frame: Option<(&Frame, f64)>) -> Result<Picture, SimError> {
-        let failed = |error: mujoco_rs::renderer::RendererError| SimError::Render(error.to_string());
+    /// [`Refusal`] if EGL is missing.
+    pub fn draw(&mut self, world: &World, camera: Camera, frame: Option<(&Frame, f64)>) -> Result<Picture, Refusal> {
+        let failed = |error: mujoco_rs::renderer::RendererError| {
+            Refusal::new(format!(
+                "off-screen rendering failed: {error} (is EGL installed? Debian: libegl1 libegl-mesa0 libgl1-mesa-dri)"
+            ))
+        };
         for (taxel, &geom) in self.pads.iter().enumerate() {
             let level = frame.map_or(0.0, |(f, full_pa)| f.pressure.values()[taxel] / full_pa);
             let [r, g, b] = heat(level);

@@ -192,10 +192,10 @@ mod tests {
     #[test]
     fn the_bytes_of_a_press() -> Result<(), Box<dyn std::error::Error>> {
         use spts_contact::mesh::cuboid;
-        use spts_contact::{PosedMesh, PreparedMesh, TouchBody, TouchSkin, WinklerConfig};
+        use spts_contact::{Foam, PosedMesh, PreparedMesh, TouchBody, TouchSkin};
 
         let layout = SkinLayout::new(10, 10, 0.015, 0.01)?;
-        let mut skin = TouchSkin::flat(layout, WinklerConfig::default())?;
+        let mut skin = TouchSkin::flat(layout, Foam::default())?;
         let mesh = cuboid([0.04, 0.05, 0.03]).translated([0.0, 0.0, -0.015]);
         let block = TouchBody::from(PreparedMesh::from(mesh));
         let chain = Chain::new(&ChainConfig::default(), &layout, 7, ".".as_ref())?;

@@ -1,19 +1,117 @@
-//! Quasi-static contact: the pressure under a body at rest, without time steps.
+//! Quasi-static contact: the pose in which the columns carry a load, without time steps.
 
-use super::foam::FoamLaw;
-use super::potential::{Potential, Row, Task};
-use super::winkler::{WinklerConfig, WinklerLayer};
-use crate::body::PosedMesh;
-use crate::equilibrium::{EquilibriumError, depth_limit_m};
-use crate::field::ContactField;
-use crate::frame::Wrench;
-use crate::patch::Patch;
+use super::winkler::{MAX_CELLS, PreloadedRow, WinklerLayer};
+use crate::field::{
+    Balance, ContactField, EquilibriumError, Holder, Load, Patch, PosedMesh, QuasiStatic, Response, Seat, Wrench,
+    depth_limit_m,
+};
+use crate::foam::{Foam, FoamLaw};
 use crate::prepared::PreparedMesh;
-use crate::quasi_static::{Balance, Holder, Load, QuasiStatic, Seat};
-use crate::response::Response;
 use crate::traction::{dot, sum};
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use spts_models::{ConfigError, SkinLayout};
+use spts_input::Refusal;
+use spts_models::SkinLayout;
+
+/// Pressure and its slope on the cells of one row.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Row {
+    pub(super) arm_m: Vec<f64>,
+    pub(super) pressure_pa: Vec<f64>,
+    pub(super) slope_pa_per_m: Vec<f64>,
+}
+
+/// One balance to be found: the columns' law, the load, and the height from which heights are counted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Task<'a> {
+    pub(super) law: FoamLaw,
+    pub(super) load: &'a Load,
+    /// Height of the origin at which the untilted body touches, m. Where the origin is far from the face, the state's z
+    /// is small compared with this height, and small numbers resolve small forces: rounding z changes the force by at
+    /// most K A ulp(z).
+    pub(super) base_m: f64,
+    /// Stiffness of the body's surface, Pa/m; ∞ for a rigid one.
+    pub(super) body_pa_per_m: f64,
+}
+
+/// Gradient and Hessian of the potential over (z, θx, θy): N and N m.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Potential {
+    pub(super) gradient: Vector3<f64>,
+    pub(super) hessian: Matrix3<f64>,
+}
+
+/// What may be left besides, in round-offs of the state: half an ulp each of the state, of z + θ y and of the depth,
+/// and as much again.
+const ROUND_OFFS: f64 = 4.0;
+
+impl Row {
+    pub(super) fn resize(&mut self, width: usize) {
+        self.pressure_pa.resize(width, 0.0);
+        self.slope_pa_per_m.resize(width, 0.0);
+    }
+
+    /// Pressures at the depths drop − base − height + turn · arm.
+    #[inline]
+    pub(super) fn press(&mut self, task: &Task<'_>, height_m: f64, turn_rad: f64, drop_m: &[f64]) {
+        let cells = self.pressure_pa.iter_mut().zip(&mut self.slope_pa_per_m);
+        for (((p, s), drop_m), arm_m) in cells.zip(drop_m).zip(&self.arm_m) {
+            let depth_m = (drop_m - task.base_m) - height_m + turn_rad * arm_m;
+            (*p, *s) = task.law.pressure_and_slope(depth_m);
+        }
+    }
+
+    /// The same where the foam is under preload.
+    #[inline]
+    pub(super) fn press_preloaded(
+        &mut self,
+        task: &Task<'_>,
+        height_m: f64,
+        turn_rad: f64,
+        drop_m: &[f64],
+        preload: &PreloadedRow<'_>,
+    ) {
+        let cells = self.pressure_pa.iter_mut().zip(&mut self.slope_pa_per_m);
+        for (k, (((p, s), drop_m), arm_m)) in cells.zip(drop_m).zip(&self.arm_m).enumerate() {
+            let depth_m = (drop_m - task.base_m) - height_m + turn_rad * arm_m;
+            (*p, *s) = preload.pressure_and_slope(k, &task.law, depth_m);
+        }
+    }
+}
+
+impl Potential {
+    /// Force that is not balanced, N: moments count by the lever `reach_m`.
+    pub(super) fn left_n(&self, reach_m: f64) -> f64 {
+        self.gradient.component_div(&Vector3::new(1.0, reach_m, reach_m)).amax()
+    }
+
+    /// What rounding `state` does to [`Potential::left_n`], N.
+    pub(super) fn round_off_n(&self, state: &Vector3<f64>, reach_m: f64) -> f64 {
+        let h = |i: usize| self.hessian[(i, i)];
+        let tilts_rad = state[1].abs() + state[2].abs();
+        let by_tilt = h(0) * reach_m + h(1).max(h(2)) / reach_m;
+        ROUND_OFFS * 0.5 * f64::EPSILON * (h(0) * state[0].abs() + by_tilt * tilts_rad)
+    }
+
+    pub(super) fn hold(&mut self, holder: Holder, state: Vector3<f64>) {
+        match holder {
+            Holder::Rigid => {
+                self.gradient = Vector3::new(self.gradient[0], 0.0, 0.0);
+                self.hessian = Matrix3::from_diagonal(&Vector3::new(self.hessian[(0, 0)], 1.0, 1.0));
+            }
+            Holder::Elastic {
+                stiffness_nm_per_rad: k,
+                rest_rad,
+            } => {
+                let off = [state[1] - rest_rad[0], state[2] - rest_rad[1]];
+                for (i, k) in (1..).zip(k) {
+                    self.gradient[i] += k[0] * off[0] + k[1] * off[1];
+                    self.hessian[(i, 1)] += k[0];
+                    self.hessian[(i, 2)] += k[1];
+                }
+            }
+        }
+    }
+}
 
 /// Elastic columns under the mesh's lower envelope, as [`WinklerLayer`] without its rates, that also find the pose in
 /// which they carry a load ([`QuasiStatic`]).
@@ -23,11 +121,11 @@ use spts_models::{ConfigError, SkinLayout};
 /// convex potential Σ A ∫p dd + F z + ½ (θ − θ₀)ᵀ k (θ − θ₀), which a damped Newton iteration finds on one height map.
 /// Neglected: the shift θ d of the outline and friction.
 ///
-/// Takes the parameters of [`WinklerConfig`], so that only the model's name changes in a scene; `damping_s`, `friction`
+/// Takes the parameters of [`Foam`], so that only the model's name changes in a scene; `damping_s`, `friction`
 /// and `friction_speed_m_per_s` are checked and kept, and do nothing.
 #[derive(Debug, Clone)]
 pub(crate) struct Footprint {
-    config: WinklerConfig,
+    config: Foam,
     layer: WinklerLayer,
     row: Row,
 }
@@ -51,11 +149,11 @@ impl Footprint {
     /// Layer under `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] when a parameter is outside its range.
-    pub(crate) fn new(config: WinklerConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
+    /// [`Refusal`] when a parameter is outside its range.
+    pub(crate) fn new(config: Foam, skin: &SkinLayout) -> Result<Self, Refusal> {
         // checked as they are, used without rates
-        WinklerLayer::check(&config, skin)?;
-        let elastic = WinklerConfig {
+        config.check_on(skin, MAX_CELLS)?;
+        let elastic = Foam {
             damping_s: 0.0,
             friction: 0.0,
             ..config
@@ -132,7 +230,7 @@ impl Footprint {
     /// bracket; the lowest one, `limit_m` below the touch, when it carries less there.
     fn height(&mut self, task: &Task<'_>, tilt_rad: [f64; 2], limit_m: f64) -> Result<f64, EquilibriumError> {
         let Some(touch_m) = self.touch_m(task, tilt_rad) else {
-            return Err(EquilibriumError::Beside { depth_m: limit_m });
+            return Err(EquilibriumError::beside(limit_m));
         };
         let state = |z: f64| Vector3::new(z, tilt_rad[0], tilt_rad[1]);
         let (mut high_m, mut depth_m) = (touch_m, FIRST_DEPTH_M);
@@ -195,11 +293,11 @@ impl Footprint {
             state += share * step;
             here = next;
         }
-        Err(EquilibriumError::NotConverged {
-            force_n,
-            iterations: MAX_ITERATIONS,
-            residual_n: here.left_n(reach_m),
-        })
+        let residual_n = here.left_n(reach_m);
+        Err(Refusal::new(format!(
+            "no equilibrium at {force_n:.4e} N after {MAX_ITERATIONS} iterations: residual force {residual_n:.3e} N"
+        ))
+        .into())
     }
 
     /// Whether the balance is one for which this is meant: small tilts, and no deeper than `limit_m`.
@@ -207,11 +305,10 @@ impl Footprint {
         let (force_n, tilt_rad) = (task.load.force_n, [state[1], state[2]]);
         let size_rad = tilt_rad[0].hypot(tilt_rad[1]);
         if size_rad > MAX_TILT_RAD {
-            return Err(EquilibriumError::Tilt {
-                force_n,
-                tilt_rad: size_rad,
-                limit_rad: MAX_TILT_RAD,
-            });
+            return Err(Refusal::new(format!(
+                "{force_n:.4e} N tilt the body by {size_rad:.3} rad, outside [0, {MAX_TILT_RAD}]: it tips over"
+            ))
+            .into());
         }
         let touch_m = self.touch_m(task, tilt_rad).unwrap_or(f64::NEG_INFINITY);
         // round-off of the height at which the search for one ends
@@ -248,14 +345,10 @@ impl QuasiStatic for Footprint {
     fn carry(&mut self, body: &PosedMesh<'_>, load: &Load) -> Result<Balance<'_>, EquilibriumError> {
         let force_n = load.force_n;
         if !(force_n > 0.0 && force_n.is_finite()) {
-            return Err(EquilibriumError::Load { force_n });
+            return Err(EquilibriumError::load(force_n));
         }
         let c = &self.config;
-        let law = FoamLaw::new(
-            c.stiffness_pa_per_m,
-            c.max_strain * c.thickness_m,
-            body.stiffness_pa_per_m,
-        );
+        let law = c.law(body.stiffness_pa_per_m);
         self.layer.clear();
         self.layer.envelope.make_map(body);
         let rest_rad = match load.holder {
@@ -266,7 +359,7 @@ impl QuasiStatic for Footprint {
         let drops = self.layer.envelope.map().drop_m().iter();
         let base_m = drops.copied().fold(f64::NEG_INFINITY, f64::max);
         if !base_m.is_finite() {
-            return Err(EquilibriumError::Beside { depth_m: limit_m });
+            return Err(EquilibriumError::beside(limit_m));
         }
         let task = Task {
             law,

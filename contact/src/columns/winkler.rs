@@ -1,56 +1,12 @@
 //! Independent columns of foam with damping, densification and friction.
 
-use super::foam::FoamLaw;
-use super::preload::Preload;
-use crate::body::PosedMesh;
-use crate::envelope::Envelope;
-use crate::field::ContactField;
-use crate::frame::Wrench;
-use crate::limits::{self, Most, parameter};
-use crate::patch::Patch;
+use crate::envelope::{Envelope, KnownBody};
+use crate::field::{ContactField, Patch, PosedMesh, Response, Wrench};
+use crate::foam::{Foam, FoamLaw, Most};
 use crate::prepared::PreparedMesh;
-use crate::response::Response;
-use crate::traction::{Friction, Tractions};
-use serde::{Deserialize, Serialize};
-use spts_models::{ConfigError, SkinLayout};
-
-/// Parameters of [`WinklerLayer`]. A missing one takes its value in [`WinklerConfig::default`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct WinklerConfig {
-    /// K, initial stiffness of the skin, Pa/m; [1e4, 1e9]. K h is the modulus of the foam.
-    pub stiffness_pa_per_m: f64,
-    /// τ, damping time of the Kelvin–Voigt element, s; [0, 0.02].
-    pub damping_s: f64,
-    /// h, thickness of the foam, m; [1e-4, 10].
-    pub thickness_m: f64,
-    /// ε_max, strain at which no pores are left (1 − relative density); [0.3, 1].
-    pub max_strain: f64,
-    /// Squares of the grid on which contact is computed, along one side of a taxel; [1, 64].
-    pub cells_per_taxel: usize,
-    /// μ, friction coefficient; [0, 5].
-    pub friction: f64,
-    /// v_reg, sliding speed below which friction is regularised, m/s; [1e-6, 1].
-    pub friction_speed_m_per_s: f64,
-}
-
-impl Default for WinklerConfig {
-    /// K = 15 MPa/m over 6 mm is a modulus of 90 kPa, inside ASTM D1056 grade 2C1 (55–140 kPa secant modulus at 25 %
-    /// strain). In series with a tennis ball it makes the 8.3 ms contact recorded on the real skin; the thickness
-    /// itself is not published. ε_max = 0.85 is neoprene foam of relative density 0.15. μ = 0.6, rubber on plastic
-    /// (estimate).
-    fn default() -> Self {
-        Self {
-            stiffness_pa_per_m: 1.5e7,
-            damping_s: 0.5e-3,
-            thickness_m: 6e-3,
-            max_strain: 0.85,
-            cells_per_taxel: 6,
-            friction: 0.6,
-            friction_speed_m_per_s: 0.01,
-        }
-    }
-}
+use crate::traction::Tractions;
+use spts_input::Refusal;
+use spts_models::SkinLayout;
 
 /// Bed of independent springs and dampers (Winkler foundation with Kelvin–Voigt columns) under the mesh's lower
 /// envelope.
@@ -63,21 +19,21 @@ impl Default for WinklerConfig {
 /// of 10–30 %, which independent columns lack (K. L. Johnson, *Contact Mechanics* (1985), §4.3, §5.8).
 ///
 /// ```
-/// use spts_contact::{ContactField as _, PosedMesh, WinklerConfig, WinklerLayer, mesh::cuboid};
+/// use spts_contact::{ContactField as _, PosedMesh, Foam, WinklerLayer, mesh::cuboid};
 /// use spts_models::SkinLayout;
 ///
-/// let config = WinklerConfig { friction: 0.5, ..WinklerConfig::default() };
+/// let config = Foam { friction: 0.5, ..Foam::default() };
 /// let mut layer = WinklerLayer::new(config, &SkinLayout::default())?;
 /// let block = cuboid([30e-3, 30e-3, 10e-3]);
 /// let mut body = PosedMesh::at_rest(&block, [0.0, 0.0, -1e-3]);
 /// body.velocity_m_per_s = [0.1, 0.0, 0.0]; // slides along x
 /// let [x_n, _, z_n] = layer.respond(&body).wrench.force_n;
 /// assert!((x_n / z_n + 0.5).abs() < 0.01, "friction opposes the motion");
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct WinklerLayer {
-    config: WinklerConfig,
+    config: Foam,
     pub(super) envelope: Envelope,
     pub(super) pressure_pa: Vec<f64>,
     pub(super) patch: Patch,
@@ -93,9 +49,9 @@ impl WinklerLayer {
     /// A layer under `skin`.
     ///
     /// # Errors
-    /// [`ConfigError`] if a parameter is outside its range.
-    pub fn new(config: WinklerConfig, skin: &SkinLayout) -> Result<Self, ConfigError> {
-        Self::check(&config, skin)?;
+    /// [`Refusal`] if a parameter is outside its range.
+    pub fn new(config: Foam, skin: &SkinLayout) -> Result<Self, Refusal> {
+        config.check_on(skin, MAX_CELLS)?;
         let envelope = Envelope::new(skin, config.cells_per_taxel);
         let [rows, cols] = envelope.shape();
         Ok(Self {
@@ -107,6 +63,11 @@ impl WinklerLayer {
             friction_pa: [vec![0.0; cols], vec![0.0; cols]],
             envelope,
         })
+    }
+
+    /// Exchanges what is known of the present body, so that several can take turns.
+    pub(crate) fn swap_known(&mut self, known: &mut KnownBody) {
+        self.envelope.swap_known(known);
     }
 
     /// Clears the last pressure.
@@ -123,16 +84,8 @@ impl WinklerLayer {
         let [_, width] = self.envelope.shape();
         self.patch = self.envelope.rasterise(body);
         let c = &self.config;
-        let law = FoamLaw::new(
-            c.stiffness_pa_per_m,
-            c.max_strain * c.thickness_m,
-            body.stiffness_pa_per_m,
-        );
-        let friction = Friction {
-            coefficient: c.friction,
-            speed_m_per_s: c.friction_speed_m_per_s,
-        };
-        let mut tractions = Tractions::new(body, friction);
+        let law = c.law(body.stiffness_pa_per_m);
+        let mut tractions = Tractions::new(body, c);
         // a patch may be wider than the contact: sums that start at fours of the grid's columns do not feel it
         let cols = [self.patch.cols[0] / 4 * 4, self.patch.cols[1]];
         let patch = Patch { cols, ..self.patch };
@@ -155,21 +108,10 @@ impl WinklerLayer {
         }
         tractions.wrench(self.envelope.cell_m() * self.envelope.cell_m())
     }
-
-    /// Whether every parameter is in its range.
-    pub(crate) fn check(c: &WinklerConfig, skin: &SkinLayout) -> Result<(), ConfigError> {
-        limits::foam(c.stiffness_pa_per_m, c.thickness_m)?;
-        parameter("damping_s", c.damping_s, [0.0, 0.02], "[0, 0.02] s")?;
-        parameter("max_strain", c.max_strain, [0.3, 1.0], "[0.3, 1]")?;
-        parameter("friction", c.friction, [0.0, 5.0], "[0, 5]")?;
-        let speed = c.friction_speed_m_per_s;
-        parameter("friction_speed_m_per_s", speed, [1e-6, 1.0], "[1e-6, 1] m/s")?;
-        limits::cells(skin, c.cells_per_taxel, (64.0, "[1, 64]"), MAX_CELLS)
-    }
 }
 
 /// Most fine cells a layer may have.
-const MAX_CELLS: Most = (16_777_216.0, "[1, 2^24]");
+pub(super) const MAX_CELLS: Most = (16_777_216.0, "[1, 2^24]");
 
 /// Pressure on a row of cells at `y_m`: the law `pressure_of` of cell k at δ + τ δ′ where the body is below the
 /// surface.
@@ -216,7 +158,7 @@ impl ContactField for WinklerLayer {
 
     fn preload(&mut self, strain: &[f64]) -> Option<Vec<f64>> {
         let c = &self.config;
-        let law = FoamLaw::new(c.stiffness_pa_per_m, c.max_strain * c.thickness_m, f64::INFINITY);
+        let law = c.law(f64::INFINITY);
         let depth_m: Vec<f64> = strain.iter().map(|strain| strain * c.thickness_m).collect();
         let (preload, rest_pa) = Preload::new(&depth_m, c.cells_per_taxel, &law, &self.envelope);
         self.preload = Some(preload);
@@ -238,5 +180,75 @@ impl ContactField for WinklerLayer {
 
     fn thickness_m(&self) -> f64 {
         self.config.thickness_m
+    }
+}
+
+/// Initial compression of the columns, as under the taut cover of a bent skin.
+///
+/// With p₀ = f(δ₀) from the foam's law f, a body that sinks in by d meets p = g(D₀ + d), where g is the law of foam and
+/// body in series and D₀ = δ₀ + p₀/K_b the compression at which that series carries p₀ (K_b: stiffness of the body's
+/// surface). The electrode feels p; the body feels p − p₀, since the cover carries p₀ with or without it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Preload {
+    /// δ₀ of every fine cell, m.
+    depth_m: Vec<f64>,
+    /// p₀ of every fine cell, Pa.
+    rest_pa: Vec<f64>,
+}
+
+/// Preload of the fine cells `start..start + n` of one row, for one body.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PreloadedRow<'a> {
+    depth_m: &'a [f64],
+    rest_pa: &'a [f64],
+    /// 1/K_b, m/Pa.
+    body_m_per_pa: f64,
+}
+
+impl Preload {
+    /// Preload of a skin whose taxels are compressed by `taxel_depth_m`, row by row, on the fine cells of `envelope`;
+    /// and the pressure of every taxel then, Pa. `law` is that of the foam under a rigid body.
+    pub(super) fn new(
+        taxel_depth_m: &[f64],
+        cells_per_taxel: usize,
+        law: &FoamLaw,
+        envelope: &Envelope,
+    ) -> (Self, Vec<f64>) {
+        let [rows, cols] = envelope.shape();
+        let taxel_cols = cols / cells_per_taxel;
+        let rest_pa: Vec<f64> = taxel_depth_m.iter().map(|d| law.pressure_pa(*d)).collect();
+        let fine = |values: &[f64]| -> Vec<f64> {
+            let cell = |k: usize| values[k / cols / cells_per_taxel * taxel_cols + k % cols / cells_per_taxel];
+            (0..rows * cols).map(cell).collect()
+        };
+        let preload = Self {
+            depth_m: fine(taxel_depth_m),
+            rest_pa: fine(&rest_pa),
+        };
+        (preload, rest_pa)
+    }
+
+    /// The cells `line` of the grid under a body of surface stiffness `body_pa_per_m`.
+    pub(super) fn row(&self, line: std::ops::Range<usize>, body_pa_per_m: f64) -> PreloadedRow<'_> {
+        PreloadedRow {
+            depth_m: &self.depth_m[line.clone()],
+            rest_pa: &self.rest_pa[line],
+            body_m_per_pa: 1.0 / body_pa_per_m,
+        }
+    }
+}
+
+impl PreloadedRow<'_> {
+    /// Pressure on the body above cell `k`, Pa, and its slope, Pa/m, where it sinks in by `depth_m`; both 0 above the
+    /// surface. Never tensile.
+    #[inline]
+    pub(super) fn pressure_and_slope(&self, k: usize, law: &FoamLaw, depth_m: f64) -> (f64, f64) {
+        if depth_m <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let rest_pa = self.rest_pa[k];
+        let start_m = self.depth_m[k] + rest_pa * self.body_m_per_pa;
+        let (p, slope) = law.pressure_and_slope(start_m + depth_m);
+        ((p - rest_pa).max(0.0), slope)
     }
 }

@@ -1,10 +1,14 @@
 //! The elastic contact fields: what they share with `winkler`, and where they must differ.
 
-use super::{ElasticConfig, ElasticField};
-use crate::columns::{FoamLaw, WinklerLayer};
-use crate::mesh::{TriMesh, sphere};
-use crate::{ContactField as _, PosedMesh};
+use super::field::ElasticSkin;
+use super::{ElasticConfig, ElasticField, ElasticKernel, ElasticSolver, Influence};
+use crate::columns::WinklerLayer;
+use crate::foam::FoamLaw;
+use crate::mesh::{TriMesh, cuboid, sphere};
+use crate::{ContactField as _, Patch, PosedMesh};
 use approx::assert_relative_eq;
+use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use spts_models::SkinLayout;
 
 fn field(config: ElasticConfig, bonded: bool) -> ElasticField {
@@ -106,7 +110,7 @@ fn refined_for_frames_only() {
     let ball = sphere(33.4e-3, 24, 48);
     for bonded in [true, false] {
         let mut skin = field(config, bonded);
-        let mut winkler = WinklerLayer::new(config.winkler(), &SkinLayout::default()).unwrap();
+        let mut winkler = WinklerLayer::new(config.foam(), &SkinLayout::default()).unwrap();
         for (mesh, depth_m) in [(&mesh, 1e-3), (&mesh, 1.2e-3), (&ball, 3e-3), (&ball, 4e-3)] {
             let body = PosedMesh::at_rest(mesh, [0.003, -0.002, -depth_m]);
             let force_n = skin.respond(&body).wrench.force_n[2];
@@ -272,4 +276,286 @@ fn a_jump_of_the_force_is_no_failure() {
         assert_eq!(layer.failure(), None);
     }
     assert!(jumps > 0 && carried > 0, "{jumps} jumps, {carried} carried");
+}
+
+// Elastic fields on skins and under bodies at their extremes: finite, without tension, balanced.
+
+fn skin(rows: usize, cols: usize, pitch_m: f64) -> SkinLayout {
+    SkinLayout::new(rows, cols, pitch_m, 0.5 * pitch_m).unwrap()
+}
+
+/// One cell a taxel.
+fn coarse(thickness_m: f64, poisson: f64) -> ElasticConfig {
+    ElasticConfig {
+        cells_per_taxel: 1,
+        thickness_m,
+        poisson,
+        ..ElasticConfig::default()
+    }
+}
+
+/// Finite numbers, p ≥ 0 everywhere, none outside the patch, Σ p A = `F_z` up to the round-off of two sums. The force,
+/// N, and the cells under pressure.
+fn sound(field: &mut ElasticField, body: &PosedMesh<'_>, skin: &SkinLayout) -> (f64, usize) {
+    let cells = field.cells_per_taxel();
+    let cell_m = skin.pitch_m() / f64::from(u32::try_from(cells).unwrap());
+    let response = field.respond(body);
+    let wrench = response.wrench;
+    let finite = wrench.force_n.iter().chain(&wrench.torque_nm).all(|v| v.is_finite());
+    assert!(finite, "{wrench:?}");
+    assert!(response.pressure_pa.iter().all(|p| p.is_finite() && *p >= 0.0));
+    let force_n = response.pressure_pa.iter().sum::<f64>() * cell_m * cell_m;
+    let limit_n = 1e-9 * force_n;
+    assert!((force_n - wrench.force_n[2]).abs() <= limit_n, "{force_n} {wrench:?}");
+    let lines = response.patch.unwrap().lines(skin.cols() * cells);
+    let inside: f64 = lines.flat_map(|line| &response.pressure_pa[line]).sum();
+    assert!((inside * cell_m * cell_m - force_n).abs() <= limit_n);
+    let loaded = response.pressure_pa.iter().filter(|p| **p > 0.0).count();
+    (wrench.force_n[2], loaded)
+}
+
+/// One taxel, a small square and a strip, of 0.1 mm, 15 mm and 0.1 m, thicknesses from 0.1 mm to 10 m: a ball that
+/// touches one cell, presses, drowns and lies beside the skin, and a plate over everything. Up to 1000 cells of 1000
+/// thicknesses.
+#[test]
+fn any_skin() {
+    for (rows, cols, pitch_m) in [
+        (1, 1, 1e-4),
+        (1, 1, 0.1),
+        (5, 7, 1e-4),
+        (5, 7, 0.1),
+        (5, 7, 3e-3),
+        (1, 1000, 15e-3),
+        (1, 1000, 1e-4),
+    ] {
+        let layout = skin(rows, cols, pitch_m);
+        for (thickness_m, poisson) in [(1e-4, 0.49), (6e-3, 0.2), (10.0, 0.0)] {
+            for bonded in [true, false] {
+                let mut field = ElasticField::new(coarse(thickness_m, poisson), bonded, &layout).unwrap();
+                any_body(&mut field, &layout);
+            }
+        }
+    }
+}
+
+fn any_body(field: &mut ElasticField, skin: &SkinLayout) {
+    let pitch_m = skin.pitch_m();
+    let ball = sphere(pitch_m.min(0.05), 8, 12);
+    // the lowest vertex on a cell's centre
+    let x_m = if skin.cols().is_multiple_of(2) {
+        0.5 * pitch_m
+    } else {
+        0.0
+    };
+    let at = |z| PosedMesh::at_rest(&ball, [x_m, 0.0, z]);
+    assert!(sound(field, &at(1e-9), skin).0 <= 0.0);
+    let (force_n, loaded) = sound(field, &at(-1e-3 * pitch_m), skin);
+    assert!(
+        force_n > 0.0 && loaded == 1,
+        "{force_n} N on {loaded} cells of {pitch_m} m"
+    );
+    for depth_m in [0.5 * pitch_m, 10.0] {
+        assert!(sound(field, &at(-depth_m), skin).0 > 0.0);
+    }
+    let beside = PosedMesh::at_rest(&ball, [1e3 * pitch_m, 0.0, -1e-3 * pitch_m]);
+    assert!(sound(field, &beside, skin).0 <= 0.0);
+    let plate = cuboid([2e3 * pitch_m, 20.0 * pitch_m, pitch_m]);
+    let flooding = PosedMesh::at_rest(&plate, [0.0, 0.0, -1e-2 * pitch_m]);
+    let (force_n, loaded) = sound(field, &flooding, skin);
+    assert!(force_n > 0.0 && loaded == skin.taxels());
+}
+
+/// The tightest tolerance is reached, at once and from memory, by a ball and by a flat shape's sharp edges, on 60 × 60
+/// cells.
+#[test]
+fn tightest_tolerance() {
+    let layout = SkinLayout::default();
+    let (ball, plate) = (sphere(33.4e-3, 24, 48), cuboid([0.06, 0.03, 0.01]));
+    for (bonded, poisson) in [(true, 0.2), (true, 0.49), (false, 0.2)] {
+        let config = ElasticConfig {
+            tolerance: 1e-12,
+            poisson,
+            ..ElasticConfig::default()
+        };
+        let mut field = ElasticField::new(config, bonded, &layout).unwrap();
+        for mesh in [&ball, &plate] {
+            for depth_m in [1e-3, 1.1e-3, 2e-3] {
+                let body = PosedMesh::at_rest(mesh, [3e-3, -2e-3, -depth_m]);
+                assert!(sound(&mut field, &body, &layout).0 > 0.0);
+            }
+        }
+    }
+}
+
+/// A wide plate over cells of 1000 thicknesses: each carries K δ (densification off), which is what wide cells are
+/// independent columns for (the iteration's 1e-10 × 10); and at 20 thicknesses the sum of all coefficients still is
+/// 1/K, the uniform layer's compliance (exp(−0.7 · 25) = 3e-8 is cut off).
+#[test]
+fn cells_wider_than_the_layer_are_columns() {
+    let layout = skin(4, 6, 0.1);
+    let config = ElasticConfig {
+        densification: Some(false),
+        tolerance: 1e-10,
+        ..coarse(1e-4, 0.45)
+    };
+    let mut field = ElasticField::new(config, true, &layout).unwrap();
+    let plate = cuboid([2.0, 2.0, 0.02]);
+    let response = field.respond(&PosedMesh::at_rest(&plate, [0.0, 0.0, -1e-5]));
+    let expected_pa = config.stiffness_pa_per_m * 1e-5;
+    for p in response.pressure_pa {
+        assert!((p - expected_pa).abs() <= 1e-9 * expected_pa, "{p} {expected_pa}");
+    }
+    for cell_m in [3e-3, 20e-3, 49e-3, 51e-3] {
+        let kernel = ElasticKernel::Layer {
+            modulus_pa: 1.0,
+            poisson: 0.3,
+            thickness_m: 1e-3,
+        };
+        let influence = Influence::new(&kernel, [12, 12], cell_m);
+        let sides = |k: usize| if k == 0 { 1.0 } else { 2.0 };
+        let sum: f64 = (0..144)
+            .map(|k| sides(k / 12) * sides(k % 12) * influence.at(k / 12, k % 12))
+            .sum();
+        let stiffness = super::confined_stiffness_pa_per_m(1.0, 0.3, 1e-3);
+        assert!((sum * stiffness - 1.0).abs() < 1e-6, "{cell_m}: {}", sum * stiffness);
+    }
+}
+
+/// 500 × 500 taxels of 0.1 m over 0.1 mm are built and answer; a finer grid than an elastic field can have is refused
+/// by name.
+#[test]
+fn large_skins() {
+    let layout = skin(500, 500, 0.1);
+    let mut field = ElasticField::new(coarse(1e-4, 0.2), true, &layout).unwrap();
+    let ball = sphere(0.3, 8, 12);
+    let (force_n, loaded) = sound(&mut field, &PosedMesh::at_rest(&ball, [0.0, 0.0, -0.1]), &layout);
+    assert!(force_n > 0.0 && loaded < 100);
+    for bonded in [true, false] {
+        let config = ElasticConfig {
+            cells_per_taxel: 3,
+            ..coarse(1e-4, 0.2)
+        };
+        let error = ElasticField::new(config, bonded, &layout).err().unwrap().to_string();
+        for part in ["rows × cols × contact.cells_per_taxel²", "2250000", "2^20"] {
+            assert!(error.contains(part), "{error}");
+        }
+    }
+}
+
+/// What has no answer says so: NaN for the wrench, no pressure; and the next body is answered as by a fresh field.
+#[test]
+fn no_answer_is_nan() {
+    let layout = SkinLayout::default();
+    let ball = sphere(33.4e-3, 12, 16);
+    let good = PosedMesh::at_rest(&ball, [0.0, 0.0, -2e-3]);
+    let bad = [
+        PosedMesh {
+            velocity_m_per_s: [0.0, 0.0, f64::NAN],
+            ..good
+        },
+        PosedMesh {
+            position_m: [f64::INFINITY, 0.0, 0.0],
+            ..good
+        },
+        PosedMesh {
+            angular_velocity_rad_per_s: [f64::NAN; 3],
+            ..good
+        },
+    ];
+    let config = ElasticConfig {
+        cells_per_taxel: 2,
+        densification: Some(false),
+        ..ElasticConfig::default()
+    };
+    let mut skin = ElasticSkin::new(config, true, &layout);
+    let expected_n = skin.respond(&good).wrench.force_n[2];
+    assert!(expected_n > 0.0);
+    for body in &bad {
+        let response = skin.respond(body);
+        let wrench = response.wrench;
+        assert!(wrench.force_n.iter().chain(&wrench.torque_nm).all(|v| v.is_nan()));
+        assert!(response.pressure_pa.iter().all(|p| p.abs() <= 0.0));
+        assert!(skin.carry(body, 1.0).is_none());
+        let again_n = skin.respond(&good).wrench.force_n[2];
+        assert_eq!(again_n.to_bits(), expected_n.to_bits());
+    }
+    // no iteration reaches an error below 0
+    let hopeless = ElasticConfig {
+        tolerance: -1.0,
+        ..config
+    };
+    let mut skin = ElasticSkin::new(hopeless, true, &layout);
+    assert!(skin.respond(&good).wrench.force_n[2].is_nan());
+    assert!(skin.carry(&good, 1.0).is_none());
+    // a body beside the skin never carries anything
+    let mut skin = ElasticSkin::new(config, true, &layout);
+    let beside = PosedMesh::at_rest(&ball, [1.0, 0.0, 0.0]);
+    assert!(skin.carry(&beside, 1.0).is_none());
+    assert!(skin.carry(&good, 1.0).is_some());
+}
+
+/// Input that carries nothing: zeros that have not converged, and no panic.
+#[test]
+fn nothing_to_press() {
+    let kernel = ElasticKernel::HalfSpace {
+        modulus_pa: 1e5,
+        poisson: 0.2,
+    };
+    let mut solver = ElasticSolver::new(kernel, [3, 4], 1e-3);
+    let patch = |rows, cols| Patch {
+        rows: [0, rows],
+        cols: [0, cols],
+    };
+    for height_m in [f64::INFINITY, f64::NAN] {
+        let outcome = solver.press(&[height_m; 12], 1.0, 1e-6);
+        assert!(!outcome.converged && solver.pressure_pa() == [0.0; 12]);
+    }
+    for force_n in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let outcome = solver.press(&[0.0; 12], force_n, 1e-6);
+        assert!(!outcome.converged && solver.pressure_pa() == [0.0; 12]);
+    }
+    assert!(!solver.sink(patch(0, 0), &[], 1e-6).converged);
+    assert!(!solver.sink(patch(4, 4), &[1e-3; 16], 1e-6).converged);
+    assert_eq!(solver.pressure_pa(), [0.0; 16]);
+    let free = solver.sink(patch(2, 2), &[f64::NEG_INFINITY; 4], 1e-6);
+    assert!(free.converged && solver.pressure_pa() == [0.0; 4]);
+    assert!(solver.sink(patch(3, 4), &[1e-3; 12], 1e-6).converged);
+    let mut none = ElasticSolver::new(kernel, [0, 0], 1e-3);
+    assert!(!none.press(&[], 1.0, 1e-6).converged);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::with_cases(24) })]
+    /// Soups of triangles, many of them without area, in any pose and motion; then again, from memory.
+    #[test]
+    fn any_soup(
+        points in prop::collection::vec(prop::array::uniform3(-0.05..0.05_f64), 3..12),
+        picks in prop::collection::vec(prop::array::uniform3(0..12_usize), 1..20),
+        q in prop::array::uniform4(-1.0..1.0_f64),
+        position in prop::array::uniform3(-0.06..0.06_f64),
+        velocity in prop::array::uniform3(-5.0..5.0_f64),
+        spin in prop::array::uniform3(-50.0..50.0_f64),
+        poisson in 0.0..0.49_f64,
+        bonded in prop::bool::ANY,
+    ) {
+        let n = points.len();
+        let mesh = TriMesh {
+            vertices: points,
+            triangles: picks.iter().map(|t| t.map(|i| u32::try_from(i % n).unwrap())).collect(),
+        };
+        let layout = skin(8, 8, 15e-3);
+        let config = ElasticConfig { cells_per_taxel: 2, ..coarse(6e-3, poisson) };
+        let mut field = ElasticField::new(config, bonded, &layout).unwrap();
+        let turn = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0] + 1.1, q[1], q[2], q[3]));
+        let turn = turn.to_rotation_matrix();
+        let body = PosedMesh {
+            rotation: std::array::from_fn(|i| std::array::from_fn(|j| turn[(i, j)])),
+            velocity_m_per_s: velocity,
+            angular_velocity_rad_per_s: spin,
+            ..PosedMesh::at_rest(&mesh, position)
+        };
+        for _ in 0..2 {
+            sound(&mut field, &body, &layout);
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! Preconditioned conjugate gradients for contact: no negative pressure and no penetration.
 
-use super::system::System;
+use super::convolution::System;
 
 /// What is prescribed besides the shape.
 #[derive(Debug, Clone, Copy, PartialEq)]

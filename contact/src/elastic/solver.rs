@@ -1,14 +1,502 @@
-//! Contact of a rigid shape with an elastic body, computed on a grid of squares.
+//! Contact of a rigid shape with an elastic body, computed on a grid of squares: from a coarse grid to the fine one, or
+//! from earlier solutions.
 
-use super::kernel::ElasticKernel;
-use super::level::{Level, Window};
-use super::memory::Memory;
-use super::pcg::{Goal, Outcome, Stop};
-use super::pyramid::{coarser, prolong, restrict};
-use super::system::Planners;
-use super::tables::{COARSEST, tables};
-use crate::patch::Patch;
+use super::convolution::{EXTRA_OFFSETS, Planners, System};
+use super::influence::{ElasticKernel, Influence, deficit};
+use super::pcg::{self, Fields, Goal, Outcome, Stop, dot};
+use crate::field::Patch;
+use std::cell::RefCell;
 use std::sync::Arc;
+
+// Influence coefficients of all levels of a solver, shared between solvers. They are most of the set-up cost, and the
+// next solver often has the same parameters: every press of a data set makes its own solver.
+
+/// A level is the coarsest when its shorter side has at most this many cells.
+pub(crate) const COARSEST: usize = 20;
+
+/// Coefficients of a level and the side of its cells, m; the finest first.
+pub(crate) type Tables = Arc<[(Arc<Influence>, f64)]>;
+
+/// Most cells of tables that are kept: a few megabytes.
+const MOST_KEPT: usize = 1 << 18;
+
+/// Kernel, rows and columns, side of a cell in m.
+type Kind = (ElasticKernel, [usize; 2], f64);
+
+thread_local! {
+    static LAST: RefCell<Option<(Kind, Tables)>> = const { RefCell::new(None) };
+}
+
+/// Coefficients for up to `shape` cells of side `cell_m`: a function of the arguments alone. Those of a thread's last
+/// solver are kept.
+pub(crate) fn tables(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Tables {
+    let kind = (kernel, shape, cell_m);
+    LAST.with_borrow_mut(|last| match last {
+        Some((known, tables)) if *known == kind => Arc::clone(tables),
+        _ => {
+            let tables = computed(kernel, shape, cell_m);
+            let small = shape[0].saturating_mul(shape[1]) <= MOST_KEPT;
+            *last = small.then(|| (kind, Arc::clone(&tables)));
+            tables
+        }
+    })
+}
+
+fn computed(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Tables {
+    let (mut sizes, mut size, mut side_m) = (vec![(shape, cell_m)], shape, cell_m);
+    while size[0].min(size[1]) > COARSEST {
+        (size, side_m) = (coarser(size), 2.0 * side_m);
+        sizes.push((size, side_m));
+    }
+    let sizes = sizes
+        .into_iter()
+        .map(|(size, side_m)| (size.map(|n| n + EXTRA_OFFSETS), side_m));
+    // the coarsest offsets reach furthest
+    let table = sizes
+        .clone()
+        .next_back()
+        .and_then(|(offsets, side_m)| deficit(&kernel, offsets, side_m));
+    let level = |(offsets, side_m)| {
+        let influence = Influence::with_deficit(&kernel, table.as_ref(), offsets, side_m);
+        (Arc::new(influence), side_m)
+    };
+    sizes.map(level).collect()
+}
+
+// One resolution of the solver: coefficients, operators by size, and fields.
+
+/// Half-open rectangle of cells inside a patch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Window {
+    pub(crate) first: [usize; 2],
+    pub(crate) end: [usize; 2],
+}
+
+impl Window {
+    pub(crate) fn whole(shape: [usize; 2]) -> Self {
+        Self {
+            first: [0, 0],
+            end: shape,
+        }
+    }
+
+    pub(crate) fn shape(&self) -> [usize; 2] {
+        [self.end[0] - self.first[0], self.end[1] - self.first[1]]
+    }
+
+    pub(crate) fn cells(&self) -> usize {
+        let [rows, cols] = self.shape();
+        rows * cols
+    }
+
+    /// Window whose sides are multiples of [`ROUND`] cells, as far as the patch goes: contacts that grow need few
+    /// operators.
+    pub(crate) fn rounded(&self, shape: [usize; 2]) -> Self {
+        let sides = self.shape();
+        let end = [0, 1].map(|i| (self.first[i] + sides[i].next_multiple_of(ROUND)).min(shape[i]));
+        // what does not fit at the end goes before the beginning
+        let first = [0, 1].map(|i| {
+            end[i]
+                .saturating_sub(sides[i].next_multiple_of(ROUND))
+                .min(self.first[i])
+        });
+        Self { first, end }
+    }
+
+    /// Smallest window with every cell for which `inside(cell)`; `None` when there is none.
+    pub(crate) fn around([rows, cols]: [usize; 2], inside: impl Fn(usize) -> bool) -> Option<Self> {
+        let (mut first, mut end) = ([rows, cols], [0, 0]);
+        for r in 0..rows {
+            for c in 0..cols {
+                if inside(r * cols + c) {
+                    first = [first[0].min(r), first[1].min(c)];
+                    end = [end[0].max(r + 1), end[1].max(c + 1)];
+                }
+            }
+        }
+        (end[0] > 0).then_some(Self { first, end })
+    }
+
+    /// Window with `margin` more cells on every side, as far as the patch goes.
+    pub(crate) fn grown(&self, margin: usize, shape: [usize; 2]) -> Self {
+        let first = self.first.map(|i| i.saturating_sub(margin));
+        let end = [0, 1].map(|i| (self.end[i] + margin).min(shape[i]));
+        Self { first, end }
+    }
+
+    /// Ranges of the window's rows in a patch `cols` wide.
+    pub(crate) fn lines(self, cols: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
+        (self.first[0]..self.end[0]).map(move |r| r * cols + self.first[1]..r * cols + self.end[1])
+    }
+
+    /// Copies the window out of a patch `cols` wide.
+    pub(crate) fn cut(self, patch: &[f64], cols: usize, out: &mut [f64]) {
+        let width = self.shape()[1];
+        for (line, out) in self.lines(cols).zip(out.chunks_exact_mut(width)) {
+            out.copy_from_slice(&patch[line]);
+        }
+    }
+
+    /// Copies the window's cells into a patch `cols` wide.
+    pub(crate) fn paste(self, cells: &[f64], patch: &mut [f64], cols: usize) {
+        let width = self.shape()[1];
+        for (line, cells) in self.lines(cols).zip(cells.chunks_exact(width)) {
+            patch[line].copy_from_slice(cells);
+        }
+    }
+}
+
+/// Windows' sides are multiples of this many cells.
+const ROUND: usize = 4;
+
+/// Operators kept; a growing contact passes through about ten sizes.
+const KEPT: usize = 24;
+
+/// Cells of one size.
+#[derive(Clone)]
+pub(crate) struct Level {
+    pub(crate) cell_m: f64,
+    influence: Arc<Influence>,
+    series_m_per_pa: f64,
+    /// Ordered by use; the most recent one is last.
+    systems: Vec<System>,
+    fields: Fields,
+    /// Fields on the patch.
+    pub(crate) target: Vec<f64>,
+    pub(crate) pressure: Vec<f64>,
+    /// C · pressure where it was solved for, 0 elsewhere.
+    pub(crate) displacement: Vec<f64>,
+    /// Where the displacement is known.
+    known: Window,
+}
+
+impl Level {
+    pub(crate) fn new(influence: Arc<Influence>, cell_m: f64) -> Self {
+        Self {
+            cell_m,
+            influence,
+            series_m_per_pa: 0.0,
+            systems: Vec::new(),
+            fields: Fields::default(),
+            target: Vec::new(),
+            pressure: Vec::new(),
+            displacement: Vec::new(),
+            known: Window::whole([0, 0]),
+        }
+    }
+
+    /// Compliance of every cell by itself, added to the elastic one; true when it has changed.
+    pub(crate) fn set_series(&mut self, series_m_per_pa: f64) -> bool {
+        let changed = self.series_m_per_pa.to_bits() != series_m_per_pa.to_bits();
+        if changed {
+            self.series_m_per_pa = series_m_per_pa;
+            self.systems.clear();
+        }
+        changed
+    }
+
+    pub(crate) fn bulge(&self) -> f64 {
+        self.influence.bulge()
+    }
+
+    fn system(&mut self, planners: &mut Planners, shape: [usize; 2]) -> usize {
+        if let Some(index) = self.systems.iter().position(|s| s.shape == shape) {
+            self.systems[index..].rotate_left(1);
+            return self.systems.len() - 1;
+        }
+        if self.systems.len() >= KEPT {
+            self.systems.remove(0);
+        }
+        let system = System::new(planners, &self.influence, shape, self.series_m_per_pa);
+        self.systems.push(system);
+        self.systems.len() - 1
+    }
+
+    /// Solves on `window` of the patch, starting from `pressure` (and a contact set of its positive cells, or, where it
+    /// is all zero, of every cell that can touch). Outside the window the pressure becomes zero.
+    pub(crate) fn solve(
+        &mut self,
+        planners: &mut Planners,
+        cols: usize,
+        window: Window,
+        goal: Goal,
+        stop: Stop,
+    ) -> Outcome {
+        let index = self.system(planners, window.shape());
+        let f = &mut self.fields;
+        f.resize(window.cells());
+        window.cut(&self.target, cols, &mut f.target);
+        window.cut(&self.pressure, cols, &mut f.pressure);
+        let started = f.pressure.iter().any(|p| *p > 0.0);
+        for ((inside, p), target) in f.contact.iter_mut().zip(&mut f.pressure).zip(&f.target) {
+            *inside = if target.is_finite() && (!started || *p > 0.0) {
+                1.0
+            } else {
+                0.0
+            };
+            *p *= *inside;
+        }
+        let outcome = pcg::solve(&mut self.systems[index], f, goal, stop);
+        self.pressure.fill(0.0);
+        window.paste(&f.pressure, &mut self.pressure, cols);
+        self.displacement.clear();
+        self.displacement.resize(self.pressure.len(), 0.0);
+        window.paste(&f.displacement, &mut self.displacement, cols);
+        self.known = window;
+        outcome
+    }
+
+    /// Completes the displacement on `window`, at the price of a convolution; true when there was something to do.
+    pub(crate) fn complete(&mut self, planners: &mut Planners, cols: usize, window: Window) -> bool {
+        let missing = self.known != window;
+        if missing {
+            let index = self.system(planners, window.shape());
+            let f = &mut self.fields;
+            f.resize(window.cells());
+            window.cut(&self.pressure, cols, &mut f.pressure);
+            self.systems[index].displace(&f.pressure, &mut f.displacement);
+            window.paste(&f.displacement, &mut self.displacement, cols);
+            self.known = window;
+        }
+        missing
+    }
+
+    /// Adds a small pressure to the cells outside `window` that the surface penetrates by more than the tolerance;
+    /// false when there are none.
+    pub(crate) fn add_outside(
+        &mut self,
+        planners: &mut Planners,
+        cols: usize,
+        window: Window,
+        approach_m: f64,
+        tolerance: f64,
+    ) -> bool {
+        let shape = [self.target.len() / cols, cols];
+        let sum: f64 = self.pressure.iter().sum();
+        let highest = self.pressure.iter().copied().fold(0.0, f64::max);
+        // nowhere does the surface rise by more than this
+        let bulge_m = self.influence.bulge_below_m(highest, sum);
+        let reach = |cell: usize| self.target[cell] + approach_m > -bulge_m || self.pressure[cell] > 0.0;
+        let Some(wide) = Window::around(shape, reach) else {
+            return false;
+        };
+        let inside = |i: usize| window.first[i] <= wide.first[i] && window.end[i] >= wide.end[i];
+        if inside(0) && inside(1) {
+            return false;
+        }
+        let wide = wide.rounded(shape);
+        self.complete(planners, cols, wide);
+        let Some(system) = self.systems.last() else {
+            return false;
+        };
+        let limit_m = tolerance * highest / system.stiffness_pa_per_m;
+        let mut found = false;
+        for r in wide.first[0]..wide.end[0] {
+            for c in wide.first[1]..wide.end[1] {
+                let within =
+                    (window.first[0]..window.end[0]).contains(&r) && (window.first[1]..window.end[1]).contains(&c);
+                let cell = r * cols + c;
+                if !within && self.target[cell] + approach_m - self.displacement[cell] > limit_m {
+                    self.pressure[cell] = SEED * highest;
+                    found = true;
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Pressure, in units of the largest, that marks a cell as a member of the first contact set.
+const SEED: f64 = 1e-9;
+
+// Halving and doubling the resolution of a patch of cells.
+
+/// Rows and columns of the next coarser patch.
+pub(crate) fn coarser([rows, cols]: [usize; 2]) -> [usize; 2] {
+    [rows.div_ceil(2), cols.div_ceil(2)]
+}
+
+/// Mean of the finite values of each 2 × 2 block; negative infinity where there are none.
+pub(crate) fn restrict(fine: &[f64], [rows, cols]: [usize; 2], coarse: &mut Vec<f64>) {
+    let [coarse_rows, coarse_cols] = coarser([rows, cols]);
+    coarse.clear();
+    for i in 0..coarse_rows {
+        for j in 0..coarse_cols {
+            let (mut sum, mut count) = (0.0, 0.0);
+            for r in 2 * i..(2 * i + 2).min(rows) {
+                for value in &fine[r * cols + 2 * j..r * cols + (2 * j + 2).min(cols)] {
+                    if value.is_finite() {
+                        sum += value;
+                        count += 1.0;
+                    }
+                }
+            }
+            coarse.push(if count > 0.0 { sum / count } else { f64::NEG_INFINITY });
+        }
+    }
+}
+
+/// Bilinear interpolation of `coarse` at the fine cells' centres; coarse cells without a `target` (no body there) are
+/// left out and the others weigh more. Cells of a coarse one without pressure have none.
+pub(crate) fn prolong(coarse: &[f64], target: &[f64], [rows, cols]: [usize; 2], fine: &mut Vec<f64>) {
+    let [coarse_rows, coarse_cols] = coarser([rows, cols]);
+    let near = |i: usize, n: usize| {
+        let own = i / 2;
+        let other = if i % 2 == 1 {
+            (own + 1).min(n - 1)
+        } else {
+            own.saturating_sub(1)
+        };
+        [(own, 0.75), (other, 0.25)]
+    };
+    fine.clear();
+    for r in 0..rows {
+        let across = near(r, coarse_rows);
+        for c in 0..cols {
+            // the coarse contact set is right on average, and a cell too few costs less than one too many
+            if coarse[r / 2 * coarse_cols + c / 2] <= 0.0 {
+                fine.push(0.0);
+                continue;
+            }
+            let along = near(c, coarse_cols);
+            let (mut sum, mut weight) = (0.0, 0.0);
+            for (i, wi) in across {
+                for (j, wj) in along {
+                    let cell = i * coarse_cols + j;
+                    if target[cell].is_finite() {
+                        sum += wi * wj * coarse[cell];
+                        weight += wi * wj;
+                    }
+                }
+            }
+            fine.push(if weight > 0.0 { sum / weight } else { 0.0 });
+        }
+    }
+}
+
+// Recent solutions, used to start the next one.
+
+/// Answers kept: a flat shape that sinks and tilts about two axes has three degrees of freedom; one more for friction's
+/// sake of round-off.
+const KEPT_ANSWERS: usize = 4;
+
+/// A direction that adds less than this share of its own energy to the ones before is left out.
+const INDEPENDENT: f64 = 1e-12;
+
+/// Pressure and displacement of earlier answers, all on the same patch.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Memory {
+    patch: Patch,
+    /// Newest first.
+    answers: Vec<Answer>,
+    spare: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Default)]
+struct Answer {
+    pressure: Vec<f64>,
+    displacement: Vec<f64>,
+}
+
+impl Memory {
+    pub(crate) fn clear(&mut self) {
+        self.answers.clear();
+    }
+
+    /// Moves to `patch` and puts the combination Σ cᵢ pᵢ of least energy ½ p·Cp − p·target into `start`; false when
+    /// nothing is known.
+    pub(crate) fn start(&mut self, patch: Patch, target: &[f64], start: &mut Vec<f64>) -> bool {
+        self.shift(patch);
+        start.clear();
+        start.resize(target.len(), 0.0);
+        let (mut factor, mut scaled) = ([[0.0; KEPT_ANSWERS]; KEPT_ANSWERS], [0.0; KEPT_ANSWERS]);
+        let mut used = [false; KEPT_ANSWERS];
+        // Cholesky of A_ij = p_i·u_j, skipping what depends on the newer ones
+        for i in 0..self.answers.len() {
+            let mut row = [0.0; KEPT_ANSWERS];
+            for j in 0..i {
+                if used[j] {
+                    let before: f64 = (0..j).map(|k| row[k] * factor[j][k]).sum();
+                    row[j] = (dot(&self.answers[i].pressure, &self.answers[j].displacement) - before) / factor[j][j];
+                }
+            }
+            let own = dot(&self.answers[i].pressure, &self.answers[i].displacement);
+            let left = own - row.iter().map(|v| v * v).sum::<f64>();
+            used[i] = left > INDEPENDENT * own;
+            if used[i] {
+                row[i] = left.sqrt();
+                let load = finite_dot(&self.answers[i].pressure, target);
+                let before: f64 = (0..i).map(|k| row[k] * scaled[k]).sum();
+                scaled[i] = (load - before) / row[i];
+                factor[i] = row;
+            }
+        }
+        let mut share = [0.0; KEPT_ANSWERS];
+        for i in (0..self.answers.len()).rev().filter(|i| used[*i]) {
+            let after: f64 = (i + 1..KEPT_ANSWERS).map(|k| factor[k][i] * share[k]).sum();
+            share[i] = (scaled[i] - after) / factor[i][i];
+        }
+        for (answer, share) in self.answers.iter().zip(share) {
+            for (to, from) in start.iter_mut().zip(&answer.pressure) {
+                *to += share * from;
+            }
+        }
+        start.iter().any(|p| *p > 0.0)
+    }
+
+    /// Keeps the answer on the patch of the last [`Memory::start`] and lets the oldest go.
+    pub(crate) fn keep(&mut self, pressure: &[f64], displacement: &[f64]) {
+        let mut answer = if self.answers.len() < KEPT_ANSWERS {
+            Answer::default()
+        } else {
+            self.answers.pop().unwrap_or_default()
+        };
+        answer.pressure.clear();
+        answer.pressure.extend_from_slice(pressure);
+        answer.displacement.clear();
+        answer.displacement.extend_from_slice(displacement);
+        self.answers.insert(0, answer);
+    }
+
+    /// Moves the answers onto another patch; what lies beside it is lost, what is new is zero.
+    fn shift(&mut self, patch: Patch) {
+        if self.patch == patch {
+            return;
+        }
+        let old = self.patch;
+        for answer in &mut self.answers {
+            for field in [&mut answer.pressure, &mut answer.displacement] {
+                shifted(field, old, patch, &mut self.spare);
+                std::mem::swap(field, &mut self.spare);
+            }
+        }
+        self.patch = patch;
+    }
+}
+
+fn shifted(field: &[f64], old: Patch, new: Patch, out: &mut Vec<f64>) {
+    let (old_width, width) = (old.cols[1] - old.cols[0], new.cols[1] - new.cols[0]);
+    out.clear();
+    out.resize((new.rows[1] - new.rows[0]) * width, 0.0);
+    let [first, end] = [old.cols[0].max(new.cols[0]), old.cols[1].min(new.cols[1])];
+    if first >= end {
+        return;
+    }
+    for row in old.rows[0].max(new.rows[0])..old.rows[1].min(new.rows[1]) {
+        let from = (row - old.rows[0]) * old_width;
+        let to = (row - new.rows[0]) * width;
+        out[to + first - new.cols[0]..to + end - new.cols[0]]
+            .copy_from_slice(&field[from + first - old.cols[0]..from + end - old.cols[0]]);
+    }
+}
+
+/// Σ p d over the cells in contact; the others may have an infinite target.
+fn finite_dot(pressure: &[f64], target: &[f64]) -> f64 {
+    let cells = pressure.iter().zip(target);
+    cells
+        .map(|(p, d)| if *p > 0.0 && d.is_finite() { p * d } else { 0.0 })
+        .sum()
+}
 
 /// Solver for the contact of height maps with a half-space or a bonded layer.
 ///

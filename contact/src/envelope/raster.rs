@@ -1,6 +1,6 @@
 //! Triangles on the grid of fine cells.
 
-use crate::patch::Patch;
+use crate::field::Patch;
 use spts_models::SkinLayout;
 
 /// Grid of cells in its own coordinates: u counts columns and v rows, from the centre of the first cell, so that every

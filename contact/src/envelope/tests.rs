@@ -1,32 +1,15 @@
-//! The rasterised envelope against rays through every cell's centre.
+//! The rasterised envelope against rays, against every triangle of arbitrary meshes, and against itself when a pose
+//! comes again.
 
 use super::Envelope;
-use crate::body::PosedMesh;
-use crate::mesh::TriMesh;
+use crate::field::PosedMesh;
+use crate::mesh::polygon::{Point, circle, rectangle};
+use crate::mesh::{TriMesh, cuboid, cylinder, extrude, extrude_recessed, revolve_ring, sphere};
+use crate::objects::OBJECTS;
 use nalgebra::{Rotation3, Unit, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use spts_models::SkinLayout;
-
-fn cuboid(half: [f64; 3]) -> TriMesh {
-    let corner = |i: u32| {
-        let sign = |bit: u32| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
-        [sign(0) * half[0], sign(1) * half[1], sign(2) * half[2]]
-    };
-    let quads = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
-    TriMesh {
-        vertices: (0..8).map(corner).collect(),
-        triangles: triangles.collect(),
-    }
-}
 
 /// Lowest z at which the vertical line through (x, y) meets the solid box, by clipping the line against the box's
 /// slabs in its own axes: shares nothing with the rasteriser.
@@ -61,7 +44,7 @@ proptest! {
         height in -0.03..0.05_f64,
         cells in 1..8_usize,
     ) {
-        let mesh = cuboid(half);
+        let mesh = cuboid(half.map(|h| 2.0 * h)).translated([0.0, 0.0, -half[2]]);
         let axis = Unit::new_normalize(Vector3::from(axis) + Vector3::new(0.0, 0.0, 1e-6));
         let rotation = Rotation3::from_axis_angle(&axis, angle);
         let position = Vector3::new(place[0], place[1], height);
@@ -100,7 +83,7 @@ proptest! {
 #[test]
 fn solids_are_seen_from_below() {
     let skin = SkinLayout::default();
-    let ball = crate::mesh::sphere(20e-3, 12, 16);
+    let ball = sphere(20e-3, 12, 16);
     let mut inside_out = ball.clone();
     for triangle in &mut inside_out.triangles {
         triangle.swap(1, 2);
@@ -122,7 +105,7 @@ fn solids_are_seen_from_below() {
     pair.triangles
         .extend(inside_out.triangles.iter().map(|t| t.map(|i| i + base)));
     assert!(ball.is_solid() && !inside_out.is_solid() && !open.is_solid() && !pair.is_solid());
-    let depths = |mesh: &crate::mesh::TriMesh| {
+    let depths = |mesh: &TriMesh| {
         let mut envelope = Envelope::new(&skin, 5);
         envelope.rasterise(&PosedMesh::at_rest(mesh, [3e-3, -2e-3, -1.5e-3]));
         envelope.depth_m().to_vec()
@@ -145,12 +128,12 @@ proptest! {
     /// µrad, so that choices are kept, left and not made.
     #[test]
     fn what_came_before_does_not_show(
-        object in 0..crate::objects::OBJECTS.len(),
+        object in 0..OBJECTS.len(),
         start in prop::array::uniform3(-1.0..1.0_f64),
         moves in prop::collection::vec((prop::array::uniform3(-1.0..1.0_f64), -8.0..-3.0_f64), 1..60),
         cells in 1..12_usize,
     ) {
-        let mesh = (crate::objects::OBJECTS[object].build)();
+        let mesh = (OBJECTS[object].build)();
         let lowest_m = mesh.vertices.iter().map(|p| p[2]).fold(f64::INFINITY, f64::min);
         let mut envelope = Envelope::new(&SkinLayout::default(), cells);
         let mut position = Vector3::new(0.04 * start[0], 0.04 * start[1], -lowest_m - 1e-3);
@@ -170,4 +153,204 @@ proptest! {
             prop_assert!(bits(&envelope) == bits(&fresh));
         }
     }
+}
+
+// The rasterised envelope against every triangle of arbitrary meshes, and against itself when a pose comes again.
+
+type Matrix = [[f64; 3]; 3];
+
+fn matrix(r: &Rotation3<f64>) -> Matrix {
+    std::array::from_fn(|i| std::array::from_fn(|j| r.matrix()[(i, j)]))
+}
+
+/// World positions of the corners.
+fn posed(body: &PosedMesh<'_>) -> Vec<[f64; 3]> {
+    let at =
+        |v: &[f64; 3]| [0, 1, 2].map(|i| (0..3).map(|j| body.rotation[i][j] * v[j]).sum::<f64>() + body.position_m[i]);
+    body.mesh.vertices.iter().map(at).collect()
+}
+
+/// Least and largest height of the surface over the disc of `slack_m` around (x, y), by brute force over the triangles:
+/// clips every triangle to the square around the point. Shares nothing with the rasteriser.
+fn heights_near(world: &[[f64; 3]], triangles: &[[u32; 3]], [x, y]: Point, slack_m: f64) -> Option<f64> {
+    let mut lowest: Option<f64> = None;
+    for t in triangles {
+        let mut polygon: Vec<[f64; 3]> = t.iter().map(|&i| world[i as usize]).collect();
+        for (axis, sign, bound) in [
+            (0, 1.0, x + slack_m),
+            (0, -1.0, slack_m - x),
+            (1, 1.0, y + slack_m),
+            (1, -1.0, slack_m - y),
+        ] {
+            polygon = clipped(&polygon, axis, sign, bound);
+        }
+        for p in polygon {
+            lowest = Some(lowest.map_or(p[2], |z| z.min(p[2])));
+        }
+    }
+    lowest
+}
+
+/// The part of a polygon with sign · coordinate ≤ bound (Sutherland–Hodgman).
+fn clipped(polygon: &[[f64; 3]], axis: usize, sign: f64, bound: f64) -> Vec<[f64; 3]> {
+    let mut out = Vec::new();
+    for (i, &p) in polygon.iter().enumerate() {
+        let q = polygon[(i + 1) % polygon.len()];
+        let (dp, dq) = (sign * p[axis] - bound, sign * q[axis] - bound);
+        if dp <= 0.0 {
+            out.push(p);
+        }
+        if (dp < 0.0 && dq > 0.0) || (dp > 0.0 && dq < 0.0) {
+            let s = dp / (dp - dq);
+            out.push([0, 1, 2].map(|k| p[k] + s * (q[k] - p[k])));
+        }
+    }
+    out
+}
+
+/// Height at (x, y) itself: the least over the triangles whose projection holds the point, by barycentric coordinates.
+fn height_at(world: &[[f64; 3]], triangles: &[[u32; 3]], [x, y]: Point) -> Option<f64> {
+    let mut lowest: Option<f64> = None;
+    for t in triangles {
+        let [a, b, c] = t.map(|i| Vector3::from(world[i as usize]));
+        let (u, v) = (b - a, c - a);
+        let det = u.x * v.y - u.y * v.x;
+        let (s, r) = (
+            ((x - a.x) * v.y - (y - a.y) * v.x) / det,
+            ((y - a.y) * u.x - (x - a.x) * u.y) / det,
+        );
+        if s >= 0.0 && r >= 0.0 && s + r <= 1.0 {
+            let z = a.z + s * u.z + r * v.z;
+            lowest = Some(lowest.map_or(z, |low| low.min(z)));
+        }
+    }
+    lowest
+}
+
+/// Round-off of positions below 1 m, m: a few ulp, times the steepest gradient that matters.
+const ROUND_OFF_M: f64 = 1e-12;
+/// The envelope may take any point this far from a centre, m: the slack over the shortest edges met here (10 µm).
+const NEAR_M: f64 = 1e-9;
+
+/// At every centre the depth is that of the surface: where the brute force is the same all around the centre, to
+/// round-off; on edges and walls between the deepest point of the neighbourhood and the point itself.
+fn check(mesh: &TriMesh, rotation: Matrix, position_m: [f64; 3], cells: usize) -> Result<(), TestCaseError> {
+    let body = PosedMesh {
+        rotation,
+        ..PosedMesh::at_rest(mesh, position_m)
+    };
+    let mut envelope = Envelope::new(&SkinLayout::default(), cells);
+    let patch = envelope.rasterise(&body);
+    let moving = envelope.depth_m().to_vec();
+    let world = posed(&body);
+    let [rows, cols] = envelope.shape();
+    for row in 0..rows {
+        for col in 0..cols {
+            let centre = envelope.centre_m(row, col);
+            let found = moving[row * cols + col];
+            let depth = |z: Option<f64>| z.map_or(0.0, |z| (-z).max(0.0));
+            let exact = depth(height_at(&world, &mesh.triangles, centre));
+            let most = depth(heights_near(&world, &mesh.triangles, centre, NEAR_M));
+            prop_assert!(
+                found >= exact - ROUND_OFF_M - 1e-6 * (most - exact) && found <= most + ROUND_OFF_M,
+                "({row}, {col}): {found:e}, brute force {exact:e} to {most:e}"
+            );
+            let inside = (patch.rows[0]..patch.rows[1]).contains(&row) && (patch.cols[0]..patch.cols[1]).contains(&col);
+            prop_assert!(found <= 0.0 || inside);
+        }
+    }
+    // the same pose again comes out of the height map, at the same height and at others
+    for lower_m in [0.0, 0.0, 3e-4, -2e-4, 0.02, -0.5] {
+        let again = PosedMesh {
+            position_m: [position_m[0], position_m[1], position_m[2] - lower_m],
+            ..body
+        };
+        let patch = envelope.rasterise(&again);
+        let mut fresh = Envelope::new(&SkinLayout::default(), cells);
+        fresh.rasterise(&again);
+        for (i, (a, b)) in envelope.depth_m().iter().zip(fresh.depth_m()).enumerate() {
+            prop_assert!(a.to_bits() == b.to_bits(), "cell {i}: {a:e} from the map, {b:e} anew");
+            let (row, col) = (i / cols, i % cols);
+            let inside = (patch.rows[0]..patch.rows[1]).contains(&row) && (patch.cols[0]..patch.cols[1]).contains(&col);
+            prop_assert!(*a <= 0.0 || inside);
+        }
+    }
+    Ok(())
+}
+
+fn any_mesh(kind: usize, a: f64, b: f64) -> TriMesh {
+    let low = |mesh: TriMesh| mesh.translated([0.0, 0.0, -0.01]);
+    match kind {
+        0 => cuboid([a, b, 0.02]),
+        1 => sphere(0.5 * a, 7, 9),
+        2 => low(cylinder(0.5 * b, 0.02, 17)),
+        // a hole right through, and a recess from below
+        3 => low(extrude(&rectangle(a, a), &[circle(0.3 * a, 11)], 0.02)),
+        4 => low(extrude_recessed(
+            &rectangle(a, b),
+            &rectangle(0.5 * a, 0.5 * b),
+            0.02,
+            0.004,
+        )),
+        5 => revolve_ring(
+            &[[0.3 * a, 0.0], [0.5 * a, -0.01], [0.5 * a, 0.01], [0.4 * a, 0.002]],
+            12,
+        ),
+        // a needle, and two bodies one above the other
+        6 => cuboid([a, 1e-5, 0.02]),
+        _ => cuboid([a, b, 0.004]).merged(&sphere(0.4 * b, 6, 8).translated([0.2 * a, 0.0, 0.003])),
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), ..ProptestConfig::with_cases(96) })]
+    #[test]
+    fn equals_brute_force(
+        kind in 0..8_usize,
+        size in prop::array::uniform2(0.01..0.06_f64),
+        axis in prop::array::uniform3(-1.0..1.0_f64),
+        // upright and upside down, with vertical walls, as often as anything between
+        angle in prop_oneof![Just(0.0), Just(std::f64::consts::PI), Just(std::f64::consts::FRAC_PI_2), -3.1..3.1_f64],
+        place in prop::array::uniform2(-0.08..0.08_f64),
+        // walls and corners on centres (odd multiples of half a cell) and on borders of cells as often as anywhere
+        snap in prop::bool::ANY,
+        height in -0.02..0.02_f64,
+        cells in 1..4_usize,
+    ) {
+        let mesh = any_mesh(kind, size[0], size[1]);
+        let axis = Unit::new_normalize(Vector3::from(axis) + Vector3::new(0.0, 0.0, 1e-6));
+        let half_cell_m = 0.5 * 0.015 / f64::from(u32::try_from(cells).unwrap());
+        let on = |x: f64| if snap { (x / half_cell_m).round() * half_cell_m } else { x };
+        let mesh = if snap && kind == 0 { cuboid([on(size[0]).max(half_cell_m), on(size[1]).max(half_cell_m), 0.02]) } else { mesh };
+        check(&mesh, matrix(&Rotation3::from_axis_angle(&axis, angle)), [on(place[0]), on(place[1]), height], cells)?;
+    }
+}
+
+/// The seventeen objects as they are pressed.
+#[test]
+fn objects_equal_brute_force() {
+    for object in OBJECTS
+        .iter()
+        .filter(|o| ["T", "comb", "tape", "center"].contains(&o.name))
+    {
+        let mesh = (object.build)();
+        check(&mesh, object.placement.matrix(), [0.001, 0.002, -1e-3], 2).unwrap();
+    }
+}
+
+/// A mesh that changes in place, keeping its address and lengths, is another mesh.
+#[test]
+fn changed_mesh_is_noticed() {
+    let mut mesh = cuboid([0.03, 0.03, 0.01]);
+    let mut envelope = Envelope::new(&SkinLayout::default(), 2);
+    let deepest = |envelope: &Envelope| envelope.depth_m().iter().copied().fold(0.0, f64::max);
+    for _ in 0..3 {
+        envelope.rasterise(&PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3]));
+        assert!((deepest(&envelope) - 1e-3).abs() < ROUND_OFF_M);
+    }
+    for v in &mut mesh.vertices {
+        v[2] -= 1e-3;
+    }
+    envelope.rasterise(&PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3]));
+    assert!((deepest(&envelope) - 2e-3).abs() < ROUND_OFF_M);
 }

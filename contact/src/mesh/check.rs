@@ -1,12 +1,727 @@
 //! Checks every mesh from outside: repairs what is safe to repair, and refuses the rest with the reason.
 
-use super::error::MeshError;
-use super::holes::{Closed, Hole, close_holes};
-use super::orient::{Disagreement, agree, turn_outward};
-use super::report::MeshReport;
-use super::sides::{Sides, balance};
-use super::size::{MAX_COORDINATE_M, MAX_EXTENT_M, MAX_TRIANGLES, MAX_VERTICES, MIN_EXTENT_M, SOFT_MAX_TRIANGLES};
-use super::tri_mesh::TriMesh;
+use super::polygon::{Point, signed_area_m2, triangulate};
+use super::tri_mesh::{
+    MAX_COORDINATE_M, MAX_EXTENT_M, MAX_TRIANGLES, MAX_VERTICES, MIN_EXTENT_M, SOFT_MAX_TRIANGLES, Side, Sides,
+    TriMesh, Unions, balance, cross, dot, index, sub,
+};
+use serde::Serialize;
+use spts_input::Refusal;
+use std::collections::BTreeMap;
+use std::fmt::Display;
+
+/// Why a mesh was refused. Every message names the file and the problem.
+///
+/// ```
+/// use spts_contact::mesh::{cuboid, read_obj};
+///
+/// let in_millimetres = cuboid([40.0, 20.0, 10.0]).to_obj("block");
+/// let error = read_obj(in_millimetres.as_bytes(), 1.0, "block.obj").unwrap_err();
+/// assert!(error.to_string().starts_with("mesh `block.obj`: largest extent = 40 m after scale = 1 is outside"));
+/// ```
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// Anything but the size.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
+    /// The size of the mesh is not plausible for an object that presses on a skin: its unit is probably not the metre.
+    #[error(
+        "mesh `{file}`: largest extent = {} m after scale = {} is outside [{MIN_EXTENT_M}, {MAX_EXTENT_M}] m{}",
+        short(*extent_m), short(*scale), advice(*suggestion)
+    )]
+    FarFromMetres {
+        /// Path as given.
+        file: String,
+        /// Largest extent after scaling, m.
+        extent_m: f64,
+        /// Scale that was applied.
+        scale: f64,
+        /// Probable unit of the file, and the scale for it; `None` if no usual unit fits.
+        suggestion: Option<(&'static str, f64)>,
+    },
+}
+
+/// The error of the mesh in `file`.
+pub(super) fn refused(file: &str, why: impl Display) -> MeshError {
+    Refusal::new(format!("mesh `{file}`: {why}")).into()
+}
+
+/// The error of a file whose content does not match its extension.
+pub(super) fn malformed(file: &str, why: impl Display) -> MeshError {
+    refused(file, format_args!("malformed: {why}"))
+}
+
+/// The error of a coordinate that is NaN or infinite.
+pub(super) fn not_finite(file: &str, vertex: usize, axis: char, value: f64) -> MeshError {
+    refused(
+        file,
+        format_args!("vertex {vertex}, coordinate {axis} = {value} is not a finite number"),
+    )
+}
+
+/// The error of the triangle `triangle` that uses a vertex that is not there.
+pub(super) fn out_of_range(file: &str, triangle: usize, index: u32, vertices: usize) -> MeshError {
+    refused(
+        file,
+        format_args!("triangle {triangle} uses vertex {index}, outside [0, {vertices})"),
+    )
+}
+
+/// The error of a file with more of something than is read.
+pub(super) fn too_large(file: &str, what: &str, found: usize, most: usize) -> MeshError {
+    refused(file, format_args!("{what} = {found} is outside [0, {most}]"))
+}
+
+/// `value` without a row of zeros.
+fn short(value: f64) -> String {
+    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
+        format!("{value:e}")
+    } else {
+        value.to_string()
+    }
+}
+
+/// What to do about a wrong unit.
+fn advice(suggestion: Option<(&'static str, f64)>) -> String {
+    suggestion.map_or_else(String::new, |(unit, scale)| {
+        format!("; if its unit is {unit}, use scale = {}", short(scale))
+    })
+}
+
+/// What was repaired in a mesh when it was loaded, and the size of the mesh afterwards.
+///
+/// ```
+/// use spts_contact::mesh::{cuboid, read_obj};
+///
+/// // a block in millimetres that has one triangle twice
+/// let mut block = cuboid([40.0, 20.0, 10.0]);
+/// block.triangles.push(block.triangles[0]);
+/// let (mesh, report) = read_obj(block.to_obj("block").as_bytes(), 1e-3, "block.obj")?;
+/// assert_eq!((report.duplicate_triangles, mesh.open_edges()), (1, 0));
+/// assert!(!report.notes().is_empty(), "the repair is reported");
+/// # Ok::<(), spts_contact::mesh::MeshError>(())
+/// ```
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct MeshReport {
+    /// Vertices after repair.
+    pub vertices: usize,
+    /// Triangles after repair.
+    pub triangles: usize,
+    /// Vertices that coincided with another and were joined. Not counted for STL, where every triangle has its own
+    /// corners.
+    pub joined_vertices: usize,
+    /// Dropped triangles without three distinct corners.
+    pub dropped_triangles: usize,
+    /// Dropped duplicate triangles.
+    pub duplicate_triangles: usize,
+    /// Triangles that were turned to agree with their neighbours.
+    pub turned_triangles: usize,
+    /// Whether the mesh, or a part of it, was inside out and has been turned.
+    pub flipped: bool,
+    /// Number of holes of at most 5 % of the mesh's size that were closed with a flat surface.
+    pub filled_holes: usize,
+    /// Number of large holes in the upper side of the mesh, as of a bowl, that were closed. From the rim of each hole,
+    /// a wall goes straight up to a flat lid above the highest point of the mesh. While the mesh stands upright, walls
+    /// and lid touch nothing; a tilted press of such a mesh is refused.
+    pub lids: usize,
+    /// Number of triangles before decimation; `None` if the mesh was not decimated.
+    pub decimated_from: Option<usize>,
+    /// Largest distance between the surfaces before and after decimation, m; `None` without decimation.
+    pub decimation_error_m: Option<f64>,
+    /// Whether there are more than [`SOFT_MAX_TRIANGLES`] triangles, which makes contact slow.
+    pub heavy: bool,
+    /// Sides of the box around the mesh, m.
+    pub extent_m: [f64; 3],
+    /// Middle of the box around the mesh, relative to its origin, m.
+    pub middle_m: [f64; 3],
+    /// Enclosed volume, m³.
+    pub volume_m3: f64,
+}
+
+impl MeshReport {
+    /// Whether the origin, by which the object is held and placed, lies beside the box around the mesh in x or y.
+    #[must_use]
+    pub(super) fn is_off_centre(&self) -> bool {
+        (0..2).any(|k| self.middle_m[k].abs() > 0.5 * self.extent_m[k])
+    }
+
+    /// Notes for the user, one a line; empty if the mesh needed no repair.
+    #[must_use]
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        let mut counted = |count: usize, one: &str, many: &str| match count {
+            0 => {}
+            1 => notes.push(format!("1 {one}")),
+            n => notes.push(format!("{n} {many}")),
+        };
+        counted(
+            self.joined_vertices,
+            "vertex of the mesh coincided with another and was joined to it",
+            "vertices of the mesh coincided with others and were joined to them",
+        );
+        counted(
+            self.dropped_triangles,
+            "triangle of the mesh without area was dropped",
+            "triangles of the mesh without area were dropped",
+        );
+        counted(
+            self.duplicate_triangles,
+            "triangle of the mesh was there before and was dropped",
+            "triangles of the mesh were there before and were dropped",
+        );
+        counted(
+            self.turned_triangles,
+            "triangle of the mesh was turned to agree with its neighbours",
+            "triangles of the mesh were turned to agree with their neighbours",
+        );
+        counted(
+            self.filled_holes,
+            "small hole in the mesh was filled flat",
+            "small holes in the mesh were filled flat",
+        );
+        counted(
+            self.lids,
+            "hole in the mesh opens upward and was closed above it, where nothing touches while the mesh stands upright",
+            "holes in the mesh open upward and were closed above it, where nothing touches while the mesh stands upright",
+        );
+        if self.flipped {
+            notes.push("the mesh was inside out and has been turned".to_owned());
+        }
+        if let (Some(from), Some(error_m)) = (self.decimated_from, self.decimation_error_m) {
+            notes.push(format!(
+                "the mesh was decimated from {from} to {} triangles; the surface moved by at most {:.4} mm",
+                self.triangles,
+                1e3 * error_m
+            ));
+        }
+        if self.heavy {
+            notes.push(format!(
+                "the mesh has {} triangles, more than {SOFT_MAX_TRIANGLES}: expect a slow contact",
+                self.triangles
+            ));
+        }
+        if self.is_off_centre() {
+            let [x, y, _] = self.middle_m.map(|m| 1e3 * m);
+            notes.push(format!(
+                "the origin of the mesh, by which it is held and placed, lies beside it: the middle of the mesh is \
+                 ({x:.1}, {y:.1}) mm from it; move the mesh in its file, or mind the lever"
+            ));
+        }
+        notes
+    }
+}
+
+// Drops duplicate triangles.
+
+impl TriMesh {
+    /// Of triangles with the same three corners only the first is kept. Sheets of triangles that are there in both
+    /// directions enclose nothing: they go altogether where that leaves every edge at their border with partners (a
+    /// fin on a surface, the wall between two boxes), and are kept once where it would tear the surface. Also returns
+    /// the number of triangles dropped.
+    fn without_duplicates(&self) -> (Self, usize) {
+        let mut keyed: Vec<([u32; 3], u32)> = Vec::with_capacity(self.triangles.len());
+        for (t, corners) in self.triangles.iter().enumerate() {
+            let mut key = *corners;
+            key.sort_unstable();
+            keyed.push((key, index(t)));
+        }
+        keyed.sort_unstable();
+        let mut keep = vec![true; self.triangles.len()];
+        let mut two_sided = vec![false; self.triangles.len()];
+        let mut any = false;
+        for group in keyed.chunk_by(|a, b| a.0 == b.0).filter(|g| g.len() > 1) {
+            let rising = |t: u32| is_rising(self.triangles[t as usize]);
+            let first = group[0].1;
+            two_sided[first as usize] = group.iter().any(|&(_, t)| rising(t) != rising(first));
+            any |= two_sided[first as usize];
+            group[1..].iter().for_each(|&(_, t)| keep[t as usize] = false);
+        }
+        if keep.iter().all(|&k| k) {
+            return (self.clone(), 0);
+        }
+        let mut out = self.only(&keep);
+        if any {
+            let kept = keep.iter().zip(&two_sided).filter(|(k, _)| **k);
+            let sheets: Vec<bool> = kept.map(|(_, &sheet)| sheet).collect();
+            out = out.without_idle_sheets(&sheets);
+        }
+        let dropped = self.triangles.len() - out.triangles.len();
+        (out, dropped)
+    }
+
+    /// Without the connected regions of `sheets` whose removal leaves more of their border edges paired than keeping
+    /// them does.
+    fn without_idle_sheets(&self, sheets: &[bool]) -> Self {
+        let sides = Sides::of(self);
+        let mut regions = Unions::new(self.triangles.len());
+        for edge in sides.edges() {
+            if let [a, b] = edge
+                && sheets[a.triangle as usize]
+                && sheets[b.triangle as usize]
+            {
+                regions.join(a.triangle, b.triangle, a.rising == b.rising);
+            }
+        }
+        let mut votes: BTreeMap<u32, i64> = BTreeMap::new();
+        for edge in sides.edges() {
+            let of_sheets: Vec<u32> = edge
+                .iter()
+                .map(|s| s.triangle)
+                .filter(|&t| sheets[t as usize])
+                .collect();
+            if let [t] = of_sheets[..] {
+                let others = edge.len() - 1;
+                *votes.entry(regions.find(t).0).or_insert(0) += if others % 2 == 0 { 1 } else { -1 };
+            }
+        }
+        let keep: Vec<bool> = (0..self.triangles.len())
+            .map(|t| !sheets[t] || votes.get(&regions.find(index(t)).0).is_none_or(|&v| v <= 0))
+            .collect();
+        self.only(&keep)
+    }
+}
+
+/// Whether the corners, from the smallest on, go up: the two directions around the same three corners differ in it.
+fn is_rising([a, b, c]: [u32; 3]) -> bool {
+    let smallest = a.min(b).min(c);
+    let [_, second, third] = if a == smallest {
+        [a, b, c]
+    } else if b == smallest {
+        [b, c, a]
+    } else {
+        [c, a, b]
+    };
+    second < third
+}
+
+// Orients the triangles of each part consistently, and outwards.
+
+/// Evaluations of a triangle spent on asking what lies inside what; beyond them boxes decide, which can only mistake a
+/// part beside a bent one for a cavity.
+const MAX_EVALUATIONS: usize = 30_000_000;
+/// Only so many of the largest bodies are asked what they contain.
+const MAX_CONTAINERS: usize = 256;
+
+/// Why a surface cannot be mended, and where, m.
+struct Broken {
+    at_m: [f64; 3],
+    kind: BrokenKind,
+}
+
+enum BrokenKind {
+    /// So many triangles meet in an edge that has no outside that they agree on.
+    Branching(usize),
+    /// On a closed path over the surface, a triangle meets itself turned over.
+    OneSided,
+    /// So many open edges, of so many in all, and why they stay open.
+    NotClosed(usize, usize, &'static str),
+}
+
+impl Broken {
+    /// The error, with the place in the unit of the file.
+    fn error(&self, scale: f64, file: &str) -> MeshError {
+        let [x, y, z] = self.at_m.map(|x| x / scale);
+        let at = format!("({x:.4}, {y:.4}, {z:.4}) of the file");
+        refused(
+            file,
+            match self.kind {
+                BrokenKind::Branching(triangles) => format!(
+                    "{triangles} triangles meet in an edge at {at}, with no outside that all agree on; a solid has 2, \
+                     export without inner walls"
+                ),
+                BrokenKind::OneSided => {
+                    format!("the surface has one side only (noticed at {at}): it has no outside")
+                }
+                BrokenKind::NotClosed(open, edges, why) => {
+                    format!("not closed: {open} of {edges} edges lack a partner, one at {at}: {why}")
+                }
+            },
+        )
+    }
+}
+
+/// Turns triangles so that neighbours agree; in each connected part those in the minority. Returns the part of each
+/// triangle, numbered from 0, and the number turned. Edges of more than two triangles do not connect.
+fn agree(mesh: &mut TriMesh, sides: &Sides) -> Result<(Vec<u32>, usize), Broken> {
+    let mut unions = Unions::new(mesh.triangles.len());
+    for edge in sides.edges() {
+        if let [a, b] = edge {
+            if !unions.join(a.triangle, b.triangle, a.rising == b.rising) {
+                let at_m = mesh.middle_m(a.edge);
+                let kind = BrokenKind::OneSided;
+                return Err(Broken { at_m, kind });
+            }
+        } else if edge.len() > 1 && edge.len() % 2 == 1 {
+            return Err(branching(mesh, edge));
+        }
+    }
+    let n = mesh.triangles.len();
+    let found: Vec<(u32, bool)> = (0..n).map(|t| unions.find(index(t))).collect();
+    // members and turned members of the part that each triangle leads
+    let mut counts = vec![[0_usize; 2]; n];
+    for &(lead, turned) in &found {
+        counts[lead as usize][0] += 1;
+        counts[lead as usize][1] += usize::from(turned);
+    }
+    let mut number = vec![u32::MAX; n];
+    let mut parts = Vec::with_capacity(n);
+    let (mut next, mut changed) = (0, 0);
+    for (t, &(lead, turned)) in found.iter().enumerate() {
+        let lead = lead as usize;
+        if number[lead] == u32::MAX {
+            number[lead] = next;
+            next += 1;
+        }
+        parts.push(number[lead]);
+        let [all, against] = counts[lead];
+        if turned == (2 * against <= all) {
+            mesh.triangles[t].swap(1, 2);
+            changed += 1;
+        }
+    }
+    Ok((parts, changed))
+}
+
+fn branching(mesh: &TriMesh, edge: &[Side]) -> Broken {
+    Broken {
+        at_m: mesh.middle_m(edge[0].edge),
+        kind: BrokenKind::Branching(edge.len()),
+    }
+}
+
+/// Turns every closed part that is inside out, together with what it contains. A part that is inside out within another
+/// is a cavity and stays. Returns the number of parts turned.
+fn turn_outward(mesh: &mut TriMesh, parts: &[u32]) -> usize {
+    let bodies = bodies(mesh, parts);
+    if bodies.iter().all(|b| b.volume_m3 >= 0.0) {
+        return 0;
+    }
+    let turned: Vec<bool> = outermost(mesh, &bodies)
+        .into_iter()
+        .map(|outer| bodies[outer].volume_m3 < 0.0)
+        .collect();
+    for (t, &part) in mesh.triangles.iter_mut().zip(parts) {
+        if turned[part as usize] {
+            t.swap(1, 2);
+        }
+    }
+    turned.into_iter().filter(|&t| t).count()
+}
+
+struct Body {
+    triangles: Vec<u32>,
+    volume_m3: f64,
+    low: [f64; 3],
+    high: [f64; 3],
+}
+
+fn bodies(mesh: &TriMesh, parts: &[u32]) -> Vec<Body> {
+    let mut bodies: Vec<Body> = Vec::new();
+    for (t, &part) in parts.iter().enumerate() {
+        let corners = mesh.corners(t);
+        if part as usize == bodies.len() {
+            bodies.push(Body {
+                triangles: Vec::new(),
+                volume_m3: 0.0,
+                low: corners[0],
+                high: corners[0],
+            });
+        }
+        let body = &mut bodies[part as usize];
+        let first = body
+            .triangles
+            .first()
+            .map_or(corners[0], |&f| mesh.corners(f as usize)[0]);
+        let [a, b, c] = corners.map(|v| sub(v, first));
+        body.volume_m3 += dot(a, cross(b, c)) / 6.0;
+        body.triangles.push(index(t));
+        for v in corners {
+            body.low = [0, 1, 2].map(|k| body.low[k].min(v[k]));
+            body.high = [0, 1, 2].map(|k| body.high[k].max(v[k]));
+        }
+    }
+    bodies
+}
+
+/// For each body the largest that contains it, or itself.
+fn outermost(mesh: &TriMesh, bodies: &[Body]) -> Vec<usize> {
+    let mut by_size: Vec<usize> = (0..bodies.len()).collect();
+    by_size.sort_by(|&a, &b| bodies[b].volume_m3.abs().total_cmp(&bodies[a].volume_m3.abs()));
+    let mut left = MAX_EVALUATIONS;
+    let mut out: Vec<usize> = (0..bodies.len()).collect();
+    // bodies that no other contains, largest first
+    let mut roots: Vec<usize> = Vec::new();
+    for &i in &by_size {
+        let inner = &bodies[i];
+        let [a, b, c] = mesh.corners(inner.triangles[0] as usize);
+        let point = [0, 1, 2].map(|k| (a[k] + b[k] + c[k]) / 3.0);
+        let container = roots.iter().copied().take(MAX_CONTAINERS).find(|&j| {
+            let outer = &bodies[j];
+            let boxed = (0..3).all(|k| outer.low[k] <= inner.low[k] && inner.high[k] <= outer.high[k]);
+            if !boxed || left < outer.triangles.len() {
+                return boxed;
+            }
+            left -= outer.triangles.len();
+            winding(mesh, &outer.triangles, point).abs() > 0.5
+        });
+        match container {
+            Some(j) => out[i] = j,
+            None => roots.push(i),
+        }
+    }
+    out
+}
+
+/// How often the closed surface of `triangles` goes around `point`: ±1 inside, 0 outside.
+///
+/// Source: van Oosterom and Strackee, *The solid angle of a plane triangle*, IEEE Trans. Biomed. Eng. 30 (1983).
+fn winding(mesh: &TriMesh, triangles: &[u32], point: [f64; 3]) -> f64 {
+    let solid: f64 = triangles
+        .iter()
+        .map(|&t| {
+            let [a, b, c] = mesh.corners(t as usize).map(|v| sub(v, point));
+            let [la, lb, lc] = [a, b, c].map(|v| dot(v, v).sqrt());
+            let below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
+            2.0 * dot(a, cross(b, c)).atan2(below)
+        })
+        .sum();
+    solid / (4.0 * std::f64::consts::PI)
+}
+
+// Closes holes where this does not change the surface that touches the skin.
+
+/// Holes of at most this part of the mesh's extent are filled flat: 3 mm on an object of 60 mm, a fifth of a taxel.
+/// What was lost there can stand out from the filling by about half of it.
+const SMALL_FRACTION: f64 = 0.05;
+/// Most of the surface that such fillings may make up, so that a sieve is not taken for a solid.
+const MOST_FILLED_FRACTION: f64 = 0.02;
+/// Holes narrower than this part of the extent, along a straight line, are slits beside a vertex that lies on a
+/// neighbour's edge (T-junctions), and are filled whatever their length: 6 µm on 60 mm.
+const SLIT_FRACTION: f64 = 1e-4;
+/// Least cosine between up and the normal of the filling for a hole that counts as opening upward: 60°.
+const UPWARD_COSINE: f64 = 0.5;
+/// Height of the lid over a mesh that opens upward, above its highest point, as part of its extent: out of reach of a
+/// press.
+const LID_FRACTION: f64 = 0.25;
+/// Longest hole that is triangulated, in edges. The time grows with the cube; several holes may take as long as one of
+/// this length.
+const MAX_EDGES: usize = 2000;
+
+/// What was closed.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Closed {
+    /// Small holes and slits, filled flat.
+    filled: usize,
+    /// Holes that open upwards, closed by walls and a lid above everything.
+    lids: usize,
+}
+
+/// Closes the holes of a mesh whose triangles agree: small ones are filled flat; around one that opens upward, walls go
+/// straight up to a lid above everything.
+///
+/// Walls and lid do not change the lower envelope of a mesh that stands upright: the walls are vertical, and below each
+/// point of the lid lies some triangle of the mesh, because a closed surface crosses each vertical line an even number
+/// of times. When the mesh leans by θ, so do the walls: what sinks in by d then reaches d tan θ beyond the rim.
+fn close_holes(mesh: &mut TriMesh, sides: &Sides) -> Result<Closed, Broken> {
+    let missing: Vec<[u32; 2]> = sides
+        .edges()
+        .filter_map(|edge| match edge {
+            // the partner that is missing runs the other way
+            [side] => Some(side.directed()).map(|[a, b]| [b, a]),
+            _ => None,
+        })
+        .collect();
+    let mut closed = Closed::default();
+    let Some(&first) = missing.first() else {
+        return Ok(closed);
+    };
+    let open = |edge: [u32; 2], why: &'static str, mesh: &TriMesh| Broken {
+        at_m: mesh.middle_m(edge),
+        kind: BrokenKind::NotClosed(missing.len(), sides.edges().count(), why),
+    };
+    let Some(loops) = loops(&missing, mesh.vertices.len()) else {
+        return Err(open(first, "its border does not close", mesh));
+    };
+    let extent_m = mesh.extent_m();
+    let lid_m = mesh.bounds().map_or(0.0, |(_, high)| high[2]) + LID_FRACTION * extent_m;
+    let most_filled_m2 = MOST_FILLED_FRACTION * mesh.area_m2();
+    let mut filled_m2 = 0.0;
+    let mut cubes = 0.0;
+    for ring in loops {
+        let outline = Outline::of(mesh, &ring);
+        let edge = [ring[0], ring[1]];
+        cubes += cube(ring.len());
+        if cubes > cube(MAX_EDGES) {
+            return Err(open(
+                edge,
+                "its holes are as long to fill as one of more than 2000 edges; close them, or simplify their borders",
+                mesh,
+            ));
+        }
+        let slit = outline.width_m <= SLIT_FRACTION * extent_m;
+        if slit || outline.extent_m <= SMALL_FRACTION * extent_m {
+            filled_m2 += if slit { 0.0 } else { outline.area_m2() };
+            if filled_m2 > most_filled_m2 {
+                return Err(open(edge, "its small holes make up more than 2 % of the surface", mesh));
+            }
+            fill(mesh, &ring, &outline);
+            closed.filled += 1;
+        } else if outline.normal_m2[2] >= UPWARD_COSINE * outline.area_m2() {
+            cover(mesh, &ring, lid_m);
+            closed.lids += 1;
+        } else {
+            return Err(open(
+                edge,
+                "a hole wider than 5 % of the mesh opens sideways or downward, where it may touch (only one that opens \
+                 upward can be closed without guessing)",
+                mesh,
+            ));
+        }
+    }
+    Ok(closed)
+}
+
+/// n³, which is how the time to fill a hole of `edges` edges grows.
+fn cube(edges: usize) -> f64 {
+    (edges as f64).powi(3)
+}
+
+/// Simple closed loops of `edges`; `None` if some edge is in none. Where loops touch they are taken apart.
+fn loops(edges: &[[u32; 2]], vertices: usize) -> Option<Vec<Vec<u32>>> {
+    let mut sorted = edges.to_vec();
+    sorted.sort_unstable();
+    // the next unused edge of each vertex: they are used in their order
+    let mut next = vec![usize::MAX; vertices];
+    for (k, edge) in sorted.iter().enumerate().rev() {
+        next[edge[0] as usize] = k;
+    }
+    let mut place: Vec<Option<usize>> = vec![None; vertices];
+    let mut out = Vec::new();
+    for start in 0..sorted.len() {
+        let first = sorted[start][0] as usize;
+        if next[first] > start {
+            continue;
+        }
+        next[first] += 1;
+        let mut path = vec![sorted[start][0]];
+        place[path[0] as usize] = Some(0);
+        let mut at = sorted[start][1];
+        loop {
+            if let Some(from) = place[at as usize] {
+                let ring = path.split_off(from);
+                ring.iter().for_each(|&v| place[v as usize] = None);
+                if ring.len() < 3 {
+                    return None;
+                }
+                out.push(ring);
+                if path.is_empty() {
+                    break;
+                }
+            }
+            place[at as usize] = Some(path.len());
+            path.push(at);
+            let edge = sorted.get(next[at as usize]).filter(|edge| edge[0] == at)?;
+            next[at as usize] += 1;
+            at = edge[1];
+        }
+    }
+    Some(out)
+}
+
+/// Size and direction of a loop.
+struct Outline {
+    /// Area times normal of the flat surface it spans, m² (Newell's formula).
+    normal_m2: [f64; 3],
+    /// Longest side of its box, m.
+    extent_m: f64,
+    /// Largest distance from the line between two points far apart, m.
+    width_m: f64,
+}
+
+impl Outline {
+    fn of(mesh: &TriMesh, ring: &[u32]) -> Self {
+        let at = |i: usize| mesh.vertices[ring[i % ring.len()] as usize];
+        let points = || (0..ring.len()).map(at);
+        let mut normal_m2 = [0.0; 3];
+        let (mut low, mut high) = (at(0), at(0));
+        for i in 0..ring.len() {
+            let n = cross(sub(at(i), at(0)), sub(at(i + 1), at(0)));
+            for k in 0..3 {
+                normal_m2[k] += 0.5 * n[k];
+                low[k] = low[k].min(at(i)[k]);
+                high[k] = high[k].max(at(i)[k]);
+            }
+        }
+        let farthest = |from: [f64; 3]| {
+            let square = |p: [f64; 3]| dot(sub(p, from), sub(p, from));
+            points().fold(from, |best, p| if square(p) > square(best) { p } else { best })
+        };
+        let one = farthest(at(0));
+        let other = farthest(one);
+        let along = sub(other, one);
+        let length_m = dot(along, along).sqrt().max(f64::MIN_POSITIVE);
+        let aside = |p: [f64; 3]| {
+            let n = cross(sub(p, one), along);
+            dot(n, n).sqrt() / length_m
+        };
+        Self {
+            normal_m2,
+            extent_m: (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max),
+            width_m: points().map(aside).fold(0.0, f64::max),
+        }
+    }
+
+    fn area_m2(&self) -> f64 {
+        dot(self.normal_m2, self.normal_m2).sqrt()
+    }
+}
+
+/// Fills a loop with triangles between its own corners, seen along the normal of the surface it spans.
+fn fill(mesh: &mut TriMesh, ring: &[u32], outline: &Outline) {
+    if let [a, b, c] = *ring {
+        mesh.triangles.push([a, b, c]);
+        return;
+    }
+    // the two axes across the normal's largest component, in the order that keeps the direction
+    let n = outline.normal_m2;
+    let up = (0..3).fold(0, |best, k| if n[k].abs() > n[best].abs() { k } else { best });
+    let (mut u, mut v) = ((up + 1) % 3, (up + 2) % 3);
+    if n[up] < 0.0 {
+        (u, v) = (v, u);
+    }
+    let points: Vec<Point> = ring
+        .iter()
+        .map(|&i| mesh.vertices[i as usize])
+        .map(|p| [p[u], p[v]])
+        .collect();
+    append(mesh, ring, &points);
+}
+
+/// Triangles of the polygon `points`, whose corners are the vertices `ring`, in the direction of the loop.
+fn append(mesh: &mut TriMesh, ring: &[u32], points: &[Point]) {
+    let along = signed_area_m2(points) > 0.0;
+    for corners in triangulate(points, &[]) {
+        let [a, b, c] = corners.map(|i| ring[i]);
+        mesh.triangles.push(if along { [a, b, c] } else { [a, c, b] });
+    }
+}
+
+/// Walls from a loop straight up to `lid_m`, and a lid between them.
+fn cover(mesh: &mut TriMesh, ring: &[u32], lid_m: f64) {
+    let n = ring.len();
+    let base = mesh.vertices.len();
+    let points: Vec<[f64; 3]> = ring.iter().map(|&i| mesh.vertices[i as usize]).collect();
+    mesh.vertices.extend(points.iter().map(|p| [p[0], p[1], lid_m]));
+    let lid: Vec<u32> = (base..base + n).map(index).collect();
+    for i in 0..n {
+        let j = (i + 1) % n;
+        let [p, q, above_p, above_q] = [ring[i], ring[j], lid[i], lid[j]];
+        mesh.triangles.extend([[p, q, above_q], [p, above_q, above_p]]);
+    }
+    let flat: Vec<Point> = points.iter().map(|p| [p[0], p[1]]).collect();
+    append(mesh, &lid, &flat);
+}
 
 /// Vertices closer than this fraction of the extent are one vertex. f32 files carry 6e-8 of rounding per coordinate;
 /// 1e-6 is 10× what two roundings of one point can differ by, and a thousandth of the finest feature that matters.
@@ -42,10 +757,7 @@ pub fn checked(raw: &TriMesh, scale: f64, file: &str) -> Result<(TriMesh, MeshRe
     let (mesh, joined_vertices, dropped_triangles) = raw.clone().scaled([scale; 3]).welded(tolerance_m);
     let (mut mesh, duplicate_triangles) = mesh.without_duplicates();
     if mesh.triangles.is_empty() {
-        return Err(MeshError::NoTriangles {
-            file: file.to_owned(),
-            dropped: dropped_triangles + duplicate_triangles,
-        });
+        return Err(no_triangles(file, dropped_triangles + duplicate_triangles));
     }
     let extent_m = mesh.extent_m();
     if !fits(extent_m) {
@@ -55,11 +767,8 @@ pub fn checked(raw: &TriMesh, scale: f64, file: &str) -> Result<(TriMesh, MeshRe
     let volume_m3 = mesh.volume_m3();
     let least_m3 = LEAST_VOLUME_FRACTION * mesh.extent_m().powi(3);
     if volume_m3 < least_m3 {
-        return Err(MeshError::NoVolume {
-            file: file.to_owned(),
-            volume_m3,
-            least_m3,
-        });
+        let why = format!("encloses {volume_m3} m³; a solid of its extent encloses at least {least_m3} m³");
+        return Err(refused(file, why));
     }
     let mut report = MeshReport {
         joined_vertices,
@@ -84,56 +793,22 @@ pub fn checked(raw: &TriMesh, scale: f64, file: &str) -> Result<(TriMesh, MeshRe
     Ok((mesh, report))
 }
 
-/// Why a surface could not be mended.
-enum Broken {
-    Disagreement(Disagreement),
-    Hole { hole: Hole, edges: usize },
-}
-
-impl Broken {
-    /// The error, with places in the unit of the file.
-    fn error(self, scale: f64, file: &str) -> MeshError {
-        let file = file.to_owned();
-        let place = |at_m: [f64; 3]| at_m.map(|x| x / scale);
-        match self {
-            Self::Disagreement(Disagreement::Branching { at_m, triangles }) => MeshError::Branching {
-                file,
-                at: place(at_m),
-                triangles,
-            },
-            Self::Disagreement(Disagreement::OneSided { at_m }) => MeshError::OneSided { file, at: place(at_m) },
-            Self::Hole { hole, edges } => MeshError::NotClosed {
-                file,
-                open_edges: hole.open_edges,
-                edges,
-                at: place(hole.at_m),
-                why: hole.why,
-            },
-        }
-    }
-}
-
 /// Makes the triangles agree, closes what may be closed and turns the parts outward. Reports what it did.
 fn mend(mesh: &mut TriMesh) -> Result<MeshReport, Broken> {
     let sides = Sides::of(mesh);
-    let (mut parts, turned_triangles) = agree(mesh, &sides).map_err(Broken::Disagreement)?;
+    let (mut parts, turned_triangles) = agree(mesh, &sides)?;
     let sides = if turned_triangles > 0 { Sides::of(mesh) } else { sides };
     let branches = sides.edges().any(|edge| edge.len() > 2);
-    let closed = close_holes(mesh, &sides).map_err(|hole| Broken::Hole {
-        hole,
-        edges: sides.edges().count(),
-    })?;
+    let closed = close_holes(mesh, &sides)?;
     if closed != Closed::default() {
-        (parts, _) = agree(mesh, &Sides::of(mesh)).map_err(Broken::Disagreement)?;
+        (parts, _) = agree(mesh, &Sides::of(mesh))?;
     }
     let flipped = turn_outward(mesh, &parts) > 0;
     // edges of two triangles agree by now; those of four and more have not been looked at
     let sides = (branches || closed != Closed::default()).then(|| Sides::of(mesh));
     let unbalanced = |sides: &Sides| sides.edges().find(|edge| balance(edge) != 0).map(<[_]>::to_vec);
     if let Some(edge) = sides.as_ref().and_then(unbalanced) {
-        let at_m = mesh.middle_m(edge[0].edge);
-        let triangles = edge.len();
-        return Err(Broken::Disagreement(Disagreement::Branching { at_m, triangles }));
+        return Err(branching(mesh, &edge));
     }
     Ok(MeshReport {
         turned_triangles,
@@ -144,40 +819,31 @@ fn mend(mesh: &mut TriMesh) -> Result<MeshReport, Broken> {
     })
 }
 
+fn no_triangles(file: &str, dropped: usize) -> MeshError {
+    let why = format!("0 triangles of non-zero size ({dropped} degenerate ones dropped); at least 4 are needed");
+    refused(file, why)
+}
+
 /// Finite coordinates, indices in range, a scale that can be used.
 fn check_numbers(raw: &TriMesh, scale: f64, file: &str) -> Result<(), MeshError> {
-    let name = || file.to_owned();
     if !(scale > 0.0 && scale.is_finite()) {
-        return Err(MeshError::Scale { file: name(), scale });
+        return Err(refused(file, format_args!("scale = {scale} is outside (0, ∞)")));
     }
     if raw.triangles.is_empty() {
-        return Err(MeshError::NoTriangles {
-            file: name(),
-            dropped: 0,
-        });
+        return Err(no_triangles(file, 0));
     }
     let (vertices, triangles) = (raw.vertices.len(), raw.triangles.len());
     within_budget(vertices, triangles, file)?;
     for (vertex, v) in raw.vertices.iter().enumerate() {
         for (axis, &value) in ['x', 'y', 'z'].into_iter().zip(v) {
             if !(value * scale).is_finite() {
-                return Err(MeshError::NotFinite {
-                    file: name(),
-                    vertex,
-                    axis,
-                    value,
-                });
+                return Err(not_finite(file, vertex, axis, value));
             }
         }
     }
     for (triangle, t) in raw.triangles.iter().enumerate() {
         if let Some(&index) = t.iter().find(|&&i| i as usize >= vertices) {
-            return Err(MeshError::IndexOutOfRange {
-                file: name(),
-                triangle,
-                index,
-                vertices,
-            });
+            return Err(out_of_range(file, triangle, index, vertices));
         }
         // only those of triangles: a stray vertex does no harm
         for &i in t {
@@ -185,14 +851,12 @@ fn check_numbers(raw: &TriMesh, scale: f64, file: &str) -> Result<(), MeshError>
             for (axis, value) in ['x', 'y', 'z'].into_iter().zip(raw.vertices[vertex]) {
                 let metres = value * scale;
                 if metres.abs() > MAX_COORDINATE_M {
-                    let file = name();
-                    return Err(MeshError::FarAway {
-                        file,
-                        vertex,
-                        axis,
-                        value,
-                        metres,
-                    });
+                    let (value, metres) = (short(value), short(metres));
+                    let why = format!(
+                        "vertex {vertex} has {axis} = {value} = {metres} m after scale, outside [-{MAX_COORDINATE_M}, \
+                         {MAX_COORDINATE_M}] m"
+                    );
+                    return Err(refused(file, why));
                 }
             }
         }
@@ -209,12 +873,7 @@ pub(super) fn within_budget(vertices: usize, triangles: usize, file: &str) -> Re
     ];
     match counts.into_iter().find(|(_, found, most)| found > most) {
         None => Ok(()),
-        Some((what, found, most)) => Err(MeshError::TooLarge {
-            file: file.to_owned(),
-            what,
-            found,
-            most,
-        }),
+        Some((what, found, most)) => Err(too_large(file, what, found, most)),
     }
 }
 

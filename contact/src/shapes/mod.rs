@@ -18,37 +18,16 @@
 //!     assert_eq!(shape.mesh.open_edges(), 0);
 //!     assert!(shape.size_m[0] <= 60e-3 && shape.size_m[1] <= 60e-3 && shape.relief_m <= 0.6e-3);
 //! }
-//! # Ok::<(), spts_contact::shapes::ShapeError>(())
+//! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
-mod boundary;
-mod conformance;
-mod corners;
-mod dice;
-mod error;
 mod families;
-mod family;
-mod font;
-mod outlines;
 mod plan;
-mod ranges;
 mod region;
-mod relief;
 mod shape;
 mod solid;
-mod stroke;
-mod table;
-mod triangulate;
-mod underside;
-
-pub use conformance::{MAX_TRIANGLES, ShapeFault, check_shape_family};
-pub use dice::Dice;
-pub use error::ShapeError;
-pub use family::ShapeFamily;
-pub use plan::{Dome, Plan};
-pub use ranges::ShapeRanges;
-pub use shape::Shape;
-pub use table::{SHAPE_FAMILIES, build_shape};
-
 #[cfg(test)]
 mod tests;
+
+pub use plan::{Dice, Dome, Plan};
+pub use shape::{SHAPE_FAMILIES, Shape, ShapeFamily, ShapeRanges, build_shape};

@@ -1,48 +1,11 @@
 //! Foam on a surface of any shape.
 
-use super::points::SurfacePoints;
-use super::solid::Solid;
-use crate::body::PosedMesh;
-use crate::columns::FoamLaw;
-use crate::frame::Wrench;
-use crate::limits::{self, parameter};
+use super::points::{Solid, SurfacePoints};
+use crate::field::{PosedMesh, Wrench};
+use crate::foam::Foam;
 use crate::traction::velocity_at;
 use parry3d_f64::math::Vector;
-use serde::{Deserialize, Serialize};
-use spts_models::ConfigError;
-
-/// Parameters of [`SurfaceField`]. A missing one takes its value in [`SurfaceConfig::default`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SurfaceConfig {
-    /// K, initial stiffness of the skin, Pa/m; [1e4, 1e9]. K h is the modulus of the foam.
-    pub stiffness_pa_per_m: f64,
-    /// τ, damping time of the Kelvin–Voigt element, s; [0, 0.02].
-    pub damping_s: f64,
-    /// h, thickness of the foam, m; [1e-4, 10]. Bodies are searched down to 2 h below the surface.
-    pub thickness_m: f64,
-    /// ε_max, strain at which no pores are left (1 − relative density); [0.3, 1].
-    pub max_strain: f64,
-    /// μ, friction coefficient; [0, 5].
-    pub friction: f64,
-    /// v_reg, sliding speed below which friction is regularised, m/s; [1e-6, 1].
-    pub friction_speed_m_per_s: f64,
-}
-
-impl Default for SurfaceConfig {
-    /// Those of [`WinklerConfig`](crate::WinklerConfig).
-    fn default() -> Self {
-        let flat = crate::WinklerConfig::default();
-        Self {
-            stiffness_pa_per_m: flat.stiffness_pa_per_m,
-            damping_s: flat.damping_s,
-            thickness_m: flat.thickness_m,
-            max_strain: flat.max_strain,
-            friction: flat.friction,
-            friction_speed_m_per_s: flat.friction_speed_m_per_s,
-        }
-    }
-}
+use spts_input::Refusal;
 
 /// Depth to which bodies are looked for, in thicknesses of the foam.
 const REACH: f64 = 2.0;
@@ -58,21 +21,21 @@ const REACH: f64 = 2.0;
 /// A body deeper than two thicknesses is treated as if at two thicknesses.
 ///
 /// ```
-/// use spts_contact::{PosedMesh, Solid, SurfaceConfig, SurfaceField, SurfacePoints, Winding, mesh::sphere};
+/// use spts_contact::{PosedMesh, Solid, Foam, SurfaceField, SurfacePoints, Winding, mesh::sphere};
 ///
 /// // half a cylinder of 50 mm radius along z
 /// let pi = std::f64::consts::PI;
 /// let (arc_rad, span_m) = ([0.0, pi], [0.0, 0.09]);
 /// let winding = Winding { shape: [6, 10], points_per_side: 4, axis: 2, centre_m: [0.0; 3], arc_rad, span_m };
-/// let mut skin = SurfaceField::new(SurfaceConfig::default(), SurfacePoints::on_cylinder(&winding, 0.05)?)?;
+/// let mut skin = SurfaceField::new(Foam::default(), SurfacePoints::on_cylinder(&winding, 0.05)?)?;
 /// let ball = sphere(20e-3, 16, 32); // its centre is 20 mm above its origin
 /// let wrench = skin.press(&Solid::new(&ball), &PosedMesh::at_rest(&ball, [0.0, 0.069, 0.025]));
 /// assert!(wrench.force_n[1] > 0.1 && wrench.force_n[0].abs() < 1e-3, "pushed away from the cylinder");
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct SurfaceField {
-    config: SurfaceConfig,
+    config: Foam,
     points: SurfacePoints,
     pressure_pa: Vec<f64>,
 }
@@ -81,15 +44,9 @@ impl SurfaceField {
     /// Foam at `points`, with nothing on it.
     ///
     /// # Errors
-    /// [`ConfigError`] if a parameter is outside its range.
-    pub fn new(config: SurfaceConfig, points: SurfacePoints) -> Result<Self, ConfigError> {
-        let c = &config;
-        limits::foam(c.stiffness_pa_per_m, c.thickness_m)?;
-        parameter("damping_s", c.damping_s, [0.0, 0.02], "[0, 0.02] s")?;
-        parameter("max_strain", c.max_strain, [0.3, 1.0], "[0.3, 1]")?;
-        parameter("friction", c.friction, [0.0, 5.0], "[0, 5]")?;
-        let speed = c.friction_speed_m_per_s;
-        parameter("friction_speed_m_per_s", speed, [1e-6, 1.0], "[1e-6, 1] m/s")?;
+    /// [`Refusal`] if a parameter is outside its range.
+    pub fn new(config: Foam, points: SurfacePoints) -> Result<Self, Refusal> {
+        config.check()?;
         Ok(Self {
             pressure_pa: vec![0.0; points.len()],
             config,
@@ -129,11 +86,7 @@ impl SurfaceField {
             return Wrench::UNKNOWN;
         }
         let c = &self.config;
-        let law = FoamLaw::new(
-            c.stiffness_pa_per_m,
-            c.max_strain * c.thickness_m,
-            body.stiffness_pa_per_m,
-        );
+        let law = c.law(body.stiffness_pa_per_m);
         let reach_m = REACH * c.thickness_m;
         let regular = c.friction_speed_m_per_s * c.friction_speed_m_per_s;
         let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);

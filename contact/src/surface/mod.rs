@@ -2,12 +2,8 @@
 
 mod field;
 mod points;
-mod solid;
 #[cfg(test)]
 mod tests;
-mod wrap;
 
-pub use field::{SurfaceConfig, SurfaceField};
-pub use points::SurfacePoints;
-pub use solid::Solid;
-pub use wrap::Winding;
+pub use field::SurfaceField;
+pub use points::{Solid, SurfacePoints, Winding};

@@ -1,6 +1,175 @@
-//! Sample points of a skin.
+//! Sample points of a skin, flat, around an axis or on a mesh; and the rays that find them and the bodies over them.
 
-use spts_models::{ConfigError, SkinLayout, in_range};
+use crate::mesh::TriMesh;
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::Vector;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhLeafCost};
+use spts_input::Refusal;
+use spts_models::{SkinLayout, in_range};
+use std::f64::consts::TAU;
+
+/// Share of a triangle by which rays beside it count as hits, so that none passes between two triangles.
+const SLACK: f64 = 1e-9;
+
+/// Triangles seen under a smaller sine than this are passed over: the faces beside them are met.
+const EDGE_ON: f64 = 1e-9;
+
+/// The triangles of a mesh in a hierarchy of bounding boxes, in body axes.
+#[derive(Debug, Clone)]
+pub struct Solid {
+    triangles: Vec<Triangle>,
+    boxes: Bvh,
+    /// Lower corner of the box around all triangles, m.
+    low_m: Vector,
+    high_m: Vector,
+    /// Whether the mesh is closed and its triangles face outwards, so that it has an inside.
+    closed: bool,
+}
+
+/// First corner, the two edges from it, and the product of their lengths.
+#[derive(Debug, Clone, Copy)]
+struct Triangle {
+    corner_m: Vector,
+    edges_m: [Vector; 2],
+    size_m2: f64,
+}
+
+/// Where a ray meets a mesh first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Hit {
+    /// Distance from the start of the ray, m.
+    pub(super) distance_m: f64,
+    /// Whether the ray enters the body there, judged by the order of the triangle's corners.
+    enters: bool,
+}
+
+impl BvhLeafCost for Hit {
+    fn cost(&self) -> f64 {
+        self.distance_m
+    }
+}
+
+impl Solid {
+    /// The solid of `mesh`, whose indices must be valid.
+    #[must_use]
+    pub fn new(mesh: &TriMesh) -> Self {
+        let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);
+        let triangle = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(corner);
+            Triangle {
+                corner_m: a,
+                edges_m: [b - a, c - a],
+                size_m2: (b - a).length() * (c - a).length(),
+            }
+        };
+        let boxed = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(corner);
+            // wider than the slack of a triangle
+            let margin = Vector::splat(4.0 * SLACK * ((b - a).length() + (c - a).length()));
+            Aabb::new(a.min(b).min(c) - margin, a.max(b).max(c) + margin)
+        };
+        let boxes: Vec<Aabb> = mesh.triangles.iter().map(boxed).collect();
+        let empty = (Vector::splat(f64::INFINITY), Vector::splat(f64::NEG_INFINITY));
+        let (low_m, high_m) = boxes
+            .iter()
+            .fold(empty, |(low, high), b| (low.min(b.mins), high.max(b.maxs)));
+        Self {
+            low_m,
+            high_m,
+            triangles: mesh.triangles.iter().map(triangle).collect(),
+            boxes: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
+            closed: mesh.is_solid(),
+        }
+    }
+
+    /// How deep the solid reaches below the end of a ray that starts at `start_m` and goes `reach_m` along `direction`
+    /// (length 1); 0 where it does not. A start inside the solid counts as the deepest point of a ray.
+    pub(super) fn depth_m(&self, start_m: Vector, direction: Vector, reach_m: f64) -> f64 {
+        let hit = self.first(start_m, direction, reach_m);
+        if let Some(hit) = hit
+            && (hit.enters || !self.closed)
+        {
+            return reach_m - hit.distance_m;
+        }
+        // it comes out first, or not at all: it may have started inside
+        if self.closed && self.holds(start_m, direction) {
+            return reach_m;
+        }
+        hit.map_or(0.0, |hit| reach_m - hit.distance_m)
+    }
+
+    /// Whether a point is inside: what is met first, both ways along `direction`, is the way out.
+    fn holds(&self, point_m: Vector, direction: Vector) -> bool {
+        let out = |direction| {
+            let first = self.first(point_m, direction, f64::INFINITY);
+            first.is_some_and(|hit| !hit.enters)
+        };
+        let beside = point_m.cmplt(self.low_m).any() || point_m.cmpgt(self.high_m).any();
+        !beside && out(direction) && out(-direction)
+    }
+
+    /// How far a ray of `reach_m` goes until it meets the mesh, and the normal there, which faces the ray.
+    pub(super) fn surface(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<(f64, Vector)> {
+        let (leaf, hit) = self.nearest(start_m, direction, reach_m)?;
+        let [e, f] = self.triangles[leaf as usize].edges_m;
+        let normal = e.cross(f).normalize();
+        Some((hit.distance_m, if hit.enters { normal } else { -normal }))
+    }
+
+    fn first(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<Hit> {
+        self.nearest(start_m, direction, reach_m).map(|(_, hit)| hit)
+    }
+
+    fn nearest(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<(u32, Hit)> {
+        let inverse = direction.recip();
+        self.boxes.find_best(
+            reach_m,
+            |node, nearest_m| slab(node.mins(), node.maxs(), start_m, inverse, nearest_m),
+            |leaf, _| self.triangles[leaf as usize].hit(start_m, direction),
+        )
+    }
+}
+
+impl Triangle {
+    /// T. Möller and B. Trumbore, Fast, minimum storage ray/triangle intersection, J. Graphics Tools 2 (1997) 21.
+    #[inline]
+    fn hit(&self, start_m: Vector, direction: Vector) -> Option<Hit> {
+        let [e, f] = self.edges_m;
+        let p = direction.cross(f);
+        let determinant = e.dot(p);
+        if determinant.abs() <= EDGE_ON * self.size_m2 {
+            return None;
+        }
+        let inverse = 1.0 / determinant;
+        let from_corner = start_m - self.corner_m;
+        let u = from_corner.dot(p) * inverse;
+        let q = from_corner.cross(e);
+        let v = direction.dot(q) * inverse;
+        if u < -SLACK || v < -SLACK || u + v > 1.0 + SLACK {
+            return None;
+        }
+        let distance_m = f.dot(q) * inverse;
+        (distance_m >= 0.0).then_some(Hit {
+            distance_m,
+            enters: determinant > 0.0,
+        })
+    }
+}
+
+/// Distance at which a ray enters a box, if that is below `nearest_m`.
+#[inline]
+fn slab(low_m: Vector, high_m: Vector, start_m: Vector, inverse: Vector, nearest_m: f64) -> f64 {
+    let (one, other) = ((low_m - start_m) * inverse, (high_m - start_m) * inverse);
+    let (mut enters, mut leaves) = (0.0, nearest_m);
+    for k in 0..3 {
+        let (a, b) = (one[k], other[k]);
+        // 0 · ∞, a ray in the plane of the lower side, stays in front; there every comparison is false
+        let (near, far) = if b < a { (b, a) } else { (a, b) };
+        enters = if near > enters { near } else { enters };
+        leaves = if far < leaves { far } else { leaves };
+    }
+    if enters <= leaves { enters } else { f64::MAX }
+}
 
 /// Sample points of a skin's free surface. Each has its outward normal, its area, and its taxel.
 ///
@@ -15,7 +184,7 @@ use spts_models::{ConfigError, SkinLayout, in_range};
 /// let (centre_m, normal) = points.taxel_centres()[0];
 /// assert!((centre_m[0] + 67.5e-3).abs() < 1e-12 && (centre_m[1] - 67.5e-3).abs() < 1e-12);
 /// assert_eq!(normal, [0.0, 0.0, 1.0]);
-/// # Ok::<(), spts_models::ConfigError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfacePoints {
@@ -35,14 +204,14 @@ impl SurfacePoints {
     /// to the largest number must have a point.
     ///
     /// # Errors
-    /// [`ConfigError`] for the first number that is not finite, normal of length 0, area that is not positive, list of
+    /// [`Refusal`] for the first number that is not finite, normal of length 0, area that is not positive, list of
     /// another length, or taxel without a point.
     pub fn new(
         positions_m: Vec<[f64; 3]>,
         normals: Vec<[f64; 3]>,
         areas_m2: Vec<f64>,
         taxels: Vec<u32>,
-    ) -> Result<Self, ConfigError> {
+    ) -> Result<Self, Refusal> {
         let count = positions_m.len();
         in_range("points", count as f64, (1..=MOST_POINTS).contains(&count), "[1, 2^24]")?;
         for (field, found) in [
@@ -99,8 +268,8 @@ impl SurfacePoints {
     /// origin. Rows run from the largest y to the smallest, columns from the smallest x to the largest.
     ///
     /// # Errors
-    /// [`ConfigError`] for no points, or too many.
-    pub fn flat(skin: &SkinLayout, cells_per_taxel: usize) -> Result<Self, ConfigError> {
+    /// [`Refusal`] for no points, or too many.
+    pub fn flat(skin: &SkinLayout, cells_per_taxel: usize) -> Result<Self, Refusal> {
         let [rows, cols] = [skin.rows(), skin.cols()].map(|n| n.saturating_mul(cells_per_taxel));
         let count = rows.saturating_mul(cols);
         let valid = (1..=MOST_POINTS).contains(&count);
@@ -203,5 +372,257 @@ impl SurfacePoints {
         for (mean, area) in means.iter_mut().zip(&self.taxel_areas_m2) {
             *mean /= area;
         }
+    }
+}
+
+// Grids of taxels around an axis, on a cylinder or on a mesh.
+
+/// A grid of rows × cols taxels around an axis. Rows run from the largest coordinate along the axis to the smallest;
+/// columns follow the angle about it. Seen from outside with the axis pointing up, columns run from left to right.
+///
+/// For the z axis the angle is 0 along x and π/2 along y; for the x axis it is 0 along y; for the y axis, 0 along z.
+///
+/// ```
+/// use spts_contact::{SurfacePoints, Winding};
+///
+/// let (shape, span_m) = ([4, 12], [0.0, 0.06]);
+/// let whole = [0.0, std::f64::consts::TAU];
+/// let winding = Winding { shape, points_per_side: 3, axis: 2, centre_m: [0.0; 3], arc_rad: whole, span_m };
+/// let points = SurfacePoints::on_cylinder(&winding, 0.05)?;
+/// let area_m2: f64 = points.areas_m2().iter().sum();
+/// assert!((area_m2 / (std::f64::consts::TAU * 0.05 * 0.06) - 1.0).abs() < 1e-9);
+/// # Ok::<(), spts_input::Refusal>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Winding {
+    /// Rows and columns of taxels.
+    pub shape: [usize; 2],
+    /// Sample points along each side of a taxel; [1, 64].
+    pub points_per_side: usize,
+    /// Number of the axis: 0 for x, 1 for y, 2 for z.
+    pub axis: usize,
+    /// A point on the axis, m.
+    pub centre_m: [f64; 3],
+    /// First and last angle, rad; at most 2π apart.
+    pub arc_rad: [f64; 2],
+    /// Lowest and highest coordinate along the axis, m.
+    pub span_m: [f64; 2],
+}
+
+/// Smallest cosine between the normal of a mesh and the way out from the axis.
+const STEEPEST: f64 = 0.1;
+
+impl SurfacePoints {
+    /// Points on a cylinder of `radius_m` around the axis of `winding`.
+    ///
+    /// # Errors
+    /// [`Refusal`] for a value outside its range.
+    pub fn on_cylinder(winding: &Winding, radius_m: f64) -> Result<Self, Refusal> {
+        in_range(
+            "radius",
+            radius_m,
+            radius_m > 1e-4 && radius_m <= 100.0,
+            "(1e-4, 100] m",
+        )?;
+        winding.points(|_, _, _| Ok((radius_m, None)))
+    }
+
+    /// Points where rays towards the axis of `winding` first meet `mesh`.
+    ///
+    /// # Errors
+    /// [`Refusal`] for a value outside its range, a ray that misses the mesh, or a surface parallel to its ray.
+    pub fn wrapped(winding: &Winding, mesh: &TriMesh) -> Result<Self, Refusal> {
+        let solid = Solid::new(mesh);
+        let centre = Vector::from(winding.centre_m);
+        let along = axis(winding.axis);
+        let away = |v: &[f64; 3]| {
+            let r = Vector::from(*v) - centre;
+            (r - along * r.dot(along)).length()
+        };
+        let reach_m = 1.001 * mesh.vertices.iter().map(away).fold(0.0, f64::max);
+        winding.points(|on_axis, outward, taxel| {
+            let met = solid.surface(on_axis + outward * reach_m, -outward, reach_m);
+            let field = format!("mesh under taxel {taxel}");
+            let Some((distance_m, normal)) = met else {
+                in_range(
+                    &field,
+                    0.0,
+                    false,
+                    "a surface between each point of the axis and its outside",
+                )?;
+                return Ok((0.0, None));
+            };
+            let cosine = normal.dot(outward);
+            in_range(
+                &field,
+                cosine,
+                cosine >= STEEPEST,
+                "a normal within 84° of the way out from the axis",
+            )?;
+            Ok((reach_m - distance_m, Some(normal)))
+        })
+    }
+}
+
+impl Winding {
+    /// Points at the radius, and with the normal, that `at` gives for a point of the axis, the way out from there, and
+    /// a taxel; without a normal it is the way out.
+    fn points(
+        &self,
+        at: impl Fn(Vector, Vector, usize) -> Result<(f64, Option<Vector>), Refusal>,
+    ) -> Result<SurfacePoints, Refusal> {
+        let [rows, cols] = self.shape;
+        let side = self.points_per_side;
+        in_range("rows", rows as f64, (1..=1 << 17).contains(&rows), "[1, 131072]")?;
+        in_range("cols", cols as f64, (1..=1 << 17).contains(&cols), "[1, 131072]")?;
+        in_range("points", side as f64, (1..=64).contains(&side), "[1, 64]")?;
+        in_range(
+            "rows × cols × points²",
+            (rows * cols * side * side) as f64,
+            rows * cols * side * side <= 1 << 24,
+            "[1, 2^24]",
+        )?;
+        let [first, last] = self.arc_rad;
+        let arc = last - first;
+        in_range(
+            "arc",
+            arc,
+            arc > 0.0 && arc <= TAU + 1e-9,
+            "(0, 2π] rad from its first angle to its last",
+        )?;
+        let [low, high] = self.span_m;
+        in_range(
+            "span",
+            high - low,
+            high > low && (high - low).is_finite(),
+            "above 0 m from its lowest to its highest",
+        )?;
+        let along = axis(self.axis);
+        let (across, beyond) = (axis((self.axis + 1) % 3), axis((self.axis + 2) % 3));
+        let (lines, rays) = (rows * side, cols * side);
+        let (height_m, angle_rad) = ((high - low) / lines as f64, arc / rays as f64);
+        let centre = Vector::from(self.centre_m);
+        let count = lines * rays;
+        let (mut positions, mut normals) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let (mut areas, mut taxels) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        for line in 0..lines {
+            let on_axis = centre + along * (high - (line as f64 + 0.5) * height_m - centre.dot(along));
+            for ray in 0..rays {
+                let (sin, cos) = (first + (ray as f64 + 0.5) * angle_rad).sin_cos();
+                let outward = across * cos + beyond * sin;
+                let taxel = line / side * cols + ray / side;
+                let (radius_m, normal) = at(on_axis, outward, taxel)?;
+                let normal = normal.unwrap_or(outward);
+                positions.push((on_axis + outward * radius_m).into());
+                normals.push(normal.into());
+                areas.push(radius_m * angle_rad * height_m / normal.dot(outward));
+                taxels.push(u32::try_from(taxel).unwrap_or(u32::MAX));
+            }
+        }
+        SurfacePoints::new(positions, normals, areas, taxels)
+    }
+}
+
+fn axis(number: usize) -> Vector {
+    let unit: [f64; 3] = std::array::from_fn(|k| f64::from(u8::from(k == number)));
+    unit.into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::cylinder;
+    use approx::assert_relative_eq;
+
+    const HALF: Winding = Winding {
+        shape: [4, 6],
+        points_per_side: 2,
+        axis: 2,
+        centre_m: [0.01, -0.02, 0.0],
+        arc_rad: [0.0, TAU / 2.0],
+        span_m: [0.02, 0.1],
+    };
+
+    #[test]
+    fn a_cylinder_has_the_area_of_one() {
+        for (axis, low) in [(0, 0.02), (1, -0.03), (2, 0.4)] {
+            let winding = Winding {
+                axis,
+                span_m: [low, low + 0.08],
+                ..HALF
+            };
+            let points = SurfacePoints::on_cylinder(&winding, 0.05).unwrap();
+            assert_eq!((points.len(), points.taxels()), (96, 24));
+            let area: f64 = points.taxel_areas_m2().iter().sum();
+            assert_relative_eq!(area, 0.05 * TAU / 2.0 * 0.08, max_relative = 1e-12);
+            for (p, n) in points.positions_m.iter().zip(&points.normals) {
+                let r: Vec<f64> = (0..3).filter(|k| *k != axis).map(|k| p[k] - HALF.centre_m[k]).collect();
+                assert_relative_eq!(r[0].hypot(r[1]), 0.05, max_relative = 1e-12);
+                assert!(n[axis].abs() < 1e-12 && p[axis] > low && p[axis] < low + 0.08);
+            }
+            // the first taxel is the highest, at the smallest angle
+            assert!(points.positions_m[0][axis] > points.positions_m[95][axis]);
+        }
+    }
+
+    /// On a prism of many sides the points are those of its cylinder, but for the sagitta 1 − cos(π/n) of 2e-4.
+    #[test]
+    fn a_mesh_of_a_cylinder_is_one() {
+        let mesh = cylinder(0.05, 0.2, 180).translated([0.01, -0.02, -0.05]);
+        let found = SurfacePoints::wrapped(&HALF, &mesh).unwrap();
+        let wanted = SurfacePoints::on_cylinder(&HALF, 0.05).unwrap();
+        for i in 0..found.len() {
+            for k in 0..3 {
+                assert!((found.positions_m[i][k] - wanted.positions_m[i][k]).abs() < 1e-5);
+                assert!((found.normals[i][k] - wanted.normals[i][k]).abs() < 0.02);
+            }
+            assert_relative_eq!(found.areas_m2[i], wanted.areas_m2[i], max_relative = 1e-3);
+        }
+        let above = Winding {
+            span_m: [0.0, 0.3],
+            ..HALF
+        };
+        let error = SurfacePoints::wrapped(&above, &mesh).unwrap_err().to_string();
+        assert!(error.contains("mesh under taxel 0"), "{error}");
+    }
+
+    #[test]
+    fn what_cannot_be_wound_is_refused() {
+        let cases: [(&str, Winding); 5] = [
+            ("rows", Winding { shape: [0, 6], ..HALF }),
+            (
+                "arc",
+                Winding {
+                    arc_rad: [1.0, 1.0],
+                    ..HALF
+                },
+            ),
+            (
+                "arc",
+                Winding {
+                    arc_rad: [0.0, 7.0],
+                    ..HALF
+                },
+            ),
+            (
+                "span",
+                Winding {
+                    span_m: [0.1, f64::NAN],
+                    ..HALF
+                },
+            ),
+            (
+                "points",
+                Winding {
+                    points_per_side: 0,
+                    ..HALF
+                },
+            ),
+        ];
+        for (field, winding) in cases {
+            let error = SurfacePoints::on_cylinder(&winding, 0.05).unwrap_err().to_string();
+            assert!(error.contains(field), "{error}");
+        }
+        assert!(SurfacePoints::on_cylinder(&HALF, f64::NAN).is_err());
     }
 }

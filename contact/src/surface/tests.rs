@@ -1,10 +1,10 @@
 //! The curved field against the flat one, a closed form, and boxes cut by hand.
 
-use super::{Solid, SurfaceConfig, SurfaceField, SurfacePoints};
-use crate::body::PosedMesh;
-use crate::columns::{WinklerConfig, WinklerLayer};
-use crate::field::ContactField as _;
-use crate::mesh::{TriMesh, sphere};
+use super::{Solid, SurfaceField, SurfacePoints};
+use crate::columns::WinklerLayer;
+use crate::field::{ContactField as _, PosedMesh};
+use crate::foam::Foam;
+use crate::mesh::{TriMesh, cuboid, sphere};
 use crate::objects::OBJECTS;
 use approx::assert_relative_eq;
 use nalgebra::{Rotation3, Vector3};
@@ -25,8 +25,8 @@ fn rotated(rotation: &Rotation3<f64>) -> [[f64; 3]; 3] {
 fn a_flat_skin_is_winkler() {
     let skin = SkinLayout::default();
     let points = SurfacePoints::flat(&skin, 6).unwrap();
-    let mut curved = SurfaceField::new(SurfaceConfig::default(), points).unwrap();
-    let mut flat = WinklerLayer::new(WinklerConfig::default(), &skin).unwrap();
+    let mut curved = SurfaceField::new(Foam::default(), points).unwrap();
+    let mut flat = WinklerLayer::new(Foam::default(), &skin).unwrap();
     for (object, k) in OBJECTS.iter().zip(1_u8..) {
         let mesh = (object.build)();
         let turn = f64::from(k);
@@ -85,10 +85,10 @@ fn a_sphere_on_a_cylinder() {
     }
     let count = positions.len();
     let points = SurfacePoints::new(positions, normals, vec![side_m * side_m; count], vec![0; count]).unwrap();
-    let config = SurfaceConfig {
+    let config = Foam {
         thickness_m: 18e-3 / 2.0,
         max_strain: 1.0,
-        ..SurfaceConfig::default()
+        ..Foam::default()
     };
     let mut field = SurfaceField::new(config, points).unwrap();
     let mesh = sphere(ball_m, 300, 600);
@@ -105,18 +105,9 @@ fn a_sphere_on_a_cylinder() {
     assert_relative_eq!(wrench.force_n[2], carried, max_relative = 1e-12);
 }
 
-fn cuboid(half: [f64; 3]) -> TriMesh {
-    crate::mesh::extrude(
-        &[
-            [-half[0], -half[1]],
-            [half[0], -half[1]],
-            [half[0], half[1]],
-            [-half[0], half[1]],
-        ],
-        &[],
-        2.0 * half[2],
-    )
-    .translated([0.0, 0.0, -half[2]])
+/// Box about the origin.
+fn centred(half: [f64; 3]) -> TriMesh {
+    cuboid(half.map(|h| 2.0 * h)).translated([0.0, 0.0, -half[2]])
 }
 
 /// Where the segment from `start` along `direction` lies in the box, as shares of its length 1; by its slabs.
@@ -148,7 +139,7 @@ proptest! {
         place in prop::array::uniform3(-0.015..0.015_f64),
         seed in 0..1000_u32,
     ) {
-        let solid = Solid::new(&cuboid(half));
+        let solid = Solid::new(&centred(half));
         let rotation = Rotation3::from_euler_angles(angles[0], angles[1], angles[2]);
         let (place, reach_m) = (Vector3::from(place), 0.012);
         for k in 0..50 {
@@ -174,8 +165,8 @@ proptest! {
 #[test]
 fn extremes() {
     let points = SurfacePoints::flat(&SkinLayout::default(), 4).unwrap();
-    let mut field = SurfaceField::new(SurfaceConfig::default(), points).unwrap();
-    let mesh = cuboid([0.02, 0.02, 0.05]);
+    let mut field = SurfaceField::new(Foam::default(), points).unwrap();
+    let mesh = centred([0.02, 0.02, 0.05]);
     let solid = Solid::new(&mesh);
     let mut last_n = 0.0;
     for k in 0..60 {

@@ -5,9 +5,11 @@ use super::moving::Moving;
 use super::touch::{ATTEMPTS, Ball, Touch, of_attempt};
 use crate::spec::{Choice, RecordKind, Spec};
 use spts_contact::Frame;
+use spts_input::Refusal;
 use spts_models::Streams;
 use spts_sim::mechanics::{DropConfig, GRAVITY_M_PER_S2, MechanicsConfig, PressConfig, Timestep};
-use spts_sim::{Mechanics, SimError, World};
+use spts_sim::world::no_touch;
+use spts_sim::{Mechanics, World};
 
 /// Shortest time from the start to the touch that the arm takes, s.
 const APPROACH_S: f64 = 0.25;
@@ -57,7 +59,7 @@ fn scene(spec: &Spec) -> MechanicsConfig {
     }
 }
 
-fn pressed(spec: &Spec, choice: &Choice, touch: Touch, streams: Streams, press: u64) -> Result<Moving, SimError> {
+fn pressed(spec: &Spec, choice: &Choice, touch: Touch, streams: Streams, press: u64) -> Result<Moving, Refusal> {
     let (config, timing) = (&spec.config().press, spec.timing());
     let drawn = |draw: &crate::spec::Draw, label: &str| draw.value(streams, label, press);
     let hold_s = drawn(&config.hold_s, "press.hold_s");
@@ -101,7 +103,7 @@ fn pressed(spec: &Spec, choice: &Choice, touch: Touch, streams: Streams, press: 
     })
 }
 
-fn fall(spec: &Spec, mut touch: Touch, ball: Ball) -> Result<Moving, SimError> {
+fn fall(spec: &Spec, mut touch: Touch, ball: Ball) -> Result<Moving, Refusal> {
     let timing = spec.timing();
     let falls_s = (2.0 * ball.height_m / GRAVITY_M_PER_S2).sqrt();
     let end_s = falls_s + (timing.span_s() - timing.before_s).max(BOUNCE_S);
@@ -125,7 +127,7 @@ fn fall(spec: &Spec, mut touch: Touch, ball: Ball) -> Result<Moving, SimError> {
     let mut world = World::new(&mechanics)?;
     let frames = frames_until(&mut world, f64::INFINITY)?;
     let Some(bounce) = world.first_bounce() else {
-        return Err(SimError::NoTouch { time_s: end_s });
+        return Err(no_touch(end_s));
     };
     touch.ball = Some(Ball {
         speed_m_per_s: bounce.speed_in_m_per_s,
@@ -139,7 +141,7 @@ fn fall(spec: &Spec, mut touch: Touch, ball: Ball) -> Result<Moving, SimError> {
 }
 
 /// The frames of `world` up to the first one at or after `end_s`.
-fn frames_until(world: &mut World, end_s: f64) -> Result<Vec<Frame>, SimError> {
+fn frames_until(world: &mut World, end_s: f64) -> Result<Vec<Frame>, Refusal> {
     let mut frames = Vec::new();
     for frame in world.frames() {
         frames.push(frame?);

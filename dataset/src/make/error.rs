@@ -4,8 +4,6 @@ use crate::spec::SpecError;
 use spts::ChainError;
 use spts_contact::EquilibriumError;
 use spts_input::Refusal;
-#[cfg(feature = "mujoco")]
-use spts_sim::SimError;
 
 /// Why a row cannot be made. The error is the same on any machine and at every attempt.
 #[derive(Debug, thiserror::Error)]
@@ -36,7 +34,7 @@ pub enum RowCause {
         /// Number of poses tried.
         attempts: u64,
         /// The error of the last pose.
-        source: SimError,
+        source: Refusal,
     },
     /// The row needs a simulation in time, and this build has no physics engine.
     #[cfg(not(feature = "mujoco"))]

@@ -1,7 +1,6 @@
 //! Errors of specifications.
 
 use spts::ChainError;
-use spts_contact::ContactError;
 use spts_contact::mesh::MeshError;
 use spts_models::ConfigError;
 use std::path::PathBuf;
@@ -21,15 +20,12 @@ pub enum SpecError {
     /// Text that is not TOML, an unknown field, or a value of the wrong type.
     #[error("{0}")]
     Syntax(String),
-    /// A number outside its range.
+    /// A number outside its range, or a contact model that is not valid.
     #[error(transparent)]
     Value(#[from] ConfigError),
     /// A name that does not exist, or two values that contradict each other.
     #[error("{0}")]
     Choice(String),
-    /// The contact model is not valid.
-    #[error(transparent)]
-    Contact(#[from] ContactError),
     /// Transducer, readout, weights or faults are not valid.
     #[error(transparent)]
     Chain(#[from] ChainError),

@@ -101,9 +101,8 @@ pub(super) struct SimulateCommand {
     /// the time between frames, 2 ms at most [default: 5e-4 for a press, 1e-4 for a drop]
     #[arg(long, value_name = "S|auto")]
     timestep: Option<Timestep>,
-    /// Contact model, which computes the pressure between object and skin: footprint, winkler, layer or half_space.
-    /// taxel_bed and flex are made of MuJoCo's own parts, to check the others: they take minutes for a press and cannot
-    /// simulate a ball [default: winkler, or the scene file's]
+    /// Contact model, which computes the pressure between object and skin: footprint, winkler, layer or half_space
+    /// [default: winkler, or the scene file's]
     #[arg(long, value_name = "NAME")]
     contact: Option<String>,
     /// Resolution of the contact: grid squares along one side of a taxel; [1, 64] [default: 6, or the scene file's]

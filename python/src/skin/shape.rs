@@ -4,7 +4,7 @@ use crate::count::whole;
 use crate::refuse::refuse;
 use numpy::{AllowTypeChange, IntoPyArray as _, PyArray2, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
-use spts::contact::{SurfaceConfig, Winding};
+use spts::contact::{Foam, Winding};
 
 /// The foam of a curved skin; what is not given is the default.
 pub(super) fn surface(
@@ -12,9 +12,9 @@ pub(super) fn surface(
     thickness: Option<f64>,
     damping: Option<f64>,
     friction: Option<f64>,
-) -> SurfaceConfig {
-    let default = SurfaceConfig::default();
-    SurfaceConfig {
+) -> Foam {
+    let default = Foam::default();
+    Foam {
         stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
         thickness_m: thickness.unwrap_or(default.thickness_m),
         damping_s: damping.unwrap_or(default.damping_s),

@@ -1,9 +1,133 @@
-//! Section `[press]`: the arm presses an object. Its fields, and the times and places that they give.
+//! The sections `[press]` and `[drop]`: their fields, the places and times that these give, and their checks.
 
-mod resolve;
-
+use super::timestep::{BLOCK_S, MechanicsError, refused};
 use serde::{Deserialize, Serialize};
-use spts_contact::objects::Placement;
+use spts_contact::PreparedMesh;
+use spts_contact::mesh::{MeshReport, load};
+use spts_contact::objects::{BALL_STIFFNESS_PA_PER_M, Placement, pressable};
+use spts_input::Refusal;
+use spts_models::{SkinLayout, in_range, within};
+use std::path::Path;
+
+/// A place as a scene writes it; at most one of the three ways is used.
+#[derive(Debug)]
+struct Place<'a> {
+    /// `press` or `drop`.
+    section: &'static str,
+    /// Row and column, taxels.
+    row: &'a mut Option<f64>,
+    col: &'a mut Option<f64>,
+    /// (x, y) relative to the middle of the sheet, m: x towards large columns, y towards small rows.
+    position_m: &'a mut Option<[f64; 2]>,
+    /// The same relative to the sheet's width and height.
+    position_share: &'a mut Option<[f64; 2]>,
+}
+
+/// How far beside the centres of the outer taxels something may be placed, m, and never less than [`REACH_TAXELS`].
+const REACH_M: f64 = 75e-3;
+/// The same in taxels.
+const REACH_TAXELS: f64 = 5.0;
+
+impl Place<'_> {
+    /// Turns whatever was written into a row and a column; where nothing was, these are `usual`.
+    ///
+    /// # Errors
+    /// [`MechanicsError`] for two ways at once, and for a place out of reach of the sheet.
+    fn resolve(mut self, skin: &SkinLayout, usual: [f64; 2]) -> Result<(), MechanicsError> {
+        let in_taxels = self.row.is_some() || self.col.is_some();
+        let found = [in_taxels, self.position_m.is_some(), self.position_share.is_some()];
+        let found = found.into_iter().filter(|given| *given).count();
+        if found > 1 {
+            let section = self.section;
+            return Err(refused(format!(
+                "give at most one of `{section}.row` with `{section}.col`, `{section}.position_m` and \
+                 `{section}.position_share`; found {found}"
+            )));
+        }
+        if let Some(share) = self.position_share.take() {
+            for (axis, s) in ["x", "y"].into_iter().zip(share) {
+                let field = format!("{}.position_share ({axis})", self.section);
+                in_range(&field, s, (-1.0..=1.0).contains(&s), "[-1, 1]")?;
+            }
+            let [width_m, height_m] = skin.extent_m();
+            self.set(skin, [share[0] * width_m, share[1] * height_m]);
+        } else if let Some(position_m) = self.position_m.take() {
+            let [width_m, height_m] = skin.extent_m();
+            for ((axis, p), extent_m) in ["x", "y"].into_iter().zip(position_m).zip([width_m, height_m]) {
+                let most_m = 0.5 * (extent_m - skin.pitch_m()) + reach(skin) * skin.pitch_m();
+                // as far as a row or a column may be, and its rounding; NaN is not within
+                let within = p.abs() <= most_m * (1.0 + 1e-12);
+                if !within {
+                    let section = self.section;
+                    return Err(refused(format!(
+                        "`{section}.position_m`: {axis} = {p} is outside [{:.4}, {most_m:.4}] m; the limit is 75 mm or 5 \
+                         taxels beyond the outer taxels",
+                        -most_m
+                    )));
+                }
+            }
+            self.set(skin, position_m);
+        }
+        let (row, col) = (*self.row, *self.col);
+        self.row.get_or_insert(usual[0]);
+        self.col.get_or_insert(usual[1]);
+        // a usual place far beside a small sheet ends in an error that says that nothing is touched
+        check_place(&format!("{}.", self.section), [row, col], skin)?;
+        Ok(())
+    }
+
+    fn set(&mut self, skin: &SkinLayout, [x, y]: [f64; 2]) {
+        let [last_row, last_col] = last(skin);
+        *self.row = Some(0.5 * last_row - y / skin.pitch_m());
+        *self.col = Some(0.5 * last_col + x / skin.pitch_m());
+    }
+}
+
+/// Indices of the last row and column.
+fn last(skin: &SkinLayout) -> [f64; 2] {
+    [skin.rows() as f64 - 1.0, skin.cols() as f64 - 1.0]
+}
+
+fn reach(skin: &SkinLayout) -> f64 {
+    // a rounding of the quotient must not cost the whole number
+    (REACH_M / skin.pitch_m() * (1.0 + 1e-12)).max(REACH_TAXELS)
+}
+
+/// Whether a row and a column are within reach of `skin`; `before` goes before their names in the error.
+fn check_place(before: &str, place: [Option<f64>; 2], skin: &SkinLayout) -> Result<(), Refusal> {
+    let names = [
+        ("row", "[-5, rows + 4], or 75 mm beside the outer rows"),
+        ("col", "[-5, cols + 4], or 75 mm beside the outer columns"),
+    ];
+    let reach = reach(skin);
+    for (((name, range), at), last) in names.into_iter().zip(place).zip(last(skin)) {
+        let Some(at) = at else { continue };
+        in_range(
+            &format!("{before}{name}"),
+            at,
+            (-reach..=last + reach).contains(&at),
+            range,
+        )?;
+    }
+    Ok(())
+}
+
+/// Row and column of the place on `skin` that is as far from the middle, in metres, as `place` is on the published
+/// skin.
+fn of_published([row, col]: [f64; 2], skin: &SkinLayout) -> [f64; 2] {
+    let published = SkinLayout::default();
+    let same = (skin.rows(), skin.cols()) == (published.rows(), published.cols());
+    if same && skin.pitch_m().to_bits() == published.pitch_m().to_bits() {
+        // to the bit
+        return [row, col];
+    }
+    let scale = published.pitch_m() / skin.pitch_m();
+    let ([last_row, last_col], [row_0, col_0]) = (last(skin), last(&published));
+    [
+        0.5 * last_row + (row - 0.5 * row_0) * scale,
+        0.5 * last_col + (col - 0.5 * col_0) * scale,
+    ]
+}
 
 /// Section `[press]`. Times count from the start of one recorded block of 1000 frames × 100 measurements at 64.3 kHz =
 /// 1.555 s. Their defaults are those of the recorded presses (onset near frame 230, rise from 10 to 90 % in 0.2–0.3 s,
@@ -105,7 +229,7 @@ impl Default for PressConfig {
             force_n: 20.0,
             presses: 10,
             mass_kg: 0.2,
-            duration_s: super::timestep::BLOCK_S,
+            duration_s: BLOCK_S,
             onset_s: 0.35,
             onset_spread_s: 0.015,
             rise_s: 0.205,
@@ -181,5 +305,330 @@ impl PressConfig {
             tilt_x_rad: tilt_x_deg.to_radians(),
             tilt_y_rad: tilt_y_deg.to_radians(),
         }
+    }
+}
+
+/// Largest tilt of a mesh that opens upwards, degrees. Such a mesh was closed by vertical walls and a lid, which are
+/// not part of the object. At a tilt θ and a depth d they reach d tan θ beyond the rim, which is less than 0.5 mm for 5
+/// mm of foam.
+pub const MAX_LIDDED_TILT_DEG: f64 = 5.0;
+
+/// Largest scale of a mesh: a file in kilometres.
+const MAX_SCALE: f64 = 1e3;
+
+impl PressConfig {
+    /// Fills what depends on the object, checks every value and loads the mesh, unless it is `given`; with the report
+    /// on a mesh from a file.
+    pub(in crate::mechanics) fn resolve(
+        &mut self,
+        skin: &SkinLayout,
+        folder: &Path,
+        given: Option<PreparedMesh>,
+    ) -> Result<(PreparedMesh, Option<MeshReport>), MechanicsError> {
+        if let Some(scale) = self.scale {
+            in_range("press.scale", scale, scale > 0.0 && scale <= MAX_SCALE, "(0, 1000]")?;
+        }
+        let (mesh, report, place) = match (&self.object, &self.mesh, given) {
+            (None, None, Some(mesh)) => (mesh, None, middle(skin)),
+            (Some(name), None, None) => {
+                if self.scale.is_some() {
+                    return Err(refused(format!(
+                        "`press.scale` is for a mesh, and `press.object` = \"{name}\" has its own size; leave the scale out"
+                    )));
+                }
+                let Some(object) = pressable().find(|object| object.name == name) else {
+                    let known: Vec<_> = pressable().map(|object| object.name).collect();
+                    let known = known.join(", ");
+                    return Err(refused(format!("`press.object` = \"{name}\" is not one of {known}")));
+                };
+                self.stiffness_pa_per_m = self.stiffness_pa_per_m.or(object.stiffness_pa_per_m);
+                let [row, col] = of_published([object.placement.row, object.placement.col], skin);
+                let placement = Placement {
+                    row,
+                    col,
+                    ..object.placement
+                };
+                ((object.build)().into(), None, placement)
+            }
+            (None, Some(file), None) => {
+                let scale = *self.scale.get_or_insert(1.0);
+                let (mesh, report) =
+                    load(&folder.join(file), scale).map_err(|error| refused(format!("`press.mesh`: {error}")))?;
+                (mesh.into(), Some(report), middle(skin))
+            }
+            (object, mesh, given) => {
+                let found = [object.is_some(), mesh.is_some(), given.is_some()];
+                let found = found.into_iter().filter(|named| *named).count();
+                let choices = "`press.object` and `press.mesh`";
+                return Err(refused(format!("exactly one of {choices} is needed, found {found}")));
+            }
+        };
+        for [row, col] in self.places.iter().flatten() {
+            check_place("press.places: ", [Some(*row), Some(*col)], skin)?;
+        }
+        self.resolve_places()?;
+        let written = Place {
+            section: "press",
+            row: &mut self.row,
+            col: &mut self.col,
+            position_m: &mut self.position_m,
+            position_share: &mut self.position_share,
+        };
+        written.resolve(skin, [place.row, place.col])?;
+        self.rotation_deg.get_or_insert(place.rotation_rad.to_degrees());
+        self.tilt_deg
+            .get_or_insert([place.tilt_x_rad.to_degrees(), place.tilt_y_rad.to_degrees()]);
+        self.check()?;
+        if let Some(report) = report.filter(|report| report.lids > 0) {
+            self.check_lids(report.lids)?;
+        }
+        let [start_s, end_s] = self.plateau_s();
+        if start_s >= end_s {
+            return Err(refused(format!(
+                "no plateau: with `press.onset_s` = {}, `press.onset_spread_s` = {} and `press.rise_s` = {} the force is \
+                 steady from {start_s:.3} s, but with `press.lift_s` = {} and `press.lift_spread_s` = {} only until \
+                 {end_s:.3} s",
+                self.onset_s, self.onset_spread_s, self.rise_s, self.lift_s, self.lift_spread_s
+            )));
+        }
+        Ok((mesh, report))
+    }
+
+    /// Makes the first of `places` the place that is written as `row` and `col`; a saved scene has both.
+    fn resolve_places(&mut self) -> Result<(), MechanicsError> {
+        let Some(places) = &self.places else { return Ok(()) };
+        let Some(&[row, col]) = places.first() else {
+            return Err(refused("`press.places` = [] is empty; valid: one [row, col] or more"));
+        };
+        let same = |written: Option<f64>, first: f64| written.is_none_or(|at| at.to_bits() == first.to_bits());
+        let elsewhere = self.position_m.is_some() || self.position_share.is_some();
+        if elsewhere || !same(self.row, row) || !same(self.col, col) {
+            return Err(refused(
+                "`press.places` gives the place of every press: remove `press.row`, `press.col`, `press.position_m` and \
+                 `press.position_share`",
+            ));
+        }
+        (self.row, self.col) = (Some(row), Some(col));
+        Ok(())
+    }
+
+    /// Refuses a tilt that would press with the walls and the lid that close a mesh from above. The scatter counts with
+    /// three times its standard deviation.
+    fn check_lids(&self, lids: usize) -> Result<(), MechanicsError> {
+        let [_, _, up] = self.placement().matrix();
+        let leaning_deg = up[2].clamp(-1.0, 1.0).acos().to_degrees() + 3.0 * self.rotation_sd_deg;
+        if leaning_deg <= MAX_LIDDED_TILT_DEG {
+            return Ok(());
+        }
+        let [tilt_x_deg, tilt_y_deg] = self.tilt_deg.unwrap_or_default();
+        let (mesh, sd_deg) = (self.mesh.as_deref().unwrap_or_default(), self.rotation_sd_deg);
+        Err(refused(format!(
+            "`press.mesh` = \"{mesh}\" opens upwards ({lids} holes were closed there): `press.tilt_deg` = [{tilt_x_deg}, \
+             {tilt_y_deg}] and three times `press.rotation_sd_deg` = {sd_deg} tilt it by {leaning_deg:.1}°, outside [0, \
+             {MAX_LIDDED_TILT_DEG}]°, so that the closed holes would touch the skin; close the mesh, or tilt it in its file"
+        )))
+    }
+
+    fn check(&self) -> Result<(), Refusal> {
+        let within = |field: &str, value, low, high, text| within(&format!("press.{field}"), value, low, high, text);
+        within(
+            "rotation_deg",
+            self.rotation_deg.unwrap_or_default(),
+            -360.0,
+            360.0,
+            "[-360, 360]",
+        )?;
+        for tilt_deg in self.tilt_deg.unwrap_or_default() {
+            within("tilt_deg", tilt_deg, -60.0, 60.0, "[-60, 60]")?;
+        }
+        if let Some(stiffness) = self.stiffness_pa_per_m {
+            within("stiffness_pa_per_m", stiffness, 1e5, 1e12, "[1e5, 1e12] Pa/m")?;
+        }
+        within("force_n", self.force_n, 0.5, 100.0, "[0.5, 100] N")?;
+        within("presses", self.presses as f64, 1.0, 1e5, "[1, 100000]")?;
+        within("mass_kg", self.mass_kg, 1e-3, 4.0, "[1e-3, 4] kg")?;
+        within("duration_s", self.duration_s, 0.5, 60.0, "[0.5, 60] s")?;
+        within("onset_spread_s", self.onset_spread_s, 0.0, 1.0, "[0, 1] s")?;
+        within(
+            "onset_s",
+            self.onset_s - self.onset_spread_s,
+            0.25,
+            30.0,
+            "[0.25 + onset_spread_s, 30] s",
+        )?;
+        within("rise_s", self.rise_s, 0.1, 10.0, "[0.1, 10] s")?;
+        within("fall_s", self.fall_s, 0.05, 10.0, "[0.05, 10] s")?;
+        within("lift_spread_s", self.lift_spread_s, 0.0, 1.0, "[0, 1] s")?;
+        within("lift_s", self.lift_s, 0.0, self.duration_s, "[0, duration_s]")?;
+        within("position_sd_m", self.position_sd_m, 0.0, 0.01, "[0, 0.01] m")?;
+        within("rotation_sd_deg", self.rotation_sd_deg, 0.0, 5.0, "[0, 5]")
+    }
+}
+
+/// Upright in the middle of the sheet.
+fn middle(skin: &SkinLayout) -> Placement {
+    Placement {
+        row: 0.5 * (skin.rows() as f64 - 1.0),
+        col: 0.5 * (skin.cols() as f64 - 1.0),
+        rotation_rad: 0.0,
+        tilt_x_rad: 0.0,
+        tilt_y_rad: 0.0,
+    }
+}
+
+/// Section `[drop]`. Defaults: an ITF tennis ball from half a metre.
+///
+/// There is no table beside the skin: a ball that misses it or rolls off keeps falling until `duration_s`, and its
+/// frames are empty.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct DropConfig {
+    /// Height of the ball's lowest point above the skin at release, m; [0.001, 5].
+    pub height_m: f64,
+    /// Row of the landing point, in taxels; inside the skin. Default: the middle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub row: Option<f64>,
+    /// Column of the landing point, in taxels; inside the skin. Default: the middle.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub col: Option<f64>,
+    /// Replaces `row` and `col`: landing point (x, y) relative to the middle of the sheet, m; x towards large columns,
+    /// y towards small rows; inside the skin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_m: Option<[f64; 2]>,
+    /// Replaces `row` and `col`: landing point relative to the sheet's width and height; each [−0.5, 0.5].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_share: Option<[f64; 2]>,
+    /// Mass, kg; [1e-3, 50].
+    pub mass_kg: f64,
+    /// Radius, m; [5e-3, 0.2].
+    pub radius_m: f64,
+    /// Stiffness of the ball's surface in series with the skin, Pa/m; [1e5, 1e12].
+    pub stiffness_pa_per_m: f64,
+    /// Number of drops; [1, 100000].
+    pub drops: usize,
+    /// Duration of a drop, s; [0.05, 60].
+    pub duration_s: f64,
+    /// Mean time of release, s; [0, 10].
+    pub release_s: f64,
+    /// The release varies uniformly within ± this, s; [0, `release_s`].
+    pub release_spread_s: f64,
+    /// Standard deviation of the landing point along each axis, m; [0, 0.05].
+    pub position_sd_m: f64,
+}
+
+impl Default for DropConfig {
+    /// ITF Rules of Tennis, appendix I: 56.0–59.4 g, 65.4–68.6 mm.
+    fn default() -> Self {
+        Self {
+            height_m: 0.5,
+            row: None,
+            col: None,
+            position_m: None,
+            position_share: None,
+            mass_kg: 57.7e-3,
+            radius_m: 33.4e-3,
+            stiffness_pa_per_m: BALL_STIFFNESS_PA_PER_M,
+            drops: 10,
+            duration_s: BLOCK_S,
+            release_s: 0.10,
+            release_spread_s: 0.05,
+            position_sd_m: 1e-3,
+        }
+    }
+}
+
+impl DropConfig {
+    /// Fills what depends on the skin and checks every value.
+    pub(super) fn resolve(&mut self, skin: &SkinLayout) -> Result<(), MechanicsError> {
+        let (last_row, last_col) = (skin.rows() as f64 - 1.0, skin.cols() as f64 - 1.0);
+        let written = Place {
+            section: "drop",
+            row: &mut self.row,
+            col: &mut self.col,
+            position_m: &mut self.position_m,
+            position_share: &mut self.position_share,
+        };
+        written.resolve(skin, [0.5 * last_row, 0.5 * last_col])?;
+        Ok(self.check([last_row, last_col])?)
+    }
+
+    fn check(&self, [last_row, last_col]: [f64; 2]) -> Result<(), Refusal> {
+        let (row, col) = (self.row.unwrap_or_default(), self.col.unwrap_or_default());
+        let within = |field: &str, value, low, high, text| within(&format!("drop.{field}"), value, low, high, text);
+        within("height_m", self.height_m, 1e-3, 5.0, "[0.001, 5] m")?;
+        within("row", row, -0.5, last_row + 0.5, "[-0.5, rows - 0.5]")?;
+        within("col", col, -0.5, last_col + 0.5, "[-0.5, cols - 0.5]")?;
+        within("mass_kg", self.mass_kg, 1e-3, 50.0, "[1e-3, 50] kg")?;
+        within("radius_m", self.radius_m, 5e-3, 0.2, "[5e-3, 0.2] m")?;
+        within(
+            "stiffness_pa_per_m",
+            self.stiffness_pa_per_m,
+            1e5,
+            1e12,
+            "[1e5, 1e12] Pa/m",
+        )?;
+        within("drops", self.drops as f64, 1.0, 1e5, "[1, 100000]")?;
+        within("duration_s", self.duration_s, 0.05, 60.0, "[0.05, 60] s")?;
+        within("release_s", self.release_s, 0.0, 10.0, "[0, 10] s")?;
+        within(
+            "release_spread_s",
+            self.release_spread_s,
+            0.0,
+            self.release_s,
+            "[0, release_s]",
+        )?;
+        within("position_sd_m", self.position_sd_m, 0.0, 0.05, "[0, 0.05] m")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mechanics::Mechanics;
+    use spts_contact::mesh::TriMesh;
+
+    /// A bowl that opens upward: pressed upright and with a small tilt, refused when it leans by more than 5°, be it by
+    /// two tilts that are small each or by the scatter. A closed mesh may lean as it likes.
+    #[test]
+    fn a_mesh_that_opens_upward_may_hardly_lean() {
+        let dir = std::env::temp_dir().join(format!("spts-lids-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        let mut bowl = TriMesh {
+            vertices: vec![[0.0; 3]],
+            triangles: Vec::new(),
+        };
+        for k in 0..24 {
+            let (y, x) = (std::f64::consts::TAU * f64::from(k) / 24.0).sin_cos();
+            bowl.vertices.push([0.02 * x, 0.02 * y, 0.02]);
+            bowl.triangles.push([0, 1 + (k + 1) % 24, 1 + k]);
+        }
+        std::fs::write(dir.join("bowl.obj"), bowl.to_obj("bowl")).unwrap();
+        // the same with a flat top
+        bowl.triangles.extend((2..24).map(|k| [1, k, k + 1]));
+        std::fs::write(dir.join("cone.obj"), bowl.to_obj("cone")).unwrap();
+        let press = |mesh: &str, [x, y]: [f64; 2], sd: f64| {
+            let text = format!(
+                "[press]\nmesh = \"{mesh}.obj\"\nforce_n = 2.0\ntilt_deg = [{x:?}, {y:?}]\nrotation_sd_deg = {sd:?}\n\
+                 [contact]\ncells_per_taxel = 2"
+            );
+            Mechanics::from_toml(&text, &dir)
+        };
+        for (tilt_deg, sd) in [([0.0, 0.0], 0.02), ([-4.9, 0.0], 0.02), ([3.5, 3.5], 0.0)] {
+            assert_eq!(press("bowl", tilt_deg, sd).unwrap().mesh_report().unwrap().lids, 1);
+        }
+        // cos 60° cos 60° = cos 75.5°
+        for (tilt_deg, sd, lean_deg) in [
+            ([60.0, 0.0], 0.0, 60.0),
+            ([60.0, 60.0], 0.0, 75.522),
+            ([4.0, -4.0], 0.0, 5.6546),
+            ([0.0, 0.0], 2.0, 6.0),
+        ] {
+            let said = press("bowl", tilt_deg, sd).unwrap_err().to_string();
+            assert!(said.contains(&format!("tilt it by {lean_deg:.1}°")), "{said}");
+            for fact in ["bowl.obj", "tilt_deg", "[0, 5]°"] {
+                assert!(said.contains(fact), "{said}");
+            }
+            assert!(press("cone", tilt_deg, sd).is_ok());
+        }
+        std::fs::remove_dir_all(dir).unwrap();
     }
 }

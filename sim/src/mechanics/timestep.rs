@@ -1,11 +1,63 @@
-//! The time step of the dynamics: as requested, its limits, and the automatic choice.
+//! The time step of the dynamics: as requested, the automatic choice, and the limit that stiffness, damping and mass set.
 
-use super::MechanicsError;
 use serde::de::{self, Deserialize, Deserializer, Visitor};
 use serde::{Serialize, Serializer};
+use spts_contact::{ContactField, PosedMesh};
+use spts_input::Refusal;
 use spts_models::in_range;
 use std::fmt;
 use std::str::FromStr;
+
+/// Why a scene is not valid.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MechanicsError {
+    /// Anything but the time step.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
+    /// The time step does not resolve the contact.
+    #[error(
+        "`timestep_s` = {timestep_s} is outside [1e-6, {limit_s:.2e}]: the contact reaches {stiffness_n_per_m:.3e} N/m \
+         on {mass_kg:.3} kg; \"auto\" takes a step that fits"
+    )]
+    Timestep {
+        /// Time step in the scene, s.
+        timestep_s: f64,
+        /// Largest valid time step, s.
+        limit_s: f64,
+        /// Largest stiffness of the contact, N/m.
+        stiffness_n_per_m: f64,
+        /// Oscillating mass, kg.
+        mass_kg: f64,
+    },
+    /// No valid time step resolves the contact.
+    #[error(
+        "no valid `timestep_s`: the contact reaches {stiffness_n_per_m:.3e} N/m on {mass_kg:.3} kg and allows at most {limit_s:.2e} s, \
+         but the shortest step is 1e-6 s; soften the contact (`contact.stiffness_pa_per_m`, `contact.damping_s`) or drop from lower"
+    )]
+    NoTimestep {
+        /// Largest valid time step, s.
+        limit_s: f64,
+        /// Largest stiffness of the contact, N/m.
+        stiffness_n_per_m: f64,
+        /// Oscillating mass, kg.
+        mass_kg: f64,
+    },
+}
+
+impl From<MechanicsError> for Refusal {
+    fn from(error: MechanicsError) -> Self {
+        match error {
+            MechanicsError::Refused(refusal) => refusal,
+            error => Self::from_error(error),
+        }
+    }
+}
+
+/// The error that says `message`.
+pub(super) fn refused(message: impl Into<String>) -> MechanicsError {
+    Refusal::new(message).into()
+}
 
 /// Length of one recorded block: 1000 frames × 100 measurements at 64.3 kHz, s.
 pub const BLOCK_S: f64 = 100_000.0 / 64_300.0;
@@ -41,16 +93,14 @@ pub enum Timestep {
 
 impl Timestep {
     /// Itself when it may be a step of some scene.
-    pub(super) fn checked(self) -> Result<Self, MechanicsError> {
+    pub(super) fn checked(self) -> Result<Self, Refusal> {
         if let Self::Seconds(step_s) = self {
             let valid = (SHORTEST_STEP_S..f64::INFINITY).contains(&step_s);
             in_range("timestep_s", step_s, valid, "[1e-6, stable limit] s")?;
         }
         Ok(self)
     }
-}
 
-impl Timestep {
     /// The step as TOML.
     #[must_use]
     pub fn to_toml(self) -> toml::Value {
@@ -123,4 +173,103 @@ impl Visitor<'_> for TimestepVisitor {
             _ => Err(E::invalid_value(de::Unexpected::Str(text), &self)),
         }
     }
+}
+
+/// Largest stable step of a scene, and what it comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct StepLimit {
+    limit_s: f64,
+    stiffness_n_per_m: f64,
+    mass_kg: f64,
+}
+
+/// Share of the stable step that is allowed. It leaves room for the modes in which an object rocks, for cells that the
+/// static curve does not see, and keeps ω dt ≤ 1, where a bounce gains at most 1/√(1 − (ω dt)²/4) in speed even on a
+/// spring without damping.
+const SHARE: f64 = 0.5;
+
+impl StepLimit {
+    /// Limit for the mass m on a spring k beside a damper c. Stepped with forces of the step's start and velocities
+    /// updated first it is stable while k dt² + 2 c dt < 4 m (Jury's criterion on its 2 × 2 map).
+    pub(super) fn new(mass_kg: f64, stiffness_n_per_m: f64, damping_n_s_per_m: f64) -> Self {
+        let root = damping_n_s_per_m.hypot((4.0 * mass_kg * stiffness_n_per_m).sqrt());
+        let stable_s = 4.0 * mass_kg / (damping_n_s_per_m + root);
+        Self {
+            limit_s: (SHARE * stable_s).min(LONGEST_STEP_S),
+            stiffness_n_per_m,
+            mass_kg,
+        }
+    }
+
+    /// The step of a scene that asks for `asked`. `auto` is `longest_s` over the smallest whole number that brings it
+    /// within the limit.
+    pub(super) fn resolve(&self, asked: Timestep, longest_s: f64) -> Result<f64, MechanicsError> {
+        let (limit_s, stiffness_n_per_m, mass_kg) = (self.limit_s, self.stiffness_n_per_m, self.mass_kg);
+        let timestep_s = match asked {
+            Timestep::Seconds(step_s) => step_s,
+            Timestep::Auto => longest_s / (longest_s / limit_s).ceil().max(1.0),
+        };
+        // a limit that is not a number refuses too
+        if timestep_s <= limit_s && timestep_s >= SHORTEST_STEP_S {
+            return Ok(timestep_s);
+        }
+        Err(if limit_s >= SHORTEST_STEP_S && asked != Timestep::Auto {
+            MechanicsError::Timestep {
+                timestep_s,
+                limit_s,
+                stiffness_n_per_m,
+                mass_kg,
+            }
+        } else {
+            MechanicsError::NoTimestep {
+                limit_s,
+                stiffness_n_per_m,
+                mass_kg,
+            }
+        })
+    }
+}
+
+/// Steps of the descent: a quarter of an oscillation takes 16 of them.
+const DESCENT_STEPS: u32 = 64;
+/// Phase of the oscillation that a step of the descent covers, rad.
+const DESCENT_PHASE: f64 = 0.1;
+/// Share of the impact speed below which the descent is over: what is left moves as the static curve does.
+const DESCENT_END: f64 = 0.05;
+/// Largest damping (F(δ, v) − F(δ, 0))/|v|, N s/m, that `body` meets on its way down from the touch, its origin
+/// `start[0]` m high and its speed `start[1]` m/s. A fast body meets a damped layer as if it were deeper by τ v, where
+/// it is stiffer; a step throws it back faster than it came unless dt times this is below 2 m. The descent itself is
+/// stepped with the damping taken implicitly, so that it is stable whatever it finds.
+pub(super) fn impact_damping(
+    field: &mut dyn ContactField,
+    body: &PosedMesh<'_>,
+    mass_kg: f64,
+    stiffness_n_per_m: f64,
+    start: [f64; 2],
+) -> f64 {
+    let [mut height_m, speed_m_per_s] = start;
+    let dt_s = DESCENT_PHASE * (mass_kg / stiffness_n_per_m).sqrt();
+    let [x, y, _] = body.position_m;
+    let mut force = |height_m: f64, velocity: f64| {
+        let posed = PosedMesh {
+            position_m: [x, y, height_m],
+            centre_of_mass_m: [x, y, height_m],
+            velocity_m_per_s: [0.0, 0.0, velocity],
+            ..*body
+        };
+        field.respond(&posed).wrench.force_n[2]
+    };
+    let mut velocity = -speed_m_per_s;
+    let mut largest = 0.0_f64;
+    for _ in 0..DESCENT_STEPS {
+        if velocity > -DESCENT_END * speed_m_per_s {
+            break;
+        }
+        height_m += dt_s * velocity;
+        let force_n = force(height_m, velocity);
+        let damping = ((force_n - force(height_m, 0.0)) / -velocity).max(0.0);
+        largest = largest.max(damping);
+        velocity += dt_s * force_n / (mass_kg + dt_s * damping);
+    }
+    largest
 }

@@ -1,13 +1,18 @@
 //! A press or drop simulated by MuJoCo, with the contact field as an external force.
 
-use super::ball::{Ball, BallMotion};
-use super::drop::{Bounce, BounceLog, Sample, Start};
-use super::error::SimError;
+use super::drop::{Ball, BallMotion, Bounce, BounceLog, Sample, Start};
 use super::model;
 use super::press::{PressDriver, PressPlan};
 use crate::mechanics::{Mechanics, Task};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
 use spts_contact::{ContactField, Frame, Pose, PosedMesh, PreparedMesh, TaxelBins};
+use spts_input::Refusal;
+
+/// The error of a frame under the normal force `force_n`, N, whose pressure the contact field cannot compute.
+#[must_use]
+pub fn no_pressure(force_n: f64, time_s: f64, reason: &str) -> Refusal {
+    Refusal::new(format!("no pressure under {force_n:e} N at {time_s:.4} s: {reason}"))
+}
 
 /// Time between the frames of a drop while the ball is away from the skin, s.
 const FLIGHT_INTERVAL_S: f64 = 2e-3;
@@ -53,12 +58,12 @@ impl Dynamics {
     /// Repeat `index` of the scene with `field`, nothing moved yet.
     ///
     /// # Errors
-    /// [`SimError`] when the arm cannot reach the place or MuJoCo does not take the model.
+    /// [`Refusal`] when the arm cannot reach the place or MuJoCo does not take the model.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "a scene's duration is at most 60 s in steps of at least 1 µs"
     )]
-    pub(super) fn new(scene: &Mechanics, index: u64, field: Box<dyn ContactField>) -> Result<Self, SimError> {
+    pub(super) fn new(scene: &Mechanics, index: u64, field: Box<dyn ContactField>) -> Result<Self, Refusal> {
         let (contact_body, _) = scene.contact_body();
         let stiffness_pa_per_m = contact_body.stiffness_pa_per_m;
         let driver = match scene.task() {
@@ -76,7 +81,7 @@ impl Dynamics {
         let body = data
             .model()
             .name_to_id(MjtObjBase::mjOBJ_BODY, model::BODY)
-            .ok_or_else(|| SimError::Model(format!("no body `{}`", model::BODY)))?;
+            .ok_or_else(|| model::rejected(&format!("no body `{}`", model::BODY)))?;
         match &driver {
             Driver::Press(press) => {
                 data.qpos_mut().copy_from_slice(press.joints_rad());
@@ -125,7 +130,7 @@ impl Dynamics {
     }
 
     /// Steps until a frame is due; `None` at the end.
-    pub(super) fn advance(&mut self) -> Result<Option<Frame>, SimError> {
+    pub(super) fn advance(&mut self) -> Result<Option<Frame>, Refusal> {
         while self.step <= self.last_step {
             let time_s = self.time_s();
             let frame = self.one_step(time_s)?;
@@ -137,7 +142,7 @@ impl Dynamics {
         Ok(None)
     }
 
-    pub(super) fn one_step(&mut self, time_s: f64) -> Result<Option<Frame>, SimError> {
+    pub(super) fn one_step(&mut self, time_s: f64) -> Result<Option<Frame>, Refusal> {
         self.data.step1();
         let b = self.body;
         let position_m = self.data.xpos()[b];
@@ -169,11 +174,10 @@ impl Dynamics {
         let ([fx, fy, fz], [tx, ty, tz]) = (wrench.force_n, wrench.torque_nm);
         if ![fx, fy, fz, tx, ty, tz].iter().all(|v| v.is_finite()) {
             let unknown = || "pose or velocity of the body are not finite, or the contact field gave up".to_owned();
-            return Err(SimError::NotFinite {
-                force_n: wrench.force_n,
-                time_s,
-                reason: self.field.failure().unwrap_or_else(unknown),
-            });
+            let (force_n, reason) = (wrench.force_n, self.field.failure().unwrap_or_else(unknown));
+            return Err(Refusal::new(format!(
+                "contact force {force_n:?} N at {time_s:.4} s is not finite: {reason}"
+            )));
         }
         let near = match &self.driver {
             Driver::Press(_) => true,
@@ -190,13 +194,7 @@ impl Dynamics {
             maps = match refined.map(|fine| self.bins.means(fine, patch)) {
                 None => match self.field.failure() {
                     None => Some(answered),
-                    Some(reason) => {
-                        return Err(SimError::NoPressure {
-                            force_n: fz,
-                            time_s,
-                            reason,
-                        });
-                    }
+                    Some(reason) => return Err(no_pressure(fz, time_s, &reason)),
                 },
                 refined => refined,
             };
@@ -236,7 +234,9 @@ impl Dynamics {
         self.data.xfrc_applied_mut()[b] = [fx, fy, fz, tx, ty, tz];
         self.data.step2();
         match self.data.warning().iter().position(|w| w.number > 0) {
-            Some(warning) => Err(SimError::Unstable { warning, time_s }),
+            Some(warning) => Err(Refusal::new(format!(
+                "MuJoCo warning {warning} at {time_s:.4} s: the dynamics are not stable"
+            ))),
             None => Ok(frame),
         }
     }

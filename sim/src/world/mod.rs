@@ -1,32 +1,24 @@
 //! The simulation of one press of the arm or one drop of the ball, as a stream of frames.
 
-mod ball;
-mod course;
-mod cover;
+pub mod arm;
 mod drop;
 mod dynamics;
-mod error;
-pub mod ik;
 pub(crate) mod model;
 mod press;
 mod quasi_static;
 #[cfg(test)]
-mod quasi_static_tests;
-#[cfg(test)]
 mod tests;
-pub mod ur5;
-pub(crate) mod visual;
-
-pub use course::PressCourse;
-pub use drop::Bounce;
-pub use error::{MAX_PIXELS, SimError};
-pub use model::MUJOCO_VERSION;
 
 use crate::mechanics::{Mechanics, Task};
-use cover::Cover;
 use dynamics::Dynamics;
 use quasi_static::QuasiStaticPress;
-use spts_contact::Frame;
+use spts_contact::{ContactField, Frame};
+use spts_input::Refusal;
+
+pub use drop::Bounce;
+pub use dynamics::no_pressure;
+pub use model::MUJOCO_VERSION;
+pub use press::{PressCourse, no_touch};
 
 /// A press or drop of a scene, simulated from frame to frame.
 ///
@@ -58,7 +50,7 @@ impl World {
     ///
     /// # Errors
     /// As [`World::repeat`].
-    pub fn new(scene: &Mechanics) -> Result<Self, SimError> {
+    pub fn new(scene: &Mechanics) -> Result<Self, Refusal> {
         Self::repeat(scene, 0)
     }
 
@@ -66,13 +58,13 @@ impl World {
     /// and in parallel.
     ///
     /// # Errors
-    /// [`SimError`] if there is no such repeat, the arm cannot reach the place, or MuJoCo rejects the model.
-    pub fn repeat(scene: &Mechanics, index: usize) -> Result<Self, SimError> {
+    /// [`Refusal`] if there is no such repeat, the arm cannot reach the place, or MuJoCo rejects the model.
+    pub fn repeat(scene: &Mechanics, index: usize) -> Result<Self, Refusal> {
         if index >= scene.repeats() {
-            return Err(SimError::NoSuchPress {
-                index,
-                repeats: scene.repeats(),
-            });
+            return Err(Refusal::new(format!(
+                "press {index} is outside [0, {})",
+                scene.repeats()
+            )));
         }
         let mut field = scene.build_contact()?;
         let index = index as u64;
@@ -137,7 +129,7 @@ impl World {
     }
 
     /// The remaining frames. The iterator ends after the last frame or the first error.
-    pub fn frames(&mut self) -> impl Iterator<Item = Result<Frame, SimError>> + '_ {
+    pub fn frames(&mut self) -> impl Iterator<Item = Result<Frame, Refusal>> + '_ {
         std::iter::from_fn(move || {
             if self.failed {
                 return None;
@@ -155,6 +147,45 @@ impl World {
             item
         })
         .fuse()
+    }
+}
+
+/// Pressure of the cover in one press.
+#[derive(Debug, Clone)]
+struct Cover {
+    /// Pressure on every taxel without a touch, Pa.
+    rest_pa: Vec<f64>,
+    /// Decrease of its logarithm at the full force, where a taxel is not touched.
+    slack: Vec<f64>,
+    /// The full force, N.
+    force_n: f64,
+}
+
+impl Cover {
+    /// The cover in press `index` of `scene`; puts `field` under its preload. `None` for a flat skin.
+    fn new(scene: &Mechanics, field: &mut dyn ContactField, index: u64) -> Option<Self> {
+        let bend = scene.config().bend.as_ref()?;
+        let Task::Press(press) = scene.task() else { return None };
+        Some(Self {
+            rest_pa: scene.preload(field, index)?,
+            slack: bend.slack(scene.skin(), scene.seed(), index),
+            force_n: press.force_n,
+        })
+    }
+
+    /// `frame` with the cover's pressure on its electrodes. Under the body the cover is as taut as without it.
+    fn over(&self, mut frame: Frame) -> Frame {
+        let share = frame.wrench.force_n[2] / self.force_n;
+        let touched = frame.pressure.values().iter().map(|p| *p > 0.0);
+        let covered = self.rest_pa.iter().zip(&self.slack).zip(touched);
+        for (p, ((rest_pa, slack), touched)) in frame.electrode_pressure.values_mut().iter_mut().zip(covered) {
+            *p += if touched {
+                *rest_pa
+            } else {
+                rest_pa * (-slack * share).exp()
+            };
+        }
+        frame
     }
 }
 

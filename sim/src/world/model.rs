@@ -1,14 +1,285 @@
-//! The MuJoCo model of a scene: bodies, joints and servos. It has no collision geometry, because the contact field
-//! computes contact.
+//! The MuJoCo model of a scene: bodies, joints and servos, and for pictures shapes, colours, lights and cameras. It has no
+//! collision geometry, because the contact field computes contact.
 
-use super::error::SimError;
-use super::ur5;
-use super::visual::Visuals;
+use super::arm;
+use super::arm::BASE_M;
 use crate::mechanics::{GRAVITY_M_PER_S2, Mechanics, Task};
 use mujoco_rs::prelude::MjModel;
 use nalgebra::UnitQuaternion;
 use spts_contact::mesh::TriMesh;
+use spts_input::Refusal;
 use std::fmt::Write as _;
+
+/// MJCF fragments for the places of the model where a picture needs something.
+#[derive(Debug, Clone)]
+pub(crate) struct Visuals {
+    /// Settings, materials, textures and the mesh.
+    pub(crate) assets: String,
+    /// Room, table, skin, base of the arm, lights and cameras.
+    pub(crate) world: String,
+    /// Shapes of each link.
+    pub(crate) links: [String; 6],
+    /// Shape of the object or ball.
+    pub(crate) body: String,
+}
+
+/// Name of the object's or ball's shape.
+pub(crate) const BODY_GEOM: &str = "body";
+
+/// Name of the pad of taxel `index`.
+pub(crate) fn pad_name(index: usize) -> String {
+    format!("pad{index}")
+}
+
+/// Geoms of the skin's pads are drawn only up to this many taxels.
+pub(crate) const MAX_PADS: usize = 1024;
+
+/// Colour (r, g, b) of a pad that is not pressed.
+pub(crate) const PAD_RGB: [f32; 3] = [0.20, 0.22, 0.25];
+
+/// Height of the table's top, m: the sheet with foam and carrier lies on it.
+fn table_m(thickness_m: f64) -> f64 {
+    -thickness_m - 2e-3
+}
+
+impl Visuals {
+    pub(crate) fn new(scene: &Mechanics, thickness_m: f64, width: usize, height: usize) -> Self {
+        let thickness_m = thickness_m.min(0.03);
+        let (hue, press) = match scene.task() {
+            Task::Press(_) => ("0.30 0.78 0.80", true),
+            Task::Drop(_) => ("0.80 0.90 0.18", false),
+        };
+        Self {
+            assets: assets(scene.mesh(), width, height),
+            world: world(scene, thickness_m, press),
+            links: links(),
+            body: format!(
+                "<geom name=\"{BODY_GEOM}\" type=\"mesh\" mesh=\"body\" mass=\"0\" contype=\"0\" conaffinity=\"0\" rgba=\"{hue} 1\" material=\"object\"/>{}",
+                if press { adapter(scene.mesh()) } else { String::new() }
+            ),
+        }
+    }
+}
+
+/// Adapter between the top of the object and the flange, drawn in the object's frame.
+fn adapter(mesh: &TriMesh) -> String {
+    let top = mesh.vertices.iter().map(|v| v[2]).fold(0.0, f64::max);
+    format!(
+        "{}{}",
+        geom("cylinder", [0.0, 0.0, top], [0.0, 0.0, top + 0.04], 0.016, "steel"),
+        geom(
+            "cylinder",
+            [0.0, 0.0, top + 0.032],
+            [0.0, 0.0, top + 0.04],
+            0.0315,
+            "steel"
+        )
+    )
+}
+
+fn assets(mesh: &TriMesh, width: usize, height: usize) -> String {
+    let mut vertices = String::new();
+    for [x, y, z] in &mesh.vertices {
+        let _ = write!(vertices, "{x} {y} {z} ");
+    }
+    let mut faces = String::new();
+    for [a, b, c] in &mesh.triangles {
+        let _ = write!(faces, "{a} {b} {c} ");
+    }
+    format!(
+        r#"<visual>
+<global offwidth="{width}" offheight="{height}"/>
+<quality shadowsize="8192" offsamples="8"/>
+<headlight ambient="0.36 0.36 0.38" diffuse="0.22 0.22 0.22" specular="0.1 0.1 0.1"/>
+<map znear="0.01" zfar="20" shadowclip="0.75"/>
+<rgba haze="0.86 0.89 0.93 1"/>
+</visual>
+<statistic center="-0.2 0 0.2" extent="1"/>
+<asset>
+<texture type="skybox" builtin="gradient" rgb1="0.93 0.95 0.98" rgb2="0.70 0.76 0.84" width="256" height="256"/>
+<texture name="floor" type="2d" builtin="checker" rgb1="0.80 0.82 0.85" rgb2="0.76 0.78 0.81" width="512" height="512"/>
+<material name="floor" texture="floor" texrepeat="8 8" reflectance="0.02" specular="0.1"/>
+<material name="table" rgba="0.62 0.63 0.65 1" specular="0.1" shininess="0.3"/>
+<material name="grey" rgba="0.76 0.78 0.80 1" specular="0.6" shininess="0.6"/>
+<material name="blue" rgba="0.33 0.60 0.80 1" specular="0.5" shininess="0.6"/>
+<material name="dark" rgba="0.22 0.23 0.25 1" specular="0.3" shininess="0.4"/>
+<material name="steel" rgba="0.55 0.57 0.60 1" specular="0.8" shininess="0.8"/>
+<material name="object" specular="0.35" shininess="0.45"/>
+<material name="foam" rgba="0.10 0.10 0.11 1" specular="0.05" shininess="0.1"/>
+<material name="carrier" rgba="0.62 0.40 0.10 1" specular="0.4" shininess="0.5"/>
+<material name="pad" rgba="1 1 1 1" specular="0.1" shininess="0.2"/>
+<mesh name="body" inertia="shell" vertex="{vertices}" face="{faces}"/>
+</asset>
+"#
+    )
+}
+
+fn world(scene: &Mechanics, thickness_m: f64, press: bool) -> String {
+    let table = table_m(thickness_m);
+    let [width, height] = scene.skin().extent_m();
+    let (hx, hy) = (0.5 * width, 0.5 * height);
+    let (reach_x, reach_y) = (hx.max(0.32), hy.max(0.42));
+    let floor = table - 0.72;
+    let target = [0.0, 0.0, 0.012];
+    let (wide, close) = if press {
+        (
+            camera("wide", [0.52, -0.94, 0.52], [-0.215, 0.0, 0.215], 34.0),
+            [0.21, -0.235, 0.165],
+        )
+    } else {
+        (
+            camera("wide", [0.42, -0.62, 0.40], [0.0, 0.0, 0.13], 38.0),
+            [0.21, -0.26, 0.17],
+        )
+    };
+    let scale = (hx.max(hy) / 0.075).max(1.0);
+    let close = camera("close", close.map(|c| c * scale), target, 38.0);
+    let mut xml = format!(
+        r#"<light pos="0.6 -0.9 1.8" dir="-0.42 0.55 -1.1" diffuse="0.56 0.55 0.53" specular="0.25 0.25 0.25" castshadow="true" directional="true"/>
+<light pos="-1 1 1.5" dir="0.6 -0.6 -0.9" diffuse="0.20 0.21 0.24" specular="0 0 0" castshadow="false" directional="true"/>
+{wide}{close}
+<geom type="plane" size="4 4 0.1" pos="0 0 {floor}" material="floor" contype="0" conaffinity="0"/>
+{}{}{}
+"#,
+        slab(
+            [if press { -0.24 } else { 0.0 }, 0.0, table - 0.02],
+            [reach_x + 0.22, reach_y, 0.02],
+            "table"
+        ),
+        slab([0.0, 0.0, table + 1e-3], [hx + 0.012, hy + 0.012, 1e-3], "carrier"),
+        slab(
+            [0.0, 0.0, -0.5 * thickness_m - 2e-4],
+            [hx, hy, 0.5 * thickness_m - 2e-4],
+            "foam"
+        ),
+    );
+    if press {
+        let foot = [BASE_M[0], BASE_M[1], table];
+        xml += &geom("cylinder", foot, [foot[0], foot[1], table + 0.012], 0.085, "dark");
+        xml += &geom(
+            "cylinder",
+            [foot[0], foot[1], table + 0.012],
+            [foot[0], foot[1], 0.035],
+            0.075,
+            "grey",
+        );
+    }
+    if scene.skin().taxels() <= MAX_PADS {
+        let half = 0.5 * scene.skin().pitch_m() * 0.88;
+        for row in 0_u32..u32::try_from(scene.skin().rows()).unwrap_or(0) {
+            for col in 0_u32..u32::try_from(scene.skin().cols()).unwrap_or(0) {
+                let [x, y] = scene.skin().position_m(f64::from(row), f64::from(col));
+                let index = row as usize * scene.skin().cols() + col as usize;
+                let [r, g, b] = PAD_RGB;
+                let _ = writeln!(
+                    xml,
+                    "<geom name=\"{}\" type=\"box\" pos=\"{x} {y} -3e-4\" size=\"{half} {half} 3e-4\" contype=\"0\" \
+                     conaffinity=\"0\" material=\"pad\" rgba=\"{r} {g} {b} 1\"/>",
+                    pad_name(index)
+                );
+            }
+        }
+    }
+    xml
+}
+
+/// Camera at `from` that looks at `to`, z up.
+fn camera(name: &str, from: [f64; 3], to: [f64; 3], fovy_deg: f64) -> String {
+    let (from_v, to_v) = (nalgebra::Vector3::from(from), nalgebra::Vector3::from(to));
+    let back = (from_v - to_v).normalize();
+    let right = nalgebra::Vector3::z().cross(&back).normalize();
+    let up = back.cross(&right);
+    format!(
+        "<camera name=\"{name}\" pos=\"{} {} {}\" xyaxes=\"{} {} {} {} {} {}\" fovy=\"{fovy_deg}\"/>\n",
+        from[0], from[1], from[2], right.x, right.y, right.z, up.x, up.y, up.z
+    )
+}
+
+fn slab(centre: [f64; 3], half: [f64; 3], material: &str) -> String {
+    let ([x, y, z], [a, b, c]) = (centre, half);
+    format!(
+        "<geom type=\"box\" pos=\"{x} {y} {z}\" size=\"{a} {b} {c}\" material=\"{material}\" contype=\"0\" conaffinity=\"0\"/>\n"
+    )
+}
+
+fn geom(kind: &str, from: [f64; 3], to: [f64; 3], radius: f64, material: &str) -> String {
+    let ([a, b, c], [d, e, f]) = (from, to);
+    if (a - d).abs() + (b - e).abs() + (c - f).abs() < 1e-6 {
+        return String::new();
+    }
+    format!(
+        "<geom type=\"{kind}\" fromto=\"{a} {b} {c} {d} {e} {f}\" size=\"{radius}\" material=\"{material}\" mass=\"0\" \
+         contype=\"0\" conaffinity=\"0\"/>"
+    )
+}
+
+/// Shapes in each body's frame (the joint's axis is z, the next joint at the link's tail): grey tubes, and joints with
+/// blue caps, offset sideways as on the real arm.
+fn links() -> [String; 6] {
+    let tube = |from, to, radius| geom("capsule", from, to, radius, "grey");
+    let drum = |from, to, radius, cap| {
+        geom("cylinder", from, to, radius, "grey") + &geom("cylinder", to, cap, radius * 0.97, "blue")
+    };
+    let z = |z: f64| [0.0, 0.0, z];
+    [
+        // shoulder: turret up to the second axis, drum along it (that axis is −y here)
+        geom("cylinder", z(-0.055), z(0.02), 0.062, "dark")
+            + &geom("cylinder", z(0.02), z(0.089), 0.060, "grey")
+            + &drum(
+                [0.0, 0.062, 0.089_159],
+                [0.0, -0.075, 0.089_159],
+                0.060,
+                [0.0, -0.075, 0.089_159],
+            )
+            + &geom(
+                "cylinder",
+                [0.0, 0.062, 0.089_159],
+                [0.0, 0.070, 0.089_159],
+                0.058,
+                "blue",
+            ),
+        drum(z(0.077), z(0.192), 0.060, z(0.200))
+            + &tube([0.0, 0.0, 0.136], [-0.425, 0.0, 0.136], 0.050)
+            + &drum([-0.425, 0.0, 0.085], [-0.425, 0.0, 0.186], 0.056, [-0.425, 0.0, 0.194]),
+        drum(z(0.085), z(-0.028), 0.050, z(-0.036))
+            + &tube([0.0, 0.0, 0.0165], [-0.392_25, 0.0, 0.0165], 0.040)
+            + &drum(
+                [-0.392_25, 0.0, 0.057],
+                [-0.392_25, 0.0, -0.03],
+                0.042,
+                [-0.392_25, 0.0, -0.038],
+            ),
+        geom("cylinder", z(0.058), z(0.109), 0.0375, "grey")
+            + &drum(
+                [0.0, 0.042, 0.109_15],
+                [0.0, -0.046, 0.109_15],
+                0.0375,
+                [0.0, -0.052, 0.109_15],
+            )
+            + &geom(
+                "cylinder",
+                [0.0, 0.042, 0.109_15],
+                [0.0, 0.050, 0.109_15],
+                0.036,
+                "blue",
+            ),
+        geom("cylinder", z(0.046), z(0.094_65), 0.0375, "grey")
+            + &drum(
+                [0.0, -0.042, 0.094_65],
+                [0.0, 0.042, 0.094_65],
+                0.0375,
+                [0.0, 0.042, 0.094_65],
+            )
+            + &geom(
+                "cylinder",
+                [0.0, -0.042, 0.094_65],
+                [0.0, -0.050, 0.094_65],
+                0.036,
+                "blue",
+            ),
+        geom("cylinder", z(0.042), z(0.074), 0.0375, "grey") + &geom("cylinder", z(0.074), z(0.0823), 0.0315, "steel"),
+    ]
+}
 
 /// MuJoCo version for which this crate is made.
 pub const MUJOCO_VERSION: &str = "3.17.0";
@@ -25,15 +296,19 @@ pub(crate) fn tool_length_m(mesh: &TriMesh) -> f64 {
 }
 
 /// Compiles the model; with `visuals`, everything a picture needs is in it too.
-pub(crate) fn compile(scene: &Mechanics, visuals: Option<&Visuals>) -> Result<MjModel, SimError> {
+pub(crate) fn compile(scene: &Mechanics, visuals: Option<&Visuals>) -> Result<MjModel, Refusal> {
     let found = mujoco_rs::mujoco_version();
     if found != MUJOCO_VERSION {
-        return Err(SimError::Version {
-            found: found.to_owned(),
-            wanted: MUJOCO_VERSION,
-        });
+        return Err(Refusal::new(format!(
+            "MuJoCo {found} is linked, {MUJOCO_VERSION} is needed"
+        )));
     }
-    MjModel::from_xml_string(&mjcf(scene, visuals)).map_err(|error| SimError::Model(error.to_string()))
+    MjModel::from_xml_string(&mjcf(scene, visuals)).map_err(|error| rejected(&error.to_string()))
+}
+
+/// The error of a model that MuJoCo does not take.
+pub(super) fn rejected(why: &str) -> Refusal {
+    Refusal::new(format!("MuJoCo rejects the model: {why}"))
 }
 
 pub(super) fn mjcf(scene: &Mechanics, visuals: Option<&Visuals>) -> String {
@@ -70,8 +345,8 @@ pub(super) fn mjcf(scene: &Mechanics, visuals: Option<&Visuals>) -> String {
 /// does.
 fn arm(tool: &str, visuals: Option<&Visuals>) -> String {
     let mut xml = String::new();
-    let mut frame = nalgebra::Isometry3::translation(ur5::BASE_M[0], ur5::BASE_M[1], ur5::BASE_M[2]);
-    for (i, link) in ur5::LINKS.iter().enumerate() {
+    let mut frame = nalgebra::Isometry3::translation(arm::BASE_M[0], arm::BASE_M[1], arm::BASE_M[2]);
+    for (i, link) in arm::LINKS.iter().enumerate() {
         let [x, y, z] = frame.translation.vector.into();
         let tail = link.tail();
         let centre = tail * nalgebra::Point3::from(link.centre_m);
@@ -88,7 +363,7 @@ fn arm(tool: &str, visuals: Option<&Visuals>) -> String {
             centre.z,
             quaternion(&tail.rotation),
             link.rotor_kg_m2,
-            ur5::JOINT_DAMPING,
+            arm::JOINT_DAMPING,
             visuals.map_or("", |v| &v.links[i]),
         );
         frame = tail;
@@ -99,7 +374,7 @@ fn arm(tool: &str, visuals: Option<&Visuals>) -> String {
         "<body name=\"flange\" pos=\"{x} {y} {z}\" quat=\"{}\">{tool}</body>",
         quaternion(&frame.rotation)
     );
-    xml.push_str(&"</body>".repeat(ur5::LINKS.len()));
+    xml.push_str(&"</body>".repeat(arm::LINKS.len()));
     xml.push('\n');
     xml
 }
@@ -126,7 +401,7 @@ fn object(mesh: &TriMesh, mass_kg: f64, visual: &str) -> String {
 
 fn servos() -> String {
     let mut xml = String::from("<actuator>\n");
-    for (i, link) in ur5::LINKS.iter().enumerate() {
+    for (i, link) in arm::LINKS.iter().enumerate() {
         let _ = writeln!(
             xml,
             "<position joint=\"joint{i}\" kp=\"{}\" dampratio=\"1\" forcerange=\"-{1} {1}\"/>",

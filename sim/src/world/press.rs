@@ -1,15 +1,21 @@
 //! The motion of the arm in a press: approach, touch, follow the force, lift.
 
-use super::error::SimError;
+use super::arm;
 use super::model::tool_length_m;
-use super::{ik, ur5};
 use crate::mechanics::{Mechanics, PressConfig, RAMP_CORNER, ramp_s};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
-use spts_contact::DepthCurve;
+use spts_contact::{DepthCurve, Frame};
+use spts_input::Refusal;
 use spts_models::Streams;
 use std::sync::Arc;
+
+/// The error of an arm or a ball that has touched nothing by `time_s`.
+#[must_use]
+pub fn no_touch(time_s: f64) -> Refusal {
+    Refusal::new(format!("nothing has touched the skin by {time_s:.3} s"))
+}
 
 /// Height of the object above its place before a press, m.
 pub(super) const CLEARANCE_M: f64 = 0.03;
@@ -127,15 +133,15 @@ impl PressPlan {
 
 impl PressDriver {
     /// Program of the press `plan`, and nothing moved yet.
-    pub(crate) fn new(scene: &Mechanics, plan: PressPlan) -> Result<Self, SimError> {
+    pub(crate) fn new(scene: &Mechanics, plan: PressPlan) -> Result<Self, Refusal> {
         let curve = Arc::clone(scene.depth_curve());
         let [lowest_m, _] = scene.contact_body().0.heights_m();
         let force_n = plan.config.force_n;
         let meant_m = -lowest_m - curve.depth_m(TOUCH * force_n);
         let touch_height_m = meant_m + plan.rise_m;
         // the deepest pose has to be within reach too
-        let start = ik::solve(&plan.flange(touch_height_m + CLEARANCE_M), &ur5::HOME_RAD)?;
-        let pressed = ik::solve(&plan.flange(meant_m - curve.depth_m(force_n)), &start)?;
+        let start = arm::solve(&plan.flange(touch_height_m + CLEARANCE_M), &arm::HOME_RAD)?;
+        let pressed = arm::solve(&plan.flange(meant_m - curve.depth_m(force_n)), &start)?;
         Ok(Self {
             arm_m_per_n: arm_compliance(&pressed, plan.tool.translation.vector),
             plan,
@@ -155,7 +161,7 @@ impl PressDriver {
     }
 
     /// Moves the command on by `dt_s` at time `time_s`, `measured_n` being the normal force on the object.
-    pub(crate) fn step(&mut self, time_s: f64, dt_s: f64, measured_n: f64) -> Result<(), SimError> {
+    pub(crate) fn step(&mut self, time_s: f64, dt_s: f64, measured_n: f64) -> Result<(), Refusal> {
         self.force_n += dt_s / (FILTER_S + dt_s) * (measured_n - self.force_n);
         match self.phase {
             Phase::Approach => {
@@ -164,7 +170,7 @@ impl PressDriver {
                     self.phase = Phase::Force { touch_s: time_s };
                     self.expected_n = [self.force_n; LAG_POLES];
                 } else if time_s >= self.plan.lift_s {
-                    return Err(SimError::NoTouch { time_s });
+                    return Err(no_touch(time_s));
                 }
             }
             Phase::Force { touch_s } => {
@@ -193,16 +199,16 @@ impl PressDriver {
                 self.phase = Phase::Retract { speed_m_per_s: speed };
             }
         }
-        ik::improve(&self.plan.flange(self.height_m), &mut self.joints_rad);
+        arm::improve(&self.plan.flange(self.height_m), &mut self.joints_rad);
         Ok(())
     }
 }
 
 /// Compliance of the servos at the tool along the vertical: Σ J_zi² / kp_i, m/N.
 fn arm_compliance(joints_rad: &[f64; 6], tool_m: Vector3<f64>) -> f64 {
-    let jacobian = ur5::jacobian(joints_rad, &tool_m);
+    let jacobian = arm::jacobian(joints_rad, &tool_m);
     let row = jacobian.row(2);
-    let parts = ur5::LINKS.iter().zip(row.iter());
+    let parts = arm::LINKS.iter().zip(row.iter());
     parts.map(|(link, j)| j * j / link.servo_nm_per_rad).sum()
 }
 
@@ -232,4 +238,68 @@ fn ramp(u: f64) -> (f64, f64) {
     } else {
         (1.0, 0.0)
     }
+}
+
+// Time course of the force in a press.
+
+/// Time course of one press, from its frames. Times are interpolated between frames.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PressCourse {
+    /// First frame with a force, s.
+    pub onset_s: f64,
+    /// Time of the rise from 10 to 90 % of the plateau, s.
+    pub rise_s: f64,
+    /// Mean over the plateau, N.
+    pub plateau_n: f64,
+    /// Largest deviation from the target on the plateau, N.
+    pub plateau_error_n: f64,
+    /// Highest force above the target, relative to it.
+    pub overshoot: f64,
+    /// When the force falls below 90 % of the plateau, s.
+    pub lift_s: f64,
+    /// Time of the fall from 90 to 10 % of the plateau, s.
+    pub fall_s: f64,
+    /// Largest [`Frame::imbalance`] of all frames.
+    pub imbalance: f64,
+}
+
+impl PressCourse {
+    /// Time course of `frames` with the target force `target_n` and the plateau `plateau_s` = [start, end]. `None`
+    /// unless the force exceeds 90 % of the target before the plateau's end and falls below 10 % afterwards.
+    #[must_use]
+    pub fn of(frames: &[Frame], target_n: f64, plateau_s: [f64; 2], cell_area_m2: f64) -> Option<Self> {
+        let force = |f: &Frame| f.wrench.force_n[2];
+        let onset_s = frames.iter().find(|f| force(f) > 0.0)?.time_s;
+        let on: Vec<f64> = frames
+            .iter()
+            .filter(|f| (plateau_s[0]..=plateau_s[1]).contains(&f.time_s))
+            .map(force)
+            .collect();
+        let plateau_n = on.iter().sum::<f64>() / on.len() as f64;
+        let middle_s = 0.5 * (plateau_s[0] + plateau_s[1]);
+        let up = |share: f64| crossing(frames, share * plateau_n, |t| t <= middle_s, false);
+        let down = |share: f64| crossing(frames, share * plateau_n, |t| t >= middle_s, true);
+        let lift_s = down(0.9)?;
+        Some(Self {
+            onset_s,
+            rise_s: up(0.9)? - up(0.1)?,
+            plateau_n,
+            plateau_error_n: on.iter().map(|f| (f - target_n).abs()).fold(0.0, f64::max),
+            overshoot: frames.iter().map(force).fold(0.0, f64::max) / target_n - 1.0,
+            lift_s,
+            fall_s: down(0.1)? - lift_s,
+            imbalance: frames.iter().map(|f| f.imbalance(cell_area_m2)).fold(0.0, f64::max),
+        })
+    }
+}
+
+/// First time, among those `within`, at which the force passes `level_n`.
+fn crossing(frames: &[Frame], level_n: f64, within: impl Fn(f64) -> bool, falling: bool) -> Option<f64> {
+    let force = |f: &Frame| f.wrench.force_n[2];
+    let pair = frames.windows(2).find(|w| {
+        let below = [force(&w[0]) < level_n, force(&w[1]) < level_n];
+        within(w[1].time_s) && below == [!falling, falling]
+    })?;
+    let share = (level_n - force(&pair[0])) / (force(&pair[1]) - force(&pair[0]));
+    Some(pair[0].time_s + share * (pair[1].time_s - pair[0].time_s))
 }

@@ -196,7 +196,7 @@ fn model_kinematics_equal_dh() {
             std::array::from_fn(|i| (f64::from(k) * 0.37 + f64::from(u32::try_from(i).unwrap())).sin() * 3.0);
         data.qpos_mut().copy_from_slice(&joints);
         data.forward();
-        let expected = ur5::flange(&joints);
+        let expected = arm::flange(&joints);
         let position = nalgebra::Vector3::from(data.xpos()[id]);
         assert!((position - expected.translation.vector).norm() < 1e-12);
         let matrix = nalgebra::Matrix3::from_row_slice(&data.xmat()[id]);
@@ -207,13 +207,16 @@ fn model_kinematics_equal_dh() {
 #[test]
 fn bad_worlds() {
     let scene = Mechanics::press("T").unwrap();
-    assert!(matches!(
-        World::repeat(&scene, 10),
-        Err(SimError::NoSuchPress { index: 10, repeats: 10 })
-    ));
+    let error = World::repeat(&scene, 10).unwrap_err().to_string();
+    assert_eq!(error, "press 10 is outside [0, 10)");
     let far = "[skin]\nrows = 400\ncols = 400\n[contact]\ncells_per_taxel = 1\n[press]\nobject = \"rec\"\nrow = 0.0\ncol = 390.0";
     let far = Mechanics::from_toml(far, Path::new("")).unwrap();
-    assert!(matches!(World::new(&far), Err(SimError::Unreachable(_))));
+    assert!(
+        World::new(&far)
+            .unwrap_err()
+            .to_string()
+            .contains("the arm cannot reach")
+    );
 }
 
 /// The rotors at the tool weigh at least what the time step's limit counts on, wherever the skin is pressed.
@@ -225,12 +228,12 @@ fn arm_is_heavier_than_assumed() {
     );
     for (x, y) in [(0.0, 0.0), (0.07, 0.07), (-0.07, 0.07), (0.07, -0.07), (-0.07, -0.07)] {
         let goal = nalgebra::Isometry3::translation(x, y, 0.0) * tool.inverse();
-        let joints = ik::solve(&goal, &ur5::HOME_RAD).unwrap();
-        let jacobian = ur5::jacobian(&joints, &tool.translation.vector);
+        let joints = arm::solve(&goal, &arm::HOME_RAD).unwrap();
+        let jacobian = arm::jacobian(&joints, &tool.translation.vector);
         let row = jacobian.row(2);
         let mobility: f64 = row
             .iter()
-            .zip(&ur5::LINKS)
+            .zip(&arm::LINKS)
             .map(|(j, link)| j * j / link.rotor_kg_m2)
             .sum();
         assert!(1.0 / mobility > crate::mechanics::ARM_MASS_KG, "{}", 1.0 / mobility);
@@ -272,11 +275,13 @@ fn picture_or_clear_error() {
             let idle = renderer.draw(&world, Camera::Close, None).unwrap();
             assert_ne!(picture.rgb, idle.rgb);
         }
-        Err(SimError::Render(reason)) => {
-            assert!(!mesa_is_installed(), "EGL is there, and yet: {reason}");
-            assert!(!reason.is_empty());
+        Err(error) => {
+            assert!(
+                error.to_string().starts_with("off-screen rendering failed: "),
+                "{error}"
+            );
+            assert!(!mesa_is_installed(), "EGL is there, and yet: {error}");
         }
-        Err(error) => panic!("{error}"),
     }
 }
 
@@ -315,8 +320,5 @@ fn a_frame_without_its_pressure_stops_the_world() {
     let scene = Mechanics::press("T").unwrap();
     let field = Box::new(Unrefined(scene.build_contact().unwrap()));
     let error = Dynamics::new(&scene, 0, field).unwrap().advance().unwrap_err();
-    assert!(
-        matches!(&error, SimError::NoPressure { reason, .. } if reason == "no depth found"),
-        "{error}"
-    );
+    assert!(error.to_string().ends_with(": no depth found"), "{error}");
 }

@@ -5,7 +5,7 @@ use crate::chain::Chain;
 use crate::wire::Wire;
 use spts_circuit::{Converter, Mode};
 use spts_contact::objects::ObjectSpec;
-use spts_contact::{PosedMesh, PreparedMesh, TouchBody, TouchSkin, WinklerConfig, Wrench};
+use spts_contact::{Foam, PosedMesh, PreparedMesh, TouchBody, TouchSkin, Wrench};
 use spts_models::{ConfigError, in_range};
 use std::f64::consts::FRAC_PI_2;
 
@@ -74,7 +74,7 @@ impl Pressed {
         };
         let [low_m, _] = lowest.heights_m();
         let mut pressed = Self {
-            skin: TouchSkin::flat(layout, WinklerConfig::default()).map_err(refused)?,
+            skin: TouchSkin::flat(layout, Foam::default()).map_err(refused)?,
             posed,
             rest_m: [x_m, y_m, -low_m],
             stiffness_pa_per_m: spec.stiffness_pa_per_m.unwrap_or(f64::INFINITY),

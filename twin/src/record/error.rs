@@ -12,7 +12,7 @@ pub enum TwinError {
     Scene(#[from] SceneError),
     /// The mechanics failed.
     #[error(transparent)]
-    Sim(#[from] spts_sim::SimError),
+    Sim(#[from] spts_input::Refusal),
     /// Transducer or readout failed, or the source of the weights cannot provide them.
     #[error(transparent)]
     Chain(#[from] ChainError),

@@ -11,7 +11,7 @@ use spts::record::{Twin, TwinError};
 use spts::scene::{PressConfig, Scene, SceneConfig};
 use spts::session::{Event, Recorded};
 use spts_circuit::{Block, Mode, Recording};
-use spts_contact::WinklerConfig;
+use spts_contact::Foam;
 use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_input::Refusal;
 use spts_models::{ConfigError, SkinLayout, Streams, VelostatConfig, in_range};
@@ -175,7 +175,7 @@ impl Skins {
         let seed = streams.rng("learn/skin", skin as u64).random::<u64>() >> 1;
         let stiffness = scattered(self.stiffness_factor, streams, "learn/stiffness", skin as u64);
         let force = scattered(self.force_factor, Streams::new(seed), "learn/force", label);
-        let defaults = (PressConfig::default(), WinklerConfig::default());
+        let defaults = (PressConfig::default(), Foam::default());
         let press = PressConfig {
             object: Some(object.name.to_owned()),
             // presses are numbered by the object, so that each has a scatter of its own

@@ -5,7 +5,8 @@ use crate::figures::FigureError;
 use crate::figures::colour::{FRAME, INK, MUTED};
 use crate::figures::draw::{Anchor, Canvas, LINE_HEIGHT, Point, Shape as Drawn, TextStyle, resample, save_png, wrap};
 use rayon::prelude::*;
-use spts_contact::shapes::{Shape, ShapeError, ShapeFamily, ShapeRanges};
+use spts_contact::shapes::{Shape, ShapeFamily, ShapeRanges};
+use spts_input::Refusal;
 use std::path::Path;
 
 /// Shapes in a line.
@@ -34,8 +35,8 @@ const HEIGHT_BAR: f64 = 220.0;
 /// family have the numbers `seed`, `seed` + 1 and so on.
 ///
 /// # Errors
-/// [`ShapeError`] when a family has no solid for a number.
-pub fn drawn_shapes(families: &[&ShapeFamily], seed: u64, count: usize) -> Result<Vec<Shape>, ShapeError> {
+/// [`Refusal`] when a family has no solid for a number.
+pub fn drawn_shapes(families: &[&ShapeFamily], seed: u64, count: usize) -> Result<Vec<Shape>, Refusal> {
     let wanted = families.iter().enumerate().flat_map(|(place, family)| {
         let more = usize::from(place < count % families.len());
         let numbers = (count / families.len() + more) as u64;

@@ -16,7 +16,7 @@ use spts::provenance::Machine;
 use spts::session::{SESSION_FILE, SessionWriter};
 use spts::simulate::{Prepared, SimulatedPiece, Simulation, Summary};
 use spts_eval::decode::DecodedSession;
-use spts_sim::SimError;
+use spts_input::Refusal;
 use std::path::PathBuf;
 
 /// Results of a simulation that were not written, or not all of them.
@@ -30,7 +30,7 @@ pub enum SimulationWriteError {
     #[error("{source}; everything else was written to {}", folder.display())]
     Scene {
         /// Cause.
-        source: SimError,
+        source: Refusal,
         /// Where the rest is.
         folder: PathBuf,
     },

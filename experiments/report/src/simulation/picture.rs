@@ -4,8 +4,9 @@ use crate::ReportError;
 use crate::figures::{FigureError, pressure_png};
 use spts::output::{OutputError, OutputFolder};
 use spts::simulate::{Prepared, Simulation};
+use spts_input::Refusal;
+use spts_sim::World;
 use spts_sim::render::{Camera, Picture, Renderer};
-use spts_sim::{SimError, World};
 
 /// Size of the pictures of the scene, pixels.
 const SCENE_PIXELS: [usize; 2] = [1280, 960];
@@ -38,7 +39,7 @@ pub(super) fn pressure_picture(
 pub(super) fn scene_pictures(
     prepared: &Prepared,
     simulation: &Simulation,
-) -> Result<Vec<(&'static str, Picture)>, SimError> {
+) -> Result<Vec<(&'static str, Picture)>, Refusal> {
     let Some(peak) = &simulation.peak else {
         return Ok(Vec::new());
     };

@@ -25,7 +25,7 @@ use spts_recon::dictionary::{Ksvd, Selection, select};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 use spts_sim::World;
 use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting, REFERENCE};
-use spts_sim::world::{Bounce, SimError};
+use spts_sim::world::{Bounce, no_pressure};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -540,7 +540,7 @@ fn run_contact(scene: &Scene, index: usize, most_runs: usize) -> Result<ContactR
 
 /// Fine pressure in the middle of the span.
 fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<FinePressure, TwinError> {
-    let mut field = scene.mechanics().build_contact().map_err(SimError::from)?;
+    let mut field = scene.mechanics().build_contact()?;
     let cells = field.cells_per_taxel();
     let (rows, cols) = (scene.skin().rows() * cells, scene.skin().cols() * cells);
     let middle_s = 0.5 * (start_s + end_s);
@@ -558,12 +558,7 @@ fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<F
         pressure_pa.copy_from_slice(refined);
     } else if let Some(reason) = field.failure() {
         let time_s = frame.time_s;
-        return Err(SimError::NoPressure {
-            force_n,
-            time_s,
-            reason,
-        }
-        .into());
+        return Err(no_pressure(force_n, time_s, &reason).into());
     }
     Ok(FinePressure {
         rows,
