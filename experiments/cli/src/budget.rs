@@ -1,9 +1,8 @@
 //! `spts budget`: what each effect costs.
 
-use super::context::{Common, open_folder};
-use super::error::CliError;
-use super::options::{Side, parse_measurements, seed, sorted, square};
-use super::progress::Bars;
+use crate::context::{Bars, Common, open_folder};
+use crate::error::CliError;
+use crate::options::{Side, parse_measurements, seed, sorted, square};
 use clap::Args;
 use spts::chain::DEFAULT_READOUT;
 use spts_eval::decoders::PublishedDecode;

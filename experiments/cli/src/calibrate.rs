@@ -1,9 +1,8 @@
 //! `spts calibrate`: a readout profile from recordings.
 
-use super::context::{Common, note};
-use super::error::CliError;
-use super::options::seed;
-use super::progress::Bars;
+use crate::context::{Bars, Common, note};
+use crate::error::CliError;
+use crate::options::seed;
 use clap::Args;
 use spts::output::{OutputError, check_writable, write_bytes};
 use spts_circuit::Profile;

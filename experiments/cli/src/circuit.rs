@@ -1,8 +1,8 @@
 //! `spts circuit`: theory of the summing amplifier for a skin of any size.
 
-use super::context::{Common, open_folder};
-use super::error::CliError;
-use super::options::{number, whole, within};
+use crate::context::{Common, open_folder};
+use crate::error::CliError;
+use crate::options::{number, whole, within};
 use clap::Args;
 use serde::Serialize;
 use spts_circuit::amplifier::{Network, Remedied, Skin};

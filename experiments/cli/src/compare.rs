@@ -1,10 +1,8 @@
 //! `spts compare`: the twin against recordings of its skin.
 
-use super::context::{Common, note, open_folder};
-use super::error::CliError;
-use super::options::seed;
-use super::progress::Bars;
-use super::skin::skin_gains;
+use crate::context::{Bars, Common, note, open_folder};
+use crate::error::CliError;
+use crate::options::{seed, skin_gains};
 use clap::Args;
 use serde::Serialize;
 use spts::chain::MAX_TOML_BYTES;
@@ -12,6 +10,7 @@ use spts::data::DataError;
 use spts_circuit::Profile;
 use spts_eval::{PublishedSkin, SessionSlip, slips_text};
 use spts_models::TaxelGains;
+use spts_studies::arm::ArmStudy;
 use spts_studies::calibrate::{SessionPair, read};
 use spts_studies::compare::{CompareReport, CompareStudy, Images, Prediction, Predictor};
 use spts_studies::per_object::{PerObjectReport, PerObjectStudy};
@@ -103,6 +102,9 @@ pub(super) struct CompareCommand {
     common: Common,
 }
 
+/// Simulated skins of `--arm` when none are asked for.
+const ARM_SKINS: u64 = 8;
+
 /// What `--json` prints.
 #[derive(Serialize)]
 struct Printed<'a> {
@@ -118,7 +120,14 @@ impl CompareCommand {
         self.common.start()?;
         let out = open_folder(&self.out, spts_report::compare::FILES)?;
         if self.arm {
-            return super::compare_arm::run(&self.recordings, self.skins, self.seed, out, &self.common);
+            let study = ArmStudy {
+                recordings: &self.recordings,
+                skins: self.skins.unwrap_or(ARM_SKINS),
+                seed: self.seed,
+            };
+            let report = study.run(&Bars::default())?;
+            spts_report::compare::write_arm(&report, out)?;
+            return self.common.print(&report, || report.text());
         }
         let pairs = read(&self.recordings)?;
         let slips: Vec<SessionSlip> = pairs.iter().flat_map(|pair| pair.slips.clone()).collect();

@@ -1,15 +1,18 @@
 //! What several commands share: thread count, progress bars, printing.
 
-use super::error::CliError;
-use super::options::whole;
-use super::terminal::{one_line, plain};
+use crate::error::CliError;
+use crate::options::whole;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use spts::output::{Manifest, OutputError, OutputFolder};
+use spts::progress::Progress;
+use std::borrow::Cow;
+use std::fmt::Write as _;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::Path;
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// Options of every command that computes.
 #[derive(Debug, Clone, Args)]
@@ -140,4 +143,132 @@ pub fn note(text: &str) {
 /// Writes an error to standard error, on one line.
 pub fn note_error(text: &str) {
     note(&format!("error: {}", one_line(text)));
+}
+
+/// Progress bars on standard error, one a stage; silent when that is not a terminal.
+#[derive(Default)]
+pub struct Bars {
+    stage: Mutex<Stage>,
+    /// Whether a line says of every stage how long it took, terminal or not.
+    lines: bool,
+}
+
+/// A shorter stage gets no line.
+const WORTH_A_LINE: Duration = Duration::from_millis(100);
+
+#[derive(Default)]
+struct Stage {
+    shown: Shown,
+    /// What is done, and since when.
+    running: Option<(&'static str, Instant)>,
+}
+
+#[derive(Default)]
+enum Shown {
+    #[default]
+    None,
+    Counted(ProgressBar),
+    Open {
+        #[expect(dead_code, reason = "turns until it is dropped")]
+        spinner: Spinner,
+    },
+}
+
+impl Bars {
+    /// Bars that leave a line of every stage, with the time that it took: for runs of minutes.
+    #[must_use]
+    pub fn with_lines() -> Self {
+        Self {
+            lines: true,
+            ..Self::default()
+        }
+    }
+
+    fn set(&self, next: Shown, running: Option<(&'static str, Instant)>) {
+        let mut stage = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
+        let before = std::mem::replace(&mut *stage, Stage { shown: next, running });
+        drop(stage);
+        if let Shown::Counted(bar) = before.shown {
+            bar.finish_and_clear();
+        }
+        let running = before.running.map(|(what, since)| (what, since.elapsed()));
+        if let Some((what, took)) = running.filter(|(_, took)| self.lines && *took > WORTH_A_LINE) {
+            note(&format!("{what}: {:.1} s", took.as_secs_f64()));
+        }
+    }
+}
+
+impl Progress for Bars {
+    fn stage(&self, what: &'static str, steps: Option<usize>) {
+        self.end();
+        let shown = match steps {
+            Some(steps) => Shown::Counted(progress(steps, what)),
+            None => Shown::Open { spinner: spinner(what) },
+        };
+        self.set(shown, Some((what, Instant::now())));
+    }
+
+    fn step(&self) {
+        if let Shown::Counted(bar) = &self.stage.lock().unwrap_or_else(PoisonError::into_inner).shown {
+            bar.inc(1);
+        }
+    }
+
+    fn end(&self) {
+        self.set(Shown::None, None);
+    }
+}
+
+/// `text` with every character that a terminal would act on written out, as in `\u{1b}`. Line ends and tabs stay.
+pub(crate) fn plain(text: &str) -> Cow<'_, str> {
+    if !text.contains(acts) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len());
+    for character in text.chars() {
+        if acts(character) {
+            // writing to a string cannot fail
+            let _ = write!(out, "{}", character.escape_unicode());
+        } else {
+            out.push(character);
+        }
+    }
+    Cow::Owned(out)
+}
+
+/// Whether a terminal acts on the character in place of showing it: control characters, and those that turn the
+/// direction of the text.
+fn acts(character: char) -> bool {
+    let layout = matches!(character, '\n' | '\t');
+    let turns = matches!(character, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    (character.is_control() && !layout) || turns
+}
+
+/// `text` on one line, whatever a library or a file put into it.
+pub(crate) fn one_line(text: &str) -> String {
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    lines.collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_terminal_would_act_on_is_written_out() {
+        for (text, shown) in [
+            ("T\tµS ± 0.1\n× 10²", "T\tµS ± 0.1\n× 10²"),
+            ("a\u{1b}[31mb", "a\\u{1b}[31mb"),
+            ("a\r\u{7}\u{8}\u{7f}", "a\\u{d}\\u{7}\\u{8}\\u{7f}"),
+            ("\u{9b}2J", "\\u{9b}2J"),
+            ("\u{202e}txt.exe", "\\u{202e}txt.exe"),
+        ] {
+            assert_eq!(plain(text), shown);
+        }
+    }
+
+    #[test]
+    fn one_line_is_one_line() {
+        assert_eq!(one_line("\n a \n\n  b\r\nc"), "a; b; c");
+    }
 }

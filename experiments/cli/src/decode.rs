@@ -1,11 +1,10 @@
 //! `spts decode`: images, classes and places of sessions.
 
-use super::context::{Common, note, open_folder, print, print_json};
-use super::error::CliError;
-use super::extras::{DECODE_FILES, simulated_presses, write_decoded};
-use super::options::{decoders_named, network, seed, sorted, whole};
-use super::skin::skin_gains;
 use crate::Bars;
+use crate::context::{Common, note, open_folder, print, print_json};
+use crate::error::CliError;
+use crate::extras::{DECODE_FILES, simulated_presses, write_decoded};
+use crate::options::{decoders_named, network, seed, skin_gains, sorted, whole};
 use clap::Args;
 use serde::Serialize;
 use spts::Session;

@@ -1,9 +1,8 @@
 //! `spts design`: a skin for what somebody wants of it, and the check of its promise.
 
-use super::context::{Common, open_folder};
-use super::error::CliError;
-use super::options::{seed, whole, within};
-use super::progress::Bars;
+use crate::context::{Bars, Common, open_folder};
+use crate::error::CliError;
+use crate::options::{seed, whole, within};
 use clap::{Args, Subcommand};
 use spts_report::design::{FILES, read_design, write};
 use spts_studies::design::{DesignObjects, DesignStudy, WireChoice};

@@ -1,8 +1,8 @@
 //! `spts device`: the skin on a pseudo-terminal, for host software.
 
-use super::context::{note, print};
-use super::error::CliError;
-use super::options::{number, pressed, seed, whole};
+use crate::context::{note, print};
+use crate::error::CliError;
+use crate::options::{number, pressed, seed, whole};
 use clap::Args;
 use rustix::fs::{Mode as Access, OFlags, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};

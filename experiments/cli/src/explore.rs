@@ -1,9 +1,8 @@
 //! `spts explore`: what a large skin takes.
 
-use super::context::{Common, open_folder};
-use super::error::CliError;
-use super::options::{Side, seed, sorted, square, whole};
-use super::progress::Bars;
+use crate::context::{Bars, Common, open_folder};
+use crate::error::CliError;
+use crate::options::{Side, seed, sorted, square, whole};
 use clap::{Args, ValueEnum};
 use spts_circuit::Seeding;
 use spts_report::explore;

@@ -1,9 +1,8 @@
 //! `spts fidelity`: cost and error of every fidelity level of the contact.
 
-use super::context::{Common, note, open_folder};
-use super::error::CliError;
-use super::options::{seed, sorted, whole};
-use super::progress::Bars;
+use crate::context::{Bars, Common, note, open_folder};
+use crate::error::CliError;
+use crate::options::{seed, sorted, whole};
 use clap::Args;
 use spts_studies::fidelity::{FidelityStudy, SettingGrid};
 use std::path::PathBuf;

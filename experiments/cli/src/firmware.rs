@@ -1,9 +1,8 @@
 //! `spts firmware`: the cell's firmware on emulated controllers.
 
-use super::context::{Common, print};
-use super::error::CliError;
-use super::options::{number, whole, within};
-use super::progress::Bars;
+use crate::context::{Bars, Common, print};
+use crate::error::CliError;
+use crate::options::{number, whole, within};
 use clap::builder::TypedValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use spts::output::{NpyFile, OutputError, check_writable};

@@ -1,11 +1,16 @@
 //! Commands that need the physics engine, the studies or the figures.
 
+use crate::context::progress;
 use crate::error::CliError;
 use crate::{
     budget, calibrate, circuit, compare, design, explore, fidelity, firmware, live, readouts, reproduce, sensing,
     simulate, validate,
 };
 use clap::Subcommand;
+use spts_contact::objects::OBJECTS;
+use spts_eval::training::Skins;
+use spts_eval::{ScoredSession, Source, TwinSessions};
+use spts_models::SkinLayout;
 
 #[derive(Debug, Subcommand)]
 pub(super) enum FullCommand {
@@ -45,4 +50,37 @@ impl FullCommand {
             Self::Sensing(command) => command.run(),
         }
     }
+}
+
+pub(crate) use spts_report::decode::{FILES as DECODE_FILES, write as write_decoded};
+pub(crate) use spts_report::score::{write as write_board, write_anytime, write_in_time};
+
+/// Where the commands are that this program lacks: it has all.
+pub(crate) const COMMANDS_ELSEWHERE: &str = "";
+
+/// Sessions of `scenes`, simulated now.
+pub(crate) fn simulated_sessions(scenes: &[String], seed: u64, quick: bool) -> Result<Source, CliError> {
+    let scenes = scenes.to_vec();
+    let twin = TwinSessions { scenes, seed, quick };
+    let bar = progress(twin.steps(), "simulating presses");
+    let set = twin.simulate(&|| bar.inc(1));
+    bar.finish_and_clear();
+    Ok(Source::new(set?)?)
+}
+
+/// Simulated presses of every object on as many skins as the default says, made once for all sources that need them.
+/// The skins have the `layout` of the scored one, and usual gains; with `median`, gain 1 everywhere.
+pub(crate) fn simulated_presses(layout: SkinLayout, median: bool, seed: u64) -> Result<Vec<ScoredSession>, CliError> {
+    let skins = if median {
+        Skins::median(layout)
+    } else {
+        Skins {
+            layout,
+            ..Skins::default()
+        }
+    };
+    let bar = progress(skins.skins * OBJECTS.len(), "simulated presses");
+    let sessions = skins.press(seed, &|| bar.inc(1));
+    bar.finish_and_clear();
+    sessions.map_err(|e| CliError::usage(format!("simulated presses: {e}")))
 }

@@ -8,8 +8,6 @@ mod calibrate;
 mod circuit;
 #[cfg(feature = "full")]
 mod compare;
-#[cfg(feature = "full")]
-mod compare_arm;
 mod context;
 mod dataset;
 mod decode;
@@ -19,7 +17,6 @@ mod device;
 mod error;
 #[cfg(feature = "full")]
 mod explore;
-mod extras;
 #[cfg(feature = "full")]
 mod fidelity;
 #[cfg(feature = "full")]
@@ -33,11 +30,9 @@ mod live;
     expect(dead_code, reason = "some belong to commands that are left out")
 )]
 mod options;
-mod progress;
 #[cfg(feature = "full")]
 mod readouts;
 mod record;
-mod refusal;
 #[cfg(feature = "full")]
 mod reproduce;
 mod score;
@@ -45,18 +40,20 @@ mod score;
 mod sensing;
 #[cfg(feature = "full")]
 mod simulate;
-mod skin;
-mod terminal;
 #[cfg(feature = "full")]
 mod validate;
+#[cfg(not(feature = "full"))]
+mod without;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
-pub use context::{Common, note, note_error};
-pub use error::CliError;
-pub use progress::Bars;
-pub use refusal::refusal;
+pub use context::{Bars, Common, note, note_error};
+pub use error::{CliError, refusal};
+#[cfg(feature = "full")]
+use full as extras;
 use std::ffi::OsString;
 use std::io::IsTerminal as _;
+#[cfg(not(feature = "full"))]
+use without as extras;
 
 /// Digital twin of the single-pixel tactile skin: simulate contacts, record them through the one-wire readout,
 /// reconstruct and score them beside recordings of the real skin.

@@ -1,8 +1,8 @@
 //! `spts live`: the skin under the mouse, on a page of this machine.
 
-use super::context::{Common, note, print};
-use super::error::CliError;
-use super::options::{pressed, seed};
+use crate::context::{Common, note, print};
+use crate::error::CliError;
+use crate::options::{pressed, seed};
 use clap::Args;
 use spts_contact::objects::ObjectSpec;
 use spts_live::{LiveConfig, Server};

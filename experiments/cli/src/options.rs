@@ -1,11 +1,13 @@
 //! Options that several commands have.
 
-use super::error::CliError;
+use crate::error::CliError;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use spts::chain::MAX_TOML_BYTES;
 use spts_contact::objects::{ObjectSpec, pressable};
 use spts_eval::Sensing;
 use spts_eval::decoders::{DECODERS, DecoderSpec, find};
 use spts_eval::training::TrainedNetwork;
+use spts_models::{SkinLayout, TaxelGains};
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -127,4 +129,16 @@ pub(super) fn decoders_named(names: &[String]) -> Result<Vec<&'static DecoderSpe
 /// [`CliError`] when it holds none.
 pub(super) fn network(path: &Path) -> Result<TrainedNetwork, CliError> {
     TrainedNetwork::open(path).map_err(|e| CliError::usage(format!("`--weights`: {e}")))
+}
+
+/// The gains in the file `path`, of a skin of this `layout`.
+///
+/// # Errors
+/// [`CliError`] with the file and what is wrong with it.
+pub(crate) fn skin_gains(path: &Path, layout: &SkinLayout) -> Result<TaxelGains, CliError> {
+    let failed = |reason: String| CliError::usage(format!("{}: {reason}", path.display()));
+    let text = spts_input::read_text(path, MAX_TOML_BYTES).map_err(|error| failed(error.to_string()))?;
+    let gains = TaxelGains::from_toml(&text).map_err(&failed)?;
+    gains.check_skin(layout).map_err(|error| failed(error.to_string()))?;
+    Ok(gains)
 }

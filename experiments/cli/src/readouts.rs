@@ -1,9 +1,8 @@
 //! `spts readouts`: few-wire readouts side by side.
 
-use super::context::{Common, open_folder};
-use super::error::CliError;
-use super::options::{Side, seed, sorted, square, whole};
-use super::progress::Bars;
+use crate::context::{Bars, Common, open_folder};
+use crate::error::CliError;
+use crate::options::{Side, seed, sorted, square, whole};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use spts_report::readouts::{FILES, write};

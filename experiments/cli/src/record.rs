@@ -1,9 +1,9 @@
 //! `spts record`: reads a device into a session.
 
-use super::context::{Common, note, progress};
-use super::device::DeviceMode;
-use super::error::CliError;
-use super::options::{whole, within};
+use crate::context::{Common, note, progress};
+use crate::device::DeviceMode;
+use crate::error::CliError;
+use crate::options::{whole, within};
 use clap::Args;
 use serde::Serialize;
 use serial2::SerialPort;

@@ -1,9 +1,8 @@
 //! `spts reproduce`: the whole report.
 
-use super::context::{Common, note_earlier};
-use super::error::CliError;
-use super::options::seed;
-use super::progress::Bars;
+use crate::context::{Bars, Common, note_earlier};
+use crate::error::CliError;
+use crate::options::seed;
 use clap::Args;
 use spts_report::reproduce::{Reproduction, ReproductionSummary};
 use std::path::PathBuf;

@@ -1,26 +1,32 @@
 //! `spts score`: decoders side by side on recordings.
 
-mod anytime;
-mod earlier;
-mod in_time;
-mod settings;
-mod training;
-
-use super::context::{Common, open_folder, print, print_json, progress, spinner};
-use super::error::CliError;
-use super::extras::write_board;
-use super::options::{number, seed, sensing, whole, within};
+use crate::context::{Common, note, open_folder, print, progress, spinner};
+use crate::error::CliError;
+use crate::extras::{simulated_presses, simulated_sessions, write_anytime, write_board, write_in_time};
+use crate::options::{
+    decoders_named, network, number, seed, sensing, skin_gains, sorted, sorted_numbers, whole, within,
+};
 use clap::Args;
-use earlier::{check_board, note_differences, read_board, verdict};
 use serde::Serialize;
-use spts::output::write_json;
-use spts_eval::algorithm::{DecodeError, ExternalError};
-use spts_eval::board::{BoardSettings, Difference, FILES, Regression, ScoreBoard, differences, regressions, table};
+use spts::output::{OutputError, OutputFolder, check_writable, write_json};
+use spts_contact::objects::OBJECTS;
+use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
+use spts_eval::anytime::{self, StopSettings};
+use spts_eval::board::{
+    BoardSettings, Difference, FILES, Regression, ScoreBoard, TrainedBoard, differences, regressions, table,
+};
 use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
-use spts_eval::training::PUBLISHED;
-use spts_eval::{ScoreError, Sensing, Source};
+use spts_eval::in_time;
+use spts_eval::training::{
+    CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainedNetwork, TrainingSource,
+    simulated_gain_sd,
+};
+use spts_eval::{ScoreError, ScoredSession, Sensing, Source, slips_text};
+use spts_models::SkinLayout;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
 
 /// Scores decoders side by side on recordings of a skin.
 ///
@@ -201,6 +207,9 @@ pub(super) struct ScoreCommand {
     common: Common,
 }
 
+/// The default numbers of measurements of `--in-time`.
+const IN_TIME_MEASUREMENTS: [usize; 4] = [5, 7, 10, 20];
+
 /// Folder of the results when none is named.
 const DEFAULT_OUT: &str = "out/score";
 
@@ -257,27 +266,207 @@ impl ScoreCommand {
             .as_ref()
             .map(|before| regressions(before, &board, self.tolerance));
         let apart = before.as_ref().map(|before| differences(before, &board));
-        // printed first, so that a disk that is full does not cost the run
-        if self.common.json {
-            print_json(&BoardOutput {
-                board: &board,
-                regressions: found.as_deref(),
-                differences: apart.as_deref(),
-            })?;
-        } else {
-            print(&table(&board))?;
-        }
+        let shown = BoardOutput {
+            board: &board,
+            regressions: found.as_deref(),
+            differences: apart.as_deref(),
+        };
+        self.show(&shown, table(&board))?;
         write_board(&board, out)?;
         if let Some(path) = &self.save {
             write_json(path, &board)?;
         }
-        if !self.common.json {
-            print(&format!("\ntables and figures: {}", path.display()))?;
-        }
+        self.note_folder(DEFAULT_OUT)?;
         if let Some(file) = &self.against {
             note_differences(file, apart.as_deref().unwrap_or_default());
         }
         verdict(found.as_deref().unwrap_or_default())
+    }
+
+    /// Runs the command with `--anytime`.
+    fn stop_early(&self) -> Result<(), CliError> {
+        let wanted = self.wanted()?;
+        let can = |settings: &BoardSettings| {
+            let unable = settings.decoders.iter().find(|spec| !spec.anytime);
+            unable.map(|spec| ScoreError::no_confidence(spec.name).to_string())
+        };
+        let (board, out) = self.special("out/anytime", anytime::FILES, &can, &|ready, done| {
+            ready.stops(&wanted, done)
+        })?;
+        self.show(&board, anytime::table(&board))?;
+        write_anytime(&board, out)?;
+        self.note_folder("out/anytime")
+    }
+
+    /// Runs the command with `--in-time`.
+    fn follow_in_time(&self) -> Result<(), CliError> {
+        let can = |settings: &BoardSettings| {
+            let unable = settings.decoders.iter().find(|spec| spec.name != "nn_lmmse");
+            let unable = unable.map(|spec| ScoreError::not_in_time(spec.name).to_string());
+            unable.or_else(|| {
+                let reason = "chosen rows have no order in time; leave it out with `--in-time`";
+                (settings.sensing != [Sensing::Random]).then(|| format!("`--sensing`: {reason}"))
+            })
+        };
+        let (board, out) = self.special("out/in_time", in_time::FILES, &can, &|ready, done| ready.in_time(done))?;
+        self.show(&board, in_time::table(&board))?;
+        write_in_time(&board, out)?;
+        self.note_folder("out/in_time")
+    }
+
+    /// A board of another kind, by `score`, and the folder for its `files`, unless `refused` has a reason against it.
+    fn special<B>(
+        &self,
+        folder: &str,
+        files: &[&str],
+        refused: &dyn Fn(&BoardSettings) -> Option<String>,
+        score: &dyn Fn(&TrainedBoard<'_>, &(dyn Fn() + Sync)) -> Result<B, ScoreError>,
+    ) -> Result<(B, OutputFolder), CliError> {
+        self.common.start()?;
+        let out = open_folder(self.out(folder), files)?;
+        let settings = self.settings()?;
+        if let Some(reason) = refused(&settings) {
+            return Err(CliError::usage(reason));
+        }
+        let source = self.source()?;
+        let settings = BoardSettings {
+            training: self.training(&source)?,
+            ..settings
+        };
+        let learning = spinner("learning");
+        let ready = settings.learn(&source).map_err(|e| explained(&e, &source))?;
+        drop(learning);
+        let bar = progress(ready.steps(), "presses");
+        let board = score(&ready, &|| bar.inc(1));
+        bar.finish_and_clear();
+        Ok((board.map_err(|e| explained(&e, &source))?, out))
+    }
+
+    /// Prints a board before it is written, so that a disk that is full does not cost the run.
+    fn show(&self, board: &impl Serialize, table: String) -> Result<(), CliError> {
+        self.common.print(board, || table)
+    }
+
+    /// Says where the results are.
+    fn note_folder(&self, default: &str) -> Result<(), CliError> {
+        if self.common.json {
+            return Ok(());
+        }
+        print(&format!("\ntables and figures: {}", self.out(default).display()))
+    }
+
+    /// The wanted confidences.
+    fn wanted(&self) -> Result<StopSettings, CliError> {
+        if let Some(outside) = self.confidence.iter().find(|p| !(**p > 0.5 && **p < 1.0)) {
+            return Err(CliError::usage(format!(
+                "`--confidence` = {outside} is outside (0.5, 1)"
+            )));
+        }
+        if self.confidence.is_empty() {
+            return Ok(StopSettings::default());
+        }
+        let wanted = sorted_numbers(self.confidence.clone());
+        Ok(StopSettings {
+            class: wanted.clone(),
+            image: wanted,
+        })
+    }
+
+    /// The sessions that are scored; a note says which of them slip.
+    fn source(&self) -> Result<Source, CliError> {
+        let source = match &self.twin {
+            Some(scenes) => simulated_sessions(scenes, self.seed, self.quick)?,
+            None => Source::open(self.recordings.as_deref().unwrap_or(Path::new("")))?,
+        };
+        if let Some(text) = slips_text(&source.slips) {
+            note(&format!("note: {text}"));
+        }
+        Ok(source)
+    }
+
+    /// What is learned from to score `scored`.
+    fn training(&self, scored: &Source) -> Result<Vec<TrainingSource>, CliError> {
+        let mut skins = SimulatedSkins::default();
+        if self.left_out && self.learn_from.iter().any(|name| name.ends_with(".toml")) {
+            note(
+                "note: gains in a file may have been fitted to the objects that are left out; `calibrated` leaves them out",
+            );
+        }
+        let training = self.learn_from.iter();
+        training
+            .map(|name| training_source(name, scored, self.seed, &mut skins))
+            .collect()
+    }
+
+    /// The same without decoders that nobody named and that have no weights for the skin.
+    fn fitting(&self, mut settings: BoardSettings, scored: &Source) -> BoardSettings {
+        let layout = &scored.layout;
+        let fits = TrainedNetwork::shipped().on([layout.rows(), layout.cols()]);
+        if let (true, None, Err(error)) = (self.decoder.is_empty(), &self.weights, fits) {
+            let before = settings.decoders.len();
+            settings.decoders.retain(|spec| spec.name != "amortised");
+            if settings.decoders.len() < before {
+                note(&format!("note: left out: {error}"));
+            }
+        }
+        settings
+    }
+
+    /// What is scored, but for what it learns from.
+    fn settings(&self) -> Result<BoardSettings, CliError> {
+        let decoders = if self.decoder.is_empty() {
+            if self.in_time {
+                decoders_named(&["nn_lmmse".to_owned()])?
+            } else if self.anytime {
+                DECODERS.iter().filter(|spec| spec.anytime && spec.shown).collect()
+            } else if self.external.is_empty() {
+                let shapes = self.learn_from.iter().any(|name| name == SHAPES);
+                let unseen = DECODERS.iter().filter(|spec| shapes && spec.needs.shapes());
+                BoardSettings::shown().into_iter().chain(unseen).collect()
+            } else {
+                Vec::new()
+            }
+        } else {
+            decoders_named(&self.decoder)?
+        };
+        let external = self.external.iter().map(|text| ExternalCommand {
+            limit: Duration::from_secs_f64(self.external_timeout),
+            ..ExternalCommand::parse(text)
+        });
+        let external: Vec<Arc<dyn Contender>> = external.map(|e| Arc::new(e) as Arc<dyn Contender>).collect();
+        let names = decoders.iter().map(|d| d.name).chain(external.iter().map(|e| e.name()));
+        let names: Vec<&str> = names.collect();
+        if let Some((k, name)) = names.iter().enumerate().find(|(k, name)| names[..*k].contains(*name)) {
+            let option = if k < decoders.len() { "--decoder" } else { "--external" };
+            return Err(CliError::usage(format!(
+                "`{option}`: {name:?} is there twice; give every one a name of its own"
+            )));
+        }
+        let mut measurements: Vec<usize> = self.measurements.iter().map(|m| *m as usize).collect();
+        if measurements.is_empty() {
+            measurements = if self.in_time {
+                IN_TIME_MEASUREMENTS.to_vec()
+            } else {
+                BoardSettings::MEASUREMENTS.to_vec()
+            };
+        }
+        Ok(BoardSettings {
+            decoders,
+            external,
+            measurements: sorted(measurements),
+            objects: self.object.clone(),
+            localisation: if self.no_ball || self.anytime {
+                Vec::new()
+            } else {
+                BoardSettings::LOCALISATION.to_vec()
+            },
+            left_out: self.left_out,
+            sensing: sorted(self.sensing.clone()),
+            training: Vec::new(),
+            network: self.weights.as_deref().map(network).transpose()?,
+            times: !self.no_times,
+            seed: self.seed,
+        })
     }
 
     /// Folder of the results, `default` when none is named.
@@ -322,4 +511,156 @@ fn list() -> String {
     });
     let lines: Vec<String> = lines.collect();
     format!("{}\n\n* shown when no decoder is named", lines.join("\n"))
+}
+
+/// Says what this board and the earlier one, which is in `file`, do not have in common.
+fn note_differences(file: &Path, found: &[Difference]) {
+    let file = file.display();
+    for Difference {
+        what,
+        only_before,
+        only_now,
+    } in found
+    {
+        let sides = [
+            (format!("only in {file}"), only_before),
+            ("only in this run".to_owned(), only_now),
+        ];
+        let sides = sides.iter().filter(|(_, names)| !names.is_empty());
+        let sides: Vec<String> = sides
+            .map(|(side, names)| format!("{side}: {}", names.join(", ")))
+            .collect();
+        let means = if *what == "objects" {
+            "; the means are over different objects"
+        } else {
+            ""
+        };
+        note(&format!("note: {what} {}{means}", sides.join("; ")));
+    }
+}
+
+/// Says which scores fell, and which rows of the earlier board this one lacks.
+///
+/// # Errors
+/// [`CliError::Differs`] when there are any.
+fn verdict(found: &[Regression]) -> Result<(), CliError> {
+    if found.is_empty() {
+        return Ok(());
+    }
+    for r in found {
+        if let Some(now) = r.now {
+            note(&format!("{}: {} was {:.4}, is {now:.4}", r.what, r.score, r.before));
+        }
+    }
+    let gone: Vec<&Regression> = found.iter().filter(|r| r.now.is_none()).collect();
+    for row in gone.chunk_by(|a, b| a.what == b.what) {
+        let scores: Vec<&str> = row.iter().map(|r| r.score).collect();
+        note(&format!(
+            "{}: not scored in this run: {}",
+            row[0].what,
+            scores.join(", ")
+        ));
+    }
+    let fell = found.len() - gone.len();
+    Err(CliError::Differs(format!(
+        "{fell} scores fell, {} are gone",
+        gone.len()
+    )))
+}
+
+/// Refuses to save a board where one cannot be written, and in place of a file that is no board.
+fn check_board(path: &Path) -> Result<(), CliError> {
+    check_writable(path)?;
+    if path.exists() && read_board(path).is_err() {
+        return Err(OutputError::NotOurs { path: path.to_owned() }.into());
+    }
+    Ok(())
+}
+
+/// Largest board that is read, bytes: one of all decoders, sources and objects has less than 1 MB.
+const MAX_BOARD_BYTES: u64 = 1 << 25;
+
+/// The board in a file that `--save` wrote.
+fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
+    let usage = |e: &dyn std::fmt::Display| {
+        CliError::usage(format!("{}: not a board as --save writes it: {e}", path.display()))
+    };
+    let text = spts_input::read_text(path, MAX_BOARD_BYTES).map_err(|e| usage(&e))?;
+    serde_json::from_str(&text).map_err(|e| usage(&e))
+}
+
+/// Name of what is learned from the objects in all their poses.
+const SIMULATION: &str = "simulation";
+/// Name of what is learned from simulated skins on which the objects lie as in the published recordings.
+const SIMULATION_FITTED: &str = "simulation_fitted";
+
+/// Simulated presses, made once for all sources that need them.
+#[derive(Debug, Default)]
+struct SimulatedSkins {
+    usual: Option<Vec<ScoredSession>>,
+    median: Option<Vec<ScoredSession>>,
+}
+
+/// The source `name` for decoders that are scored on `scored`; simulated skins are pressed once and kept in `skins`.
+///
+/// # Errors
+/// [`CliError`] when a folder cannot be opened or nothing can be simulated on the skin.
+fn training_source(
+    name: &str,
+    scored: &Source,
+    seed: u64,
+    skins: &mut SimulatedSkins,
+) -> Result<TrainingSource, CliError> {
+    let mut presses = |median: bool| -> Result<Vec<ScoredSession>, CliError> {
+        let skins = if median { &mut skins.median } else { &mut skins.usual };
+        if let Some(sessions) = skins {
+            return Ok(sessions.clone());
+        }
+        let sessions = simulated_presses(scored.layout, median, seed)?;
+        Ok(skins.insert(sessions).clone())
+    };
+    Ok(match name {
+        PUBLISHED => TrainingSource::Published,
+        RASTER => TrainingSource::Raster,
+        SHAPES => TrainingSource::Shapes,
+        SIMULATION => TrainingSource::Poses {
+            name: SIMULATION.to_owned(),
+            objects: posed_objects(&scored.layout, seed)?,
+        },
+        SIMULATION_FITTED => TrainingSource::Other {
+            name: SIMULATION_FITTED.to_owned(),
+            sessions: presses(false)?,
+            all: true,
+            gain_sd: simulated_gain_sd(),
+        },
+        CALIBRATED => TrainingSource::Calibrated {
+            name: CALIBRATED.to_owned(),
+            simulated: presses(true)?,
+            gains: None,
+        },
+        file if Path::new(file).extension().is_some_and(|e| e == "toml") => TrainingSource::Calibrated {
+            name: file.to_owned(),
+            gains: Some(skin_gains(Path::new(file), &scored.layout)?),
+            simulated: presses(true)?,
+        },
+        dir => {
+            let source = Source::open(Path::new(dir))?;
+            // of the scored sessions themselves, the presses that are not scored
+            let all = source.simulated && !source.shares_raster(scored);
+            TrainingSource::Other {
+                name: dir.to_owned(),
+                sessions: source.sessions,
+                all,
+                gain_sd: if all { simulated_gain_sd() } else { 0.0 },
+            }
+        }
+    })
+}
+
+/// The objects in all the poses that they may have.
+fn posed_objects(layout: &SkinLayout, seed: u64) -> Result<Vec<PosedObject>, CliError> {
+    let bar = progress(OBJECTS.len(), "simulated objects");
+    let objects = PoseKnowledge::default().press(layout, seed, &|| bar.inc(1));
+    bar.finish_and_clear();
+    objects.map_err(|e| CliError::usage(format!("simulated objects: {e}")))
 }

@@ -1,9 +1,8 @@
 //! `spts sensing`: rows of the sensing matrix that are designed.
 
-use super::context::{Common, open_folder};
-use super::error::CliError;
-use super::options::{seed, whole, within};
-use super::progress::Bars;
+use crate::context::{Bars, Common, open_folder};
+use crate::error::CliError;
+use crate::options::{seed, whole, within};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use spts::SkinLayout;

@@ -1,25 +1,23 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-mod folder;
-mod scenes;
-
-use super::context::{Common, TICK, note, open_folder, progress, spinner};
-use super::error::CliError;
-use super::options::{number, seed, whole};
+use crate::context::{Common, TICK, note, open_folder, progress, spinner};
+use crate::error::CliError;
+use crate::options::{number, seed, whole};
 use clap::Args;
-use folder::default_folder;
-use scenes::SceneList;
+use serde::Serialize;
 use spts::Session;
-use spts::scene::{Assignment, Timestep};
-use spts::simulate::{Request, Summary, run};
+use spts::scene::{Assignment, MESH_COPY, Timestep};
+use spts::simulate::{Prepared, Request, Summary, run};
 use spts_contact::Frame;
-use spts_contact::objects::OBJECTS;
+use spts_contact::mesh::MAX_FILE_BYTES;
+use spts_contact::objects::{OBJECTS, pressable};
 use spts_eval::decode::{DecodeRequest, DecodedSession, LearnedDecoders};
 use spts_eval::decoders::find;
 use spts_eval::training::TrainingData;
 use spts_models::{SkinLayout, Streams};
 use spts_report::animation::Animation;
 use spts_report::simulation::{FILES, SimulationFiles};
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use toml::Value;
 
@@ -344,3 +342,120 @@ impl Learned {
 
 /// Most taxels of a skin that `spts simulate` decodes at its end: a second or two.
 const MOST_DECODED: usize = 1100;
+
+/// Everything that `SCENE` may be.
+#[derive(Debug, Serialize)]
+struct SceneList {
+    scenes: &'static [NamedScene],
+    objects: Vec<NamedObject>,
+}
+
+#[derive(Debug, Serialize)]
+struct NamedScene {
+    /// As it stands on the command line.
+    scene: &'static str,
+    about: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct NamedObject {
+    name: &'static str,
+    /// Number of its class; 0 for what has none.
+    label: u8,
+    about: &'static str,
+}
+
+const SCENES: &[NamedScene] = &[
+    NamedScene {
+        scene: "press/NAME",
+        about: "A robot arm presses the object NAME, one of those below, on the skin",
+    },
+    NamedScene {
+        scene: "press --mesh FILE",
+        about: "The arm presses a mesh of your own: .obj, .glb or .stl",
+    },
+    NamedScene {
+        scene: "bounce",
+        about: "A tennis ball falls on the skin and bounces",
+    },
+    NamedScene {
+        scene: "arm",
+        about: "A finger touches a skin that is wrapped round a robot's arm",
+    },
+    NamedScene {
+        scene: "FILE.toml",
+        about: "A scene file. Every run writes one, scene.toml, to start from",
+    },
+];
+
+impl SceneList {
+    fn new() -> Self {
+        let objects = pressable().map(|object| NamedObject {
+            name: object.name,
+            label: object.label,
+            about: object.description,
+        });
+        Self {
+            scenes: SCENES,
+            objects: objects.collect(),
+        }
+    }
+
+    /// The list, a line each.
+    fn text(&self) -> String {
+        let mut text = "Scenes:\n".to_owned();
+        for NamedScene { scene, about } in self.scenes {
+            let _ = writeln!(text, "  {scene:<18} {about}");
+        }
+        text += "\nObjects for press/NAME:\n";
+        for NamedObject { name, about, .. } in &self.objects {
+            let _ = writeln!(text, "  {name:<18} {about}");
+        }
+        text + "\nTry: spts simulate press/T"
+    }
+}
+
+/// Folder of all runs that name none.
+const OUT: &str = "out";
+
+/// `out/NAME`, where NAME is that of the scene: of the object, or of the file of a mesh. Where the results of another
+/// mesh, or of anything else, lie there, a mesh gets the first of `out/NAME_2`, `out/NAME_3`, … in which they do not.
+fn default_folder(prepared: &Prepared) -> PathBuf {
+    let named = |name: &str| Path::new(OUT).join(name);
+    let name = prepared.scene.name();
+    let is_mesh = |(file, _): &&(String, Vec<u8>)| Path::new(file).file_stem() == Some(MESH_COPY.as_ref());
+    let Some((file, bytes)) = prepared.copies.iter().find(is_mesh) else {
+        return named(name);
+    };
+    // the same mesh, whatever its force and place: a run that replaces the one before
+    let same = |folder: &Path| spts_input::read(&folder.join(file), MAX_FILE_BYTES).is_ok_and(|there| there == *bytes);
+    let others = (2_u32..).map(|number| named(&format!("{name}_{number}")));
+    let mut folders = [named(name)].into_iter().chain(others);
+    let free = folders.find(|folder| !folder.exists() || same(folder));
+    free.unwrap_or_else(|| named(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts::simulate::NAMED_SCENES;
+
+    /// Every scene that ships is listed, and what is listed can be simulated.
+    #[test]
+    fn the_list_is_complete() {
+        let list = SceneList::new();
+        for (name, _) in NAMED_SCENES {
+            assert!(list.scenes.iter().any(|scene| scene.scene == *name), "{name}");
+        }
+        let plain = list.scenes.iter().map(|scene| scene.scene.to_owned());
+        let plain = plain.filter(|scene| !scene.contains(|c: char| c.is_uppercase()));
+        let objects = list.objects.iter().map(|object| format!("press/{}", object.name));
+        for scene in plain.chain(objects) {
+            let request = Request {
+                scene,
+                ..Request::default()
+            };
+            request.prepare().unwrap();
+        }
+    }
+}

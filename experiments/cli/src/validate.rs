@@ -1,8 +1,8 @@
 //! `spts validate`: the real skin's scores.
 
-use super::context::{Common, note, progress, spinner};
-use super::error::CliError;
-use super::options::parse_measurements;
+use crate::context::{Common, note, progress, spinner};
+use crate::error::CliError;
+use crate::options::parse_measurements;
 use clap::Args;
 use serde::Serialize;
 use spts_eval::PublishedSkin;

@@ -1,10 +1,9 @@
 //! `spts dataset export`.
 
-use super::make::Files;
-use crate::context::{print, print_json};
+use super::Files;
+use crate::context::{Bars, print, print_json};
 use crate::error::CliError;
 use crate::options::whole;
-use crate::progress::Bars;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use spts_dataset::{EXPORTS, ExportOptions};
