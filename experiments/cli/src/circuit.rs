@@ -6,8 +6,8 @@ use crate::options::{number, whole, within};
 use clap::Args;
 use serde::Serialize;
 use spts_circuit::amplifier::{Network, Remedied, Skin};
-use spts_report::electronics::write;
-use spts_studies::electronics::{ElectronicsStudy, TABLE_TAXELS, text};
+use spts_report::electronics::{TABLE_TAXELS, text, write};
+use spts_studies::electronics::ElectronicsStudy;
 use std::path::PathBuf;
 
 /// Computes noise, bandwidth, settling, saturation and signal of the summing amplifier for a skin of any size, and what

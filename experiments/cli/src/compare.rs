@@ -127,7 +127,7 @@ impl CompareCommand {
             };
             let report = study.run(&Bars::default())?;
             spts_report::compare::write_arm(&report, out)?;
-            return self.common.print(&report, || report.text());
+            return self.common.print(&report, || spts_report::compare::arm_text(&report));
         }
         let pairs = read(&self.recordings)?;
         let slips: Vec<SessionSlip> = pairs.iter().flat_map(|pair| pair.slips.clone()).collect();
@@ -166,10 +166,14 @@ impl CompareCommand {
             self.out.join("figures")
         };
         let text = || {
-            let objects = objects
-                .as_ref()
-                .map_or_else(String::new, |found| format!("\n{}\n", found.text()));
-            format!("{}{objects}\nresults: {}", report.text(), folder.display())
+            let objects = objects.as_ref().map_or_else(String::new, |found| {
+                format!("\n{}\n", spts_report::per_object::text(found))
+            });
+            format!(
+                "{}{objects}\nresults: {}",
+                spts_report::compare::text(&report),
+                folder.display()
+            )
         };
         let printed = Printed {
             compared: &report,

@@ -78,7 +78,13 @@ impl FidelityCommand {
         let report = study.run(&out.folder("scenes")?, &Bars::default())?;
         spts_report::fidelity::write(&report, out)?;
         let folder = self.out.join("figures");
-        let text = || format!("{}\npictures: {}", report.text(), folder.display());
+        let text = || {
+            format!(
+                "{}\npictures: {}",
+                spts_report::fidelity::text(&report),
+                folder.display()
+            )
+        };
         self.common.print(&report, text)?;
         for refusal in report.refusals.iter().take(3) {
             note(&format!(

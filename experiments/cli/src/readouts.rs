@@ -104,7 +104,7 @@ impl ReadoutsCommand {
         let text = || {
             format!(
                 "{}\ntables and pictures: {}",
-                report.text().trim_end(),
+                spts_report::readouts::text(&report).trim_end(),
                 self.out.display()
             )
         };

@@ -4,7 +4,8 @@ use crate::figures::{Chart, FigureError, Series, Style, save_charts};
 use crate::labels::object_label;
 use crate::{ReportError, per_object, write_all_or_none};
 use spts::output::{OutputFolder, write_json, write_table};
-use spts_eval::decoders::{PublishedDecode, label};
+use spts_eval::Table;
+use spts_eval::decoders::{PublishedDecode, label, short_label};
 use spts_studies::arm::ArmReport;
 use spts_studies::calibrate::quantiles;
 use spts_studies::compare::{CompareReport, ComparedSession, ScoreCurves};
@@ -25,6 +26,79 @@ pub const FILES: &[&str] = &[
 
 /// Tables of the bent skin.
 const ARM: [&str; 2] = ["arm.csv", "arm.json"];
+
+/// A value with its standard error; a dash if it is undefined, such as the share of unexplained outliers when there are
+/// no outliers.
+#[must_use]
+pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
+    match error {
+        _ if value.is_nan() => "–".to_owned(),
+        Some(error) if !error.is_nan() => format!("{value:.digits$} ± {error:.digits$}"),
+        _ => format!("{value:.digits$}"),
+    }
+}
+
+/// Statistics and distances of the curves, or what was predicted, as text tables.
+#[must_use]
+pub fn text(report: &CompareReport) -> String {
+    let verdict = |ok| if ok { "ok" } else { "DIFFERS" };
+    if !report.predicted.is_empty() {
+        let inside = report.predicted.iter().filter(|row| row.inside).count();
+        let table = Table::new("predicted", &report.predicted)
+            .shown("session", |r| &r.session)
+            .shown("statistic", |r| r.name)
+            .shown("real", |r| r.real)
+            .digits(5)
+            .shown("twin", |r| r.twin)
+            .digits(5)
+            .shown("90 % of twins", |r| format!("{:.5} to {:.5}", r.low, r.high))
+            .shown("", |r| if r.inside { "inside" } else { "OUTSIDE" });
+        return format!("{}inside: {inside} of {}", table.text(), report.predicted.len());
+    }
+    let statistics = Table::new("compare", report.statistics.iter().chain(&report.not_modelled))
+        .shown("session", |s| &s.session)
+        .shown("statistic", |s| s.name)
+        .shown("real", |s| with_error(s.real, s.real_standard_error, 5))
+        .shown("twin", |s| with_error(s.twin, s.twin_standard_error, 5))
+        .shown("tolerance", |s| s.tolerance)
+        .shown("", move |s| s.ok.map_or("", verdict));
+    let mut out = statistics.text();
+    if !report.distances().is_empty() {
+        let curves = Table::new("curves", report.distances())
+            .shown("decoder", |c| short_label(c.decode))
+            .shown("score", |c| c.metric)
+            .shown("mean", |c| c.mean_abs_difference)
+            .digits(4)
+            .shown("largest", |c| c.max_abs_difference)
+            .digits(4)
+            .shown("allowed", |c| c.tolerance)
+            .digits(2)
+            .shown("", move |c| verdict(c.ok));
+        out.push_str(&format!("\n|twin − real| over M = 7 … 100\n{}", curves.text()));
+    }
+    out.trim_end().to_owned()
+}
+
+/// The statistics of the bent skin as a text table.
+#[must_use]
+pub fn arm_text(report: &ArmReport) -> String {
+    let table = Table::new("arm", &report.statistics)
+        .shown("statistic", |b| b.statistic)
+        .shown("unit", |b| b.unit)
+        .shown("real", |b| b.real)
+        .digits(3)
+        .shown("twin", |b| b.twin)
+        .digits(3)
+        .shown("90 % band", |b| format!("{:.3} – {:.3}", b.low, b.high))
+        .shown("", |b| if b.inside { "" } else { "outside" });
+    format!(
+        "{} ({} touches), twin: {} simulated bent skins (`spts simulate arm`)\n{}",
+        report.session,
+        report.touches,
+        report.skins,
+        table.text().trim_end()
+    )
+}
 
 /// Writes the tables of the bent skin into the folder `out`.
 ///
@@ -184,5 +258,20 @@ fn scores(curves: &ScoreCurves, decode: PublishedDecode) -> Chart {
         y_range: Some((0.0, 1.02)),
         series: all,
         ..Chart::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_formed_is_a_dash() {
+        assert_eq!(with_error(f64::NAN, Some(f64::NAN), 5), "–");
+        assert_eq!(with_error(f64::NAN, None, 5), "–");
+        assert_eq!(with_error(0.5, Some(f64::NAN), 2), "0.50");
+        assert_eq!(with_error(0.5, Some(0.125), 3), "0.500 ± 0.125");
+        let null = serde_json::to_string(&f64::NAN).unwrap();
+        assert_eq!(null, "null", "as a statistic is written");
     }
 }

@@ -1,10 +1,10 @@
 //! Files and figures of `spts circuit`.
 
-use crate::figures::{Chart, Series, Style, save_charts};
+use crate::figures::{Chart, Curve, Plot, Series, Style, save_charts};
 use crate::{ReportError, write_all_or_none};
-use serde::Serialize;
-use spts::output::{OutputFolder, write_csv, write_json};
+use spts::output::{OutputFolder, write_json};
 use spts_circuit::amplifier::{Budget, Remedied, Remedy};
+use spts_eval::{Cell, Table};
 use spts_studies::electronics::{ElectronicsReport, ElectronicsStudy};
 
 /// Files outside of folders of their own.
@@ -16,68 +16,88 @@ pub const FILES: &[&str] = &["circuit.csv", "parameters.json"];
 /// [`ReportError`] when a file cannot be written.
 pub fn write(study: &ElectronicsStudy, report: &ElectronicsReport, out: OutputFolder) -> Result<(), ReportError> {
     write_all_or_none(out, |out| {
-        write_csv(&out.path("circuit.csv"), &COLUMNS, report.rows.iter().map(line))?;
+        table(&report.rows).write(out)?;
         write_json(&out.path("parameters.json"), study)?;
         save_charts(&charts(report), &out.folder("figures")?, "circuit")?;
         Ok(())
     })
 }
 
-/// Columns of `circuit.csv`.
-const COLUMNS: [&str; 27] = [
-    "taxels",
-    "remedy",
-    "wires",
-    "amplifiers",
-    "levels",
-    "feedback_ohm",
-    "gain",
-    "noise_gain",
-    "bandwidth_hz",
-    "quality",
-    "settle_s",
-    "slew_s",
-    "noise_taxels_v",
-    "noise_feedback_v",
-    "noise_voltage_v",
-    "noise_current_v",
-    "noise_v_rms",
-    "adc_step_v",
-    "adc_noise_v",
-    "signal_v",
-    "snr_db",
-    "snr_adc_db",
-    "sum_rms_v",
-    "sum_worst_v",
-    "range_v",
-    "saturates",
-    "limit",
-];
+/// Sizes of the printed table.
+pub const TABLE_TAXELS: [u32; 5] = [100, 1000, 10_000, 100_000, 1_000_000];
 
-/// A line of `circuit.csv`.
-fn line(r: &Remedied) -> impl Serialize + use<> {
-    let b = &r.budget;
-    (
-        (r.taxels, r.remedy, r.wires, r.amplifiers, r.levels),
-        [r.feedback_ohm, r.gain, b.noise_gain, b.bandwidth_hz, b.quality],
-        [b.settle_s, b.slew_s],
-        [
-            b.noise_v.taxels,
-            b.noise_v.feedback,
-            b.noise_v.voltage,
-            b.noise_v.current,
-        ],
-        [
-            b.noise_v_rms,
-            b.adc_step_v,
-            b.adc_noise_v,
-            b.signal_v,
-            b.snr_db,
-            b.snr_adc_db,
-        ],
-        [b.sum_rms_v, b.sum_worst_v, b.range_v],
-        (b.saturates, b.limit.map_or("none", |l| l.name())),
+/// Skins of all sizes as a text table.
+#[must_use]
+pub fn text(rows: &[Remedied], available_s: f64) -> String {
+    format!(
+        "to settle in: {:.2} µs; SNR: one pressed taxel over the amplifier's noise, and with the converter's step\n\n{}",
+        available_s * 1e6,
+        table(rows).text()
     )
+}
+
+fn table(rows: &[Remedied]) -> Table<'_, &Remedied> {
+    Table::new("circuit", rows)
+        .column("taxels", "taxels", |r| r.taxels)
+        .file("remedy", |r| Cell::name_of(r.remedy))
+        .shown("readout", |r| r.remedy.name())
+        .column("wires", "wires", |r| r.wires)
+        .column("amplifiers", "amps", |r| r.amplifiers)
+        .file("levels", |r| r.levels)
+        .file("feedback_ohm", |r| r.feedback_ohm)
+        .file("gain", |r| r.gain)
+        .column("noise_gain", "noise gain", |r| r.budget.noise_gain)
+        .digits(4)
+        .file("bandwidth_hz", |r| r.budget.bandwidth_hz)
+        .shown("bandwidth", |r| scaled(r.budget.bandwidth_hz, "Hz"))
+        .file("quality", |r| r.budget.quality)
+        .file("settle_s", |r| r.budget.settle_s)
+        .file("slew_s", |r| r.budget.slew_s)
+        .shown("settle", |r| scaled(r.budget.settle_s + r.budget.slew_s, "s"))
+        .file("noise_taxels_v", |r| r.budget.noise_v.taxels)
+        .file("noise_feedback_v", |r| r.budget.noise_v.feedback)
+        .file("noise_voltage_v", |r| r.budget.noise_v.voltage)
+        .file("noise_current_v", |r| r.budget.noise_v.current)
+        .column("noise_v_rms", "noise", |r| r.budget.noise_v_rms)
+        .unit("mV", 1e3)
+        .digits(4)
+        .file("adc_step_v", |r| r.budget.adc_step_v)
+        .file("adc_noise_v", |r| r.budget.adc_noise_v)
+        .column("signal_v", "signal", |r| r.budget.signal_v)
+        .unit("mV", 1e3)
+        .digits(4)
+        .column("snr_db", "SNR, dB", |r| r.budget.snr_db)
+        .digits(1)
+        .column("snr_adc_db", "with ADC", |r| r.budget.snr_adc_db)
+        .digits(1)
+        .file("sum_rms_v", |r| r.budget.sum_rms_v)
+        .file("sum_worst_v", |r| r.budget.sum_worst_v)
+        .file("range_v", |r| r.budget.range_v)
+        .shown("4σ sum, V", |r| r.budget.excursion_v)
+        .digits(3)
+        .file("saturates", |r| r.budget.saturates)
+        .file("limit", |r| r.budget.limit.map_or("none", |l| l.name()))
+        .shown("limit", |r| r.budget.limit.map(|l| l.name()))
+}
+
+/// A number with a prefix of the SI, to three digits.
+fn scaled(value: f64, unit: &str) -> String {
+    let prefixes = [
+        (1e9, "G"),
+        (1e6, "M"),
+        (1e3, "k"),
+        (1.0, ""),
+        (1e-3, "m"),
+        (1e-6, "µ"),
+        (1e-9, "n"),
+    ];
+    let (scale, prefix) = prefixes
+        .into_iter()
+        .find(|(scale, _)| value >= *scale)
+        .unwrap_or((1e-9, "n"));
+    let lead = value / scale;
+    let decimals = if lead < 10.0 { 2 } else { usize::from(lead < 100.0) };
+    format!("{lead:.decimals$} {prefix}{unit}")
 }
 
 /// Ink of every remedy, in the order of [`Remedy::ALL`].
@@ -89,22 +109,17 @@ const BOUND: Style = Style::Baseline;
 fn charts(report: &ElectronicsReport) -> Vec<Chart> {
     let rows = report.rows.as_slice();
     let range_v = rows.first().map_or(f64::NAN, |r| r.budget.range_v);
-    let panel = |title: &str, y_label: &str, y_log: bool, get: &dyn Fn(&Remedied) -> f64| Chart {
-        title: title.to_owned(),
-        x_label: "taxels".to_owned(),
-        y_label: y_label.to_owned(),
-        x_log: true,
-        y_log,
-        series: Remedy::ALL
-            .into_iter()
-            .zip(STYLES)
-            .map(|(remedy, (style, variant))| {
-                let of = rows.iter().filter(|r| r.remedy == remedy);
-                let points = of.map(|r| (f64::from(r.taxels), get(r))).collect();
-                Series::new(remedy.name(), style, variant, points)
-            })
-            .collect(),
-        ..Chart::default()
+    let panel = |title: &str, y_label: &str, y_log: bool, get: &dyn Fn(&Remedied) -> f64| {
+        let curve = |r: &Remedied| {
+            let place = Remedy::ALL.iter().position(|remedy| *remedy == r.remedy).unwrap_or(0);
+            Curve::new(r.remedy.name(), STYLES[place].0, STYLES[place].1)
+        };
+        let plot = Plot::new(rows)
+            .x("taxels", |r| f64::from(r.taxels))
+            .log_x()
+            .y(y_label, get)
+            .by(curve);
+        if y_log { plot.log_y() } else { plot }.chart(title)
     };
     let with = |mut chart: Chart, name: &str, level: f64| {
         let ends = [rows.first(), rows.last()].into_iter().flatten();
@@ -177,5 +192,17 @@ fn sources(rows: &[Remedied]) -> Chart {
             of("converter's step", BOUND, 0, |b| b.adc_noise_v),
         ],
         ..Chart::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_three_digits_and_a_prefix() {
+        assert_eq!(scaled(2.197e6, "Hz"), "2.20 MHz");
+        assert_eq!(scaled(27.6e3, "Hz"), "27.6 kHz");
+        assert_eq!(scaled(438e-6, "s"), "438 µs");
     }
 }

@@ -3,26 +3,10 @@
 use crate::figures::colour::heat;
 use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow, save_charts, save_sheet};
 use crate::{Origin, ReportError, write_all_or_none};
-use serde::Serialize;
 use spts::output::{OutputFolder, write_bytes, write_json, write_table};
-use spts_eval::unique;
+use spts_eval::{Table, unique};
 use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
-use spts_studies::fidelity::{FidelityReport, FinePressure, SettingMeans, setting_means};
-
-/// A line without what depends on the machine.
-#[derive(Debug, Serialize)]
-struct ErrorRow<'a> {
-    scene: &'a str,
-    #[serde(rename = "rung")]
-    level: &'a str,
-    cells: &'a str,
-    timestep_s: f64,
-    pressure_rms_rel: f64,
-    taxel_rms_rel: f64,
-    support_delta: f64,
-    iou_delta: f64,
-    class_delta: f64,
-}
+use spts_studies::fidelity::{FidelityReport, FinePressure};
 
 /// Files outside of folders of their own.
 pub const FILES: &[&str] = &[
@@ -39,11 +23,21 @@ pub const FILES: &[&str] = &[
 /// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
 pub fn write(report: &FidelityReport, out: OutputFolder) -> Result<(), ReportError> {
     write_all_or_none(out, |out| {
-        let errors: Vec<ErrorRow<'_>> = report.rows.iter().map(ErrorRow::from).collect();
-        write_table(&out.path("errors.csv"), &errors)?;
+        // without what depends on the machine
+        Table::new("errors", &report.rows)
+            .file("scene", |r| &r.scene)
+            .file("rung", |r| &r.level)
+            .file("cells", |r| &r.cells)
+            .file("timestep_s", |r| r.timestep_s)
+            .file("pressure_rms_rel", |r| r.pressure_rms_rel)
+            .file("taxel_rms_rel", |r| r.taxel_rms_rel)
+            .file("support_delta", |r| r.support_delta)
+            .file("iou_delta", |r| r.iou_delta)
+            .file("class_delta", |r| r.class_delta)
+            .write(out)?;
         write_table(&out.path("fidelity.csv"), &report.rows)?;
         write_table(&out.path("refused.csv"), &report.refusals)?;
-        write_bytes(&out.path("summary.md"), report.text().as_bytes())?;
+        write_bytes(&out.path("summary.md"), text(report).as_bytes())?;
         let folder = out.folder("figures")?;
         save_charts(&pareto(&report.rows), &folder, "pareto")?;
         save_sheet(&pressures(&report.rows, &report.fine), &folder, "pressure")?;
@@ -52,20 +46,115 @@ pub fn write(report: &FidelityReport, out: OutputFolder) -> Result<(), ReportErr
     })
 }
 
-impl<'a> From<&'a MeasuredSetting> for ErrorRow<'a> {
-    fn from(row: &'a MeasuredSetting) -> Self {
-        Self {
-            scene: &row.scene,
-            level: &row.level,
-            cells: &row.cells,
-            timestep_s: row.timestep_s,
-            pressure_rms_rel: row.pressure_rms_rel,
-            taxel_rms_rel: row.taxel_rms_rel,
-            support_delta: row.support_delta,
-            iou_delta: row.iou_delta,
-            class_delta: row.class_delta,
+/// The means over the scenes as Markdown tables, which are readable as plain text too.
+#[must_use]
+pub fn text(report: &FidelityReport) -> String {
+    let mut out = String::new();
+    for (task, heading) in [("press", "Presses"), ("drop", "Drops")] {
+        let lines = setting_means(&report.rows, task);
+        let Some(scenes) = lines.iter().map(|o| o.scenes).max() else {
+            continue;
+        };
+        let table = Table::new("means", &lines)
+            .shown("fidelity level", |o| label(&o.first.level))
+            .shown("cells", |o| &o.first.cells)
+            .shown("step", |o| o.first.timestep_s)
+            .unit("ms", 1e3)
+            .shown("µs/step", |o| o.cost_us_per_step)
+            .digits(1)
+            .shown("s a second", |o| o.cost_s_per_s)
+            .digits(4)
+            .shown("pressure", |o| o.pressure_rms_rel)
+            .digits(4)
+            .shown("taxels", |o| o.taxel_rms_rel)
+            .digits(4)
+            .shown("worst", |o| o.worst_taxel_rms_rel)
+            .digits(4)
+            .shown("support", |o| o.support_change)
+            .digits(3)
+            .shown("IoU", |o| o.iou_change)
+            .digits(3)
+            .shown("class", |o| o.class_change)
+            .digits(3);
+        out.push_str(&format!(
+            "{heading}: mean over {scenes} scenes; errors against the layer at its finest, changes of the scores in size\n\n{}\n",
+            table.text()
+        ));
+    }
+    if !report.refusals.is_empty() {
+        out.push_str(&format!(
+            "{} settings were refused (refused.csv)\n",
+            report.refusals.len()
+        ));
+    }
+    out
+}
+
+/// Cost and error of one contact model, resolution and time step: means over all scenes of one kind, presses or drops.
+#[derive(Debug, Clone, PartialEq)]
+struct SettingMeans<'a> {
+    /// Row of the first scene. All rows share its level, resolution and time step.
+    first: &'a MeasuredSetting,
+    /// Number of scenes with this setting.
+    scenes: usize,
+    /// Wall time of a time step, µs.
+    cost_us_per_step: f64,
+    /// Wall time of a simulated second, s.
+    cost_s_per_s: f64,
+    /// Error of the fine pressure, relative root mean square.
+    pressure_rms_rel: f64,
+    /// Error of the taxels' pressures, relative root mean square.
+    taxel_rms_rel: f64,
+    /// Largest error of the taxels' pressures over the scenes, relative root mean square.
+    worst_taxel_rms_rel: f64,
+    /// Absolute change of the support accuracy.
+    support_change: f64,
+    /// Absolute change of the intersection over union.
+    iou_change: f64,
+    /// Absolute change of the share of correctly classified windows.
+    class_change: f64,
+}
+
+/// Every setting of the scenes of `task`, the cheapest level first; means over the scenes.
+fn setting_means<'a>(rows: &'a [MeasuredSetting], task: &str) -> Vec<SettingMeans<'a>> {
+    let rows: Vec<&MeasuredSetting> = rows.iter().filter(|r| r.task == task).collect();
+    let mut settings: Vec<&MeasuredSetting> = Vec::new();
+    for &row in &rows {
+        if !settings.iter().any(|s| alike(s, row)) {
+            settings.push(row);
         }
     }
+    settings.sort_by_key(|r| {
+        let level = LEVELS.iter().position(|level| level.name == r.level);
+        (level, r.cells_per_taxel, r.timestep_s.to_bits())
+    });
+    let of = |first: &'a MeasuredSetting| {
+        let same: Vec<&&MeasuredSetting> = rows.iter().filter(|r| alike(r, first)).collect();
+        let mean = |get: fn(&MeasuredSetting) -> f64| same.iter().map(|r| get(r)).sum::<f64>() / same.len() as f64;
+        SettingMeans {
+            first,
+            scenes: same.len(),
+            cost_us_per_step: mean(|r| r.cost_us_per_step),
+            cost_s_per_s: mean(|r| r.cost_s_per_s),
+            pressure_rms_rel: mean(|r| r.pressure_rms_rel),
+            taxel_rms_rel: mean(|r| r.taxel_rms_rel),
+            worst_taxel_rms_rel: same.iter().map(|r| r.taxel_rms_rel).fold(0.0, f64::max),
+            // sizes: a gain on one scene does not make up for a loss on another
+            support_change: mean(|r| r.support_delta.abs()),
+            iou_change: mean(|r| r.iou_delta.abs()),
+            class_change: mean(|r| r.class_delta.abs()),
+        }
+    };
+    settings.into_iter().map(of).collect()
+}
+
+/// What a fidelity level is called in tables.
+fn label(name: &str) -> &str {
+    FidelityLevel::named(name).map_or(name, |level| level.label)
+}
+
+fn alike(a: &MeasuredSetting, b: &MeasuredSetting) -> bool {
+    a.level == b.level && a.cells == b.cells && a.timestep_s.to_bits() == b.timestep_s.to_bits()
 }
 
 /// A quantity of the setting_means.

@@ -85,6 +85,42 @@ fn chart(report: &PerObjectReport) -> IntervalChart {
     }
 }
 
+/// Distances, then a line an object, as text tables.
+#[must_use]
+pub fn text(report: &PerObjectReport) -> String {
+    let distances = spts_eval::Table::new("distances", &report.distances)
+        .shown("images", |d| d.images.label())
+        .shown("decoder", |d| &d.decoder)
+        .shown("M", |d| d.m)
+        .shown("score", |d| d.score)
+        .shown("|twin − real|", |d| d.mean_abs_difference)
+        .digits(3)
+        .shown("between skins", |d| d.between_skins)
+        .digits(3)
+        .shown("means, twin − real", |d| format!("{:+.3}", d.difference_of_means))
+        .shown("outside the 90 % band", |d| {
+            if d.outside.is_empty() { "none" } else { &d.outside }
+        });
+    let objects = spts_eval::Table::new("objects", &report.objects)
+        .shown("images", |b| b.images.label())
+        .shown("decoder", |b| &b.decoder)
+        .shown("M", |b| b.m)
+        .shown("score", |b| b.score)
+        .shown("object", |b| &b.object)
+        .shown("real", |b| b.real)
+        .digits(3)
+        .shown("twin", |b| b.twin)
+        .digits(3)
+        .shown("90 % band", |b| format!("{:.3} – {:.3}", b.low, b.high))
+        .shown("", |b| if b.inside { "" } else { "outside" });
+    format!(
+        "mean over the objects of |twin − real|, twin: mean of {} simulated skins\n{}\n{}",
+        report.skins,
+        distances.text(),
+        objects.text().trim_end()
+    )
+}
+
 /// Section of the report's page.
 pub(crate) fn section(report: &PerObjectReport) -> Section {
     Section {

@@ -114,14 +114,6 @@ impl ArmStudy<'_> {
     }
 }
 
-impl ArmReport {
-    /// The statistics as a text table.
-    #[must_use]
-    pub fn text(&self) -> String {
-        table(self)
-    }
-}
-
 /// Compressive recording of a bent skin of this `layout` that follows from `seed`, touched at places that follow from
 /// it too.
 fn touched(layout: &SkinLayout, seed: u64) -> Result<Recording, Refusal> {
@@ -264,30 +256,4 @@ fn lost(touch: &RecordedTouch, recording: &Recording) -> Option<f64> {
 
 fn largest(image: &[f64]) -> f64 {
     image.iter().copied().fold(f64::NEG_INFINITY, f64::max)
-}
-
-/// A line a statistic.
-fn table(report: &ArmReport) -> String {
-    let mut out = format!(
-        "{} ({} touches), twin: {} simulated bent skins (`spts simulate arm`)\n{:<24} {:<5} {:>7} {:>7}  90 % band\n",
-        report.session, report.touches, report.skins, "statistic", "unit", "real", "twin"
-    );
-    for band in &report.statistics {
-        out.push_str(&line(band));
-    }
-    out.pop();
-    out
-}
-
-fn line(b: &ArmBand) -> String {
-    format!(
-        "{:<24} {:<5} {:>7.3} {:>7.3}  {:.3} – {:.3}{}\n",
-        b.statistic,
-        b.unit,
-        b.real,
-        b.twin,
-        b.low,
-        b.high,
-        if b.inside { "" } else { "  outside" }
-    )
 }

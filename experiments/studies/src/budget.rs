@@ -1,24 +1,22 @@
 //! `spts budget`: how much support accuracy, IoU and classification each effect of each stage costs.
 //!
-//! Objects are pressed once (`mechanics`). A skin (`skin`) is a contact model with the active parts of the transducer;
-//! its raster scans are the ground truth and the training data of its decoder. On every skin the presses are recorded
-//! with every readout to be compared (`variants`) under the same noise, decoded and scored (`scorer`). The differences
-//! are the budget (`table`).
+//! Objects are pressed once. A skin is a contact model with the active parts of the transducer; its raster scans are
+//! the ground truth and the training data of its decoder. On every skin the presses are recorded with every readout to
+//! be compared, under the same noise, decoded and scored. The paired differences of the scores are the budget.
 
 use rayon::prelude::*;
-use serde::Serialize;
-use spts::chain::{Acquisition, Chain, ChainConfig, ChainError};
+use spts::chain::{Acquisition, Chain, ChainConfig};
 use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
 use spts::record::{TwinError, press_frames};
-use spts::scene::{MechanicsError, PressConfig, Scene, SceneConfig, SceneError};
+use spts::scene::{PressConfig, Scene, SceneConfig};
 use spts_circuit::{EFFECTS, FAULTS, Interpolated, Mode, Profile, Recording};
 use spts_contact::Frame;
 use spts_contact::objects::{OBJECTS, ObjectSpec, by_name};
-use spts_eval::decoders::{PublishedDecode, TrainedDecoder, short_label};
+use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
 use spts_eval::protocol::{PUBLISHED_TAXELS, Protocol, Truth};
 use spts_eval::training::{LearnError, Learned, Learning};
-use spts_eval::{Press, RASTER, ScoreError, ScoredSession, Scorer, Tally, Window, idle_mean, unique};
+use spts_eval::{Press, RASTER, ScoredSession, Scorer, Tally, Window, idle_mean, unique};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::Workspace;
@@ -100,9 +98,28 @@ impl BudgetStudy {
         };
         let (scores, scan) = chains.score(&variants, progress)?;
         let taxels = self.side * self.side;
+        let each_key = || keys.iter().enumerate();
+        let rows = variants.comparisons.iter().flat_map(|line| {
+            let (after, before) = (&scores[line.variant], &scores[line.reference]);
+            each_key().map(move |(key, (decode, m))| BudgetRow {
+                stage: line.stage,
+                effect: line.effect,
+                mode: line.mode,
+                decode: decode.name(),
+                m: *m,
+                taxels,
+                changes: CHANGED.map(|score| mean_score(after, Some(before), key, score)),
+            })
+        });
+        let ends = [("everything", EVERYTHING), ("ideal", IDEAL)].into_iter();
+        let ends = ends.flat_map(|(chain, index)| {
+            let scores = &scores[index];
+            each_key().flat_map(move |(key, (decode, m))| end_points(chain, (decode.name(), *m), taxels, (scores, key)))
+        });
+        let scanned = end_points(SCAN, (RASTER, taxels), taxels, (&scan, 0));
         Ok(BudgetReport {
-            rows: rows(&variants, &scores, &keys, taxels),
-            end_points: [end_points(&scores, &keys, taxels), scan_points(&scan, taxels)].concat(),
+            rows: rows.collect(),
+            end_points: ends.chain(scanned).collect(),
             provenance: Provenance::new(self.seed, hash),
         })
     }
@@ -152,6 +169,93 @@ impl BudgetStudy {
         let of_decode = |&decode| measurements.iter().map(move |&m| (decode, m)).collect::<Vec<_>>();
         Ok(self.decodes.iter().flat_map(of_decode).collect())
     }
+}
+
+/// Cost of one effect with one decoding variant and M: scores of the modified chain minus those of the reference chain,
+/// each with its standard error over the sessions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BudgetRow {
+    /// Stage: contact, transducer, faults, drive, amplifier, noise or converter.
+    pub stage: &'static str,
+    /// Effect; `whole_stage` for all effects of the stage together; `layer` for another contact model.
+    pub effect: &'static str,
+    /// How the cost is found.
+    pub mode: Direction,
+    /// Decoding variant.
+    pub decode: &'static str,
+    /// Number of measurements, M.
+    pub m: usize,
+    /// Number of taxels, N.
+    pub taxels: usize,
+    /// Change of every score of [`CHANGES`].
+    pub changes: [MeanWithError; CHANGES.len()],
+}
+
+/// Names of the scores whose changes are a row: support accuracy, IoU, shares of single windows and of votes of 20
+/// windows classified correctly, and IoU with the image of a skin that has only the static law, at the same instant.
+/// The transducer cannot change this last ground truth.
+pub const CHANGES: [&str; 5] = ["support", "iou", "class_single", "class_vote20", "iou_contact"];
+
+/// Places of [`CHANGES`] in the scores of a press.
+const CHANGED: [usize; CHANGES.len()] = [SUPPORT, IOU, CLASSES[0], CLASSES[1], IOU + 2];
+
+/// Scores of a chain that the effects are compared with, such as the ideal one, against one ground truth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EndPoint {
+    /// "everything", "ideal", or "scan" for the raster frames to which the ground truth belongs.
+    pub chain: &'static str,
+    /// Decoding variant; "raster" for the scan.
+    pub decode: &'static str,
+    /// Number of measurements, M.
+    pub m: usize,
+    /// Number of taxels, N.
+    pub taxels: usize,
+    /// Ground truth: "raster" is the scan's own frame, as in the publication; "image" the noiseless image of the same
+    /// skin at that instant; "contact" that of a skin with only the static law.
+    pub truth: &'static str,
+    /// Support accuracy, IoU, and the shares of single windows and of votes of 20 windows classified correctly. Nothing
+    /// votes in the scan, which is one press: how much another would differ is not known.
+    pub scores: [MeanWithError; 4],
+}
+
+impl EndPoint {
+    /// Whether this is the scan.
+    #[must_use]
+    pub fn is_scan(&self) -> bool {
+        self.chain == SCAN
+    }
+}
+
+/// Name of the raster frames to which the ground truth belongs.
+const SCAN: &str = "scan";
+
+/// The chain `chain` with the scores `scores` of one key, by every truth.
+fn end_points<'a>(
+    chain: &'static str,
+    (decode, m): (&'static str, usize),
+    taxels: usize,
+    (scores, key): (&'a ScoreTable, usize),
+) -> impl Iterator<Item = EndPoint> + 'a {
+    TRUTHS.into_iter().enumerate().map(move |(place, truth)| EndPoint {
+        chain,
+        decode,
+        m,
+        taxels,
+        truth,
+        scores: [SUPPORT + place, IOU + place, CLASSES[0], CLASSES[1]]
+            .map(|score| mean_score(scores, None, key, score)),
+    })
+}
+
+/// Results of `spts budget`: what every effect costs, and the scores of the chains that are compared.
+#[derive(Debug, Clone)]
+pub struct BudgetReport {
+    /// One row for each effect, direction, decoding variant and M.
+    pub rows: Vec<BudgetRow>,
+    /// Scores of the whole chain, of the ideal chain, and of the scan that is the ground truth.
+    pub end_points: Vec<EndPoint>,
+    /// Provenance of the numbers.
+    pub provenance: Provenance,
 }
 
 /// What the scores of all chains are made from.
@@ -322,8 +426,7 @@ fn without_parts(off: &[&str]) -> Result<toml::Table, toml::de::Error> {
 }
 
 /// How the cost of an effect is found: by taking it out of the whole chain, or by adding it to the ideal one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
     /// The chain without the effect, compared with the whole chain: a positive change is the cost of the effect.
     Ablation,
@@ -668,7 +771,7 @@ impl LearnedSkin {
                 decisions.push(decision.and_then(Result::unwrap_or_default));
             }
             tallies[0].decisions(&decisions, object.label, self.protocol.vote);
-            vec![vec![PressScores::new(&tallies)]]
+            vec![vec![press_scores(&tallies)]]
         };
         self.objects.iter().map(of_object).collect()
     }
@@ -753,31 +856,33 @@ fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Re
     Ok(mask)
 }
 
-/// Scores of one press with one decode and M.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct PressScores {
-    /// Support accuracy against each ground truth in [`TRUTHS`].
-    support: [f64; 3],
-    /// Intersection over union against each ground truth.
-    iou: [f64; 3],
-    /// Share of single windows classified correctly.
-    class_single: f64,
-    /// Share of votes classified correctly.
-    class_vote20: f64,
-}
+/// Scores of one press with one decode and M: support accuracy by every truth of [`TRUTHS`], IoU by every truth, and the
+/// shares of single windows and of votes of 20 windows that are classified correctly.
+type PressScores = [f64; 8];
 
-impl PressScores {
-    /// Scores of the images by every truth, and of the classes that are counted in the first tally; 0 where nothing was
-    /// counted.
-    fn new(tallies: &[Tally; 3]) -> Self {
-        let scores = tallies.each_ref().map(Tally::scores);
-        Self {
-            support: scores.map(|s| s.support.unwrap_or(0.0)),
-            iou: scores.map(|s| s.iou.unwrap_or(0.0)),
-            class_single: scores[0].class_single.unwrap_or(0.0),
-            class_vote20: scores[0].class_vote20.unwrap_or(0.0),
-        }
-    }
+/// Place of the support accuracy by the first truth in [`PressScores`], that of the IoU, and those of the classes.
+const SUPPORT: usize = 0;
+const IOU: usize = TRUTHS.len();
+const CLASSES: [usize; 2] = [6, 7];
+
+/// Scores of a chain: `[object][session][key]`.
+type ScoreTable = Vec<Vec<Vec<PressScores>>>;
+
+/// Scores of the images by every truth, and of the classes that are counted in the first tally; 0 where nothing was
+/// counted.
+fn press_scores(tallies: &[Tally; 3]) -> PressScores {
+    let [a, b, c] = tallies.each_ref().map(Tally::scores);
+    let scores = [
+        a.support,
+        b.support,
+        c.support,
+        a.iou,
+        b.iou,
+        c.iou,
+        a.class_single,
+        a.class_vote20,
+    ];
+    scores.map(|score| score.unwrap_or(0.0))
 }
 
 /// What all readouts of a skin share: its decoders, one set a session.
@@ -844,7 +949,7 @@ impl<'a> PressScorer<'a> {
                     tallies[0].decisions(&decisions, object.label, vote);
                 }
             }
-            Ok(PressScores::new(&tallies))
+            Ok(press_scores(&tallies))
         };
         self.keys.iter().map(score).collect()
     }
@@ -858,7 +963,7 @@ impl<'a> PressScorer<'a> {
 }
 
 /// Probability with which a mean of nothing but chance is taken to stand out.
-const CHANCE: f64 = 0.01;
+pub const CHANCE: f64 = 0.01;
 
 /// A mean over the sessions of a study, and its standard error.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -875,7 +980,8 @@ impl MeanWithError {
     /// Whether the mean is further from zero than chance brings it once in 1/[`CHANCE`]: by Student's t test with S − 1
     /// degrees of freedom; and where all sessions have the same value, so that there is no error to measure it by, by
     /// the test of signs, p = 2^(1 − S).
-    fn stands_out(self) -> bool {
+    #[must_use]
+    pub fn stands_out(self) -> bool {
         let freedom = u32::try_from(self.sessions.saturating_sub(1)).unwrap_or(u32::MAX);
         if self.mean.abs() <= 0.0 || freedom == 0 {
             return false;
@@ -890,7 +996,8 @@ impl MeanWithError {
     }
 
     /// Whether chance alone could make it stand out: it is not zero in every session.
-    fn can_stand_out(self) -> bool {
+    #[must_use]
+    pub fn can_stand_out(self) -> bool {
         self.mean.abs() > 0.0 || self.se > 0.0
     }
 }
@@ -901,7 +1008,7 @@ impl MeanWithError {
 /// Every session has presses, noise and a learned dictionary of its own, so sessions are independent; the objects of
 /// one session share the dictionary and are not. The objects are the ones that were asked about, not a sample of
 /// others.
-pub(crate) fn estimate(values: &[Vec<f64>]) -> MeanWithError {
+fn estimate(values: &[Vec<f64>]) -> MeanWithError {
     let sessions = values.iter().map(Vec::len).min().unwrap_or(0);
     let of_session = |k: usize| mean(values.iter().map(|v| v[k])).unwrap_or_default();
     let means: Vec<f64> = (0..sessions).map(of_session).collect();
@@ -912,433 +1019,17 @@ pub(crate) fn estimate(values: &[Vec<f64>]) -> MeanWithError {
     })
 }
 
-/// Scores of a chain: `[object][session][key]`.
-type ScoreTable = Vec<Vec<Vec<PressScores>>>;
-
-/// Mean of `get` at the key with index `key`.
-fn level(scores: &ScoreTable, key: usize, get: impl Fn(&PressScores) -> f64) -> MeanWithError {
-    let of_object = |sessions: &Vec<Vec<PressScores>>| sessions.iter().map(|keys| get(&keys[key])).collect();
-    estimate(&scores.iter().map(of_object).collect::<Vec<_>>())
-}
-
-/// Mean of `get` for `variant` less that for `reference`, press by press: noise that both share cancels.
-fn change(
-    variant: &ScoreTable,
-    reference: &ScoreTable,
-    key: usize,
-    get: impl Fn(&PressScores) -> f64,
-) -> MeanWithError {
-    let of_object = |(a, b): (&Vec<Vec<PressScores>>, &Vec<Vec<PressScores>>)| {
-        let pairs = a.iter().zip(b);
-        pairs.map(|(a, b)| get(&a[key]) - get(&b[key])).collect()
+/// Mean of the score with the place `score` at the key with the place `key`, or of its change from `reference`, press by
+/// press: noise that both share cancels.
+fn mean_score(scores: &ScoreTable, reference: Option<&ScoreTable>, key: usize, score: usize) -> MeanWithError {
+    let of_object = |(object, sessions): (usize, &Vec<Vec<PressScores>>)| {
+        let before = |session: usize| reference.map_or(0.0, |r| r[object][session][key][score]);
+        let sessions = sessions.iter().enumerate();
+        sessions
+            .map(|(session, keys)| keys[key][score] - before(session))
+            .collect()
     };
-    estimate(&variant.iter().zip(reference).map(of_object).collect::<Vec<_>>())
-}
-
-/// Cost of one effect with one decoding variant and M: scores of the modified chain minus those of the reference chain,
-/// each with its standard error over the presses.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct BudgetRow {
-    /// Stage: contact, transducer, faults, drive, amplifier, noise or converter.
-    pub stage: &'static str,
-    /// Effect; `whole_stage` for all effects of the stage together; `layer` for another contact model.
-    pub effect: &'static str,
-    /// "ablation": the whole chain without the effect, compared with the whole chain; "addition": the ideal chain with
-    /// the effect, compared with the ideal chain.
-    pub mode: &'static str,
-    /// Decoding variant.
-    pub decode: &'static str,
-    /// Number of measurements, M.
-    pub m: usize,
-    /// Number of taxels, N.
-    pub taxels: usize,
-    /// Number of sessions S. The standard errors have S − 1 degrees of freedom.
-    pub sessions: usize,
-    /// Change of the support accuracy.
-    pub support_delta: f64,
-    /// Its standard error.
-    pub support_se: f64,
-    /// Change of the intersection over union.
-    pub iou_delta: f64,
-    /// Its standard error.
-    pub iou_se: f64,
-    /// Change of the share of single windows classified correctly.
-    pub class_single_delta: f64,
-    /// Its standard error.
-    pub class_single_se: f64,
-    /// Change of the share of votes of 20 windows classified correctly.
-    pub class_vote20_delta: f64,
-    /// Its standard error.
-    pub class_vote20_se: f64,
-    /// Change of the intersection over union with the image of a skin that has only the static law, at the same
-    /// instant. The transducer cannot change this ground truth.
-    pub iou_contact_delta: f64,
-    /// Its standard error.
-    pub iou_contact_se: f64,
-}
-
-/// Reads the change of a score, with its standard error, from a row.
-pub type Change = fn(&BudgetRow) -> MeanWithError;
-
-impl BudgetRow {
-    /// Change of the intersection over union with the published ground truth.
-    #[must_use]
-    pub fn iou(&self) -> MeanWithError {
-        self.change(self.iou_delta, self.iou_se)
-    }
-
-    /// Change of the intersection over union with the ground truth of the contact alone.
-    #[must_use]
-    pub fn iou_contact(&self) -> MeanWithError {
-        self.change(self.iou_contact_delta, self.iou_contact_se)
-    }
-
-    /// The change `mean` of one of the row's scores, with its standard error.
-    fn change(&self, mean: f64, se: f64) -> MeanWithError {
-        MeanWithError {
-            mean,
-            se,
-            sessions: self.sessions,
-        }
-    }
-}
-
-/// Scores of a chain that the effects are compared with, such as the ideal one, against one ground truth.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct EndPoint {
-    /// "everything", "ideal", or "scan" for the raster frames to which the ground truth belongs.
-    pub chain: &'static str,
-    /// Decoding variant; "raster" for the scan.
-    pub decode: &'static str,
-    /// Number of measurements, M.
-    pub m: usize,
-    /// Number of taxels, N.
-    pub taxels: usize,
-    /// Ground truth: "raster" is the scan's own frame, as in the publication; "image" the noiseless image of the same
-    /// skin at that instant; "contact" that of a skin with only the static law.
-    pub truth: &'static str,
-    /// Support accuracy.
-    pub support: f64,
-    /// Its standard error.
-    pub support_se: Option<f64>,
-    /// Intersection over union.
-    pub iou: f64,
-    /// Its standard error.
-    pub iou_se: Option<f64>,
-    /// Share of single windows classified correctly.
-    pub class_single: f64,
-    /// Its standard error.
-    pub class_single_se: Option<f64>,
-    /// Share of votes of 20 windows classified correctly; none for the scan.
-    pub class_vote20: Option<f64>,
-    /// Its standard error.
-    pub class_vote20_se: Option<f64>,
-}
-
-/// Place of the published truth in [`TRUTHS`].
-const PUBLISHED: usize = 0;
-/// Place of the contact alone in [`TRUTHS`].
-const CONTACT_TRUTH: usize = 2;
-
-/// Every comparison with every decode and M, in the order of `variants`.
-fn rows(
-    variants: &Variants,
-    scores: &[ScoreTable],
-    keys: &[(PublishedDecode, usize)],
-    taxels: usize,
-) -> Vec<BudgetRow> {
-    let mut rows = Vec::new();
-    for line in &variants.comparisons {
-        let (after, before) = (&scores[line.variant], &scores[line.reference]);
-        for (key, &(decode, m)) in keys.iter().enumerate() {
-            let of = |get: fn(&PressScores) -> f64| change(after, before, key, get);
-            let support = of(|s| s.support[PUBLISHED]);
-            let iou = of(|s| s.iou[PUBLISHED]);
-            let (single, vote20) = (of(|s| s.class_single), of(|s| s.class_vote20));
-            let iou_contact = of(|s| s.iou[CONTACT_TRUTH]);
-            rows.push(BudgetRow {
-                stage: line.stage,
-                effect: line.effect,
-                mode: line.mode.name(),
-                decode: decode.name(),
-                m,
-                taxels,
-                sessions: support.sessions,
-                support_delta: support.mean,
-                support_se: support.se,
-                iou_delta: iou.mean,
-                iou_se: iou.se,
-                class_single_delta: single.mean,
-                class_single_se: single.se,
-                class_vote20_delta: vote20.mean,
-                class_vote20_se: vote20.se,
-                iou_contact_delta: iou_contact.mean,
-                iou_contact_se: iou_contact.se,
-            });
-        }
-    }
-    rows
-}
-
-/// The two ends by every truth.
-fn end_points(scores: &[ScoreTable], keys: &[(PublishedDecode, usize)], taxels: usize) -> Vec<EndPoint> {
-    let mut points = Vec::new();
-    for (chain, index) in [("everything", EVERYTHING), ("ideal", IDEAL)] {
-        for (key, &(decode, m)) in keys.iter().enumerate() {
-            for truth in 0..TRUTHS.len() {
-                let point = EndPoint::new(chain, (decode.name(), m), truth, &scores[index], key);
-                points.push(EndPoint { taxels, ..point });
-            }
-        }
-    }
-    points
-}
-
-/// The scan with the scores `scores` by every truth: what a truth taken from it can be worth. It is one press: how much
-/// another would differ is not known, and nothing votes.
-fn scan_points(scores: &ScoreTable, taxels: usize) -> Vec<EndPoint> {
-    let of_truth = |truth| EndPoint {
-        taxels,
-        support_se: None,
-        iou_se: None,
-        class_single_se: None,
-        class_vote20: None,
-        class_vote20_se: None,
-        ..EndPoint::new("scan", (RASTER, taxels), truth, scores, 0)
-    };
-    (0..TRUTHS.len()).map(of_truth).collect()
-}
-
-impl EndPoint {
-    fn new(
-        chain: &'static str,
-        (decode, m): (&'static str, usize),
-        truth: usize,
-        scores: &ScoreTable,
-        key: usize,
-    ) -> Self {
-        let support = level(scores, key, |s| s.support[truth]);
-        let iou = level(scores, key, |s| s.iou[truth]);
-        let (single, vote20) = (
-            level(scores, key, |s| s.class_single),
-            level(scores, key, |s| s.class_vote20),
-        );
-        Self {
-            chain,
-            decode,
-            m,
-            taxels: 0,
-            truth: TRUTHS[truth],
-            support: support.mean,
-            support_se: Some(support.se),
-            iou: iou.mean,
-            iou_se: Some(iou.se),
-            class_single: single.mean,
-            class_single_se: Some(single.se),
-            class_vote20: Some(vote20.mean),
-            class_vote20_se: Some(vote20.se),
-        }
-    }
-}
-
-/// Results of `spts budget`: what every effect costs, and the scores of the chains that are compared.
-#[derive(Debug, Clone, Serialize)]
-pub struct BudgetReport {
-    /// One row for each effect, direction, decoding variant and M.
-    pub rows: Vec<BudgetRow>,
-    /// Scores of the whole chain, of the ideal chain, and of the scan that is the ground truth.
-    pub end_points: Vec<EndPoint>,
-    /// Provenance of the numbers.
-    pub provenance: Provenance,
-}
-
-impl BudgetReport {
-    /// The row of an effect; `None` if it was not measured.
-    #[must_use]
-    pub fn find(
-        &self,
-        (stage, effect): (&str, &str),
-        direction: Direction,
-        (decode, m): (&str, usize),
-    ) -> Option<&BudgetRow> {
-        let found =
-            |r: &&BudgetRow| (r.stage, r.effect, r.mode, r.decode, r.m) == (stage, effect, direction.name(), decode, m);
-        self.rows.iter().find(found)
-    }
-
-    /// Stage and effect of every row, without duplicates.
-    #[must_use]
-    pub fn effects(&self) -> Vec<(&'static str, &'static str)> {
-        unique(self.rows.iter().map(|r| (r.stage, r.effect)))
-    }
-
-    /// Decoding variants, without duplicates.
-    #[must_use]
-    pub fn decodes(&self) -> Vec<&'static str> {
-        unique(self.rows.iter().map(|r| r.decode))
-    }
-
-    /// Numbers of measurements, without duplicates.
-    #[must_use]
-    pub fn measurements(&self) -> Vec<usize> {
-        unique(self.rows.iter().map(|r| r.m))
-    }
-}
-
-/// Changes of all scores, with their headings.
-const CHANGES: [(&str, Change); 5] = [
-    ("support", |r| r.change(r.support_delta, r.support_se)),
-    ("IoU", BudgetRow::iou),
-    ("IoU, contact", BudgetRow::iou_contact),
-    ("class", |r| r.change(r.class_single_delta, r.class_single_se)),
-    ("vote of 20", |r| r.change(r.class_vote20_delta, r.class_vote20_se)),
-];
-
-impl BudgetReport {
-    /// The end points and the change of the IoU with every effect, as tables to read.
-    #[must_use]
-    pub fn text(&self) -> String {
-        overview(self)
-    }
-
-    /// Every score of every effect, as Markdown tables.
-    #[must_use]
-    pub fn markdown(&self) -> String {
-        markdown(self)
-    }
-}
-
-/// End points and the change of the IoU with every effect.
-fn overview(report: &BudgetReport) -> String {
-    let mut out = ends(report);
-    for decode in report.decodes() {
-        out.push_str(&format!(
-            "\n{}: change of the IoU without each effect (against everything) and with it alone (against ideal)\n\n",
-            short_label(decode)
-        ));
-        let mut heads = Vec::new();
-        for m in report.measurements() {
-            heads.extend([format!("without, M = {m}"), format!("alone, M = {m}")]);
-        }
-        out.push_str(&table(report, &heads, &|stage, effect| {
-            let of = |m| move |direction| report.find((stage, effect), direction, (decode, m)).map(BudgetRow::iou);
-            let cells = report.measurements().into_iter().map(of);
-            cells
-                .flat_map(|find| [find(Direction::Ablation), find(Direction::Addition)])
-                .collect()
-        }));
-    }
-    out.push_str(&footnote(report, &[BudgetRow::iou]));
-    out
-}
-
-/// What the signs mean, and how many stars are nothing but chance among the numbers `shown` of every row.
-fn footnote(report: &BudgetReport, shown: &[Change]) -> String {
-    let numbers = report.rows.iter().flat_map(|row| shown.iter().map(move |get| get(row)));
-    let (all, stars) = numbers.fold((0_usize, 0_usize), |(all, stars), number| {
-        (
-            all + usize::from(number.can_stand_out()),
-            stars + usize::from(number.stands_out()),
-        )
-    });
-    let sessions = report.rows.first().map_or(0, |row| row.sessions);
-    format!(
-        "\n± one standard error over {sessions} sessions: presses, gains, noise and dictionaries; * further from 0 than chance brings it \
-         in {:.0} % (Student's t).\n{stars} of {all} numbers that are not 0 throughout have a *; chance alone gives about {:.1}.\n",
-        CHANCE * 100.0,
-        CHANCE * all as f64,
-    )
-}
-
-/// The overview and, for every decode and M, every score.
-fn markdown(report: &BudgetReport) -> String {
-    let mut out = overview(report);
-    for decode in report.decodes() {
-        for m in report.measurements() {
-            for (direction, heading) in [
-                (Direction::Ablation, "without each effect, against everything"),
-                (Direction::Addition, "with each effect alone, against ideal"),
-            ] {
-                out.push_str(&format!("\n{}, M = {m}, {heading}\n\n", short_label(decode)));
-                let heads: Vec<String> = CHANGES.iter().map(|(head, _)| (*head).to_owned()).collect();
-                out.push_str(&table(report, &heads, &|stage, effect| {
-                    let row = report.find((stage, effect), direction, (decode, m));
-                    CHANGES.iter().map(|(_, change)| row.map(change)).collect()
-                }));
-            }
-        }
-    }
-    out.push_str(&footnote(report, &CHANGES.map(|(_, change)| change)));
-    out
-}
-
-/// One line an effect; lines without any cell are left out.
-fn table(report: &BudgetReport, heads: &[String], cells: &dyn Fn(&str, &str) -> Vec<Option<MeanWithError>>) -> String {
-    let mut out = format!("| {:<11} | {:<14} |", "stage", "effect");
-    heads.iter().for_each(|head| out.push_str(&format!(" {head:>17} |")));
-    out.push_str(&format!("\n|{:-<13}|{:-<16}|", "", ""));
-    heads.iter().for_each(|_| out.push_str(&format!("{:->18}:|", "")));
-    out.push('\n');
-    for (stage, effect) in report.effects() {
-        let cells = cells(stage, effect);
-        if cells.iter().all(Option::is_none) {
-            continue;
-        }
-        let name = if effect == WHOLE_STAGE { "all of it" } else { effect };
-        out.push_str(&format!("| {stage:<11} | {name:<14} |"));
-        for cell in cells {
-            let text = cell.map_or_else(|| "–".to_owned(), show);
-            out.push_str(&format!(" {text:>17} |"));
-        }
-        out.push('\n');
-    }
-    out
-}
-
-fn show(change: MeanWithError) -> String {
-    let mark = if change.stands_out() { "*" } else { " " };
-    format!("{:+.3} ± {:.3}{mark}", change.mean, change.se)
-}
-
-/// End points with the published truth, and what that truth is worth.
-fn ends(report: &BudgetReport) -> String {
-    let mut out = String::from(
-        "| chain       | decode           |    M | truth   | support | IoU   | class | vote of 20 |\n\
-         |-------------|------------------|-----:|---------|--------:|------:|------:|-----------:|\n",
-    );
-    for p in &report.end_points {
-        out.push_str(&format!(
-            "| {:<11} | {:<16} | {:>4} | {:<7} | {:>7.3} | {:.3} | {:.3} | {:>10} |\n",
-            p.chain,
-            short_label(p.decode),
-            p.m,
-            p.truth,
-            p.support,
-            p.iou,
-            p.class_single,
-            p.class_vote20.map_or_else(|| "–".to_owned(), |v| format!("{v:.3}")),
-        ));
-    }
-    out.push_str(&unexplained(&report.end_points));
-    out
-}
-
-/// What no effect explains: the ideal chain's distance from 1, part by part.
-fn unexplained(points: &[EndPoint]) -> String {
-    let mut out = String::from(
-        "\nIoU that the ideal chain loses to the decoder, and to the noise of the frame that is the truth:\n",
-    );
-    let ideal = |truth| points.iter().filter(move |p| p.chain == "ideal" && p.truth == truth);
-    for (image, raster) in ideal("image").zip(ideal("raster")) {
-        out.push_str(&format!(
-            "{}, M = {}: {:.3}, {:.3}\n",
-            short_label(image.decode),
-            image.m,
-            1.0 - image.iou,
-            image.iou - raster.iou
-        ));
-    }
-    out
+    estimate(&scores.iter().enumerate().map(of_object).collect::<Vec<_>>())
 }
 
 #[cfg(test)]
@@ -1443,18 +1134,12 @@ mod tests {
     /// A shift that is the same in every press has no error, however much the presses differ.
     #[test]
     fn paired_changes_cancel_what_is_shared() {
-        let press = |iou| {
-            vec![PressScores {
-                iou: [iou; 3],
-                ..PressScores::default()
-            }]
-        };
-        let before: ScoreTable = vec![vec![press(0.25), press(0.75)]];
-        let after: ScoreTable = vec![vec![press(0.375), press(0.875)]];
-        let found = change(&after, &before, 0, |s| s.iou[0]);
+        let before: ScoreTable = vec![vec![vec![[0.25; 8]], vec![[0.75; 8]]]];
+        let after: ScoreTable = vec![vec![vec![[0.375; 8]], vec![[0.875; 8]]]];
+        let found = mean_score(&after, Some(&before), 0, IOU);
         assert_relative_eq!(found.mean, 0.125, max_relative = 1e-15);
         assert!(found.se <= 0.0);
-        assert!(level(&before, 0, |s| s.iou[0]).se > 0.2);
+        assert!(mean_score(&before, None, 0, IOU).se > 0.2);
     }
 
     /// Student's quantiles at 1 % are 9.925 for 3 sessions and 3.250 for 10; equal values stand out by their signs,

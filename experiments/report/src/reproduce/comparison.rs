@@ -1,6 +1,7 @@
 //! The readout beside the recordings it is fitted to: the skin's own images through the twin's electronics.
 
 use super::ReproduceError;
+use crate::compare::with_error;
 use crate::labels::{object_label, statistic_label};
 use crate::{PageFigure, ReportError, Section, Table, compare};
 use spts::output::write_table;
@@ -8,7 +9,7 @@ use spts::progress::Progress;
 use spts_eval::PublishedSkin;
 use spts_eval::decoders::label;
 use spts_studies::calibrate::read;
-use spts_studies::compare::{CompareReport, CompareStudy, CurveDistance, Images, Statistic, with_error};
+use spts_studies::compare::{CompareReport, CompareStudy, CurveDistance, Images, Statistic};
 use std::path::Path;
 
 /// What `spts compare` finds, as a section of the report.

@@ -14,7 +14,7 @@
 //!     shapes: 4,
 //!     seed: 1,
 //! };
-//! println!("{}", study.run(&())?.text());
+//! assert_eq!(study.run(&())?.rows.len(), READOUTS.len());
 //! # Ok::<(), spts_input::Refusal>(())
 //! ```
 

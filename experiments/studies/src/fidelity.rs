@@ -29,10 +29,6 @@ use spts_sim::world::{Bounce, no_pressure};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-mod text;
-
-pub use text::{SettingMeans, setting_means};
-
 /// Settings of `spts fidelity`, which measures cost and error of every contact model, resolution and time step.
 #[derive(Debug, Clone)]
 pub struct FidelityStudy {
