@@ -5,18 +5,18 @@
 //! be compared, under the same noise, decoded and scored. The paired differences of the scores are the budget.
 
 use rayon::prelude::*;
-use spts::chain::{Acquisition, Chain, ChainConfig};
+use spts::chain::{Acquisition, Chain, ChainConfig, ChainError};
 use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
 use spts::record::{TwinError, press_frames};
-use spts::scene::{PressConfig, Scene, SceneConfig};
+use spts::scene::{MechanicsError, PressConfig, Scene, SceneConfig, SceneError};
 use spts_circuit::{EFFECTS, FAULTS, Interpolated, Mode, Profile, Recording};
 use spts_contact::Frame;
 use spts_contact::objects::{OBJECTS, ObjectSpec, by_name};
 use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
 use spts_eval::protocol::{PUBLISHED_TAXELS, Protocol, Truth};
 use spts_eval::training::{LearnError, Learned, Learning};
-use spts_eval::{Press, RASTER, ScoredSession, Scorer, Tally, Window, idle_mean, unique};
+use spts_eval::{Press, RASTER, ScoreError, ScoredSession, Scorer, Tally, Window, idle_mean, unique};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::Workspace;

@@ -161,7 +161,7 @@ pub(super) struct ShapesCommand {
 
 /// What the command prints as JSON.
 #[derive(Debug, Serialize)]
-struct Report {
+struct ShapesReport {
     file: PathBuf,
     shapes: Vec<ShapeLine>,
 }
@@ -201,7 +201,7 @@ impl ShapesCommand {
         check_writable(&self.out)?;
         let shapes = drawn_shapes(&families, self.seed, self.count).map_err(|e| CliError::usage(e.to_string()))?;
         save_shapes(&shapes, &self.out)?;
-        let report = Report {
+        let report = ShapesReport {
             file: self.out,
             shapes: shapes.iter().map(ShapeLine::of).collect(),
         };
