@@ -2,6 +2,8 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseError, TestRunner};
+use spts_contact::Frame;
+use spts_models::Grid;
 use spts_sim::World;
 use spts_sim::mechanics::{DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Timestep};
 use std::cell::Cell;
@@ -11,132 +13,83 @@ fn read(text: &str) -> Result<Mechanics, MechanicsError> {
     Mechanics::from_toml(text, Path::new(""))
 }
 
-/// Runs the scene to its end: every number finite, no pressure below zero, Σ p A the force. Largest force, N.
-#[track_caller]
-fn sane(text: &str) -> f64 {
-    let scene = read(text).unwrap_or_else(|error| panic!("{text}\n{error}"));
-    let area_m2 = scene.skin().cell_area_m2();
-    let mut world = World::new(&scene).unwrap_or_else(|error| panic!("{text}\n{error}"));
-    let mut peak_n = 0.0_f64;
-    for frame in world.frames() {
-        let frame = frame.unwrap_or_else(|error| panic!("{text}\n{error}"));
-        assert!(
-            frame.pressure.values().iter().all(|p| p.is_finite() && *p >= 0.0),
-            "{text}"
-        );
-        assert!(
-            frame
-                .electrode_pressure
-                .values()
-                .iter()
-                .all(|p| p.is_finite() && *p >= 0.0),
-            "{text}"
-        );
-        let numbers = [frame.wrench.force_n, frame.wrench.torque_nm, frame.pose.position_m];
-        assert!(numbers.iter().flatten().all(|x| x.is_finite()), "{text}");
+/// Whether the numbers of `frame` are finite, no pressure is below zero, and Σ p A is the force.
+fn is_sane(frame: &Frame, area_m2: f64) -> bool {
+    let pressures = [&frame.pressure, &frame.electrode_pressure].map(Grid::values);
+    let numbers = [frame.wrench.force_n, frame.wrench.torque_nm, frame.pose.position_m];
+    pressures.into_iter().flatten().all(|p| p.is_finite() && *p >= 0.0)
+        && numbers.iter().flatten().all(|x| x.is_finite())
         // sums of positive numbers in two orders: 1e7 cells at most, 1e-16 each, growing with the root of their number
-        assert!(frame.imbalance(area_m2) <= 1e-9, "{text}: {}", frame.imbalance(area_m2));
-        peak_n = peak_n.max(frame.wrench.force_n[2]);
-    }
-    peak_n
+        && frame.imbalance(area_m2) <= 1e-9
 }
 
-/// The scene is refused, in these words.
-#[track_caller]
-fn refused(text: &str, words: &[&str]) {
-    let error = match read(text) {
-        Err(error) => error.to_string(),
-        Ok(_) => panic!("accepted: {text}"),
-    };
-    for word in words {
-        assert!(error.contains(word), "{text}\n{error}\nlacks {word}");
-    }
-}
+/// Scenes that run to their end, and the range of their largest force, N: their lines with ` ; ` between them.
+const SCENES: &str = r#"
+skin = { rows = 1, cols = 1 } ; [press] ; object = "T" ; row = 0.0 ; col = 0.0 ; presses = 1 | 19.9 | 20.5
+skin = { rows = 1, cols = 1 } ; [drop] | 1 | inf
+frame_interval_s = 0.02 ; skin = { rows = 1, cols = 1000 } ; [press] ; object = "line" ; row = 0.0 ; col = 499.5 ; rotation_deg = 0.0 ; presses = 1 | 19 | inf
+skin = { rows = 1, cols = 1000 } ; [drop] ; height_m = 0.05 ; duration_s = 0.3 ; position_sd_m = 0.0 | 1 | inf
+frame_interval_s = 0.1 ; skin = { rows = 500, cols = 500 } ; contact.cells_per_taxel = 2 ; [press] ; object = "tape" ; row = 249.5 ; col = 249.5 ; presses = 1 | 19 | inf
+frame_interval_s = 0.02 ; skin = { rows = 100, cols = 100, pitch_m = 1e-4, electrode_m = 5e-5 } ; contact.cells_per_taxel = 1 ; [press] ; object = "rec" ; row = 49.5 ; col = 49.5 ; presses = 1 | 19 | 21
+skin = { rows = 10, cols = 10, pitch_m = 1e-4, electrode_m = 5e-5 } ; contact.cells_per_taxel = 1 ; [press] ; object = "rec" ; force_n = 0.5 ; presses = 1 | 0 | inf
+skin = { pitch_m = 0.1, electrode_m = 0.06 } ; [press] ; object = "brain" ; row = 4.5 ; col = 4.5 ; presses = 1 | 0 | inf
+skin = { pitch_m = 0.1, electrode_m = 0.06 } ; [drop] | 0 | inf
+[press] ; object = "line" ; force_n = 100.0 ; presses = 1 | 99 | 105
+[press] ; object = "brain" ; force_n = 100.0 ; presses = 1 | 99 | 105
+[press] ; object = "rec" ; force_n = 100.0 ; presses = 1 | 99 | 105
+timestep_s = "auto" ; contact.thickness_m = 1e-3 ; [press] ; object = "line" ; force_n = 100.0 ; presses = 1 | 99 | inf
+"#;
 
+/// One taxel, which is stiffer than foam under a T that covers it; a row of a thousand and a square of 250,000; a skin of
+/// 10 mm that a plate floods (K A = 1500 N/m) and one of a metre in cells of 17 mm, of which a dome meets few; the
+/// hardest presses, deeper than 1 mm of foam is thick, and the softest.
 #[test]
-fn one_taxel() {
-    let skin = "[skin]\nrows = 1\ncols = 1\n";
-    // 15 mm square under a T that covers it: stiffer than foam, and it holds
-    let peak_n = sane(&format!(
-        "{skin}[press]\nobject = \"T\"\nrow = 0.0\ncol = 0.0\npresses = 1"
-    ));
-    assert!((19.9..20.5).contains(&peak_n), "{peak_n}");
-    assert!(sane(&format!("{skin}[drop]")) > 1.0);
+fn extreme_scenes_run() {
+    for line in SCENES.lines().filter(|line| !line.is_empty()) {
+        let mut parts = line.split(" | ");
+        let text = parts.next().unwrap().replace(" ; ", "\n");
+        let [low_n, high_n] = [(); 2].map(|()| parts.next().unwrap().parse::<f64>().unwrap());
+        let scene = read(&text).unwrap_or_else(|error| panic!("{text}\n{error}"));
+        let area_m2 = scene.skin().cell_area_m2();
+        let mut world = World::new(&scene).unwrap_or_else(|error| panic!("{text}\n{error}"));
+        let mut peak_n = 0.0_f64;
+        for frame in world.frames() {
+            let frame = frame.unwrap_or_else(|error| panic!("{text}\n{error}"));
+            assert!(is_sane(&frame, area_m2), "{text}\n{frame:?}");
+            peak_n = peak_n.max(frame.wrench.force_n[2]);
+        }
+        assert!((low_n..=high_n).contains(&peak_n), "{text}\n{peak_n}");
+    }
 }
 
+/// What is too large, too small, too strong or beside the skin is refused, with a reason.
 #[test]
-fn one_row_of_a_thousand() {
-    let skin = "[skin]\nrows = 1\ncols = 1000\n";
-    let press = "[press]\nobject = \"line\"\nrow = 0.0\ncol = 499.5\nrotation_deg = 0.0\npresses = 1\n";
-    assert!(sane(&format!("frame_interval_s = 0.02\n{skin}{press}")) > 19.0);
-    assert!(
-        sane(&format!(
-            "{skin}[drop]\nheight_m = 0.05\nduration_s = 0.3\nposition_sd_m = 0.0"
-        )) > 1.0
-    );
-    // the last taxel is 7.5 m away from the arm
-    let far = read(&format!("{skin}{}", press.replace("499.5", "999.0"))).unwrap();
-    let error = World::new(&far).unwrap_err().to_string();
+fn scenes_beyond_the_extremes_are_refused() {
+    const REFUSED: &str = r#"
+skin = { rows = 500, cols = 500 } ; contact.cells_per_taxel = 64 ; [drop] | cells_per_taxel | 2^24
+skin = { rows = 10, cols = 10, pitch_m = 1e-4, electrode_m = 5e-5 } ; contact.cells_per_taxel = 1 ; [press] ; object = "rec" ; force_n = 100.0 | press.force_n | carries at most
+[press] ; object = "T" ; force_n = 0.0 | press.force_n | 0 | [0.5, 100] N
+[press] ; object = "brain" ; row = -5.0 | press.force_n | beside the skin
+[drop] ; row = 9.6 | drop.row | [-0.5, rows - 0.5]
+"#;
+    for line in REFUSED.lines().filter(|line| !line.is_empty()) {
+        let mut parts = line.split(" | ");
+        let text = parts.next().unwrap().replace(" ; ", "\n");
+        let error = read(&text).map(drop).unwrap_err().to_string();
+        for word in parts {
+            assert!(error.contains(word), "{text}\n{error}\nlacks {word}");
+        }
+    }
+    // the last taxel of a row of a thousand is 7.5 m away from the arm
+    let far =
+        "skin = { rows = 1, cols = 1000 }\n[press]\nobject = \"line\"\nrow = 0.0\ncol = 999.0\nrotation_deg = 0.0";
+    let error = World::new(&read(far).unwrap()).unwrap_err().to_string();
     assert!(error.contains("reach"), "{error}");
 }
 
+/// A landing point on the corner and a scatter of 5 cm: the ball hits, rolls off, or misses and falls on.
 #[test]
-fn five_hundred_squared() {
-    let skin = "[skin]\nrows = 500\ncols = 500\n[contact]\ncells_per_taxel = 2\n";
-    let press = "[press]\nobject = \"tape\"\nrow = 249.5\ncol = 249.5\npresses = 1";
-    assert!(sane(&format!("frame_interval_s = 0.1\n{skin}{press}")) > 19.0);
-    refused(
-        "[skin]\nrows = 500\ncols = 500\n[contact]\ncells_per_taxel = 64\n[drop]",
-        &["cells_per_taxel", "2^24"],
-    );
-}
-
-#[test]
-fn smallest_and_largest_pitch() {
-    // 10 mm of skin, flooded by the plate: K A = 1500 N/m
-    let small = "[skin]\nrows = 100\ncols = 100\npitch_m = 1e-4\nelectrode_m = 5e-5\n[contact]\ncells_per_taxel = 1\n";
-    let peak_n = sane(&format!(
-        "frame_interval_s = 0.02\n{small}[press]\nobject = \"rec\"\nrow = 49.5\ncol = 49.5\npresses = 1"
-    ));
-    assert!((19.0..21.0).contains(&peak_n), "{peak_n}");
-    // 1 mm of skin: too small for 20 N, enough for 1 N
-    let speck = small.replace("= 100", "= 10");
-    refused(
-        &format!("{speck}[press]\nobject = \"rec\"\nforce_n = 100.0"),
-        &["press.force_n", "carries at most"],
-    );
-    sane(&format!("{speck}[press]\nobject = \"rec\"\nforce_n = 0.5\npresses = 1"));
-    // a metre of skin in cells of 17 mm, of which the dome meets few
-    let large = "[skin]\npitch_m = 0.1\nelectrode_m = 0.06\n";
-    sane(&format!(
-        "{large}[press]\nobject = \"brain\"\nrow = 4.5\ncol = 4.5\npresses = 1"
-    ));
-    sane(&format!("{large}[drop]"));
-}
-
-#[test]
-fn hardest_and_softest_press() {
-    for object in ["line", "brain", "rec"] {
-        let peak_n = sane(&format!("[press]\nobject = \"{object}\"\nforce_n = 100.0\npresses = 1"));
-        assert!((99.0..105.0).contains(&peak_n), "{object}: {peak_n}");
-    }
-    // deeper than 1 mm of foam is thick
-    let thin = "[contact]\nthickness_m = 1e-3\n[press]\nobject = \"line\"\nforce_n = 100.0\npresses = 1";
-    assert!(sane(&format!("timestep_s = \"auto\"\n{thin}")) > 99.0);
-    refused(
-        "[press]\nobject = \"T\"\nforce_n = 0.0",
-        &["press.force_n", "0", "[0.5, 100] N"],
-    );
-}
-
-#[test]
-fn beside_the_skin() {
-    refused(
-        "[press]\nobject = \"brain\"\nrow = -5.0",
-        &["press.force_n", "beside the skin"],
-    );
-    refused("[drop]\nrow = 9.6", &["drop.row", "[-0.5, rows - 0.5]"]);
-    // a landing point on the corner and a scatter of 5 cm: it hits, rolls off, or misses and falls on
+fn a_ball_beside_the_skin_falls_on() {
     let text = "[drop]\nrow = -0.5\ncol = -0.5\nposition_sd_m = 0.05\ndrops = 6\nduration_s = 1.0";
     let scene = read(text).unwrap();
     let mut missed = 0;
@@ -251,9 +204,7 @@ fn any_scene_is_refused_or_runs() {
         let mut peak_n = 0.0_f64;
         for frame in world.frames() {
             let frame = frame.map_err(|error| TestCaseError::fail(error.to_string()))?;
-            prop_assert!(frame.pressure.values().iter().all(|p| p.is_finite() && *p >= 0.0));
-            prop_assert!(frame.pose.position_m.iter().all(|x| x.is_finite()));
-            prop_assert!(frame.imbalance(area_m2) <= 1e-9);
+            prop_assert!(is_sane(&frame, area_m2), "{frame:?}");
             peak_n = peak_n.max(frame.wrench.force_n[2]);
         }
         if peak_n > 0.0 {

@@ -8,12 +8,6 @@ mod anytime;
 #[cfg(test)]
 mod arm;
 #[cfg(test)]
-mod bad_input;
-#[cfg(test)]
-mod bad_values;
-#[cfg(test)]
-mod bombs;
-#[cfg(test)]
 mod budget;
 #[cfg(test)]
 mod calibration;
@@ -50,9 +44,7 @@ mod firmware;
 #[cfg(test)]
 mod firmware_command;
 #[cfg(test)]
-mod folders;
-#[cfg(test)]
-mod foreign_bytes;
+mod hostile;
 #[cfg(test)]
 mod in_time;
 #[cfg(test)]
@@ -80,14 +72,11 @@ mod rows;
 #[cfg(test)]
 mod score;
 #[cfg(test)]
-#[cfg(test)]
 mod setup;
 #[cfg(test)]
 mod simulation_only;
 #[cfg(test)]
 mod style;
-#[cfg(test)]
-mod unscorable;
 mod unseen;
 #[cfg(test)]
 mod weights;

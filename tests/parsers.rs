@@ -48,7 +48,7 @@ pub fn stl(bytes: &[u8]) {
 
 /// The variable `C` of a MATLAB file.
 pub fn mat(bytes: &[u8]) {
-    let _ = spts::data::parse_mat(bytes.to_vec(), "C", Path::new("fuzz.mat"));
+    let _ = spts::data::parse_mat(bytes.to_vec(), &["C"], Path::new("fuzz.mat"));
 }
 
 /// A NumPy array of a session.

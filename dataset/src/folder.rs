@@ -112,10 +112,7 @@ impl Dataset {
             let problem = "is not of a data set; choose an empty folder, or one that `spts dataset make` began";
             return Err(DatasetError::file(other, problem));
         }
-        let failed = |source| OutputError::Folder {
-            path: data.clone(),
-            source,
-        };
+        let failed = |source| OutputError::no_folder(&data, source);
         std::fs::create_dir_all(&data).map_err(failed)?;
         // the same bytes whoever comes first; the head last, so that what has one has all
         write_bytes(&folder.join(SPEC_FILE), spec.text().as_bytes())?;

@@ -2,6 +2,7 @@
 
 use std::error::Error;
 use std::fmt::{self, Display};
+use std::path::Path;
 use std::sync::Arc;
 
 /// Why something was refused, as one sentence that names the field, its value and what is valid.
@@ -43,6 +44,12 @@ impl Refusal {
             message: source.to_string(),
             source: Some(Arc::new(source)),
         }
+    }
+
+    /// What a reader or writer of the file at `path` says, with the path before it.
+    pub fn in_file<E: Error + Send + Sync + 'static>(path: &Path) -> impl Fn(E) -> Self + use<E> {
+        let path = path.to_owned();
+        move |source| Self::from_error(source).at(path.display())
     }
 
     /// The same refusal with the place of the mistake before it: a file, or the section of one.

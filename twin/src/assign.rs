@@ -1,5 +1,6 @@
 //! `KEY=VALUE`: one field of a table, and the value to give it.
 
+use spts_input::Refusal;
 use std::fmt;
 use std::str::FromStr;
 use toml::{Table, Value};
@@ -28,24 +29,11 @@ pub struct Assignment {
     said: String,
 }
 
-/// A value that cannot be put into a table.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("{said}: {reason}")]
-pub struct AssignError {
-    /// What was asked for, as the user wrote it.
-    pub said: String,
-    /// Why the value cannot be set.
-    pub reason: String,
-}
-
 impl FromStr for Assignment {
-    type Err = AssignError;
+    type Err = Refusal;
 
-    fn from_str(text: &str) -> Result<Self, AssignError> {
-        let refused = |reason: &str| AssignError {
-            said: text.to_owned(),
-            reason: reason.to_owned(),
-        };
+    fn from_str(text: &str) -> Result<Self, Refusal> {
+        let refused = |reason: &str| Refusal::new(reason).at(text);
         let Some((key, value)) = text.split_once('=') else {
             return Err(refused("KEY=VALUE is needed, such as press.force_n=12"));
         };
@@ -103,22 +91,19 @@ impl Assignment {
     }
 
     /// An error about this assignment.
-    pub(crate) fn refused(&self, reason: impl Into<String>) -> AssignError {
-        AssignError {
-            said: self.said.clone(),
-            reason: reason.into(),
-        }
+    pub(crate) fn refused(&self, reason: impl Into<String>) -> Refusal {
+        Refusal::new(reason).at(self)
     }
 
     /// Puts the value into `table`. `table` may be any table, and the result is not checked as a scene.
     ///
     /// # Errors
-    /// [`AssignError`] if the key lies below a plain value, or names an entry that a list does not have.
-    pub fn put_into(&self, table: &mut Table) -> Result<(), AssignError> {
+    /// [`Refusal`] if the key lies below a plain value, or names an entry that a list does not have.
+    pub fn put_into(&self, table: &mut Table) -> Result<(), Refusal> {
         self.put(table, &self.keys[0])
     }
 
-    pub(crate) fn put(&self, table: &mut Table, key: &str) -> Result<(), AssignError> {
+    pub(crate) fn put(&self, table: &mut Table, key: &str) -> Result<(), Refusal> {
         set(table, key, self.value.clone()).map_err(|reason| self.refused(reason))
     }
 }

@@ -59,8 +59,8 @@ pub use chain::{Acquisition, Chain, ChainConfig, ChainError};
 #[cfg(feature = "mujoco")]
 pub use record::{Twin, TwinError};
 #[cfg(feature = "mujoco")]
-pub use scene::{Scene, SceneError};
-pub use session::{PressFacts, Recorded, Session, SessionError};
+pub use scene::Scene;
+pub use session::{PressFacts, Recorded, Session};
 pub use wire::Wire;
 
 pub use spts_circuit::{Block, Mode, Profile, Recording, RecordingInfo, Seeding, WeightMode, Weights};

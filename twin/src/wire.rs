@@ -1,7 +1,8 @@
 //! The one wire of a skin, live: pressure in, measurements out.
 
-use crate::chain::{Chain, ChainError, SkinSession};
+use crate::chain::{Chain, SkinSession, of_conductance, of_readout};
 use spts_circuit::{Constant, Mode, Readout, RecordingInfo, WeightRows};
+use spts_input::Refusal;
 use spts_models::PressureMap;
 use spts_recon::metrics::median;
 
@@ -22,7 +23,7 @@ const IDLE: usize = 2000;
 /// let (mut volts, mut phi) = (vec![0.0; 20], vec![0.0; 20 * 100]);
 /// wire.rows(Mode::Compressive, 20).fill(&mut phi);
 /// wire.measure(Mode::Compressive, &mut volts)?;
-/// # Ok::<(), spts::ChainError>(())
+/// # Ok::<(), spts::Refusal>(())
 /// ```
 pub struct Wire {
     skin: SkinSession,
@@ -41,17 +42,17 @@ impl Wire {
     /// The wire of the skin of `chain`, in session number `session`.
     ///
     /// # Errors
-    /// [`ChainError`] if the source of the weights cannot provide them.
-    pub fn new(chain: &Chain, session: u64) -> Result<Self, ChainError> {
+    /// [`Refusal`] if the source of the weights cannot provide them.
+    pub fn new(chain: &Chain, session: u64) -> Result<Self, Refusal> {
         let layout = chain.skin();
         let shape = [layout.rows(), layout.cols()];
         let mut skin = chain.skin_session(session);
         let mut felt =
-            Constant::new(skin.hold(&PressureMap::zeros(shape[0], shape[1]), 0.0)).map_err(ChainError::Source)?;
+            Constant::new(skin.hold(&PressureMap::zeros(shape[0], shape[1]), 0.0)).map_err(of_conductance)?;
         let mut line = |mode| {
             let mut readout = chain.readout(mode, session)?;
-            let idle = readout.measure(&mut felt, IDLE)?;
-            Ok::<_, ChainError>(Line {
+            let idle = readout.measure(&mut felt, IDLE).map_err(of_readout)?;
+            Ok::<_, Refusal>(Line {
                 idle_v: median(&idle).unwrap_or_default(),
                 readout,
             })
@@ -68,24 +69,24 @@ impl Wire {
     /// Applies `electrode_pressure` for `dt_s` seconds. It then stays until the next call.
     ///
     /// # Errors
-    /// [`ChainError::Source`] for a conductance that cannot be used.
+    /// [`Refusal`] for a conductance that cannot be used.
     ///
     /// # Panics
     /// If the map has another shape than the skin.
-    pub fn feel(&mut self, electrode_pressure: &PressureMap, dt_s: f64) -> Result<(), ChainError> {
+    pub fn feel(&mut self, electrode_pressure: &PressureMap, dt_s: f64) -> Result<(), Refusal> {
         let found = [electrode_pressure.rows(), electrode_pressure.cols()];
         assert_eq!(found, self.shape, "shape of the pressure");
-        self.felt = Constant::new(self.skin.hold(electrode_pressure, dt_s)).map_err(ChainError::Source)?;
+        self.felt = Constant::new(self.skin.hold(electrode_pressure, dt_s)).map_err(of_conductance)?;
         Ok(())
     }
 
     /// Fills `volts` with consecutive measurements, V.
     ///
     /// # Errors
-    /// [`ChainError::Readout`] if the cells put out nothing.
-    pub fn measure(&mut self, mode: Mode, volts: &mut [f64]) -> Result<(), ChainError> {
+    /// [`Refusal`] if the cells put out nothing.
+    pub fn measure(&mut self, mode: Mode, volts: &mut [f64]) -> Result<(), Refusal> {
         let line = &mut self.lines[index(mode)];
-        Ok(line.readout.go_on(&mut self.felt, volts)?)
+        line.readout.go_on(&mut self.felt, volts).map_err(of_readout)
     }
 
     /// Lets `frames` frames pass without recording them, counted from the start of the current frame. Clocks and faults

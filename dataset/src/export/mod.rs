@@ -100,7 +100,7 @@ impl Dataset {
             )));
         };
         let write = prepare(self, options)?;
-        let folder = OutputFolder::open(out, &[])?;
+        let folder = OutputFolder::open(out)?;
         check_empty(out)?;
         self.check_files(progress)?;
         self.check_manifest()?;
@@ -148,6 +148,9 @@ impl Dataset {
 
 /// Refuses a folder that holds something.
 fn check_empty(out: &Path) -> Result<(), DatasetError> {
+    if !out.exists() {
+        return Ok(());
+    }
     for entry in std::fs::read_dir(out).map_err(DatasetError::read(out))? {
         let entry = entry.map_err(DatasetError::read(out))?;
         if !entry.file_name().to_string_lossy().starts_with(HIDDEN) {

@@ -1,7 +1,6 @@
 //! Errors of rows.
 
 use crate::spec::SpecError;
-use spts::ChainError;
 use spts_contact::EquilibriumError;
 use spts_input::Refusal;
 
@@ -45,10 +44,7 @@ pub enum RowCause {
     /// A drawn value that is not valid.
     #[error(transparent)]
     Spec(#[from] SpecError),
-    /// Skin or readout is not valid.
-    #[error(transparent)]
-    Chain(#[from] ChainError),
-    /// The conductance is not valid, or the readout refuses it.
+    /// Skin, readout or conductance is not valid, or the readout refuses the conductance.
     #[error(transparent)]
     Refused(#[from] Refusal),
 }

@@ -35,7 +35,7 @@ impl Skin {
         };
         let faults = faults(spec, number);
         let chain = Chain::new(&spec.chain_config(number, &faults)?, spec.skin(), seed, spec.folder())?;
-        let rail_v = |mode| chain.profile().rail_v(mode).map_err(spts::ChainError::from);
+        let rail_v = |mode| chain.profile().rail_v(mode).map_err(|error| error.at("readout"));
         Ok(Self {
             number,
             seed,

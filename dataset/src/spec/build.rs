@@ -184,13 +184,13 @@ impl Spec {
 
 impl SpecError {
     /// The error of a chain, with the section of a spec in place of a scene's.
-    fn chain(error: spts::ChainError) -> Self {
+    fn chain(error: Refusal) -> Self {
         let message = error.to_string();
         let of_spec = message
             .replace("`rows.", "`weights.")
             .replace("`transducer_parameters", "`transducer");
         if of_spec == message {
-            Self::Chain(error)
+            Self::Value(error)
         } else {
             Self::Choice(of_spec)
         }

@@ -1,6 +1,5 @@
 //! Errors of specifications.
 
-use spts::ChainError;
 use spts_contact::mesh::MeshError;
 use spts_models::ConfigError;
 use std::path::PathBuf;
@@ -20,15 +19,12 @@ pub enum SpecError {
     /// Text that is not TOML, an unknown field, or a value of the wrong type.
     #[error("{0}")]
     Syntax(String),
-    /// A number outside its range, or a contact model that is not valid.
+    /// A number outside its range, or a contact model, transducer, readout, weights or faults that are not valid.
     #[error(transparent)]
     Value(#[from] ConfigError),
     /// A name that does not exist, or two values that contradict each other.
     #[error("{0}")]
     Choice(String),
-    /// Transducer, readout, weights or faults are not valid.
-    #[error(transparent)]
-    Chain(#[from] ChainError),
     /// A mesh file is not valid.
     #[error(transparent)]
     Mesh(#[from] MeshError),

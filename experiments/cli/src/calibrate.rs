@@ -115,13 +115,13 @@ impl CalibrateCommand {
             check_writable(path)?;
             let text = spts_input::read_text(path, MAX_PROFILE_BYTES);
             if path.exists() && !text.is_ok_and(|text| TaxelGains::from_toml(&text).is_ok()) {
-                return Err(OutputError::NotOurs { path: path.clone() }.into());
+                return Err(OutputError::not_ours(path).into());
             }
             for picture in ["png", "svg"].map(|extension| path.with_extension(extension)) {
                 check_writable(&picture)?;
                 // pictures of our own stand beside gains
                 if picture.exists() && !path.exists() {
-                    return Err(OutputError::NotOurs { path: picture }.into());
+                    return Err(OutputError::not_ours(picture).into());
                 }
             }
         }
@@ -156,5 +156,5 @@ fn check_profile(path: &Path) -> Result<(), CliError> {
     if ours {
         return Ok(());
     }
-    Err(OutputError::NotOurs { path: path.to_owned() }.into())
+    Err(OutputError::not_ours(path).into())
 }

@@ -47,13 +47,12 @@ impl Common {
     }
 }
 
-/// Opens the folder `path` for the results of a run that may write `files`, and says so when the results of an earlier
-/// run lie in it.
+/// Opens the folder `path` for the results of a run, and says so when the results of an earlier run lie in it.
 ///
 /// # Errors
 /// As for [`OutputFolder::open`].
-pub(super) fn open_folder(path: &Path, files: &[&str]) -> Result<OutputFolder, OutputError> {
-    let folder = OutputFolder::open(path, files)?;
+pub(super) fn open_folder(path: &Path, _: &[&str]) -> Result<OutputFolder, OutputError> {
+    let folder = OutputFolder::open(path)?;
     note_earlier(path);
     Ok(folder)
 }

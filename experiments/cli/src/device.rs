@@ -203,7 +203,7 @@ impl<S: BlockSource> BlockSource for First<S> {
         self.0.sample_rate_hz()
     }
 
-    fn next_block(&mut self) -> Result<Option<spts::device::DeviceBlock>, spts::device::DeviceError> {
+    fn next_block(&mut self) -> Result<Option<spts::device::DeviceBlock>, spts::Refusal> {
         if self.1 == 0 {
             return Ok(None);
         }

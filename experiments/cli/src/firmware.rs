@@ -258,10 +258,7 @@ impl WeightsCommand {
         let bars = Bars::default();
         bars.stage("clocking the cells", Some(weights.blocks()));
         let mut file = NpyFile::create(&self.out, &weights.shape())?;
-        let failed = |error| OutputError::Write {
-            path: self.out.clone(),
-            source: std::io::Error::other(error),
-        };
+        let failed = |error| OutputError::write(&self.out)(std::io::Error::other(error));
         while let Some(levels) = weights.next_block().map_err(failed)? {
             file.push(levels.iter().copied())?;
             bars.step();
@@ -302,7 +299,7 @@ fn check_array(path: &Path) -> Result<(), CliError> {
     let mut start = [0; MAGIC.len()];
     let found = File::open(path).and_then(|mut file| file.read_exact(&mut start));
     if path.exists() && (found.is_err() || start != *MAGIC) {
-        return Err(OutputError::NotOurs { path: path.to_owned() }.into());
+        return Err(OutputError::not_ours(path).into());
     }
     Ok(())
 }

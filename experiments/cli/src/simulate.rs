@@ -146,9 +146,9 @@ pub(super) struct SimulateCommand {
     /// is decoded from that trace in time
     #[arg(long, conflicts_with = "no_record")]
     animate: bool,
-    /// Folder for the results. When the run ends, it replaces the files that an earlier run has written there; all
-    /// other files in the folder stay [default: out/NAME, such as out/T for press/T; with --mesh cup.obj out/cup, or
-    /// out/cup_2, out/cup_3 and so on where out/cup has the results of another mesh]
+    /// Folder for the results. When the run ends, they replace those of an earlier run there; a folder with other files
+    /// is refused [default: out/NAME, such as out/T for press/T; with --mesh cup.obj out/cup, or out/cup_2, out/cup_3
+    /// and so on where out/cup has the results of another mesh]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     #[command(flatten)]

@@ -5,6 +5,7 @@ use crate::labels::Labels;
 use crate::session::ScoredSession;
 use crate::skin::ScoredSkin;
 use crate::training::{LearnError, Learned, SHIFT_REACH, TrainingData, TrainingPresses};
+use spts::Refusal;
 use spts::Session;
 use spts::data::{DataError, Published, SessionSet};
 use spts::session::Event;
@@ -70,7 +71,7 @@ impl Source {
     /// Prepares the sessions of `set`. Samples that slipped are realigned ([`follow_slips`]).
     ///
     /// # Errors
-    /// [`DataError::Unscorable`] for a session with nothing to score, or of another skin than the first.
+    /// [`DataError`] for a session with nothing to score, or of another skin than the first.
     pub fn new(mut set: SessionSet) -> Result<Self, DataError> {
         let slips = follow_slips(&mut set);
         let bounces = set.drops().cloned();
@@ -168,11 +169,11 @@ impl Source {
     /// added to [`Source::missing`].
     ///
     /// # Errors
-    /// [`DataError::Missing`] without a published dictionary or library, [`DataError::NothingFound`] without a session
+    /// [`DataError::Missing`] without a published dictionary or library, [`DataError`] without a session
     /// of presses.
     pub fn published_skin(mut self) -> Result<PublishedSkin, DataError> {
         if self.sessions.is_empty() {
-            return Err(DataError::NothingFound { path: self.root });
+            return Err(DataError::nothing_found(&self.root));
         }
         let published = self.published.take().ok_or_else(|| DataError::Missing {
             path: self.root.join("{dictionary,SRC_lib}.mat"),
@@ -201,16 +202,12 @@ impl Source {
 /// something. `root` is the folder named in errors.
 ///
 /// # Errors
-/// [`DataError::Unscorable`], with the session and what it lacks.
+/// [`DataError`], with the session and what it lacks.
 pub fn check_session(root: &Path, session: &Session, layout: &SkinLayout) -> Result<(), DataError> {
-    let refuse = |mode: &str, field, value: String, needed: String| {
-        Err(DataError::Unscorable {
-            path: root.to_owned(),
-            session: format!("{:?}, {mode} recording", session.name),
-            field,
-            value,
-            needed,
-        })
+    let refuse = |mode: &str, field: &str, value: String, needed: String| {
+        let (path, name) = (root.display(), &session.name);
+        let problem = format!("session {name:?}, {mode} recording: `{field}` = {value}; scoring needs {needed}");
+        Err(Refusal::new(problem).at(path).into())
     };
     let scored = ScoredSession::new(session.clone(), 0);
     let recordings = [

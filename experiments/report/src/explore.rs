@@ -42,10 +42,7 @@ pub fn text(report: &ExploreReport) -> String {
 pub fn write(study: &ExploreStudy, report: &ExploreReport, out: OutputFolder) -> Result<(), ReportError> {
     write_all_or_none(out, |out| {
         let path = out.path("parameters.json");
-        let parameters = serde_json::to_string(study).map_err(|e| OutputError::Write {
-            path: path.clone(),
-            source: e.into(),
-        })?;
+        let parameters = serde_json::to_string(study).map_err(|e| OutputError::write(&path)(e.into()))?;
         sizes(report).write(out)?;
         trials("trials", report)
             .file("wires", |(r, _)| r.wires)

@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use spts::Mode;
 use spts::assign::Assignment;
 use spts::output::{OutputError, OutputFolder};
-use spts::session::{SESSION_FILE, SessionWriter};
+use spts::session::SessionWriter;
 use spts::simulate::{Request, SimulateError, run};
 use std::path::PathBuf;
 
@@ -53,7 +53,7 @@ pub(crate) fn simulate(py: Python<'_>, scene: String, set: &Bound<'_, PyDict>, o
 
 fn simulated(request: &Request, step: &(dyn Fn() + Sync), out: PathBuf) -> Result<Vec<String>, Failure> {
     let prepared = request.prepare()?;
-    let folder = OutputFolder::open(&out, &[SESSION_FILE])?;
+    let folder = OutputFolder::open(&out)?;
     let mut writer = SessionWriter::create(&folder.path(""), &prepared.session())?;
     let done = run(&prepared, true, step, |piece| {
         step();

@@ -15,39 +15,6 @@ pub const RASTER_PERIOD: usize = (LAST_ADDRESS - FIRST_ADDRESS) as usize + 1;
 /// Rows that are clocked at a time on the way to a row.
 const STRIDE: u64 = 1024;
 
-/// Why cells cannot be emulated for a recording.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CellsError {
-    /// A raster scan of a size that the firmware does not have.
-    #[error(
-        "a raster scan of {taxels} taxels: the firmware's raster has {RASTER_PERIOD}; other skins have `weights` = \"model\""
-    )]
-    Raster {
-        /// Taxels of the skin.
-        taxels: usize,
-    },
-    /// A pattern that the firmware's cells cannot store.
-    #[error(
-        "a pattern of {levels} levels and {period} rows: the firmware's cells hold ±1 and at most {PATTERN_BITS} rows; others have `weights` = \"model\""
-    )]
-    Patterns {
-        /// Name of the pattern's levels.
-        levels: &'static str,
-        /// Rows after which the pattern starts again.
-        period: usize,
-    },
-    /// A rate that the emulated clock line cannot reach.
-    #[error("the profile's `sample_rate_hz` = {sample_rate_hz} is outside [1, 1e6] Hz of the emulated clock")]
-    Rate {
-        /// Measurements a second.
-        sample_rate_hz: f64,
-    },
-    /// The emulated array refused its configuration.
-    #[error(transparent)]
-    Array(#[from] Refusal),
-}
-
 /// Emulated cells that run the shipped firmware. One bus serves up to 112 cells; the cells are seeded over the bus and
 /// clocked at the rate of the measurements. Every bus uses the same addresses; the seeds continue from bus to bus.
 ///
@@ -90,9 +57,9 @@ impl FirmwareCells {
     /// sampled 11 µs after the edge, as on the real skin; with a faster clock, after the same share of a period.
     ///
     /// # Errors
-    /// [`CellsError`] for a raster scan of other than 100 taxels, or an array or clock that the emulation does not
+    /// [`Refusal`] for a raster scan of other than 100 taxels, or an array or clock that the emulation does not
     /// support.
-    pub fn new(weights: &Weights, sample_rate_hz: f64) -> Result<Self, CellsError> {
+    pub fn new(weights: &Weights, sample_rate_hz: f64) -> Result<Self, Refusal> {
         Self::check(weights, sample_rate_hz)?;
         let taxels = weights.taxels();
         let image = Image::shipped();
@@ -133,15 +100,19 @@ impl FirmwareCells {
     /// Whether cells can put out `weights` at `sample_rate_hz`.
     ///
     /// # Errors
-    /// [`CellsError::Raster`] for a raster of other than 100 taxels, [`CellsError::Patterns`] for patterns that are
-    /// longer than 64 rows or not ±1, [`CellsError::Rate`] outside [1, 1e6] Hz.
-    pub fn check(weights: &Weights, sample_rate_hz: f64) -> Result<(), CellsError> {
+    /// [`Refusal`] for a raster of other than 100 taxels, patterns that are longer than 64 rows or not ±1, and a rate
+    /// outside [1, 1e6] Hz.
+    pub fn check(weights: &Weights, sample_rate_hz: f64) -> Result<(), Refusal> {
         if !(1.0..=1e6).contains(&sample_rate_hz) {
-            return Err(CellsError::Rate { sample_rate_hz });
+            return Err(Refusal::new(format!(
+                "the profile's `sample_rate_hz` = {sample_rate_hz} is outside [1, 1e6] Hz of the emulated clock"
+            )));
         }
         let taxels = weights.taxels();
         if weights.mode() == WeightMode::Raster && taxels != RASTER_PERIOD {
-            return Err(CellsError::Raster { taxels });
+            return Err(Refusal::new(format!(
+                "a raster scan of {taxels} taxels: the firmware's raster has {RASTER_PERIOD}; other skins have `weights` = \"model\""
+            )));
         }
         match weights.patterns() {
             Some(patterns) => fits(weights.mode(), patterns),
@@ -195,30 +166,32 @@ pub fn cell_mode(mode: WeightMode) -> CellMode {
 }
 
 /// Whether cells hold `patterns` of levels of `mode`.
-fn fits(mode: WeightMode, patterns: &Patterns) -> Result<(), CellsError> {
+fn fits(mode: WeightMode, patterns: &Patterns) -> Result<(), Refusal> {
     let period = patterns.period();
     if mode == WeightMode::Binary && period <= PATTERN_BITS {
         return Ok(());
     }
-    Err(CellsError::Patterns {
-        levels: mode.name(),
-        period,
-    })
+    Err(unfit(mode, period))
+}
+
+/// The error of a pattern that cells cannot store.
+fn unfit(mode: WeightMode, period: usize) -> Refusal {
+    let levels = mode.name();
+    Refusal::new(format!(
+        "a pattern of {levels} levels and {period} rows: the firmware's cells hold ±1 and at most {PATTERN_BITS} rows; others have `weights` = \"model\""
+    ))
 }
 
 /// The message that the bus master writes to the cell of `taxel` at `address` so that the cell puts out `weights`.
 ///
 /// # Errors
-/// [`CellsError::Patterns`] for a pattern that cells cannot store.
-pub fn start_message(weights: &Weights, taxel: usize, address: u8) -> Result<Vec<u8>, CellsError> {
+/// [`Refusal`] for a pattern that cells cannot store.
+pub fn start_message(weights: &Weights, taxel: usize, address: u8) -> Result<Vec<u8>, Refusal> {
     let mode = cell_mode(weights.mode());
     if let Some(patterns) = weights.patterns() {
         fits(weights.mode(), patterns)?;
         let bits = (0..patterns.period() as u64).map(|row| patterns.row(row)[taxel] > 127);
-        let pattern = Pattern::of_bits(bits).map_err(|_| CellsError::Patterns {
-            levels: weights.mode().name(),
-            period: patterns.period(),
-        })?;
+        let pattern = Pattern::of_bits(bits).map_err(|_| unfit(weights.mode(), patterns.period()))?;
         return Ok(pattern.message());
     }
     // the device's own way: one byte, the address
@@ -232,8 +205,8 @@ pub fn start_message(weights: &Weights, taxel: usize, address: u8) -> Result<Vec
 /// A bus with the cells of the taxels `first..first + cells`, seeded and started.
 ///
 /// # Errors
-/// [`CellsError`] for an array that the emulation does not support, or a pattern that cells cannot store.
-pub fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, CellsError> {
+/// [`Refusal`] for an array that the emulation does not support, or a pattern that cells cannot store.
+pub fn bus(weights: &Weights, first: usize, cells: usize, image: &Image) -> Result<Array, Refusal> {
     let mut array = Array::new(cells, image)?;
     for (address, taxel) in (FIRST_ADDRESS..).zip(first..first + cells) {
         let message = start_message(weights, taxel, address)?;
@@ -321,13 +294,8 @@ mod tests {
         for taxels in [1, 99, 101, 144] {
             let weights = Weights::new(WeightMode::Raster, Seeding::Address, taxels);
             let error = FirmwareCells::new(&weights, 64.3e3).unwrap_err();
-            assert_eq!(
-                error,
-                CellsError::Raster {
-                    taxels: taxels as usize
-                }
-            );
-            assert!(error.to_string().contains("firmware's raster has 100"), "{error}");
+            let needed = format!("a raster scan of {taxels} taxels: the firmware's raster has 100");
+            assert!(error.to_string().contains(&needed), "{error}");
         }
         let binary = Weights::new(WeightMode::Binary, Seeding::Address, 2);
         for rate_hz in [0.0, 2e6, f64::NAN, f64::INFINITY] {

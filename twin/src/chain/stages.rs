@@ -1,17 +1,20 @@
-//! Every stage between the pressure on the skin and the recording.
+//! Every stage between the pressure on the skin and the recording, and the presses of one session, recorded a few at a
+//! time.
 
-use super::acquisition::Acquisition;
 use super::cells::FirmwareCells;
-use super::config::{ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER};
-use super::error::ChainError;
-use super::rows::RowsFile;
-use super::weights::{DEFAULT_WEIGHTS, WeightSource};
-use spts_circuit::{FaultConfig, Interpolated, Mode, PROFILES, Profile, Readout, Recording};
+use super::config::{
+    ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS, ProfileFile, RowsFile, WeightSource,
+};
+use crate::session::{PressFacts, PressPose};
+use spts_circuit::{Constant, FaultConfig, Interpolated, Mode, PROFILES, Profile, Readout, Recording};
 use spts_contact::Frame;
 use spts_input::Refusal;
-use spts_models::{ConductanceMap, SkinLayout, Streams, Transducer, build_transducer, explain_toml, in_section};
+use spts_models::{
+    ConductanceMap, PressureMap, REFERENCE_PA, SkinLayout, Streams, Transducer, TransducerError, build_transducer,
+    explain_toml, in_section,
+};
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -23,7 +26,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 ///
 /// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
 /// assert!((chain.sample_rate_hz() - 64_300.0).abs() < 1e-9);
-/// # Ok::<(), spts::ChainError>(())
+/// # Ok::<(), spts::Refusal>(())
 /// ```
 #[derive(Clone)]
 pub struct Chain {
@@ -47,39 +50,30 @@ impl fmt::Debug for Chain {
     }
 }
 
-/// The file from which a readout profile was read.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ProfileFile {
-    /// Path of the file.
-    pub path: PathBuf,
-    /// Its text.
-    pub text: String,
-}
-
 impl Chain {
     /// The chain of the skin `skin` with the stages in `config`. A readout that ends in `.toml` is a file in `folder`.
     /// Chains with the same `seed` have the same specimen of the skin.
     ///
     /// # Errors
-    /// [`ChainError`] for an unknown transducer, profile, fault or source of weights, a value outside its range, or a
+    /// [`Refusal`] for an unknown transducer, profile, fault or source of weights, a value outside its range, or a
     /// file that cannot be used.
-    pub fn new(config: &ChainConfig, skin: &SkinLayout, seed: u64, folder: &Path) -> Result<Self, ChainError> {
+    pub fn new(config: &ChainConfig, skin: &SkinLayout, seed: u64, folder: &Path) -> Result<Self, Refusal> {
         let streams = Streams::new(seed);
         let name = config.transducer.as_deref().unwrap_or(DEFAULT_TRANSDUCER);
         let transducer = build_transducer(name, config.transducer_parameters.clone(), skin, streams);
-        let transducer = transducer.map_err(|source| ChainError::transducer(name, &source))?;
+        let transducer = transducer.map_err(|error| refused_transducer(name, &error))?;
         let readout = config.readout.as_deref().unwrap_or(DEFAULT_READOUT);
         let profile_file = ProfileFile::of(readout, folder)?;
         let path = profile_file.as_ref().map(|file| file.path.as_path());
-        let in_file = |error: Refusal| ChainError::profile(path, &error);
+        let in_file = |error: Refusal| refused_profile(path, &error);
         let profile = match &profile_file {
             Some(file) => Profile::from_toml(&file.text),
             None if PROFILES.iter().all(|(known, _)| *known != readout) => {
                 let known: Vec<&str> = PROFILES.iter().map(|(known, _)| *known).collect();
-                return Err(ChainError::UnknownProfile {
-                    name: readout.to_owned(),
-                    known: known.join(", "),
-                });
+                return Err(Refusal::new(format!(
+                    "`readout` = \"{readout}\" is not a readout profile; known: {}",
+                    known.join(", ")
+                )));
             }
             None => Profile::named(readout),
         };
@@ -123,16 +117,6 @@ impl Chain {
         &self.skin
     }
 
-    /// Random streams of the skin.
-    pub(super) fn streams(&self) -> Streams {
-        self.streams
-    }
-
-    /// The transducer of a fresh skin.
-    pub(super) fn fresh_transducer(&self) -> Box<dyn Transducer> {
-        self.transducer.boxed()
-    }
-
     /// The readout profile, including the rows and faults of the scene. Its values hold for electrodes of 10 mm × 10
     /// mm.
     #[must_use]
@@ -143,13 +127,13 @@ impl Chain {
     /// Checks whether presses can be recorded in `mode`, before the first one is simulated.
     ///
     /// # Errors
-    /// [`ChainError::Cells`] if the source of the weights cannot provide them.
-    pub fn check(&self, mode: Mode) -> Result<(), ChainError> {
+    /// [`Refusal`] if the source of the weights cannot provide them.
+    pub fn check(&self, mode: Mode) -> Result<(), Refusal> {
         match self.weights {
             WeightSource::Model => Ok(()),
             WeightSource::Firmware => {
-                let weights = self.profile.weights(mode, taxels(&self.skin))?;
-                Ok(FirmwareCells::check(&weights, self.profile.sample_rate_hz)?)
+                let weights = self.profile.weights(mode, taxels(&self.skin)).map_err(of_readout)?;
+                FirmwareCells::check(&weights, self.profile.sample_rate_hz).map_err(of_cells)
             }
         }
     }
@@ -157,16 +141,16 @@ impl Chain {
     /// The readout for session number `session` in `mode`, with freshly loaded seeds.
     ///
     /// # Errors
-    /// [`ChainError`] if the source of the weights cannot provide them.
-    pub fn readout(&self, mode: Mode, session: u64) -> Result<Readout, ChainError> {
-        let readout = Readout::new(&self.profile, mode, &self.skin, self.streams, session)?;
+    /// [`Refusal`] if the source of the weights cannot provide them.
+    pub fn readout(&self, mode: Mode, session: u64) -> Result<Readout, Refusal> {
+        let readout = Readout::new(&self.profile, mode, &self.skin, self.streams, session).map_err(of_readout)?;
         match self.weights {
             WeightSource::Model => Ok(readout),
             WeightSource::Firmware => {
-                let weights = self.profile.weights(mode, taxels(&self.skin))?;
-                let cells = FirmwareCells::new(&weights, self.profile.sample_rate_hz)?;
+                let weights = self.profile.weights(mode, taxels(&self.skin)).map_err(of_readout)?;
+                let cells = FirmwareCells::new(&weights, self.profile.sample_rate_hz).map_err(of_cells)?;
                 let cells = cells.counting(Arc::clone(&self.unlike_codes));
-                Ok(readout.with_codes(Box::new(cells))?)
+                readout.with_codes(Box::new(cells)).map_err(of_readout)
             }
         }
     }
@@ -181,11 +165,11 @@ impl Chain {
     /// The same skin with another readout profile.
     ///
     /// # Errors
-    /// [`ChainError`] for a profile with an unknown effect or a value outside its range.
-    pub fn with_profile(&self, profile: Profile) -> Result<Self, ChainError> {
+    /// [`Refusal`] for a profile with an unknown effect or a value outside its range.
+    pub fn with_profile(&self, profile: Profile) -> Result<Self, Refusal> {
         let valid = profile.validate(taxels(&self.skin));
         let valid = valid.and_then(|()| profile.on(&self.skin).map(drop));
-        valid.map_err(|error| ChainError::profile(None, &error))?;
+        valid.map_err(|error| refused_profile(None, &error))?;
         Ok(Self {
             profile,
             profile_file: None,
@@ -217,13 +201,13 @@ impl Chain {
     /// Records `presses` of `duration_s` seconds each, in order. Foam and Velostat remember earlier presses.
     ///
     /// # Errors
-    /// [`ChainError`] if the readout refuses a conductance, or a press is too long to record.
+    /// [`Refusal`] if the readout refuses a conductance, or a press is too long to record.
     pub fn record(
         &self,
         presses: &[&[Frame]],
         duration_s: f64,
         acquisition: &Acquisition,
-    ) -> Result<Recording, ChainError> {
+    ) -> Result<Recording, Refusal> {
         let mut sources = self.conductance(presses, acquisition)?;
         self.record_sources(&mut sources, duration_s, acquisition)
     }
@@ -237,19 +221,15 @@ impl Chain {
         sources: &mut [Interpolated],
         duration_s: f64,
         acquisition: &Acquisition,
-    ) -> Result<Recording, ChainError> {
+    ) -> Result<Recording, Refusal> {
         self.readout_session(duration_s, acquisition)?.record(sources)
     }
 
     /// Conductance of every press as a function of time, in the session and with the conditioning of `acquisition`.
     ///
     /// # Errors
-    /// [`ChainError::Source`] if the frames of a press are not in order of time.
-    pub fn conductance(
-        &self,
-        presses: &[&[Frame]],
-        acquisition: &Acquisition,
-    ) -> Result<Vec<Interpolated>, ChainError> {
+    /// [`Refusal`] if the frames of a press are not in order of time.
+    pub fn conductance(&self, presses: &[&[Frame]], acquisition: &Acquisition) -> Result<Vec<Interpolated>, Refusal> {
         let mut skin = self.skin_session(acquisition.session);
         for frames in presses.iter().cycle().take(acquisition.conditioning_presses) {
             skin.press(frames);
@@ -271,42 +251,403 @@ fn taxels(skin: &SkinLayout) -> u32 {
     u32::try_from(skin.taxels()).unwrap_or(u32::MAX)
 }
 
-/// Size of the largest scene or readout profile that is read, bytes. The limit keeps parsing small, because a parsed
-/// file takes some hundred times its size. The seeds of 100,000 taxels fill 1 MB; larger skins name a file of seeds.
-pub const MAX_TOML_BYTES: u64 = 1 << 21;
-
-impl ProfileFile {
-    /// The file that `readout` names, in `folder`; `None` when it is the name of a profile.
-    fn of(readout: &str, folder: &Path) -> Result<Option<Self>, ChainError> {
-        if Path::new(readout).extension().is_none_or(|e| e != "toml") {
-            return Ok(None);
-        }
-        let path = folder.join(readout);
-        match spts_input::read_text(&path, MAX_TOML_BYTES) {
-            Ok(text) => Ok(Some(Self { path, text })),
-            Err(error) => Err(ChainError::Io {
-                path,
-                source: error.into(),
-            }),
-        }
-    }
-}
-
 /// `profile` with the `faults` of a scene added to its own, for a skin of `taxels` taxels.
-fn with_faults(mut profile: Profile, faults: &[toml::Table], taxels: u32) -> Result<Profile, ChainError> {
+fn with_faults(mut profile: Profile, faults: &[toml::Table], taxels: u32) -> Result<Profile, Refusal> {
     let own = profile.faults.len();
     for (index, fault) in faults.iter().enumerate() {
         let fault = fault.clone().try_into::<FaultConfig>();
-        let refused = |message: &str| ChainError::Fault(in_section(&format!("faults[{index}]"), message));
+        let refused = |message: &str| Refusal::new(in_section(&format!("faults[{index}]"), message));
         profile.faults.push(fault.map_err(|e| refused(&explain_toml(&e)))?);
         profile.validate(taxels).map_err(|error| {
             // its place in the scene, not behind the profile's own faults
             let message = error.to_string();
             let (found, meant) = (format!("faults[{}]", own + index), format!("faults[{index}]"));
-            ChainError::Fault(message.replacen(&found, &meant, 1))
+            Refusal::new(message.replacen(&found, &meant, 1))
         })?;
     }
     Ok(profile)
+}
+
+/// What the transducer called `name` refuses.
+fn refused_transducer(name: &str, error: &TransducerError) -> Refusal {
+    match error {
+        TransducerError::Unknown { name, known } => {
+            Refusal::new(format!("`transducer` = \"{name}\" is not a transducer; known: {known}"))
+        }
+        other => {
+            let message = in_section("transducer_parameters", &other.to_string());
+            Refusal::new(format!("{message} (transducer `{name}`)"))
+        }
+    }
+}
+
+/// What is wrong with the readout profile, which is in the file `path` unless it goes by a name.
+fn refused_profile(path: Option<&Path>, error: &Refusal) -> Refusal {
+    let refusal = Refusal::new(in_section("readout", &error.to_string()));
+    match path {
+        Some(path) => refusal.at(path.display()),
+        None => refusal,
+    }
+}
+
+/// What cannot be read out.
+pub(crate) fn of_readout(error: Refusal) -> Refusal {
+    error.at("readout")
+}
+
+/// A conductance that the readout cannot use.
+pub(crate) fn of_conductance(error: Refusal) -> Refusal {
+    error.at("conductance")
+}
+
+/// Weights that cannot come from the firmware.
+fn of_cells(error: Refusal) -> Refusal {
+    error.at("`weights` = \"firmware\"")
+}
+
+/// How a session is recorded: in which mode, as which session of the skin, and with how many frames before and between
+/// its blocks. A block is one press or drop; a frame is as many measurements as there are taxels.
+///
+/// ```
+/// use spts::{Acquisition, Mode};
+///
+/// let presses = Acquisition::presses(Mode::Compressive, 3);
+/// let drops = Acquisition::drops(Mode::Compressive, 3);
+/// assert_eq!((presses.gap_frames, drops.gap_frames), (57, 0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Acquisition {
+    /// Raster scan or compressive.
+    pub mode: Mode,
+    /// Number of the session. Sessions of one skin differ in their noise and, if the transducer varies between
+    /// sessions, in their gains.
+    pub session: u64,
+    /// Frames from the loading of the cells' seeds to the first block. They are not recorded.
+    pub lead_frames: u64,
+    /// Frames after each block that are not recorded.
+    pub gap_frames: u64,
+    /// Whether nothing touches the skin in the first 0.233 s of every block (15,000 measurements at 64.3 kHz).
+    pub starts_idle: bool,
+    /// Number of presses that condition the sheet before the recording. The session's own presses are used, repeated
+    /// from the first as often as needed.
+    pub conditioning_presses: usize,
+}
+
+impl Acquisition {
+    /// The way in which the published device records presses: 57 frames are not recorded after each block, while the
+    /// arm returns, and a block begins with an untouched skin.
+    #[must_use]
+    pub fn presses(mode: Mode, session: u64) -> Self {
+        Self {
+            mode,
+            session,
+            lead_frames: 243,
+            gap_frames: 57,
+            starts_idle: true,
+            conditioning_presses: 0,
+        }
+    }
+
+    /// The way in which the published device records touches by a finger: block follows block without a gap, as for
+    /// [`Acquisition::drops`], and nothing says when in a block the skin is touched.
+    #[must_use]
+    pub fn touches(mode: Mode, session: u64) -> Self {
+        Self::drops(mode, session)
+    }
+
+    /// The way in which the published device records drops of a ball: block follows block without a gap, and nothing
+    /// says when in a block the ball lands.
+    #[must_use]
+    pub fn drops(mode: Mode, session: u64) -> Self {
+        Self {
+            lead_frames: 0,
+            gap_frames: 0,
+            starts_idle: false,
+            ..Self::presses(mode, session)
+        }
+    }
+}
+
+/// No press touches the skin in the first so many measurements at [`IDLE_RATE_HZ`], 0.233 s: the earliest begins at
+/// 0.25 s.
+const IDLE_MEASUREMENTS: f64 = 15_000.0;
+/// Rate of [`IDLE_MEASUREMENTS`], Hz.
+const IDLE_RATE_HZ: f64 = 64_300.0;
+
+/// Frames at the start of a block in which no press touches the skin, of `frame` measurements each at `rate_hz`.
+fn idle_frames(rate_hz: f64, frame: usize) -> usize {
+    #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
+    let frames = (IDLE_MEASUREMENTS * rate_hz / IDLE_RATE_HZ / frame as f64) as usize;
+    frames
+}
+
+/// Rest between two presses: the arm's way back, s.
+const REST_S: f64 = 2.0;
+/// Time for which a bent skin has been under its preload before a session, s: creep is over for the most part.
+const BENT_S: f64 = 3600.0;
+/// Most measurements recorded of one press: ten minutes at 64.3 kHz, 320 MB.
+const MAX_MEASUREMENTS: f64 = 4e7;
+
+/// The skin during one session. Foam and Velostat remember earlier presses.
+///
+/// ```
+/// use spts::{Chain, ChainConfig, PressureMap, SkinLayout};
+///
+/// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+/// let pressure = PressureMap::from_values(10, 10, vec![10e3; 100]);
+/// let mut skin = chain.skin_session(0);
+/// let first = skin.hold(&pressure, 0.5).sum();
+/// skin.rest();
+/// assert!(skin.hold(&pressure, 0.5).sum() > first, "Velostat conducts better at the second press");
+/// # Ok::<(), spts::Refusal>(())
+/// ```
+pub struct SkinSession {
+    transducer: Box<dyn Transducer>,
+    rows: usize,
+    cols: usize,
+    /// Whether the skin has been pressed in this session.
+    pressed: bool,
+}
+
+impl Clone for SkinSession {
+    fn clone(&self) -> Self {
+        Self {
+            transducer: self.transducer.boxed(),
+            ..*self
+        }
+    }
+}
+
+impl SkinSession {
+    /// Conductance of every taxel, S, `hold_s` seconds after the start of a press with the constant pressure
+    /// `electrode_pressure`.
+    pub fn hold(&mut self, electrode_pressure: &PressureMap, hold_s: f64) -> ConductanceMap {
+        let mut map = ConductanceMap::zeros(self.rows, self.cols);
+        self.transducer.step(electrode_pressure, hold_s, &mut map);
+        map
+    }
+
+    /// Lets the skin rest as long as between two presses.
+    pub fn rest(&mut self) {
+        self.transducer.rest(REST_S);
+    }
+
+    /// Conductance of every taxel at every frame of the next press; afterwards the skin rests. A bent skin rests under
+    /// its preload, which has acted since long before the session.
+    pub fn press(&mut self, frames: &[Frame]) -> Vec<ConductanceMap> {
+        let preload = preload(frames);
+        if let Some(preload) = preload.filter(|_| !self.pressed) {
+            self.hold(preload, BENT_S);
+        }
+        self.pressed = true;
+        let mut last_s = 0.0;
+        let maps = frames.iter().map(|frame| {
+            let mut map = ConductanceMap::zeros(self.rows, self.cols);
+            self.transducer
+                .step(&frame.electrode_pressure, frame.time_s - last_s, &mut map);
+            last_s = frame.time_s;
+            map
+        });
+        let maps = maps.collect();
+        match preload {
+            Some(preload) => drop(self.hold(preload, REST_S)),
+            None => self.rest(),
+        }
+        maps
+    }
+
+    /// [`SkinSession::press`] as a function of time, interpolated between the frames.
+    ///
+    /// # Errors
+    /// [`Refusal`] if the frames are not in order of time.
+    pub fn conductance(&mut self, frames: &[Frame]) -> Result<Interpolated, Refusal> {
+        let times_s = frames.iter().map(|frame| frame.time_s).collect();
+        Interpolated::new(times_s, self.press(frames)).map_err(of_conductance)
+    }
+}
+
+/// Pressure on the electrodes of a bent skin before `frames`' touch; `None` for a flat one. It is pressure without a
+/// force.
+fn preload(frames: &[Frame]) -> Option<&PressureMap> {
+    let first = frames.first().filter(|frame| frame.wrench.force_n[2] <= 0.0)?;
+    let loaded = first.electrode_pressure.values().iter().any(|p| *p > 0.0);
+    loaded.then_some(&first.electrode_pressure)
+}
+
+/// The readout during one session. The seeds are loaded before the first block.
+pub struct ReadoutSession {
+    readout: Readout,
+    measurements: usize,
+    gap_frames: u64,
+    idle_frames: Option<usize>,
+}
+
+impl ReadoutSession {
+    /// Records one block for each of `sources`, in order.
+    ///
+    /// # Errors
+    /// [`Refusal`] if the readout refuses a conductance.
+    pub fn record(&mut self, sources: &mut [Interpolated]) -> Result<Recording, Refusal> {
+        let recording = self.readout.record(sources, self.measurements, self.gap_frames);
+        let recording = recording.map_err(of_readout)?;
+        Ok(recording.with_idle_frames(self.idle_frames))
+    }
+}
+
+impl Chain {
+    /// The skin, ready for session number `session`.
+    #[must_use]
+    pub fn skin_session(&self, session: u64) -> SkinSession {
+        let mut transducer = self.transducer.boxed();
+        transducer.start_session(session);
+        SkinSession {
+            transducer,
+            rows: self.skin().rows(),
+            cols: self.skin().cols(),
+            pressed: false,
+        }
+    }
+
+    /// The readout, ready to record presses of `duration_s` seconds each as `acquisition` says.
+    ///
+    /// # Errors
+    /// [`Refusal`] if a press is too long to record, or the source of the weights cannot provide them.
+    pub fn readout_session(&self, duration_s: f64, acquisition: &Acquisition) -> Result<ReadoutSession, Refusal> {
+        let mut readout = self.readout(acquisition.mode, acquisition.session)?;
+        readout.skip(acquisition.lead_frames);
+        let frame = readout.measurements_per_frame();
+        let measurements = duration_s * readout.sample_rate_hz();
+        if measurements > MAX_MEASUREMENTS {
+            return Err(Refusal::new(format!(
+                "`duration_s` = {duration_s}: {measurements:.0} measurements a press are outside [1, {MAX_MEASUREMENTS:.0}]"
+            )));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "limited to MAX_MEASUREMENTS")]
+        let frames = (measurements / frame as f64).round() as usize;
+        let idle_frames = idle_frames(readout.sample_rate_hz(), frame);
+        // no whole frame of a large skin passes before the earliest press
+        let known = acquisition.starts_idle && idle_frames > 0;
+        Ok(ReadoutSession {
+            measurements: frames.max(1) * frame,
+            gap_frames: acquisition.gap_frames,
+            idle_frames: known.then_some(idle_frames),
+            readout,
+        })
+    }
+}
+
+/// Facts about one press or drop at the middle of its hold or, without a hold, at the instant of the largest force.
+/// `maps` are the conductances at `frames`.
+#[must_use]
+pub fn press_facts(frames: &[Frame], maps: &[ConductanceMap], hold_s: Option<[f64; 2]>) -> PressFacts {
+    let at = match hold_s {
+        Some([start_s, end_s]) => frames.iter().position(|f| f.time_s >= 0.5 * (start_s + end_s)),
+        None => {
+            let force = |k: &usize| frames[*k].wrench.force_n[2];
+            // the first of several
+            (0..frames.len()).rev().max_by(|a, b| force(a).total_cmp(&force(b)))
+        }
+    };
+    let Some(frame) = at.and_then(|at| frames.get(at)) else {
+        return PressFacts::default();
+    };
+    PressFacts {
+        time_s: Some(frame.time_s),
+        pose: Some(PressPose {
+            position_m: frame.pose.position_m,
+            quaternion: frame.pose.quaternion,
+        }),
+        force_n: Some(frame.wrench.force_n[2]),
+        pressure: Some(frame.pressure.clone()),
+        conductance: at.and_then(|at| maps.get(at)).cloned(),
+    }
+}
+
+/// Signal and noise of one pressed taxel in a measurement of the compressive readout.
+///
+/// ```
+/// use spts::{Chain, ChainConfig, SkinLayout};
+///
+/// let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 0, ".".as_ref())?;
+/// let taxel = chain.taxel_signal()?;
+/// assert!(!taxel.below_noise() && taxel.signal_v > 5.0 * taxel.step_v);
+/// # Ok::<(), spts::Refusal>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TaxelSignal {
+    /// Output of a taxel of median gain under 10 kPa, V.
+    pub signal_v: f64,
+    /// Standard deviation of a measurement of this taxel alone, V. All effects of the profile contribute, including the
+    /// taxel's contact noise.
+    pub noise_v: f64,
+    /// Step of the converter, V; 0 if the profile has no converter.
+    pub step_v: f64,
+}
+
+/// Time for which the taxel has been pressed, s: creep is over for the most part.
+const HOLD_S: f64 = 0.5;
+/// Measurements that the noise is found from: its standard error is 1 %.
+const MEASUREMENTS: usize = 5000;
+/// A taxel of less than so many standard deviations of a measurement is below the noise.
+const LEAST_RATIO: f64 = 2.0;
+
+impl TaxelSignal {
+    /// Whether the signal is less than twice the noise, or less than one step of the converter. An image then needs
+    /// many more measurements than there are taxels.
+    #[must_use]
+    pub fn below_noise(&self) -> bool {
+        self.signal_v < LEAST_RATIO * self.noise_v || self.signal_v < self.step_v
+    }
+}
+
+impl Chain {
+    /// Signal and noise of one taxel of this skin and readout. They are measured on a skin of one taxel, without faults
+    /// and with seeds by the rule, so that the result does not depend on the rows.
+    ///
+    /// # Errors
+    /// [`Refusal`] if the readout cannot be set up.
+    pub fn taxel_signal(&self) -> Result<TaxelSignal, Refusal> {
+        let skin = self.skin();
+        let shape = (skin.rows(), skin.cols());
+        let pressure = PressureMap::from_values(shape.0, shape.1, vec![REFERENCE_PA; skin.taxels()]);
+        let mut map = ConductanceMap::zeros(shape.0, shape.1);
+        self.transducer.boxed().step(&pressure, HOLD_S, &mut map);
+        let mut values = map.values().to_vec();
+        let (_, median_s, _) = values.select_nth_unstable_by(skin.taxels() / 2, f64::total_cmp);
+        let conductance = ConductanceMap::from_values(1, 1, vec![*median_s]);
+        let one = SkinLayout::new(1, 1, skin.pitch_m(), skin.electrode_m()).unwrap_or_default();
+        let profile = Profile {
+            seeds: None,
+            patterns: None,
+            faults: Vec::new(),
+            ..self.profile().clone()
+        };
+        let mut readout = Readout::new(&profile, Mode::Compressive, &one, self.streams, 0).map_err(of_readout)?;
+        let mut pressed = Constant::new(conductance).map_err(of_conductance)?;
+        let volts = readout.measure(&mut pressed, MEASUREMENTS).map_err(of_readout)?;
+        let mut weights = vec![0.0; MEASUREMENTS];
+        readout.weights().fill_rows(0, &mut weights);
+        let converter = readout.info().converter;
+        Ok(TaxelSignal {
+            signal_v: *median_s * profile.on(&one).map_err(of_readout)?.volts_per_siemens(),
+            noise_v: residual_sd(&weights, &volts),
+            step_v: converter.map_or(0.0, |c| c.volts(0) - c.volts(1)),
+        })
+    }
+}
+
+/// Standard deviation of `y` about its regression on `x`.
+fn residual_sd(x: &[f64], y: &[f64]) -> f64 {
+    let n = x.len() as f64;
+    let mean = |v: &[f64]| v.iter().sum::<f64>() / n;
+    let (x_mean, y_mean) = (mean(x), mean(y));
+    let products = |a: &[f64], a_mean: f64, b: &[f64], b_mean: f64| {
+        let pairs = a.iter().zip(b);
+        pairs.map(|(a, b)| (a - a_mean) * (b - b_mean)).sum::<f64>()
+    };
+    let (xx, xy) = (products(x, x_mean, x, x_mean), products(x, x_mean, y, y_mean));
+    let explained = if xx > 0.0 { xy * xy / xx } else { 0.0 };
+    ((products(y, y_mean, y, y_mean) - explained).max(0.0) / n).sqrt()
 }
 
 #[cfg(test)]

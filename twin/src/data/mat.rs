@@ -1,15 +1,18 @@
-//! One variable of a MATLAB v5 file.
+//! Variables of a MATLAB v5 file: its elements are decompressed and found first, so that nothing is parsed that would not
+//! fit.
 
-use super::error::DataError;
-use super::inflate::{HEADER, inflate};
-use super::mat_elements::{MatElement, mat_elements};
+use flate2::read::ZlibDecoder;
 use matfile::{MatFile, NumericData};
+use spts_input::Refusal;
+use std::io::Read as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
-/// A numeric array: `shape` and column-major `values`.
+/// A numeric array: its name, `shape` and column-major `values`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatVariable {
+    /// Name.
+    pub name: &'static str,
     /// Size along each dimension.
     pub shape: Vec<usize>,
     /// Values, first index fastest.
@@ -17,49 +20,41 @@ pub struct MatVariable {
 }
 
 /// Largest file taken for a recording, bytes: the published ones are below 4 MB.
-const MAX_BYTES: u64 = 1 << 28;
+const MAX_FILE_BYTES: u64 = 1 << 28;
 /// Most values of an array: 16 times the longest published recording. Whatever their type in the file, each takes
 /// 8 bytes here, several times over.
 const MAX_VALUES: usize = 1 << 25;
 
-/// Reads variable `name` of the file at `path`.
+/// Reads the first of the variables `names` that the file at `path` has.
 ///
 /// # Errors
-/// [`DataError`] when the file cannot be read, is not MATLAB v5, or has no such numeric variable.
-pub fn read_mat(path: &Path, name: &'static str) -> Result<MatVariable, DataError> {
-    let bytes = spts_input::read(path, MAX_BYTES).map_err(|error| DataError::Io {
-        path: path.to_owned(),
-        source: error.into(),
-    })?;
-    parse_mat(bytes, name, path)
+/// [`Refusal`] when the file cannot be read, is not MATLAB v5, or that variable is missing or no array of numbers.
+pub(super) fn read_mat(path: &Path, names: &[&'static str]) -> Result<MatVariable, Refusal> {
+    let bytes = spts_input::read(path, MAX_FILE_BYTES).map_err(Refusal::in_file(path))?;
+    parse_mat(bytes, names, path)
 }
 
-/// Reads variable `name` from the content `bytes` of a MATLAB v5 file. Errors name the file `path`.
+/// Reads the first of the variables `names` from the content `bytes` of a MATLAB v5 file. Errors name the file `path`.
 ///
 /// # Errors
 /// As [`read_mat`].
-pub fn parse_mat(bytes: Vec<u8>, name: &'static str, path: &Path) -> Result<MatVariable, DataError> {
-    let not_mat = |reason: String| DataError::NotMat {
-        path: path.to_owned(),
-        reason,
-    };
-    let plain = inflate(&bytes).map_err(not_mat)?;
+pub fn parse_mat(bytes: Vec<u8>, names: &[&'static str], path: &Path) -> Result<MatVariable, Refusal> {
+    let refused = |problem: String| Refusal::new(problem).at(path.display());
+    let plain = inflate(&bytes).map_err(|reason| not_mat(path, &reason))?;
+    let not_mat = |reason: String| not_mat(path, &reason);
     drop(bytes);
     let (header, elements) = plain.split_at(HEADER);
     let found = mat_elements(elements);
-    let Some(element) = found.iter().find(|element| element.name == name) else {
-        return Err(DataError::NoVariable {
-            path: path.to_owned(),
-            name,
-            found: listed(&found),
-        });
+    let element_of = |name: &&'static str| Some((*name, found.iter().find(|element| element.name == *name)?));
+    let Some((name, element)) = names.iter().find_map(element_of) else {
+        let name = names.first().copied().unwrap_or_default();
+        return Err(refused(format!("no variable `{name}` (found: {})", listed(&found))));
     };
     if !element.numeric {
-        return Err(DataError::NotNumeric {
-            path: path.to_owned(),
-            name,
-            class: element.class,
-        });
+        let class = element.class;
+        return Err(refused(format!(
+            "variable `{name}` is a {class}; expected an array of numbers"
+        )));
     }
     if element.values > MAX_VALUES {
         return Err(not_mat(format!(
@@ -83,7 +78,12 @@ pub fn parse_mat(bytes: Vec<u8>, name: &'static str, path: &Path) -> Result<MatV
             values.len()
         )));
     }
-    Ok(MatVariable { shape, values })
+    Ok(MatVariable { name, shape, values })
+}
+
+/// The error of a file that is not in MATLAB v5 format, or is damaged.
+pub(super) fn not_mat(path: &Path, reason: &str) -> Refusal {
+    Refusal::new(format!("{}: not a readable MATLAB v5 file ({reason})", path.display()))
 }
 
 /// The parsed file. The parser slices without looking on some damaged headers: a panic in it is an unreadable file.
@@ -118,16 +118,244 @@ fn listed(found: &[MatElement<'_>]) -> String {
 }
 
 fn real_values(data: &NumericData) -> Vec<f64> {
-    match data {
-        NumericData::Double { real, .. } => real.clone(),
-        NumericData::Single { real, .. } => real.iter().map(|&v| f64::from(v)).collect(),
-        NumericData::Int8 { real, .. } => real.iter().map(|&v| f64::from(v)).collect(),
-        NumericData::UInt8 { real, .. } => real.iter().map(|&v| f64::from(v)).collect(),
-        NumericData::Int16 { real, .. } => real.iter().map(|&v| f64::from(v)).collect(),
-        NumericData::UInt16 { real, .. } => real.iter().map(|&v| f64::from(v)).collect(),
-        NumericData::Int32 { real, .. } => real.iter().map(|&v| f64::from(v)).collect(),
-        NumericData::UInt32 { real, .. } => real.iter().map(|&v| f64::from(v)).collect(),
-        NumericData::Int64 { real, .. } => real.iter().map(|&v| v as f64).collect(),
-        NumericData::UInt64 { real, .. } => real.iter().map(|&v| v as f64).collect(),
+    macro_rules! values {
+        ($($kind:ident: $value:expr),*) => {
+            match data {
+                $(NumericData::$kind { real, .. } => real.iter().map($value).collect(),)*
+            }
+        };
+    }
+    values!(
+        Double: |&v| v, Single: |&v| f64::from(v),
+        Int8: |&v| f64::from(v), UInt8: |&v| f64::from(v), Int16: |&v| f64::from(v), UInt16: |&v| f64::from(v),
+        Int32: |&v| f64::from(v), UInt32: |&v| f64::from(v), Int64: |&v| v as f64, UInt64: |&v| v as f64
+    )
+}
+
+/// Length of the file header, bytes.
+const HEADER: usize = 128;
+/// Type of a compressed element, `miCOMPRESSED`.
+const COMPRESSED: u32 = 15;
+/// Most bytes a file may unfold to: a recording of 250 presses as doubles.
+const MAX_BYTES: usize = 1 << 28;
+
+/// The same file without compression, so that every element's length is known before it is parsed.
+///
+/// Layout: a header of 128 bytes that ends in a version and "IM" (little-endian), then elements, each a type and a
+/// length (32 bits both) and that many bytes. Source: MathWorks, *MAT-File Format*, chapter "Level 5 MAT-File Format".
+///
+/// # Errors
+/// What is wrong, in words: a foreign header, a file that ends early, a damaged element.
+fn inflate(file: &[u8]) -> Result<Vec<u8>, String> {
+    let header = file.get(..HEADER).ok_or_else(|| {
+        format!(
+            "the file ends after {} bytes; its header alone has {HEADER}",
+            file.len()
+        )
+    })?;
+    if header[126..] != *b"IM" {
+        return Err("it does not begin with a little-endian v5 header".to_owned());
+    }
+    let mut plain = header.to_vec();
+    let mut rest = &file[HEADER..];
+    while !rest.is_empty() {
+        let at = file.len() - rest.len();
+        let ends = |needed: usize| {
+            format!(
+                "the file ends after {} bytes; the element at byte {at} needs {needed} more than there are",
+                file.len()
+            )
+        };
+        let (head, body) = rest.split_at_checked(8).ok_or_else(|| ends(8 - rest.len()))?;
+        let word = |i: usize| u32::from_le_bytes([head[i], head[i + 1], head[i + 2], head[i + 3]]);
+        let length = usize::try_from(word(4)).map_err(|_| "an element is too long".to_owned())?;
+        let (element, after) = body.split_at_checked(length).ok_or_else(|| ends(length - body.len()))?;
+        if word(0) == COMPRESSED {
+            let limit = (MAX_BYTES - plain.len().min(MAX_BYTES)) as u64;
+            let before = plain.len();
+            let read = ZlibDecoder::new(element).take(limit).read_to_end(&mut plain);
+            read.map_err(|e| format!("the compressed element at byte {at} is damaged: {e}"))?;
+            if (plain.len() - before) as u64 == limit {
+                return Err(format!(
+                    "the element at byte {at} unfolds to more than {MAX_BYTES} bytes"
+                ));
+            }
+        } else {
+            if plain.len() + head.len() + element.len() > MAX_BYTES {
+                return Err(format!("it unfolds to more than {MAX_BYTES} bytes"));
+            }
+            plain.extend_from_slice(head);
+            plain.extend_from_slice(element);
+        }
+        rest = after;
+    }
+    Ok(plain)
+}
+
+/// Type of an element that is a matrix, `miMATRIX`.
+const MATRIX: u32 = 14;
+/// Length of the tag of an element, bytes.
+const TAG: usize = 8;
+
+/// A variable of the file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct MatElement<'a> {
+    name: String,
+    /// Class, in MATLAB's words.
+    class: &'static str,
+    /// Whether it is an array of numbers.
+    numeric: bool,
+    /// Number of stored values, real and imaginary.
+    values: usize,
+    /// The whole element, its tag included.
+    bytes: &'a [u8],
+}
+
+/// The variables that stand in `elements`, which is what follows a file's header, without compression. What is damaged
+/// is left to the parser: it ends the list, or has the values that there could be at most.
+///
+/// Layout: MathWorks, *MAT-File Format*, chapter "Level 5 MAT-File Format".
+fn mat_elements(elements: &[u8]) -> Vec<MatElement<'_>> {
+    let mut found = Vec::new();
+    let mut rest = elements;
+    while let Some((kind, body)) = rest.get(..TAG).and_then(|tag| {
+        let length = usize::try_from(word(tag, 4)?).ok()?;
+        Some((word(tag, 0)?, rest.get(..TAG.checked_add(length)?)?))
+    }) {
+        if kind == MATRIX {
+            found.extend(matrix(body));
+        }
+        let padded = body.len().next_multiple_of(TAG).min(rest.len());
+        rest = &rest[padded..];
+    }
+    found
+}
+
+/// The matrix whose element is `bytes`.
+fn matrix(bytes: &[u8]) -> Option<MatElement<'_>> {
+    let mut rest = bytes.get(TAG..)?;
+    let (_, flags) = part(&mut rest)?;
+    let (class, numeric) = class(*flags.first()?);
+    let (_, _dimensions) = part(&mut rest)?;
+    let (_, name) = part(&mut rest)?;
+    let mut values = 0;
+    // with other classes the parts are elements of their own, which nothing reads
+    while numeric && let Some((kind, data)) = part(&mut rest) {
+        values += data.len() / width(kind);
+    }
+    Some(MatElement {
+        name: String::from_utf8_lossy(name).into_owned(),
+        class,
+        numeric,
+        values,
+        bytes,
+    })
+}
+
+/// The type and data of the part that `rest` begins with; leaves what follows it.
+fn part<'a>(rest: &mut &'a [u8]) -> Option<(u32, &'a [u8])> {
+    let first = word(rest, 0)?;
+    let small = first >> 16;
+    let (kind, data, whole) = if small != 0 {
+        // at most four bytes in place of the length
+        let length = usize::try_from(small).ok().filter(|length| *length <= 4)?;
+        (first & 0xffff, rest.get(4..4 + length)?, TAG)
+    } else {
+        let length = usize::try_from(word(rest, 4)?).ok()?;
+        let end = TAG.checked_add(length)?;
+        (first, rest.get(TAG..end)?, end.next_multiple_of(TAG))
+    };
+    *rest = &rest[whole.min(rest.len())..];
+    Some((kind, data))
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<u32> {
+    let word = bytes.get(at..at + 4)?;
+    Some(u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+}
+
+/// Bytes a value of the type `kind`; one for types that are not known.
+fn width(kind: u32) -> usize {
+    match kind {
+        3 | 4 => 2,
+        5..=7 => 4,
+        9 | 12 | 13 => 8,
+        _ => 1,
+    }
+}
+
+/// Name of the class, and whether it is an array of numbers.
+fn class(number: u8) -> (&'static str, bool) {
+    match number {
+        1 => ("cell", false),
+        2 => ("struct", false),
+        3 | 17 => ("object", false),
+        4 => ("char", false),
+        5 => ("sparse", false),
+        6 => ("double", true),
+        7 => ("single", true),
+        8 => ("int8", true),
+        9 => ("uint8", true),
+        10 => ("int16", true),
+        11 => ("uint16", true),
+        12 => ("int32", true),
+        13 => ("uint32", true),
+        14 => ("int64", true),
+        15 => ("uint64", true),
+        16 => ("function", false),
+        _ => ("unknown", false),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flate2::Compression;
+    use flate2::write::ZlibEncoder;
+    use std::io::Write as _;
+
+    /// A header, an element as it is, and the same element compressed.
+    fn file() -> (Vec<u8>, Vec<u8>) {
+        let mut header = vec![b' '; HEADER];
+        header[124..].copy_from_slice(&[0, 1, b'I', b'M']);
+        let element = [&14_u32.to_le_bytes()[..], &16_u32.to_le_bytes(), &[7; 16]].concat();
+        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+        encoder.write_all(&element).unwrap();
+        let packed = encoder.finish().unwrap();
+        let length = u32::try_from(packed.len()).unwrap();
+        let compressed = [
+            &header[..],
+            &element,
+            &COMPRESSED.to_le_bytes(),
+            &length.to_le_bytes(),
+            &packed,
+        ]
+        .concat();
+        (compressed, [header, element.clone(), element].concat())
+    }
+
+    #[test]
+    fn a_compressed_element_unfolds_to_what_it_was() {
+        let (compressed, plain) = file();
+        assert_eq!(inflate(&compressed).unwrap(), plain);
+        assert_eq!(inflate(&plain).unwrap(), plain);
+    }
+
+    #[test]
+    fn every_cut_is_named_and_no_flipped_byte_panics() {
+        let (compressed, _) = file();
+        let boundaries = [HEADER, HEADER + 24, compressed.len()];
+        for length in (0..compressed.len()).filter(|l| !boundaries.contains(l)) {
+            let said = inflate(&compressed[..length]).unwrap_err();
+            assert!(said.contains(&format!("ends after {length} bytes")), "{length}: {said}");
+        }
+        let packed = HEADER + 24 + 8;
+        for at in 0..compressed.len() {
+            let mut damaged = compressed.clone();
+            damaged[at] ^= 0x55;
+            let found = inflate(&damaged);
+            // the stream carries a checksum; what stands outside it is for the parser to judge
+            assert!(at < packed || found.is_err(), "byte {at} of {}", compressed.len());
+        }
     }
 }

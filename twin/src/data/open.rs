@@ -1,15 +1,39 @@
 //! Opens recordings: a session, a folder of sessions, or the published recordings.
 
-use super::error::DataError;
-use super::published::PublishedFiles;
-use super::set::{SessionSet, published_place};
+use super::published::{DataError, Published, PublishedFiles, published_place};
 use crate::session::{Event, SESSION_FILE, Session};
+use spts_circuit::Recording;
+use spts_input::Refusal;
 use spts_models::SkinLayout;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Folders below the one that is opened in which sessions are looked for.
 const DEPTH: usize = 3;
+
+/// All sessions of one folder, and what was published with them.
+///
+/// ```
+/// use spts::data::SessionSet;
+///
+/// # let folder = std::env::temp_dir().join(format!("spts-doc-set-{}", std::process::id()));
+/// # std::fs::create_dir_all(&folder)?;
+/// let error = SessionSet::open(&folder).unwrap_err();
+/// assert!(error.to_string().contains("no recordings found; expected session.json"));
+/// # std::fs::remove_dir_all(&folder)?;
+/// # Ok::<(), std::io::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct SessionSet {
+    /// The folder that was opened.
+    pub root: PathBuf,
+    /// The sessions: first those of the published objects in order of their labels, then the others by name.
+    pub sessions: Vec<Session>,
+    /// Dictionary and library, if they were published with the sessions.
+    pub published: Option<Published>,
+    /// Parts of the published layout that this folder lacks.
+    pub missing: Vec<String>,
+}
 
 impl SessionSet {
     /// Reads the sessions in `root`:
@@ -33,7 +57,13 @@ impl SessionSet {
         let mut folders = Vec::new();
         find(root, DEPTH, &mut folders)?;
         if folders.is_empty() {
-            return PublishedFiles::open(root)?.read();
+            let (sessions, published, missing) = PublishedFiles::open(root)?.read()?;
+            return Ok(Self {
+                root: root.to_owned(),
+                sessions,
+                published,
+                missing,
+            });
         }
         let sessions = folders.iter().map(|folder| Session::read(folder));
         let mut sessions = sessions.collect::<Result<Vec<_>, _>>()?;
@@ -53,10 +83,28 @@ impl SessionSet {
             missing: Vec::new(),
         })
     }
+
+    /// The session called `name`.
+    #[must_use]
+    pub fn named(&self, name: &str) -> Option<&Session> {
+        self.sessions.iter().find(|s| s.name == name)
+    }
+
+    /// Sessions in which an object was pressed.
+    pub fn presses(&self) -> impl Iterator<Item = &Session> {
+        self.sessions.iter().filter(|s| s.event == Event::Press)
+    }
+
+    /// Compressive recording of the first session in which an object was dropped.
+    #[must_use]
+    pub fn drops(&self) -> Option<&Recording> {
+        let drops = self.sessions.iter().filter(|s| s.event == Event::Drop);
+        drops.filter_map(Session::compressive).next()
+    }
 }
 
 /// Names sessions whose names repeat by their folders below `root`.
-fn tell_apart(root: &Path, folders: &[PathBuf], sessions: &mut [Session]) -> Result<(), DataError> {
+fn tell_apart(root: &Path, folders: &[PathBuf], sessions: &mut [Session]) -> Result<(), Refusal> {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for session in sessions.iter() {
         *counts.entry(session.name.clone()).or_default() += 1;
@@ -69,11 +117,12 @@ fn tell_apart(root: &Path, folders: &[PathBuf], sessions: &mut [Session]) -> Res
             session.name = parts.join("_");
         }
         if let Some(first) = named.insert(session.name.clone(), folder) {
-            return Err(DataError::SameName {
-                first: first.clone(),
-                second: folder.clone(),
-                name: session.name.clone(),
-            });
+            return Err(Refusal::new(format!(
+                "{} and {}: `name` = {:?} of both sessions; valid: names that differ",
+                first.display(),
+                folder.display(),
+                session.name
+            )));
         }
     }
     Ok(())
@@ -88,21 +137,18 @@ fn sort(sessions: &mut [Session]) {
 }
 
 /// Folders with a session in them, `depth` levels down, sorted.
-fn find(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), DataError> {
+fn find(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) -> Result<(), Refusal> {
     // what is there but no regular file is named when it is read
     if folder.join(SESSION_FILE).exists() {
         found.push(folder.to_owned());
         return Ok(());
     }
-    let io = |source| DataError::Io {
-        path: folder.to_owned(),
-        source,
-    };
+    let io = Refusal::in_file(folder);
     let mut below = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(io)? {
-        let entry = entry.map_err(io)?;
+    for entry in std::fs::read_dir(folder).map_err(&io)? {
+        let entry = entry.map_err(&io)?;
         let hidden = entry.file_name().to_string_lossy().starts_with('.');
-        if !hidden && entry.file_type().map_err(io)?.is_dir() {
+        if !hidden && entry.file_type().map_err(&io)?.is_dir() {
             below.push(entry.path());
         }
     }

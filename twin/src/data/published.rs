@@ -1,17 +1,81 @@
 //! The published recordings of the real skin, in this project's layout or that of the original repository.
 
-use super::converter::published_converter;
-use super::error::DataError;
-use super::mat::{MatVariable, read_mat};
-use super::recording_files::{RecordingFiles, recording_files};
-use super::set::{Published, SessionSet, published_place};
+use super::mat::{MatVariable, not_mat, read_mat};
 use crate::session::{Event, Recorded, Session};
-use spts_circuit::{Block, Mode, Recording, RecordingInfo, Seeding, WeightMode, Weights};
+use spts_circuit::{
+    Block, CodeScale, Converter, ConverterConfig, Mode, Recording, RecordingInfo, Seeding, WeightMode, Weights,
+};
 use spts_contact::objects::OBJECTS;
+use spts_input::Refusal;
 use spts_models::SkinLayout;
 use spts_recon::Matrix;
 use spts_recon::classify::Library;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// A recording that cannot be used. Every message names the file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DataError {
+    /// A required file is missing.
+    #[error("{path}: missing; {needed_by} needs it", path = path.display())]
+    Missing {
+        /// File.
+        path: PathBuf,
+        /// What cannot be used without it.
+        needed_by: String,
+    },
+    /// A session to which no readout can be fitted.
+    #[error("{path}: {session} session: `{field}` = {value}; calibration needs {needed}", path = path.display())]
+    Unfit {
+        /// Folder of the recordings.
+        path: PathBuf,
+        /// Name of the session and mode of its recording.
+        session: String,
+        /// The field that does not fit.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// The value that calibration needs.
+        needed: String,
+    },
+    /// No recording to calibrate from.
+    #[error("{path}: no session of presses has a compressive recording; calibration needs one", path = path.display())]
+    NoCompressive {
+        /// Folder of the recordings.
+        path: PathBuf,
+    },
+    /// A file or a session that cannot be read or used.
+    #[error(transparent)]
+    Refused(#[from] Refusal),
+}
+
+impl DataError {
+    /// The folder `root` has no recordings.
+    #[must_use]
+    pub fn nothing_found(root: &Path) -> Self {
+        let expected = "session.json, folders with one, or the published recordings (presses/NAME/NAME_raster.mat, \
+                        Measurements_Collected/NAME/NAME_raster.mat, or a clone of their repository)";
+        Refusal::new(format!("{}: no recordings found; expected {expected}", root.display())).into()
+    }
+}
+
+/// Dictionary, shifted dictionary and classifier library, as published.
+#[derive(Debug, Clone)]
+pub struct Published {
+    /// K-SVD dictionary, 100 × 100.
+    pub dictionary: Matrix,
+    /// Shifted copies of the dictionary, 100 × 2450; `None` if the file is missing.
+    pub shifted: Option<Matrix>,
+    /// Labelled raster images. The label of an object is its place among the published objects, from 1.
+    pub library: Library,
+}
+
+/// Place of an object among the published ones; all others come after them.
+pub(super) fn published_place(object: &str) -> usize {
+    let place = spts_contact::objects::OBJECTS.iter().position(|o| o.name == object);
+    place.unwrap_or(usize::MAX)
+}
 
 /// Rate of the published recordings, Hz: from the beat of the cells' timer interrupt against the measurement clock.
 const RATE_HZ: f64 = 64_300.0;
@@ -45,7 +109,7 @@ impl PublishedFiles {
     /// Opens the directory `root`, which may be the root of a clone of the published repository.
     ///
     /// # Errors
-    /// [`DataError::NothingFound`] when it holds no recording in a known layout.
+    /// [`DataError`] when it holds no recording in a known layout.
     pub(super) fn open(root: &Path) -> Result<Self, DataError> {
         let known = [Self::PRESSES, Self::DROPS, Self::ARM].concat();
         let holds = |base: &PathBuf| known.iter().any(|folder| base.join(folder).is_dir());
@@ -55,7 +119,7 @@ impl PublishedFiles {
                 root: root.to_owned(),
                 base,
             }),
-            None => Err(DataError::NothingFound { path: root.to_owned() }),
+            None => Err(DataError::nothing_found(root)),
         }
     }
 
@@ -68,11 +132,11 @@ impl PublishedFiles {
         Self { root, base }.published()
     }
 
-    /// Reads all sessions, and dictionary and library where they are there.
+    /// Reads all sessions, and dictionary and library where they are there, and names the recordings that are not.
     ///
     /// # Errors
     /// [`DataError`] when a file is there but cannot be used, or no session is there at all.
-    pub(super) fn read(&self) -> Result<SessionSet, DataError> {
+    pub(super) fn read(&self) -> Result<(Vec<Session>, Option<Published>, Vec<String>), DataError> {
         let mut sessions = self.presses()?;
         let mut missing = Vec::new();
         if !sessions.is_empty() {
@@ -95,16 +159,9 @@ impl PublishedFiles {
             sessions.extend(self.events(&folder, Event::Touch)?);
         }
         if sessions.is_empty() {
-            return Err(DataError::NothingFound {
-                path: self.root.clone(),
-            });
+            return Err(DataError::nothing_found(&self.root));
         }
-        Ok(SessionSet {
-            root: self.root.clone(),
-            sessions,
-            published: self.published()?,
-            missing,
-        })
+        Ok((sessions, self.published()?, missing))
     }
 
     fn folder_of(&self, names: &[&str]) -> Option<PathBuf> {
@@ -178,23 +235,17 @@ impl PublishedFiles {
             shifted: file("permuted_dictionary")
                 .map(|path| matrix(&path, "Dksvd_new"))
                 .transpose()?,
-            library: Library::new(&images, &labels).map_err(|e| DataError::NotMat {
-                path: library,
-                reason: e.to_string(),
-            })?,
+            library: Library::new(&images, &labels).map_err(|e| not_mat(&library, &e.to_string()))?,
         }))
     }
 }
 
 /// Names of the folders in `folder`.
-fn folders(folder: &Path) -> Result<Vec<String>, DataError> {
-    let io = |source| DataError::Io {
-        path: folder.to_owned(),
-        source,
-    };
+fn folders(folder: &Path) -> Result<Vec<String>, Refusal> {
+    let io = Refusal::in_file(folder);
     let mut names = Vec::new();
-    for entry in std::fs::read_dir(folder).map_err(io)? {
-        let entry = entry.map_err(io)?;
+    for entry in std::fs::read_dir(folder).map_err(&io)? {
+        let entry = entry.map_err(&io)?;
         if entry.path().is_dir() {
             names.push(entry.file_name().to_string_lossy().into_owned());
         }
@@ -241,38 +292,42 @@ fn sums(path: &Path, files: &RecordingFiles) -> Result<Recording, DataError> {
         });
     };
     let blocks = blocks(path, Mode::Compressive)?;
-    let positions = read_mat(time_path, "framePosition")?;
+    let positions = read_mat(time_path, &["framePosition"])?;
     if positions.values.len() != blocks.len() {
-        return Err(DataError::Shape {
-            path: time_path.clone(),
-            name: "framePosition",
-            shape: positions.shape,
-            expected: "one position a press",
-        });
+        return Err(wrong_shape(time_path, &positions, "one position a press").into());
     }
     let mut positioned = Vec::with_capacity(blocks.len());
     for (index, (&value, volts)) in positions.values.iter().zip(blocks).enumerate() {
         positioned.push((frame_position(time_path, index, value)?, volts));
     }
-    recording(path, Mode::Compressive, Some(IDLE_FRAMES), positioned)
+    Ok(recording(path, Mode::Compressive, Some(IDLE_FRAMES), positioned)?)
 }
 
 /// The blocks in the file at `path`: raster scans are called `D` or `C`, sums `C`.
-fn blocks(path: &Path, mode: Mode) -> Result<Vec<Vec<f64>>, DataError> {
-    if mode == Mode::Raster {
-        match read_mat(path, "D") {
-            Ok(array) => return split_blocks(path, "D", &array),
-            Err(error @ DataError::NoVariable { .. }) => {
-                let array = match read_mat(path, "C") {
-                    Err(DataError::NoVariable { .. }) => return Err(error),
-                    array => array?,
-                };
-                return split_blocks(path, "C", &array);
-            }
-            Err(error) => return Err(error),
-        }
-    }
-    split_blocks(path, "C", &read_mat(path, "C")?)
+fn blocks(path: &Path, mode: Mode) -> Result<Vec<Vec<f64>>, Refusal> {
+    let names: &[&str] = if mode == Mode::Raster { &["D", "C"] } else { &["C"] };
+    let array = read_mat(path, names)?;
+    // MATLAB's order, 100 × frames × presses, is the recording's order
+    let frames = match array.shape[..] {
+        [TAXELS, frames] | [TAXELS, frames, _] if frames > 0 && !array.values.is_empty() => frames,
+        _ => return Err(wrong_shape(path, &array, "100 × frames × presses")),
+    };
+    Ok(array
+        .values
+        .chunks_exact(TAXELS * frames)
+        .map(<[f64]>::to_vec)
+        .collect())
+}
+
+/// The error of a variable of the wrong shape.
+fn wrong_shape(path: &Path, array: &MatVariable, expected: &str) -> Refusal {
+    let MatVariable { name, shape, .. } = array;
+    Refusal::new(format!("`{name}` has shape {shape:?}; expected {expected}")).at(path.display())
+}
+
+/// The error of a value outside its range.
+fn wrong_value(path: &Path, name: &str, index: usize, value: f64, range: &str) -> Refusal {
+    Refusal::new(format!("`{name}`[{index}] = {value} is outside {range}")).at(path.display())
 }
 
 fn recording(
@@ -280,7 +335,7 @@ fn recording(
     mode: Mode,
     idle_frames: Option<usize>,
     blocks: impl IntoIterator<Item = (u64, Vec<f64>)>,
-) -> Result<Recording, DataError> {
+) -> Result<Recording, Refusal> {
     let blocks = blocks.into_iter().map(|(frame_position, volts)| Block {
         frame_position,
         idle_frames: idle_frames.map(|idle| idle.min(volts.len() / TAXELS)),
@@ -292,72 +347,41 @@ fn recording(
         ..RecordingInfo::new(SkinLayout::default(), weights(mode), RATE_HZ)
     };
     let recording = Recording::new(info, blocks);
-    recording.map_err(|source| DataError::Recording {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-/// Cuts a `100 × frames × presses` array into presses; MATLAB's order is the recording's order.
-fn split_blocks(path: &Path, name: &'static str, array: &MatVariable) -> Result<Vec<Vec<f64>>, DataError> {
-    let frames = match array.shape[..] {
-        [TAXELS, frames] | [TAXELS, frames, _] if frames > 0 && !array.values.is_empty() => frames,
-        _ => {
-            return Err(DataError::Shape {
-                path: path.to_owned(),
-                name,
-                shape: array.shape.clone(),
-                expected: "100 × frames × presses",
-            });
-        }
-    };
-    Ok(array
-        .values
-        .chunks_exact(TAXELS * frames)
-        .map(<[f64]>::to_vec)
-        .collect())
+    recording.map_err(|error| error.at(path.display()))
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "checked to be a whole number in range")]
-fn frame_position(path: &Path, index: usize, value: f64) -> Result<u64, DataError> {
+fn frame_position(path: &Path, index: usize, value: f64) -> Result<u64, Refusal> {
     /// Frames of about two years of recording.
     const MAX: f64 = 4e10;
     if value.fract() == 0.0 && (0.0..=MAX).contains(&value) {
         return Ok(value as u64);
     }
-    Err(DataError::Value {
-        path: path.to_owned(),
-        name: "framePosition",
+    Err(wrong_value(
+        path,
+        "framePosition",
         index,
         value,
-        range: "the whole numbers in [0, 4e10]",
-    })
+        "the whole numbers in [0, 4e10]",
+    ))
 }
 
 /// A matrix with one row a taxel.
-fn matrix(path: &Path, name: &'static str) -> Result<Matrix, DataError> {
-    let array = read_mat(path, name)?;
+fn matrix(path: &Path, name: &'static str) -> Result<Matrix, Refusal> {
+    let array = read_mat(path, &[name])?;
     let [TAXELS, columns] = array.shape[..] else {
-        return Err(DataError::Shape {
-            path: path.to_owned(),
-            name,
-            shape: array.shape,
-            expected: "100 × columns",
-        });
+        return Err(wrong_shape(path, &array, "100 × columns"));
     };
     if let Some(index) = array.values.iter().position(|v| !v.is_finite()) {
-        return Err(DataError::Value {
-            path: path.to_owned(),
+        return Err(wrong_value(
+            path,
             name,
             index,
-            value: array.values[index],
-            range: "the finite numbers",
-        });
+            array.values[index],
+            "the finite numbers",
+        ));
     }
-    Matrix::from_columns(TAXELS, columns, &array.values).map_err(|e| DataError::NotMat {
-        path: path.to_owned(),
-        reason: e.to_string(),
-    })
+    Matrix::from_columns(TAXELS, columns, &array.values).map_err(|e| not_mat(path, &e.to_string()))
 }
 
 /// Weights of the published device: cells seeded with their addresses.
@@ -367,4 +391,172 @@ fn weights(mode: Mode) -> Weights {
         Mode::Compressive => WeightMode::Binary,
     };
     Weights::new(mode, Seeding::Address, TAXEL_COUNT)
+}
+
+/// Files of one recording. A recording that was repeated has files of its own for every repetition.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+struct RecordingFiles {
+    /// What follows the name: nothing for the first recording, `_re`, `_retake`, `_film` for its repetitions.
+    suffix: String,
+    /// Raster scans.
+    raster: Option<PathBuf>,
+    /// Sums.
+    compressive: Option<PathBuf>,
+    /// Positions of the blocks of the sums.
+    positions: Option<PathBuf>,
+}
+
+impl RecordingFiles {
+    /// Name and object of a recording of the bouncing ball, whose files are called `random2_tennis_re` and the like.
+    fn ball(&self) -> (String, String) {
+        let words: Vec<&str> = self.suffix.split('_').filter(|word| !word.is_empty()).collect();
+        let (ball, rest) = match words.split_first() {
+            Some((&ball, rest)) if ball == "tennis" || ball == "ball" => (ball, rest),
+            _ => ("ball", words.as_slice()),
+        };
+        let name = [&[ball, "bounces"], rest].concat().join("_");
+        (name, ball.to_owned())
+    }
+}
+
+/// Recordings in `folder` whose files are called `{prefix}raster…`, `{prefix}random2…` and `{prefix}random2…_time`,
+/// repetitions after the first one.
+///
+/// # Errors
+/// [`Refusal`] when the folder cannot be read.
+fn recording_files(folder: &Path, prefix: &str) -> Result<Vec<RecordingFiles>, Refusal> {
+    let io = Refusal::in_file(folder);
+    let mut found: BTreeMap<String, RecordingFiles> = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).map_err(&io)? {
+        let path = entry.map_err(&io)?.path();
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let Some(name) = stem
+            .strip_prefix(prefix)
+            .filter(|_| path.extension().is_some_and(|e| e == "mat"))
+        else {
+            continue;
+        };
+        // 0: scans, 1: sums, 2: positions
+        let (suffix, kind) = match (name.strip_prefix("raster"), name.strip_prefix("random2")) {
+            (Some(suffix), _) => (suffix, 0),
+            (_, Some(suffix)) => suffix.strip_suffix("_time").map_or((suffix, 1), |suffix| (suffix, 2)),
+            _ => continue,
+        };
+        // `random2_` is the first recording of a ball without a name, whose scans are called `raster_ball`
+        let suffix = if suffix == "_" { "_ball" } else { suffix };
+        let suffix = if suffix.is_empty() || suffix.starts_with('_') {
+            suffix
+        } else {
+            continue;
+        };
+        let files = found.entry(suffix.to_owned()).or_default();
+        suffix.clone_into(&mut files.suffix);
+        *[&mut files.raster, &mut files.compressive, &mut files.positions][kind] = Some(path);
+    }
+    let found = found.into_values();
+    Ok(found
+        .filter(|files| files.raster.is_some() || files.compressive.is_some())
+        .collect())
+}
+
+/// Largest constant that the publication subtracted from a raster scan before it set negative volts to 0, hundredths of
+/// a volt; all are whole hundredths, of either sign.
+const MOST_SUBTRACTED: i32 = 20;
+
+/// Scale that made the volts of `blocks`, every one of them bit for bit; `None` when it is not the published one. From
+/// a raster scan a constant was subtracted that differs between sessions, and negative volts were set to 0.
+pub(super) fn published_converter(mode: Mode, blocks: &[Block]) -> Option<Converter> {
+    let (offset_v, numerator, denominator) = match mode {
+        Mode::Raster => (4.3, 508.0, 165.0),
+        Mode::Compressive => (32.0, 11_140.0, 570.0),
+    };
+    let constants = (0..=MOST_SUBTRACTED)
+        .flat_map(|k| [k, -k])
+        .map(|k| Some(f64::from(k) / 100.0));
+    let constants: Vec<Option<f64>> = match mode {
+        Mode::Raster => std::iter::once(None).chain(constants).collect(),
+        Mode::Compressive => vec![None],
+    };
+    let converters = constants.into_iter().filter_map(|subtract_v| {
+        let scale = CodeScale::Divider {
+            reference_v: 3.3,
+            numerator,
+            denominator,
+        };
+        Converter::new(ConverterConfig {
+            offset_v,
+            scale,
+            max_code: 1023,
+            subtract_v,
+        })
+        .ok()
+    });
+    converters
+        .into_iter()
+        .find(|c| blocks.iter().all(|block| c.made(&block.volts)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The names in the published repository.
+    #[test]
+    fn repetitions_of_the_ball_have_names_of_their_own() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in [
+            "random2_",
+            "random2_re",
+            "random2_tennis",
+            "random2_tennis_re",
+            "raster_ball",
+            "raster_tennis",
+        ] {
+            std::fs::write(dir.path().join(format!("{name}.mat")), "").unwrap();
+        }
+        std::fs::write(dir.path().join("random2_tennis.fig"), "").unwrap();
+        let found = recording_files(dir.path(), "").unwrap();
+        let names: Vec<(String, String, bool)> = found
+            .iter()
+            .map(|files| {
+                let (name, object) = files.ball();
+                (name, object, files.raster.is_some())
+            })
+            .collect();
+        let expected = [
+            ("ball_bounces", "ball", true),
+            ("ball_bounces_re", "ball", false),
+            ("tennis_bounces", "tennis", true),
+            ("tennis_bounces_re", "tennis", false),
+        ];
+        assert_eq!(
+            names,
+            expected.map(|(name, object, raster)| (name.to_owned(), object.to_owned(), raster))
+        );
+    }
+
+    #[test]
+    fn repetitions_of_a_press_have_files_of_their_own() {
+        let dir = tempfile::tempdir().unwrap();
+        for name in [
+            "T_raster",
+            "T_random2",
+            "T_random2_time",
+            "T_random2_re",
+            "T_random2_re_time",
+            "T_random1",
+            "U_raster",
+        ] {
+            std::fs::write(dir.path().join(format!("{name}.mat")), "").unwrap();
+        }
+        let found = recording_files(dir.path(), "T_").unwrap();
+        let suffixes: Vec<&str> = found.iter().map(|files| files.suffix.as_str()).collect();
+        assert_eq!(suffixes, ["", "_re"]);
+        assert!(found[0].raster.is_some() && found[1].raster.is_none());
+        assert!(
+            found
+                .iter()
+                .all(|files| files.positions.is_some() && files.compressive.is_some())
+        );
+    }
 }

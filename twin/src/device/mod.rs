@@ -17,21 +17,8 @@
 //! # Ok::<(), std::io::Error>(())
 //! ```
 
-mod host;
-mod played;
-mod pressed;
-#[cfg(test)]
-mod tests;
-mod virtual_device;
+mod protocol;
+mod sources;
 
-pub use host::{Host, HostError};
-pub use played::Played;
-pub use pressed::{Pressed, PressedConfig};
-pub use virtual_device::{BlockSource, DeviceBlock, DeviceError, VirtualDevice, write_block};
-
-/// What wakes the device.
-const START: u8 = b'*';
-/// Its first answer.
-const SENDING: &str = "Sending.";
-/// Its answer when the cells are loaded.
-const SENT: &str = "Sent!.";
+pub use protocol::{BlockSource, DeviceBlock, Host, VirtualDevice, write_block};
+pub use sources::{Played, Pressed, PressedConfig};

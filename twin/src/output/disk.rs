@@ -1,10 +1,79 @@
-//! Every disk operation on the way to a result, so that a test can watch each and make it fail.
+//! Every disk operation on the way to a result, so that a test can watch each and make it fail, and the error of those
+//! that fail.
 
+use spts_input::Refusal;
 use std::cell::RefCell;
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
+
+/// A result that could not be written. The message names the file or folder.
+///
+/// ```
+/// use spts::output::OutputError;
+///
+/// let error = OutputError::write("out/a.csv".as_ref())(std::io::ErrorKind::StorageFull.into());
+/// assert_eq!(error.to_string(), "out/a.csv: cannot be written: no storage space");
+/// ```
+#[derive(Debug, thiserror::Error)]
+#[error("{}: {problem}", path.display())]
+pub struct OutputError {
+    path: PathBuf,
+    problem: String,
+    source: Option<io::Error>,
+}
+
+impl OutputError {
+    /// The error that `path` has this `problem`.
+    pub fn new(path: impl Into<PathBuf>, problem: impl Into<String>) -> Self {
+        Self {
+            path: path.into(),
+            problem: problem.into(),
+            source: None,
+        }
+    }
+
+    /// Wraps an I/O error with the file that cannot be written.
+    pub fn write(path: &Path) -> impl Fn(io::Error) -> Self + use<> {
+        let path = path.to_owned();
+        move |source| Self {
+            problem: format!("cannot be written: {source}"),
+            source: Some(source),
+            path: path.clone(),
+        }
+    }
+
+    /// A folder that cannot be made.
+    pub fn no_folder(path: impl Into<PathBuf>, source: io::Error) -> Self {
+        Self {
+            path: path.into(),
+            problem: format!("the output folder cannot be made: {source}"),
+            source: Some(source),
+        }
+    }
+
+    /// A file that no run has written has the name of a result.
+    pub fn not_ours(path: impl Into<PathBuf>) -> Self {
+        let problem = "is not a result of an earlier run and is not replaced; move it away or choose another folder";
+        Self::new(path, problem)
+    }
+
+    /// The same error, with `place` applied to its path.
+    #[must_use]
+    pub fn relocated(self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
+        Self {
+            path: place(&self.path),
+            ..self
+        }
+    }
+}
+
+impl From<OutputError> for Refusal {
+    fn from(error: OutputError) -> Self {
+        Self::from_error(error)
+    }
+}
 
 /// Kind of a disk operation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,8 +91,6 @@ pub enum DiskOperation {
     Rename,
     /// Exchanges the names of two folders.
     Exchange,
-    /// Gives a file a second name.
-    Link,
     /// Removes a file or an empty folder.
     Remove,
 }
@@ -54,7 +121,7 @@ fn tell(operation: DiskOperation, path: &Path) -> io::Result<()> {
 #[derive(Debug)]
 pub struct NewFile {
     file: File,
-    path: std::path::PathBuf,
+    path: PathBuf,
 }
 
 impl NewFile {
@@ -133,12 +200,6 @@ pub(super) fn exchange(a: &Path, b: &Path) -> io::Result<()> {
     renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE).map_err(Into::into)
 }
 
-/// Gives the file `from` the second name `to`.
-pub(super) fn link(from: &Path, to: &Path) -> io::Result<()> {
-    tell(DiskOperation::Link, to)?;
-    std::fs::hard_link(from, to)
-}
-
 /// Waits until the entries of the folder `path` are on the disk.
 pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
     tell(DiskOperation::Sync, path)?;
@@ -177,4 +238,12 @@ pub(super) fn remove_all(path: &Path) -> io::Result<()> {
 /// Whether something has the name `path`, a link to nowhere as well.
 pub(super) fn exists(path: &Path) -> bool {
     path.symlink_metadata().is_ok()
+}
+
+/// Folder of the file `path`.
+pub(super) fn parent(path: &Path) -> &Path {
+    match path.parent() {
+        Some(parent) if parent != Path::new("") => parent,
+        _ => Path::new("."),
+    }
 }

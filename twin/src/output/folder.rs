@@ -1,22 +1,20 @@
-//! The folder for the results of one run. It changes as a whole, and files that no run has written stay.
+//! The folder for the results of one run. It is new, empty, or wholly an earlier run's, and changes in one step.
+//!
+//! The results wait in a hidden folder beside it, `.NAME.spts-new`. At the end the two folders exchange their names in
+//! one step (`renameat2` with `RENAME_EXCHANGE`), and the earlier results, which have the hidden name then, are removed.
+//! A file system without such a step first gives the earlier results the name `.NAME.spts-old`. A run that is ended
+//! leaves what the next run with this folder clears up. A run holds `.NAME.spts-lock` locked.
 
-use super::atomic::RANDOM;
-use super::commit::{self, PLACING};
-use super::disk;
-use super::error::OutputError;
-use super::lock::{LOCK_FILE, Lock};
-use super::manifest::{MANIFEST_FILE, Manifest};
+use super::disk::{self, OutputError, parent};
+use super::manifest::{MANIFEST_FILE, Manifest, changed};
 use crate::cleanup::{Entry, Leftover, listed};
 use std::collections::BTreeSet;
+use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Start of the names of what waits to be put in place. Nothing else has such names, so what a run that was killed has
-/// left waiting can be removed.
-pub(super) const WAITING: &str = ".spts-";
-
-/// A folder that a run is filling. From its opening on, no other run can open it. The results wait in a hidden folder
-/// inside until [`OutputFolder::commit`]. Without a commit the folder stays unchanged.
+/// A folder that a run is filling. From its opening on, no other run can open it. The results wait beside it until
+/// [`OutputFolder::commit`]. Without a commit the folder stays unchanged.
 #[derive(Debug)]
 pub struct OutputFolder {
     /// The folder without symbolic links, because the exchange must act on the folder itself.
@@ -25,56 +23,53 @@ pub struct OutputFolder {
     shown: PathBuf,
     stage: PathBuf,
     timed: BTreeSet<String>,
-    lock: Option<Lock>,
-    /// Lets a signal remove the waiting results; dropped before they move.
+    /// Lets a signal remove the waiting results; `None` once they are on their way.
     entry: Option<Entry>,
-    /// Folders created for this run, deepest first.
-    made: Vec<PathBuf>,
-    /// Lets a signal remove those of the created folders that are empty.
-    _made_entry: Entry,
+    lock: Option<Lock>,
+    made: Parents,
 }
 
 impl OutputFolder {
-    /// Opens the folder `path` for a run, and creates it and its parents where they are missing. `files` are the known
-    /// names of results: a name that could not be written at the end is refused now.
+    /// Opens the folder `path` for a run. Its parents are created where they are missing.
     ///
     /// # Errors
-    /// [`OutputError`] if `path` is a file, the folder cannot be created or written to, another run is writing to it,
-    /// or a file that no run has written has the name of a result.
-    pub fn open(path: &Path, files: &[&str]) -> Result<Self, OutputError> {
-        let made = make(path)?;
+    /// [`OutputError`] if `path` is a file, holds a file that is not an unchanged result of an earlier run, or cannot
+    /// be created or replaced, and while another run is writing to it.
+    pub fn open(path: &Path) -> Result<Self, OutputError> {
         let failed = OutputError::write(path);
-        let ((), made_entry) = listed(|| Ok(()), |()| Leftover::EmptyFolders(made.clone())).map_err(failed)?;
-        let folder = path.canonicalize().map_err(OutputError::write(path));
-        let opened = folder.and_then(|folder| {
-            let lock = Lock::take(&folder).map_err(|error| error.relocated(&|_| path.to_owned()))?;
-            let failed = OutputError::write(path);
-            commit::recover(&folder).map_err(&failed)?;
-            commit::sweep(&folder).map_err(&failed)?;
-            let manifest = Manifest::read(&folder);
-            for name in files.iter().chain([&MANIFEST_FILE]) {
-                let ours = check_ours(&folder, manifest.as_ref(), name);
-                ours.map_err(|error| error.relocated(&|_| path.join(name)))?;
-            }
-            let stage = listed(|| make_stage(&folder), |stage| Leftover::Folder(stage.clone()));
-            Ok((folder, lock, stage.map_err(&failed)?))
-        });
-        match opened {
-            Ok((folder, lock, (stage, entry))) => Ok(Self {
-                folder,
-                shown: path.to_owned(),
-                stage,
-                timed: BTreeSet::new(),
-                lock: Some(lock),
-                entry: Some(entry),
-                made,
-                _made_entry: made_entry,
-            }),
-            Err(error) => {
-                unmake(&made);
-                Err(error)
-            }
+        let made = Parents::make(path)?;
+        let folder = match path.file_name() {
+            // a link to nowhere is no place for a folder
+            Some(name) if path.symlink_metadata().is_err() => parent(path).canonicalize().map(|it| it.join(name)),
+            _ => path.canonicalize(),
+        };
+        let folder = folder.map_err(&failed)?;
+        let (Some(above), Some(_)) = (folder.parent(), folder.file_name()) else {
+            return Err(OutputError::new(path, UNMOVABLE));
+        };
+        let lock = Lock::take(&folder, path)?;
+        recover(&folder).map_err(&failed)?;
+        check_ours(&folder, path)?;
+        if folder.exists() {
+            let writable = rustix::fs::access(&folder, rustix::fs::Access::WRITE_OK);
+            writable.map_err(|error| failed(error.into()))?;
         }
+        let here = std::env::current_dir().and_then(|here| here.canonicalize());
+        if here.is_ok_and(|here| here.starts_with(&folder)) || is_mounted(&folder, above) {
+            return Err(OutputError::new(path, UNMOVABLE));
+        }
+        let stage = beside(&folder, NEW);
+        let make = || disk::make_folder(&stage);
+        let ((), entry) = listed(make, |()| Leftover::Folder(stage.clone())).map_err(failed)?;
+        Ok(Self {
+            folder,
+            shown: path.to_owned(),
+            stage,
+            timed: BTreeSet::new(),
+            entry: Some(entry),
+            lock: Some(lock),
+            made,
+        })
     }
 
     /// Where to write the result `name`. It may lie in a folder (`tables/scores.csv`) that [`OutputFolder::folder`] has
@@ -95,45 +90,31 @@ impl OutputFolder {
     /// Creates the folder `name` for results.
     ///
     /// # Errors
-    /// [`OutputError::Folder`] if the folder cannot be created.
+    /// [`OutputError`] if the folder cannot be created.
     pub fn folder(&self, name: &str) -> Result<PathBuf, OutputError> {
         let path = self.path(name);
-        make(&path)?;
+        make_folders(&path)?;
         Ok(path)
     }
 
     /// Replaces the results of the earlier run by the new ones, writes a manifest, and returns the names of the
     /// results, sorted.
     ///
-    /// A folder that holds only results and some files changes in one step. Where this is not possible, such as in a
-    /// folder that a container mounts, files move one by one: the earlier results are removed, then the new ones move
-    /// in. Until the last has moved, the folder is marked as half-made.
-    ///
     /// # Errors
-    /// [`OutputError`] if a result has the name of a file that no run has written or that has changed since, or the
+    /// [`OutputError`] if a file that is not an unchanged result of an earlier run has come into the folder, or the
     /// file system reports an error. The folder then stays unchanged.
     pub fn commit(mut self) -> Result<Vec<String>, OutputError> {
-        let names = commit::files_below(&self.stage).map_err(OutputError::write(&self.shown))?;
-        let commit = || -> Result<(), OutputError> {
-            let manifest = Manifest::of(&self.stage, &names, &self.timed)?;
-            manifest.write(&self.stage)?;
-            commit::sync_folders(&self.stage).map_err(OutputError::write(&self.shown))?;
-            let before = Manifest::read(&self.folder);
-            for name in names.iter().map(String::as_str).chain([MANIFEST_FILE]) {
-                check_ours(&self.folder, before.as_ref(), name)?;
-            }
-            Ok(())
-        };
-        commit().map_err(|error| self.unstaged(error))?;
-        let Some(lock) = self.lock.take() else {
-            return Ok(names);
-        };
-        // from here on the stage may hold the results of the run before; the next run sweeps what a signal leaves
+        let failed = OutputError::write(&self.shown);
+        let names = files_below(&self.stage).map_err(&failed)?;
+        let manifest = Manifest::of(&self.stage, &names, &self.timed).and_then(|all| all.write(&self.stage));
+        manifest.map_err(|error| self.unstaged(error))?;
+        sync_folders(&self.stage).map_err(&failed)?;
+        check_ours(&self.folder, &self.shown)?;
+        // from here on the stage may be the earlier results, which the next run clears up after a signal
         self.entry = None;
-        let placed = commit::put_in_place(&self.folder, &self.stage, lock);
-        self.lock = placed.lock;
-        placed.result.map_err(|error| self.unstaged(error))?;
-        self.made.clear();
+        put_in_place(&self.stage, &self.folder).map_err(failed)?;
+        self.stage.clear();
+        self.made.keep();
         Ok(names)
     }
 
@@ -146,9 +127,7 @@ impl OutputFolder {
     /// Final path of the result that waits at `path`. Any other path is returned unchanged.
     #[must_use]
     pub fn final_path(&self, path: &Path) -> PathBuf {
-        let below = path
-            .strip_prefix(&self.stage)
-            .or_else(|_| path.strip_prefix(&self.folder));
+        let below = path.strip_prefix(&self.stage);
         below.map_or_else(|_| path.to_owned(), |name| self.shown.join(name))
     }
 
@@ -161,90 +140,242 @@ impl OutputFolder {
 
 impl Drop for OutputFolder {
     fn drop(&mut self) {
-        // nothing more can be done about what does not go away; the next run in this folder removes it
-        let _ = disk::remove_all(&self.stage);
+        if !self.stage.as_os_str().is_empty() {
+            // nothing more can be done about what does not go away; the next run in this folder removes it
+            let _ = disk::remove_all(&self.stage);
+        }
+        // the lock lies in the folders that go after it
         self.lock = None;
-        unmake(&self.made);
     }
 }
 
-/// Refuses to replace the file `name` unless an earlier run has written it and it is still as that run wrote it.
-fn check_ours(folder: &Path, manifest: Option<&Manifest>, name: &str) -> Result<(), OutputError> {
-    let path = folder.join(name);
-    // a link or a file in place of one of the name's folders
-    let mut parents: Vec<&Path> = Path::new(name).ancestors().skip(1).collect();
-    parents.pop();
-    for parent in parents {
-        let parent = folder.join(parent);
-        if parent.symlink_metadata().is_ok_and(|found| !found.is_dir()) {
-            return Err(OutputError::NotOurs { path: parent });
+/// Why a folder that is in use cannot be replaced, as a user is told.
+const UNMOVABLE: &str = "is a mount point or the folder that the program works in, so that it cannot be replaced as a \
+                         whole; choose a folder in it";
+
+/// Whether something is mounted on `folder`, which lies in `above`.
+fn is_mounted(folder: &Path, above: &Path) -> bool {
+    use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
+    use std::os::unix::fs::MetadataExt as _;
+    let found = statx(CWD, folder, AtFlags::empty(), StatxFlags::empty());
+    let mounted = found.is_ok_and(|found| found.stx_attributes.contains(StatxAttributes::MOUNT_ROOT));
+    let device = |path: &Path| path.metadata().map(|found| found.dev()).ok();
+    mounted || device(folder).is_some_and(|of| Some(of) != device(above))
+}
+
+/// End of the name of the new results while they wait, and of the earlier ones once they have been exchanged.
+const NEW: &str = "new";
+/// End of the name of earlier results that have made room for the new ones.
+const OLD: &str = "old";
+
+/// Hidden name beside `folder`. Nothing but this program gives such names.
+fn beside(folder: &Path, what: &str) -> PathBuf {
+    let mut name = std::ffi::OsString::from(".");
+    name.push(folder.file_name().unwrap_or_default());
+    name.push(".spts-");
+    name.push(what);
+    folder.with_file_name(name)
+}
+
+/// Refuses `folder`, which the user calls `shown`, if it holds a file that is not an unchanged result of an earlier run.
+fn check_ours(folder: &Path, shown: &Path) -> Result<(), OutputError> {
+    if !disk::exists(folder) {
+        return Ok(());
+    }
+    let manifest = Manifest::read(folder);
+    walk(folder, Path::new(""), &mut |name| {
+        let path = shown.join(&name);
+        let name = name.to_string_lossy();
+        match &manifest {
+            Some(_) if name == MANIFEST_FILE => Ok(()),
+            Some(manifest) if manifest.lists(&name) => {
+                if manifest
+                    .is_unchanged(folder, &name)
+                    .map_err(OutputError::write(&path))?
+                {
+                    return Ok(());
+                }
+                let advice = "it is not replaced: move it away or choose another folder";
+                Err(changed(path, shown, advice))
+            }
+            _ => Err(OutputError::not_ours(path)),
         }
-    }
-    let Ok(found) = path.symlink_metadata() else {
-        return Ok(());
-    };
-    if !found.is_file() && !found.is_symlink() {
-        return Err(OutputError::NotRegular { path });
-    }
-    let Some(manifest) = manifest.filter(|m| name == MANIFEST_FILE || m.names().any(|listed| listed == name)) else {
-        return Err(OutputError::NotOurs { path });
-    };
-    if name == MANIFEST_FILE || manifest.is_unchanged(folder, name).map_err(OutputError::write(&path))? {
-        return Ok(());
-    }
-    Err(OutputError::Changed {
-        path,
-        manifest: folder.join(MANIFEST_FILE),
-        advice: "it is not replaced: move it away or choose another folder",
     })
 }
 
-/// Checks that the files `names` of `folder` are those that the last run wrote. It refuses files that have changed, and
-/// a folder whose run ended while it moved its results into place. The manifest may lie in `folder` or in one of the
-/// two folders above. A folder without a manifest passes.
-///
-/// # Errors
-/// [`OutputError::HalfMade`], [`OutputError::Changed`], or [`OutputError::Write`] for a file that cannot be read.
-pub fn check_whole(folder: &Path, names: &[&str]) -> Result<(), OutputError> {
-    let Ok(whole) = folder.canonicalize() else {
-        return Ok(());
+/// Gives the results in `stage` the name `folder`, which holds nothing but an earlier run's results, and removes those.
+fn put_in_place(stage: &Path, folder: &Path) -> io::Result<()> {
+    let empty = match std::fs::read_dir(folder) {
+        Ok(mut entries) => entries.next().is_none(),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => true,
+        Err(error) => return Err(error),
     };
-    for above in whole.ancestors().take(3) {
-        if disk::exists(&above.join(PLACING)) {
-            return Err(OutputError::HalfMade {
-                folder: folder.to_owned(),
-            });
-        }
-        let (Some(manifest), Ok(below)) = (Manifest::read(above), whole.strip_prefix(above)) else {
-            continue;
-        };
-        for name in names {
-            let listed = below.join(name).to_string_lossy().into_owned();
-            if !manifest.names().any(|known| known == listed) {
-                continue;
-            }
-            let path = folder.join(name);
-            if !manifest
-                .is_unchanged(above, &listed)
-                .map_err(OutputError::write(&path))?
-            {
-                return Err(OutputError::Changed {
-                    path,
-                    manifest: above.join(MANIFEST_FILE),
-                    advice: "the folder holds results of two runs, or the file was changed by hand: then delete the manifest",
+    if let Ok(found) = folder.metadata() {
+        std::fs::set_permissions(stage, found.permissions())?;
+    }
+    // a new name, or that of an empty folder, is taken in one step
+    if empty {
+        disk::rename(stage, folder)?;
+        let _ = disk::sync_folder(parent(folder));
+        return Ok(());
+    }
+    let earlier = match disk::exchange(stage, folder) {
+        Ok(()) => stage.to_owned(),
+        Err(error) if is_unknown(&error) => {
+            let aside = beside(folder, OLD);
+            disk::rename(folder, &aside)?;
+            if let Err(error) = disk::rename(stage, folder) {
+                let shown = aside.display();
+                return Err(match disk::rename(&aside, folder) {
+                    Ok(()) => error,
+                    Err(_) => io::Error::other(format!(
+                        "{error}; the earlier results are in {shown}; the next run with this folder puts them back"
+                    )),
                 });
             }
+            aside
         }
-        break;
+        Err(error) => return Err(error),
+    };
+    // what does not reach the disk or does not go away does no harm: the next run sees to it
+    let _ = disk::sync_folder(parent(folder));
+    let _ = retire(&earlier, folder);
+    Ok(())
+}
+
+/// Whether the file system does not know how to exchange two names.
+fn is_unknown(error: &io::Error) -> bool {
+    use rustix::io::Errno;
+    let unknown = [Errno::INVAL, Errno::NOSYS, Errno::OPNOTSUPP];
+    unknown
+        .iter()
+        .any(|one| error.raw_os_error() == Some(one.raw_os_error()))
+}
+
+/// Clears up after a run with this `folder` that was ended. The folder is locked, so all of it is of the past.
+fn recover(folder: &Path) -> io::Result<()> {
+    let [new, old] = [NEW, OLD].map(|what| beside(folder, what));
+    let is_folder = |path: &Path| path.symlink_metadata().is_ok_and(|found| found.is_dir());
+    if is_folder(&old) {
+        match disk::exists(folder) {
+            true => retire(&old, folder)?,
+            false => disk::rename(&old, folder)?,
+        }
+    }
+    if is_folder(&new) {
+        // results have a manifest when they are complete; what is exchanged for them has one, too
+        match Manifest::read(&new) {
+            Some(_) => retire(&new, folder)?,
+            None => disk::remove_all(&new)?,
+        }
     }
     Ok(())
 }
 
+/// Removes the earlier results in `earlier`. A file that somebody has put there while the run ended moves into `folder`.
+fn retire(earlier: &Path, folder: &Path) -> io::Result<()> {
+    let manifest = Manifest::read(earlier).unwrap_or_default();
+    let mut names = files_below(earlier)?;
+    // the manifest last: the next run may have to go on with this
+    names.sort_by_key(|name| name == MANIFEST_FILE);
+    for name in names {
+        let (path, to) = (earlier.join(&name), folder.join(&name));
+        if name == MANIFEST_FILE || manifest.is_unchanged(earlier, &name)? {
+            disk::remove_file(&path)?;
+        } else {
+            std::fs::create_dir_all(parent(&to))?;
+            let moved = disk::rename_new(&path, &to);
+            moved
+                .map_err(|error| io::Error::new(error.kind(), format!("{} is in the way: {error}", path.display())))?;
+        }
+    }
+    remove_folders(earlier)
+}
+
+/// Removes `folder` and the folders in it, all of them empty.
+fn remove_folders(folder: &Path) -> io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        remove_folders(&entry?.path())?;
+    }
+    disk::remove_folder(folder)
+}
+
+/// Waits until the entries of `folder` and of the folders in it are on the disk.
+fn sync_folders(folder: &Path) -> io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_dir() {
+            sync_folders(&entry.path())?;
+        }
+    }
+    disk::sync_folder(folder)
+}
+
+/// Calls `each` with every file below `folder` in the folder `below` of it, in order of name.
+fn walk(
+    folder: &Path,
+    below: &Path,
+    each: &mut dyn FnMut(PathBuf) -> Result<(), OutputError>,
+) -> Result<(), OutputError> {
+    let at = folder.join(below);
+    let entries = std::fs::read_dir(&at).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+    let mut entries = entries.map_err(OutputError::write(&at))?;
+    entries.sort_by_key(std::fs::DirEntry::file_name);
+    for entry in entries {
+        let name = below.join(entry.file_name());
+        match entry.file_type().map_err(OutputError::write(&at))?.is_dir() {
+            true => walk(folder, &name, each)?,
+            false => each(name)?,
+        }
+    }
+    Ok(())
+}
+
+/// Names of all files below `folder`, with `/` between their parts, sorted.
+fn files_below(folder: &Path) -> io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    let walked = walk(folder, Path::new(""), &mut |name| {
+        let name = name.into_os_string().into_string();
+        names.push(name.map_err(|name| OutputError::new(name, "has a name that is not text"))?);
+        Ok(())
+    });
+    walked.map_err(io::Error::other)?;
+    names.sort();
+    Ok(names)
+}
+
+/// Folders that were created on the way to a folder, deepest first. As far as they are empty, they go when dropped.
+#[derive(Debug)]
+struct Parents {
+    made: Vec<PathBuf>,
+    /// Lets a signal remove them.
+    _entry: Entry,
+}
+
+impl Parents {
+    /// Makes the missing parents of `path`.
+    fn make(path: &Path) -> Result<Self, OutputError> {
+        let made = make_folders(if path.exists() { path } else { parent(path) })?;
+        let entry = listed(|| Ok(()), |()| Leftover::EmptyFolders(made.clone())).map_err(OutputError::write(path));
+        Ok(Self { made, _entry: entry?.1 })
+    }
+
+    fn keep(&mut self) {
+        self.made.clear();
+    }
+}
+
+impl Drop for Parents {
+    fn drop(&mut self) {
+        self.made.iter().for_each(|folder| drop(disk::remove_folder(folder)));
+    }
+}
+
 /// Makes the folder `path` and its parents where they are missing; returns those that were made, deepest first.
-fn make(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
+fn make_folders(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
     let found = path.ancestors().find(|p| p.exists());
     if let Some(found) = found.filter(|found| !found.is_dir()) {
-        return Err(OutputError::IsFile { path: found.to_owned() });
+        return Err(OutputError::new(found, "is a file; the output has to be a folder"));
     }
     let missing = path
         .ancestors()
@@ -254,11 +385,8 @@ fn make(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
         match disk::make_folder(folder) {
             // another run may make the same parents
             Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
-                unmake(&missing[k + 1..]);
-                return Err(OutputError::Folder {
-                    path: path.to_owned(),
-                    source: error,
-                });
+                missing[k + 1..].iter().for_each(|made| drop(disk::remove_folder(made)));
+                return Err(OutputError::no_folder(path, error));
             }
             _ => {}
         }
@@ -266,23 +394,281 @@ fn make(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
     Ok(missing)
 }
 
-/// Removes folders that were made for nothing, as far as they are empty.
-fn unmake(made: &[PathBuf]) {
-    for folder in made {
-        let _ = disk::remove_folder(folder);
+/// The lock of a folder, given up when dropped. The operating system holds it (`flock`), not a process number in a
+/// file: it holds between containers, and a run that was killed does not hold it.
+#[derive(Debug)]
+struct Lock {
+    _file: File,
+    path: PathBuf,
+    /// Lets a signal remove the file.
+    _entry: Option<Entry>,
+}
+
+impl Lock {
+    /// Locks `folder`, which the user calls `shown`.
+    fn take(folder: &Path, shown: &Path) -> Result<Self, OutputError> {
+        let path = beside(folder, LOCK);
+        let failed = OutputError::write(shown);
+        loop {
+            let file = disk::open_or_create(&path).map_err(|error| match error.kind() {
+                io::ErrorKind::PermissionDenied if folder.exists() => {
+                    let above = parent(folder).display();
+                    let problem = format!("cannot be replaced as a whole: {above}: {error}; choose a folder in it");
+                    OutputError::new(shown, problem)
+                }
+                _ => failed(error),
+            })?;
+            match file.try_lock() {
+                Ok(()) => {}
+                Err(TryLockError::WouldBlock) => {
+                    let problem =
+                        "another run is writing to this folder; choose another one, or wait until that run has ended";
+                    return Err(OutputError::new(shown, problem));
+                }
+                // a file system without locks: one run at a time is then the user's to see to
+                Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
+                Err(TryLockError::Error(error)) => return Err(failed(error)),
+            }
+            // the run before may have removed the file between its opening and its locking
+            if is_same(&file, &path) {
+                let entry = listed(|| Ok(()), |()| Leftover::File(path.clone())).ok();
+                return Ok(Self {
+                    _file: file,
+                    _entry: entry.map(|((), entry)| entry),
+                    path,
+                });
+            }
+        }
     }
 }
 
-/// Makes the hidden folder in which the results wait.
-fn make_stage(folder: &Path) -> io::Result<PathBuf> {
-    let made = tempfile::Builder::new()
-        .prefix(WAITING)
-        .rand_bytes(RANDOM)
-        .make_in(folder, disk::make_folder)?;
-    Ok(made.into_temp_path().keep()?)
+impl Drop for Lock {
+    fn drop(&mut self) {
+        // while it is still locked, so that no other run holds a file that is gone
+        let _ = disk::remove_file(&self.path);
+    }
 }
 
-/// Whether `name` is one that only this program gives, to what waits or to a lock.
-pub(super) fn is_hidden(name: &str) -> bool {
-    name.starts_with(WAITING) || name == LOCK_FILE
+/// End of the name of the file that a run holds locked while the folder is its own.
+const LOCK: &str = "lock";
+
+/// Whether `file` is what has the name `path`.
+fn is_same(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let identity = |m: std::fs::Metadata| (m.dev(), m.ino());
+    let (held, named) = (file.metadata().map(identity), path.metadata().map(identity));
+    matches!((held, named), (Ok(held), Ok(named)) if held == named)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{check_whole, write_bytes, write_npy};
+    use super::*;
+    use std::fs;
+
+    fn names(dir: &Path) -> Vec<String> {
+        let entries = fs::read_dir(dir).unwrap();
+        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    /// Opens `dir`, writes files with these contents, and commits them.
+    fn run(dir: &Path, files: &[(&str, &str)]) -> Result<Vec<String>, OutputError> {
+        let out = OutputFolder::open(dir)?;
+        for (name, content) in files {
+            if let Some((folder, _)) = name.rsplit_once('/') {
+                out.folder(folder)?;
+            }
+            write_bytes(&out.path(name), content.as_bytes())?;
+        }
+        out.commit()
+    }
+
+    #[track_caller]
+    fn refused(dir: &Path, facts: &[&str]) {
+        let said = OutputFolder::open(dir).unwrap_err().to_string();
+        for fact in facts {
+            assert!(said.contains(fact), "{fact:?} is not in {said}");
+        }
+    }
+
+    #[test]
+    fn results_of_a_run_appear_together_or_not_at_all() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("deep/er");
+        assert_eq!(
+            run(&out, &[("a", "old"), ("tables/b", "old")]).unwrap(),
+            ["a", "tables/b"]
+        );
+        let dropped = OutputFolder::open(&out).unwrap();
+        write_bytes(&dropped.path("a"), b"half").unwrap();
+        drop(dropped);
+        assert_eq!(fs::read(out.join("a")).unwrap(), b"old");
+        // an empty folder and a result that is gone are nobody's loss
+        fs::create_dir(out.join("empty")).unwrap();
+        fs::remove_file(out.join("tables/b")).unwrap();
+        run(&out, &[("a", "new"), ("c", "new")]).unwrap();
+        assert_eq!(fs::read(out.join("a")).unwrap(), b"new");
+        // what the earlier run has left would stand beside the new results
+        assert_eq!(names(&out), ["a", "c", MANIFEST_FILE]);
+        assert_eq!(names(&dir.path().join("deep")), ["er"]);
+        // the folder that a link names is replaced, and not the link
+        let link = dir.path().join("link");
+        std::os::unix::fs::symlink(&out, &link).unwrap();
+        run(&link, &[("d", "new")]).unwrap();
+        assert_eq!(
+            (names(&out), link.is_symlink()),
+            (vec!["d".to_owned(), MANIFEST_FILE.to_owned()], true)
+        );
+        // a folder that was made for nothing goes again
+        drop(OutputFolder::open(&dir.path().join("x/y")).unwrap());
+        assert_eq!(names(dir.path()), ["deep", "link"]);
+    }
+
+    /// Whatever else lies in a folder is somebody's: it is named, and everything stays.
+    #[test]
+    fn only_unchanged_results_are_replaced() {
+        let make: [(&str, &dyn Fn(&Path)); 6] = [
+            ("notes.txt", &|out| fs::write(out.join("notes.txt"), "mine").unwrap()),
+            ("tables/mine.csv", &|out| {
+                fs::write(out.join("tables/mine.csv"), "mine").unwrap()
+            }),
+            (".hidden/mine", &|out| {
+                fs::create_dir(out.join(".hidden")).unwrap();
+                fs::write(out.join(".hidden/mine"), "mine").unwrap();
+            }),
+            ("a", &|out| fs::write(out.join("a"), "mine").unwrap()),
+            ("a", &|out| {
+                fs::remove_file(out.join("a")).unwrap();
+                std::os::unix::fs::symlink("tables/b", out.join("a")).unwrap();
+            }),
+            // a manifest of somebody's own is nobody's leave to replace what it lists
+            ("a", &|out| {
+                fs::write(out.join(MANIFEST_FILE), r#"{"format": "mine", "files": {"a": {}}}"#).unwrap();
+            }),
+        ];
+        for (name, make) in make {
+            let dir = tempfile::tempdir().unwrap();
+            let out = dir.path().join("out");
+            run(&out, &[("a", "old"), ("tables/b", "old")]).unwrap();
+            let early = OutputFolder::open(&out).unwrap();
+            make(&out);
+            let shown = out.join(name).display().to_string();
+            let late = early.commit().unwrap_err().to_string();
+            assert!(late.starts_with(&format!("{shown}: is not ")), "{late}");
+            refused(
+                &out,
+                &[&shown, "is not", "replaced", "move it away or choose another folder"],
+            );
+            assert_eq!(names(dir.path()), ["out"]);
+            assert_eq!(fs::read(out.join("tables/b")).unwrap(), b"old");
+        }
+    }
+
+    #[test]
+    fn one_run_at_a_time() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let first = OutputFolder::open(&out).unwrap();
+        write_bytes(&first.path("a"), b"first").unwrap();
+        refused(&out, &["out: another run is writing to this folder"]);
+        first.commit().unwrap();
+        run(&out, &[("a", "second")]).unwrap();
+        assert_eq!(fs::read(out.join("a")).unwrap(), b"second");
+        assert_eq!(names(dir.path()), ["out"]);
+    }
+
+    /// Results of two runs beside each other are noticed, whoever put them there.
+    #[test]
+    fn mixed_results_are_noticed() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        run(&out, &[("a", "one"), ("below/b", "one")]).unwrap();
+        check_whole(&out, &["a", "not listed"]).unwrap();
+        check_whole(&out.join("below"), &["b"]).unwrap();
+        fs::write(out.join("below/b"), "two").unwrap();
+        check_whole(&out, &["a"]).unwrap();
+        let error = check_whole(&out.join("below"), &["b"]).unwrap_err().to_string();
+        assert!(error.contains("below/b") && error.contains(MANIFEST_FILE), "{error}");
+    }
+
+    #[test]
+    fn what_cannot_be_replaced_as_a_whole_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("file");
+        fs::write(&file, b"precious").unwrap();
+        refused(&file, &["file: is a file; the output has to be a folder"]);
+        refused(&file.join("below"), &["file: is a file"]);
+        assert_eq!(fs::read(&file).unwrap(), b"precious");
+        let nowhere = dir.path().join("nowhere");
+        std::os::unix::fs::symlink(dir.path().join("gone"), &nowhere).unwrap();
+        refused(&nowhere, &["nowhere: cannot be written"]);
+        assert_eq!(names(dir.path()), ["file", "nowhere"]);
+        refused(Path::new("/"), &["/: is a mount point", "choose a folder in it"]);
+        assert!(!is_mounted(dir.path(), parent(dir.path())));
+        for mounted in ["/proc", "/dev/shm"]
+            .map(Path::new)
+            .into_iter()
+            .filter(|path| path.exists())
+        {
+            assert!(is_mounted(mounted, parent(mounted)), "{}", mounted.display());
+        }
+    }
+
+    /// Whatever fails while results wait, the message names where they would have been.
+    #[test]
+    fn errors_name_the_final_place() {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("out");
+        let staged = OutputFolder::open(&out).unwrap();
+        write_bytes(&staged.path("figures"), b"in the way").unwrap();
+        let in_the_way = staged.folder("figures").unwrap_err();
+        let wrong_shape = write_npy(&staged.path("a.npy"), &[4], &[1.0]).unwrap_err();
+        for (error, name) in [(in_the_way, "figures"), (wrong_shape, "a.npy")] {
+            let text = staged.unstaged(error).to_string();
+            assert!(text.starts_with(&format!("{}: ", out.join(name).display())), "{text}");
+        }
+    }
+
+    /// What lies beside a folder under the hidden names may be anybody's work: only listed results are removed.
+    #[test]
+    fn what_an_ended_run_has_left_is_read_without_trust() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        run(&at("out"), &[("a", "old")]).unwrap();
+        // ended between two renames, in the file system that cannot exchange
+        fs::rename(at("out"), at(".out.spts-old")).unwrap();
+        drop(OutputFolder::open(&at("out")).unwrap());
+        assert_eq!(fs::read(at("out/a")).unwrap(), b"old");
+        // a file that came into the earlier results while the run ended goes where it was meant to be
+        run(&at("other"), &[("a", "older")]).unwrap();
+        fs::create_dir(at("other/mine")).unwrap();
+        fs::write(at("other/mine/notes.txt"), "mine").unwrap();
+        fs::rename(at("other"), at(".out.spts-new")).unwrap();
+        refused(&at("out"), &["out/mine/notes.txt: is not a result"]);
+        assert_eq!(fs::read(at("out/mine/notes.txt")).unwrap(), b"mine");
+        fs::remove_dir_all(at("out/mine")).unwrap();
+        assert_eq!(names(dir.path()), ["out"]);
+        // a result that was changed then has a place of its own no more
+        fs::create_dir(at(".out.spts-old")).unwrap();
+        fs::write(at(".out.spts-old/a"), "mine").unwrap();
+        refused(&at("out"), &["out: cannot be written", ".out.spts-old/a is in the way"]);
+        assert_eq!(fs::read(at(".out.spts-old/a")).unwrap(), b"mine");
+        fs::remove_dir_all(at(".out.spts-old")).unwrap();
+        // a link leads to what is not ours, a list may name what is not below, and a pipe never answers
+        fs::create_dir(at("precious")).unwrap();
+        fs::write(at("precious/a"), "mine").unwrap();
+        std::os::unix::fs::symlink(at("precious"), at(".out.spts-new")).unwrap();
+        refused(&at("out"), &["out: cannot be written"]);
+        fs::remove_file(at(".out.spts-new")).unwrap();
+        let list = r#"{"format": "spts-results", "schema": 1, "files": {"../precious/a": {}}}"#;
+        fs::create_dir(at(".out.spts-old")).unwrap();
+        fs::write(at(".out.spts-old").join(MANIFEST_FILE), list).unwrap();
+        drop(OutputFolder::open(&at("out")).unwrap());
+        let made = std::process::Command::new("mkfifo").arg(at("out/pipe")).status();
+        assert!(made.unwrap().success());
+        refused(&at("out"), &["out/pipe: is not a result"]);
+        assert_eq!(fs::read(at("precious/a")).unwrap(), b"mine");
+    }
 }

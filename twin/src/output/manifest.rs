@@ -1,13 +1,13 @@
 //! The manifest: which files of a folder a run has written.
 
-use super::atomic::write_bytes;
-use super::error::OutputError;
+use super::disk::OutputError;
+use super::files::write_bytes;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::Metadata;
 use std::io::{self, Read as _};
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 /// The file that lists the files that a run has written.
 pub const MANIFEST_FILE: &str = "manifest.json";
@@ -24,7 +24,7 @@ const PIECE: usize = 1 << 16;
 /// use spts::output::{Manifest, OutputFolder, write_bytes};
 ///
 /// # let path = std::env::temp_dir().join(format!("spts-doc-manifest-{}", std::process::id()));
-/// let folder = OutputFolder::open(&path, &["scores.csv"])?;
+/// let folder = OutputFolder::open(&path)?;
 /// write_bytes(&folder.path("scores.csv"), b"iou\n0.8\n")?;
 /// folder.commit()?;
 /// let manifest = Manifest::read(&path).expect("a run has left its manifest");
@@ -44,7 +44,7 @@ pub struct Manifest {
 }
 
 /// What is known of a file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FileEntry {
     /// Size, bytes, and SHA-256 of the content in hexadecimal digits. Both are absent for a file that depends on the
@@ -70,13 +70,7 @@ impl Manifest {
     pub(super) fn of(folder: &Path, names: &[String], timed: &BTreeSet<String>) -> Result<Self, OutputError> {
         let entry = |name: &String| {
             if timed.contains(name) {
-                return Ok((
-                    name.clone(),
-                    FileEntry {
-                        bytes: None,
-                        sha256: None,
-                    },
-                ));
+                return Ok((name.clone(), FileEntry::default()));
             }
             let path = folder.join(name);
             let (bytes, sha256) = digest(&path).map_err(OutputError::write(&path))?;
@@ -95,7 +89,7 @@ impl Manifest {
     /// Writes the manifest of the files `names` of `folder` into that folder.
     ///
     /// # Errors
-    /// [`OutputError::Write`] if a file cannot be read, or the manifest cannot be written.
+    /// [`OutputError`] if a file cannot be read, or the manifest cannot be written.
     pub fn write_of(folder: &Path, names: &[String]) -> Result<Self, OutputError> {
         let manifest = Self::of(folder, names, &BTreeSet::new())?;
         manifest.write(folder)?;
@@ -139,6 +133,11 @@ impl Manifest {
         self.files.keys().map(String::as_str)
     }
 
+    /// Whether a run has written the file `name`.
+    pub(super) fn lists(&self, name: &str) -> bool {
+        self.files.contains_key(name)
+    }
+
     /// Whether the file `name` of `folder` is still as the run wrote it; `false` for a file that is not listed.
     ///
     /// # Errors
@@ -161,8 +160,49 @@ impl Manifest {
     }
 }
 
+/// Checks that the files `names` of `folder` are those that the last run wrote, and refuses files that have changed. The
+/// manifest may lie in `folder` or in one of the two folders above. A folder without a manifest passes.
+///
+/// # Errors
+/// [`OutputError`] for a file that has changed or cannot be read.
+pub fn check_whole(folder: &Path, names: &[&str]) -> Result<(), OutputError> {
+    let Ok(whole) = folder.canonicalize() else {
+        return Ok(());
+    };
+    let listing = whole
+        .ancestors()
+        .take(3)
+        .find_map(|above| Some((above, Manifest::read(above)?)));
+    let Some((above, manifest)) = listing else {
+        return Ok(());
+    };
+    let below = whole.strip_prefix(above).unwrap_or(Path::new(""));
+    for name in names {
+        let (path, listed) = (folder.join(name), below.join(name).to_string_lossy().into_owned());
+        if manifest.lists(&listed)
+            && !manifest
+                .is_unchanged(above, &listed)
+                .map_err(OutputError::write(&path))?
+        {
+            let advice =
+                "the folder holds results of two runs, or the file was changed by hand: then delete the manifest";
+            return Err(changed(path, above, advice));
+        }
+    }
+    Ok(())
+}
+
+/// The error that `path` is not as the manifest in `folder` lists it.
+pub(super) fn changed(path: PathBuf, folder: &Path, advice: &str) -> OutputError {
+    let manifest = folder.join(MANIFEST_FILE);
+    OutputError::new(
+        path,
+        format!("is not the file that {} lists; {advice}", manifest.display()),
+    )
+}
+
 /// Whether `name` stays below the folder that it is joined to.
-pub(super) fn is_below(name: &str) -> bool {
+fn is_below(name: &str) -> bool {
     !name.is_empty()
         && Path::new(name)
             .components()
@@ -170,7 +210,7 @@ pub(super) fn is_below(name: &str) -> bool {
 }
 
 /// Size and SHA-256 of a file.
-pub(super) fn digest(path: &Path) -> io::Result<(u64, String)> {
+fn digest(path: &Path) -> io::Result<(u64, String)> {
     let (mut file, _) = spts_input::open(path, u64::MAX)?;
     let (mut hash, mut bytes, mut piece) = (Sha256::new(), 0, vec![0; PIECE]);
     loop {

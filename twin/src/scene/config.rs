@@ -1,10 +1,10 @@
 //! A scene as written in TOML.
 
-use super::{BendConfig, DropConfig, PressConfig, Timestep};
 use crate::chain::{ChainConfig, RowsConfig};
 use serde::{Deserialize, Serialize};
-use spts_models::SkinLayout;
-use spts_sim::mechanics::MechanicsConfig;
+use spts_input::Refusal;
+use spts_models::{SkinLayout, explain_toml};
+use spts_sim::mechanics::{BendConfig, DropConfig, MechanicsConfig, PressConfig, Timestep};
 
 /// A scene as written in TOML. A missing field takes its default.
 ///
@@ -15,7 +15,7 @@ use spts_sim::mechanics::MechanicsConfig;
 /// assert_eq!((scene.seed, scene.readout.as_deref()), (7, Some("ideal")));
 /// let error = SceneConfig::from_toml("sead = 7").err().expect("an unknown key");
 /// assert!(error.to_string().contains("sead"));
-/// # Ok::<(), spts::SceneError>(())
+/// # Ok::<(), spts::Refusal>(())
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -130,3 +130,38 @@ impl SceneConfig {
         }
     }
 }
+
+impl SceneConfig {
+    /// The configuration in `table`.
+    ///
+    /// # Errors
+    /// [`Refusal`] for an unknown key or a wrong value.
+    pub fn from_table(table: toml::Table) -> Result<Self, Refusal> {
+        table.try_into().map_err(|error| Refusal::new(explain_toml(&error)))
+    }
+
+    /// The configuration in the TOML text `text`.
+    ///
+    /// # Errors
+    /// [`Refusal`], with the line.
+    pub fn from_toml(text: &str) -> Result<Self, Refusal> {
+        toml::from_str(text).map_err(|error| unparsed(text, &error))
+    }
+}
+
+/// What the TOML reader found in `text`, on one line.
+fn unparsed(text: &str, error: &toml::de::Error) -> Refusal {
+    let start = error.span().map_or(0, |span| span.start.min(text.len()));
+    let before = text.get(..start).unwrap_or_default();
+    let line = before.matches('\n').count();
+    // of a text that is TOML the table knows the field, and the text the line
+    let table: Result<toml::Table, _> = toml::from_str(text);
+    let in_table = table.ok().and_then(|table| table.try_into::<SceneConfig>().err());
+    let message = explain_toml(in_table.as_ref().unwrap_or(error));
+    let shown = text.lines().nth(line).unwrap_or_default().trim();
+    let shown: String = shown.chars().take(SHOWN).collect();
+    Refusal::new(format!("line {}: {message} (`{shown}`)", line + 1))
+}
+
+/// Characters of a wrong line that an error repeats: a line of any file of ours is shorter.
+const SHOWN: usize = 120;

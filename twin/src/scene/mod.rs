@@ -17,15 +17,16 @@
 
 mod assign;
 mod config;
-mod error;
-mod make_room;
 #[cfg(test)]
 mod tests;
 
-pub use crate::assign::{AssignError, Assignment};
+pub use crate::assign::Assignment;
 pub use crate::chain::RowsConfig;
 pub use config::SceneConfig;
-pub use error::SceneError;
+// the other name of a refusal, until all crates have it
+pub use spts_input::Refusal as SceneError;
+// another name of a refusal, until all crates have it
+pub use spts_input::Refusal as AssignError;
 pub use spts_sim::mechanics::{
     BendConfig, DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Task, Timestep,
 };
@@ -33,8 +34,10 @@ pub use spts_sim::mechanics::{
 use crate::chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS, read_gains};
 use crate::provenance::hash_text;
 use crate::session::{NAMES, is_plain};
+use spts_input::Refusal;
 use spts_models::SkinLayout;
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// A valid scene: the mechanics, and the chain of transducer, readout and weights that follows them.
 ///
@@ -47,21 +50,23 @@ use std::path::Path;
 /// // what is wrong ends in an error that names the field
 /// let error = Scene::from_toml("[transducer_parameters]\ntemperature_c = 900\n[drop]", ".".as_ref()).unwrap_err();
 /// assert!(error.to_string().contains("`transducer_parameters.temperature_c` = 900"));
-/// # Ok::<(), spts::scene::SceneError>(())
+/// # Ok::<(), spts::Refusal>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct Scene {
     config: SceneConfig,
     mechanics: Mechanics,
     chain: Chain,
+    /// Hash of the scene, once it has been asked for.
+    hash: OnceLock<String>,
 }
 
 impl Scene {
     /// The scene that `config` describes. Files that it names are looked up in `folder`.
     ///
     /// # Errors
-    /// [`SceneError`] for the first field that is not valid.
-    pub fn new(mut config: SceneConfig, folder: &Path) -> Result<Self, SceneError> {
+    /// [`Refusal`] for the first field that is not valid.
+    pub fn new(mut config: SceneConfig, folder: &Path) -> Result<Self, Refusal> {
         read_gains(&mut config.transducer_parameters, folder)?;
         let mechanics = Mechanics::new(config.mechanics(), folder)?;
         let chain = Chain::new(&config.chain(), mechanics.skin(), config.seed, folder)?;
@@ -76,23 +81,21 @@ impl Scene {
         let name = default_name(&config);
         let name = config.name.get_or_insert(name);
         if !is_plain(name) {
-            return Err(SceneError::Name {
-                value: name.clone(),
-                range: NAMES,
-            });
+            return Err(Refusal::range("name", format!("{name:?}"), NAMES));
         }
         Ok(Self {
             config,
             mechanics,
             chain,
+            hash: OnceLock::new(),
         })
     }
 
     /// The scene in the TOML text `text`. Files that it names are looked up in `folder`.
     ///
     /// # Errors
-    /// [`SceneError`] if the text is not TOML, or the scene is not valid.
-    pub fn from_toml(text: &str, folder: &Path) -> Result<Self, SceneError> {
+    /// [`Refusal`] if the text is not TOML, or the scene is not valid.
+    pub fn from_toml(text: &str, folder: &Path) -> Result<Self, Refusal> {
         Self::new(SceneConfig::from_toml(text)?, folder)
     }
 
@@ -100,46 +103,35 @@ impl Scene {
     /// the file's.
     ///
     /// # Errors
-    /// [`SceneError::InFile`], with the path of the file, if the file cannot be read, is not TOML, or its scene is not
+    /// [`Refusal`], with the path of the file, if the file cannot be read, is not TOML, or its scene is not
     /// valid.
-    pub fn load(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, Refusal> {
         let path = path.as_ref();
         let read = || {
-            let text = spts_input::read_text(path, crate::chain::MAX_TOML_BYTES).map_err(std::io::Error::from)?;
+            let text = spts_input::read_text(path, crate::chain::MAX_TOML_BYTES);
+            let text = text.map_err(|error| Refusal::from_error(error).at("cannot be read"))?;
             let mut config = SceneConfig::from_toml(&text)?;
             let stem = path.file_stem().unwrap_or_default().to_string_lossy();
             config.name.get_or_insert_with(|| stem.into_owned());
             Self::new(config, path.parent().unwrap_or(Path::new("")))
         };
-        read().map_err(|source: SceneError| source.in_file(path))
+        read().map_err(|error: Refusal| error.at(path.display()))
     }
 
     /// Ten presses of the object called `name` by the arm, at the place of the published recordings. Everything else
     /// has its default.
     ///
     /// # Errors
-    /// [`SceneError::Mechanics`] if there is no object of that name.
-    pub fn press(name: &str) -> Result<Self, SceneError> {
+    /// [`Refusal`] if there is no object of that name.
+    pub fn press(name: &str) -> Result<Self, Refusal> {
         Self::new(MechanicsConfig::press(name).into(), Path::new(""))
-    }
-
-    /// Ten presses of the mesh in `file` (`scale` metres a unit) in the middle of the skin.
-    ///
-    /// # Errors
-    /// [`SceneError`] if the mesh cannot be used.
-    pub fn press_mesh(file: impl AsRef<Path>, scale: f64) -> Result<Self, SceneError> {
-        let file = file.as_ref();
-        let name = file
-            .to_str()
-            .ok_or_else(|| SceneError::NotUtf8 { path: file.to_owned() })?;
-        Self::new(MechanicsConfig::press_mesh(name, scale).into(), Path::new(""))
     }
 
     /// Ten drops of a tennis ball from half a metre onto the middle of the skin. Everything else has its default.
     ///
     /// # Errors
     /// None, with the defaults as they are.
-    pub fn bounce() -> Result<Self, SceneError> {
+    pub fn bounce() -> Result<Self, Refusal> {
         Self::new(MechanicsConfig::bounce().into(), Path::new(""))
     }
 
@@ -210,9 +202,9 @@ impl Scene {
     /// The scene as TOML, with all defaults filled in. Reading it back gives the same scene.
     ///
     /// # Errors
-    /// [`SceneError::Write`], which no valid scene should cause.
-    pub fn to_toml(&self) -> Result<String, SceneError> {
-        Ok(toml::to_string(&self.config)?)
+    /// [`Refusal`], which no valid scene should cause.
+    pub fn to_toml(&self) -> Result<String, Refusal> {
+        toml::to_string(&self.config).map_err(unwritable)
     }
 
     /// Hash of the scene: of its TOML text, and of the contents of its mesh, profile and seed files, whatever these
@@ -220,8 +212,11 @@ impl Scene {
     ///
     /// # Errors
     /// As [`Scene::to_toml`].
-    pub fn hash(&self) -> Result<String, SceneError> {
-        let mut bytes = toml::to_string(&self.portable())?.into_bytes();
+    pub fn hash(&self) -> Result<String, Refusal> {
+        if let Some(hash) = self.hash.get() {
+            return Ok(hash.clone());
+        }
+        let mut bytes = toml::to_string(&self.portable()).map_err(unwritable)?.into_bytes();
         let mesh = self.mechanics.mesh();
         for value in mesh.vertices.iter().flatten() {
             bytes.extend(value.to_le_bytes());
@@ -234,7 +229,7 @@ impl Scene {
             self.chain.rows_file().map(|file| &file.text),
         ];
         bytes.extend(texts.into_iter().flatten().flat_map(|text| text.bytes()));
-        Ok(hash_text(&bytes))
+        Ok(self.hash.get_or_init(|| hash_text(&bytes)).clone())
     }
 
     /// The configuration with all defaults filled in. Files are named [`MESH_COPY`] (with the extension of the mesh),
@@ -268,6 +263,16 @@ pub const READOUT_COPY: &str = "readout.toml";
 pub const SEEDS_COPY: &str = "seeds.txt";
 /// Name of the copy of a pattern file.
 pub const PATTERNS_COPY: &str = "patterns.txt";
+
+/// The error of a scene that has no TOML.
+pub(crate) fn unwritable(error: toml::ser::Error) -> Refusal {
+    Refusal::from_error(error).at("cannot be written")
+}
+
+/// The error of a file whose name cannot stand in a scene.
+pub(crate) fn not_text(file: &Path) -> Refusal {
+    Refusal::new("the name of the file is not valid UTF-8").at(file.display())
+}
 
 /// Name of a scene that has none: of its object, of its mesh file, or `bounce`.
 fn default_name(config: &SceneConfig) -> String {

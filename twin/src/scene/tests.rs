@@ -46,49 +46,28 @@ fn the_hash_sees_every_change() {
     }
 }
 
+/// The cases of a table: a line each, of the scene's lines with ` ; ` between them, and the facts in its error.
+fn cases(table: &'static str) -> impl Iterator<Item = (String, Vec<&'static str>)> {
+    table.lines().filter(|line| !line.is_empty()).map(|line| {
+        let (scene, facts) = line.split_once(" | ").unwrap();
+        (scene.replace(" ; ", "\n"), facts.split(" | ").collect())
+    })
+}
+
 /// Every stage is checked when the scene is made, and the error names the field as the scene writes it.
 #[test]
 fn errors_name_the_field_of_every_stage() {
-    let fault = |text: &str| format!("[[faults]]\nname = \"dead\"\ntaxel = 1\n[[faults]]\n{text}\n[drop]");
-    for (text, facts) in [
-        (
-            "transducer = \"foil\"\n[drop]".to_owned(),
-            ["`transducer` = \"foil\"", "velostat"],
-        ),
-        (
-            "[transducer_parameters]\nspread_log_sd = -1.0\n[drop]".to_owned(),
-            ["`transducer_parameters.spread_log_sd` = -1", "is outside"],
-        ),
-        (
-            "transducer = \"linear\"\n[transducer_parameters]\nslope_s_per_pa = nan\n[drop]".to_owned(),
-            ["`transducer_parameters.slope_s_per_pa` = NaN", "is outside"],
-        ),
-        (
-            "[transducer_parameters]\nspred = 1.0\n[drop]".to_owned(),
-            ["`transducer_parameters`", "spred"],
-        ),
-        (
-            "readout = \"perfect\"\n[drop]".to_owned(),
-            ["`readout` = \"perfect\"", "as_built"],
-        ),
-        (
-            "weights = \"magic\"\n[drop]".to_owned(),
-            ["`weights` = \"magic\"", "model, firmware"],
-        ),
-        (
-            fault("name = \"dead\"\ntaxel = 100"),
-            ["`faults[1].taxel` = 100", "[0, 99]"],
-        ),
-        (fault("name = \"dead\"\ntaxel = -3"), ["`faults[1]", "-3"]),
-        (
-            fault("name = \"stuck\"\ntaxel = 2\nlevel = 3.0"),
-            ["`faults[1].level` = 3", "[−1, 1]"],
-        ),
-        (
-            fault("name = \"lame\"\ntaxel = 2"),
-            ["`faults[1].name` = \"lame\"", "dead, stuck"],
-        ),
-    ] {
+    const STAGES: &str = r#"
+transducer = "foil" ; [drop] | `transducer` = "foil" | velostat
+[transducer_parameters] ; spread_log_sd = -1.0 ; [drop] | `transducer_parameters.spread_log_sd` = -1 | is outside
+transducer = "linear" ; [transducer_parameters] ; slope_s_per_pa = nan ; [drop] | `transducer_parameters.slope_s_per_pa` = NaN
+[transducer_parameters] ; spred = 1.0 ; [drop] | `transducer_parameters` | spred
+readout = "perfect" ; [drop] | `readout` = "perfect" | as_built
+weights = "magic" ; [drop] | `weights` = "magic" | model, firmware
+[[faults]] ; name = "dead" ; taxel = 1 ; [[faults]] ; name = "dead" ; taxel = 100 ; [drop] | `faults[1].taxel` = 100 | [0, 99]
+[[faults]] ; name = "dead" ; taxel = 1 ; [[faults]] ; name = "lame" ; taxel = 2 ; [drop] | `faults[1].name` = "lame" | dead, stuck
+"#;
+    for (text, facts) in cases(STAGES) {
         let error = read(&text).unwrap_err();
         for fact in facts {
             assert!(error.contains(fact), "{text}: {error}");
@@ -218,64 +197,29 @@ fn rows_of_a_scene_take_the_place_of_the_profile_s() {
 
 #[test]
 fn wrong_rows_are_refused_with_file_and_field() {
+    const ROWS: &str = r#"
+seeding = "random" | random | `address` or `mixed`
+seeds = [1, 2] | `rows.seeds`: number of seeds = 2 | 100, one for each taxel of 10 × 10
+seeds = [-1] | line 2: `rows.seeds` = -1 | [0, 2^32)
+seeds_file = "gone.txt" | rows.seeds_file | gone.txt
+seeds_file = "few.txt" | few.txt: `rows.seeds_file`: number of seeds = 3 | 100
+seeds_file = "bad.txt" | bad.txt: `rows.seeds_file`: line 2: seed = `4294967296` | [0, 4294967295]
+seeding = "mixed" ; seeds_file = "few.txt" | only one of `rows.seeding` and `rows.seeds_file`
+levels = "ternary" | ternary | `binary` or `analog`
+kind = "random" | random | `generator` or `pattern`
+kind = "pattern" | `rows.kind` = "pattern" | `rows.patterns_file`
+kind = "generator" ; patterns_file = "signs.txt" | `rows.patterns_file` does not go with | "generator"
+kind = "pattern" ; seeding = "mixed" | `rows.seeding` does not go with | "pattern"
+patterns_file = "gone.txt" | rows.patterns_file | gone.txt
+patterns_file = "signs.txt" | signs.txt: `rows.patterns_file`: number of taxels of a row = 3 | 100
+patterns_file = "bad.txt" | bad.txt: `rows.patterns_file`: line 2: `4294967296` | [0, 255]
+patterns = { period = 2, codes = [0, 255] } | `rows.patterns`: number of taxels of a row = 1 | 100
+"#;
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("few.txt"), "1 2 3").unwrap();
     std::fs::write(folder.path().join("bad.txt"), "1\n4294967296").unwrap();
     std::fs::write(folder.path().join("signs.txt"), "+-+\n--+\n").unwrap();
-    for (rows, facts) in [
-        ("seeding = \"random\"", ["random", "`address` or `mixed`"]),
-        (
-            "seeds = [1, 2]",
-            [
-                "`rows.seeds`: number of seeds = 2",
-                "100, one for each taxel of 10 × 10",
-            ],
-        ),
-        ("seeds = [-1]", ["line 2: `rows.seeds` = -1", "[0, 2^32)"]),
-        ("seeds_file = \"gone.txt\"", ["rows.seeds_file", "gone.txt"]),
-        (
-            "seeds_file = \"few.txt\"",
-            ["few.txt: `rows.seeds_file`: number of seeds = 3", "100"],
-        ),
-        (
-            "seeds_file = \"bad.txt\"",
-            [
-                "bad.txt: `rows.seeds_file`: line 2: seed = `4294967296`",
-                "[0, 4294967295]",
-            ],
-        ),
-        (
-            "seeding = \"mixed\"\nseeds_file = \"few.txt\"",
-            ["only one of `rows.seeding` and `rows.seeds_file`", ""],
-        ),
-        ("levels = \"ternary\"", ["ternary", "`binary` or `analog`"]),
-        ("kind = \"random\"", ["random", "`generator` or `pattern`"]),
-        (
-            "kind = \"pattern\"",
-            ["`rows.kind` = \"pattern\"", "`rows.patterns_file`"],
-        ),
-        (
-            "kind = \"generator\"\npatterns_file = \"signs.txt\"",
-            ["`rows.patterns_file` does not go with", "\"generator\""],
-        ),
-        (
-            "kind = \"pattern\"\nseeding = \"mixed\"",
-            ["`rows.seeding` does not go with", "\"pattern\""],
-        ),
-        ("patterns_file = \"gone.txt\"", ["rows.patterns_file", "gone.txt"]),
-        (
-            "patterns_file = \"signs.txt\"",
-            ["signs.txt: `rows.patterns_file`: number of taxels of a row = 3", "100"],
-        ),
-        (
-            "patterns_file = \"bad.txt\"",
-            ["bad.txt: `rows.patterns_file`: line 2: `4294967296`", "[0, 255]"],
-        ),
-        (
-            "patterns = { period = 2, codes = [0, 255] }",
-            ["`rows.patterns`: number of taxels of a row = 1", "100"],
-        ),
-    ] {
+    for (rows, facts) in cases(ROWS) {
         let text = format!("[rows]\n{rows}\n[drop]");
         let error = Scene::from_toml(&text, folder.path()).unwrap_err().to_string();
         for fact in facts {

@@ -1,12 +1,13 @@
-//! Turns a request of the command line into a valid scene that can be stored and run again.
+//! Turns a request of the command line into a valid scene that can be stored and run again, with notes for the user.
 
-use super::error::SimulateError;
-use super::notes;
 use crate::chain::MAX_TOML_BYTES;
-use crate::record::{TwinError, header};
-use crate::scene::{Assignment, Scene, SceneConfig, SceneError, Task};
+use crate::record::header;
+use crate::scene::{Assignment, Scene, SceneConfig, Task, not_text, unwritable};
 use crate::session::Session;
-use spts_contact::mesh::MAX_FILE_BYTES;
+use spts_contact::mesh::{MAX_FILE_BYTES, MeshReport};
+use spts_input::{InputError, Refusal};
+use spts_models::REFERENCE_PA;
+use spts_sim::mechanics::Mechanics;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
@@ -66,21 +67,26 @@ impl Prepared {
 }
 
 impl Request {
-    /// Checks everything that can be checked before the first step.
+    /// The scene, valid and with its changes.
     ///
     /// # Errors
-    /// [`SimulateError`], which names the file or option, the value, and what is valid.
-    pub fn prepare(&self) -> Result<Prepared, SimulateError> {
+    /// [`Refusal`], which names the file or option, the value, and what is valid.
+    pub fn scene(&self) -> Result<Scene, Refusal> {
         let mut table = self.start()?;
         Assignment::apply_all(&self.assignments, &mut table)?;
         let scene = SceneConfig::from_table(table).and_then(|config| Scene::new(config, Path::new("")));
-        let scene = scene.map_err(|error| {
-            if is_toml(&self.scene) {
-                error.in_file(Path::new(&self.scene))
-            } else {
-                error
-            }
-        })?;
+        scene.map_err(|error| match is_toml(&self.scene) {
+            true => error.at(&self.scene),
+            false => error,
+        })
+    }
+
+    /// Checks everything that can be checked before the first step.
+    ///
+    /// # Errors
+    /// As [`Request::scene`].
+    pub fn prepare(&self) -> Result<Prepared, Refusal> {
+        let scene = self.scene()?;
         let portable = scene.portable();
         let mut copies = Vec::new();
         if let (Some(file), Some(name)) = (scene.chain().profile_file(), &portable.readout) {
@@ -97,16 +103,13 @@ impl Request {
         let mesh = |config: &SceneConfig| config.press.as_ref().and_then(|press| press.mesh.clone());
         if let (Some(file), Some(name)) = (mesh(scene.config()), mesh(&portable)) {
             let path = Path::new(&file);
-            let bytes = spts_input::read(path, MAX_FILE_BYTES).map_err(|error| SimulateError::Read {
-                path: path.to_owned(),
-                source: error.into(),
-            })?;
+            let bytes = spts_input::read(path, MAX_FILE_BYTES).map_err(unreadable(path))?;
             copies.push((name, bytes));
         }
         Ok(Prepared {
             scene_hash: scene.hash()?,
-            scene_toml: toml::to_string(&portable).map_err(SceneError::Write)?,
-            notes: notes::of_scene(&scene).map_err(TwinError::from)?,
+            scene_toml: toml::to_string(&portable).map_err(unwritable)?,
+            notes: notes_on(&scene)?,
             scene,
             copies,
         })
@@ -114,7 +117,7 @@ impl Request {
 
     /// The scene before anything is changed in it, with the folder of the scene file before the names of the files that
     /// it needs.
-    fn start(&self) -> Result<Table, SimulateError> {
+    fn start(&self) -> Result<Table, Refusal> {
         let mesh = self.assignments.iter().find(|assignment| assignment.sets("press.mesh"));
         let once = |section: &str, entries: &[(&str, Value)]| {
             let section = (
@@ -136,25 +139,23 @@ impl Request {
                     "a mesh takes the place of the object: write `press` in place of `{}`",
                     self.scene
                 );
-                Err(mesh.refused(reason).into())
+                Err(mesh.refused(reason))
             }
             (Some(("press", object)), None) => once("press", &[("object", object.into()), ("presses", 1.into())]),
             (None, Some(_)) if self.scene == "press" => once("press", &[("presses", 1.into())]),
             (None, _) if self.scene == "bounce" => once("drop", &[("drops", 1.into())]),
-            _ => Err(SimulateError::UnknownScene {
-                name: self.scene.clone(),
-            }),
+            _ => Err(Refusal::new(format!(
+                "SCENE = \"{}\" is not press/NAME, press with --mesh, bounce, arm, or a file that ends in .toml",
+                self.scene
+            ))),
         }
     }
 
     /// The scene file.
-    fn read_scene(&self) -> Result<Table, SimulateError> {
+    fn read_scene(&self) -> Result<Table, Refusal> {
         let path = Path::new(&self.scene);
-        let text = spts_input::read_text(path, MAX_TOML_BYTES).map_err(|error| SimulateError::Read {
-            path: path.to_owned(),
-            source: error.into(),
-        })?;
-        let parsed = SceneConfig::from_toml(&text).map_err(|error| error.in_file(path))?;
+        let text = spts_input::read_text(path, MAX_TOML_BYTES).map_err(unreadable(path))?;
+        let parsed = SceneConfig::from_toml(&text).map_err(|error| error.at(path.display()))?;
         // it is TOML, or it would not have been a scene
         let mut table: Table = toml::from_str(&text).unwrap_or_default();
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -188,7 +189,76 @@ fn is_toml(text: &str) -> bool {
     Path::new(text).extension().is_some_and(|e| e == "toml")
 }
 
-fn utf8(path: PathBuf) -> Result<String, SceneError> {
+fn utf8(path: PathBuf) -> Result<String, Refusal> {
     let text = path.into_os_string().into_string();
-    text.map_err(|path| SceneError::NotUtf8 { path: path.into() })
+    text.map_err(|path| not_text(path.as_ref()))
+}
+
+/// The error of the file at `path`, which cannot be read.
+fn unreadable(path: &Path) -> impl Fn(InputError) -> Refusal {
+    move |error| Refusal::from_error(error).at("cannot be read").at(path.display())
+}
+
+/// Notes on `scene`: what was repaired in its mesh, what hangs over the edge, what a tolerance chose, faults, and a
+/// taxel that is below the noise.
+fn notes_on(scene: &Scene) -> Result<Vec<String>, Refusal> {
+    let mechanics = scene.mechanics();
+    let mut notes = mechanics.mesh_report().map(MeshReport::notes).unwrap_or_default();
+    notes.extend(overhang(mechanics));
+    notes.extend(chosen(mechanics));
+    let cols = scene.skin().cols();
+    notes.extend(scene.chain().profile().faults.iter().map(|fault| {
+        let taxel = fault.taxel as usize;
+        format!(
+            "injected fault: `{}`, taxel {taxel} (row {}, column {})",
+            fault.name,
+            taxel / cols,
+            taxel % cols
+        )
+    }));
+    notes.extend(below_noise(scene)?);
+    Ok(notes)
+}
+
+fn overhang(mechanics: &Mechanics) -> Option<String> {
+    let edges = mechanics.overhang()?.edges();
+    let over = edges.iter().filter(|(_, m)| *m > 0.0);
+    let over: Vec<String> = over
+        .map(|(edge, m)| format!("{:.1} mm over the edge at {edge}", 1e3 * m))
+        .collect();
+    let what = match mechanics.task() {
+        Task::Press(_) => "object",
+        Task::Drop(_) => "ball",
+    };
+    Some(format!(
+        "the {what} hangs {}: beside the sheet there is nothing to press on",
+        over.join(", ")
+    ))
+}
+
+fn chosen(mechanics: &Mechanics) -> Option<String> {
+    let config = mechanics.config();
+    let tolerance = config.chosen_for_tolerance?;
+    let of = |key: &str| config.contact.get(key).map(ToString::to_string).unwrap_or_default();
+    Some(format!(
+        "the tolerance of {tolerance} chose the contact field {}, {} cells along a taxel and steps of {} s",
+        of("model"),
+        of("cells_per_taxel"),
+        mechanics.timestep_s()
+    ))
+}
+
+fn below_noise(scene: &Scene) -> Result<Option<String>, Refusal> {
+    let signal = scene.chain().taxel_signal()?;
+    Ok(signal.below_noise().then(|| {
+        format!(
+            "a taxel under {:.0} kPa gives {:.2e} V, a measurement has a noise of {:.2e} V and steps of {:.2e} V: the taxel is below the noise. An electrode of \
+             {:.1} mm needs more feedback than the readout profile has",
+            1e-3 * REFERENCE_PA,
+            signal.signal_v,
+            signal.noise_v,
+            signal.step_v,
+            1e3 * scene.skin().electrode_m()
+        )
+    }))
 }

@@ -1,13 +1,14 @@
 //! Simulates and records the presses of a run, a few at a time.
 
-use super::error::SimulateError;
 use super::request::Prepared;
-use super::summary::PressSummary;
-use crate::chain::ChainError;
-use crate::record::{PressFrames, Twin, TwinError, TwinSession};
+use crate::chain::of_readout;
+use crate::record::{PressFrames, Twin, TwinSession};
 use crate::session::{Recorded, Session};
+use serde::Serialize;
 use spts_circuit::{Interpolated, Mode, Recording};
 use spts_contact::Frame;
+use spts_input::Refusal;
+use spts_sim::world::{Bounce, PressCourse};
 use std::time::{Duration, Instant};
 
 /// Consecutive presses of a run, with all their results.
@@ -76,21 +77,20 @@ impl Simulation {
 /// depend on the number of threads.
 ///
 /// # Errors
-/// [`SimulateError`] if a press is too large, the firmware cannot provide its weights, or mechanics or readout fail; or
+/// [`Refusal`] if a press is too large, the firmware cannot provide its weights, or mechanics or readout fail; or
 /// the error of `each`.
-pub fn run<E: From<SimulateError>>(
+pub fn run<E: From<Refusal>>(
     prepared: &Prepared,
     record: bool,
     done: &(dyn Fn() + Sync),
     mut each: impl FnMut(SimulatedPiece<'_>) -> Result<(), E>,
 ) -> Result<Simulation, E> {
-    let twin = Twin::new(&prepared.scene).map_err(SimulateError::from)?;
+    let twin = Twin::new(&prepared.scene)?;
     let mut run = Run::new(prepared, &twin, record)?;
     let (all, together) = (prepared.scene.repeats(), twin.presses_at_once());
     for first in (0..all).step_by(together) {
         let start = Instant::now();
-        let presses = twin.presses(first..(first + together).min(all), done);
-        let presses = presses.map_err(SimulateError::from)?;
+        let presses = twin.presses(first..(first + together).min(all), done)?;
         run.simulation.mechanics += start.elapsed();
         let start = Instant::now();
         let piece = run.record(first, all, &presses)?;
@@ -109,7 +109,7 @@ struct Run<'a> {
 }
 
 impl<'a> Run<'a> {
-    fn new(prepared: &'a Prepared, twin: &'a Twin, record: bool) -> Result<Self, SimulateError> {
+    fn new(prepared: &'a Prepared, twin: &'a Twin, record: bool) -> Result<Self, Refusal> {
         if record {
             twin.check_press(Mode::Compressive)?;
         }
@@ -136,7 +136,7 @@ impl<'a> Run<'a> {
         first: usize,
         of: usize,
         presses: &'p [PressFrames],
-    ) -> Result<SimulatedPiece<'p>, SimulateError> {
+    ) -> Result<SimulatedPiece<'p>, Refusal> {
         let Self {
             raster, compressive, ..
         } = self;
@@ -158,7 +158,7 @@ impl<'a> Run<'a> {
     }
 
     /// Keeps what is asked for when the run is over.
-    fn keep(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), SimulateError> {
+    fn keep(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), Refusal> {
         let scene = &self.prepared.scene;
         let area_m2 = scene.skin().cell_area_m2();
         let simulation = &mut self.simulation;
@@ -193,7 +193,7 @@ impl<'a> Run<'a> {
 }
 
 /// Adds blocks of `piece` to `kept`, as far as there are too few.
-fn keep_first(kept: &mut Option<Recorded>, piece: Option<&Recorded>) -> Result<(), SimulateError> {
+fn keep_first(kept: &mut Option<Recorded>, piece: Option<&Recorded>) -> Result<(), Refusal> {
     let Some(piece) = piece else { return Ok(()) };
     let known = kept.as_ref().map_or(0, |kept| kept.presses.len());
     let more = Simulation::FIRST_BLOCKS.saturating_sub(known).min(piece.presses.len());
@@ -208,9 +208,117 @@ fn keep_first(kept: &mut Option<Recorded>, piece: Option<&Recorded>) -> Result<(
     presses.extend_from_slice(&piece.presses[..more]);
     let recording = Recording::new(piece.recording.info().clone(), blocks);
     *kept = Some(Recorded {
-        recording: recording.map_err(|e| TwinError::from(ChainError::from(e)))?,
+        recording: recording.map_err(of_readout)?,
         conditioning: 0,
         presses,
     });
     Ok(())
+}
+
+/// One contact of the ball with the skin.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BounceSummary {
+    /// First instant with a force, s.
+    pub start_s: f64,
+    /// Time with a force, s.
+    pub contact_s: f64,
+    /// Speed towards the skin before the contact, m/s.
+    pub speed_in_m_per_s: f64,
+    /// Speed away from the skin after the contact, m/s.
+    pub speed_out_m_per_s: f64,
+    /// Coefficient of restitution.
+    pub restitution: f64,
+    /// Largest normal force, N.
+    pub peak_force_n: f64,
+}
+
+impl From<&Bounce> for BounceSummary {
+    fn from(b: &Bounce) -> Self {
+        Self {
+            start_s: b.start_s,
+            contact_s: b.contact_s,
+            speed_in_m_per_s: b.speed_in_m_per_s,
+            speed_out_m_per_s: b.speed_out_m_per_s,
+            restitution: b.restitution(),
+            peak_force_n: b.peak_force_n,
+        }
+    }
+}
+
+/// Time course of the force in a press that reached its target.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CourseSummary {
+    /// First frame with a force, s.
+    pub onset_s: f64,
+    /// Time of the rise from 10 to 90 % of the plateau, s.
+    pub rise_s: f64,
+    /// Mean over the plateau, N.
+    pub plateau_force_n: f64,
+    /// Largest deviation from the target on the plateau, N.
+    pub plateau_error_n: f64,
+    /// Highest force above the target, relative to it.
+    pub overshoot: f64,
+    /// When the force falls below 90 % of the plateau, s.
+    pub lift_s: f64,
+    /// Time of the fall from 90 to 10 % of the plateau, s.
+    pub fall_s: f64,
+}
+
+impl From<&PressCourse> for CourseSummary {
+    fn from(c: &PressCourse) -> Self {
+        Self {
+            onset_s: c.onset_s,
+            rise_s: c.rise_s,
+            plateau_force_n: c.plateau_n,
+            plateau_error_n: c.plateau_error_n,
+            overshoot: c.overshoot,
+            lift_s: c.lift_s,
+            fall_s: c.fall_s,
+        }
+    }
+}
+
+/// One press or drop.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PressSummary {
+    /// Number of the press, from 0.
+    pub press: usize,
+    /// Number of frames.
+    pub frames: usize,
+    /// Largest normal force in a frame, N.
+    pub peak_force_n: f64,
+    /// Time of the largest force, s.
+    pub peak_time_s: f64,
+    /// Largest pressure on a taxel in a frame, Pa.
+    pub peak_pressure_pa: f64,
+    /// Largest |force − Σ p·A| / force over all frames with a force.
+    pub force_imbalance: f64,
+    /// Time course of the force; `None` for a drop, and for a press that did not reach its target.
+    pub course: Option<CourseSummary>,
+    /// Contacts of the ball.
+    pub bounces: Vec<BounceSummary>,
+}
+
+impl PressSummary {
+    fn new(press: usize, frames: &PressFrames, cell_area_m2: f64) -> Self {
+        let (mut peak_force_n, mut peak_time_s) = (0.0, 0.0);
+        let mut peak_pressure_pa = 0.0_f64;
+        for frame in &frames.frames {
+            let force_n = frame.wrench.force_n[2];
+            if force_n > peak_force_n {
+                (peak_force_n, peak_time_s) = (force_n, frame.time_s);
+            }
+            peak_pressure_pa = peak_pressure_pa.max(frame.pressure.max());
+        }
+        Self {
+            press,
+            frames: frames.frames.len(),
+            peak_force_n,
+            peak_time_s,
+            peak_pressure_pa,
+            force_imbalance: frames.imbalance(cell_area_m2),
+            course: frames.course.as_ref().map(CourseSummary::from),
+            bounces: frames.bounces.iter().map(BounceSummary::from).collect(),
+        }
+    }
 }

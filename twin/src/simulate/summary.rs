@@ -1,123 +1,14 @@
-//! Summary of a run, in numbers.
+//! Summary of a run: the numbers as text, and notes for the user.
 
-use super::notes;
 use super::request::Prepared;
-use super::run::Simulation;
+use super::run::{PressSummary, Saturated, Simulation};
 use crate::provenance::Provenance;
-use crate::record::PressFrames;
-use crate::scene::Task;
+use crate::scene::{Scene, Task};
+use crate::session::MOST_SAMPLES;
 use serde::Serialize;
+use spts_circuit::Mode;
 use spts_contact::mesh::MeshReport;
-use spts_sim::world::{Bounce, PressCourse};
 use std::fmt::Write as _;
-
-/// One contact of the ball with the skin.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct BounceSummary {
-    /// First instant with a force, s.
-    pub start_s: f64,
-    /// Time with a force, s.
-    pub contact_s: f64,
-    /// Speed towards the skin before the contact, m/s.
-    pub speed_in_m_per_s: f64,
-    /// Speed away from the skin after the contact, m/s.
-    pub speed_out_m_per_s: f64,
-    /// Coefficient of restitution.
-    pub restitution: f64,
-    /// Largest normal force, N.
-    pub peak_force_n: f64,
-}
-
-impl From<&Bounce> for BounceSummary {
-    fn from(b: &Bounce) -> Self {
-        Self {
-            start_s: b.start_s,
-            contact_s: b.contact_s,
-            speed_in_m_per_s: b.speed_in_m_per_s,
-            speed_out_m_per_s: b.speed_out_m_per_s,
-            restitution: b.restitution(),
-            peak_force_n: b.peak_force_n,
-        }
-    }
-}
-
-/// Time course of the force in a press that reached its target.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct CourseSummary {
-    /// First frame with a force, s.
-    pub onset_s: f64,
-    /// Time of the rise from 10 to 90 % of the plateau, s.
-    pub rise_s: f64,
-    /// Mean over the plateau, N.
-    pub plateau_force_n: f64,
-    /// Largest deviation from the target on the plateau, N.
-    pub plateau_error_n: f64,
-    /// Highest force above the target, relative to it.
-    pub overshoot: f64,
-    /// When the force falls below 90 % of the plateau, s.
-    pub lift_s: f64,
-    /// Time of the fall from 90 to 10 % of the plateau, s.
-    pub fall_s: f64,
-}
-
-impl From<&PressCourse> for CourseSummary {
-    fn from(c: &PressCourse) -> Self {
-        Self {
-            onset_s: c.onset_s,
-            rise_s: c.rise_s,
-            plateau_force_n: c.plateau_n,
-            plateau_error_n: c.plateau_error_n,
-            overshoot: c.overshoot,
-            lift_s: c.lift_s,
-            fall_s: c.fall_s,
-        }
-    }
-}
-
-/// One press or drop.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PressSummary {
-    /// Number of the press, from 0.
-    pub press: usize,
-    /// Number of frames.
-    pub frames: usize,
-    /// Largest normal force in a frame, N.
-    pub peak_force_n: f64,
-    /// Time of the largest force, s.
-    pub peak_time_s: f64,
-    /// Largest pressure on a taxel in a frame, Pa.
-    pub peak_pressure_pa: f64,
-    /// Largest |force − Σ p·A| / force over all frames with a force.
-    pub force_imbalance: f64,
-    /// Time course of the force; `None` for a drop, and for a press that did not reach its target.
-    pub course: Option<CourseSummary>,
-    /// Contacts of the ball.
-    pub bounces: Vec<BounceSummary>,
-}
-
-impl PressSummary {
-    pub(super) fn new(press: usize, frames: &PressFrames, cell_area_m2: f64) -> Self {
-        let (mut peak_force_n, mut peak_time_s) = (0.0, 0.0);
-        let mut peak_pressure_pa = 0.0_f64;
-        for frame in &frames.frames {
-            let force_n = frame.wrench.force_n[2];
-            if force_n > peak_force_n {
-                (peak_force_n, peak_time_s) = (force_n, frame.time_s);
-            }
-            peak_pressure_pa = peak_pressure_pa.max(frame.pressure.max());
-        }
-        Self {
-            press,
-            frames: frames.frames.len(),
-            peak_force_n,
-            peak_time_s,
-            peak_pressure_pa,
-            force_imbalance: frames.imbalance(cell_area_m2),
-            course: frames.course.as_ref().map(CourseSummary::from),
-            bounces: frames.bounces.iter().map(BounceSummary::from).collect(),
-        }
-    }
-}
 
 /// Summary of a whole run. It is the same for the same scene, on any number of threads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -171,7 +62,7 @@ impl Summary {
             )
         }));
         if simulation.first.is_some() {
-            notes.extend(notes::of_recordings(scene, &simulation.saturated));
+            notes.extend(notes_on_recordings(scene, &simulation.saturated));
         }
         let unlike = scene.chain().unlike_codes();
         if unlike > 0 {
@@ -287,4 +178,33 @@ fn plural(word: &str, count: usize) -> String {
         ("press", _) => "presses".to_owned(),
         _ => format!("{word}s"),
     }
+}
+
+/// Notes on the recordings of a run: samples that saturate, more samples than can be read again, and a scan that there
+/// is not.
+fn notes_on_recordings(scene: &Scene, saturated: &[Option<Saturated>; 2]) -> Vec<String> {
+    let modes = [Mode::Raster, Mode::Compressive].into_iter().zip(saturated);
+    let mut notes = Vec::new();
+    for (mode, saturated) in modes {
+        let Some(Saturated { samples, of }) = *saturated else {
+            continue;
+        };
+        if samples > 0 {
+            notes.push(format!(
+                "{}: {samples} of {of} samples ({:.2} %) are at the end of the converter's or the amplifier's range",
+                mode.name(),
+                100.0 * samples as f64 / of as f64
+            ));
+        }
+        if of as u64 > MOST_SAMPLES {
+            notes.push(format!(
+                "{}: {of} samples are more than the {MOST_SAMPLES} that are read as one session",
+                mode.name()
+            ));
+        }
+    }
+    if let Err(error) = scene.chain().check(Mode::Raster) {
+        notes.push(format!("no raster scan was recorded: {error}"));
+    }
+    notes
 }

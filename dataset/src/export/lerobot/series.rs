@@ -117,7 +117,7 @@ mod tests {
     #[test]
     fn files_have_limits() {
         let dir = tempfile::tempdir().unwrap();
-        let out = OutputFolder::open(&dir.path().join("out"), &[]).unwrap();
+        let out = OutputFolder::open(&dir.path().join("out")).unwrap();
         let schema = Arc::new(Schema::new(vec![Field::new("k", DataType::Int64, true)]));
         let mut series = Series::new(&out, "data", Arc::clone(&schema));
         let mut add = |megabytes: u64| {

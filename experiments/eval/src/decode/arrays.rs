@@ -60,8 +60,5 @@ pub(super) fn write(path: &Path, session: &DecodedSession) -> Result<(), OutputE
         .iter()
         .map(|(name, shape, values)| (name.as_str(), NpzArray::Doubles(shape, values)))
         .collect();
-    npz::write(path, &named).map_err(|source| OutputError::Write {
-        path: path.to_owned(),
-        source,
-    })
+    npz::write(path, &named).map_err(OutputError::write(path))
 }

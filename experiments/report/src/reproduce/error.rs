@@ -4,7 +4,6 @@ use crate::ReportError;
 use crate::animation::MotionError;
 use spts::data::DataError;
 use spts::output::OutputError;
-use spts::record::TwinError;
 use spts_eval::ScoreError;
 use spts_eval::training::LearnError;
 use spts_input::Refusal;
@@ -16,9 +15,6 @@ pub enum ReproduceError {
     /// The recordings of the real skin cannot be used.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// The twin cannot be run.
-    #[error(transparent)]
-    Twin(#[from] TwinError),
     /// The animations cannot be made.
     #[error(transparent)]
     Motion(#[from] MotionError),
@@ -28,7 +24,7 @@ pub enum ReproduceError {
     /// A skin cannot be scored.
     #[error(transparent)]
     Score(#[from] ScoreError),
-    /// Twin and skin cannot be compared.
+    /// The twin cannot be run, or not be compared with the skin.
     #[error(transparent)]
     Compare(#[from] Refusal),
     /// The report's folder or one of its tables cannot be written.

@@ -43,9 +43,6 @@ use spts_studies::per_object::{PerObjectReport, PerObjectStudy};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Files outside of folders of their own.
-const FILES: &[&str] = &["index.html", "summary.json", "timings.csv"];
-
 /// Simulated skins that the real one is held against, object by object.
 const SKINS: u64 = 8;
 
@@ -96,7 +93,7 @@ impl Reproduction {
         } else {
             ReproductionSize::full()
         };
-        let mut out = OutputFolder::open(&self.out, FILES)?;
+        let mut out = OutputFolder::open(&self.out)?;
         progress.stage("reading recordings", None);
         let real = self.recordings.as_deref().map(PublishedSkin::open).transpose()?;
         progress.stage("simulating presses", Some(dataset::steps(&size)));

@@ -30,7 +30,7 @@ pub(super) fn pressure_picture(
     );
     let path = out.path("pressure.png");
     pressure_png(map.values(), map.rows(), map.cols(), "kPa", KPA_PER_PA, &title, &path).map_err(|error| match error {
-        FigureError::Io { path, source } => OutputError::Write { path, source }.into(),
+        FigureError::Io { path, source } => OutputError::write(&path)(source).into(),
         other => other.into(),
     })
 }

@@ -1,13 +1,75 @@
-//! An object that is pressed while the device measures. Contact only; no physics engine.
+//! Where a virtual device has its blocks from: a recorded session, or an object that is pressed while it measures
+//! (contact only, no physics engine).
 
-use super::virtual_device::{BlockSource, DeviceBlock, DeviceError};
+use super::protocol::{BlockSource, DeviceBlock};
 use crate::chain::Chain;
 use crate::wire::Wire;
-use spts_circuit::{Converter, Mode};
+use spts_circuit::{Converter, Mode, Recording};
 use spts_contact::objects::ObjectSpec;
 use spts_contact::{Foam, PosedMesh, PreparedMesh, TouchBody, TouchSkin, Wrench};
-use spts_models::{ConfigError, in_range};
+use spts_input::Refusal;
+use spts_models::in_range;
 use std::f64::consts::FRAC_PI_2;
+
+/// The blocks of a recording, in order.
+///
+/// ```
+/// use spts::device::{BlockSource as _, Played};
+/// use spts::{Block, Recording, RecordingInfo, Seeding, SkinLayout, WeightMode, Weights};
+///
+/// let layout = SkinLayout::new(1, 8, 5e-3, 3e-3)?;
+/// let info = RecordingInfo::new(layout, Weights::new(WeightMode::Binary, Seeding::Mixed, 8), 64_300.0);
+/// let block = Block { frame_position: 10, idle_frames: None, volts: vec![0.25; 80] };
+/// let recording = Recording::new(info, vec![block])?;
+/// assert!(Played::new(&recording).is_err(), "volts without a converter's scale have no codes");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Played<'a> {
+    recording: &'a Recording,
+    converter: Converter,
+    next: usize,
+}
+
+impl<'a> Played<'a> {
+    /// The blocks of `recording`.
+    ///
+    /// # Errors
+    /// [`Refusal`] if the recording has no codes, because it was made without a converter or its scale is
+    /// unknown.
+    pub fn new(recording: &'a Recording) -> Result<Self, Refusal> {
+        let converter = recording.converter().copied().ok_or_else(|| {
+            Refusal::new("the recording has no codes: its readout has no converter, or one of unknown scale")
+        })?;
+        Ok(Self {
+            recording,
+            converter,
+            next: 0,
+        })
+    }
+}
+
+impl BlockSource for Played<'_> {
+    fn mode(&self) -> Mode {
+        self.recording.mode()
+    }
+
+    fn sample_rate_hz(&self) -> f64 {
+        self.recording.sample_rate_hz()
+    }
+
+    fn next_block(&mut self) -> Result<Option<DeviceBlock>, Refusal> {
+        let Some(block) = self.recording.blocks().get(self.next) else {
+            return Ok(None);
+        };
+        self.next += 1;
+        // a sample that was lost is sent as 0
+        let codes = block.volts.iter().map(|v| self.converter.code(*v).unwrap_or(0));
+        Ok(Some(DeviceBlock {
+            frame_position: block.frame_position,
+            codes: codes.collect(),
+        }))
+    }
+}
 
 /// Which object is pressed, and how.
 #[derive(Debug, Clone, Copy)]
@@ -55,14 +117,13 @@ impl Pressed {
     /// A source that presses the object of `config` on the skin of `chain`.
     ///
     /// # Errors
-    /// [`DeviceError`] for a force outside its range or too large for the object, or a readout without a converter.
-    pub fn new(chain: &Chain, config: PressedConfig) -> Result<Self, DeviceError> {
-        let refused = |e: ConfigError| DeviceError::Source(e.to_string());
+    /// [`Refusal`] for a force outside its range or too large for the object, or a readout without a converter.
+    pub fn new(chain: &Chain, config: PressedConfig) -> Result<Self, Refusal> {
         let force_n = config.force_n;
-        in_range("force_n", force_n, (0.1..=1e3).contains(&force_n), "[0.1, 1000] N").map_err(refused)?;
+        in_range("force_n", force_n, (0.1..=1e3).contains(&force_n), "[0.1, 1000] N")?;
         let wire = Wire::new(chain, config.session)?;
         let converter = wire.info(config.mode).converter;
-        let converter = converter.ok_or_else(|| DeviceError::Source("the readout has no converter".to_owned()))?;
+        let converter = converter.ok_or_else(|| Refusal::new("the readout has no converter"))?;
         let layout = *chain.skin();
         let (spec, place) = (config.object, config.object.placement);
         let body = TouchBody::from(PreparedMesh::from((spec.build)()));
@@ -74,7 +135,7 @@ impl Pressed {
         };
         let [low_m, _] = lowest.heights_m();
         let mut pressed = Self {
-            skin: TouchSkin::flat(layout, Foam::default()).map_err(refused)?,
+            skin: TouchSkin::flat(layout, Foam::default())?,
             posed,
             rest_m: [x_m, y_m, -low_m],
             stiffness_pa_per_m: spec.stiffness_pa_per_m.unwrap_or(f64::INFINITY),
@@ -104,11 +165,11 @@ impl Pressed {
         self.wrenches.first().map_or(0.0, |wrench| wrench.force_n[2])
     }
 
-    fn depth_for(&mut self, force_n: f64) -> Result<f64, DeviceError> {
+    fn depth_for(&mut self, force_n: f64) -> Result<f64, Refusal> {
         let (mut low_m, mut high_m) = (0.0, DEEPEST_M);
         if self.touch(high_m, 0.0) < force_n {
             let name = self.config.object.name;
-            return Err(DeviceError::Source(format!(
+            return Err(Refusal::new(format!(
                 "{name:?} cannot press with {force_n} N on this skin"
             )));
         }
@@ -145,7 +206,7 @@ impl BlockSource for Pressed {
         self.sample_rate_hz
     }
 
-    fn next_block(&mut self) -> Result<Option<DeviceBlock>, DeviceError> {
+    fn next_block(&mut self) -> Result<Option<DeviceBlock>, Refusal> {
         if self.config.blocks.is_some_and(|blocks| self.made >= blocks) {
             return Ok(None);
         }
@@ -174,5 +235,66 @@ impl BlockSource for Pressed {
             frame_position: self.wire.rows(mode, 0).first_row() / taxels as u64,
             codes,
         }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Host, VirtualDevice};
+    use super::*;
+    use crate::ChainConfig;
+    use spts_contact::objects::by_name;
+    use spts_models::SkinLayout;
+    use std::os::unix::net::UnixStream;
+
+    fn pressed(mode: Mode, blocks: u64) -> Pressed {
+        let config = ChainConfig {
+            readout: Some("as_built".to_owned()),
+            ..ChainConfig::default()
+        };
+        let chain = Chain::new(&config, &SkinLayout::default(), 3, "".as_ref()).unwrap();
+        let config = PressedConfig {
+            object: by_name("T").unwrap(),
+            force_n: 20.0,
+            mode,
+            blocks: Some(blocks),
+            session: 0,
+        };
+        Pressed::new(&chain, config).unwrap()
+    }
+
+    #[test]
+    fn a_host_reads_what_the_device_measures() {
+        for mode in [Mode::Raster, Mode::Compressive] {
+            let mut same = pressed(mode, 2);
+            let (near, far) = UnixStream::pair().unwrap();
+            let device = std::thread::spawn(move || {
+                let mut counted = 0;
+                let count = VirtualDevice::new(far, false).serve(&mut pressed(mode, 2), |_| counted += 1);
+                (count.unwrap(), counted)
+            });
+            let mut host = Host::greet(near).unwrap();
+            let mut last = 0;
+            for _ in 0..2 {
+                let (found, mut made) = (host.block(100_000).unwrap(), same.next_block().unwrap().unwrap());
+                made.codes.pop();
+                assert_eq!(found, made);
+                assert!(found.frame_position > last + 1000);
+                last = found.frame_position;
+            }
+            assert_eq!(device.join().unwrap(), (2, 2));
+            assert!(same.next_block().unwrap().is_none());
+        }
+    }
+
+    /// In a raster scan, the taxel that the object presses most reads lowest, and only while it is held.
+    #[test]
+    fn a_press_is_seen_while_it_lasts() {
+        let block = pressed(Mode::Raster, 1).next_block().unwrap().unwrap();
+        let least = |frame: usize| *block.codes[frame * 100..][..100].iter().min().unwrap();
+        let idle = least(100);
+        // four times what the device itself takes for a touch
+        assert!(least(600) + 20 < idle, "{} of {idle}", least(600));
+        assert!(least(990).abs_diff(idle) < 20);
     }
 }

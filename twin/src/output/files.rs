@@ -1,0 +1,451 @@
+//! Files that are written completely or not at all: bytes, NumPy arrays, CSV tables and JSON. Their bytes depend only on
+//! the values.
+
+use super::disk::{self, NewFile, OutputError};
+use npyz::WriterBuilder as _;
+use serde::Serialize;
+use std::fs::File;
+use std::io::{self, BufWriter, Read as _, Seek as _, Write as _};
+use std::marker::PhantomData;
+use std::path::{Path, PathBuf};
+
+/// A file being written. [`AtomicFile::finish`] gives it its name. If it is dropped before, nothing is left behind, and
+/// an earlier file of that name stays unchanged.
+///
+/// ```
+/// use spts::output::AtomicFile;
+/// use std::io::Write as _;
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-atomic-{}.txt", std::process::id()));
+/// let mut file = AtomicFile::create(&path)?;
+/// file.fill(|buffer| buffer.write_all(b"results"))?;
+/// assert!(!path.exists(), "the name comes last");
+/// file.finish()?;
+/// assert_eq!(std::fs::read(&path)?, b"results");
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct AtomicFile {
+    buffer: BufWriter<NewFile>,
+    temporary: tempfile::TempPath,
+    path: PathBuf,
+}
+
+impl AtomicFile {
+    /// Starts the file `path`. It will replace a regular file of that name.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the file cannot be created, or `path` is something other than a regular file.
+    pub fn create(path: &Path) -> Result<Self, OutputError> {
+        let failed = OutputError::write(path);
+        if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
+            return Err(OutputError::new(path, "is not a regular file and is not replaced"));
+        }
+        if path.file_name().is_none() {
+            return Err(failed(io::ErrorKind::InvalidInput.into()));
+        }
+        let made = tempfile::Builder::new()
+            .prefix(TEMPORARY[0])
+            .suffix(TEMPORARY[1])
+            .rand_bytes(RANDOM)
+            .make_in(disk::parent(path), NewFile::create);
+        let (file, temporary) = made.map_err(failed)?.into_parts();
+        file.show_in_use();
+        Ok(Self {
+            buffer: BufWriter::with_capacity(PIECE, file),
+            temporary,
+            path: path.to_owned(),
+        })
+    }
+
+    /// Writes the bytes that `fill` puts into the buffer.
+    ///
+    /// # Errors
+    /// [`OutputError`] if `fill` fails.
+    pub fn fill(&mut self, fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>) -> Result<(), OutputError> {
+        fill(&mut self.buffer).map_err(OutputError::write(&self.path))
+    }
+
+    /// Waits until the bytes are on the disk, then gives the file its name.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the disk is full or reports an error.
+    pub fn finish(mut self) -> Result<(), OutputError> {
+        let failed = OutputError::write(&self.path);
+        self.buffer.flush().map_err(&failed)?;
+        // a full disk may only show when the data reach it
+        self.buffer.get_ref().sync().map_err(&failed)?;
+        disk::rename(&self.temporary, &self.path).map_err(&failed)?;
+        // the temporary name is gone, so there is nothing to remove
+        let _ = self.temporary.keep();
+        Ok(())
+    }
+
+    /// Hands what was written so far, from byte `start` on, to `each` in pieces of at most `piece` bytes.
+    fn read_back(
+        &mut self,
+        start: u64,
+        piece: usize,
+        mut each: impl FnMut(&[u8]) -> Result<(), OutputError>,
+    ) -> Result<(), OutputError> {
+        let failed = OutputError::write(&self.path);
+        self.buffer.flush().map_err(&failed)?;
+        let mut file = File::open(&self.temporary).map_err(&failed)?;
+        file.seek(io::SeekFrom::Start(start)).map_err(&failed)?;
+        let mut bytes = Vec::with_capacity(piece);
+        loop {
+            bytes.clear();
+            let wanted = u64::try_from(piece).unwrap_or(u64::MAX);
+            if (&file).take(wanted).read_to_end(&mut bytes).map_err(&failed)? == 0 {
+                return Ok(());
+            }
+            each(&bytes)?;
+        }
+    }
+}
+
+impl io::Write for AtomicFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.buffer.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.buffer.flush()
+    }
+}
+
+/// Writes `path` with the bytes that `fill` puts into the buffer. A regular file of that name is replaced.
+///
+/// # Errors
+/// [`OutputError`] if the file cannot be written, or `path` is something other than a regular file. Nothing is left
+/// behind then, and an earlier file stays unchanged.
+pub fn write_with(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>,
+) -> Result<(), OutputError> {
+    let mut file = AtomicFile::create(path)?;
+    file.fill(fill)?;
+    file.finish()
+}
+
+/// Start and end of the name of a file that is being written.
+const TEMPORARY: [&str; 2] = [".spts-", ".part"];
+
+/// Whether `name` is a name that unfinished files have.
+#[must_use]
+pub fn is_temporary(name: &str) -> bool {
+    name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1])
+}
+
+/// Removes the unfinished file `path` (see [`is_temporary`]) if the run that wrote it has ended. A file that is still
+/// being written, or may be, stays.
+///
+/// # Errors
+/// [`io::Error`] if the file cannot be removed.
+pub fn remove_left(path: &Path) -> io::Result<()> {
+    let left = File::open(path).is_ok_and(|file| file.try_lock().is_ok());
+    if left { std::fs::remove_file(path) } else { Ok(()) }
+}
+
+/// Bytes that reach the disk together.
+const PIECE: usize = 1 << 17;
+
+/// Random letters and digits in the name of what waits: no two runs choose the same.
+const RANDOM: usize = 12;
+
+/// Checks that a file `path` can be written, and leaves nothing there. A long run calls this before it computes.
+///
+/// # Errors
+/// As [`write_with`].
+pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+    AtomicFile::create(path).map(drop)
+}
+
+/// Writes `bytes` as `path`.
+///
+/// # Errors
+/// As [`write_with`].
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    write_with(path, |out| out.write_all(bytes))
+}
+
+/// A type that a NumPy array can hold.
+///
+/// ```
+/// use spts::output::NpyValue;
+///
+/// assert_eq!(1.5_f64.bytes().as_ref(), 1.5_f64.to_le_bytes());
+/// ```
+pub trait NpyValue: Copy {
+    /// Type as NumPy writes it, such as `f8`.
+    const KIND: &'static str;
+    /// Bytes of the value, little-endian.
+    fn bytes(self) -> impl AsRef<[u8]>;
+}
+
+macro_rules! values {
+    ($($of:ty: $kind:literal),*) => {
+        $(impl NpyValue for $of {
+            const KIND: &'static str = $kind;
+            fn bytes(self) -> impl AsRef<[u8]> {
+                self.to_le_bytes()
+            }
+        })*
+    };
+}
+
+values!(f64: "<f8", u16: "<u2", u32: "<u4");
+
+/// A NumPy array that is written piece by piece, in C order and little-endian.
+///
+/// ```
+/// use spts::output::NpyFile;
+/// use spts::session::read_npy;
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-npy-{}.npy", std::process::id()));
+/// let mut file = NpyFile::create(&path, &[2, 3])?;
+/// file.push([1.0, 2.0, 3.0])?;
+/// file.push([4.0, 5.0, 6.0])?;
+/// file.finish()?;
+/// assert_eq!(read_npy(&path)?.values, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct NpyFile<T> {
+    file: AtomicFile,
+    path: PathBuf,
+    shape: Vec<usize>,
+    written: usize,
+    header_bytes: u64,
+    kind: PhantomData<T>,
+}
+
+impl<T: NpyValue> NpyFile<T> {
+    /// Starts the array `path` with shape `shape`.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the file cannot be created.
+    pub fn create(path: &Path, shape: &[usize]) -> Result<Self, OutputError> {
+        let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
+        let mut file = AtomicFile::create(path)?;
+        let mut header = Vec::new();
+        file.fill(|out| {
+            let kind = T::KIND
+                .parse()
+                .map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
+            let options = npyz::WriteOptions::new_header_only().dtype(npyz::DType::Plain(kind));
+            options.shape(&sides).writer(&mut header).write_header_only()?;
+            out.write_all(&header)
+        })?;
+        Ok(Self {
+            file,
+            path: path.to_owned(),
+            shape: shape.to_vec(),
+            written: 0,
+            header_bytes: header.len() as u64,
+            kind: PhantomData,
+        })
+    }
+
+    /// Writes the next values.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the disk is full or reports an error.
+    pub fn push(&mut self, values: impl IntoIterator<Item = T>) -> Result<(), OutputError> {
+        let written = &mut self.written;
+        self.file.fill(|out| {
+            values.into_iter().try_for_each(|value| {
+                *written += 1;
+                out.write_all(value.bytes().as_ref())
+            })
+        })
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the number of values differs from that of the shape, or the file cannot be written.
+    pub fn finish(self) -> Result<(), OutputError> {
+        if self.shape.iter().product::<usize>() != self.written {
+            let problem = format!("{} values for an array of shape {:?}", self.written, self.shape);
+            return Err(OutputError::new(self.path, problem));
+        }
+        self.file.finish()
+    }
+
+    /// Hands the bytes of the values that were written so far to `each`, some thousand values at a time.
+    pub(crate) fn read_back(&mut self, each: impl FnMut(&[u8]) -> Result<(), OutputError>) -> Result<(), OutputError> {
+        self.file.read_back(self.header_bytes, size_of::<T>() << 13, each)
+    }
+}
+
+/// Writes `values` as a NumPy array of little-endian doubles in C order.
+///
+/// # Errors
+/// [`OutputError`] if the number of values differs from that of the shape, or the file cannot be written.
+pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), OutputError> {
+    let mut file = NpyFile::create(path, shape)?;
+    file.push(values.iter().copied())?;
+    file.finish()
+}
+
+/// A table that is written row by row.
+///
+/// ```
+/// use spts::output::CsvFile;
+///
+/// # let path = std::env::temp_dir().join(format!("spts-doc-csv-{}.csv", std::process::id()));
+/// let mut table = CsvFile::create(&path, &["name", "x", "y"])?;
+/// table.push(("cup", [0.1, 2.0]))?;
+/// table.finish()?;
+/// assert_eq!(std::fs::read_to_string(&path)?, "name,x,y\ncup,0.1,2.0\n");
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct CsvFile {
+    writer: csv::Writer<AtomicFile>,
+    path: PathBuf,
+}
+
+impl CsvFile {
+    /// Starts the table `path` with the header `header`.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the file cannot be created.
+    pub fn create(path: &Path, header: &[&str]) -> Result<Self, OutputError> {
+        let mut options = csv::WriterBuilder::new();
+        let mut writer = options.has_headers(false).from_writer(AtomicFile::create(path)?);
+        let written = writer.write_record(header);
+        written.map_err(|e| OutputError::write(path)(e.into()))?;
+        Ok(Self {
+            writer,
+            path: path.to_owned(),
+        })
+    }
+
+    /// Writes the next row. A row may be a tuple that contains arrays; their elements become fields in order. Numbers
+    /// have the fewest digits that read back as the same number.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the number of fields differs from that of the header, or the disk is full or reports
+    /// an error.
+    pub fn push(&mut self, row: impl Serialize) -> Result<(), OutputError> {
+        let written = self.writer.serialize(row);
+        written.map_err(|e| OutputError::write(&self.path)(e.into()))
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// [`OutputError`] if the file cannot be written.
+    pub fn finish(self) -> Result<(), OutputError> {
+        let failed = OutputError::write(&self.path);
+        let file = self.writer.into_inner().map_err(|e| failed(e.into_error()))?;
+        file.finish()
+    }
+}
+
+/// Writes a table with rows as in [`CsvFile::push`].
+///
+/// # Errors
+/// [`OutputError`] if the number of fields of a row differs from that of the header, or the file cannot be written.
+pub fn write_csv<R: Serialize>(
+    path: &Path,
+    header: &[&str],
+    rows: impl IntoIterator<Item = R>,
+) -> Result<(), OutputError> {
+    let mut file = CsvFile::create(path, header)?;
+    rows.into_iter().try_for_each(|row| file.push(row))?;
+    file.finish()
+}
+
+/// Writes a table whose header is the field names of its rows.
+///
+/// # Errors
+/// [`OutputError`] if the file cannot be written.
+pub fn write_table<R: Serialize>(path: &Path, rows: &[R]) -> Result<(), OutputError> {
+    write_with(path, |out| {
+        let mut writer = csv::Writer::from_writer(out);
+        for row in rows {
+            writer.serialize(row)?;
+        }
+        writer.flush()
+    })
+}
+
+/// Writes `value` as indented JSON that ends with a newline.
+///
+/// # Errors
+/// [`OutputError`] if the file cannot be written.
+pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), OutputError> {
+    write_with(path, |out| {
+        serde_json::to_writer_pretty(&mut *out, value)?;
+        out.write_all(b"\n")
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_array_is_read_back_bit_for_bit() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.npy");
+        let values = [0.1, -0.0, f64::NAN, f64::INFINITY, 5e-324, 1.0 / 3.0];
+        write_npy(&path, &[2, 3], &values).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let npy = npyz::NpyFile::new(&bytes[..]).unwrap();
+        assert_eq!(
+            (npy.shape(), npy.order(), npy.dtype().descr()),
+            (&[2, 3][..], npyz::Order::C, "'<f8'".to_owned())
+        );
+        let back: Vec<f64> = npy.into_vec().unwrap();
+        assert!(back.iter().zip(&values).all(|(b, v)| b.to_bits() == v.to_bits()));
+        write_npy(&path, &[2, 3], &values).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), bytes, "same values, other bytes");
+        let error = write_npy(&path, &[4], &values).unwrap_err().to_string();
+        assert!(error.ends_with("6 values for an array of shape [4]"), "{error}");
+    }
+
+    #[test]
+    fn a_table_has_the_shortest_numbers_that_read_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.csv");
+        write_csv(
+            &path,
+            &["press", "time_s", "x", "y"],
+            [(0_usize, 0.1, [1e-7, 2.0 / 3.0])],
+        )
+        .unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text, "press,time_s,x,y\n0,0.1,1e-7,0.6666666666666666\n");
+        assert!(write_csv(&path, &["one"], [(1, 2)]).is_err());
+        assert_eq!(
+            std::fs::read_to_string(&path).unwrap(),
+            text,
+            "damaged by a refused row"
+        );
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("result.csv");
+        write_bytes(&path, b"old").unwrap();
+        let error = write_with(&path, |out| {
+            out.write_all(b"new, and then the disk is full")?;
+            Err(std::io::ErrorKind::StorageFull.into())
+        })
+        .unwrap_err();
+        assert!(error.to_string().contains("result.csv"), "{error}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
+        let error = write_bytes(dir.path(), b"").unwrap_err().to_string();
+        assert!(error.contains("is not a regular file"), "{error}");
+        assert!(write_bytes(Path::new("/dev/full"), b"x").is_err());
+    }
+}
