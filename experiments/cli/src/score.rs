@@ -572,7 +572,7 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
 fn check_board(path: &Path) -> Result<(), CliError> {
     check_writable(path)?;
     if path.exists() && read_board(path).is_err() {
-        return Err(OutputError::NotOurs { path: path.to_owned() }.into());
+        return Err(OutputError::not_ours(path).into());
     }
     Ok(())
 }

@@ -29,10 +29,7 @@ pub fn write(study: &ReadoutsStudy, report: &ReadoutsReport, out: OutputFolder) 
     write_all_or_none(out, |out| {
         let path = out.path("parameters.json");
         let parameters = study.parameters();
-        let hashed = serde_json::to_string(&parameters).map_err(|e| OutputError::Write {
-            path: path.clone(),
-            source: e.into(),
-        })?;
+        let hashed = serde_json::to_string(&parameters).map_err(|e| OutputError::write(&path)(e.into()))?;
         write_json(&path, &parameters)?;
         let provenance = Provenance::new(study.seed, hash_text(hashed.as_bytes()));
         write_json(&out.path("provenance.json"), &provenance)?;
