@@ -1,16 +1,83 @@
-//! Compares two data sets of the same touches, row by row.
+//! Compares the rows of a data set: with the same rows made again, and with those of another data set.
 
-use crate::error::DatasetError;
+use crate::columns::{columns, put, stores};
+use crate::file::{Wanted, batches, check_shard, numbers, refused, shard_rows};
 use crate::folder::Dataset;
-use crate::read::{Wanted, batches, numbers};
-use crate::shard::check_shard;
+use crate::make::Maker;
 use crate::spec::Label;
 use arrow_array::RecordBatch;
 use arrow_array::cast::AsArray as _;
+use rayon::prelude::*;
 use serde::Serialize;
+use spts::Refusal;
 use spts::progress::Progress;
 use spts::recon::metrics::{SupportScore, pearson};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Which rows of a data set were made again, and which of them differ from the files.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Verified {
+    /// Number of rows that were made again.
+    pub rows: u64,
+    /// Number of files to which they belong.
+    pub shards: u64,
+    /// Rows that differ, each with the first column that differs.
+    pub differ: Vec<(u64, String)>,
+}
+
+impl Dataset {
+    /// Makes `rows` rows, drawn with `seed`, again, and compares them with the files, bit for bit.
+    ///
+    /// # Errors
+    /// [`Refusal`] if a file is missing, damaged or of another data set, or a row cannot be made.
+    pub fn verify(&self, rows: u64, seed: u64, progress: &dyn Progress) -> Result<Verified, Refusal> {
+        let all = 0..self.spec().config().rows;
+        let sample = self.spec().drawn_rows("verify", &[all], rows, seed);
+        let per_shard = self.spec().rows_per_shard();
+        let shards: BTreeSet<u64> = sample.iter().map(|row| row / per_shard).collect();
+        progress.stage("rows compared", Some(sample.len()));
+        let compared = shards.par_iter().map(|&shard| {
+            let wanted: Vec<u64> = sample.range(shard_rows(self.spec(), shard)).copied().collect();
+            self.compare(shard, &wanted, progress)
+        });
+        let differ: Result<Vec<_>, _> = compared.collect();
+        progress.end();
+        Ok(Verified {
+            rows: sample.len() as u64,
+            shards: shards.len() as u64,
+            differ: differ?.concat(),
+        })
+    }
+
+    fn compare(&self, shard: u64, wanted: &[u64], progress: &dyn Progress) -> Result<Vec<(u64, String)>, Refusal> {
+        let path = self.shard_file(shard);
+        check_shard(self.spec(), shard, &path)?;
+        let columns = columns(self.spec());
+        let mut stores = stores(self.spec());
+        let mut maker = Maker::new(self.spec());
+        let (mut first, mut differ) = (shard_rows(self.spec(), shard).start, Vec::new());
+        let mut wanted = wanted.iter().copied().peekable();
+        batches(&path, Wanted::All, |batch| {
+            let end = first + batch.num_rows() as u64;
+            while let Some(index) = wanted.next_if(|index| *index < end) {
+                put(&maker.row(index)?, &mut stores);
+                let place = usize::try_from(index - first).unwrap_or_default();
+                let mut other = None;
+                for ((column, store), array) in columns.iter().zip(&mut stores).zip(batch.columns()) {
+                    let made = store.take().map_err(|e| refused(&path, e.to_string()))?;
+                    if *made != *array.slice(place, 1) {
+                        other.get_or_insert_with(|| column.name.clone());
+                    }
+                }
+                differ.extend(other.map(|column| (index, column)));
+                progress.step();
+            }
+            first = end;
+            Ok(wanted.peek().is_some())
+        })?;
+        Ok(differ)
+    }
+}
 
 /// How far the ground truth of one data set is from that of a reference, over the rows in which both have a touch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,22 +108,17 @@ pub struct Errors {
     pub support_iou: [f64; 3],
 }
 
-/// Differences of single rows.
+/// Differences of single rows, in the order of the fields of [`Errors`].
 #[derive(Default)]
-struct Rows {
-    pressure: Vec<f64>,
-    conductance: Vec<f64>,
-    correlation: Vec<f64>,
-    support_iou: Vec<f64>,
-}
+struct Rows([Vec<f64>; 4]);
 
 impl Dataset {
     /// Compares the ground truth of every row with that of the same row of `reference`. The reference must have as many
     /// rows, equally large files and the same skin.
     ///
     /// # Errors
-    /// [`DatasetError`] if the data sets cannot be compared, or a file is missing or damaged.
-    pub fn compare_with(&self, reference: &Self, progress: &dyn Progress) -> Result<Comparison, DatasetError> {
+    /// [`Refusal`] if the data sets cannot be compared, or a file is missing or damaged.
+    pub fn compare_with(&self, reference: &Self, progress: &dyn Progress) -> Result<Comparison, Refusal> {
         let facts = |of: &Self| {
             let spec = of.spec();
             let shape = [spec.skin().rows(), spec.skin().cols()];
@@ -68,13 +130,13 @@ impl Dataset {
                 "has {} rows, {} a file, of {:?} taxels, and the reference {} rows, {} a file, of {:?} taxels: they do not go together",
                 own.0, own.1, own.2, other.0, other.1, other.2
             );
-            return Err(DatasetError::file(self.folder(), problem));
+            return Err(refused(self.folder(), problem));
         }
         for dataset in [self, reference] {
             let labels = &dataset.spec().config().record.labels;
             if !Label::ALL.iter().all(|label| labels.contains(label)) {
                 let problem = "lacks columns that are compared: `record.labels` has to have all of them".to_owned();
-                return Err(DatasetError::file(dataset.folder(), problem));
+                return Err(refused(dataset.folder(), problem));
             }
         }
         let (mut all, mut objects, mut one_sided) = (Rows::default(), BTreeMap::<String, Rows>::new(), 0);
@@ -126,13 +188,13 @@ struct Row {
 }
 
 impl Row {
-    fn of(batch: &RecordBatch, row: usize) -> Result<Self, DatasetError> {
-        let missing = |name: &str| DatasetError::Part(format!("a file has no column `{name}`"));
+    fn of(batch: &RecordBatch, row: usize) -> Result<Self, Refusal> {
+        let missing = |name: &str| Refusal::new(format!("a file has no column `{name}`"));
         let list = |name: &str| {
             let column = batch.column_by_name(name).ok_or_else(|| missing(name))?;
             let mut values = Vec::new();
             numbers(&column.slice(row, 1), |value| values.push(value));
-            Ok::<_, DatasetError>(values)
+            Ok::<_, Refusal>(values)
         };
         let object = batch.column_by_name("object").ok_or_else(|| missing("object"))?;
         Ok(Self {
@@ -154,21 +216,21 @@ impl Rows {
             let apart: f64 = a.iter().zip(b).map(|(a, b)| (a - b).abs()).sum();
             apart / b.iter().sum::<f64>()
         };
-        self.pressure.push(apart(&found.pressure, &wanted.pressure));
-        self.conductance.push(apart(&found.conductance, &wanted.conductance));
-        self.correlation
-            .extend(pearson(&found.conductance, &wanted.conductance));
-        self.support_iou
-            .push(SupportScore::new(&found.support, &wanted.support).iou);
+        let Self([pressure, conductance, correlation, support_iou]) = self;
+        pressure.push(apart(&found.pressure, &wanted.pressure));
+        conductance.push(apart(&found.conductance, &wanted.conductance));
+        correlation.extend(pearson(&found.conductance, &wanted.conductance));
+        support_iou.push(SupportScore::new(&found.support, &wanted.support).iou);
     }
 
     fn errors(&self) -> Errors {
+        let [pressure, conductance, correlation, support_iou] = self.0.each_ref().map(|values| spread(values));
         Errors {
-            rows: self.pressure.len() as u64,
-            pressure: spread(&self.pressure),
-            conductance: spread(&self.conductance),
-            correlation: spread(&self.correlation),
-            support_iou: spread(&self.support_iou),
+            rows: self.0[0].len() as u64,
+            pressure,
+            conductance,
+            correlation,
+            support_iou,
         }
     }
 }

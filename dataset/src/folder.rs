@@ -1,11 +1,10 @@
-//! The folder of a data set.
+//! The folder of a data set, and how its files are divided among workers.
 
-use crate::error::DatasetError;
-use crate::part::Part;
-use crate::shard::{check_shard, shard_name, shard_rows, version, write_shard};
+use crate::file::{check_shard, failed, refused, shard_name, shard_rows, version, write_shard};
 use crate::spec::{Spec, SpecError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use spts::Refusal;
 use spts::output::{Manifest, OutputError, is_temporary, write_bytes, write_json};
 use spts::progress::Progress;
 use spts_circuit::RecordingInfo;
@@ -96,8 +95,8 @@ impl Dataset {
     /// The data set of `spec` in `folder`. The folder must be missing, empty, or hold a part of this data set.
     ///
     /// # Errors
-    /// [`DatasetError`] if the folder holds something else, or cannot be written.
-    pub fn begin(folder: &Path, spec: Spec) -> Result<Self, DatasetError> {
+    /// [`Refusal`] if the folder holds something else, or cannot be written.
+    pub fn begin(folder: &Path, spec: Spec) -> Result<Self, Refusal> {
         let data = folder.join(DATA_FOLDER);
         let head_file = folder.join(HEAD_FILE);
         let head = Head::of(&spec);
@@ -110,13 +109,15 @@ impl Dataset {
             }
         } else if let Some(other) = other {
             let problem = "is not of a data set; choose an empty folder, or one that `spts dataset make` began";
-            return Err(DatasetError::file(other, problem));
+            return Err(refused(other, problem));
         }
-        let failed = |source| OutputError::no_folder(&data, source);
-        std::fs::create_dir_all(&data).map_err(failed)?;
+        let unmade = |source| OutputError::no_folder(&data, source);
         // the same bytes whoever comes first; the head last, so that what has one has all
-        write_bytes(&folder.join(SPEC_FILE), spec.text().as_bytes())?;
-        write_json(&head_file, &head)?;
+        std::fs::create_dir_all(&data)
+            .map_err(unmade)
+            .and_then(|()| write_bytes(&folder.join(SPEC_FILE), spec.text().as_bytes()))
+            .and_then(|()| write_json(&head_file, &head))
+            .map_err(Refusal::from_error)?;
         Ok(Self {
             folder: folder.to_owned(),
             spec,
@@ -126,22 +127,19 @@ impl Dataset {
     /// Opens the data set in `folder`. Files that its specification names are looked up in `files`.
     ///
     /// # Errors
-    /// [`DatasetError`] if there is no data set, or another version of this library made it.
-    pub fn open(folder: &Path, files: &Path) -> Result<Self, DatasetError> {
+    /// [`Refusal`] if there is no data set, or another version of this library made it.
+    pub fn open(folder: &Path, files: &Path) -> Result<Self, Refusal> {
         let head_file = folder.join(HEAD_FILE);
         let found = read_head(&head_file)?;
         let path = folder.join(SPEC_FILE);
-        let text =
-            spts_input::read_text(&path, MAX_TEXT_BYTES).map_err(|e| DatasetError::file(&path, e.to_string()))?;
-        let spec = Spec::from_toml(&text, &toml::Table::new(), files).map_err(|error| match error {
-            SpecError::Folder { .. } | SpecError::Mesh(_) | SpecError::Unreadable { .. } => DatasetError::file(
-                &path,
-                format!(
-                    "names a file that is not in {} ({error}); `--files` says where it is",
-                    files.display()
-                ),
-            ),
-            error => error.into(),
+        let text = spts_input::read_text(&path, MAX_TEXT_BYTES).map_err(failed(&path))?;
+        let spec = Spec::read(&text, &toml::Table::new(), files).map_err(|error| match error {
+            SpecError::Folder(error) | SpecError::Mesh(error) => {
+                let files = files.display();
+                let problem = format!("names a file that is not in {files} ({error}); `--files` says where it is");
+                refused(&path, problem)
+            }
+            SpecError::Refused(refusal) => refusal,
         })?;
         let head = Head::of(&spec);
         if found != head {
@@ -192,8 +190,8 @@ impl Dataset {
     /// Makes the missing files of `part`, one file a thread.
     ///
     /// # Errors
-    /// [`DatasetError`] if an existing file is not valid, a row cannot be made, or a file cannot be written.
-    pub fn make(&self, part: Part, progress: &dyn Progress) -> Result<Made, DatasetError> {
+    /// [`Refusal`] if an existing file is not valid, a row cannot be made, or a file cannot be written.
+    pub fn make(&self, part: Part, progress: &dyn Progress) -> Result<Made, Refusal> {
         let mut made = Made {
             rows: 0,
             shards: 0,
@@ -221,23 +219,23 @@ impl Dataset {
     }
 
     /// Whether file number `shard` is there, which is then whole.
-    fn is_made(&self, shard: u64) -> Result<bool, DatasetError> {
+    fn is_made(&self, shard: u64) -> Result<bool, Refusal> {
         let path = self.shard_file(shard);
         match std::fs::symlink_metadata(&path) {
             Ok(_) => check_shard(&self.spec, shard, &path).map(|()| true),
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
-            Err(error) => Err(DatasetError::read(path)(error)),
+            Err(error) => Err(failed(&path)(error)),
         }
     }
 }
 
-fn read_head(path: &Path) -> Result<Head, DatasetError> {
-    let text = spts_input::read_text(path, MAX_TEXT_BYTES).map_err(|e| DatasetError::file(path, e.to_string()))?;
-    serde_json::from_str(&text).map_err(|e| DatasetError::file(path, format!("is not the head of a data set ({e})")))
+fn read_head(path: &Path) -> Result<Head, Refusal> {
+    let text = spts_input::read_text(path, MAX_TEXT_BYTES).map_err(failed(path))?;
+    serde_json::from_str(&text).map_err(|e| refused(path, format!("is not the head of a data set ({e})")))
 }
 
 /// The error of a folder that holds the data set `found`.
-fn other_data_set(path: &Path, found: &Head, needed: &Head) -> DatasetError {
+fn other_data_set(path: &Path, found: &Head, needed: &Head) -> Refusal {
     let problem = if found.spec_sha256 == needed.spec_sha256 && found.version != needed.version {
         format!(
             "was begun by version {}; this is {}, whose rows may differ: choose another folder",
@@ -251,19 +249,19 @@ fn other_data_set(path: &Path, found: &Head, needed: &Head) -> DatasetError {
             found.spec_sha256.chars().take(12).collect::<String>()
         )
     };
-    DatasetError::file(path, problem)
+    refused(path, problem)
 }
 
 /// The first entry of `folder` that is not a file on its way to its name; none where there is no folder.
-fn first_entry(folder: &Path) -> Result<Option<PathBuf>, DatasetError> {
+fn first_entry(folder: &Path) -> Result<Option<PathBuf>, Refusal> {
     let entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(DatasetError::read(folder)(error)),
+        Err(error) => return Err(failed(folder)(error)),
     };
     let mut found = Vec::new();
     for entry in entries {
-        let entry = entry.map_err(DatasetError::read(folder))?;
+        let entry = entry.map_err(failed(folder))?;
         let name = entry.file_name();
         // what a run that was ended before it had made a head has left
         let begun = name == DATA_FOLDER || name == SPEC_FILE || is_temporary(&name.to_string_lossy());
@@ -273,4 +271,134 @@ fn first_entry(folder: &Path) -> Result<Option<PathBuf>, DatasetError> {
     }
     found.sort();
     Ok(found.into_iter().next())
+}
+
+/// A worker's part: the files k with k mod `of` = `worker`. The set of files does not depend on it.
+///
+/// ```
+/// use spts_dataset::Part;
+///
+/// let part = Part::parse("1/4")?;
+/// assert_eq!(part.shards(10).collect::<Vec<_>>(), [1, 5, 9]);
+/// # Ok::<(), spts::Refusal>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    /// Number of this worker, from 0.
+    pub worker: u64,
+    /// Number of workers.
+    pub of: u64,
+}
+
+/// Variables of Slurm's job arrays and of Kubernetes' indexed jobs.
+const SLURM: [&str; 3] = ["SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_MIN", "SLURM_ARRAY_TASK_COUNT"];
+const KUBERNETES: &str = "JOB_COMPLETION_INDEX";
+
+impl Part {
+    /// The part of a single worker: all files.
+    pub const WHOLE: Self = Self { worker: 0, of: 1 };
+
+    /// Reads the text "i/n": worker i of n, counted from 0.
+    ///
+    /// # Errors
+    /// [`Refusal`] if the text is not a valid part.
+    pub fn parse(text: &str) -> Result<Self, Refusal> {
+        let numbers = text
+            .split_once('/')
+            .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        match numbers {
+            Some((worker, of)) if worker < of => Ok(Self { worker, of }),
+            _ => Err(Refusal::new(format!(
+                "`--shard` = {}: valid: i/n with whole numbers 0 ≤ i < n",
+                text.escape_debug()
+            ))),
+        }
+    }
+
+    /// The part of this worker, found with `variable`, which reads environment variables. In a Slurm array: the task's
+    /// number minus the array's first, out of the number of tasks. In a Kubernetes indexed job: the job's index, out of
+    /// `workers`. `None` outside of both.
+    ///
+    /// # Errors
+    /// [`Refusal`] if a variable is missing or not a number, or the worker is out of range.
+    pub fn from_environment(
+        variable: impl Fn(&str) -> Option<String>,
+        workers: Option<u64>,
+    ) -> Result<Option<Self>, Refusal> {
+        let number = |name: &str| -> Result<Option<u64>, Refusal> {
+            let Some(text) = variable(name) else { return Ok(None) };
+            let number = text.trim().parse().map(Some);
+            number.map_err(|_| Refusal::new(format!("{name} = {}: a whole number is needed", text.escape_debug())))
+        };
+        let [task, first, tasks] = SLURM;
+        let (worker, of, name) = if let Some(task_number) = number(task)? {
+            let first_number = number(first)?.unwrap_or(0);
+            let worker = task_number.checked_sub(first_number);
+            let worker = worker
+                .ok_or_else(|| Refusal::new(format!("{task} = {task_number} is below {first} = {first_number}")))?;
+            let count = number(tasks)?;
+            (worker, count.or(workers), tasks)
+        } else if let Some(index) = number(KUBERNETES)? {
+            (index, workers, "`--shards`")
+        } else {
+            return Ok(None);
+        };
+        let Some(of) = of else {
+            return Err(Refusal::new(format!("{name} is needed beside worker number {worker}")));
+        };
+        if worker >= of {
+            return Err(Refusal::new(format!(
+                "worker number {worker} is not one of {of}, which count from 0"
+            )));
+        }
+        Ok(Some(Self { worker, of }))
+    }
+
+    /// Numbers of the files that this worker makes, of the `shards` files of the data set, counted from 0.
+    pub fn shards(self, shards: u64) -> impl Iterator<Item = u64> {
+        (self.worker..shards).step_by(usize::try_from(self.of).unwrap_or(usize::MAX))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn workers_share_all_files() {
+        for of in 1..6 {
+            let mut all: Vec<u64> = (0..of).flat_map(|worker| Part { worker, of }.shards(17)).collect();
+            all.sort_unstable();
+            assert_eq!(all, (0..17).collect::<Vec<_>>());
+        }
+        for bad in ["", "1", "4/4", "-1/4", "a/b", "1/0", "1/4/2", "1.0/4"] {
+            assert!(Part::parse(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn clusters_tell_their_workers() {
+        let part = |variables: &[(&str, &str)], workers| {
+            let variables: BTreeMap<_, _> = variables.iter().copied().collect();
+            Part::from_environment(|name| variables.get(name).map(|v| (*v).to_owned()), workers)
+                .map_err(|e| e.to_string())
+        };
+        let slurm = |id| {
+            vec![
+                ("SLURM_ARRAY_TASK_ID", id),
+                ("SLURM_ARRAY_TASK_MIN", "3"),
+                ("SLURM_ARRAY_TASK_COUNT", "4"),
+            ]
+        };
+        assert_eq!(part(&[], None), Ok(None));
+        assert_eq!(part(&slurm("3"), None), Ok(Some(Part { worker: 0, of: 4 })));
+        assert_eq!(part(&slurm("6"), None), Ok(Some(Part { worker: 3, of: 4 })));
+        assert!(part(&slurm("7"), None).unwrap_err().contains("is not one of 4"));
+        assert!(part(&slurm("2"), None).unwrap_err().contains("is below"));
+        assert!(part(&slurm("x"), None).unwrap_err().contains("a whole number"));
+        let kubernetes = [("JOB_COMPLETION_INDEX", "2")];
+        assert_eq!(part(&kubernetes, Some(8)), Ok(Some(Part { worker: 2, of: 8 })));
+        assert!(part(&kubernetes, None).unwrap_err().contains("`--shards` is needed"));
+    }
 }

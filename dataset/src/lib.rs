@@ -17,41 +17,25 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod card;
-mod choose;
 mod columns;
 mod compare;
-mod error;
-mod export;
+mod file;
 mod finish;
 mod folder;
 mod make;
-mod part;
-mod read;
 mod rows;
-mod shard;
 mod spec;
-mod statistics;
-mod store;
 #[cfg(test)]
 mod tests;
-mod verify;
 
-pub use choose::spread_rows;
-pub use columns::{Column, columns};
-pub use compare::{Comparison, Errors};
-pub use error::DatasetError;
-pub use export::{EXPORTS, ExportOptions, Exported, PrepareExport, WriteExport, Written};
-pub use finish::Finished;
-pub use folder::{Dataset, Info, Made};
-pub use make::{Maker, Row, RowCause, RowError};
-pub use part::Part;
-pub use read::ColumnValues;
-pub use shard::{check_shard, schema, shard_name, shard_rows, write_shard};
+pub use columns::{Column, Kind, columns};
+pub use compare::{Comparison, Errors, Verified};
+pub use file::{ColumnValues, shard_rows};
+pub use finish::{ColumnStatistics, Finished, Statistics};
+pub use folder::{Dataset, Info, Made, Part};
+pub use make::{Maker, Row};
+pub use rows::spread_rows;
 pub use spec::{
     Draw, DropConfig, FaultsConfig, Label, NAMED_SPECS, ObjectConfig, ObjectSource, PoseConfig, PoseOrigin,
-    PressConfig, RecordConfig, RecordKind, SkinConfig, Spec, SpecConfig, SpecError, SplitBy, SplitConfig,
+    PressConfig, RecordConfig, RecordKind, SkinConfig, Spec, SpecConfig, SplitBy, SplitConfig,
 };
-pub use statistics::{ColumnStatistics, Statistics};
-pub use store::Kind;
-pub use verify::Verified;

@@ -9,7 +9,8 @@ const WIDTH: usize = 120;
 
 /// All commands below `command`, each with its name as it is typed.
 fn below(command: &Command, name: &str) -> Vec<(String, Command)> {
-    let inner = command.get_subcommands().flat_map(|inner| {
+    let shown = command.get_subcommands().filter(|inner| !inner.is_hide_set());
+    let inner = shown.flat_map(|inner| {
         let name = format!("{name} {}", inner.get_name());
         let mut found = below(inner, &name);
         found.push((name, inner.clone()));

@@ -1,11 +1,9 @@
 //! Simulates motion: an object pressed by the arm, or a falling ball.
 
-use super::error::RowCause;
-use super::moving::Moving;
-use super::touch::{ATTEMPTS, Ball, Touch, of_attempt};
+use super::touch::{ATTEMPTS, Ball, Moving, Touch, of_attempt};
 use crate::spec::{Choice, RecordKind, Spec};
+use spts::Refusal;
 use spts_contact::Frame;
-use spts_input::Refusal;
 use spts_models::Streams;
 use spts_sim::mechanics::{DropConfig, GRAVITY_M_PER_S2, MechanicsConfig, PressConfig, Timestep};
 use spts_sim::world::no_touch;
@@ -22,7 +20,7 @@ const BOUNCE_S: f64 = 0.05;
 
 impl Moving {
     /// Follows `choice` in press number `press`: poses are drawn until one can be pressed.
-    pub(super) fn new(spec: &Spec, choice: &Choice, streams: Streams, press: u64) -> Result<Self, RowCause> {
+    pub(super) fn new(spec: &Spec, choice: &Choice, streams: Streams, press: u64) -> Result<Self, Refusal> {
         let mut attempt = 0;
         loop {
             let mut touch = Touch::draw(spec, choice, of_attempt(streams, attempt), press);
@@ -34,11 +32,10 @@ impl Moving {
             };
             match followed {
                 Ok(moving) => return Ok(moving),
-                Err(source) if attempt == ATTEMPTS => {
-                    return Err(RowCause::Motion {
-                        attempts: ATTEMPTS,
-                        source,
-                    });
+                Err(last) if attempt == ATTEMPTS => {
+                    return Err(Refusal::new(format!(
+                        "none of {ATTEMPTS} poses can be pressed or dropped; the last: {last}"
+                    )));
                 }
                 Err(_) => {}
             }

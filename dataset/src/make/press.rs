@@ -1,14 +1,77 @@
-//! One press or drop and its recordings.
+//! The skin of a press, and the recordings of one press or drop on it.
 
-use super::error::RowCause;
-use super::held::{Held, sum};
-use super::moving::Moving;
-use super::skin::Skin;
-use super::touch::Touch;
+use super::touch::{Held, Moving, Touch, sum};
 use crate::spec::{RecordKind, Spec, whole};
 use rand::RngExt as _;
-use spts_circuit::{ConductanceSource, Constant};
+use rand::seq::{IndexedRandom as _, index::sample};
+use spts::chain::SkinSession;
+use spts::{Chain, Refusal};
+use spts_circuit::{ConductanceSource, Constant, FAULTS, Mode, Readout};
 use spts_models::{ConductanceMap, PressureMap};
+
+/// Bits of a specimen's seed, so that a double holds it.
+const SEED_BITS: u32 = 53;
+
+/// Skin number `number` of a data set, in one session.
+pub(crate) struct Skin {
+    pub(crate) number: u64,
+    /// Seed of the specimen.
+    pub(crate) seed: u64,
+    /// The skin before the first press.
+    pub(crate) fresh: SkinSession,
+    pub(crate) compressive: Readout,
+    pub(crate) raster: Readout,
+    /// Largest output of the amplifier in each mode, V: compressive, raster.
+    pub(crate) rails_v: [Option<f64>; 2],
+    /// Number of faulty cells.
+    pub(crate) faults: usize,
+}
+
+impl Skin {
+    pub(crate) fn new(spec: &Spec, number: u64) -> Result<Self, Refusal> {
+        let streams = spec.streams();
+        let seed = match &spec.config().skin.seed {
+            Some(seed) => whole(seed.value(streams, "skin.seed", number)) as u64,
+            None => streams.rng("skin.seed", number).random::<u64>() >> (u64::BITS - SEED_BITS),
+        };
+        let faults = faults(spec, number);
+        let chain = Chain::new(&spec.chain_config(number, &faults)?, spec.skin(), seed, spec.folder())?;
+        let rail_v = |mode| chain.profile().rail_v(mode).map_err(|error| error.at("readout"));
+        Ok(Self {
+            number,
+            seed,
+            fresh: chain.skin_session(number),
+            compressive: chain.readout(Mode::Compressive, number)?,
+            raster: chain.readout(Mode::Raster, number)?,
+            rails_v: [rail_v(Mode::Compressive)?, rail_v(Mode::Raster)?],
+            faults: faults.len(),
+        })
+    }
+}
+
+/// The faulty cells of skin `number`, each another one.
+fn faults(spec: &Spec, number: u64) -> Vec<toml::Table> {
+    let (config, streams) = (&spec.config().faults, spec.streams());
+    let count = whole(config.count.value(streams, "faults.count", number));
+    if count == 0 {
+        return Vec::new();
+    }
+    let mut rng = streams.rng("faults", number);
+    let mut taxels = sample(&mut rng, spec.skin().taxels(), count).into_vec();
+    taxels.sort_unstable();
+    let all: Vec<&str> = match &config.names {
+        Some(names) => names.iter().map(String::as_str).collect(),
+        None => FAULTS.iter().map(|(name, _)| *name).collect(),
+    };
+    let fault = |taxel: usize| {
+        let name = all.choose(&mut rng).copied().unwrap_or_default();
+        let taxel = i64::try_from(taxel).unwrap_or(i64::MAX);
+        [("name".to_owned(), name.into()), ("taxel".to_owned(), taxel.into())]
+            .into_iter()
+            .collect()
+    };
+    taxels.into_iter().map(fault).collect()
+}
 
 /// Frames between loading the seeds and the first press, and the least from press to press, as on the device.
 const LEAD_FRAMES: u64 = 243;
@@ -19,8 +82,8 @@ const GAP_FRAMES: u64 = 57;
 const HOLD_MEASUREMENTS: std::ops::Range<u64> = 50_000..70_000;
 
 /// One press or drop and its recordings.
-pub(super) struct Press {
-    pub(super) number: u64,
+pub(crate) struct Press {
+    pub(crate) number: u64,
     pub(super) touches: Vec<Touch>,
     /// Ground truth of each window, or one entry for all of them.
     states: Vec<State>,
@@ -30,7 +93,7 @@ pub(super) struct Press {
     pub(super) first_row: u64,
     /// Time from the touch to the first measurement, s.
     pub(super) start_s: f64,
-    pub(super) presses_before: usize,
+    pub(crate) presses_before: usize,
 }
 
 /// The skin in a window.
@@ -50,7 +113,7 @@ impl Press {
     }
 
     /// Press number `number`, in which the objects `held` lie on `skin`.
-    pub(super) fn of_held(spec: &Spec, skin: &mut Skin, number: u64, held: Vec<Held>) -> Result<Self, RowCause> {
+    pub(super) fn of_held(spec: &Spec, skin: &mut Skin, number: u64, held: Vec<Held>) -> Result<Self, Refusal> {
         let (config, timing) = (spec.config(), spec.timing());
         let streams = spec.streams();
         let pressure = sum(spec, &held, |object| &object.pressure);
@@ -93,7 +156,7 @@ impl Press {
     }
 
     /// Press number `number`, in which `moving` meets `skin`.
-    pub(super) fn of_moving(spec: &Spec, skin: &mut Skin, number: u64, moving: Moving) -> Result<Self, RowCause> {
+    pub(super) fn of_moving(spec: &Spec, skin: &mut Skin, number: u64, moving: Moving) -> Result<Self, Refusal> {
         let timing = spec.timing();
         let before = presses_before(spec, number);
         let mut sheet = skin.fresh.clone();
@@ -181,7 +244,7 @@ impl Block {
         skin: &mut Skin,
         part: u64,
         source: &mut dyn ConductanceSource,
-    ) -> Result<(Vec<f64>, Vec<f64>), RowCause> {
+    ) -> Result<(Vec<f64>, Vec<f64>), Refusal> {
         let record = &spec.config().record;
         let (timing, taxels) = (spec.timing(), spec.skin().taxels());
         let (block, row) = (self.number * self.parts() + part, self.first_row + timing.row_of(part));

@@ -1,9 +1,11 @@
-//! Random values of one object in a press.
+//! What touches the skin: random values of an object in a press; objects at rest under a force, each an equilibrium
+//! without time steps; and contacts that are followed in time.
 
 use crate::spec::{Choice, Draw, PoseOrigin, Spec};
-use spts_contact::PosedMesh;
+use spts::Refusal;
 use spts_contact::objects::Placement;
-use spts_models::{SkinLayout, Streams};
+use spts_contact::{ContactField, EquilibriumError, Frame, Holder, Load, Patch, PosedMesh, TaxelBins, build_contact};
+use spts_models::{PressureMap, SkinLayout, Streams};
 
 /// Poses that are drawn for one object before the row is given up.
 pub(super) const ATTEMPTS: u64 = 32;
@@ -128,4 +130,147 @@ fn over_edge(body: &PosedMesh<'_>, skin: &SkinLayout) -> bool {
         (a * v[0] + b * v[1] + c * v[2] + body.position_m[k]).abs() > half_m[k]
     };
     body.mesh.vertices.iter().any(|v| beside(v, 0) || beside(v, 1))
+}
+
+/// A contact field that keeps what it has prepared for one mesh.
+pub(super) struct Field {
+    field: Box<dyn ContactField>,
+    bins: TaxelBins,
+}
+
+/// One object in balance, and what the skin feels of it.
+pub(super) struct Held {
+    pub(super) touch: Touch,
+    /// Height of the object's origin above the skin's free surface, m.
+    pub(super) height_m: f64,
+    pub(super) pressure: PressureMap,
+    pub(super) electrode_pressure: PressureMap,
+    patch: Patch,
+}
+
+impl Field {
+    /// The field of `spec` for `choice`.
+    pub(super) fn new(spec: &Spec, choice: &Choice) -> Result<Self, Refusal> {
+        let (model, parameters) = spec.contact();
+        let mut field = build_contact(model, parameters.clone(), spec.skin())?;
+        field.expect(&choice.mesh);
+        Ok(Self {
+            bins: TaxelBins::new(spec.skin(), field.cells_per_taxel()),
+            field,
+        })
+    }
+
+    /// Presses `choice` in press number `press`, beside the `others`: poses are drawn until one is a balance and keeps
+    /// clear of them. `None` when none keeps clear.
+    pub(super) fn press(
+        &mut self,
+        spec: &Spec,
+        choice: &Choice,
+        streams: Streams,
+        press: u64,
+        others: &[Held],
+    ) -> Result<Option<Held>, Refusal> {
+        let mut failure = None;
+        for attempt in 0..ATTEMPTS {
+            let mut touch = Touch::draw(spec, choice, of_attempt(streams, attempt), press);
+            touch.refused = attempt;
+            match self.balance(spec, choice, touch) {
+                Ok(held) if others.iter().all(|other| apart(&other.patch, &held.patch)) => return Ok(Some(held)),
+                Ok(_) => failure = None,
+                Err(error) => failure = Some(error),
+            }
+        }
+        match failure {
+            Some(last) => Err(Refusal::new(format!(
+                "none of {ATTEMPTS} poses has an equilibrium; the last: {last}"
+            ))),
+            None => Ok(None),
+        }
+    }
+
+    fn balance(&mut self, spec: &Spec, choice: &Choice, touch: Touch) -> Result<Held, EquilibriumError> {
+        let stiffness = spec.config().press.tilt_stiffness_nm_per_rad;
+        let load = Load {
+            force_n: touch.force_n,
+            axis_m: touch.position_m,
+            holder: Holder::Elastic {
+                stiffness_nm_per_rad: [[stiffness, 0.0], [0.0, stiffness]],
+                rest_rad: [0.0; 2],
+            },
+            from: None,
+        };
+        let Some(field) = self.field.quasi_static() else {
+            unreachable!("a spec that is not followed in time has a field that finds balances");
+        };
+        let balance = field.carry(&touch.body(choice), &load)?;
+        let patch = balance.response.patch.unwrap_or_default();
+        let height_m = balance.seat.height_m;
+        let [pressure, electrode_pressure] = self.bins.means(balance.response.pressure_pa, balance.response.patch);
+        Ok(Held {
+            touch,
+            height_m,
+            pressure,
+            electrode_pressure,
+            patch,
+        })
+    }
+}
+
+/// The sum of the maps of all objects.
+pub(super) fn sum(spec: &Spec, held: &[Held], of: fn(&Held) -> &PressureMap) -> PressureMap {
+    let mut total = PressureMap::zeros(spec.skin().rows(), spec.skin().cols());
+    for object in held {
+        for (total, p) in total.values_mut().iter_mut().zip(of(object).values()) {
+            *total += p;
+        }
+    }
+    total
+}
+
+/// Whether two patches have no cell in common.
+fn apart(a: &Patch, b: &Patch) -> bool {
+    let along = |a: [usize; 2], b: [usize; 2]| a[1] <= b[0] || b[1] <= a[0];
+    along(a.rows, b.rows) || along(a.cols, b.cols)
+}
+
+/// One object or ball over time.
+pub(super) struct Moving {
+    pub(super) touch: Touch,
+    /// Frames in order of time, which counts from the start of the simulation.
+    pub(super) frames: Vec<Frame>,
+    /// Time of the touch, s.
+    pub(super) touch_s: f64,
+}
+
+impl Moving {
+    /// Mean pressure over every taxel's cell at `time_s`, Pa, and the height of the object's origin, m; between two
+    /// frames on a straight line, as the conductance is.
+    pub(super) fn at(&self, time_s: f64) -> (PressureMap, f64) {
+        let after = self.frames.partition_point(|frame| frame.time_s <= time_s);
+        let first = &self.frames[after.saturating_sub(1)];
+        let second = &self.frames[after.min(self.frames.len() - 1)];
+        let apart_s = second.time_s - first.time_s;
+        let share = if apart_s > 0.0 {
+            ((time_s - first.time_s) / apart_s).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        let mut pressure = first.pressure.clone();
+        for (from, to) in pressure.values_mut().iter_mut().zip(second.pressure.values()) {
+            *from += share * (to - *from);
+        }
+        let [from_m, to_m] = [first, second].map(|frame| frame.pose.position_m[2]);
+        (pressure, from_m + share * (to_m - from_m))
+    }
+}
+
+#[cfg(not(feature = "mujoco"))]
+impl Moving {
+    /// Refuses: there is no engine to follow anything with.
+    pub(super) fn new(_: &Spec, _: &Choice, _: Streams, _: u64) -> Result<Self, Refusal> {
+        Err(Refusal::new(
+            "`record.what` is not \"hold\", or the contact field does not balance: motion in time needs MuJoCo, which this \
+             build lacks",
+        ))
+    }
 }

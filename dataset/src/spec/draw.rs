@@ -3,8 +3,12 @@
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::{Deserialize, Deserializer, de::Error as _};
-use spts_models::{ConfigError, Streams, in_range};
-use toml::Value;
+use spts::Refusal;
+use spts_models::{Streams, in_section, within};
+use toml::{Table, Value};
+
+/// Names of the distributions: a table with one of these keys alone is a draw.
+const DISTRIBUTIONS: [&str; 5] = ["uniform", "log_uniform", "normal", "choice", "grid"];
 
 /// A normal distribution is cut at so many standard deviations, so that its range is known.
 const NORMAL_CUT: f64 = 4.0;
@@ -95,15 +99,10 @@ impl Draw {
         }
     }
 
-    /// Checks that every possible number is in [`least`, `most`]. `range` is the same interval as text.
-    ///
-    /// # Errors
-    /// [`ConfigError`] for the first end of the range that is outside.
-    pub fn within(&self, field: &str, least: f64, most: f64, range: &'static str) -> Result<(), ConfigError> {
-        for end in self.range() {
-            in_range(field, end, (least..=most).contains(&end), range)?;
-        }
-        Ok(())
+    /// Refuses the first end of its range that is outside [`least`, `most`]; `range` is that interval as text.
+    pub(super) fn within(&self, field: &str, least: f64, most: f64, range: &'static str) -> Result<(), Refusal> {
+        let mut ends = self.range().into_iter();
+        ends.try_for_each(|end| within(field, end, least, most, range))
     }
 
     /// Makes it the grid that changes after `stride` items, if it is a grid, and counts its values.
@@ -198,6 +197,69 @@ fn grid(value: &Value) -> Result<Vec<f64>, String> {
     let steps = steps.ok_or_else(|| format!("`steps` is outside the whole numbers in [1, {MOST_STEPS}]"))?;
     let at = |k: i64| from + (to - from) * k as f64 / (steps - 1).max(1) as f64;
     Ok((0..steps).map(at).collect())
+}
+
+/// A number that was drawn as a whole one.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "casts saturate")]
+pub(crate) fn whole(value: f64) -> usize {
+    value.round() as usize
+}
+
+/// Parameters that go to others, such as a transducer's, with their draws.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Template {
+    table: Table,
+}
+
+impl Template {
+    pub(crate) fn new(table: Table) -> Self {
+        Self { table }
+    }
+
+    /// The table of item `index`, every draw replaced by its number. `section` names the table.
+    ///
+    /// # Errors
+    /// [`Refusal`] for a draw that is none.
+    pub(crate) fn of(&self, streams: Streams, section: &str, index: u64) -> Result<Table, Refusal> {
+        let mut turn = 1;
+        filled(&self.table, section, &mut |mut draw, field| {
+            draw.take_turn(&mut turn);
+            draw.value(streams, field, index)
+        })
+    }
+
+    /// The table with every draw at its least number, and with every draw at its largest.
+    ///
+    /// # Errors
+    /// As for [`Template::of`].
+    pub(crate) fn ends(&self, section: &str) -> Result<[Table; 2], Refusal> {
+        let end = |k: usize| filled(&self.table, section, &mut |draw, _| draw.range()[k]);
+        Ok([end(0)?, end(1)?])
+    }
+}
+
+/// `table` with the numbers that `number` gives for its draws and their fields.
+fn filled(table: &Table, section: &str, number: &mut dyn FnMut(Draw, &str) -> f64) -> Result<Table, Refusal> {
+    let mut out = Table::new();
+    for (key, value) in table {
+        let field = format!("{section}.{key}");
+        let value = match value {
+            Value::Table(inner) if is_draw(inner) => {
+                let draw = Draw::from_toml(value);
+                let draw = draw.map_err(|problem| Refusal::new(in_section(&field, &problem)))?;
+                Value::Float(number(draw, &field))
+            }
+            Value::Table(inner) => Value::Table(filled(inner, &field, number)?),
+            other => other.clone(),
+        };
+        out.insert(key.clone(), value);
+    }
+    Ok(out)
+}
+
+/// Whether `table` writes a distribution.
+pub(super) fn is_draw(table: &Table) -> bool {
+    table.len() == 1 && table.keys().all(|key| DISTRIBUTIONS.contains(&key.as_str()))
 }
 
 #[cfg(test)]

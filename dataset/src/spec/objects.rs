@@ -1,17 +1,37 @@
 //! The objects of a data set: from shape number to mesh.
 
 use super::config::{ObjectConfig, ObjectSource, PoseOrigin};
-use super::error::SpecError;
 use rand::RngExt as _;
 use sha2::{Digest as _, Sha256};
+use spts::Refusal;
 use spts_contact::PreparedMesh;
 use spts_contact::mesh::load;
 use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_contact::shapes::{SHAPE_FAMILIES, ShapeRanges, build_shape};
-use spts_input::Refusal;
 use spts_models::{Streams, in_range, in_section};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+
+/// Why a specification is refused: its folder of meshes or a file there cannot be read, or anything else.
+pub(crate) enum SpecError {
+    Folder(Refusal),
+    Mesh(Refusal),
+    Refused(Refusal),
+}
+
+impl From<Refusal> for SpecError {
+    fn from(refusal: Refusal) -> Self {
+        Self::Refused(refusal)
+    }
+}
+
+impl From<SpecError> for Refusal {
+    fn from(error: SpecError) -> Self {
+        match error {
+            SpecError::Folder(refusal) | SpecError::Mesh(refusal) | SpecError::Refused(refusal) => refusal,
+        }
+    }
+}
 
 /// Name of the ball.
 const BALL: &str = "ball";
@@ -19,17 +39,10 @@ const BALL: &str = "ball";
 /// The shapes of a data set. Number `n` is entry `n` modulo their count, so that each comes equally often.
 #[derive(Debug, Clone)]
 pub(crate) struct Choices {
-    entries: Vec<Entry>,
+    /// Those of procedural shapes have no mesh yet.
+    entries: Vec<Choice>,
     ranges: ShapeRanges,
     source: ObjectSource,
-}
-
-#[derive(Debug, Clone)]
-enum Entry {
-    Family(&'static str),
-    Object(&'static ObjectSpec, PreparedMesh),
-    Mesh { name: Arc<str>, mesh: PreparedMesh },
-    Ball,
 }
 
 /// One shape and what is known of it.
@@ -58,59 +71,76 @@ pub(crate) struct ShapeFacts {
 }
 
 impl Choices {
-    pub(crate) fn new(config: &ObjectConfig, about: PoseOrigin, folder: &Path) -> Result<Self, SpecError> {
+    pub(super) fn new(config: &ObjectConfig, about: PoseOrigin, folder: &Path) -> Result<Self, SpecError> {
         let source = config.from;
         if about == PoseOrigin::Placement && source != ObjectSource::Objects {
-            return Err(SpecError::Choice(
-                "`pose.about` = \"placement\": only the seventeen objects have one (`object.from` = \"objects\")"
-                    .to_owned(),
-            ));
+            let problem =
+                "`pose.about` = \"placement\": only the seventeen objects have one (`object.from` = \"objects\")";
+            return Err(Refusal::new(problem).into());
         }
         for (field, given, of) in [
-            ("object.folder", config.folder.is_some(), ObjectSource::Meshes),
-            ("object.size_m", config.size_m.is_some(), ObjectSource::Shapes),
-            ("object.relief_m", config.relief_m.is_some(), ObjectSource::Shapes),
-            ("object.edge_m", config.edge_m.is_some(), ObjectSource::Shapes),
+            ("folder", config.folder.is_some(), ObjectSource::Meshes),
+            ("size_m", config.size_m.is_some(), ObjectSource::Shapes),
+            ("relief_m", config.relief_m.is_some(), ObjectSource::Shapes),
+            ("edge_m", config.edge_m.is_some(), ObjectSource::Shapes),
         ] {
             if given && of != source {
-                return Err(SpecError::Choice(format!("`{field}` is not for this `object.from`")));
+                return Err(Refusal::new(format!("`object.{field}` is not for this `object.from`")).into());
             }
         }
-        in_range(
-            "object.scale",
-            config.scale,
-            config.scale > 0.0 && config.scale <= 1e3,
-            "(0, 1000]",
-        )?;
-        let mut ranges = ShapeRanges::default();
-        ranges.size_m = config.size_m.unwrap_or(ranges.size_m);
-        ranges.relief_m = config.relief_m.unwrap_or(ranges.relief_m);
-        ranges.edge_m = config.edge_m.unwrap_or(ranges.edge_m);
+        let is_valid = config.scale > 0.0 && config.scale <= 1e3;
+        in_range("object.scale", config.scale, is_valid, "(0, 1000]")?;
+        let default = ShapeRanges::default();
+        let ranges = ShapeRanges {
+            size_m: config.size_m.unwrap_or(default.size_m),
+            relief_m: config.relief_m.unwrap_or(default.relief_m),
+            edge_m: config.edge_m.unwrap_or(default.edge_m),
+            ..default
+        };
         ranges
             .check()
-            .map_err(|error| Refusal::new(in_section("object", &error.to_string())))?;
-        let entries = match source {
+            .map_err(|e| Refusal::new(in_section("object", &e.to_string())))?;
+        let entry = |name: &str, mesh: PreparedMesh| Choice {
+            name: Arc::from(name),
+            label: 0,
+            mesh,
+            object: None,
+            shape: None,
+        };
+        let mut entries: Vec<Choice> = match source {
             ObjectSource::Shapes => {
                 let known: Vec<&str> = SHAPE_FAMILIES.iter().map(|family| family.name).collect();
-                let chosen = chosen(config, &known)?;
-                chosen
-                    .into_iter()
-                    .map(|k| Entry::Family(SHAPE_FAMILIES[k].name))
-                    .collect()
+                let chosen = chosen(config, &known)?.into_iter();
+                chosen.map(|k| entry(known[k], PreparedMesh::default())).collect()
             }
             ObjectSource::Objects => {
                 let known: Vec<&str> = OBJECTS.iter().map(|object| object.name).collect();
-                chosen(config, &known)?
-                    .into_iter()
-                    .map(|k| Entry::Object(&OBJECTS[k], (OBJECTS[k].build)().into()))
-                    .collect()
+                let chosen = chosen(config, &known)?.into_iter().map(|k| &OBJECTS[k]);
+                let object = |object: &'static ObjectSpec| Choice {
+                    object: Some(object),
+                    ..entry(object.name, (object.build)().into())
+                };
+                chosen.map(object).collect()
             }
-            ObjectSource::Meshes => meshes(config, folder)?,
+            ObjectSource::Meshes => {
+                let files = mesh_files(config, folder)?;
+                let known: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+                let read = |k: usize| {
+                    let (mesh, _) =
+                        load(&files[k].1, config.scale).map_err(|error| SpecError::Mesh(Refusal::from_error(error)))?;
+                    Ok(entry(known[k], mesh.into()))
+                };
+                let read = chosen(config, &known)?.into_iter().map(read);
+                read.collect::<Result<_, SpecError>>()?
+            }
             ObjectSource::Ball => {
                 chosen(config, &[BALL])?;
-                vec![Entry::Ball]
+                vec![entry(BALL, PreparedMesh::default())]
             }
         };
+        for (place, entry) in (0..).zip(&mut entries) {
+            entry.label = entry.object.map_or(place, |object| object.label.into());
+        }
         Ok(Self {
             entries,
             ranges,
@@ -118,12 +148,9 @@ impl Choices {
         })
     }
 
-    /// Names of the classes, in the order of their labels.
-    pub(crate) fn classes(&self) -> Vec<(i32, Arc<str>)> {
-        (0..)
-            .zip(&self.entries)
-            .map(|(place, entry)| (entry.label(place), entry.name()))
-            .collect()
+    /// Number of different objects or files, or of families.
+    pub(crate) fn count(&self) -> u64 {
+        self.entries.len() as u64
     }
 
     /// Whether every number is another shape.
@@ -132,103 +159,65 @@ impl Choices {
     }
 
     /// Shape number `number`.
-    pub(crate) fn shape(&self, streams: Streams, number: u64) -> Result<Choice, SpecError> {
-        let count = self.entries.len() as u64;
-        let place = usize::try_from(number % count).unwrap_or_default();
-        let entry = &self.entries[place];
-        let (mesh, shape) = match entry {
-            Entry::Family(family) => {
-                let seed = streams.rng("shape", number).random();
-                let shape = build_shape(family, &self.ranges, seed).map_err(|e| SpecError::Choice(e.to_string()))?;
-                let facts = ShapeFacts {
-                    size_m: shape.size_m,
-                    relief_m: shape.relief_m,
-                    edge_m: shape.edge_m,
-                    area_m2: shape.area_m2,
-                    holes: shape.holes,
-                };
-                (shape.mesh.into(), Some(facts))
-            }
-            Entry::Object(_, mesh) | Entry::Mesh { mesh, .. } => (mesh.clone(), None),
-            Entry::Ball => (PreparedMesh::default(), None),
-        };
-        Ok(Choice {
-            name: entry.name(),
-            label: entry.label(i32::try_from(place).unwrap_or(i32::MAX)),
-            mesh,
-            object: match entry {
-                Entry::Object(object, _) => Some(object),
-                _ => None,
-            },
-            shape,
-        })
+    pub(crate) fn shape(&self, streams: Streams, number: u64) -> Result<Choice, Refusal> {
+        let place = usize::try_from(number % self.count()).unwrap_or_default();
+        let mut choice = self.entries[place].clone();
+        if self.are_procedural() {
+            let seed = streams.rng("shape", number).random();
+            let shape = build_shape(&choice.name, &self.ranges, seed)?;
+            choice.shape = Some(ShapeFacts {
+                size_m: shape.size_m,
+                relief_m: shape.relief_m,
+                edge_m: shape.edge_m,
+                area_m2: shape.area_m2,
+                holes: shape.holes,
+            });
+            choice.mesh = shape.mesh.into();
+        }
+        Ok(choice)
     }
 
     /// Adds the meshes that were read from files.
-    pub(crate) fn digest(&self, digest: &mut Sha256) {
-        for entry in &self.entries {
-            if let Entry::Mesh { name, mesh } = entry {
-                digest.update(name.as_bytes());
-                for vertex in mesh.vertices.as_flattened() {
-                    digest.update(vertex.to_le_bytes());
-                }
-                for corner in mesh.triangles.as_flattened() {
-                    digest.update(corner.to_le_bytes());
-                }
+    pub(super) fn digest(&self, digest: &mut Sha256) {
+        let files = self.entries.iter().filter(|_| self.source == ObjectSource::Meshes);
+        for Choice { name, mesh, .. } in files {
+            digest.update(name.as_bytes());
+            for vertex in mesh.vertices.as_flattened() {
+                digest.update(vertex.to_le_bytes());
             }
-        }
-    }
-}
-
-impl Entry {
-    fn name(&self) -> Arc<str> {
-        match self {
-            Self::Family(name) => Arc::from(*name),
-            Self::Object(object, _) => Arc::from(object.name),
-            Self::Mesh { name, .. } => Arc::clone(name),
-            Self::Ball => Arc::from(BALL),
-        }
-    }
-
-    fn label(&self, place: i32) -> i32 {
-        match self {
-            Self::Object(object, _) => i32::from(object.label),
-            Self::Family(_) | Self::Mesh { .. } | Self::Ball => place,
+            for corner in mesh.triangles.as_flattened() {
+                digest.update(corner.to_le_bytes());
+            }
         }
     }
 }
 
 /// Places in `known` of the names that `config` takes.
-fn chosen(config: &ObjectConfig, known: &[&str]) -> Result<Vec<usize>, SpecError> {
+fn chosen(config: &ObjectConfig, known: &[&str]) -> Result<Vec<usize>, Refusal> {
     let Some(names) = &config.names else {
         return Ok((0..known.len()).collect());
     };
     if names.is_empty() {
-        return Err(SpecError::Choice(
-            "`object.names` = []: at least one name is needed".to_owned(),
-        ));
+        return Err(Refusal::new("`object.names` = []: at least one name is needed"));
     }
     let place = |name: &String| {
         known.iter().position(|known| known == name).ok_or_else(|| {
             let (name, known) = (name.escape_debug(), known.join(", "));
-            SpecError::Choice(format!("`object.names` = \"{name}\"; known: {known}"))
+            Refusal::new(format!("`object.names` = \"{name}\"; known: {known}"))
         })
     };
     names.iter().map(place).collect()
 }
 
-/// The mesh files of the folder, or those of them that are named.
-fn meshes(config: &ObjectConfig, folder: &Path) -> Result<Vec<Entry>, SpecError> {
+/// The mesh files of the folder, in order, each with its name.
+fn mesh_files(config: &ObjectConfig, folder: &Path) -> Result<Vec<(String, PathBuf)>, SpecError> {
     let Some(named) = &config.folder else {
-        return Err(SpecError::Choice(
-            "`object.folder` is needed with `object.from` = \"meshes\"".to_owned(),
-        ));
+        let problem = "`object.folder` is needed with `object.from` = \"meshes\"";
+        return Err(Refusal::new(problem).into());
     };
     let path = folder.join(named);
-    let failed = |source| SpecError::Folder {
-        path: path.clone(),
-        source,
-    };
+    let at = format!("`object.folder`: {}", path.display());
+    let failed = |error| SpecError::Folder(Refusal::from_error(error).at(&at));
     let mut files: Vec<PathBuf> = Vec::new();
     for entry in std::fs::read_dir(&path).map_err(failed)? {
         let file = entry.map_err(failed)?.path();
@@ -237,22 +226,12 @@ fn meshes(config: &ObjectConfig, folder: &Path) -> Result<Vec<Entry>, SpecError>
             files.push(file);
         }
     }
-    files.sort();
-    let names: Vec<String> = files
-        .iter()
-        .map(|f| f.file_stem().unwrap_or_default().to_string_lossy().into_owned())
-        .collect();
     if files.is_empty() {
-        let (path, needed) = (path.display(), "no file that ends in `.obj`, `.glb` or `.stl`");
-        return Err(SpecError::Choice(format!("`object.folder`: {path}: {needed}")));
+        return Err(Refusal::new("no file that ends in `.obj`, `.glb` or `.stl`")
+            .at(at)
+            .into());
     }
-    let known: Vec<&str> = names.iter().map(String::as_str).collect();
-    let read = |k: usize| {
-        let (mesh, _) = load(&files[k], config.scale)?;
-        Ok(Entry::Mesh {
-            name: Arc::from(known[k]),
-            mesh: mesh.into(),
-        })
-    };
-    chosen(config, &known)?.into_iter().map(read).collect()
+    files.sort();
+    let name = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(files.into_iter().map(|file| (name(&file), file)).collect())
 }

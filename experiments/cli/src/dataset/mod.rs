@@ -12,7 +12,6 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-mod export;
 #[cfg(feature = "full")]
 mod pictures;
 
@@ -29,10 +28,10 @@ mod pictures;
   spts dataset schema random-shapes                         its columns
   spts dataset head DIR --rows 2
   spts dataset verify DIR
-  spts dataset export lerobot DIR --out OUT
   spts dataset preview my_spec.toml                         a picture of 24 of its rows; of DIR the same
   spts dataset shapes                                       a picture of 100 procedural shapes
 
+LeRobot and WebDataset: python -m spts.export DIR LAYOUT --out OUT
 In Python: pandas.read_parquet(\"DIR/data\"), polars.read_parquet(\"DIR/data/*.parquet\"), or
 datasets.load_dataset(\"parquet\", data_dir=\"DIR/data\")")]
 pub(super) struct DatasetCommand {
@@ -46,7 +45,11 @@ enum Action {
     Finish(FinishCommand),
     Verify(VerifyCommand),
     Compare(CompareCommand),
-    Export(export::ExportCommand),
+    #[command(hide = true)]
+    Export {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<std::ffi::OsString>,
+    },
     Info(InfoCommand),
     Head(HeadCommand),
     Schema(SchemaCommand),
@@ -65,7 +68,9 @@ impl DatasetCommand {
             Action::Finish(command) => command.run(),
             Action::Verify(command) => command.run(),
             Action::Compare(command) => command.run(),
-            Action::Export(command) => command.run(),
+            Action::Export { .. } => Err(CliError::usage(
+                "exports are in the Python package: `python -m spts.export DATASET LAYOUT --out DIR`",
+            )),
             Action::Info(command) => command.run(),
             Action::Head(command) => command.run(),
             Action::Schema(command) => command.run(),

@@ -6,9 +6,10 @@ use crate::error::CliError;
 use crate::options::{seed, whole};
 use clap::Args;
 use serde::Serialize;
+use spts::Refusal;
 use spts::output::check_writable;
 use spts_contact::shapes::{SHAPE_FAMILIES, Shape, ShapeFamily};
-use spts_dataset::{Dataset, DatasetError, Label, Spec, spread_rows};
+use spts_dataset::{Dataset, Label, Spec, spread_rows};
 use spts_report::dataset::{
     MOST_PREVIEW_ROWS, PREVIEW_COLUMNS, Preview, PreviewRow, drawn_shapes, save_preview, save_shapes,
 };
@@ -102,7 +103,7 @@ impl PreviewCommand {
         check_writable(&file)?;
         let (mut rows, mut wrong) = (Vec::new(), None);
         let size = (spec.skin().rows(), spec.skin().cols());
-        let each = |row| -> Result<(), DatasetError> {
+        let each = |row| -> Result<(), Refusal> {
             match PreviewRow::of(&row, size) {
                 Ok(row) => rows.push(row),
                 Err(error) => wrong = wrong.take().or(Some(error)),

@@ -1,7 +1,8 @@
 //! Images of procedural shapes, pressed in the simulation on a skin without recordings.
 
 use rayon::prelude::*;
-use spts_dataset::{Maker, RowError, Spec, SpecError};
+use spts_dataset::{Maker, Spec};
+use spts_input::Refusal;
 use spts_models::SkinLayout;
 use spts_recon::Matrix;
 
@@ -20,12 +21,9 @@ const CHUNK: u64 = 50;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShapesError {
-    /// No data set can be made for the layout.
+    /// No data set can be made for the layout, or a shape cannot be pressed.
     #[error(transparent)]
-    Spec(#[from] SpecError),
-    /// A shape cannot be pressed.
-    #[error(transparent)]
-    Row(#[from] RowError),
+    Refused(#[from] Refusal),
 }
 
 /// Images of a skin of this `layout` (taxels × presses) under the shapes of [`SHAPES_SPEC`], with equal gains of all
