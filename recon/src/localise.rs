@@ -512,28 +512,16 @@ mod tests {
     #[test]
     fn refuses_what_it_cannot_use() {
         let good = BlobConfig::new(4, 4);
-        for bad in [
-            BlobConfig {
-                rows: 0,
-                ..good.clone()
-            },
-            BlobConfig {
-                step_px: 0.0,
-                ..good.clone()
-            },
-            BlobConfig {
-                noise: f64::NAN,
-                ..good.clone()
-            },
-            BlobConfig {
-                widths_px: vec![],
-                ..good.clone()
-            },
-            BlobConfig {
-                widths_px: vec![0.0],
-                ..good.clone()
-            },
-        ] {
+        let bad: [fn(&mut BlobConfig); 5] = [
+            |c| c.rows = 0,
+            |c| c.step_px = 0.0,
+            |c| c.noise = f64::NAN,
+            |c| c.widths_px = vec![],
+            |c| c.widths_px = vec![0.0],
+        ];
+        for change in bad {
+            let mut bad = good.clone();
+            change(&mut bad);
             assert!(Localiser::new(&bad).is_err(), "{bad:?}");
         }
         let localiser = Localiser::new(&good).unwrap();

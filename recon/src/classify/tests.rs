@@ -235,24 +235,15 @@ fn refuses_what_it_cannot_use() {
     );
     let new = |c: &[Component]| EvidenceClassifier::new(c, range(), 0.1);
     assert!(new(&[]).unwrap_err().to_string().contains("there is no component"));
-    for bad in [
-        Component {
-            noise_variance: 0.0,
-            ..good.clone()
-        },
-        Component {
-            weight: -1.0,
-            ..good.clone()
-        },
-        Component {
-            mean: vec![f64::NAN; 4],
-            ..good.clone()
-        },
-        Component {
-            factors: vec![vec![1.0; 3]],
-            ..good.clone()
-        },
-    ] {
+    let bad: [fn(&mut Component); 4] = [
+        |c| c.noise_variance = 0.0,
+        |c| c.weight = -1.0,
+        |c| c.mean = vec![f64::NAN; 4],
+        |c| c.factors = vec![vec![1.0; 3]],
+    ];
+    for change in bad {
+        let mut bad = good.clone();
+        change(&mut bad);
         assert!(new(&[good.clone(), bad.clone()]).is_err(), "{bad:?}");
     }
     assert!(EvidenceClassifier::new(&[good], range(), 1.0).is_err());
@@ -309,16 +300,7 @@ fn finds_planted_classes() {
     for trial in 0..trials {
         let which = trial % 3;
         let amplitude = rng.random_range(0.3..3.0);
-        let signs: Vec<f64> = (0..20 * 36)
-            .map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 })
-            .collect();
-        let phi = Matrix::from_rows(20, 36, signs).unwrap();
-        let y: Vec<f64> = (0..20)
-            .map(|m| {
-                let signal: f64 = phi.row(m).iter().zip(&images[which]).map(|(a, b)| a * b).sum();
-                amplitude * (signal + 0.2 * normal(&mut rng))
-            })
-            .collect();
+        let PlantedWindow { phi, y } = PlantedWindow::new(trial as u64, 20, &images[which], amplitude, 0.2);
         let (_, _, posterior, decision) = run(&classifier, &phi, &y);
         let (_, _, early, _) = run(&classifier, &phi, &y[..1]);
         let label = [3, 1, 2][which];
@@ -376,15 +358,10 @@ fn shifted_templates_find_shifted_objects() {
 #[test]
 fn noise_is_unknown() {
     let (classifier, _) = planted();
-    let mut rng = ChaCha8Rng::seed_from_u64(6);
     let mut unknown = 0;
-    for _ in 0..50 {
-        let signs: Vec<f64> = (0..40 * 36)
-            .map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 })
-            .collect();
-        let phi = Matrix::from_rows(40, 36, signs).unwrap();
-        let y: Vec<f64> = (0..40).map(|_| 2.0 * normal(&mut rng)).collect();
-        unknown += i32::from(run(&classifier, &phi, &y).3.label.is_none());
+    for seed in 0..50 {
+        let window = PlantedWindow::new(seed, 40, &[0.0; 36], 2.0, 1.0);
+        unknown += i32::from(run(&classifier, &window.phi, &window.y).3.label.is_none());
     }
     assert!(unknown >= 45, "{unknown} of 50");
 }

@@ -259,19 +259,10 @@ impl SequentialEstimate {
     /// If `gains` holds fewer rows than there are samples.
     #[must_use]
     pub fn expected_iou(&self, gains: &SequentialGains, threshold: f64) -> f64 {
-        self.expected_iou_of(&self.mean, gains, threshold)
-    }
-
-    /// As [`Self::expected_iou`], for the support of `image`, which may be another estimate from the same samples.
-    ///
-    /// # Panics
-    /// As [`Self::expected_iou`].
-    #[must_use]
-    pub fn expected_iou_of(&self, image: &[f64], gains: &SequentialGains, threshold: f64) -> f64 {
         if self.count == 0 {
             return 0.0;
         }
-        expected_iou(image, &self.mean, gains.variances(self.count), self.scale(), threshold)
+        expected_iou(&self.mean, gains.variances(self.count), self.scale(), threshold)
     }
 }
 
@@ -331,8 +322,6 @@ pub struct TrackedImage {
     shape: Vec<f64>,
     /// P, and P a divided by √q.
     posterior: GaussianPosterior,
-    /// Diagonal of P.
-    variances: Vec<f64>,
     /// s û.
     image: Vec<f64>,
     /// s.
@@ -372,13 +361,12 @@ impl TrackedImage {
             return Err(with_mean(index, value));
         }
         let n = prior.len();
-        let variances: Vec<f64> = (0..n).map(|i| prior.covariance().row(i)[i]).collect();
+        let variances = (0..n).map(|i| prior.covariance().row(i)[i]);
         Ok(Self {
             motion,
-            mean_variance: variances.iter().sum::<f64>() / n as f64,
+            mean_variance: variances.sum::<f64>() / n as f64,
             shape: vec![0.0; n],
             posterior: GaussianPosterior::new(prior.covariance().view().values().to_vec(), n),
-            variances,
             image: vec![0.0; n],
             strength: 0.0,
             sums: Sums::default(),
@@ -395,7 +383,6 @@ impl TrackedImage {
         self.image.fill(0.0);
         self.strength = 0.0;
         self.sums = Sums::default();
-        self.keep_variances();
     }
 
     /// Adds the samples `y` of the rows of weights `phi` (M × N), at the time `elapsed`, in [0, ∞), after the previous
@@ -424,7 +411,6 @@ impl TrackedImage {
         self.advance(elapsed);
         self.follow_strength(elapsed, phi, y);
         self.take(phi, y)?;
-        self.keep_variances();
         for (x, u) in self.image.iter_mut().zip(&self.shape) {
             *x = self.strength * u;
         }
@@ -484,34 +470,16 @@ impl TrackedImage {
         Ok(())
     }
 
-    fn keep_variances(&mut self) {
-        self.variances.clear();
-        self.variances.extend(self.posterior.variances());
-    }
-
     /// Image s û, length N, in the unit of the samples. It may have negative values.
     #[must_use]
     pub fn image(&self) -> &[f64] {
         &self.image
     }
 
-    /// Strength s of the contact: the standard deviation of pixel i is s √Pᵢᵢ. 0 before the first sample.
-    #[must_use]
-    pub fn strength(&self) -> f64 {
-        self.strength
-    }
-
     /// Posterior covariance P of the shape, N × N.
     #[must_use]
     pub fn covariance(&self) -> &[f64] {
         &self.posterior.covariance
-    }
-
-    /// Expected intersection over union, in [0, 1], of the image's support with the true one, as
-    /// [`super::SequentialEstimate::expected_iou`]: pixels above `threshold` times the maximum.
-    #[must_use]
-    pub fn expected_iou(&self, threshold: f64) -> f64 {
-        expected_iou(&self.image, &self.image, &self.variances, self.strength, threshold)
     }
 }
 
@@ -525,12 +493,12 @@ impl TrackedImage {
 /// the expected intersection over the expected union. Three things are approximate: the ratio of expectations stands
 /// for the expectation of the ratio, τ is that of the image and not of the true one, and the noise is Gaussian. An
 /// image without a positive taxel has the answer 0.
-pub(super) fn expected_iou(image: &[f64], mean: &[f64], variances: &[f64], scale: f64, threshold: f64) -> f64 {
-    let level = threshold * image.iter().copied().fold(0.0, f64::max);
+fn expected_iou(mean: &[f64], variances: &[f64], scale: f64, threshold: f64) -> f64 {
+    let level = threshold * mean.iter().copied().fold(0.0, f64::max);
     let (mut both, mut union) = (0.0, 0.0);
-    for ((&pixel, &mean), &variance) in image.iter().zip(mean).zip(variances) {
+    for (&mean, &variance) in mean.iter().zip(variances) {
         let above = probability_above(level, mean, scale * variance.max(0.0).sqrt());
-        if pixel > level {
+        if mean > level {
             both += above;
             union += 1.0;
         } else {
@@ -581,7 +549,7 @@ mod tests {
         let (one, two) = (0.841_344_746_068_5, 0.977_249_868_051_8);
         let mean = [3.0, 2.0, 0.0, -1.0];
         // the level is 1: distances of two, one, one and two deviations
-        let found = expected_iou(&mean, &mean, &[0.25; 4], 2.0, 1.0 / 3.0);
+        let found = expected_iou(&mean, &[0.25; 4], 2.0, 1.0 / 3.0);
         let expected = (two + one) / (2.0 + (1.0 - one) + (1.0 - two));
         assert!((found - expected).abs() < 1e-10, "{found}, expected {expected}");
     }
@@ -589,10 +557,10 @@ mod tests {
     #[test]
     fn without_doubt_it_is_one_and_without_an_image_zero() {
         let image = [1.0, 0.2, 0.0];
-        assert!((expected_iou(&image, &image, &[0.0; 3], 1.0, 0.23) - 1.0).abs() < 1e-15);
-        assert!((expected_iou(&image, &image, &[1e-20; 3], 1e-3, 0.23) - 1.0).abs() < 1e-15);
+        assert!((expected_iou(&image, &[0.0; 3], 1.0, 0.23) - 1.0).abs() < 1e-15);
+        assert!((expected_iou(&image, &[1e-20; 3], 1e-3, 0.23) - 1.0).abs() < 1e-15);
         for image in [[0.0; 3], [-1.0; 3], [f64::NAN; 3]] {
-            assert!(expected_iou(&image, &image, &[1.0; 3], 1.0, 0.23) <= 0.0);
+            assert!(expected_iou(&image, &[1.0; 3], 1.0, 0.23) <= 0.0);
         }
     }
 
@@ -601,10 +569,10 @@ mod tests {
     fn the_unit_of_the_image_does_not_matter() {
         let image = [1.0, 0.7, 0.2, -0.1];
         let variances = [0.1, 0.2, 0.1, 0.3];
-        let one = expected_iou(&image, &image, &variances, 1.0, 0.23);
+        let one = expected_iou(&image, &variances, 1.0, 0.23);
         for unit in [1e-100, 1e100] {
             let scaled = image.map(|v| v * unit);
-            let found = expected_iou(&scaled, &scaled, &variances, unit, 0.23);
+            let found = expected_iou(&scaled, &variances, unit, 0.23);
             assert!((found - one).abs() < 1e-14, "{found}, expected {one}");
         }
     }

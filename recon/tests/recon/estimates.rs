@@ -129,60 +129,6 @@ fn lmmse_equals_the_explicit_formula() {
     }
 }
 
-/// x ≥ 0, g = (Aᵀ A + σ² C⁻¹) x − Aᵀ y − σ² C⁻¹ μ ≥ 0 and xᵢ gᵢ = 0.
-#[test]
-fn non_negative_lmmse_satisfies_its_conditions() {
-    for (m, k) in [(1, 30), (7, 30), (20, 30), (60, 30)] {
-        let (a, y) = problem(11, m, k);
-        let (gaussian, c, mean) = prior(13, k);
-        let deviation = 0.1_f64;
-        let method = NnLmmse::new(gaussian, Noise::Absolute(deviation)).unwrap();
-        let x = solve(&method, &Matrix::from(&a), &y);
-        let precision = c.try_inverse().unwrap() * deviation.powi(2);
-        let x = DVector::from_vec(x);
-        let linear = a.transpose() * DVector::from_vec(y.clone()) + &precision * mean;
-        let slope = (a.transpose() * &a + precision) * &x - &linear;
-        for i in 0..k {
-            assert!(x[i] >= 0.0);
-            // 1e-12 by its own measure, times what the other order of the sums leaves
-            let tolerance = 1e-9 * linear.amax();
-            assert!(slope[i] >= -tolerance, "M = {m}: slope {}", slope[i]);
-            assert!(
-                x[i] == 0.0 || slope[i].abs() <= tolerance,
-                "M = {m}: slope {}",
-                slope[i]
-            );
-        }
-    }
-}
-
-/// Orthonormal columns: every unknown is alone, and every method has a closed form in c = Aᵀ y.
-#[test]
-fn orthonormal_columns_have_closed_forms() {
-    let (m, k) = (12, 8);
-    let a = problem(17, m, k).0.qr().q();
-    let y = Uniform(19).vector(m);
-    let c = a.transpose() * DVector::from_column_slice(&y);
-    // soft threshold at M α
-    let alpha = 0.02;
-    let mut method = NnLasso::new(Penalty::Absolute(alpha)).unwrap();
-    method.stopping.tol = 1e-14;
-    let expected: Vec<f64> = c.iter().map(|c| (c - 12.0 * alpha).max(0.0)).collect();
-    // a gap of 1e-14 in an objective of unit curvature is 1e-7 in a coefficient
-    assert_near(&solve(&method, &Matrix::from(&a), &y), &expected, 1e-6, "lasso");
-    // max(c, 0) over 1 + σ²
-    let noise = Noise::Absolute(0.3);
-    let white = Arc::new(Gaussian::white(k, 1.0).unwrap());
-    let expected: Vec<f64> = c.iter().map(|c| c.max(0.0) / 1.09).collect();
-    let method = NnLmmse::new(white, noise).unwrap();
-    assert_near(
-        &solve(&method, &Matrix::from(&a), &y),
-        &expected,
-        1e-12,
-        "non-negative lmmse",
-    );
-}
-
 /// Two plateaus of n₁ and n₂ pixels, a < b, seen directly: each moves towards the other by λ over its size while they
 /// do not meet, and a negative one stays at zero.
 #[test]

@@ -357,8 +357,7 @@ fn the_unit_does_not_matter() {
         },
         &[(1.0, signs(&mut rng, 2, 9), vec![1e-300; 2])],
     );
-    assert!(silent.image().iter().all(|x| x.to_bits() == 0) && silent.strength().to_bits() == 0);
-    assert!(silent.expected_iou(0.23).to_bits() == 0);
+    assert!(silent.image().iter().all(|x| x.to_bits() == 0));
 }
 
 /// After a long time without a contact nothing is left of the one before.
