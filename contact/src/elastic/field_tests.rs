@@ -5,7 +5,7 @@ use super::{ElasticConfig, ElasticField, ElasticKernel, ElasticSolver, Influence
 use crate::columns::WinklerLayer;
 use crate::foam::FoamLaw;
 use crate::mesh::{TriMesh, cuboid, sphere};
-use crate::{ContactField as _, Patch, PosedMesh};
+use crate::{ContactField as _, Patch, PosedMesh, build_contact};
 use approx::assert_relative_eq;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -15,16 +15,10 @@ fn field(config: ElasticConfig, bonded: bool) -> ElasticField {
     ElasticField::new(config, bonded, &SkinLayout::default()).unwrap()
 }
 
+/// Block over [x0, x1] × [y0, y1] that stands on z = 0.
 fn plate(x: [f64; 2], y: [f64; 2]) -> TriMesh {
-    TriMesh {
-        vertices: vec![
-            [x[0], y[0], 0.0],
-            [x[1], y[0], 0.0],
-            [x[1], y[1], 0.0],
-            [x[0], y[1], 0.0],
-        ],
-        triangles: vec![[0, 2, 1], [0, 3, 2]],
-    }
+    let middle = [0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]), 0.0];
+    cuboid([x[1] - x[0], y[1] - y[0], 10e-3]).translated(middle)
 }
 
 /// Under the middle of a plate 15 thicknesses from its rim a layer carries what independent columns carry, densified,
@@ -168,66 +162,18 @@ fn tolerance_is_kept_along_a_press() {
     }
 }
 
-/// Skins of one taxel and of one cell, wholly flooded, deep beyond the foam and fast: finite.
-#[test]
-fn smallest_and_flooded_skins() {
-    let mesh = plate([-1.0, 1.0], [-1.0, 1.0]);
-    let skin = SkinLayout::new(1, 1, 15e-3, 6e-3).unwrap();
-    for cells_per_taxel in [1, 5] {
-        for bonded in [true, false] {
-            let config = ElasticConfig {
-                cells_per_taxel,
-                poisson: 0.45,
-                ..ElasticConfig::default()
-            };
-            let mut small = ElasticField::new(config, bonded, &skin).unwrap();
-            for depth_m in [1e-9, 1e-3, 1.0] {
-                let body = PosedMesh {
-                    velocity_m_per_s: [1.0, 0.0, -50.0],
-                    ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -depth_m])
-                };
-                let response = small.respond(&body);
-                assert!(response.pressure_pa.iter().all(|p| p.is_finite() && *p > 0.0));
-                assert!(response.wrench.force_n[2].is_finite());
-            }
-        }
-    }
-}
-
 #[test]
 fn refuses_what_it_cannot_do() {
-    let base = ElasticConfig::default();
-    let cases = [
-        (ElasticConfig { poisson: 0.5, ..base }, true, "poisson"),
-        (
-            ElasticConfig {
-                poisson: f64::NAN,
-                ..base
-            },
-            true,
-            "poisson",
-        ),
-        (ElasticConfig { tolerance: 0.0, ..base }, false, "tolerance"),
-        (
-            ElasticConfig {
-                densification: Some(true),
-                ..base
-            },
-            false,
-            "densification",
-        ),
-        (
-            ElasticConfig {
-                thickness_m: -1.0,
-                ..base
-            },
-            true,
-            "thickness_m",
-        ),
-    ];
-    for (config, bonded, name) in cases {
-        let error = ElasticField::new(config, bonded, &SkinLayout::default()).err().unwrap();
-        assert!(error.to_string().contains(name), "{error}");
+    for (model, text, name) in [
+        ("layer", "poisson = 0.5", "poisson"),
+        ("layer", "poisson = nan", "poisson"),
+        ("half_space", "tolerance = 0.0", "tolerance"),
+        ("half_space", "densification = true", "densification"),
+        ("layer", "thickness_m = -1.0", "thickness_m"),
+    ] {
+        let error = build_contact(model, toml::from_str(text).unwrap(), &SkinLayout::default());
+        let said = error.err().unwrap().to_string();
+        assert!(said.contains(&format!("`contact.{name}`")), "{said}");
     }
     let wide = SkinLayout::new(1000, 1000, 1e-3, 5e-4).unwrap();
     let error = ElasticField::new(ElasticConfig::default(), true, &wide).err().unwrap();

@@ -371,42 +371,24 @@ fn wrong_type(accessor: &gltf::Accessor<'_>, expected: &str, file: &str) -> Mesh
 
 /// First reference or enumeration of `root` that is wrong, in words.
 pub(super) fn broken_reference(root: &Root) -> Option<String> {
-    let within = |what: &str, i: usize, n: usize| (i >= n).then(|| format!("{what} {i} is outside [0, {n})"));
-    if let Some(scene) = root.scene
-        && let Some(wrong) = within("scene", scene.value(), root.scenes.len())
-    {
-        return Some(wrong);
-    }
     let nodes = root.scenes.iter().flat_map(|s| &s.nodes);
     let children = root.nodes.iter().filter_map(|n| n.children.as_ref()).flatten();
-    let meshes = root.nodes.iter().filter_map(|n| n.mesh).map(|m| m.value());
-    let views = root.accessors.iter().filter_map(|a| a.buffer_view).map(|v| v.value());
-    nodes
-        .chain(children)
-        .find_map(|node| within("node", node.value(), root.nodes.len()))
-        .or_else(|| meshes.into_iter().find_map(|i| within("mesh", i, root.meshes.len())))
-        .or_else(|| {
-            root.meshes
-                .iter()
-                .flat_map(|m| &m.primitives)
-                .find_map(|p| broken_primitive(root, p))
-        })
-        .or_else(|| {
-            views
-                .into_iter()
-                .find_map(|i| within("buffer view", i, root.buffer_views.len()))
-        })
-        .or_else(|| {
-            root.buffer_views
-                .iter()
-                .find_map(|v| within("buffer", v.buffer.value(), root.buffers.len()))
-        })
-        .or_else(|| {
-            root.accessors
-                .iter()
-                .position(|a| !is_readable(a))
-                .map(|i| format!("accessor {i} has an unknown type"))
-        })
+    let scene = root.scene.iter().map(|i| ("scene", i.value(), root.scenes.len()));
+    let nodes = nodes.chain(children).map(|i| ("node", i.value(), root.nodes.len()));
+    let meshes = root.nodes.iter().filter_map(|n| n.mesh);
+    let meshes = meshes.map(|i| ("mesh", i.value(), root.meshes.len()));
+    let views = root.accessors.iter().filter_map(|a| a.buffer_view);
+    let views = views.map(|i| ("buffer view", i.value(), root.buffer_views.len()));
+    let buffers = root.buffer_views.iter();
+    let buffers = buffers.map(|v| ("buffer", v.buffer.value(), root.buffers.len()));
+    let mut indices = scene.chain(nodes).chain(meshes).chain(views).chain(buffers);
+    let outside = |(what, i, n): (&str, usize, usize)| (i >= n).then(|| format!("{what} {i} is outside [0, {n})"));
+    let unreadable = || root.accessors.iter().position(|a| !is_readable(a));
+    let mut primitives = root.meshes.iter().flat_map(|m| &m.primitives);
+    indices
+        .find_map(outside)
+        .or_else(|| primitives.find_map(|p| broken_primitive(root, p)))
+        .or_else(|| unreadable().map(|i| format!("accessor {i} has an unknown type")))
 }
 
 fn broken_primitive(root: &Root, primitive: &gltf::json::mesh::Primitive) -> Option<String> {

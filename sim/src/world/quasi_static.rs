@@ -337,26 +337,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn same_bits_in_any_order_and_repeats_differ() {
-        let scene = scene("footprint", "smallT");
-        let (b, a) = (run(&scene, 1), run(&scene, 0));
-        assert_eq!(run(&scene, 0), a);
-        assert_eq!(run(&scene, 1), b);
-        assert_ne!(a, b);
-    }
-
-    /// A field that needs a force cannot stop a ball, and says so.
-    #[test]
-    fn drop_is_refused() {
-        let error = Mechanics::from_toml("[contact]\nmodel = \"footprint\"\n[drop]", Path::new(""));
-        let error = error.unwrap_err().to_string();
-        assert_eq!(
-            error,
-            "`contact.model` = \"footprint\" needs a force and cannot stop a ball: use [press] instead of [drop], or another model"
-        );
-    }
-
     /// The joint angles asked for bring the object to where the frame says it is.
     #[test]
     fn joints_reach_the_pose() {
@@ -384,14 +364,7 @@ mod tests {
     fn press_of_a_body_with_a_far_origin() {
         let folder = tempfile::tempdir().unwrap();
         let mesh = cuboid([0.085, 0.07, 0.01]).translated([0.0, 0.0, -0.1]);
-        let mut text = String::new();
-        for [x, y, z] in &mesh.vertices {
-            text += &format!("v {x} {y} {z}\n");
-        }
-        for t in &mesh.triangles {
-            text += &format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
-        }
-        std::fs::write(folder.path().join("plate.obj"), text).unwrap();
+        std::fs::write(folder.path().join("plate.obj"), mesh.to_obj("plate")).unwrap();
         for k in ["1.5e7", "1e9"] {
             let scene = format!(
                 "[contact]\nmodel = \"footprint\"\nstiffness_pa_per_m = {k}\n[press]\nmesh = \"plate.obj\"\nforce_n = 0.5"

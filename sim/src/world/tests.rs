@@ -65,20 +65,6 @@ fn plateau_is_steady_for_any_course() {
 }
 
 #[test]
-fn imbalance_is_relative_to_the_force() {
-    let scene = Mechanics::from_toml("[press]\nobject = \"T\"", Path::new("")).unwrap();
-    let mut frame = World::new(&scene).unwrap().frames().next().unwrap().unwrap();
-    let area_m2 = cell_area_m2();
-    assert_eq!(frame.imbalance(area_m2).to_bits(), 0);
-    frame.pressure.values_mut()[3] = 1e4;
-    // no force: nothing to compare with
-    assert_eq!(frame.imbalance(area_m2).to_bits(), 0);
-    frame.wrench.force_n[2] = 2.5;
-    // 1e4 Pa on (15 mm)² are 2.25 N
-    assert_relative_eq!(frame.imbalance(area_m2), 0.1, max_relative = 1e-12);
-}
-
-#[test]
 fn frames_come_at_their_interval_and_end() {
     let scene = Mechanics::press("X").unwrap();
     let mut world = World::new(&scene).unwrap();
