@@ -119,7 +119,6 @@ fn an_access_behind_the_key_closes_the_window() {
     assert_eq!(behind(&[0x9a1b]), protected, "sbi VPORTA.INTFLAGS, 3");
     assert_eq!(behind(&[0x981b]), protected, "cbi VPORTA.INTFLAGS, 3");
     assert_eq!(behind(&load(2, 0x1400)), protected, "a load of EEPROM");
-    assert_eq!(behind(&load(2, 0x1002)), protected, "a load of NVMCTRL.STATUS");
     assert_eq!(behind(&load(2, 0x8000)), protected, "a load of mapped flash");
     assert_eq!(behind(&[0x95c8]), protected, "lpm");
 }
@@ -127,7 +126,7 @@ fn an_access_behind_the_key_closes_the_window() {
 /// A load of three cycles, and one more from EEPROM, mapped flash or signature.
 #[test]
 fn memories_beside_sram_have_a_wait_state() {
-    for (address, cycles) in [(0x3f00, 3), (0x1002, 3), (0x1400, 4), (0x8000, 4), (0x1100, 4)] {
+    for (address, cycles) in [(0x3f00, 3), (0x1400, 4), (0x8000, 4), (0x1100, 4)] {
         let mut words = load(0, address).to_vec();
         words.push(STAY);
         let mut device = device(&words);

@@ -91,42 +91,6 @@ fn sizes_out_of_range_are_refused() {
     assert_eq!(said(array.clock(late, &mut [0; 3])), needed);
 }
 
-/// Edges run on while one cell after another is seeded anew. The others never miss one, and the new sequence of each
-/// starts at one of the edges that come during its write.
-#[test]
-fn cells_can_be_seeded_while_clocked() {
-    const CELLS: usize = 20;
-    let (mut array, mut cells) = seeded(CELLS, CellMode::Analog);
-    array.run_clock(FAST).unwrap();
-    for (k, seed) in (0..CELLS).zip(200..) {
-        // other phases of edge and bus for each cell
-        array.idle(1e-3 + 0.7e-6 * k as f64).unwrap();
-        let codes = array.codes();
-        assert_eq!(codes, expected(&mut cells, codes.len() / CELLS));
-        let pair = CellMode::Analog.pair(seed);
-        array.write(cells[k].address(), &pair).unwrap();
-        let codes = array.codes();
-        let rows = codes.len() / CELLS;
-        // three bytes, 27 bits and more at 2.5 µs a bit, an edge every 13.9 µs
-        assert!(rows >= 4, "only {rows} edges came during a write");
-        let seeded_at = |taken: usize| {
-            let mut trial = cells.clone();
-            let mut all = expected(&mut trial, taken);
-            trial[k].receive(&pair);
-            all.extend(expected(&mut trial, rows - taken));
-            (all == codes).then_some(trial)
-        };
-        cells = (0..=rows)
-            .rev()
-            .find_map(seeded_at)
-            .expect("a place of the seed that explains the codes");
-    }
-    array.stop_clock();
-    let codes = array.codes();
-    assert_eq!(codes, expected(&mut cells, codes.len() / CELLS));
-    assert_agrees(&mut array, &mut cells);
-}
-
 /// The read-back tells a cell that lost its seed, and the cell does not drive until it has a new one.
 #[test]
 fn a_brown_out_while_clocked_silences_one_cell() {
