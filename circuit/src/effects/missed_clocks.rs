@@ -208,7 +208,7 @@ impl SkippingClocks {
             weights: session.weights.clone(),
             taxel,
             streams: session.streams.child(LABEL, u64::from(taxel)),
-            missed_of_a_stretch: Binomial::new(STRETCH, probability).map_err(|e| Refusal::from_error(e))?,
+            missed_of_a_stretch: Binomial::new(STRETCH, probability).map_err(Refusal::from_error)?,
             stretch: 0,
             missed_before: 0,
             missed: Vec::new(),
