@@ -322,16 +322,9 @@ mod tests {
     use super::*;
     use crate::effects::check_effect;
     use crate::weights::{Seeding, Weights};
-    use spts_models::Streams;
 
     fn session(mode: WeightMode) -> EffectSession {
-        EffectSession {
-            device: Streams::new(4),
-            streams: Streams::new(4),
-            weights: Weights::new(mode, Seeding::Address, 100),
-            feedback_ohm: 1e3,
-            sample_rate_hz: 1e3,
-        }
+        EffectSession::of(4, Weights::new(mode, Seeding::Address, 100))
     }
 
     fn faults(text: &str) -> Vec<FaultConfig> {

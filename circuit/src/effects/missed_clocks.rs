@@ -290,13 +290,7 @@ mod tests {
     use crate::weights::{Seeding, WeightMode};
 
     fn session() -> EffectSession {
-        EffectSession {
-            device: Streams::new(9),
-            streams: Streams::new(9),
-            weights: Weights::new(WeightMode::Binary, Seeding::Address, 8),
-            feedback_ohm: 1e3,
-            sample_rate_hz: 1e3,
-        }
+        EffectSession::of(9, Weights::new(WeightMode::Binary, Seeding::Address, 8))
     }
 
     /// Missed edges are as many as the probability says, within five binomial standard deviations, and the same

@@ -229,11 +229,8 @@ fn every_effect_conforms() {
 #[test]
 fn nonsense_is_refused_with_its_name() {
     let session = EffectSession {
-        device: Streams::new(0),
-        streams: Streams::new(0),
-        weights: Weights::new(WeightMode::Binary, Seeding::Address, 100),
-        feedback_ohm: 1e3,
         sample_rate_hz: 67e3,
+        ..EffectSession::of(0, Weights::new(WeightMode::Binary, Seeding::Address, 100))
     };
     let error = |text: &str| {
         build_chain(&toml::from_str(text).unwrap(), &session)
