@@ -1,4 +1,5 @@
-//! The end of the signal path: the amplifier's rails, the analog-to-digital converter, and the processing of the raster scans before publication.
+//! The end of the signal path: the amplifier's rails, the analog-to-digital converter, and the processing of the raster
+//! scans before publication.
 
 use crate::batch::Batch;
 use crate::converter::Adc;

@@ -1,4 +1,5 @@
-//! Consecutive rows of the weight matrix, computed without storing the matrix, and rows of codes that come from outside.
+//! Consecutive rows of the weight matrix, computed without storing the matrix, and rows of codes that come from
+//! outside.
 
 use super::kernels::{Drives, Jumps, LANES, Lines, Sums, analog_sums, signed_sums, signed_sums_2};
 use super::lcg::{ANALOG_SCALE, Jump};

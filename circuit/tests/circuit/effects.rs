@@ -1,5 +1,5 @@
-//! What each effect does is found again in what the readout recorded; every effect keeps what effects promise and refuses
-//! nonsense; and leaving an effect out of a profile switches it off, and nothing else.
+//! What each effect does is found again in what the readout recorded; every effect keeps what effects promise and
+//! refuses nonsense; and leaving an effect out of a profile switches it off, and nothing else.
 
 use crate::readout::{press_v, profile, samples, skin, start};
 use nalgebra::{DMatrix, DVector};

@@ -59,7 +59,7 @@ impl Device {
     /// The flash of an ATtiny412, starting with `flash`.
     ///
     /// # Errors
-    /// [`Refusal::TooLong`] for more than 4096 bytes.
+    /// [`Refusal`] for more than 4096 bytes.
     pub fn program(flash: &[u8]) -> Result<Arc<Program>, Refusal> {
         Program::new(flash, usize::from(FLASH_LEN)).map(Arc::new)
     }
@@ -290,8 +290,8 @@ impl Device {
     }
 }
 
-/// Whether an instruction ends the window of configuration change protection without passing through the memory map: by a
-/// load of flash, or a store to stack pointer or status register.
+/// Whether an instruction ends the window of configuration change protection without passing through the memory map: by
+/// a load of flash, or a store to stack pointer or status register.
 fn beside_the_memory_map(op: Op) -> bool {
     let own = 0x3d..=0x3f;
     match op {

@@ -1,8 +1,8 @@
 //! Memory map: the peripheral at each address.
 
-use super::pins::{DAC, DAC_LEN, Dac, PORT, PORT_LEN, PORT_VECTOR, Port, VPORT_LEN, VREF, VREF_LEN, Vref};
+use super::pins::{DAC, DAC_END, Dac, PORT, PORT_END, PORT_VECTOR, Port, VPORT_LEN, VREF, VREF_END, Vref};
 use super::system::{
-    CLKCTRL, CLKCTRL_LEN, CPUINT, CPUINT_LEN, Ccp, Clkctrl, Cpuint, Fault, Faults, RSTCTRL, RSTCTRL_LEN, ResetCause,
+    CLKCTRL, CLKCTRL_END, CPUINT, CPUINT_END, Ccp, Clkctrl, Cpuint, Fault, Faults, RSTCTRL, RSTCTRL_END, ResetCause,
     Rstctrl, SLPCTRL_CTRLA, Slpctrl,
 };
 use super::tca::{self, Tca};
@@ -30,16 +30,7 @@ const FLASH: u16 = 0x8000;
 /// Size of the flash (bytes).
 pub(super) const FLASH_LEN: u16 = 0x1000;
 
-// last address of each block
-const CLKCTRL_END: u16 = CLKCTRL + CLKCTRL_LEN - 1;
-const CPUINT_END: u16 = CPUINT + CPUINT_LEN - 1;
-const DAC_END: u16 = DAC + DAC_LEN - 1;
 const EEPROM_END: u16 = EEPROM + 0x7f;
-const PORT_END: u16 = PORT + PORT_LEN - 1;
-const RSTCTRL_END: u16 = RSTCTRL + RSTCTRL_LEN - 1;
-const TCA_END: u16 = tca::BASE + tca::LEN - 1;
-const TWI_END: u16 = twi::BASE + twi::LEN - 1;
-const VREF_END: u16 = VREF + VREF_LEN - 1;
 const SIGNATURE_END: u16 = SIGNATURE + 2;
 const FLASH_END: u16 = FLASH + FLASH_LEN - 1;
 
@@ -148,11 +139,11 @@ impl Space {
             CPUINT..=CPUINT_END => self.cpuint.read(address),
             PORT..=PORT_END => self.port.read(address),
             DAC..=DAC_END => Some(self.dac.read(address)),
-            twi::BASE..=TWI_END => {
+            twi::BASE..=twi::END => {
                 self.attention = true;
                 self.twi.read(address)
             }
-            tca::BASE..=TCA_END => {
+            tca::BASE..=tca::END => {
                 self.advance_timer(self.now);
                 self.attention = true;
                 self.tca.read(address)
@@ -206,8 +197,8 @@ impl Space {
                 self.dac.write(address, value);
                 Ok(())
             }
-            twi::BASE..=TWI_END => self.twi.write(address, value),
-            tca::BASE..=TCA_END => {
+            twi::BASE..=twi::END => self.twi.write(address, value),
+            tca::BASE..=tca::END => {
                 self.advance_timer(self.now);
                 self.tca.write(address, value, self.now)
             }

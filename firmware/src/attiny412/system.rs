@@ -122,10 +122,9 @@ impl Ccp {
     }
 }
 
-/// First address.
+/// First and last address of CLKCTRL.
 pub(super) const CLKCTRL: u16 = 0x0060;
-/// Addresses from the first on.
-pub(super) const CLKCTRL_LEN: u16 = 0x20;
+pub(super) const CLKCTRL_END: u16 = 0x007f;
 
 const MCLKCTRLA: u16 = CLKCTRL;
 const MCLKCTRLB: u16 = CLKCTRL + 1;
@@ -201,10 +200,9 @@ fn division(mclkctrlb: u8) -> Option<u64> {
     }
 }
 
-/// First address.
+/// First and last address of RSTCTRL.
 pub(super) const RSTCTRL: u16 = 0x0040;
-/// Addresses from the first on.
-pub(super) const RSTCTRL_LEN: u16 = 2;
+pub(super) const RSTCTRL_END: u16 = 0x0041;
 
 const RSTFR: u16 = RSTCTRL;
 const SWRR: u16 = RSTCTRL + 1;
@@ -306,10 +304,9 @@ impl Slpctrl {
     }
 }
 
-/// First address.
+/// First and last address of CPUINT.
 pub(super) const CPUINT: u16 = 0x0110;
-/// Addresses from the first on.
-pub(super) const CPUINT_LEN: u16 = 4;
+pub(super) const CPUINT_END: u16 = 0x0113;
 
 const CPUINT_CTRLA: u16 = CPUINT;
 const CPUINT_STATUS: u16 = CPUINT + 1;
@@ -327,8 +324,8 @@ pub(super) struct Accepted {
     level_one: bool,
 }
 
-/// Registers of CPUINT: two levels, one vector on level 1, order within level 0 by vector number. Neither its round robin
-/// nor its compact vector table is emulated.
+/// Registers of CPUINT: two levels, one vector on level 1, order within level 0 by vector number. Neither its round
+/// robin nor its compact vector table is emulated.
 ///
 /// Source: tinyAVR 1-series data sheet (DS40002287), chapter CPUINT.
 #[derive(Debug, Clone, Default)]

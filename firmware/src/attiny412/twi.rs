@@ -2,10 +2,9 @@
 
 use super::system::Fault;
 
-/// First address of the client's registers.
+/// First and last address.
 pub(super) const BASE: u16 = 0x0810;
-/// Addresses from the first on.
-pub(super) const LEN: u16 = 0x0f;
+pub(super) const END: u16 = 0x081e;
 /// Interrupt vector.
 pub(super) const VECTOR: u8 = 19;
 

@@ -1,5 +1,5 @@
-//! Emulated cells on their bus and clock: whatever a master does, each cell ends where the behavioural cell says it should;
-//! and cells that something is wrong with stay out of the way, and can be told.
+//! Emulated cells on their bus and clock: whatever a master does, each cell ends where the behavioural cell says it
+//! should; and cells that something is wrong with stay out of the way, and can be told.
 
 use crate::build::{Substitution, changed, compiler};
 use crate::conformance::FAST;

@@ -175,8 +175,8 @@ fn interrupts_leave_the_flag_alone() {
     }
 }
 
-/// SEI takes effect behind the following instruction, so that `sei; sleep` loses no interrupt. A write to SPL holds back
-/// interrupts for four instructions or until I/O memory is written.
+/// SEI takes effect behind the following instruction, so that `sei; sleep` loses no interrupt. A write to SPL holds
+/// back interrupts for four instructions or until I/O memory is written.
 #[test]
 fn interrupts_are_held_back_behind_sei_and_spl() {
     let enabled = |sreg: u8, words: &[u16]| {
