@@ -31,7 +31,7 @@ fn known() -> String {
 /// # Errors
 /// [`Refusal`] for an unknown fault, a taxel that the skin does not have, parameters outside their range, or a
 /// second fault that determines the level of the same cell.
-pub fn build_faults(configs: &[FaultConfig], session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
+pub(crate) fn build_faults(configs: &[FaultConfig], session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let mut cells: Vec<FaultyCell> = Vec::new();
     for (index, config) in configs.iter().enumerate() {
         let taxel = config.taxel as usize;
