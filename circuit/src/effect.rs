@@ -23,6 +23,30 @@ pub struct EffectSession {
     pub sample_rate_hz: f64,
 }
 
+impl EffectSession {
+    /// The first session of the device with this seed, with 1 kΩ and 1000 measurements a second.
+    ///
+    /// ```
+    /// use spts_circuit::{EFFECTS, EffectSession, Seeding, WeightMode, Weights};
+    ///
+    /// let session = EffectSession::of(7, Weights::new(WeightMode::Binary, Seeding::Address, 100));
+    /// let (_, build) = EFFECTS.iter().find(|(name, _)| *name == "rails").unwrap();
+    /// let error = build(toml::from_str("limit_v = -1.0")?, &session).map(drop).unwrap_err();
+    /// assert_eq!(error.to_string(), "`limit_v` = -1 is outside (0, 1e6]");
+    /// # Ok::<(), toml::de::Error>(())
+    /// ```
+    #[must_use]
+    pub fn of(seed: u64, weights: Weights) -> Self {
+        Self {
+            device: Streams::new(seed),
+            streams: Streams::new(seed),
+            weights,
+            feedback_ohm: 1e3,
+            sample_rate_hz: 1e3,
+        }
+    }
+}
+
 /// Inputs of an effect at the start of a block.
 #[derive(Debug, Clone, Copy)]
 pub struct BlockStart {

@@ -31,7 +31,7 @@ fn known() -> String {
 /// # Errors
 /// [`Refusal`] for an unknown fault, a taxel that the skin does not have, parameters outside their range, or a
 /// second fault that determines the level of the same cell.
-pub fn build_faults(configs: &[FaultConfig], session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
+pub(crate) fn build_faults(configs: &[FaultConfig], session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let mut cells: Vec<FaultyCell> = Vec::new();
     for (index, config) in configs.iter().enumerate() {
         let taxel = config.taxel as usize;
@@ -322,16 +322,9 @@ mod tests {
     use super::*;
     use crate::effects::check_effect;
     use crate::weights::{Seeding, Weights};
-    use spts_models::Streams;
 
     fn session(mode: WeightMode) -> EffectSession {
-        EffectSession {
-            device: Streams::new(4),
-            streams: Streams::new(4),
-            weights: Weights::new(mode, Seeding::Address, 100),
-            feedback_ohm: 1e3,
-            sample_rate_hz: 1e3,
-        }
+        EffectSession::of(4, Weights::new(mode, Seeding::Address, 100))
     }
 
     fn faults(text: &str) -> Vec<FaultConfig> {

@@ -59,7 +59,7 @@ pub use batch::{Batch, CellRun};
 pub use converter::{Adc, CodeScale, Converter, ConverterConfig};
 pub use effect::{BlockStart, BuildEffect, BuildFault, Effect, EffectSession, Fault, FaultConfig, Span};
 pub use effects::{EFFECTS, build_chain, check_effect};
-pub use faults::{FAULTS, build_faults};
+pub use faults::FAULTS;
 pub use profile::{CompressiveWeights, PROFILES, Profile};
 pub use readout::Readout;
 pub use recording::{Block, Recording, RecordingInfo, Slip};

@@ -4,12 +4,10 @@ use crate::converter::Converter;
 use crate::effect::{Effect, EffectSession, FaultConfig};
 use crate::effects::{build_chain, converter, rail_v};
 use crate::faults::build_faults;
-use crate::weights::{
-    LevelSource, Mode, Patterns, Seeding, WeightMode, Weights, check_taxels, not_in_mode, one_source,
-};
+use crate::weights::{LevelSource, Mode, Patterns, Seeding, WeightMode, Weights, not_in_mode};
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, Streams, explain_toml, within};
+use spts_models::{SkinLayout, explain_toml, within};
 
 /// Every profile by name, as TOML. Each parameter has its source beside it.
 pub const PROFILES: &[(&str, &str)] = &[
@@ -147,17 +145,12 @@ impl Profile {
         within("drive_v", self.drive_v, 1e-3, 1e3, "[1e-3, 1e3]")?;
         within("feedback_ohm", self.feedback_ohm, 1e-3, 1e9, "[1e-3, 1e9]")?;
         for mode in [Mode::Raster, Mode::Compressive] {
-            let weights = self.weights(mode, taxels)?;
-            self.effects(
-                mode,
-                &EffectSession {
-                    device: Streams::new(0),
-                    streams: Streams::new(0),
-                    weights,
-                    feedback_ohm: self.feedback_ohm,
-                    sample_rate_hz: self.sample_rate_hz,
-                },
-            )?;
+            let session = EffectSession {
+                feedback_ohm: self.feedback_ohm,
+                sample_rate_hz: self.sample_rate_hz,
+                ..EffectSession::of(0, self.weights(mode, taxels)?)
+            };
+            self.effects(mode, &session)?;
         }
         Ok(())
     }
@@ -192,24 +185,16 @@ impl Profile {
             (Mode::Compressive, CompressiveWeights::Binary) => WeightMode::Binary,
             (Mode::Compressive, CompressiveWeights::Analog) => WeightMode::Analog,
         };
-        let (weights, field) = match (self.seeding, &self.seeds, &self.patterns) {
-            (seeding, None, None) => return Ok(Weights::new(weight_mode, seeding, taxels)),
-            (Seeding::Address, Some(seeds), None) => (Weights::with_seeds(weight_mode, seeds.as_slice())?, "seeds"),
-            (Seeding::Address, None, Some(patterns)) => {
-                (Weights::with_patterns(weight_mode, patterns.clone())?, "patterns")
-            }
-            (seeding, seeds, patterns) => {
-                let mixed = (seeding == Seeding::Mixed).then_some("`seeding` = \"mixed\"");
-                let listed = [
-                    seeds.as_ref().map(|_| "`seeds`"),
-                    patterns.as_ref().map(|_| "`patterns`"),
-                ];
-                let given: Vec<&str> = mixed.into_iter().chain(listed.into_iter().flatten()).collect();
-                return Err(one_source(&given.join(", ")));
-            }
-        };
-        check_taxels(&weights, field, taxels)?;
-        Ok(weights)
+        // a rule that is not the default one contradicts a list
+        let ruled = self.seeding == Seeding::Mixed || (self.seeds.is_none() && self.patterns.is_none());
+        let rule = (ruled.then_some(self.seeding), "`seeding` = \"mixed\"");
+        Weights::from_one(
+            weight_mode,
+            Some(taxels),
+            rule,
+            self.seeds.as_deref(),
+            self.patterns.as_ref(),
+        )
     }
 
     /// The profile with `weights` in its compressive mode, replacing earlier ones.

@@ -1,7 +1,7 @@
 //! Recordings: the interface between a skin, real or simulated, and everything that decodes it.
 
 use crate::converter::Converter;
-use crate::weights::{Mode, WeightMode, WeightRows, Weights};
+use crate::weights::{Mode, WeightRows, Weights};
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
 use spts_models::SkinLayout;
@@ -50,10 +50,7 @@ impl RecordingInfo {
     /// The readout that made the recording.
     #[must_use]
     pub fn mode(&self) -> Mode {
-        match self.weights.mode() {
-            WeightMode::Raster => Mode::Raster,
-            WeightMode::Analog | WeightMode::Binary => Mode::Compressive,
-        }
+        self.weights.mode().readout()
     }
 
     /// Checks what does not depend on the samples.
@@ -429,7 +426,7 @@ fn put_back(block: &mut Block, slips: &[&Slip]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::weights::Seeding;
+    use crate::weights::{Seeding, WeightMode};
     use crate::{Constant, Profile, Readout};
     use spts_models::{ConductanceMap, Streams};
 

@@ -70,7 +70,7 @@ impl Server {
     /// Listens on 127.0.0.1.
     ///
     /// # Errors
-    /// [`Refusal`] for an object that is not there, [`Refusal`] for a port that is taken.
+    /// [`Refusal`] for an object that is not there, or a port that is taken.
     pub fn bind(config: &LiveConfig) -> Result<Self, Refusal> {
         LiveObject::named(&config.object)?;
         let refused = |e: std::io::Error| {

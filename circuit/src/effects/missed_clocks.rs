@@ -208,7 +208,7 @@ impl SkippingClocks {
             weights: session.weights.clone(),
             taxel,
             streams: session.streams.child(LABEL, u64::from(taxel)),
-            missed_of_a_stretch: Binomial::new(STRETCH, probability).map_err(|e| Refusal::from_error(e))?,
+            missed_of_a_stretch: Binomial::new(STRETCH, probability).map_err(Refusal::from_error)?,
             stretch: 0,
             missed_before: 0,
             missed: Vec::new(),
@@ -290,13 +290,7 @@ mod tests {
     use crate::weights::{Seeding, WeightMode};
 
     fn session() -> EffectSession {
-        EffectSession {
-            device: Streams::new(9),
-            streams: Streams::new(9),
-            weights: Weights::new(WeightMode::Binary, Seeding::Address, 8),
-            feedback_ohm: 1e3,
-            sample_rate_hz: 1e3,
-        }
+        EffectSession::of(9, Weights::new(WeightMode::Binary, Seeding::Address, 8))
     }
 
     /// Missed edges are as many as the probability says, within five binomial standard deviations, and the same

@@ -117,11 +117,8 @@ pub(crate) fn rail_v(chain: &toml::Table, mode: Mode) -> Result<Option<f64>, Ref
 pub fn check_effect(build: &dyn Fn(&EffectSession) -> Box<dyn Effect>) {
     for mode in [WeightMode::Binary, WeightMode::Analog, WeightMode::Raster] {
         let session = EffectSession {
-            device: Streams::new(2),
             streams: Streams::new(3),
-            weights: Weights::new(mode, Seeding::Address, 4),
-            feedback_ohm: 1e3,
-            sample_rate_hz: 1e3,
+            ..EffectSession::of(2, Weights::new(mode, Seeding::Address, 4))
         };
         for scale_s in [0.0, 1e-9, 1e-4, 1e3] {
             let mut effect = [build(&session)];

@@ -1,4 +1,5 @@
-//! The end of the signal path: the amplifier's rails, the analog-to-digital converter, and the processing of the raster scans before publication.
+//! The end of the signal path: the amplifier's rails, the analog-to-digital converter, and the processing of the raster
+//! scans before publication.
 
 use crate::batch::Batch;
 use crate::converter::Adc;
@@ -18,12 +19,7 @@ struct Rails {
 /// Largest output, V, from the effect's parameters.
 pub(super) fn limit_v(table: toml::Table) -> Result<f64, Refusal> {
     let limit_v = parse::<Rails>(table)?.limit_v;
-    Ok(in_range(
-        "limit_v",
-        limit_v,
-        limit_v > 0.0 && limit_v <= 1e6,
-        "(0, 1e6]",
-    )?)
+    in_range("limit_v", limit_v, limit_v > 0.0 && limit_v <= 1e6, "(0, 1e6]")
 }
 
 pub(super) fn rails(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {

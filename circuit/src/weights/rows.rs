@@ -1,4 +1,5 @@
-//! Consecutive rows of the weight matrix, computed without storing the matrix, and rows of codes that come from outside.
+//! Consecutive rows of the weight matrix, computed without storing the matrix, and rows of codes that come from
+//! outside.
 
 use super::kernels::{Drives, Jumps, LANES, Lines, Sums, analog_sums, signed_sums, signed_sums_2};
 use super::lcg::{ANALOG_SCALE, Jump};
@@ -462,6 +463,7 @@ mod tests {
                     for (i, out) in again.chunks_mut(7).enumerate() {
                         weights.weighted_sums(77 + 7 * i as u64, &values, out);
                     }
+                    let [sums, again] = [sums, again].map(|sums| sums.map(f64::to_bits));
                     assert!(sums == again, "{mode:?}, {seeding:?}, {taxels} taxels");
                 }
             }

@@ -129,24 +129,6 @@ pub(crate) fn not_in_mode(field: &str, mode: WeightMode) -> Refusal {
     ))
 }
 
-/// Weights with no source of the levels, or several: the keys `found`.
-pub(crate) fn one_source(found: &str) -> Refusal {
-    Refusal::new(format!(
-        "weights need exactly one of `seeding`, `seeds` and `patterns`; found: {found}"
-    ))
-}
-
-/// Checks that `weights` from the list `field` are for a skin of `taxels` taxels.
-pub(crate) fn check_taxels(weights: &Weights, field: &str, taxels: u32) -> Result<(), Refusal> {
-    if weights.taxels() == taxels as usize {
-        return Ok(());
-    }
-    let found = weights.taxels();
-    Err(Refusal::new(format!(
-        "`{field}` is for {found} taxels; expected {taxels}"
-    )))
-}
-
 /// Most codes in a pattern.
 const MAX_CODES: usize = 1 << 30;
 

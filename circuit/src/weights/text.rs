@@ -1,7 +1,7 @@
 //! Weights, seeds and patterns as text.
 
 use super::lcg::Seeding;
-use super::sequence::{LevelSource, Patterns, WeightMode, Weights, check_taxels, one_source};
+use super::sequence::{LevelSource, Patterns, WeightMode, Weights};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use spts_input::Refusal;
 use std::fmt::Write as _;
@@ -59,38 +59,74 @@ impl From<&Weights> for WeightsConfig {
 impl TryFrom<WeightsConfig> for Weights {
     type Error = Refusal;
     fn try_from(config: WeightsConfig) -> Result<Self, Refusal> {
-        let mode = config.mode;
-        let missing = || Refusal::new("`taxels` is missing; valid: [1, 2^32 − 1]");
-        if config.generator.is_some() && config.patterns.is_some() {
+        let WeightsConfig {
+            mode,
+            taxels,
+            generator,
+            seeding,
+            seeds,
+            patterns,
+        } = config;
+        if generator.is_some() && patterns.is_some() {
             return Err(one_source("`generator`, `patterns`"));
         }
-        let (weights, field) = match (config.seeding, config.seeds, config.patterns) {
-            (None, None, None) if mode == WeightMode::Raster => {
-                let taxels = config.taxels.ok_or_else(missing)?;
-                return Ok(Self::new(mode, Seeding::Address, taxels));
-            }
+        let raster = mode == WeightMode::Raster && seeds.is_none() && patterns.is_none();
+        let seeding = seeding.or(raster.then_some(Seeding::Address));
+        Self::from_one(
+            mode,
+            taxels,
+            (seeding, "`seeding`"),
+            seeds.as_deref(),
+            patterns.as_ref(),
+        )
+    }
+}
+
+impl Weights {
+    /// Weights from the one source that is given; a rule is shown with its name. A list decides the number of taxels,
+    /// unless that is given, too, and is then checked.
+    ///
+    /// # Errors
+    /// [`Refusal`] for no source or several, for a rule without a number of taxels, or for a list that is not valid.
+    pub(crate) fn from_one(
+        mode: WeightMode,
+        taxels: Option<u32>,
+        (seeding, shown): (Option<Seeding>, &str),
+        seeds: Option<&[u32]>,
+        patterns: Option<&Patterns>,
+    ) -> Result<Self, Refusal> {
+        let (weights, field) = match (seeding, seeds, patterns) {
             (Some(seeding), None, None) => {
-                let taxels = config.taxels.ok_or_else(missing)?;
-                return Ok(Self::new(mode, seeding, taxels));
+                let missing = || Refusal::new("`taxels` is missing; valid: [1, 2^32 − 1]");
+                return Ok(Self::new(mode, seeding, taxels.ok_or_else(missing)?));
             }
             (None, Some(seeds), None) => (Self::with_seeds(mode, seeds)?, "seeds"),
-            (None, None, Some(patterns)) => (Self::with_patterns(mode, patterns)?, "patterns"),
-            (seeding, seeds, patterns) => {
+            (None, None, Some(patterns)) => (Self::with_patterns(mode, patterns.clone())?, "patterns"),
+            _ => {
                 let given = [
-                    seeding.map(|_| "`seeding`"),
+                    seeding.map(|_| shown),
                     seeds.map(|_| "`seeds`"),
                     patterns.map(|_| "`patterns`"),
                 ];
-                let given: Vec<&str> = given.into_iter().flatten().collect();
-                let found = given.join(", ");
-                return Err(one_source(if given.is_empty() { "none" } else { &found }));
+                let found = given.into_iter().flatten().collect::<Vec<_>>().join(", ");
+                return Err(one_source(if found.is_empty() { "none" } else { &found }));
             }
         };
-        if let Some(taxels) = config.taxels {
-            check_taxels(&weights, field, taxels)?;
+        let found = weights.taxels();
+        match taxels {
+            Some(taxels) if taxels as usize != found => Err(Refusal::new(format!(
+                "`{field}` is for {found} taxels; expected {taxels}"
+            ))),
+            _ => Ok(weights),
         }
-        Ok(weights)
     }
+}
+
+/// Weights with no source of the levels, or several: the keys `found`.
+fn one_source(found: &str) -> Refusal {
+    Refusal::new(format!(
+        "weights need exactly one of `seeding`, `seeds` and `patterns`; found: {found}"
+    ))
 }
 
 impl Serialize for Weights {

@@ -1,5 +1,5 @@
-//! The amplifier: what it does over time, its response, its noise, its limits, the amplifier within the readout, and what
-//! it makes of skins of every size.
+//! The amplifier: what it does over time, its response, its noise, its limits, the amplifier within the readout, and
+//! what it makes of skins of every size.
 
 use crate::readout::{press_v, profile, samples, start};
 use approx::assert_relative_eq;

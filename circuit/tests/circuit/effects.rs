@@ -1,5 +1,5 @@
-//! What each effect does is found again in what the readout recorded; every effect keeps what effects promise and refuses
-//! nonsense; and leaving an effect out of a profile switches it off, and nothing else.
+//! What each effect does is found again in what the readout recorded; every effect keeps what effects promise and
+//! refuses nonsense; and leaving an effect out of a profile switches it off, and nothing else.
 
 use crate::readout::{press_v, profile, samples, skin, start};
 use nalgebra::{DMatrix, DVector};
@@ -229,11 +229,8 @@ fn every_effect_conforms() {
 #[test]
 fn nonsense_is_refused_with_its_name() {
     let session = EffectSession {
-        device: Streams::new(0),
-        streams: Streams::new(0),
-        weights: Weights::new(WeightMode::Binary, Seeding::Address, 100),
-        feedback_ohm: 1e3,
         sample_rate_hz: 67e3,
+        ..EffectSession::of(0, Weights::new(WeightMode::Binary, Seeding::Address, 100))
     };
     let error = |text: &str| {
         build_chain(&toml::from_str(text).unwrap(), &session)

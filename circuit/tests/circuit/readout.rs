@@ -76,20 +76,6 @@ fn every_profile_is_valid_in_both_modes() {
     assert!(bad.validate(100).unwrap_err().to_string().contains("sample_rate_hz"));
 }
 
-/// Removing every effect of a profile leaves the ideal readout, bit for bit.
-#[test]
-fn no_effects_is_ideal() {
-    let mut bare = Profile::named("as_built").unwrap();
-    bare.compressive.clear();
-    bare.raster.clear();
-    for mode in [Mode::Raster, Mode::Compressive] {
-        let mut bare = start(&bare, mode, 1);
-        let a = bare.acquire(&mut skin(&press_v()), 10_000).unwrap();
-        let b = readout("ideal", mode).acquire(&mut skin(&press_v()), 10_000).unwrap();
-        assert!(a == b, "{mode:?}");
-    }
-}
-
 #[test]
 fn an_ideal_raster_is_the_skin() {
     let x = press_v();

@@ -1,7 +1,7 @@
 //! One device: core, memory map and time; and its trace, instruction by instruction, for debugging.
 
 use super::space::{FLASH_LEN, RAM_END, Space};
-use super::system::{Accepted, Access, Fault, Faults, ResetCause};
+use super::system::{Accepted, Fault, Faults, ResetCause};
 use crate::avr::{Core, Event, Op, Program, disassemble, sreg};
 use spts_input::Refusal;
 use std::fmt;
@@ -59,7 +59,7 @@ impl Device {
     /// The flash of an ATtiny412, starting with `flash`.
     ///
     /// # Errors
-    /// [`Refusal::TooLong`] for more than 4096 bytes.
+    /// [`Refusal`] for more than 4096 bytes.
     pub fn program(flash: &[u8]) -> Result<Arc<Program>, Refusal> {
         Program::new(flash, usize::from(FLASH_LEN)).map(Arc::new)
     }
@@ -92,12 +92,6 @@ impl Device {
     #[must_use]
     pub fn sram(&self) -> &[u8; 256] {
         self.space.sram()
-    }
-
-    /// EEPROM, 128 bytes.
-    #[must_use]
-    pub fn eeprom(&self) -> &[u8] {
-        self.space.nvmctrl.eeprom()
     }
 
     /// Accesses without effect since power-on. A correct program causes none.
@@ -245,8 +239,8 @@ impl Device {
             // counts instructions, and no interrupt comes in between
             space.attention = true;
             self.pending = None;
-            if let Some(access) = beside_the_memory_map(self.program.op(self.core.pc)) {
-                space.ccp.end_behind_next(access, self.core.instructions);
+            if beside_the_memory_map(self.program.op(self.core.pc)) {
+                space.ccp.close_behind_next(self.core.instructions);
             }
         } else {
             self.pending = space.cpuint.next(space.requests());
@@ -279,11 +273,11 @@ impl Device {
         self.hear(
             observer,
             TraceStep::Interrupt {
-                vector: accepted.source,
+                vector: accepted.vector,
             },
         );
         self.space.cpuint.enter(accepted);
-        let cycles = self.core.interrupt(accepted.entry, &mut self.space);
+        let cycles = self.core.interrupt(accepted.vector, &mut self.space);
         self.now += u64::from(cycles) * ticks_per_cycle;
         self.space.attention = true;
         true
@@ -296,14 +290,15 @@ impl Device {
     }
 }
 
-/// What an instruction does, as far as configuration change protection hears it, that does not pass through the memory
-/// map.
-fn beside_the_memory_map(op: Op) -> Option<Access> {
+/// Whether an instruction ends the window of configuration change protection without passing through the memory map: by
+/// a load of flash, or a store to stack pointer or status register.
+fn beside_the_memory_map(op: Op) -> bool {
+    let own = 0x3d..=0x3f;
     match op {
-        Op::Lpm { .. } | Op::LpmIncrement { .. } => Some(Access::Memory),
-        // stack pointer and status register
-        Op::Out { a: 0x3d..=0x3f, .. } | Op::Sts { k: 0x3d..=0x3f, .. } => Some(Access::Store),
-        _ => None,
+        Op::Lpm { .. } | Op::LpmIncrement { .. } => true,
+        Op::Out { a, .. } => own.contains(&u16::from(a)),
+        Op::Sts { k, .. } => own.contains(&k),
+        _ => false,
     }
 }
 

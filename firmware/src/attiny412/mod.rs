@@ -3,7 +3,7 @@
 //! Peripherals have the register addresses of the manufacturer's device description. Emulated: memory map
 //! (I/O, SRAM, EEPROM, mapped flash, signature), CPUINT with both levels, configuration change protection, CLKCTRL's
 //! prescaler, PORTA with pin-change interrupts and its mirror, TWI0 as a client byte by byte, DAC0, VREF, idle sleep,
-//! EEPROM writes, RSTCTRL and the overflow of TCA0. What a program touches beside these is recorded as a [`Fault`] and
+//! RSTCTRL and the overflow of TCA0. What a program touches beside these is recorded as a [`Fault`] and
 //! has no effect.
 //!
 //! Left out: the start-up time behind a reset, the input synchroniser (up to three cycles, the same for all cells),

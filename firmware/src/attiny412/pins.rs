@@ -1,9 +1,8 @@
 //! Pins: PORTA with its mirror VPORTA, DAC0, whose output is pin PA6, and the voltage references.
 
-/// First address.
+/// First and last address of PORT.
 pub(super) const PORT: u16 = 0x0400;
-/// Addresses from the first on.
-pub(super) const PORT_LEN: u16 = 0x18;
+pub(super) const PORT_END: u16 = 0x0417;
 /// Addresses of the mirror, from 0.
 pub(super) const VPORT_LEN: u16 = 4;
 
@@ -179,10 +178,9 @@ impl Senses {
     }
 }
 
-/// First address.
+/// First and last address of DAC.
 pub(super) const DAC: u16 = 0x0680;
-/// Addresses from the first on.
-pub(super) const DAC_LEN: u16 = 2;
+pub(super) const DAC_END: u16 = 0x0681;
 
 const DAC_CTRLA: u16 = DAC;
 const ENABLE: u8 = 0x01;
@@ -256,10 +254,9 @@ impl Dac {
     }
 }
 
-/// First address.
+/// First and last address of VREF.
 pub(super) const VREF: u16 = 0x00a0;
-/// Addresses from the first on.
-pub(super) const VREF_LEN: u16 = 2;
+pub(super) const VREF_END: u16 = 0x00a1;
 
 /// Registers of VREF.
 #[derive(Debug, Clone, Default)]

@@ -1,9 +1,9 @@
-//! Memory map: the peripheral at each address; memory controller and EEPROM.
+//! Memory map: the peripheral at each address.
 
-use super::pins::{DAC, DAC_LEN, Dac, PORT, PORT_LEN, PORT_VECTOR, Port, VPORT_LEN, VREF, VREF_LEN, Vref};
+use super::pins::{DAC, DAC_END, Dac, PORT, PORT_END, PORT_VECTOR, Port, VPORT_LEN, VREF, VREF_END, Vref};
 use super::system::{
-    Access, CLKCTRL, CLKCTRL_LEN, CPUINT, CPUINT_LEN, Ccp, Clkctrl, Cpuint, Fault, Faults, Key, RSTCTRL, RSTCTRL_LEN,
-    ResetCause, Rstctrl, SLPCTRL_CTRLA, Slpctrl,
+    CLKCTRL, CLKCTRL_END, CPUINT, CPUINT_END, Ccp, Clkctrl, Cpuint, Fault, Faults, RSTCTRL, RSTCTRL_END, ResetCause,
+    Rstctrl, SLPCTRL_CTRLA, Slpctrl,
 };
 use super::tca::{self, Tca};
 use super::twi::{self, Twi};
@@ -21,23 +21,16 @@ const GPIO: u16 = 0x1c;
 const GPIO_END: u16 = GPIO + 3;
 const CCP: u16 = 0x34;
 const SIGNATURE: u16 = 0x1100;
+const EEPROM: u16 = 0x1400;
+/// Size of the EEPROM (bytes).
+const EEPROM_LEN: usize = 128;
 /// Identifies an ATtiny412.
 const SIGNATURE_BYTES: [u8; 3] = [0x1e, 0x92, 0x23];
 const FLASH: u16 = 0x8000;
 /// Size of the flash (bytes).
 pub(super) const FLASH_LEN: u16 = 0x1000;
 
-// last address of each block
-const CLKCTRL_END: u16 = CLKCTRL + CLKCTRL_LEN - 1;
-const CPUINT_END: u16 = CPUINT + CPUINT_LEN - 1;
-const DAC_END: u16 = DAC + DAC_LEN - 1;
-const NVMCTRL_END: u16 = NVMCTRL + NVMCTRL_LEN - 1;
-const EEPROM_END: u16 = EEPROM_BASE + 0x7f;
-const PORT_END: u16 = PORT + PORT_LEN - 1;
-const RSTCTRL_END: u16 = RSTCTRL + RSTCTRL_LEN - 1;
-const TCA_END: u16 = tca::BASE + tca::LEN - 1;
-const TWI_END: u16 = twi::BASE + twi::LEN - 1;
-const VREF_END: u16 = VREF + VREF_LEN - 1;
+const EEPROM_END: u16 = EEPROM + 0x7f;
 const SIGNATURE_END: u16 = SIGNATURE + 2;
 const FLASH_END: u16 = FLASH + FLASH_LEN - 1;
 
@@ -46,6 +39,7 @@ const FLASH_END: u16 = FLASH + FLASH_LEN - 1;
 pub(super) struct Space {
     sram: [u8; SRAM_LEN],
     gpio: [u8; 4],
+    eeprom: [u8; EEPROM_LEN],
     /// Whether a register was accessed that may change interrupts, clock or the time of the next event.
     pub(super) attention: bool,
     /// Tick at which the present instruction started.
@@ -56,7 +50,6 @@ pub(super) struct Space {
     pub(super) clkctrl: Clkctrl,
     pub(super) cpuint: Cpuint,
     pub(super) dac: Dac,
-    pub(super) nvmctrl: Nvmctrl,
     pub(super) port: Port,
     pub(super) rstctrl: Rstctrl,
     pub(super) slpctrl: Slpctrl,
@@ -71,9 +64,11 @@ impl Space {
     /// Memory with `eeprom` at the start of the EEPROM. SRAM holds a pattern: what it holds after power-on is
     /// undefined.
     pub(super) fn new(program: Arc<Program>, eeprom: &[u8]) -> Self {
+        let byte = |k| eeprom.get(k).copied().unwrap_or(u8::MAX);
         Self {
             sram: power_on_pattern(),
             gpio: [0; 4],
+            eeprom: std::array::from_fn(byte),
             attention: true,
             now: 0,
             wait_cycles: 0,
@@ -81,7 +76,6 @@ impl Space {
             clkctrl: Clkctrl::default(),
             cpuint: Cpuint::default(),
             dac: Dac::default(),
-            nvmctrl: Nvmctrl::new(eeprom),
             port: Port::default(),
             rstctrl: Rstctrl::default().after(ResetCause::PowerOn),
             slpctrl: Slpctrl::default(),
@@ -95,12 +89,11 @@ impl Space {
 
     /// Peripherals as after a reset by `cause`; EEPROM and, except at power-on, SRAM stay.
     pub(super) fn reset(&mut self, cause: ResetCause) {
-        let mut fresh = Self::new(Arc::clone(&self.program), &[]);
+        let mut fresh = Self::new(Arc::clone(&self.program), &self.eeprom);
         if cause != ResetCause::PowerOn {
             fresh.sram = self.sram;
         }
         fresh.now = self.now;
-        fresh.nvmctrl = self.nvmctrl.after_reset();
         fresh.port = self.port.after_reset();
         fresh.rstctrl = self.rstctrl.after(cause);
         fresh.dac = self.dac.after_reset();
@@ -129,7 +122,7 @@ impl Space {
     /// An access to memory that is not SRAM: one more cycle at least (DS40002198, notes to the cycles), here always
     /// one.
     fn wait_for_memory(&mut self) {
-        self.ccp.end_by(Access::Memory);
+        self.ccp.close();
         self.wait_cycles += 1;
         self.attention = true;
     }
@@ -146,22 +139,18 @@ impl Space {
             CPUINT..=CPUINT_END => self.cpuint.read(address),
             PORT..=PORT_END => self.port.read(address),
             DAC..=DAC_END => Some(self.dac.read(address)),
-            twi::BASE..=TWI_END => {
+            twi::BASE..=twi::END => {
                 self.attention = true;
                 self.twi.read(address)
             }
-            tca::BASE..=TCA_END => {
+            tca::BASE..=tca::END => {
                 self.advance_timer(self.now);
                 self.attention = true;
                 self.tca.read(address)
             }
-            NVMCTRL..=NVMCTRL_END => {
-                self.ccp.end_by(Access::Memory);
-                self.nvmctrl.read(address, self.now)
-            }
-            EEPROM_BASE..=EEPROM_END => {
+            EEPROM..=EEPROM_END => {
                 self.wait_for_memory();
-                self.nvmctrl.read(address, self.now)
+                Some(self.eeprom[usize::from(address - EEPROM)])
             }
             SIGNATURE..=SIGNATURE_END => {
                 self.wait_for_memory();
@@ -202,34 +191,21 @@ impl Space {
                 self.vref.write(address, value);
                 Ok(())
             }
-            CPUINT..=CPUINT_END => self.cpuint.write(address, value, &self.ccp),
+            CPUINT..=CPUINT_END => self.cpuint.write(address, value),
             PORT..=PORT_END if self.port.write(address, value) => Ok(()),
             DAC..=DAC_END => {
                 self.dac.write(address, value);
                 Ok(())
             }
-            twi::BASE..=TWI_END => self.twi.write(address, value),
-            tca::BASE..=TCA_END => {
+            twi::BASE..=twi::END => self.twi.write(address, value),
+            tca::BASE..=tca::END => {
                 self.advance_timer(self.now);
                 self.tca.write(address, value, self.now)
-            }
-            NVMCTRL..=NVMCTRL_END => {
-                let outcome = self.nvmctrl.write(address, value, self.now, &self.ccp);
-                self.ccp.end_by(Access::Memory);
-                outcome
-            }
-            EEPROM_BASE..=EEPROM_END => {
-                self.wait_for_memory();
-                self.nvmctrl.write(address, value, self.now, &self.ccp)
-            }
-            FLASH..=FLASH_END => {
-                self.ccp.end_by(Access::Memory);
-                unmapped
             }
             _ => unmapped,
         };
         if address != CCP {
-            self.ccp.end_by(Access::Store);
+            self.ccp.close();
         }
         if let Err(fault) = outcome {
             self.faults.record(fault);
@@ -253,10 +229,10 @@ impl DataSpace for Space {
     fn write(&mut self, address: u16, value: u8) {
         if address >> 8 == SRAM_PAGE {
             self.sram[usize::from(address & 0xff)] = value;
-            self.ccp.end_by(Access::Store);
+            self.ccp.close();
         } else if address < VPORT_LEN {
             self.port.write_mirror(address, value);
-            self.ccp.end_by(Access::Store);
+            self.ccp.close();
             self.attention = true;
         } else {
             self.write_io(address, value);
@@ -278,151 +254,4 @@ impl DataSpace for Space {
 /// Bytes that no program would leave behind: each differs from its neighbours.
 fn power_on_pattern() -> [u8; SRAM_LEN] {
     std::array::from_fn(|k| (k.to_le_bytes()[0]).wrapping_mul(0x9d) ^ 0xa5)
-}
-
-/// First address of the registers.
-pub(super) const NVMCTRL: u16 = 0x1000;
-/// Addresses from the first on.
-pub(super) const NVMCTRL_LEN: u16 = 0x0a;
-/// First address of the EEPROM.
-pub(super) const EEPROM_BASE: u16 = 0x1400;
-/// Size of the EEPROM (bytes).
-pub(super) const EEPROM_LEN: usize = 128;
-
-const NVM_CTRLA: u16 = NVMCTRL;
-const NVM_CTRLB: u16 = NVMCTRL + 1;
-const NVM_STATUS: u16 = NVMCTRL + 2;
-const EEBUSY: u8 = 0x02;
-const PAGE: usize = 32;
-/// Ticks of an erase or a write, and of both: 2 ms and 4 ms at 20 MHz. Source: DS40002287, electrical characteristics.
-const ERASE_OR_WRITE_TICKS: u64 = 40_000;
-
-mod command {
-    pub(super) const NONE: u8 = 0;
-    pub(super) const WRITE: u8 = 1;
-    pub(super) const ERASE: u8 = 2;
-    pub(super) const ERASE_WRITE: u8 = 3;
-    pub(super) const CLEAR_BUFFER: u8 = 4;
-    pub(super) const ERASE_EEPROM: u8 = 6;
-}
-
-/// EEPROM with its page buffer. The flash cannot be written.
-#[derive(Debug, Clone)]
-pub(super) struct Nvmctrl {
-    eeprom: [u8; EEPROM_LEN],
-    /// Bytes waiting in the page buffer, by position in the page.
-    buffer: [Option<u8>; PAGE],
-    page: usize,
-    busy_until: u64,
-}
-
-impl Nvmctrl {
-    /// EEPROM that starts with `bytes`; the rest is erased.
-    pub(super) fn new(bytes: &[u8]) -> Self {
-        let mut eeprom = [0xff; EEPROM_LEN];
-        for (cell, byte) in eeprom.iter_mut().zip(bytes) {
-            *cell = *byte;
-        }
-        Self {
-            eeprom,
-            buffer: [None; PAGE],
-            page: 0,
-            busy_until: 0,
-        }
-    }
-
-    /// After a reset the buffer is empty; the EEPROM stays.
-    pub(super) fn after_reset(&self) -> Self {
-        Self::new(&self.eeprom)
-    }
-
-    /// Content of the EEPROM.
-    pub(super) fn eeprom(&self) -> &[u8] {
-        &self.eeprom
-    }
-
-    pub(super) fn read(&self, address: u16, now: u64) -> Option<u8> {
-        match address {
-            NVM_CTRLA | NVM_CTRLB => Some(0),
-            NVM_STATUS => Some(if now < self.busy_until { EEBUSY } else { 0 }),
-            _ => self.eeprom.get(usize::from(address.checked_sub(EEPROM_BASE)?)).copied(),
-        }
-    }
-
-    pub(super) fn write(&mut self, address: u16, value: u8, now: u64, ccp: &Ccp) -> Result<(), Fault> {
-        match address {
-            NVM_CTRLA => {
-                ccp.check(Key::Spm, address)?;
-                self.run(value, now)
-            }
-            EEPROM_BASE.. => {
-                let place = usize::from(address - EEPROM_BASE);
-                self.page = place / PAGE;
-                self.buffer[place % PAGE] = Some(value);
-                Ok(())
-            }
-            _ => Err(Fault::Write { address, value }),
-        }
-    }
-
-    fn run(&mut self, value: u8, now: u64) -> Result<(), Fault> {
-        let address = NVM_CTRLA;
-        if now < self.busy_until {
-            return Err(Fault::Unsupported { address, value });
-        }
-        match value {
-            command::NONE | command::CLEAR_BUFFER => {}
-            command::WRITE => self.apply(|old, new| old & new),
-            command::ERASE => self.apply(|_, _| 0xff),
-            command::ERASE_WRITE => self.apply(|_, new| new),
-            command::ERASE_EEPROM => self.eeprom.fill(0xff),
-            _ => return Err(Fault::Unsupported { address, value }),
-        }
-        self.busy_until = now
-            + match value {
-                command::NONE | command::CLEAR_BUFFER => 0,
-                command::ERASE_WRITE => 2 * ERASE_OR_WRITE_TICKS,
-                _ => ERASE_OR_WRITE_TICKS,
-            };
-        if value != command::NONE {
-            self.buffer = [None; PAGE];
-        }
-        Ok(())
-    }
-
-    /// Only bytes that are in the buffer change.
-    fn apply(&mut self, byte: impl Fn(u8, u8) -> u8) {
-        let cells = self.eeprom.iter_mut().skip(self.page * PAGE);
-        for (cell, waiting) in cells.zip(&self.buffer) {
-            if let Some(new) = waiting {
-                *cell = byte(*cell, *new);
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_buffered_bytes_are_written_and_only_by_command() {
-        let mut ccp = Ccp::default();
-        let mut memory = Nvmctrl::new(&[8, 1]);
-        memory.write(EEPROM_BASE, 0x0f, 0, &ccp).unwrap();
-        memory.write(EEPROM_BASE + 33, 0x33, 0, &ccp).unwrap();
-        assert!(memory.write(NVM_CTRLA, command::ERASE_WRITE, 0, &ccp).is_err());
-        ccp.write(0x9d);
-        memory.write(NVM_CTRLA, command::CLEAR_BUFFER, 0, &ccp).unwrap();
-        memory.write(EEPROM_BASE, 0x3c, 0, &ccp).unwrap();
-        memory.write(NVM_CTRLA, command::ERASE_WRITE, 10, &ccp).unwrap();
-        assert_eq!(memory.read(EEPROM_BASE, 10), Some(0x3c));
-        assert_eq!(memory.read(EEPROM_BASE + 1, 10), Some(1));
-        assert_eq!(memory.read(EEPROM_BASE + 33, 10), Some(0xff));
-        assert_eq!(memory.read(NVM_STATUS, 80_009), Some(EEBUSY));
-        assert_eq!(memory.read(NVM_STATUS, 80_010), Some(0));
-        memory.write(EEPROM_BASE, 0x0f, 80_010, &ccp).unwrap();
-        memory.write(NVM_CTRLA, command::WRITE, 80_010, &ccp).unwrap();
-        assert_eq!(memory.after_reset().eeprom()[0], 0x0c);
-    }
 }

@@ -64,36 +64,17 @@ impl Faults {
 
 /// Key that opens protected I/O registers.
 const KEY_IOREG: u8 = 0xd8;
-/// Key that opens self-programming commands.
-const KEY_SPM: u8 = 0x9d;
 /// Instructions after the key within which the protected write has to come.
 const WINDOW_INSTRUCTIONS: u64 = 4;
 
-/// What a key has opened.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Key {
-    /// Protected I/O registers.
-    Ioreg,
-    /// Commands of the memory controller.
-    Spm,
-}
-
-/// An access that ends a window before its time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Access {
-    /// Store to an I/O register or SRAM: closes the window of protected I/O registers.
-    Store,
-    /// Load or store of flash, EEPROM or memory controller: closes any window.
-    Memory,
-}
-
-/// Register CPU.CCP: a key opens protected registers for four instructions, in which no interrupt is taken. The window
-/// ends behind the first [`Access`] that ends it, the protected write among them, and at SLEEP.
+/// Register CPU.CCP: a key opens protected I/O registers for four instructions, in which no interrupt is taken. The
+/// window ends behind the first store to an I/O register or SRAM, the protected write among them, the first access to
+/// flash or EEPROM, and at SLEEP. The key of self-programming opens nothing: the flash cannot be written.
 ///
 /// Source: tinyAVR 1-series data sheet (DS40002287), section "Configuration Change Protection (CCP)".
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ccp {
-    open: Option<Key>,
+    open: bool,
     /// Instruction count at which the window closes, once it is known.
     closes_at: Option<u64>,
 }
@@ -102,85 +83,54 @@ impl Ccp {
     /// Writes the key register; a value that is no key closes the window.
     pub(super) fn write(&mut self, value: u8) {
         self.closes_at = None;
-        self.open = match value {
-            KEY_IOREG => Some(Key::Ioreg),
-            KEY_SPM => Some(Key::Spm),
-            _ => None,
-        };
+        self.open = value == KEY_IOREG;
     }
 
-    /// Register as read: bit 0 while I/O registers are open, bit 1 as well while commands are.
+    /// Register as read: bit 0 while I/O registers are open.
     pub(super) fn read(&self) -> u8 {
-        match self.open {
-            None => 0,
-            Some(Key::Ioreg) => 1,
-            Some(Key::Spm) => 2,
-        }
+        self.open.into()
     }
 
-    /// Whether any window is open.
+    /// Whether the window is open.
     pub(super) fn is_open(&self) -> bool {
-        self.open.is_some()
+        self.open
     }
 
-    /// Whether `key` has opened what `address` protects; the fault to record if not.
-    pub(super) fn check(&self, key: Key, address: u16) -> Result<(), Fault> {
-        if self.open == Some(key) {
-            Ok(())
-        } else {
-            Err(Fault::Protected { address })
-        }
+    /// Whether the register at `address` is open; the fault to record if not.
+    pub(super) fn check(&self, address: u16) -> Result<(), Fault> {
+        self.open.then_some(()).ok_or(Fault::Protected { address })
     }
 
     /// Takes note of the instructions executed so far, between two instructions.
     pub(super) fn advance(&mut self, instructions: u64) {
-        if self.open.is_some() {
-            let closes_at = *self.closes_at.get_or_insert(instructions + WINDOW_INSTRUCTIONS);
-            if instructions >= closes_at {
-                self.close();
-            }
-        }
-    }
-
-    /// Takes note of an access that is being made.
-    #[inline]
-    pub(super) fn end_by(&mut self, access: Access) {
-        if self.is_open() && self.is_ended_by(access) {
+        if self.open && instructions >= *self.closes_at.get_or_insert(instructions + WINDOW_INSTRUCTIONS) {
             self.close();
         }
     }
 
-    /// Takes note of an access that the next instruction makes, `instructions` having been executed.
-    pub(super) fn end_behind_next(&mut self, access: Access, instructions: u64) {
-        if self.is_ended_by(access) {
-            self.closes_at = Some(instructions + 1);
-        }
-    }
-
-    fn is_ended_by(&self, access: Access) -> bool {
-        self.open == Some(Key::Ioreg) || access == Access::Memory
+    /// Ends the window after the next instruction, `instructions` having been executed.
+    pub(super) fn close_behind_next(&mut self, instructions: u64) {
+        self.closes_at = Some(instructions + 1);
     }
 
     /// Ends the window.
+    #[inline]
     pub(super) fn close(&mut self) {
-        self.open = None;
-        self.closes_at = None;
+        if self.open {
+            *self = Self::default();
+        }
     }
 }
 
-/// First address.
+/// First and last address of CLKCTRL.
 pub(super) const CLKCTRL: u16 = 0x0060;
-/// Addresses from the first on.
-pub(super) const CLKCTRL_LEN: u16 = 0x20;
+pub(super) const CLKCTRL_END: u16 = 0x007f;
 
 const MCLKCTRLA: u16 = CLKCTRL;
 const MCLKCTRLB: u16 = CLKCTRL + 1;
-const MCLKLOCK: u16 = CLKCTRL + 2;
 const MCLKSTATUS: u16 = CLKCTRL + 3;
 /// MCLKCTRLB: prescaler on.
 const PEN: u8 = 0x01;
-/// MCLKLOCK: registers locked until the next reset.
-const LOCKEN: u8 = 0x01;
 /// MCLKSTATUS: the 20 MHz oscillator is stable.
 const OSC20MS: u8 = 0x10;
 /// MCLKCTRLB out of reset: prescaler on, division by 6.
@@ -190,7 +140,6 @@ const MCLKCTRLB_RESET: u8 = 0x11;
 #[derive(Debug, Clone)]
 pub(super) struct Clkctrl {
     mclkctrlb: u8,
-    lock: u8,
     ticks_per_cycle: u64,
 }
 
@@ -198,7 +147,6 @@ impl Default for Clkctrl {
     fn default() -> Self {
         Self {
             mclkctrlb: MCLKCTRLB_RESET,
-            lock: 0,
             ticks_per_cycle: 6,
         }
     }
@@ -214,27 +162,22 @@ impl Clkctrl {
         match address {
             MCLKCTRLA => Some(0),
             MCLKCTRLB => Some(self.mclkctrlb),
-            MCLKLOCK => Some(self.lock),
             MCLKSTATUS => Some(OSC20MS),
             _ => None,
         }
     }
 
     pub(super) fn write(&mut self, address: u16, value: u8, ccp: &Ccp) -> Result<(), Fault> {
-        if !matches!(address, MCLKCTRLA | MCLKCTRLB | MCLKLOCK) {
+        if !matches!(address, MCLKCTRLA | MCLKCTRLB) {
             return Err(Fault::Write { address, value });
         }
-        ccp.check(Key::Ioreg, address)?;
-        if self.lock & LOCKEN != 0 {
-            return Err(Fault::Protected { address });
-        }
+        ccp.check(address)?;
         match address {
             MCLKCTRLA if value != 0 => return Err(Fault::Unsupported { address, value }),
             MCLKCTRLB => {
                 self.ticks_per_cycle = division(value).ok_or(Fault::Unsupported { address, value })?;
                 self.mclkctrlb = value & 0x1f;
             }
-            MCLKLOCK => self.lock = value & LOCKEN,
             _ => {}
         }
         Ok(())
@@ -257,10 +200,9 @@ fn division(mclkctrlb: u8) -> Option<u64> {
     }
 }
 
-/// First address.
+/// First and last address of RSTCTRL.
 pub(super) const RSTCTRL: u16 = 0x0040;
-/// Addresses from the first on.
-pub(super) const RSTCTRL_LEN: u16 = 2;
+pub(super) const RSTCTRL_END: u16 = 0x0041;
 
 const RSTFR: u16 = RSTCTRL;
 const SWRR: u16 = RSTCTRL + 1;
@@ -307,7 +249,7 @@ impl Rstctrl {
         match address {
             RSTFR => self.flags &= !value,
             SWRR => {
-                ccp.check(Key::Ioreg, address)?;
+                ccp.check(address)?;
                 self.requested = value & 1 != 0;
             }
             _ => return Err(Fault::Write { address, value }),
@@ -362,21 +304,13 @@ impl Slpctrl {
     }
 }
 
-/// First address.
+/// First and last address of CPUINT.
 pub(super) const CPUINT: u16 = 0x0110;
-/// Addresses from the first on.
-pub(super) const CPUINT_LEN: u16 = 4;
+pub(super) const CPUINT_END: u16 = 0x0113;
 
 const CPUINT_CTRLA: u16 = CPUINT;
 const CPUINT_STATUS: u16 = CPUINT + 1;
-const LVL0PRI: u16 = CPUINT + 2;
 const LVL1VEC: u16 = CPUINT + 3;
-/// CPUINT_CTRLA: round robin among level 0.
-const LVL0RR: u8 = 0x01;
-/// CPUINT_CTRLA: compact vector table.
-const CVT: u8 = 0x20;
-/// CPUINT_CTRLA: vectors in the boot section. The whole flash is boot section here, so the bit changes nothing.
-const IVSEL: u8 = 0x40;
 /// CPUINT_STATUS: a level 0 handler runs.
 const LVL0EX: u8 = 0x01;
 /// CPUINT_STATUS: a level 1 handler runs.
@@ -385,44 +319,35 @@ const LVL1EX: u8 = 0x02;
 /// An interrupt that is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Accepted {
-    /// Vector number of its source.
-    pub(super) source: u8,
-    /// Entry of the vector table to which it jumps.
-    pub(super) entry: u8,
+    /// Vector number.
+    pub(super) vector: u8,
     level_one: bool,
 }
 
-/// Registers of CPUINT: two levels, one vector on level 1, order within level 0 by vector number.
+/// Registers of CPUINT: two levels, one vector on level 1, order within level 0 by vector number. Neither its round
+/// robin nor its compact vector table is emulated.
 ///
 /// Source: tinyAVR 1-series data sheet (DS40002287), chapter CPUINT.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Cpuint {
-    ctrla: u8,
     status: u8,
-    level0_priority: u8,
     level1_vector: u8,
 }
 
 impl Cpuint {
     pub(super) fn read(&self, address: u16) -> Option<u8> {
         match address {
-            CPUINT_CTRLA => Some(self.ctrla),
+            CPUINT_CTRLA => Some(0),
             CPUINT_STATUS => Some(self.status),
-            LVL0PRI => Some(self.level0_priority),
             LVL1VEC => Some(self.level1_vector),
             _ => None,
         }
     }
 
-    pub(super) fn write(&mut self, address: u16, value: u8, ccp: &Ccp) -> Result<(), Fault> {
+    pub(super) fn write(&mut self, address: u16, value: u8) -> Result<(), Fault> {
         match address {
-            CPUINT_CTRLA => {
-                if (value ^ self.ctrla) & (CVT | IVSEL) != 0 {
-                    ccp.check(Key::Ioreg, address)?;
-                }
-                self.ctrla = value & (LVL0RR | CVT | IVSEL);
-            }
-            LVL0PRI => self.level0_priority = value,
+            CPUINT_CTRLA if value == 0 => {}
+            CPUINT_CTRLA => return Err(Fault::Unsupported { address, value }),
             LVL1VEC => self.level1_vector = value,
             _ => return Err(Fault::Write { address, value }),
         }
@@ -436,42 +361,26 @@ impl Cpuint {
         }
         let level1 = 1_u32.checked_shl(u32::from(self.level1_vector)).unwrap_or(0) & !1;
         if requests & level1 != 0 {
-            return Some(self.accepted(self.level1_vector, true));
+            let vector = self.level1_vector;
+            return Some(Accepted {
+                vector,
+                level_one: true,
+            });
         }
         let level0 = requests & !level1;
         if level0 == 0 || self.status & LVL0EX != 0 {
             return None;
         }
-        // LVL0PRI names the vector of least priority; the numbers behind it come first
-        let behind = level0 & u32::MAX.checked_shl(u32::from(self.level0_priority) + 1).unwrap_or(0);
-        let from = if behind == 0 { level0 } else { behind };
-        let vector = u8::try_from(from.trailing_zeros()).ok()?;
-        Some(self.accepted(vector, false))
-    }
-
-    fn accepted(&self, source: u8, level_one: bool) -> Accepted {
-        let entry = match (self.ctrla & CVT != 0, level_one) {
-            (false, _) => source,
-            (true, true) => 2,
-            (true, false) => 3,
-        };
-        Accepted {
-            source,
-            entry,
-            level_one,
-        }
+        let vector = u8::try_from(level0.trailing_zeros()).ok()?;
+        Some(Accepted {
+            vector,
+            level_one: false,
+        })
     }
 
     /// A handler starts.
     pub(super) fn enter(&mut self, accepted: Accepted) {
-        if accepted.level_one {
-            self.status |= LVL1EX;
-        } else {
-            self.status |= LVL0EX;
-            if self.ctrla & LVL0RR != 0 {
-                self.level0_priority = accepted.source;
-            }
-        }
+        self.status |= if accepted.level_one { LVL1EX } else { LVL0EX };
     }
 
     /// RETI: the handler of the highest running level ends.
@@ -491,38 +400,16 @@ mod tests {
     #[test]
     fn the_window_is_four_instructions() {
         let mut ccp = Ccp::default();
-        assert!(ccp.check(Key::Ioreg, 0x61).is_err());
+        assert!(ccp.check(0x61).is_err());
         ccp.write(KEY_IOREG);
         for executed in 100..104 {
             ccp.advance(executed);
-            assert!(ccp.check(Key::Ioreg, 0x61).is_ok(), "after {executed}");
-            assert!(ccp.check(Key::Spm, 0x1000).is_err());
+            assert!(ccp.check(0x61).is_ok(), "after {executed}");
         }
         ccp.advance(104);
         assert!(!ccp.is_open());
         ccp.write(0x55);
         assert!(!ccp.is_open());
-    }
-
-    #[test]
-    fn a_store_ends_the_window_of_registers_and_a_memory_access_both() {
-        for (key, access, open) in [
-            (KEY_IOREG, Access::Store, false),
-            (KEY_IOREG, Access::Memory, false),
-            (KEY_SPM, Access::Store, true),
-            (KEY_SPM, Access::Memory, false),
-        ] {
-            let mut now = Ccp::default();
-            now.write(key);
-            let mut next = now.clone();
-            now.end_by(access);
-            assert_eq!(now.is_open(), open, "{key:#x}, {access:?}");
-            next.advance(100);
-            next.end_behind_next(access, 100);
-            assert!(next.is_open());
-            next.advance(101);
-            assert_eq!(next.is_open(), open, "{key:#x}, {access:?}, next");
-        }
     }
 
     #[test]
@@ -549,8 +436,6 @@ mod tests {
         }
         clock.write(MCLKCTRLB, 0, &ccp).unwrap();
         assert_eq!(clock.ticks_per_cycle(), 1);
-        clock.write(MCLKLOCK, 1, &ccp).unwrap();
-        assert!(clock.write(MCLKCTRLB, 1, &ccp).is_err());
         assert!(Clkctrl::default().write(MCLKCTRLB, 0, &Ccp::default()).is_err());
     }
 
@@ -559,13 +444,13 @@ mod tests {
     const TWI: u32 = 1 << 19;
 
     fn source(cpuint: &Cpuint, requests: u32) -> Option<u8> {
-        cpuint.next(requests).map(|a| a.source)
+        cpuint.next(requests).map(|a| a.vector)
     }
 
     #[test]
     fn level_one_preempts_level_zero_and_nothing_preempts_level_one() {
         let mut cpuint = Cpuint::default();
-        cpuint.write(LVL1VEC, 3, &Ccp::default()).unwrap();
+        cpuint.write(LVL1VEC, 3).unwrap();
         let twi = cpuint.next(TWI).unwrap();
         cpuint.enter(twi);
         assert_eq!(source(&cpuint, TIMER | TWI), None);
@@ -578,34 +463,5 @@ mod tests {
         assert_eq!(cpuint.read(CPUINT_STATUS), Some(1));
         cpuint.leave();
         assert_eq!(source(&cpuint, TWI | TIMER), Some(8));
-    }
-
-    #[test]
-    fn least_priority_can_be_moved_and_goes_round() {
-        let mut cpuint = Cpuint::default();
-        assert_eq!(source(&cpuint, PORT | TIMER | TWI), Some(3));
-        cpuint.write(LVL0PRI, 3, &Ccp::default()).unwrap();
-        assert_eq!(source(&cpuint, PORT | TIMER | TWI), Some(8));
-        cpuint.write(CPUINT_CTRLA, LVL0RR, &Ccp::default()).unwrap();
-        let mut taken = vec![];
-        for _ in 0..4 {
-            let next = cpuint.next(PORT | TIMER | TWI).unwrap();
-            taken.push(next.source);
-            cpuint.enter(next);
-            cpuint.leave();
-        }
-        assert_eq!(taken, [8, 19, 3, 8]);
-    }
-
-    #[test]
-    fn the_compact_table_has_one_entry_a_level() {
-        let mut ccp = Ccp::default();
-        let mut cpuint = Cpuint::default();
-        assert!(cpuint.write(CPUINT_CTRLA, CVT, &ccp).is_err());
-        ccp.write(0xd8);
-        cpuint.write(CPUINT_CTRLA, CVT, &ccp).unwrap();
-        cpuint.write(LVL1VEC, 3, &ccp).unwrap();
-        assert_eq!(cpuint.next(PORT).unwrap().entry, 2);
-        assert_eq!(cpuint.next(TWI).unwrap().entry, 3);
     }
 }

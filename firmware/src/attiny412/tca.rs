@@ -2,10 +2,9 @@
 
 use super::system::Fault;
 
-/// First address.
+/// First and last address.
 pub(super) const BASE: u16 = 0x0a00;
-/// Addresses from the first on.
-pub(super) const LEN: u16 = 0x28;
+pub(super) const END: u16 = 0x0a27;
 /// Interrupt vector of the overflow.
 pub(super) const VECTOR: u8 = 8;
 

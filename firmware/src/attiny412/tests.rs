@@ -119,7 +119,6 @@ fn an_access_behind_the_key_closes_the_window() {
     assert_eq!(behind(&[0x9a1b]), protected, "sbi VPORTA.INTFLAGS, 3");
     assert_eq!(behind(&[0x981b]), protected, "cbi VPORTA.INTFLAGS, 3");
     assert_eq!(behind(&load(2, 0x1400)), protected, "a load of EEPROM");
-    assert_eq!(behind(&load(2, 0x1002)), protected, "a load of NVMCTRL.STATUS");
     assert_eq!(behind(&load(2, 0x8000)), protected, "a load of mapped flash");
     assert_eq!(behind(&[0x95c8]), protected, "lpm");
 }
@@ -127,7 +126,7 @@ fn an_access_behind_the_key_closes_the_window() {
 /// A load of three cycles, and one more from EEPROM, mapped flash or signature.
 #[test]
 fn memories_beside_sram_have_a_wait_state() {
-    for (address, cycles) in [(0x3f00, 3), (0x1002, 3), (0x1400, 4), (0x8000, 4), (0x1100, 4)] {
+    for (address, cycles) in [(0x3f00, 3), (0x1400, 4), (0x8000, 4), (0x1100, 4)] {
         let mut words = load(0, address).to_vec();
         words.push(STAY);
         let mut device = device(&words);
@@ -258,40 +257,6 @@ fn no_interrupt_comes_between_a_key_and_its_write() {
     };
     assert_eq!(taken_after(0), Some((1, true)));
     assert_eq!(taken_after(0xd8), Some((3, true)));
-}
-
-/// A level 0 handler that never ends keeps other level 0 interrupts out, and lets level 1 in.
-#[test]
-fn levels_decide_who_preempts() {
-    let mut main = full_speed().to_vec();
-    main.extend(store(0x0a26, 99)); // TCA0.PER
-    main.extend(store(0x0a27, 0));
-    main.extend(store(0x0a0a, 1)); // overflow interrupt
-    main.extend(store(0x0a00, 1)); // run
-    main.extend(store(0x0413, 1)); // PORTA.PIN3CTRL: both edges
-    main.extend([NOP, NOP, NOP, SEI, STAY]);
-    let level_one = main.len();
-    let priority = store(0x0113, 3); // CPUINT.LVL1VEC
-    let run = |preempts: bool| {
-        let mut main = main.clone();
-        if preempts {
-            main.splice(level_one - 5..level_one - 2, priority);
-        }
-        let words = with_vectors(&[(8, 60), (3, 64)], &main);
-        let words = place(words, 60, &[0x9543, STAY]); // timer: inc r20, stay
-        let words = place(words, 64, &[0x9a1b, 0x9553, RETI]); // pin: clear, inc r21, reti
-        let mut device = device(&words);
-        let [.., timer, pin] = device.core().registers[..22] else {
-            unreachable!()
-        };
-        device.run_until(2000);
-        device.set_clock(true);
-        device.run_until(3000);
-        let after = &device.core().registers;
-        (after[20].wrapping_sub(timer), after[21].wrapping_sub(pin))
-    };
-    assert_eq!(run(false), (1, 0));
-    assert_eq!(run(true), (1, 1));
 }
 
 #[test]

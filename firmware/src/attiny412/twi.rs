@@ -2,10 +2,9 @@
 
 use super::system::Fault;
 
-/// First address of the client's registers.
+/// First and last address.
 pub(super) const BASE: u16 = 0x0810;
-/// Addresses from the first on.
-pub(super) const LEN: u16 = 0x0f;
+pub(super) const END: u16 = 0x081e;
 /// Interrupt vector.
 pub(super) const VECTOR: u8 = 19;
 
@@ -15,10 +14,10 @@ const SCTRLB: u16 = BASE + 0x0a;
 const SSTATUS: u16 = BASE + 0x0b;
 const SADDR: u16 = BASE + 0x0c;
 const SDATA: u16 = BASE + 0x0d;
-const SADDRMASK: u16 = BASE + 0x0e;
 
 // SCTRLA
 const ENABLE: u8 = 0x01;
+/// Smart mode and all addresses; neither is emulated, nor are a second address and the general call.
 const SMEN: u8 = 0x02;
 const PMEN: u8 = 0x04;
 const PIEN: u8 = 0x20;
@@ -38,8 +37,6 @@ const RXACK: u8 = 0x10;
 const CLKHOLD: u8 = 0x20;
 const APIF: u8 = 0x40;
 const DIF: u8 = 0x80;
-/// SADDRMASK: the mask is a second address.
-const ADDREN: u8 = 0x01;
 
 /// Where the client is in a transaction. In the `Held` phases it keeps SCL low until the program answers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -72,7 +69,6 @@ pub(super) struct Twi {
     /// SSTATUS without CLKHOLD.
     status: u8,
     address: u8,
-    mask: u8,
     data: u8,
     phase: Phase,
     acknowledged: bool,
@@ -113,24 +109,13 @@ impl Twi {
             return false;
         }
         self.status &= !(COLL | DIF);
-        if !self.matches(byte) {
+        if byte >> 1 != self.address >> 1 {
             return false;
         }
         self.data = byte;
         self.phase = Phase::AddressHeld;
         self.status = self.status & !DIR | AP | APIF | if byte & 1 == 0 { 0 } else { DIR };
         true
-    }
-
-    fn matches(&self, byte: u8) -> bool {
-        let (heard, own, mask) = (byte >> 1, self.address >> 1, self.mask >> 1);
-        let general_call = byte == 0 && self.address & 1 != 0;
-        let by_address = if self.mask & ADDREN != 0 {
-            heard == own || heard == mask
-        } else {
-            (heard ^ own) & !mask == 0
-        };
-        self.sctrla & PMEN != 0 || general_call || by_address
     }
 
     /// A byte of the master's write.
@@ -185,14 +170,9 @@ impl Twi {
             SSTATUS => Some(self.status | if self.holds() { CLKHOLD } else { 0 }),
             SADDR => Some(self.address),
             SDATA => {
-                let data = self.data;
                 self.status &= !DIF;
-                if self.sctrla & SMEN != 0 && self.phase == Phase::ByteHeld {
-                    self.respond();
-                }
-                Some(data)
+                Some(self.data)
             }
-            SADDRMASK => Some(self.mask),
             _ => None,
         }
     }
@@ -200,8 +180,10 @@ impl Twi {
     pub(super) fn write(&mut self, address: u16, value: u8) -> Result<(), Fault> {
         match address {
             CTRLA => self.ctrla = value & 0x1e,
+            SCTRLA if value & (SMEN | PMEN) != 0 => return Err(Fault::Unsupported { address, value }),
+            SADDR if value & 1 != 0 => return Err(Fault::Unsupported { address, value }),
             SCTRLA => {
-                self.sctrla = value & (ENABLE | SMEN | PMEN | PIEN | APIEN | DIEN);
+                self.sctrla = value & (ENABLE | PIEN | APIEN | DIEN);
                 if value & ENABLE == 0 {
                     self.phase = Phase::Idle;
                 }
@@ -215,11 +197,7 @@ impl Twi {
             SDATA => {
                 self.data = value;
                 self.status &= !DIF;
-                if self.sctrla & SMEN != 0 && self.phase == Phase::LoadHeld {
-                    self.respond();
-                }
             }
-            SADDRMASK => self.mask = value,
             _ => return Err(Fault::Write { address, value }),
         }
         Ok(())
@@ -352,40 +330,15 @@ mod tests {
     }
 
     #[test]
-    fn smart_mode_answers_by_the_data_register() {
+    fn only_its_own_address_is_answered_while_it_is_enabled() {
         let mut twi = client();
-        twi.write(SCTRLA, ENABLE | SMEN).unwrap();
-        twi.hear_address(40 << 1);
-        twi.write(SSTATUS, APIF).unwrap();
-        assert!(twi.take_acknowledge());
-        twi.hear_byte(7);
-        assert_eq!(twi.read(SDATA), Some(7));
-        assert!(twi.take_acknowledge() && !twi.holds());
-        twi.hear_address(40 << 1 | 1);
-        twi.write(SCTRLB, RESPONSE).unwrap();
-        twi.write(SDATA, 3).unwrap();
-        assert!(twi.sends());
-    }
-
-    #[test]
-    fn masks_second_addresses_general_calls_and_all_addresses() {
-        let mut twi = client();
-        twi.write(SADDRMASK, 3 << 1).unwrap();
-        assert_eq!(
-            (39..46).filter(|a| twi.hear_address(a << 1)).collect::<Vec<_>>(),
-            [40, 41, 42, 43]
-        );
-        twi.write(SADDRMASK, 99 << 1 | ADDREN).unwrap();
-        assert_eq!(
-            (0..128).filter(|a| twi.hear_address(a << 1)).collect::<Vec<_>>(),
-            [40, 99]
-        );
-        twi.write(SADDR, 40 << 1 | 1).unwrap();
-        assert!(twi.hear_address(0) && !twi.hear_address(1));
-        twi.write(SCTRLA, ENABLE | PMEN).unwrap();
-        assert!(twi.hear_address(77 << 1));
+        let answered = |twi: &mut Twi| (0..128).filter(|a| twi.hear_address(a << 1)).collect::<Vec<_>>();
+        assert_eq!(answered(&mut twi), [40]);
+        for (address, value) in [(SCTRLA, ENABLE | SMEN), (SCTRLA, ENABLE | PMEN), (SADDR, 1)] {
+            assert_eq!(twi.write(address, value), Err(Fault::Unsupported { address, value }));
+        }
         twi.write(SCTRLA, 0).unwrap();
-        assert!(!twi.hear_address(40 << 1));
+        assert!(answered(&mut twi).is_empty());
     }
 
     #[test]

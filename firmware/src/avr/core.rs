@@ -498,7 +498,8 @@ impl Core {
     }
 }
 
-// Arithmetic: every function returns the result and the new SREG; flags an instruction does not affect keep their value.
+// Arithmetic: every function returns the result and the new SREG; flags an instruction does not affect keep their
+// value.
 
 /// Bit 7 of a byte as 0 or 1.
 const fn msb(byte: u8) -> u8 {

@@ -1,5 +1,5 @@
-//! Emulated cells on their bus and clock: whatever a master does, each cell ends where the behavioural cell says it should;
-//! and cells that something is wrong with stay out of the way, and can be told.
+//! Emulated cells on their bus and clock: whatever a master does, each cell ends where the behavioural cell says it
+//! should; and cells that something is wrong with stay out of the way, and can be told.
 
 use crate::build::{Substitution, changed, compiler};
 use crate::conformance::FAST;
@@ -89,59 +89,6 @@ fn sizes_out_of_range_are_refused() {
     };
     let needed = "`sample_delay_s` = 0.000014 is outside [0, 1/edge_hz) in whole ticks of 50 ns";
     assert_eq!(said(array.clock(late, &mut [0; 3])), needed);
-}
-
-/// Edges run on while one cell after another is seeded anew. The others never miss one, and the new sequence of each
-/// starts at one of the edges that come during its write.
-#[test]
-fn cells_can_be_seeded_while_clocked() {
-    const CELLS: usize = 20;
-    let (mut array, mut cells) = seeded(CELLS, CellMode::Analog);
-    array.run_clock(FAST).unwrap();
-    for (k, seed) in (0..CELLS).zip(200..) {
-        // other phases of edge and bus for each cell
-        array.idle(1e-3 + 0.7e-6 * k as f64).unwrap();
-        let codes = array.codes();
-        assert_eq!(codes, expected(&mut cells, codes.len() / CELLS));
-        let pair = CellMode::Analog.pair(seed);
-        array.write(cells[k].address(), &pair).unwrap();
-        let codes = array.codes();
-        let rows = codes.len() / CELLS;
-        // three bytes, 27 bits and more at 2.5 µs a bit, an edge every 13.9 µs
-        assert!(rows >= 4, "only {rows} edges came during a write");
-        let seeded_at = |taken: usize| {
-            let mut trial = cells.clone();
-            let mut all = expected(&mut trial, taken);
-            trial[k].receive(&pair);
-            all.extend(expected(&mut trial, rows - taken));
-            (all == codes).then_some(trial)
-        };
-        cells = (0..=rows)
-            .rev()
-            .find_map(seeded_at)
-            .expect("a place of the seed that explains the codes");
-    }
-    array.stop_clock();
-    let codes = array.codes();
-    assert_eq!(codes, expected(&mut cells, codes.len() / CELLS));
-    assert_agrees(&mut array, &mut cells);
-}
-
-/// The read-back tells a cell that lost its seed, and the cell does not drive until it has a new one.
-#[test]
-fn a_brown_out_while_clocked_silences_one_cell() {
-    let (mut array, mut cells) = seeded(10, CellMode::Binary);
-    assert_eq!(clocked(&mut array, 5), expected(&mut cells, 5));
-    array.cell_mut(12).unwrap().reset(ResetCause::BrownOut);
-    cells[4] = Cell::new(12).unwrap();
-    let codes = clocked(&mut array, 500);
-    assert_eq!(codes, expected(&mut cells, 500));
-    assert!(codes.iter().skip(4).step_by(10).all(|code| *code == NEUTRAL_CODE));
-    assert_eq!(state(&mut array, 12)[0], 0xff);
-    assert_agrees(&mut array, &mut cells);
-    array.write(12, &CellMode::Binary.pair(12)).unwrap();
-    cells[4].receive(&CellMode::Binary.pair(12));
-    assert_agrees(&mut array, &mut cells);
 }
 
 #[test]
@@ -259,39 +206,6 @@ fn a_cell_that_holds_the_clock_is_reported() {
     assert_eq!(said(array.read(9, &mut [0])), stuck);
     array.cell_mut(9).unwrap().reset(ResetCause::External);
     assert_eq!(said(array.write(50, &[])), "no cell acknowledges address 50");
-}
-
-/// A program that gathers in SRAM every flag that TWI0.SSTATUS ever shows.
-#[test]
-fn an_illegal_stop_is_a_bus_error() {
-    const BUSERR: u8 = 0x04;
-    let watch = image(&[
-        0xe001, //         ldi  r16, 0x01
-        0x9300, 0x0819, // sts  TWI0.SCTRLA, r16
-        0x2711, //         clr  r17
-        0x9100, 0x081b, // lds  r16, TWI0.SSTATUS
-        0x2b10, //         or   r17, r16
-        0x9310, 0x3f00, // sts  0x3f00, r17
-        0xcffa, //         rjmp .-12
-    ]);
-    for (events, is_error) in [
-        (&[BusEvent::Start, BusEvent::Write(50 << 1), BusEvent::Stop][..], false),
-        (&[BusEvent::Start, BusEvent::Stop], true),
-        (
-            &[
-                BusEvent::Start,
-                BusEvent::Write(50 << 1),
-                BusEvent::Bits(3),
-                BusEvent::Stop,
-            ],
-            true,
-        ),
-    ] {
-        let mut array = Array::new(1, &watch).unwrap();
-        array.transact(events).unwrap();
-        array.idle(1e-3).unwrap();
-        assert_eq!(array.cells()[0].sram()[0] & BUSERR != 0, is_error, "{events:?}");
-    }
 }
 
 /// Two cells with the same address answer together: the bus carries the AND of what they send, and the overruled one

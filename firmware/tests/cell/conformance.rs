@@ -1,5 +1,5 @@
-//! Emulated cells beside behavioural ones: same bus traffic, whatever it is, same edges, same codes, acknowledgements and
-//! replies.
+//! Emulated cells beside behavioural ones: same bus traffic, whatever it is, same edges, same codes, acknowledgements
+//! and replies.
 
 use proptest::prelude::*;
 use spts_firmware::attiny412::ResetCause;

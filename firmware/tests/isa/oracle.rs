@@ -3,9 +3,10 @@
 //! `oracle/reference.py` runs the programs of [`program`] on yasimavr's ATtiny402 and prints each final state.
 //! `oracle/states.txt` holds the digests of those states.
 //!
-//! Every AVR with SRAM at 0x3F00 and four general-purpose I/O registers at 0x1C executes the random programs alike. Data
-//! goes to 0x3F00…0x3FBF, the stack grows down from 0x3FFF; loads and stores stay within them, since parts differ
-//! outside. All jumps go forward and all calls to subroutines in front, so that every program ends, at a jump to itself.
+//! Every AVR with SRAM at 0x3F00 and four general-purpose I/O registers at 0x1C executes the random programs alike.
+//! Data goes to 0x3F00…0x3FBF, the stack grows down from 0x3FFF; loads and stores stay within them, since parts differ
+//! outside. All jumps go forward and all calls to subroutines in front, so that every program ends, at a jump to
+//! itself.
 
 use crate::asm::{self, bit, branch, displaced, flag, fractional, io, io_bit, movw, muls, one, relative, rk, rr, word};
 use crate::machine::Machine;
