@@ -1,7 +1,6 @@
 //! Prediction of new sessions: spans for their values, and whether these hold.
 
-use super::statistics::mean;
-use super::statistics::sd;
+use super::statistics::{mean, sd};
 use serde::Serialize;
 use spts_recon::statistics::student_t;
 

@@ -1,9 +1,7 @@
 //! Estimates the gains of a skin's taxels from raster presses of objects that the simulation knows.
 
-use super::CalibrationStudy;
-use super::SessionEstimates;
-use super::read;
 use super::statistics::middle;
+use super::{CalibrationStudy, SessionEstimates, read};
 use serde::Serialize;
 use spts::data::DataError;
 use spts::progress::Progress;

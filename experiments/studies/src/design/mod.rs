@@ -18,9 +18,9 @@ mod answer;
 mod check;
 mod objects;
 mod search;
-mod text;
 mod wire;
 
+pub use answer::counted;
 pub use check::{CheckReport, CheckedQuantity, DesignCheck};
 pub use objects::DesignObjects;
 pub use search::OUTSIDE;
