@@ -70,15 +70,13 @@ impl BudgetStudy {
             seed: self.seed,
         };
         let scenes = objects.iter().map(|object| setup.scene(object, &size, false));
-        let scenes = scenes
-            .collect::<Result<Vec<_>, TwinError>>()
-            .map_err(Refusal::from_error)?;
+        let scenes = scenes.collect::<Result<Vec<_>, TwinError>>()?;
         let Some(first) = scenes.first() else {
             return Err(Refusal::new("`--objects` names no object"));
         };
         let profile = first.chain().profile().clone();
         let hashes = scenes.iter().map(spts::Scene::hash).collect::<Result<Vec<_>, _>>();
-        let hash = combined_hash(&hashes.map_err(TwinError::from).map_err(Refusal::from_error)?);
+        let hash = combined_hash(&hashes.map_err(TwinError::from)?);
         let items = items(&profile);
         let variants = Variants::new(&items);
         progress.stage("pressing", Some(2 * objects.len() * size.presses()));
@@ -91,10 +89,7 @@ impl BudgetStudy {
             items: &items,
             keys: &keys,
             seed: self.seed,
-            pressed: [
-                columns.map_err(Refusal::from_error)?,
-                layer.map_err(Refusal::from_error)?,
-            ],
+            pressed: [columns?, layer?],
         };
         let (scores, scan) = chains.score(&variants, progress)?;
         let taxels = self.side * self.side;
@@ -736,17 +731,14 @@ impl LearnedSkin {
         let objects = pressed
             .par_iter()
             .map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol))
-            .collect::<Result<Vec<_>, TwinError>>()
-            .map_err(Refusal::from_error)?;
+            .collect::<Result<Vec<_>, TwinError>>()?;
         let sessions: Vec<ScoredSession> = objects.iter().map(|o| o.session(protocol)).collect();
         let streams = Streams::new(seed);
         let learned = (0..size.sessions).into_par_iter().map(|session| {
             let streams = streams.child("learning", session as u64);
             Learned::learn(&sessions, &size.learning, layout.cols(), streams)
         });
-        let learned = learned
-            .collect::<Result<Vec<_>, LearnError>>()
-            .map_err(Refusal::from_error)?;
+        let learned = learned.collect::<Result<Vec<_>, LearnError>>()?;
         Ok(Self {
             chain,
             learned,
@@ -780,11 +772,11 @@ impl LearnedSkin {
 /// Chain of `scene` without the transducer's parts `off`.
 fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, Refusal> {
     let config = ChainConfig {
-        transducer_parameters: without_parts(off).map_err(Refusal::from_error)?,
+        transducer_parameters: without_parts(off)?,
         ..scene.config().chain()
     };
     let chain = Chain::new(&config, scene.skin(), scene.seed(), Path::new(""));
-    Ok(chain.map_err(TwinError::from).map_err(Refusal::from_error)?)
+    Ok(chain.map_err(TwinError::from)?)
 }
 
 impl LearnedObject {
@@ -904,7 +896,7 @@ impl<'a> PressScorer<'a> {
             skin,
             keys,
             votes: size.votes,
-            decoders: decoders.collect::<Result<_, _>>().map_err(Refusal::from_error)?,
+            decoders: decoders.collect::<Result<_, _>>()?,
         })
     }
 
@@ -912,18 +904,16 @@ impl<'a> PressScorer<'a> {
     /// on object and session alone, so that two profiles are compared under the same noise.
     fn score(&self, profile: &Profile, object: usize, session: usize) -> Result<Vec<PressScores>, Refusal> {
         let (skin, object) = (self.skin, &self.skin.objects[object]);
-        let chain = skin.chain.with_profile(profile.clone()).map_err(Refusal::from_error)?;
+        let chain = skin.chain.with_profile(profile.clone())?;
         let frames = skin.protocol.first_frame + skin.protocol.frames;
         let mut sources = [object.sources[session].clone()];
         let taxels = skin.learned[session].dictionary.atoms.nrows();
         let duration_s = (frames * taxels) as f64 / chain.sample_rate_hz();
-        let recording = chain
-            .record_sources(
-                &mut sources,
-                duration_s,
-                &compressive_acquisition(object.label, session),
-            )
-            .map_err(Refusal::from_error)?;
+        let recording = chain.record_sources(
+            &mut sources,
+            duration_s,
+            &compressive_acquisition(object.label, session),
+        )?;
         let per_frame = recording.measurements_per_frame();
         let (idle_v, vote) = (idle_mean(&recording, 0), skin.protocol.vote);
         let [first, end] =
@@ -936,10 +926,7 @@ impl<'a> PressScorer<'a> {
                     // vote by vote, because the weights of a whole press on a large skin fill the memory
                     let press = Press::within(&recording, 0, start..start + vote * m, idle_v);
                     let windows: Vec<Window<'_>> = press.windows(0..press.len(), m, m).map(|(_, w)| w).collect();
-                    let answers = scorer
-                        .answers(&windows)
-                        .map_err(ScoreError::from)
-                        .map_err(Refusal::from_error)?;
+                    let answers = scorer.answers(&windows).map_err(ScoreError::from)?;
                     for answer in &answers {
                         for (tally, truth) in tallies.iter_mut().zip(&object.masks) {
                             tally.image(&answer.image, truth);

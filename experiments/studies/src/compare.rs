@@ -218,7 +218,7 @@ impl CompareStudy<'_> {
             progress.end();
             scored
         });
-        let curves = scored.transpose().map_err(Refusal::from_error)?;
+        let curves = scored.transpose()?;
         Ok(CompareReport {
             statistics: statistics(&compared),
             not_modelled: not_modelled(&compared),
@@ -677,7 +677,7 @@ pub fn replay(
     for (block, recorded) in anew {
         all[block] = recorded;
     }
-    Ok(real.with_blocks(all).map_err(Refusal::from_error)?)
+    Ok(real.with_blocks(all)?)
 }
 
 fn record_again(

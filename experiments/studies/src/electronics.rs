@@ -96,7 +96,7 @@ impl ElectronicsStudy {
             remedied(&self.amplifier(on_bus)?, taxels, self.sub_array, remedy, &setting)
         });
         let ways = ways.collect::<Result<_, spts_models::ConfigError>>();
-        Ok(ways.map_err(Refusal::from_error)?)
+        Ok(ways?)
     }
 
     /// Capacitance of a bus with `taxels` taxels, F.
@@ -219,7 +219,7 @@ impl ElectronicsStudy {
     /// # Errors
     /// As [`ElectronicsStudy::of`].
     pub fn largest_on_one_wire(&self) -> Result<Option<u32>, Refusal> {
-        self.skin.validate().map_err(Refusal::from_error)?;
+        self.skin.validate()?;
         let setting = Setting {
             skin: self.skin,
             adc: self.adc,

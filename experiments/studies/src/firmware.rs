@@ -88,8 +88,8 @@ impl CellTask {
             Self::Pattern(period) => {
                 let mut codes = vec![0; period * cells];
                 Weights::new(WeightMode::Binary, Seeding::Mixed, taxels).fill_codes(0, &mut codes);
-                let patterns = Patterns::new(period, codes).map_err(Refusal::from_error)?;
-                Weights::with_patterns(WeightMode::Binary, patterns).map_err(Refusal::from_error)
+                let patterns = Patterns::new(period, codes)?;
+                Weights::with_patterns(WeightMode::Binary, patterns)
             }
         }
     }
@@ -337,9 +337,8 @@ impl EmulatedCells {
 
     /// What the cell of `taxel` replies after all edges.
     fn reply(&self, weights: &Weights, taxel: usize) -> Result<[u8; REPLY_BYTES], Refusal> {
-        let mut cell = Cell::new(FIRST_ADDRESS.saturating_add(u8::try_from(taxel).unwrap_or(u8::MAX)))
-            .map_err(Refusal::from_error)?;
-        cell.receive(&start_message(weights, taxel, cell.address()).map_err(Refusal::from_error)?);
+        let mut cell = Cell::new(FIRST_ADDRESS.saturating_add(u8::try_from(taxel).unwrap_or(u8::MAX)))?;
+        cell.receive(&start_message(weights, taxel, cell.address())?);
         for _ in 0..self.edges {
             cell.edge();
         }
@@ -432,9 +431,7 @@ impl EmulatedWeights {
         }
         self.left -= rows;
         self.codes.resize(rows * self.cells, 0);
-        self.array
-            .clock(self.clock, &mut self.codes)
-            .map_err(Refusal::from_error)?;
+        self.array.clock(self.clock, &mut self.codes)?;
         self.levels.clear();
         self.levels
             .extend(self.codes.iter().map(|code| self.mode.code_level(*code)));

@@ -111,11 +111,11 @@ impl TouchScene {
         if self.touches == 0 {
             return Ok(Vec::new());
         }
-        let spec = Spec::from_toml(&self.spec(), &toml::Table::new(), ".".as_ref()).map_err(Refusal::from_error)?;
+        let spec = Spec::from_toml(&self.spec(), &toml::Table::new(), ".".as_ref())?;
         let mut maker = Maker::new(&spec);
         (0..self.touches as u64)
             .map(|index| {
-                let row = maker.row(index).map_err(Refusal::from_error)?;
+                let row = maker.row(index)?;
                 let conductance_s = row.conductance().clone();
                 let mut mask = Vec::new();
                 support(conductance_s.values(), SUPPORT_THRESHOLD, &mut mask);
@@ -206,17 +206,14 @@ impl TouchWire {
     /// # Errors
     /// [`Refusal`] if the readout cannot be built.
     pub fn new(profile: &Profile, weights: &Weights, layout: &SkinLayout, device: Streams) -> Result<Self, Refusal> {
-        let profile = profile.with_weights(weights).map_err(Refusal::from_error)?;
-        let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0).map_err(Refusal::from_error)?;
-        let mut untouched =
-            Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols())).map_err(Refusal::from_error)?;
+        let profile = profile.with_weights(weights)?;
+        let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0)?;
+        let mut untouched = Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols()))?;
         readout.seek_row(IDLE_BLOCK, 0);
-        let idle = readout
-            .measure(&mut untouched, IDLE_MEASUREMENTS)
-            .map_err(Refusal::from_error)?;
+        let idle = readout.measure(&mut untouched, IDLE_MEASUREMENTS)?;
         Ok(Self {
             readout,
-            rail_v: profile.rail_v(Mode::Compressive).map_err(Refusal::from_error)?,
+            rail_v: profile.rail_v(Mode::Compressive)?,
             clipped: 0,
             idle_v: idle.iter().sum::<f64>() / IDLE_MEASUREMENTS as f64,
         })
@@ -245,12 +242,9 @@ impl TouchWire {
         first_row: u64,
         measurements: usize,
     ) -> Result<Vec<f64>, Refusal> {
-        let mut source = Constant::new(conductance_s).map_err(Refusal::from_error)?;
+        let mut source = Constant::new(conductance_s)?;
         self.readout.seek_row(number, first_row);
-        Ok(self
-            .readout
-            .measure(&mut source, measurements)
-            .map_err(Refusal::from_error)?)
+        Ok(self.readout.measure(&mut source, measurements)?)
     }
 
     /// Samples of `touch` at the rows `first_row..first_row + measurements`, minus the mean of the untouched skin, V.

@@ -149,7 +149,7 @@ impl DesignStudy {
         Ok(Ground {
             layout,
             electronics: ElectronicsStudy::as_designed()?,
-            prior: SheetPrior::like(images, [layout.rows(), layout.cols()]).map_err(Refusal::from_error)?,
+            prior: SheetPrior::like(images, [layout.rows(), layout.cols()])?,
             learned,
         })
     }

@@ -155,7 +155,7 @@ fn trial(
     for (scene, measured) in scenes.iter().zip(measured) {
         let (phi, volts) = measured.first(rows)?;
         let time = Instant::now();
-        let found = pursuit.recover(&phi, &volts, None).map_err(Refusal::from_error)?;
+        let found = pursuit.recover(&phi, &volts, None)?;
         sum.decode_s += share * time.elapsed().as_secs_f64();
         support(&scene.image_s, SUPPORT_THRESHOLD, &mut truth);
         support(&found.image, SUPPORT_THRESHOLD, &mut mask);

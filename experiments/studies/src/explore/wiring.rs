@@ -145,15 +145,15 @@ fn profile(way: Way, feedback_ohm: f64, available_s: f64, period_s: f64, seeding
     if way == Way::Ideal {
         return Ok(Profile {
             seeding,
-            ..Profile::named("ideal").map_err(Refusal::from_error)?
+            ..Profile::named("ideal")?
         });
     }
-    let built = Profile::named("as_built").map_err(Refusal::from_error)?;
+    let built = Profile::named("as_built")?;
     let mut profile = Profile {
         seeding,
         feedback_ohm,
         sample_rate_hz: 1.0 / period_s,
-        ..Profile::named("as_designed").map_err(Refusal::from_error)?
+        ..Profile::named("as_designed")?
     };
     for effect in ["contact_noise", "late_updates"] {
         let table = built

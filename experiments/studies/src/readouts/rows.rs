@@ -292,13 +292,11 @@ impl WireReadout for DesignedSigns {
         let most = skin.measurements().last().copied().unwrap_or(1);
         let shape = [skin.layout.rows(), skin.layout.cols()];
         let expected = if taxels <= WHOLE_IMAGES {
-            Expected::like(&*skin.prior()?, shape, Tolerances::default()).map_err(Refusal::from_error)?
+            Expected::like(&*skin.prior()?, shape, Tolerances::default())?
         } else {
-            Expected::smooth(shape, SMOOTH_TAXELS).map_err(Refusal::from_error)?
+            Expected::smooth(shape, SMOOTH_TAXELS)?
         };
-        let designed = Separable
-            .design(&RowTask::new(most, &expected))
-            .map_err(Refusal::from_error)?;
+        let designed = Separable.design(&RowTask::new(most, &expected))?;
         let signs = designed
             .view()
             .values()

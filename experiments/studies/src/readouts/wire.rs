@@ -202,7 +202,7 @@ impl HeldWire<'_, '_> {
         let touch = self.touch.conductance_s.values();
         self.session.frame(touch, self.number, taxels, |session| {
             let (profile, layout) = (&session.wire.profile, &session.layout);
-            Ok(Readout::new(profile, Mode::Raster, layout, session.device, 0).map_err(Refusal::from_error)?)
+            Ok(Readout::new(profile, Mode::Raster, layout, session.device, 0)?)
         })
     }
 
@@ -221,11 +221,8 @@ impl HeldWire<'_, '_> {
                 weights: CompressiveWeights::Binary,
                 ..session.wire.profile.clone()
             };
-            let readout = Readout::new(&profile, Mode::Compressive, &session.layout, session.device, 0)
-                .map_err(Refusal::from_error)?;
-            Ok(readout
-                .with_codes(Box::new(rows.clone()))
-                .map_err(Refusal::from_error)?)
+            let readout = Readout::new(&profile, Mode::Compressive, &session.layout, session.device, 0)?;
+            Ok(readout.with_codes(Box::new(rows.clone()))?)
         })
     }
 
@@ -259,13 +256,8 @@ impl HeldWire<'_, '_> {
         let line = |chips: &StoredRows| -> Result<TouchWire, Refusal> {
             // the cells that transmit, whatever their places
             let layout = SkinLayout::new(1, chips.taxels(), published.pitch_m(), published.electrode_m())?;
-            let readout = Readout::new(&session.wire.profile, Mode::Raster, &layout, session.device, 0)
-                .map_err(Refusal::from_error)?;
-            Ok(TouchWire::of(
-                readout
-                    .with_codes(Box::new(chips.clone()))
-                    .map_err(Refusal::from_error)?,
-            ))
+            let readout = Readout::new(&session.wire.profile, Mode::Raster, &layout, session.device, 0)?;
+            Ok(TouchWire::of(readout.with_codes(Box::new(chips.clone()))?))
         };
         let silent = StoredRows::new(1, vec![0]);
         let idle = line(&silent)?.volts(ConductanceMap::zeros(1, 1), IDLE_BLOCK, 0, IDLE_MEASUREMENTS)?;
@@ -410,7 +402,7 @@ impl SkinWire {
 
     /// The profile with what a session draws fixed, so that it is the same for all readouts and in both modes.
     fn with_feedback(&self, feedback_ohm: f64, session: Streams) -> Result<ReadoutWire, Refusal> {
-        let built = Profile::named("as_built").map_err(Refusal::from_error)?;
+        let built = Profile::named("as_built")?;
         let mut profile = Profile {
             feedback_ohm,
             ..self.base.clone()
