@@ -1,6 +1,6 @@
 //! `spts dataset preview`: rows of a data set as a picture.
 
-use super::Files;
+use super::make::Files;
 use crate::context::Common;
 use crate::error::CliError;
 use crate::options::{seed, whole};
