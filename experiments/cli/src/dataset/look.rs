@@ -1,7 +1,7 @@
 //! What looks at a data set and makes nothing: `verify`, `compare`, `info`, `head`, `schema`, `specs`.
 
 use super::make::Files;
-use crate::context::{Common, print, print_json};
+use crate::context::{Bars, Common, print, print_json};
 use crate::error::CliError;
 use crate::options::{seed, whole};
 use clap::Args;
