@@ -194,9 +194,7 @@ const IDLE_BLOCK: u64 = 1 << 40;
 /// ```
 pub struct TouchWire {
     readout: Readout,
-    rail_v: Option<f64>,
     idle_v: f64,
-    clipped: usize,
 }
 
 impl TouchWire {
@@ -213,8 +211,6 @@ impl TouchWire {
         let idle = readout.measure(&mut untouched, IDLE_MEASUREMENTS)?;
         Ok(Self {
             readout,
-            rail_v: profile.rail_v(Mode::Compressive)?,
-            clipped: 0,
             idle_v: idle.iter().sum::<f64>() / IDLE_MEASUREMENTS as f64,
         })
     }
@@ -222,12 +218,7 @@ impl TouchWire {
     /// A wire with the given readout. Nothing is subtracted from its samples.
     #[must_use]
     pub fn of(readout: Readout) -> Self {
-        Self {
-            readout,
-            rail_v: None,
-            idle_v: 0.0,
-            clipped: 0,
-        }
+        Self { readout, idle_v: 0.0 }
     }
 
     /// Unmodified samples of a skin with this conductance at the rows `first_row..first_row + measurements`, V.
@@ -260,21 +251,8 @@ impl TouchWire {
         measurements: usize,
     ) -> Result<Vec<f64>, Refusal> {
         let mut volts = self.volts(touch.conductance_s.clone(), number, first_row, measurements)?;
-        self.clipped += self.readout.info().saturated(&volts, self.rail_v);
         volts.iter_mut().for_each(|v| *v -= self.idle_v);
         Ok(volts)
-    }
-
-    /// Number of samples of all touches so far at an end of their range.
-    #[must_use]
-    pub fn clipped(&self) -> usize {
-        self.clipped
-    }
-
-    /// The readout.
-    #[must_use]
-    pub fn readout(&self) -> &Readout {
-        &self.readout
     }
 }
 

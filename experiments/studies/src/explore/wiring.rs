@@ -6,7 +6,6 @@ use serde::Serialize;
 use spts_circuit::amplifier::{Amplifier, Budget, Limit, Network, Setting, Skin, fewest_wires};
 use spts_circuit::{Profile, Seeding};
 use spts_input::Refusal;
-use spts_models::ConfigError;
 
 /// Share of the converter's range that a fitted feedback uses: the sum is Gaussian, and scenes differ.
 const HEADROOM: f64 = 0.8;
@@ -129,7 +128,7 @@ pub(crate) fn wirings(
 }
 
 /// The amplifier with a feedback, no larger than it is, at which the sum of the whole skin fits.
-fn fitted(designed: &Amplifier, taxels: u32, setting: &Setting) -> Result<Amplifier, ConfigError> {
+fn fitted(designed: &Amplifier, taxels: u32, setting: &Setting) -> Result<Amplifier, Refusal> {
     let budget = Budget::new(designed, f64::from(taxels), setting);
     let network = Network {
         // the sum is proportional to the feedback
@@ -173,6 +172,7 @@ fn profile(way: Way, feedback_ohm: f64, available_s: f64, period_s: f64, seeding
     amplifier.insert("sample_s".to_owned(), sample_s.into());
     Ok(profile)
 }
+
 /// An effect that a profile lacks, or a value of it, as an error.
 fn no_effect(profile: &str, name: &str) -> Refusal {
     Refusal::new(format!("profile {profile}: no `compressive.{name}`"))
