@@ -215,7 +215,6 @@ pub struct EndPoint {
 
 impl EndPoint {
     /// Whether this is the scan.
-    #[must_use]
     pub fn is_scan(&self) -> bool {
         self.chain == SCAN
     }
@@ -431,7 +430,6 @@ pub enum Direction {
 
 impl Direction {
     /// Name in the tables.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Ablation => "ablation",
@@ -967,7 +965,6 @@ impl MeanWithError {
     /// Whether the mean is further from zero than chance brings it once in 1/[`CHANCE`]: by Student's t test with S − 1
     /// degrees of freedom; and where all sessions have the same value, so that there is no error to measure it by, by
     /// the test of signs, p = 2^(1 − S).
-    #[must_use]
     pub fn stands_out(self) -> bool {
         let freedom = u32::try_from(self.sessions.saturating_sub(1)).unwrap_or(u32::MAX);
         if self.mean.abs() <= 0.0 || freedom == 0 {
@@ -983,7 +980,6 @@ impl MeanWithError {
     }
 
     /// Whether chance alone could make it stand out: it is not zero in every session.
-    #[must_use]
     pub fn can_stand_out(self) -> bool {
         self.mean.abs() > 0.0 || self.se > 0.0
     }

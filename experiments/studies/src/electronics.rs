@@ -250,7 +250,6 @@ impl ElectronicsStudy {
     }
 
     /// Describes the result of [`ElectronicsStudy::largest_on_one_wire`].
-    #[must_use]
     pub fn one_wire_text(&self, taxels: Option<u32>) -> String {
         let pressing = format!(
             "{:.4} % of them pressed to {:.4} µS, the others at {:.4} µS",

@@ -234,7 +234,6 @@ const FRAME_S: f64 = 2e-3;
 
 impl SettingGrid {
     /// The settings of the shipped table.
-    #[must_use]
     pub fn full() -> Self {
         Self {
             cells_per_taxel: vec![2, 3, 6, 12, 24],
@@ -245,7 +244,6 @@ impl SettingGrid {
     }
 
     /// Settings that take less than a minute.
-    #[must_use]
     pub fn quick() -> Self {
         Self {
             cells_per_taxel: vec![2, 6],
@@ -307,7 +305,6 @@ const REPEATS: usize = 2;
 
 impl FidelityScene {
     /// Whether the scene is a drop.
-    #[must_use]
     pub fn is_drop(&self) -> bool {
         self.config.drop.is_some()
     }

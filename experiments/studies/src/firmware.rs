@@ -46,7 +46,6 @@ impl CellTask {
         Self::Pattern(64),
     ];
     /// Name of the mode.
-    #[must_use]
     pub fn mode(self) -> &'static str {
         match self {
             Self::Mode(mode) => mode.name(),
@@ -55,7 +54,6 @@ impl CellTask {
     }
 
     /// Number of bits of the pattern; `None` for other modes.
-    #[must_use]
     pub fn period(self) -> Option<usize> {
         match self {
             Self::Mode(_) => None,
@@ -64,7 +62,6 @@ impl CellTask {
     }
 
     /// Name of the mode, with the number of bits for a pattern.
-    #[must_use]
     pub fn name(self) -> String {
         match self {
             Self::Mode(mode) => mode.name().to_owned(),
@@ -408,13 +405,11 @@ impl EmulatedCells {
 
 impl EmulatedWeights {
     /// Number of clock edges in all, and number of cells.
-    #[must_use]
     pub fn shape(&self) -> [usize; 2] {
         [self.edges, self.cells]
     }
 
     /// Number of blocks that [`Self::next_block`] returns.
-    #[must_use]
     pub fn blocks(&self) -> usize {
         self.edges.div_ceil(BLOCK)
     }
@@ -440,7 +435,6 @@ impl EmulatedWeights {
 }
 
 /// What `spts firmware verify` prints: codes that differ, one line for each mode.
-#[must_use]
 pub fn verification_text(v: &Verification) -> String {
     let mut out = format!(
         "image {}: {} cells, {} edges a mode at {:.1} kHz\n",

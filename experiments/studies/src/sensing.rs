@@ -209,7 +209,6 @@ fn constant(row: &[f64]) -> bool {
 
 impl RowDesignReport {
     /// A summary in a few lines.
-    #[must_use]
     pub fn text(&self) -> String {
         let [rows, cols] = self.skin;
         let mut out = format!(

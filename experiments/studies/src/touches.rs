@@ -90,7 +90,6 @@ pub struct Touch {
 
 impl TouchScene {
     /// A scene with `touches` touches of `objects` on a skin.
-    #[must_use]
     pub fn new(layout: SkinLayout, objects: TouchObjects, touches: usize, seed: u64) -> Self {
         Self {
             layout,
@@ -216,7 +215,6 @@ impl TouchWire {
     }
 
     /// A wire with the given readout. Nothing is subtracted from its samples.
-    #[must_use]
     pub fn of(readout: Readout) -> Self {
         Self { readout, idle_v: 0.0 }
     }
@@ -270,7 +268,6 @@ impl TouchScore {
     ///
     /// # Panics
     /// If image and touch have different numbers of taxels.
-    #[must_use]
     pub fn of(image: &[f64], touch: &Touch, layout: &SkinLayout) -> Self {
         assert_eq!(image.len(), touch.support.len(), "taxels");
         let mut found = Vec::new();
@@ -288,7 +285,6 @@ const OUTSIDE: f64 = 0.1;
 
 /// Mean of independent repetitions, each with its own skin, noise and touches, and its 90 % confidence interval. The
 /// band of a single one has no width. `None` without repetitions.
-#[must_use]
 pub fn band(repetitions: &[f64]) -> Option<Band> {
     Sample::of(repetitions).map(|sample| sample.band(OUTSIDE))
 }

@@ -343,7 +343,6 @@ pub struct SessionEstimates {
 
 impl SessionEstimates {
     /// Median over the presses of the value `name`; NaN if there is none.
-    #[must_use]
     pub fn value(&self, name: &str) -> f64 {
         self.numbers.get(name).map_or(f64::NAN, |e| e.value)
     }
@@ -351,7 +350,6 @@ impl SessionEstimates {
     /// Estimates from the given presses of `recording`, the compressive recording of `pair` or one like it. The raster
     /// recording of `pair` shows to which cell a foreign sequence belongs, and is the reference for the taxels. Presses
     /// that missed are left out. `None` if no press determines an image.
-    #[must_use]
     pub fn of(pair: &SessionPair, recording: &Recording, blocks: &[usize]) -> Option<Self> {
         let hold = &pair.hold;
         let raster = pair.raster.as_ref();

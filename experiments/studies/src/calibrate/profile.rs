@@ -68,7 +68,6 @@ const ERROR_DIGITS: i32 = 2;
 
 impl FittedReadout {
     /// Fits the readout to all `sessions` together, or to one. They must have the same weights and rate.
-    #[must_use]
     pub fn of(sessions: &[SessionEstimates]) -> Self {
         let periods = periods(sessions);
         let beat = (!periods.is_empty()).then(|| Estimated::mean_of(&periods));

@@ -199,7 +199,6 @@ impl SkinReport {
     }
 
     /// Text about sessions whose scored presses were used; `None` if there are none.
-    #[must_use]
     pub fn scored_text(&self) -> Option<String> {
         (!self.scored.is_empty()).then(|| {
             format!(

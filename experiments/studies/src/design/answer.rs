@@ -287,7 +287,6 @@ fn scene(design: &Design) -> String {
 }
 
 /// "1 wire", "2 wires".
-#[must_use]
 pub fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }

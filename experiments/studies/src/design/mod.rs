@@ -285,7 +285,6 @@ pub enum Binding {
 
 impl Binding {
     /// The constraint in words.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Iou => "IoU",

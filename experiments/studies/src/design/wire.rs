@@ -235,7 +235,6 @@ pub enum RowSource {
 
 impl RowSource {
     /// Name in tables and figures.
-    #[must_use]
     pub fn name(&self) -> &str {
         match self {
             Self::Generator => "random",

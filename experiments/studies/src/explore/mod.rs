@@ -267,14 +267,12 @@ impl SizeRow {
     }
 
     /// The trial with the wanted IoU and the fewest measurements; otherwise the last one.
-    #[must_use]
     pub fn deciding(&self) -> Option<&ExploreTrial> {
         let found = self.trials.iter().find(|t| Some(t.measurements) == self.m_iou);
         found.or(self.trials.last())
     }
 
     /// The best IoU of all trials.
-    #[must_use]
     pub fn best_iou(&self) -> f64 {
         self.trials.iter().map(|t| t.iou).fold(0.0, f64::max)
     }
@@ -294,7 +292,6 @@ pub struct CostFit {
 
 impl CostFit {
     /// Whether the cost is a computing time on this machine.
-    #[must_use]
     pub fn is_of_this_machine(&self) -> bool {
         self.cost == DECODING
     }

@@ -30,7 +30,6 @@ impl Way {
     pub const ALL: [Self; 4] = [Self::Ideal, Self::AsDesigned, Self::Fitted, Self::Wires];
 
     /// The wiring in words.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Ideal => "ideal wire",
