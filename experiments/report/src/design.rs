@@ -275,18 +275,21 @@ pub fn text(report: &DesignReport) -> String {
 /// The check of a design as text.
 #[must_use]
 pub fn check_text(report: &CheckReport) -> String {
-    let quantities = Table::new("check", &report.quantities)
-        .shown("quantity", |q| q.quantity)
-        .shown("found", |q| q.found)
-        .digits(3)
-        .shown("promised", |q| promise(&q.promised, 3))
-        .shown("", |q| if q.agrees { "agrees" } else { "DOES NOT AGREE" });
+    let quantities = report.quantities.iter().map(|q| {
+        let verdict = if q.agrees { "agrees" } else { "DOES NOT AGREE" };
+        format!(
+            "\n{:<20} {:.3}, promised {}: {verdict}",
+            q.quantity,
+            q.found,
+            promise(&q.promised, 3)
+        )
+    });
     format!(
-        "{} repetitions of {} touches with seed {}, none of which the design has seen\n{}",
+        "{} repetitions of {} touches with seed {}, none of which the design has seen{}",
         report.repetitions,
         report.touches,
         report.seed,
-        quantities.text().trim_end()
+        quantities.collect::<String>()
     )
 }
 
