@@ -200,7 +200,7 @@ impl ShapesCommand {
         self.common.start()?;
         let families = self.chosen()?;
         check_writable(&self.out)?;
-        let shapes = drawn_shapes(&families, self.seed, self.count).map_err(|e| CliError::usage(e.to_string()))?;
+        let shapes = drawn_shapes(&families, self.seed, self.count)?;
         save_shapes(&shapes, &self.out)?;
         let report = ShapesReport {
             file: self.out,
