@@ -79,7 +79,7 @@ impl ArmStudy<'_> {
     /// # Errors
     /// [`Refusal`] without a recording of touches on a preloaded skin, or if the simulation fails.
     pub fn run(&self, progress: &dyn Progress) -> Result<ArmReport, Refusal> {
-        let set = SessionSet::open(self.recordings)?;
+        let set = SessionSet::open(self.recordings).map_err(Refusal::from_error)?;
         let of_touches = |session: &&Session| session.event == Event::Touch;
         let measured = |session: &Session| {
             let recording = session.compressive()?;
@@ -135,11 +135,17 @@ fn touched(layout: &SkinLayout, seed: u64) -> Result<Recording, Refusal> {
     let assignments = assignments.iter().map(|text| text.parse());
     let request = Request {
         scene: SCENE.to_owned(),
-        assignments: assignments.collect::<Result<_, _>>().map_err(SimulateError::from)?,
+        assignments: assignments
+            .collect::<Result<_, _>>()
+            .map_err(SimulateError::from)
+            .map_err(Refusal::from_error)?,
     };
-    let twin = Twin::new(&request.prepare()?.scene)?;
-    let presses = twin.presses(0..TOUCHES, &|| ())?;
-    Ok(twin.recorded(&presses, &twin.acquisition(Mode::Compressive))?.recording)
+    let twin = Twin::new(&request.prepare().map_err(Refusal::from_error)?.scene).map_err(Refusal::from_error)?;
+    let presses = twin.presses(0..TOUCHES, &|| ()).map_err(Refusal::from_error)?;
+    Ok(twin
+        .recorded(&presses, &twin.acquisition(Mode::Compressive))
+        .map_err(Refusal::from_error)?
+        .recording)
 }
 
 fn bands(real: &TouchStatistics, twins: &[TouchStatistics]) -> Vec<ArmBand> {

@@ -70,13 +70,15 @@ impl BudgetStudy {
             seed: self.seed,
         };
         let scenes = objects.iter().map(|object| setup.scene(object, &size, false));
-        let scenes = scenes.collect::<Result<Vec<_>, TwinError>>()?;
+        let scenes = scenes
+            .collect::<Result<Vec<_>, TwinError>>()
+            .map_err(Refusal::from_error)?;
         let Some(first) = scenes.first() else {
             return Err(Refusal::new("`--objects` names no object"));
         };
         let profile = first.chain().profile().clone();
         let hashes = scenes.iter().map(spts::Scene::hash).collect::<Result<Vec<_>, _>>();
-        let hash = combined_hash(&hashes.map_err(TwinError::from)?);
+        let hash = combined_hash(&hashes.map_err(TwinError::from).map_err(Refusal::from_error)?);
         let items = items(&profile);
         let variants = Variants::new(&items);
         progress.stage("pressing", Some(2 * objects.len() * size.presses()));
@@ -89,7 +91,10 @@ impl BudgetStudy {
             items: &items,
             keys: &keys,
             seed: self.seed,
-            pressed: [columns?, layer?],
+            pressed: [
+                columns.map_err(Refusal::from_error)?,
+                layer.map_err(Refusal::from_error)?,
+            ],
         };
         let (scores, scan) = chains.score(&variants, progress)?;
         let taxels = self.side * self.side;
@@ -729,14 +734,17 @@ impl LearnedSkin {
         let objects = pressed
             .par_iter()
             .map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol))
-            .collect::<Result<Vec<_>, TwinError>>()?;
+            .collect::<Result<Vec<_>, TwinError>>()
+            .map_err(Refusal::from_error)?;
         let sessions: Vec<ScoredSession> = objects.iter().map(|o| o.session(protocol)).collect();
         let streams = Streams::new(seed);
         let learned = (0..size.sessions).into_par_iter().map(|session| {
             let streams = streams.child("learning", session as u64);
             Learned::learn(&sessions, &size.learning, layout.cols(), streams)
         });
-        let learned = learned.collect::<Result<Vec<_>, LearnError>>()?;
+        let learned = learned
+            .collect::<Result<Vec<_>, LearnError>>()
+            .map_err(Refusal::from_error)?;
         Ok(Self {
             chain,
             learned,
@@ -770,11 +778,11 @@ impl LearnedSkin {
 /// Chain of `scene` without the transducer's parts `off`.
 fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, Refusal> {
     let config = ChainConfig {
-        transducer_parameters: without_parts(off)?,
+        transducer_parameters: without_parts(off).map_err(Refusal::from_error)?,
         ..scene.config().chain()
     };
     let chain = Chain::new(&config, scene.skin(), scene.seed(), Path::new(""));
-    Ok(chain.map_err(TwinError::from)?)
+    Ok(chain.map_err(TwinError::from).map_err(Refusal::from_error)?)
 }
 
 impl LearnedObject {
@@ -894,7 +902,7 @@ impl<'a> PressScorer<'a> {
             skin,
             keys,
             votes: size.votes,
-            decoders: decoders.collect::<Result<_, _>>()?,
+            decoders: decoders.collect::<Result<_, _>>().map_err(Refusal::from_error)?,
         })
     }
 
@@ -902,16 +910,18 @@ impl<'a> PressScorer<'a> {
     /// on object and session alone, so that two profiles are compared under the same noise.
     fn score(&self, profile: &Profile, object: usize, session: usize) -> Result<Vec<PressScores>, Refusal> {
         let (skin, object) = (self.skin, &self.skin.objects[object]);
-        let chain = skin.chain.with_profile(profile.clone())?;
+        let chain = skin.chain.with_profile(profile.clone()).map_err(Refusal::from_error)?;
         let frames = skin.protocol.first_frame + skin.protocol.frames;
         let mut sources = [object.sources[session].clone()];
         let taxels = skin.learned[session].dictionary.atoms.nrows();
         let duration_s = (frames * taxels) as f64 / chain.sample_rate_hz();
-        let recording = chain.record_sources(
-            &mut sources,
-            duration_s,
-            &compressive_acquisition(object.label, session),
-        )?;
+        let recording = chain
+            .record_sources(
+                &mut sources,
+                duration_s,
+                &compressive_acquisition(object.label, session),
+            )
+            .map_err(Refusal::from_error)?;
         let per_frame = recording.measurements_per_frame();
         let (idle_v, vote) = (idle_mean(&recording, 0), skin.protocol.vote);
         let [first, end] =
@@ -924,7 +934,10 @@ impl<'a> PressScorer<'a> {
                     // vote by vote, because the weights of a whole press on a large skin fill the memory
                     let press = Press::within(&recording, 0, start..start + vote * m, idle_v);
                     let windows: Vec<Window<'_>> = press.windows(0..press.len(), m, m).map(|(_, w)| w).collect();
-                    let answers = scorer.answers(&windows).map_err(ScoreError::from)?;
+                    let answers = scorer
+                        .answers(&windows)
+                        .map_err(ScoreError::from)
+                        .map_err(Refusal::from_error)?;
                     for answer in &answers {
                         for (tally, truth) in tallies.iter_mut().zip(&object.masks) {
                             tally.image(&answer.image, truth);

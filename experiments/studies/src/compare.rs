@@ -217,7 +217,7 @@ impl CompareStudy<'_> {
             progress.end();
             scored
         });
-        let curves = scored.transpose()?;
+        let curves = scored.transpose().map_err(Refusal::from_error)?;
         Ok(CompareReport {
             statistics: statistics(&compared),
             not_modelled: not_modelled(&compared),

@@ -89,7 +89,8 @@ impl FidelityStudy {
                     scene,
                 })
             })
-            .collect::<Result<Vec<_>, TwinError>>()?;
+            .collect::<Result<Vec<_>, TwinError>>()
+            .map_err(Refusal::from_error)?;
         let others: Vec<(Scene, ContactRun)> = others(&references, self.seed, meshes)?
             .into_par_iter()
             .filter_map(|scene| {
@@ -113,7 +114,7 @@ impl FidelityStudy {
             })
             .collect::<Result<_, Refusal>>()?;
         progress.end();
-        let hash = provenance_hash(&references)?;
+        let hash = provenance_hash(&references).map_err(Refusal::from_error)?;
         let mut report = FidelityReport::new(Provenance::new(self.seed, hash));
         for result in results {
             report.add(result);
@@ -391,7 +392,7 @@ fn built_in(name: &str, seed: u64, folder: &Path) -> Result<FidelityScene, Refus
                 )));
             };
             let file = format!("{name}.obj");
-            write_bytes(&folder.join(&file), mesh.to_obj(name).as_bytes())?;
+            write_bytes(&folder.join(&file), mesh.to_obj(name).as_bytes()).map_err(Refusal::from_error)?;
             press.mesh = Some(file);
             [press.row, press.col] = PLACE.map(Some);
             press.rotation_deg = Some(ROTATION_DEG);
@@ -431,7 +432,9 @@ fn shape(name: &str) -> Option<TriMesh> {
 
 /// A user's scene: its first two presses or drops, without what the levels decide.
 fn from_file(path: &Path) -> Result<FidelityScene, Refusal> {
-    let scene = Scene::load(path).map_err(TwinError::from)?;
+    let scene = Scene::load(path)
+        .map_err(TwinError::from)
+        .map_err(Refusal::from_error)?;
     let mut config = scene.config().clone();
     match scene.task() {
         Task::Press(press) => {
@@ -717,7 +720,7 @@ impl ReferenceScores {
         let (mut training, mut library, mut labels) = (Images::new(), Images::new(), Vec::new());
         let known = references.iter().map(|r| (&r.at_reference, &r.learned));
         for (label, (scene, run)) in known.chain(others.iter().map(|(s, r)| (s, r))).enumerate() {
-            let images = images(scene, run)?;
+            let images = images(scene, run).map_err(Refusal::from_error)?;
             let stride = images.len().div_ceil(TRAINING_IMAGES).max(1);
             training.extend(images.iter().step_by(stride).cloned());
             let full: Vec<&Vec<f64>> = images.iter().filter(|image| peak(image) > 0.7).collect();
@@ -749,14 +752,16 @@ impl ReferenceScores {
         let cols = references.first().map_or(1, |r| r.at_reference.skin().cols());
         let learned = Learned::new(dictionary, None, library, cols);
         let mut learned = Self {
-            decoder: PublishedDecode::Matched.decoder(&learned)?,
+            decoder: PublishedDecode::Matched
+                .decoder(&learned)
+                .map_err(Refusal::from_error)?,
             truths: Vec::new(),
             references: Vec::new(),
         };
         for (label, reference) in references.iter().enumerate() {
             learned
                 .truths
-                .push(Truth::new(&reference.at_reference, &reference.scored)?);
+                .push(Truth::new(&reference.at_reference, &reference.scored).map_err(Refusal::from_error)?);
             let scores = learned.score(&reference.at_reference, &reference.scored, label)?;
             learned.references.push(scores);
         }
@@ -779,7 +784,10 @@ impl ReferenceScores {
             conditioning_presses: PRESSES_BEFORE,
             ..of_task(Mode::Compressive, label as u64)
         };
-        let recording = scene.chain().record(&[&run.frames], scene.duration_s(), &acquisition)?;
+        let recording = scene
+            .chain()
+            .record(&[&run.frames], scene.duration_s(), &acquisition)
+            .map_err(Refusal::from_error)?;
         let volts = &recording.blocks()[0].volts;
         let rate_hz = recording.sample_rate_hz();
         #[expect(clippy::cast_possible_truncation, reason = "cut to the recording's length")]
@@ -792,7 +800,10 @@ impl ReferenceScores {
         let stride = (press.len() / WINDOWS).max(M);
         let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = press.windows(0..press.len(), M, stride).unzip();
         let mut scorer = Scorer::new(&self.decoder);
-        let answers = scorer.answers(&windows).map_err(ScoreError::from)?;
+        let answers = scorer
+            .answers(&windows)
+            .map_err(ScoreError::from)
+            .map_err(Refusal::from_error)?;
         let mut tally = Tally::default();
         for (window, answer) in starts.iter().zip(&answers) {
             let time_s = (start + window + M / 2) as f64 / rate_hz;

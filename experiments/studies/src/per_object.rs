@@ -65,7 +65,7 @@ impl PerObjectStudy<'_> {
     /// [`Refusal`] for recordings that cannot be used, or a simulation that fails.
     pub fn run(&self, progress: &dyn Progress) -> Result<PerObjectReport, Refusal> {
         progress.stage("scoring the real skin", None);
-        let real = Source::open(self.recordings)?;
+        let real = Source::open(self.recordings).map_err(Refusal::from_error)?;
         let with_sums = real.sessions.iter().filter(|s| s.scorable());
         let known = |name: &str| OBJECTS.iter().any(|object| object.name == name);
         let objects: Vec<String> = with_sums.map(|s| s.object.clone()).filter(|name| known(name)).collect();
@@ -88,13 +88,20 @@ impl PerObjectStudy<'_> {
         let done = || progress.step();
         progress.stage("pressing simulated skins", Some(skins * presses(objects.len())));
         let mut all = of(ReadoutImages::Twin, &|seed| {
-            Ok(Source::new(twin(seed, &objects, true, &done)?)?)
+            Ok(
+                Source::new(twin(seed, &objects, true, &done).map_err(Refusal::from_error)?)
+                    .map_err(Refusal::from_error)?,
+            )
         })?;
         progress.end();
         if self.causes {
             progress.stage("with the skin's gains", Some(skins * presses(objects.len())));
             all.extend(of(ReadoutImages::TwinWithSkinGains, &|seed| {
-                with_skin_gains(&twin(seed, &objects, false, &done)?, &real, seed)
+                with_skin_gains(
+                    &twin(seed, &objects, false, &done).map_err(Refusal::from_error)?,
+                    &real,
+                    seed,
+                )
             })?);
             progress.end();
             for (images, volts) in [
@@ -144,7 +151,11 @@ fn scores(source: &Source, objects: &[String], seed: u64) -> Result<Vec<ObjectSc
         times: false,
         seed,
     };
-    let board = settings.learn(source)?.score(&|| ())?;
+    let board = settings
+        .learn(source)
+        .map_err(Refusal::from_error)?
+        .score(&|| ())
+        .map_err(Refusal::from_error)?;
     let of_row = |row: &ObjectRow| {
         let value = |(score, get): &ScoreOf| {
             Some(ObjectScore {
@@ -181,7 +192,7 @@ fn raster_images(real: &Source, objects: &[String]) -> Result<Vec<(String, Vec<f
 
 /// Images of `objects` in their compressive sessions, V: by least squares, median over the presses.
 fn compressive_images(recordings: &Path, objects: &[String]) -> Result<Vec<(String, Vec<f64>)>, Refusal> {
-    let pairs = read(recordings)?;
+    let pairs = read(recordings).map_err(Refusal::from_error)?;
     let pairs = pairs.iter().filter(|pair| objects.contains(&pair.session));
     let image = |pair: &crate::calibrate::SessionPair| {
         let blocks: Vec<usize> = (0..pair.compressive.blocks().len()).collect();
@@ -449,7 +460,7 @@ fn session(
 /// The sessions of `set`, simulated at gain 1, as the skin of `real` would have shown them. The gains that apply to an
 /// object are those that unscored raster presses of the other objects tell.
 fn with_skin_gains(set: &SessionSet, real: &Source, seed: u64) -> Result<Source, Refusal> {
-    let simulated = Source::new(set.clone())?;
+    let simulated = Source::new(set.clone()).map_err(Refusal::from_error)?;
     let mut source = simulated.clone();
     for (scored, session) in source.sessions.iter_mut().zip(&set.sessions) {
         let images = [&real.sessions, &simulated.sessions].map(|sessions| others(sessions, &scored.object));

@@ -166,7 +166,7 @@ impl CalibrationStudy {
     /// [`Refusal`] if the recordings are not usable, the session does not exist, sessions differ in their
     /// weights or rate, or no press of a session can be fitted.
     pub fn run(&self, recordings: &Path, progress: &dyn Progress) -> Result<CalibrationReport, Refusal> {
-        self.fit_all(read(recordings)?, progress)
+        self.fit_all(read(recordings).map_err(Refusal::from_error)?, progress)
     }
 
     /// Fits the sessions `pairs`.

@@ -368,7 +368,7 @@ pub fn fitted_profile(readings: &FittedReadout, taxels: u32) -> Result<(Profile,
     let base = PROFILES.iter().find(|(name, _)| *name == DEFAULT_READOUT);
     let base: toml::Table =
         toml::from_str(base.map_or("", |(_, text)| text)).map_err(|e| Refusal::from_error(e).at(DEFAULT_READOUT))?;
-    let text = readings.to_toml(&base)?;
+    let text = readings.to_toml(&base).map_err(Refusal::from_error)?;
     let profile = Profile::from_toml(&text)?;
     profile.validate(taxels)?;
     Ok((profile, text))

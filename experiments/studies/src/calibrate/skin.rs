@@ -68,7 +68,7 @@ impl SkinStudy {
     /// # Errors
     /// [`Refusal`] if the recordings are not usable, or the simulation knows none of their objects.
     pub fn run(&self, root: &Path, progress: &dyn Progress) -> Result<SkinReport, Refusal> {
-        let source = Source::open(root)?;
+        let source = Source::open(root).map_err(Refusal::from_error)?;
         if source.sessions.iter().all(|s| s.raster.is_none()) {
             return Err(Refusal::new(format!(
                 "gains of the skin: {}: no session of presses has a raster recording to fit them to",

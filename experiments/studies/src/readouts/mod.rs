@@ -119,7 +119,10 @@ impl ReadoutSkin {
         if let Some(prior) = self.prior.get() {
             return Ok(Arc::clone(prior));
         }
-        let prior = TrainingData::for_layout(&self.layout, self.streams)?.prior(ImagePrior::UNSEEN)?;
+        let prior = TrainingData::for_layout(&self.layout, self.streams)
+            .map_err(Refusal::from_error)?
+            .prior(ImagePrior::UNSEEN)
+            .map_err(Refusal::from_error)?;
         Ok(Arc::clone(self.prior.get_or_init(|| prior)))
     }
 
