@@ -782,7 +782,7 @@ fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, Refusal> {
         ..scene.config().chain()
     };
     let chain = Chain::new(&config, scene.skin(), scene.seed(), Path::new(""));
-    Ok(chain.map_err(TwinError::from).map_err(Refusal::from_error)?)
+    chain.map_err(TwinError::from).map_err(Refusal::from_error)
 }
 
 impl LearnedObject {

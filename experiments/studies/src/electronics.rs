@@ -95,8 +95,7 @@ impl ElectronicsStudy {
             };
             remedied(&self.amplifier(on_bus)?, taxels, self.sub_array, remedy, &setting)
         });
-        let ways = ways.collect::<Result<_, spts_models::ConfigError>>();
-        Ok(ways?)
+        ways.collect()
     }
 
     /// Capacitance of a bus with `taxels` taxels, F.
@@ -105,7 +104,7 @@ impl ElectronicsStudy {
     }
 
     /// Amplifier of a bus with `taxels` taxels.
-    fn amplifier(&self, taxels: u32) -> Result<Amplifier, spts_models::ConfigError> {
+    fn amplifier(&self, taxels: u32) -> Result<Amplifier, Refusal> {
         let network = Network {
             bus_f: self.bus_f(taxels),
             ..self.network

@@ -233,7 +233,7 @@ impl TouchWire {
     ) -> Result<Vec<f64>, Refusal> {
         let mut source = Constant::new(conductance_s)?;
         self.readout.seek_row(number, first_row);
-        Ok(self.readout.measure(&mut source, measurements)?)
+        self.readout.measure(&mut source, measurements)
     }
 
     /// Samples of `touch` at the rows `first_row..first_row + measurements`, minus the mean of the untouched skin, V.

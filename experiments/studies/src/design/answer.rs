@@ -293,10 +293,5 @@ pub fn counted(count: usize, what: &str) -> String {
 
 /// The layout of a design.
 pub(super) fn layout_of(design: &Design) -> Result<SkinLayout, Refusal> {
-    Ok(SkinLayout::new(
-        design.rows,
-        design.cols,
-        design.pitch_m,
-        design.electrode_m,
-    )?)
+    SkinLayout::new(design.rows, design.cols, design.pitch_m, design.electrode_m)
 }

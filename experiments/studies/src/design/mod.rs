@@ -138,7 +138,7 @@ impl DesignStudy {
             )));
         }
         let electrode_m = SkinLayout::usual_electrode_m(self.pitch_m);
-        Ok(SkinLayout::new(rows, cols, self.pitch_m, electrode_m)?)
+        SkinLayout::new(rows, cols, self.pitch_m, electrode_m)
     }
 
     /// Learns what images are like.

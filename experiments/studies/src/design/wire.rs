@@ -329,7 +329,7 @@ impl BandRows {
                 codes[..codes.len().min(band.len() * cols)].to_vec()
             });
             let patterns = Patterns::new(pattern.period(), rows.collect())?;
-            Ok(Weights::with_patterns(WeightMode::Binary, patterns)?)
+            Weights::with_patterns(WeightMode::Binary, patterns)
         });
         Ok(Self {
             cols,

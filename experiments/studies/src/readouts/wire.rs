@@ -198,7 +198,7 @@ impl HeldWire<'_, '_> {
         let touch = self.touch.conductance_s.values();
         self.session.frame(touch, self.number, taxels, |session| {
             let (profile, layout) = (&session.wire.profile, &session.layout);
-            Ok(Readout::new(profile, Mode::Raster, layout, session.device, 0)?)
+            Readout::new(profile, Mode::Raster, layout, session.device, 0)
         })
     }
 
@@ -218,7 +218,7 @@ impl HeldWire<'_, '_> {
                 ..session.wire.profile.clone()
             };
             let readout = Readout::new(&profile, Mode::Compressive, &session.layout, session.device, 0)?;
-            Ok(readout.with_codes(Box::new(rows.clone()))?)
+            readout.with_codes(Box::new(rows.clone()))
         })
     }
 
