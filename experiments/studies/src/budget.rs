@@ -854,8 +854,8 @@ fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Re
     Ok(mask)
 }
 
-/// Scores of one press with one decode and M: support accuracy by every truth of [`TRUTHS`], IoU by every truth, and the
-/// shares of single windows and of votes of 20 windows that are classified correctly.
+/// Scores of one press with one decode and M: support accuracy by every truth of [`TRUTHS`], IoU by every truth, and
+/// the shares of single windows and of votes of 20 windows that are classified correctly.
 type PressScores = [f64; 8];
 
 /// Place of the support accuracy by the first truth in [`PressScores`], that of the IoU, and those of the classes.
@@ -1015,8 +1015,8 @@ fn estimate(values: &[Vec<f64>]) -> MeanWithError {
     })
 }
 
-/// Mean of the score with the place `score` at the key with the place `key`, or of its change from `reference`, press by
-/// press: noise that both share cancels.
+/// Mean of the score with the place `score` at the key with the place `key`, or of its change from `reference`, press
+/// by press: noise that both share cancels.
 fn mean_score(scores: &ScoreTable, reference: Option<&ScoreTable>, key: usize, score: usize) -> MeanWithError {
     let of_object = |(object, sessions): (usize, &Vec<Vec<PressScores>>)| {
         let before = |session: usize| reference.map_or(0.0, |r| r[object][session][key][score]);

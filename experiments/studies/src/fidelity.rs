@@ -963,8 +963,8 @@ mod tests {
         study.run(meshes.path(), &()).unwrap()
     }
 
-    /// The reference has no error; every other level has one, and the layer's own coarser resolution a smaller one than the
-    /// half-space, which has no base under it.
+    /// The reference has no error; every other level has one, and the layer's own coarser resolution a smaller one than
+    /// the half-space, which has no base under it.
     #[test]
     fn errors_are_ordered() {
         let report = study(&["T", "drop"]);

@@ -374,9 +374,9 @@ pub fn fitted_profile(readings: &FittedReadout, taxels: u32) -> Result<(Profile,
     Ok((profile, text))
 }
 
-/// A parameter and where it comes from: section and key of the profile; name of the value in [`super::PressNumbers`] that
-/// has its uncertainty; smallest and largest valid value of the readout (rates, shares and noise are not negative); and
-/// its value of a session, NaN if the session does not determine it.
+/// A parameter and where it comes from: section and key of the profile; name of the value in [`super::PressNumbers`]
+/// that has its uncertainty; smallest and largest valid value of the readout (rates, shares and noise are not
+/// negative); and its value of a session, NaN if the session does not determine it.
 type Parameter = (&'static str, &'static str, [f64; 2], fn(&SessionEstimates) -> f64);
 
 /// In the order of the profile.
