@@ -104,7 +104,7 @@ impl CalibrateCommand {
             write_bytes(path, report.profile_toml()?.as_bytes())?;
             note(&format!("profile: {}", path.display()));
         }
-        self.common.print(&report, || report.text())
+        self.common.print(&report, || spts_report::calibrate::text(&report))
     }
 }
 
@@ -130,7 +130,8 @@ impl CalibrateCommand {
         if let Some(text) = report.scored_text() {
             note(&format!("note: {text}"));
         }
-        self.common.print(&report, || report.text())?;
+        self.common
+            .print(&report, || spts_report::calibrate::skin_text(&report))?;
         if let Some(path) = &self.out {
             write_bytes(path, report.toml()?.as_bytes())?;
             let picture = path.with_extension("png");

@@ -130,7 +130,7 @@ pub(super) fn print(text: &str) -> Result<(), CliError> {
 /// # Errors
 /// [`CliError`] when it has no JSON, as a map with keys that are no strings, and as [`print`].
 pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
-    let json = serde_json::to_string_pretty(value).map_err(|e| CliError::usage(e.to_string()))?;
+    let json = serde_json::to_string_pretty(value)?;
     print(&json)
 }
 

@@ -218,16 +218,15 @@ impl<'a> Training<'a> {
     }
 
     fn of(&self, layout: &SkinLayout) -> Result<(TrainingData, Option<&Labels>), CliError> {
-        let failed = |error: spts_eval::training::LearnError| CliError::usage(error.to_string());
         if let Some(skin) = self.skin {
             let gains = skin_gains(skin, layout)?;
             let simulated = simulated_presses(*layout, true, self.seed)?;
-            let data = TrainingData::of_skin(&simulated, &gains, layout.cols(), self.streams).map_err(failed)?;
+            let data = TrainingData::of_skin(&simulated, &gains, layout.cols(), self.streams)?;
             return Ok((data, Some(&self.labels)));
         }
         match self.source.as_ref().filter(|source| source.layout == *layout) {
-            Some(source) => source.training(self.streams).map_err(failed),
-            None => Ok((TrainingData::for_layout(layout, self.streams).map_err(failed)?, None)),
+            Some(source) => Ok(source.training(self.streams)?),
+            None => Ok((TrainingData::for_layout(layout, self.streams)?, None)),
         }
     }
 }

@@ -181,7 +181,7 @@ impl NewDesign {
             let folder = self.out.display();
             format!(
                 "{}\ncheck it:    spts design check {folder}\nsimulate it: spts simulate {folder}/scene.toml\npicture:     {folder}/figures/design.png",
-                report.text()
+                spts_report::design::text(&report)
             )
         };
         self.common.print(&report, text)
@@ -193,7 +193,8 @@ impl CheckCommand {
         self.common.start()?;
         let check = read_design(&self.design, self.seed)?;
         let report = check.run(&Bars::default())?;
-        self.common.print(&report, || report.text().trim_end().to_owned())?;
+        self.common
+            .print(&report, || spts_report::design::check_text(&report))?;
         if report.agrees {
             return Ok(());
         }

@@ -175,7 +175,7 @@ impl DeviceCommand {
             blocks,
         };
         if self.json {
-            let line = serde_json::to_string(&opened).map_err(|e| CliError::usage(e.to_string()))?;
+            let line = serde_json::to_string(&opened)?;
             print(&line)?;
         } else {
             print(&terminal.name)?;

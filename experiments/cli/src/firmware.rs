@@ -203,7 +203,7 @@ impl CellOptions {
         if let Some(sample_us) = self.sample_us {
             clock.sample_delay_s = sample_us * 1e-6;
         }
-        clock.check().map_err(|e| CliError::usage(e.to_string()))?;
+        clock.check()?;
         Ok(clock)
     }
 }

@@ -17,12 +17,11 @@ use spts_eval::board::{
 };
 use spts_eval::decoders::DECODERS;
 use spts_eval::external::ExternalCommand;
-use spts_eval::in_time;
 use spts_eval::training::{
     CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainedNetwork, TrainingSource,
     simulated_gain_sd,
 };
-use spts_eval::{ScoreError, ScoredSession, Sensing, Source, slips_text};
+use spts_eval::{ScoreError, ScoredSession, Sensing, Source, in_time, slips_text};
 use spts_models::SkinLayout;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -318,7 +318,7 @@ struct Learned {
 
 impl Learned {
     fn new(layout: &SkinLayout) -> Result<Self, CliError> {
-        let training = TrainingData::for_layout(layout, Streams::new(1)).map_err(|e| CliError::usage(e.to_string()))?;
+        let training = TrainingData::for_layout(layout, Streams::new(1))?;
         let request = DecodeRequest {
             decoders: find("nn_lmmse").into_iter().collect(),
             measurements: DecodeRequest::default_measurements(layout.taxels()),

@@ -5,10 +5,9 @@ use crate::error::CliError;
 use crate::options::parse_measurements;
 use clap::Args;
 use serde::Serialize;
-use spts_eval::PublishedSkin;
-use spts_eval::SkinScores;
 use spts_eval::decoders::short_label;
 use spts_eval::place::locator_label;
+use spts_eval::{PublishedSkin, SkinScores};
 use std::path::PathBuf;
 
 /// Scores recordings of the real skin.

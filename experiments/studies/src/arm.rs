@@ -217,7 +217,6 @@ pub const STATISTICS: [StatisticOf; 10] = [
 impl TouchStatistics {
     /// Statistics of `recording`, whose blocks must begin without a touch; `None` if no touch of a skin under preload
     /// is found.
-    #[must_use]
     pub fn of(recording: &Recording) -> Option<Self> {
         let touches = find_touches(recording);
         let rest: Vec<&Vec<f64>> = touches.iter().filter_map(|t| t.untouched.image.as_ref()).collect();

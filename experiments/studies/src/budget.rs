@@ -220,7 +220,6 @@ pub struct EndPoint {
 
 impl EndPoint {
     /// Whether this is the scan.
-    #[must_use]
     pub fn is_scan(&self) -> bool {
         self.chain == SCAN
     }
@@ -436,7 +435,6 @@ pub enum Direction {
 
 impl Direction {
     /// Name in the tables.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Ablation => "ablation",
@@ -784,7 +782,7 @@ fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, Refusal> {
         ..scene.config().chain()
     };
     let chain = Chain::new(&config, scene.skin(), scene.seed(), Path::new(""));
-    Ok(chain.map_err(TwinError::from).map_err(Refusal::from_error)?)
+    chain.map_err(TwinError::from).map_err(Refusal::from_error)
 }
 
 impl LearnedObject {
@@ -856,8 +854,8 @@ fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Re
     Ok(mask)
 }
 
-/// Scores of one press with one decode and M: support accuracy by every truth of [`TRUTHS`], IoU by every truth, and the
-/// shares of single windows and of votes of 20 windows that are classified correctly.
+/// Scores of one press with one decode and M: support accuracy by every truth of [`TRUTHS`], IoU by every truth, and
+/// the shares of single windows and of votes of 20 windows that are classified correctly.
 type PressScores = [f64; 8];
 
 /// Place of the support accuracy by the first truth in [`PressScores`], that of the IoU, and those of the classes.
@@ -980,7 +978,6 @@ impl MeanWithError {
     /// Whether the mean is further from zero than chance brings it once in 1/[`CHANCE`]: by Student's t test with S − 1
     /// degrees of freedom; and where all sessions have the same value, so that there is no error to measure it by, by
     /// the test of signs, p = 2^(1 − S).
-    #[must_use]
     pub fn stands_out(self) -> bool {
         let freedom = u32::try_from(self.sessions.saturating_sub(1)).unwrap_or(u32::MAX);
         if self.mean.abs() <= 0.0 || freedom == 0 {
@@ -996,7 +993,6 @@ impl MeanWithError {
     }
 
     /// Whether chance alone could make it stand out: it is not zero in every session.
-    #[must_use]
     pub fn can_stand_out(self) -> bool {
         self.mean.abs() > 0.0 || self.se > 0.0
     }
@@ -1019,8 +1015,8 @@ fn estimate(values: &[Vec<f64>]) -> MeanWithError {
     })
 }
 
-/// Mean of the score with the place `score` at the key with the place `key`, or of its change from `reference`, press by
-/// press: noise that both share cancels.
+/// Mean of the score with the place `score` at the key with the place `key`, or of its change from `reference`, press
+/// by press: noise that both share cancels.
 fn mean_score(scores: &ScoreTable, reference: Option<&ScoreTable>, key: usize, score: usize) -> MeanWithError {
     let of_object = |(object, sessions): (usize, &Vec<Vec<PressScores>>)| {
         let before = |session: usize| reference.map_or(0.0, |r| r[object][session][key][score]);

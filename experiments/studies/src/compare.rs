@@ -37,7 +37,6 @@ pub struct ComparedSession {
 
 /// Presses (from 0) for calibration, and for comparison: the first, third, … and the second, fourth, …. They alternate
 /// because the readout drifts during a session (the first tap of the memory by 0.01). `None` for one press.
-#[must_use]
 pub fn split(recording: &Recording) -> Option<(Vec<usize>, Vec<usize>)> {
     let presses = recording.blocks().len();
     (presses > 1).then(|| ((0..presses).step_by(2).collect(), (1..presses).step_by(2).collect()))
@@ -235,13 +234,11 @@ impl CompareStudy<'_> {
 
 impl CompareReport {
     /// Statistics of both kinds.
-    #[must_use]
     pub fn all_statistics(&self) -> Vec<Statistic> {
         [self.statistics.as_slice(), &self.not_modelled].concat()
     }
 
     /// Distances of the score curves; empty without curves.
-    #[must_use]
     pub fn distances(&self) -> &[CurveDistance] {
         distances(self.curves.as_ref())
     }
@@ -322,7 +319,6 @@ const STEP_ROUNDING: f64 = 1e-9;
 const QUANTILE_SHARE: f64 = 0.10;
 
 /// Every statistic of every session.
-#[must_use]
 pub fn statistics(compared: &[ComparedSession]) -> Vec<Statistic> {
     compared.iter().flat_map(|c| session(&c.real, &c.twin)).collect()
 }
@@ -373,7 +369,6 @@ fn session(real: &SessionEstimates, twin: &SessionEstimates) -> Vec<Statistic> {
 const NOT_MODELLED: [&str; 3] = ["idle_sd", "idle_parity", "unexplained_outliers"];
 
 /// Statistics of effects that the readout does not model, for every session, without a verdict.
-#[must_use]
 pub fn not_modelled(compared: &[ComparedSession]) -> Vec<Statistic> {
     let row = |c: &ComparedSession, name: &'static str| {
         let (r, t) = (c.real.numbers.get(name)?, c.twin.numbers.get(name)?);
@@ -440,7 +435,6 @@ pub struct ScoreCurves {
 }
 
 /// Number of progress reports of [`curves`].
-#[must_use]
 pub fn steps(compared: &[ComparedSession], real: &PublishedSkin) -> usize {
     2 * compared
         .iter()
@@ -677,7 +671,7 @@ pub fn replay(
     for (block, recorded) in anew {
         all[block] = recorded;
     }
-    Ok(real.with_blocks(all).map_err(Refusal::from_error)?)
+    real.with_blocks(all)
 }
 
 fn record_again(

@@ -95,8 +95,7 @@ impl ElectronicsStudy {
             };
             remedied(&self.amplifier(on_bus)?, taxels, self.sub_array, remedy, &setting)
         });
-        let ways = ways.collect::<Result<_, spts_models::ConfigError>>();
-        Ok(ways.map_err(Refusal::from_error)?)
+        ways.collect()
     }
 
     /// Capacitance of a bus with `taxels` taxels, F.
@@ -105,7 +104,7 @@ impl ElectronicsStudy {
     }
 
     /// Amplifier of a bus with `taxels` taxels.
-    fn amplifier(&self, taxels: u32) -> Result<Amplifier, spts_models::ConfigError> {
+    fn amplifier(&self, taxels: u32) -> Result<Amplifier, Refusal> {
         let network = Network {
             bus_f: self.bus_f(taxels),
             ..self.network
@@ -219,7 +218,7 @@ impl ElectronicsStudy {
     /// # Errors
     /// As [`ElectronicsStudy::of`].
     pub fn largest_on_one_wire(&self) -> Result<Option<u32>, Refusal> {
-        self.skin.validate().map_err(Refusal::from_error)?;
+        self.skin.validate()?;
         let setting = Setting {
             skin: self.skin,
             adc: self.adc,
@@ -250,7 +249,6 @@ impl ElectronicsStudy {
     }
 
     /// Describes the result of [`ElectronicsStudy::largest_on_one_wire`].
-    #[must_use]
     pub fn one_wire_text(&self, taxels: Option<u32>) -> String {
         let pressing = format!(
             "{:.4} % of them pressed to {:.4} µS, the others at {:.4} µS",

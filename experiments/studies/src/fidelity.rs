@@ -235,7 +235,6 @@ const FRAME_S: f64 = 2e-3;
 
 impl SettingGrid {
     /// The settings of the shipped table.
-    #[must_use]
     pub fn full() -> Self {
         Self {
             cells_per_taxel: vec![2, 3, 6, 12, 24],
@@ -246,7 +245,6 @@ impl SettingGrid {
     }
 
     /// Settings that take less than a minute.
-    #[must_use]
     pub fn quick() -> Self {
         Self {
             cells_per_taxel: vec![2, 6],
@@ -308,7 +306,6 @@ const REPEATS: usize = 2;
 
 impl FidelityScene {
     /// Whether the scene is a drop.
-    #[must_use]
     pub fn is_drop(&self) -> bool {
         self.config.drop.is_some()
     }
@@ -966,8 +963,8 @@ mod tests {
         study.run(meshes.path(), &()).unwrap()
     }
 
-    /// The reference has no error; every other level has one, and the layer's own coarser resolution a smaller one than the
-    /// half-space, which has no base under it.
+    /// The reference has no error; every other level has one, and the layer's own coarser resolution a smaller one than
+    /// the half-space, which has no base under it.
     #[test]
     fn errors_are_ordered() {
         let report = study(&["T", "drop"]);

@@ -46,7 +46,6 @@ impl CellTask {
         Self::Pattern(64),
     ];
     /// Name of the mode.
-    #[must_use]
     pub fn mode(self) -> &'static str {
         match self {
             Self::Mode(mode) => mode.name(),
@@ -55,7 +54,6 @@ impl CellTask {
     }
 
     /// Number of bits of the pattern; `None` for other modes.
-    #[must_use]
     pub fn period(self) -> Option<usize> {
         match self {
             Self::Mode(_) => None,
@@ -64,7 +62,6 @@ impl CellTask {
     }
 
     /// Name of the mode, with the number of bits for a pattern.
-    #[must_use]
     pub fn name(self) -> String {
         match self {
             Self::Mode(mode) => mode.name().to_owned(),
@@ -88,8 +85,8 @@ impl CellTask {
             Self::Pattern(period) => {
                 let mut codes = vec![0; period * cells];
                 Weights::new(WeightMode::Binary, Seeding::Mixed, taxels).fill_codes(0, &mut codes);
-                let patterns = Patterns::new(period, codes).map_err(Refusal::from_error)?;
-                Weights::with_patterns(WeightMode::Binary, patterns).map_err(Refusal::from_error)
+                let patterns = Patterns::new(period, codes)?;
+                Weights::with_patterns(WeightMode::Binary, patterns)
             }
         }
     }
@@ -337,8 +334,7 @@ impl EmulatedCells {
 
     /// What the cell of `taxel` replies after all edges.
     fn reply(&self, weights: &Weights, taxel: usize) -> Result<[u8; REPLY_BYTES], Refusal> {
-        let mut cell = Cell::new(FIRST_ADDRESS.saturating_add(u8::try_from(taxel).unwrap_or(u8::MAX)))
-            .map_err(Refusal::from_error)?;
+        let mut cell = Cell::new(FIRST_ADDRESS.saturating_add(u8::try_from(taxel).unwrap_or(u8::MAX)))?;
         cell.receive(&start_message(weights, taxel, cell.address()).map_err(Refusal::from_error)?);
         for _ in 0..self.edges {
             cell.edge();
@@ -409,13 +405,11 @@ impl EmulatedCells {
 
 impl EmulatedWeights {
     /// Number of clock edges in all, and number of cells.
-    #[must_use]
     pub fn shape(&self) -> [usize; 2] {
         [self.edges, self.cells]
     }
 
     /// Number of blocks that [`Self::next_block`] returns.
-    #[must_use]
     pub fn blocks(&self) -> usize {
         self.edges.div_ceil(BLOCK)
     }
@@ -432,9 +426,7 @@ impl EmulatedWeights {
         }
         self.left -= rows;
         self.codes.resize(rows * self.cells, 0);
-        self.array
-            .clock(self.clock, &mut self.codes)
-            .map_err(Refusal::from_error)?;
+        self.array.clock(self.clock, &mut self.codes)?;
         self.levels.clear();
         self.levels
             .extend(self.codes.iter().map(|code| self.mode.code_level(*code)));
@@ -443,7 +435,6 @@ impl EmulatedWeights {
 }
 
 /// What `spts firmware verify` prints: codes that differ, one line for each mode.
-#[must_use]
 pub fn verification_text(v: &Verification) -> String {
     let mut out = format!(
         "image {}: {} cells, {} edges a mode at {:.1} kHz\n",

@@ -126,7 +126,6 @@ impl PerObjectStudy<'_> {
 
 impl PerObjectReport {
     /// The distance of the twin in the score `score` of `decoder` at `m`.
-    #[must_use]
     pub fn distance(&self, decoder: &str, m: usize, score: &str) -> Option<&ScoreDistance> {
         let same = |d: &&ScoreDistance| d.decoder == decoder && d.m == m && d.score == score;
         self.distances
@@ -306,7 +305,6 @@ pub struct ScoreDistance {
 /// let band = &bands(ReadoutImages::Twin, &[score(0.76)], &skins)[0];
 /// assert!(band.inside && (band.twin - 0.74).abs() < 1e-12);
 /// ```
-#[must_use]
 pub fn bands(images: ReadoutImages, real: &[ObjectScore], skins: &[Vec<ObjectScore>]) -> Vec<ObjectBand> {
     let band = |real: &ObjectScore| {
         let same = |skin: &Vec<ObjectScore>| skin.iter().find(|s| s.is_of(real)).map(|s| s.value);
@@ -333,7 +331,6 @@ pub fn bands(images: ReadoutImages, real: &[ObjectScore], skins: &[Vec<ObjectSco
 }
 
 /// The distance in every score of `bands`, in order.
-#[must_use]
 pub fn distances(bands: &[ObjectBand]) -> Vec<ScoreDistance> {
     let mut out: Vec<ScoreDistance> = Vec::new();
     let key = |b: &ObjectBand| (b.images, b.decoder.clone(), b.m, b.score);
@@ -390,7 +387,6 @@ pub enum ReadoutImages {
 
 impl ReadoutImages {
     /// The kind of images in words.
-    #[must_use]
     pub const fn label(self) -> &'static str {
         match self {
             Self::Twin => "twin",

@@ -111,7 +111,7 @@ impl RowDesign {
             seed: self.seed,
             ..RowTask::new(self.rows, &expected)
         };
-        let rows = (self.designer.build)().design(&task).map_err(Refusal::from_error)?;
+        let rows = (self.designer.build)().design(&task)?;
         let taxels = rows.ncols();
         let order = if self.fewest_flips {
             fewest_flips(rows.view(), &vec![1.0; taxels])
@@ -120,8 +120,8 @@ impl RowDesign {
         };
         let mode = WeightMode::Binary;
         let levels: Vec<f64> = order.iter().flat_map(|&r| rows.row(r)).copied().collect();
-        let patterns = Patterns::of_levels(order.len(), &levels).map_err(Refusal::from_error)?;
-        let weights = Weights::with_patterns(mode, patterns.clone()).map_err(Refusal::from_error)?;
+        let patterns = Patterns::of_levels(order.len(), &levels)?;
+        let weights = Weights::with_patterns(mode, patterns.clone())?;
         let seeds = seeds_of_first_window(&patterns).ok();
         let random = |seed: u64| {
             let task = RowTask {
@@ -131,10 +131,7 @@ impl RowDesign {
             };
             Random.design(&task).and_then(|rows| posterior_trace(&task, &rows))
         };
-        let random = (0..RANDOM)
-            .map(random)
-            .collect::<Result<Vec<f64>, _>>()
-            .map_err(Refusal::from_error)?;
+        let random = (0..RANDOM).map(random).collect::<Result<Vec<f64>, _>>()?;
         let message = (rows.nrows() <= PATTERN_BITS)
             .then(|| {
                 Pattern::new(rows.nrows(), 0)
@@ -148,7 +145,7 @@ impl RowDesign {
             skin: expected.shape(),
             m: rows.nrows(),
             levels: mode.name(),
-            variance_left: posterior_trace(&task, &rows).map_err(Refusal::from_error)?,
+            variance_left: posterior_trace(&task, &rows)?,
             variance_left_random: random.iter().sum::<f64>() / random.len() as f64,
             largest_sum: largest_sum(&expected, &rows),
             flips: flips(&patterns),
@@ -168,7 +165,7 @@ impl RowDesign {
         let streams = Streams::new(self.seed);
         let (data, classes) = match &self.images {
             DesignImages::Smooth(length) => {
-                let expected = Expected::smooth(shape, *length).map_err(Refusal::from_error)?;
+                let expected = Expected::smooth(shape, *length)?;
                 return Ok((expected, Vec::new()));
             }
             DesignImages::Shapes => {
@@ -179,11 +176,11 @@ impl RowDesign {
                 let source = Source::open(path).map_err(Refusal::from_error)?;
                 let (data, _) = source.training(streams).map_err(Refusal::from_error)?;
                 let classes = TemplateModel::new(data.shape[1]).classes(&data.templates);
-                (data, classes.map_err(Refusal::from_error)?)
+                (data, classes?)
             }
         };
         let prior = data.prior(ImagePrior::UNSEEN).map_err(Refusal::from_error)?;
-        let expected = Expected::like(&prior, data.shape, self.tolerances).map_err(Refusal::from_error)?;
+        let expected = Expected::like(&prior, data.shape, self.tolerances)?;
         Ok((expected, classes))
     }
 }
@@ -212,7 +209,6 @@ fn constant(row: &[f64]) -> bool {
 
 impl RowDesignReport {
     /// A summary in a few lines.
-    #[must_use]
     pub fn text(&self) -> String {
         let [rows, cols] = self.skin;
         let mut out = format!(

@@ -90,7 +90,6 @@ pub struct Touch {
 
 impl TouchScene {
     /// A scene with `touches` touches of `objects` on a skin.
-    #[must_use]
     pub fn new(layout: SkinLayout, objects: TouchObjects, touches: usize, seed: u64) -> Self {
         Self {
             layout,
@@ -194,9 +193,7 @@ const IDLE_BLOCK: u64 = 1 << 40;
 /// ```
 pub struct TouchWire {
     readout: Readout,
-    rail_v: Option<f64>,
     idle_v: f64,
-    clipped: usize,
 }
 
 impl TouchWire {
@@ -206,31 +203,20 @@ impl TouchWire {
     /// # Errors
     /// [`Refusal`] if the readout cannot be built.
     pub fn new(profile: &Profile, weights: &Weights, layout: &SkinLayout, device: Streams) -> Result<Self, Refusal> {
-        let profile = profile.with_weights(weights).map_err(Refusal::from_error)?;
-        let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0).map_err(Refusal::from_error)?;
-        let mut untouched =
-            Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols())).map_err(Refusal::from_error)?;
+        let profile = profile.with_weights(weights)?;
+        let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0)?;
+        let mut untouched = Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols()))?;
         readout.seek_row(IDLE_BLOCK, 0);
-        let idle = readout
-            .measure(&mut untouched, IDLE_MEASUREMENTS)
-            .map_err(Refusal::from_error)?;
+        let idle = readout.measure(&mut untouched, IDLE_MEASUREMENTS)?;
         Ok(Self {
             readout,
-            rail_v: profile.rail_v(Mode::Compressive).map_err(Refusal::from_error)?,
-            clipped: 0,
             idle_v: idle.iter().sum::<f64>() / IDLE_MEASUREMENTS as f64,
         })
     }
 
     /// A wire with the given readout. Nothing is subtracted from its samples.
-    #[must_use]
     pub fn of(readout: Readout) -> Self {
-        Self {
-            readout,
-            rail_v: None,
-            idle_v: 0.0,
-            clipped: 0,
-        }
+        Self { readout, idle_v: 0.0 }
     }
 
     /// Unmodified samples of a skin with this conductance at the rows `first_row..first_row + measurements`, V.
@@ -245,12 +231,9 @@ impl TouchWire {
         first_row: u64,
         measurements: usize,
     ) -> Result<Vec<f64>, Refusal> {
-        let mut source = Constant::new(conductance_s).map_err(Refusal::from_error)?;
+        let mut source = Constant::new(conductance_s)?;
         self.readout.seek_row(number, first_row);
-        Ok(self
-            .readout
-            .measure(&mut source, measurements)
-            .map_err(Refusal::from_error)?)
+        self.readout.measure(&mut source, measurements)
     }
 
     /// Samples of `touch` at the rows `first_row..first_row + measurements`, minus the mean of the untouched skin, V.
@@ -266,21 +249,8 @@ impl TouchWire {
         measurements: usize,
     ) -> Result<Vec<f64>, Refusal> {
         let mut volts = self.volts(touch.conductance_s.clone(), number, first_row, measurements)?;
-        self.clipped += self.readout.info().saturated(&volts, self.rail_v);
         volts.iter_mut().for_each(|v| *v -= self.idle_v);
         Ok(volts)
-    }
-
-    /// Number of samples of all touches so far at an end of their range.
-    #[must_use]
-    pub fn clipped(&self) -> usize {
-        self.clipped
-    }
-
-    /// The readout.
-    #[must_use]
-    pub fn readout(&self) -> &Readout {
-        &self.readout
     }
 }
 
@@ -298,7 +268,6 @@ impl TouchScore {
     ///
     /// # Panics
     /// If image and touch have different numbers of taxels.
-    #[must_use]
     pub fn of(image: &[f64], touch: &Touch, layout: &SkinLayout) -> Self {
         assert_eq!(image.len(), touch.support.len(), "taxels");
         let mut found = Vec::new();
@@ -316,7 +285,6 @@ const OUTSIDE: f64 = 0.1;
 
 /// Mean of independent repetitions, each with its own skin, noise and touches, and its 90 % confidence interval. The
 /// band of a single one has no width. `None` without repetitions.
-#[must_use]
 pub fn band(repetitions: &[f64]) -> Option<Band> {
     Sample::of(repetitions).map(|sample| sample.band(OUTSIDE))
 }

@@ -1,6 +1,6 @@
 //! `spts dataset preview`: rows of a data set as a picture.
 
-use super::Files;
+use super::make::Files;
 use crate::context::Common;
 use crate::error::CliError;
 use crate::options::{seed, whole};
@@ -200,7 +200,7 @@ impl ShapesCommand {
         self.common.start()?;
         let families = self.chosen()?;
         check_writable(&self.out)?;
-        let shapes = drawn_shapes(&families, self.seed, self.count).map_err(|e| CliError::usage(e.to_string()))?;
+        let shapes = drawn_shapes(&families, self.seed, self.count)?;
         save_shapes(&shapes, &self.out)?;
         let report = ShapesReport {
             file: self.out,

@@ -164,7 +164,6 @@ fn missing(image: &[f64], raster: &[f64], taken: &[u32]) -> Option<u32> {
 }
 
 /// The cells with another seed among `faults` whose taxel is known.
-#[must_use]
 pub fn reseeded(faults: &[CellFault]) -> Vec<Reseeded> {
     let cell = |fault: &CellFault| match *fault {
         CellFault::MisSeeded {

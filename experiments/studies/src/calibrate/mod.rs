@@ -267,27 +267,13 @@ impl CalibrationReport {
             fitted_profile(&self.profile, taxels).map_err(|e| Refusal::from_error(e).at("the fitted profile"))?;
         Ok(text)
     }
-
-    /// The estimates as a text table, with what the recordings cannot determine.
-    #[must_use]
-    pub fn text(&self) -> String {
-        format!(
-            "{}\n{}not identifiable from these recordings:\n- {}\nin the recordings, not modelled:\n- {}",
-            table(&self.sessions),
-            self.predicted_inside
-                .as_ref()
-                .map_or_else(String::new, |found| predictions(found) + "\n"),
-            NOT_IDENTIFIABLE.join("\n- "),
-            NOT_MODELLED.join("\n- ")
-        )
-    }
 }
 
 /// A number of [`PressNumbers`]: name, unit, value.
-type Number = (&'static str, &'static str, fn(&PressNumbers) -> f64);
+pub type Number = (&'static str, &'static str, fn(&PressNumbers) -> f64);
 
 /// Every number of a press.
-pub(super) const NUMBERS: [Number; 22] = [
+pub const NUMBERS: [Number; 22] = [
     ("idle_mean", "V", |p| p.idle_mean_v),
     ("idle_sd", "V", |p| p.idle_sd_v),
     ("idle_noise", "V", |p| p.idle_noise_v),
@@ -357,7 +343,6 @@ pub struct SessionEstimates {
 
 impl SessionEstimates {
     /// Median over the presses of the value `name`; NaN if there is none.
-    #[must_use]
     pub fn value(&self, name: &str) -> f64 {
         self.numbers.get(name).map_or(f64::NAN, |e| e.value)
     }
@@ -365,7 +350,6 @@ impl SessionEstimates {
     /// Estimates from the given presses of `recording`, the compressive recording of `pair` or one like it. The raster
     /// recording of `pair` shows to which cell a foreign sequence belongs, and is the reference for the taxels. Presses
     /// that missed are left out. `None` if no press determines an image.
-    #[must_use]
     pub fn of(pair: &SessionPair, recording: &Recording, blocks: &[usize]) -> Option<Self> {
         let hold = &pair.hold;
         let raster = pair.raster.as_ref();
@@ -489,99 +473,4 @@ fn plateau_volts(recording: &Recording, hold: &Range<usize>, blocks: &[usize]) -
         .iter()
         .flat_map(|&block| recording.blocks()[block].volts[range.clone()].iter().copied())
         .collect()
-}
-
-/// One line for each value and one column for each session: median ± standard error over the presses. Then beats, steps
-/// and faults.
-#[must_use]
-pub fn table(sessions: &[SessionEstimates]) -> String {
-    let mut out = format!("{:<22}", "");
-    sessions
-        .iter()
-        .for_each(|s| out.push_str(&format!("{:>20}", s.session)));
-    for (name, unit, _) in NUMBERS {
-        let label = if unit.is_empty() {
-            name.to_owned()
-        } else {
-            format!("{name} [{unit}]")
-        };
-        out.push_str(&format!("\n{label:<22}"));
-        for session in sessions {
-            out.push_str(&format!(
-                "{:>20}",
-                session.numbers.get(name).map_or_else(String::new, show)
-            ));
-        }
-    }
-    for s in sessions {
-        let beats: Vec<String> = s
-            .beats
-            .iter()
-            .map(|b| format!("{:.2} (taxel {})", b.period_measurements, b.taxel))
-            .collect();
-        out.push_str(&format!("\n{}: {} presses", s.session, s.presses.len()));
-        match s.steps {
-            Some(steps) => out.push_str(&format!(", step {:.4} mV", 1e3 * steps.step_v)),
-            None => out.push_str(", values on no grid"),
-        }
-        out.push_str(&format!(
-            ", beats [measurements]: {}",
-            if beats.is_empty() {
-                "none seen".to_owned()
-            } else {
-                beats.join(", ")
-            }
-        ));
-        if let Some(gains) = &s.gains {
-            out.push_str(&format!(
-                "\n{}: gains of {} taxels against the raster session: log-sd {:.3} ± {:.3}",
-                s.session,
-                gains.taxels.len(),
-                gains.log_sd,
-                gains.standard_error
-            ));
-        }
-        for fault in &s.faults {
-            out.push_str(&format!("\n{}: {fault}", s.session));
-        }
-        for cell in &s.overdriven {
-            out.push_str(&format!("\n{}: {cell}", s.session));
-        }
-        for press in &s.missed {
-            out.push_str(&format!("\n{}: {press}", s.session));
-        }
-        if s.presses.len() == 1 {
-            out.push_str(&format!(
-                "\n{}: one press only: no number has an uncertainty",
-                s.session
-            ));
-        }
-    }
-    out
-}
-
-fn show(e: &Estimated) -> String {
-    match (e.n, e.standard_error) {
-        (0, _) => "not identified".to_owned(),
-        (_, None) => format!("{:.4}", e.value),
-        (_, Some(error)) => format!("{:.4} ± {error:.4}", e.value),
-    }
-}
-
-/// How many sessions lie in the spans that the others predict, parameter by parameter.
-pub(super) fn predictions(found: &PredictedInside) -> String {
-    let mut out = format!(
-        "each session left out, inside the {:.0} % span that the others predict: {:.0} % of all numbers (between the others' smallest and \
-         largest: {:.0} %)",
-        100.0 * found.coverage,
-        100.0 * found.share,
-        100.0 * found.share_of_range
-    );
-    for n in &found.numbers {
-        out.push_str(&format!("\n- {}: {} of {}", n.name, n.inside, n.sessions));
-        if !n.outside.is_empty() {
-            out.push_str(&format!(", not {}", n.outside.join(", ")));
-        }
-    }
-    out
 }

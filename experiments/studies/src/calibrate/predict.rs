@@ -1,7 +1,6 @@
 //! Prediction of new sessions: spans for their values, and whether these hold.
 
-use super::statistics::mean;
-use super::statistics::sd;
+use super::statistics::{mean, sd};
 use serde::Serialize;
 use spts_recon::statistics::student_t;
 
@@ -23,7 +22,6 @@ const OUTSIDE: f64 = 0.1;
 /// assert!(low < 0.7 && high > 1.3, "few sessions predict a wide span");
 /// assert_eq!(predicted(&[]), None);
 /// ```
-#[must_use]
 pub fn predicted(values: &[f64]) -> Option<(f64, f64)> {
     let n = values.len();
     match values {

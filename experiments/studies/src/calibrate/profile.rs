@@ -68,7 +68,6 @@ const ERROR_DIGITS: i32 = 2;
 
 impl FittedReadout {
     /// Fits the readout to all `sessions` together, or to one. They must have the same weights and rate.
-    #[must_use]
     pub fn of(sessions: &[SessionEstimates]) -> Self {
         let periods = periods(sessions);
         let beat = (!periods.is_empty()).then(|| Estimated::mean_of(&periods));
@@ -370,74 +369,37 @@ pub fn fitted_profile(readings: &FittedReadout, taxels: u32) -> Result<(Profile,
     let base: toml::Table =
         toml::from_str(base.map_or("", |(_, text)| text)).map_err(|e| Refusal::from_error(e).at(DEFAULT_READOUT))?;
     let text = readings.to_toml(&base).map_err(Refusal::from_error)?;
-    let profile = Profile::from_toml(&text).map_err(Refusal::from_error)?;
-    profile.validate(taxels).map_err(Refusal::from_error)?;
+    let profile = Profile::from_toml(&text)?;
+    profile.validate(taxels)?;
     Ok((profile, text))
 }
 
-/// A parameter and where it comes from.
-pub(super) struct Parameter {
-    /// Section and key of the profile.
-    pub(super) name: &'static str,
-    /// Name of the value in [`super::PressNumbers`] that has its uncertainty.
-    number: &'static str,
-    /// Smallest and largest valid value of the readout; rates, shares and noise are not negative.
-    limits: [f64; 2],
-    /// Value of a session; NaN if the session does not determine it.
-    value: fn(&SessionEstimates) -> f64,
-}
+/// A parameter and where it comes from: section and key of the profile; name of the value in [`super::PressNumbers`]
+/// that has its uncertainty; smallest and largest valid value of the readout (rates, shares and noise are not
+/// negative); and its value of a session, NaN if the session does not determine it.
+type Parameter = (&'static str, &'static str, [f64; 2], fn(&SessionEstimates) -> f64);
 
 /// In the order of the profile.
 const PARAMETERS: [Parameter; 8] = [
-    Parameter {
-        name: LATE_RATE,
-        number: "late_per_flip",
-        // half a beat of 52.4 measurements; see the effect `late_updates`
-        limits: [0.0, 0.5 / 53.0],
-        value: |s| s.value("late_per_flip"),
-    },
-    Parameter {
-        name: "drive_offset.constant_v",
-        number: "constant",
-        limits: [-5.0, 5.0],
-        value: |s| s.value("constant"),
-    },
-    Parameter {
-        name: "drive_offset.asymmetry",
-        number: "asymmetry",
-        limits: [-0.5, 0.5],
-        value: |s| s.value("asymmetry"),
-    },
-    Parameter {
-        name: "memory.h1",
-        number: "h1",
-        limits: [-0.4, 0.4],
-        value: |s| s.value("h1"),
-    },
-    Parameter {
-        name: "memory.h2",
-        number: "h2",
-        limits: [-0.4, 0.4],
-        value: |s| s.value("h2"),
-    },
-    Parameter {
-        name: "clock_pattern.amplitude_v",
-        number: "parity",
-        limits: [-2.0, 2.0],
-        value: |s| s.value("parity"),
-    },
-    Parameter {
-        name: "contact_noise.fraction",
-        number: "contact_fraction",
-        limits: [0.0, 1.0],
-        value: |s| s.value("contact_fraction"),
-    },
-    Parameter {
-        name: "idle_noise.sd_v",
-        number: "idle_noise",
-        limits: [0.0, 10.0],
-        value: idle_noise_v,
-    },
+    // half a beat of 52.4 measurements; see the effect `late_updates`
+    (LATE_RATE, "late_per_flip", [0.0, 0.5 / 53.0], |s| {
+        s.value("late_per_flip")
+    }),
+    ("drive_offset.constant_v", "constant", [-5.0, 5.0], |s| {
+        s.value("constant")
+    }),
+    ("drive_offset.asymmetry", "asymmetry", [-0.5, 0.5], |s| {
+        s.value("asymmetry")
+    }),
+    ("memory.h1", "h1", [-0.4, 0.4], |s| s.value("h1")),
+    ("memory.h2", "h2", [-0.4, 0.4], |s| s.value("h2")),
+    ("clock_pattern.amplitude_v", "parity", [-2.0, 2.0], |s| {
+        s.value("parity")
+    }),
+    ("contact_noise.fraction", "contact_fraction", [0.0, 1.0], |s| {
+        s.value("contact_fraction")
+    }),
+    ("idle_noise.sd_v", "idle_noise", [0.0, 10.0], idle_noise_v),
 ];
 
 /// The one parameter that is drawn once a taxel, not once a session.
@@ -462,27 +424,23 @@ pub(super) fn fitted_parameters(sessions: &[SessionEstimates]) -> Vec<FittedPara
     PARAMETERS.iter().map(|parameter| fitted(parameter, sessions)).collect()
 }
 
-fn fitted(parameter: &Parameter, sessions: &[SessionEstimates]) -> FittedParameter {
-    let values: Vec<f64> = sessions.iter().map(parameter.value).filter(|v| v.is_finite()).collect();
+fn fitted(&(name, number, limits, value): &Parameter, sessions: &[SessionEstimates]) -> FittedParameter {
+    let values: Vec<f64> = sessions.iter().map(value).filter(|v| v.is_finite()).collect();
     let estimate = match sessions {
         [only] => Estimated {
             value: values.first().copied().unwrap_or(f64::NAN),
-            ..only
-                .numbers
-                .get(parameter.number)
-                .copied()
-                .unwrap_or(Estimated::mean_of(&[]))
+            ..only.numbers.get(number).copied().unwrap_or(Estimated::mean_of(&[]))
         },
         _ => Estimated::mean_of(&values),
     };
-    let mut span = predicted(&values).map(|span| clipped(span, parameter.limits));
+    let mut span = predicted(&values).map(|span| clipped(span, limits));
     // one session's own value is known better than which of its taxels are the late ones: drawn anew, they would change
     // it
-    if parameter.name == LATE_RATE && sessions.len() > 1 {
+    if name == LATE_RATE && sessions.len() > 1 {
         span = late_span(estimate.value, sessions).or(span);
     }
     FittedParameter {
-        name: parameter.name,
+        name,
         span,
         sessions: values,
         estimate,
@@ -492,11 +450,11 @@ fn fitted(parameter: &Parameter, sessions: &[SessionEstimates]) -> FittedParamet
 /// Whether every session lies in the spans that the others predict; of the late rate, its mean over the taxels. `None`
 /// with fewer than three sessions.
 pub(super) fn predicted_inside(sessions: &[SessionEstimates]) -> Option<PredictedInside> {
-    let of = |parameter: &Parameter| {
-        let values = sessions.iter().map(|s| (s.session.as_str(), (parameter.value)(s)));
+    let of = |&(name, _, limits, value): &Parameter| {
+        let values = sessions.iter().map(|s| (s.session.as_str(), value(s)));
         SessionValues {
-            name: parameter.name,
-            limits: parameter.limits,
+            name,
+            limits,
             sessions: values.filter(|(_, v)| v.is_finite()).collect(),
         }
     };

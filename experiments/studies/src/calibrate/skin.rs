@@ -1,9 +1,7 @@
 //! Estimates the gains of a skin's taxels from raster presses of objects that the simulation knows.
 
-use super::CalibrationStudy;
-use super::SessionEstimates;
-use super::read;
 use super::statistics::middle;
+use super::{CalibrationStudy, SessionEstimates, read};
 use serde::Serialize;
 use spts::data::DataError;
 use spts::progress::Progress;
@@ -201,7 +199,6 @@ impl SkinReport {
     }
 
     /// Text about sessions whose scored presses were used; `None` if there are none.
-    #[must_use]
     pub fn scored_text(&self) -> Option<String> {
         (!self.scored.is_empty()).then(|| {
             format!(
@@ -216,71 +213,4 @@ impl SkinReport {
     pub fn bands(&self) -> impl Iterator<Item = f64> + '_ {
         self.skin.gains.log_sd.iter().map(|sd| (BAND_SD * sd).exp())
     }
-
-    /// The report as text.
-    #[must_use]
-    pub fn text(&self) -> String {
-        let [rows, cols] = self.shape;
-        let touched = self.skin.sessions.iter().filter(|n| **n > 0).count();
-        let mut out = format!(
-            "gains of {rows} × {cols} taxels, {touched} of them touched; objects: {}\n\
-             standard deviation of log gain: {:.3} over the skin, {:.3} from a simulated contact, {:.3} from a mounting{}\n",
-            self.skin.fitted_objects,
-            self.skin.spread_log_sd,
-            self.skin.contact_log_sd,
-            self.skin.gains.mounting_log_sd,
-            if self.mountings.is_empty() {
-                " (not measured: no session has both recordings)".to_owned()
-            } else {
-                let each = self.mountings.iter().map(|m| format!("{} {:.3}", m.session, m.log_sd));
-                format!(" (median of {})", each.collect::<Vec<_>>().join(", "))
-            }
-        );
-        if cols <= MOST_SHOWN {
-            let grid = |out: &mut String, title: &str, values: Vec<f64>| {
-                out.push_str(&format!("\n{title}\n"));
-                for line in values.chunks(cols) {
-                    let line: Vec<String> = line.iter().map(|v| format!("{v:5.2}")).collect();
-                    out.push_str(&format!("{}\n", line.join("")));
-                }
-            };
-            let gains = self.skin.gains.log_mean.iter().map(|log| log.exp());
-            grid(&mut out, "gain", gains.collect());
-            grid(
-                &mut out,
-                "factor by which it may be larger or smaller (90 %)",
-                self.bands().collect(),
-            );
-        }
-        if self.objects.is_empty() {
-            out.push_str("\nno other object to check them with");
-            return out;
-        }
-        out.push_str(
-            "\nsimulated image beside the skin's, with the gains that the other objects tell\n\
-             object      taxels  correlation  with gains  ratios inside 90 %\n",
-        );
-        for object in &self.objects {
-            let c = &object.check;
-            out.push_str(&format!(
-                "{:<12}{:>6}  {:>11.3}  {:>10.3}  {:>18.2}\n",
-                object.object, c.taxels, c.correlation, c.correlation_with_gains, c.inside
-            ));
-        }
-        let mean = |of: fn(&GainCheck) -> f64| {
-            self.objects.iter().map(|o| of(&o.check)).sum::<f64>() / self.objects.len() as f64
-        };
-        out.push_str(&format!(
-            "{:<12}{:>6}  {:>11.3}  {:>10.3}  {:>18.2}",
-            "mean",
-            "",
-            mean(|c| c.correlation),
-            mean(|c| c.correlation_with_gains),
-            mean(|c| c.inside)
-        ));
-        out
-    }
 }
-
-/// Most columns of a sheet whose gains are printed.
-const MOST_SHOWN: usize = 20;

@@ -46,7 +46,6 @@ pub(super) fn kurtosis(values: &[f64]) -> f64 {
 
 /// Quantiles of the finite values at (k + ½)/`count`, by linear interpolation between order statistics. Empty without
 /// values.
-#[must_use]
 pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
     let mut sorted = finite(values);
     sorted.sort_unstable_by(f64::total_cmp);
@@ -77,7 +76,6 @@ pub struct Estimated {
 impl Estimated {
     /// Mean of `values` and its standard error s/√n, with the standard deviation s (n − 1 degrees of freedom). Values
     /// that are not finite are ignored.
-    #[must_use]
     pub fn mean_of(values: &[f64]) -> Self {
         let values = finite(values);
         let n = values.len();
@@ -90,7 +88,6 @@ impl Estimated {
 
     /// Median of `values`, which is robust against a few outliers, and its standard error √(π/2)·s/√n for Gaussian
     /// values, with s from the median distance to the median. Values that are not finite are ignored.
-    #[must_use]
     pub fn median_of(values: &[f64]) -> Self {
         let values = finite(values);
         let n = values.len();

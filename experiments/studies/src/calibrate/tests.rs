@@ -1,9 +1,6 @@
 //! What is put into a simulated recording is found in it.
 
-use super::FittedReadout;
-use super::SessionEstimates;
-use super::SessionPair;
-use super::fitted_profile;
+use super::{FittedReadout, SessionEstimates, SessionPair, fitted_profile};
 use crate::compare::{recorded_images, replay};
 use approx::assert_abs_diff_eq;
 use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording, Seeding};

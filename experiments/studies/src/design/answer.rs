@@ -1,21 +1,8 @@
 //! Consequences of a design: costs, the limiting constraint, alternatives, and files to simulate it.
 
-use super::Alternative;
-use super::Binding;
-use super::CostDrivers;
-use super::Design;
-use super::DesignReport;
-use super::DesignStudy;
-use super::Ground;
-use super::LatencyParts;
-use super::WireChoice;
-use super::search::Bench;
-use super::search::Tried;
-use super::search::draw;
-use super::search::mean;
-use super::wire::BandRows;
-use super::wire::FeedbackLimit;
-use super::wire::RowSource;
+use super::search::{Bench, Tried, draw, mean};
+use super::wire::{BandRows, FeedbackLimit, RowSource};
+use super::{Alternative, Binding, CostDrivers, Design, DesignReport, DesignStudy, Ground, LatencyParts, WireChoice};
 use crate::sensing::load_s;
 use spts_firmware::{FIRST_ADDRESS, LAST_BUS_ADDRESS, Pattern};
 use spts_input::Refusal;
@@ -300,16 +287,11 @@ fn scene(design: &Design) -> String {
 }
 
 /// "1 wire", "2 wires".
-pub(super) fn counted(count: usize, what: &str) -> String {
+pub fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 /// The layout of a design.
 pub(super) fn layout_of(design: &Design) -> Result<SkinLayout, Refusal> {
-    Ok(SkinLayout::new(
-        design.rows,
-        design.cols,
-        design.pitch_m,
-        design.electrode_m,
-    )?)
+    SkinLayout::new(design.rows, design.cols, design.pitch_m, design.electrode_m)
 }

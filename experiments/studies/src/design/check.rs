@@ -1,15 +1,9 @@
 //! Checks a design with other touches.
 
-use super::Design;
-use super::DesignStudy;
-use super::WireChoice;
 use super::answer::layout_of;
-use super::search::Bench;
-use super::search::draw;
-use super::search::mean;
-use super::wire::BandRows;
-use super::wire::RowSource;
-use super::wire::bands;
+use super::search::{Bench, draw, mean};
+use super::wire::{BandRows, RowSource, bands};
+use super::{Design, DesignStudy, WireChoice};
 use rand::RngExt as _;
 use serde::Serialize;
 use spts::progress::Progress;

@@ -18,9 +18,9 @@ mod answer;
 mod check;
 mod objects;
 mod search;
-mod text;
 mod wire;
 
+pub use answer::counted;
 pub use check::{CheckReport, CheckedQuantity, DesignCheck};
 pub use objects::DesignObjects;
 pub use search::OUTSIDE;
@@ -138,7 +138,7 @@ impl DesignStudy {
             )));
         }
         let electrode_m = SkinLayout::usual_electrode_m(self.pitch_m);
-        Ok(SkinLayout::new(rows, cols, self.pitch_m, electrode_m)?)
+        SkinLayout::new(rows, cols, self.pitch_m, electrode_m)
     }
 
     /// Learns what images are like.
@@ -149,7 +149,7 @@ impl DesignStudy {
         Ok(Ground {
             layout,
             electronics: ElectronicsStudy::as_designed()?,
-            prior: SheetPrior::like(images, [layout.rows(), layout.cols()]).map_err(Refusal::from_error)?,
+            prior: SheetPrior::like(images, [layout.rows(), layout.cols()])?,
             learned,
         })
     }
@@ -285,7 +285,6 @@ pub enum Binding {
 
 impl Binding {
     /// The constraint in words.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Iou => "IoU",

@@ -153,20 +153,14 @@ impl Classes {
         let slices: Vec<&[f64]> = means.iter().map(Vec::as_slice).collect();
         let taxels = slices.first().map_or(0, |m| m.len());
         let labels: Vec<usize> = (0..names.len()).collect();
-        let templates =
-            Library::new(&Matrix::from_column_slices(taxels, &slices), &labels).map_err(Refusal::from_error)?;
+        let templates = Library::new(&Matrix::from_column_slices(taxels, &slices), &labels)?;
         let model = TemplateModel {
             gains: vec![GAIN_SD; taxels],
             rank: RANK,
             ..TemplateModel::new(cols)
         };
-        let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1]).map_err(Refusal::from_error)?;
-        let classifier = EvidenceClassifier::new(
-            &model.classes(&templates).map_err(Refusal::from_error)?,
-            amplitude,
-            UNKNOWN_PRIOR,
-        )
-        .map_err(Refusal::from_error)?;
+        let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
+        let classifier = EvidenceClassifier::new(&model.classes(&templates)?, amplitude, UNKNOWN_PRIOR)?;
         Ok(Self { classifier, names })
     }
 
@@ -186,8 +180,8 @@ impl Classes {
         let mut preparation = self.classifier.preparation();
         let mut evidence = self.classifier.evidence();
         for (row, v) in rows.iter().zip(volts) {
-            preparation.push(row).map_err(Refusal::from_error)?;
-            evidence.observe(&preparation, *v).map_err(Refusal::from_error)?;
+            preparation.push(row)?;
+            evidence.observe(&preparation, *v)?;
         }
         let decision = self
             .classifier

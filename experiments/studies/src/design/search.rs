@@ -97,7 +97,7 @@ impl DesignStudy {
             pressing(&touches, &bands, layout.cols()),
             alike,
         )?;
-        let profile = Profile::from_toml(&wire.profile(!alike)?).map_err(Refusal::from_error)?;
+        let profile = Profile::from_toml(&wire.profile(!alike)?)?;
         #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
         let in_time = (self.latency_s / wire.period_s * (1.0 + 1e-9)) as usize;
         if in_time < FEWEST {
@@ -296,7 +296,7 @@ impl Bench {
         prior: SheetPrior,
         places: usize,
     ) -> Result<Self, Refusal> {
-        let decoder = SheetDecoder::new(prior, SheetNoise::default(), rows.bands.len()).map_err(Refusal::from_error)?;
+        let decoder = SheetDecoder::new(prior, SheetNoise::default(), rows.bands.len())?;
         Ok(Self {
             layout,
             rows,
@@ -318,7 +318,7 @@ impl Bench {
         let done = self.decoder.measurements() / self.rows.bands.len();
         if measurements > done {
             let (rows, wires) = self.rows.rows(done..measurements);
-            self.decoder.extend(&rows, &wires).map_err(Refusal::from_error)?;
+            self.decoder.extend(&rows, &wires)?;
         }
         Ok(())
     }
@@ -376,7 +376,7 @@ impl Bench {
             })
             .collect();
         let one = |(r, touch, volts): (usize, &Touch, &[f64])| -> Result<_, Refusal> {
-            let image = self.decoder.non_negative(volts, places).map_err(Refusal::from_error)?;
+            let image = self.decoder.non_negative(volts, places)?;
             let right = match (classes, &rows) {
                 (Some(classes), Some(rows)) => Some(classes.is_right(rows, volts, &touch.name)?),
                 _ => None,

@@ -177,8 +177,8 @@ impl WireDesign {
             amplifier.insert("sample_s".to_owned(), (update_s + self.available_s).into());
         }
         let text = toml::to_string(&table).map_err(|e| Refusal::from_error(e).at("profile"))?;
-        let profile = Profile::from_toml(&text).map_err(Refusal::from_error)?;
-        profile.validate(1).map_err(Refusal::from_error)?;
+        let profile = Profile::from_toml(&text)?;
+        profile.validate(1)?;
         Ok(text)
     }
 }
@@ -235,7 +235,6 @@ pub enum RowSource {
 
 impl RowSource {
     /// Name in tables and figures.
-    #[must_use]
     pub fn name(&self) -> &str {
         match self {
             Self::Generator => "random",
@@ -295,20 +294,16 @@ impl BandRows {
             RowSource::Generator => Self::generator(bands, cols),
             RowSource::Designer(name) => {
                 let height = bands.first().map_or(0, Range::len);
-                let expected = Expected::smooth([height, cols], length(prior)).map_err(Refusal::from_error)?;
+                let expected = Expected::smooth([height, cols], length(prior))?;
                 let task = RowTask {
                     seed,
                     ..RowTask::new(measurements, &expected)
                 };
                 let found = designer(name).ok_or_else(|| Refusal::new(format!("rows: no designer {name:?}")))?;
-                let matrix = (found.build)().design(&task).map_err(Refusal::from_error)?;
+                let matrix = (found.build)().design(&task)?;
                 let signs = (0..matrix.nrows()).flat_map(|r| matrix.row(r).to_vec());
                 let codes = signs.map(|v| if v > 0.0 { u8::MAX } else { 0 }).collect();
-                Self::pattern(
-                    &Patterns::new(matrix.nrows(), codes).map_err(Refusal::from_error)?,
-                    bands,
-                    cols,
-                )
+                Self::pattern(&Patterns::new(matrix.nrows(), codes)?, bands, cols)
             }
         }
     }
@@ -333,8 +328,8 @@ impl BandRows {
                 let codes = pattern.row(row);
                 codes[..codes.len().min(band.len() * cols)].to_vec()
             });
-            let patterns = Patterns::new(pattern.period(), rows.collect()).map_err(Refusal::from_error)?;
-            Ok(Weights::with_patterns(WeightMode::Binary, patterns).map_err(Refusal::from_error)?)
+            let patterns = Patterns::new(pattern.period(), rows.collect())?;
+            Weights::with_patterns(WeightMode::Binary, patterns)
         });
         Ok(Self {
             cols,

@@ -155,7 +155,7 @@ fn trial(
     for (scene, measured) in scenes.iter().zip(measured) {
         let (phi, volts) = measured.first(rows)?;
         let time = Instant::now();
-        let found = pursuit.recover(&phi, &volts, None).map_err(Refusal::from_error)?;
+        let found = pursuit.recover(&phi, &volts, None)?;
         sum.decode_s += share * time.elapsed().as_secs_f64();
         support(&scene.image_s, SUPPORT_THRESHOLD, &mut truth);
         support(&found.image, SUPPORT_THRESHOLD, &mut mask);
@@ -267,14 +267,12 @@ impl SizeRow {
     }
 
     /// The trial with the wanted IoU and the fewest measurements; otherwise the last one.
-    #[must_use]
     pub fn deciding(&self) -> Option<&ExploreTrial> {
         let found = self.trials.iter().find(|t| Some(t.measurements) == self.m_iou);
         found.or(self.trials.last())
     }
 
     /// The best IoU of all trials.
-    #[must_use]
     pub fn best_iou(&self) -> f64 {
         self.trials.iter().map(|t| t.iou).fold(0.0, f64::max)
     }
@@ -294,7 +292,6 @@ pub struct CostFit {
 
 impl CostFit {
     /// Whether the cost is a computing time on this machine.
-    #[must_use]
     pub fn is_of_this_machine(&self) -> bool {
         self.cost == DECODING
     }

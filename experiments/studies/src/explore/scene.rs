@@ -122,10 +122,7 @@ impl MeasuredWires {
             let line = |session: u64, conductance_s: Vec<f64>| -> Result<(Readout, Constant), Refusal> {
                 let readout = Readout::new(&wiring.profile, Mode::Compressive, &layout, device, session);
                 let map = ConductanceMap::from_values(1, conductance_s.len(), conductance_s);
-                Ok((
-                    readout.map_err(Refusal::from_error)?,
-                    Constant::new(map).map_err(Refusal::from_error)?,
-                ))
+                Ok((readout?, Constant::new(map)?))
             };
             let conductance_s = scene.image_s[band.clone()].iter().map(|g| g + idle_s).collect();
             let pressed = line(1, conductance_s)?;
@@ -137,7 +134,7 @@ impl MeasuredWires {
                 volts: Vec::new(),
             });
         }
-        let generator = SignGenerator::new(MULTIPLIER, INCREMENT, SIGN_BIT).map_err(Refusal::from_error)?;
+        let generator = SignGenerator::new(MULTIPLIER, INCREMENT, SIGN_BIT)?;
         Ok(Self { wires, generator })
     }
 
@@ -166,10 +163,7 @@ impl Wire {
         }
         let run = |(readout, source): &mut (Readout, Constant)| readout.measure(source, more);
         let (pressed, idle) = rayon::join(|| run(&mut self.pressed), || run(&mut self.idle));
-        let (pressed, idle) = (
-            pressed.map_err(Refusal::from_error)?,
-            idle.map_err(Refusal::from_error)?,
-        );
+        let (pressed, idle) = (pressed?, idle?);
         self.volts.extend(pressed.iter().zip(&idle).map(|(p, i)| p - i));
         Ok(())
     }

@@ -6,7 +6,6 @@ use serde::Serialize;
 use spts_circuit::amplifier::{Amplifier, Budget, Limit, Network, Setting, Skin, fewest_wires};
 use spts_circuit::{Profile, Seeding};
 use spts_input::Refusal;
-use spts_models::ConfigError;
 
 /// Share of the converter's range that a fitted feedback uses: the sum is Gaussian, and scenes differ.
 const HEADROOM: f64 = 0.8;
@@ -31,7 +30,6 @@ impl Way {
     pub const ALL: [Self; 4] = [Self::Ideal, Self::AsDesigned, Self::Fitted, Self::Wires];
 
     /// The wiring in words.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Ideal => "ideal wire",
@@ -129,7 +127,7 @@ pub(crate) fn wirings(
 }
 
 /// The amplifier with a feedback, no larger than it is, at which the sum of the whole skin fits.
-fn fitted(designed: &Amplifier, taxels: u32, setting: &Setting) -> Result<Amplifier, ConfigError> {
+fn fitted(designed: &Amplifier, taxels: u32, setting: &Setting) -> Result<Amplifier, Refusal> {
     let budget = Budget::new(designed, f64::from(taxels), setting);
     let network = Network {
         // the sum is proportional to the feedback
@@ -145,15 +143,15 @@ fn profile(way: Way, feedback_ohm: f64, available_s: f64, period_s: f64, seeding
     if way == Way::Ideal {
         return Ok(Profile {
             seeding,
-            ..Profile::named("ideal").map_err(Refusal::from_error)?
+            ..Profile::named("ideal")?
         });
     }
-    let built = Profile::named("as_built").map_err(Refusal::from_error)?;
+    let built = Profile::named("as_built")?;
     let mut profile = Profile {
         seeding,
         feedback_ohm,
         sample_rate_hz: 1.0 / period_s,
-        ..Profile::named("as_designed").map_err(Refusal::from_error)?
+        ..Profile::named("as_designed")?
     };
     for effect in ["contact_noise", "late_updates"] {
         let table = built
@@ -173,6 +171,7 @@ fn profile(way: Way, feedback_ohm: f64, available_s: f64, period_s: f64, seeding
     amplifier.insert("sample_s".to_owned(), sample_s.into());
     Ok(profile)
 }
+
 /// An effect that a profile lacks, or a value of it, as an error.
 fn no_effect(profile: &str, name: &str) -> Refusal {
     Refusal::new(format!("profile {profile}: no `compressive.{name}`"))

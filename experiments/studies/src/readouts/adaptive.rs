@@ -1,12 +1,7 @@
 //! Scans taxels one by one, guided by the contacts found.
 
-use super::PreparedReadout;
-use super::Reading;
-use super::ReadoutSkin;
-use super::WireReadout;
-use super::until_noticed;
-use super::wire::HeldWire;
-use super::wire::WireFrame;
+use super::wire::{HeldWire, WireFrame};
+use super::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
 use spts_input::Refusal;
 use std::collections::VecDeque;
 

@@ -59,24 +59,17 @@ fn gaussian(skin: &ReadoutSkin, rows: &StoredRows, count: usize) -> Result<Decod
         prior.covariance().apply(row, &mut product);
         square += row.iter().zip(&product).map(|(a, b)| a * b).sum::<f64>() / count as f64;
     }
-    let fixed = Fixed::new(matrix.view(), prior, NOISE).map_err(Refusal::from_error)?;
+    let fixed = Fixed::new(matrix.view(), prior, NOISE)?;
     Ok(Decoder::Gaussian(Box::new(fixed), square.sqrt()))
 }
 
 /// The decoder of a large sheet on which images are alike over `length` taxels, its rows prepared.
 fn sheet(rows: &StoredRows, shape: [usize; 2], length: f64) -> Result<SheetDecoder, Refusal> {
-    let mut decoder = SheetDecoder::new(
-        SheetPrior::smooth(shape, length).map_err(Refusal::from_error)?,
-        SheetNoise::default(),
-        1,
-    )
-    .map_err(Refusal::from_error)?;
+    let mut decoder = SheetDecoder::new(SheetPrior::smooth(shape, length)?, SheetNoise::default(), 1)?;
     let levels: Vec<f64> = (0..rows.len())
         .flat_map(|r| rows.row(r).iter().map(|w| f64::from(*w)))
         .collect();
-    decoder
-        .extend(&levels, &vec![0; rows.len()])
-        .map_err(Refusal::from_error)?;
+    decoder.extend(&levels, &vec![0; rows.len()])?;
     Ok(decoder)
 }
 
@@ -116,12 +109,12 @@ impl FewRows {
                     .iter()
                     .for_each(|v| window.push(v * expected / rms.max(f64::MIN_POSITIVE)));
                 Ok(if quick {
-                    window.image().map_err(Refusal::from_error)?.to_vec()
+                    window.image()?.to_vec()
                 } else {
-                    window.non_negative().map_err(Refusal::from_error)?.to_vec()
+                    window.non_negative()?.to_vec()
                 })
             }
-            Decoder::Sheet(sheet, places) => Ok(sheet.non_negative(samples, *places).map_err(Refusal::from_error)?),
+            Decoder::Sheet(sheet, places) => Ok(sheet.non_negative(samples, *places)?),
             Decoder::Patches => {
                 let [rows, cols] = self.shape;
                 let pursuit = RegionPursuit {
@@ -134,10 +127,7 @@ impl FewRows {
                 });
                 let mut centred = samples.to_vec();
                 centre(&mut centred);
-                let mut image = pursuit
-                    .recover(&phi, &centred, None)
-                    .map_err(Refusal::from_error)?
-                    .image;
+                let mut image = pursuit.recover(&phi, &centred, None)?.image;
                 // a pursuit's bumps are wider than a taxel
                 if let Some(taxels) = contact_taxels(&image, samples.len()) {
                     let mut columns = phi.inner().select_columns(&taxels);

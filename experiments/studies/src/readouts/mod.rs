@@ -103,7 +103,6 @@ pub struct ReadoutSkin {
 
 impl ReadoutSkin {
     /// A skin of this layout. `seed` determines the random numbers that readouts need for preparation.
-    #[must_use]
     pub fn new(layout: SkinLayout, seed: u64) -> Self {
         Self {
             layout,
@@ -129,7 +128,6 @@ impl ReadoutSkin {
 
     /// Numbers of measurements for a readout that can choose them: 1 to 50 % of the taxels, at least 5 and at most
     /// 2000.
-    #[must_use]
     pub fn measurements(&self) -> Vec<usize> {
         #[expect(clippy::cast_possible_truncation, reason = "skins have far fewer than 2^52 taxels")]
         let rounded = |share: &f64| (share * self.layout.taxels() as f64).round() as usize;
@@ -142,7 +140,6 @@ impl ReadoutSkin {
 /// of every measurement of a frame whether its sample is beyond the threshold. The frame is measured over and over, and
 /// the onset is at a uniformly distributed moment, so that half a measurement passes on average before the next one
 /// begins. `None` if no sample is beyond the threshold.
-#[must_use]
 pub fn until_noticed(beyond: &[bool]) -> Option<f64> {
     let first = beyond.iter().position(|b| *b)?;
     let count = beyond.len();
@@ -234,7 +231,6 @@ pub const READOUTS: &[ReadoutLine] = &[
 ];
 
 /// The readout called `name`.
-#[must_use]
 pub fn readout(name: &str) -> Option<&'static ReadoutLine> {
     READOUTS.iter().find(|line| line.name == name)
 }

@@ -45,7 +45,6 @@ impl StoredRows {
     ///
     /// # Panics
     /// If the levels are not a whole number of rows.
-    #[must_use]
     pub fn new(taxels: usize, levels: Vec<i8>) -> Self {
         assert!(
             taxels > 0 && !levels.is_empty() && levels.len().is_multiple_of(taxels),
@@ -59,19 +58,16 @@ impl StoredRows {
     }
 
     /// Number of rows M.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.levels.len() / self.taxels
     }
 
     /// Always `false`: there is at least one row.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.levels.is_empty()
     }
 
     /// Number of taxels N.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.taxels
     }
@@ -80,7 +76,6 @@ impl StoredRows {
     ///
     /// # Panics
     /// If there is no such row.
-    #[must_use]
     pub fn row(&self, r: usize) -> &[i8] {
         &self.levels[r * self.taxels..(r + 1) * self.taxels]
     }
@@ -89,7 +84,6 @@ impl StoredRows {
     ///
     /// # Panics
     /// If the number of values differs from that of the taxels.
-    #[must_use]
     pub fn sums(&self, values: &[f64]) -> Vec<f64> {
         assert_eq!(values.len(), self.taxels, "one value a taxel");
         let sum = |row: &[i8]| row.iter().zip(values).map(|(w, v)| f64::from(*w) * v).sum();
@@ -130,20 +124,17 @@ pub struct WalshRows {
 
 impl WalshRows {
     /// Walsh functions of `taxels` taxels.
-    #[must_use]
     pub fn new(taxels: usize) -> Self {
         Self { taxels }
     }
 
     /// Number of rows before they repeat: the smallest power of two that is at least the number of taxels.
-    #[must_use]
     pub fn rows(self) -> usize {
         self.taxels.next_power_of_two()
     }
 
     /// The noiseless sample of every row: Σ wₖ·valuesₖ over the taxels, with one value a taxel, by the fast Walsh
     /// transform. Applied to its own result, divided by the number of rows, it gives the values back.
-    #[must_use]
     pub fn transform(self, values: &[f64]) -> Vec<f64> {
         let mut sums = values.to_vec();
         sums.resize(self.rows(), 0.0);
@@ -282,7 +273,7 @@ impl WireReadout for RandomSigns {
 const SMOOTH_TAXELS: f64 = 1.5;
 
 /// Rows of ±1 in pattern mode: products of two rows along the axes of the skin. Each of the two lowers what is left of
-/// the expected images' variance most. They make the best images of `spts sensing study`.
+/// the expected images' variance most. They make the best images of docs/rows.md.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DesignedSigns;
 
@@ -292,13 +283,11 @@ impl WireReadout for DesignedSigns {
         let most = skin.measurements().last().copied().unwrap_or(1);
         let shape = [skin.layout.rows(), skin.layout.cols()];
         let expected = if taxels <= WHOLE_IMAGES {
-            Expected::like(&*skin.prior()?, shape, Tolerances::default()).map_err(Refusal::from_error)?
+            Expected::like(&*skin.prior()?, shape, Tolerances::default())?
         } else {
-            Expected::smooth(shape, SMOOTH_TAXELS).map_err(Refusal::from_error)?
+            Expected::smooth(shape, SMOOTH_TAXELS)?
         };
-        let designed = Separable
-            .design(&RowTask::new(most, &expected))
-            .map_err(Refusal::from_error)?;
+        let designed = Separable.design(&RowTask::new(most, &expected))?;
         let signs = designed
             .view()
             .values()

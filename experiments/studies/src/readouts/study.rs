@@ -71,7 +71,6 @@ struct Means {
 
 impl ReadoutsStudy {
     /// The parameters of the study.
-    #[must_use]
     pub fn parameters(&self) -> ReadoutsParameters {
         ReadoutsParameters {
             readouts: self.readouts.iter().map(|line| line.name).collect(),
@@ -298,7 +297,6 @@ pub struct ReadoutTrial {
 
 impl ReadoutTrial {
     /// Whether the mean IoU is good.
-    #[must_use]
     pub fn is_good(&self) -> bool {
         self.iou.is_some_and(|iou| iou.mean >= GOOD_IOU)
     }
@@ -324,7 +322,6 @@ pub struct ReadoutRow {
 
 impl ReadoutRow {
     /// The trial with the fewest measurements and a good image; otherwise the one with the best IoU.
-    #[must_use]
     pub fn deciding(&self) -> Option<&ReadoutTrial> {
         let iou = |t: &ReadoutTrial| t.iou.map_or(0.0, |iou| iou.mean);
         let best = self.trials.iter().max_by(|a, b| iou(a).total_cmp(&iou(b)));
@@ -375,7 +372,6 @@ struct Known {
 impl Templates {
     /// Templates from `touches` on a skin of `rows` × `cols`: the mean of all touches of an object, normalised to
     /// length 1.
-    #[must_use]
     pub fn new(touches: &[Touch], rows: usize, cols: usize) -> Self {
         let mut sums: Vec<(Arc<str>, Vec<f64>)> = Vec::new();
         for touch in touches {
@@ -403,7 +399,6 @@ impl Templates {
 
     /// The object whose template, shifted by up to a taxel along each axis, correlates most with `image`. The length of
     /// `image` does not matter. `None` for an empty image.
-    #[must_use]
     pub fn name(&self, image: &[f64]) -> Option<&str> {
         let shifts = (-REACH..=REACH).flat_map(|r| (-REACH..=REACH).map(move |c| (r, c)));
         let scores = self.known.iter().map(|known| {
@@ -443,72 +438,72 @@ pub struct PublishedSystem {
     pub source: &'static str,
 }
 
+/// A system as published: name, taxels, images a second, wires, the stated figure, source.
+const fn system(
+    name: &'static str,
+    taxels: usize,
+    frames_hz: f64,
+    [wires, stated, source]: [&'static str; 3],
+) -> PublishedSystem {
+    PublishedSystem {
+        name,
+        taxels,
+        frames_hz,
+        wires,
+        stated,
+        source,
+    }
+}
+
 /// Published systems, from few taxels to many.
 pub const PUBLISHED: &[PublishedSystem] = &[
-    PublishedSystem {
-        name: "CDMA skin",
-        taxels: 16,
-        frames_hz: 78.0,
-        wires: "1",
-        stated: "measured",
-        source: "arXiv 2509.10888",
-    },
-    PublishedSystem {
-        name: "SPTS",
-        taxels: 100,
-        frames_hz: 3500.0,
-        wires: "1, and a bus",
-        stated: "measured, M = 20",
-        source: "arXiv 2511.16898",
-    },
-    PublishedSystem {
-        name: "ACES",
-        taxels: 240,
-        frames_hz: 1000.0,
-        wires: "1",
-        stated: "measured, 1 ms an event",
-        source: "Science Robotics 4 (2019) eaax2198",
-    },
-    PublishedSystem {
-        name: "ACTS, adaptive",
-        taxels: 1024,
-        frames_hz: 1000.0,
-        wires: "rows and columns",
-        stated: "measured, the most",
-        source: "arXiv 2410.13847",
-    },
-    PublishedSystem {
-        name: "ACTS, raster",
-        taxels: 1024,
-        frames_hz: 56.0,
-        wires: "rows and columns",
-        stated: "measured",
-        source: "arXiv 2410.13847",
-    },
-    PublishedSystem {
-        name: "Hollis",
-        taxels: 4096,
-        frames_hz: 100.0,
-        wires: "not stated",
-        stated: "simulated, M = 1024, at least",
-        source: "arXiv 1705.05247",
-    },
-    PublishedSystem {
-        name: "TUM H1",
-        taxels: 7560,
-        frames_hz: 250.0,
-        wires: "47 patches",
-        stated: "measured, sensors of several kinds",
-        source: "G. Cheng et al., Proc. IEEE 107 (2019) 2034",
-    },
-    PublishedSystem {
-        name: "BYU fabric",
-        taxels: 8000,
-        frames_hz: 50.0,
-        wires: "SPI, daisy-chained",
-        stated: "measured, at least, on 1 m²",
-        source: "arXiv 2508.20959",
-    },
+    system("CDMA skin", 16, 78.0, ["1", "measured", "arXiv 2509.10888"]),
+    system(
+        "SPTS",
+        100,
+        3500.0,
+        ["1, and a bus", "measured, M = 20", "arXiv 2511.16898"],
+    ),
+    system(
+        "ACES",
+        240,
+        1000.0,
+        ["1", "measured, 1 ms an event", "Science Robotics 4 (2019) eaax2198"],
+    ),
+    system(
+        "ACTS, adaptive",
+        1024,
+        1000.0,
+        ["rows and columns", "measured, the most", "arXiv 2410.13847"],
+    ),
+    system(
+        "ACTS, raster",
+        1024,
+        56.0,
+        ["rows and columns", "measured", "arXiv 2410.13847"],
+    ),
+    system(
+        "Hollis",
+        4096,
+        100.0,
+        ["not stated", "simulated, M = 1024, at least", "arXiv 1705.05247"],
+    ),
+    system(
+        "TUM H1",
+        7560,
+        250.0,
+        [
+            "47 patches",
+            "measured, sensors of several kinds",
+            "G. Cheng et al., Proc. IEEE 107 (2019) 2034",
+        ],
+    ),
+    system(
+        "BYU fabric",
+        8000,
+        50.0,
+        ["SPI, daisy-chained", "measured, at least, on 1 m²", "arXiv 2508.20959"],
+    ),
 ];
 
 #[cfg(test)]

@@ -34,7 +34,6 @@ impl WireFrame {
     /// The samples of a scan of a sheet with `cols` columns that belong to a contact, and 0 for all others. A contact
     /// consists of the samples beyond the alarm threshold and the positive ones next to them. On a large skin, noise
     /// would otherwise appear as taxels.
-    #[must_use]
     pub fn contacts(&self, cols: usize) -> Vec<f64> {
         let mut image = vec![0.0; self.volts.len()];
         let cols = cols.max(1);
@@ -79,7 +78,6 @@ pub struct WireSession<'a> {
 impl<'a> WireSession<'a> {
     /// A session with `wire` on a skin of `layout`. A measurement takes `period_s`; an untouched taxel has the
     /// conductance `idle_s` and a fully pressed one `pressed_s`, S. `device` provides its random numbers.
-    #[must_use]
     pub fn new(
         wire: &'a ReadoutWire,
         layout: SkinLayout,
@@ -182,13 +180,11 @@ pub struct HeldWire<'w, 'a> {
 
 impl HeldWire<'_, '_> {
     /// Output for a conductance at level 1, V/S.
-    #[must_use]
     pub fn volts_per_siemens(&self) -> f64 {
         self.session.volts_per_siemens()
     }
 
     /// Levels of the codes 0 and 255 according to the data sheet.
-    #[must_use]
     pub fn levels(&self) -> [f64; 2] {
         self.session.wire.levels
     }
@@ -202,7 +198,7 @@ impl HeldWire<'_, '_> {
         let touch = self.touch.conductance_s.values();
         self.session.frame(touch, self.number, taxels, |session| {
             let (profile, layout) = (&session.wire.profile, &session.layout);
-            Ok(Readout::new(profile, Mode::Raster, layout, session.device, 0).map_err(Refusal::from_error)?)
+            Readout::new(profile, Mode::Raster, layout, session.device, 0)
         })
     }
 
@@ -221,18 +217,14 @@ impl HeldWire<'_, '_> {
                 weights: CompressiveWeights::Binary,
                 ..session.wire.profile.clone()
             };
-            let readout = Readout::new(&profile, Mode::Compressive, &session.layout, session.device, 0)
-                .map_err(Refusal::from_error)?;
-            Ok(readout
-                .with_codes(Box::new(rows.clone()))
-                .map_err(Refusal::from_error)?)
+            let readout = Readout::new(&profile, Mode::Compressive, &session.layout, session.device, 0)?;
+            readout.with_codes(Box::new(rows.clone()))
         })
     }
 
     /// Each cell's own measurement of its taxel, S: the conductance minus that of the idle skin, with the relative
     /// noise of a contact. It is for cells with a converter of their own; the receiver at the end of the wire does not
     /// know it.
-    #[must_use]
     pub fn own_values_s(&self) -> Vec<f64> {
         let mut rng = self.session.device.rng("readouts/cells", self.number);
         let noisy = |g: &f64| {
@@ -243,7 +235,6 @@ impl HeldWire<'_, '_> {
     }
 
     /// Random numbers for events that are not synchronised with a clock; different for every touch.
-    #[must_use]
     pub fn moments(&self) -> Streams {
         self.session.device.child("readouts/moments", self.number)
     }
@@ -259,13 +250,8 @@ impl HeldWire<'_, '_> {
         let line = |chips: &StoredRows| -> Result<TouchWire, Refusal> {
             // the cells that transmit, whatever their places
             let layout = SkinLayout::new(1, chips.taxels(), published.pitch_m(), published.electrode_m())?;
-            let readout = Readout::new(&session.wire.profile, Mode::Raster, &layout, session.device, 0)
-                .map_err(Refusal::from_error)?;
-            Ok(TouchWire::of(
-                readout
-                    .with_codes(Box::new(chips.clone()))
-                    .map_err(Refusal::from_error)?,
-            ))
+            let readout = Readout::new(&session.wire.profile, Mode::Raster, &layout, session.device, 0)?;
+            Ok(TouchWire::of(readout.with_codes(Box::new(chips.clone()))?))
         };
         let silent = StoredRows::new(1, vec![0]);
         let idle = line(&silent)?.volts(ConductanceMap::zeros(1, 1), IDLE_BLOCK, 0, IDLE_MEASUREMENTS)?;
@@ -282,13 +268,11 @@ impl HeldWire<'_, '_> {
     }
 
     /// Conductance of a fully pressed taxel, S.
-    #[must_use]
     pub fn pressed_s(&self) -> f64 {
         self.session.pressed_s
     }
 
     /// Conductance of an untouched taxel, S.
-    #[must_use]
     pub fn idle_s(&self) -> f64 {
         self.session.idle_s
     }
@@ -364,7 +348,6 @@ impl SkinWire {
     }
 
     /// Conductance of a fully pressed taxel, S.
-    #[must_use]
     pub fn pressed_s(&self) -> f64 {
         self.electronics.skin.pressed_s
     }
@@ -410,7 +393,7 @@ impl SkinWire {
 
     /// The profile with what a session draws fixed, so that it is the same for all readouts and in both modes.
     fn with_feedback(&self, feedback_ohm: f64, session: Streams) -> Result<ReadoutWire, Refusal> {
-        let built = Profile::named("as_built").map_err(Refusal::from_error)?;
+        let built = Profile::named("as_built")?;
         let mut profile = Profile {
             feedback_ohm,
             ..self.base.clone()
