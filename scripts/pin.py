@@ -9,7 +9,9 @@ out. RECORDINGS=DIR adds what is measured on recordings of the real skin; names 
 scripts/pin.py press board. SPTS=PROGRAM takes another program. Some minutes on two cores.
 """
 
+import csv
 import hashlib
+import io
 import json
 import os
 import subprocess
@@ -29,7 +31,7 @@ RUNS = {
     "decode": "decode press --measurements 7,20 --json",
     "board": "score --twin press/T press/tape --quick --measurements 20,50 --no-times --out {out}",
     "unlearned": "score --twin press/T --quick --learn-from shapes --measurements 20 --no-times --json",
-    "anytime": "score --twin press/T press/tape --quick --anytime --no-times --json",
+    "anytime": "score --twin press/T press/tape --quick --anytime --json",
     "shapes": "dataset make random-shapes --rows 40 --out {out}",
     "courses": "dataset make courses --rows 40 --out {out}",
     "skins": "dataset make skins --rows 20 --out {out}",
@@ -46,31 +48,39 @@ RUNS = {
 }
 ON_RECORDINGS = {
     "validate": "validate {real} --json",
-    "published": "score {real} --quick --left-out --measurements 7,20 --no-times --out {out}",
-    "in_time": "score {real} --in-time --quick --no-times --out {out}",
+    "published": "score {real} --left-out --decoder matched,evidence,nn_lmmse --measurements 7,20 --no-times --out {out}",
+    "in_time": "score {real} --in-time --out {out}",
     "calibrate": "calibrate {real} --json",
     "gains": "calibrate {real} --skin --json",
     "compare": "compare {real} --no-curves --json",
     "compare_arm": "compare {real} --arm --skins 2 --json",
 }
 
-# keys of JSON that are no results
-CHANGING = ("revision", "version", "cpu", "threads", "seconds", "elapsed", "provenance", "time", "took")
+# what stands in the names of keys and columns that change from run to run
+CHANGING = ("revision", "version", "cpu", "threads", "seconds", "provenance", "wall", "cost", "_us_", "per_s")
 PICTURES = {".png", ".svg", ".gif", ".html"}
-OTHERS = {"timing.json", "manifest.json", "timing.csv"}
+# times, and texts that have them
+OTHERS = {"timing.json", "timings.csv", "manifest.json", "provenance.json", "summary.md", "README.md"}
+
+
+def kept(name):
+    return not any(part in name for part in CHANGING)
 
 
 def results(value):
-    """The JSON `value` without the keys that change from run to run."""
+    """The JSON `value` without what changes from run to run."""
     if isinstance(value, dict):
-        kept = {key: results(inner) for key, inner in value.items()}
-        return {key: inner for key, inner in kept.items() if not any(key.startswith(c) or key.endswith(c) for c in CHANGING)}
+        return {key: results(inner) for key, inner in value.items() if kept(key)}
     return [results(inner) for inner in value] if isinstance(value, list) else value
 
 
 def digest(name, content):
     if name.endswith(".json"):
         content = json.dumps(results(json.loads(content)), sort_keys=True).encode()
+    if name.endswith(".csv"):
+        head, *rows = list(csv.reader(io.StringIO(content.decode()))) or [[]]
+        rows = [[cell for key, cell in zip(head, row) if kept(key)] for row in rows]
+        content = json.dumps([[key for key in head if kept(key)], rows]).encode()
     return hashlib.sha256(content).hexdigest()[:16]
 
 
@@ -100,7 +110,7 @@ def main():
                     print(f"{path.relative_to(folder)} {digest(path.name, path.read_bytes())}")
             if name == "reproduce":
                 headline = json.loads((out / "summary.json").read_text())["headline"]
-                for key, value in sorted(headline.items()):
+                for key, value in sorted(results(headline).items()):
                     print(f"headline {key} {json.dumps(value)}")
             sys.stdout.flush()
 
