@@ -59,8 +59,8 @@ ON_RECORDINGS = {
 # what stands in the names of keys and columns that change from run to run
 CHANGING = ("revision", "version", "cpu", "threads", "seconds", "provenance", "wall", "cost", "_us_", "per_s")
 PICTURES = {".png", ".svg", ".gif", ".html"}
-# times, and texts that have them
-OTHERS = {"timing.json", "timings.csv", "manifest.json", "provenance.json", "summary.md", "README.md"}
+# times and revisions, and what has them
+OTHERS = {"timing.json", "timings.csv", "manifest.json", "provenance.json", "summary.md", "README.md", "croissant.json"}
 
 
 def kept(name):
@@ -81,6 +81,9 @@ def digest(name, content):
         head, *rows = list(csv.reader(io.StringIO(content.decode()))) or [[]]
         rows = [[cell for key, cell in zip(head, row) if kept(key)] for row in rows]
         content = json.dumps([[key for key in head if kept(key)], rows]).encode()
+    if name.endswith(".parquet"):
+        # its footer, whose length stands at its end, names the revision
+        content = content[: -8 - int.from_bytes(content[-8:-4], "little")]
     return hashlib.sha256(content).hexdigest()[:16]
 
 
