@@ -282,7 +282,7 @@ impl WireReadout for RandomSigns {
 const SMOOTH_TAXELS: f64 = 1.5;
 
 /// Rows of ±1 in pattern mode: products of two rows along the axes of the skin. Each of the two lowers what is left of
-/// the expected images' variance most. They make the best images of `spts sensing study`.
+/// the expected images' variance most. They make the best images of all designers (docs/rows.md).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DesignedSigns;
 
