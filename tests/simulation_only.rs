@@ -1,8 +1,9 @@
 //! Decoders of the real skin that have seen simulated presses only, beside the same learned from the real raster
 //! presses that are not scored. "Simulation" knows the objects' shapes, their places to half a taxel, their rotations
-//! to 15° and nothing of their tilts. "Simulation, fitted" has them placed as `scripts/fit_objects.py` fitted them to
-//! recorded raster images. "Calibrated" also knows the gains of the skin's taxels, from unscored raster presses of the
-//! OTHER objects. Parameters of transducer and electronics were fitted to the recordings for all three.
+//! to 15° and nothing of their tilts. "Simulation, fitted" has them placed as `scripts/fit_objects.py` at the tag
+//! `before-halving` fitted them to recorded raster images. "Calibrated" also knows the gains of the skin's taxels, from
+//! unscored raster presses of the OTHER objects. Parameters of transducer and electronics were fitted to the recordings
+//! for all three.
 
 use crate::command::{refused, succeeds};
 use crate::recordings::recordings;

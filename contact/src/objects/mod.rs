@@ -2,7 +2,8 @@
 //! pressed.
 //!
 //! The published text names the objects but gives no sizes. Sizes and places are estimates: a static contact model was
-//! fitted to the published raster recordings (`scripts/fit_objects.py`), within plausible sizes of each object.
+//! fitted to the published raster recordings (`scripts/fit_objects.py` at the tag `before-halving`), within plausible
+//! sizes of each object.
 //!
 //! ```
 //! use spts_contact::objects::by_name;

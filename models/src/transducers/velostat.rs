@@ -24,8 +24,8 @@ use spts_input::Refusal;
 pub struct VelostatConfig {
     /// G_ref, conductance at 10 kPa, without saturation, of a median taxel with an electrode of 10 mm × 10 mm, S. Range
     /// (0, 1]; default 1.35e-4. This is within 1 % of the law fitted to the recorded plateaus of five objects (A = 6.7
-    /// mV/√Pa at this exponent and Ps, `scripts/fit_objects.py`), divided by 1.17 for creep and conditioning up to that
-    /// time.
+    /// mV/√Pa at this exponent and Ps, `scripts/fit_objects.py` at the tag `before-halving`), divided by 1.17 for creep
+    /// and conditioning up to that time.
     pub reference_s: f64,
     /// n. Range [0.05, 2]; default 0.5.
     pub exponent: f64,
