@@ -1,14 +1,14 @@
 #!/usr/bin/env bash
 # Makes a fresh Debian/Ubuntu machine ready to build and run the twin: setup.sh [PACKAGE …], which are Debian packages
 # to install as well. Idempotent; needs no environment variable.
-#   1. system libraries for off-screen rendering, fonts for the figures, the circuit simulator that the tests compare
+#   1. system libraries for off-screen rendering, the circuit simulator that the tests compare
 #      with, and the compiler of the cells' firmware (apt, when root; otherwise prints the command)
 #   2. the MuJoCo library, taken out of its Python wheel by pinned hash, into third_party/mujoco/lib. The hash of the
 #      library itself is checked every time: a file that was damaged or replaced since is fetched again.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-packages=(libegl1 libegl-mesa0 libgl1-mesa-dri fontconfig libfontconfig1-dev libfreetype-dev fonts-dejavu-core pkg-config build-essential ngspice gcc-avr binutils-avr "$@")
+packages=(libegl1 libegl-mesa0 libgl1-mesa-dri build-essential ngspice gcc-avr binutils-avr "$@")
 missing=()
 if command -v dpkg-query >/dev/null; then
   for p in "${packages[@]}"; do

@@ -418,5 +418,9 @@ mod tests {
         let html = table.html();
         assert!(html.contains("a&lt;b") && html.contains("<td class=\"number\">±0.5</td>"));
         assert_eq!(TextTable::default().to_string(), "|\n|\n");
+        assert_eq!(
+            escape("a<b & \"c\" 'd'\u{0}>"),
+            "a&lt;b &amp; &quot;c&quot; &#39;d&#39;&gt;"
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! The page as HTML: text, headline numbers, figures and tables, without scripts or anything from a network.
 
-use crate::figures::draw::escape;
+use spts_eval::{Table, TextTable, escape};
 
 /// Style of the page, light and dark, screen and print.
 const STYLE: &str = include_str!("style.css");
@@ -51,7 +51,7 @@ pub struct Section {
     /// Figures.
     pub figures: Vec<PageFigure>,
     /// Tables.
-    pub tables: Vec<Table>,
+    pub tables: Vec<PageTable>,
 }
 
 /// One figure of a section.
@@ -121,15 +121,24 @@ impl PageFigure {
 
 /// One table.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Table {
+pub struct PageTable {
     /// Caption.
     pub caption: String,
-    /// Names of the columns.
-    pub header: Vec<String>,
-    /// Cells, row by row.
-    pub rows: Vec<Vec<String>>,
+    /// What it shows.
+    pub table: TextTable,
     /// Files in `tables/` that hold the rows, with or without `.csv`.
     pub files: Vec<String>,
+}
+
+impl PageTable {
+    /// The columns for readers of `table`, whose rows are in the file `file`.
+    pub fn new<R: Copy>(caption: &str, table: &Table<'_, R>, file: &str) -> Self {
+        Self {
+            caption: caption.to_owned(),
+            table: table.for_readers(),
+            files: vec![file.to_owned()],
+        }
+    }
 }
 
 /// The page as one HTML document; `figures/` and `tables/` are looked for beside it.
@@ -254,42 +263,7 @@ fn link(name: &str) -> String {
         .collect()
 }
 
-fn table(table: &Table) -> String {
-    let columns = table
-        .rows
-        .iter()
-        .map(Vec::len)
-        .chain([table.header.len()])
-        .max()
-        .unwrap_or(0);
-    // A column of numbers, apart from empty cells and dashes, is set flush right.
-    let right: Vec<bool> = (0..columns)
-        .map(|column| {
-            let mut cells = table
-                .rows
-                .iter()
-                .filter_map(|row| row.get(column))
-                .filter(|cell| !blank(cell))
-                .peekable();
-            cells.peek().is_some() && cells.all(|cell| numeric(cell))
-        })
-        .collect();
-    let row = |cells: &[String], tag: &str| {
-        let cells: String = right
-            .iter()
-            .enumerate()
-            .map(|(column, right)| {
-                let class = if *right { " class=\"number\"" } else { "" };
-                let scope = if tag == "th" { " scope=\"col\"" } else { "" };
-                format!(
-                    "<{tag}{scope}{class}>{}</{tag}>",
-                    escape(cells.get(column).map_or("", String::as_str))
-                )
-            })
-            .collect();
-        format!("<tr>{cells}</tr>\n")
-    };
-    let body: String = table.rows.iter().map(|cells| row(cells, "td")).collect();
+fn table(table: &PageTable) -> String {
     // one file needs no name, several do
     let files = table.files.iter().map(|file| {
         let stem = file.strip_suffix(".csv").unwrap_or(file);
@@ -304,11 +278,8 @@ fn table(table: &Table) -> String {
         )
     });
     let files: String = files.collect();
-    let whole = format!(
-        "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead>{}</thead>\n<tbody>\n{body}</tbody>\n</table></div>\n",
-        row(&table.header, "th")
-    );
-    let count = table.rows.len();
+    let whole = format!("<div class=\"scroll\" tabindex=\"0\">{}</div>\n", table.table.html());
+    let count = table.table.rows.len();
     let shown = if count > MOST_UNFOLDED {
         format!("<details>\n<summary>All {count} rows</summary>\n{whole}</details>\n")
     } else {
@@ -316,21 +287,6 @@ fn table(table: &Table) -> String {
     };
     let caption = escape(&table.caption);
     format!("<figure class=\"table\">\n<figcaption>{caption}{files}</figcaption>\n{shown}</figure>\n")
-}
-
-/// Whether a cell holds no value.
-fn blank(cell: &str) -> bool {
-    matches!(cell.trim(), "" | "-" | "–" | "—")
-}
-
-/// Whether a cell reads as a number, perhaps with a sign, an error, a unit sign or a comparison.
-fn numeric(cell: &str) -> bool {
-    let cell = cell.trim();
-    let lead = cell.trim_start_matches(['+', '-', '−', '±', '≥', '≤', '<', '>', '≈', '~', ' ']);
-    lead.starts_with(|c: char| c.is_ascii_digit())
-        && lead.split_whitespace().count() <= 4
-        && cell.chars().filter(|c| c.is_alphabetic()).count() <= 4
-        || cell.eq_ignore_ascii_case("nan")
 }
 
 #[cfg(test)]

@@ -18,12 +18,10 @@ mod origin;
 pub mod per_object;
 pub mod readouts;
 pub mod reproduce;
-#[cfg(test)]
-pub(crate) mod samples;
 pub mod score;
 pub mod sensing;
 pub mod simulation;
 
 pub use error::{ReportError, write_all_or_none};
-pub use html::{Card, Page, PageFigure, Section, Table, html};
+pub use html::{Card, Page, PageFigure, PageTable, Section, html};
 pub use origin::Origin;

@@ -1,12 +1,12 @@
 //! Tables and the figure of twin and skin object by object, for `spts compare` and the report.
 
-use crate::PageFigure;
 use crate::figures::{FigureError, Interval, IntervalChart, IntervalLine, IntervalPanel, save_intervals};
 use crate::labels::{object_label, object_list};
-use crate::{Section, Table};
+use crate::{PageFigure, PageTable, Section};
 use spts::output::{OutputError, write_json, write_table};
+use spts_eval::Table;
 use spts_eval::decoders::label;
-use spts_studies::per_object::{MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES, ScoreDistance};
+use spts_studies::per_object::{MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES};
 use std::path::Path;
 
 /// Name of the figure.
@@ -145,59 +145,33 @@ pub(crate) fn section(report: &PerObjectReport) -> Section {
     }
 }
 
-fn distances(report: &PerObjectReport) -> Table {
-    let row = |d: &ScoreDistance| {
-        vec![
-            label(&d.decoder).to_owned(),
-            score_label(d.score).to_owned(),
-            d.m.to_string(),
-            format!("{:.3}", d.mean_abs_difference),
-            format!("{:.3}", d.between_skins),
-            format!("{:+.3}", d.difference_of_means),
-            object_list(&d.outside),
-        ]
-    };
-    let header = [
-        "decoder",
-        "score",
-        "M",
-        "|twin − real|",
-        "between skins",
-        "means: twin − real",
-        "outside",
-    ];
-    Table {
-        caption: "Mean over the objects of |twin − real|, and the difference of their means, in which errors cancel"
-            .to_owned(),
-        header: header.map(str::to_owned).to_vec(),
-        rows: report
-            .distances
-            .iter()
-            .filter(|d| d.images == ReadoutImages::Twin)
-            .map(row)
-            .collect(),
-        files: vec![TABLES[1].to_owned()],
-    }
+fn distances(report: &PerObjectReport) -> PageTable {
+    let rows = report.distances.iter().filter(|d| d.images == ReadoutImages::Twin);
+    let table = Table::new("", rows)
+        .shown("decoder", |d| label(&d.decoder))
+        .shown("score", |d| score_label(d.score))
+        .shown("M", |d| d.m)
+        .shown("|twin − real|", |d| d.mean_abs_difference)
+        .digits(3)
+        .shown("between skins", |d| d.between_skins)
+        .digits(3)
+        .shown("means: twin − real", |d| format!("{:+.3}", d.difference_of_means))
+        .shown("outside", |d| object_list(&d.outside));
+    let caption = "Mean over the objects of |twin − real|, and the difference of their means, in which errors cancel";
+    PageTable::new(caption, &table, TABLES[1])
 }
 
-fn objects(report: &PerObjectReport) -> Table {
-    let row = |b: &ObjectBand| {
-        vec![
-            label(&b.decoder).to_owned(),
-            score_label(b.score).to_owned(),
-            b.m.to_string(),
-            object_label(&b.object).to_owned(),
-            format!("{:.3}", b.real),
-            format!("{:.3}", b.twin),
-            format!("{:.3} – {:.3}", b.low, b.high),
-            if b.inside { "" } else { "outside" }.to_owned(),
-        ]
-    };
-    let header = ["decoder", "score", "M", "object", "real skin", "twin, mean", "band", ""];
-    Table {
-        caption: "Scores object by object".to_owned(),
-        header: header.map(str::to_owned).to_vec(),
-        rows: of_twin(report).map(row).collect(),
-        files: vec![TABLES[0].to_owned()],
-    }
+fn objects(report: &PerObjectReport) -> PageTable {
+    let table = Table::new("", of_twin(report))
+        .shown("decoder", |b| label(&b.decoder))
+        .shown("score", |b| score_label(b.score))
+        .shown("M", |b| b.m)
+        .shown("object", |b| object_label(&b.object))
+        .shown("real skin", |b| b.real)
+        .digits(3)
+        .shown("twin, mean", |b| b.twin)
+        .digits(3)
+        .shown("band", |b| format!("{:.3} – {:.3}", b.low, b.high))
+        .shown("", |b| if b.inside { "" } else { "outside" });
+    PageTable::new("Scores object by object", &table, TABLES[0])
 }

@@ -1,24 +1,22 @@
 //! Contacts in motion: the pressure on the skin, the trace of its one wire, and the image decoded from that trace, as
 //! one GIF.
 
-mod encode;
 mod figures;
-mod palette;
+mod gif;
 mod picture;
 #[cfg(test)]
 mod tests;
 mod timeline;
-mod wire;
 
 pub use figures::{MOTION_FIGURES, MotionError, MotionFigure, simulate_motion};
 
-use crate::figures::FigureError;
-use crate::figures::draw::{Canvas, encode_png, paint};
-use encode::gif;
-use palette::Palette;
+use self::gif::{Palette, gif};
+use crate::figures::canvas::Canvas;
+use crate::figures::pixels::{failed, paint, png_of};
 use picture::{COLUMNS, Moment, Stage};
 use rayon::prelude::*;
 use spts::Session;
+use spts::output::OutputError;
 use spts::scene::Task;
 use spts::simulate::Prepared;
 use spts_contact::Frame;
@@ -27,8 +25,7 @@ use spts_eval::idle_mean;
 use spts_eval::in_time::{FollowedImage, followed_images};
 use spts_eval::training::TrainingData;
 use std::path::Path;
-use timeline::{Timeline, pressure_pa};
-use wire::Trace;
+use timeline::{Timeline, Trace, pressure_pa};
 
 /// Name of the file of `spts simulate --animate`.
 pub const ANIMATION_FILE: &str = "animation.gif";
@@ -151,22 +148,19 @@ impl Animation {
     /// file they are for, named in errors.
     ///
     /// # Errors
-    /// [`FigureError::Paint`] when no font is found.
-    pub fn gif(&self, path: &Path) -> Result<Vec<u8>, FigureError> {
+    /// [`OutputError`] when there is not enough memory.
+    pub fn gif(&self, path: &Path) -> Result<Vec<u8>, OutputError> {
         let palette = Palette::new();
         let paint = |k: usize| {
-            let (width, height, rgb) = paint(&self.picture(k), path)?;
+            let (width, height, rgb) = paint(&self.picture(k))?;
             Ok((palette.numbers(&rgb), [width, height]))
         };
         let painted = (0..self.len()).into_par_iter().map(paint);
-        let painted: Vec<(Vec<u8>, [usize; 2])> = painted.collect::<Result<_, FigureError>>()?;
+        let painted = painted.collect::<std::io::Result<Vec<_>>>().map_err(failed(path))?;
         let size = painted.first().map_or([1; 2], |(_, size)| *size);
         let [width, height] = size.map(|side| u16::try_from(side).unwrap_or(u16::MAX));
         let pictures: Vec<Vec<u8>> = painted.into_iter().map(|(picture, _)| picture).collect();
-        gif(&pictures, (width, height), &palette).map_err(|error| FigureError::Paint {
-            path: path.to_owned(),
-            reason: error.to_string(),
-        })
+        gif(&pictures, (width, height), &palette).map_err(|error| failed(path)(std::io::Error::other(error)))
     }
 
     /// The picture with the largest pressure, as the bytes of a PNG file; `path` is the file they are for, named in
@@ -174,12 +168,11 @@ impl Animation {
     ///
     /// # Errors
     /// As [`Animation::gif`].
-    pub fn still(&self, path: &Path) -> Result<Vec<u8>, FigureError> {
+    pub fn still(&self, path: &Path) -> Result<Vec<u8>, OutputError> {
         let sum = |k: &usize| self.pressures[*k].iter().sum::<f64>();
         let strongest = (0..self.len()).max_by(|a, b| sum(a).total_cmp(&sum(b)));
         let canvas = strongest.map_or_else(|| Canvas::new(1.0, 1.0, ""), |k| self.picture(k));
-        let (width, height, rgb) = paint(&canvas, path)?;
-        encode_png(&rgb, width, height, path)
+        png_of(&canvas).map_err(failed(path))
     }
 }
 

@@ -1,11 +1,10 @@
 //! One picture: pressure, the samples of the current window, the image decoded from the wire, and the wire's trace.
 
-use super::palette::{AHEAD, TRACE, WINDOW, step_of};
-use super::timeline::Timeline;
-use super::wire::Trace;
+use super::gif::{AHEAD, TRACE, WINDOW, step_of};
+use super::timeline::{Timeline, Trace};
 use crate::figures::axis::Axis;
+use crate::figures::canvas::{Anchor, Canvas, Point, TextStyle, text_width, wrap};
 use crate::figures::colour::{FRAME, INK, MUTED, Rgb, heat};
-use crate::figures::draw::{Anchor, Canvas, Point, TextStyle, text_width, wrap};
 use crate::figures::draw_heat;
 use std::ops::Range;
 

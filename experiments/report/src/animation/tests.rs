@@ -1,7 +1,7 @@
 //! Animations are small, whole, the same on any number of threads, and never a panic.
 
-use super::encode::gif;
-use super::palette::Palette;
+use super::gif::Palette;
+use super::gif::gif;
 use super::timeline::{Timeline, pressure_pa};
 use super::{Animation, MOTION_FIGURES};
 use gif::{ColorOutput, DecodeOptions};

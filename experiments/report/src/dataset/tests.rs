@@ -1,21 +1,35 @@
 //! Pictures of made-up rows and of shapes.
 
 use super::preview::{MOST_PREVIEW_ROWS, layout};
-use super::relief::{height_at, picture, shade, share};
-use super::shapes;
+use super::shapes::{self, height_at, picture, shade, share};
 use super::{Preview, PreviewRow, drawn_shapes};
-use crate::figures::draw::{Anchor, Canvas, Shape, text_width};
+use crate::figures::canvas::{Canvas, text_width};
 use serde_json::{Value, json};
 use spts_contact::mesh::cuboid;
 use spts_contact::shapes::SHAPE_FAMILIES;
 
+/// Elements `tag` of a picture.
+fn elements(canvas: &Canvas, tag: &str) -> Vec<String> {
+    let svg = canvas.svg();
+    svg.lines()
+        .filter(|line| line.starts_with(&format!("<{tag} ")))
+        .map(str::to_owned)
+        .collect()
+}
+
+/// A number among the attributes of an element.
+fn attribute(element: &str, name: &str) -> f64 {
+    let (_, rest) = element.split_once(&format!(" {name}=\"")).unwrap();
+    rest.split_once('"').unwrap().0.parse().unwrap()
+}
+
 /// Texts of a picture.
-fn texts(canvas: &Canvas) -> Vec<&str> {
-    let texts = canvas.items.iter().filter_map(|shape| match shape {
-        Shape::Text { text, .. } => Some(text.as_str()),
-        _ => None,
-    });
-    texts.collect()
+fn texts(canvas: &Canvas) -> Vec<String> {
+    let inside = |element: String| {
+        let (_, rest) = element.split_once('>').unwrap();
+        rest.split_once('<').unwrap().0.to_owned()
+    };
+    elements(canvas, "text").into_iter().map(inside).collect()
 }
 
 /// A row of a skin of `rows` × `cols` taxels, the first of which carries 12 kPa.
@@ -48,7 +62,7 @@ fn a_card_says_what_its_row_holds() {
         "0 to 1.50 V",
         "2 samples: −0.500 to 0.250 V",
     ] {
-        assert!(texts(&volts).contains(&text), "{text}: {:?}", texts(&volts));
+        assert!(texts(&volts).contains(&text.to_owned()), "{text}: {:?}", texts(&volts));
     }
     let mut coded = row(3, 7);
     coded["y_v"] = Value::Null;
@@ -58,7 +72,7 @@ fn a_card_says_what_its_row_holds() {
     coded["force_n_2"] = json!(40);
     let codes = card(&coded, (3, 7));
     for text in ["ring 7.2 N, gear 40.0 N", "3 codes: 17.0 to 1023", "0 to 12.0 kPa"] {
-        assert!(texts(&codes).contains(&text), "{text}: {:?}", texts(&codes));
+        assert!(texts(&codes).contains(&text.to_owned()), "{text}: {:?}", texts(&codes));
     }
     assert!(!texts(&codes).iter().any(|text| text.ends_with(" V")));
 }
@@ -98,22 +112,27 @@ fn odd_values_stay_on_the_card() {
         rows: vec![PreviewRow::of(&odd, (4, 4)).unwrap()],
     };
     let canvas = layout(&preview);
-    for shape in &canvas.items {
-        if let Shape::Polygon { points, .. } | Shape::Line { points, .. } = shape {
-            let inside = |p: &(f64, f64)| (0.0..=canvas.width).contains(&p.0) && (0.0..=canvas.height).contains(&p.1);
-            assert!(points.iter().all(inside), "{points:?}");
-        }
-        if let Shape::Text { at, text, style } = shape {
-            // a card of two maps is 208 wide; only the heading is beyond it
-            let width = text_width(text, style.size, style.bold);
-            let least = if style.anchor == Anchor::Start {
-                at.0
-            } else {
-                at.0 - width / 2.0
-            };
-            let card = if at.1 < 90.0 { canvas.width } else { 16.0 + 208.0 };
-            assert!(least >= 0.0 && least + width <= card, "{text}");
-        }
+    // the first rectangle is the paper
+    for rect in elements(&canvas, "rect").iter().skip(1) {
+        let far = |place, size| attribute(rect, place) + attribute(rect, size);
+        assert!(attribute(rect, "x") >= 0.0 && attribute(rect, "y") >= 0.0, "{rect}");
+        assert!(
+            far("x", "width") <= canvas.width && far("y", "height") <= canvas.height,
+            "{rect}"
+        );
+    }
+    for text in elements(&canvas, "text") {
+        // a card of two maps is 208 wide; only the heading is beyond it
+        let (at, size) = (attribute(&text, "x"), attribute(&text, "font-size"));
+        let words = text.split_once('>').unwrap().1.split_once('<').unwrap().0;
+        let width = text_width(words, size, text.contains("bold"));
+        let least = if text.contains("middle") { at - width / 2.0 } else { at };
+        let card = if attribute(&text, "y") < 95.0 {
+            canvas.width
+        } else {
+            16.0 + 208.0
+        };
+        assert!(least >= 0.0 && least + width <= card, "{text}");
     }
 }
 
@@ -172,9 +191,8 @@ fn a_sheet_has_what_was_asked_for() {
     assert_eq!(drawn, of(0, 4).chain(of(1, 4)).chain(of(2, 3)).collect::<Vec<_>>());
     let canvas = shapes::layout(&shapes);
     for family in families {
-        let named = texts(&canvas).into_iter().filter(|text| *text == family.name);
+        let named = texts(&canvas).into_iter().filter(|text| text == family.name);
         assert_eq!(named.count(), 1, "{}", family.name);
     }
-    let pictures = canvas.items.iter().filter(|item| matches!(item, Shape::Picture { .. }));
-    assert_eq!(pictures.count(), 11);
+    assert_eq!(elements(&canvas, "image").len(), 11);
 }

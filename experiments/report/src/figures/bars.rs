@@ -1,10 +1,11 @@
-//! Horizontal bars with error bars: one row a quantity, one or several bars in it, one or several panels side by side.
+//! Horizontal bars with error bars, and intervals with a mark beside each: one row a quantity, panels side by side.
 
 use super::axis::Axis;
-use super::chart::Style;
-use super::colour::{self, CLAIM, GRID, INK, MUTED, WHITE};
-use super::draw::{Anchor, Canvas, Point, Shape, TextStyle, save, text_width};
-use super::error::FigureError;
+use super::canvas::{Anchor, Canvas, Point, TextStyle, text_width, widest};
+use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
+use super::looks::{Style, draw_marker, ink};
+use super::pixels::save;
+use spts::output::OutputError;
 use std::path::Path;
 
 /// The value that a bar shows, and its standard error, which is drawn as an error bar.
@@ -49,8 +50,8 @@ pub struct BarChart {
 /// Writes the figure to `dir/name.svg` and `dir/name.png`.
 ///
 /// # Errors
-/// [`FigureError`] when a file cannot be written or no font is found for the PNG.
-pub fn save_bars(chart: &BarChart, dir: &Path, name: &str) -> Result<(), FigureError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn save_bars(chart: &BarChart, dir: &Path, name: &str) -> Result<(), OutputError> {
     save(&layout(chart), dir, name)
 }
 
@@ -70,7 +71,7 @@ const CAP: f64 = 2.5;
 const FOOT: f64 = 84.0;
 
 /// The figure as shapes.
-pub(super) fn layout(chart: &BarChart) -> Canvas {
+fn layout(chart: &BarChart) -> Canvas {
     let labels = chart.rows.iter().map(|row| text_width(&row.label, SIZE, row.heading));
     let margin = labels.fold(0.0, f64::max) + 2.0 * BORDER;
     let panel = match chart.panels.len() {
@@ -126,13 +127,7 @@ impl BarFrame {
         for (index, _) in chart.rows.iter().enumerate().filter(|(_, r)| r.heading) {
             canvas.rect((left, top + row * index as f64), (width, row), GRID, 0.6);
         }
-        let tick = TextStyle::new(SIZE, MUTED).anchored(Anchor::Middle);
-        for (value, label) in self.axis.ticks(4) {
-            let Some(x) = self.column(value) else { continue };
-            canvas.line(&[(x, top), (x, bottom)], GRID, 1.0);
-            canvas.line(&[(x, bottom), (x, bottom + 5.0)], CLAIM, 1.0);
-            canvas.text((x, bottom + 15.0), &label, tick);
-        }
+        draw_ticks(canvas, &self.axis, self.at, self.size);
         if let Some(zero) = self.column(0.0) {
             canvas.line(&[(zero, top), (zero, bottom)], CLAIM, 1.2);
         }
@@ -157,7 +152,7 @@ impl BarFrame {
             return;
         };
         let (left, right) = (zero.min(end), zero.max(end));
-        canvas.rect((left, top), (right - left, BAR - 1.0), colour::style(style, 0), 1.0);
+        canvas.rect((left, top), (right - left, BAR - 1.0), ink(style, 0), 1.0);
         if let (true, Some(low), Some(high)) = (se > 0.0, place(value - se), place(value + se)) {
             let y = top + 0.5 * (BAR - 1.0);
             canvas.line(&[(low, y), (high, y)], INK, 1.2);
@@ -175,27 +170,188 @@ fn legend(canvas: &mut Canvas, chart: &BarChart, y: f64, width: f64) {
     let total: f64 = chart.groups.iter().map(wide).sum();
     let mut x = (0.5 * (width - total)).max(BORDER);
     for group in &chart.groups {
-        canvas.items.push(Shape::Polygon {
-            points: vec![
-                (x, y - 0.5 * BAR),
-                (x + SAMPLE, y - 0.5 * BAR),
-                (x + SAMPLE, y + 0.5 * BAR),
-                (x, y + 0.5 * BAR),
-            ],
-            fill: colour::style(group.style, 0),
-            opacity: 1.0,
-        });
+        canvas.rect((x, y - 0.5 * BAR), (SAMPLE, BAR), ink(group.style, 0), 1.0);
         canvas.text((x + SAMPLE + 8.0, y), &group.name, TextStyle::new(SIZE, INK));
         x += wide(group);
     }
 }
 
+/// The grid of a panel, with ticks below it.
+fn draw_ticks(canvas: &mut Canvas, axis: &Axis, (left, top): Point, (width, height): Point) {
+    let bottom = top + height;
+    let tick = TextStyle::new(SIZE, MUTED).anchored(Anchor::Middle);
+    for (value, label) in axis.ticks(4) {
+        let Some(place) = axis.place(value) else { continue };
+        let x = left + place * width;
+        canvas.line(&[(x, top), (x, bottom)], GRID, 1.0);
+        canvas.line(&[(x, bottom), (x, bottom + 5.0)], CLAIM, 1.0);
+        canvas.text((x, bottom + 15.0), &label, tick);
+    }
+}
+
+/// A band with the middle of what it is made of, and the value that is held against it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Middle.
+    pub middle: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Value that is held against the band; red when it lies outside.
+    pub mark: f64,
+}
+
+/// One panel: an interval for every row, if there is one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IntervalPanel {
+    /// Heading.
+    pub title: String,
+    /// Rows.
+    pub intervals: Vec<Option<Interval>>,
+}
+
+/// Panels side by side.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IntervalLine {
+    /// Heading.
+    pub title: String,
+    /// Panels, from left to right.
+    pub panels: Vec<IntervalPanel>,
+}
+
+/// A figure of intervals, all between 0 and 1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IntervalChart {
+    /// Heading of the figure.
+    pub title: String,
+    /// Name of the band, and of the mark.
+    pub legend: [String; 2],
+    /// Words beside the rows.
+    pub rows: Vec<String>,
+    /// Lines, from above.
+    pub lines: Vec<IntervalLine>,
+}
+
+/// Writes the figure to `dir/name.svg` and `dir/name.png`.
+///
+/// # Errors
+/// [`OutputError`] when a file cannot be written.
+pub fn save_intervals(chart: &IntervalChart, dir: &Path, name: &str) -> Result<(), OutputError> {
+    save(&interval_layout(chart), dir, name)
+}
+
+/// Gap between panels: half a tick's label to either side.
+const PANEL_GAP: f64 = 40.0;
+/// Height of a row.
+const ROW: f64 = 22.0;
+/// Width of a panel.
+const PANEL: f64 = 220.0;
+/// Height of the headings of a line and of its panels.
+const HEAD: f64 = 52.0;
+/// Height of the ticks below.
+const TICKS: f64 = 34.0;
+/// Thickness of a band.
+const BAND: f64 = 8.0;
+
+/// The figure as shapes.
+fn interval_layout(chart: &IntervalChart) -> Canvas {
+    let margin = widest(chart.rows.iter().map(String::as_str), SIZE, false) + 2.0 * BORDER;
+    let columns = chart.lines.iter().map(|line| line.panels.len()).max().unwrap_or(0);
+    let (top, inner) = (3.0 * HEADING, ROW * chart.rows.len() as f64);
+    let line = HEAD + inner + TICKS;
+    let bottom = top + line * chart.lines.len() as f64;
+    let width = margin + columns as f64 * (PANEL + PANEL_GAP);
+    let mut canvas = Canvas::new(width, bottom + 2.0 * HEADING, &chart.title);
+    let heading = TextStyle::new(HEADING, INK).bold();
+    canvas.text((BORDER, BORDER + HEADING * 0.5), &chart.title, heading);
+    let beside = TextStyle::new(SIZE, INK).anchored(Anchor::End);
+    for (l, of_line) in chart.lines.iter().enumerate() {
+        let y = top + line * l as f64 + HEAD;
+        canvas.text((BORDER, y - 0.75 * HEAD), &of_line.title, heading);
+        for (column, panel) in of_line.panels.iter().enumerate() {
+            draw_panel(
+                &mut canvas,
+                panel,
+                (margin + column as f64 * (PANEL + PANEL_GAP), y),
+                inner,
+            );
+        }
+        for (k, label) in chart.rows.iter().enumerate() {
+            canvas.text((margin - BORDER, y + ROW * (k as f64 + 0.5)), label, beside);
+        }
+    }
+    interval_legend(&mut canvas, chart, (margin, bottom + 0.5 * HEADING));
+    canvas
+}
+
+fn draw_panel(canvas: &mut Canvas, panel: &IntervalPanel, (left, top): Point, height: f64) {
+    let axis = Axis::new([0.0, 1.0].into_iter(), false, Some((0.0, 1.0)));
+    let column = |value: f64| axis.place(value).map(|u| left + u * PANEL);
+    canvas.rect((left, top), (PANEL, height), WHITE, 1.0);
+    draw_ticks(canvas, &axis, (left, top), (PANEL, height));
+    canvas.frame((left, top), (PANEL, height), CLAIM, 1.0);
+    let heading = TextStyle::new(SIZE, INK).anchored(Anchor::Middle);
+    canvas.text((left + 0.5 * PANEL, top - 0.25 * HEAD), &panel.title, heading);
+    for (k, interval) in panel.intervals.iter().enumerate() {
+        let y = top + ROW * (k as f64 + 0.5);
+        if let Some(interval) = interval {
+            draw_interval(canvas, *interval, y, &column);
+        }
+    }
+}
+
+fn draw_interval(canvas: &mut Canvas, i: Interval, y: f64, column: &dyn Fn(f64) -> Option<f64>) {
+    let (Some(low), Some(middle), Some(high), Some(mark)) =
+        (column(i.low), column(i.middle), column(i.high), column(i.mark))
+    else {
+        return;
+    };
+    let twin = ink(Style::Twin, 0);
+    // a band of no width is still seen
+    let width = (high - low).max(2.0);
+    canvas.rect((low, y - 0.5 * BAND), (width, BAND), twin, 0.35);
+    canvas.line(&[(middle, y - 0.8 * BAND), (middle, y + 0.8 * BAND)], twin, 2.0);
+    if (i.low..=i.high).contains(&i.mark) {
+        draw_marker(canvas, (mark, y), Style::Real, 0);
+    } else {
+        draw_marker(canvas, (mark, y), Style::Raster, 0);
+    }
+}
+
+/// What bands and marks are, in a line.
+fn interval_legend(canvas: &mut Canvas, chart: &IntervalChart, (left, y): Point) {
+    let style = TextStyle::new(SIZE, INK);
+    let twin = ink(Style::Twin, 0);
+    canvas.rect((left, y - 0.5 * BAND), (24.0, BAND), twin, 0.35);
+    canvas.line(
+        &[(left + 12.0, y - 0.8 * BAND), (left + 12.0, y + 0.8 * BAND)],
+        twin,
+        2.0,
+    );
+    canvas.text((left + 32.0, y), &chart.legend[0], style);
+    let mut x = left + 32.0 + text_width(&chart.legend[0], SIZE, false) + 2.0 * BORDER;
+    for (marked, variant, words) in [
+        (Style::Real, 0, chart.legend[1].clone()),
+        (Style::Raster, 0, format!("{}, outside the band", chart.legend[1])),
+    ] {
+        draw_marker(canvas, (x, y), marked, variant);
+        canvas.text((x + 12.0, y), &words, style);
+        x += 12.0 + text_width(&words, SIZE, false) + 2.0 * BORDER;
+    }
+    let right = x - BORDER;
+    if right > canvas.width {
+        canvas.width = right;
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::colour::Rgb;
     use super::*;
     use approx::assert_relative_eq;
 
-    fn chart(values: Vec<Vec<Option<Bar>>>) -> BarChart {
+    fn bars_of(values: Vec<Vec<Option<Bar>>>) -> BarChart {
         BarChart {
             title: "made up".to_owned(),
             x_label: "loss".to_owned(),
@@ -212,46 +368,79 @@ mod tests {
         }
     }
 
-    /// Left and right ends of every bar.
-    fn bars(canvas: &Canvas) -> Vec<(f64, f64)> {
-        let blue = colour::style(Style::Twin, 0);
-        let of_item = |item: &Shape| match item {
-            Shape::Polygon { points, fill, .. } if *fill == blue => Some((points[0].0, points[1].0)),
-            _ => None,
+    /// Left and right ends of every rectangle of a colour.
+    fn ends(canvas: &Canvas, colour: Rgb) -> Vec<(f64, f64)> {
+        let svg = canvas.svg();
+        let rects = svg
+            .lines()
+            .filter(|line| line.starts_with("<rect") && line.contains(&colour.hex()));
+        let number = |line: &str, name: &str| -> f64 {
+            let (_, rest) = line.split_once(&format!(" {name}=\"")).unwrap();
+            rest.split_once('"').unwrap().0.parse().unwrap()
         };
-        canvas.items.iter().filter_map(of_item).collect()
+        rects
+            .map(|line| (number(line, "x"), number(line, "x") + number(line, "width")))
+            .collect()
     }
 
     /// Bars of 2 and −1: the second is half as long, ends where the first begins, and both share one axis in two
-    /// panels.
+    /// panels. Coordinates are written to a hundredth of a pixel.
     #[test]
     fn lengths_are_values() {
-        let found = bars(&layout(&chart(vec![vec![Some((2.0, 0.0))], vec![Some((-1.0, 0.5))]])));
+        let canvas = layout(&bars_of(vec![vec![Some((2.0, 0.0))], vec![Some((-1.0, 0.5))]]));
+        let found = ends(&canvas, ink(Style::Twin, 0));
         // the third is the legend's sample
         assert_eq!(found.len(), 3);
         let (first, second) = (found[0], found[1]);
-        assert_relative_eq!(first.1 - first.0, 2.0 * (second.1 - second.0), max_relative = 1e-12);
+        assert_relative_eq!(first.1 - first.0, 2.0 * (second.1 - second.0), epsilon = 0.03);
         // panels of 340 stand side by side, and zero at the same place in each
-        assert_relative_eq!(second.1 - first.0, 340.0, max_relative = 1e-12);
+        assert_relative_eq!(second.1 - first.0, 340.0, epsilon = 0.03);
     }
 
     #[test]
     fn what_has_no_length_is_left_out() {
-        for bar in [
-            None,
-            Some((f64::NAN, 1.0)),
-            Some((f64::INFINITY, 0.0)),
-            Some((0.0, f64::NAN)),
+        for (bar, count) in [
+            (None, 1),
+            (Some((f64::NAN, 1.0)), 1),
+            (Some((f64::INFINITY, 0.0)), 1),
+            (Some((0.0, f64::NAN)), 2),
         ] {
-            let canvas = layout(&chart(vec![vec![bar], vec![]]));
-            assert!(
-                bars(&canvas)
-                    .iter()
-                    .all(|(left, right)| left.is_finite() && right.is_finite())
-            );
+            let canvas = layout(&bars_of(vec![vec![bar], vec![]]));
+            assert_eq!(ends(&canvas, ink(Style::Twin, 0)).len(), count, "{bar:?}");
         }
         let dir = tempfile::tempdir().unwrap();
-        save_bars(&chart(vec![]), dir.path(), "none").unwrap();
+        save_bars(&bars_of(vec![]), dir.path(), "none").unwrap();
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
+    }
+
+    fn interval_of(mark: f64) -> IntervalChart {
+        IntervalChart {
+            title: "made up".to_owned(),
+            legend: ["twin".to_owned(), "skin".to_owned()],
+            rows: vec!["brain".to_owned(), "trig".to_owned()],
+            lines: vec![IntervalLine {
+                title: "IoU".to_owned(),
+                panels: vec![IntervalPanel {
+                    title: "M = 20".to_owned(),
+                    intervals: vec![
+                        Some(Interval {
+                            low: 0.4,
+                            middle: 0.5,
+                            high: 0.6,
+                            mark,
+                        }),
+                        None,
+                    ],
+                }],
+            }],
+        }
+    }
+
+    /// Red shapes: one in the legend, one more for a mark that lies outside.
+    #[test]
+    fn a_mark_outside_its_band_is_red() {
+        let red = ink(Style::Raster, 0).hex();
+        let count = |mark: f64| interval_layout(&interval_of(mark)).svg().matches(&red).count();
+        assert_eq!((count(0.5), count(0.7)), (1, 2));
     }
 }

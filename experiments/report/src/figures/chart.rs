@@ -1,30 +1,7 @@
-//! Line charts: what is plotted.
+//! Line charts: what is plotted, and the one way from rows of results to it.
 
-use super::looks::{self, Stroke};
-
-/// Whose numbers a series shows. Decides colour and stroke, the same in every figure.
-///
-/// Colours are from the palette of M. Okabe and K. Ito, *Color Universal Design* (2008), safe for the common kinds
-/// of colour blindness; stroke and marker repeat the distinction for print in grey.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Style {
-    /// The twin, compressive mode: solid blue.
-    Twin,
-    /// The recorded sensor, compressive mode: solid near-black, hollow markers.
-    Real,
-    /// The twin, raster control: solid vermilion.
-    Raster,
-    /// The recorded sensor, raster control: solid dark brown, hollow markers.
-    RasterReal,
-    /// A curve or number of the paper: dashed grey.
-    Paper,
-    /// A baseline: dotted green.
-    Baseline,
-    /// One of several alternatives, all of the twin: solid, six hues and markers, one a variant.
-    Alternative,
-    /// A decoder or locator, whose variant follows from its name alone: see [`super::decoder_variant`].
-    Decoder,
-}
+use super::looks::{Stroke, Style, decoder_variant};
+use spts_eval::unique;
 
 /// One curve.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,17 +21,6 @@ pub struct Series {
     pub scatter: Vec<(f64, f64, f64)>,
 }
 
-impl Style {
-    /// Variants that differ.
-    pub(super) const fn variants(self) -> u8 {
-        match self {
-            Self::Alternative => 6,
-            Self::Decoder => looks::VARIANTS,
-            _ => 4,
-        }
-    }
-}
-
 impl Series {
     /// The curve `name` through `points`.
     pub fn new(name: impl Into<String>, style: Style, variant: u8, points: Vec<(f64, f64)>) -> Self {
@@ -70,7 +36,7 @@ impl Series {
 
     /// The curve `name` of the decoder, locator or control `decoder`, in that one's own colour.
     pub fn of_decoder(name: impl Into<String>, decoder: &str, stroke: Stroke, points: Vec<(f64, f64)>) -> Self {
-        Self::new(name, Style::Decoder, looks::decoder_variant(decoder, stroke), points)
+        Self::new(name, Style::Decoder, decoder_variant(decoder, stroke), points)
     }
 
     /// The same curve with a shade of its scatter.
@@ -131,4 +97,189 @@ pub struct Chart {
     pub ranges: Vec<StatedRange>,
     /// What others have published: points that are drawn hollow.
     pub published: Vec<Claim>,
+}
+
+/// Rows as curves: what is on the axes, which curve a row belongs to, and which panel.
+///
+/// Curves and panels are in the order in which the rows first have them. A row without a value on one of the axes has
+/// no point.
+///
+/// ```
+/// use spts_report::figures::{Curve, Plot, Style, save_charts};
+///
+/// struct Score { skin: &'static str, m: usize, iou: Option<f64>, band: Option<(f64, f64)> }
+/// let rows = [
+///     Score { skin: "twin", m: 10, iou: Some(0.5), band: Some((0.4, 0.6)) },
+///     Score { skin: "twin", m: 20, iou: Some(0.6), band: None },
+///     Score { skin: "real skin", m: 10, iou: None, band: None },
+/// ];
+/// let chart = Plot::new(&rows)
+///     .x("measurements M", |r| r.m as f64).log_x()
+///     .y("IoU", |r| r.iou).within(0.0, 1.0)
+///     .band(|r| r.band)
+///     .by(|r| match r.skin {
+///         "twin" => Curve::new(r.skin, Style::Twin, 0),
+///         _ => Curve::new(r.skin, Style::Real, 0),
+///     })
+///     .chart("Images");
+/// assert_eq!(chart.series.len(), 2);
+/// assert_eq!(chart.series[0].points, [(10.0, 0.5), (20.0, 0.6)]);
+/// # let dir = std::env::temp_dir().join(format!("spts-doc-plot-{}", std::process::id()));
+/// save_charts(&[chart], &dir, "images")?; // images.svg and images.png
+/// # std::fs::remove_dir_all(&dir)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct Plot<'a, R> {
+    rows: Vec<R>,
+    x: Value<'a, R, f64>,
+    y: Value<'a, R, f64>,
+    band: Value<'a, R, (f64, f64)>,
+    scatter: Value<'a, R, (f64, f64)>,
+    curve: Box<dyn Fn(R) -> Curve + 'a>,
+    /// Labels of the axes, logarithms and range.
+    axes: Chart,
+}
+
+/// What is known of a row.
+type Value<'a, R, V> = Box<dyn Fn(R) -> Option<V> + 'a>;
+
+/// Name and look of a curve.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Curve {
+    /// Name in the legend.
+    pub name: String,
+    /// Whose numbers.
+    pub style: Style,
+    /// As in [`Series`].
+    pub variant: u8,
+}
+
+impl Curve {
+    /// The curve `name` of a style and variant.
+    pub fn new(name: impl Into<String>, style: Style, variant: u8) -> Self {
+        Self {
+            name: name.into(),
+            style,
+            variant,
+        }
+    }
+
+    /// The curve `name` of the decoder, locator or control `decoder`, in that one's own colour.
+    pub fn of_decoder(name: impl Into<String>, decoder: &str, stroke: Stroke) -> Self {
+        Self::new(name, Style::Decoder, decoder_variant(decoder, stroke))
+    }
+}
+
+impl<'a, R: Copy> Plot<'a, R> {
+    /// One nameless curve of `rows`, which are references or small values; there is nothing on the axes yet.
+    pub fn new(rows: impl IntoIterator<Item = R>) -> Self {
+        Self {
+            rows: rows.into_iter().collect(),
+            x: Box::new(|_| None),
+            y: Box::new(|_| None),
+            band: Box::new(|_| None),
+            scatter: Box::new(|_| None),
+            curve: Box::new(|_| Curve::new("", Style::Twin, 0)),
+            axes: Chart::default(),
+        }
+    }
+
+    /// The horizontal axis: quantity with unit, and its value.
+    #[must_use]
+    pub fn x<V: Into<Option<f64>>>(mut self, label: &str, value: impl Fn(R) -> V + 'a) -> Self {
+        label.clone_into(&mut self.axes.x_label);
+        self.x = Box::new(move |row| value(row).into());
+        self
+    }
+
+    /// The vertical axis: quantity with unit, and its value.
+    #[must_use]
+    pub fn y<V: Into<Option<f64>>>(mut self, label: &str, value: impl Fn(R) -> V + 'a) -> Self {
+        label.clone_into(&mut self.axes.y_label);
+        self.y = Box::new(move |row| value(row).into());
+        self
+    }
+
+    /// Lower and upper end of an interval about the value, drawn as a thin bar.
+    #[must_use]
+    pub fn band(mut self, ends: impl Fn(R) -> Option<(f64, f64)> + 'a) -> Self {
+        self.band = Box::new(ends);
+        self
+    }
+
+    /// Lower and upper end of the scatter about the curve, drawn as a shade.
+    #[must_use]
+    pub fn scatter(mut self, ends: impl Fn(R) -> Option<(f64, f64)> + 'a) -> Self {
+        self.scatter = Box::new(ends);
+        self
+    }
+
+    /// Which curve a row belongs to.
+    #[must_use]
+    pub fn by(mut self, curve: impl Fn(R) -> Curve + 'a) -> Self {
+        self.curve = Box::new(curve);
+        self
+    }
+
+    /// A logarithmic horizontal axis.
+    #[must_use]
+    pub fn log_x(mut self) -> Self {
+        self.axes.x_log = true;
+        self
+    }
+
+    /// A logarithmic vertical axis.
+    #[must_use]
+    pub fn log_y(mut self) -> Self {
+        self.axes.y_log = true;
+        self
+    }
+
+    /// Ends of the vertical axis; without, it holds every point.
+    #[must_use]
+    pub fn within(mut self, low: f64, high: f64) -> Self {
+        self.axes.y_range = Some((low, high));
+        self
+    }
+
+    /// All rows in one panel.
+    #[must_use]
+    pub fn chart(&self, title: impl Into<String>) -> Chart {
+        self.panel(title.into(), &self.rows)
+    }
+
+    /// The rows divided into panels by what `facet` says, which is also the panel's title.
+    #[must_use]
+    pub fn facets(&self, facet: impl Fn(R) -> String) -> Vec<Chart> {
+        let titles = unique(self.rows.iter().map(|row| facet(*row)));
+        let panel = |title: String| {
+            let own = self.rows.iter().copied().filter(|row| facet(*row) == title);
+            let own: Vec<R> = own.collect();
+            self.panel(title, &own)
+        };
+        titles.into_iter().map(panel).collect()
+    }
+
+    fn panel(&self, title: String, rows: &[R]) -> Chart {
+        let ends = |of: &Value<'a, R, (f64, f64)>, own: &[R]| -> Vec<(f64, f64, f64)> {
+            let bars = own.iter().filter_map(|&row| {
+                let (low, high) = of(row)?;
+                Some(((self.x)(row)?, low, high))
+            });
+            bars.collect()
+        };
+        let series = |curve: Curve| {
+            let own: Vec<R> = rows.iter().copied().filter(|&row| (self.curve)(row) == curve).collect();
+            let points = own.iter().filter_map(|&row| Some(((self.x)(row)?, (self.y)(row)?)));
+            Series::new(curve.name, curve.style, curve.variant, points.collect())
+                .with_spans(ends(&self.band, &own))
+                .with_scatter(ends(&self.scatter, &own))
+        };
+        let curves = unique(rows.iter().map(|&row| (self.curve)(row)));
+        Chart {
+            title,
+            series: curves.into_iter().map(series).collect(),
+            ..self.axes.clone()
+        }
+    }
 }

@@ -1,7 +1,4 @@
-//! Colours: one perceptually even map for values, one ink for each style.
-
-use super::chart::Style;
-use super::looks;
+//! Colours, and one perceptually even map for values.
 
 /// A 24-bit sRGB colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,16 +21,6 @@ pub const MISSING: Rgb = Rgb(0xbd, 0xbd, 0xbd);
 /// Outline around the taxels that are truly touched: far in hue from every colour of [`heat`].
 pub const OUTLINE: Rgb = Rgb(0x2e, 0xe6, 0xd6);
 
-/// Hues of alternatives: six of the palette of Okabe and Ito, without its black and its yellow.
-const ALTERNATIVES: [Rgb; 6] = [
-    Rgb(0xd5, 0x5e, 0x00),
-    Rgb(0x00, 0x72, 0xb2),
-    Rgb(0x56, 0xb4, 0xe9),
-    Rgb(0x00, 0x9e, 0x73),
-    Rgb(0xe6, 0x9f, 0x00),
-    Rgb(0xcc, 0x79, 0xa7),
-];
-
 impl Rgb {
     /// `#rrggbb`.
     #[must_use]
@@ -46,29 +33,6 @@ impl Rgb {
     pub fn mix(self, other: Self, share: f64) -> Self {
         let part = |a: u8, b: u8| channel((f64::from(a) + share * (f64::from(b) - f64::from(a))) / 255.0);
         Self(part(self.0, other.0), part(self.1, other.1), part(self.2, other.2))
-    }
-}
-
-/// Colour of a style; `variant` 0 is the style's own, 1 to 3 are shades of it, then they repeat.
-#[must_use]
-pub fn style(style: Style, variant: u8) -> Rgb {
-    let base = match style {
-        Style::Twin => Rgb(0x00, 0x72, 0xb2),
-        Style::Real => Rgb(0x1a, 0x1a, 0x1a),
-        Style::Raster => Rgb(0xd5, 0x5e, 0x00),
-        Style::RasterReal => Rgb(0x7a, 0x3e, 0x00),
-        Style::Paper => CLAIM,
-        Style::Baseline => Rgb(0x00, 0x9e, 0x73),
-        Style::Decoder => return looks::look(variant).0,
-        Style::Alternative => return ALTERNATIVES[usize::from(variant % style.variants())],
-    };
-    match variant % 4 {
-        0 => base,
-        1 => base.mix(WHITE, 0.45),
-        2 => base
-            .mix(Rgb(0, 0, 0), 0.5)
-            .mix(WHITE, if style == Style::Real { 0.35 } else { 0.0 }),
-        _ => base.mix(WHITE, 0.65),
     }
 }
 

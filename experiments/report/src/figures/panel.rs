@@ -1,13 +1,13 @@
-//! Layout of charts: where the panels stand, and what each shows.
+//! Charts as figures: where the panels stand, and what each shows.
 
-use super::axis::Axis;
-use super::chart::{Chart, Style};
+use super::axis::{Axis, PanelFrame};
+use super::canvas::{Anchor, Canvas, Point, TextStyle, text_width, widest, wrap};
+use super::chart::{Chart, Claim, Series};
 use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
-use super::draw::{Anchor, Canvas, Point, Shape, TextStyle, save, text_width, wrap};
-use super::error::FigureError;
-use super::frame::PanelFrame;
-use super::legend::{self, Legend, LegendKey};
-use super::{claims, coincide, colour, marker, shade};
+use super::legend::{Legend, LegendKey, RANGE_OPACITY, draw_labels, draw_marks, entries};
+use super::looks::{Style, dash, draw_marker, ink, ring, star};
+use super::pixels::save;
+use spts::output::OutputError;
 use std::path::Path;
 
 /// Size of tick labels.
@@ -30,8 +30,8 @@ const MARKERS: usize = 40;
 /// More than three panels are wrapped into rows.
 ///
 /// # Errors
-/// [`FigureError`] when a file cannot be written or no font is found for the PNG.
-pub fn save_charts(charts: &[Chart], dir: &Path, name: &str) -> Result<(), FigureError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn save_charts(charts: &[Chart], dir: &Path, name: &str) -> Result<(), OutputError> {
     save(&layout(charts), dir, name)
 }
 
@@ -51,14 +51,14 @@ pub(super) fn layout(charts: &[Chart]) -> Canvas {
     let inner = panel - 2.0 * BORDER;
     // what others have published may be in one panel alone; the common legend has it, too
     let curves = |chart: &Chart| -> Vec<_> {
-        let entries = legend::entries(chart).into_iter();
+        let entries = entries(chart).into_iter();
         entries.filter(|(key, _)| *key != LegendKey::Ring).collect()
     };
     let shared = charts.len() > 1 && charts.windows(2).all(|pair| curves(&pair[0]) == curves(&pair[1]));
     let common = charts
         .iter()
         .filter(|_| shared)
-        .max_by_key(|chart| legend::entries(chart).len())
+        .max_by_key(|chart| entries(chart).len())
         .map(|chart| Legend::new(chart, width - 4.0 * BORDER));
     let mut blocks = Vec::new();
     let mut top = BORDER;
@@ -112,8 +112,7 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         .iter()
         .map(|series| series.points.iter().copied().filter(finite).collect())
         .collect();
-    let claimed =
-        |pick: fn(&super::chart::Claim) -> Option<f64>| chart.claims.iter().chain(&chart.published).filter_map(pick);
+    let claimed = |pick: fn(&Claim) -> Option<f64>| chart.claims.iter().chain(&chart.published).filter_map(pick);
     let stated = chart.ranges.iter().flat_map(|range| [range.from, range.to]);
     let x = Axis::new(
         curves
@@ -131,10 +130,7 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         chart.y_range,
     );
     let y_ticks = y.ticks(if height > 300.0 { 6 } else { 5 });
-    let widest = y_ticks
-        .iter()
-        .map(|(_, label)| text_width(label, TICK, false))
-        .fold(0.0, f64::max);
+    let widest = widest(y_ticks.iter().map(|(_, label)| label.as_str()), TICK, false);
     let margin = (widest + 34.0).ceil();
     let frame = PanelFrame {
         left: left + margin,
@@ -146,11 +142,11 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
     };
     draw_axes(canvas, chart, &frame, left, &y_ticks);
 
-    shade::draw_ranges(canvas, chart, &frame);
+    draw_ranges(canvas, chart, &frame);
     let mut busy: Vec<Point> = Vec::new();
     let mut drawn: Vec<Vec<Point>> = Vec::new();
     for series in &chart.series {
-        shade::draw_scatter(canvas, series, &frame);
+        draw_scatter(canvas, series, &frame);
     }
     // Twin and sensor lie above the rest: baselines and claims are drawn first.
     let mut order: Vec<_> = chart.series.iter().zip(&curves).collect();
@@ -162,21 +158,16 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         Style::Real => 4,
         Style::Twin | Style::Alternative | Style::Decoder => 5,
     });
-    let mut marks = claims::draw_marks(canvas, &chart.claims, &frame, marker::star);
-    marks.extend(claims::draw_marks(canvas, &chart.published, &frame, marker::ring));
+    let mut marks = draw_marks(canvas, &chart.claims, &frame, star);
+    marks.extend(draw_marks(canvas, &chart.published, &frame, ring));
     for (series, points) in order {
         let places: Vec<Point> = points.iter().filter_map(|&p| frame.place(p)).collect();
-        let stroke = colour::style(series.style, series.variant);
-        let below = coincide::below(&places, &drawn);
+        let stroke = ink(series.style, series.variant);
+        let below = below(&places, &drawn);
         for piece in clip(&places, &frame) {
             busy.extend(samples(&piece));
-            let dash = coincide::dash(below).or(marker::dash(series.style, series.variant));
-            canvas.items.push(Shape::Line {
-                points: piece,
-                stroke,
-                width: STROKE,
-                dash,
-            });
+            let dash = dash_on(below).or(dash(series.style, series.variant));
+            canvas.dashed(&piece, stroke, STROKE, dash);
         }
         for bar in series.spans.iter().filter_map(|&span| bar(span, chart.y_log, &frame)) {
             canvas.line(&bar, stroke, BAR);
@@ -186,11 +177,11 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         let stride = stride * (1 + below.min(1));
         for &place in places.iter().step_by(stride).filter(|&&place| frame.holds(place)) {
             busy.push(place);
-            marker::draw(canvas, place, series.style, series.variant);
+            draw_marker(canvas, place, series.style, series.variant);
         }
         drawn.push(places);
     }
-    claims::draw_labels(canvas, &marks, &frame, &busy);
+    draw_labels(canvas, &marks, &frame, &busy);
     if curves.iter().all(Vec::is_empty) {
         let middle = (frame.left + frame.width / 2.0, frame.top + frame.height / 2.0);
         canvas.text(middle, "no data", TextStyle::new(LABEL, MUTED).anchored(Anchor::Middle));
@@ -306,4 +297,102 @@ fn samples(points: &[Point]) -> Vec<Point> {
         }
     }
     out
+}
+
+/// Size of the words in a range.
+const RANGE_SIZE: f64 = 12.0;
+/// Distance between lines of words.
+const RANGE_LINE: f64 = 15.0;
+/// Opacity of the scatter about a curve.
+const SCATTER_OPACITY: f64 = 0.22;
+
+/// Draws the ranges that the paper states. The words stand at the foot of the panel, inside of a range that is wide
+/// enough, or beside it where no other range is, each on lines of its own.
+fn draw_ranges(canvas: &mut Canvas, chart: &Chart, frame: &PanelFrame) {
+    let bottom = frame.top + frame.height;
+    let mut foot = bottom - 4.0;
+    for range in &chart.ranges {
+        let (Some(left), Some(right)) = (column(frame, range.from), column(frame, range.to)) else {
+            continue;
+        };
+        canvas.rect((left, frame.top), (right - left, frame.height), CLAIM, RANGE_OPACITY);
+        let lines = wrap(&range.label, RANGE_SIZE, false, 0.5 * frame.width);
+        let widest = widest(lines.iter().map(String::as_str), RANGE_SIZE, false);
+        let others = chart.ranges.iter().filter(|other| *other != range);
+        let before: Vec<f64> = others
+            .filter(|other| other.to <= range.from)
+            .filter_map(|other| column(frame, other.to))
+            .collect();
+        let free = before.iter().copied().fold(frame.left, f64::max);
+        let (at, anchor) = if right - left > widest + 8.0 {
+            (0.5 * (left + right), Anchor::Middle)
+        } else if left - free > widest + 8.0 {
+            (left - 5.0, Anchor::End)
+        } else {
+            // no further than the frame
+            (
+                (right + 5.0).min(frame.left + frame.width - widest - 4.0),
+                Anchor::Start,
+            )
+        };
+        let first = foot - RANGE_LINE * (lines.len() as f64 - 0.5);
+        canvas.lines((at, first), &lines, TextStyle::new(RANGE_SIZE, MUTED).anchored(anchor));
+        foot -= RANGE_LINE * lines.len() as f64 + 2.0;
+    }
+}
+
+/// Place of a value on the horizontal axis, kept inside the panel.
+fn column(frame: &PanelFrame, value: f64) -> Option<f64> {
+    Some(frame.column(value)?.clamp(frame.left, frame.left + frame.width))
+}
+
+/// Draws the scatter about `series`.
+fn draw_scatter(canvas: &mut Canvas, series: &Series, frame: &PanelFrame) {
+    let (top, bottom) = (frame.top, frame.top + frame.height);
+    let edge = |pick: fn(&(f64, f64, f64)) -> f64| -> Vec<Point> {
+        let places = series.scatter.iter().filter_map(|row| frame.place((row.0, pick(row))));
+        places.map(|(x, y)| (x, y.clamp(top, bottom))).collect()
+    };
+    let (low, high) = (edge(|row| row.1), edge(|row| row.2));
+    if low.len() < 2 || low.len() != high.len() {
+        return;
+    }
+    let around: Vec<Point> = low.into_iter().chain(high.into_iter().rev()).collect();
+    canvas.polygon(&around, ink(series.style, series.variant), SCATTER_OPACITY);
+}
+
+/// Distance below which two curves cannot be told apart, CSS pixels.
+const APART: f64 = 2.0;
+/// Share of the points that must be that near.
+const SHARE: f64 = 0.8;
+
+/// Dash and gap of a curve that lies on `below` others: the gaps show what is below.
+fn dash_on(below: usize) -> Option<(f64, f64)> {
+    (below > 0).then_some((9.0, 9.0 + 4.0 * below as f64))
+}
+
+/// How many of `earlier` the curve `places` lies on.
+fn below(places: &[Point], earlier: &[Vec<Point>]) -> usize {
+    earlier.iter().filter(|other| same(places, other)).count()
+}
+
+/// Whether two curves have points at the same columns, and most of them at the same heights.
+fn same(a: &[Point], b: &[Point]) -> bool {
+    let near = |p: &&Point| b.iter().any(|q| (p.0 - q.0).abs() < APART && (p.1 - q.1).abs() < APART);
+    a.len() > 1 && b.len() > 1 && a.iter().filter(near).count() as f64 >= SHARE * a.len() as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn equal_curves_are_found_and_others_are_not() {
+        let line = |height: f64| -> Vec<Point> { (0..10).map(|i| (f64::from(i) * 20.0, height)).collect() };
+        let drawn = [line(50.0), line(51.0), line(80.0)];
+        assert_eq!(below(&line(50.0), &drawn), 2);
+        assert_eq!(below(&line(60.0), &drawn), 0);
+        assert_eq!(below(&[(0.0, 50.0)], &drawn), 0);
+        assert!(dash_on(0).is_none() && dash_on(1).is_some());
+    }
 }

@@ -1,11 +1,88 @@
-//! Layout of sheets.
+//! Tactile images: sheets of them beside pictures and bars, and one large image with its colour bar.
 
-use super::colour::{FRAME, GRID, INK, MUTED, Rgb, WHITE};
-use super::draw::{Anchor, Canvas, LINE_HEIGHT, Point, Shape, TextStyle, save, text_width, wrap};
-use super::error::FigureError;
-use super::heat_map::draw_heat;
-use super::tiles::{Sheet, Tile, TileRow};
+use super::axis::Axis;
+use super::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, text_width, widest, wrap};
+use super::colour::{FRAME, GRID, INK, MISSING, MUTED, OUTLINE, Rgb, WHITE, heat};
+use super::pixels::{failed, save, save_png};
+use spts::output::OutputError;
+use std::io;
 use std::path::Path;
+
+/// One cell of a sheet.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Tile {
+    /// A tactile image.
+    Heat {
+        /// Values, row-major. A negative is shown as 0, a non-finite as grey.
+        values: Vec<f64>,
+        /// Rows of taxels.
+        rows: usize,
+        /// Columns of taxels.
+        cols: usize,
+        /// Value at the bright end of the colours; `None` takes the image's own maximum.
+        max: Option<f64>,
+        /// Line below the tile.
+        caption: String,
+        /// True taxels, outlined: row-major, one a value.
+        outline: Option<Vec<bool>>,
+    },
+    /// A picture, fitted into the tile with its aspect kept.
+    Picture {
+        /// Pixels in a row.
+        width: usize,
+        /// Pixels in a column.
+        height: usize,
+        /// Red, green, blue of every pixel, row-major.
+        rgb: Vec<u8>,
+        /// Line below the tile.
+        caption: String,
+    },
+    /// A bar chart without axes, such as the voltages read so far.
+    Bars {
+        /// Bar heights; the largest magnitude fills the tile.
+        values: Vec<f64>,
+        /// The first `highlight` bars are coloured, the others grey.
+        highlight: usize,
+        /// Line below the tile.
+        caption: String,
+    },
+    /// Words.
+    Text(String),
+    /// Nothing.
+    Empty,
+}
+
+impl Tile {
+    /// Line below the tile; empty where there is none.
+    pub(super) fn caption(&self) -> &str {
+        match self {
+            Self::Heat { caption, .. } | Self::Picture { caption, .. } | Self::Bars { caption, .. } => caption,
+            Self::Text(_) | Self::Empty => "",
+        }
+    }
+}
+
+/// A row of tiles with its label on the left.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TileRow {
+    /// Label.
+    pub label: String,
+    /// Tiles, left to right. Rows may be of different lengths.
+    pub tiles: Vec<Tile>,
+}
+
+/// A figure of rows of tiles. More than nine rows are set as two halves, side by side.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Sheet {
+    /// Heading.
+    pub title: String,
+    /// Headings of the columns; may be empty.
+    pub column_titles: Vec<String>,
+    /// Rows, top to bottom.
+    pub rows: Vec<TileRow>,
+    /// Side of a tile in CSS pixels; at least 24 is used.
+    pub tile_px: usize,
+}
 
 /// Rows above which a sheet is set as two halves.
 const ROWS_OF_ONE_HALF: usize = 9;
@@ -39,9 +116,8 @@ struct SheetGrid {
 /// Writes a sheet to `dir/name.svg` and `dir/name.png`.
 ///
 /// # Errors
-/// [`FigureError`] when a tile's values do not fill its grid, a file cannot be written or no font is found for the
-/// PNG.
-pub fn save_sheet(sheet: &Sheet, dir: &Path, name: &str) -> Result<(), FigureError> {
+/// [`OutputError`] when a tile's values do not fill its grid, or a file cannot be written.
+pub fn save_sheet(sheet: &Sheet, dir: &Path, name: &str) -> Result<(), OutputError> {
     let path = dir.join(format!("{name}.svg"));
     for tile in sheet.rows.iter().flat_map(|row| &row.tiles) {
         let (len, rows, cols, marks) = match tile {
@@ -57,7 +133,7 @@ pub fn save_sheet(sheet: &Sheet, dir: &Path, name: &str) -> Result<(), FigureErr
         };
         for len in std::iter::once(len).chain(marks) {
             if len != rows * cols {
-                return Err(FigureError::Shape { path, len, rows, cols });
+                return Err(misshapen(&path, len, rows, cols));
             }
         }
     }
@@ -68,11 +144,7 @@ pub fn save_sheet(sheet: &Sheet, dir: &Path, name: &str) -> Result<(), FigureErr
 pub(super) fn layout(sheet: &Sheet) -> Canvas {
     let tile = sheet.tile_px.max(24) as f64;
     let longest = sheet.rows.iter().map(|row| row.tiles.len()).max().unwrap_or(0);
-    let widest = sheet
-        .rows
-        .iter()
-        .map(|row| text_width(&row.label, WORDS, true))
-        .fold(0.0, f64::max);
+    let widest = widest(sheet.rows.iter().map(|row| row.label.as_str()), WORDS, true);
     let split = sheet.rows.len() > ROWS_OF_ONE_HALF;
     let heads: Vec<_> = sheet
         .column_titles
@@ -235,13 +307,7 @@ fn draw_picture(canvas: &mut Canvas, (width, height): (usize, usize), rgb: &[u8]
         corner.0 + ((side - size.0) / 2.0).floor(),
         corner.1 + ((side - size.1) / 2.0).floor(),
     );
-    canvas.items.push(Shape::Picture {
-        at,
-        size,
-        width,
-        height,
-        rgb: rgb.to_vec(),
-    });
+    canvas.picture(at, size, (width, height), rgb, false);
     canvas.frame(at, size, FRAME, 1.0);
 }
 
@@ -271,4 +337,232 @@ fn draw_bars(canvas: &mut Canvas, values: &[f64], highlight: usize, (x, y): Poin
         );
     }
     canvas.line(&[(x + 4.0, nought), (x + side - 4.0, nought)], MUTED, 1.0);
+}
+
+/// The error of values that do not fill the grid that they are said to fill.
+fn misshapen(path: &Path, len: usize, rows: usize, cols: usize) -> OutputError {
+    failed(path)(io::Error::other(format!(
+        "{len} values do not fill {rows} × {cols} cells"
+    )))
+}
+
+/// Taxels up to which an image is drawn as rectangles; a larger one is a picture.
+const MOST_RECTS: usize = 4096;
+
+/// A tactile image: square taxels, centred, with the outline of the true ones. The taxels of a strip are drawn as bars,
+/// so that they can be seen.
+pub(crate) fn draw_heat(
+    canvas: &mut Canvas,
+    values: &[f64],
+    (rows, cols): (usize, usize),
+    peak: f64,
+    outline: Option<&[bool]>,
+    corner: Point,
+    side: f64,
+) {
+    if rows == 0 || cols == 0 {
+        canvas.rect(corner, (side, side), MISSING, 1.0);
+        canvas.frame(corner, (side, side), FRAME, 1.0);
+        return;
+    }
+    let cell = cell_of((rows, cols), side);
+    let (w, h) = (cell.0 * cols as f64, cell.1 * rows as f64);
+    let (left, top) = (corner.0 + (side - w) / 2.0, corner.1 + (side - h) / 2.0);
+    let nought = heat(0.0);
+    let colour = |value: &f64| {
+        if value.is_finite() && peak <= 0.0 {
+            nought
+        } else {
+            heat(value / peak)
+        }
+    };
+    let colours: Vec<Rgb> = values.iter().take(rows * cols).map(colour).collect();
+    if colours.len() > MOST_RECTS {
+        let rgb: Vec<u8> = colours.iter().flat_map(|Rgb(r, g, b)| [*r, *g, *b]).collect();
+        canvas.picture((left, top), (w, h), (cols, rows), &rgb, true);
+    } else {
+        canvas.rect((left, top), (w, h), nought, 1.0);
+        // Edges of cells are rounded to half pixels, which the PNG can show sharply.
+        let edge = |origin: f64, cell: f64, index: usize| ((origin + index as f64 * cell) * 2.0).round() / 2.0;
+        for (taxel, &fill) in colours.iter().enumerate().filter(|(_, fill)| **fill != nought) {
+            let (row, col) = (taxel / cols, taxel % cols);
+            let (x, y) = (edge(left, cell.0, col), edge(top, cell.1, row));
+            let size = (edge(left, cell.0, col + 1) - x, edge(top, cell.1, row + 1) - y);
+            canvas.rect((x, y), size, fill, 1.0);
+        }
+    }
+    canvas.frame((left, top), (w, h), FRAME, 1.0);
+    if let Some(marks) = outline {
+        draw_outline(canvas, marks, (rows, cols), (left, top), cell);
+    }
+}
+
+/// Width and height of a taxel in a tile: the same, but at least a sixth of the tile for all of a strip's rows or
+/// columns.
+fn cell_of((rows, cols): (usize, usize), side: f64) -> (f64, f64) {
+    let square = side / rows.max(cols) as f64;
+    let least = side / 6.0;
+    (square.max(least / cols as f64), square.max(least / rows as f64))
+}
+
+/// A thin line between true taxels and others, drawn just inside the true ones.
+fn draw_outline(canvas: &mut Canvas, marks: &[bool], (rows, cols): (usize, usize), (left, top): Point, cell: Point) {
+    let marked = |row: Option<usize>, col: Option<usize>| match (row, col) {
+        (Some(row), Some(col)) if row < rows && col < cols => marks.get(row * cols + col).copied().unwrap_or(false),
+        _ => false,
+    };
+    for row in 0..rows {
+        for col in (0..cols).filter(|&col| marked(Some(row), Some(col))) {
+            let (x0, y0) = (left + col as f64 * cell.0, top + row as f64 * cell.1);
+            let (x1, y1) = (x0 + cell.0, y0 + cell.1);
+            let sides = [
+                (marked(row.checked_sub(1), Some(col)), [(x0, y0), (x1, y0)]),
+                (marked(Some(row + 1), Some(col)), [(x0, y1), (x1, y1)]),
+                (marked(Some(row), col.checked_sub(1)), [(x0, y0), (x0, y1)]),
+                (marked(Some(row), Some(col + 1)), [(x1, y0), (x1, y1)]),
+            ];
+            for (_, line) in sides.iter().filter(|(inside, _)| !inside) {
+                canvas.line(line, OUTLINE, 1.5);
+            }
+        }
+    }
+}
+
+/// Longest side of the map in CSS pixels.
+const MAP: f64 = 560.0;
+/// The same of a strip: a map that is more than [`STRIP`] times as long as wide.
+const LONG_MAP: f64 = 960.0;
+const STRIP: usize = 4;
+/// Least height of the colour bar in CSS pixels.
+const LEAST_BAR: f64 = 160.0;
+/// Steps of the colour bar.
+const BAR_STEPS: u32 = 140;
+
+/// Paints one tactile image with a colour bar and the indices of the taxels.
+///
+/// `values` are row-major; `value · scale` is shown, in `unit_label`. A negative value is shown as 0, a non-finite
+/// one as grey.
+///
+/// # Errors
+/// [`OutputError`] when the values do not fill the grid, or the file cannot be written.
+pub fn pressure_png(
+    values: &[f64],
+    rows: usize,
+    cols: usize,
+    unit_label: &str,
+    scale: f64,
+    title: &str,
+    path: &Path,
+) -> Result<(), OutputError> {
+    if values.len() != rows * cols || values.is_empty() {
+        return Err(misshapen(path, values.len(), rows, cols));
+    }
+    let shown: Vec<f64> = values.iter().map(|value| value * scale).collect();
+    save_png(&pressure_layout(&shown, (rows, cols), unit_label, title), path)
+}
+
+/// The picture as shapes.
+fn pressure_layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, title: &str) -> Canvas {
+    let longest = rows.max(cols);
+    let side = if longest > STRIP * rows.min(cols) {
+        LONG_MAP
+    } else {
+        MAP
+    };
+    let cell = (side / longest as f64).floor().max(1.0);
+    let (w, h) = (cell * cols as f64, cell * rows as f64);
+    let (left, width) = (56.0, 56.0 + w + 130.0);
+    let heading = wrap(title, 18.0, true, width - 2.0 * 20.0);
+    let top = 62.0 + 24.0 * heading.len() as f64;
+    let bar_h = h.max(LEAST_BAR);
+    let mut canvas = Canvas::new(width, top + bar_h + 24.0, title);
+    canvas.lines((20.0, 28.0), &heading, TextStyle::new(18.0, INK).bold());
+
+    let peak = shown.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+    let axis = Axis::new([0.0, peak].into_iter(), false, (peak > 0.0).then_some((0.0, peak)));
+    let share = |value: f64| if peak > 0.0 { value / peak } else { value * 0.0 };
+    let fills: Vec<Rgb> = shown.iter().map(|value| heat(share(*value))).collect();
+    if fills.len() > MOST_RECTS {
+        let rgb: Vec<u8> = fills.iter().flat_map(|Rgb(r, g, b)| [*r, *g, *b]).collect();
+        canvas.picture((left, top), (w, h), (cols, rows), &rgb, true);
+    }
+    for (taxel, (&value, &fill)) in shown
+        .iter()
+        .zip(&fills)
+        .enumerate()
+        .filter(|_| fills.len() <= MOST_RECTS)
+    {
+        let corner = (left + (taxel % cols) as f64 * cell, top + (taxel / cols) as f64 * cell);
+        canvas.rect(corner, (cell, cell), fill, 1.0);
+        if cell >= 40.0 && value.is_finite() {
+            let middle = (corner.0 + cell / 2.0, corner.1 + cell / 2.0);
+            let style = TextStyle::new(12.0, contrast(fill)).anchored(Anchor::Middle);
+            canvas.text(middle, &reading(value.max(0.0), peak), style);
+        }
+    }
+    canvas.frame((left, top), (w, h), FRAME, 1.0);
+    // labels do not touch
+    let every = ((text_width(&longest.to_string(), 12.0, false) + 8.0) / cell)
+        .ceil()
+        .max(1.0);
+    let index = TextStyle::new(12.0, MUTED).anchored(Anchor::Middle);
+    for col in (0..cols).filter(|&col| (col as f64 % every) < 0.5) {
+        canvas.text((left + (col as f64 + 0.5) * cell, top - 12.0), &col.to_string(), index);
+    }
+    for row in (0..rows).filter(|&row| (row as f64 % every) < 0.5) {
+        let at = (left - 8.0, top + (row as f64 + 0.5) * cell);
+        canvas.text(at, &row.to_string(), index.anchored(Anchor::End));
+    }
+    canvas.text((18.0, top + h / 2.0), "row", index.upwards());
+    canvas.text((left + w / 2.0, top - 30.0), "column", index);
+
+    let bar = left + w + 28.0;
+    for step in 0..BAR_STEPS {
+        let (from, to) = (
+            f64::from(step) / f64::from(BAR_STEPS),
+            f64::from(step + 1) / f64::from(BAR_STEPS),
+        );
+        let (y0, y1) = ((top + bar_h * (1.0 - to)).round(), (top + bar_h * (1.0 - from)).round());
+        canvas.rect((bar, y0), (20.0, y1 - y0), heat((from + to) / 2.0), 1.0);
+    }
+    canvas.frame((bar, top), (20.0, bar_h), FRAME, 1.0);
+    for (tick, label) in if peak > 0.0 {
+        axis.ticks(6)
+    } else {
+        vec![(0.0, "0".to_owned())]
+    } {
+        let place = if peak > 0.0 {
+            axis.place(tick).unwrap_or(0.0)
+        } else {
+            0.0
+        };
+        let y = top + bar_h * (1.0 - place);
+        canvas.line(&[(bar + 20.0, y), (bar + 25.0, y)], MUTED, 1.0);
+        canvas.text((bar + 30.0, y), &label, TextStyle::new(13.0, INK));
+    }
+    canvas.text((bar, top - 16.0), unit, TextStyle::new(13.0, INK));
+    canvas
+}
+
+/// A value in three digits or so, on the scale of the largest.
+fn reading(value: f64, peak: f64) -> String {
+    let decimals = match peak {
+        p if p >= 100.0 => 0,
+        p if p >= 10.0 => 1,
+        p if p >= 0.1 => 2,
+        _ => {
+            return if value > 0.0 {
+                format!("{value:.0e}")
+            } else {
+                "0".to_owned()
+            };
+        }
+    };
+    format!("{value:.decimals$}")
+}
+
+/// Black or white, whichever reads better on `fill`: the luma of Rec. 709 decides.
+fn contrast(fill: Rgb) -> Rgb {
+    let luma = 0.2126 * f64::from(fill.0) + 0.7152 * f64::from(fill.1) + 0.0722 * f64::from(fill.2);
+    if luma > 128.0 { INK } else { WHITE }
 }

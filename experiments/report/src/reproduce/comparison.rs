@@ -3,13 +3,13 @@
 use super::ReproduceError;
 use crate::compare::with_error;
 use crate::labels::{object_label, statistic_label};
-use crate::{PageFigure, ReportError, Section, Table, compare};
+use crate::{PageFigure, PageTable, ReportError, Section, compare};
 use spts::output::write_table;
 use spts::progress::Progress;
-use spts_eval::PublishedSkin;
 use spts_eval::decoders::label;
+use spts_eval::{PublishedSkin, Table};
 use spts_studies::calibrate::read;
-use spts_studies::compare::{CompareReport, CompareStudy, CurveDistance, Images, Statistic};
+use spts_studies::compare::{CompareReport, CompareStudy, Images};
 use std::path::Path;
 
 /// What `spts compare` finds, as a section of the report.
@@ -72,52 +72,32 @@ impl ReadoutSection {
         }
     }
 
-    fn statistics_table(&self) -> Table {
-        let row = |s: &Statistic| {
-            vec![
-                object_label(&s.session).to_owned(),
-                statistic_label(s.name),
-                with_error(s.real, s.real_standard_error, 4),
-                with_error(s.twin, s.twin_standard_error, 4),
-                s.tolerance.to_owned(),
-                s.ok.map_or_else(String::new, met),
-            ]
-        };
-        Table {
-            caption: "Statistics of the even presses, ± standard error".to_owned(),
-            header: [
-                "recording",
-                "statistic",
-                "real skin",
-                "twin",
-                "allowed difference",
-                "met",
-            ]
-            .map(str::to_owned)
-            .to_vec(),
-            rows: self.0.all_statistics().iter().map(row).collect(),
-            files: vec!["readout_statistics_real.csv".to_owned()],
-        }
+    fn statistics_table(&self) -> PageTable {
+        let all = self.0.all_statistics();
+        let table = Table::new("", &all)
+            .shown("recording", |s| object_label(&s.session))
+            .shown("statistic", |s| statistic_label(s.name))
+            .shown("real skin", |s| with_error(s.real, s.real_standard_error, 4))
+            .shown("twin", |s| with_error(s.twin, s.twin_standard_error, 4))
+            .shown("allowed difference", |s| s.tolerance)
+            .shown("met", |s| s.ok.map_or("", met));
+        let caption = "Statistics of the even presses, ± standard error";
+        PageTable::new(caption, &table, "readout_statistics_real.csv")
     }
 
-    fn curves_table(&self) -> Table {
-        let row = |c: &CurveDistance| {
-            vec![
-                label(c.decode).to_owned(),
-                score_label(c.metric),
-                format!("{:.4}", c.mean_abs_difference),
-                format!("{:.4}", c.max_abs_difference),
-                format!("{:.2}", c.tolerance),
-                met(c.ok),
-            ]
-        };
-        let header = ["decoder", "score", "mean", "largest", "mean allowed", "met"];
-        Table {
-            caption: "|twin − real| of the score curves over M = 7 … 100".to_owned(),
-            header: header.map(str::to_owned).to_vec(),
-            rows: self.0.distances().iter().map(row).collect(),
-            files: vec!["readout_curves_real.csv".to_owned()],
-        }
+    fn curves_table(&self) -> PageTable {
+        let table = Table::new("", self.0.distances())
+            .shown("decoder", |c| label(c.decode))
+            .shown("score", |c| score_label(c.metric))
+            .shown("mean", |c| c.mean_abs_difference)
+            .digits(4)
+            .shown("largest", |c| c.max_abs_difference)
+            .digits(4)
+            .shown("mean allowed", |c| c.tolerance)
+            .digits(2)
+            .shown("met", |c| c.ok);
+        let caption = "|twin − real| of the score curves over M = 7 … 100";
+        PageTable::new(caption, &table, "readout_curves_real.csv")
     }
 }
 
@@ -133,6 +113,6 @@ fn score_label(name: &str) -> String {
     }
 }
 
-fn met(ok: bool) -> String {
-    if ok { "yes" } else { "no" }.to_owned()
+fn met(ok: bool) -> &'static str {
+    if ok { "yes" } else { "no" }
 }

@@ -1,6 +1,6 @@
 //! The simulated data set: seventeen objects in both modes, and the bouncing ball.
 
-use super::size::ReproductionSize;
+use super::results::ReproductionSize;
 use rayon::prelude::*;
 use spts::Session;
 use spts::chain::Acquisition;

@@ -1,43 +1,39 @@
 //! `spts reproduce`: simulate, learn, score, draw, report.
 
-mod best;
 mod comparison;
-mod curves;
 mod dataset;
-mod error;
 mod figures;
 mod headline;
-mod images;
 mod latency;
-mod onset;
 mod page;
 mod results;
 mod sheets;
-mod size;
 mod tables;
-mod timing;
 mod tracking;
 
-pub use error::ReproduceError;
 pub use headline::Headline;
 
 use crate::animation::{MOTION_FIGURES, MotionError, simulate_motion};
 use crate::{Origin, PageFigure, ReportError, html, per_object};
-use best::best;
 use comparison::ReadoutSection;
-use curves::BothSkins;
 use dataset::SimulatedData;
 use figures::Shown;
+use headline::Facts;
 use page::PageContent;
-use results::SkinResults;
+use results::{BothSkins, ReproductionSize, SkinResults, TimingRow, best, timings};
 use serde::Serialize;
-use size::ReproductionSize;
+use spts::data::DataError;
+use spts::output::OutputError;
 use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts::progress::Progress;
 use spts::provenance::Provenance;
+use spts::record::TwinError;
+use spts_eval::ScoreError;
 use spts_eval::protocol::Protocol;
+use spts_eval::training::LearnError;
 use spts_eval::training::{Learned, TrainingPresses};
 use spts_eval::{PublishedSkin, ScoredSession, ScoredSkin};
+use spts_input::Refusal;
 use spts_models::Streams;
 use spts_studies::per_object::{PerObjectReport, PerObjectStudy};
 use std::path::{Path, PathBuf};
@@ -61,13 +57,40 @@ pub struct Reproduction {
     pub save_recordings: bool,
 }
 
+/// Why the report cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReproduceError {
+    /// The recordings of the real skin cannot be used.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// The twin cannot be run.
+    #[error(transparent)]
+    Twin(#[from] TwinError),
+    /// The animations cannot be made.
+    #[error(transparent)]
+    Motion(#[from] MotionError),
+    /// Nothing is learned from the twin's raster images.
+    #[error(transparent)]
+    Learn(#[from] LearnError),
+    /// A skin cannot be scored.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
+    /// Twin and skin cannot be compared.
+    #[error(transparent)]
+    Compare(#[from] Refusal),
+    /// The report cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
 /// What was scored.
 #[derive(Clone, Copy)]
 struct Scored<'a> {
     skins: &'a BothSkins<'a>,
     comparison: Option<&'a ReadoutSection>,
     per_object: Option<&'a PerObjectReport>,
-    timings: &'a [timing::TimingRow],
+    timings: &'a [TimingRow],
     /// Recordings of the real skin that are not there.
     missing: &'a [String],
 }
@@ -100,7 +123,7 @@ impl Reproduction {
         let dataset = dataset::simulate(self.seed, &size, &|| progress.step())?;
         progress.stage("drawing what moves", None);
         simulate_motion(self.seed, &out.folder("figures")?).map_err(|error| match error {
-            MotionError::Report(error) => ReproduceError::Report(error.unstaged(&out)),
+            MotionError::Report(error) => ReproduceError::Output(out.unstaged(error)),
             error => ReproduceError::Motion(error),
         })?;
         progress.stage("learning", None);
@@ -149,7 +172,7 @@ impl Reproduction {
         };
         progress.stage("timing and drawing", None);
         let results = Scored {
-            timings: &timing::timings(&twin, &size.measurements, size.timed_decodes)?,
+            timings: &timings(&twin, &size.measurements, size.timed_decodes)?,
             skins: &skins,
             comparison: comparison.as_ref(),
             per_object: per_object.as_ref(),
@@ -157,7 +180,7 @@ impl Reproduction {
         };
         let summary = self
             .write(&dataset, &results, begin, &mut out)
-            .map_err(|error| error.unstaged(&out))?;
+            .map_err(|error| out.unstaged(error))?;
         out.commit()?;
         progress.end();
         Ok(summary)
@@ -226,7 +249,14 @@ impl Reproduction {
             per_object::draw(objects, &figures)?;
         }
         let wall_s = begin.elapsed().as_secs_f64();
-        let headline = Headline::new(dataset, skins, per_object, &correlations, timings, wall_s);
+        let headline = Headline::new(&Facts {
+            dataset,
+            skins,
+            per_object,
+            correlations: &correlations,
+            timings,
+            wall_s,
+        });
         let summary = ReproductionSummary {
             headline,
             provenance: Origin::here(Provenance::new(self.seed, dataset.scene_hash.clone())),

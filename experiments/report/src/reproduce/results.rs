@@ -1,12 +1,16 @@
-//! Everything the report says of one skin.
+//! Everything the report says of one skin, scored by the published decoders and by the ones that do best; how much is
+//! simulated and scored; and how long a decode takes, the only result that depends on the machine.
 
-use super::best::SHOWN;
-use super::error::ReproduceError;
 use super::latency::{LatencyRow, latency};
 use super::tracking::{TraceRow, TrackingRow, traces, tracking};
-use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
+use crate::figures::Stroke;
+use serde::Serialize;
+use spts_eval::decoders::{PublishedDecode, TrainedDecoder, find};
 use spts_eval::place::{PlaceRow, RecordedBounce, find_bounces};
-use spts_eval::{BaselineRow, ScoredSkin, SkinScores, mean_rows};
+use spts_eval::protocol::{MEASUREMENTS, Protocol};
+use spts_eval::training::{LearnError, Learning, TrainingData, TrainingPresses};
+use spts_eval::{BaselineRow, Press, ScoreError, ScoredSkin, SkinScores, decode_us, mean_rows};
+use spts_models::Streams;
 use spts_recon::metrics::median;
 
 /// Name of the mean over the objects that both skins were recorded with.
@@ -51,14 +55,14 @@ impl SkinResults {
     /// Scores `skin`, by the published decoders and by its `best` ones.
     ///
     /// # Errors
-    /// [`ReproduceError::Score`] when what was learned does not fit the skin.
+    /// [`ScoreError`] when what was learned does not fit the skin.
     pub(super) fn new(
         skin: ScoredSkin,
         best: Vec<(&'static str, TrainedDecoder)>,
         measurements: &[usize],
         localisation: &[usize],
         done: &(dyn Fn() + Sync),
-    ) -> Result<Self, ReproduceError> {
+    ) -> Result<Self, ScoreError> {
         let scores = skin.score(measurements, localisation, &best, done)?;
         let matched = PublishedDecode::Matched.decoder(&skin.learned)?;
         let latency = latency(&skin, &matched)?;
@@ -132,5 +136,173 @@ impl SkinResults {
     pub(super) fn shown(&self) -> Option<(&'static str, &TrainedDecoder)> {
         let found = self.best.iter().find(|(name, _)| *name == SHOWN);
         found.map(|(name, decoder)| (*name, decoder))
+    }
+}
+
+/// The best in both tasks, images and classes of objects that were learned; and the best image of any object.
+pub(super) const BEST: [&str; 2] = ["evidence", "nn_lmmse"];
+/// The one in the pictures.
+pub(super) const SHOWN: &str = BEST[0];
+
+/// The decoders of [`BEST`], each beside its name, after they have learned from `presses` of a sheet of `cols` columns;
+/// none without presses.
+///
+/// # Errors
+/// [`LearnError`] when the presses cannot be learned from.
+pub(super) fn best<'a>(
+    presses: impl Iterator<Item = TrainingPresses<'a>>,
+    cols: usize,
+    streams: Streams,
+) -> Result<Vec<(&'static str, TrainedDecoder)>, LearnError> {
+    let presses: Vec<_> = presses.filter(|p| !p.is_empty()).collect();
+    if presses.is_empty() {
+        return Ok(Vec::new());
+    }
+    let data = TrainingData::new(&presses, cols, Vec::new(), streams)?;
+    let specs = BEST.iter().filter_map(|name| find(name));
+    specs
+        .map(|spec| Ok((spec.name, TrainedDecoder::new(spec, &data)?)))
+        .collect()
+}
+
+/// Size of a reproduction.
+#[derive(Debug, Clone)]
+pub(super) struct ReproductionSize {
+    /// Presses of an object's raster session.
+    pub(super) raster_presses: usize,
+    /// What the decoder learns from; the control is scored on the other raster presses.
+    pub(super) learning: Learning,
+    /// Presses of an object's compressive session.
+    pub(super) compressive_presses: usize,
+    /// Numbers of measurements on the board.
+    pub(super) measurements: Vec<usize>,
+    /// Numbers of measurements of the localisation board.
+    pub(super) localisation: Vec<usize>,
+    /// Decodes that are timed.
+    pub(super) timed_decodes: usize,
+    /// Protocol of the twin's compressive sessions.
+    pub(super) protocol: Protocol,
+    /// Protocol of the twin's raster sessions.
+    pub(super) raster_protocol: Protocol,
+    /// Protocol of the real sessions.
+    pub(super) real_protocol: Protocol,
+}
+
+impl ReproductionSize {
+    /// The whole reproduction: ten presses an object in either mode.
+    #[must_use]
+    pub(super) fn full() -> Self {
+        let protocol = Protocol::default();
+        Self {
+            raster_presses: 10,
+            learning: Learning {
+                presses: 0..5,
+                training_images: 1500,
+                sweeps: 15,
+            },
+            compressive_presses: 10,
+            measurements: MEASUREMENTS.to_vec(),
+            localisation: MEASUREMENTS.to_vec(),
+            timed_decodes: 2000,
+            protocol: Protocol {
+                first_press: 0,
+                ..protocol
+            },
+            raster_protocol: protocol,
+            real_protocol: protocol,
+        }
+    }
+
+    /// A look at everything in a minute: fewer presses, windows and numbers of measurements.
+    #[must_use]
+    pub(super) fn quick() -> Self {
+        let few = Protocol {
+            presses: 2,
+            max_windows: 60,
+            support_stride: 20,
+            ..Protocol::default()
+        };
+        Self {
+            raster_presses: 3,
+            learning: Learning {
+                presses: 0..2,
+                training_images: 500,
+                sweeps: 5,
+            },
+            compressive_presses: 2,
+            measurements: vec![5, 10, 20, 25, 50, 100],
+            localisation: vec![5, 7, 10, 15, 20, 25, 50, 100],
+            timed_decodes: 500,
+            protocol: Protocol { first_press: 0, ..few },
+            raster_protocol: Protocol { first_press: 2, ..few },
+            real_protocol: few,
+        }
+    }
+}
+
+/// Time of a matched decode.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct TimingRow {
+    /// Number of measurements.
+    pub(super) m: usize,
+    /// Median time of one decode on one thread, Φ·D and image included, µs.
+    pub(super) decode_us_median: f64,
+    /// Time to acquire the measurements, µs.
+    pub(super) acquire_us: f64,
+}
+
+/// Times the matched decode at every M on one press of the twin.
+///
+/// # Errors
+/// [`ScoreError`] when the decoder does not fit the recording.
+pub(super) fn timings(
+    twin: &SkinResults,
+    measurements: &[usize],
+    decodes: usize,
+) -> Result<Vec<TimingRow>, ScoreError> {
+    let Some((recording, block, protocol)) = twin.skin.sessions.iter().find_map(|s| {
+        let recording = s.compressive.as_ref()?;
+        Some((recording, s.scored().next()?, s.protocol))
+    }) else {
+        return Ok(Vec::new());
+    };
+    let press = Press::new(recording, block, &protocol);
+    let mut rows = Vec::new();
+    for &m in measurements {
+        if let Some(decode_us_median) = decode_us(&twin.matched, &press, m, decodes)? {
+            rows.push(TimingRow {
+                m,
+                decode_us_median,
+                acquire_us: m as f64 / recording.sample_rate_hz() * 1e6,
+            });
+        }
+    }
+    Ok(rows)
+}
+
+/// Both skins; the real one only when recordings were given.
+pub(super) struct BothSkins<'a> {
+    /// The twin.
+    pub(super) twin: &'a SkinResults,
+    /// The real skin.
+    pub(super) real: Option<&'a SkinResults>,
+}
+
+impl BothSkins<'_> {
+    /// Objects that the curves are means over: those both skins recorded compressively, or all of the twin's.
+    pub(super) fn common(&self) -> &'static str {
+        if self.real.is_some() { MEAN_COMMON } else { "mean" }
+    }
+
+    /// The skins with the ending of their names in a legend and the stroke of their curves. Without recordings there is
+    /// one, and it needs no name.
+    pub(super) fn named(&self) -> Vec<(&SkinResults, &'static str, Stroke)> {
+        match self.real {
+            None => vec![(self.twin, "", Stroke::Solid)],
+            Some(real) => vec![
+                (self.twin, ", twin", Stroke::Solid),
+                (real, ", real skin", Stroke::Dashed),
+            ],
+        }
     }
 }

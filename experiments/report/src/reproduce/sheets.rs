@@ -1,15 +1,13 @@
 //! The report's picture sheets: the objects (S5), progressive reconstruction (4), examples (S4), dictionary (S6).
 
-use super::curves::BothSkins;
 use super::dataset::SimulatedData;
-use super::images::{ProgressiveImages, median_image, progressive};
-use super::results::SkinResults;
-use super::tables::CorrelationRow;
+use super::results::{BothSkins, SkinResults};
+use super::tables::{CorrelationRow, median_image};
 use crate::figures::{Sheet, Tile, TileRow};
 use crate::labels::object_label;
-use spts_eval::ScoredSession;
 use spts_eval::decoders::TrainedDecoder;
 use spts_eval::protocol::Truth;
+use spts_eval::{Press, ScoredSession, Scorer, idle_mean};
 use spts_recon::Matrix;
 
 /// Numbers of measurements of the progressive reconstruction.
@@ -241,4 +239,39 @@ fn signed(atom: &[f64]) -> Vec<f64> {
         .copied()
         .fold(0.0_f64, |a, v| if v.abs() > a.abs() { v } else { a });
     atom.iter().map(|v| v * largest.signum()).collect()
+}
+
+/// A window of measurements and the images reconstructed from its first M, for several M.
+#[derive(Debug, Clone)]
+pub(super) struct ProgressiveImages {
+    /// Measurements less the idle mean, V.
+    pub(super) y: Vec<f64>,
+    /// M and image.
+    pub(super) images: Vec<(usize, Vec<f64>)>,
+}
+
+/// Reconstructs the first M measurements of frame `frame` of press `block`, for every M, as `decoder` decodes them.
+#[must_use]
+pub(super) fn progressive(
+    decoder: &TrainedDecoder,
+    session: &ScoredSession,
+    block: usize,
+    frame: usize,
+    measurements: &[usize],
+) -> Option<ProgressiveImages> {
+    let recording = session.compressive.as_ref().filter(|r| block < r.blocks().len())?;
+    let longest = measurements.iter().copied().max()?;
+    let start = frame * recording.measurements_per_frame();
+    if start + longest > recording.blocks()[block].volts.len() {
+        return None;
+    }
+    let press = Press::within(recording, block, start..start + longest, idle_mean(recording, block));
+    let mut scorer = Scorer::new(decoder);
+    let mut images = Vec::new();
+    for &m in measurements {
+        let answer = scorer.answers(&[press.window(0, m)?]).ok()?.pop()?;
+        images.push((m, answer.image));
+    }
+    let y = press.window(0, longest)?.y.to_vec();
+    Some(ProgressiveImages { y, images })
 }

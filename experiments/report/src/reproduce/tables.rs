@@ -1,14 +1,34 @@
 //! Results as CSV tables and arrays. Nothing in them depends on the machine, the time or the number of threads.
 
 use super::dataset::SimulatedData;
-use super::images::median_image;
 use super::results::SkinResults;
 use super::tracking::{CourseRow, TRACKING_MEASUREMENTS, over_bounces};
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, write_csv, write_npy, write_table};
-use spts_recon::metrics::pearson;
+use spts_circuit::Recording;
+use spts_eval::protocol::PLATEAU;
+use spts_recon::metrics::{median, pearson};
 use spts_sim::world::PressCourse;
 use std::path::Path;
+
+/// Step between the frames that enter the median.
+const STRIDE: usize = 10;
+
+/// Median raster image over the plateau frames of all presses but the first, which conditions the foam (a single press
+/// is taken as it is), V.
+#[must_use]
+pub(super) fn median_image(raster: &Recording) -> Vec<f64> {
+    let presses = raster.blocks().len();
+    let first = usize::from(presses > 1);
+    let frames: Vec<&[f64]> = (first..presses)
+        .flat_map(|press| PLATEAU.step_by(STRIDE).map(move |frame| (press, frame)))
+        .filter(|(_, frame)| *frame < raster.frames())
+        .map(|(press, frame)| raster.volts(press, frame))
+        .collect();
+    (0..raster.taxels())
+        .map(|taxel| median(&frames.iter().map(|f| f[taxel]).collect::<Vec<_>>()).unwrap_or(0.0))
+        .collect()
+}
 
 /// Correlation of an object's simulated raster image with the recorded one.
 #[derive(Debug, Clone, PartialEq, Serialize)]

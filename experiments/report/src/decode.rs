@@ -1,10 +1,28 @@
-//! One picture of decoded windows: what pressed, what the wire carried, and what decoders saw in it.
+//! Decoded sessions as files: a table, arrays, and one picture.
 
-use crate::figures::{FigureError, Sheet, Tile, TileRow, save_sheet};
+use crate::figures::{Sheet, Tile, TileRow, save_sheet};
+use crate::{ReportError, write_all_or_none};
 use spts::Session;
-use spts_eval::decode::{DecodedSession, DecodedWindow};
+use spts::output::OutputFolder;
+use spts_eval::decode::{self, DecodedSession, DecodedWindow};
 use spts_eval::decoders::short_label;
 use std::path::Path;
+
+/// Files outside of folders of their own.
+pub const FILES: &[&str] = &["windows.csv", "decoded.svg", "decoded.png"];
+
+/// Writes `windows.csv`, one `NAME.npz` a session and the picture `decoded` (.svg and .png) into the folder `out`: all
+/// of them, or none.
+///
+/// # Errors
+/// [`ReportError`] when a file cannot be written.
+pub fn write(decoded: &[(&Session, DecodedSession)], out: OutputFolder) -> Result<(), ReportError> {
+    write_all_or_none(out, |out| {
+        decode::write(decoded, out)?;
+        save_picture(decoded, &out.path(""), "decoded")?;
+        Ok(())
+    })
+}
 
 /// Rows that are shown at most.
 const MOST_ROWS: usize = 6;
@@ -19,8 +37,8 @@ const FINE: usize = 24;
 /// image where that is not known, the trace of the wire, and the images at each M with the true support outlined.
 ///
 /// # Errors
-/// [`FigureError`] when a file cannot be written.
-pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name: &str) -> Result<(), FigureError> {
+/// [`ReportError`] when a file cannot be written.
+pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name: &str) -> Result<(), ReportError> {
     let mut rows = Vec::new();
     let mut columns = vec!["pressed".to_owned(), "the wire".to_owned()];
     // sessions of other skins are decoded from other numbers of measurements

@@ -1,0 +1,360 @@
+//! A figure while it is drawn: shapes and text, as SVG 1.1.
+
+use super::colour::Rgb;
+use super::pixels::{PIXELS_PER_UNIT, encode_png, index, resample};
+use spts_eval::escape;
+use std::fmt::Write as _;
+
+/// A position in CSS pixels; y points down.
+pub type Point = (f64, f64);
+
+/// Faces: the one that the PNG files are painted with, then the usual ones; the layout leaves room for the widest.
+const FACES: &str = "Inter, 'Helvetica Neue', Helvetica, Arial, 'DejaVu Sans', sans-serif";
+/// Height of a capital above the base line, halved, in em: moves the anchor from the middle to the base line.
+const HALF_CAPITAL_EM: f64 = 0.36;
+/// Distance between lines of text, in em.
+pub const LINE_HEIGHT: f64 = 1.3;
+/// Letters of base 64 (RFC 4648, §4).
+const BASE64: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+/// Which end of a text its position is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Anchor {
+    /// Left end.
+    Start,
+    /// Middle.
+    Middle,
+    /// Right end.
+    End,
+}
+
+/// How a text looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TextStyle {
+    /// Size of an em in CSS pixels.
+    pub size: f64,
+    /// Bold face.
+    pub bold: bool,
+    /// Colour.
+    pub colour: Rgb,
+    /// Which end of the text its position is.
+    pub anchor: Anchor,
+    /// Turned a quarter to read upwards.
+    pub upwards: bool,
+}
+
+impl TextStyle {
+    /// Regular, level text that starts at its position.
+    #[must_use]
+    pub const fn new(size: f64, colour: Rgb) -> Self {
+        Self {
+            size,
+            bold: false,
+            colour,
+            anchor: Anchor::Start,
+            upwards: false,
+        }
+    }
+
+    /// The same in bold.
+    #[must_use]
+    pub const fn bold(self) -> Self {
+        Self { bold: true, ..self }
+    }
+
+    /// The same at another anchor.
+    #[must_use]
+    pub const fn anchored(self, anchor: Anchor) -> Self {
+        Self { anchor, ..self }
+    }
+
+    /// The same reading upwards.
+    #[must_use]
+    pub const fn upwards(self) -> Self {
+        Self { upwards: true, ..self }
+    }
+}
+
+/// A figure on white. What is added later lies above what was added before.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Canvas {
+    /// Width in CSS pixels.
+    pub width: f64,
+    /// Height in CSS pixels.
+    pub height: f64,
+    /// What the figure shows, for those who cannot see it.
+    pub description: String,
+    /// Elements, one a line.
+    elements: String,
+}
+
+impl Canvas {
+    /// A blank figure.
+    #[must_use]
+    pub fn new(width: f64, height: f64, description: &str) -> Self {
+        Self {
+            width: width.ceil(),
+            height: height.ceil(),
+            description: description.to_owned(),
+            elements: String::new(),
+        }
+    }
+
+    /// The figure as an SVG document.
+    #[must_use]
+    pub fn svg(&self) -> String {
+        let (w, h) = (number(self.width), number(self.height));
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" xmlns:xlink=\"http://www.w3.org/1999/xlink\" \
+             width=\"{w}\" height=\"{h}\" viewBox=\"0 0 {w} {h}\" role=\"img\" font-family=\"{FACES}\">\n\
+             <title>{}</title>\n<rect width=\"{w}\" height=\"{h}\" fill=\"#ffffff\"/>\n{}</svg>\n",
+            escape(&self.description),
+            self.elements
+        )
+    }
+
+    fn add(&mut self, element: &str) {
+        self.elements.push_str(element);
+        self.elements.push('\n');
+    }
+
+    /// Adds a filled rectangle.
+    pub fn rect(&mut self, (x, y): Point, (w, h): Point, fill: Rgb, opacity: f64) {
+        let (left, top) = (number(x.min(x + w)), number(y.min(y + h)));
+        let (w, h, fill, clear) = (number(w.abs()), number(h.abs()), fill.hex(), clear(opacity));
+        self.add(&format!(
+            "<rect x=\"{left}\" y=\"{top}\" width=\"{w}\" height=\"{h}\" fill=\"{fill}\"{clear} \
+             shape-rendering=\"crispEdges\"/>"
+        ));
+    }
+
+    /// Adds a filled polygon.
+    pub fn polygon(&mut self, points: &[Point], fill: Rgb, opacity: f64) {
+        let (d, fill, clear) = (path_data(points), fill.hex(), clear(opacity));
+        self.add(&format!(
+            "<path d=\"{d}Z\" fill=\"{fill}\" fill-rule=\"evenodd\"{clear}/>"
+        ));
+    }
+
+    /// Adds a filled disc.
+    pub fn disc(&mut self, (x, y): Point, radius: f64, fill: Rgb) {
+        let (x, y, r, fill) = (number(x), number(y), number(radius), fill.hex());
+        self.add(&format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"{r}\" fill=\"{fill}\"/>"));
+    }
+
+    /// Adds a solid line.
+    pub fn line(&mut self, points: &[Point], stroke: Rgb, width: f64) {
+        self.dashed(points, stroke, width, None);
+    }
+
+    /// Adds a line with round joins; `dash` has the lengths of dash and gap.
+    pub fn dashed(&mut self, points: &[Point], stroke: Rgb, width: f64, dash: Option<(f64, f64)>) {
+        let dash = dash.map_or(String::new(), |(on, off)| format!(" stroke-dasharray=\"{on} {off}\""));
+        let (d, stroke) = (path_data(points), stroke.hex());
+        self.add(&format!(
+            "<path d=\"{d}\" fill=\"none\" stroke=\"{stroke}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"{dash}/>"
+        ));
+    }
+
+    /// Adds the outline of a rectangle.
+    pub fn frame(&mut self, (x, y): Point, (w, h): Point, stroke: Rgb, width: f64) {
+        self.line(&[(x, y), (x + w, y), (x + w, y + h), (x, y + h), (x, y)], stroke, width);
+    }
+
+    /// Adds a picture of `shape` = (columns, rows) pixels, red, green and blue row by row, stretched over a rectangle.
+    /// `sharp` pixels stay squares when they are enlarged.
+    pub fn picture(&mut self, (x, y): Point, size: Point, shape: (usize, usize), rgb: &[u8], sharp: bool) {
+        // no more pixels than the PNG file shows
+        let most = |side: f64, pixels: usize| index((side * PIXELS_PER_UNIT).round(), pixels).max(1);
+        let (w, h) = (most(size.0, shape.0), most(size.1, shape.1));
+        // a picture in memory is always encoded
+        let png = encode_png(&resample(rgb, shape, (w, h)), w, h).unwrap_or_default();
+        let (x, y, w, h) = (number(x), number(y), number(size.0), number(size.1));
+        let sharp = if sharp { " image-rendering=\"pixelated\"" } else { "" };
+        self.add(&format!(
+            "<image x=\"{x}\" y=\"{y}\" width=\"{w}\" height=\"{h}\" preserveAspectRatio=\"none\"{sharp} \
+             xlink:href=\"data:image/png;base64,{}\"/>",
+            base64(&png)
+        ));
+    }
+
+    /// Adds a line of text; an empty one adds nothing. `at` is the end that the anchor names, at half the height of a
+    /// capital.
+    pub fn text(&mut self, (x, y): Point, text: &str, style: TextStyle) {
+        if text.trim().is_empty() {
+            return;
+        }
+        let shift = HALF_CAPITAL_EM * style.size;
+        let place = if style.upwards {
+            format!(
+                "transform=\"translate({} {}) rotate(-90)\"",
+                number(x + shift),
+                number(y)
+            )
+        } else {
+            format!("x=\"{}\" y=\"{}\"", number(x), number(y + shift))
+        };
+        let anchor = match style.anchor {
+            Anchor::Start => "",
+            Anchor::Middle => " text-anchor=\"middle\"",
+            Anchor::End => " text-anchor=\"end\"",
+        };
+        let weight = if style.bold { " font-weight=\"bold\"" } else { "" };
+        let (size, fill, text) = (number(style.size), style.colour.hex(), escape(text));
+        self.add(&format!(
+            "<text {place} font-size=\"{size}\"{anchor}{weight} fill=\"{fill}\">{text}</text>"
+        ));
+    }
+
+    /// Adds lines of text, one below the other, the first at `at`.
+    pub fn lines(&mut self, (x, y): Point, lines: &[String], style: TextStyle) {
+        let mut middle = y;
+        for line in lines {
+            self.text((x, middle), line, style);
+            middle += style.size * LINE_HEIGHT;
+        }
+    }
+}
+
+fn clear(opacity: f64) -> String {
+    if opacity < 1.0 {
+        format!(" fill-opacity=\"{opacity}\"")
+    } else {
+        String::new()
+    }
+}
+
+/// Corners as path commands.
+fn path_data(points: &[Point]) -> String {
+    let mut out = String::new();
+    for (index, (x, y)) in points.iter().enumerate() {
+        let command = if index == 0 { 'M' } else { 'L' };
+        // writing to a String does not fail
+        let _ = write!(out, "{command}{} {}", number(*x), number(*y));
+    }
+    out
+}
+
+/// A coordinate to a hundredth of a pixel; a non-finite one is 0.
+fn number(value: f64) -> String {
+    let value = if value.is_finite() { value } else { 0.0 };
+    let text = format!("{value:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
+}
+
+/// Bytes in base 64 with padding (RFC 4648, §4).
+fn base64(bytes: &[u8]) -> String {
+    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for chunk in bytes.chunks(3) {
+        let byte = |i: usize| u32::from(chunk.get(i).copied().unwrap_or(0));
+        let word = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for place in 0..4 {
+            let letter = usize::try_from(word >> (18 - 6 * place) & 63).map_or(b'=', |index| BASE64[index]);
+            out.push(if place <= chunk.len() { char::from(letter) } else { '=' });
+        }
+    }
+    out
+}
+
+/// Advance of a character of DejaVu Sans in em, within about 10 %. Wider than the usual sans-serif faces, so a text
+/// that fits by this measure fits in any of them.
+fn advance_em(c: char) -> f64 {
+    match c {
+        'i' | 'j' | 'l' | '\'' | '|' => 0.29,
+        ' ' | '.' | ',' | ':' | ';' | '!' | 'I' | 'f' | 't' | '(' | ')' | '[' | ']' | '/' | '·' => 0.37,
+        'r' | '"' | '-' => 0.42,
+        's' | 'z' | 'c' | 'v' | 'x' | 'y' | 'k' => 0.57,
+        'm' | 'W' | '%' | '@' => 0.98,
+        'M' | 'w' | '–' | '±' | '×' | '=' | '<' | '>' | '≥' | '≤' | '+' => 0.85,
+        c if c.is_ascii_uppercase() => 0.71,
+        c if c.is_ascii() => 0.64,
+        _ => 0.72,
+    }
+}
+
+/// Width of a text in the unit of `size`, the em.
+#[must_use]
+pub fn text_width(text: &str, size: f64, bold: bool) -> f64 {
+    text.chars().map(advance_em).sum::<f64>() * size * if bold { 1.12 } else { 1.0 }
+}
+
+/// Width of the widest of several texts.
+pub fn widest<'a>(texts: impl IntoIterator<Item = &'a str>, size: f64, bold: bool) -> f64 {
+    texts
+        .into_iter()
+        .map(|text| text_width(text, size, bold))
+        .fold(0.0, f64::max)
+}
+
+/// Breaks a text between words into lines no wider than `width`; a longer word keeps a line of its own. A number
+/// stays with its unit, and a relation with both of its sides.
+#[must_use]
+pub fn wrap(text: &str, size: f64, bold: bool, width: f64) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for phrase in phrases(text) {
+        match lines.last_mut() {
+            Some(line) if text_width(&format!("{line} {phrase}"), size, bold) <= width => {
+                line.push(' ');
+                line.push_str(&phrase);
+            }
+            _ => lines.push(phrase),
+        }
+    }
+    lines
+}
+
+/// Words, and groups of words that belong on one line.
+fn phrases(text: &str) -> Vec<String> {
+    /// Longest word after a number that is taken for its unit, in characters.
+    const UNIT_LENGTH: usize = 3;
+    let relation = |word: &str| matches!(word, "=" | "<" | ">" | "≤" | "≥" | "≈" | "±" | "×" | "·");
+    let mut out: Vec<String> = Vec::new();
+    let mut last = "";
+    for word in text.split_whitespace() {
+        let unit = last.ends_with(|c: char| c.is_ascii_digit()) && word.chars().count() <= UNIT_LENGTH;
+        let equals = matches!(word, "=" | "±" | "×" | "·");
+        match out.last_mut() {
+            Some(phrase) if unit || equals || relation(last) => {
+                phrase.push(' ');
+                phrase.push_str(word);
+            }
+            _ => out.push(word.to_owned()),
+        }
+        last = word;
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Test vectors of RFC 4648, §10.
+    #[test]
+    fn base64_matches_the_rfc() {
+        for (plain, coded) in [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foobar", "Zm9vYmFy"),
+        ] {
+            assert_eq!(base64(plain.as_bytes()), coded);
+        }
+    }
+
+    #[test]
+    fn numbers_are_short_and_finite() {
+        let shown = [10.0, -0.001, 2.345_678, f64::NAN].map(number);
+        assert_eq!(shown, ["10", "0", "2.35", "0"]);
+    }
+
+    #[test]
+    fn lines_break_between_phrases() {
+        let lines = wrap("paper: ≥ 98 % at M = 20", 10.0, false, 1.0);
+        assert_eq!(lines, ["paper:", "≥ 98 %", "at", "M = 20"]);
+        assert_eq!(wrap("one line", 10.0, false, 1e3), ["one line"]);
+        assert!(wrap("  ", 10.0, false, 1.0).is_empty());
+    }
+}
