@@ -2,7 +2,6 @@
 
 use spts::session::{Session, read_npy};
 use spts::{Profile, Scene};
-use std::io::Cursor;
 use std::path::Path;
 
 /// A parser that is given whatever bytes there are. What it makes of them is dropped.
@@ -15,7 +14,6 @@ pub const PARSERS: &[(&str, Parser)] = &[
     ("stl", stl),
     ("mat", mat),
     ("npy", npy),
-    ("npz", npz),
     ("answer", answer),
     ("session", session),
     ("scene", scene),
@@ -24,8 +22,6 @@ pub const PARSERS: &[(&str, Parser)] = &[
     ("seeds", seeds),
 ];
 
-/// Most values of an answer that is read: those of a thousand windows of a hundred taxels.
-const ANSWER_VALUES: usize = 100_000;
 /// Taxels of the skin that a profile is checked for, and of the images of answers.
 const TAXELS: u32 = 100;
 /// Classes that an answer may name.
@@ -56,17 +52,6 @@ pub fn npy(bytes: &[u8]) {
     in_folder("a.npy", bytes, |folder| {
         let _ = read_npy(&folder.join("a.npy"));
     });
-}
-
-/// Images and labels that an external program answers with.
-pub fn npz(bytes: &[u8]) {
-    for name in ["images", "labels"] {
-        let check = |sides: &[usize]| match sides.iter().product::<usize>() {
-            0..=ANSWER_VALUES => Ok(()),
-            _ => Err(std::io::ErrorKind::InvalidData.into()),
-        };
-        let _ = spts_eval::npz::read_from(Cursor::new(bytes), name, check);
-    }
 }
 
 /// A line of the output of an external program.

@@ -121,7 +121,6 @@ fn external_programs_are_scored_or_named() {
         ),
         ("sed -u -e 1d -e 's/.*/hello/'", "answered window 1 with `hello`"),
         ("exit 3", "before it had answered"),
-        ("true {windows} {answers}", "answers-"),
     ] {
         let start = ["score", recordings.to_str().unwrap()];
         let output = spts(dir.path(), &[&start, &quick[..], &[command]].concat());

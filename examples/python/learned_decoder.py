@@ -1,12 +1,13 @@
 """Decodes with the model of `learn_from_data.py`:
 
-    spts score recordings/ --external 'learned=python3 examples/python/learned_decoder.py MODEL.npz {windows} {answers}'
+    spts score recordings/ --external 'learned=python3 examples/python/learned_decoder.py MODEL.npz'
 
 For every Gaussian of the mixture and every length ℓ the measurements are Gaussian too, y ~ N(ℓΦμ, ℓ²ΦΣΦᵀ + s²I): that gives
 the most probable image, μ + ΣΦᵀ(…)⁻¹(y − …), and how well it explains y. The answer is their mean, weighed by that, without
 its negative values. Needs numpy.
 """
 
+import json
 import sys
 
 import numpy as np
@@ -35,11 +36,13 @@ def decode(model, phi, y):
 
 
 def main():
-    path, windows, answers = sys.argv[1:4]
-    model, asked = dict(np.load(path)), np.load(windows)
+    model = dict(np.load(sys.argv[1]))
     model["sum"] = model["means"][0].sum()
-    pairs = zip(asked["phi"].astype(float), asked["y"].astype(float))
-    np.savez(answers, images=np.array([decode(model, phi, y) for phi, y in pairs]))
+    sys.stdin.readline()  # a header with what other decoders learn from
+    for line in sys.stdin:
+        window = json.loads(line)
+        phi = np.array([[1.0 if sign == "+" else -1.0 for sign in row] for row in window["phi"]])
+        print(json.dumps({"image": decode(model, phi, np.array(window["y"])).tolist()}), flush=True)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ use crate::interrupt::stoppable;
 use crate::refuse::refuse;
 use numpy::{IntoPyArray as _, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
+use spts::Refusal;
 use spts_eval::algorithm::{Algorithm, Answer, Class, Contender, DecodeError, ExternalError, Trained};
 use spts_eval::board::{BoardSettings, DECODERS, Window, find, table};
 use spts_eval::training::{PUBLISHED, RASTER, SHAPES, TrainingData, TrainingSource};
@@ -60,10 +61,7 @@ impl Contender for Given {
 }
 
 fn failed(name: &str, error: &PyErr) -> ExternalError {
-    ExternalError::Failed {
-        name: name.to_owned(),
-        problem: error.to_string(),
-    }
+    ExternalError::Refused(Refusal::new(format!("{name}: {error}")))
 }
 
 impl Trained for Learned {

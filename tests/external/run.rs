@@ -1,6 +1,5 @@
-//! A run of `spts score` with an external program, and what it leaves behind.
+//! A run of `spts score` with an external program, and the processes that it leaves behind.
 
-use super::programs::ARRAYS;
 use crate::command::SPTS;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -20,26 +19,19 @@ const START: Duration = Duration::from_secs(120);
 const STARTS: &str = "[ -e \"$STARTED\" ] || \
     { date +%s.%N > \"$STARTED.$$\"; mv \"$STARTED.$$\" \"$STARTED\"; }; ";
 
-/// A run of `spts score` with one program, in a folder for temporary files of its own.
+/// A run of `spts score` with one program, in a folder of its own.
 pub(super) struct Run {
-    pub(super) parent: tempfile::TempDir,
-    /// Folder of temporary files.
-    pub(super) temporary: PathBuf,
+    parent: tempfile::TempDir,
     /// File that the program writes when it begins.
-    pub(super) started: PathBuf,
+    started: PathBuf,
     /// What finds its processes again: a variable of their environment.
     marker: String,
 }
 
 impl Run {
-    /// `temporary` is the name of the folder for temporary files.
-    pub(super) fn new(temporary: &str) -> Self {
+    pub(super) fn new() -> Self {
         let parent = tempfile::tempdir().unwrap();
-        let folder = parent.path().join(temporary);
-        std::fs::create_dir(&folder).unwrap();
-        std::fs::write(parent.path().join("arrays.py"), ARRAYS).unwrap();
         Self {
-            temporary: folder,
             started: parent.path().join("started"),
             marker: format!("SPTS_TEST_MARKER={}", parent.path().display()),
             parent,
@@ -54,10 +46,7 @@ impl Run {
             .args(["--object", "brain", "--no-ball", "--no-times", "--learn-from", "raster"])
             .args(["--external-timeout", &limit_s.to_string(), "--threads", "2"])
             .args(["--external", &format!("x={STARTS}{program}")])
-            .env("TMPDIR", &self.temporary)
             .env("STARTED", &self.started)
-            .env("PYTHONPATH", self.parent.path())
-            .env("PYTHONDONTWRITEBYTECODE", "1")
             .env_remove("PYTHONUNBUFFERED")
             .env(name, value)
             .current_dir(self.parent.path())
@@ -94,11 +83,5 @@ impl Run {
             }
         }
         found
-    }
-
-    /// What is left in the folder for temporary files.
-    pub(super) fn left(&self) -> Vec<PathBuf> {
-        let entries = std::fs::read_dir(&self.temporary).unwrap();
-        entries.map(|entry| entry.unwrap().path()).collect()
     }
 }

@@ -15,7 +15,7 @@ use spts_eval::anytime::{self, StopSettings};
 use spts_eval::board::{
     BoardSettings, Difference, FILES, Regression, ScoreBoard, TrainedBoard, differences, regressions, table,
 };
-use spts_eval::decoders::DECODERS;
+use spts_eval::decoders::{DECODERS, no_confidence, not_in_time};
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{
     CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainedNetwork, TrainingSource,
@@ -67,18 +67,13 @@ use std::time::Duration;
   spts score recordings/ --against board.json --tolerance 0.005 || echo regression
 
 An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\",
-\"learn\", \"classes\": {\"1\": \"brain\", ...}} and then one line a window, {\"m\", \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and
-answers each at once with a line {\"image\": [...]} or {\"label\": N} or both. m is the number of samples, volts the
-samples, and y the samples minus the output of the untouched skin, both in V. A program that answers only labels has no
-scores of images. An image without a label is classified by the published classifier, as the images of the other
-decoders are. Where weights are not +1 or -1, phi has an array of numbers in place of each string of signs. When its
-input ends, the program has to end with status 0.
-
-With {windows} and {answers} in its command, the program runs once for every press and M instead. It reads the .npz file
-{windows}, with phi (windows x M x taxels), y and volts, and writes the .npz file {answers}, with images (windows x
-taxels) or labels (windows; -1: unknown) or both. {learn} in the command, and `learn` in the header, is an .npz file
-with images and labels to learn from. Write placeholders without quotes: each becomes one word. The paths are also in
-the environment, as SPTS_WINDOWS, SPTS_ANSWERS and SPTS_LEARN.
+\"classes\": {\"1\": \"brain\", ...}, \"learn\": {\"images\": [[...], ...], \"labels\": [...]}} and then one line a window, {\"m\",
+\"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once with a line {\"image\": [...]} or {\"label\": N} or both.
+learn has the raster images to learn from and their labels. m is the number of samples, volts the samples, and y the
+samples minus the output of the untouched skin, both in V. A program that answers only labels has no scores of images.
+An image without a label is classified by the published classifier, as the images of the other decoders are. Where
+weights are not +1 or -1, phi has an array of numbers in place of each string of signs. When its input ends, the program
+has to end with status 0.
 
 Every answer needs one finite value a taxel or a label that is in `classes`; nothing else may be written to standard
 output. A program that answers otherwise, ends with another status than 0 or is late (--external-timeout) is ended, and
@@ -117,8 +112,7 @@ pub(super) struct ScoreCommand {
     /// A decoder of your own, a program given as COMMAND or NAME=COMMAND; repeat for several [default: none]
     #[arg(long, value_name = "COMMAND")]
     external: Vec<String>,
-    /// Time limit of an external program, s, [0.1, 86400]: for each window or, with {windows} and {answers}, for each
-    /// run
+    /// Time limit of an external program for each window, s, [0.1, 86400]
     #[arg(
         long,
         value_name = "SECONDS",
@@ -287,7 +281,7 @@ impl ScoreCommand {
         let wanted = self.wanted()?;
         let can = |settings: &BoardSettings| {
             let unable = settings.decoders.iter().find(|spec| !spec.anytime);
-            unable.map(|spec| ScoreError::no_confidence(spec.name).to_string())
+            unable.map(|spec| no_confidence(spec.name).to_string())
         };
         let (board, out) = self.special("out/anytime", anytime::FILES, &can, &|ready, done| {
             ready.stops(&wanted, done)
@@ -301,7 +295,7 @@ impl ScoreCommand {
     fn follow_in_time(&self) -> Result<(), CliError> {
         let can = |settings: &BoardSettings| {
             let unable = settings.decoders.iter().find(|spec| spec.name != "nn_lmmse");
-            let unable = unable.map(|spec| ScoreError::not_in_time(spec.name).to_string());
+            let unable = unable.map(|spec| not_in_time(spec.name).to_string());
             unable.or_else(|| {
                 let reason = "chosen rows have no order in time; leave it out with `--in-time`";
                 (settings.sensing != [Sensing::Random]).then(|| format!("`--sensing`: {reason}"))
@@ -477,11 +471,8 @@ impl ScoreCommand {
 /// What went wrong, for a reader who knows the options.
 fn explained(e: &ScoreError, source: &Source) -> CliError {
     match e {
-        ScoreError::NoSession { .. } | ScoreError::Object { .. } => {
-            CliError::usage(format!("{}: {e}", source.root.display()))
-        }
-        ScoreError::External(ExternalError::Late { .. })
-        | ScoreError::Decode(DecodeError::External(ExternalError::Late { .. })) => {
+        ScoreError::Sessions(_) => CliError::usage(format!("{}: {e}", source.root.display())),
+        ScoreError::Decode(DecodeError::External(ExternalError::Late { .. })) => {
             CliError::usage(format!("{e}; `--external-timeout` sets another limit"))
         }
         _ => CliError::usage(e.to_string()),

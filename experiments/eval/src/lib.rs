@@ -8,51 +8,38 @@
 pub mod algorithm;
 mod alignment;
 pub mod anytime;
-mod baselines;
 pub mod board;
 mod chunk;
-mod control;
 pub mod decode;
 pub mod decoders;
-mod error;
 pub mod external;
 pub mod in_time;
 mod labels;
-pub mod npz;
 pub mod place;
 pub mod protocol;
+mod published;
 mod scorer;
 mod sensing;
 mod session;
-mod skin;
+#[cfg(feature = "mujoco")]
+mod skin_run;
 mod source;
 mod table;
 mod tally;
-mod timing;
 pub mod training;
-#[cfg(feature = "mujoco")]
-mod twin_sessions;
-mod unique;
-mod untouched;
-mod validation;
 mod windows;
 
+pub use algorithm::ScoreError;
 pub use alignment::{SessionSlip, find_slips, follow_slips, slips_text};
-pub use baselines::{BaselineRow, baselines};
-pub use control::{RASTER, score_raster};
-pub use error::ScoreError;
+pub use decoders::RASTER;
 pub use labels::Labels;
-pub use scorer::Scorer;
+pub use published::{BaselineRow, ScoreRow, ScoredSkin, SkinScores, baselines, mean_rows, score_raster, score_session};
+pub use scorer::{Scorer, decode_us};
 pub use sensing::{RowChooser, Sensing};
 pub use session::ScoredSession;
-pub use skin::{ScoredSkin, SkinScores};
+#[cfg(feature = "mujoco")]
+pub use skin_run::{SkinRun, SkinRunPresses, TwinSessions, footprint_scene, twin_set};
 pub use source::{PublishedSkin, Source, check_session};
 pub use table::{Cell, Table, TextTable, escape};
-pub use tally::{Scores, Tally};
-pub use timing::decode_us;
-#[cfg(feature = "mujoco")]
-pub use twin_sessions::{TwinSessions, TwinSessionsError};
-pub use unique::unique;
-pub use untouched::Untouched;
-pub use validation::{ScoreRow, mean_rows, score_session};
-pub use windows::{Press, PressRows, Window, idle_mean};
+pub use tally::{Scores, Tally, unique};
+pub use windows::{Press, PressRows, Untouched, Window, idle_mean};

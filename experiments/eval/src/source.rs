@@ -2,8 +2,8 @@
 
 use crate::alignment::{SessionSlip, follow_slips};
 use crate::labels::Labels;
+use crate::published::ScoredSkin;
 use crate::session::ScoredSession;
-use crate::skin::ScoredSkin;
 use crate::training::{LearnError, Learned, SHIFT_REACH, TrainingData, TrainingPresses};
 use spts::Refusal;
 use spts::Session;

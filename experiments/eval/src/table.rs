@@ -85,6 +85,14 @@ impl Cell {
             _ => Self::Unknown,
         }
     }
+
+    /// The two ends of an interval for readers, with `digits` decimals.
+    #[must_use]
+    pub fn span(interval: Option<[f64; 2]>, digits: usize) -> Self {
+        interval
+            .map(|[low, high]| format!("{low:.digits$}–{high:.digits$}"))
+            .into()
+    }
 }
 
 impl<'a, R: Copy> Table<'a, R> {
@@ -112,6 +120,13 @@ impl<'a, R: Copy> Table<'a, R> {
     #[must_use]
     pub fn file<V: Into<Cell>>(self, key: impl Into<String>, value: impl Fn(R) -> V + 'a) -> Self {
         self.with(Some(key.into()), None, value)
+    }
+
+    /// Adds the two ends of an interval as columns for files alone, `key`_low and `key`_high.
+    #[must_use]
+    pub fn interval(self, key: &str, value: impl Fn(R) -> Option<[f64; 2]> + Copy + 'a) -> Self {
+        self.file(format!("{key}_low"), move |row| value(row).map(|[low, _]| low))
+            .file(format!("{key}_high"), move |row| value(row).map(|[_, high]| high))
     }
 
     /// Adds a column for readers alone.

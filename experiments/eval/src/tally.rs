@@ -34,6 +34,21 @@ pub struct Scores {
     pub class_evidence: Option<f64>,
 }
 
+/// A column of scores: its name in files, and the score.
+pub(crate) type ScoreColumn<T> = (&'static str, fn(&T) -> Option<f64>);
+
+impl Scores {
+    /// Columns in files.
+    pub(crate) const COLUMNS: [ScoreColumn<Self>; 6] = [
+        ("support", |s| s.support),
+        ("iou", |s| s.iou),
+        ("f1", |s| s.f1),
+        ("class_single", |s| s.class_single),
+        ("class_vote20", |s| s.class_vote20),
+        ("class_evidence", |s| s.class_evidence),
+    ];
+}
+
 /// Scores of the windows of one press by one decoder and M.
 ///
 /// ```
@@ -179,6 +194,21 @@ fn percentiles(mut values: Vec<f64>) -> [f64; 2] {
     values.sort_unstable_by(f64::total_cmp);
     let last = values.len().saturating_sub(1);
     [last / 40, last - last / 40].map(|i| values.get(i).copied().unwrap_or_default())
+}
+
+/// `values` without duplicates, in order of first appearance.
+///
+/// ```
+/// assert_eq!(spts_eval::unique([3, 1, 3, 2, 1]), [3, 1, 2]);
+/// ```
+pub fn unique<T: PartialEq>(values: impl IntoIterator<Item = T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for value in values {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+    }
+    found
 }
 
 #[cfg(test)]

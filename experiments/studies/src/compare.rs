@@ -7,7 +7,6 @@ use crate::calibrate::{
     FitRequest, FittedReadout, SessionEstimates, SessionPair, WINDOW_FRAMES, fit_windows, fitted_profile, predicted,
     reseeded,
 };
-use crate::pressed::footprint_scene;
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 use spts::progress::Progress;
@@ -17,7 +16,7 @@ use spts_circuit::{Block, Interpolated, Mode, Profile, Readout, Recording};
 use spts_contact::objects::OBJECTS;
 use spts_eval::decoders::PublishedDecode;
 use spts_eval::protocol::{PLATEAU, PUBLISHED_RATE_HZ, PUBLISHED_TAXELS, Protocol};
-use spts_eval::{PublishedSkin, ScoreError, ScoreRow, ScoredSession, mean_rows, score_session};
+use spts_eval::{PublishedSkin, ScoreError, ScoreRow, ScoredSession, footprint_scene, mean_rows, score_session};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, Streams, TaxelGains};
 use std::path::Path;

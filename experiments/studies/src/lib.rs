@@ -10,7 +10,6 @@ pub mod explore;
 pub mod fidelity;
 pub mod firmware;
 pub mod per_object;
-mod pressed;
 pub mod readouts;
 pub mod sensing;
 pub mod touches;

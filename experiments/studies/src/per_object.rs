@@ -7,26 +7,24 @@
 
 use crate::calibrate::{SessionEstimates, predicted, read};
 use crate::compare::readout_refused;
-use crate::pressed::footprint_scene;
 use rayon::prelude::*;
 use serde::Serialize;
-use spts::Session;
-use spts::chain::{Acquisition, DEFAULT_READOUT};
+use spts::chain::DEFAULT_READOUT;
 use spts::data::SessionSet;
 use spts::progress::Progress;
-use spts::record::{Twin, TwinError};
+use spts::record::TwinError;
 use spts::scene::{Scene, SceneConfig};
 use spts::session::Recorded;
 use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording};
-use spts_contact::objects::{OBJECTS, ObjectSpec};
+use spts_contact::objects::OBJECTS;
 use spts_eval::board::{BoardSettings, ObjectRow, find};
 use spts_eval::protocol::Protocol;
 use spts_eval::training::{SkinGains, TrainingPresses, TrainingSource, templates};
-use spts_eval::{ScoredSession, Scores, Sensing, Source};
+use spts_eval::{ScoredSession, Scores, Sensing, SkinRun, Source, footprint_scene, twin_set};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams, VelostatConfig};
 use spts_recon::classify::Library;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Numbers of measurements.
 pub const MEASUREMENTS: [usize; 3] = [7, 20, 50];
@@ -414,47 +412,22 @@ fn presses(scored: usize) -> usize {
 /// whether the taxels have gains of their own.
 fn twin(seed: u64, scored: &[String], gains: bool, done: &(dyn Fn() + Sync)) -> Result<SessionSet, TwinError> {
     let sessions = OBJECTS.par_iter().map(|object| {
+        let spread = (!gains).then(|| ("spread_log_sd".to_owned(), 0.0.into()));
+        let config = SceneConfig {
+            transducer_parameters: spread.into_iter().collect(),
+            ..footprint_scene(object.name, SCANNED + SCORED, seed)
+        };
         let is_scored = scored.iter().any(|name| name == object.name);
-        session(object, seed, is_scored, gains, done)
+        let run = SkinRun {
+            scene: &Scene::new(config, Path::new(""))?,
+            number: u64::from(object.label),
+            scanned: SCANNED,
+            summed: if is_scored { SCORED } else { 0 },
+            conditioning: CONDITIONING,
+        };
+        Ok(run.record(done)?.session)
     });
-    Ok(SessionSet {
-        root: PathBuf::from("the twin"),
-        sessions: sessions.collect::<Result<_, _>>()?,
-        published: None,
-        missing: Vec::new(),
-    })
-}
-
-fn session(
-    object: &ObjectSpec,
-    seed: u64,
-    scored: bool,
-    gains: bool,
-    done: &(dyn Fn() + Sync),
-) -> Result<Session, TwinError> {
-    let spread = (!gains).then(|| ("spread_log_sd".to_owned(), 0.0.into()));
-    let config = SceneConfig {
-        transducer_parameters: spread.into_iter().collect(),
-        ..footprint_scene(object.name, SCANNED + SCORED, seed)
-    };
-    let twin = Twin::new(&Scene::new(config, Path::new(""))?)?;
-    // sessions are numbered, so that every one has noise of its own
-    let number = 2 * u64::from(object.label);
-    let scan = Acquisition::presses(Mode::Raster, number);
-    let raster = Recorded {
-        conditioning: SCANNED - 1,
-        ..twin.recorded(&twin.presses(0..SCANNED, done)?, &scan)?
-    };
-    let sums = Acquisition {
-        conditioning_presses: CONDITIONING,
-        ..Acquisition::presses(Mode::Compressive, number + 1)
-    };
-    let presses = SCANNED..SCANNED + if scored { SCORED } else { 0 };
-    let compressive = match presses.is_empty() {
-        true => None,
-        false => Some(twin.recorded(&twin.presses(presses, done)?, &sums)?),
-    };
-    Ok(twin.session(Some(raster), compressive))
+    Ok(twin_set(sessions.collect::<Result<_, TwinError>>()?))
 }
 
 /// The sessions of `set`, simulated at gain 1, as the skin of `real` would have shown them. The gains that apply to an

@@ -1,6 +1,5 @@
-//! Classification by the evidence of Gaussian classes given y.
+//! Gaussian components weighed by their evidence given y: classes with an image each, and a mixture of shapes.
 
-use super::bank::Bank;
 use crate::algorithm::{Algorithm, Answer, Belief, Class, Confidence, DecodeError, Subject, Trained};
 use crate::training::{LearnError, TrainingData, in_parameter, in_range, in_templates, simulated_gain_sd};
 use crate::windows::Window;
@@ -10,7 +9,7 @@ use spts_input::Refusal;
 use spts_recon::classify::{
     ClusterModel, Clusters, Evidence, EvidenceClassifier, ImageEstimator, Posterior, Preparation, TemplateModel,
 };
-use spts_recon::{AmplitudeRange, Matrix, Workspace};
+use spts_recon::{AmplitudeRange, Matrix, SignTables, Workspace};
 
 /// Amplitudes of a press that count as possible, V at the strongest taxel: sessions of one object differ by .50–1.38,
 /// objects by .4–1.7.
@@ -32,6 +31,8 @@ struct Classes {
     classifier: EvidenceClassifier,
     images: ImageEstimator,
     bank: Bank,
+    /// Whether the components are classes with names.
+    named: bool,
 }
 
 /// Objects whose poses are not known: a dozen clusters of poses each score as thirty do. Noise as of images, and what a
@@ -48,6 +49,19 @@ const LENGTHS_V: [f64; 2] = [0.05, 50.0];
 /// Root of the random numbers of the clusters.
 const SEED: u64 = 1;
 
+/// Thirty clusters; a hundred score no better. Gains scatter as those of the skins in the published recordings.
+const SHAPES: ClusterModel = ClusterModel {
+    clusters: 30,
+    gain: 0.3,
+    floor: 0.01,
+    noise: 0.12,
+    rank: 20,
+};
+/// Weight of the wide component, so that a cluster takes over only where the evidence is clear.
+const APART: f64 = 0.99;
+/// Components that are solved with non-negative taxels.
+const SOLVED: usize = 2;
+
 pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
     if let Some((images, labels)) = data.posed() {
         return posed(images, labels);
@@ -60,12 +74,20 @@ pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError>
     let components = model.classes(&data.templates).map_err(in_templates)?;
     let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1]).map_err(in_range)?;
     let classifier = EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR).map_err(in_templates)?;
-    Ok(Box::new(Classes {
-        bank: Bank::new(classifier.bank()),
-        images: ImageEstimator::new(model.image_priors(&data.templates).map_err(in_templates)?, IMAGE_NOISE)
-            .map_err(in_parameter)?,
-        classifier,
-    }))
+    let priors = model.image_priors(&data.templates).map_err(in_templates)?;
+    let images = ImageEstimator::new(priors, IMAGE_NOISE).map_err(in_parameter)?;
+    Ok(Classes::trained(classifier, images, true))
+}
+
+/// A mixture of clusters of procedural shapes: images alone, weighted by the evidence given y.
+pub(super) fn mixture(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+    let clusters = Clusters::with_wide(&SHAPES, data.alike(), APART, &mut ChaCha8Rng::seed_from_u64(SEED));
+    let clusters = clusters.map_err(in_templates)?;
+    let amplitude = AmplitudeRange::new(LENGTHS_V[0], LENGTHS_V[1]).map_err(in_range)?;
+    // every component has the same label, so that no unknown one is weighed
+    let classifier = EvidenceClassifier::new(&clusters.components, amplitude, 0.5).map_err(in_templates)?;
+    let images = ImageEstimator::non_negative(clusters.priors, SHAPES.noise, SOLVED).map_err(in_parameter)?;
+    Ok(Classes::trained(classifier, images, false))
 }
 
 /// Classes of objects in many poses, which are marginalised; the gains are not known.
@@ -90,14 +112,20 @@ fn posed(images: &Matrix, labels: &[usize]) -> Result<Box<dyn Trained>, LearnErr
     }
     let amplitude = AmplitudeRange::new(LENGTHS_V[0], LENGTHS_V[1]).map_err(in_range)?;
     let classifier = EvidenceClassifier::new(&all.components, amplitude, UNKNOWN_PRIOR).map_err(in_templates)?;
-    Ok(Box::new(Classes {
-        bank: Bank::new(classifier.bank()),
-        images: ImageEstimator::new(all.priors, model.noise).map_err(in_parameter)?,
-        classifier,
-    }))
+    let images = ImageEstimator::new(all.priors, model.noise).map_err(in_parameter)?;
+    Ok(Classes::trained(classifier, images, true))
 }
 
 impl Classes {
+    fn trained(classifier: EvidenceClassifier, images: ImageEstimator, named: bool) -> Box<dyn Trained> {
+        Box::new(Self {
+            bank: Bank::new(classifier.bank()),
+            classifier,
+            images,
+            named,
+        })
+    }
+
     fn at_work(&self) -> AtWork<'_> {
         AtWork {
             classes: self,
@@ -116,7 +144,8 @@ impl Trained for Classes {
     }
 
     fn confidence(&self) -> Option<(Subject, Box<dyn Confidence + '_>)> {
-        Some((Subject::Class, Box::new(self.at_work())))
+        self.named
+            .then(|| (Subject::Class, Box::new(self.at_work()) as Box<dyn Confidence + '_>))
     }
 }
 
@@ -176,7 +205,8 @@ impl Algorithm for AtWork<'_> {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
         self.evidence.clear();
         self.take(window)?;
-        answer.class = Some(self.decide().0);
+        let class = self.decide().0;
+        answer.class = self.classes.named.then_some(class);
         answer.image.resize(window.phi.ncols(), 0.0);
         self.classes
             .images
@@ -185,6 +215,9 @@ impl Algorithm for AtWork<'_> {
     }
 
     fn sum(&mut self, windows: &[Window<'_>]) -> Option<Class> {
+        if !self.classes.named {
+            return None;
+        }
         self.evidence.clear();
         for window in windows {
             if self.take(window).is_err() {
@@ -194,5 +227,36 @@ impl Algorithm for AtWork<'_> {
             classifier.next_window(&self.preparation, &mut self.evidence, &mut self.posterior);
         }
         Some(self.decide().0)
+    }
+}
+
+/// Up to this many columns rows are looked up; the tables of more no longer fit a cache.
+const FEW_COLUMNS: usize = 1200;
+
+/// Forms rows of Φ times the bank.
+struct Bank {
+    tables: Option<SignTables<f64>>,
+}
+
+impl Bank {
+    fn new(bank: &Matrix) -> Self {
+        let few = bank.ncols() <= FEW_COLUMNS;
+        Self {
+            tables: few.then(|| SignTables::new(bank.view())),
+        }
+    }
+
+    /// Overwrites `rows` with one row of Φ times `bank` (taxels × columns) for every measurement of `window`.
+    fn project(&self, bank: &Matrix, window: &Window<'_>, rows: &mut Vec<f64>) {
+        let columns = bank.ncols().max(1);
+        rows.resize(window.y.len() * columns, 0.0);
+        if let (Some(tables), Some(signs)) = (&self.tables, window.signs) {
+            return tables.fill_rows(signs, rows);
+        }
+        let phi = window.phi.values().chunks_exact(window.phi.ncols().max(1));
+        for (row, out) in phi.zip(rows.chunks_exact_mut(columns)) {
+            out.fill(0.0);
+            bank.accumulate_row(row, out);
+        }
     }
 }

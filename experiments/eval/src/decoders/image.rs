@@ -1,15 +1,22 @@
 //! Decoders that reconstruct an image, from atoms of a dictionary or directly from taxels.
 
-use super::quarter;
-use super::sure::ImageConfidence;
-use crate::algorithm::{Algorithm, Answer, Confidence, DecodeError, Subject, Trained};
+use crate::algorithm::{Algorithm, Answer, Belief, Confidence, DecodeError, Subject, Trained};
 use crate::training::{Dictionary, LearnError, TrainingData, in_parameter, in_prior};
 use crate::windows::Window;
+use spts_input::Refusal;
+use spts_recon::metrics::SUPPORT_THRESHOLD;
 use spts_recon::recover::{
-    Gaussian, ImagePrior, Lmmse, NnLasso, NnLmmse, NnOmp, Noise, Omp, Penalty, ReferenceOmp, Tv,
+    Gaussian, ImagePrior, Lmmse, NnLasso, NnLmmse, NnOmp, Noise, Omp, Penalty, ReferenceOmp, SequentialEstimate,
+    SequentialGains, Tv,
 };
 use spts_recon::{MatrixView, Problem, Recover, Solution, Workspace};
 use std::sync::Arc;
+
+/// M/4 rounded half up, at least 1: the published rule for the number of atoms.
+#[must_use]
+pub fn quarter(m: usize) -> usize {
+    ((m + 2) / 4).max(1)
+}
 
 /// Most atoms of the published script.
 const SCRIPT_ATOMS: usize = 20;
@@ -198,5 +205,42 @@ impl Algorithm for AtWork<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// Expected IoU of the linear estimate under the prior of a decoder, by its posterior covariance.
+#[derive(Debug, Clone)]
+pub(super) struct ImageConfidence {
+    gains: SequentialGains,
+    estimate: SequentialEstimate,
+}
+
+impl ImageConfidence {
+    /// Confidence under `prior` for measurements with `noise`.
+    ///
+    /// # Errors
+    /// [`Refusal`] when they do not go together.
+    pub(super) fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, Refusal> {
+        let gains = SequentialGains::new(prior, noise)?;
+        let estimate = SequentialEstimate::new(&gains);
+        Ok(Self { gains, estimate })
+    }
+}
+
+impl Confidence for ImageConfidence {
+    fn begin(&mut self) {
+        self.gains.clear();
+        self.estimate.clear();
+    }
+
+    fn observe(&mut self, sample: &Window<'_>) -> Result<Belief, DecodeError> {
+        self.gains.push(sample.phi.values())?;
+        for y in sample.y {
+            self.estimate.observe(&self.gains, *y)?;
+        }
+        Ok(Belief {
+            confidence: self.estimate.expected_iou(&self.gains, SUPPORT_THRESHOLD),
+            class: None,
+        })
     }
 }

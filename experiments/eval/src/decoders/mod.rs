@@ -1,24 +1,19 @@
 //! The table of algorithms. A new one has a file here and a line in [`DECODERS`].
 
 mod amortised;
-mod bank;
-mod correlate;
+mod baselines;
 mod evidence;
 mod image;
-mod labels;
-mod mixture;
-mod published;
-mod sure;
-mod trained;
-mod trivial;
 
-pub use labels::{label, short_label};
-pub use published::{PublishedDecode, quarter};
-pub use trained::TrainedDecoder;
+pub use image::quarter;
 
 use crate::algorithm::Trained;
-use crate::training::{LearnError, TrainingData};
+use crate::training::{LearnError, Learned, TrainingData};
 use Needs::{Classes, Dictionary, Images, Network, Nothing, Shapes};
+use serde::{Serialize, Serializer};
+use spts_input::Refusal;
+use spts_recon::classify::Src;
+use std::sync::Arc;
 
 /// Training data that a decoder needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -135,10 +130,10 @@ const MATCHED: DecoderSpec = spec(
 /// Every algorithm: name, label, training data, whether it is shown by default, training function, shorter label,
 /// description.
 pub const DECODERS: &[DecoderSpec] = &[
-    spec("empty", "empty image", Nothing, true, trivial::empty).about("baseline: an empty image"),
-    spec("mean_image", "mean image", Images, true, trivial::mean_image)
+    spec("empty", "empty image", Nothing, true, baselines::empty).about("baseline: an empty image"),
+    spec("mean_image", "mean image", Images, true, baselines::mean_image)
         .about("baseline: the mean of all images learned from"),
-    spec("correlate", "best correlated", Classes, true, correlate::train)
+    spec("correlate", "best correlated", Classes, true, baselines::correlate)
         .about("baseline: the object's mean image that correlates best with y"),
     SCRIPT_S20,
     SCRIPT_M4,
@@ -162,7 +157,7 @@ pub const DECODERS: &[DecoderSpec] = &[
     )
     .short("NN LMMSE, objects seen")
     .about("as nn_lmmse, prior for the objects that were seen"),
-    spec("mixture", "mixture of shapes", Shapes, false, mixture::train)
+    spec("mixture", "mixture of shapes", Shapes, false, evidence::mixture)
         .about("thirty clusters of simulated shapes weighed by the evidence of y, non-negative taxels"),
     spec("amortised", "trained network", Network, false, amortised::train)
         .short("amortised")
@@ -180,6 +175,155 @@ pub fn find(name: &str) -> Option<&'static DecoderSpec> {
     DECODERS.iter().find(|spec| spec.name == name)
 }
 
+/// A trained algorithm, with an image classifier for algorithms that find no class themselves.
+#[derive(Clone)]
+pub struct TrainedDecoder {
+    pub(crate) trained: Arc<dyn Trained>,
+    pub(crate) classifier: Arc<Src>,
+}
+
+impl TrainedDecoder {
+    /// Trains the algorithm `spec` with `data`.
+    ///
+    /// # Errors
+    /// [`LearnError`] if `data` is not usable.
+    pub fn new(spec: &DecoderSpec, data: &TrainingData) -> Result<Self, LearnError> {
+        Ok(Self::of(Arc::from((spec.train)(data)?), data))
+    }
+
+    /// `trained`, which has learned from `data`.
+    pub(crate) fn of(trained: Arc<dyn Trained>, data: &TrainingData) -> Self {
+        let classifier = Src::new(data.library.clone(), Src::PUBLISHED_SPARSITY);
+        Self {
+            trained,
+            classifier: Arc::new(classifier),
+        }
+    }
+}
+
+/// Name of the control on the board: the raster session, reduced to M pixels a frame.
+pub const RASTER: &str = "raster";
+
+/// Label and short label of the control, which is scored beside the decoders of the table and is none of them.
+const CONTROL: [&str; 2] = ["raster scan of M taxels", "raster"];
+
+/// Label of the decoder or control `name`, in plain words, on pages and in their figures. An external program is
+/// labelled by its name.
+///
+/// ```
+/// use spts_eval::decoders::{label, short_label};
+///
+/// assert_eq!(label("amortised"), "trained network");
+/// assert_eq!(short_label("amortised"), "amortised");
+/// assert_eq!(label("my program"), "my program");
+/// ```
+#[must_use]
+pub fn label(name: &str) -> &str {
+    match find(name) {
+        Some(spec) => spec.label,
+        None if name == RASTER => CONTROL[0],
+        None => name,
+    }
+}
+
+/// Label of the decoder or control `name` where space is short: in printed tables, and in figures with many decoders.
+/// An external program is labelled by its name.
+#[must_use]
+pub fn short_label(name: &str) -> &str {
+    match find(name) {
+        Some(spec) => spec.short,
+        None if name == RASTER => CONTROL[1],
+        None => name,
+    }
+}
+
+/// How the published evaluation turns a window of measurements into an image.
+///
+/// ```
+/// use spts_eval::decoders::{PublishedDecode, find, quarter};
+///
+/// assert_eq!((quarter(20), quarter(50), quarter(1)), (5, 13, 1));
+/// assert!(PublishedDecode::ALL.iter().all(|decode| find(decode.name()).is_some()));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PublishedDecode {
+    /// As in the published script: weights {0, 1}, no offset, 20 atoms.
+    ScriptS20,
+    /// As in the paper's text: weights {0, 1}, no offset, M/4 atoms.
+    ScriptM4,
+    /// Adapted to the device: weights ±1, the idle mean subtracted, M/4 atoms.
+    Matched,
+}
+
+impl PublishedDecode {
+    /// Every variant.
+    pub const ALL: [Self; 3] = [Self::ScriptS20, Self::ScriptM4, Self::Matched];
+
+    /// Its line of the table of algorithms.
+    fn line(self) -> &'static DecoderSpec {
+        match self {
+            Self::ScriptS20 => &SCRIPT_S20,
+            Self::ScriptM4 => &SCRIPT_M4,
+            Self::Matched => &MATCHED,
+        }
+    }
+
+    /// Name in the table of algorithms.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        self.line().name
+    }
+
+    /// The decoder of this variant, with dictionary and library of `learned`.
+    ///
+    /// # Errors
+    /// [`LearnError`] if `learned` is not usable.
+    pub fn decoder(self, learned: &Learned) -> Result<TrainedDecoder, LearnError> {
+        TrainedDecoder::new(self.line(), &TrainingData::given(learned))
+    }
+
+    /// The decoders of all variants.
+    ///
+    /// # Errors
+    /// [`LearnError`] if `learned` is not usable.
+    pub fn decoders(learned: &Learned) -> Result<Vec<(Self, TrainedDecoder)>, LearnError> {
+        let each = Self::ALL.into_iter();
+        each.map(|decode| Ok((decode, decode.decoder(learned)?))).collect()
+    }
+
+    /// All of them, each beside its name.
+    ///
+    /// # Errors
+    /// [`LearnError`] when one of them cannot use what was learned.
+    pub fn named(learned: &Learned) -> Result<Vec<(&'static str, TrainedDecoder)>, LearnError> {
+        let each = Self::ALL.into_iter();
+        each.map(|decode| Ok((decode.name(), decode.decoder(learned)?)))
+            .collect()
+    }
+}
+
+impl Serialize for PublishedDecode {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.name())
+    }
+}
+
+/// Why `decoder` cannot be stopped by its confidence.
+#[must_use]
+pub fn no_confidence(decoder: &str) -> Refusal {
+    let valid = DECODERS.iter().filter(|spec| spec.anytime).map(|spec| spec.name);
+    let valid = valid.collect::<Vec<_>>().join(", ");
+    Refusal::new(format!("`--decoder` = {decoder}: states no confidence; valid: {valid}"))
+}
+
+/// Why `decoder` cannot track a contact in time.
+#[must_use]
+pub fn not_in_time(decoder: &str) -> Refusal {
+    Refusal::new(format!(
+        "`--decoder` = {decoder}: has no Gaussian prior to track a contact with; valid: nn_lmmse"
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -189,6 +333,27 @@ mod tests {
         for (k, spec) in DECODERS.iter().enumerate() {
             let twice = DECODERS[..k].iter().any(|before| before.name == spec.name);
             assert!(!twice && !spec.about.is_empty(), "{}", spec.name);
+        }
+    }
+
+    /// Width of the column of decoders in the printed tables of the board.
+    const WIDTH: usize = 22;
+
+    /// No two decoders share a label or a short label, the control included, and short labels fit into their columns.
+    #[test]
+    fn every_decoder_has_labels_of_its_own() {
+        let names: Vec<&str> = DECODERS.iter().map(|spec| spec.name).chain([RASTER]).collect();
+        for (k, name) in names.iter().enumerate() {
+            let (long, short) = (label(name), short_label(name));
+            assert!(!long.trim().is_empty() && !short.trim().is_empty(), "{name}");
+            assert!(
+                short.chars().count() <= long.chars().count().min(WIDTH),
+                "{name}: {short}"
+            );
+            for before in &names[..k] {
+                assert_ne!(label(before), long, "{before} and {name}");
+                assert_ne!(short_label(before), short, "{before} and {name}");
+            }
         }
     }
 }

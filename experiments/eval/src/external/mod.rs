@@ -1,43 +1,31 @@
 //! External algorithms: any command that reads windows and answers with images or labels.
 //!
-//! A command without placeholders runs once and is sent lines. The first line is a header `{"taxels": …, "rows": …,
-//! "cols": …, "left_out": …, "learn": …, "classes": {"1": "brain", …}}`. Each further line is one window, `{"m": …,
-//! "phi": ["+-+…", …], "y": […], "volts": […]}`, with one string of signs for each measurement or, if weights are not
-//! ±1, one array of numbers. The program answers each window with a line `{"image": […]}` or `{"label": …}` (null:
-//! unknown) or both, before it waits for the next window. When its input ends, it must end with status 0.
-//!
-//! A command with `{windows}` and `{answers}` runs once for every press and M. The first is an .npz file with `phi`
-//! (windows × M × taxels, int8; float64 if weights are not ±1), `y` and `volts` (windows × M). The second is the .npz
-//! file that the program writes, with only `images` (windows × taxels), `labels` (windows; −1: unknown), or both.
-//! `{learn}`, like the header's `learn`, is an .npz file with the raster images (images × taxels) and labels for
-//! training. Placeholders are written without quotes: each becomes one word of the shell, whatever the path contains.
-//! The environment also holds the paths: `SPTS_LEARN`, `SPTS_WINDOWS`, `SPTS_ANSWERS`.
+//! The command runs once and is sent lines. The first line is a header `{"taxels": …, "rows": …, "cols": …, "left_out":
+//! …, "classes": {"1": "brain", …}, "learn": {"images": [[…], …], "labels": […]}}`, with the raster images that may be
+//! learned from and their classes. Each further line is one window, `{"m": …, "phi": ["+-+…", …], "y": […], "volts":
+//! […]}`, with one string of signs for each measurement or, if weights are not ±1, one array of numbers. The program
+//! answers each window with a line `{"image": […]}` or `{"label": …}` (null: unknown) or both, before it waits for the
+//! next window. When its input ends, it must end with status 0.
 //!
 //! A label must be one of the header's classes, and an image must have one finite value a taxel. Any other answer, an
-//! additional answer, a bad exit status, or exceeding [`ExternalCommand::limit`] for a window or a run ends the scoring
-//! with an error. When `spts` ends, for whatever reason, it also ends the program and all processes in its group. If
-//! `spts` itself is killed (SIGKILL), the next run removes its temporary folder.
+//! additional answer, a bad exit status, or exceeding [`ExternalCommand::limit`] for a window ends the scoring with an
+//! error. When `spts` ends, for whatever reason, it also ends the program and all processes in its group.
 
-mod answers;
-mod batch;
-mod exchange;
-mod pipes;
-mod process;
-mod stream;
+mod program;
 
-use crate::algorithm::{Algorithm, Contender, DecodeError, ExternalError, Trained};
-use crate::error::ScoreError;
+use crate::algorithm::{Algorithm, Answer, Class, Contender, DecodeError, ExternalError, ScoreError, Trained};
 use crate::labels::Labels;
-use crate::npz::{self, NpzArray};
 use crate::training::TrainingData;
-use answers::Valid;
-pub use answers::check_line;
-use exchange::{Exchange, PLACEHOLDERS, shell};
+use crate::windows::Window;
+use program::{Asked, Event, Pipes, Process, in_words};
+use serde::Deserialize;
 use serde_json::json;
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use std::time::Duration;
-use stream::Stream;
+use spts_input::Refusal;
+use std::collections::BTreeMap;
+use std::process::{Command, Stdio};
+use std::sync::mpsc::RecvTimeoutError;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// A program and its name on the board.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,7 +34,7 @@ pub struct ExternalCommand {
     pub name: String,
     /// The command for the shell.
     pub command: String,
-    /// Time limit for the answer to a window, for the end after the last answer, and for one run on files. Range:
+    /// Time limit for the answer to a window, and for the end after the last answer. Range:
     /// [`ExternalCommand::LIMIT_S`].
     pub limit: Duration,
 }
@@ -84,136 +72,368 @@ impl Contender for ExternalCommand {
         labels: &Labels,
         left_out: Option<&str>,
     ) -> Result<Arc<dyn Trained>, ScoreError> {
-        Ok(Arc::new(External::start(self, data, labels, left_out)?))
+        let valid = Valid::new(data, labels, left_out);
+        let ([rows, cols], images) = (data.shape, data.library.images());
+        let images: Vec<Vec<f64>> = (0..images.ncols()).map(|k| images.column(k)).collect();
+        let header = json!({
+            "taxels": valid.taxels, "rows": rows, "cols": cols, "left_out": left_out, "classes": valid.classes,
+            "learn": {"images": images, "labels": data.library.labels()},
+        });
+        Ok(Arc::new(External(Mutex::new(Stream::start(self, valid, &header)?))))
     }
 }
 
-/// What every way of speaking with a program needs.
-#[derive(Debug, Clone)]
-struct Settings {
+/// A program at work, asked by all threads in turn.
+struct External(Mutex<Stream>);
+
+impl Trained for External {
+    fn start(&self) -> Box<dyn Algorithm + '_> {
+        Box::new(Turn(&self.0))
+    }
+
+    fn finish(&self) -> Result<(), DecodeError> {
+        Ok(self.0.lock().unwrap_or_else(PoisonError::into_inner).finish()?)
+    }
+}
+
+fn said(message: String) -> ExternalError {
+    ExternalError::Refused(Refusal::new(message))
+}
+
+/// The error of a command or its pipes.
+fn broken(command: &str, source: std::io::Error) -> ExternalError {
+    ExternalError::Refused(Refusal::from_error(source).at(format_args!("`{command}`")))
+}
+
+/// Time for a program that has closed a pipe to end by itself, so that the error can say with which status; no longer
+/// than the limit of an answer.
+const GRACE: Duration = Duration::from_secs(1);
+
+/// The running program.
+#[derive(Debug)]
+struct Stream {
     /// The command as the user wrote it.
     command: String,
     limit: Duration,
     valid: Valid,
+    process: Process,
+    pipes: Pipes,
+    /// Number of windows sent.
+    asked: usize,
+    /// Why no more windows are sent. All threads that come later get this error at once.
+    failure: Option<ExternalError>,
+    finished: bool,
 }
 
-impl Settings {
+impl Stream {
+    /// Starts `command` and sends it `header`.
+    fn start(
+        ExternalCommand { command, limit, .. }: &ExternalCommand,
+        valid: Valid,
+        header: &serde_json::Value,
+    ) -> Result<Self, ExternalError> {
+        let mut shell = Command::new("sh");
+        shell
+            .arg("-c")
+            .arg(command)
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped());
+        let mut process = Process::start(&mut shell).map_err(|e| broken(command, e))?;
+        let child = process.child();
+        let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
+            return Err(broken(command, std::io::ErrorKind::BrokenPipe.into()));
+        };
+        let pipes = Pipes::new(input, output, valid.taxels);
+        pipes.send(header.to_string());
+        Ok(Self {
+            command: command.clone(),
+            limit: *limit,
+            valid,
+            process,
+            pipes,
+            asked: 0,
+            failure: None,
+            finished: false,
+        })
+    }
+
+    fn answer(&mut self, window: &Window<'_>) -> Result<Answer, ExternalError> {
+        if let Some(failure) = &self.failure {
+            return Err(failure.clone());
+        }
+        let answer = self.ask(window);
+        if let Err(error) = &answer {
+            self.fail(error);
+        }
+        answer
+    }
+
+    /// Ends the program, which is not asked any more.
+    fn fail(&mut self, error: &ExternalError) {
+        self.failure = Some(error.clone());
+        // it has failed already
+        let _ = self.process.end();
+    }
+
+    fn ask(&mut self, window: &Window<'_>) -> Result<Answer, ExternalError> {
+        let deadline = Instant::now() + self.limit;
+        // what waits here was written before the question
+        match self.pipes.waiting() {
+            None | Some(Event::InputClosed) => {}
+            Some(event) => return Err(self.unexpected(&event, deadline)),
+        }
+        let rows = window.phi.values().chunks_exact(window.phi.ncols());
+        let phi = if window.signs.is_some() {
+            json!(rows.map(signs).collect::<Vec<_>>())
+        } else {
+            json!(rows.collect::<Vec<_>>())
+        };
+        let question = json!({"m": window.y.len(), "phi": phi, "y": window.y, "volts": window.volts});
+        self.asked += 1;
+        self.pipes.ask(question.to_string());
+        let line = match self.pipes.next_by(deadline) {
+            Ok(Event::Line(line)) => line,
+            Ok(event) => return Err(self.unexpected(&event, deadline)),
+            Err(_) => return Err(self.late()),
+        };
+        self.valid
+            .line(&line)
+            .map_err(|problem| self.refused(&self.window(), &problem))
+    }
+
+    /// The window that was asked last, in words.
+    fn window(&self) -> String {
+        format!("window {}", self.asked)
+    }
+
     /// The error of what was waited for.
-    fn late(&self, waited: String) -> ExternalError {
+    fn too_late(&self, waited: String) -> ExternalError {
         ExternalError::Late {
             command: self.command.clone(),
             waited,
             limit: self.limit,
         }
     }
+
+    /// The error of an answer to `window` with a problem.
+    fn refused(&self, window: &str, problem: &str) -> ExternalError {
+        said(format!("`{}` answered {window} with {problem}", self.command))
+    }
+
+    fn late(&self) -> ExternalError {
+        let waited = match self.pipes.waits_for() {
+            Asked::Write(0) => "reading the header".to_owned(),
+            Asked::Write(window) => format!("reading window {window}"),
+            Asked::Answer => format!("the answer to {} (does it flush its output?)", self.window()),
+        };
+        self.too_late(waited)
+    }
+
+    /// The error of `event` in place of an answer.
+    fn unexpected(&mut self, event: &Event, deadline: Instant) -> ExternalError {
+        match event {
+            Event::Failed(error) => broken(&self.command, error.kind().into()),
+            Event::Line(_) => self.surplus(self.asked + 1),
+            Event::Surplus(line) => self.surplus(*line),
+            Event::TooLong => {
+                let problem = format!("a line of more than {} bytes", self.pipes.most_bytes());
+                self.refused(&format!("window {}", self.asked.max(1)), &problem)
+            }
+            Event::OutputEnd | Event::InputClosed => {
+                let by = deadline.min(Instant::now() + GRACE);
+                let has_ended = self.process.ends_by(by);
+                let how = match event {
+                    _ if has_ended => format!("ended ({})", in_words(&self.process.end())),
+                    Event::OutputEnd => "closed its output".to_owned(),
+                    _ => "closed its input".to_owned(),
+                };
+                let (command, waited) = (&self.command, self.asked.max(1));
+                said(format!("`{command}` {how} before it had answered window {waited}"))
+            }
+        }
+    }
+
+    fn surplus(&self, line: usize) -> ExternalError {
+        let Self { command, asked, .. } = self;
+        said(format!(
+            "`{command}` wrote line {line} of its output before it had read window {line} ({asked} windows had been \
+             sent); it must write one line a window, after reading the window"
+        ))
+    }
+
+    /// Tells the program that nothing comes any more, and waits for its end: it must write nothing else, and end well.
+    /// Does nothing for a second time.
+    fn finish(&mut self) -> Result<(), ExternalError> {
+        if let Some(failure) = &self.failure {
+            return Err(failure.clone());
+        }
+        if self.finished {
+            return Ok(());
+        }
+        self.finished = true;
+        let finished = self.wait_for_end();
+        if let Err(error) = &finished {
+            self.fail(error);
+        }
+        finished
+    }
+
+    fn wait_for_end(&mut self) -> Result<(), ExternalError> {
+        let deadline = Instant::now() + self.limit;
+        self.pipes.close();
+        // the program may write for as long as it runs
+        if !self.process.ends_by(deadline) {
+            return match self.pipes.waiting() {
+                Some(event @ (Event::Line(_) | Event::Surplus(_) | Event::TooLong)) => {
+                    Err(self.unexpected(&event, deadline))
+                }
+                _ => Err(self.too_late("its end after the last answer".to_owned())),
+            };
+        }
+        // what it has started ends with it, so that nothing holds its output open
+        let status = self.process.end();
+        loop {
+            match self.pipes.next_by(Instant::now() + GRACE) {
+                Ok(Event::InputClosed) => {}
+                // a process that has left the group may hold the output open
+                Ok(Event::OutputEnd) | Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => break,
+                Ok(event) => return Err(self.unexpected(&event, deadline)),
+            }
+        }
+        match status {
+            Ok(status) if status.success() => Ok(()),
+            status => Err(said(format!(
+                "`{}` ended with an error ({}) after its last answer; its answers are not scored",
+                self.command,
+                in_words(&status)
+            ))),
+        }
+    }
 }
 
-/// A command with its exchange folder.
-pub(crate) struct External {
-    settings: Settings,
-    /// The program that is sent lines; `None` for one run a press. It ends before its folder is removed.
-    stream: Option<Mutex<Stream>>,
-    /// The first error of a run on files.
-    failure: OnceLock<ExternalError>,
-    /// File of the training data.
-    learn: PathBuf,
-    exchange: Exchange,
+fn signs(row: &[f64]) -> String {
+    row.iter().map(|w| if *w > 0.0 { '+' } else { '-' }).collect()
 }
 
-impl External {
-    /// Starts `command` with the training data `data`, whose classes have their names in `labels`; without the object
-    /// `left_out`.
+/// A turn at the program.
+struct Turn<'a>(&'a Mutex<Stream>);
+
+impl Algorithm for Turn<'_> {
+    fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
+        // a thread that panicked while it held the program leaves it with an answer too many, which is noticed
+        let mut stream = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        *answer = stream.answer(window)?;
+        Ok(())
+    }
+}
+
+/// Longest piece of an answer that an error quotes, characters.
+const QUOTED: usize = 80;
+
+/// A line of a program's output.
+#[derive(Debug, Deserialize)]
+struct Line {
+    image: Option<Vec<f64>>,
+    #[serde(default, deserialize_with = "given")]
+    label: Option<Option<f64>>,
+}
+
+/// Tells `"label": null` from no label.
+fn given<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Option<f64>>, D::Error> {
+    Option::deserialize(deserializer).map(Some)
+}
+
+/// The answers that make sense for one skin and one set of training data.
+#[derive(Debug, Clone)]
+struct Valid {
+    /// Number of values in an image.
+    taxels: usize,
+    /// Names of the classes by number, as sent to the program.
+    classes: BTreeMap<usize, String>,
+    /// Number of the left-out object: a correct answer, although not one of the classes.
+    left_out: Option<usize>,
+}
+
+impl Valid {
+    /// Classes are those of the training images; all of `labels` where the images have none.
+    fn new(data: &TrainingData, labels: &Labels, left_out: Option<&str>) -> Self {
+        let all = (0..).map_while(|number| Some((number, labels.name(number)?.to_owned())));
+        let learned = data.library.labels();
+        let known: BTreeMap<usize, String> = all.collect();
+        let mut classes = known.clone();
+        classes.retain(|number, _| learned.contains(number));
+        Self {
+            taxels: data.images.nrows(),
+            classes: if classes.is_empty() { known } else { classes },
+            left_out: left_out.and_then(|object| labels.number(object)),
+        }
+    }
+
+    /// The class of number `value`.
     ///
     /// # Errors
-    /// [`ExternalError`] when the exchange files cannot be written or the command does not start.
-    pub(crate) fn start(
-        command: &ExternalCommand,
-        data: &TrainingData,
-        labels: &Labels,
-        left_out: Option<&str>,
-    ) -> Result<Self, ExternalError> {
-        let exchange = Exchange::new()?;
-        let learn = exchange.path("learn.npz");
-        write_training_data(&learn, data)?;
-        let settings = Settings {
-            command: command.command.clone(),
-            limit: command.limit,
-            valid: Valid::new(data, labels, left_out),
-        };
-        let [_, in_files @ ..] = PLACEHOLDERS;
-        let stream = if in_files
-            .iter()
-            .any(|(placeholder, _)| settings.command.contains(placeholder))
-        {
-            None
-        } else {
-            let [rows, cols] = data.shape;
-            let header = json!({
-                "taxels": settings.valid.taxels, "rows": rows, "cols": cols, "left_out": left_out,
-                "learn": learn.to_string_lossy(), "classes": settings.valid.classes,
-            });
-            let shell = shell(&settings.command, &[Some(&learn), None, None]);
-            Some(Mutex::new(Stream::start(settings.clone(), shell, &header)?))
-        };
-        Ok(Self {
-            settings,
-            stream,
-            failure: OnceLock::new(),
-            learn,
-            exchange,
+    /// What is wrong with it.
+    fn label(&self, value: f64) -> Result<usize, String> {
+        let mut known = self.classes.keys().copied().chain(self.left_out);
+        #[expect(clippy::float_cmp, reason = "class numbers are small whole numbers")]
+        known.find(|number| *number as f64 == value).ok_or_else(|| {
+            let valid: Vec<String> = self.classes.keys().map(usize::to_string).collect();
+            format!("`label` = {value}; valid: {}, or no class at all", valid.join(", "))
+        })
+    }
+
+    /// The answer that a line of output gives.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    fn line(&self, line: &[u8]) -> Result<Answer, String> {
+        let text = String::from_utf8_lossy(line);
+        let parsed: Line = serde_json::from_str(&text).map_err(|e| {
+            let start: String = text.trim_end().chars().take(QUOTED).collect();
+            format!("`{}` ({e})", start.escape_debug())
+        })?;
+        let label = parsed
+            .label
+            .map(|label| label.map(|value| self.label(value)).transpose());
+        self.answer(parsed.image, label.transpose()?)
+    }
+
+    /// The answer with `image` and `label`; a label of `None` is an unknown class.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    fn answer(&self, image: Option<Vec<f64>>, label: Option<Option<usize>>) -> Result<Answer, String> {
+        if let Some(image) = &image {
+            if image.len() != self.taxels {
+                let (found, needed) = (image.len(), self.taxels);
+                return Err(format!("an image of {found} values; needed are {needed}, one a taxel"));
+            }
+            if let Some(taxel) = image.iter().position(|value| !value.is_finite()) {
+                return Err(format!("an image with {} at taxel {taxel} (from 0)", image[taxel]));
+            }
+        }
+        if image.is_none() && label.is_none() {
+            return Err("neither an image nor a label".to_owned());
+        }
+        Ok(Answer {
+            image: image.unwrap_or_default(),
+            class: label.map(|l| l.map_or(Class::Unknown, Class::Known)),
+            failed: false,
         })
     }
 }
 
-fn write_training_data(path: &Path, data: &TrainingData) -> Result<(), ExternalError> {
-    let (images, labels) = (data.library.images(), data.library.labels());
-    let columns: Vec<f64> = (0..images.ncols()).flat_map(|k| images.column(k)).collect();
-    let labels: Vec<f64> = labels.iter().map(|l| *l as f64).collect();
-    npz::write(
-        path,
-        &[
-            ("images", NpzArray::Doubles(&[labels.len(), images.nrows()], &columns)),
-            ("labels", NpzArray::Doubles(&[labels.len()], &labels)),
-        ],
-    )
-    .map_err(|source| in_file(path, source))
-}
-
-/// The error of an exchange file.
-fn in_file(path: &Path, source: std::io::Error) -> ExternalError {
-    ExternalError::File {
-        path: path.to_owned(),
-        source: Arc::new(source),
-    }
-}
-
-/// The error of a command or its pipes.
-fn broken(command: &str, source: std::io::Error) -> ExternalError {
-    ExternalError::Pipe {
-        command: command.to_owned(),
-        source: Arc::new(source),
-    }
-}
-
-impl Trained for External {
-    fn start(&self) -> Box<dyn Algorithm + '_> {
-        match &self.stream {
-            Some(stream) => Box::new(stream::PipeLines::new(stream)),
-            None => Box::new(batch::Files {
-                settings: &self.settings,
-                exchange: &self.exchange,
-                learn: &self.learn,
-                failure: &self.failure,
-            }),
-        }
-    }
-
-    fn finish(&self) -> Result<(), DecodeError> {
-        let Some(stream) = &self.stream else {
-            return Ok(());
-        };
-        Ok(stream.lock().unwrap_or_else(PoisonError::into_inner).finish()?)
-    }
+/// Checks `line` as the answer of a program that must return images of `taxels` values or classes 1 to `classes`.
+///
+/// # Errors
+/// A message that says what is wrong.
+pub fn check_line(line: &[u8], taxels: usize, classes: usize) -> Result<Answer, String> {
+    let valid = Valid {
+        taxels,
+        classes: (1..=classes).map(|number| (number, number.to_string())).collect(),
+        left_out: None,
+    };
+    valid.line(line)
 }
 
 #[cfg(test)]
@@ -230,5 +450,30 @@ mod tests {
         assert_eq!(parsed("mine=python3 x.py"), own("mine", "python3 x.py"));
         assert_eq!(parsed("A=1 B=2 run"), own("A", "1 B=2 run"));
         assert_eq!(parsed("run --key=value"), own("run --key=value", "run --key=value"));
+    }
+
+    #[test]
+    fn answers_are_checked() {
+        let valid = Valid {
+            taxels: 2,
+            classes: [(1, "brain".to_owned()), (4, "rec".to_owned())].into(),
+            left_out: Some(7),
+        };
+        for bad in [-2.0, -1.0, 0.0, 1.5, 2.0, 99.0, 1e300, f64::NAN, f64::INFINITY] {
+            let said = valid.label(bad).unwrap_err();
+            assert!(said.contains("valid: 1, 4"), "{said}");
+        }
+        assert_eq!((valid.label(4.0), valid.label(7.0)), (Ok(4), Ok(7)));
+        assert!(valid.answer(Some(vec![1.0]), None).is_err());
+        assert!(valid.answer(Some(vec![]), Some(Some(1))).is_err());
+        assert!(
+            valid
+                .answer(Some(vec![1.0, f64::NAN]), None)
+                .unwrap_err()
+                .contains("NaN at taxel 1")
+        );
+        assert!(valid.answer(None, None).is_err());
+        assert_eq!(valid.answer(None, Some(None)).unwrap().class, Some(Class::Unknown));
+        assert_eq!(valid.answer(Some(vec![1.0, 2.0]), None).unwrap().class, None);
     }
 }

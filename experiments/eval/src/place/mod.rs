@@ -1,28 +1,24 @@
 //! Locates the bouncing ball or a finger from windows of measurements.
 
-mod bounces;
-mod contact;
+mod contacts;
 mod locators;
-mod rows;
-mod touches;
 
-pub use bounces::{RecordedBounce, contact_image, find_bounces};
-pub use rows::{LocalisationRow, PlaceRow};
-pub(crate) use touches::touch_of;
-pub use touches::{RecordedTouch, find_touches};
+pub(crate) use contacts::touch_of;
+pub use contacts::{RecordedBounce, RecordedTouch, contact_image, find_bounces, find_touches};
+pub use locators::locator_label;
 
-use crate::error::ScoreError;
+use crate::algorithm::ScoreError;
 use crate::sensing::{Sensing, chosen_places};
 use crate::training::Dictionary;
-use contact::Contact;
-pub use locators::locator_label;
+use crate::windows::Press;
 use locators::{LOCATORS, Locate, LocatorSpec, TAXEL, Taxel, Tools, middle};
 use rayon::prelude::*;
-use rows::{BALL, Located};
+use serde::{Deserialize, Serialize};
 use spts_circuit::Recording;
 use spts_input::Refusal;
 use spts_recon::Matrix;
-use spts_recon::localise::{BlobConfig, Localiser, distance};
+use spts_recon::localise::{BlobConfig, Localiser, centre_of_mass, distance};
+use spts_recon::metrics::{SUPPORT_THRESHOLD, median};
 use spts_recon::statistics::mean;
 
 /// The published locators.
@@ -31,7 +27,7 @@ const PUBLISHED: [&str; 2] = ["script_s5", "matched"];
 /// Rows of the published locators at every M of `measurements`, of the contacts as recorded.
 ///
 /// # Errors
-/// [`ScoreError::Refused`] when the sheet is no grid of `cols` columns.
+/// [`ScoreError`] when the sheet is no grid of `cols` columns.
 pub(crate) fn localise(
     recording: &Recording,
     shifted: &Matrix,
@@ -53,7 +49,7 @@ pub(crate) fn localise(
 /// `sensing`.
 ///
 /// # Errors
-/// [`ScoreError::Refused`] when the sheet is no grid of `cols` columns, [`ScoreError::Rows`] when no rows can be chosen.
+/// [`ScoreError`] when the sheet is no grid of `cols` columns, or when no rows can be chosen.
 pub(crate) fn places(
     recording: &Recording,
     shifted: Matrix,
@@ -77,7 +73,7 @@ pub(crate) fn places(
 /// that need one have no rows.
 ///
 /// # Errors
-/// [`ScoreError::Refused`] when the sheet is no grid of `cols` columns.
+/// [`ScoreError`] when the sheet is no grid of `cols` columns.
 pub(crate) fn touch_places(
     name: &str,
     recording: &Recording,
@@ -165,7 +161,7 @@ impl PlacesRequest<'_> {
             .par_iter()
             .map(|&(_, contact, shift)| self.errors(tools, contact, shift))
             .collect::<Result<_, Refusal>>()
-            .map_err(ScoreError::Rows)?;
+            .map_err(ScoreError::rows)?;
         let kinds = self
             .sensing
             .iter()
@@ -226,4 +222,145 @@ impl PlacesRequest<'_> {
 fn views(contact: &Contact) -> Vec<(bool, &Contact, [usize; 2])> {
     let relabelled = contact.shifts().into_iter().map(|shift| (true, contact, shift));
     std::iter::once((false, contact, [0, 0])).chain(relabelled).collect()
+}
+
+/// A relabelled contact's centre keeps this distance from the outer taxels, taxels.
+const MARGIN_PX: f64 = 1.2;
+
+/// Measurements of a touch in which it is located: some hundred windows of the usual sizes.
+const TOUCH_MEASUREMENTS: usize = 2000;
+
+/// Measurements and true centre.
+struct Contact {
+    shape: [usize; 2],
+    centre: [f64; 2],
+    press: Press,
+}
+
+impl Contact {
+    /// `None` when a sample is lost or the contact has no image.
+    fn new(recording: &Recording, bounce: &RecordedBounce, shape: [usize; 2]) -> Option<Self> {
+        let centre = centre_of_mass(&contact_image(recording, bounce)?, shape[1], SUPPORT_THRESHOLD)?;
+        let press = Press::within(recording, bounce.block, bounce.start..bounce.end, bounce.idle);
+        Some(Self { shape, centre, press })
+    }
+
+    /// The middle of a touch, at most [`TOUCH_MEASUREMENTS`]; its centre is the touched taxel. `None` without an image.
+    fn of_touch(recording: &Recording, touch: &RecordedTouch, shape: [usize; 2]) -> Option<Self> {
+        let taxel = touch.taxel(recording)?;
+        Some(Self {
+            shape,
+            centre: [taxel / shape[1], taxel % shape[1]].map(|at| at as f64),
+            press: touch.press(recording, TOUCH_MEASUREMENTS),
+        })
+    }
+
+    /// The centre after a cyclic shift by whole taxels.
+    fn moved(&self, shift: [usize; 2]) -> [f64; 2] {
+        [0, 1].map(|k| (self.centre[k] + shift[k] as f64) % self.shape[k] as f64)
+    }
+
+    /// Shifts that leave the centre far enough from the edge.
+    fn shifts(&self) -> Vec<[usize; 2]> {
+        let all = (0..self.shape[0]).flat_map(|r| (0..self.shape[1]).map(move |c| [r, c]));
+        let inside = |k: usize, at: f64| (MARGIN_PX..=self.shape[k] as f64 - 1.0 - MARGIN_PX).contains(&at);
+        all.filter(|&s| {
+            let [r, c] = self.moved(s);
+            inside(0, r) && inside(1, c)
+        })
+        .collect()
+    }
+
+    /// The contact with taxel (r, c) called (r + shift₀, c + shift₁), cyclically.
+    fn relabelled(&self, shift: [usize; 2]) -> Press {
+        let [rows, cols] = self.shape;
+        self.press
+            .renamed(|k| (k / cols + shift[0]) % rows * cols + (k % cols + shift[1]) % cols)
+    }
+}
+
+/// The contact of rows that do not say it.
+const BALL: &str = "ball";
+
+fn ball() -> String {
+    BALL.to_owned()
+}
+
+/// How well one decoder at one M finds the place of a bouncing ball or of touches.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PlaceRow {
+    /// Kind of contact: "ball", or the name of a session of touches.
+    #[serde(default = "ball")]
+    pub contact: String,
+    /// Algorithm.
+    pub decoder: String,
+    /// Number of measurements, M.
+    pub m: usize,
+    /// Whether the taxels were relabelled cyclically, so that the contact may be anywhere. As recorded, all drops fall
+    /// near the middle.
+    pub relabelled: bool,
+    /// How the rows of a window are obtained.
+    #[serde(default)]
+    pub sensing: Sensing,
+    /// Mean distance from the true centre, taxels.
+    pub mean_px: f64,
+    /// Share of windows within one taxel.
+    pub share_under_1px: f64,
+}
+
+/// How well one variant of the published decoder at one M finds the place of the bouncing ball.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LocalisationRow {
+    /// Decoding variant.
+    pub decode: &'static str,
+    /// Number of measurements.
+    pub m: usize,
+    /// Mean distance between the estimated and the true centre, taxels.
+    pub mean_px: f64,
+    /// Median distance, taxels.
+    pub median_px: f64,
+    /// Share of windows within one taxel.
+    pub share_under_1px: f64,
+}
+
+/// Distances from the true centre, taxels.
+struct Located {
+    locator: &'static str,
+    m: usize,
+    relabelled: bool,
+    sensing: Sensing,
+    errors_px: Vec<f64>,
+}
+
+impl Located {
+    /// Mean distance and share of windows within one taxel; `None` without a window.
+    fn mean(&self) -> Option<(f64, f64)> {
+        let count = self.errors_px.len() as f64;
+        let near = self.errors_px.iter().filter(|e| **e < 1.0).count() as f64;
+        (count > 0.0).then(|| (self.errors_px.iter().sum::<f64>() / count, near / count))
+    }
+
+    fn place_row(&self, contact: &str) -> Option<PlaceRow> {
+        let (mean_px, share_under_1px) = self.mean()?;
+        Some(PlaceRow {
+            contact: contact.to_owned(),
+            decoder: self.locator.to_owned(),
+            m: self.m,
+            relabelled: self.relabelled,
+            sensing: self.sensing,
+            mean_px,
+            share_under_1px,
+        })
+    }
+
+    fn localisation_row(&self) -> Option<LocalisationRow> {
+        let (mean_px, share_under_1px) = self.mean()?;
+        Some(LocalisationRow {
+            decode: self.locator,
+            m: self.m,
+            mean_px,
+            median_px: median(&self.errors_px)?,
+            share_under_1px,
+        })
+    }
 }

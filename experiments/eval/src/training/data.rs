@@ -1,21 +1,20 @@
 //! Training data: everything that an algorithm may know before it gets a compressive measurement.
 
-use super::dictionary::{Dictionary, learn_dictionary};
-use super::error::{LearnError, in_dictionary, in_gains, in_library, in_prior};
 use super::gains::{gain_sds, on_skins_with};
-use super::layout;
-use super::learned::Learned;
 use super::network::TrainedNetwork;
-use super::poses::PosedObject;
 use super::presses::{TrainingPresses, library, prior_images, templates, training_images};
-use super::shapes::shape_images;
+use super::shapes::{PosedObject, blobs, outline_images, shape_images, with_gains};
+use super::{LearnError, in_dictionary, in_gains, in_library, in_prior};
 use crate::session::ScoredSession;
 use rand::RngExt as _;
+use rand::seq::SliceRandom as _;
+use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams, TaxelGains};
-use spts_recon::Matrix;
-use spts_recon::classify::Library;
-use spts_recon::dictionary::{Ksvd, Selection};
+use spts_recon::classify::{Library, Src};
+use spts_recon::dictionary::{Ksvd, Selection, select, shifted};
 use spts_recon::recover::{Gaussian, ImagePrior, Unrolled};
+use spts_recon::{Matrix, MatrixView, SignTables};
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 /// Of so many poses one is in the library of the classifier by images.
@@ -68,7 +67,7 @@ impl TrainingData {
     /// request.
     ///
     /// # Errors
-    /// [`LearnError::Refused`] if there is no training image.
+    /// [`LearnError`] if there is no training image.
     pub fn new(
         training: &[TrainingPresses<'_>],
         cols: usize,
@@ -77,19 +76,29 @@ impl TrainingData {
     ) -> Result<Self, LearnError> {
         let images = prior_images(training);
         Ok(Self {
-            shape: [images.nrows() / cols.max(1), cols],
-            library: library(training).map_err(in_library)?,
             templates: templates(training).map_err(in_library)?,
-            images,
             gain_sd,
+            candidates: Arc::new(training_images(training)),
+            ..Self::of_library(library(training).map_err(in_library)?, images, cols, streams)
+        })
+    }
+
+    /// Training data from a `library`, which also serves as templates, and `images` for priors.
+    fn of_library(library: Library, images: Matrix, cols: usize, streams: Streams) -> Self {
+        Self {
+            shape: [images.nrows() / cols.max(1), cols],
+            templates: library.clone(),
+            library,
+            images,
+            gain_sd: Vec::new(),
             random_shapes: false,
             alike: None,
             posed: None,
             network: None,
-            candidates: Arc::new(training_images(training)),
+            candidates: Arc::default(),
             streams,
             dictionary: OnceLock::new(),
-        })
+        }
     }
 
     /// Training data for a skin whose gains are known. `simulated` are sessions pressed on a median skin, whose taxels
@@ -97,7 +106,7 @@ impl TrainingData {
     /// anew within their uncertainty. The sheet has `cols` columns.
     ///
     /// # Errors
-    /// As [`Self::new`]; [`LearnError::Refused`] if a gain makes a sample infinite.
+    /// As [`Self::new`]; [`LearnError`] if a gain makes a sample infinite.
     pub fn of_skin(
         simulated: &[ScoredSession],
         gains: &TaxelGains,
@@ -113,7 +122,7 @@ impl TrainingData {
     /// is learned with `streams` on request. Negative values are used as they are.
     ///
     /// # Errors
-    /// [`LearnError::Refused`] if all images are zero.
+    /// [`LearnError`] if all images are zero.
     ///
     /// # Panics
     /// If the number of labels differs from that of the images.
@@ -137,19 +146,15 @@ impl TrainingData {
         let means: Vec<Vec<f64>> = means.collect();
         let slices: Vec<&[f64]> = means.iter().map(Vec::as_slice).collect();
         Ok(Self {
-            shape: [images.nrows() / cols.max(1), cols],
-            library: Library::new(&images, labels).map_err(in_library)?,
             templates: Library::new(&Matrix::from_column_slices(images.nrows(), &slices), &classes)
                 .map_err(in_library)?,
-            images,
-            gain_sd: Vec::new(),
-            random_shapes: false,
-            alike: None,
-            posed: None,
-            network: None,
             candidates: Arc::new(columns),
-            streams,
-            dictionary: OnceLock::new(),
+            ..Self::of_library(
+                Library::new(&images, labels).map_err(in_library)?,
+                images,
+                cols,
+                streams,
+            )
         })
     }
 
@@ -157,29 +162,21 @@ impl TrainingData {
     /// of blobs, and no classes.
     ///
     /// # Errors
-    /// [`LearnError::TooLarge`] for more than [`TrainingData::MOST_TAXELS`], [`LearnError::Refused`] if the images are
-    /// not usable.
+    /// [`LearnError`] for more than [`TrainingData::MOST_TAXELS`], or if the images are not usable.
     pub fn for_layout(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
         let (taxels, most) = (skin.taxels(), Self::MOST_TAXELS);
         if taxels > most {
-            return Err(LearnError::TooLarge { taxels, most });
+            let message =
+                format!("taxels = {taxels} is outside [1, {most}]: the decoders keep matrices of taxels × taxels");
+            return Err(Refusal::new(message).into());
         }
-        let images = layout::images(skin, streams);
+        let images = outline_images(skin, streams);
         let mean: Vec<f64> = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
         let library = Library::new(&Matrix::from_column_slices(images.nrows(), &[&mean]), &[0]).map_err(in_library)?;
         Ok(Self {
-            shape: [skin.rows(), skin.cols()],
-            templates: library.clone(),
-            library,
-            images,
-            gain_sd: Vec::new(),
             random_shapes: true,
-            alike: None,
-            posed: None,
-            network: None,
-            candidates: Arc::default(),
-            streams,
-            dictionary: OnceLock::from(Arc::new(Dictionary::new(layout::dictionary(skin)))),
+            dictionary: OnceLock::from(Arc::new(Dictionary::new(blobs(skin)))),
+            ..Self::of_library(library, images, skin.cols(), streams)
         })
     }
 
@@ -187,12 +184,12 @@ impl TrainingData {
     /// on taxels with the usual spread of gains.
     ///
     /// # Errors
-    /// As [`Self::for_layout`]; [`LearnError::Shapes`] if no shape can be pressed on the skin.
+    /// As [`Self::for_layout`]; [`LearnError`] if no shape can be pressed on the skin.
     pub fn for_shapes(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
         let data = Self::for_layout(skin, streams)?;
-        let alike = shape_images(skin, streams.rng("shapes", 0).random())?;
+        let alike = shape_images(skin, streams.rng("shapes", 0).random()).map_err(|e| e.at("shapes"))?;
         Ok(Self {
-            images: layout::with_gains(&alike, streams),
+            images: with_gains(&alike, streams),
             alike: Some(Arc::new(alike)),
             ..data
         })
@@ -214,7 +211,7 @@ impl TrainingData {
             Matrix::from_column_slices(columns.first().map_or(0, Vec::len), &slices)
         };
         let alike = matrix(&columns);
-        let images = layout::with_gains(&alike, streams);
+        let images = with_gains(&alike, streams);
         // the library and the dictionary take few images of every object
         let few: Vec<usize> = (0..labels.len()).step_by(POSES_OF_A_LIBRARY).collect();
         let of_library: Vec<Vec<f64>> = few.iter().map(|&k| images.column(k)).collect();
@@ -249,7 +246,7 @@ impl TrainingData {
     /// The network for this sheet.
     ///
     /// # Errors
-    /// [`LearnError::Network`] if it is for another sheet.
+    /// [`LearnError`] if it is for another sheet.
     pub fn network(&self) -> Result<Arc<Unrolled>, LearnError> {
         let network = self.network.clone().unwrap_or_else(TrainedNetwork::shipped);
         Ok(network.on(self.shape)?)
@@ -260,19 +257,10 @@ impl TrainingData {
     #[must_use]
     pub fn given(learned: &Learned) -> Self {
         let library = learned.classifier.library().clone();
+        let images = library.images().clone();
         Self {
-            shape: [learned.dictionary.atoms.nrows() / learned.cols.max(1), learned.cols],
-            templates: library.clone(),
-            images: library.images().clone(),
-            library,
-            gain_sd: Vec::new(),
-            random_shapes: false,
-            alike: None,
-            posed: None,
-            network: None,
-            candidates: Arc::default(),
-            streams: Streams::new(0),
             dictionary: OnceLock::from(Arc::clone(&learned.dictionary)),
+            ..Self::of_library(library, images, learned.cols, Streams::new(0))
         }
     }
 
@@ -287,7 +275,7 @@ impl TrainingData {
     /// The given dictionary, or one learned by K-SVD with the published preprocessing.
     ///
     /// # Errors
-    /// [`LearnError::Refused`].
+    /// [`LearnError`].
     pub fn dictionary(&self) -> Result<Arc<Dictionary>, LearnError> {
         if let Some(dictionary) = self.dictionary.get() {
             return Ok(Arc::clone(dictionary));
@@ -302,7 +290,7 @@ impl TrainingData {
     /// A prior of the images, cleaned and shifted as `how` says.
     ///
     /// # Errors
-    /// [`LearnError::Refused`].
+    /// [`LearnError`].
     pub fn prior(&self, how: ImagePrior) -> Result<Arc<Gaussian>, LearnError> {
         let how = if self.random_shapes {
             ImagePrior {
@@ -316,4 +304,164 @@ impl TrainingData {
         };
         Ok(Arc::new(how.learn(&self.images, self.shape[1]).map_err(in_prior)?))
     }
+}
+
+/// Reach of the shifted dictionary if none is published, taxels.
+pub const SHIFT_REACH: usize = 2;
+
+/// What the published decoder has learned from raster presses: dictionary and classifier.
+#[derive(Debug, Clone)]
+pub struct Learned {
+    /// Dictionary.
+    pub dictionary: Arc<Dictionary>,
+    /// The dictionary with shifted copies, for contacts at untrained places, taxels × atoms.
+    pub shifted: Matrix,
+    /// Classifier.
+    pub classifier: Arc<Src>,
+    /// Columns of the array.
+    pub cols: usize,
+}
+
+impl Learned {
+    /// Combines a dictionary (taxels × atoms), its shifted copies (computed if not given) and a library, for an array
+    /// with `cols` columns.
+    #[must_use]
+    pub fn new(dictionary: Matrix, shifted_copies: Option<Matrix>, library: Library, cols: usize) -> Self {
+        Self {
+            shifted: shifted_copies.unwrap_or_else(|| shifted(&dictionary, cols, SHIFT_REACH)),
+            dictionary: Arc::new(Dictionary::new(dictionary)),
+            classifier: Arc::new(Src::new(library, Src::PUBLISHED_SPARSITY)),
+            cols,
+        }
+    }
+
+    /// Learns a dictionary by K-SVD (published preprocessing) and a library from the raster recordings of `sessions`,
+    /// for an array with `cols` columns.
+    ///
+    /// # Errors
+    /// [`LearnError`] if no raster image is strong enough.
+    pub fn learn(
+        sessions: &[ScoredSession],
+        learning: &Learning,
+        cols: usize,
+        streams: Streams,
+    ) -> Result<Self, LearnError> {
+        let training: Vec<TrainingPresses<'_>> = sessions
+            .iter()
+            .filter_map(|s| TrainingPresses::within(s, &learning.presses))
+            .collect();
+        let dictionary =
+            learn_dictionary(training_images(&training), &learning.dictionary(), streams).map_err(in_dictionary)?;
+        Ok(Self::new(
+            dictionary,
+            None,
+            library(&training).map_err(in_library)?,
+            cols,
+        ))
+    }
+
+    /// The same with the shifted dictionary in place of the dictionary.
+    #[must_use]
+    pub fn at_all_places(&self) -> Self {
+        Self {
+            dictionary: Arc::new(Dictionary::new(self.shifted.clone())),
+            ..self.clone()
+        }
+    }
+}
+
+/// Images (atoms) that a sparse decoder composes its image of, with look-up tables for their sums under rows of ±1.
+///
+/// ```
+/// use spts_eval::training::Dictionary;
+/// use spts_recon::Matrix;
+///
+/// let dictionary = Dictionary::new(Matrix::from_columns(3, 1, &[1.0, 2.0, 4.0]).unwrap());
+/// let phi = Matrix::from_rows(1, 3, vec![1.0, -1.0, 1.0]).unwrap();
+/// let mut row = [0.0];
+/// dictionary.project(phi.view(), None, &mut row);
+/// assert_eq!(row, [3.0]);
+/// dictionary.to_unit_weights(&mut row); // the weights {1, 0, 1}
+/// assert_eq!(row, [5.0]);
+/// ```
+#[derive(Debug, Clone)]
+pub struct Dictionary {
+    /// Atoms, taxels × K.
+    pub atoms: Matrix,
+    /// Look-up tables of the atoms.
+    pub tables: SignTables<f64>,
+    /// Sum over the taxels of every atom. Φ·D with weights {0, 1} is (Φ·D with ±1 + this sum) / 2.
+    pub sums: Vec<f64>,
+}
+
+impl Dictionary {
+    /// The dictionary of `atoms`, taxels × K.
+    #[must_use]
+    pub fn new(atoms: Matrix) -> Self {
+        Self {
+            tables: SignTables::new(atoms.view()),
+            sums: atoms.column_sums(),
+            atoms,
+        }
+    }
+
+    /// Computes rows of Φ·D for the rows `phi` of Φ, by look-up if `signs` holds the weights as bits.
+    pub fn project(&self, phi: MatrixView<'_>, signs: Option<&[u64]>, out: &mut [f64]) {
+        if let Some(signs) = signs {
+            return self.tables.fill_rows(signs, out);
+        }
+        let (taxels, atoms) = (phi.ncols().max(1), self.sums.len().max(1));
+        for (row, out) in phi.values().chunks_exact(taxels).zip(out.chunks_exact_mut(atoms)) {
+            out.fill(0.0);
+            self.atoms.accumulate_row(row, out);
+        }
+    }
+
+    /// Turns rows of Φ·D with weights ±1 into rows with weights {0, 1}.
+    pub fn to_unit_weights(&self, rows: &mut [f64]) {
+        for row in rows.chunks_exact_mut(self.sums.len().max(1)) {
+            row.iter_mut().zip(&self.sums).for_each(|(a, s)| *a = 0.5 * (*a + s));
+        }
+    }
+}
+
+/// How much the published decoder learns from: presses, images, and sweeps of the dictionary learning.
+#[derive(Debug, Clone)]
+pub struct Learning {
+    /// Raster presses of every object that are used for training.
+    pub presses: Range<usize>,
+    /// Largest number of training images of the dictionary.
+    pub training_images: usize,
+    /// Number of sweeps of the dictionary learning.
+    pub sweeps: usize,
+}
+
+impl Learning {
+    /// Which images a dictionary is learned from, and how.
+    pub(super) fn dictionary(&self) -> (Selection, Ksvd) {
+        let selection = Selection {
+            max_images: self.training_images,
+            ..Selection::default()
+        };
+        let ksvd = Ksvd {
+            n_iter: self.sweeps,
+            ..Ksvd::default()
+        };
+        (selection, ksvd)
+    }
+}
+
+/// K-SVD on what `selection` keeps of the `candidates`.
+pub(super) fn learn_dictionary(
+    mut candidates: Vec<Vec<f64>>,
+    (selection, ksvd): &(Selection, Ksvd),
+    streams: Streams,
+) -> Result<Matrix, Refusal> {
+    // the limit on their number then treats all objects, presses and frames alike
+    candidates.shuffle(&mut streams.rng("training", 0));
+    let chosen: Vec<Vec<f64>> = select(&candidates, selection)
+        .into_iter()
+        .map(|i| candidates[i].clone())
+        .collect();
+    ksvd.learn(&chosen, &mut streams.rng("ksvd", 0))
 }

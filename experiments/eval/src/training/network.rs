@@ -4,7 +4,7 @@ use safetensors::{Dtype, SafeTensors, tensor::TensorView};
 use spts_input::Refusal;
 use spts_recon::Matrix;
 use spts_recon::recover::{Layer, Unrolled, UnrolledStep, UnrolledWeights};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
 /// The network that ships, for the published skin; `python -m spts.amortised` trains it.
@@ -32,43 +32,6 @@ pub struct TrainedNetwork {
     pub network: Arc<Unrolled>,
 }
 
-/// Why a trained network cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum NetworkError {
-    /// The file cannot be read.
-    #[error(transparent)]
-    Read(#[from] spts_input::InputError),
-    /// The file is not in safetensors format.
-    #[error("{path}: not a trained network in safetensors format: {reason}")]
-    Format {
-        /// The file.
-        path: PathBuf,
-        /// Cause.
-        reason: String,
-    },
-    /// The numbers in the file do not form a network.
-    #[error("{path}: {source}")]
-    Weights {
-        /// The file.
-        path: PathBuf,
-        /// Cause.
-        source: Refusal,
-    },
-    /// The network is for another layout of taxels.
-    #[error(
-        "`amortised` is trained for {} × {} taxels, and the skin has {} × {}: train a network for it (`python -m \
-         spts.amortised --help`) and name its file with `--weights`",
-        .weights[0], .weights[1], .skin[0], .skin[1]
-    )]
-    Shape {
-        /// Rows and columns of taxels for which the network was trained.
-        weights: [usize; 2],
-        /// Rows and columns of the skin.
-        skin: [usize; 2],
-    },
-}
-
 impl TrainedNetwork {
     /// The network shipped with the program, for the published skin of 10 × 10 taxels.
     ///
@@ -86,15 +49,15 @@ impl TrainedNetwork {
     /// Reads a network from the file at `path`, as written by `python -m spts.amortised`.
     ///
     /// # Errors
-    /// [`NetworkError`] if the file cannot be read, or holds no such network.
-    pub fn open(path: &Path) -> Result<Self, NetworkError> {
+    /// [`Refusal`] if the file cannot be read, or holds no such network.
+    pub fn open(path: &Path) -> Result<Self, Refusal> {
         Self::parse(&spts_input::read(path, LARGEST)?, path)
     }
 
-    fn parse(bytes: &[u8], path: &Path) -> Result<Self, NetworkError> {
-        let failed = |reason: String| NetworkError::Format {
-            path: path.to_owned(),
-            reason,
+    fn parse(bytes: &[u8], path: &Path) -> Result<Self, Refusal> {
+        let failed = |reason: String| {
+            let path = path.display();
+            Refusal::new(format!("{path}: not a trained network in safetensors format: {reason}"))
         };
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| failed(e.to_string()))?;
         let told = metadata
@@ -129,10 +92,7 @@ impl TrainedNetwork {
             ))
         };
         let (shape, weights) = read().map_err(failed)?;
-        let weights = weights.map_err(|source| NetworkError::Weights {
-            path: path.to_owned(),
-            source,
-        })?;
+        let weights = weights.map_err(|e| e.at(path.display()))?;
         Ok(Self {
             shape,
             network: Arc::new(Unrolled::new(weights)),
@@ -142,15 +102,16 @@ impl TrainedNetwork {
     /// The network, for a sheet with `skin` rows and columns.
     ///
     /// # Errors
-    /// [`NetworkError::Shape`] if it is for another sheet.
-    pub fn on(&self, skin: [usize; 2]) -> Result<Arc<Unrolled>, NetworkError> {
+    /// [`Refusal`] if it is for another sheet.
+    pub fn on(&self, skin: [usize; 2]) -> Result<Arc<Unrolled>, Refusal> {
         if self.shape == skin {
             Ok(Arc::clone(&self.network))
         } else {
-            Err(NetworkError::Shape {
-                weights: self.shape,
-                skin,
-            })
+            let [[rows, cols], [own_rows, own_cols]] = [self.shape, skin];
+            Err(Refusal::new(format!(
+                "`amortised` is trained for {rows} × {cols} taxels, and the skin has {own_rows} × {own_cols}: train a \
+                 network for it (`python -m spts.amortised --help`) and name its file with `--weights`"
+            )))
         }
     }
 }
@@ -227,7 +188,7 @@ mod tests {
     fn the_weights_that_ship_are_for_the_published_skin() {
         assert_eq!(TrainedNetwork::shipped().shape, [10, 10]);
         let refused = TrainedNetwork::shipped().on([12, 20]).unwrap_err();
-        assert!(matches!(refused, NetworkError::Shape { skin: [12, 20], .. }));
+        assert!(refused.to_string().contains("the skin has 12 × 20"), "{refused}");
     }
 
     #[test]

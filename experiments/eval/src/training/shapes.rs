@@ -1,9 +1,13 @@
-//! Images of procedural shapes, pressed in the simulation on a skin without recordings.
+//! Images for a skin without recordings: procedural shapes and objects in all poses, pressed in the simulation, and
+//! outlines without one.
 
+use rand::RngExt as _;
+use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_dataset::{Maker, Spec};
 use spts_input::Refusal;
-use spts_models::SkinLayout;
+use spts_models::{SkinLayout, Streams, VelostatConfig};
 use spts_recon::Matrix;
 
 /// The data set of these shapes.
@@ -17,21 +21,12 @@ const FEWEST: u64 = 1_500;
 /// Presses that one maker makes: neighbours share a shape.
 const CHUNK: u64 = 50;
 
-/// Why shapes cannot be pressed.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ShapesError {
-    /// No data set can be made for the layout, or a shape cannot be pressed.
-    #[error(transparent)]
-    Refused(#[from] Refusal),
-}
-
 /// Images of a skin of this `layout` (taxels × presses) under the shapes of [`SHAPES_SPEC`], with equal gains of all
 /// taxels, each scaled to a maximum of 1. The result depends only on the layout and `seed`.
 ///
 /// # Errors
-/// [`ShapesError`] if the layout is too large.
-pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, ShapesError> {
+/// [`Refusal`] if the layout is too large.
+pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
     let presses = (VALUES / layout.taxels().max(1) as u64).clamp(FEWEST, PRESSES);
     let skin: toml::Table = [
         ("rows".to_owned(), toml::Value::Integer(layout.rows() as i64)),
@@ -48,16 +43,20 @@ pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, ShapesErro
     ]
     .into_iter()
     .collect();
-    let spec = Spec::load(SHAPES_SPEC, &overrides)?;
+    let spec = Spec::load(SHAPES_SPEC, &overrides).map_err(Refusal::from_error)?;
     let chunks: Vec<Vec<Vec<f64>>> = (0..presses.div_ceil(CHUNK))
         .into_par_iter()
         .map(|chunk| {
             let mut maker = Maker::new(&spec);
             let rows = chunk * CHUNK..((chunk + 1) * CHUNK).min(presses);
-            rows.map(|row| Ok(scaled(maker.row(row)?.conductance().values())))
-                .collect()
+            rows.map(|row| {
+                Ok(scaled(
+                    maker.row(row).map_err(Refusal::from_error)?.conductance().values(),
+                ))
+            })
+            .collect()
         })
-        .collect::<Result<_, ShapesError>>()?;
+        .collect::<Result<_, Refusal>>()?;
     let columns: Vec<&[f64]> = chunks.iter().flatten().map(Vec::as_slice).collect();
     Ok(Matrix::from_column_slices(layout.taxels(), &columns))
 }
@@ -66,6 +65,228 @@ pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, ShapesErro
 pub(super) fn scaled(image: &[f64]) -> Vec<f64> {
     let peak = image.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     image.iter().map(|v| v / peak).collect()
+}
+
+/// How accurately the pose of an object is known: its place to half a taxel and its rotation to 15°, as read by eye;
+/// its tilt is unknown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseKnowledge {
+    /// Step to which a place is known along each axis, m.
+    pub place_step_m: f64,
+    /// Standard deviation of the place about the step, m.
+    pub place_sd_m: f64,
+    /// Step to which a rotation is known, degrees.
+    pub rotation_step_deg: f64,
+    /// Standard deviation of the rotation about the step, degrees.
+    pub rotation_sd_deg: f64,
+    /// Standard deviation of the tilt about each axis of the skin, degrees.
+    pub tilt_sd_deg: f64,
+}
+
+impl Default for PoseKnowledge {
+    fn default() -> Self {
+        Self {
+            place_step_m: 7.5e-3,
+            place_sd_m: 4e-3,
+            rotation_step_deg: 15.0,
+            rotation_sd_deg: 5.0,
+            tilt_sd_deg: 0.7,
+        }
+    }
+}
+
+/// Presses of each object.
+const PRESSES_OF_AN_OBJECT: u64 = 600;
+/// Pitch and middle of the sheet on which the objects' places are written down.
+const PITCH_M: f64 = 0.015;
+const MIDDLE: f64 = 4.5;
+
+/// Simulated images of one object in many places, rotations and tilts, to learn from.
+#[derive(Debug, Clone)]
+pub struct PosedObject {
+    /// Name.
+    pub name: &'static str,
+    /// Taxels × presses, with equal gains of all taxels; each image is scaled to a maximum of 1.
+    pub images: Matrix,
+}
+
+impl PoseKnowledge {
+    /// Images of all objects on a skin of this `layout`, at the same distances in metres from the middle. The result
+    /// depends only on the layout and `seed`. `done` is called after every object.
+    ///
+    /// # Errors
+    /// [`Refusal`] if the objects cannot be pressed there.
+    pub fn press(&self, layout: &SkinLayout, seed: u64, done: &(dyn Fn() + Sync)) -> Result<Vec<PosedObject>, Refusal> {
+        let objects = OBJECTS.par_iter().map(|object| {
+            let streams = Streams::new(seed).rng("poses", u64::from(object.label));
+            let images = self.press_one(object, layout, streams)?;
+            done();
+            Ok(PosedObject {
+                name: object.name,
+                images,
+            })
+        });
+        objects.collect()
+    }
+
+    fn press_one(&self, object: &ObjectSpec, layout: &SkinLayout, mut rng: impl rand::Rng) -> Result<Matrix, Refusal> {
+        let placement = &object.placement;
+        let to = |step: f64, value: f64| (value / step).round() * step;
+        let x_m = to(self.place_step_m, (placement.col - MIDDLE) * PITCH_M);
+        let y_m = to(self.place_step_m, (MIDDLE - placement.row) * PITCH_M);
+        let rotation_deg = to(self.rotation_step_deg, placement.rotation_rad.to_degrees());
+        let text = format!(
+            "rows = {PRESSES_OF_AN_OBJECT}\nseed = {}\nreadout = \"ideal\"\n\
+             [object]\nfrom = \"objects\"\nnames = [\"{}\"]\n\
+             [pose]\nx_m = {{ normal = [{x_m:e}, {:e}] }}\ny_m = {{ normal = [{y_m:e}, {:e}] }}\n\
+             rotation_deg = {{ normal = [{rotation_deg:e}, {:e}] }}\n\
+             tilt_x_deg = {{ normal = [0.0, {tilt:e}] }}\ntilt_y_deg = {{ normal = [0.0, {tilt:e}] }}\n\
+             [skin]\nrows = {}\ncols = {}\npitch_m = {:e}\nelectrode_m = {:e}\n\
+             [transducer]\nspread_log_sd = 0.0\nsession_log_sd = 0.0\n\
+             [record]\nmeasurements = 1\nraster = false\nlabels = []\n",
+            rng.next_u64() >> 2,
+            object.name,
+            self.place_sd_m,
+            self.place_sd_m,
+            self.rotation_sd_deg,
+            layout.rows(),
+            layout.cols(),
+            layout.pitch_m(),
+            layout.electrode_m(),
+            tilt = self.tilt_sd_deg,
+        );
+        let spec = Spec::from_toml(&text, &toml::Table::new(), ".".as_ref()).map_err(Refusal::from_error)?;
+        let mut maker = Maker::new(&spec);
+        let images = (0..PRESSES_OF_AN_OBJECT)
+            .map(|row| {
+                Ok(scaled(
+                    maker.row(row).map_err(Refusal::from_error)?.conductance().values(),
+                ))
+            })
+            .collect::<Result<Vec<_>, Refusal>>()?;
+        let columns: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
+        Ok(Matrix::from_column_slices(layout.taxels(), &columns))
+    }
+}
+
+/// Random shapes in the prior. Their moments on 100 taxels change by less than 3 % when there are twice as many.
+const SHAPES: usize = 1500;
+/// Points along one side of a taxel at which a shape is sampled: its edges then fade over a taxel, as electrodes see
+/// them.
+const SAMPLES: usize = 3;
+/// Half sizes of a shape as shares of the side of a square sheet with as many taxels.
+const HALF_SIZES: [f64; 2] = [0.04, 0.4];
+/// Smallest half size, taxels.
+const SMALLEST: f64 = 0.7;
+/// Widths of the blobs of the dictionary, taxels: standard deviations.
+const WIDTHS: [f64; 2] = [0.8, 1.8];
+/// With more taxels than this, the dictionary has blobs of the first width only.
+const FEW_TAXELS: usize = 400;
+/// Blobs end at this many standard deviations.
+const REACH: f64 = 3.0;
+
+/// Outline of a shape about its centre, in its own axes, for half sizes (a, b).
+type Inside = fn(x: f64, y: f64, a: f64, b: f64) -> bool;
+
+/// The outlines.
+const OUTLINES: [Inside; 5] = [
+    // ellipse
+    |x, y, a, b| (x / a).powi(2) + (y / b).powi(2) <= 1.0,
+    // plate
+    |x, y, a, b| x.abs() <= a && y.abs() <= b,
+    // ring
+    |x, y, a, b| {
+        let r = ((x / a).powi(2) + (y / b).powi(2)).sqrt();
+        (0.55..=1.0).contains(&r)
+    },
+    // cross
+    |x, y, a, b| (x.abs() <= a && y.abs() <= 0.3 * b) || (y.abs() <= b && x.abs() <= 0.3 * a),
+    // angle
+    |x, y, a, b| x.abs() <= a && y.abs() <= b && (x < -0.3 * a || y < -0.3 * b),
+];
+
+/// Images of random shapes on a skin of this layout, taxels × images; a function of `streams` alone.
+pub(super) fn outline_images(layout: &SkinLayout, streams: Streams) -> Matrix {
+    let gain_log_sd = VelostatConfig::default().spread_log_sd;
+    let images: Vec<Vec<f64>> = (0..SHAPES as u64)
+        .map(|index| image(layout, gain_log_sd, &mut streams.rng("layout/shape", index)))
+        .collect();
+    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
+    Matrix::from_column_slices(layout.taxels(), &slices)
+}
+
+/// One shape, on taxels whose gains have logarithms with the standard deviation `gain_log_sd`.
+fn image(layout: &SkinLayout, gain_log_sd: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    let (rows, cols) = (layout.rows(), layout.cols());
+    // shapes that are wider than a strip still cover a length of it
+    let side = ((rows * cols) as f64).sqrt().max(2.0);
+    let mut uniform = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
+    let mut half = || (side * HALF_SIZES[0] * (HALF_SIZES[1] / HALF_SIZES[0]).powf(uniform(0.0, 1.0))).max(SMALLEST);
+    let (a, b) = (half(), half());
+    let centre = [uniform(-0.5, rows as f64 - 0.5), uniform(-0.5, cols as f64 - 0.5)];
+    let (sin, cos) = uniform(0.0, std::f64::consts::TAU).sin_cos();
+    #[expect(clippy::cast_possible_truncation, reason = "a small positive number")]
+    let outline = OUTLINES[uniform(0.0, OUTLINES.len() as f64) as usize % OUTLINES.len()];
+    let mut image = Vec::with_capacity(rows * cols);
+    for row in 0..rows {
+        for col in 0..cols {
+            let mut covered = 0.0;
+            for k in 0..SAMPLES * SAMPLES {
+                let offset = |i: usize| (i as f64 + 0.5) / SAMPLES as f64 - 0.5;
+                let y = row as f64 + offset(k / SAMPLES) - centre[0];
+                let x = col as f64 + offset(k % SAMPLES) - centre[1];
+                covered += f64::from(u8::from(outline(cos * x + sin * y, cos * y - sin * x, a, b)));
+            }
+            // a sum of uniform numbers is nearly normal; its standard deviation is one half
+            let normal: f64 = (0..3).map(|_| uniform(-0.5, 0.5)).sum::<f64>() * 2.0;
+            image.push(covered / (SAMPLES * SAMPLES) as f64 * (gain_log_sd * normal).exp());
+        }
+    }
+    image
+}
+
+/// The `images` (taxels × images) on taxels whose gains scatter as a skin's do, other ones in every image.
+pub(super) fn with_gains(images: &Matrix, streams: Streams) -> Matrix {
+    let gain_log_sd = VelostatConfig::default().spread_log_sd;
+    let mut scattered = images.clone();
+    for taxel in 0..images.nrows() {
+        let mut rng = streams.rng("layout/gains", taxel as u64);
+        for value in scattered.row_mut(taxel) {
+            *value *= (gain_log_sd * normal(|| rng.random())).exp();
+        }
+    }
+    scattered
+}
+
+/// A number that is nearly normal, from uniform ones in [0, 1): a sum of twelve of them has the variance 1.
+fn normal(mut uniform: impl FnMut() -> f64) -> f64 {
+    (0..12).map(|_| uniform() - 0.5).sum()
+}
+
+/// Dictionary of blobs at every taxel, taxels × atoms, every atom of length 1.
+pub(super) fn blobs(layout: &SkinLayout) -> Matrix {
+    let (rows, cols) = (layout.rows(), layout.cols());
+    let widths = if layout.taxels() > FEW_TAXELS {
+        &WIDTHS[..1]
+    } else {
+        &WIDTHS
+    };
+    let mut atoms: Vec<Vec<f64>> = Vec::new();
+    for width in widths {
+        for centre in 0..rows * cols {
+            let at = |k: usize| {
+                let dr = (k / cols) as f64 - (centre / cols) as f64;
+                let dc = (k % cols) as f64 - (centre % cols) as f64;
+                let r = dr.hypot(dc) / width;
+                if r > REACH { 0.0 } else { (-0.5 * r * r).exp() }
+            };
+            let atom: Vec<f64> = (0..rows * cols).map(at).collect();
+            let length = atom.iter().map(|v| v * v).sum::<f64>().sqrt();
+            atoms.push(atom.iter().map(|v| v / length).collect());
+        }
+    }
+    let slices: Vec<&[f64]> = atoms.iter().map(Vec::as_slice).collect();
+    Matrix::from_column_slices(rows * cols, &slices)
 }
 
 #[cfg(test)]
@@ -86,6 +307,28 @@ mod tests {
                 "{rows} × {cols}: {touched} of {}",
                 images.ncols()
             );
+        }
+    }
+
+    /// Every taxel is covered by shapes, and atoms have length 1, on a strip and on a sheet.
+    #[test]
+    fn any_layout_has_images_and_atoms() {
+        for (rows, cols) in [(1, 64), (12, 20), (2, 1)] {
+            let layout = SkinLayout::new(rows, cols, 5e-3, 3e-3).unwrap();
+            let images = outline_images(&layout, Streams::new(1));
+            assert_eq!((images.nrows(), images.ncols()), (rows * cols, SHAPES));
+            for taxel in 0..rows * cols {
+                let touched = images.row(taxel).iter().filter(|v| **v > 0.1).count();
+                assert!(
+                    touched > SHAPES / 100,
+                    "{rows} × {cols}: taxel {taxel} is in {touched} shapes"
+                );
+            }
+            let atoms = blobs(&layout);
+            for k in 0..atoms.ncols() {
+                let length: f64 = atoms.column(k).iter().map(|v| v * v).sum();
+                assert!((length - 1.0).abs() < 1e-12, "{length}");
+            }
         }
     }
 }

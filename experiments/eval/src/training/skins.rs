@@ -3,18 +3,18 @@
 use crate::labels::Labels;
 use crate::protocol::PUBLISHED_HOLD_S;
 use crate::session::ScoredSession;
+use crate::skin_run::footprint_scene;
 use rand::RngExt as _;
 use rayon::prelude::*;
 use spts::Session;
 use spts::chain::{Acquisition, DEFAULT_READOUT};
 use spts::record::{Twin, TwinError};
-use spts::scene::{PressConfig, Scene, SceneConfig};
+use spts::scene::{PressConfig, Scene};
 use spts::session::{Event, Recorded};
 use spts_circuit::{Block, Mode, Recording};
-use spts_contact::Foam;
 use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_input::Refusal;
-use spts_models::{ConfigError, SkinLayout, Streams, VelostatConfig, in_range};
+use spts_models::{SkinLayout, Streams, VelostatConfig, in_range};
 use std::path::Path;
 
 /// How simulated skins and presses vary.
@@ -24,7 +24,7 @@ use std::path::Path;
 /// use spts_models::SkinLayout;
 ///
 /// let median = Skins::median(SkinLayout::default());
-/// assert_eq!((median.spread_log_sd, median.force_factor), (0.0, 1.0));
+/// assert_eq!((median.spread_log_sd, median.readout), (0.0, "ideal"));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Skins {
@@ -42,11 +42,6 @@ pub struct Skins {
     pub position_sd_m: f64,
     /// Standard deviation of an object's rotation about each axis, degrees; [0, 5].
     pub rotation_sd_deg: f64,
-    /// The force of a press is log-uniform between the default divided by this factor and the default times this
-    /// factor; [1, 4].
-    pub force_factor: f64,
-    /// The same factor for the initial stiffness of the foam; [1, 4].
-    pub stiffness_factor: f64,
     /// Readout profile of the raster scans.
     pub readout: &'static str,
 }
@@ -63,8 +58,6 @@ impl Default for Skins {
             session_log_sd: sheet.session_log_sd,
             position_sd_m: press.position_sd_m,
             rotation_sd_deg: press.rotation_sd_deg,
-            force_factor: 1.0,
-            stiffness_factor: 1.0,
             readout: DEFAULT_READOUT,
         }
     }
@@ -85,39 +78,14 @@ impl Skins {
     }
 }
 
-/// Why presses cannot be simulated for training.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SkinsError {
-    /// A parameter outside its range.
-    #[error(transparent)]
-    Config(#[from] ConfigError),
-    /// The simulation failed.
-    #[error("{object}: {source}")]
-    Twin {
-        /// Name of the object.
-        object: &'static str,
-        /// Cause.
-        source: TwinError,
-    },
-    /// The presses do not form a session.
-    #[error("{object}: {source}")]
-    Session {
-        /// Name of the object.
-        object: &'static str,
-        /// Cause.
-        source: Refusal,
-    },
-}
-
 impl Skins {
     /// Presses every object once on every skin. The sessions are in order of label; block k of each raster session is
     /// from skin k, and there are no compressive recordings. The result depends only on `seed`. `done` is called after
     /// every press.
     ///
     /// # Errors
-    /// [`SkinsError`] for a parameter outside its range, or if the simulation fails.
-    pub fn press(&self, seed: u64, done: &(dyn Fn() + Sync)) -> Result<Vec<ScoredSession>, SkinsError> {
+    /// [`Refusal`] for a parameter outside its range, or if the simulation fails.
+    pub fn press(&self, seed: u64, done: &(dyn Fn() + Sync)) -> Result<Vec<ScoredSession>, Refusal> {
         self.check()?;
         let labels = Labels::default();
         let sessions = OBJECTS.par_iter().map(|object| {
@@ -125,14 +93,9 @@ impl Skins {
                 .into_par_iter()
                 .map(|skin| self.press_one(object, seed, skin, done))
                 .collect::<Result<Vec<_>, _>>();
-            let blocks = blocks.map_err(|source| SkinsError::Twin {
-                object: object.name,
-                source,
-            })?;
-            let raster = joined(blocks).map_err(|source| SkinsError::Session {
-                object: object.name,
-                source,
-            })?;
+            let refused = |e: Refusal| e.at(object.name);
+            let blocks = blocks.map_err(|e: TwinError| refused(Refusal::from_error(e)))?;
+            let raster = joined(blocks).map_err(refused)?;
             let session = Session {
                 hold_s: Some(PUBLISHED_HOLD_S),
                 raster: Some(Recorded::new(raster)),
@@ -146,20 +109,9 @@ impl Skins {
         sessions.collect()
     }
 
-    fn check(&self) -> Result<(), ConfigError> {
-        in_range(
-            "skins",
-            self.skins as f64,
-            (1..=10_000).contains(&self.skins),
-            "[1, 10000]",
-        )?;
-        for (field, value) in [
-            ("force_factor", self.force_factor),
-            ("stiffness_factor", self.stiffness_factor),
-        ] {
-            in_range(field, value, (1.0..=4.0).contains(&value), "[1, 4]")?;
-        }
-        Ok(())
+    fn check(&self) -> Result<(), Refusal> {
+        let few = (1..=10_000).contains(&self.skins);
+        in_range("skins", self.skins as f64, few, "[1, 10000]").map(drop)
     }
 
     fn press_one(
@@ -171,41 +123,20 @@ impl Skins {
     ) -> Result<Recording, TwinError> {
         let label = u64::from(object.label);
         // the skin follows from the scene's seed, and is the same for all objects
-        let streams = Streams::new(seed);
-        let seed = streams.rng("learn/skin", skin as u64).random::<u64>() >> 1;
-        let stiffness = scattered(self.stiffness_factor, streams, "learn/stiffness", skin as u64);
-        let force = scattered(self.force_factor, Streams::new(seed), "learn/force", label);
-        let defaults = (PressConfig::default(), Foam::default());
-        let press = PressConfig {
-            object: Some(object.name.to_owned()),
-            // presses are numbered by the object, so that each has a scatter of its own
-            presses: OBJECTS.len() + 1,
-            force_n: defaults.0.force_n * force,
-            position_sd_m: self.position_sd_m,
-            rotation_sd_deg: self.rotation_sd_deg,
-            ..defaults.0
-        };
-        let contact = [
-            // nothing is stepped: a press takes milliseconds, and its plateau is at rest in any case
-            ("model".to_owned(), "footprint".into()),
-            (
-                "stiffness_pa_per_m".to_owned(),
-                (defaults.1.stiffness_pa_per_m * stiffness).into(),
-            ),
-        ];
+        let seed = Streams::new(seed).rng("learn/skin", skin as u64).random::<u64>() >> 1;
+        // presses are numbered by the object, so that each has a scatter of its own
+        let mut config = footprint_scene(object.name, OBJECTS.len() + 1, seed);
+        if let Some(press) = &mut config.press {
+            press.position_sd_m = self.position_sd_m;
+            press.rotation_sd_deg = self.rotation_sd_deg;
+        }
         let gains = [
             ("spread_log_sd".to_owned(), self.spread_log_sd.into()),
             ("session_log_sd".to_owned(), self.session_log_sd.into()),
         ];
-        let config = SceneConfig {
-            seed,
-            skin: self.layout,
-            transducer_parameters: gains.into_iter().collect(),
-            readout: Some(self.readout.to_owned()),
-            contact: contact.into_iter().collect(),
-            press: Some(press),
-            ..SceneConfig::default()
-        };
+        config.skin = self.layout;
+        config.transducer_parameters = gains.into_iter().collect();
+        config.readout = Some(self.readout.to_owned());
         let scene = Scene::new(config, Path::new(""))?;
         let index = usize::from(object.label);
         let twin = Twin::new(&scene)?;
@@ -214,12 +145,6 @@ impl Skins {
             .recorded(&presses, &Acquisition::presses(Mode::Raster, label))?
             .recording)
     }
-}
-
-/// Factor between 1/`factor` and `factor`, log-uniform, for item `index` of the purpose `label`.
-fn scattered(factor: f64, streams: Streams, label: &str, index: u64) -> f64 {
-    let uniform: f64 = streams.rng(label, index).random();
-    factor.powf(2.0 * uniform - 1.0)
 }
 
 /// One session of the blocks of all `recordings`.
@@ -257,8 +182,6 @@ mod tests {
             session_log_sd: 0.10,
             position_sd_m: 0.0,
             rotation_sd_deg: 0.0,
-            force_factor: 1.0,
-            stiffness_factor: 1.0,
             readout: DEFAULT_READOUT,
         };
         let sessions = skins.press(3, &|| ()).unwrap();
@@ -290,30 +213,11 @@ mod tests {
             skins: 1,
             ..Skins::default()
         };
-        for (bad, field) in [
-            (Skins { skins: 0, ..few }, "skins"),
-            (
-                Skins {
-                    force_factor: 0.5,
-                    ..few
-                },
-                "force_factor",
-            ),
-            (
-                Skins {
-                    stiffness_factor: f64::NAN,
-                    ..few
-                },
-                "stiffness_factor",
-            ),
-            (
-                Skins {
-                    position_sd_m: -1.0,
-                    ..few
-                },
-                "position_sd_m",
-            ),
-        ] {
+        let far = Skins {
+            position_sd_m: -1.0,
+            ..few
+        };
+        for (bad, field) in [(Skins { skins: 0, ..few }, "skins"), (far, "position_sd_m")] {
             let said = bad.press(1, &|| ()).unwrap_err().to_string();
             assert!(said.contains(field), "{said}");
         }

@@ -5,8 +5,8 @@ use crate::ReportError;
 use spts::output::write_bytes;
 use spts::scene::Assignment;
 use spts::simulate::{Request, SimulateError, run};
-use spts_eval::decode::DecodeSessionError;
 use spts_eval::training::{LearnError, TrainingData};
+use spts_input::Refusal;
 use spts_models::Streams;
 use std::path::Path;
 
@@ -66,7 +66,7 @@ pub enum MotionError {
     Learn(#[from] LearnError),
     /// Its recording cannot be decoded.
     #[error(transparent)]
-    Decode(#[from] DecodeSessionError),
+    Decode(#[from] Refusal),
     /// A file cannot be written.
     #[error(transparent)]
     Report(#[from] ReportError),

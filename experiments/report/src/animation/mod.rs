@@ -20,10 +20,11 @@ use spts::output::OutputError;
 use spts::scene::Task;
 use spts::simulate::Prepared;
 use spts_contact::Frame;
-use spts_eval::decode::{DecodeRequest, DecodeSessionError};
+use spts_eval::decode::{DecodeRequest, no_recording};
 use spts_eval::idle_mean;
 use spts_eval::in_time::{FollowedImage, followed_images};
 use spts_eval::training::TrainingData;
+use spts_input::Refusal;
 use std::path::Path;
 use timeline::{Timeline, Trace, pressure_pa};
 
@@ -63,16 +64,14 @@ impl Animation {
     /// decoded.
     ///
     /// # Errors
-    /// [`DecodeSessionError`] when there is no recording, or it cannot be followed.
+    /// [`Refusal`] when there is no recording, or it cannot be followed.
     pub fn new(
         prepared: &Prepared,
         frames: &[Frame],
         session: &Session,
         training: Option<&TrainingData>,
-    ) -> Result<Self, DecodeSessionError> {
-        let without = || DecodeSessionError::NoRecording {
-            session: session.name.clone(),
-        };
+    ) -> Result<Self, Refusal> {
+        let without = || no_recording(session);
         let recording = session.compressive().ok_or_else(without)?;
         let volts = &recording.blocks().first().ok_or_else(without)?.volts;
         let (layout, rate_hz) = (recording.layout(), recording.sample_rate_hz());

@@ -7,9 +7,10 @@ use spts::chain::Acquisition;
 use spts::provenance::{Provenance, combined_hash};
 use spts::record::{Twin, TwinError};
 use spts::scene::{DropConfig, Scene, SceneConfig, Task};
-use spts::session::{Event, Recorded};
+use spts::session::Event;
 use spts_circuit::Mode;
 use spts_contact::objects::OBJECTS;
+use spts_eval::{SkinRun, SkinRunPresses};
 use spts_sim::World;
 use spts_sim::render::{Camera, Picture, Renderer};
 use spts_sim::world::{Bounce, PressCourse};
@@ -92,40 +93,27 @@ pub(super) fn simulate(
         .par_iter()
         .map(|object| {
             let scene = press_scene(object.name, seed, size)?;
-            // sessions are numbered, so that every one has noise of its own
-            let session = 2 * u64::from(object.label);
-            let (rasters, all) = (size.raster_presses, size.raster_presses + size.compressive_presses);
-            let twin = Twin::new(&scene)?;
-            let first = twin.presses(0..rasters, done)?;
-            let raster = twin.recorded(&first, &Acquisition::presses(Mode::Raster, session))?;
-            // the recorded sessions are scored from their sixth press on: the sheet changes with its first presses
-            let sums = Acquisition {
-                conditioning_presses: size.real_protocol.first_press,
-                ..Acquisition::presses(Mode::Compressive, session + 1)
+            // the recorded sessions are scored from their sixth press on
+            let run = SkinRun {
+                scene: &scene,
+                number: u64::from(object.label),
+                scanned: size.raster_presses,
+                summed: size.compressive_presses,
+                conditioning: size.real_protocol.first_press,
             };
-            let second = twin.presses(rasters..all, done)?;
-            let compressive = twin.recorded(&second, &sums)?;
+            let SkinRunPresses { session, presses } = run.record(done)?;
             let plateau_s = PLATEAU * scene.duration_s();
-            let pressure_pa = first
+            let pressure_pa = presses
                 .first()
                 .and_then(|press| press.frames.iter().find(|f| f.time_s >= plateau_s))
                 .map(|f| f.pressure.values().to_vec());
+            let area_m2 = scene.skin().cell_area_m2();
             Ok(SimulatedObject {
-                session: twin.session(
-                    Some(Recorded {
-                        conditioning: size.real_protocol.first_press.min(rasters - 1),
-                        ..raster
-                    }),
-                    Some(compressive),
-                ),
+                session,
                 label: usize::from(object.label),
                 pressure_pa: pressure_pa.unwrap_or_default(),
-                imbalance: first
-                    .iter()
-                    .chain(&second)
-                    .map(|p| p.imbalance(scene.skin().cell_area_m2()))
-                    .fold(0.0, f64::max),
-                courses: first.iter().chain(&second).map(|p| p.course).collect(),
+                imbalance: presses.iter().map(|p| p.imbalance(area_m2)).fold(0.0, f64::max),
+                courses: presses.iter().map(|p| p.course).collect(),
                 picture: picture(&scene, plateau_s).map_err(|e| e.to_string()),
             })
         })

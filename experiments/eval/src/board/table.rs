@@ -1,0 +1,207 @@
+//! The board as files, and as text.
+
+use super::{BoardRow, ObjectRow, ScoreBoard};
+use crate::decoders::short_label;
+use crate::place::{PlaceRow, locator_label};
+use crate::sensing::Sensing;
+use crate::table::{Cell, Table, TextTable};
+use crate::tally::Scores;
+use crate::training::{PUBLISHED, RASTER};
+use crate::unique;
+use spts::output::{OutputError, OutputFolder, write_json};
+
+/// Names of the result files.
+pub const FILES: &[&str] = &["board.json", "board.csv", "objects.csv", "localisation.csv"];
+
+/// Writes `board.json`, `board.csv`, `objects.csv` and `localisation.csv` into the folder `out`.
+///
+/// # Errors
+/// [`OutputError`] if a file cannot be written.
+pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), OutputError> {
+    write_json(&out.path("board.json"), board)?;
+    rows(&board.rows).write(out)?;
+    let objects = Table::new("objects", &board.objects)
+        .file("decoder", |r| &r.decoder)
+        .file("m", |r| r.m)
+        .file("left_out", |r| r.left_out)
+        .file("learned_from", |r| &r.learned_from)
+        .file("sensing", |r| r.sensing.name())
+        .file("object", |r| &r.object);
+    with_scores(objects, |r: &ObjectRow| &r.scores)
+        .interval("iou", |r| r.iou_ci)
+        .interval("class_single", |r| r.class_single_ci)
+        .write(out)?;
+    if !board.localisation.is_empty() {
+        places(&board.localisation).write(out)?;
+    }
+    Ok(())
+}
+
+fn with_scores<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> &'a Scores + Copy + 'a) -> Table<'a, R> {
+    let columns = Scores::COLUMNS.into_iter();
+    columns.fold(table, |table, (name, get)| table.file(name, move |r| get(of(r))))
+}
+
+/// `board.csv`, and what a reader sees of it.
+fn rows<'a>(rows: impl IntoIterator<Item = &'a BoardRow>) -> Table<'a, &'a BoardRow> {
+    let rows: Vec<&BoardRow> = rows.into_iter().collect();
+    let rows_with_remarks = rows.iter().any(|r| r.too_slow == Some(true) || r.failed > 0);
+    let keys = Table::new("board", rows)
+        .file("decoder", |r: &BoardRow| &r.decoder)
+        .file("m", |r| r.m)
+        .file("left_out", |r| r.left_out)
+        .file("learned_from", |r| &r.learned_from)
+        .file("sensing", |r| r.sensing.name());
+    let mut table = with_scores(keys, |r: &BoardRow| &r.scores)
+        .interval("support", |r| r.support_ci)
+        .interval("iou", |r| r.iou_ci)
+        .interval("class_single", |r| r.class_single_ci)
+        .file("decode_us", |r| r.decode_us)
+        .file("acquire_us", |r| r.acquire_us)
+        .file("too_slow", |r| r.too_slow)
+        .file("failed", |r| r.failed)
+        .shown("decoder", |r| short_label(&r.decoder))
+        .shown("learned", |r| &r.learned_from)
+        .shown("rows", |r| r.sensing.name())
+        .shown("M", |r| r.m)
+        .shown("support", |r| r.scores.support)
+        .digits(3)
+        .shown("IoU", |r| r.scores.iou)
+        .digits(3)
+        .shown("(95 %)", |r| Cell::span(r.iou_ci, 3))
+        .shown("F1", |r| r.scores.f1)
+        .digits(3)
+        .shown("single", |r| r.scores.class_single)
+        .digits(3)
+        .shown("vote20", |r| r.scores.class_vote20)
+        .digits(3)
+        .shown("evidence", |r| r.scores.class_evidence)
+        .digits(3)
+        .shown("decode, µs", |r| r.decode_us)
+        .digits(1)
+        .shown("window, µs", |r| r.acquire_us)
+        .digits(0);
+    // a remark on some rows has a column where there are such rows
+    if rows_with_remarks {
+        table = table.shown("", |r| {
+            let slow = if r.too_slow == Some(true) { "TOO SLOW " } else { "" };
+            match r.failed {
+                0 => slow.trim_end().to_owned(),
+                failed => format!("{slow}({failed} windows failed)"),
+            }
+        });
+    }
+    table
+}
+
+/// `localisation.csv`, and what a reader sees of it.
+fn places(rows: &[PlaceRow]) -> Table<'_, &PlaceRow> {
+    Table::new("localisation", rows)
+        .column("contact", "contact", |r| &r.contact)
+        .file("decoder", |r| &r.decoder)
+        .shown("locator", |r| locator_label(&r.decoder))
+        .shown("taxels", |r| if r.relabelled { "relabelled" } else { "as recorded" })
+        .shown("rows", |r| r.sensing.name())
+        .column("m", "M", |r| r.m)
+        .file("relabelled", |r| r.relabelled)
+        .file("sensing", |r| r.sensing.name())
+        .column("mean_px", "mean px", |r| r.mean_px)
+        .digits(2)
+        .column("share_under_1px", "under 1 px", |r| r.share_under_1px)
+        .digits(3)
+}
+
+/// The board as tables: rows with known and with left-out objects, then places, then single objects at the largest M up
+/// to 20.
+#[must_use]
+pub fn table(board: &ScoreBoard) -> String {
+    let mut out = String::new();
+    for (left_out, title) in [
+        (false, "objects that were learned from"),
+        (true, "\nleft out: the object was not learned from"),
+    ] {
+        let own: Vec<&BoardRow> = board.rows.iter().filter(|r| r.left_out == left_out).collect();
+        if !own.is_empty() {
+            out.push_str(&format!("{title}\n{}", rows(own).text()));
+        }
+    }
+    out.push_str("\nclasses: share correct of single windows, of votes of 20, of evidence added over 20; support counts every taxel, so that an empty image is right about all that is not touched\n");
+    if board.rows.iter().any(|r| r.sensing == Sensing::Chosen) {
+        out.push_str("chosen rows: picked from those of a press for what was learned, before a sample is seen; their order in time is lost, and there are no votes\n");
+    }
+    if !board.localisation.is_empty() {
+        out.push_str(&format!("\nplace of contacts\n{}", places(&board.localisation).text()));
+    }
+    out.push_str(&objects(board));
+    out.push_str(&gaps(board));
+    out.truncate(out.trim_end().len());
+    out
+}
+
+/// IoU and single windows, object by object, at one M.
+fn objects(board: &ScoreBoard) -> String {
+    let names = unique(board.objects.iter().map(|row| row.object.as_str()));
+    let (Some(m), true) = (shown_m(board), names.len() > 1) else {
+        return String::new();
+    };
+    let line = |row: &BoardRow| {
+        let learned = if row.left_out { "left out" } else { &row.learned_from };
+        let same = board.objects.iter().filter(|o| {
+            let conditions = (o.m, o.left_out, o.sensing) == (m, row.left_out, row.sensing);
+            conditions && o.decoder == row.decoder && o.learned_from == row.learned_from
+        });
+        let number = |value: Option<f64>, digits: usize| value.map_or("–".to_owned(), |v| format!("{v:.digits$}"));
+        let cells = same.map(|o| format!("{}/{}", number(o.scores.iou, 2), number(o.scores.class_single, 3)));
+        let key = [short_label(&row.decoder), learned, row.sensing.name()].map(str::to_owned);
+        key.into_iter().chain(cells).collect()
+    };
+    let table = TextTable {
+        head: ["decoder", "learned", "rows"]
+            .into_iter()
+            .chain(names)
+            .map(str::to_owned)
+            .collect(),
+        rows: board.rows.iter().filter(|r| r.m == m).map(line).collect(),
+    };
+    format!("\nobject by object at M = {m}: IoU / single windows\n{table}")
+}
+
+/// What learning from elsewhere costs beside learning from the recordings' own raster presses, object by object, at one
+/// M.
+fn gaps(board: &ScoreBoard) -> String {
+    let Some(m) = shown_m(board) else {
+        return String::new();
+    };
+    let elsewhere = |r: &&ObjectRow| r.m == m && ![RASTER, PUBLISHED, "nothing"].contains(&r.learned_from.as_str());
+    let own = |row: &ObjectRow| {
+        let same = |o: &&ObjectRow| {
+            let conditions = (o.m, o.left_out, o.sensing) == (m, row.left_out, row.sensing);
+            conditions && o.decoder == row.decoder && o.learned_from == RASTER && o.object == row.object
+        };
+        board.objects.iter().find(same)
+    };
+    let pairs: Vec<(&ObjectRow, &ObjectRow)> = board
+        .objects
+        .iter()
+        .filter(elsewhere)
+        .filter_map(|row| Some((row, own(row)?)))
+        .collect();
+    if pairs.is_empty() {
+        return String::new();
+    }
+    let gap = |own: Option<f64>, other: Option<f64>| Some(format!("{:+.3}", other? - own?));
+    let table = Table::new("", pairs)
+        .shown("decoder", |(row, _)| short_label(&row.decoder))
+        .shown("learned from", |(row, _)| &row.learned_from)
+        .shown("object", |(row, _)| &row.object)
+        .shown("IoU", |(row, own)| gap(own.scores.iou, row.scores.iou))
+        .shown("single", |(row, own)| {
+            gap(own.scores.class_single, row.scores.class_single)
+        });
+    format!("\ngap to learning from {RASTER} at M = {m}\n{}", table.text())
+}
+
+/// The M of the tables by object: the largest up to 20.
+fn shown_m(board: &ScoreBoard) -> Option<usize> {
+    board.rows.iter().map(|r| r.m).filter(|m| *m <= 20).max()
+}

@@ -1,0 +1,452 @@
+//! Decodes single windows of sessions into image, class and place, and scores them where the ground truth is known.
+
+use crate::algorithm::{Answer, Trained};
+use crate::decoders::{DecoderSpec, Needs};
+use crate::place::{RecordedTouch, find_bounces, find_touches};
+use crate::session::ScoredSession;
+use crate::training::{LearnError, TrainedNetwork, TrainingData};
+use crate::windows::{Untouched, Window};
+use crate::{Labels, unique};
+use npyz::WriterBuilder as _;
+use rayon::prelude::*;
+use serde::Serialize;
+use spts::Session;
+use spts::output::{OutputError, OutputFolder, write_csv};
+use spts::session::Event;
+use spts_circuit::Recording;
+use spts_input::Refusal;
+use spts_models::{SkinLayout, Streams};
+use spts_recon::Workspace;
+use spts_recon::classify::Src;
+use spts_recon::localise::centre_of_mass;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, pearson, support};
+use std::fs::File;
+use std::io;
+use std::io::{BufWriter, Write as _};
+use std::path::Path;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+/// Settings of `spts decode`: decoders, numbers of measurements and windows.
+#[derive(Clone)]
+pub struct DecodeRequest {
+    /// Decoders of the board.
+    pub decoders: Vec<&'static DecoderSpec>,
+    /// Numbers of measurements.
+    pub measurements: Vec<usize>,
+    /// Number of consecutive windows in each block, from the beginning of the hold.
+    pub windows: usize,
+    /// The network for decoders that use one; `None` for the one shipped with the program.
+    pub network: Option<TrainedNetwork>,
+    /// Seed of the procedural shapes that train decoders for unseen objects.
+    pub seed: u64,
+}
+
+/// Decoders trained for a layout, and the classes that they know.
+pub struct LearnedDecoders {
+    trained: Vec<Box<dyn Trained>>,
+    classifier: Option<Src>,
+    classes: Option<Labels>,
+}
+
+/// What one decoder made of one window of a session, and how good it is where the truth is known.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DecodedWindow {
+    /// Name of the session.
+    pub session: String,
+    /// Number of the block, from 0.
+    pub block: usize,
+    /// Number of the window within the block, from 0.
+    pub window: usize,
+    /// Decoder.
+    pub decoder: &'static str,
+    /// Number of measurements.
+    pub m: usize,
+    /// First measurement of the window, within the block.
+    pub start: usize,
+    /// Support accuracy; `None` without ground truth.
+    pub support: Option<f64>,
+    /// Intersection over union of the supports; `None` without ground truth.
+    pub iou: Option<f64>,
+    /// Pearson correlation of the image with the true one; `None` without ground truth, or if either is constant.
+    pub correlation: Option<f64>,
+    /// Class that was found; `None` if the decoder has no classes, or found none.
+    pub label: Option<String>,
+    /// Class of the session's object.
+    pub label_true: String,
+    /// Centre of mass of the image as (row, col), taxels; `None` for an empty image.
+    pub place: Option<[f64; 2]>,
+    /// Tactile image, one value a taxel.
+    #[serde(skip)]
+    pub image: Vec<f64>,
+}
+
+/// All decoded windows of one session, with the true images and what was measured.
+#[derive(Debug, Clone)]
+pub struct DecodedSession {
+    /// Name of the session.
+    pub session: String,
+    /// Rows and columns of the skin.
+    pub shape: [usize; 2],
+    /// Whether the object is one of the trained classes.
+    pub knows_class: bool,
+    /// In order of block, decoder, M, window.
+    pub rows: Vec<DecodedWindow>,
+    /// True image of every block; `None` where it is not known.
+    pub truth: Vec<Option<Vec<f64>>>,
+    /// Measurements of the windows for each M, in order of M, block, window.
+    pub measured: Vec<MeasuredWindow>,
+}
+
+/// The samples of one window with their rows of the sensing matrix: what a decoder is given.
+#[derive(Debug, Clone)]
+pub struct MeasuredWindow {
+    /// Number of the block.
+    pub block: usize,
+    /// Number of the window within the block.
+    pub window: usize,
+    /// Number of measurements.
+    pub m: usize,
+    /// Rows of weights, M × taxels.
+    pub phi: Vec<f64>,
+    /// Output of the summing amplifier minus that of the untouched skin, V.
+    pub y: Vec<f64>,
+}
+
+/// Why a session without a compressive recording is not decoded.
+#[must_use]
+pub fn no_recording(session: &Session) -> Refusal {
+    Refusal::new(format!(
+        "session {:?} has no compressive recording to decode",
+        session.name
+    ))
+}
+
+/// Why `windows` windows of `m` measurements a block are not decoded, of a block of `session` with `most` measurements
+/// from measurement `start` on.
+pub(crate) fn too_many(session: &Session, m: usize, windows: usize, [start, most]: [usize; 2]) -> Refusal {
+    Refusal::new(format!(
+        "`measurements` = {m} in {windows} windows is outside [1, {most}]: a block of session {:?} has {most} \
+         measurements from measurement {start} on",
+        session.name
+    ))
+}
+
+/// Why `decoder` cannot be trained.
+pub(crate) fn untrained(decoder: &str, error: LearnError) -> Refusal {
+    Refusal::from_error(error).at(format_args!("decoder `{decoder}`"))
+}
+
+impl DecodeRequest {
+    /// Default numbers of measurements for a skin of `taxels` taxels: 7, 20 and 50 for 100 taxels, and the same shares
+    /// of other numbers.
+    #[must_use]
+    pub fn default_measurements(taxels: usize) -> Vec<usize> {
+        let mut shares: Vec<usize> = [7, 20, 50].map(|m| (m * taxels).div_ceil(100)).to_vec();
+        shares.dedup();
+        shares
+    }
+
+    /// Shapes on a skin of this `layout`, where a decoder learns from them.
+    fn shapes(&self, layout: &SkinLayout) -> Result<Option<TrainingData>, Refusal> {
+        let Some(spec) = self.decoders.iter().find(|spec| spec.needs == Needs::Shapes) else {
+            return Ok(None);
+        };
+        let data = TrainingData::for_shapes(layout, Streams::new(self.seed));
+        let data = data.map_err(|e| untrained(spec.name, e))?;
+        Ok(Some(data.with_network(self.network.clone())))
+    }
+
+    /// Trains the decoders with `training` for a skin of this `layout`. `classes` are the names of its labels; `None`
+    /// without classes.
+    ///
+    /// # Errors
+    /// [`Refusal`] if one cannot be trained.
+    pub fn learn(
+        &self,
+        layout: &SkinLayout,
+        training: &TrainingData,
+        classes: Option<&Labels>,
+    ) -> Result<LearnedDecoders, Refusal> {
+        let shapes = self.shapes(layout)?;
+        let named = training.clone().with_network(self.network.clone());
+        let trained = self.decoders.iter().map(|spec| {
+            let own = shapes.as_ref().filter(|_| spec.needs == Needs::Shapes);
+            let trained = (spec.train)(own.unwrap_or(&named));
+            trained.map_err(|e| untrained(spec.name, e))
+        });
+        Ok(LearnedDecoders {
+            trained: trained.collect::<Result<_, _>>()?,
+            classifier: classes.map(|_| Src::new(training.library.clone(), Src::PUBLISHED_SPARSITY)),
+            classes: classes.cloned(),
+        })
+    }
+
+    /// Decodes every block of `session` with the decoders `learned` for its layout.
+    ///
+    /// # Errors
+    /// [`Refusal`] if there is no recording, or the windows do not fit.
+    pub fn decode(&self, session: &Session, learned: &LearnedDecoders) -> Result<DecodedSession, Refusal> {
+        let Some(recording) = session.compressive() else {
+            return Err(no_recording(session));
+        };
+        let scored = ScoredSession::new(session.clone(), 0);
+        let begins = begins(session, recording, &scored);
+        for &m in &self.measurements {
+            for &(start, _) in &begins {
+                let most = recording.blocks()[0].volts.len() - start;
+                if m == 0 || m * self.windows > most {
+                    return Err(too_many(session, m, self.windows, [start, most]));
+                }
+            }
+        }
+        let layout = recording.layout();
+        let longest = self.measurements.iter().copied().max().unwrap_or(0) * self.windows;
+        let judge = Judge {
+            session,
+            scored: &scored,
+            classifier: learned.classifier.as_ref(),
+            classes: learned.classes.as_ref(),
+        };
+        let blocks = begins.par_iter().enumerate().map(|(block, &(start, ref untouched))| {
+            let range = start..start + longest;
+            let press = untouched.press(recording, block, range);
+            let all = |m: usize| press.windows(0..m * self.windows, m, m);
+            let measured = self
+                .measurements
+                .iter()
+                .flat_map(|&m| all(m))
+                .map(|(at, window)| MeasuredWindow {
+                    block,
+                    window: at / window.y.len(),
+                    m: window.y.len(),
+                    phi: window.phi.values().to_vec(),
+                    y: window.y.to_vec(),
+                });
+            let measured: Vec<MeasuredWindow> = measured.collect();
+            let mut rows = Vec::new();
+            for (spec, trained) in self.decoders.iter().zip(&learned.trained) {
+                let mut algorithm = trained.start();
+                for &m in &self.measurements {
+                    let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = all(m).unzip();
+                    let answers = starts
+                        .iter()
+                        .zip(algorithm.decode_all(&windows).map_err(Refusal::from_error)?);
+                    rows.extend(answers.map(|(&at, answer)| DecodedWindow {
+                        window: at / m,
+                        decoder: spec.name,
+                        m,
+                        start: start + at,
+                        ..judge.judged(block, answer)
+                    }));
+                }
+            }
+            Ok((rows, measured, scored.truth(block).map(|truth| truth.image)))
+        });
+        let blocks = blocks.collect::<Result<Vec<_>, Refusal>>()?;
+        let mut decoded = DecodedSession {
+            session: session.name.clone(),
+            shape: [layout.rows(), layout.cols()],
+            knows_class: learned
+                .classes
+                .as_ref()
+                .is_some_and(|classes| classes.number(&session.object).is_some()),
+            rows: Vec::new(),
+            truth: Vec::new(),
+            measured: Vec::new(),
+        };
+        for (rows, measured, truth) in blocks {
+            decoded.rows.extend(rows);
+            decoded.measured.extend(measured);
+            decoded.truth.push(truth);
+        }
+        decoded.measured.sort_by_key(|m| (m.m, m.block, m.window));
+        Ok(decoded)
+    }
+}
+
+/// What an answer is held against.
+struct Judge<'a> {
+    session: &'a Session,
+    scored: &'a ScoredSession,
+    classifier: Option<&'a Src>,
+    classes: Option<&'a Labels>,
+}
+
+impl Judge<'_> {
+    /// The answer to a window of block `block`, scored; what names the window is left empty.
+    fn judged(&self, block: usize, answer: Answer) -> DecodedWindow {
+        let class = match (answer.class, self.classifier) {
+            (Some(class), Some(_)) => class.label(),
+            (None, Some(classifier)) => {
+                let class = classifier.classify(&answer.image, &mut Workspace::default());
+                class.ok().flatten()
+            }
+            (_, None) => None,
+        };
+        let truth = self.scored.truth(block);
+        let truth = truth.filter(|truth| truth.image.len() == answer.image.len());
+        let mut mask = Vec::new();
+        support(&answer.image, SUPPORT_THRESHOLD, &mut mask);
+        let score = truth.as_ref().map(|truth| SupportScore::new(&mask, &truth.support));
+        let cols = self.session.layout().map_or(1, SkinLayout::cols);
+        DecodedWindow {
+            session: self.session.name.clone(),
+            block,
+            window: 0,
+            decoder: "",
+            m: 0,
+            start: 0,
+            support: score.map(|s| s.accuracy),
+            iou: score.map(|s| s.iou),
+            correlation: truth.and_then(|truth| pearson(&answer.image, &truth.image)),
+            label: self.classes.and_then(|labels| labels.name(class?)).map(str::to_owned),
+            label_true: self.session.object.clone(),
+            place: centre_of_mass(&answer.image, cols, SUPPORT_THRESHOLD),
+            image: answer.image,
+        }
+    }
+}
+
+/// First measurement of the hold of every block, and the untouched skin before it. It is the first of the contact where
+/// something fell on the skin, or touched one that is under preload.
+fn begins(session: &Session, recording: &Recording, scored: &ScoredSession) -> Vec<(usize, Untouched)> {
+    let hold = scored.protocol.first_frame * recording.measurements_per_frame();
+    let contacts = match session.event {
+        Event::Drop => find_bounces(recording),
+        Event::Press | Event::Touch => Vec::new(),
+    };
+    let touches = match session.event {
+        Event::Touch => find_touches(recording),
+        Event::Press | Event::Drop => Vec::new(),
+    };
+    let begin = |block: usize| {
+        let preloaded = |touch: &&RecordedTouch| touch.block == block && touch.untouched.image.is_some();
+        if let Some(touch) = touches.iter().find(preloaded) {
+            return (touch.start, touch.untouched.clone());
+        }
+        let contact = contacts.iter().find(|contact| contact.block == block);
+        let start = contact.map_or(hold, |contact| contact.start);
+        (start, Untouched::of(recording, block))
+    };
+    (0..recording.blocks().len()).map(begin).collect()
+}
+
+/// Columns of `windows.csv`.
+const COLUMNS: [&str; 13] = [
+    "session",
+    "block",
+    "window",
+    "decoder",
+    "m",
+    "start",
+    "support",
+    "iou",
+    "correlation",
+    "label",
+    "label_true",
+    "row",
+    "col",
+];
+
+/// Names of the result files that do not depend on the session.
+pub const FILES: &[&str] = &["windows.csv"];
+
+/// Writes `windows.csv` and one `NAME.npz` for each session into the folder `out`.
+///
+/// # Errors
+/// [`OutputError`] if a file cannot be written.
+pub fn write(decoded: &[(&Session, DecodedSession)], out: &mut OutputFolder) -> Result<(), OutputError> {
+    let rows = decoded.iter().flat_map(|(_, session)| &session.rows);
+    let line = |r: &DecodedWindow| {
+        let [row, col] = r.place.map_or([None; 2], |place| place.map(Some));
+        let key = (r.session.clone(), r.block, r.window, r.decoder, r.m, r.start);
+        (
+            key,
+            (r.support, r.iou, r.correlation),
+            (r.label.clone(), r.label_true.clone()),
+            (row, col),
+        )
+    };
+    write_csv(&out.path("windows.csv"), &COLUMNS, rows.map(line))?;
+    for (_, session) in decoded {
+        write_arrays(&out.path(&format!("{}.npz", session.session)), session)?;
+    }
+    Ok(())
+}
+
+/// Writes the archive `path`. For every M: `phi_mM` (windows × M × taxels), `y_mM` (windows × M, V), `block_mM` and
+/// `window_mM`, and for every decoder `image_DECODER_mM` (windows × rows × cols). `truth` is blocks × rows × cols, NaN
+/// where none is known.
+///
+/// # Errors
+/// [`OutputError`] when the file cannot be written.
+fn write_arrays(path: &Path, session: &DecodedSession) -> Result<(), OutputError> {
+    let [rows, cols] = session.shape;
+    let taxels = rows * cols;
+    let mut arrays: Vec<(String, Vec<usize>, Vec<f64>)> = Vec::new();
+    let mut sizes: Vec<usize> = session.measured.iter().map(|w| w.m).collect();
+    sizes.dedup();
+    for m in sizes {
+        let windows: Vec<_> = session.measured.iter().filter(|w| w.m == m).collect();
+        let n = windows.len();
+        let column = |of: fn(&MeasuredWindow) -> usize| windows.iter().map(|w| of(w) as f64).collect();
+        arrays.push((
+            format!("phi_m{m}"),
+            vec![n, m, taxels],
+            windows.iter().flat_map(|w| w.phi.clone()).collect(),
+        ));
+        arrays.push((
+            format!("y_m{m}"),
+            vec![n, m],
+            windows.iter().flat_map(|w| w.y.clone()).collect(),
+        ));
+        arrays.push((format!("block_m{m}"), vec![n], column(|w| w.block)));
+        arrays.push((format!("window_m{m}"), vec![n], column(|w| w.window)));
+        let decoders = unique(session.rows.iter().filter(|row| row.m == m).map(|row| row.decoder));
+        for decoder in decoders {
+            let of = session.rows.iter().filter(|row| row.m == m && row.decoder == decoder);
+            let mut of: Vec<_> = of.collect();
+            of.sort_by_key(|row| (row.block, row.window));
+            let mut images = Vec::with_capacity(of.len() * taxels);
+            for row in &of {
+                // a decoder that answers labels only has no image
+                let mut image = row.image.clone();
+                image.resize(taxels, f64::NAN);
+                images.extend(image);
+            }
+            arrays.push((format!("image_{decoder}_m{m}"), vec![of.len(), rows, cols], images));
+        }
+    }
+    let unknown = vec![f64::NAN; taxels];
+    let truth = session
+        .truth
+        .iter()
+        .flat_map(|t| t.as_ref().unwrap_or(&unknown).clone())
+        .collect();
+    arrays.push(("truth".to_owned(), vec![session.truth.len(), rows, cols], truth));
+    write_npz(path, &arrays).map_err(|source| OutputError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+/// Writes a NumPy archive of arrays of doubles, each with its name and its shape, without compression.
+fn write_npz(path: &Path, arrays: &[(String, Vec<usize>, Vec<f64>)]) -> io::Result<()> {
+    let mut zip = ZipWriter::new(BufWriter::new(File::create(path)?));
+    let stored = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .large_file(true);
+    for (name, shape, values) in arrays {
+        zip.start_file(format!("{name}.npy"), stored)?;
+        let shape: Vec<u64> = shape.iter().map(|n| *n as u64).collect();
+        let mut writer = npyz::WriteOptions::new()
+            .default_dtype()
+            .shape(&shape)
+            .writer(&mut zip)
+            .begin_nd()?;
+        writer.extend(values.iter().copied())?;
+        writer.finish()?;
+    }
+    zip.finish()?.flush()
+}

@@ -1,0 +1,250 @@
+//! Which measurements of a recording form a window: consecutive ones, or those with selected rows.
+//!
+//! A held press contains thousands of random rows of a constant image. Any set of rows that a rule selects without
+//! looking at the samples can therefore be scored on real samples. The order in time is lost: memory effects of the
+//! cells, and changes during the press, are those of the recording and not of the window.
+
+use crate::training::{LearnError, TrainingData, in_rows, in_templates};
+use crate::windows::Press;
+use serde::{Deserialize, Serialize};
+use spts_input::Refusal;
+use spts_recon::classify::{Component, TemplateModel};
+use spts_recon::localise::BlobConfig;
+use spts_recon::recover::ImagePrior;
+use spts_recon::rows::{Expected, RowTask, Tolerances, choose_for_classes, choose_for_images};
+use spts_recon::{Matrix, MatrixView};
+
+/// How the rows of a window are obtained.
+///
+/// ```
+/// use spts_eval::Sensing;
+///
+/// assert_eq!(Sensing::ALL.map(Sensing::name), ["random", "chosen"]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sensing {
+    /// Consecutive measurements, with the rows that the cells put out.
+    #[default]
+    Random,
+    /// Rows selected from those of a press for the decoder's training data, before any sample is used.
+    Chosen,
+}
+
+impl Sensing {
+    /// Both ways.
+    pub const ALL: [Self; 2] = [Self::Random, Self::Chosen];
+
+    /// Name on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Random => "random",
+            Self::Chosen => "chosen",
+        }
+    }
+}
+
+/// Windows of a press: candidates are every so many rows, beginning with each of the first so many.
+const OFFSETS: usize = 3;
+
+/// Share of the scored frames that candidates come from: the first 150 of 200 published ones, before a press yields.
+const CANDIDATES: [usize; 2] = [3, 4];
+
+/// Noise of a measurement that rows are chosen with, as a share of the root mean square of a random row's sum.
+const NOISE: f64 = RowTask::NOISE;
+
+/// Selects rows for the training data of a decoder. It knows neither the scored object nor any sample.
+#[derive(Debug, Clone)]
+pub struct RowChooser {
+    images: Expected,
+    classes: Vec<Component>,
+}
+
+impl RowChooser {
+    /// A chooser for images and classes like those of `data`.
+    ///
+    /// # Errors
+    /// [`LearnError`] if they make no prior.
+    pub fn new(data: &TrainingData) -> Result<Self, LearnError> {
+        let prior = data.prior(ImagePrior::UNSEEN)?;
+        let templates = &data.templates;
+        let mut labels = templates.labels().to_vec();
+        labels.sort_unstable();
+        labels.dedup();
+        let classes = if labels.len() > 1 {
+            TemplateModel::new(data.shape[1])
+                .classes(templates)
+                .map_err(in_templates)?
+        } else {
+            Vec::new()
+        };
+        Ok(Self {
+            images: Expected::like(&prior, data.shape, Tolerances::default()).map_err(in_rows)?,
+            classes,
+        })
+    }
+
+    /// Three windows of `press`, each of up to `most` measurements in the order of their choice: for images, and for
+    /// classes; without `classes`, those for images again.
+    ///
+    /// # Errors
+    /// [`Refusal`] when the rows have another number of taxels than the images.
+    pub(crate) fn windows(&self, press: &Press, most: usize, classes: bool) -> Result<[Vec<Press>; 2], Refusal> {
+        let [share, of] = CANDIDATES;
+        let pool = (press.len() * share / of).max(1).min(press.len());
+        let task = task(&self.images, &self.classes);
+        let images = chosen(press, pool, most, |rows, m| {
+            choose_for_images(&RowTask { rows: m, ..task }, rows)
+        })?;
+        let classes = if classes && !self.classes.is_empty() {
+            chosen(press, pool, most, |rows, m| {
+                choose_for_classes(&RowTask { rows: m, ..task }, rows)
+            })?
+        } else {
+            images.clone()
+        };
+        Ok([images, classes])
+    }
+}
+
+fn task<'a>(expected: &'a Expected, classes: &'a [Component]) -> RowTask<'a> {
+    RowTask {
+        classes,
+        noise: NOISE,
+        ..RowTask::new(1, expected)
+    }
+}
+
+/// Windows of `press` whose rows tell places of blobs, of up to `most` measurements each.
+///
+/// # Errors
+/// [`Refusal`] when the rows do not fill the sheet.
+pub(crate) fn chosen_places(press: &Press, shape: [usize; 2], most: usize) -> Result<Vec<Press>, Refusal> {
+    let blobs = blobs(shape);
+    let how = ImagePrior {
+        reach: 0,
+        stay: 1.0,
+        threshold: 0.0,
+        ..ImagePrior::UNSEEN
+    };
+    let prior = how.learn(&blobs, shape[1])?;
+    let expected = Expected::like(&prior, shape, Tolerances::default())?;
+    let task = task(&expected, &[]);
+    chosen(press, press.len(), most, |rows, m| {
+        choose_for_images(&RowTask { rows: m, ..task }, rows)
+    })
+}
+
+/// One round blob at every taxel, of every width that the locator knows.
+fn blobs(shape: [usize; 2]) -> Matrix {
+    let [rows, cols] = shape;
+    let widths = BlobConfig::new(rows, cols).widths_px;
+    let blob = |width: f64, centre: usize| {
+        let at = |k: usize| {
+            let d = ((k / cols) as f64 - (centre / cols) as f64).hypot((k % cols) as f64 - (centre % cols) as f64);
+            (-0.5 * (d / width).powi(2)).exp()
+        };
+        (0..rows * cols).map(at).collect::<Vec<f64>>()
+    };
+    let all = widths
+        .iter()
+        .flat_map(|&width| (0..rows * cols).map(move |centre| (width, centre)));
+    let images: Vec<Vec<f64>> = all.map(|(width, centre)| blob(width, centre)).collect();
+    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
+    Matrix::from_column_slices(rows * cols, &slices)
+}
+
+/// A window for every offset: up to `most` of every third of the first `pool` measurements, chosen by `choose`. A
+/// measurement that was lost is no candidate.
+fn chosen(
+    press: &Press,
+    pool: usize,
+    most: usize,
+    choose: impl Fn(MatrixView<'_>, usize) -> Result<Vec<usize>, Refusal>,
+) -> Result<Vec<Press>, Refusal> {
+    let mut windows = Vec::with_capacity(OFFSETS);
+    for offset in 0..OFFSETS {
+        let candidates: Vec<usize> = (offset..pool)
+            .step_by(OFFSETS)
+            .filter(|k| press.window(*k, 1).is_some())
+            .collect();
+        if candidates.is_empty() {
+            continue;
+        }
+        let there = press.picked(&candidates);
+        let Some(all) = there.window(0, candidates.len()) else {
+            continue;
+        };
+        let order = choose(all.phi, most.min(candidates.len()))?;
+        windows.push(there.picked(&order));
+    }
+    Ok(windows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::windows::PressRows;
+    use spts_recon::rows::{DesignRows as _, Random};
+    use std::sync::Arc;
+
+    const SHAPE: [usize; 2] = [4, 4];
+
+    fn press(volts: Vec<f64>) -> Press {
+        let expected = Expected::smooth(SHAPE, 1.0).unwrap();
+        let rows = Random.design(&RowTask::new(volts.len(), &expected)).unwrap();
+        Press::on(Arc::new(PressRows::of_matrix(&rows)), volts, 0.0)
+    }
+
+    fn windows(volts: Vec<f64>, most: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
+        let found = chosen_places(&press(volts), SHAPE, most).unwrap();
+        let all = found.iter().map(|press| press.window(0, most).unwrap());
+        all.map(|w| (w.phi.values().to_vec(), w.y.to_vec())).collect()
+    }
+
+    /// The measurement whose sample is its number.
+    fn number(sample: f64) -> usize {
+        (0..90)
+            .position(|k| f64::from(k).to_bits() == sample.to_bits())
+            .unwrap()
+    }
+
+    /// Other samples at the same rows are no reason for another choice, and each sample stays with its row.
+    #[test]
+    fn the_choice_sees_no_sample() {
+        let (count, most) = (90, 6);
+        let first = windows((0..count).map(f64::from).collect(), most);
+        let second = windows((0..count).map(|k| f64::from((k * 37) % 50) - 20.0).collect(), most);
+        assert_eq!(first.len(), OFFSETS);
+        let all = press((0..count).map(f64::from).collect());
+        for (offset, ((phi, y), (other, _))) in first.iter().zip(&second).enumerate() {
+            assert_eq!(phi, other);
+            for (row, sample) in phi.chunks_exact(16).zip(y) {
+                let at = number(*sample);
+                assert_eq!(at % OFFSETS, offset);
+                assert_eq!(all.window(at, 1).unwrap().phi.values(), row);
+            }
+        }
+    }
+
+    /// A window of fewer measurements begins the longer one; a lost sample is in none.
+    #[test]
+    fn the_first_rows_are_a_choice_of_their_own_and_lost_samples_are_no_candidates() {
+        let all: Vec<f64> = (0..90).map(f64::from).collect();
+        let long = windows(all.clone(), 6);
+        for (short, long) in windows(all.clone(), 3).iter().zip(&long) {
+            assert_eq!((&short.0[..], &short.1[..]), (&long.0[..48], &long.1[..3]));
+        }
+        let mut lost = all;
+        long.iter().for_each(|(_, y)| lost[number(y[0])] = f64::NAN);
+        for ((_, y), (_, before)) in windows(lost, 6).iter().zip(&long) {
+            assert!(y.iter().all(|v| v.is_finite() && v.to_bits() != before[0].to_bits()));
+        }
+    }
+
+    #[test]
+    fn a_press_without_samples_has_no_windows() {
+        assert!(chosen_places(&press(vec![f64::NAN; 9]), SHAPE, 4).unwrap().is_empty());
+    }
+}
