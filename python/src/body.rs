@@ -1,7 +1,7 @@
 //! What touches a skin.
 
-use crate::refuse::refuse;
-use crate::skin::triples;
+use crate::args::{Array2, triples};
+use crate::common::refuse;
 use numpy::{
     AllowTypeChange, IntoPyArray as _, PyArray2, PyArrayLike2, PyArrayMethods as _, PyUntypedArrayMethods as _,
 };
@@ -49,9 +49,7 @@ impl Body {
     fn new(mesh: TriMesh, stiffness: Option<f64>) -> PyResult<Self> {
         let stiffness_pa_per_m = stiffness.unwrap_or(f64::INFINITY);
         if !(1e4..=f64::INFINITY).contains(&stiffness_pa_per_m) {
-            return Err(refuse(format!(
-                "`stiffness` = {stiffness_pa_per_m} is outside [1e4, inf] Pa/m"
-            )));
+            bail!("`stiffness` = {stiffness_pa_per_m} is outside [1e4, inf] Pa/m");
         }
         Ok(Self {
             body: PreparedMesh::from(mesh).into(),
@@ -67,7 +65,7 @@ impl Body {
     #[pyo3(signature = (path, scale = 1.0, stiffness = None))]
     fn from_mesh(py: Python<'_>, path: PathBuf, scale: f64, stiffness: Option<f64>) -> PyResult<Self> {
         if !(scale > 0.0 && scale <= 1e3) {
-            return Err(refuse(format!("`scale` = {scale} is outside (0, 1000]")));
+            bail!("`scale` = {scale} is outside (0, 1000]");
         }
         let (mesh, report) = load(&path, scale).map_err(refuse)?;
         for note in report.notes() {
@@ -88,13 +86,11 @@ impl Body {
         let vertices = triples("vertices", &vertices)?;
         if faces.shape()[1] != 3 || faces.shape()[0] == 0 || vertices.is_empty() {
             let (points, shape) = (vertices.len(), faces.shape());
-            return Err(refuse(format!(
-                "`faces` has shape {shape:?} and `vertices` {points} rows; (n, 3) with n > 0 is needed of both"
-            )));
+            bail!("`faces` has shape {shape:?} and `vertices` {points} rows; (n, 3) with n > 0 is needed of both");
         }
         if let Some(i) = vertices.iter().position(|v| !v.iter().all(|x| x.abs() <= 1e3)) {
             let v = vertices[i];
-            return Err(refuse(format!("`vertices[{i}]` = {v:?} is outside [-1000, 1000] m")));
+            bail!("`vertices[{i}]` = {v:?} is outside [-1000, 1000] m");
         }
         let mut triangles = Vec::with_capacity(faces.shape()[0]);
         for (i, row) in faces.as_array().rows().into_iter().enumerate() {
@@ -110,9 +106,7 @@ impl Body {
         }
         let mesh = TriMesh { vertices, triangles };
         if mesh.volume_m3() < 0.0 {
-            return Err(refuse(
-                "`faces` run clockwise seen from outside: swap two of their columns",
-            ));
+            bail!("`faces` run clockwise seen from outside: swap two of their columns");
         }
         Self::new(mesh, stiffness)
     }
@@ -168,8 +162,7 @@ impl Body {
 
     /// Vertices (V, 3), m, and faces (F, 3), counter-clockwise seen from outside.
     #[getter]
-    #[expect(clippy::type_complexity, reason = "a pair of arrays")]
-    fn mesh<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<i64>>)> {
+    fn mesh<'py>(&self, py: Python<'py>) -> PyResult<(Array2<'py>, Bound<'py, PyArray2<i64>>)> {
         let mesh = &self.body.mesh;
         let vertices: Vec<f64> = mesh.vertices.iter().flatten().copied().collect();
         let faces: Vec<i64> = mesh.triangles.iter().flatten().map(|k| i64::from(*k)).collect();

@@ -1,8 +1,6 @@
 //! Data sets: their folders, made and read.
 
-use crate::interrupt::stoppable;
-use crate::refuse::refuse;
-use crate::value::table;
+use crate::common::{refuse, stoppable, table};
 use numpy::{IntoPyArray as _, PyArray2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -1,9 +1,8 @@
 //! Decoders that have learned.
 
-use crate::refuse::refuse;
-use numpy::{
-    IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
-};
+use crate::args::Array2;
+use crate::common::refuse;
+use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use spts::SkinLayout;
 use spts::models::Streams;
@@ -39,7 +38,11 @@ const SLICE: usize = 256;
 #[pyclass(frozen, module = "spts")]
 pub(crate) struct Decoder {
     trained: Box<dyn Trained>,
+    /// Name of the algorithm.
+    #[pyo3(get)]
     name: &'static str,
+    /// Rows and columns of taxels.
+    #[pyo3(get)]
     shape: (usize, usize),
 }
 
@@ -56,13 +59,11 @@ impl Decoder {
     ) -> PyResult<Self> {
         let Some(spec) = find(name) else {
             let known: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
-            return Err(refuse(format!("`decoder` = \"{name}\"; valid: {}", known.join(", "))));
+            bail!("`decoder` = \"{name}\"; valid: {}", known.join(", "));
         };
         let taxels = shape.0.saturating_mul(shape.1);
         if taxels == 0 || taxels > MOST_TAXELS {
-            return Err(refuse(format!(
-                "`shape` = {shape:?}: its taxels are outside [1, {MOST_TAXELS}]"
-            )));
+            bail!("`shape` = {shape:?}: its taxels are outside [1, {MOST_TAXELS}]");
         }
         let learned = match &images {
             Some(images) => {
@@ -71,9 +72,7 @@ impl Decoder {
                 py.detach(|| TrainingData::of_images(images, &labels, shape.1, Streams::new(0)))
             }
             None if spec.needs == Needs::Classes => {
-                return Err(refuse(format!(
-                    "`images`: \"{name}\" learns from raster images of named objects"
-                )));
+                bail!("`images`: \"{name}\" learns from raster images of named objects");
             }
             None => {
                 let layout = SkinLayout::with_pitch(shape.0, shape.1, 0.015).map_err(refuse)?;
@@ -97,7 +96,7 @@ impl Decoder {
         py: Python<'py>,
         phi: PyReadonlyArray2<'_, f64>,
         y: PyReadonlyArray1<'_, f64>,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    ) -> PyResult<Array2<'py>> {
         let rows = self.rows_of(
             phi.as_array().rows().into_iter().flatten().copied(),
             phi.as_array().dim(),
@@ -119,19 +118,16 @@ impl Decoder {
 
     /// Images and classes of n windows: `phi` (n, M, taxels), `y` (n, M); images (n, taxels), and classes (n,), -1 for
     /// none. A window that cannot be decoded has an empty image and no class.
-    #[expect(clippy::type_complexity, reason = "a pair of arrays")]
     fn decode_all<'py>(
         &self,
         py: Python<'py>,
         phi: PyReadonlyArray3<'_, f64>,
         y: PyReadonlyArray2<'_, f64>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<i64>>)> {
+    ) -> PyResult<(Array2<'py>, Bound<'py, PyArray1<i64>>)> {
         let (count, m, taxels) = phi.as_array().dim();
         let found = y.as_array().dim();
         if found != (count, m) {
-            return Err(refuse(format!(
-                "`y` has shape {found:?}; ({count}, {m}) is needed, as `phi` has it"
-            )));
+            bail!("`y` has shape {found:?}; ({count}, {m}) is needed, as `phi` has it");
         }
         let own = self.shape.0 * self.shape.1;
         let mut images = Vec::with_capacity(count * own);
@@ -163,18 +159,6 @@ impl Decoder {
         Ok((images.into_pyarray(py).reshape([count, own])?, classes.into_pyarray(py)))
     }
 
-    /// Name of the algorithm.
-    #[getter]
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    /// Rows and columns of taxels.
-    #[getter]
-    fn shape(&self) -> (usize, usize) {
-        self.shape
-    }
-
     fn __repr__(&self) -> String {
         format!(
             "<spts decoder {} for {} x {} taxels>",
@@ -188,18 +172,11 @@ impl Decoder {
     fn rows_of(&self, values: impl Iterator<Item = f64>, dim: (usize, usize)) -> PyResult<(Matrix, usize)> {
         let taxels = self.shape.0 * self.shape.1;
         if dim.0 == 0 || dim.1 != taxels {
-            return Err(refuse(format!(
-                "`phi` has shape {dim:?}; (M, {taxels}) with M > 0 is needed"
-            )));
+            bail!("`phi` has shape {dim:?}; (M, {taxels}) with M > 0 is needed");
         }
         let values: Vec<f64> = values.collect();
         if let Some(k) = values.iter().position(|v| !v.is_finite()) {
-            return Err(refuse(format!(
-                "`phi[{}, {}]` = {} is not finite",
-                k / taxels,
-                k % taxels,
-                values[k]
-            )));
+            bail!("`phi[{}, {}]` = {} is not finite", k / taxels, k % taxels, values[k]);
         }
         Ok((Matrix::from_rows(dim.0, taxels, values).map_err(refuse)?, dim.0))
     }
@@ -218,14 +195,11 @@ impl Decoder {
 /// Measurements, checked; `m` are needed.
 fn measured(values: impl ExactSizeIterator<Item = f64>, m: usize) -> PyResult<Vec<f64>> {
     if values.len() != m {
-        return Err(refuse(format!(
-            "`y` has {} values; {m} are needed, one a row of Φ",
-            values.len()
-        )));
+        bail!("`y` has {} values; {m} are needed, one a row of Φ", values.len());
     }
     let values: Vec<f64> = values.collect();
     if let Some(k) = values.iter().position(|v| !v.is_finite()) {
-        return Err(refuse(format!("`y[{k}]` = {} is not finite", values[k])));
+        bail!("`y[{k}]` = {} is not finite", values[k]);
     }
     Ok(values)
 }
@@ -235,12 +209,10 @@ fn images_in(images: &PyReadonlyArray2<'_, f64>, taxels: usize) -> PyResult<Matr
     let images = images.as_array();
     let dim = images.dim();
     if dim.0 == 0 || dim.1 != taxels {
-        return Err(refuse(format!(
-            "`images` has shape {dim:?}; (n, {taxels}) with n > 0 is needed"
-        )));
+        bail!("`images` has shape {dim:?}; (n, {taxels}) with n > 0 is needed");
     }
     if let Some(((k, taxel), v)) = images.indexed_iter().find(|(_, v)| !v.is_finite()) {
-        return Err(refuse(format!("`images[{k}, {taxel}]` = {v} is not finite")));
+        bail!("`images[{k}, {taxel}]` = {v} is not finite");
     }
     let columns: Vec<Vec<f64>> = images.rows().into_iter().map(|row| row.to_vec()).collect();
     let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
@@ -254,10 +226,7 @@ fn labels_in(labels: Option<PyReadonlyArray1<'_, i64>>, count: usize) -> PyResul
     };
     let labels = labels.as_array();
     if labels.len() != count {
-        return Err(refuse(format!(
-            "`labels` has {} values; {count} are needed, one an image",
-            labels.len()
-        )));
+        bail!("`labels` has {} values; {count} are needed, one an image", labels.len());
     }
     let label = |label: &i64| usize::try_from(*label).map_err(|_| refuse(format!("`labels` = {label} is below 0")));
     labels.iter().map(label).collect()
@@ -281,7 +250,7 @@ impl ImageClassifier {
         let images = images_in(&images, pixels)?;
         let labels = labels_in(Some(labels), images.ncols())?;
         if !(1..=1024).contains(&sparsity) {
-            return Err(refuse(format!("`sparsity` = {sparsity} is outside [1, 1024]")));
+            bail!("`sparsity` = {sparsity} is outside [1, 1024]");
         }
         let library = Library::new(&images, &labels).map_err(refuse)?;
         Ok(Self(Src::new(library, sparsity)))

@@ -1,30 +1,26 @@
 //! Python bindings of the tactile-skin twin: the module `spts._spts`.
 
+#[macro_use]
+mod common;
+mod args;
 mod body;
-mod command;
-mod count;
 mod dataset;
 mod decode;
-mod interrupt;
 mod mount;
-mod pose;
 mod recorded;
-mod refuse;
-mod score;
 mod scorer;
 mod skin;
-mod value;
 mod wire;
 
 use pyo3::prelude::*;
+use spts_dataset::NAMED_SPECS;
+use std::ffi::OsString;
 
 /// What the package `spts` is made of.
 #[pymodule]
 mod _spts {
     #[pymodule_export]
     use super::body::Body;
-    #[pymodule_export]
-    use super::command::{command_line, shipped_specs};
     #[pymodule_export]
     use super::dataset::DataFolder;
     #[pymodule_export]
@@ -34,11 +30,24 @@ mod _spts {
     #[pymodule_export]
     use super::recorded::{Recording, Session, load};
     #[pymodule_export]
-    use super::score::support_scores;
-    #[pymodule_export]
-    use super::scorer::score_sessions;
+    use super::scorer::{score_sessions, support_scores};
     #[pymodule_export]
     use super::skin::{Skin, Touch};
     #[pymodule_export]
     use super::wire::Wire;
+    #[pymodule_export]
+    use super::{command_line, shipped_specs};
+}
+
+/// Runs the command line `arguments`, the first of which is the program's name; its exit status. Ctrl-C ends the
+/// process.
+#[pyfunction]
+fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| spts_cli::main_with(arguments))
+}
+
+/// Names of the specs that ship.
+#[pyfunction]
+fn shipped_specs() -> Vec<&'static str> {
+    NAMED_SPECS.iter().map(|(name, _)| *name).collect()
 }

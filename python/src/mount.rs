@@ -1,7 +1,8 @@
 //! A skin on a link of somebody's MuJoCo model, by the arrays of its data.
 
+use crate::args::Array1;
 use crate::body::Body;
-use crate::refuse::refuse;
+use crate::common::refuse;
 use crate::skin::{Placed, Skin, Touch};
 use numpy::{PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
@@ -75,7 +76,7 @@ impl Mount {
             .chain([link])
             .chain(roots.iter().copied());
         if !fits || site >= sites || numbers.max().is_some_and(|most| most >= count) {
-            return Err(refuse("`data` is not of this model"));
+            bail!("`data` is not of this model");
         }
         let (bodies, shapes) = bodies.into_iter().unzip();
         Ok(Self {
@@ -108,8 +109,7 @@ impl Mount {
 
     /// Lets the bodies touch the skin, `dt` s after the last time; the touch, and for every body and the skin's link
     /// its number, and force and torque about its centre of mass in the world's frame (6,).
-    #[expect(clippy::type_complexity, reason = "a pair")]
-    fn loads<'py>(&self, py: Python<'py>, dt: f64) -> PyResult<(Touch, Vec<(usize, Bound<'py, PyArray1<f64>>)>)> {
+    fn loads<'py>(&self, py: Python<'py>, dt: f64) -> PyResult<(Touch, Vec<(usize, Array1<'py>)>)> {
         let (touch, loads) = self.felt(py, dt)?;
         let loads = loads
             .into_iter()
@@ -149,7 +149,7 @@ impl Mount {
             let force = turned(&frame, wrench.force_n);
             let about_origin = turned(&frame, wrench.torque_nm);
             if !force.iter().chain(&about_origin).all(|v| v.is_finite()) {
-                return Err(refuse(format!("body {body} has a pose or velocity that is not finite")));
+                bail!("body {body} has a pose or velocity that is not finite");
             }
             let at = row(&xpos, *body);
             let about = |centre: Vector| plus(about_origin, cross(minus(at, centre), force));

@@ -1,8 +1,8 @@
 //! Sessions: recordings of the real skin or of the twin.
 
-use crate::count::whole;
-use crate::refuse::refuse;
-use numpy::{IntoPyArray as _, PyArray1, PyArray2, PyArray3, PyArrayMethods as _};
+use crate::args::{Array1, Array2, Array3, whole};
+use crate::common::refuse;
+use numpy::{IntoPyArray as _, PyArrayMethods as _};
 use pyo3::prelude::*;
 use spts::circuit::Recording as Samples;
 use spts::data::SessionSet;
@@ -143,7 +143,7 @@ impl Recording {
 
     /// All samples, V, (blocks, measurements); NaN where one was lost.
     #[getter]
-    fn volts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn volts<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
         let blocks = self.samples().blocks();
         let all: Vec<f64> = blocks.iter().flat_map(|block| block.volts.iter().copied()).collect();
         all.into_pyarray(py).reshape([blocks.len(), blocks[0].volts.len()])
@@ -151,7 +151,7 @@ impl Recording {
 
     /// Output of the untouched skin before each block, V, (blocks,).
     #[getter]
-    fn idle<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn idle<'py>(&self, py: Python<'py>) -> Array1<'py> {
         let samples = self.samples();
         let idle: Vec<f64> = (0..samples.blocks().len())
             .map(|block| idle_mean(samples, block))
@@ -170,13 +170,7 @@ impl Recording {
     /// Returns
     /// -------
     /// ndarray (count, taxels)
-    fn phi<'py>(
-        &self,
-        py: Python<'py>,
-        block: usize,
-        start: usize,
-        count: usize,
-    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn phi<'py>(&self, py: Python<'py>, block: usize, start: usize, count: usize) -> PyResult<Array2<'py>> {
         self.check(block, start, count)?;
         let rows = self.samples().rows(block, start..start + count);
         rows.to_vec().into_pyarray(py).reshape([count, rows.taxels()])
@@ -200,7 +194,6 @@ impl Recording {
     /// y : ndarray (count, M)
     ///     V; NaN where a sample was lost.
     #[pyo3(signature = (block, measurements, start = None, count = 1))]
-    #[expect(clippy::type_complexity, reason = "a pair of arrays")]
     fn windows<'py>(
         &self,
         py: Python<'py>,
@@ -208,21 +201,19 @@ impl Recording {
         measurements: i128,
         start: Option<f64>,
         count: i128,
-    ) -> PyResult<(Bound<'py, PyArray3<f64>>, Bound<'py, PyArray2<f64>>)> {
+    ) -> PyResult<(Array3<'py>, Array2<'py>)> {
         let (block, count): (usize, usize) = (whole("block", block)?, whole("count", count)?);
         let measurements: usize = whole("measurements", measurements)?;
         let start_s = start.or(self.whole.hold_s.map(|[start_s, _]| start_s)).unwrap_or(0.0);
         if !(0.0..1e9).contains(&start_s) {
-            return Err(refuse(format!("`start` = {start_s} is outside [0, 1e9] s")));
+            bail!("`start` = {start_s} is outside [0, 1e9] s");
         }
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked above")]
         let first = (start_s * self.sample_rate()).round() as usize;
         let total = measurements.saturating_mul(count);
         self.check(block, first, total)?;
         if total == 0 {
-            return Err(refuse(format!(
-                "`measurements` = {measurements} and `count` = {count}: at least 1 is needed of both"
-            )));
+            bail!("`measurements` = {measurements} and `count` = {count}: at least 1 is needed of both");
         }
         let samples = self.samples();
         let idle_v = idle_mean(samples, block);
@@ -240,25 +231,25 @@ impl Recording {
 
     /// True pressure of every block at its hold or largest force, Pa, (blocks, rows, cols); None where it is not known.
     #[getter]
-    fn pressure<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
+    fn pressure<'py>(&self, py: Python<'py>) -> PyResult<Option<Array3<'py>>> {
         self.maps(py, |facts| facts.pressure.as_ref().map(|map| map.values()))
     }
 
     /// True conductance of every block at that time, S, (blocks, rows, cols); None where it is not known.
     #[getter]
-    fn conductance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
+    fn conductance<'py>(&self, py: Python<'py>) -> PyResult<Option<Array3<'py>>> {
         self.maps(py, |facts| facts.conductance.as_ref().map(|map| map.values()))
     }
 
     /// Normal force of every block at that time, N, (blocks,); NaN where it is not known.
     #[getter]
-    fn force<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn force<'py>(&self, py: Python<'py>) -> Array1<'py> {
         self.each(py, |facts| facts.force_n)
     }
 
     /// That time, s from the beginning of the block, (blocks,); NaN where it is not known.
     #[getter]
-    fn time<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn time<'py>(&self, py: Python<'py>) -> Array1<'py> {
         self.each(py, |facts| facts.time_s)
     }
 
@@ -296,10 +287,7 @@ impl Recording {
     fn check(&self, block: usize, start: usize, count: usize) -> PyResult<()> {
         let blocks = self.samples().blocks();
         let Some(samples) = blocks.get(block) else {
-            return Err(refuse(format!(
-                "`block` = {block} is outside [0, {}]",
-                blocks.len() - 1
-            )));
+            bail!("`block` = {block} is outside [0, {}]", blocks.len() - 1);
         };
         let most = samples.volts.len();
         if start.saturating_add(count) <= most {
@@ -311,7 +299,7 @@ impl Recording {
         )))
     }
 
-    fn each<'py>(&self, py: Python<'py>, of: impl Fn(&PressFacts) -> Option<f64>) -> Bound<'py, PyArray1<f64>> {
+    fn each<'py>(&self, py: Python<'py>, of: impl Fn(&PressFacts) -> Option<f64>) -> Array1<'py> {
         let recorded = self.recorded();
         let blocks = 0..recorded.recording.blocks().len();
         let values: Vec<f64> = blocks
@@ -320,11 +308,7 @@ impl Recording {
         values.into_pyarray(py)
     }
 
-    fn maps<'py>(
-        &self,
-        py: Python<'py>,
-        of: impl Fn(&PressFacts) -> Option<&[f64]>,
-    ) -> PyResult<Option<Bound<'py, PyArray3<f64>>>> {
+    fn maps<'py>(&self, py: Python<'py>, of: impl Fn(&PressFacts) -> Option<&[f64]>) -> PyResult<Option<Array3<'py>>> {
         let recorded = self.recorded();
         let (blocks, layout) = (recorded.recording.blocks().len(), recorded.recording.layout());
         let mut all = Vec::with_capacity(blocks * layout.taxels());

@@ -1,10 +1,11 @@
-//! Estimators of the user on the board, beside its own decoders.
+//! Scores: estimators of the user on the board, beside its own decoders, and how good images are.
 
-use crate::interrupt::stoppable;
-use crate::refuse::refuse;
+use crate::args::{Array1, one_of};
+use crate::common::{refuse, stoppable};
 use numpy::{IntoPyArray as _, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use spts::Refusal;
+use spts::recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 use spts_eval::algorithm::{Algorithm, Answer, Class, Contender, DecodeError, ExternalError, Trained};
 use spts_eval::board::{BoardSettings, DECODERS, Window, find, table};
 use spts_eval::training::{PUBLISHED, RASTER, SHAPES, TrainingData, TrainingSource};
@@ -114,14 +115,11 @@ impl Learned {
             let images = images.as_array();
             let needed = (count, self.taxels);
             if images.dim() != needed {
-                return Err(refuse(format!(
-                    "images of shape {:?}; {needed:?} is needed",
-                    images.dim()
-                )));
+                bail!("images of shape {:?}; {needed:?} is needed", images.dim());
             }
             for (answer, image) in answers.iter_mut().zip(images.rows()) {
                 if !image.iter().all(|v| v.is_finite()) {
-                    return Err(refuse("an image with a value that is not finite"));
+                    bail!("an image with a value that is not finite");
                 }
                 answer.image = image.to_vec();
             }
@@ -129,7 +127,7 @@ impl Learned {
         if let Some(labels) = &labels {
             let labels = labels.as_array();
             if labels.len() != count {
-                return Err(refuse(format!("{} labels for {count} windows", labels.len())));
+                bail!("{} labels for {count} windows", labels.len());
             }
             for (answer, label) in answers.iter_mut().zip(labels) {
                 let known = usize::try_from(*label).ok().filter(|label| *label < self.classes);
@@ -167,18 +165,14 @@ pub(crate) fn score_sessions(
     });
     let decoders = named.collect::<PyResult<Vec<_>>>()?;
     if let Some(m) = measurements.iter().find(|m| !(1..=10_000).contains(*m)) {
-        return Err(refuse(format!("`measurements` = {m} is outside [1, 10000]")));
+        bail!("`measurements` = {m} is outside [1, 10000]");
     }
-    let source = match learn_from {
-        PUBLISHED => TrainingSource::Published,
-        RASTER => TrainingSource::Raster,
-        SHAPES => TrainingSource::Shapes,
-        other => {
-            return Err(refuse(format!(
-                "`learn_from` = \"{other}\"; valid: \"published\", \"raster\", \"shapes\""
-            )));
-        }
-    };
+    let sources = [
+        (PUBLISHED, TrainingSource::Published),
+        (RASTER, TrainingSource::Raster),
+        (SHAPES, TrainingSource::Shapes),
+    ];
+    let training = vec![one_of("learn_from", learn_from, &sources)?];
     let sensing = sensing.iter().map(|name| {
         let known = Sensing::ALL.into_iter().find(|sensing| sensing.name() == name);
         known.ok_or_else(|| {
@@ -200,7 +194,7 @@ pub(crate) fn score_sessions(
         localisation: Vec::new(),
         left_out,
         sensing,
-        training: vec![source],
+        training,
         network: None,
         times,
         seed,
@@ -213,4 +207,27 @@ pub(crate) fn score_sessions(
         ready.score(step).map_err(refuse)
     })??;
     Ok((serde_json::to_string(&board).map_err(refuse)?, table(&board)))
+}
+
+/// Support accuracy and intersection over union, each (n,), of `images` against `truths`, both (n, taxels).
+#[pyfunction]
+pub(crate) fn support_scores<'py>(
+    py: Python<'py>,
+    images: PyReadonlyArray2<'_, f64>,
+    truths: PyReadonlyArray2<'_, f64>,
+) -> PyResult<(Array1<'py>, Array1<'py>)> {
+    let (images, truths) = (images.as_array(), truths.as_array());
+    let (found, needed) = (images.dim(), truths.dim());
+    if found != needed {
+        bail!("`images` has shape {found:?}; {needed:?} is needed, as `truths` has it");
+    }
+    let (mut own, mut truth) = (Vec::new(), Vec::new());
+    let scores = images.rows().into_iter().zip(truths.rows()).map(|(image, wanted)| {
+        support(&image.to_vec(), SUPPORT_THRESHOLD, &mut own);
+        support(&wanted.to_vec(), SUPPORT_THRESHOLD, &mut truth);
+        let score = SupportScore::new(&own, &truth);
+        (score.accuracy, score.iou)
+    });
+    let (accuracy, iou): (Vec<f64>, Vec<f64>) = scores.unzip();
+    Ok((accuracy.into_pyarray(py), iou.into_pyarray(py)))
 }

@@ -1,21 +1,13 @@
-//! Skins: how they are made, and what can be asked of them.
+//! Skins: how they are made, what can be asked of them, and touches: what they feel of bodies.
 
-mod shape;
-mod touch;
-
-pub(crate) use shape::triples;
-pub(crate) use touch::{Placed, Touch};
-
+use crate::args::{Array1, Array2, PoseIn, checked_twist, one_of, triples, triples_out, whole};
 use crate::body::Body;
-use crate::count::whole;
-use crate::pose::{PoseIn, checked_twist};
-use crate::refuse::refuse;
-use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2};
+use crate::common::refuse;
+use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use shape::{surface, triples_out, winding};
-use spts::SkinLayout;
-use spts::contact::{Foam, SurfacePoints, TouchSkin};
+use pyo3::types::{PyDict, PyTuple};
+use spts::contact::{PosedMesh, SurfaceConfig, SurfacePoints, TouchSkin, Winding, WinklerConfig, Wrench};
+use spts::{PressureMap, SkinLayout};
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -81,8 +73,8 @@ impl Skin {
             electrode.unwrap_or(SkinLayout::usual_electrode_m(pitch)),
         )
         .map_err(refuse)?;
-        let default = Foam::default();
-        let foam = Foam {
+        let default = WinklerConfig::default();
+        let config = WinklerConfig {
             stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
             thickness_m: thickness.unwrap_or(default.thickness_m),
             damping_s: damping.unwrap_or(default.damping_s),
@@ -90,7 +82,7 @@ impl Skin {
             cells_per_taxel: whole("cells", cells)?,
             ..default
         };
-        Ok(Self::of(TouchSkin::flat(layout, foam).map_err(refuse)?))
+        Ok(Self::of(TouchSkin::flat(layout, config).map_err(refuse)?))
     }
 
     /// Skin of `rows` x `cols` taxels around an axis of a cylinder.
@@ -217,7 +209,7 @@ impl Skin {
         if let Some(twists) = twists
             && let Some(stray) = twists.keys().iter().find(|body| !poses.contains(body).unwrap_or(false))
         {
-            return Err(refuse(format!("`twists` has {stray}, which has no pose")));
+            bail!("`twists` has {stray}, which has no pose");
         }
         Ok(self.touched(py, &keys, &placed, dt)?.0)
     }
@@ -231,21 +223,21 @@ impl Skin {
 
     /// Middle of every taxel on the free surface, m, (taxels, 3).
     #[getter]
-    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
         let centres = self.locked().skin.taxel_centres();
         triples_out(py, centres.into_iter().map(|(place, _)| place))
     }
 
     /// Outward normal of every taxel, of length 1, (taxels, 3).
     #[getter]
-    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn normals<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
         let centres = self.locked().skin.taxel_centres();
         triples_out(py, centres.into_iter().map(|(_, normal)| normal))
     }
 
     /// Area of every taxel, m², (taxels,).
     #[getter]
-    fn areas<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+    fn areas<'py>(&self, py: Python<'py>) -> Array1<'py> {
         self.locked().skin.taxel_areas_m2().into_pyarray(py)
     }
 
@@ -327,6 +319,57 @@ impl Skin {
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
 impl Skin {
+    /// Puts `bodies` on the skin; what it feels, and the wrenches on them.
+    pub(crate) fn touched(
+        &self,
+        py: Python<'_>,
+        bodies: &[Py<Body>],
+        placed: &[Placed],
+        dt: f64,
+    ) -> PyResult<(Touch, Vec<Wrench>)> {
+        if !(0.0..=1e9).contains(&dt) {
+            bail!("`dt` = {dt} is outside [0, 1e9] s");
+        }
+        let pairs: Vec<_> = bodies.iter().map(Py::get).zip(placed).collect();
+        let (wrenches, values, felt, [area, time], number) = py.detach(|| {
+            let posed = pairs.iter().map(|(body, placed)| {
+                let posed = PosedMesh {
+                    rotation: placed.rotation,
+                    velocity_m_per_s: placed.velocity_m_per_s,
+                    angular_velocity_rad_per_s: placed.spin_rad_per_s,
+                    stiffness_pa_per_m: body.stiffness_pa_per_m,
+                    ..PosedMesh::at_rest(&body.body.mesh, placed.position_m)
+                };
+                (&body.body, posed)
+            });
+            let posed: Vec<_> = posed.collect();
+            let mut wrenches: Vec<Wrench> = Vec::with_capacity(posed.len());
+            let mut state = self.locked();
+            state.skin.touch(&posed, &mut wrenches);
+            state.touches += 1;
+            state.time_s += dt;
+            let values = state.skin.pressure().values().to_vec();
+            let felt = state.skin.electrode_pressure().clone();
+            let scalars = [state.skin.touched_m2(), state.time_s];
+            (wrenches, values, felt, scalars, state.touches)
+        });
+        let found = PyDict::new(py);
+        for (key, wrench) in bodies.iter().zip(&wrenches) {
+            let pair = [wrench.force_n, wrench.torque_nm].map(|v| PyArray1::from_slice(py, &v));
+            found.set_item(key, PyTuple::new(py, pair)?)?;
+        }
+        let touch = Touch {
+            pressure: values.into_pyarray(py).reshape([felt.rows(), felt.cols()])?.unbind(),
+            wrenches: found.unbind(),
+            area,
+            time,
+            number,
+            felt,
+            skin: self.id,
+        };
+        Ok((touch, wrenches))
+    }
+
     fn of(skin: TouchSkin) -> Self {
         Self {
             id: NEXT.fetch_add(1, Ordering::Relaxed),
@@ -346,10 +389,10 @@ impl Skin {
     }
 
     /// Skin at `points`; a taxel's electrode has the usual share of a square of their mean area.
-    fn curved(points: SurfacePoints, [rows, cols]: [usize; 2], foam: Foam) -> PyResult<Self> {
+    fn curved(points: SurfacePoints, [rows, cols]: [usize; 2], config: SurfaceConfig) -> PyResult<Self> {
         let mean_area_m2 = points.taxel_areas_m2().iter().sum::<f64>() / points.taxels() as f64;
         let layout = SkinLayout::with_pitch(rows, cols, mean_area_m2.sqrt()).map_err(refuse)?;
-        Ok(Self::of(TouchSkin::curved(layout, points, foam).map_err(refuse)?))
+        Ok(Self::of(TouchSkin::curved(layout, points, config).map_err(refuse)?))
     }
 
     fn locked(&self) -> MutexGuard<'_, State> {
@@ -363,4 +406,73 @@ impl Skin {
     pub(crate) fn id(&self) -> u64 {
         self.id
     }
+}
+
+/// What the skin feels at one moment.
+#[pyclass(frozen, module = "spts")]
+pub(crate) struct Touch {
+    /// Mean pressure over every taxel, Pa, (rows, cols).
+    #[pyo3(get)]
+    pressure: Py<PyArray2<f64>>,
+    /// Wrench on every body about its origin, in the skin's frame: (force (3,) N, torque (3,) N m).
+    #[pyo3(get)]
+    wrenches: Py<PyDict>,
+    /// Area that is pressed, m².
+    #[pyo3(get)]
+    area: f64,
+    /// Time of the touch, s: the sum of every `dt` up to it.
+    #[pyo3(get)]
+    pub(crate) time: f64,
+    /// Number of the touch, from 1.
+    #[pyo3(get)]
+    pub(crate) number: u64,
+    /// What the transducer feels.
+    pub(crate) felt: PressureMap,
+    /// Which skin.
+    pub(crate) skin: u64,
+}
+
+/// Where a body is and how it moves, in the skin's frame.
+pub(crate) struct Placed {
+    pub(crate) position_m: [f64; 3],
+    pub(crate) rotation: [[f64; 3]; 3],
+    /// Velocity of its origin.
+    pub(crate) velocity_m_per_s: [f64; 3],
+    pub(crate) spin_rad_per_s: [f64; 3],
+}
+
+/// The foam of a curved skin; what is not given is the default.
+fn surface(
+    stiffness: Option<f64>,
+    thickness: Option<f64>,
+    damping: Option<f64>,
+    friction: Option<f64>,
+) -> SurfaceConfig {
+    let default = SurfaceConfig::default();
+    SurfaceConfig {
+        stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
+        thickness_m: thickness.unwrap_or(default.thickness_m),
+        damping_s: damping.unwrap_or(default.damping_s),
+        friction: friction.unwrap_or(default.friction),
+        ..default
+    }
+}
+
+/// How the taxels of a skin wind around an axis.
+fn winding(
+    [rows, cols]: [i128; 2],
+    points: i128,
+    axis: &str,
+    centre_m: [f64; 3],
+    arc: (f64, f64),
+    span_m: [f64; 2],
+) -> PyResult<Winding> {
+    Ok(Winding {
+        shape: [whole("rows", rows)?, whole("cols", cols)?],
+        points_per_side: whole("points", points)?,
+        axis: one_of("axis", axis, &[("x", 0), ("y", 1), ("z", 2)])?,
+        centre_m,
+        arc_rad: [arc.0, arc.1],
+        span_m,
+    })
 }

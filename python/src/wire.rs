@@ -1,10 +1,9 @@
 //! The one wire: transducer and electronics, with their state.
 
-use crate::count::whole;
-use crate::refuse::refuse;
+use crate::args::{Array1, Array2, one_of, whole};
+use crate::common::{refuse, table};
 use crate::skin::{Skin, Touch};
-use crate::value::table;
-use numpy::{IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _};
+use numpy::{IntoPyArray as _, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use spts::chain::RowsConfig;
@@ -49,8 +48,12 @@ pub(crate) struct Wire {
     skin: u64,
     /// Taxels of the skin on this wire; `None` for all of them.
     taxels: Option<Vec<usize>>,
+    /// Rows and columns of the taxels on this wire.
+    #[pyo3(get)]
     shape: (usize, usize),
-    sample_rate_hz: f64,
+    /// Measurements a second, Hz.
+    #[pyo3(get)]
+    sample_rate: f64,
 }
 
 struct State {
@@ -114,7 +117,7 @@ impl Wire {
             let chain = Chain::new(&config, &layout, seed, Path::new(""))?;
             Ok::<_, spts::ChainError>((chain.sample_rate_hz(), Line::new(&chain, session)?))
         });
-        let (sample_rate_hz, line) = line.map_err(refuse)?;
+        let (sample_rate, line) = line.map_err(refuse)?;
         Ok(Self {
             state: Mutex::new(State {
                 line,
@@ -125,7 +128,7 @@ impl Wire {
             skin: skin.id(),
             taxels,
             shape: (layout.rows(), layout.cols()),
-            sample_rate_hz,
+            sample_rate,
         })
     }
 
@@ -161,7 +164,6 @@ impl Wire {
     /// phi : ndarray (M, taxels)
     ///     The rows of the sensing matrix Φ: the weights of the cells at each measurement.
     #[pyo3(signature = (touch, measurements = None, *, raster = false, raw = false, weights = true))]
-    #[expect(clippy::type_complexity, reason = "a pair of arrays")]
     fn record<'py>(
         &self,
         py: Python<'py>,
@@ -170,21 +172,21 @@ impl Wire {
         raster: bool,
         raw: bool,
         weights: bool,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Option<Bound<'py, PyArray2<f64>>>)> {
+    ) -> PyResult<(Array1<'py>, Option<Array2<'py>>)> {
         let taxels = self.shape.0 * self.shape.1;
         let count = match measurements {
             Some(count) => whole("measurements", count)?,
             None if raster => taxels,
-            None => return Err(refuse("`measurements` is missing: how many?")),
+            None => bail!("`measurements` is missing: how many?"),
         };
         if !(1..=MOST).contains(&count) {
-            return Err(refuse(format!("`measurements` = {count} is outside [1, 2^27]")));
+            bail!("`measurements` = {count} is outside [1, 2^27]");
         }
         let most = if weights { MOST / taxels } else { MOST };
         if count > most {
-            return Err(refuse(format!(
+            bail!(
                 "`measurements` = {count} is outside [1, {most}] with Φ of {taxels} columns; `weights=False` leaves Φ out"
-            )));
+            );
         }
         let mode = if raster { Mode::Raster } else { Mode::Compressive };
         let (mut volts, mut phi) = (vec![0.0; count], vec![0.0; if weights { count * taxels } else { 0 }]);
@@ -221,7 +223,7 @@ impl Wire {
 
     /// Conductance of the taxels as they are, S, (rows, cols).
     #[getter]
-    fn conductance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn conductance<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
         let values = self.locked().line.conductance_s().to_vec();
         values.into_pyarray(py).reshape([self.shape.0, self.shape.1])
     }
@@ -230,18 +232,6 @@ impl Wire {
     #[getter]
     fn idle(&self) -> f64 {
         self.locked().line.idle_v(Mode::Compressive)
-    }
-
-    /// Rows and columns of the taxels on this wire.
-    #[getter]
-    fn shape(&self) -> (usize, usize) {
-        self.shape
-    }
-
-    /// Measurements a second, Hz.
-    #[getter]
-    fn sample_rate(&self) -> f64 {
-        self.sample_rate_hz
     }
 
     fn __repr__(&self) -> String {
@@ -258,14 +248,15 @@ impl Wire {
     fn felt(&self, state: &mut State, touch: &Touch) -> PyResult<()> {
         let felt = touch.felt.values();
         if touch.skin != self.skin {
-            return Err(refuse("`touch` is of another skin than this wire"));
+            bail!("`touch` is of another skin than this wire");
         }
         let dt_s = touch.time - state.time_s;
         if dt_s < 0.0 || touch.number < state.number {
-            return Err(refuse(format!(
+            bail!(
                 "`touch` is of {} s; this wire has felt one of {} s: time does not run back",
-                touch.time, state.time_s
-            )));
+                touch.time,
+                state.time_s
+            );
         }
         if touch.number == state.number {
             return Ok(());
@@ -290,8 +281,8 @@ fn part(skin: &SkinLayout, taxels: &[usize]) -> PyResult<SkinLayout> {
     let mut seen = vec![false; count];
     for (k, taxel) in taxels.iter().enumerate() {
         match seen.get_mut(*taxel) {
-            None => return Err(refuse(format!("`taxels[{k}]` = {taxel} is outside [0, {}]", count - 1))),
-            Some(seen) if *seen => return Err(refuse(format!("`taxels[{k}]` = {taxel} is there twice"))),
+            None => bail!("`taxels[{k}]` = {taxel} is outside [0, {}]", count - 1),
+            Some(seen) if *seen => bail!("`taxels[{k}]` = {taxel} is there twice"),
             Some(seen) => *seen = true,
         }
     }
@@ -308,9 +299,7 @@ fn rows(seeds: Option<Bound<'_, PyAny>>, levels: Option<&str>) -> PyResult<RowsC
                     "mixed" => Seeding::Mixed,
                     "address" => Seeding::Address,
                     _ => {
-                        return Err(refuse(format!(
-                            "`seeds` = \"{rule}\"; valid: \"mixed\", \"address\", or a number a taxel"
-                        )));
+                        bail!("`seeds` = \"{rule}\"; valid: \"mixed\", \"address\", or a number a taxel");
                     }
                 });
             }
@@ -321,11 +310,10 @@ fn rows(seeds: Option<Bound<'_, PyAny>>, levels: Option<&str>) -> PyResult<RowsC
             }
         },
     }
-    rows.levels = match levels {
-        None => None,
-        Some("binary") => Some(CompressiveWeights::Binary),
-        Some("analog") => Some(CompressiveWeights::Analog),
-        Some(other) => return Err(refuse(format!("`levels` = \"{other}\"; valid: \"binary\", \"analog\""))),
-    };
+    let known = [
+        ("binary", CompressiveWeights::Binary),
+        ("analog", CompressiveWeights::Analog),
+    ];
+    rows.levels = levels.map(|levels| one_of("levels", levels, &known)).transpose()?;
     Ok(rows)
 }

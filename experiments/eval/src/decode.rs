@@ -425,10 +425,7 @@ fn write_arrays(path: &Path, session: &DecodedSession) -> Result<(), OutputError
         .flat_map(|t| t.as_ref().unwrap_or(&unknown).clone())
         .collect();
     arrays.push(("truth".to_owned(), vec![session.truth.len(), rows, cols], truth));
-    write_npz(path, &arrays).map_err(|source| OutputError::Write {
-        path: path.to_owned(),
-        source,
-    })
+    write_npz(path, &arrays).map_err(OutputError::write(path))
 }
 
 /// Writes a NumPy archive of arrays of doubles, each with its name and its shape, without compression.

@@ -192,7 +192,7 @@ impl<'a> SimulationFiles<'a> {
         let drawn = render.then(|| scene_pictures(prepared, simulation)).transpose();
         for (name, picture) in drawn.iter().flatten().flatten() {
             let path = out.path(name);
-            let png = encode_png(&picture.rgb, picture.width, picture.height).map_err(failed(&path));
+            let png = encode_png(&picture.rgb, picture.width, picture.height).map_err(OutputError::write(&path));
             let written = png.and_then(|png| write_bytes(&path, &png));
             written.map_err(|error| out.unstaged(error))?;
         }

@@ -1,14 +1,10 @@
 //! What the Python package does with a physics engine: the module `spts._scenes`.
 
+#[path = "../../src/common.rs"]
+mod common;
 #[path = "../../src/dataset.rs"]
 mod dataset;
-#[path = "../../src/interrupt.rs"]
-mod interrupt;
-#[path = "../../src/refuse.rs"]
-mod refuse;
 mod simulate;
-#[path = "../../src/value.rs"]
-mod value;
 
 use pyo3::prelude::*;
 

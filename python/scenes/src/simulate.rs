@@ -1,8 +1,6 @@
 //! Scenes from their name to a session.
 
-use crate::interrupt::stoppable;
-use crate::refuse::refuse;
-use crate::value::table;
+use crate::common::{refuse, stoppable, table};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use spts::Mode;

@@ -10,7 +10,8 @@ use spts_models::{Streams, TaxelGains, VelostatConfig};
 use spts_recon::classify::Library;
 use spts_recon::metrics::pearson;
 
-/// Where the fit of [`SkinGains::contact_log_sd`] begins (`scripts/fit_objects.py` fits its gains with the same).
+/// Where the fit of [`SkinGains::contact_log_sd`] begins (`scripts/fit_objects.py` at the tag `before-halving` fits its
+/// gains with the same).
 const CONTACT_LOG_SD: f64 = 0.35;
 /// A taxel takes part where the simulated image is above this share of its maximum: below it, a small shift of an edge
 /// makes any ratio. Shares from .1 to .35 lead to the same classes within .01.

@@ -155,11 +155,11 @@ impl Animation {
             Ok((palette.numbers(&rgb), [width, height]))
         };
         let painted = (0..self.len()).into_par_iter().map(paint);
-        let painted = painted.collect::<std::io::Result<Vec<_>>>().map_err(failed(path))?;
+        let painted = painted.collect::<std::io::Result<Vec<_>>>().map_err(OutputError::write(path))?;
         let size = painted.first().map_or([1; 2], |(_, size)| *size);
         let [width, height] = size.map(|side| u16::try_from(side).unwrap_or(u16::MAX));
         let pictures: Vec<Vec<u8>> = painted.into_iter().map(|(picture, _)| picture).collect();
-        gif(&pictures, (width, height), &palette).map_err(|error| failed(path)(std::io::Error::other(error)))
+        gif(&pictures, (width, height), &palette).map_err(|error| OutputError::write(path)(std::io::Error::other(error)))
     }
 
     /// The picture with the largest pressure, as the bytes of a PNG file; `path` is the file they are for, named in
@@ -171,7 +171,7 @@ impl Animation {
         let sum = |k: &usize| self.pressures[*k].iter().sum::<f64>();
         let strongest = (0..self.len()).max_by(|a, b| sum(a).total_cmp(&sum(b)));
         let canvas = strongest.map_or_else(|| Canvas::new(1.0, 1.0, ""), |k| self.picture(k));
-        png_of(&canvas).map_err(failed(path))
+        png_of(&canvas).map_err(OutputError::write(path))
     }
 }
 

@@ -40,7 +40,7 @@ static PAINTING: LazyLock<Options<'static>> = LazyLock::new(|| {
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
 pub fn save(canvas: &Canvas, dir: &Path, name: &str) -> Result<(), OutputError> {
-    std::fs::create_dir_all(dir).map_err(failed(dir))?;
+    std::fs::create_dir_all(dir).map_err(OutputError::write(dir))?;
     write_bytes(&dir.join(format!("{name}.svg")), canvas.svg().as_bytes())?;
     save_png(canvas, &dir.join(format!("{name}.png")))
 }
@@ -50,7 +50,7 @@ pub fn save(canvas: &Canvas, dir: &Path, name: &str) -> Result<(), OutputError> 
 /// # Errors
 /// [`OutputError`] when the file cannot be written.
 pub fn save_png(canvas: &Canvas, path: &Path) -> Result<(), OutputError> {
-    write_bytes(path, &png_of(canvas).map_err(failed(path))?)
+    write_bytes(path, &png_of(canvas).map_err(OutputError::write(path))?)
 }
 
 /// A figure as the bytes of a PNG file.
@@ -60,12 +60,6 @@ pub fn save_png(canvas: &Canvas, path: &Path) -> Result<(), OutputError> {
 pub fn png_of(canvas: &Canvas) -> io::Result<Vec<u8>> {
     let (width, height, rgb) = paint(canvas)?;
     encode_png(&rgb, width, height)
-}
-
-/// What went wrong with the file `path`.
-pub(crate) fn failed(path: &Path) -> impl FnOnce(io::Error) -> OutputError {
-    let path = path.to_owned();
-    |source| OutputError::Write { path, source }
 }
 
 /// Paints the figure. Returns width, height and RGB pixels.

@@ -341,7 +341,7 @@ fn draw_bars(canvas: &mut Canvas, values: &[f64], highlight: usize, (x, y): Poin
 
 /// The error of values that do not fill the grid that they are said to fill.
 fn misshapen(path: &Path, len: usize, rows: usize, cols: usize) -> OutputError {
-    failed(path)(io::Error::other(format!(
+    OutputError::write(path)(io::Error::other(format!(
         "{len} values do not fill {rows} × {cols} cells"
     )))
 }
