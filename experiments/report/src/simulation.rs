@@ -4,7 +4,6 @@ use super::ReportError;
 use super::animation::{ANIMATION_FILE, Animation};
 use super::decode::save_picture;
 use super::figures::encode_png;
-use super::figures::pixels::failed;
 use crate::figures::pressure_png;
 use serde::Serialize;
 use spts::Mode;

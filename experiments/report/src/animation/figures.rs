@@ -4,7 +4,7 @@ use super::Animation;
 use crate::ReportError;
 use spts::output::write_bytes;
 use spts::scene::Assignment;
-use spts::simulate::{Request, SimulateError, run};
+use spts::simulate::{Request, run};
 use spts_eval::training::{LearnError, TrainingData};
 use spts_input::Refusal;
 use spts_models::Streams;
@@ -52,9 +52,6 @@ pub const MOTION_FIGURES: [MotionFigure; 2] = [
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum MotionError {
-    /// The scene cannot be simulated.
-    #[error(transparent)]
-    Simulate(#[from] SimulateError),
     /// Its scene records nothing.
     #[error("{scene}: nothing was recorded")]
     Unrecorded {
@@ -64,9 +61,9 @@ pub enum MotionError {
     /// The decoder cannot learn for its skin.
     #[error(transparent)]
     Learn(#[from] LearnError),
-    /// Its recording cannot be decoded.
+    /// The scene cannot be simulated, or its recording not be decoded.
     #[error(transparent)]
-    Decode(#[from] Refusal),
+    Refused(#[from] Refusal),
     /// A file cannot be written.
     #[error(transparent)]
     Report(#[from] ReportError),
@@ -78,7 +75,7 @@ pub enum MotionError {
 /// [`MotionError`].
 pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), MotionError> {
     for figure in MOTION_FIGURES {
-        let assignment: Assignment = format!("seed={seed}").parse().map_err(SimulateError::from)?;
+        let assignment: Assignment = format!("seed={seed}").parse()?;
         let request = Request {
             scene: figure.scene.to_owned(),
             assignments: vec![assignment],
@@ -87,7 +84,7 @@ pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), MotionError> {
         let mut frames = Vec::new();
         let simulation = run(&prepared, true, &|| (), |piece| {
             frames.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
-            Ok::<_, SimulateError>(())
+            Ok::<_, Refusal>(())
         })?;
         let unrecorded = MotionError::Unrecorded { scene: figure.scene };
         let session = simulation.first.as_ref().ok_or(unrecorded)?;

@@ -12,7 +12,7 @@ pub use figures::{MOTION_FIGURES, MotionError, MotionFigure, simulate_motion};
 
 use self::gif::{Palette, gif};
 use crate::figures::canvas::Canvas;
-use crate::figures::pixels::{failed, paint, png_of};
+use crate::figures::pixels::{paint, png_of};
 use picture::{COLUMNS, Moment, Stage};
 use rayon::prelude::*;
 use spts::Session;
@@ -155,11 +155,14 @@ impl Animation {
             Ok((palette.numbers(&rgb), [width, height]))
         };
         let painted = (0..self.len()).into_par_iter().map(paint);
-        let painted = painted.collect::<std::io::Result<Vec<_>>>().map_err(OutputError::write(path))?;
+        let painted = painted
+            .collect::<std::io::Result<Vec<_>>>()
+            .map_err(OutputError::write(path))?;
         let size = painted.first().map_or([1; 2], |(_, size)| *size);
         let [width, height] = size.map(|side| u16::try_from(side).unwrap_or(u16::MAX));
         let pictures: Vec<Vec<u8>> = painted.into_iter().map(|(picture, _)| picture).collect();
-        gif(&pictures, (width, height), &palette).map_err(|error| OutputError::write(path)(std::io::Error::other(error)))
+        gif(&pictures, (width, height), &palette)
+            .map_err(|error| OutputError::write(path)(std::io::Error::other(error)))
     }
 
     /// The picture with the largest pressure, as the bytes of a PNG file; `path` is the file they are for, named in

@@ -3,9 +3,8 @@
 use super::axis::Axis;
 use super::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, text_width, widest, wrap};
 use super::colour::{FRAME, GRID, INK, MISSING, MUTED, OUTLINE, Rgb, WHITE, heat};
-use super::pixels::{failed, save, save_png};
+use super::pixels::{save, save_png};
 use spts::output::OutputError;
-use std::io;
 use std::path::Path;
 
 /// One cell of a sheet.
@@ -341,9 +340,7 @@ fn draw_bars(canvas: &mut Canvas, values: &[f64], highlight: usize, (x, y): Poin
 
 /// The error of values that do not fill the grid that they are said to fill.
 fn misshapen(path: &Path, len: usize, rows: usize, cols: usize) -> OutputError {
-    OutputError::write(path)(io::Error::other(format!(
-        "{len} values do not fill {rows} × {cols} cells"
-    )))
+    OutputError::new(path, format!("{len} values do not fill {rows} × {cols} cells"))
 }
 
 /// Taxels up to which an image is drawn as rectangles; a larger one is a picture.

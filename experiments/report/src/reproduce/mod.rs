@@ -27,7 +27,6 @@ use spts::output::OutputError;
 use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts::progress::Progress;
 use spts::provenance::Provenance;
-use spts::record::TwinError;
 use spts_eval::ScoreError;
 use spts_eval::protocol::Protocol;
 use spts_eval::training::LearnError;
@@ -64,9 +63,6 @@ pub enum ReproduceError {
     /// The recordings of the real skin cannot be used.
     #[error(transparent)]
     Data(#[from] DataError),
-    /// The twin cannot be run.
-    #[error(transparent)]
-    Twin(#[from] TwinError),
     /// The animations cannot be made.
     #[error(transparent)]
     Motion(#[from] MotionError),
@@ -76,7 +72,7 @@ pub enum ReproduceError {
     /// A skin cannot be scored.
     #[error(transparent)]
     Score(#[from] ScoreError),
-    /// Twin and skin cannot be compared.
+    /// The twin cannot be run, or not be compared with the skin.
     #[error(transparent)]
     Compare(#[from] Refusal),
     /// The report cannot be written.
