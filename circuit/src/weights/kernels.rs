@@ -263,6 +263,10 @@ impl<'a> Levels for Given<'a> {
 }
 
 /// `sums[v]` += Σₖ ±`values[v][k]`, with the signs of the binary levels.
+#[expect(
+    clippy::needless_range_loop,
+    reason = "one counter for slices of equal length is what is made SIMD of"
+)]
 #[inline(always)]
 fn signed_sums_of<L: Levels, const V: usize>(levels: L, values: [&[f64]; V], sums: [&mut [f64]; V]) {
     let len = levels.len();
@@ -281,10 +285,6 @@ fn signed_sums_of<L: Levels, const V: usize>(levels: L, values: [&[f64]; V], sum
 }
 
 /// `sums` += Σₖ wₖ·xₖ and `squares` += Σₖ (wₖ·xₖ)², w = 127.5 times the analog level: top byte − 127.5.
-#[expect(
-    clippy::needless_range_loop,
-    reason = "one counter for slices of equal length is what is made SIMD of"
-)]
 #[inline(always)]
 fn analog_sums_of<L: Levels>(levels: L, lines: Lines<'_>, sums: &mut [f64], squares: &mut [f64]) {
     let len = levels.len();

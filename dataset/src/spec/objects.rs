@@ -95,7 +95,6 @@ impl Choices {
             size_m: config.size_m.unwrap_or(default.size_m),
             relief_m: config.relief_m.unwrap_or(default.relief_m),
             edge_m: config.edge_m.unwrap_or(default.edge_m),
-            ..default
         };
         ranges
             .check()

@@ -13,6 +13,9 @@ use spts_recon::classify::Library;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// The sessions of a folder, dictionary and library where they are there, and the recordings that are missing.
+pub(super) type Found = (Vec<Session>, Option<Published>, Vec<String>);
+
 /// A recording that cannot be used. Every message names the file.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -136,7 +139,7 @@ impl PublishedFiles {
     ///
     /// # Errors
     /// [`DataError`] when a file is there but cannot be used, or no session is there at all.
-    pub(super) fn read(&self) -> Result<(Vec<Session>, Option<Published>, Vec<String>), DataError> {
+    pub(super) fn read(&self) -> Result<Found, DataError> {
         let mut sessions = self.presses()?;
         let mut missing = Vec::new();
         if !sessions.is_empty() {
