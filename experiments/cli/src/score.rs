@@ -283,7 +283,7 @@ impl ScoreCommand {
             let unable = settings.decoders.iter().find(|spec| !spec.anytime);
             unable.map(|spec| no_confidence(spec.name).to_string())
         };
-        let (board, out) = self.special("out/anytime", anytime::FILES, &can, &|ready, done| {
+        let (board, out) = self.special("out/anytime", anytime::FILES, &can, |ready, done| {
             ready.stops(&wanted, done)
         })?;
         self.show(&board, anytime::table(&board))?;
@@ -301,7 +301,7 @@ impl ScoreCommand {
                 (settings.sensing != [Sensing::Random]).then(|| format!("`--sensing`: {reason}"))
             })
         };
-        let (board, out) = self.special("out/in_time", in_time::FILES, &can, &|ready, done| ready.in_time(done))?;
+        let (board, out) = self.special("out/in_time", in_time::FILES, &can, |ready, done| ready.in_time(done))?;
         self.show(&board, in_time::table(&board))?;
         write_in_time(&board, out)?;
         self.note_folder("out/in_time")
@@ -313,7 +313,7 @@ impl ScoreCommand {
         folder: &str,
         files: &[&str],
         refused: &dyn Fn(&BoardSettings) -> Option<String>,
-        score: &dyn Fn(&TrainedBoard<'_>, &(dyn Fn() + Sync)) -> Result<B, ScoreError>,
+        score: impl Fn(&TrainedBoard<'_>, &(dyn Fn() + Sync)) -> Result<B, ScoreError>,
     ) -> Result<(B, OutputFolder), CliError> {
         self.common.start()?;
         let out = open_folder(self.out(folder), files)?;

@@ -13,7 +13,7 @@ use spts::data::SessionSet;
 use spts::progress::Progress;
 use spts::record::Twin;
 use spts::session::{Event, Session};
-use spts::simulate::{Request, SimulateError};
+use spts::simulate::Request;
 use spts_circuit::{Mode, Recording};
 use spts_eval::place::{RecordedTouch, find_touches, touch_errors_px};
 use spts_input::Refusal;
@@ -135,10 +135,7 @@ fn touched(layout: &SkinLayout, seed: u64) -> Result<Recording, Refusal> {
     let assignments = assignments.iter().map(|text| text.parse());
     let request = Request {
         scene: SCENE.to_owned(),
-        assignments: assignments
-            .collect::<Result<_, _>>()
-            .map_err(SimulateError::from)
-            .map_err(Refusal::from_error)?,
+        assignments: assignments.collect::<Result<_, _>>().map_err(Refusal::from_error)?,
     };
     let twin = Twin::new(&request.prepare().map_err(Refusal::from_error)?.scene).map_err(Refusal::from_error)?;
     let presses = twin.presses(0..TOUCHES, &|| ()).map_err(Refusal::from_error)?;

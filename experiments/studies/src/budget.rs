@@ -78,7 +78,7 @@ impl BudgetStudy {
         };
         let profile = first.chain().profile().clone();
         let hashes = scenes.iter().map(spts::Scene::hash).collect::<Result<Vec<_>, _>>();
-        let hash = combined_hash(&hashes.map_err(TwinError::from).map_err(Refusal::from_error)?);
+        let hash = combined_hash(&hashes.map_err(Refusal::from_error)?);
         let items = items(&profile);
         let variants = Variants::new(&items);
         progress.stage("pressing", Some(2 * objects.len() * size.presses()));
@@ -663,7 +663,7 @@ impl PressSetup<'_> {
             change_model(&mut config.contact, "layer");
             config.contact.insert("coupled".to_owned(), false.into());
         }
-        Ok(Scene::new(config, Path::new(""))?)
+        Scene::new(config, Path::new(""))
     }
 
     /// Runs every press of every object and reports each to `progress`.
@@ -782,7 +782,7 @@ fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, Refusal> {
         ..scene.config().chain()
     };
     let chain = Chain::new(&config, scene.skin(), scene.seed(), Path::new(""));
-    chain.map_err(TwinError::from).map_err(Refusal::from_error)
+    chain.map_err(Refusal::from_error)
 }
 
 impl LearnedObject {

@@ -779,7 +779,7 @@ impl SimulatedPresses {
             config.transducer_parameters.insert("gains".to_owned(), gains);
         }
         let failed = |error: spts::TwinError| Refusal::from_error(error).at("simulated presses");
-        let scene = Scene::new(config, Path::new("")).map_err(|e| failed(e.into()))?;
+        let scene = Scene::new(config, Path::new("")).map_err(failed)?;
         let twin = Twin::new(&scene).map_err(failed)?;
         let frames = twin.presses(0..presses, &|| ()).map_err(failed)?;
         let acquisition = twin.acquisition(spts_circuit::Mode::Compressive);

@@ -131,7 +131,7 @@ impl FidelityStudy {
 
 /// Hash of the references' scenes: what every other setting follows from.
 fn provenance_hash(references: &[Reference]) -> Result<String, TwinError> {
-    let hashes = references.iter().map(|r| Ok(r.at_reference.hash()?));
+    let hashes = references.iter().map(|r| r.at_reference.hash());
     Ok(combined_hash(&hashes.collect::<Result<Vec<_>, TwinError>>()?))
 }
 
@@ -315,7 +315,7 @@ impl FidelityScene {
         let mut config = self.config.clone();
         setting.level.apply(&mut config.contact, setting.cells_per_taxel);
         config.timestep_s = Some(setting.timestep_s.into());
-        Ok(Scene::new(config, &self.folder)?)
+        Scene::new(config, &self.folder)
     }
 }
 
@@ -432,9 +432,7 @@ fn shape(name: &str) -> Option<TriMesh> {
 
 /// A user's scene: its first two presses or drops, without what the levels decide.
 fn from_file(path: &Path) -> Result<FidelityScene, Refusal> {
-    let scene = Scene::load(path)
-        .map_err(TwinError::from)
-        .map_err(Refusal::from_error)?;
+    let scene = Scene::load(path).map_err(Refusal::from_error)?;
     let mut config = scene.config().clone();
     match scene.task() {
         Task::Press(press) => {
@@ -551,7 +549,7 @@ fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<F
         pressure_pa.copy_from_slice(refined);
     } else if let Some(reason) = field.failure() {
         let time_s = frame.time_s;
-        return Err(no_pressure(force_n, time_s, &reason).into());
+        return Err(no_pressure(force_n, time_s, &reason));
     }
     Ok(FinePressure {
         rows,

@@ -86,10 +86,7 @@ impl PerObjectStudy<'_> {
         let done = || progress.step();
         progress.stage("pressing simulated skins", Some(skins * presses(objects.len())));
         let mut all = of(ReadoutImages::Twin, &|seed| {
-            Ok(
-                Source::new(twin(seed, &objects, true, &done).map_err(Refusal::from_error)?)
-                    .map_err(Refusal::from_error)?,
-            )
+            Source::new(twin(seed, &objects, true, &done).map_err(Refusal::from_error)?).map_err(Refusal::from_error)
         })?;
         progress.end();
         if self.causes {

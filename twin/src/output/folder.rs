@@ -529,7 +529,8 @@ mod tests {
     /// Whatever else lies in a folder is somebody's: it is named, and everything stays.
     #[test]
     fn only_unchanged_results_are_replaced() {
-        let make: [(&str, &dyn Fn(&Path)); 6] = [
+        type Make<'a> = (&'a str, &'a dyn Fn(&Path));
+        let make: [Make<'_>; 6] = [
             ("notes.txt", &|out| fs::write(out.join("notes.txt"), "mine").unwrap()),
             ("tables/mine.csv", &|out| {
                 fs::write(out.join("tables/mine.csv"), "mine").unwrap()

@@ -97,8 +97,8 @@ pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), MotionError> {
             } else {
                 animation.still(&path)
             };
-            let bytes = bytes.map_err(ReportError::from)?;
-            write_bytes(&path, &bytes).map_err(ReportError::from)?;
+            let bytes = bytes?;
+            write_bytes(&path, &bytes)?;
         }
     }
     Ok(())

@@ -162,7 +162,7 @@ fn press_scene(object: &str, seed: u64, size: &ReproductionSize) -> Result<Scene
     if let Some(press) = &mut config.press {
         press.presses = size.raster_presses + size.compressive_presses;
     }
-    Ok(Scene::new(config, Path::new(""))?)
+    Scene::new(config, Path::new(""))
 }
 
 /// Every landing point is a scene of its own; the skin, which follows from the seed, is the same.
@@ -180,7 +180,7 @@ fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, TwinE
         drop: Some(ball),
         ..SceneConfig::default()
     };
-    Ok(Scene::new(config, Path::new(""))?)
+    Scene::new(config, Path::new(""))
 }
 
 /// Picture of the first press at `time_s`: the object as it is, not see-through.
@@ -193,5 +193,5 @@ fn picture(scene: &Scene, time_s: f64) -> Result<Picture, TwinError> {
         .transpose()?;
     debug_assert!(reached.is_some(), "the plateau is within the press");
     let mut renderer = Renderer::new(&world, PICTURE[0], PICTURE[1])?;
-    Ok(renderer.draw(&world, Camera::Close, None)?)
+    renderer.draw(&world, Camera::Close, None)
 }

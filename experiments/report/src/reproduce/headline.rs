@@ -342,7 +342,6 @@ const CARDS: &[CardLine] = &[
             });
             format!("As the recordings show it.{mechanics}")
         },
-        ..SHARE
     },
     CardLine {
         label: "Raster images, twin and real skin",
