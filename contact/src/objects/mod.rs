@@ -58,7 +58,7 @@ pub fn placements_csv() -> String {
 pub struct ObjectSpec {
     /// Name, as in the published recordings.
     pub name: &'static str,
-    /// Label for classifiers, 1 to 17 in the order of [`OBJECTS`](super::OBJECTS); 0 for an object that is not
+    /// Label for classifiers, 1 to 17 in the order of [`OBJECTS`]; 0 for an object that is not
     /// classified.
     pub label: u8,
     /// What the object is, in everyday words.

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Every press is simulated by itself, so that nothing of a scan is in what is scored.
 #[derive(Debug, Clone, Copy)]
 pub struct SkinRun<'a> {
-    /// The scene, with [press].
+    /// The scene, with a section `press`.
     pub scene: &'a Scene,
     /// Number among the runs on this skin: each has noise of its own.
     pub number: u64,

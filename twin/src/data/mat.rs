@@ -37,7 +37,7 @@ pub(super) fn read_mat(path: &Path, names: &[&'static str]) -> Result<MatVariabl
 /// Reads the first of the variables `names` from the content `bytes` of a MATLAB v5 file. Errors name the file `path`.
 ///
 /// # Errors
-/// As [`read_mat`].
+/// [`Refusal`] when they are not MATLAB v5, or that variable is missing or no array of numbers.
 pub fn parse_mat(bytes: Vec<u8>, names: &[&'static str], path: &Path) -> Result<MatVariable, Refusal> {
     let refused = |problem: String| Refusal::new(problem).at(path.display());
     let plain = inflate(&bytes).map_err(|reason| not_mat(path, &reason))?;
