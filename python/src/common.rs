@@ -10,6 +10,7 @@ use std::time::Duration;
 use toml::Value;
 
 /// Ends a function with a `ValueError` of this format.
+#[allow(unused_macros, reason = "the part with a physics engine has no use for it")]
 macro_rules! bail {
     ($($format:tt)+) => {
         return Err($crate::common::refuse(format!($($format)+)))

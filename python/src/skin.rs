@@ -6,7 +6,7 @@ use crate::common::refuse;
 use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use spts::contact::{PosedMesh, SurfaceConfig, SurfacePoints, TouchSkin, Winding, WinklerConfig, Wrench};
+use spts::contact::{Foam, PosedMesh, SurfacePoints, TouchSkin, Winding, Wrench};
 use spts::{PressureMap, SkinLayout};
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -73,8 +73,8 @@ impl Skin {
             electrode.unwrap_or(SkinLayout::usual_electrode_m(pitch)),
         )
         .map_err(refuse)?;
-        let default = WinklerConfig::default();
-        let config = WinklerConfig {
+        let default = Foam::default();
+        let config = Foam {
             stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
             thickness_m: thickness.unwrap_or(default.thickness_m),
             damping_s: damping.unwrap_or(default.damping_s),
@@ -389,7 +389,7 @@ impl Skin {
     }
 
     /// Skin at `points`; a taxel's electrode has the usual share of a square of their mean area.
-    fn curved(points: SurfacePoints, [rows, cols]: [usize; 2], config: SurfaceConfig) -> PyResult<Self> {
+    fn curved(points: SurfacePoints, [rows, cols]: [usize; 2], config: Foam) -> PyResult<Self> {
         let mean_area_m2 = points.taxel_areas_m2().iter().sum::<f64>() / points.taxels() as f64;
         let layout = SkinLayout::with_pitch(rows, cols, mean_area_m2.sqrt()).map_err(refuse)?;
         Ok(Self::of(TouchSkin::curved(layout, points, config).map_err(refuse)?))
@@ -447,9 +447,9 @@ fn surface(
     thickness: Option<f64>,
     damping: Option<f64>,
     friction: Option<f64>,
-) -> SurfaceConfig {
-    let default = SurfaceConfig::default();
-    SurfaceConfig {
+) -> Foam {
+    let default = Foam::default();
+    Foam {
         stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
         thickness_m: thickness.unwrap_or(default.thickness_m),
         damping_s: damping.unwrap_or(default.damping_s),
