@@ -442,12 +442,7 @@ pub(crate) struct Placed {
 }
 
 /// The foam of a curved skin; what is not given is the default.
-fn surface(
-    stiffness: Option<f64>,
-    thickness: Option<f64>,
-    damping: Option<f64>,
-    friction: Option<f64>,
-) -> Foam {
+fn surface(stiffness: Option<f64>, thickness: Option<f64>, damping: Option<f64>, friction: Option<f64>) -> Foam {
     let default = Foam::default();
     Foam {
         stiffness_pa_per_m: stiffness.unwrap_or(default.stiffness_pa_per_m),
