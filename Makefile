@@ -23,9 +23,10 @@ test: setup
 
 # The slow tests, which `make test` leaves out, some minutes: ngspice's speed, MuJoCo's finite elements, a million edges
 # of a hundred cells, the processor against yasimavr, and with recordings the score curves of twin and skin. Without
-# recordings, ngspice or yasimavr, what needs them says so and is skipped.
+# recordings, ngspice or yasimavr, what needs them says so and is skipped. ONLY="NAME..." runs those tests alone.
+ONLY ?=
 validate: setup
-	cargo test --release --locked --workspace --lib --bins --tests -- --ignored
+	cargo test --release --locked --workspace --lib --bins --tests -- --ignored $(ONLY)
 
 # Data sets, read with the programs that people read them with (pyarrow, DuckDB, polars, pandas, Hugging Face
 # `datasets`, Croissant), and made by many workers, Ray among them. A minute or two; the first time, and after a change

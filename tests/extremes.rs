@@ -40,8 +40,8 @@ skin = { pitch_m = 0.1, electrode_m = 0.06 } ; [drop] | 0 | inf
 timestep_s = "auto" ; contact.thickness_m = 1e-3 ; [press] ; object = "line" ; force_n = 100.0 ; presses = 1 | 99 | inf
 "#;
 
-/// One taxel, which is stiffer than foam under a T that covers it; a row of a thousand and a square of 250,000; a skin of
-/// 10 mm that a plate floods (K A = 1500 N/m) and one of a metre in cells of 17 mm, of which a dome meets few; the
+/// One taxel, which is stiffer than foam under a T that covers it; a row of a thousand and a square of 250,000; a skin
+/// of 10 mm that a plate floods (K A = 1500 N/m) and one of a metre in cells of 17 mm, of which a dome meets few; the
 /// hardest presses, deeper than 1 mm of foam is thick, and the softest.
 #[test]
 fn extreme_scenes_run() {

@@ -1,10 +1,10 @@
 //! The contact fields against MuJoCo's own collisions and solver.
 //!
-//! Here MuJoCo finds the contacts and balances the forces; the contact fields do both themselves. The body is a triangle
-//! mesh, as a rigid flex, so that holes and concave parts count; a mesh geom would be replaced by its convex hull. The
-//! skin consists of bodies with a small sphere (a tip) at the centre of every grid square. Tips touch the mesh without
-//! friction, and do not touch each other. The answer is static: every call starts with the skin pressed flat below the
-//! body and lets it rise, so that no tip gets caught above an underside.
+//! Here MuJoCo finds the contacts and balances the forces; the contact fields do both themselves. The body is a
+//! triangle mesh, as a rigid flex, so that holes and concave parts count; a mesh geom would be replaced by its convex
+//! hull. The skin consists of bodies with a small sphere (a tip) at the centre of every grid square. Tips touch the
+//! mesh without friction, and do not touch each other. The answer is static: every call starts with the skin pressed
+//! flat below the body and lets it rise, so that no tip gets caught above an underside.
 //!
 //! Length is counted in cells, and force in K · cell³, so that a column of the skin has the stiffness 1: the engine has
 //! absolute limits (smallest mass, volume, reference times), which a fine skin in metres would reach.
@@ -31,11 +31,12 @@ const COLUMN_MASS: f64 = 0.25;
 /// Contacts are critically damped with a time constant of this many steps, the least that MuJoCo advises
 /// (documentation of `solref`); with the impedance 0.9999 a tip sinks less than 1e-4 of its compression into the mesh.
 const CONTACT_STEPS: f64 = 2.0;
-/// A tip moves at most this share of its own and the shell's radius in one step; its highest speed, that of a critically
-/// damped column of time constant 1/2 that starts at depth 1, is 2/e.
+/// A tip moves at most this share of its own and the shell's radius in one step; its highest speed, that of a
+/// critically damped column of time constant 1/2 that starts at depth 1, is 2/e.
 const STRIDE: f64 = 0.5;
 const HIGHEST_SPEED: f64 = 0.74;
-/// Units of time after which a skin must have settled: finite elements, which swing sideways, take up to 162, springs 16.
+/// Units of time after which a skin must have settled: finite elements, which swing sideways, take up to 162, springs
+/// 16.
 const LONGEST: u32 = 300;
 /// Settled: the fastest coordinate would move by less than this share of the depth in a unit of time.
 const SETTLED: f64 = 1e-5;
@@ -137,8 +138,8 @@ fn flex(layout: &SkinLayout, cells: usize, thickness_m: f64, poisson: f64, eleme
             skin.bodies.push_str("</body>\n");
         }
     }
-    // every brick in six tetrahedra around its diagonal: the ways from the corner (0, 0, 0) to (1, 1, 1) along the axes;
-    // odd ones are turned to have positive volume
+    // every brick in six tetrahedra around its diagonal: the ways from the corner (0, 0, 0) to (1, 1, 1) along the
+    // axes; odd ones are turned to have positive volume
     let ways = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
     let mut tetrahedra = String::new();
     for level in 0..elements {
@@ -159,8 +160,8 @@ fn flex(layout: &SkinLayout, cells: usize, thickness_m: f64, poisson: f64, eleme
             }
         }
     }
-    // MuJoCo's energy density is μ tr(ε²) + λ (tr ε)² with Lamé's constants of its E and ν, where Hooke's law has λ/2: its
-    // λ has to be half of the layer's
+    // MuJoCo's energy density is μ tr(ε²) + λ (tr ε)² with Lamé's constants of its E and ν, where Hooke's law has λ/2:
+    // its λ has to be half of the layer's
     let modulus = thickness * (1.0 + poisson) * (1.0 - 2.0 * poisson) / (1.0 - poisson);
     let shear = 0.5 * modulus / (1.0 + poisson);
     let lame = 0.5 * modulus * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
@@ -372,8 +373,8 @@ fn apart_from_layer(cells: Option<usize>) -> f64 {
     relative_rms(&found, &expected)
 }
 
-/// At 1 % strain the finite elements miss 1.5 % by their material (1.5 ε) and, with one node a taxel, a part of what the
-/// layer's rim carries above the middle. Springs know nothing of the rim: the finite elements have to be nearer.
+/// At 1 % strain the finite elements miss 1.5 % by their material (1.5 ε) and, with one node a taxel, a part of what
+/// the layer's rim carries above the middle. Springs know nothing of the rim: the finite elements have to be nearer.
 #[test]
 fn finite_elements_are_near_the_layer() {
     let (columns, elements) = (apart_from_layer(None), apart_from_layer(Some(1)));

@@ -1,4 +1,5 @@
-//! What the sheet remembers: hysteresis of the pressure, creep and lag of the conductance, conditioning from press to press.
+//! What the sheet remembers: hysteresis of the pressure, creep and lag of the conductance, conditioning from press to
+//! press.
 
 use crate::check::{in_range, within};
 use serde::Deserialize;

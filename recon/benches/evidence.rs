@@ -1,5 +1,5 @@
-//! Deciding by evidence, 17 classes and the unknown, images sample by sample, and localising a blob: what is done before
-//! a sample arrives, and after it.
+//! Deciding by evidence, 17 classes and the unknown, images sample by sample, and localising a blob: what is done
+//! before a sample arrives, and after it.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::{RngExt as _, SeedableRng as _};

@@ -454,8 +454,8 @@ mod tests {
             let d = [e.position_px[0] - centre[0], e.position_px[1] - centre[1]];
             mahalanobis += (c * d[0] * d[0] - 2.0 * b * d[0] * d[1] + a * d[1] * d[1]) / (a * c - b * b);
         }
-        // 200 draws have a mean of 2 ± .14 if the posterior were a Gaussian; the cells of the grid are as wide as it, which
-        // may change either's variance by half
+        // 200 draws have a mean of 2 ± .14 if the posterior were a Gaussian; the cells of the grid are as wide as it,
+        // which may change either's variance by half
         let mean = mahalanobis / f64::from(trials);
         assert!((1.0..4.0).contains(&mean), "{mean}");
     }

@@ -4,8 +4,9 @@ use spts_input::Refusal;
 
 /// Stops a series of measurements at a wanted confidence: after at least one sample, and at most [`StopRule::most`].
 ///
-/// The confidence comes from the algorithm: the probability of the best class ([`crate::classify::EvidenceClassifier`]),
-/// or the expected intersection over union of an image ([`crate::recover::SequentialEstimate`]).
+/// The confidence comes from the algorithm: the probability of the best class
+/// ([`crate::classify::EvidenceClassifier`]), or the expected intersection over union of an image
+/// ([`crate::recover::SequentialEstimate`]).
 ///
 /// Source of the rule for classes: C. W. Baum, V. V. Veeravalli, "A sequential procedure for multihypothesis testing",
 /// IEEE Trans. Inf. Theory 40(6), 1994; with two classes it is Wald's sequential probability ratio test.

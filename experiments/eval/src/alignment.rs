@@ -443,9 +443,9 @@ mod tests {
         assert_eq!(find_slips(&aligned), []);
     }
 
-    /// Edges that are missed by chance, as often as in the published sessions that slip: one in 10 000 edges, one or two a
-    /// press. The lag never falls, and it ends at as many as were missed; each press of the realigned recording is where it
-    /// says.
+    /// Edges that are missed by chance, as often as in the published sessions that slip: one in 10 000 edges, one or
+    /// two a press. The lag never falls, and it ends at as many as were missed; each press of the realigned recording
+    /// is where it says.
     #[test]
     fn edges_missed_by_chance_are_followed() {
         const BLOCKS: usize = 8;

@@ -135,7 +135,8 @@ impl TwinSessions {
         self.names().iter().flat_map(|name| self.presses(name)).sum()
     }
 
-    /// Simulates and records all sessions. `done` is called after each press. The result depends only on the scenes and the seed.
+    /// Simulates and records all sessions. `done` is called after each press. The result depends only on the scenes and
+    /// the seed.
     ///
     /// # Errors
     /// [`Refusal`] for a scene that is not valid, or if the simulation fails.

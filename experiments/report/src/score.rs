@@ -150,8 +150,8 @@ fn localisation(ball: &[&PlaceRow]) -> [Chart; 2] {
 }
 
 /// Samples that are needed against the error, for random and for chosen rows, those that stop and those with a fixed
-/// number: a panel of the classes and one of the images. Images are those of objects that were left out, where there are
-/// such.
+/// number: a panel of the classes and one of the images. Images are those of objects that were left out, where there
+/// are such.
 fn stops(board: &AnytimeBoard) -> Vec<Chart> {
     let left_out = board.rows.iter().any(|r| r.left_out);
     let panel = |title: &str, y_label: &str, subject: Subject, left_out: bool| {

@@ -725,7 +725,8 @@ mod tests {
         w * inputs + DVector::from_iterator(outputs, layer.bias.iter().map(|b| f64::from(*b)))
     }
 
-    /// Image before it is made to agree with the support, and probabilities, as the documentation of [`Unrolled`] has them.
+    /// Image before it is made to agree with the support, and probabilities, as the documentation of [`Unrolled`] has
+    /// them.
     fn formula(w: &UnrolledWeights, phi: &DMatrix<f64>, y: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
         let m = phi.nrows();
         let k = DMatrix::from_row_slice(N, N, w.prior.view().values());
@@ -757,8 +758,8 @@ mod tests {
         (x * scale, dense(&w.output, &all).map(|z| 1.0 / (1.0 + (-z).exp())))
     }
 
-    /// Single precision in the network leaves 24 bits of numbers near 1 that add up a hundred at a time: 1e-5 is ten times
-    /// what that leaves.
+    /// Single precision in the network leaves 24 bits of numbers near 1 that add up a hundred at a time: 1e-5 is ten
+    /// times what that leaves.
     #[test]
     fn the_network_is_its_formula() {
         let mut rng = ChaCha8Rng::seed_from_u64(4);
@@ -793,8 +794,8 @@ mod tests {
         }
     }
 
-    /// Rows that are not ±1 are scaled to a root mean square of 1: those of another size give the same image, as large as y
-    /// and they say.
+    /// Rows that are not ±1 are scaled to a root mean square of 1: those of another size give the same image, as large
+    /// as y and they say.
     #[test]
     fn the_size_of_rows_and_samples_is_taken_out() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);

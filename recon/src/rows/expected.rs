@@ -41,8 +41,8 @@ pub(super) enum Moments {
 pub struct Tolerances {
     /// Standard deviation of the logarithm of a taxel's gain, in [0, 3].
     pub gain_log_sd: f64,
-    /// Largest shift of the images, taxels, at most 64, and less on sheets of thousands of taxels; all shifts are equally
-    /// likely.
+    /// Largest shift of the images, taxels, at most 64, and less on sheets of thousands of taxels; all shifts are
+    /// equally likely.
     pub shift: usize,
 }
 

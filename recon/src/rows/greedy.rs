@@ -240,8 +240,8 @@ pub(super) trait Worth {
 /// Least gain of worth, as a share of it, for which a level is changed: rounding makes no progress.
 const LEAST_GAIN: f64 = 1e-9;
 
-/// Turns single signs of `row` while its worth grows, at most `sweeps` times through all of them. A row whose sum is too
-/// large is brought within `headroom` first, by the turns that cost the least worth for what they take off the sum;
+/// Turns single signs of `row` while its worth grows, at most `sweeps` times through all of them. A row whose sum is
+/// too large is brought within `headroom` first, by the turns that cost the least worth for what they take off the sum;
 /// `None` when that cannot be done.
 pub(super) fn climb(
     worth: &mut dyn Worth,

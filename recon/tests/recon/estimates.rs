@@ -1,5 +1,5 @@
-//! The regularised algorithms against closed forms, against scikit-learn and scipy (`scripts/oracles/convex.py`), and those
-//! for one sensing matrix against those that are given it with every window.
+//! The regularised algorithms against closed forms, against scikit-learn and scipy (`scripts/oracles/convex.py`), and
+//! those for one sensing matrix against those that are given it with every window.
 
 use crate::helpers::{assert_near, drawn, says, solve};
 use nalgebra::{DMatrix, DVector};

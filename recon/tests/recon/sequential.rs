@@ -1,5 +1,5 @@
-//! Estimates sample by sample against those of a whole window, which scipy has checked; an image followed in time against
-//! the posterior of all its windows at once, by dense algebra.
+//! Estimates sample by sample against those of a whole window, which scipy has checked; an image followed in time
+//! against the posterior of all its windows at once, by dense algebra.
 
 use crate::helpers::{assert_near, drawn, prior, says, signs, solve};
 use allocation_counter::measure;

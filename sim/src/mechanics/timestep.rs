@@ -1,4 +1,5 @@
-//! The time step of the dynamics: as requested, the automatic choice, and the limit that stiffness, damping and mass set.
+//! The time step of the dynamics: as requested, the automatic choice, and the limit that stiffness, damping and mass
+//! set.
 
 use serde::de::{self, Deserialize, Deserializer, Visitor};
 use serde::{Serialize, Serializer};

@@ -1,5 +1,5 @@
-//! The MuJoCo model of a scene: bodies, joints and servos, and for pictures shapes, colours, lights and cameras. It has no
-//! collision geometry, because the contact field computes contact.
+//! The MuJoCo model of a scene: bodies, joints and servos, and for pictures shapes, colours, lights and cameras. It has
+//! no collision geometry, because the contact field computes contact.
 
 use super::arm;
 use super::arm::BASE_M;

@@ -314,9 +314,9 @@ mod tests {
         }
     }
 
-    /// The same index is the same press: on the plateau the object stands where the stepped arm puts it (within a tenth of
-    /// how far it gives way sideways), and the taxels feel nearly the same. The rest is friction, and outlines that cross
-    /// the centres of cells: one of some hundred cells in contact, or 0.5 %.
+    /// The same index is the same press: on the plateau the object stands where the stepped arm puts it (within a tenth
+    /// of how far it gives way sideways), and the taxels feel nearly the same. The rest is friction, and outlines that
+    /// cross the centres of cells: one of some hundred cells in contact, or 0.5 %.
     #[test]
     fn plateau_is_that_of_the_stepped_press() {
         for name in ["T", "tape", "tennis"] {

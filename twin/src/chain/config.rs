@@ -181,8 +181,8 @@ impl RowsConfig {
     /// `profile` with these rows on a skin with this `layout`, and the file that they were read from.
     ///
     /// # Errors
-    /// [`Refusal`] for more than one source of rows or one of another kind, a file that holds none or cannot be read, and
-    /// rows of another number of taxels.
+    /// [`Refusal`] for more than one source of rows or one of another kind, a file that holds none or cannot be read,
+    /// and rows of another number of taxels.
     pub(super) fn applied(
         &self,
         mut profile: Profile,

@@ -1,5 +1,5 @@
-//! Files that are written completely or not at all: bytes, NumPy arrays, CSV tables and JSON. Their bytes depend only on
-//! the values.
+//! Files that are written completely or not at all: bytes, NumPy arrays, CSV tables and JSON. Their bytes depend only
+//! on the values.
 
 use super::disk::{self, NewFile, OutputError};
 use npyz::WriterBuilder as _;

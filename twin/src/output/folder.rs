@@ -1,9 +1,9 @@
 //! The folder for the results of one run. It is new, empty, or wholly an earlier run's, and changes in one step.
 //!
 //! The results wait in a hidden folder beside it, `.NAME.spts-new`. At the end the two folders exchange their names in
-//! one step (`renameat2` with `RENAME_EXCHANGE`), and the earlier results, which have the hidden name then, are removed.
-//! A file system without such a step first gives the earlier results the name `.NAME.spts-old`. A run that is ended
-//! leaves what the next run with this folder clears up. A run holds `.NAME.spts-lock` locked.
+//! one step (`renameat2` with `RENAME_EXCHANGE`), and the earlier results, which have the hidden name then, are
+//! removed. A file system without such a step first gives the earlier results the name `.NAME.spts-old`. A run that is
+//! ended leaves what the next run with this folder clears up. A run holds `.NAME.spts-lock` locked.
 
 use super::disk::{self, OutputError, parent};
 use super::manifest::{MANIFEST_FILE, Manifest, changed};
@@ -177,7 +177,8 @@ fn beside(folder: &Path, what: &str) -> PathBuf {
     folder.with_file_name(name)
 }
 
-/// Refuses `folder`, which the user calls `shown`, if it holds a file that is not an unchanged result of an earlier run.
+/// Refuses `folder`, which the user calls `shown`, if it holds a file that is not an unchanged result of an earlier
+/// run.
 fn check_ours(folder: &Path, shown: &Path) -> Result<(), OutputError> {
     if !disk::exists(folder) {
         return Ok(());
@@ -272,7 +273,8 @@ fn recover(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Removes the earlier results in `earlier`. A file that somebody has put there while the run ended moves into `folder`.
+/// Removes the earlier results in `earlier`. A file that somebody has put there while the run ended moves into
+/// `folder`.
 fn retire(earlier: &Path, folder: &Path) -> io::Result<()> {
     let manifest = Manifest::read(earlier).unwrap_or_default();
     let mut names = files_below(earlier)?;

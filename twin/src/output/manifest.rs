@@ -160,8 +160,8 @@ impl Manifest {
     }
 }
 
-/// Checks that the files `names` of `folder` are those that the last run wrote, and refuses files that have changed. The
-/// manifest may lie in `folder` or in one of the two folders above. A folder without a manifest passes.
+/// Checks that the files `names` of `folder` are those that the last run wrote, and refuses files that have changed.
+/// The manifest may lie in `folder` or in one of the two folders above. A folder without a manifest passes.
 ///
 /// # Errors
 /// [`OutputError`] for a file that has changed or cannot be read.

@@ -1,5 +1,5 @@
-//! A session as a folder: `session.json` and its arrays. Writing and reading loses nothing. docs/session.md describes the
-//! file for users.
+//! A session as a folder: `session.json` and its arrays. Writing and reading loses nothing. docs/session.md describes
+//! the file for users.
 
 use super::npy::{self, Expected, npy_bytes, read_codes, read_doubles, room};
 use super::recorded::{Event, PressFacts, PressPose, Recorded, Session, check, check_header, check_recorded, is_plain};

@@ -432,9 +432,9 @@ mod tests {
         Library::new(&Matrix::from_column_slices(3, images), &labels).unwrap()
     }
 
-    /// Two objects on two taxels whose gains are e^±a, all ratios exact. With the amplitude free, the difference of the two
-    /// log gains has a prior of variance 2σ² and two measurements of variance 2(σ_c² + σₘ²): it is 2a · 2/(2 + (σ_c² +
-    /// σₘ²)/σ²).
+    /// Two objects on two taxels whose gains are e^±a, all ratios exact. With the amplitude free, the difference of the
+    /// two log gains has a prior of variance 2σ² and two measurements of variance 2(σ_c² + σₘ²): it is 2a · 2/(2 +
+    /// (σ_c² + σₘ²)/σ²).
     #[test]
     fn gains_shrink_as_the_regression_says() {
         let a = 0.2_f64;

@@ -1,4 +1,5 @@
-//! Which part of a press or drop is shown, and how slowly; and the trace of the wire in that time, as columns of pixels.
+//! Which part of a press or drop is shown, and how slowly; and the trace of the wire in that time, as columns of
+//! pixels.
 
 use spts_contact::Frame;
 use std::ops::Range;

@@ -1,5 +1,5 @@
-//! Looks: colour, stroke and marker of whose numbers a curve shows, and of decoders and locators, which look the same in
-//! every figure, whatever else is in it. Stroke and marker are the second way, beside colour, to tell curves apart.
+//! Looks: colour, stroke and marker of whose numbers a curve shows, and of decoders and locators, which look the same
+//! in every figure, whatever else is in it. Stroke and marker are the second way, beside colour, to tell curves apart.
 
 use super::canvas::{Canvas, Point};
 use super::colour::{CLAIM, INK, Rgb, WHITE};

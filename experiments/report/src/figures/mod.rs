@@ -1,8 +1,8 @@
 //! Figures: charts, bars and sheets of tactile images, each written as SVG (to look at) and PNG (to share).
 //!
-//! A figure is drawn once, on a [`canvas::Canvas`], in CSS pixels. That is the SVG file, and the PNG file is painted from
-//! its text, with [`pixels::PIXELS_PER_UNIT`] pixels to the CSS pixel: the two never disagree. Results become charts
-//! through [`Plot`]. Files are written to a temporary name and renamed: a reader never sees half a figure.
+//! A figure is drawn once, on a [`canvas::Canvas`], in CSS pixels. That is the SVG file, and the PNG file is painted
+//! from its text, with [`pixels::PIXELS_PER_UNIT`] pixels to the CSS pixel: the two never disagree. Results become
+//! charts through [`Plot`]. Files are written to a temporary name and renamed: a reader never sees half a figure.
 
 pub mod axis;
 mod bars;

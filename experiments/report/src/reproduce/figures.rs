@@ -1,5 +1,5 @@
-//! The table of the report's figures, and its line charts. A new figure is a function here or in `sheets`, and a line in
-//! the table.
+//! The table of the report's figures, and its line charts. A new figure is a function here or in `sheets`, and a line
+//! in the table.
 
 use super::dataset::SimulatedData;
 use super::latency::LatencyRow;

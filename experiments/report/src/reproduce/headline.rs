@@ -70,8 +70,8 @@ impl Facts<'_> {
 type Entry = (&'static str, fn(&Facts<'_>) -> Cell);
 
 /// Every number of the headline. Each key says score, M, decoder and skin. Means are over all objects of the skin:
-/// seventeen for the twin, those with a compressive session for the real skin; `*_common_*` is the twin over the latter.
-/// The first seven but one are means over the objects of |twin − real|, where the twin's score is a mean over
+/// seventeen for the twin, those with a compressive session for the real skin; `*_common_*` is the twin over the
+/// latter. The first seven but one are means over the objects of |twin − real|, where the twin's score is a mean over
 /// `per_object_skins` simulated skins, and `*_between_skins` is the same of one of the simulated skins in place of the
 /// real one.
 #[rustfmt::skip] // one line a number
