@@ -62,7 +62,8 @@ def main():
         for fault in faults(page):
             print(f"{page.relative_to(ROOT)}: {fault}")
             wrong += 1
-    words = len((ROOT / "README.md").read_text().split())
+    # the lines of a table are no words
+    words = sum(any(map(str.isalnum, word)) for word in (ROOT / "README.md").read_text().split())
     if words > 900:
         print(f"README.md: {words} words, 900 at most")
         wrong += 1
