@@ -66,6 +66,17 @@ fn list() -> MutexGuard<'static, List> {
 #[must_use = "an entry that is dropped is off the list"]
 pub struct Entry(u64);
 
+impl Entry {
+    /// Takes the entry off the list and calls `last`. A signal that comes meanwhile waits until `last` has returned.
+    /// `last` must neither list anything nor drop another entry.
+    pub fn finish<T>(self, last: impl FnOnce() -> T) -> T {
+        let mut list = list();
+        list.entries.remove(&self.0);
+        std::mem::forget(self);
+        last()
+    }
+}
+
 impl Drop for Entry {
     fn drop(&mut self) {
         list().entries.remove(&self.0);

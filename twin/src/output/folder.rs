@@ -23,7 +23,7 @@ pub struct OutputFolder {
     shown: PathBuf,
     stage: PathBuf,
     timed: BTreeSet<String>,
-    /// Lets a signal remove the waiting results; `None` once they are on their way.
+    /// Lets a signal remove the waiting results; `None` once they are in place.
     entry: Option<Entry>,
     lock: Option<Lock>,
     made: Parents,
@@ -110,9 +110,10 @@ impl OutputFolder {
         manifest.map_err(|error| self.unstaged(error))?;
         sync_folders(&self.stage).map_err(&failed)?;
         check_ours(&self.folder, &self.shown)?;
-        // from here on the stage may be the earlier results, which the next run clears up after a signal
-        self.entry = None;
-        put_in_place(&self.stage, &self.folder).map_err(failed)?;
+        // from here on the stage may be the earlier results, which no signal may remove unseen
+        if let Some(entry) = self.entry.take() {
+            entry.finish(|| put_in_place(&self.stage, &self.folder)).map_err(failed)?;
+        }
         self.stage.clear();
         self.made.keep();
         Ok(names)
