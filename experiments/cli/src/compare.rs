@@ -4,15 +4,15 @@ use crate::context::{Bars, Common, note, open_folder};
 use crate::error::CliError;
 use crate::options::{seed, skin_gains};
 use clap::Args;
-use serde::Serialize;
 use spts::chain::MAX_TOML_BYTES;
 use spts::data::DataError;
 use spts_circuit::Profile;
 use spts_eval::{PublishedSkin, SessionSlip, slips_text};
 use spts_models::TaxelGains;
+use spts_report::compare::{FILES, arm_json, arm_text, json, text, write, write_arm};
 use spts_studies::arm::ArmStudy;
 use spts_studies::calibrate::{SessionPair, read};
-use spts_studies::compare::{CompareReport, CompareStudy, Images, Prediction, Predictor};
+use spts_studies::compare::{CompareStudy, Images, Prediction, Predictor};
 use spts_studies::per_object::{PerObjectReport, PerObjectStudy};
 use std::path::{Path, PathBuf};
 
@@ -105,20 +105,11 @@ pub(super) struct CompareCommand {
 /// Simulated skins of `--arm` when none are asked for.
 const ARM_SKINS: u64 = 8;
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Printed<'a> {
-    #[serde(flatten)]
-    compared: &'a CompareReport,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    per_object: Option<&'a PerObjectReport>,
-}
-
 impl CompareCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = open_folder(&self.out, spts_report::compare::FILES)?;
+        let out = open_folder(&self.out, FILES)?;
         if self.arm {
             let study = ArmStudy {
                 recordings: &self.recordings,
@@ -126,8 +117,8 @@ impl CompareCommand {
                 seed: self.seed,
             };
             let report = study.run(&Bars::default())?;
-            spts_report::compare::write_arm(&report, out)?;
-            return self.common.print(&report, || spts_report::compare::arm_text(&report));
+            write_arm(&report, out)?;
+            return self.common.print(&arm_json(&report), || arm_text(&report));
         }
         let pairs = read(&self.recordings)?;
         let slips: Vec<SessionSlip> = pairs.iter().flat_map(|pair| pair.slips.clone()).collect();
@@ -159,27 +150,22 @@ impl CompareCommand {
         };
         let report = study.run(&Bars::default())?;
         let objects = self.per_object()?;
-        spts_report::compare::write(&report, objects.as_ref(), out)?;
+        write(&report, objects.as_ref(), out)?;
         let folder = if self.profile.is_some() {
-            self.out.join("predicted.csv")
+            "predicted.csv"
         } else {
-            self.out.join("figures")
+            "figures"
         };
-        let text = || {
+        self.common.print(&json(&report, objects.as_ref()), || {
             let objects = objects.as_ref().map_or_else(String::new, |found| {
                 format!("\n{}\n", spts_report::per_object::text(found))
             });
             format!(
                 "{}{objects}\nresults: {}",
-                spts_report::compare::text(&report),
-                folder.display()
+                text(&report),
+                self.out.join(folder).display()
             )
-        };
-        let printed = Printed {
-            compared: &report,
-            per_object: objects.as_ref(),
-        };
-        self.common.print(&printed, text)
+        })
     }
 
     /// Gains of the simulated skin, which is that of the recordings.

@@ -269,7 +269,19 @@ impl From<ExternalError> for ScoreError {
 
 impl From<LearnError> for ScoreError {
     fn from(error: LearnError) -> Self {
-        Self::Refused(Refusal::from_error(error))
+        Self::Refused(error.into())
+    }
+}
+
+impl From<ScoreError> for Refusal {
+    fn from(error: ScoreError) -> Self {
+        Self::from_error(error)
+    }
+}
+
+impl From<DecodeError> for Refusal {
+    fn from(error: DecodeError) -> Self {
+        Self::from_error(error)
     }
 }
 

@@ -122,6 +122,18 @@ impl<'a, R: Copy> Table<'a, R> {
         self.with(Some(key.into()), None, value)
     }
 
+    /// Adds a column that files know by a short name, and readers by the `words` for it.
+    #[must_use]
+    pub fn named<N: Into<Cell>, W: Into<Cell>>(
+        self,
+        key: &str,
+        head: &str,
+        name: impl Fn(R) -> N + Copy + 'a,
+        words: impl Fn(N) -> W + 'a,
+    ) -> Self {
+        self.file(key, name).shown(head, move |row| words(name(row)))
+    }
+
     /// Adds the two ends of an interval as columns for files alone, `key`_low and `key`_high.
     #[must_use]
     pub fn interval(self, key: &str, value: impl Fn(R) -> Option<[f64; 2]> + Copy + 'a) -> Self {

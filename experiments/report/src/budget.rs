@@ -1,14 +1,15 @@
 //! `spts budget` as text, files and figures.
 
 use crate::figures::{BarChart, BarGroup, BarRow, Style, save_bars};
-use crate::{ReportError, write_all_or_none};
+use crate::write_all_or_none;
 use serde::Serialize;
-use spts::output::{OutputFolder, write_bytes, write_json};
+use spts::output::{OutputError, OutputFolder, write_bytes, write_json};
 use spts::provenance::Provenance;
 use spts_eval::decoders::short_label;
-use spts_eval::{Table, TextTable, unique};
+use spts_eval::{Table, unique};
+use spts_recon::statistics::Sample;
 use spts_studies::budget::{
-    BudgetReport, BudgetRow, CHANCE, CHANGES, CONTACT, Direction, EndPoint, MeanWithError, WHOLE_STAGE,
+    BudgetReport, BudgetRow, CHANCE, CHANGES, CONTACT, Direction, EndPoint, WHOLE_STAGE, stands_out,
 };
 
 /// Files outside of folders of their own.
@@ -45,8 +46,8 @@ pub fn json(report: &BudgetReport) -> impl Serialize + '_ {
 /// Writes the tables, their summary, the figures and the provenance of `report` into the folder `out`.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
-pub fn write(report: &BudgetReport, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written or a figure cannot be drawn.
+pub fn write(report: &BudgetReport, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         costs(&report.rows).write(out)?;
         end_points(report).write(out)?;
@@ -77,11 +78,11 @@ fn costs(rows: &[BudgetRow]) -> Table<'_, &BudgetRow> {
         .file("decode", |r| r.decode)
         .file("m", |r| r.m)
         .file("taxels", |r| r.taxels)
-        .file("sessions", |r| r.changes[0].sessions);
+        .file("sessions", |r| r.changes[0].count);
     for (place, name) in CHANGES.into_iter().enumerate() {
         table = table
             .file(format!("{name}_delta"), move |r| r.changes[place].mean)
-            .file(format!("{name}_se"), move |r| r.changes[place].se);
+            .file(format!("{name}_se"), move |r| r.changes[place].standard_error());
     }
     table
 }
@@ -108,7 +109,7 @@ fn end_points(report: &BudgetReport) -> Table<'_, &EndPoint> {
             })
             .digits(3)
             .file(format!("{key}_se"), move |p| {
-                (!p.is_scan()).then_some(p.scores[place].se)
+                (!p.is_scan()).then_some(p.scores[place].standard_error())
             });
     }
     table
@@ -134,13 +135,11 @@ fn find(
     direction: Direction,
     (decode, m): (&str, usize),
     change: usize,
-) -> Option<MeanWithError> {
+) -> Option<Sample> {
     let key = (stage, effect, direction, decode, m);
-    let found = report
-        .rows
-        .iter()
-        .find(|r| (r.stage, r.effect, r.mode, r.decode, r.m) == key);
-    found.map(|row| row.changes[change])
+    let mut rows = report.rows.iter();
+    let row = rows.find(|r| (r.stage, r.effect, r.mode, r.decode, r.m) == key)?;
+    Some(row.changes[change])
 }
 
 /// The end points and the change of the IoU with every effect, as tables to read.
@@ -181,30 +180,26 @@ fn markdown(report: &BudgetReport) -> String {
 
 /// One line an effect, with columns of a heading, direction, M and change; lines without any cell are left out.
 fn by_effect(report: &BudgetReport, decode: &str, columns: &[(String, Direction, usize, usize)]) -> String {
-    let show = |change: MeanWithError| {
-        let mark = if change.stands_out() { "*" } else { "" };
-        format!("{:+.3} ± {:.3}{mark}", change.mean, change.se)
-    };
-    let row = |(stage, effect): (&str, &str)| {
-        let found = columns.iter();
-        let found: Vec<Option<MeanWithError>> = found
-            .map(|(_, direction, m, change)| find(report, (stage, effect), *direction, (decode, *m), *change))
-            .collect();
-        found.iter().any(Option::is_some).then(|| {
-            let name = if effect == WHOLE_STAGE { "all of it" } else { effect };
-            let cells = found.into_iter().map(|cell| cell.map_or_else(|| "–".to_owned(), show));
-            [stage.to_owned(), name.to_owned()].into_iter().chain(cells).collect()
-        })
-    };
-    let heads = columns.iter().map(|(head, ..)| head.clone());
-    let table = TextTable {
-        head: ["stage".to_owned(), "effect".to_owned()]
-            .into_iter()
-            .chain(heads)
-            .collect(),
-        rows: effects(report).into_iter().filter_map(row).collect(),
-    };
-    table.to_string()
+    let rows = effects(report).into_iter().filter(|effect| {
+        let mut found = columns
+            .iter()
+            .map(|(_, direction, m, change)| find(report, *effect, *direction, (decode, *m), *change));
+        found.any(|cell| cell.is_some())
+    });
+    let mut table = Table::new("", rows)
+        .shown("stage", |(stage, _)| stage)
+        .shown(
+            "effect",
+            |(_, effect)| if effect == WHOLE_STAGE { "all of it" } else { effect },
+        );
+    for (head, direction, m, change) in columns {
+        table = table.shown(head, move |effect| {
+            let cell = find(report, effect, *direction, (decode, *m), *change)?;
+            let mark = if stands_out(&cell) { "*" } else { "" };
+            Some(format!("{:+.3} ± {:.3}{mark}", cell.mean, cell.standard_error()))
+        });
+    }
+    table.text()
 }
 
 /// What the signs mean, and how many stars are nothing but chance among the changes `shown` of every row.
@@ -213,9 +208,11 @@ fn footnote(report: &BudgetReport, shown: &[usize]) -> String {
         .rows
         .iter()
         .flat_map(|row| shown.iter().map(|change| row.changes[*change]));
-    let moved: Vec<MeanWithError> = numbers.filter(|number| number.can_stand_out()).collect();
-    let (all, stars) = (moved.len(), moved.iter().filter(|number| number.stands_out()).count());
-    let sessions = report.rows.first().map_or(0, |row| row.changes[0].sessions);
+    let moved: Vec<Sample> = numbers
+        .filter(|number| number.mean.abs() > 0.0 || number.variance > 0.0)
+        .collect();
+    let (all, stars) = (moved.len(), moved.iter().filter(|number| stands_out(number)).count());
+    let sessions = report.rows.first().map_or(0, |row| row.changes[0].count);
     format!(
         "\n± one standard error over {sessions} sessions: presses, gains, noise and dictionaries; * further from 0 than chance brings it \
          in {:.0} % (Student's t).\n{stars} of {all} numbers that are not 0 throughout have a *; chance alone gives about {:.1}.\n",
@@ -251,10 +248,9 @@ fn bars(report: &BudgetReport, decode: &str, truth: &str, change: usize) -> BarC
         let (stage, name) = effect;
         let lost = |m: usize| {
             let change_of = |direction| find(report, effect, direction, (decode, m), change);
-            let pair = |e: MeanWithError| (e.mean, e.se);
-            let removed = change_of(Direction::Ablation).map(pair);
+            let removed = change_of(Direction::Ablation).map(|change| (change.mean, change.standard_error()));
             // adding an effect loses what it lowers the score by
-            let added = change_of(Direction::Addition).map(|e| pair(MeanWithError { mean: -e.mean, ..e }));
+            let added = change_of(Direction::Addition).map(|change| (-change.mean, change.standard_error()));
             vec![removed, added]
         };
         let heading = name == WHOLE_STAGE;

@@ -1,7 +1,7 @@
 //! `spts calibrate` as text, and the picture of `spts calibrate --skin`.
 
-use crate::ReportError;
 use crate::figures::{Sheet, Tile, TileRow, save_sheet};
+use spts::output::OutputError;
 use spts_eval::{Table, TextTable};
 use spts_recon::statistics::mean;
 use spts_studies::calibrate::{
@@ -174,8 +174,8 @@ pub fn skin_text(report: &SkinReport) -> String {
 /// `.png`.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn write_gains(report: &SkinReport, path: &Path) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn write_gains(report: &SkinReport, path: &Path) -> Result<(), OutputError> {
     let [rows, cols] = report.shape;
     let tile = |values: Vec<f64>, what: &str| {
         let (least, most) = values

@@ -1,14 +1,17 @@
 //! The files of a comparison of the twin with recordings.
 
-use crate::figures::{Chart, FigureError, Series, Style, save_charts};
-use crate::labels::object_label;
-use crate::{ReportError, per_object, write_all_or_none};
-use spts::output::{OutputFolder, write_json, write_table};
-use spts_eval::Table;
+use crate::figures::{Chart, Curve, Plot, Series, Style, save_charts};
+use crate::labels::{object_label, score_label, statistic_label};
+use crate::{per_object, write_all_or_none};
+use serde::Serialize;
+use spts::output::{OutputError, OutputFolder, write_json};
 use spts_eval::decoders::{PublishedDecode, label, short_label};
-use spts_studies::arm::ArmReport;
+use spts_eval::{ScoreRow, Table};
+use spts_studies::arm::{ArmBand, ArmReport};
 use spts_studies::calibrate::quantiles;
-use spts_studies::compare::{CompareReport, ComparedSession, ScoreCurves};
+use spts_studies::compare::{
+    Banded, CompareReport, ComparedSession, CurveDistance, PredictedStatistic, ScoreCurves, Statistic,
+};
 use spts_studies::per_object::PerObjectReport;
 use std::path::Path;
 
@@ -38,43 +41,118 @@ pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
     }
 }
 
+/// Adds a value of the real skin and the band of the twins.
+pub(crate) fn banded<'a, R: Copy + 'a>(
+    table: Table<'a, R>,
+    digits: usize,
+    of: impl Fn(R) -> Banded + Copy + 'a,
+) -> Table<'a, R> {
+    table
+        .column("real", "real skin", move |row| of(row).real)
+        .digits(digits)
+        .column("twin", "twin, mean", move |row| of(row).twin)
+        .digits(digits)
+        .file("low", move |row| of(row).low)
+        .file("high", move |row| of(row).high)
+        .shown("90 % band", move |row| {
+            format!("{:.digits$} – {:.digits$}", of(row).low, of(row).high)
+        })
+}
+
+/// Adds whether the real value lies in the band.
+pub(crate) fn marked<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> Banded + Copy + 'a) -> Table<'a, R> {
+    table.named(
+        "inside",
+        "",
+        move |row| of(row).inside(),
+        |inside| if inside { "" } else { "outside" },
+    )
+}
+
+/// Statistics that are compared, or of what is not modelled.
+pub(crate) fn statistics<'a>(rows: impl IntoIterator<Item = &'a Statistic>) -> Table<'a, &'a Statistic> {
+    Table::new("compare", rows)
+        .named("session", "session", |s| s.session.as_str(), object_label)
+        .named("name", "statistic", |s| s.name, statistic_label)
+        .file("real", |s| s.real)
+        .file("real_standard_error", |s| s.real_standard_error)
+        .shown("real skin", |s| with_error(s.real, s.real_standard_error, 5))
+        .file("twin", |s| s.twin)
+        .file("twin_standard_error", |s| s.twin_standard_error)
+        .shown("twin", |s| with_error(s.twin, s.twin_standard_error, 5))
+        .column("tolerance", "allowed difference", |s| s.tolerance)
+        .named("ok", "", |s| s.ok, |ok| ok.map_or("", verdict))
+}
+
+fn verdict(ok: bool) -> &'static str {
+    if ok { "ok" } else { "DIFFERS" }
+}
+
+/// How far the score curves of skin and twin are from each other.
+pub(crate) fn curves(report: &CompareReport) -> Table<'_, &CurveDistance> {
+    Table::new("curves", report.distances())
+        .named("metric", "score", |c| c.metric, score_label)
+        .named("decode", "decoder", |c| c.decode, short_label)
+        .column("mean_abs_difference", "mean |twin − real|", |c| c.mean_abs_difference)
+        .digits(4)
+        .column("max_abs_difference", "largest", |c| c.max_abs_difference)
+        .digits(4)
+        .column("tolerance", "mean allowed", |c| c.tolerance)
+        .digits(2)
+        .named("ok", "", |c| c.ok, verdict)
+}
+
+fn predicted(report: &CompareReport) -> Table<'_, &PredictedStatistic> {
+    let table = Table::new("predicted", &report.predicted)
+        .named("session", "session", |r| r.session.as_str(), object_label)
+        .named("name", "statistic", |r| r.name, statistic_label);
+    marked(banded(table, 5, |r| r.of), |r| r.of)
+}
+
+/// The statistics of the bent skin.
+fn arm(report: &ArmReport) -> Table<'_, &ArmBand> {
+    let table = Table::new("arm", &report.statistics)
+        .column("statistic", "statistic", |b| b.statistic)
+        .column("unit", "unit", |b| b.unit);
+    marked(banded(table, 3, |b| b.of), |b| b.of)
+}
+
+/// What `--json` prints.
+#[must_use]
+pub fn json<'a>(report: &'a CompareReport, objects: Option<&'a PerObjectReport>) -> impl Serialize + 'a {
+    #[derive(Serialize)]
+    struct Printed<'a> {
+        statistics: Table<'a, &'a Statistic>,
+        curves: Table<'a, &'a CurveDistance>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        predicted: Option<Table<'a, &'a PredictedStatistic>>,
+        not_modelled: Table<'a, &'a Statistic>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        per_object: Option<per_object::Printed<'a>>,
+    }
+    Printed {
+        statistics: statistics(&report.statistics),
+        curves: curves(report),
+        predicted: (!report.predicted.is_empty()).then(|| predicted(report)),
+        not_modelled: statistics(&report.not_modelled),
+        per_object: objects.map(per_object::json),
+    }
+}
+
 /// Statistics and distances of the curves, or what was predicted, as text tables.
 #[must_use]
 pub fn text(report: &CompareReport) -> String {
-    let verdict = |ok| if ok { "ok" } else { "DIFFERS" };
     if !report.predicted.is_empty() {
-        let inside = report.predicted.iter().filter(|row| row.inside).count();
-        let table = Table::new("predicted", &report.predicted)
-            .shown("session", |r| &r.session)
-            .shown("statistic", |r| r.name)
-            .shown("real", |r| r.real)
-            .digits(5)
-            .shown("twin", |r| r.twin)
-            .digits(5)
-            .shown("90 % of twins", |r| format!("{:.5} to {:.5}", r.low, r.high))
-            .shown("", |r| if r.inside { "inside" } else { "OUTSIDE" });
-        return format!("{}inside: {inside} of {}", table.text(), report.predicted.len());
+        let inside = report.predicted.iter().filter(|row| row.of.inside()).count();
+        return format!(
+            "{}inside: {inside} of {}",
+            predicted(report).text(),
+            report.predicted.len()
+        );
     }
-    let statistics = Table::new("compare", report.statistics.iter().chain(&report.not_modelled))
-        .shown("session", |s| &s.session)
-        .shown("statistic", |s| s.name)
-        .shown("real", |s| with_error(s.real, s.real_standard_error, 5))
-        .shown("twin", |s| with_error(s.twin, s.twin_standard_error, 5))
-        .shown("tolerance", |s| s.tolerance)
-        .shown("", move |s| s.ok.map_or("", verdict));
-    let mut out = statistics.text();
+    let mut out = statistics(report.all_statistics()).text();
     if !report.distances().is_empty() {
-        let curves = Table::new("curves", report.distances())
-            .shown("decoder", |c| short_label(c.decode))
-            .shown("score", |c| c.metric)
-            .shown("mean", |c| c.mean_abs_difference)
-            .digits(4)
-            .shown("largest", |c| c.max_abs_difference)
-            .digits(4)
-            .shown("allowed", |c| c.tolerance)
-            .digits(2)
-            .shown("", move |c| verdict(c.ok));
-        out.push_str(&format!("\n|twin − real| over M = 7 … 100\n{}", curves.text()));
+        out.push_str(&format!("\nscore curves over M = 7 … 100\n{}", curves(report).text()));
     }
     out.trim_end().to_owned()
 }
@@ -82,48 +160,55 @@ pub fn text(report: &CompareReport) -> String {
 /// The statistics of the bent skin as a text table.
 #[must_use]
 pub fn arm_text(report: &ArmReport) -> String {
-    let table = Table::new("arm", &report.statistics)
-        .shown("statistic", |b| b.statistic)
-        .shown("unit", |b| b.unit)
-        .shown("real", |b| b.real)
-        .digits(3)
-        .shown("twin", |b| b.twin)
-        .digits(3)
-        .shown("90 % band", |b| format!("{:.3} – {:.3}", b.low, b.high))
-        .shown("", |b| if b.inside { "" } else { "outside" });
     format!(
         "{} ({} touches), twin: {} simulated bent skins (`spts simulate arm`)\n{}",
         report.session,
         report.touches,
         report.skins,
-        table.text().trim_end()
+        arm(report).text().trim_end()
     )
+}
+
+/// What `--arm --json` prints.
+#[must_use]
+pub fn arm_json(report: &ArmReport) -> impl Serialize + '_ {
+    #[derive(Serialize)]
+    struct Printed<'a> {
+        session: &'a str,
+        touches: usize,
+        skins: u64,
+        statistics: Table<'a, &'a ArmBand>,
+    }
+    Printed {
+        session: &report.session,
+        touches: report.touches,
+        skins: report.skins,
+        statistics: arm(report),
+    }
 }
 
 /// Writes the tables of the bent skin into the folder `out`.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn write_arm(report: &ArmReport, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn write_arm(report: &ArmReport, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
-        write_table(&out.path(ARM[0]), &report.statistics)?;
-        write_json(&out.path(ARM[1]), report)?;
-        Ok(())
+        arm(report).write(out)?;
+        write_json(&out.path(ARM[1]), &arm_json(report))
     })
 }
 
 /// Writes the tables and the figures of `report`, and of `objects` where there are any, into the folder `out`.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
-pub fn write(report: &CompareReport, objects: Option<&PerObjectReport>, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written or a figure cannot be drawn.
+pub fn write(report: &CompareReport, objects: Option<&PerObjectReport>, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         if !report.predicted.is_empty() {
-            write_table(&out.path("predicted.csv"), &report.predicted)?;
-            return Ok(());
+            return predicted(report).write(out);
         }
-        write_table(&out.path("compare.csv"), &report.all_statistics())?;
-        write_table(&out.path("curves.csv"), report.distances())?;
+        statistics(report.all_statistics()).write(out)?;
+        curves(report).write(out)?;
         let figures = out.folder("figures")?;
         draw(report, &figures)?;
         if let Some(objects) = objects {
@@ -138,9 +223,19 @@ pub fn write(report: &CompareReport, objects: Option<&PerObjectReport>, out: Out
 /// `scores`.
 ///
 /// # Errors
-/// [`FigureError`] when a file cannot be written or no font is found.
-pub fn draw(report: &CompareReport, folder: &Path) -> Result<(), FigureError> {
-    draw_all(&report.compared, report.curves.as_ref(), folder)
+/// [`OutputError`] when a file cannot be written or no font is found.
+pub fn draw(report: &CompareReport, folder: &Path) -> Result<(), OutputError> {
+    let charts: Vec<Chart> = report.compared.iter().map(histogram).collect();
+    save_charts(&charts, folder, "residuals")?;
+    let charts: Vec<Chart> = report.compared.iter().map(quantile_plot).collect();
+    save_charts(&charts, folder, "quantiles")?;
+    let Some(curves) = &report.curves else { return Ok(()) };
+    let panels = [
+        PublishedDecode::Matched,
+        PublishedDecode::ScriptS20,
+        PublishedDecode::ScriptM4,
+    ];
+    save_charts(&panels.map(|decode| scores(curves, decode)), folder, "scores")
 }
 
 /// Bins of a histogram, over ± [`REACH`].
@@ -149,24 +244,6 @@ const BINS: usize = 81;
 const REACH: f64 = 1.2;
 /// Quantiles of a residual in a quantile–quantile plot.
 const POINTS: usize = 200;
-
-/// Writes `residuals`, `quantiles` and, with curves, `scores` (.svg and .png) into `folder`.
-///
-/// # Errors
-/// [`FigureError`] when a file cannot be written or no font is found.
-fn draw_all(compared: &[ComparedSession], curves: Option<&ScoreCurves>, folder: &Path) -> Result<(), FigureError> {
-    let charts: Vec<Chart> = compared.iter().map(histogram).collect();
-    save_charts(&charts, folder, "residuals")?;
-    let charts: Vec<Chart> = compared.iter().map(quantile_plot).collect();
-    save_charts(&charts, folder, "quantiles")?;
-    let Some(curves) = curves else { return Ok(()) };
-    let panels = [
-        PublishedDecode::Matched,
-        PublishedDecode::ScriptS20,
-        PublishedDecode::ScriptM4,
-    ];
-    save_charts(&panels.map(|decode| scores(curves, decode)), folder, "scores")
-}
 
 /// Share of the residuals in each bin, logarithmic.
 fn histogram(compared: &ComparedSession) -> Chart {
@@ -228,37 +305,30 @@ fn quantile_plot(compared: &ComparedSession) -> Chart {
 }
 
 fn scores(curves: &ScoreCurves, decode: PublishedDecode) -> Chart {
-    let mut all = Vec::new();
-    for (variant, (name, get)) in (0..).zip([
-        ("support", (|r| r.support) as fn(&spts_eval::ScoreRow) -> f64),
-        ("IoU", |r| r.iou),
-        ("vote of 20", |r| r.class_vote20),
-    ]) {
-        for (style, whose, rows) in [
-            (Style::Twin, "twin", &curves.twin),
-            (Style::Real, "real skin", &curves.real),
-        ] {
-            let points = rows
-                .iter()
-                .filter(|r| r.decode == decode.name())
-                .map(|r| (r.m as f64, get(r)));
-            all.push(Series::new(
-                format!("{whose}, {name}"),
-                style,
-                variant,
-                points.collect(),
-            ));
+    type Score = (u8, &'static str, fn(&ScoreRow) -> f64);
+    let all: [Score; 3] = [
+        (0, "support", |r| r.support),
+        (1, "IoU", |r| r.iou),
+        (2, "vote of 20", |r| r.class_vote20),
+    ];
+    let skins = [
+        (Style::Twin, "twin", &curves.twin),
+        (Style::Real, "real skin", &curves.real),
+    ];
+    let mut rows = Vec::new();
+    for score in &all {
+        for (style, whose, of_skin) in skins {
+            let here = of_skin.iter().filter(|r| r.decode == decode.name());
+            rows.extend(here.map(|r| (score, style, whose, r)));
         }
     }
-    Chart {
-        title: label(decode.name()).to_owned(),
-        x_label: "measurements M".to_owned(),
-        y_label: "score, mean over the objects".to_owned(),
-        x_log: true,
-        y_range: Some((0.0, 1.02)),
-        series: all,
-        ..Chart::default()
-    }
+    Plot::new(rows)
+        .x("measurements M", |(.., r)| r.m as f64)
+        .log_x()
+        .y("score, mean over the objects", |((_, _, get), .., r)| get(r))
+        .within(0.0, 1.02)
+        .by(|((variant, name, _), style, whose, _)| Curve::new(format!("{whose}, {name}"), style, *variant))
+        .chart(label(decode.name()))
 }
 
 #[cfg(test)]

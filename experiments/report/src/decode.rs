@@ -1,9 +1,9 @@
 //! Decoded sessions as files: a table, arrays, and one picture.
 
 use crate::figures::{Sheet, Tile, TileRow, save_sheet};
-use crate::{ReportError, write_all_or_none};
+use crate::write_all_or_none;
 use spts::Session;
-use spts::output::OutputFolder;
+use spts::output::{OutputError, OutputFolder};
 use spts_eval::decode::{self, DecodedSession, DecodedWindow};
 use spts_eval::decoders::short_label;
 use std::path::Path;
@@ -15,8 +15,8 @@ pub const FILES: &[&str] = &["windows.csv", "decoded.svg", "decoded.png"];
 /// of them, or none.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn write(decoded: &[(&Session, DecodedSession)], out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn write(decoded: &[(&Session, DecodedSession)], out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         decode::write(decoded, out)?;
         save_picture(decoded, &out.path(""), "decoded")?;
@@ -37,8 +37,8 @@ const FINE: usize = 24;
 /// image where that is not known, the trace of the wire, and the images at each M with the true support outlined.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name: &str) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name: &str) -> Result<(), OutputError> {
     let mut rows = Vec::new();
     let mut columns = vec!["pressed".to_owned(), "the wire".to_owned()];
     // sessions of other skins are decoded from other numbers of measurements

@@ -1,8 +1,8 @@
 //! Files and figures of `spts circuit`.
 
 use crate::figures::{Chart, Curve, Plot, Series, Style, save_charts};
-use crate::{ReportError, write_all_or_none};
-use spts::output::{OutputFolder, write_json};
+use crate::write_all_or_none;
+use spts::output::{OutputError, OutputFolder, write_json};
 use spts_circuit::amplifier::{Budget, Remedied, Remedy};
 use spts_eval::{Cell, Table};
 use spts_studies::electronics::{ElectronicsReport, ElectronicsStudy};
@@ -13,8 +13,8 @@ pub const FILES: &[&str] = &["circuit.csv", "parameters.json"];
 /// Writes `circuit.csv`, `parameters.json` and `figures/circuit` into the folder `out`: all of them, or none.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn write(study: &ElectronicsStudy, report: &ElectronicsReport, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn write(study: &ElectronicsStudy, report: &ElectronicsReport, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         table(&report.rows).write(out)?;
         write_json(&out.path("parameters.json"), study)?;

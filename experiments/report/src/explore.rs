@@ -1,6 +1,6 @@
 //! `spts explore` as text, files and figures.
 
-use super::{ReportError, write_all_or_none};
+use super::write_all_or_none;
 use crate::figures::{Chart, Curve, Plot, Style, save_charts};
 use spts::output::{OutputError, OutputFolder, write_json};
 use spts::provenance::{Machine, Provenance, hash_text};
@@ -38,8 +38,8 @@ pub fn text(report: &ExploreReport) -> String {
 /// Writes the tables, the figures and what they depend on into the folder `out`: all of them, or none.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn write(study: &ExploreStudy, report: &ExploreReport, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn write(study: &ExploreStudy, report: &ExploreReport, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         let path = out.path("parameters.json");
         let parameters = serde_json::to_string(study).map_err(|e| OutputError::write(&path)(e.into()))?;

@@ -2,8 +2,8 @@
 
 use crate::figures::colour::heat;
 use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow, save_charts, save_sheet};
-use crate::{Origin, ReportError, write_all_or_none};
-use spts::output::{OutputFolder, write_bytes, write_json, write_table};
+use crate::{Origin, write_all_or_none};
+use spts::output::{OutputError, OutputFolder, write_bytes, write_json, write_table};
 use spts_eval::{Table, unique};
 use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
 use spts_studies::fidelity::{FidelityReport, FinePressure};
@@ -20,8 +20,8 @@ pub const FILES: &[&str] = &[
 /// Writes the tables, their summary, the figures and the provenance of `report` beside the scenes that wait in `out`.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written or a figure cannot be drawn.
-pub fn write(report: &FidelityReport, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written or a figure cannot be drawn.
+pub fn write(report: &FidelityReport, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         // without what depends on the machine
         Table::new("errors", &report.rows)

@@ -48,3 +48,16 @@ pub(crate) fn object_list(names: &str) -> String {
         .collect::<Vec<_>>()
         .join(", ")
 }
+
+/// What a score is called.
+#[must_use]
+pub(crate) fn score_label(name: &str) -> String {
+    match name {
+        "support" => "support accuracy".to_owned(),
+        "iou" => "IoU".to_owned(),
+        "f1" => "F1".to_owned(),
+        "class_single" => "single windows classified".to_owned(),
+        "class_vote20" => "votes of 20 classified".to_owned(),
+        other => other.replace('_', " "),
+    }
+}

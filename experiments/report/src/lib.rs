@@ -22,6 +22,6 @@ pub mod score;
 pub mod sensing;
 pub mod simulation;
 
-pub use error::{ReportError, write_all_or_none};
+pub use error::write_all_or_none;
 pub use html::{Card, Page, PageFigure, PageTable, Section, html};
 pub use origin::Origin;

@@ -1,123 +1,97 @@
 //! Tables and the figure of twin and skin object by object, for `spts compare` and the report.
 
-use crate::figures::{FigureError, Interval, IntervalChart, IntervalLine, IntervalPanel, save_intervals};
-use crate::labels::{object_label, object_list};
+use crate::compare::{banded, marked};
+use crate::figures::{Interval, IntervalChart, IntervalLine, IntervalPanel, save_intervals};
+use crate::labels::{object_label, object_list, score_label};
 use crate::{PageFigure, PageTable, Section};
-use spts::output::{OutputError, write_json, write_table};
-use spts_eval::Table;
+use serde::Serialize;
+use spts::output::{OutputError, write_json};
 use spts_eval::decoders::label;
-use spts_studies::per_object::{MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES};
-use std::path::Path;
+use spts_eval::{Cell, Table, unique};
+use spts_studies::per_object::{MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES, ScoreDistance};
+use std::path::{Path, PathBuf};
 
 /// Name of the figure.
 pub(crate) const FIGURE: &str = "per_object";
 /// Tables, in the folder they are written to.
 pub(crate) const TABLES: [&str; 3] = ["per_object.csv", "per_object_distances.csv", "per_object.json"];
 
+/// What is written as JSON.
+#[derive(Serialize)]
+pub(crate) struct Printed<'a> {
+    skins: u64,
+    distances: Table<'a, &'a ScoreDistance>,
+    objects: Table<'a, &'a ObjectBand>,
+}
+
+/// What is written as JSON.
+pub(crate) fn json(report: &PerObjectReport) -> Printed<'_> {
+    Printed {
+        skins: report.skins,
+        distances: distances(report),
+        objects: objects(report),
+    }
+}
+
 /// Writes [`TABLES`], each to the path that `path` gives its name.
-pub(crate) fn write_tables(
+pub(crate) fn write_tables(report: &PerObjectReport, path: impl Fn(&str) -> PathBuf) -> Result<(), OutputError> {
+    objects(report).write_csv(&path(TABLES[0]))?;
+    distances(report).write_csv(&path(TABLES[1]))?;
+    write_json(&path(TABLES[2]), &json(report))
+}
+
+fn distances(report: &PerObjectReport) -> Table<'_, &ScoreDistance> {
+    with_images(Table::new("distances", &report.distances), report, |d| d.images)
+        .named("decoder", "decoder", |d| d.decoder.as_str(), label)
+        .column("m", "M", |d| d.m)
+        .named("score", "score", |d| d.score, score_label)
+        .column("mean_abs_difference", "|twin − real|", |d| d.mean_abs_difference)
+        .digits(3)
+        .column("between_skins", "between skins", |d| d.between_skins)
+        .digits(3)
+        .file("difference_of_means", |d| d.difference_of_means)
+        .shown("means, twin − real", |d| format!("{:+.3}", d.difference_of_means))
+        .file("objects", |d| d.objects)
+        .named("outside", "outside the 90 % band", |d| d.outside.as_str(), object_list)
+}
+
+fn objects(report: &PerObjectReport) -> Table<'_, &ObjectBand> {
+    let table = with_images(Table::new("objects", &report.objects), report, |b| b.images)
+        .named("decoder", "decoder", |b| b.score.decoder.as_str(), label)
+        .column("m", "M", |b| b.score.m)
+        .named("score", "score", |b| b.score.score, score_label)
+        .named("object", "object", |b| b.score.object.as_str(), object_label);
+    let table = banded(table, 3, |b| b.of).file("difference", |b| b.of.difference());
+    marked(table, |b| b.of)
+}
+
+/// The images of the twin's recordings; readers see them where there are several.
+fn with_images<'a, R: Copy + 'a>(
+    table: Table<'a, R>,
     report: &PerObjectReport,
-    path: impl Fn(&str) -> std::path::PathBuf,
-) -> Result<(), OutputError> {
-    write_table(&path(TABLES[0]), &report.objects)?;
-    write_table(&path(TABLES[1]), &report.distances)?;
-    write_json(&path(TABLES[2]), report)
+    images: impl Fn(R) -> ReadoutImages + Copy + 'a,
+) -> Table<'a, R> {
+    let table = table.file("images", move |row| Cell::name_of(images(row)));
+    if unique(report.objects.iter().map(|b| b.images)).len() < 2 {
+        return table;
+    }
+    table.shown("images", move |row| images(row).label())
 }
 
 /// Draws the bands of the twin and the marks of the skin into `folder`: a line of panels a score and decoder, a panel
 /// an M, a row an object.
-pub(crate) fn draw(report: &PerObjectReport, folder: &Path) -> Result<(), FigureError> {
+pub(crate) fn draw(report: &PerObjectReport, folder: &Path) -> Result<(), OutputError> {
     save_intervals(&chart(report), folder, FIGURE)
-}
-
-/// In words.
-fn score_label(score: &str) -> &str {
-    match score {
-        "iou" => "IoU",
-        "class_single" => "single windows classified",
-        other => other,
-    }
-}
-
-fn of_twin(report: &PerObjectReport) -> impl Iterator<Item = &ObjectBand> {
-    report.objects.iter().filter(|b| b.images == ReadoutImages::Twin)
-}
-
-fn chart(report: &PerObjectReport) -> IntervalChart {
-    let mut rows: Vec<String> = Vec::new();
-    let mut lines: Vec<(&str, &str)> = Vec::new();
-    for band in of_twin(report) {
-        if !rows.contains(&band.object) {
-            rows.push(band.object.clone());
-        }
-        if !lines.contains(&(band.score, &band.decoder)) {
-            lines.push((band.score, &band.decoder));
-        }
-    }
-    lines.sort_by_key(|(score, _)| SCORES.iter().position(|(name, _)| name == score));
-    let panel = |score: &str, decoder: &str, m: usize| {
-        let interval = |object: &String| {
-            let same = |b: &&ObjectBand| b.score == score && b.decoder == decoder && b.m == m && b.object == *object;
-            of_twin(report).find(same).map(|b| Interval {
-                low: b.low,
-                middle: b.twin,
-                high: b.high,
-                mark: b.real,
-            })
-        };
-        IntervalPanel {
-            title: format!("M = {m}"),
-            intervals: rows.iter().map(interval).collect(),
-        }
-    };
-    let line = |(score, decoder): &(&str, &str)| IntervalLine {
-        title: format!("{}, {}", label(decoder), score_label(score)),
-        panels: MEASUREMENTS.map(|m| panel(score, decoder, m)).into(),
-    };
-    IntervalChart {
-        title: format!("Twin and real skin, object by object; {} simulated skins", report.skins),
-        legend: [
-            "twin: mean, and where one more simulated skin lies (90 %)".to_owned(),
-            "real skin".to_owned(),
-        ],
-        rows: rows.iter().map(|name| object_label(name).to_owned()).collect(),
-        lines: lines.iter().map(line).collect(),
-    }
 }
 
 /// Distances, then a line an object, as text tables.
 #[must_use]
 pub fn text(report: &PerObjectReport) -> String {
-    let distances = spts_eval::Table::new("distances", &report.distances)
-        .shown("images", |d| d.images.label())
-        .shown("decoder", |d| &d.decoder)
-        .shown("M", |d| d.m)
-        .shown("score", |d| d.score)
-        .shown("|twin − real|", |d| d.mean_abs_difference)
-        .digits(3)
-        .shown("between skins", |d| d.between_skins)
-        .digits(3)
-        .shown("means, twin − real", |d| format!("{:+.3}", d.difference_of_means))
-        .shown("outside the 90 % band", |d| {
-            if d.outside.is_empty() { "none" } else { &d.outside }
-        });
-    let objects = spts_eval::Table::new("objects", &report.objects)
-        .shown("images", |b| b.images.label())
-        .shown("decoder", |b| &b.decoder)
-        .shown("M", |b| b.m)
-        .shown("score", |b| b.score)
-        .shown("object", |b| &b.object)
-        .shown("real", |b| b.real)
-        .digits(3)
-        .shown("twin", |b| b.twin)
-        .digits(3)
-        .shown("90 % band", |b| format!("{:.3} – {:.3}", b.low, b.high))
-        .shown("", |b| if b.inside { "" } else { "outside" });
     format!(
         "mean over the objects of |twin − real|, twin: mean of {} simulated skins\n{}\n{}",
         report.skins,
-        distances.text(),
-        objects.text().trim_end()
+        distances(report).text(),
+        objects(report).text().trim_end()
     )
 }
 
@@ -141,37 +115,53 @@ pub(crate) fn section(report: &PerObjectReport) -> Section {
              are classified correctly."
                 .to_owned(),
         )],
-        tables: vec![distances(report), objects(report)],
+        tables: vec![
+            PageTable::new(
+                "Mean over the objects of |twin − real|, and the difference of their means, in which errors cancel",
+                &distances(report),
+                TABLES[1],
+            ),
+            PageTable::new("Scores object by object", &objects(report), TABLES[0]),
+        ],
     }
 }
 
-fn distances(report: &PerObjectReport) -> PageTable {
-    let rows = report.distances.iter().filter(|d| d.images == ReadoutImages::Twin);
-    let table = Table::new("", rows)
-        .shown("decoder", |d| label(&d.decoder))
-        .shown("score", |d| score_label(d.score))
-        .shown("M", |d| d.m)
-        .shown("|twin − real|", |d| d.mean_abs_difference)
-        .digits(3)
-        .shown("between skins", |d| d.between_skins)
-        .digits(3)
-        .shown("means: twin − real", |d| format!("{:+.3}", d.difference_of_means))
-        .shown("outside", |d| object_list(&d.outside));
-    let caption = "Mean over the objects of |twin − real|, and the difference of their means, in which errors cancel";
-    PageTable::new(caption, &table, TABLES[1])
-}
-
-fn objects(report: &PerObjectReport) -> PageTable {
-    let table = Table::new("", of_twin(report))
-        .shown("decoder", |b| label(&b.decoder))
-        .shown("score", |b| score_label(b.score))
-        .shown("M", |b| b.m)
-        .shown("object", |b| object_label(&b.object))
-        .shown("real skin", |b| b.real)
-        .digits(3)
-        .shown("twin, mean", |b| b.twin)
-        .digits(3)
-        .shown("band", |b| format!("{:.3} – {:.3}", b.low, b.high))
-        .shown("", |b| if b.inside { "" } else { "outside" });
-    PageTable::new("Scores object by object", &table, TABLES[0])
+fn chart(report: &PerObjectReport) -> IntervalChart {
+    let twin: Vec<&ObjectBand> = report
+        .objects
+        .iter()
+        .filter(|b| b.images == ReadoutImages::Twin)
+        .collect();
+    let rows = unique(twin.iter().map(|b| b.score.object.as_str()));
+    let mut lines = unique(twin.iter().map(|b| (b.score.score, b.score.decoder.as_str())));
+    lines.sort_by_key(|(score, _)| SCORES.iter().position(|(name, _)| name == score));
+    let panel = |score: &str, decoder: &str, m: usize| {
+        let interval = |object: &&str| {
+            let key = (score, decoder, m, *object);
+            let same = |b: &&&ObjectBand| (b.score.score, &*b.score.decoder, b.score.m, &*b.score.object) == key;
+            twin.iter().find(same).map(|b| Interval {
+                low: b.of.low,
+                middle: b.of.twin,
+                high: b.of.high,
+                mark: b.of.real,
+            })
+        };
+        IntervalPanel {
+            title: format!("M = {m}"),
+            intervals: rows.iter().map(interval).collect(),
+        }
+    };
+    let line = |(score, decoder): (&str, &str)| IntervalLine {
+        title: format!("{}, {}", label(decoder), score_label(score)),
+        panels: MEASUREMENTS.map(|m| panel(score, decoder, m)).into(),
+    };
+    IntervalChart {
+        title: format!("Twin and real skin, object by object; {} simulated skins", report.skins),
+        legend: [
+            "twin: mean, and where one more simulated skin lies (90 %)".to_owned(),
+            "real skin".to_owned(),
+        ],
+        rows: rows.iter().map(|name| object_label(name).to_owned()).collect(),
+        lines: lines.into_iter().map(line).collect(),
+    }
 }

@@ -1,6 +1,6 @@
 //! `spts readouts` as text, files and figures.
 
-use super::{ReportError, write_all_or_none};
+use super::write_all_or_none;
 use crate::figures::{Chart, Claim, Curve, Plot, Style, save_charts};
 use spts::output::{OutputError, OutputFolder, write_bytes, write_json, write_table};
 use spts::provenance::{Provenance, hash_text};
@@ -24,8 +24,8 @@ type Line<'a> = (&'a ReadoutRow, &'a ReadoutTrial, f64);
 /// Writes the tables, the figure and what they depend on into the folder `out`: all of them, or none.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn write(study: &ReadoutsStudy, report: &ReadoutsReport, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn write(study: &ReadoutsStudy, report: &ReadoutsReport, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         let path = out.path("parameters.json");
         let parameters = study.parameters();

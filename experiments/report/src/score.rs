@@ -1,8 +1,8 @@
 //! Files and figures of `spts score`.
 
-use super::{ReportError, write_all_or_none};
-use crate::figures::{Chart, Curve, FigureError, Plot, Stroke, Style, save_charts};
-use spts::output::OutputFolder;
+use super::write_all_or_none;
+use crate::figures::{Chart, Curve, Plot, Stroke, Style, save_charts};
+use spts::output::{OutputError, OutputFolder};
 use spts_eval::algorithm::Subject;
 use spts_eval::anytime::{self, AnytimeBoard, AnytimeRow};
 use spts_eval::board::{self, BoardRow, ScoreBoard};
@@ -19,8 +19,8 @@ pub use spts_eval::board::FILES;
 /// them, or none.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         board::write(scores, out)?;
         draw_board(scores, &out.folder("figures")?)
@@ -31,8 +31,8 @@ pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), ReportError> 
 /// none.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn write_anytime(scores: &AnytimeBoard, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn write_anytime(scores: &AnytimeBoard, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         anytime::write(scores, out)?;
         save_charts(&stops(scores), &out.folder("figures")?, "anytime")
@@ -43,8 +43,8 @@ pub fn write_anytime(scores: &AnytimeBoard, out: OutputFolder) -> Result<(), Rep
 /// none.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn write_in_time(scores: &InTimeBoard, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn write_in_time(scores: &InTimeBoard, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         in_time::write(scores, out)?;
         save_charts(&since_touch(scores), &out.folder("figures")?, "in_time")
@@ -61,7 +61,7 @@ fn drawn(charts: impl IntoIterator<Item = Chart>) -> Vec<Chart> {
 }
 
 /// Writes `reconstruction`, `classification` and, with a ball, `localisation`, each as .svg and .png.
-fn draw_board(board: &ScoreBoard, folder: &Path) -> Result<(), FigureError> {
+fn draw_board(board: &ScoreBoard, folder: &Path) -> Result<(), OutputError> {
     let (iou, single): (Score, Score) = (|r| r.scores.iou, |r| r.scores.class_single);
     let same = "The same over acquisition + decode";
     let mut images = vec![

@@ -1,10 +1,10 @@
 //! Files and figures of `spts sensing design`.
 
 use crate::figures::{Sheet, Tile, TileRow, save_sheet};
-use crate::{ReportError, write_all_or_none};
+use crate::write_all_or_none;
 use serde::Serialize;
 use spts::chain::start_message;
-use spts::output::{OutputFolder, write_bytes, write_json, write_table};
+use spts::output::{OutputError, OutputFolder, write_bytes, write_json, write_table};
 use spts_circuit::FIRST_ADDRESS;
 use spts_firmware::LAST_BUS_ADDRESS;
 use spts_studies::sensing::RowDesignReport;
@@ -32,8 +32,8 @@ pub const FILES: &[&str] = &["rows.txt", "design.json", "weights.json", "bus.csv
 /// all of them, or none.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub fn write(report: &RowDesignReport, out: OutputFolder) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub fn write(report: &RowDesignReport, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
         write_bytes(&out.path("rows.txt"), report.patterns.to_text().as_bytes())?;
         write_json(&out.path("design.json"), report)?;

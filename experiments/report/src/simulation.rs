@@ -1,6 +1,5 @@
 //! Files and pictures of `spts simulate`.
 
-use super::ReportError;
 use super::animation::{ANIMATION_FILE, Animation};
 use super::decode::save_picture;
 use super::figures::encode_png;
@@ -26,7 +25,7 @@ use std::path::PathBuf;
 pub enum SimulationWriteError {
     /// A file cannot be written, or the pressure map cannot be drawn: there are no new results.
     #[error(transparent)]
-    Report(#[from] ReportError),
+    Report(#[from] OutputError),
     /// The scene cannot be drawn; everything else was written.
     #[error("{source}; everything else was written to {}", folder.display())]
     Scene {
@@ -88,8 +87,8 @@ impl<'a> SimulationFiles<'a> {
     /// Begins the results of `prepared` in the folder `out`, with a session if its presses are recorded.
     ///
     /// # Errors
-    /// [`ReportError`] when a file cannot be written.
-    pub fn create(out: OutputFolder, prepared: &'a Prepared, record: bool) -> Result<Self, ReportError> {
+    /// [`OutputError`] when a file cannot be written.
+    pub fn create(out: OutputFolder, prepared: &'a Prepared, record: bool) -> Result<Self, OutputError> {
         let begin = || {
             write_bytes(&out.path("scene.toml"), prepared.scene_toml.as_bytes())?;
             for (name, content) in &prepared.copies {
@@ -114,8 +113,8 @@ impl<'a> SimulationFiles<'a> {
     /// Writes the next presses.
     ///
     /// # Errors
-    /// [`ReportError`] when a file cannot be written.
-    pub fn push(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), ReportError> {
+    /// [`OutputError`] when a file cannot be written.
+    pub fn push(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), OutputError> {
         self.write(piece).map_err(|error| self.out.unstaged(error))
     }
 
@@ -140,8 +139,8 @@ impl<'a> SimulationFiles<'a> {
     /// Writes the `animation` of a press.
     ///
     /// # Errors
-    /// [`ReportError`] when the file cannot be written.
-    pub fn animate(&self, animation: &Animation) -> Result<(), ReportError> {
+    /// [`OutputError`] when the file cannot be written.
+    pub fn animate(&self, animation: &Animation) -> Result<(), OutputError> {
         let path = self.out.path(ANIMATION_FILE);
         let gif = animation.gif(&path);
         let written = gif.and_then(|gif| write_bytes(&path, &gif));
@@ -176,7 +175,7 @@ impl<'a> SimulationFiles<'a> {
             write_json(&out.timed_path("timing.json"), &SimulationTiming::of(simulation))
         };
         let written = numbers();
-        let pictures = || -> Result<(), ReportError> {
+        let pictures = || -> Result<(), OutputError> {
             let folder = out.path("");
             let pair = simulation.first.as_ref().zip(decoded);
             let (pressure, decoded) = rayon::join(
@@ -313,7 +312,7 @@ const SCENE_PIXELS: [usize; 2] = [1280, 960];
 const KPA_PER_PA: f64 = 1e-3;
 
 /// `pressure.png`: the pressure map.
-fn pressure_picture(out: &OutputFolder, prepared: &Prepared, simulation: &Simulation) -> Result<(), ReportError> {
+fn pressure_picture(out: &OutputFolder, prepared: &Prepared, simulation: &Simulation) -> Result<(), OutputError> {
     let Some(frame) = simulation.peak.as_ref().map(|peak| &peak.at) else {
         return Ok(());
     };

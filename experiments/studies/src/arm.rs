@@ -5,10 +5,9 @@
 //! number of such taxels show whether the twin's preload is like the real one. The size of a touch, and how accurately
 //! it is located, show whether the rest is.
 
-use crate::calibrate::predicted;
+use crate::compare::{Banded, UNLIMITED};
 use rand::RngExt as _;
 use rayon::prelude::*;
-use serde::Serialize;
 use spts::data::SessionSet;
 use spts::progress::Progress;
 use spts::record::Twin;
@@ -42,26 +41,18 @@ pub struct ArmStudy<'a> {
 }
 
 /// One statistic of the real skin and of the simulated ones.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ArmBand {
     /// Name.
     pub statistic: &'static str,
     /// Unit; empty for a number.
     pub unit: &'static str,
-    /// The real skin's value.
-    pub real: f64,
-    /// Mean over the simulated skins.
-    pub twin: f64,
-    /// Lower end of the band, in which a further simulated skin lies with a probability of 90 %.
-    pub low: f64,
-    /// Upper end of the band.
-    pub high: f64,
-    /// Whether the real skin lies in the band.
-    pub inside: bool,
+    /// Value and band.
+    pub of: Banded,
 }
 
 /// Results of `spts compare --arm`: every statistic of the real bent skin, beside the band of the simulated ones.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ArmReport {
     /// Name of the recorded session.
     pub session: String,
@@ -79,15 +70,15 @@ impl ArmStudy<'_> {
     /// # Errors
     /// [`Refusal`] without a recording of touches on a preloaded skin, or if the simulation fails.
     pub fn run(&self, progress: &dyn Progress) -> Result<ArmReport, Refusal> {
-        let set = SessionSet::open(self.recordings).map_err(Refusal::from_error)?;
+        let set = SessionSet::open(self.recordings)?;
         let of_touches = |session: &&Session| session.event == Event::Touch;
         let measured = |session: &Session| {
             let recording = session.compressive()?;
-            let found = TouchStatistics::of(recording)?;
+            let found = statistics(recording)?;
             Some((session.name.clone(), *recording.layout(), found))
         };
         let real = set.sessions.iter().filter(of_touches).find_map(measured);
-        let Some((session, layout, real)) = real else {
+        let Some((session, layout, (touches, real))) = real else {
             return Err(Refusal::new(format!(
                 "{}: no compressive session of touches in which the skin is under preload; such sessions lie in robot_arm/",
                 self.recordings.display()
@@ -98,18 +89,23 @@ impl ArmStudy<'_> {
         let twins = (0..self.skins).into_par_iter().map(|k| {
             // a seed is a whole number below 2^63
             let seed = self.seed.wrapping_add(k) & (u64::MAX >> 1);
-            let found = TouchStatistics::of(&touched(&layout, seed)?)
+            let found = statistics(&touched(&layout, seed)?)
                 .ok_or_else(|| Refusal::new(format!("no touch was found on the simulated skin of seed {seed}")));
             progress.step();
-            found
+            Ok(found?.1)
         });
-        let twins = twins.collect::<Result<Vec<TouchStatistics>, Refusal>>()?;
+        let twins = twins.collect::<Result<Vec<[f64; STATISTICS.len()]>, Refusal>>()?;
         progress.end();
+        let bands = STATISTICS.iter().enumerate().filter_map(|(k, &(statistic, unit))| {
+            let twins: Vec<f64> = twins.iter().map(|twin| twin[k]).collect();
+            let of = Banded::of(real[k], &twins, UNLIMITED)?;
+            Some(ArmBand { statistic, unit, of })
+        });
         Ok(ArmReport {
             session,
-            touches: real.touches,
+            touches,
             skins: self.skins,
-            statistics: bands(&real, &twins),
+            statistics: bands.collect(),
         })
     }
 }
@@ -135,109 +131,63 @@ fn touched(layout: &SkinLayout, seed: u64) -> Result<Recording, Refusal> {
     let assignments = assignments.iter().map(|text| text.parse());
     let request = Request {
         scene: SCENE.to_owned(),
-        assignments: assignments.collect::<Result<_, _>>().map_err(Refusal::from_error)?,
+        assignments: assignments.collect::<Result<_, _>>()?,
     };
-    let twin = Twin::new(&request.prepare().map_err(Refusal::from_error)?.scene).map_err(Refusal::from_error)?;
-    let presses = twin.presses(0..TOUCHES, &|| ()).map_err(Refusal::from_error)?;
-    Ok(twin
-        .recorded(&presses, &twin.acquisition(Mode::Compressive))
-        .map_err(Refusal::from_error)?
-        .recording)
-}
-
-fn bands(real: &TouchStatistics, twins: &[TouchStatistics]) -> Vec<ArmBand> {
-    let band = |(statistic, unit, value): &StatisticOf| {
-        let values: Vec<f64> = twins.iter().map(value).collect();
-        let (low, high) = predicted(&values)?;
-        let real = value(real);
-        Some(ArmBand {
-            statistic,
-            unit,
-            real,
-            twin: values.iter().sum::<f64>() / values.len() as f64,
-            low,
-            high,
-            inside: low <= real && real <= high,
-        })
-    };
-    STATISTICS.iter().filter_map(band).collect()
+    let twin = Twin::new(&request.prepare()?.scene)?;
+    let presses = twin.presses(0..TOUCHES, &|| ())?;
+    Ok(twin.recorded(&presses, &twin.acquisition(Mode::Compressive))?.recording)
 }
 
 /// Output above which a taxel of an untouched skin counts as loaded, V: five times the error of a taxel estimated from
 /// 2000 measurements with a noise of 0.15 V, and a fifth of the largest value on the published skin.
-pub const LOADED_V: f64 = 0.1;
+const LOADED_V: f64 = 0.1;
 
 /// Numbers of measurements for locating touches.
-pub const MEASUREMENTS: [usize; 3] = [7, 10, 25];
+const MEASUREMENTS: [usize; 3] = [7, 10, 25];
 
-/// How a bent skin, recorded while a finger touches it, answers: its output without a touch, the size of a touch, and
-/// how far from the touched taxel the touch is located.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct TouchStatistics {
-    /// Number of touches found.
-    pub touches: usize,
-    /// Number of taxels above [`LOADED_V`] without a touch, mean over the blocks.
-    pub loaded_taxels: f64,
-    /// Sum of the image without a touch, V, mean over the blocks.
-    pub rest_sum_v: f64,
-    /// Largest taxel without a touch, V, mean over the blocks.
-    pub rest_largest_v: f64,
-    /// Correlation of the images without a touch of consecutive blocks, mean over the blocks.
-    pub rest_correlation: f64,
-    /// Share of `rest_sum_v` that the loaded taxels lose during a touch, median over the touches.
-    pub rest_lost: f64,
-    /// Largest taxel of a touch minus the preload, V, median over the touches.
-    pub touch_v: f64,
-    /// Share of the largest taxel in the sum of squares of a touch, median over the touches.
-    pub touch_in_one: f64,
-    /// Distance of the located from the touched taxel, taxels, mean over the windows, for each of [`MEASUREMENTS`].
-    pub errors_px: [f64; MEASUREMENTS.len()],
-}
-
-/// Label, unit and value of a statistic.
-pub type StatisticOf = (&'static str, &'static str, fn(&TouchStatistics) -> f64);
-
-/// All statistics that are compared.
-pub const STATISTICS: [StatisticOf; 10] = [
-    ("loaded taxels at rest", "", |s| s.loaded_taxels),
-    ("sum at rest", "V", |s| s.rest_sum_v),
-    ("largest taxel at rest", "V", |s| s.rest_largest_v),
-    ("rest, block to block", "r", |s| s.rest_correlation),
-    ("rest, lost in a touch", "share", |s| s.rest_lost),
-    ("touch, largest taxel", "V", |s| s.touch_v),
-    ("touch in one taxel", "share", |s| s.touch_in_one),
-    ("located at M = 7", "px", |s| s.errors_px[0]),
-    ("located at M = 10", "px", |s| s.errors_px[1]),
-    ("located at M = 25", "px", |s| s.errors_px[2]),
+/// Label and unit of every statistic that is compared.
+///
+/// Means over the blocks, without a touch: number of taxels above [`LOADED_V`], sum of the image, its largest taxel, and
+/// the correlation of the images of consecutive blocks. Medians over the touches: share of the sum at rest that the
+/// loaded taxels lose, largest taxel minus the preload, and its share in the sum of squares. Means over the windows:
+/// distance of the located from the touched taxel, for each of [`MEASUREMENTS`].
+const STATISTICS: [(&str, &str); 10] = [
+    ("loaded taxels at rest", ""),
+    ("sum at rest", "V"),
+    ("largest taxel at rest", "V"),
+    ("rest, block to block", "r"),
+    ("rest, lost in a touch", "share"),
+    ("touch, largest taxel", "V"),
+    ("touch in one taxel", "share"),
+    ("located at M = 7", "px"),
+    ("located at M = 10", "px"),
+    ("located at M = 25", "px"),
 ];
 
-impl TouchStatistics {
-    /// Statistics of `recording`, whose blocks must begin without a touch; `None` if no touch of a skin under preload
-    /// is found.
-    pub fn of(recording: &Recording) -> Option<Self> {
-        let touches = find_touches(recording);
-        let rest: Vec<&Vec<f64>> = touches.iter().filter_map(|t| t.untouched.image.as_ref()).collect();
-        let changes: Vec<Vec<f64>> = touches
-            .iter()
-            .filter_map(|t: &RecordedTouch| t.image(recording))
-            .collect();
-        let over_rest = |of: &dyn Fn(&Vec<f64>) -> f64| mean(rest.iter().map(|image| of(image)));
-        let over_touches = |of: &dyn Fn(&Vec<f64>) -> f64| median(&changes.iter().map(of).collect::<Vec<_>>());
-        let lost: Vec<f64> = touches.iter().filter_map(|touch| lost(touch, recording)).collect();
-        let errors = touch_errors_px(recording, &touches, &MEASUREMENTS);
-        let errors: Vec<f64> = errors.into_iter().collect::<Option<_>>()?;
-        Some(Self {
-            touches: touches.len(),
-            loaded_taxels: over_rest(&|image| image.iter().filter(|v| **v > LOADED_V).count() as f64)?,
-            rest_sum_v: over_rest(&|image| image.iter().sum())?,
-            rest_largest_v: over_rest(&|image| largest(image))?,
-            rest_correlation: mean(rest.windows(2).filter_map(|pair| pearson(pair[0], pair[1])))?,
-            rest_lost: median(&lost)?,
-            touch_v: over_touches(&|image| largest(image))?,
-            touch_in_one: over_touches(&|image| largest(image).powi(2) / image.iter().map(|v| v * v).sum::<f64>())?,
-            errors_px: errors.try_into().ok()?,
-        })
-    }
+/// Number of touches in `recording`, whose blocks must begin without one, and every statistic of [`STATISTICS`]; `None`
+/// if no touch of a skin under preload is found.
+fn statistics(recording: &Recording) -> Option<(usize, [f64; STATISTICS.len()])> {
+    let touches = find_touches(recording);
+    let rest: Vec<&Vec<f64>> = touches.iter().filter_map(|t| t.untouched.image.as_ref()).collect();
+    let changes: Vec<Vec<f64>> = touches.iter().filter_map(|t| t.image(recording)).collect();
+    let over_rest = |of: &dyn Fn(&Vec<f64>) -> f64| mean(rest.iter().map(|image| of(image)));
+    let over_touches = |of: &dyn Fn(&Vec<f64>) -> f64| median(&changes.iter().map(of).collect::<Vec<_>>());
+    let lost: Vec<f64> = touches.iter().filter_map(|touch| lost(touch, recording)).collect();
+    let errors = touch_errors_px(recording, &touches, &MEASUREMENTS);
+    let [at_7, at_10, at_25] = errors[..] else { return None };
+    let statistics = [
+        over_rest(&|image| image.iter().filter(|v| **v > LOADED_V).count() as f64)?,
+        over_rest(&|image| image.iter().sum())?,
+        over_rest(&|image| largest(image))?,
+        mean(rest.windows(2).filter_map(|pair| pearson(pair[0], pair[1])))?,
+        median(&lost)?,
+        over_touches(&|image| largest(image))?,
+        over_touches(&|image| largest(image).powi(2) / image.iter().map(|v| v * v).sum::<f64>())?,
+        at_7?,
+        at_10?,
+        at_25?,
+    ];
+    Some((touches.len(), statistics))
 }
 
 /// Share of the sum of the loaded taxels that those which are not touched lose in `touch`.

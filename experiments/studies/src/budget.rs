@@ -5,18 +5,18 @@
 //! be compared, under the same noise, decoded and scored. The paired differences of the scores are the budget.
 
 use rayon::prelude::*;
-use spts::chain::{Acquisition, Chain, ChainConfig, ChainError};
+use spts::chain::{Acquisition, Chain, ChainConfig};
 use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
-use spts::record::{TwinError, press_frames};
-use spts::scene::{MechanicsError, PressConfig, Scene, SceneConfig, SceneError};
+use spts::record::{PressFrames, Twin};
+use spts::scene::{PressConfig, Scene, SceneConfig};
 use spts_circuit::{EFFECTS, FAULTS, Interpolated, Mode, Profile, Recording};
 use spts_contact::Frame;
 use spts_contact::objects::{OBJECTS, ObjectSpec, by_name};
 use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
 use spts_eval::protocol::{PUBLISHED_TAXELS, Protocol, Truth};
-use spts_eval::training::{LearnError, Learned, Learning};
-use spts_eval::{Press, RASTER, ScoreError, ScoredSession, Scorer, Tally, Window, idle_mean, unique};
+use spts_eval::training::{Learned, Learning};
+use spts_eval::{Press, RASTER, ScoredSession, Scorer, Tally, Window, idle_mean, unique};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::Workspace;
@@ -26,19 +26,19 @@ use spts_sim::fidelity::change_model;
 use std::path::Path;
 
 /// Objects that the published recordings contain in both modes.
-pub const DEFAULT_OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
+const DEFAULT_OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
 /// Numbers of measurements on the published skin. A larger skin uses the same shares of its taxels.
-pub const DEFAULT_MEASUREMENTS: [usize; 3] = [7, 20, 50];
+const DEFAULT_MEASUREMENTS: [usize; 3] = [7, 20, 50];
 
 /// Settings of `spts budget`, which measures how much each imperfection of transducer, readout and contact costs in
 /// image quality.
 #[derive(Debug, Clone)]
 pub struct BudgetStudy {
-    /// Names of objects; "all" for every object, empty for [`DEFAULT_OBJECTS`].
+    /// Names of objects; "all" for every object, empty for those that the published recordings have in both modes.
     pub objects: Vec<String>,
     /// Readout profile: a name, or a file that ends in `.toml`.
     pub readout: String,
-    /// Numbers of measurements; empty for [`DEFAULT_MEASUREMENTS`], or the same shares of a larger skin's taxels.
+    /// Numbers of measurements; empty for 7, 20 and 50, or the same shares of a larger skin's taxels.
     pub measurements: Vec<usize>,
     /// Decoding variants.
     pub decodes: Vec<PublishedDecode>,
@@ -61,66 +61,89 @@ impl BudgetStudy {
         } else {
             BudgetSize::full()
         };
-        let keys = self.keys(&size)?;
-        let objects = self.objects()?;
-        let setup = PressSetup {
-            objects: &objects,
-            readout: &self.readout,
-            side: self.side,
-            seed: self.seed,
-        };
-        let scenes = objects.iter().map(|object| setup.scene(object, &size, false));
-        let scenes = scenes
-            .collect::<Result<Vec<_>, TwinError>>()
-            .map_err(Refusal::from_error)?;
-        let Some(first) = scenes.first() else {
-            return Err(Refusal::new("`--objects` names no object"));
-        };
-        let profile = first.chain().profile().clone();
-        let hashes = scenes.iter().map(spts::Scene::hash).collect::<Result<Vec<_>, _>>();
-        let hash = combined_hash(&hashes.map_err(Refusal::from_error)?);
-        let items = items(&profile);
-        let variants = Variants::new(&items);
-        progress.stage("pressing", Some(2 * objects.len() * size.presses()));
-        let pressed = [false, true].map(|layer| setup.press(&size, layer, progress));
-        progress.end();
-        let [columns, layer] = pressed;
-        let chains = Chains {
-            size: &size,
-            profile: &profile,
-            items: &items,
-            keys: &keys,
-            seed: self.seed,
-            pressed: [
-                columns.map_err(Refusal::from_error)?,
-                layer.map_err(Refusal::from_error)?,
-            ],
-        };
-        let (scores, scan) = chains.score(&variants, progress)?;
         let taxels = self.side * self.side;
-        let each_key = || keys.iter().enumerate();
-        let rows = variants.comparisons.iter().flat_map(|line| {
-            let (after, before) = (&scores[line.variant], &scores[line.reference]);
-            each_key().map(move |(key, (decode, m))| BudgetRow {
+        let measurements = self.fitting(&size)?;
+        let objects = self.objects()?;
+        let scenes = |layer: bool| -> Result<Vec<Scene>, Refusal> {
+            let scenes = objects.iter().map(|object| self.scene(object, &size, layer));
+            scenes.collect()
+        };
+        let (columns, layers) = (scenes(false)?, scenes(true)?);
+        progress.stage("pressing", Some(2 * objects.len() * size.presses()));
+        let press = |scenes: Vec<Scene>| {
+            let pressed = objects.par_iter().zip(scenes).map(|(&object, scene)| {
+                let presses = Twin::new(&scene)?.presses(0..size.presses(), &|| progress.step())?;
+                Ok(Pressed { object, scene, presses })
+            });
+            pressed.collect::<Result<Vec<_>, Refusal>>()
+        };
+        let pressed = [press(columns)?, press(layers)?];
+        progress.end();
+        let hashes = pressed[0]
+            .iter()
+            .map(|p| p.scene.hash())
+            .collect::<Result<Vec<_>, _>>()?;
+        let whole = pressed[0][0].scene.chain().profile();
+        let items = items(whole);
+        let comparisons = comparisons(&items);
+        let [everything, ideal] = [items, Vec::new()].map(|acts| Variant { layer: false, acts });
+        let compared = comparisons.iter().map(|line| &line.variant);
+        let variants = unique([&everything, &ideal].into_iter().chain(compared));
+        progress.stage(
+            "recording and scoring",
+            Some(variants.len() * objects.len() * size.sessions),
+        );
+        let mut scores = vec![ScoreTable::new(); variants.len()];
+        let mut scan = ScoreTable::new();
+        // skin by skin: what a skin has learned is used by all its readouts and then dropped
+        for skin in unique(variants.iter().map(|variant| variant.skin())) {
+            let learned = LearnedSkin::prepare(&pressed[usize::from(skin.0)], &skin.1, &size, self)?;
+            if skin == everything.skin() {
+                scan = learned.scan();
+            }
+            let of_skin = scores
+                .par_iter_mut()
+                .zip(&variants)
+                .filter(|(_, variant)| variant.skin() == skin);
+            of_skin.try_for_each(|(scores, variant)| {
+                *scores = learned.score(&variant.readout(whole), &measurements, progress)?;
+                Ok::<_, Refusal>(())
+            })?;
+        }
+        progress.end();
+        let scores_of = |variant: &Variant| {
+            let place = variants.iter().position(|v| *v == variant);
+            &scores[place.unwrap_or_default()]
+        };
+        let each_m = |decode: &PublishedDecode| measurements.iter().map(|&m| (decode.name(), m)).collect::<Vec<_>>();
+        let keys: Vec<(&'static str, usize)> = self.decodes.iter().flat_map(each_m).collect();
+        let (mut rows, mut ends) = (Vec::new(), Vec::new());
+        for line in &comparisons {
+            let before = scores_of(match line.mode {
+                Direction::Ablation => &everything,
+                Direction::Addition => &ideal,
+            });
+            let after = scores_of(&line.variant);
+            rows.extend(keys.iter().enumerate().map(|(key, &(decode, m))| BudgetRow {
                 stage: line.stage,
                 effect: line.effect,
                 mode: line.mode,
-                decode: decode.name(),
-                m: *m,
+                decode,
+                m,
                 taxels,
                 changes: CHANGED.map(|score| mean_score(after, Some(before), key, score)),
-            })
-        });
-        let ends = [("everything", EVERYTHING), ("ideal", IDEAL)].into_iter();
-        let ends = ends.flat_map(|(chain, index)| {
-            let scores = &scores[index];
-            each_key().flat_map(move |(key, (decode, m))| end_points(chain, (decode.name(), *m), taxels, (scores, key)))
-        });
-        let scanned = end_points(SCAN, (RASTER, taxels), taxels, (&scan, 0));
+            }));
+        }
+        for (chain, variant) in [("everything", &everything), ("ideal", &ideal)] {
+            for (key, at) in keys.iter().enumerate() {
+                ends.extend(end_points(chain, *at, taxels, scores_of(variant), key));
+            }
+        }
+        ends.extend(end_points(SCAN, (RASTER, taxels), taxels, &scan, 0));
         Ok(BudgetReport {
-            rows: rows.collect(),
-            end_points: ends.chain(scanned).collect(),
-            provenance: Provenance::new(self.seed, hash),
+            rows,
+            end_points: ends,
+            provenance: Provenance::new(self.seed, combined_hash(&hashes)),
         })
     }
 
@@ -151,8 +174,8 @@ impl BudgetStudy {
         Ok(objects)
     }
 
-    /// Every decode with every M. An M of which no vote fits into a press is refused.
-    fn keys(&self, size: &BudgetSize) -> Result<Vec<(PublishedDecode, usize)>, Refusal> {
+    /// The numbers of measurements. An M of which no vote fits into a press is refused.
+    fn fitting(&self, size: &BudgetSize) -> Result<Vec<usize>, Refusal> {
         let taxels = self.side * self.side;
         let share = |m: usize| (m * taxels).div_ceil(PUBLISHED_TAXELS);
         let measurements = if self.measurements.is_empty() {
@@ -161,13 +184,37 @@ impl BudgetStudy {
             self.measurements.clone()
         };
         let most = size.most_measurements(taxels);
-        if let Some(&m) = measurements.iter().find(|&&m| m > most) {
-            return Err(Refusal::new(format!(
+        match measurements.iter().find(|&&m| m > most) {
+            None => Ok(measurements),
+            Some(m) => Err(Refusal::new(format!(
                 "`--measurements`: {m} is outside [1, {most}] on a skin of {taxels} taxels: a press has no room for a vote of windows of {m}"
-            )));
+            ))),
         }
-        let of_decode = |&decode| measurements.iter().map(move |&m| (decode, m)).collect::<Vec<_>>();
-        Ok(self.decodes.iter().flat_map(of_decode).collect())
+    }
+
+    /// Scene of an object: on the published skin at its own place, on a larger one as far from the middle. `layer` puts
+    /// the elastic layer, solved at the frames, in place of the columns.
+    fn scene(&self, object: &ObjectSpec, size: &BudgetSize, layer: bool) -> Result<Scene, Refusal> {
+        let published = SkinLayout::default();
+        let shift = 0.5 * (self.side as f64 - published.rows() as f64);
+        let mut config = SceneConfig {
+            seed: self.seed,
+            readout: Some(self.readout.clone()),
+            skin: SkinLayout::new(self.side, self.side, published.pitch_m(), published.electrode_m())?,
+            press: Some(PressConfig {
+                object: Some(object.name.to_owned()),
+                row: Some(object.placement.row + shift),
+                col: Some(object.placement.col + shift),
+                presses: size.presses(),
+                ..PressConfig::default()
+            }),
+            ..SceneConfig::default()
+        };
+        if layer {
+            change_model(&mut config.contact, "layer");
+            config.contact.insert("coupled".to_owned(), false.into());
+        }
+        Scene::new(config, Path::new(""))
     }
 }
 
@@ -188,7 +235,7 @@ pub struct BudgetRow {
     /// Number of taxels, N.
     pub taxels: usize,
     /// Change of every score of [`CHANGES`].
-    pub changes: [MeanWithError; CHANGES.len()],
+    pub changes: [Sample; CHANGES.len()],
 }
 
 /// Names of the scores whose changes are a row: support accuracy, IoU, shares of single windows and of votes of 20
@@ -215,7 +262,7 @@ pub struct EndPoint {
     pub truth: &'static str,
     /// Support accuracy, IoU, and the shares of single windows and of votes of 20 windows classified correctly. Nothing
     /// votes in the scan, which is one press: how much another would differ is not known.
-    pub scores: [MeanWithError; 4],
+    pub scores: [Sample; 4],
 }
 
 impl EndPoint {
@@ -229,18 +276,19 @@ impl EndPoint {
 const SCAN: &str = "scan";
 
 /// The chain `chain` with the scores `scores` of one key, by every truth.
-fn end_points<'a>(
+fn end_points(
     chain: &'static str,
     (decode, m): (&'static str, usize),
     taxels: usize,
-    (scores, key): (&'a ScoreTable, usize),
-) -> impl Iterator<Item = EndPoint> + 'a {
-    TRUTHS.into_iter().enumerate().map(move |(place, truth)| EndPoint {
+    scores: &ScoreTable,
+    key: usize,
+) -> [EndPoint; 3] {
+    [0, 1, 2].map(|place| EndPoint {
         chain,
         decode,
         m,
         taxels,
-        truth,
+        truth: TRUTHS[place],
         scores: [SUPPORT + place, IOU + place, CLASSES[0], CLASSES[1]]
             .map(|score| mean_score(scores, None, key, score)),
     })
@@ -255,87 +303,6 @@ pub struct BudgetReport {
     pub end_points: Vec<EndPoint>,
     /// Provenance of the numbers.
     pub provenance: Provenance,
-}
-
-/// What the scores of all chains are made from.
-struct Chains<'a> {
-    size: &'a BudgetSize,
-    profile: &'a Profile,
-    items: &'a [BudgetItem],
-    keys: &'a [(PublishedDecode, usize)],
-    seed: u64,
-    /// On columns, on the elastic layer.
-    pressed: [Vec<Pressed>; 2],
-}
-
-impl Chains<'_> {
-    /// Scores of every chain, in their order, and of the whole chain's scan.
-    fn score(&self, variants: &Variants, progress: &dyn Progress) -> Result<(Vec<ScoreTable>, ScoreTable), Refusal> {
-        let objects = self.pressed[0].len();
-        let jobs = variants.list.len() * objects * self.size.sessions;
-        progress.stage("recording and scoring", Some(jobs));
-        let mut scores: Vec<ScoreTable> = vec![Vec::new(); variants.list.len()];
-        let mut scan = ScoreTable::new();
-        for index in 0..variants.list.len() {
-            if !scores[index].is_empty() {
-                continue;
-            }
-            // skin by skin: what a skin has learned is used by all its readouts and then dropped
-            let alike = |v: &Variant| self.skin_of(v) == self.skin_of(&variants.list[index]);
-            let members: Vec<usize> = (0..variants.list.len()).filter(|&i| alike(&variants.list[i])).collect();
-            let (layer, off) = self.skin_of(&variants.list[index]);
-            let skin = LearnedSkin::prepare(&self.pressed[usize::from(layer)], &off, self.size, self.seed)?;
-            if index == EVERYTHING {
-                scan = skin.scan();
-            }
-            let profiles: Vec<Profile> = members.iter().map(|&i| self.readout(&variants.list[i])).collect();
-            for (&i, found) in members.iter().zip(self.score_skin(&skin, &profiles, progress)?) {
-                scores[i] = found;
-            }
-        }
-        progress.end();
-        Ok((scores, scan))
-    }
-
-    /// Contact model of a chain, and the parts of the transducer that do not act in it.
-    fn skin_of(&self, variant: &Variant) -> (bool, Vec<&'static str>) {
-        let parts = self.items.iter().zip(&variant.acts);
-        let off = parts.filter(|(item, acts)| item.stage == TRANSDUCER && !**acts);
-        (variant.layer, off.map(|(item, _)| item.name).collect())
-    }
-
-    /// The profile with the effects that act in a chain.
-    fn readout(&self, variant: &Variant) -> Profile {
-        let mut profile = self.profile.clone();
-        let items = self.items.iter().zip(&variant.acts);
-        let off = items.filter(|(item, acts)| item.stage != TRANSDUCER && !**acts);
-        for (item, _) in off {
-            take_away(*item, &mut profile);
-        }
-        profile
-    }
-
-    /// Scores of every profile on one skin.
-    fn score_skin(
-        &self,
-        skin: &LearnedSkin,
-        profiles: &[Profile],
-        progress: &dyn Progress,
-    ) -> Result<Vec<ScoreTable>, Refusal> {
-        let scorer = PressScorer::new(skin, self.keys, self.size)?;
-        let (objects, sessions) = (skin.objects.len(), self.size.sessions);
-        let flat = (0..profiles.len() * objects * sessions)
-            .into_par_iter()
-            .map(|job| {
-                let (profile, press) = (job / (objects * sessions), job % (objects * sessions));
-                let found = scorer.score(&profiles[profile], press / sessions, press % sessions);
-                progress.step();
-                found
-            })
-            .collect::<Result<Vec<_>, Refusal>>()?;
-        let of_profile = |presses: &[_]| presses.chunks(sessions).map(<[_]>::to_vec).collect();
-        Ok(flat.chunks(objects * sessions).map(of_profile).collect())
-    }
 }
 
 /// Name of the stage between mechanics and transducer.
@@ -376,40 +343,21 @@ struct BudgetItem {
 /// Everything that acts on a compressive recording with `profile`: the transducer's parts, then the faults, then the
 /// effects, stage by stage.
 fn items(profile: &Profile) -> Vec<BudgetItem> {
-    let parts = PARTS.iter().map(|&(name, _)| BudgetItem {
-        stage: TRANSDUCER,
-        name,
-    });
-    let listed = EFFECTS
-        .iter()
-        .filter(|(name, _)| profile.compressive.contains_key(*name));
-    let mut effects: Vec<BudgetItem> = listed
-        .map(|&(name, _)| BudgetItem {
-            stage: stage_of(name),
-            name,
-        })
-        .collect();
-    // stable: signal order within a stage
-    effects.sort_by_key(|item| READOUT_STAGES.iter().position(|(stage, _)| *stage == item.stage));
+    let item = |stage, name| BudgetItem { stage, name };
+    let parts = PARTS.iter().map(|(name, _)| item(TRANSDUCER, name));
     let present = FAULTS
         .iter()
         .filter(|(name, _)| profile.faults.iter().any(|f| f.name == *name));
-    let faults = present.map(|&(name, _)| BudgetItem { stage: CELLS, name });
-    parts.chain(faults).chain(effects).collect()
-}
-
-/// Takes an item of the readout out of a profile's compressive mode.
-fn take_away(item: BudgetItem, profile: &mut Profile) {
-    if item.stage == CELLS {
-        profile.faults.retain(|fault| fault.name != item.name);
-    } else {
-        profile.compressive.remove(item.name);
-    }
-}
-
-/// Stages of `items`, each once, in their order.
-fn stages(items: &[BudgetItem]) -> Vec<&'static str> {
-    unique(items.iter().map(|item| item.stage))
+    let listed = EFFECTS
+        .iter()
+        .filter(|(name, _)| profile.compressive.contains_key(*name));
+    let mut effects: Vec<BudgetItem> = listed.map(|(name, _)| item(stage_of(name), name)).collect();
+    // stable: signal order within a stage
+    effects.sort_by_key(|item| READOUT_STAGES.iter().position(|(stage, _)| *stage == item.stage));
+    parts
+        .chain(present.map(|(name, _)| item(CELLS, name)))
+        .chain(effects)
+        .collect()
 }
 
 fn stage_of(effect: &str) -> &'static str {
@@ -417,11 +365,11 @@ fn stage_of(effect: &str) -> &'static str {
     found.map_or(OTHER, |(stage, _)| stage)
 }
 
-/// Transducer parameters without the parts called `off`.
-fn without_parts(off: &[&str]) -> Result<toml::Table, toml::de::Error> {
-    let texts = PARTS.iter().filter(|(name, _)| off.contains(name));
-    let text: Vec<&str> = texts.map(|(_, text)| *text).collect();
-    toml::from_str(&text.join("\n"))
+/// Transducer parameters with the parts called `acting` alone.
+fn with_parts(acting: &[&str]) -> Result<toml::Table, Refusal> {
+    let off = PARTS.iter().filter(|(name, _)| !acting.contains(name));
+    let text: Vec<&str> = off.map(|(_, text)| *text).collect();
+    toml::from_str(&text.join("\n")).map_err(Refusal::from_error)
 }
 
 /// How the cost of an effect is found: by taking it out of the whole chain, or by adding it to the ideal one.
@@ -448,87 +396,70 @@ pub const WHOLE_STAGE: &str = "whole_stage";
 /// Name of the line of the contact model.
 const LAYER: &str = "layer";
 
-/// A chain: the contact model, and which of the items act.
+/// A chain: the contact model, and the items that act. Without any it is the ideal one: the transducer's static law
+/// alone, and y = Φx.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Variant {
     /// Whether the foam is an elastic layer instead of columns.
     layer: bool,
-    /// Which items are active.
-    acts: Vec<bool>,
+    /// The active items.
+    acts: Vec<BudgetItem>,
 }
 
-/// One line of the budget: `variant` less `reference`, by their places in the list of variants.
+impl Variant {
+    /// What the skin follows from: whether it has an elastic layer, and the acting parts of the transducer.
+    fn skin(&self) -> (bool, Vec<&'static str>) {
+        let parts = self.acts.iter().filter(|item| item.stage == TRANSDUCER);
+        (self.layer, parts.map(|item| item.name).collect())
+    }
+
+    /// The profile `whole` with the effects and faults that act.
+    fn readout(&self, whole: &Profile) -> Profile {
+        let acts = |name: &str, fault: bool| {
+            let mut of_readout = self.acts.iter().filter(|item| item.stage != TRANSDUCER);
+            of_readout.any(|item| item.name == name && (item.stage == CELLS) == fault)
+        };
+        let mut profile = whole.clone();
+        profile.faults.retain(|fault| acts(&fault.name, true));
+        profile.compressive.retain(|name, _| acts(name, false));
+        profile
+    }
+}
+
+/// One line of the budget: a chain that is compared with the whole or with the ideal one.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct ChainComparison {
     stage: &'static str,
     effect: &'static str,
     mode: Direction,
-    reference: usize,
-    variant: usize,
+    variant: Variant,
 }
 
-/// Every chain that is scored, each once, and what is compared.
-#[derive(Debug, Clone)]
-struct Variants {
-    list: Vec<Variant>,
-    comparisons: Vec<ChainComparison>,
-}
-
-/// Place of the whole chain in the list.
-const EVERYTHING: usize = 0;
-/// Place of the ideal chain in the list: the transducer's static law alone, and y = Φx.
-const IDEAL: usize = 1;
-
-impl Variants {
-    /// Ablation and addition of every item and of every stage; the contact model is exchanged in the whole chain.
-    fn new(items: &[BudgetItem]) -> Self {
-        let chain = |layer: bool, acts: &dyn Fn(&BudgetItem) -> bool| Variant {
-            layer,
-            acts: items.iter().map(acts).collect(),
-        };
-        let mut all = Self {
-            list: vec![chain(false, &|_| true), chain(false, &|_| false)],
-            comparisons: Vec::new(),
-        };
-        let whole = |layer| chain(layer, &|_| true);
-        all.compare(CONTACT, LAYER, Direction::Ablation, EVERYTHING, whole(true));
-        for stage in stages(items) {
-            let of_stage = |i: &BudgetItem| i.stage == stage;
-            all.compare_both(stage, WHOLE_STAGE, &|chosen| chain(false, &|i| of_stage(i) == chosen));
-            for item in items.iter().filter(|i| of_stage(i)) {
-                all.compare_both(stage, item.name, &|chosen| chain(false, &|i| (i == item) == chosen));
-            }
-        }
-        all
-    }
-
-    /// `with(false)` is the chain without what is looked at, `with(true)` the chain of that alone.
-    fn compare_both(&mut self, stage: &'static str, effect: &'static str, with: &dyn Fn(bool) -> Variant) {
-        self.compare(stage, effect, Direction::Ablation, EVERYTHING, with(false));
-        self.compare(stage, effect, Direction::Addition, IDEAL, with(true));
-    }
-
-    fn compare(
-        &mut self,
-        stage: &'static str,
-        effect: &'static str,
-        mode: Direction,
-        reference: usize,
-        variant: Variant,
-    ) {
-        let found = self.list.iter().position(|v| *v == variant);
-        let variant = found.unwrap_or_else(|| {
-            self.list.push(variant);
-            self.list.len() - 1
-        });
-        self.comparisons.push(ChainComparison {
+/// Ablation and addition of every item and of every stage; the contact model is exchanged in the whole chain.
+fn comparisons(items: &[BudgetItem]) -> Vec<ChainComparison> {
+    let mut all = Vec::new();
+    let mut compare = |stage, effect, mode, layer, acts: &dyn Fn(&BudgetItem) -> bool| {
+        let acts = items.iter().copied().filter(acts).collect();
+        all.push(ChainComparison {
             stage,
             effect,
             mode,
-            reference,
-            variant,
+            variant: Variant { layer, acts },
         });
+    };
+    compare(CONTACT, LAYER, Direction::Ablation, true, &|_| true);
+    for stage in unique(items.iter().map(|item| item.stage)) {
+        let of_stage = items.iter().map(|item| (item.stage, item.name));
+        let effects = [(stage, WHOLE_STAGE)]
+            .into_iter()
+            .chain(of_stage.filter(|of| of.0 == stage));
+        for (_, effect) in effects {
+            let own = |item: &BudgetItem| item.stage == stage && (effect == WHOLE_STAGE || item.name == effect);
+            compare(stage, effect, Direction::Ablation, false, &|item| !own(item));
+            compare(stage, effect, Direction::Addition, false, &own);
+        }
     }
+    all
 }
 
 /// Size of a budget.
@@ -619,87 +550,24 @@ fn compressive_acquisition(label: usize, session: usize) -> Acquisition {
     }
 }
 
-/// What is pressed, on which skin.
-#[derive(Debug, Clone, Copy)]
-struct PressSetup<'a> {
-    objects: &'a [&'static ObjectSpec],
-    readout: &'a str,
-    /// Taxels along one side of the skin.
-    side: usize,
-    seed: u64,
-}
-
-/// An object and the frames of all its presses.
-#[derive(Debug, Clone)]
+/// An object and all its presses.
 struct Pressed {
     object: &'static ObjectSpec,
     scene: Scene,
-    presses: Vec<Vec<Frame>>,
-}
-
-impl PressSetup<'_> {
-    /// Scene of an object: on the published skin at its own place, on a larger one as far from the middle. `layer` puts
-    /// the elastic layer, solved at the frames, in place of the columns.
-    fn scene(&self, object: &ObjectSpec, size: &BudgetSize, layer: bool) -> Result<Scene, TwinError> {
-        let published = SkinLayout::default();
-        let skin = SkinLayout::new(self.side, self.side, published.pitch_m(), published.electrode_m())
-            .map_err(|e| SceneError::from(MechanicsError::from(e)))?;
-        let shift = 0.5 * (self.side as f64 - published.rows() as f64);
-        let press = PressConfig {
-            object: Some(object.name.to_owned()),
-            row: Some(object.placement.row + shift),
-            col: Some(object.placement.col + shift),
-            presses: size.presses(),
-            ..PressConfig::default()
-        };
-        let mut config = SceneConfig {
-            seed: self.seed,
-            readout: Some(self.readout.to_owned()),
-            skin,
-            press: Some(press),
-            ..SceneConfig::default()
-        };
-        if layer {
-            change_model(&mut config.contact, "layer");
-            config.contact.insert("coupled".to_owned(), false.into());
-        }
-        Scene::new(config, Path::new(""))
-    }
-
-    /// Runs every press of every object and reports each to `progress`.
-    fn press(&self, size: &BudgetSize, layer: bool, progress: &dyn Progress) -> Result<Vec<Pressed>, TwinError> {
-        let of_object = |&object: &&'static ObjectSpec| {
-            let scene = self.scene(object, size, layer)?;
-            let presses = (0..size.presses()).into_par_iter().map(|index| {
-                let frames = press_frames(&scene, index)?.frames;
-                progress.step();
-                Ok(frames)
-            });
-            Ok(Pressed {
-                object,
-                presses: presses.collect::<Result<_, TwinError>>()?,
-                scene,
-            })
-        };
-        self.objects.par_iter().map(of_object).collect()
-    }
+    presses: Vec<PressFrames>,
 }
 
 /// What may count as touched.
 const TRUTHS: [&str; 3] = ["raster", "image", "contact"];
 
-/// The touched taxels of an object by every truth of [`TRUTHS`]: those of a raster frame, as published; of the
-/// noiseless image of the same skin in the scan's session at the same instant; and of that image on a skin that has the
-/// static law alone.
-type Masks = [Vec<bool>; 3];
-
 /// A skin that has been pressed and learned from.
-struct LearnedSkin {
+struct LearnedSkin<'a> {
+    size: &'a BudgetSize,
     /// Transducer and complete readout.
     chain: Chain,
-    /// Decoders, one for each compressive session. Training starts at random, so two dictionaries learned from the same
-    /// scans have different scores.
-    learned: Vec<Learned>,
+    /// What is learned for each compressive session, and its decoders. Training starts at random, so two dictionaries
+    /// learned from the same scans have different scores.
+    learned: Vec<(Learned, Vec<TrainedDecoder>)>,
     /// Objects in order of the presses.
     objects: Vec<LearnedObject>,
     /// Scored instants.
@@ -708,46 +576,57 @@ struct LearnedSkin {
 
 /// An object on a skin.
 struct LearnedObject {
-    /// Name.
-    name: &'static str,
     /// Label.
     label: usize,
     /// Conductance as a function of time, one source for each compressive session.
     sources: Vec<Interpolated>,
-    /// Ground truths.
-    masks: Masks,
+    /// The touched taxels by every truth of [`TRUTHS`]: those of a raster frame, as published; of the noiseless image of
+    /// the same skin in the scan's session at the same instant; and of that image on a skin that has the static law
+    /// alone.
+    masks: [Vec<bool>; 3],
     raster: Recording,
 }
 
-impl LearnedSkin {
-    /// Presses all objects on a skin without the transducer's parts `off`, scans the first presses and learns from
-    /// them.
-    fn prepare(pressed: &[Pressed], off: &[&str], size: &BudgetSize, seed: u64) -> Result<Self, Refusal> {
-        let Some(first) = pressed.first() else {
-            return Err(Refusal::new("`--objects` names no object"));
-        };
-        let chain = self::chain(&first.scene, off)?;
-        let every_part: Vec<&str> = PARTS.iter().map(|(name, _)| *name).collect();
-        let bare = self::chain(&first.scene, &every_part)?;
-        let layout = first.scene.skin();
-        let protocol = size.protocol(layout.taxels());
+impl<'a> LearnedSkin<'a> {
+    /// Presses all objects on a skin with the transducer's parts `acting`, scans the first presses and learns from them.
+    fn prepare(
+        pressed: &[Pressed],
+        acting: &[&str],
+        size: &'a BudgetSize,
+        study: &BudgetStudy,
+    ) -> Result<Self, Refusal> {
+        let scene = &pressed[0].scene;
+        let (chain, bare) = (chain(scene, acting)?, chain(scene, &[])?);
+        let protocol = size.protocol(scene.skin().taxels());
         let objects = pressed
             .par_iter()
-            .map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol))
-            .collect::<Result<Vec<_>, TwinError>>()
-            .map_err(Refusal::from_error)?;
-        let sessions: Vec<ScoredSession> = objects.iter().map(|o| o.session(protocol)).collect();
-        let streams = Streams::new(seed);
-        let learned = (0..size.sessions).into_par_iter().map(|session| {
-            let streams = streams.child("learning", session as u64);
-            Learned::learn(&sessions, &size.learning, layout.cols(), streams)
+            .map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol));
+        let objects = objects.collect::<Result<Vec<_>, Refusal>>()?;
+        let scanned = pressed.iter().zip(&objects).map(|(pressed, object)| ScoredSession {
+            name: pressed.object.name.to_owned(),
+            object: pressed.object.name.to_owned(),
+            label: object.label,
+            again: false,
+            shared_raster: false,
+            raster: Some(object.raster.clone()),
+            compressive: None,
+            protocol,
+            raster_protocol: protocol,
+            held: true,
+            simulated: Vec::new(),
         });
-        let learned = learned
-            .collect::<Result<Vec<_>, LearnError>>()
-            .map_err(Refusal::from_error)?;
+        let scanned: Vec<ScoredSession> = scanned.collect();
+        let learned = (0..size.sessions).into_par_iter().map(|session| {
+            let streams = Streams::new(study.seed).child("learning", session as u64);
+            let learned = Learned::learn(&scanned, &size.learning, scene.skin().cols(), streams)?;
+            let decoders = study.decodes.iter().map(|decode| decode.decoder(&learned));
+            Ok((decoders.collect::<Result<Vec<_>, _>>()?, learned))
+        });
+        let learned = learned.map(|found| found.map(|(decoders, learned)| (learned, decoders)));
         Ok(Self {
+            size,
+            learned: learned.collect::<Result<_, Refusal>>()?,
             chain,
-            learned,
             objects,
             protocol,
         })
@@ -762,10 +641,11 @@ impl LearnedSkin {
             let last = (self.protocol.first_frame + self.protocol.frames).min(object.raster.frames());
             for frame in self.protocol.first_frame..last {
                 let image = object.raster.volts(self.protocol.truth.0, frame);
-                for (tally, truth) in tallies.iter_mut().zip(&object.masks) {
-                    tally.image(image, truth);
-                }
-                let decision = self.learned.first().map(|l| l.classifier.classify(image, &mut work));
+                object.tally(&mut tallies, image);
+                let decision = self
+                    .learned
+                    .first()
+                    .map(|(l, _)| l.classifier.classify(image, &mut work));
                 decisions.push(decision.and_then(Result::unwrap_or_default));
             }
             tallies[0].decisions(&decisions, object.label, self.protocol.vote);
@@ -773,16 +653,80 @@ impl LearnedSkin {
         };
         self.objects.iter().map(of_object).collect()
     }
+
+    /// Records all compressive sessions with `profile` and scores them. Noise depends on object and session alone, so
+    /// that two profiles are compared under the same noise.
+    fn score(&self, profile: &Profile, measurements: &[usize], progress: &dyn Progress) -> Result<ScoreTable, Refusal> {
+        let chain = self.chain.with_profile(profile.clone())?;
+        let of_object = |object: &LearnedObject| {
+            let sessions = (0..self.size.sessions).into_par_iter().map(|session| {
+                let scores = self.score_press(&chain, object, session, measurements);
+                progress.step();
+                scores
+            });
+            sessions.collect::<Result<Vec<_>, Refusal>>()
+        };
+        self.objects.par_iter().map(of_object).collect()
+    }
+
+    /// Records compressive session `session` of `object` with `chain` and scores it by every decoder and M.
+    fn score_press(
+        &self,
+        chain: &Chain,
+        object: &LearnedObject,
+        session: usize,
+        measurements: &[usize],
+    ) -> Result<Vec<PressScores>, Refusal> {
+        let Protocol {
+            first_frame,
+            frames,
+            vote,
+            ..
+        } = self.protocol;
+        let mut source = [object.sources[session].clone()];
+        let duration_s = ((first_frame + frames) * object.raster.taxels()) as f64 / chain.sample_rate_hz();
+        let acquisition = compressive_acquisition(object.label, session);
+        let recording = chain.record_sources(&mut source, duration_s, &acquisition)?;
+        let idle_v = idle_mean(&recording, 0);
+        let [first, end] =
+            [first_frame.min(recording.frames()), recording.frames()].map(|f| f * recording.measurements_per_frame());
+        let mut all = Vec::new();
+        for decoder in &self.learned[session].1 {
+            for &m in measurements {
+                let mut tallies: [Tally; 3] = Default::default();
+                let mut scorer = Scorer::new(decoder);
+                for start in starts(self.size.votes, end - first, vote * m) {
+                    // vote by vote, because the weights of a whole press on a large skin fill the memory
+                    let start = first + start;
+                    let press = Press::within(&recording, 0, start..start + vote * m, idle_v);
+                    let windows: Vec<Window<'_>> = press.windows(0..press.len(), m, m).map(|(_, w)| w).collect();
+                    let answers = scorer.answers(&windows)?;
+                    answers
+                        .iter()
+                        .for_each(|answer| object.tally(&mut tallies, &answer.image));
+                    let decisions: Vec<Option<usize>> = answers.iter().map(|a| scorer.class(a)).collect();
+                    tallies[0].decisions(&decisions, object.label, vote);
+                }
+                all.push(press_scores(&tallies));
+            }
+        }
+        Ok(all)
+    }
 }
 
-/// Chain of `scene` without the transducer's parts `off`.
-fn chain(scene: &Scene, off: &[&str]) -> Result<Chain, Refusal> {
+/// First measurements of the votes of `vote_len` measurements, at most `most`, spread evenly over a press of `len`.
+fn starts(most: usize, len: usize, vote_len: usize) -> impl Iterator<Item = usize> {
+    let votes = most.min(len / vote_len);
+    (0..votes).map(move |vote| vote * (len - vote_len) / votes.saturating_sub(1).max(1))
+}
+
+/// Chain of `scene` with the transducer's parts `acting` alone.
+fn chain(scene: &Scene, acting: &[&str]) -> Result<Chain, Refusal> {
     let config = ChainConfig {
-        transducer_parameters: without_parts(off).map_err(Refusal::from_error)?,
+        transducer_parameters: with_parts(acting)?,
         ..scene.config().chain()
     };
-    let chain = Chain::new(&config, scene.skin(), scene.seed(), Path::new(""));
-    chain.map_err(Refusal::from_error)
+    Chain::new(&config, scene.skin(), scene.seed(), Path::new(""))
 }
 
 impl LearnedObject {
@@ -792,8 +736,8 @@ impl LearnedObject {
         bare: &Chain,
         size: &BudgetSize,
         protocol: &Protocol,
-    ) -> Result<Self, TwinError> {
-        let presses: Vec<&[Frame]> = pressed.presses.iter().map(Vec::as_slice).collect();
+    ) -> Result<Self, Refusal> {
+        let presses: Vec<&[Frame]> = pressed.presses.iter().map(|press| press.frames.as_slice()).collect();
         let label = usize::from(pressed.object.label);
         let scan = raster_acquisition(label);
         let (scans, read) = presses.split_at(size.raster_presses);
@@ -808,39 +752,28 @@ impl LearnedObject {
             };
             chain.conductance(&[press], &sums)
         });
-        let sources = sources.collect::<Result<Vec<_>, ChainError>>()?.concat();
         Ok(Self {
-            name: pressed.object.name,
             label,
-            sources,
+            sources: sources.collect::<Result<Vec<_>, Refusal>>()?.concat(),
             masks: [
                 Truth::new(&raster, protocol).support,
-                touched(chain, scans, scan.session, time_s)?,
-                touched(bare, scans, scan.session, time_s)?,
+                touched(chain, scans, scan.session, time_s),
+                touched(bare, scans, scan.session, time_s),
             ],
             raster,
         })
     }
 
-    fn session(&self, protocol: Protocol) -> ScoredSession {
-        ScoredSession {
-            name: self.name.to_owned(),
-            object: self.name.to_owned(),
-            label: self.label,
-            again: false,
-            shared_raster: false,
-            raster: Some(self.raster.clone()),
-            compressive: None,
-            protocol,
-            raster_protocol: protocol,
-            held: true,
-            simulated: Vec::new(),
+    /// Scores `image` by every truth.
+    fn tally(&self, tallies: &mut [Tally; 3], image: &[f64]) {
+        for (tally, truth) in tallies.iter_mut().zip(&self.masks) {
+            tally.image(image, truth);
         }
     }
 }
 
 /// Support of the conductance at `time_s` of the last of `presses`, above that of the untouched skin.
-fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Result<Vec<bool>, TwinError> {
+fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Vec<bool> {
     let mut mask = Vec::new();
     let maps = chain.conductance_maps(presses, session).pop().unwrap_or_default();
     let after = presses
@@ -851,7 +784,7 @@ fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Re
         let image: Vec<f64> = pairs.map(|(g, g0)| g - g0).collect();
         support(&image, SUPPORT_THRESHOLD, &mut mask);
     }
-    Ok(mask)
+    mask
 }
 
 /// Scores of one press with one decode and M: support accuracy by every truth of [`TRUTHS`], IoU by every truth, and
@@ -883,149 +816,47 @@ fn press_scores(tallies: &[Tally; 3]) -> PressScores {
     scores.map(|score| score.unwrap_or(0.0))
 }
 
-/// What all readouts of a skin share: its decoders, one set a session.
-struct PressScorer<'a> {
-    skin: &'a LearnedSkin,
-    keys: &'a [(PublishedDecode, usize)],
-    votes: usize,
-    decoders: Vec<Vec<(PublishedDecode, TrainedDecoder)>>,
-}
-
-impl<'a> PressScorer<'a> {
-    /// Scores presses on `skin` by every decode and M of `keys`.
-    ///
-    /// # Errors
-    /// [`Refusal`] when a decode cannot use what was learned.
-    fn new(skin: &'a LearnedSkin, keys: &'a [(PublishedDecode, usize)], size: &BudgetSize) -> Result<Self, Refusal> {
-        let decoders = skin.learned.iter().map(PublishedDecode::decoders);
-        Ok(Self {
-            skin,
-            keys,
-            votes: size.votes,
-            decoders: decoders.collect::<Result<_, _>>().map_err(Refusal::from_error)?,
-        })
-    }
-
-    /// Records compressive session `session` of object `object` with `profile` and scores it, key by key. Noise depends
-    /// on object and session alone, so that two profiles are compared under the same noise.
-    fn score(&self, profile: &Profile, object: usize, session: usize) -> Result<Vec<PressScores>, Refusal> {
-        let (skin, object) = (self.skin, &self.skin.objects[object]);
-        let chain = skin.chain.with_profile(profile.clone()).map_err(Refusal::from_error)?;
-        let frames = skin.protocol.first_frame + skin.protocol.frames;
-        let mut sources = [object.sources[session].clone()];
-        let taxels = skin.learned[session].dictionary.atoms.nrows();
-        let duration_s = (frames * taxels) as f64 / chain.sample_rate_hz();
-        let recording = chain
-            .record_sources(
-                &mut sources,
-                duration_s,
-                &compressive_acquisition(object.label, session),
-            )
-            .map_err(Refusal::from_error)?;
-        let per_frame = recording.measurements_per_frame();
-        let (idle_v, vote) = (idle_mean(&recording, 0), skin.protocol.vote);
-        let [first, end] =
-            [skin.protocol.first_frame.min(recording.frames()), recording.frames()].map(|f| f * per_frame);
-        let score = |&(decode, m): &(PublishedDecode, usize)| {
-            let mut tallies: [Tally; 3] = Default::default();
-            for (_, decoder) in self.decoders[session].iter().filter(|(d, _)| *d == decode) {
-                let mut scorer = Scorer::new(decoder);
-                for start in self.starts(end - first, m).map(|start| first + start) {
-                    // vote by vote, because the weights of a whole press on a large skin fill the memory
-                    let press = Press::within(&recording, 0, start..start + vote * m, idle_v);
-                    let windows: Vec<Window<'_>> = press.windows(0..press.len(), m, m).map(|(_, w)| w).collect();
-                    let answers = scorer
-                        .answers(&windows)
-                        .map_err(ScoreError::from)
-                        .map_err(Refusal::from_error)?;
-                    for answer in &answers {
-                        for (tally, truth) in tallies.iter_mut().zip(&object.masks) {
-                            tally.image(&answer.image, truth);
-                        }
-                    }
-                    let decisions: Vec<Option<usize>> = answers.iter().map(|a| scorer.class(a)).collect();
-                    tallies[0].decisions(&decisions, object.label, vote);
-                }
-            }
-            Ok(press_scores(&tallies))
-        };
-        self.keys.iter().map(score).collect()
-    }
-
-    /// First measurements of the votes, spread evenly over a press of `len` measurements.
-    fn starts(&self, len: usize, m: usize) -> impl Iterator<Item = usize> {
-        let vote_len = self.skin.protocol.vote * m;
-        let votes = self.votes.min(len / vote_len);
-        (0..votes).map(move |vote| vote * (len - vote_len) / votes.saturating_sub(1).max(1))
-    }
-}
-
 /// Probability with which a mean of nothing but chance is taken to stand out.
 pub const CHANCE: f64 = 0.01;
 
-/// A mean over the sessions of a study, and its standard error.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct MeanWithError {
-    /// Mean.
-    pub mean: f64,
-    /// Its standard error.
-    pub se: f64,
-    /// Number of sessions S.
-    pub sessions: usize,
+/// Whether the mean over sessions is further from zero than chance brings it once in 1/[`CHANCE`]: by Student's t test
+/// with S − 1 degrees of freedom; and where all sessions have the same value, so that there is no error to measure it
+/// by, by the test of signs, p = 2^(1 − S).
+pub fn stands_out(sample: &Sample) -> bool {
+    let freedom = u32::try_from(sample.count.saturating_sub(1)).unwrap_or(u32::MAX);
+    if sample.mean.abs() <= 0.0 || freedom == 0 {
+        return false;
+    }
+    let se = sample.standard_error();
+    // equal values leave the rounding of their mean
+    let chance = if se > 1e-12 * sample.mean.abs() {
+        two_sided(sample.mean / se, freedom)
+    } else {
+        (-f64::from(freedom)).exp2()
+    };
+    chance < CHANCE
 }
 
-impl MeanWithError {
-    /// Whether the mean is further from zero than chance brings it once in 1/[`CHANCE`]: by Student's t test with S − 1
-    /// degrees of freedom; and where all sessions have the same value, so that there is no error to measure it by, by
-    /// the test of signs, p = 2^(1 − S).
-    pub fn stands_out(self) -> bool {
-        let freedom = u32::try_from(self.sessions.saturating_sub(1)).unwrap_or(u32::MAX);
-        if self.mean.abs() <= 0.0 || freedom == 0 {
-            return false;
-        }
-        // equal values leave the rounding of their mean
-        let chance = if self.se > 1e-12 * self.mean.abs() {
-            two_sided(self.mean / self.se, freedom)
-        } else {
-            (-f64::from(freedom)).exp2()
-        };
-        chance < CHANCE
-    }
-
-    /// Whether chance alone could make it stand out: it is not zero in every session.
-    pub fn can_stand_out(self) -> bool {
-        self.mean.abs() > 0.0 || self.se > 0.0
-    }
-}
-
-/// Mean over sessions and objects of `values[object][session]`, with its standard error s/√S: s is the standard
-/// deviation of the S sessions' means over the objects.
+/// The score with the place `score` at the key with the place `key`, or its change from `reference` press by press, so
+/// that noise which both share cancels: mean over the objects, session by session.
 ///
 /// Every session has presses, noise and a learned dictionary of its own, so sessions are independent; the objects of
 /// one session share the dictionary and are not. The objects are the ones that were asked about, not a sample of
 /// others.
-fn estimate(values: &[Vec<f64>]) -> MeanWithError {
-    let sessions = values.iter().map(Vec::len).min().unwrap_or(0);
-    let of_session = |k: usize| mean(values.iter().map(|v| v[k])).unwrap_or_default();
-    let means: Vec<f64> = (0..sessions).map(of_session).collect();
-    Sample::of(&means).map_or_else(MeanWithError::default, |sample| MeanWithError {
-        mean: sample.mean,
-        se: sample.standard_error(),
-        sessions,
-    })
-}
-
-/// Mean of the score with the place `score` at the key with the place `key`, or of its change from `reference`, press
-/// by press: noise that both share cancels.
-fn mean_score(scores: &ScoreTable, reference: Option<&ScoreTable>, key: usize, score: usize) -> MeanWithError {
-    let of_object = |(object, sessions): (usize, &Vec<Vec<PressScores>>)| {
-        let before = |session: usize| reference.map_or(0.0, |r| r[object][session][key][score]);
-        let sessions = sessions.iter().enumerate();
-        sessions
-            .map(|(session, keys)| keys[key][score] - before(session))
-            .collect()
+fn mean_score(scores: &ScoreTable, reference: Option<&ScoreTable>, key: usize, score: usize) -> Sample {
+    let sessions = scores.iter().map(Vec::len).min().unwrap_or(0);
+    let of_session = |session: usize| {
+        let before = |object: usize| reference.map_or(0.0, |r| r[object][session][key][score]);
+        let objects = scores.iter().enumerate();
+        mean(objects.map(|(object, sessions)| sessions[session][key][score] - before(object))).unwrap_or_default()
     };
-    estimate(&scores.iter().enumerate().map(of_object).collect::<Vec<_>>())
+    let means: Vec<f64> = (0..sessions).map(of_session).collect();
+    let none = Sample {
+        count: 0,
+        mean: 0.0,
+        variance: 0.0,
+    };
+    Sample::of(&means).unwrap_or(none)
 }
 
 #[cfg(test)]
@@ -1045,47 +876,51 @@ mod tests {
     #[test]
     fn the_transducer_knows_every_part() {
         for (name, _) in PARTS {
-            let parameters = without_parts(&[name]).unwrap();
+            let others: Vec<&str> = PARTS
+                .iter()
+                .map(|(other, _)| *other)
+                .filter(|other| other != name)
+                .collect();
+            let parameters = with_parts(&others).unwrap();
             build_transducer("velostat", parameters, &SkinLayout::default(), Streams::new(0)).unwrap();
         }
-        let off: Vec<&str> = PARTS.iter().map(|(name, _)| *name).collect();
-        assert_eq!(without_parts(&off).unwrap().len(), PARTS.len());
+        assert_eq!(with_parts(&[]).unwrap().len(), PARTS.len());
     }
 
     #[test]
     fn stages_stand_in_signal_order() {
         let (_, text) = PROFILES.iter().find(|(name, _)| *name == "as_built").unwrap();
         let faults = "[[faults]]\nname = \"dead\"\ntaxel = 4\n[[faults]]\nname = \"dead\"\ntaxel = 7\n";
-        let mut profile = Profile::from_toml(&format!("{text}\n{faults}")).unwrap();
-        let found = items(&profile);
+        let profile = Profile::from_toml(&format!("{text}\n{faults}")).unwrap();
+        let acts = items(&profile);
         assert_eq!(
-            stages(&found),
+            unique(acts.iter().map(|item| item.stage)),
             [TRANSDUCER, CELLS, "drive", "amplifier", "noise", "converter"]
         );
-        assert_eq!(found.iter().filter(|item| item.stage == CELLS).count(), 1);
-        for &item in found.iter().filter(|item| item.stage != TRANSDUCER) {
-            take_away(item, &mut profile);
-        }
-        assert!(profile.faults.is_empty() && profile.compressive.is_empty() && !profile.raster.is_empty());
+        assert_eq!(acts.iter().filter(|item| item.stage == CELLS).count(), 1);
+        let [whole, ideal] = [acts, Vec::new()].map(|acts| Variant { layer: false, acts }.readout(&profile));
+        assert_eq!(whole, profile);
+        assert!(ideal.faults.is_empty() && ideal.compressive.is_empty() && !ideal.raster.is_empty());
     }
 
     /// Two stages with two items and one: 1 exchange of the contact, 2 × (2 stages + 3 items) comparisons. A stage of
     /// one item is that item: chains all, none, layer, 2 × (first stage + 3 items).
     #[test]
-    fn every_chain_is_scored_once() {
+    fn every_chain_is_compared() {
         let item = |stage, name| BudgetItem { stage, name };
         let items = [item("a", "x"), item("a", "y"), item("b", "z")];
-        let variants = Variants::new(&items);
-        assert_eq!(variants.comparisons.len(), 1 + 2 * 5);
+        let lines = comparisons(&items);
+        assert_eq!(lines.len(), 1 + 2 * 5);
         // all less the first stage is the second stage alone, and the other way round
-        assert_eq!(variants.list.len(), 3 + 2 + 3 + 3 - 2);
-        let line = |effect, mode| {
-            let found = |c: &&ChainComparison| c.effect == effect && c.mode == mode;
-            let line = variants.comparisons.iter().find(found).unwrap();
-            (line.reference, variants.list[line.variant].acts.clone())
+        assert_eq!(unique(lines.iter().map(|line| &line.variant)).len(), 1 + 3 + 3);
+        let acts = |effect, mode| {
+            let line = lines.iter().find(|c| c.effect == effect && c.mode == mode).unwrap();
+            line.variant.acts.iter().map(|item| item.name).collect::<String>()
         };
-        assert_eq!(line("y", Direction::Ablation), (EVERYTHING, vec![true, false, true]));
-        assert_eq!(line("y", Direction::Addition), (IDEAL, vec![false, true, false]));
+        assert_eq!(
+            (acts("y", Direction::Ablation), acts("y", Direction::Addition)),
+            ("xz".to_owned(), "y".to_owned())
+        );
     }
 
     /// Sessions of the scan and of all compressive recordings are numbered apart, so that each has noise and gains of
@@ -1119,33 +954,30 @@ mod tests {
     }
 
     /// Two objects in three sessions: means over the objects 1, 3 and 5, of mean 3 and variance 4, whatever the objects
-    /// differ by.
+    /// differ by; and a shift that is the same in every press has no error, however much the presses differ.
     #[test]
-    fn sessions_are_the_sample() {
-        let found = estimate(&[vec![-9.0, 3.0, 7.0], vec![11.0, 3.0, 3.0]]);
+    fn sessions_are_the_sample_and_changes_are_paired() {
+        let table = |add: f64| [[-9.0, 3.0, 7.0], [11.0, 3.0, 3.0]].map(|of| of.map(|v| vec![[v + add; 8]]).to_vec());
+        let (before, after) = (table(0.0).to_vec(), table(0.125).to_vec());
+        let found = mean_score(&before, None, 0, IOU);
         assert_relative_eq!(found.mean, 3.0, max_relative = 1e-15);
-        assert_relative_eq!(found.se, (4.0_f64 / 3.0).sqrt(), max_relative = 1e-15);
-    }
-
-    /// A shift that is the same in every press has no error, however much the presses differ.
-    #[test]
-    fn paired_changes_cancel_what_is_shared() {
-        let before: ScoreTable = vec![vec![vec![[0.25; 8]], vec![[0.75; 8]]]];
-        let after: ScoreTable = vec![vec![vec![[0.375; 8]], vec![[0.875; 8]]]];
-        let found = mean_score(&after, Some(&before), 0, IOU);
-        assert_relative_eq!(found.mean, 0.125, max_relative = 1e-15);
-        assert!(found.se <= 0.0);
-        assert!(mean_score(&before, None, 0, IOU).se > 0.2);
+        assert_relative_eq!(found.standard_error(), (4.0_f64 / 3.0).sqrt(), max_relative = 1e-15);
+        let change = mean_score(&after, Some(&before), 0, IOU);
+        assert_relative_eq!(change.mean, 0.125, max_relative = 1e-15);
+        assert!(change.variance <= 0.0);
     }
 
     /// Student's quantiles at 1 % are 9.925 for 3 sessions and 3.250 for 10; equal values stand out by their signs,
     /// from the eighth session on: 2⁻⁷ < 1 % < 2⁻⁶.
     #[test]
     fn few_sessions_need_a_larger_distance() {
-        let stands_out = |mean: f64, se: f64, sessions: usize| MeanWithError { mean, se, sessions }.stands_out();
-        assert!(!stands_out(-9.8, 1.0, 3) && stands_out(-10.0, 1.0, 3));
-        assert!(!stands_out(3.2, 1.0, 10) && stands_out(3.3, 1.0, 10));
-        assert!(!stands_out(0.1, 0.0, 7) && stands_out(0.1, 0.0, 8));
-        assert!(!stands_out(0.0, 0.0, 10) && !stands_out(1.0, 0.0, 1));
+        let of = |mean: f64, se: f64, count: usize| {
+            let variance = se * se * count as f64;
+            stands_out(&Sample { count, mean, variance })
+        };
+        assert!(!of(-9.8, 1.0, 3) && of(-10.0, 1.0, 3));
+        assert!(!of(3.2, 1.0, 10) && of(3.3, 1.0, 10));
+        assert!(!of(0.1, 0.0, 7) && of(0.1, 0.0, 8));
+        assert!(!of(0.0, 0.0, 10) && !of(1.0, 0.0, 1));
     }
 }

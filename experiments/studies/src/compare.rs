@@ -4,11 +4,11 @@
 //! The comparison can therefore fail.
 
 use crate::calibrate::{
-    FitRequest, FittedReadout, SessionEstimates, SessionPair, WINDOW_FRAMES, fit_windows, fitted_profile, predicted,
-    reseeded,
+    Estimated, FitRequest, FittedReadout, SessionEstimates, SessionPair, WINDOW_FRAMES, fit_windows, fitted_profile,
+    predicted, reseeded,
 };
+use rand::RngExt as _;
 use rayon::prelude::*;
-use serde::{Serialize, Serializer};
 use spts::progress::Progress;
 use spts::record::Twin;
 use spts::scene::Scene;
@@ -16,10 +16,49 @@ use spts_circuit::{Block, Interpolated, Mode, Profile, Readout, Recording};
 use spts_contact::objects::OBJECTS;
 use spts_eval::decoders::PublishedDecode;
 use spts_eval::protocol::{PLATEAU, PUBLISHED_RATE_HZ, PUBLISHED_TAXELS, Protocol};
-use spts_eval::{PublishedSkin, ScoreError, ScoreRow, ScoredSession, footprint_scene, mean_rows, score_session};
+use spts_eval::{PublishedSkin, ScoreRow, ScoredSession, footprint_scene, mean_rows, score_session, unique};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, Streams, TaxelGains};
 use std::path::Path;
+
+/// A value of the real skin, and the band of its twins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Banded {
+    /// Value of the real skin.
+    pub real: f64,
+    /// Mean of the twins.
+    pub twin: f64,
+    /// Lower end of the band, in which a further twin lies with a probability of 90 %.
+    pub low: f64,
+    /// Upper end of the band.
+    pub high: f64,
+}
+
+impl Banded {
+    /// The band of the values `twins`, cut off at `limits`; `None` without values.
+    pub fn of(real: f64, twins: &[f64], limits: [f64; 2]) -> Option<Self> {
+        let (low, high) = predicted(twins)?;
+        Some(Self {
+            real,
+            twin: twins.iter().sum::<f64>() / twins.len() as f64,
+            low: low.max(limits[0]),
+            high: high.min(limits[1]),
+        })
+    }
+
+    /// twin − real.
+    pub fn difference(&self) -> f64 {
+        self.twin - self.real
+    }
+
+    /// Whether the real value lies in the band.
+    pub fn inside(&self) -> bool {
+        (self.low..=self.high).contains(&self.real)
+    }
+}
+
+/// Limits of a band of values that have none.
+pub(crate) const UNLIMITED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
 /// Estimates of one session of the real skin and of the twin, and the twin's recording.
 #[derive(Debug, Clone)]
@@ -28,37 +67,34 @@ pub struct ComparedSession {
     pub real: SessionEstimates,
     /// Estimates from the twin's presses.
     pub twin: SessionEstimates,
-    /// The readout fitted to the calibration presses.
-    pub readings: FittedReadout,
     /// The twin's session. Presses that are not compared are the skin's own.
     pub recording: Recording,
 }
 
 /// Presses (from 0) for calibration, and for comparison: the first, third, … and the second, fourth, …. They alternate
 /// because the readout drifts during a session (the first tap of the memory by 0.01). `None` for one press.
-pub fn split(recording: &Recording) -> Option<(Vec<usize>, Vec<usize>)> {
+fn split(recording: &Recording) -> Option<(Vec<usize>, Vec<usize>)> {
     let presses = recording.blocks().len();
     (presses > 1).then(|| ((0..presses).step_by(2).collect(), (1..presses).step_by(2).collect()))
 }
 
-/// Presses of a session that are compared.
+/// Presses of a session for calibration, and those that are compared.
 ///
 /// # Errors
 /// [`Refusal`] for a session of one press.
-fn compared_presses(pair: &SessionPair) -> Result<Vec<usize>, Refusal> {
-    let (_, compared) = split(&pair.compressive).ok_or_else(|| one_press(pair))?;
-    Ok(compared)
+fn halves(pair: &SessionPair) -> Result<(Vec<usize>, Vec<usize>), Refusal> {
+    split(&pair.compressive).ok_or_else(|| {
+        Refusal::new(format!(
+            "{} compressive: `presses` = 1 is outside [2, ∞): some calibrate, the others are compared",
+            pair.session
+        ))
+    })
 }
 
-fn one_press(pair: &SessionPair) -> Refusal {
-    Refusal::new(format!(
-        "{} compressive: `presses` = 1 is outside [2, ∞): some calibrate, the others are compared",
-        pair.session
-    ))
-}
-
-fn unfit(pair: &SessionPair) -> Refusal {
-    Refusal::new(format!("{} compressive: no press can be fitted", pair.session))
+/// Estimates from the presses `blocks` of `recording`, the compressive recording of `pair` or one like it.
+fn estimated(pair: &SessionPair, recording: &Recording, blocks: &[usize]) -> Result<SessionEstimates, Refusal> {
+    SessionEstimates::of(pair, recording, blocks)
+        .ok_or_else(|| Refusal::new(format!("{} compressive: no press can be fitted", pair.session)))
 }
 
 /// The presses of `pair` that are compared, with `images`, through the readout with `profile`, in its session number
@@ -75,7 +111,7 @@ fn twin_of(
     draw: u64,
 ) -> Result<Recording, Refusal> {
     let real = &pair.compressive;
-    let blocks = compared_presses(pair)?;
+    let (_, blocks) = halves(pair)?;
     let readout = streams.child(&format!("compare/{}", pair.session), 0);
     match images {
         Images::Recorded => {
@@ -83,8 +119,16 @@ fn twin_of(
             replay(real, &blocks, &images, profile, readout, draw)
         }
         Images::Simulated { gains } => {
-            let presses = SimulatedPresses::of(pair, skin_seed(streams, draw), gains.as_ref())?;
-            replay(real, &blocks, &|block| Ok(presses.press(block)), profile, readout, draw)
+            let seed = streams.rng("compare/skin", draw).random::<u64>() >> 1;
+            let presses = simulated_presses(pair, seed, gains.as_ref())?;
+            replay(
+                real,
+                &blocks,
+                &|block| Ok(presses[block].clone()),
+                profile,
+                readout,
+                draw,
+            )
         }
     }
 }
@@ -93,40 +137,21 @@ fn twin_of(
 ///
 /// # Errors
 /// [`Refusal`] if there are too few presses, a press cannot be fitted, or the readout refuses the fitted values.
-pub fn compare(pair: &SessionPair, images: &Images, streams: Streams) -> Result<ComparedSession, Refusal> {
-    let (calibration, compared) = split(&pair.compressive).ok_or_else(|| one_press(pair))?;
-    let estimate = |recording: &Recording, blocks: &[usize]| SessionEstimates::of(pair, recording, blocks);
-    let fitted = estimate(&pair.compressive, &calibration).ok_or_else(|| unfit(pair))?;
-    let real = estimate(&pair.compressive, &compared).ok_or_else(|| unfit(pair))?;
-    let readings = FittedReadout::of(std::slice::from_ref(&fitted));
-    let taxels = u32::try_from(pair.compressive.taxels()).unwrap_or(u32::MAX);
-    let (profile, _) = fitted_profile(&readings, taxels).map_err(not_a_profile)?;
+fn compare(pair: &SessionPair, images: &Images, streams: Streams) -> Result<ComparedSession, Refusal> {
+    let (calibration, compared) = halves(pair)?;
+    let fitted = estimated(pair, &pair.compressive, &calibration)?;
+    let real = estimated(pair, &pair.compressive, &compared)?;
+    let profile = profile_of(std::slice::from_ref(&fitted), pair)?;
     let recording = twin_of(pair, images, (&fitted, &profile), streams, 0)?;
-    let twin = estimate(&recording, &compared).ok_or_else(|| unfit(pair))?;
-    Ok(ComparedSession {
-        real,
-        twin,
-        readings,
-        recording,
-    })
+    let twin = estimated(pair, &recording, &compared)?;
+    Ok(ComparedSession { real, twin, recording })
 }
 
-/// [`compare`] for every session. `done` is called after each.
-///
-/// # Errors
-/// The error of the first session that cannot be compared.
-pub fn compare_all(
-    pairs: &[SessionPair],
-    images: &Images,
-    streams: Streams,
-    done: &(dyn Fn() + Sync),
-) -> Result<Vec<ComparedSession>, Refusal> {
-    let one = |pair| {
-        let compared = compare(pair, images, streams);
-        done();
-        compared
-    };
-    pairs.par_iter().map(one).collect()
+/// The profile that is fitted to `sessions`, on the skin of `pair`.
+fn profile_of(sessions: &[SessionEstimates], pair: &SessionPair) -> Result<Profile, Refusal> {
+    let taxels = u32::try_from(pair.compressive.taxels()).unwrap_or(u32::MAX);
+    let fitted = fitted_profile(&FittedReadout::of(sessions), taxels);
+    Ok(fitted.map_err(|e| Refusal::from_error(e).at("the fitted profile"))?.0)
 }
 
 /// The images that the twin's readout is given.
@@ -160,29 +185,18 @@ pub struct CompareStudy<'a> {
 }
 
 /// Results of `spts compare`: statistics and score curves of the twin beside those of the real skin.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default)]
 pub struct CompareReport {
     /// Sessions.
-    #[serde(skip)]
     pub compared: Vec<ComparedSession>,
     /// Statistics that must agree.
     pub statistics: Vec<Statistic>,
-    /// Score curves, if requested. Only their distances are serialised.
-    #[serde(serialize_with = "distances_only")]
+    /// Score curves, if requested.
     pub curves: Option<ScoreCurves>,
     /// Statistics compared with the band of a profile fitted to others, if requested.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub predicted: Vec<PredictedStatistic>,
     /// Statistics of effects that the readout does not model.
     pub not_modelled: Vec<Statistic>,
-}
-
-fn distances_only<S: Serializer>(curves: &Option<ScoreCurves>, serializer: S) -> Result<S::Ok, S::Error> {
-    distances(curves.as_ref()).serialize(serializer)
-}
-
-fn distances(curves: Option<&ScoreCurves>) -> &[CurveDistance] {
-    curves.map_or(&[], |c| &c.distances)
 }
 
 impl CompareStudy<'_> {
@@ -191,60 +205,66 @@ impl CompareStudy<'_> {
     /// # Errors
     /// [`Refusal`] if a session cannot be compared.
     pub fn run(&self, progress: &dyn Progress) -> Result<CompareReport, Refusal> {
+        let report = self.compared(progress);
+        report.map_err(|refusal| refusal.at(self.recordings.display()))
+    }
+
+    fn compared(&self, progress: &dyn Progress) -> Result<CompareReport, Refusal> {
+        let streams = Streams::new(self.seed);
+        let done = || progress.step();
         if let Some(prediction) = &self.prediction {
-            #[expect(clippy::cast_possible_truncation, reason = "at most 1000 draws")]
-            let twins = self.pairs.len() * prediction.draws as usize;
-            progress.stage("predicting sessions", Some(twins));
-            let streams = Streams::new(self.seed);
-            let predicted = predicted_statistics(self.pairs, prediction, &self.images, streams, &|| progress.step());
+            let draws = usize::try_from(prediction.draws).unwrap_or(usize::MAX);
+            progress.stage("predicting sessions", Some(self.pairs.len() * draws));
+            let predicted = predicted_statistics(self.pairs, prediction, &self.images, streams, &done)?;
             progress.end();
             return Ok(CompareReport {
-                compared: Vec::new(),
-                statistics: Vec::new(),
-                curves: None,
-                predicted: predicted.map_err(|source| self.at(source))?,
-                not_modelled: Vec::new(),
+                predicted,
+                ..CompareReport::default()
             });
         }
         progress.stage("replaying sessions", Some(self.pairs.len()));
-        let compared = compare_all(self.pairs, &self.images, Streams::new(self.seed), &|| progress.step());
-        let compared = compared.map_err(|source| self.at(source))?;
-        progress.end();
-        let scored = self.real.map(|real| {
-            progress.stage("scoring presses", Some(steps(&compared, real)));
-            let scored = curves(&compared, real, &|| progress.step());
-            progress.end();
-            scored
+        let compared = self.pairs.par_iter().map(|pair| {
+            let compared = compare(pair, &self.images, streams);
+            done();
+            compared
         });
-        let curves = scored.transpose().map_err(Refusal::from_error)?;
+        let compared = compared.collect::<Result<Vec<_>, Refusal>>()?;
+        progress.end();
+        let curves = match self.real {
+            Some(real) => {
+                let sessions = scored_sessions(&compared, real);
+                let presses = sessions.iter().flatten().map(|session| session.scored().len());
+                progress.stage("scoring presses", Some(presses.sum()));
+                let curves = curves(&sessions, real, &done)?;
+                progress.end();
+                Some(curves)
+            }
+            None => None,
+        };
         Ok(CompareReport {
-            statistics: statistics(&compared),
-            not_modelled: not_modelled(&compared),
+            statistics: compared.iter().flat_map(ComparedSession::statistics).collect(),
+            not_modelled: compared.iter().flat_map(ComparedSession::not_modelled).collect(),
             compared,
             predicted: Vec::new(),
             curves,
         })
     }
-
-    fn at(&self, source: Refusal) -> Refusal {
-        source.at(self.recordings.display())
-    }
 }
 
 impl CompareReport {
     /// Statistics of both kinds.
-    pub fn all_statistics(&self) -> Vec<Statistic> {
-        [self.statistics.as_slice(), &self.not_modelled].concat()
+    pub fn all_statistics(&self) -> impl Iterator<Item = &Statistic> {
+        self.statistics.iter().chain(&self.not_modelled)
     }
 
     /// Distances of the score curves; empty without curves.
     pub fn distances(&self) -> &[CurveDistance] {
-        distances(self.curves.as_ref())
+        self.curves.as_ref().map_or(&[], |curves| &curves.distances)
     }
 }
 
 /// One statistic of a session, such as the noise, in the recordings of the real skin and in those of its twin.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Statistic {
     /// Object.
     pub session: String,
@@ -296,94 +316,67 @@ const COMPARED: [(&str, Allowed, &str); 7] = [
     ("kurtosis", Allowed::Factor(2.0), "factor 2"),
 ];
 
-/// Names of [`COMPARED`].
-const COMPARED_NAMES: [&str; COMPARED.len()] = {
-    let mut names = [""; COMPARED.len()];
-    let mut k = 0;
-    while k < names.len() {
-        names[k] = COMPARED[k].0;
-        k += 1;
-    }
-    names
-};
-
-/// The number `name` of a session, where it has one.
-fn value_of(session: &SessionEstimates, name: &str) -> Option<f64> {
-    session.numbers.get(name).map(|n| n.value).filter(|v| v.is_finite())
-}
-
 /// Rounding of a step that is found as a range over a whole number: relative.
 const STEP_ROUNDING: f64 = 1e-9;
 /// Largest distance of two quantiles over the range of the output.
 const QUANTILE_SHARE: f64 = 0.10;
 
-/// Every statistic of every session.
-pub fn statistics(compared: &[ComparedSession]) -> Vec<Statistic> {
-    compared.iter().flat_map(|c| session(&c.real, &c.twin)).collect()
-}
-
-fn session(real: &SessionEstimates, twin: &SessionEstimates) -> Vec<Statistic> {
-    let mut rows = Vec::new();
-    let mut push = |name, values: [f64; 2], errors: [Option<f64>; 2], tolerance, ok| {
-        rows.push(Statistic {
-            session: real.session.clone(),
-            name,
-            real: values[0],
-            real_standard_error: errors[0],
-            twin: values[1],
-            twin_standard_error: errors[1],
-            tolerance,
-            ok,
-        });
-    };
-    for (name, allowed, words) in COMPARED {
-        let (Some(r), Some(t)) = (real.numbers.get(name), twin.numbers.get(name)) else {
-            continue;
-        };
-        let ok = allowed.holds(r.value, t.value);
-        push(
-            name,
-            [r.value, t.value],
-            [r.standard_error, t.standard_error],
-            words,
-            Some(ok),
-        );
-    }
-    let step_v = |s: &SessionEstimates| s.steps.map_or(f64::NAN, |s| s.step_v);
-    let steps_v = [step_v(real), step_v(twin)];
-    let same = (steps_v[0] - steps_v[1]).abs() <= STEP_ROUNDING * steps_v[0].abs();
-    push("step_v", steps_v, [None; 2], "exact", Some(same));
-    let gap = quantile_gap(&real.output_quantiles_v, &twin.output_quantiles_v);
-    push(
-        "quantile_gap",
-        [0.0, gap],
-        [None; 2],
-        "10 % of the range",
-        Some(gap <= QUANTILE_SHARE),
-    );
-    rows
-}
-
 /// Numbers of the recordings that the readout does not model.
 const NOT_MODELLED: [&str; 3] = ["idle_sd", "idle_parity", "unexplained_outliers"];
 
-/// Statistics of effects that the readout does not model, for every session, without a verdict.
-pub fn not_modelled(compared: &[ComparedSession]) -> Vec<Statistic> {
-    let row = |c: &ComparedSession, name: &'static str| {
-        let (r, t) = (c.real.numbers.get(name)?, c.twin.numbers.get(name)?);
-        Some(Statistic {
-            session: c.real.session.clone(),
+impl ComparedSession {
+    fn statistic(
+        &self,
+        name: &'static str,
+        [real, twin]: [Estimated; 2],
+        tolerance: &'static str,
+        ok: Option<bool>,
+    ) -> Statistic {
+        Statistic {
+            session: self.real.session.clone(),
             name,
-            real: r.value,
-            real_standard_error: r.standard_error,
-            twin: t.value,
-            twin_standard_error: t.standard_error,
-            tolerance: "not modelled",
-            ok: None,
-        })
-    };
-    let rows = compared.iter().flat_map(|c| NOT_MODELLED.map(|name| row(c, name)));
-    rows.flatten().collect()
+            real: real.value,
+            real_standard_error: real.standard_error,
+            twin: twin.value,
+            twin_standard_error: twin.standard_error,
+            tolerance,
+            ok,
+        }
+    }
+
+    /// The number `name` of skin and twin.
+    fn numbers(&self, name: &str) -> Option<[Estimated; 2]> {
+        Some([*self.real.numbers.get(name)?, *self.twin.numbers.get(name)?])
+    }
+
+    /// Statistics that must agree.
+    fn statistics(&self) -> Vec<Statistic> {
+        let compared = COMPARED.iter().filter_map(|&(name, allowed, words)| {
+            let numbers = self.numbers(name)?;
+            let ok = allowed.holds(numbers[0].value, numbers[1].value);
+            Some(self.statistic(name, numbers, words, Some(ok)))
+        });
+        let mut rows: Vec<Statistic> = compared.collect();
+        let exact = |value| Estimated {
+            value,
+            standard_error: None,
+            n: 1,
+        };
+        let (real, twin) = (&self.real, &self.twin);
+        let [real_v, twin_v] = [real, twin].map(|s| s.steps.map_or(f64::NAN, |s| s.step_v));
+        let same = (real_v - twin_v).abs() <= STEP_ROUNDING * real_v.abs();
+        rows.push(self.statistic("step_v", [real_v, twin_v].map(exact), "exact", Some(same)));
+        let gap = quantile_gap(&real.output_quantiles_v, &twin.output_quantiles_v);
+        let small = Some(gap <= QUANTILE_SHARE);
+        rows.push(self.statistic("quantile_gap", [0.0, gap].map(exact), "10 % of the range", small));
+        rows
+    }
+
+    /// Statistics of effects that the readout does not model, without a verdict.
+    fn not_modelled(&self) -> Vec<Statistic> {
+        let row = |name| Some(self.statistic(name, self.numbers(name)?, "not modelled", None));
+        NOT_MODELLED.into_iter().filter_map(row).collect()
+    }
 }
 
 /// Largest distance of the quantiles over the range of the real ones.
@@ -406,7 +399,7 @@ const METRICS: [Metric; 3] = [
 ];
 
 /// How far the twin's curve of a score over M is from the real skin's.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct CurveDistance {
     /// Score.
     pub metric: &'static str,
@@ -433,18 +426,6 @@ pub struct ScoreCurves {
     pub twin: Vec<ScoreRow>,
 }
 
-/// Number of progress reports of [`curves`].
-pub fn steps(compared: &[ComparedSession], real: &PublishedSkin) -> usize {
-    2 * compared
-        .iter()
-        .filter_map(|c| {
-            let session = real.skin.sessions.iter().find(|s| s.name == c.real.session)?;
-            compared_only(&c.recording, &session.protocol)
-        })
-        .map(|(recording, _)| recording.blocks().len())
-        .sum::<usize>()
-}
-
 /// The presses of `recording` that `protocol` scores and the readout was not calibrated on, and a protocol that scores
 /// them all. `None` when there are none.
 fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recording, Protocol)> {
@@ -463,53 +444,50 @@ fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recordin
     Some((recording.with_blocks(blocks).ok()?, protocol))
 }
 
-/// Scores the compared sessions of both skins, on presses of the protocol that were not used for calibration. True
-/// images, dictionary and library are the published ones for both: the ground truth is the skin's own raster session.
-///
-/// # Errors
-/// [`ScoreError`] if the published dictionary or library is not usable.
-pub fn curves(
-    compared: &[ComparedSession],
-    real: &PublishedSkin,
-    done: &(dyn Fn() + Sync),
-) -> Result<ScoreCurves, ScoreError> {
-    let decoders = PublishedDecode::named(&real.skin.learned).map_err(ScoreError::from)?;
-    let score = |is_twin: bool| {
-        let mut rows = Vec::new();
-        for c in compared {
-            let Some(session) = real.skin.sessions.iter().find(|s| s.name == c.real.session) else {
-                continue;
-            };
-            let recording = if is_twin {
-                Some(&c.recording)
-            } else {
-                session.compressive.as_ref()
-            };
-            let Some((compressive, protocol)) = recording.and_then(|r| compared_only(r, &session.protocol)) else {
-                continue;
-            };
-            let session = ScoredSession {
+/// The compared sessions of the skin and of the twin, with the presses of the protocol that were not used for
+/// calibration.
+fn scored_sessions(compared: &[ComparedSession], real: &PublishedSkin) -> [Vec<ScoredSession>; 2] {
+    [false, true].map(|is_twin| {
+        let scored = compared.iter().filter_map(|c| {
+            let session = real.skin.sessions.iter().find(|s| s.name == c.real.session)?;
+            let own = session.compressive.as_ref();
+            let recording = if is_twin { Some(&c.recording) } else { own };
+            let (compressive, protocol) = compared_only(recording?, &session.protocol)?;
+            Some(ScoredSession {
                 compressive: Some(compressive),
                 protocol,
                 ..session.clone()
-            };
-            rows.extend(score_session(&session, &decoders, &MEASUREMENTS, done)?);
-        }
-        Ok::<_, ScoreError>(mean_rows(&rows))
-    };
-    let (skin, twin) = (score(false)?, score(true)?);
+            })
+        });
+        scored.collect()
+    })
+}
+
+/// Score curves of the `sessions` of the skin and of the twin. True images, dictionary and library are the published
+/// ones for both: the ground truth is the skin's own raster session.
+fn curves(
+    sessions: &[Vec<ScoredSession>; 2],
+    real: &PublishedSkin,
+    done: &(dyn Fn() + Sync),
+) -> Result<ScoreCurves, Refusal> {
+    let decoders = PublishedDecode::named(&real.skin.learned)?;
+    let [skin, twin] = sessions.each_ref().map(|sessions| {
+        let rows = sessions
+            .iter()
+            .map(|session| score_session(session, &decoders, &MEASUREMENTS, done));
+        Ok::<_, Refusal>(mean_rows(&rows.collect::<Result<Vec<_>, _>>()?.concat()))
+    });
+    let (real, twin) = (skin?, twin?);
     Ok(ScoreCurves {
-        distances: curve_distances(&skin, &twin),
-        real: skin,
+        distances: curve_distances(&real, &twin),
+        real,
         twin,
     })
 }
 
 fn curve_distances(real: &[ScoreRow], twin: &[ScoreRow]) -> Vec<CurveDistance> {
-    let mut decodes: Vec<&'static str> = real.iter().map(|r| r.decode).collect();
-    decodes.dedup();
     let mut out = Vec::new();
-    for decode in decodes {
+    for decode in unique(real.iter().map(|r| r.decode)) {
         for (metric, tolerance, get) in METRICS {
             let pairs = real.iter().filter(|r| r.decode == decode).filter_map(|r| {
                 let t = twin.iter().find(|t| t.decode == decode && t.m == r.m)?;
@@ -549,26 +527,14 @@ pub struct Prediction {
 }
 
 /// One statistic of one session, compared with the band of its twins.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PredictedStatistic {
     /// Session.
     pub session: String,
     /// Name.
     pub name: &'static str,
-    /// Value in the recordings of the skin.
-    pub real: f64,
-    /// Mean of the twins.
-    pub twin: f64,
-    /// Lower end of the span in which a further twin lies with a probability of 90 %.
-    pub low: f64,
-    /// Its upper end.
-    pub high: f64,
-    /// Whether the real value lies in the span.
-    pub inside: bool,
-}
-
-fn not_a_profile(error: impl std::error::Error + Send + Sync + 'static) -> Refusal {
-    Refusal::from_error(error).at("the fitted profile")
+    /// Value and band.
+    pub of: Banded,
 }
 
 /// Numbers of every session, each beside the band of its twins; `done` is called after every twin.
@@ -584,72 +550,52 @@ fn predicted_statistics(
 ) -> Result<Vec<PredictedStatistic>, Refusal> {
     let whole = |pair: &SessionPair| {
         let blocks: Vec<usize> = (0..pair.compressive.blocks().len()).collect();
-        SessionEstimates::of(pair, &pair.compressive, &blocks).ok_or_else(|| unfit(pair))
+        estimated(pair, &pair.compressive, &blocks)
     };
     let sessions: Vec<SessionEstimates> = pairs.par_iter().map(whole).collect::<Result<_, _>>()?;
     let mut rows = Vec::new();
-    for (k, pair) in pairs.iter().enumerate() {
-        let taxels = u32::try_from(pair.compressive.taxels()).unwrap_or(u32::MAX);
+    for (pair, fitted) in pairs.iter().zip(&sessions) {
         let profile = match &asked.predictor {
             Predictor::Profile(profile) => profile.as_ref().clone(),
+            Predictor::Others if sessions.len() < 2 => {
+                return Err(Refusal::new(format!(
+                    "{} compressive: the only session, and no other to fit a profile to; name a profile",
+                    pair.session
+                )));
+            }
             Predictor::Others => {
-                let others: Vec<SessionEstimates> = sessions
-                    .iter()
-                    .enumerate()
-                    .filter(|(other, _)| *other != k)
-                    .map(|(_, s)| s.clone())
-                    .collect();
-                if others.is_empty() {
-                    return Err(Refusal::new(format!(
-                        "{} compressive: the only session, and no other to fit a profile to; name a profile",
-                        pair.session
-                    )));
-                }
-                fitted_profile(&FittedReadout::of(&others), taxels)
-                    .map_err(not_a_profile)?
-                    .0
+                let others = sessions.iter().filter(|other| !std::ptr::eq(*other, fitted));
+                profile_of(&others.cloned().collect::<Vec<_>>(), pair)?
             }
         };
-        let blocks = compared_presses(pair)?;
-        let real = SessionEstimates::of(pair, &pair.compressive, &blocks).ok_or_else(|| unfit(pair))?;
-        let twin = |draw: u64| -> Result<SessionEstimates, Refusal> {
-            let recording = twin_of(pair, images, (&sessions[k], &profile), streams, draw)?;
+        let (_, blocks) = halves(pair)?;
+        let real = estimated(pair, &pair.compressive, &blocks)?;
+        let twins = (0..asked.draws).into_par_iter().map(|draw| {
+            let recording = twin_of(pair, images, (fitted, &profile), streams, draw)?;
             done();
-            SessionEstimates::of(pair, &recording, &blocks).ok_or_else(|| unfit(pair))
-        };
-        let twins: Vec<SessionEstimates> = (0..asked.draws).into_par_iter().map(twin).collect::<Result<_, _>>()?;
-        for name in COMPARED_NAMES {
-            let Some(value) = value_of(&real, name) else { continue };
-            let drawn: Vec<f64> = twins.iter().filter_map(|twin| value_of(twin, name)).collect();
-            let Some((low, high)) = predicted(&drawn).filter(|_| drawn.len() > 1) else {
-                continue;
-            };
-            rows.push(PredictedStatistic {
-                session: pair.session.clone(),
-                name,
-                real: value,
-                twin: drawn.iter().sum::<f64>() / drawn.len() as f64,
-                low,
-                high,
-                inside: (low..=high).contains(&value),
-            });
-        }
+            estimated(pair, &recording, &blocks)
+        });
+        let twins = twins.collect::<Result<Vec<_>, Refusal>>()?;
+        rows.extend(COMPARED.iter().filter_map(|&(name, ..)| {
+            let value = |session: &SessionEstimates| Some(session.value(name)).filter(|v| v.is_finite());
+            let drawn: Vec<f64> = twins.iter().filter_map(value).collect();
+            let of = Banded::of(value(&real)?, &drawn, UNLIMITED).filter(|_| drawn.len() > 1)?;
+            let session = pair.session.clone();
+            Some(PredictedStatistic { session, name, of })
+        }));
     }
     Ok(rows)
 }
-
-/// Conductance of a press as a function of time, by the number of the press.
-pub type PressSource<'a> = dyn Fn(usize) -> Result<Interpolated, Refusal> + Sync + 'a;
 
 /// Records the presses `blocks` of `real` again: with the conductance from `source`, the same rows of weights, and the
 /// readout `profile`, in session number `session`. The other presses are unchanged.
 ///
 /// # Errors
 /// [`Refusal`] if a press has no conductance, or the readout refuses it.
-pub fn replay(
+pub(crate) fn replay(
     real: &Recording,
     blocks: &[usize],
-    source: &PressSource<'_>,
+    source: &(dyn Fn(usize) -> Result<Interpolated, Refusal> + Sync),
     profile: &Profile,
     streams: Streams,
     session: u64,
@@ -696,7 +642,7 @@ fn record_again(
 ///
 /// The noise of the windows adds √(p/n) = 0.2 of one measurement's noise to the twin's output, 4 % of its variance. It
 /// is constant within a window, so the estimators, which fit the image again, are not affected.
-pub fn recorded_images<'a>(
+pub(crate) fn recorded_images<'a>(
     real: &'a Recording,
     fitted: &'a SessionEstimates,
     profile: &'a Profile,
@@ -744,58 +690,42 @@ pub(crate) fn readout_refused(error: impl std::error::Error + Send + Sync + 'sta
 /// The lift begins so long after the hold at least, s: as much as it scatters by.
 const LIFT_AFTER_S: f64 = 0.04;
 
-/// Presses of one object on one simulated skin.
-struct SimulatedPresses(Vec<Interpolated>);
-
-impl SimulatedPresses {
-    /// As many presses of the object of `pair` as its session has, on the skin that follows from `seed`: one with the
-    /// given `gains`, or any.
-    ///
-    /// # Errors
-    /// [`Refusal`] when the simulation does not know the object, or fails.
-    fn of(pair: &SessionPair, seed: u64, gains: Option<&TaxelGains>) -> Result<Self, Refusal> {
-        let Some(object) = OBJECTS.iter().find(|object| object.name == pair.object) else {
-            return Err(Refusal::new(format!(
-                "{} compressive: `object` = {:?} is not known to the simulation; known: {}",
-                pair.session,
-                pair.object,
-                OBJECTS.iter().map(|o| o.name).collect::<Vec<_>>().join(", ")
-            )));
-        };
-        let presses = pair.compressive.blocks().len();
-        let mut config = footprint_scene(object.name, presses, seed);
-        config.skin = *pair.compressive.layout();
-        // the hold of the session, and everything that comes before and after it as usual
-        let frame_s = pair.compressive.measurements_per_frame() as f64 / pair.compressive.sample_rate_hz();
-        let published_s = PUBLISHED_TAXELS as f64 / PUBLISHED_RATE_HZ;
-        let later_s = pair.hold.start as f64 * frame_s - PLATEAU.start as f64 * published_s;
-        if let Some(press) = &mut config.press {
-            press.onset_s += later_s;
-            press.lift_s = (press.lift_s + later_s).max(pair.hold.end as f64 * frame_s + LIFT_AFTER_S);
-            press.duration_s = (pair.compressive.frames() as f64 * frame_s).max(press.lift_s + press.fall_s);
-        }
-        if let Some(gains) = gains {
-            let gains = toml::Value::try_from(gains).map_err(|e| Refusal::from_error(e).at("gains"))?;
-            config.transducer_parameters.insert("gains".to_owned(), gains);
-        }
-        let failed = |error: spts::TwinError| Refusal::from_error(error).at("simulated presses");
-        let scene = Scene::new(config, Path::new("")).map_err(failed)?;
-        let twin = Twin::new(&scene).map_err(failed)?;
-        let frames = twin.presses(0..presses, &|| ()).map_err(failed)?;
-        let acquisition = twin.acquisition(spts_circuit::Mode::Compressive);
-        Ok(Self(twin.conductance(&frames, &acquisition).map_err(failed)?))
+/// Conductance over time in as many presses of the object of `pair` as its session has, on the skin that follows from
+/// `seed`: one with the given `gains`, or any.
+///
+/// # Errors
+/// [`Refusal`] when the simulation does not know the object, or fails.
+fn simulated_presses(pair: &SessionPair, seed: u64, gains: Option<&TaxelGains>) -> Result<Vec<Interpolated>, Refusal> {
+    let Some(object) = OBJECTS.iter().find(|object| object.name == pair.object) else {
+        return Err(Refusal::new(format!(
+            "{} compressive: `object` = {:?} is not known to the simulation; known: {}",
+            pair.session,
+            pair.object,
+            OBJECTS.iter().map(|o| o.name).collect::<Vec<_>>().join(", ")
+        )));
+    };
+    let real = &pair.compressive;
+    let mut config = footprint_scene(object.name, real.blocks().len(), seed);
+    config.skin = *real.layout();
+    // the hold of the session, and everything that comes before and after it as usual
+    let frame_s = real.measurements_per_frame() as f64 / real.sample_rate_hz();
+    let published_s = PUBLISHED_TAXELS as f64 / PUBLISHED_RATE_HZ;
+    let later_s = pair.hold.start as f64 * frame_s - PLATEAU.start as f64 * published_s;
+    if let Some(press) = &mut config.press {
+        press.onset_s += later_s;
+        press.lift_s = (press.lift_s + later_s).max(pair.hold.end as f64 * frame_s + LIFT_AFTER_S);
+        press.duration_s = (real.frames() as f64 * frame_s).max(press.lift_s + press.fall_s);
     }
-
-    /// Conductance over time of press `block`.
-    fn press(&self, block: usize) -> Interpolated {
-        self.0[block].clone()
+    if let Some(gains) = gains {
+        let gains = toml::Value::try_from(gains).map_err(|e| Refusal::from_error(e).at("gains"))?;
+        config.transducer_parameters.insert("gains".to_owned(), gains);
     }
-}
-
-/// Seed of the simulated skin number `draw`.
-fn skin_seed(streams: Streams, draw: u64) -> u64 {
-    use rand::RngExt as _;
-    streams.rng("compare/skin", draw).random::<u64>() >> 1
+    let pressed = || {
+        let twin = Twin::new(&Scene::new(config, Path::new(""))?)?;
+        let presses = twin.presses(0..real.blocks().len(), &|| ())?;
+        twin.conductance(&presses, &twin.acquisition(Mode::Compressive))
+    };
+    pressed().map_err(|refusal: Refusal| refusal.at("simulated presses"))
 }
 
 #[cfg(test)]

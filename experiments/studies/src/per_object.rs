@@ -5,14 +5,13 @@
 //! cancel. Here the band of an object shows what a further skin of the twin would score, and the distance between twin
 //! and skin is the mean over objects of |twin − real|.
 
-use crate::calibrate::{SessionEstimates, predicted, read};
-use crate::compare::readout_refused;
+use crate::calibrate::{SessionEstimates, SessionPair, read};
+use crate::compare::{Banded, readout_refused};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts::chain::DEFAULT_READOUT;
 use spts::data::SessionSet;
 use spts::progress::Progress;
-use spts::record::TwinError;
 use spts::scene::{Scene, SceneConfig};
 use spts::session::Recorded;
 use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording};
@@ -20,7 +19,7 @@ use spts_contact::objects::OBJECTS;
 use spts_eval::board::{BoardSettings, ObjectRow, find};
 use spts_eval::protocol::Protocol;
 use spts_eval::training::{SkinGains, TrainingPresses, TrainingSource, templates};
-use spts_eval::{ScoredSession, Scores, Sensing, SkinRun, Source, footprint_scene, twin_set};
+use spts_eval::{ScoredSession, Scores, Sensing, SkinRun, Source, footprint_scene, twin_set, unique};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams, VelostatConfig};
 use spts_recon::classify::Library;
@@ -46,7 +45,7 @@ pub struct PerObjectStudy<'a> {
 }
 
 /// Results of `spts compare --skins`: each object's score on the real skin beside the band of the simulated skins.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PerObjectReport {
     /// Number of simulated skins.
     pub skins: u64,
@@ -63,12 +62,12 @@ impl PerObjectStudy<'_> {
     /// [`Refusal`] for recordings that cannot be used, or a simulation that fails.
     pub fn run(&self, progress: &dyn Progress) -> Result<PerObjectReport, Refusal> {
         progress.stage("scoring the real skin", None);
-        let real = Source::open(self.recordings).map_err(Refusal::from_error)?;
+        let real = Source::open(self.recordings)?;
         let with_sums = real.sessions.iter().filter(|s| s.scorable());
-        let known = |name: &str| OBJECTS.iter().any(|object| object.name == name);
-        let objects: Vec<String> = with_sums.map(|s| s.object.clone()).filter(|name| known(name)).collect();
+        let known: Vec<&str> = OBJECTS.iter().map(|o| o.name).collect();
+        let objects = with_sums.map(|s| s.object.clone());
+        let objects: Vec<String> = objects.filter(|name| known.contains(&name.as_str())).collect();
         if objects.is_empty() {
-            let known: Vec<&str> = OBJECTS.iter().map(|o| o.name).collect();
             return Err(Refusal::new(format!(
                 "the recordings hold no compressive session of an object that the twin has; it has {}",
                 known.join(", ")
@@ -76,39 +75,37 @@ impl PerObjectStudy<'_> {
         }
         let of_real = scores(&real, &objects, self.seed)?;
         progress.end();
-        let of = |images: ReadoutImages, skin: &(dyn Fn(u64) -> Result<Source, Refusal> + Sync)| {
-            let seeds = self.seed..self.seed.saturating_add(self.skins);
-            let skins = seeds.into_par_iter().map(|seed| scores(&skin(seed)?, &objects, seed));
-            let skins = skins.collect::<Result<Vec<_>, Refusal>>()?;
-            Ok::<_, Refusal>(bands(images, &of_real, &skins))
-        };
-        let skins = usize::try_from(self.skins).unwrap_or(usize::MAX);
-        let done = || progress.step();
-        progress.stage("pressing simulated skins", Some(skins * presses(objects.len())));
-        let mut all = of(ReadoutImages::Twin, &|seed| {
-            Source::new(twin(seed, &objects, true, &done).map_err(Refusal::from_error)?).map_err(Refusal::from_error)
-        })?;
-        progress.end();
-        if self.causes {
-            progress.stage("with the skin's gains", Some(skins * presses(objects.len())));
-            all.extend(of(ReadoutImages::TwinWithSkinGains, &|seed| {
-                with_skin_gains(
-                    &twin(seed, &objects, false, &done).map_err(Refusal::from_error)?,
-                    &real,
-                    seed,
-                )
-            })?);
-            progress.end();
-            for (images, volts) in [
-                (ReadoutImages::SkinRaster, raster_images(&real, &objects)?),
-                (
-                    ReadoutImages::SkinCompressive,
-                    compressive_images(self.recordings, &objects)?,
-                ),
-            ] {
-                progress.stage(images.label(), Some(skins * real.sessions.len()));
-                all.extend(of(images, &|seed| with_images(&real, &volts, seed, &done))?);
+        let mut all = Vec::new();
+        let mut of =
+            |images: ReadoutImages, what, steps: usize, skin: &(dyn Fn(u64) -> Result<Source, Refusal> + Sync)| {
+                progress.stage(what, Some(usize::try_from(self.skins).unwrap_or(usize::MAX) * steps));
+                let seeds = self.seed..self.seed.saturating_add(self.skins);
+                let skins = seeds.into_par_iter().map(|seed| scores(&skin(seed)?, &objects, seed));
+                all.extend(bands(images, &of_real, &skins.collect::<Result<Vec<_>, Refusal>>()?));
                 progress.end();
+                Ok::<_, Refusal>(())
+            };
+        let done = || progress.step();
+        let presses = OBJECTS.len() * SCANNED + objects.len() * SCORED;
+        of(ReadoutImages::Twin, "pressing simulated skins", presses, &|seed| {
+            Ok(Source::new(twin(seed, &objects, true, &done)?)?)
+        })?;
+        if self.causes {
+            of(
+                ReadoutImages::TwinWithSkinGains,
+                "with the skin's gains",
+                presses,
+                &|seed| with_skin_gains(&twin(seed, &objects, false, &done)?, &real, seed),
+            )?;
+            let raster = raster_images(&real, &objects)?;
+            let compressive = compressive_images(self.recordings, &objects)?;
+            for (images, volts) in [
+                (ReadoutImages::SkinRaster, raster),
+                (ReadoutImages::SkinCompressive, compressive),
+            ] {
+                of(images, images.label(), real.sessions.len(), &|seed| {
+                    with_images(&real, &volts, seed, &done)
+                })?;
             }
         }
         Ok(PerObjectReport {
@@ -122,17 +119,15 @@ impl PerObjectStudy<'_> {
 impl PerObjectReport {
     /// The distance of the twin in the score `score` of `decoder` at `m`.
     pub fn distance(&self, decoder: &str, m: usize, score: &str) -> Option<&ScoreDistance> {
-        let same = |d: &&ScoreDistance| d.decoder == decoder && d.m == m && d.score == score;
-        self.distances
-            .iter()
-            .filter(|d| d.images == ReadoutImages::Twin)
-            .find(same)
+        let key = (ReadoutImages::Twin, decoder, m, score);
+        let mut distances = self.distances.iter();
+        distances.find(|d| (d.images, d.decoder.as_str(), d.m, d.score) == key)
     }
 }
 
 /// Scores of `objects` in `source`. The published pursuit learns its dictionary from raster presses that are not scored
 /// unless one is published; the others learn from such presses.
-fn scores(source: &Source, objects: &[String], seed: u64) -> Result<Vec<ObjectScore>, Refusal> {
+fn scores(source: &Source, objects: &[String], seed: u64) -> Result<Vec<(ObjectScore, f64)>, Refusal> {
     let settings = BoardSettings {
         network: None,
         decoders: DECODERS.iter().filter_map(|name| find(name)).collect(),
@@ -146,20 +141,16 @@ fn scores(source: &Source, objects: &[String], seed: u64) -> Result<Vec<ObjectSc
         times: false,
         seed,
     };
-    let board = settings
-        .learn(source)
-        .map_err(Refusal::from_error)?
-        .score(&|| ())
-        .map_err(Refusal::from_error)?;
+    let board = settings.learn(source)?.score(&|| ())?;
     let of_row = |row: &ObjectRow| {
-        let value = |(score, get): &ScoreOf| {
-            Some(ObjectScore {
+        let value = |&(score, get): &(&'static str, fn(&Scores) -> Option<f64>)| {
+            let key = ObjectScore {
                 decoder: row.decoder.clone(),
                 m: row.m,
                 score,
                 object: row.object.clone(),
-                value: get(&row.scores)?,
-            })
+            };
+            Some((key, get(&row.scores)?))
         };
         SCORES.iter().filter_map(value).collect::<Vec<_>>()
     };
@@ -169,27 +160,21 @@ fn scores(source: &Source, objects: &[String], seed: u64) -> Result<Vec<ObjectSc
 /// Mean raster images of `objects`, V, from presses that are not scored.
 fn raster_images(real: &Source, objects: &[String]) -> Result<Vec<(String, Vec<f64>)>, Refusal> {
     let sessions = real.sessions.iter().filter(|s| objects.contains(&s.object));
-    let image = |session| -> Result<Option<(String, Vec<f64>)>, Refusal> {
-        let session: &spts_eval::ScoredSession = session;
-        let Some(training) = TrainingPresses::unscored(session).filter(|t| !t.is_empty()) else {
-            return Ok(None);
-        };
-        Ok(Some((
-            session.object.clone(),
-            templates(&[training])
-                .map_err(|e| Refusal::from_error(e).at("raster images"))?
-                .images()
-                .column(0),
-        )))
-    };
-    sessions.filter_map(|s| image(s).transpose()).collect()
+    let trained = sessions.filter_map(|session| Some((session, TrainingPresses::unscored(session)?)));
+    let images = trained
+        .filter(|(_, training)| !training.is_empty())
+        .map(|(session, training)| {
+            let library = templates(&[training]).map_err(|e| Refusal::from(e).at("raster images"))?;
+            Ok((session.object.clone(), library.images().column(0)))
+        });
+    images.collect()
 }
 
 /// Images of `objects` in their compressive sessions, V: by least squares, median over the presses.
 fn compressive_images(recordings: &Path, objects: &[String]) -> Result<Vec<(String, Vec<f64>)>, Refusal> {
-    let pairs = read(recordings).map_err(Refusal::from_error)?;
+    let pairs = read(recordings)?;
     let pairs = pairs.iter().filter(|pair| objects.contains(&pair.session));
-    let image = |pair: &crate::calibrate::SessionPair| {
+    let image = |pair: &SessionPair| {
         let blocks: Vec<usize> = (0..pair.compressive.blocks().len()).collect();
         let found = SessionEstimates::of(pair, &pair.compressive, &blocks)?;
         let mut image = found.image_v;
@@ -201,14 +186,12 @@ fn compressive_images(recordings: &Path, objects: &[String]) -> Result<Vec<(Stri
     Ok(pairs.filter_map(image).collect())
 }
 
-/// Name of a score and its value; `None` for a decoder without it.
-pub type ScoreOf = (&'static str, fn(&Scores) -> Option<f64>);
+/// The scores that are compared: intersection over union of the supports, and the share of single windows classified;
+/// `None` for a decoder without it.
+pub const SCORES: [(&str, fn(&Scores) -> Option<f64>); 2] = [("iou", |s| s.iou), ("class_single", |s| s.class_single)];
 
-/// The scores that are compared: intersection over union of the supports, and the share of single windows classified.
-pub const SCORES: [ScoreOf; 2] = [("iou", |s| s.iou), ("class_single", |s| s.class_single)];
-
-/// One score of one object, such as its IoU, on one real or simulated skin.
-#[derive(Debug, Clone, PartialEq)]
+/// Which score of which object, such as its IoU.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ObjectScore {
     /// Decoder.
     pub decoder: String,
@@ -218,53 +201,23 @@ pub struct ObjectScore {
     pub score: &'static str,
     /// Object.
     pub object: String,
-    /// Value, in [0, 1].
-    pub value: f64,
-}
-
-impl ObjectScore {
-    /// Whether `other` is the same score of the same object.
-    fn is_of(&self, other: &Self) -> bool {
-        self.key() == other.key() && self.object == other.object
-    }
-
-    fn key(&self) -> (&str, usize, &str) {
-        (&self.decoder, self.m, self.score)
-    }
 }
 
 /// One score of one object: simulated skins and real skin.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ObjectBand {
     /// The images of the twin's recordings.
     pub images: ReadoutImages,
-    /// Decoder.
-    pub decoder: String,
-    /// Number of measurements, M.
-    pub m: usize,
-    /// One of [`SCORES`].
-    pub score: &'static str,
-    /// Object.
-    pub object: String,
-    /// Score of the real skin.
-    pub real: f64,
-    /// Mean over the simulated skins.
-    pub twin: f64,
-    /// Lower end of the band, in which a further simulated skin scores with a probability of 90 %.
-    pub low: f64,
-    /// Upper end of the band.
-    pub high: f64,
-    /// twin − real.
-    pub difference: f64,
-    /// Whether the real skin lies in the band.
-    pub inside: bool,
-    /// Score of every simulated skin.
-    #[serde(skip)]
-    pub skins: Vec<f64>,
+    /// The score.
+    pub score: ObjectScore,
+    /// Its value on the real skin, and the band of the simulated ones within [0, 1].
+    pub of: Banded,
+    /// Its values on the simulated skins.
+    skins: Vec<f64>,
 }
 
 /// How far the twin is from the real skin in one score, over all objects.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ScoreDistance {
     /// The images of the twin's recordings.
     pub images: ReadoutImages,
@@ -289,36 +242,14 @@ pub struct ScoreDistance {
 }
 
 /// The band of every score of the real skin that all `skins` also have, in the order of `real`.
-///
-/// ```
-/// use spts_studies::per_object::{ReadoutImages, ObjectScore, bands};
-///
-/// let (decoder, object) = ("matched".to_owned(), "T".to_owned());
-/// let one = ObjectScore { decoder, m: 20, score: "iou", object, value: 0.0 };
-/// let score = |value| ObjectScore { value, ..one.clone() };
-/// let skins: Vec<_> = [0.70, 0.74, 0.78].map(|value| vec![score(value)]).to_vec();
-/// let band = &bands(ReadoutImages::Twin, &[score(0.76)], &skins)[0];
-/// assert!(band.inside && (band.twin - 0.74).abs() < 1e-12);
-/// ```
-pub fn bands(images: ReadoutImages, real: &[ObjectScore], skins: &[Vec<ObjectScore>]) -> Vec<ObjectBand> {
-    let band = |real: &ObjectScore| {
-        let same = |skin: &Vec<ObjectScore>| skin.iter().find(|s| s.is_of(real)).map(|s| s.value);
+fn bands(images: ReadoutImages, real: &[(ObjectScore, f64)], skins: &[Vec<(ObjectScore, f64)>]) -> Vec<ObjectBand> {
+    let band = |(score, real): &(ObjectScore, f64)| {
+        let same = |skin: &Vec<(ObjectScore, f64)>| skin.iter().find(|(of, _)| of == score).map(|(_, value)| *value);
         let skins: Vec<f64> = skins.iter().map(same).collect::<Option<_>>()?;
-        let (low, high) = predicted(&skins)?;
-        let twin = skins.iter().sum::<f64>() / skins.len() as f64;
-        let (low, high) = (low.max(0.0), high.min(1.0));
         Some(ObjectBand {
             images,
-            decoder: real.decoder.clone(),
-            m: real.m,
-            score: real.score,
-            object: real.object.clone(),
-            real: real.value,
-            twin,
-            low,
-            high,
-            difference: twin - real.value,
-            inside: low <= real.value && real.value <= high,
+            score: score.clone(),
+            of: Banded::of(*real, &skins, [0.0, 1.0])?,
             skins,
         })
     };
@@ -326,32 +257,31 @@ pub fn bands(images: ReadoutImages, real: &[ObjectScore], skins: &[Vec<ObjectSco
 }
 
 /// The distance in every score of `bands`, in order.
-pub fn distances(bands: &[ObjectBand]) -> Vec<ScoreDistance> {
-    let mut out: Vec<ScoreDistance> = Vec::new();
-    let key = |b: &ObjectBand| (b.images, b.decoder.clone(), b.m, b.score);
-    for first in bands {
-        if out
-            .iter()
-            .any(|d| (d.images, d.decoder.clone(), d.m, d.score) == key(first))
-        {
-            continue;
-        }
-        let of: Vec<&ObjectBand> = bands.iter().filter(|b| key(b) == key(first)).collect();
+fn distances(bands: &[ObjectBand]) -> Vec<ScoreDistance> {
+    fn key(band: &ObjectBand) -> (ReadoutImages, &str, usize, &'static str) {
+        (band.images, &band.score.decoder, band.score.m, band.score.score)
+    }
+    let distance = |(images, decoder, m, score)| {
+        let of: Vec<&ObjectBand> = bands.iter().filter(|b| key(b) == (images, decoder, m, score)).collect();
         let mean = |get: &dyn Fn(&ObjectBand) -> f64| of.iter().map(|b| get(b)).sum::<f64>() / of.len() as f64;
-        let outside: Vec<&str> = of.iter().filter(|b| !b.inside).map(|b| b.object.as_str()).collect();
-        out.push(ScoreDistance {
-            images: first.images,
-            decoder: first.decoder.clone(),
-            m: first.m,
-            score: first.score,
-            mean_abs_difference: mean(&|b| b.difference.abs()),
+        let outside: Vec<&str> = of
+            .iter()
+            .filter(|b| !b.of.inside())
+            .map(|b| b.score.object.as_str())
+            .collect();
+        ScoreDistance {
+            images,
+            decoder: decoder.to_owned(),
+            m,
+            score,
+            mean_abs_difference: mean(&|b| b.of.difference().abs()),
             between_skins: mean(&|b| one_to_others(&b.skins)),
-            difference_of_means: mean(&|b| b.difference),
+            difference_of_means: mean(&|b| b.of.difference()),
             objects: of.len(),
             outside: outside.join(" "),
-        });
-    }
-    out
+        }
+    };
+    unique(bands.iter().map(key)).into_iter().map(distance).collect()
 }
 
 /// Mean distance of a value to the mean of the others; 0 of one value.
@@ -399,15 +329,10 @@ const SCORED: usize = 4;
 /// Presses before the compressive session, as in the published evaluation.
 const CONDITIONING: usize = 5;
 
-/// Number of presses of a simulated skin on which `scored` objects are scored.
-fn presses(scored: usize) -> usize {
-    OBJECTS.len() * SCANNED + scored * SCORED
-}
-
 /// Presses all objects on the skin that follows from `seed`, and those named in `scored` in both modes. Nothing is
 /// stepped (contact field `footprint`), so that a press takes milliseconds; `done` is called after each. `gains` says
 /// whether the taxels have gains of their own.
-fn twin(seed: u64, scored: &[String], gains: bool, done: &(dyn Fn() + Sync)) -> Result<SessionSet, TwinError> {
+fn twin(seed: u64, scored: &[String], gains: bool, done: &(dyn Fn() + Sync)) -> Result<SessionSet, Refusal> {
     let sessions = OBJECTS.par_iter().map(|object| {
         let spread = (!gains).then(|| ("spread_log_sd".to_owned(), 0.0.into()));
         let config = SceneConfig {
@@ -424,30 +349,28 @@ fn twin(seed: u64, scored: &[String], gains: bool, done: &(dyn Fn() + Sync)) -> 
         };
         Ok(run.record(done)?.session)
     });
-    Ok(twin_set(sessions.collect::<Result<_, TwinError>>()?))
+    Ok(twin_set(sessions.collect::<Result<_, Refusal>>()?))
 }
 
 /// The sessions of `set`, simulated at gain 1, as the skin of `real` would have shown them. The gains that apply to an
 /// object are those that unscored raster presses of the other objects tell.
 fn with_skin_gains(set: &SessionSet, real: &Source, seed: u64) -> Result<Source, Refusal> {
-    let simulated = Source::new(set.clone()).map_err(Refusal::from_error)?;
+    let simulated = Source::new(set.clone())?;
     let mut source = simulated.clone();
     for (scored, session) in source.sessions.iter_mut().zip(&set.sessions) {
-        let images = [&real.sessions, &simulated.sessions].map(|sessions| others(sessions, &scored.object));
-        let [skin, median] = images;
+        let [skin, median] = [real, &simulated].map(|source| others(&source.sessions, &scored.object));
         let mounting = VelostatConfig::default().session_log_sd;
-        let known = SkinGains::estimate(&skin?, &median?, mounting)
-            .map_err(|e| Refusal::from_error(e).at("gains of the skin"))?
-            .gains;
-        let gains: Vec<f64> = known.log_mean.iter().map(|log| log.exp()).collect();
+        let known = SkinGains::estimate(&skin?, &median?, mounting);
+        let known = known.map_err(|e| Refusal::from_error(e).at("gains of the skin"))?;
+        let gains: Vec<f64> = known.gains.log_mean.iter().map(|log| log.exp()).collect();
         let readout = ReadoutOfImages::new(seed, scored)?;
         let again = |recorded: Option<&Recorded>, mode: Mode| -> Result<Option<Recording>, Refusal> {
             let Some(recorded) = recorded else { return Ok(None) };
             let images = recorded.presses.iter().filter_map(|press| press.conductance.as_ref());
             let with_gains = |image: &ConductanceMap| image.values().iter().zip(&gains).map(|(c, g)| c * g).collect();
-            readout
-                .record(mode, &images.map(with_gains).collect::<Vec<Vec<f64>>>())
-                .map(Some)
+            Ok(Some(
+                readout.record(mode, &images.map(with_gains).collect::<Vec<Vec<f64>>>())?,
+            ))
         };
         scored.raster = again(session.raster.as_ref(), Mode::Raster)?;
         scored.compressive = again(session.compressive.as_ref(), Mode::Compressive)?;
@@ -575,14 +498,14 @@ mod tests {
         );
     }
 
-    fn score(object: &str, value: f64) -> ObjectScore {
-        ObjectScore {
+    fn score(object: &str, value: f64) -> (ObjectScore, f64) {
+        let score = ObjectScore {
             decoder: "matched".to_owned(),
             m: 20,
             score: "iou",
             object: object.to_owned(),
-            value,
-        }
+        };
+        (score, value)
     }
 
     /// The twin is .4 low on one object and .4 high on another: the means agree, the distance is .4.
@@ -603,7 +526,11 @@ mod tests {
     #[test]
     fn a_real_skin_like_the_twin_s_lies_within_the_band() {
         let skins = [0.4, 0.6, 0.4, 0.6].map(|v| vec![score("brain", v)]);
-        let within = |real: f64| bands(ReadoutImages::Twin, &[score("brain", real)], &skins)[0].inside;
+        let within = |real: f64| {
+            bands(ReadoutImages::Twin, &[score("brain", real)], &skins)[0]
+                .of
+                .inside()
+        };
         assert!(within(0.5) && within(0.79) && !within(0.81) && !within(0.19));
     }
 

@@ -53,6 +53,12 @@ pub enum DataError {
     Refused(#[from] Refusal),
 }
 
+impl From<DataError> for Refusal {
+    fn from(error: DataError) -> Self {
+        Self::from_error(error)
+    }
+}
+
 impl DataError {
     /// The folder `root` has no recordings.
     #[must_use]

@@ -77,6 +77,12 @@ pub enum TrainingSource {
 #[error(transparent)]
 pub struct LearnError(#[from] Refusal);
 
+impl From<LearnError> for Refusal {
+    fn from(error: LearnError) -> Self {
+        error.0
+    }
+}
+
 macro_rules! places {
     ($($name:ident, $place:literal;)*) => {$(
         #[doc = concat!("The refusal, said of \"", $place, "\".")]

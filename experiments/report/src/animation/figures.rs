@@ -1,8 +1,7 @@
 //! The two animations of the report.
 
 use super::Animation;
-use crate::ReportError;
-use spts::output::write_bytes;
+use spts::output::{OutputError, write_bytes};
 use spts::scene::Assignment;
 use spts::simulate::{Request, run};
 use spts_eval::training::{LearnError, TrainingData};
@@ -66,7 +65,7 @@ pub enum MotionError {
     Refused(#[from] Refusal),
     /// A file cannot be written.
     #[error(transparent)]
-    Report(#[from] ReportError),
+    Report(#[from] OutputError),
 }
 
 /// Simulates the scenes of [`MOTION_FIGURES`] with the root `seed` and writes their files into `folder`.

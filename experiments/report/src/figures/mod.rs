@@ -24,7 +24,6 @@ pub use panel::save_charts;
 pub use pixels::encode_png;
 pub(crate) use sheet::draw_heat;
 pub use sheet::{Sheet, Tile, TileRow, pressure_png, save_sheet};
-pub use spts::output::OutputError as FigureError;
 
 #[cfg(test)]
 pub(crate) mod tests;

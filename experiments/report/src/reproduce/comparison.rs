@@ -1,13 +1,10 @@
 //! The readout beside the recordings it is fitted to: the skin's own images through the twin's electronics.
 
 use super::ReproduceError;
-use crate::compare::with_error;
-use crate::labels::{object_label, statistic_label};
-use crate::{PageFigure, PageTable, ReportError, Section, compare};
-use spts::output::write_table;
+use crate::{PageFigure, PageTable, Section, compare};
+use spts::output::OutputError;
 use spts::progress::Progress;
-use spts_eval::decoders::label;
-use spts_eval::{PublishedSkin, Table};
+use spts_eval::PublishedSkin;
 use spts_studies::calibrate::read;
 use spts_studies::compare::{CompareReport, CompareStudy, Images};
 use std::path::Path;
@@ -35,11 +32,10 @@ impl ReadoutSection {
     }
 
     /// Writes the tables into `tables` and the figures into `figures`.
-    pub(super) fn write(&self, tables: &Path, figures: &Path) -> Result<(), ReportError> {
-        write_table(&tables.join("readout_statistics_real.csv"), &self.0.all_statistics())?;
-        write_table(&tables.join("readout_curves_real.csv"), self.0.distances())?;
-        compare::draw(&self.0, figures)?;
-        Ok(())
+    pub(super) fn write(&self, tables: &Path, figures: &Path) -> Result<(), OutputError> {
+        compare::statistics(self.0.all_statistics()).write_csv(&tables.join("readout_statistics_real.csv"))?;
+        compare::curves(&self.0).write_csv(&tables.join("readout_curves_real.csv"))?;
+        compare::draw(&self.0, figures)
     }
 
     /// Section of the page.
@@ -68,51 +64,18 @@ impl ReadoutSection {
                      image is the truth for both.",
                 ),
             ],
-            tables: vec![self.statistics_table(), self.curves_table()],
+            tables: vec![
+                PageTable::new(
+                    "Statistics of the even presses, ± standard error",
+                    &compare::statistics(self.0.all_statistics()),
+                    "readout_statistics_real.csv",
+                ),
+                PageTable::new(
+                    "|twin − real| of the score curves over M = 7 … 100",
+                    &compare::curves(&self.0),
+                    "readout_curves_real.csv",
+                ),
+            ],
         }
     }
-
-    fn statistics_table(&self) -> PageTable {
-        let all = self.0.all_statistics();
-        let table = Table::new("", &all)
-            .shown("recording", |s| object_label(&s.session))
-            .shown("statistic", |s| statistic_label(s.name))
-            .shown("real skin", |s| with_error(s.real, s.real_standard_error, 4))
-            .shown("twin", |s| with_error(s.twin, s.twin_standard_error, 4))
-            .shown("allowed difference", |s| s.tolerance)
-            .shown("met", |s| s.ok.map_or("", met));
-        let caption = "Statistics of the even presses, ± standard error";
-        PageTable::new(caption, &table, "readout_statistics_real.csv")
-    }
-
-    fn curves_table(&self) -> PageTable {
-        let table = Table::new("", self.0.distances())
-            .shown("decoder", |c| label(c.decode))
-            .shown("score", |c| score_label(c.metric))
-            .shown("mean", |c| c.mean_abs_difference)
-            .digits(4)
-            .shown("largest", |c| c.max_abs_difference)
-            .digits(4)
-            .shown("mean allowed", |c| c.tolerance)
-            .digits(2)
-            .shown("met", |c| c.ok);
-        let caption = "|twin − real| of the score curves over M = 7 … 100";
-        PageTable::new(caption, &table, "readout_curves_real.csv")
-    }
-}
-
-/// What a score is called.
-fn score_label(name: &str) -> String {
-    match name {
-        "support" => "support accuracy".to_owned(),
-        "iou" => "IoU".to_owned(),
-        "f1" => "F1".to_owned(),
-        "class_single" => "single windows classified".to_owned(),
-        "class_vote20" => "votes of 20 classified".to_owned(),
-        other => other.replace('_', " "),
-    }
-}
-
-fn met(ok: bool) -> &'static str {
-    if ok { "yes" } else { "no" }
 }

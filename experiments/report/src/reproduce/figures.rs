@@ -7,8 +7,8 @@ use super::results::{BEST, BothSkins, SkinResults, TimingRow};
 use super::sheets;
 use super::tables::CorrelationRow;
 use super::tracking::{TrackingRow, over_bounces};
-use crate::ReportError;
 use crate::figures::{Chart, Claim, Series, Sheet, StatedRange, Stroke, Style, save_charts, save_sheet};
+use spts::output::OutputError;
 use spts_eval::decoders::{PublishedDecode, label};
 use spts_eval::place::locator_label;
 use spts_eval::{BaselineRow, RASTER, ScoreRow};
@@ -161,8 +161,8 @@ pub(super) const FIGURES: &[FigureLine] = &[
 /// Writes every figure, as .svg and .png, into the folder `dir`.
 ///
 /// # Errors
-/// [`ReportError`] when a file cannot be written.
-pub(super) fn draw(dir: &Path, shown: &Shown<'_>) -> Result<(), ReportError> {
+/// [`OutputError`] when a file cannot be written.
+pub(super) fn draw(dir: &Path, shown: &Shown<'_>) -> Result<(), OutputError> {
     for figure in FIGURES {
         let name = figure.file.trim_end_matches(".png");
         match (figure.draw)(shown) {

@@ -14,7 +14,7 @@ mod tracking;
 pub use headline::Headline;
 
 use crate::animation::{MOTION_FIGURES, MotionError, simulate_motion};
-use crate::{Origin, PageFigure, ReportError, html, per_object};
+use crate::{Origin, PageFigure, html, per_object};
 use comparison::ReadoutSection;
 use dataset::SimulatedData;
 use figures::Shown;
@@ -204,7 +204,7 @@ impl Reproduction {
         results: &Scored<'_>,
         begin: Instant,
         out: &mut OutputFolder,
-    ) -> Result<ReproductionSummary, ReportError> {
+    ) -> Result<ReproductionSummary, OutputError> {
         let Scored {
             skins,
             comparison,
