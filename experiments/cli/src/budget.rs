@@ -88,7 +88,7 @@ impl BudgetCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = open_folder(&self.out, spts_report::budget::FILES)?;
+        let out = open_folder(&self.out)?;
         let study = BudgetStudy {
             objects: self.objects,
             readout: self.readout,

@@ -107,7 +107,7 @@ impl CircuitCommand {
             let text = || format!("{}\n{one_wire}", text(&ways, available_s));
             return self.common.print(&one, text);
         }
-        let out = open_folder(&self.out, spts_report::electronics::FILES)?;
+        let out = open_folder(&self.out)?;
         let report = study.run()?;
         write(&study, &report, out)?;
         let picture = self.out.join("figures/circuit.png");

@@ -9,10 +9,10 @@ use spts::data::DataError;
 use spts_circuit::Profile;
 use spts_eval::{PublishedSkin, SessionSlip, slips_text};
 use spts_models::TaxelGains;
-use spts_report::compare::{FILES, arm_json, arm_text, json, text, write, write_arm};
+use spts_report::compare::{arm_json, arm_text, json, text, write, write_arm};
 use spts_studies::arm::ArmStudy;
 use spts_studies::calibrate::{SessionPair, read};
-use spts_studies::compare::{CompareStudy, Images, Prediction, Predictor};
+use spts_studies::compare::{CompareStudy, Images, Prediction};
 use spts_studies::per_object::{PerObjectReport, PerObjectStudy};
 use std::path::{Path, PathBuf};
 
@@ -109,7 +109,7 @@ impl CompareCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = open_folder(&self.out, FILES)?;
+        let out = open_folder(&self.out)?;
         if self.arm {
             let study = ArmStudy {
                 recordings: &self.recordings,
@@ -179,19 +179,13 @@ impl CompareCommand {
     /// How sessions are predicted, if that is asked for.
     fn prediction(&self) -> Result<Option<Prediction>, CliError> {
         let Some(name) = &self.profile else { return Ok(None) };
-        let predictor = if name == "others" {
-            Predictor::Others
-        } else {
-            let path = Path::new(name);
-            let failed = |reason: String| CliError::usage(format!("{name}: {reason}"));
-            let text = spts_input::read_text(path, MAX_TOML_BYTES).map_err(|e| failed(e.to_string()))?;
-            let profile = Profile::from_toml(&text).map_err(|e| failed(e.to_string()))?;
-            Predictor::Profile(Box::new(profile))
+        let read = |path: &Path| Profile::from_toml(&spts_input::read_text(path, MAX_TOML_BYTES)?);
+        let profile = match name.as_str() {
+            "others" => None,
+            file => Some(read(Path::new(file)).map_err(|e| e.at(file))?),
         };
-        Ok(Some(Prediction {
-            predictor,
-            draws: self.draws,
-        }))
+        let draws = self.draws;
+        Ok(Some(Prediction { profile, draws }))
     }
 
     /// Twin and skin object by object, if that is asked for.

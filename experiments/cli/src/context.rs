@@ -51,7 +51,7 @@ impl Common {
 ///
 /// # Errors
 /// As for [`OutputFolder::open`].
-pub(super) fn open_folder(path: &Path, _: &[&str]) -> Result<OutputFolder, OutputError> {
+pub(super) fn open_folder(path: &Path) -> Result<OutputFolder, OutputError> {
     let folder = OutputFolder::open(path)?;
     note_earlier(path);
     Ok(folder)

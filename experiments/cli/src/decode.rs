@@ -3,7 +3,7 @@
 use crate::Bars;
 use crate::context::{Common, note, open_folder, print, print_json};
 use crate::error::CliError;
-use crate::extras::{DECODE_FILES, simulated_presses, write_decoded};
+use crate::extras::{simulated_presses, write_decoded};
 use crate::options::{decoders_named, network, seed, skin_gains, sorted, whole};
 use clap::Args;
 use serde::Serialize;
@@ -14,7 +14,7 @@ use spts::session::Event;
 use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow, LearnedDecoders};
 use spts_eval::decoders::short_label;
 use spts_eval::training::TrainingData;
-use spts_eval::{Labels, SessionSlip, Source, check_session, follow_slips, slips_text, unique};
+use spts_eval::{Labels, SessionSlip, Source, Table, check_session, follow_slips, slips_text, unique};
 use spts_models::{SkinLayout, Streams};
 use std::path::{Path, PathBuf};
 
@@ -87,7 +87,7 @@ impl DecodeCommand {
     /// Runs the command.
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = open_folder(&self.out, DECODE_FILES)?;
+        let out = open_folder(&self.out)?;
         let decoders = decoders_named(&self.decoder)?;
         let network = self.weights.as_deref().map(network).transpose()?;
         let mut set = SessionSet::open(&self.session)?;
@@ -233,46 +233,34 @@ impl<'a> Training<'a> {
 
 /// Means over the windows of every session, decoder and M.
 fn table(decoded: &[(&Session, DecodedSession)]) -> String {
-    let mut out =
-        String::from("session          decoder                M  windows  support    IoU  correlation  classified\n");
+    let mut groups: Vec<(bool, Vec<&DecodedWindow>)> = Vec::new();
     for (_, session) in decoded {
-        let keys = unique(session.rows.iter().map(|row| (row.decoder, row.m)));
-        for (decoder, m) in keys {
-            let rows: Vec<_> = session
-                .rows
-                .iter()
-                .filter(|r| r.decoder == decoder && r.m == m)
-                .collect();
-            let mean = |of: fn(&DecodedWindow) -> Option<f64>| {
-                let values: Vec<f64> = rows.iter().filter_map(|r| of(r)).collect();
-                let mean = values.iter().sum::<f64>() / values.len() as f64;
-                if values.is_empty() {
-                    "–".to_owned()
-                } else {
-                    format!("{mean:.3}")
-                }
-            };
-            let known = session.knows_class && rows.iter().any(|r| r.label.is_some());
-            let right = rows
-                .iter()
-                .filter(|r| r.label.as_deref() == Some(r.label_true.as_str()))
-                .count();
-            let right = if known {
-                format!("{right} of {}", rows.len())
-            } else {
-                "–".to_owned()
-            };
-            out.push_str(&format!(
-                "{:<16} {:<18} {m:>5}  {:>7}  {:>7}  {:>5}  {:>11}  {right:>10}\n",
-                session.session,
-                short_label(decoder),
-                rows.len(),
-                mean(|r| r.support),
-                mean(|r| r.iou),
-                mean(|r| r.correlation),
-            ));
+        for key in unique(session.rows.iter().map(|row| (row.decoder, row.m))) {
+            let rows = session.rows.iter().filter(|row| (row.decoder, row.m) == key);
+            groups.push((session.knows_class, rows.collect()));
         }
     }
-    out.pop();
-    out
+    let mean = |rows: &[&DecodedWindow], of: fn(&DecodedWindow) -> Option<f64>| {
+        let values: Vec<f64> = rows.iter().filter_map(|r| of(r)).collect();
+        (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+    };
+    let table = Table::new("windows", &groups)
+        .shown("session", |(_, rows)| &rows[0].session)
+        .shown("decoder", |(_, rows)| short_label(rows[0].decoder))
+        .shown("M", |(_, rows)| rows[0].m)
+        .shown("windows", |(_, rows)| rows.len())
+        .shown("support", |(_, rows)| mean(rows, |r| r.support))
+        .digits(3)
+        .shown("IoU", |(_, rows)| mean(rows, |r| r.iou))
+        .digits(3)
+        .shown("correlation", |(_, rows)| mean(rows, |r| r.correlation))
+        .digits(3)
+        .shown("classified", |(known, rows)| {
+            let right = rows
+                .iter()
+                .filter(|r| r.label.as_deref() == Some(&*r.label_true))
+                .count();
+            (*known && rows.iter().any(|r| r.label.is_some())).then(|| format!("{right} of {}", rows.len()))
+        });
+    table.text().trim_end().to_owned()
 }

@@ -4,7 +4,7 @@ use crate::context::{Bars, Common, open_folder};
 use crate::error::CliError;
 use crate::options::{seed, whole, within};
 use clap::{Args, Subcommand};
-use spts_report::design::{FILES, read_design, write};
+use spts_report::design::{read_design, write};
 use spts_studies::design::{DesignObjects, DesignStudy, WireChoice};
 use std::path::PathBuf;
 
@@ -174,7 +174,7 @@ impl NewDesign {
             seed: self.seed,
         };
         study.layout()?;
-        let out = open_folder(&self.out, FILES)?;
+        let out = open_folder(&self.out)?;
         let report = study.run(&Bars::default())?;
         write(&report, out)?;
         let text = || {

@@ -72,7 +72,7 @@ impl ExploreCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = open_folder(&self.out, explore::FILES)?;
+        let out = open_folder(&self.out)?;
         let study = ExploreStudy {
             sides: sorted(
                 self.taxels

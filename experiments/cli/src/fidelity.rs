@@ -74,7 +74,7 @@ impl FidelityCommand {
             grid,
             seed: self.seed,
         };
-        let out = open_folder(&self.out, spts_report::fidelity::FILES)?;
+        let out = open_folder(&self.out)?;
         let report = study.run(&out.folder("scenes")?, &Bars::default())?;
         spts_report::fidelity::write(&report, out)?;
         let folder = self.out.join("figures");

@@ -3,10 +3,9 @@
 use crate::context::{Bars, Common, print};
 use crate::error::CliError;
 use crate::options::{number, whole, within};
-use clap::builder::TypedValueParser;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
 use spts::output::{NpyFile, OutputError, check_writable};
-use spts::progress::Progress as _;
 use spts_circuit::{Seeding, WeightMode};
 use spts_firmware::attiny412::TraceRecord;
 use spts_firmware::{Clock, PATTERN_BITS};
@@ -85,8 +84,8 @@ struct WeightsCommand {
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     /// Clock edges: rows of the array; [1, 1000000]
-    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole::<u64>(1..=1_000_000))]
-    edges: u64,
+    #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = whole::<usize>(1..=1_000_000))]
+    edges: usize,
     /// Mode of the cells
     #[arg(long, value_name = "MODE", default_value = "binary")]
     mode: ModeName,
@@ -141,8 +140,8 @@ struct CellOptions {
     image: String,
     /// Seeds of the cells' random generators: address is the cell's bus address in one byte, as published; mixed is a
     /// 32-bit hash of it
-    #[arg(long, value_name = "SEEDING", default_value = "address")]
-    seeding: SeedingName,
+    #[arg(long, value_name = "SEEDING", default_value = "address", value_parser = seeding())]
+    seeding: Seeding,
     /// Clock edges a second, rising and falling; every edge is a measurement; [1, 1000000]
     #[arg(long, value_name = "HZ", default_value_t = DESIGN_EDGE_HZ, value_parser = within(1.0, 1e6, "[1, 1000000] Hz"))]
     edge_hz: f64,
@@ -162,24 +161,27 @@ enum ModeName {
 
 impl ModeName {
     fn task(self, period: usize) -> CellTask {
-        match self {
-            Self::Raster => CellTask::Mode(WeightMode::Raster),
-            Self::Analog => CellTask::Mode(WeightMode::Analog),
-            Self::Binary => CellTask::Mode(WeightMode::Binary),
-            Self::Pattern => CellTask::Pattern(period),
-        }
+        let (mode, period) = match self {
+            Self::Raster => (WeightMode::Raster, None),
+            Self::Analog => (WeightMode::Analog, None),
+            Self::Binary => (WeightMode::Binary, None),
+            Self::Pattern => (WeightMode::Binary, Some(period)),
+        };
+        CellTask { mode, period }
     }
+}
+
+/// Parser of the kind of seeds.
+fn seeding() -> impl TypedValueParser<Value = Seeding> {
+    PossibleValuesParser::new(["address", "mixed"]).map(|name| match name.as_str() {
+        "mixed" => Seeding::Mixed,
+        _ => Seeding::Address,
+    })
 }
 
 /// Parser of a number of bits of a pattern.
 fn bits() -> impl TypedValueParser<Value = usize> {
     whole::<usize>(1..=PATTERN_BITS)
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum SeedingName {
-    Address,
-    Mixed,
 }
 
 impl CellOptions {
@@ -190,10 +192,7 @@ impl CellOptions {
             cells: usize::from(self.cells),
             edges,
             tasks,
-            seeding: match self.seeding {
-                SeedingName::Address => Seeding::Address,
-                SeedingName::Mixed => Seeding::Mixed,
-            },
+            seeding: self.seeding,
             clock: self.clock()?,
         })
     }
@@ -253,20 +252,14 @@ impl WeightsCommand {
         self.common.start()?;
         let task = self.mode.task(self.period);
         check_array(&self.out)?;
-        let cells = self.cells.emulated(self.edges, vec![task])?;
-        let mut weights = cells.emulated_weights(task)?;
-        let bars = Bars::default();
-        bars.stage("clocking the cells", Some(weights.blocks()));
-        let mut file = NpyFile::create(&self.out, &weights.shape())?;
-        let failed = |error| OutputError::write(&self.out)(std::io::Error::other(error));
-        while let Some(levels) = weights.next_block().map_err(failed)? {
-            file.push(levels.iter().copied())?;
-            bars.step();
-        }
+        let cells = self.cells.emulated(self.edges as u64, vec![task])?;
+        let mut file = NpyFile::create(&self.out, &[self.edges, cells.cells])?;
+        cells.weights(task, &Bars::default(), &mut |levels| {
+            Ok(file.push(levels.iter().copied())?)
+        })?;
         file.finish()?;
-        bars.end();
         let written = serde_json::json!({
-            "file": self.out, "shape": [cells.edges, cells.cells], "mode": task.mode(), "period": task.period(),
+            "file": self.out, "shape": [cells.edges, cells.cells], "mode": task.mode(), "period": task.period,
             "image": cells.image_name,
         });
         let (file, name) = (self.out.display(), task.name());

@@ -52,7 +52,7 @@ impl FullCommand {
     }
 }
 
-pub(crate) use spts_report::decode::{FILES as DECODE_FILES, write as write_decoded};
+pub(crate) use spts_report::decode::write as write_decoded;
 pub(crate) use spts_report::score::{write as write_board, write_anytime, write_in_time};
 
 /// Where the commands are that this program lacks: it has all.

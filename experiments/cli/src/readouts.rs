@@ -5,7 +5,7 @@ use crate::error::CliError;
 use crate::options::{Side, seed, sorted, square, whole};
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use spts_report::readouts::{FILES, write};
+use spts_report::readouts::write;
 use spts_studies::readouts::{READOUTS, ReadoutLine, ReadoutsStudy, readout};
 use std::path::PathBuf;
 
@@ -86,7 +86,7 @@ impl ReadoutsCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = open_folder(&self.out, FILES)?;
+        let out = open_folder(&self.out)?;
         let asked = |line: &&ReadoutLine| self.readout.is_empty() || self.readout.iter().any(|r| r.0.name == line.name);
         let study = ReadoutsStudy {
             readouts: READOUTS.iter().filter(asked).collect(),

@@ -1,6 +1,7 @@
 //! `spts score`: decoders side by side on recordings.
 
-use crate::context::{Common, note, open_folder, print, progress, spinner};
+use crate::Bars;
+use crate::context::{Common, note, open_folder, print, progress};
 use crate::error::CliError;
 use crate::extras::{simulated_presses, simulated_sessions, write_anytime, write_board, write_in_time};
 use crate::options::{
@@ -9,11 +10,12 @@ use crate::options::{
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, check_writable, write_json};
+use spts::progress::Progress as _;
 use spts_contact::objects::OBJECTS;
 use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
 use spts_eval::anytime::{self, StopSettings};
 use spts_eval::board::{
-    BoardSettings, Difference, FILES, Regression, ScoreBoard, TrainedBoard, differences, regressions, table,
+    BoardSettings, Difference, Regression, ScoreBoard, TrainedBoard, differences, regressions, table,
 };
 use spts_eval::decoders::{DECODERS, no_confidence, not_in_time};
 use spts_eval::external::ExternalCommand;
@@ -203,9 +205,6 @@ pub(super) struct ScoreCommand {
 /// The default numbers of measurements of `--in-time`.
 const IN_TIME_MEASUREMENTS: [usize; 4] = [5, 7, 10, 20];
 
-/// Folder of the results when none is named.
-const DEFAULT_OUT: &str = "out/score";
-
 /// What the command reports.
 #[derive(Debug, Serialize)]
 struct BoardOutput<'a> {
@@ -241,20 +240,16 @@ impl ScoreCommand {
         if self.in_time {
             return self.follow_in_time();
         }
-        self.common.start()?;
-        let path = self.out(DEFAULT_OUT);
-        let out = open_folder(path, FILES)?;
         if let Some(path) = &self.save {
             check_board(path)?;
         }
         let before = self.against.as_deref().map(read_board).transpose()?;
-        let settings = self.settings()?;
-        let source = self.source()?;
-        let settings = BoardSettings {
-            training: self.training(&source)?,
-            ..self.fitting(settings, &source)
-        };
-        let board = score(&settings, &source)?;
+        let (board, out) = self.scored(&|_| None, |ready, bars| {
+            let mut board = ready.score(&|| bars.step())?;
+            bars.stage("places", None);
+            board.localisation = ready.localise()?;
+            Ok(board)
+        })?;
         let found = before
             .as_ref()
             .map(|before| regressions(before, &board, self.tolerance));
@@ -264,12 +259,10 @@ impl ScoreCommand {
             regressions: found.as_deref(),
             differences: apart.as_deref(),
         };
-        self.show(&shown, table(&board))?;
-        write_board(&board, out)?;
-        if let Some(path) = &self.save {
-            write_json(path, &board)?;
-        }
-        self.note_folder(DEFAULT_OUT)?;
+        self.finish(&shown, table(&board), || {
+            write_board(&board, out)?;
+            self.save.as_deref().map_or(Ok(()), |path| write_json(path, &board))
+        })?;
         if let Some(file) = &self.against {
             note_differences(file, apart.as_deref().unwrap_or_default());
         }
@@ -280,43 +273,34 @@ impl ScoreCommand {
     fn stop_early(&self) -> Result<(), CliError> {
         let wanted = self.wanted()?;
         let can = |settings: &BoardSettings| {
-            let unable = settings.decoders.iter().find(|spec| !spec.anytime);
-            unable.map(|spec| no_confidence(spec.name).to_string())
+            let unable = settings.decoders.iter().find(|spec| !spec.anytime)?;
+            Some(no_confidence(unable.name).to_string())
         };
-        let (board, out) = self.special("out/anytime", anytime::FILES, &can, |ready, done| {
-            ready.stops(&wanted, done)
-        })?;
-        self.show(&board, anytime::table(&board))?;
-        write_anytime(&board, out)?;
-        self.note_folder("out/anytime")
+        let (board, out) = self.scored(&can, |ready, bars| ready.stops(&wanted, &|| bars.step()))?;
+        self.finish(&board, anytime::table(&board), || write_anytime(&board, out))
     }
 
     /// Runs the command with `--in-time`.
     fn follow_in_time(&self) -> Result<(), CliError> {
         let can = |settings: &BoardSettings| {
-            let unable = settings.decoders.iter().find(|spec| spec.name != "nn_lmmse");
-            let unable = unable.map(|spec| not_in_time(spec.name).to_string());
-            unable.or_else(|| {
-                let reason = "chosen rows have no order in time; leave it out with `--in-time`";
-                (settings.sensing != [Sensing::Random]).then(|| format!("`--sensing`: {reason}"))
-            })
+            if let Some(unable) = settings.decoders.iter().find(|spec| spec.name != "nn_lmmse") {
+                return Some(not_in_time(unable.name).to_string());
+            }
+            let reason = "`--sensing`: chosen rows have no order in time; leave it out with `--in-time`";
+            (settings.sensing != [Sensing::Random]).then(|| reason.to_owned())
         };
-        let (board, out) = self.special("out/in_time", in_time::FILES, &can, |ready, done| ready.in_time(done))?;
-        self.show(&board, in_time::table(&board))?;
-        write_in_time(&board, out)?;
-        self.note_folder("out/in_time")
+        let (board, out) = self.scored(&can, |ready, bars| ready.in_time(&|| bars.step()))?;
+        self.finish(&board, in_time::table(&board), || write_in_time(&board, out))
     }
 
-    /// A board of another kind, by `score`, and the folder for its `files`, unless `refused` has a reason against it.
-    fn special<B>(
+    /// A board by `score`, and the folder for it, unless `refused` has a reason against the settings.
+    fn scored<B>(
         &self,
-        folder: &str,
-        files: &[&str],
         refused: &dyn Fn(&BoardSettings) -> Option<String>,
-        score: impl Fn(&TrainedBoard<'_>, &(dyn Fn() + Sync)) -> Result<B, ScoreError>,
+        score: impl FnOnce(&TrainedBoard<'_>, &Bars) -> Result<B, ScoreError>,
     ) -> Result<(B, OutputFolder), CliError> {
         self.common.start()?;
-        let out = open_folder(self.out(folder), files)?;
+        let out = open_folder(self.out())?;
         let settings = self.settings()?;
         if let Some(reason) = refused(&settings) {
             return Err(CliError::usage(reason));
@@ -324,28 +308,31 @@ impl ScoreCommand {
         let source = self.source()?;
         let settings = BoardSettings {
             training: self.training(&source)?,
-            ..settings
+            ..self.fitting(settings, &source)
         };
-        let learning = spinner("learning");
-        let ready = settings.learn(&source).map_err(|e| explained(&e, &source))?;
-        drop(learning);
-        let bar = progress(ready.steps(), "presses");
-        let board = score(&ready, &|| bar.inc(1));
-        bar.finish_and_clear();
-        Ok((board.map_err(|e| explained(&e, &source))?, out))
+        let bars = Bars::default();
+        bars.stage("learning", None);
+        let scored = settings.learn(&source).and_then(|ready| {
+            bars.stage("presses", Some(ready.steps()));
+            score(&ready, &bars)
+        });
+        bars.end();
+        Ok((scored.map_err(|e| explained(&e, &source))?, out))
     }
 
-    /// Prints a board before it is written, so that a disk that is full does not cost the run.
-    fn show(&self, board: &impl Serialize, table: String) -> Result<(), CliError> {
-        self.common.print(board, || table)
-    }
-
-    /// Says where the results are.
-    fn note_folder(&self, default: &str) -> Result<(), CliError> {
+    /// Prints a board before it is written, so that a disk that is full does not cost the run, and says where it is.
+    fn finish(
+        &self,
+        board: &impl Serialize,
+        table: String,
+        write: impl FnOnce() -> Result<(), OutputError>,
+    ) -> Result<(), CliError> {
+        self.common.print(board, || table)?;
+        write()?;
         if self.common.json {
             return Ok(());
         }
-        print(&format!("\ntables and figures: {}", self.out(default).display()))
+        print(&format!("\ntables and figures: {}", self.out().display()))
     }
 
     /// The wanted confidences.
@@ -462,8 +449,13 @@ impl ScoreCommand {
         })
     }
 
-    /// Folder of the results, `default` when none is named.
-    fn out<'a>(&'a self, default: &'a str) -> &'a Path {
+    /// Folder of the results.
+    fn out(&self) -> &Path {
+        let default = match (self.anytime, self.in_time) {
+            (true, _) => "out/anytime",
+            (_, true) => "out/in_time",
+            _ => "out/score",
+        };
         self.out.as_deref().unwrap_or(Path::new(default))
     }
 }
@@ -477,21 +469,6 @@ fn explained(e: &ScoreError, source: &Source) -> CliError {
         }
         _ => CliError::usage(e.to_string()),
     }
-}
-
-fn score(settings: &BoardSettings, source: &Source) -> Result<ScoreBoard, CliError> {
-    let failed = |e: ScoreError| explained(&e, source);
-    let learning = spinner("learning");
-    let ready = settings.learn(source).map_err(failed)?;
-    drop(learning);
-    let bar = progress(ready.steps(), "presses");
-    let board = ready.score(&|| bar.inc(1));
-    bar.finish_and_clear();
-    let mut board = board.map_err(failed)?;
-    let locating = spinner("places");
-    board.localisation = ready.localise().map_err(failed)?;
-    drop(locating);
-    Ok(board)
 }
 
 fn list() -> String {

@@ -3,12 +3,12 @@
 use crate::context::{Bars, Common, open_folder};
 use crate::error::CliError;
 use crate::options::{seed, whole, within};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use spts::SkinLayout;
 use spts::progress::Progress as _;
-use spts_recon::rows::{DESIGNERS, Designer, RowTask, Tolerances, designer};
-use spts_report::sensing::{FILES, write};
+use spts_recon::rows::{DESIGNERS, RowTask, Tolerances, designer};
+use spts_report::sensing::write;
 use spts_studies::sensing::{DesignImages, RowDesign};
 use std::path::PathBuf;
 
@@ -37,21 +37,6 @@ impl SensingCommand {
             SensingAction::Design(command) => command.run(),
         }
     }
-}
-
-/// A line of the table of designers.
-#[derive(Clone)]
-struct DesignerArg(&'static Designer);
-
-impl std::fmt::Debug for DesignerArg {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.0.name)
-    }
-}
-
-fn designer_named() -> impl TypedValueParser<Value = DesignerArg> {
-    let of = |name: String| DesignerArg(designer(&name).unwrap_or(&DESIGNERS[0]));
-    PossibleValuesParser::new(DESIGNERS.iter().map(|d| d.name)).map(of)
 }
 
 /// Most rows and columns of a skin.
@@ -102,8 +87,8 @@ Files in DIR:
   figures/rows.png    every row as a picture of the skin; rows.svg the same")]
 struct DesignCommand {
     /// Way to choose the rows; see below
-    #[arg(long, value_name = "NAME", default_value = "greedy", value_parser = designer_named())]
-    designer: DesignerArg,
+    #[arg(long, value_name = "NAME", default_value = "greedy", value_parser = PossibleValuesParser::new(DESIGNERS.iter().map(|d| d.name)))]
+    designer: String,
     /// Number of rows M; [1, 1024]
     #[arg(long, value_name = "M", default_value_t = 20, value_parser = whole::<usize>(1..=1024))]
     rows: usize,
@@ -148,10 +133,10 @@ struct DesignCommand {
 impl DesignCommand {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let out = open_folder(&self.out, FILES)?;
+        let out = open_folder(&self.out)?;
         let design = RowDesign {
             layout: layout(self.skin)?,
-            designer: self.designer.0,
+            designer: designer(&self.designer).unwrap_or(&DESIGNERS[0]),
             rows: self.rows,
             images: match (self.recordings, self.smooth) {
                 (Some(path), _) => DesignImages::Recordings(path),

@@ -10,14 +10,14 @@ use spts::scene::{Assignment, MESH_COPY, Timestep};
 use spts::simulate::{Prepared, Request, Summary, run};
 use spts_contact::Frame;
 use spts_contact::mesh::MAX_FILE_BYTES;
-use spts_contact::objects::{OBJECTS, pressable};
+use spts_contact::objects::{OBJECTS, ObjectSpec, pressable};
+use spts_eval::Table;
 use spts_eval::decode::{DecodeRequest, DecodedSession, LearnedDecoders};
 use spts_eval::decoders::find;
 use spts_eval::training::TrainingData;
 use spts_models::{SkinLayout, Streams};
 use spts_report::animation::Animation;
-use spts_report::simulation::{FILES, SimulationFiles};
-use std::fmt::Write as _;
+use spts_report::simulation::SimulationFiles;
 use std::path::{Path, PathBuf};
 use toml::Value;
 
@@ -232,11 +232,8 @@ impl SimulateCommand {
             assignments.extend(value.map(|value| Assignment::of_option(option, keys, value)));
         }
         for (name, taxel) in &self.faults {
-            let entries = [("name", Value::from(name.clone())), ("taxel", Value::from(*taxel))];
-            let fault: toml::Table = entries
-                .map(|(key, value)| (key.to_owned(), value))
-                .into_iter()
-                .collect();
+            let name = ("name".to_owned(), Value::from(name.clone()));
+            let fault = toml::Table::from_iter([name, ("taxel".to_owned(), Value::from(*taxel))]);
             assignments.push(Assignment::of_option("--fault", &["faults.+"], fault.into()));
         }
         assignments.extend(self.set.iter().cloned());
@@ -257,7 +254,7 @@ impl SimulateCommand {
         let prepared = request.prepare()?;
         let out = self.out.clone();
         let out = out.unwrap_or_else(|| default_folder(&prepared));
-        let folder = open_folder(&out, FILES)?;
+        let folder = open_folder(&out)?;
         let mut files = SimulationFiles::create(folder, &prepared, !self.no_record)?;
         let bar = progress(prepared.scene.repeats(), "simulating");
         let done = || {
@@ -343,75 +340,49 @@ impl Learned {
 /// Most taxels of a skin that `spts simulate` decodes at its end: a second or two.
 const MOST_DECODED: usize = 1100;
 
-/// Everything that `SCENE` may be.
-#[derive(Debug, Serialize)]
-struct SceneList {
-    scenes: &'static [NamedScene],
-    objects: Vec<NamedObject>,
-}
-
-#[derive(Debug, Serialize)]
-struct NamedScene {
-    /// As it stands on the command line.
-    scene: &'static str,
-    about: &'static str,
-}
-
-#[derive(Debug, Serialize)]
-struct NamedObject {
-    name: &'static str,
-    /// Number of its class; 0 for what has none.
-    label: u8,
-    about: &'static str,
-}
-
-const SCENES: &[NamedScene] = &[
-    NamedScene {
-        scene: "press/NAME",
-        about: "A robot arm presses the object NAME, one of those below, on the skin",
-    },
-    NamedScene {
-        scene: "press --mesh FILE",
-        about: "The arm presses a mesh of your own: .obj, .glb or .stl",
-    },
-    NamedScene {
-        scene: "bounce",
-        about: "A tennis ball falls on the skin and bounces",
-    },
-    NamedScene {
-        scene: "arm",
-        about: "A finger touches a skin that is wrapped round a robot's arm",
-    },
-    NamedScene {
-        scene: "FILE.toml",
-        about: "A scene file. Every run writes one, scene.toml, to start from",
-    },
+/// Everything that `SCENE` may be, as it stands on the command line, and what it is.
+const SCENES: [(&str, &str); 5] = [
+    (
+        "press/NAME",
+        "A robot arm presses the object NAME, one of those below, on the skin",
+    ),
+    (
+        "press --mesh FILE",
+        "The arm presses a mesh of your own: .obj, .glb or .stl",
+    ),
+    ("bounce", "A tennis ball falls on the skin and bounces"),
+    ("arm", "A finger touches a skin that is wrapped round a robot's arm"),
+    (
+        "FILE.toml",
+        "A scene file. Every run writes one, scene.toml, to start from",
+    ),
 ];
+
+/// What `--list` prints.
+#[derive(Serialize)]
+struct SceneList {
+    scenes: Table<'static, (&'static str, &'static str)>,
+    objects: Table<'static, &'static ObjectSpec>,
+}
 
 impl SceneList {
     fn new() -> Self {
-        let objects = pressable().map(|object| NamedObject {
-            name: object.name,
-            label: object.label,
-            about: object.description,
-        });
+        let scenes = Table::new("scenes", SCENES).column("scene", "scene", |(scene, _)| scene);
+        let objects = Table::new("objects", pressable()).column("name", "object for press/NAME", |object| object.name);
         Self {
-            scenes: SCENES,
-            objects: objects.collect(),
+            scenes: scenes.column("about", "what it is", |(_, about)| about),
+            objects: objects
+                .file("label", |object| object.label)
+                .column("about", "what it is", |object| object.description),
         }
     }
 
-    /// The list, a line each.
     fn text(&self) -> String {
-        let mut text = "Scenes:\n".to_owned();
-        for NamedScene { scene, about } in self.scenes {
-            let _ = writeln!(text, "  {scene:<18} {about}");
-        }
-        text += "\nObjects for press/NAME:\n";
-        for NamedObject { name, about, .. } in &self.objects {
-            let _ = writeln!(text, "  {name:<18} {about}");
-        }
-        text + "\nTry: spts simulate press/T"
+        format!(
+            "{}\n{}\nTry: spts simulate press/T",
+            self.scenes.text(),
+            self.objects.text()
+        )
     }
 }
 
@@ -443,13 +414,12 @@ mod tests {
     /// Every scene that ships is listed, and what is listed can be simulated.
     #[test]
     fn the_list_is_complete() {
-        let list = SceneList::new();
         for (name, _) in NAMED_SCENES {
-            assert!(list.scenes.iter().any(|scene| scene.scene == *name), "{name}");
+            assert!(SCENES.iter().any(|(scene, _)| scene == name), "{name}");
         }
-        let plain = list.scenes.iter().map(|scene| scene.scene.to_owned());
+        let plain = SCENES.iter().map(|(scene, _)| (*scene).to_owned());
         let plain = plain.filter(|scene| !scene.contains(|c: char| c.is_uppercase()));
-        let objects = list.objects.iter().map(|object| format!("press/{}", object.name));
+        let objects = pressable().map(|object| format!("press/{}", object.name));
         for scene in plain.chain(objects) {
             let request = Request {
                 scene,

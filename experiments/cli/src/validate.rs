@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use spts_eval::decoders::short_label;
 use spts_eval::place::locator_label;
-use spts_eval::{PublishedSkin, SkinScores};
+use spts_eval::{PublishedSkin, SkinScores, Table};
 use std::path::PathBuf;
 
 /// Scores recordings of the real skin.
@@ -74,49 +74,45 @@ fn score(real: &PublishedSkin, measurements: &[usize]) -> Result<ValidationOutpu
 }
 
 fn table(report: &ValidationOutput) -> String {
-    let mut out =
-        String::from("mean over the objects with a compressive session (raster and baselines: all objects)\n");
-    out.push_str("decode              M  support    IoU     F1  balanced  single  vote20\n");
-    for r in report.scores.rows.iter().filter(|r| r.object == "mean") {
+    /// Decoder or baseline, M, and the scores of images and of classes.
+    type Line<'a> = (&'a str, Option<usize>, [f64; 4], Option<[f64; 2]>);
+    let scores = &report.scores;
+    let rows = scores.rows.iter().filter(|r| r.object == "mean").map(|r| {
+        let images = [r.support, r.iou, r.f1, r.balanced_accuracy];
+        (r.decode, Some(r.m), images, Some([r.class_single, r.class_vote20]))
+    });
+    let baselines = scores.baselines.iter().filter(|b| b.object == "mean").map(|b| {
+        let images = [b.support, b.iou, b.f1, b.balanced_accuracy];
+        (b.baseline, None, images, None)
+    });
+    let lines: Vec<Line<'_>> = rows.chain(baselines).collect();
+    let mut table = Table::new("scores", &lines)
+        .shown("decode", |line| short_label(line.0))
+        .shown("M", |line| line.1);
+    for (k, head) in ["support", "IoU", "F1", "balanced"].into_iter().enumerate() {
+        table = table.shown(head, move |line| line.2[k]).digits(3);
+    }
+    for (k, head) in ["single", "vote of 20"].into_iter().enumerate() {
+        table = table.shown(head, move |line| Some(line.3?[k])).digits(3);
+    }
+    let mut out = "mean over the objects with a compressive session (raster and baselines: all objects)\n".to_owned();
+    out.push_str(&table.text());
+    if !scores.localisation.is_empty() {
+        let places = Table::new("places", &scores.localisation)
+            .shown("decode", |l| locator_label(l.decode))
+            .shown("M", |l| l.m)
+            .shown("mean", |l| l.mean_px)
+            .digits(2)
+            .shown("median", |l| l.median_px)
+            .digits(2)
+            .shown("share under 1", |l| l.share_under_1px)
+            .digits(2);
         out.push_str(&format!(
-            "{:<16} {:>4}    {:.3}  {:.3}  {:.3}     {:.3}   {:.3}   {:.3}\n",
-            short_label(r.decode),
-            r.m,
-            r.support,
-            r.iou,
-            r.f1,
-            r.balanced_accuracy,
-            r.class_single,
-            r.class_vote20
+            "\nlocalisation of the bouncing ball, taxels\n{}",
+            places.text()
         ));
     }
-    for b in report.scores.baselines.iter().filter(|b| b.object == "mean") {
-        out.push_str(&format!(
-            "{:<16}    –    {:.3}  {:.3}  {:.3}     {:.3}       –       –\n",
-            short_label(b.baseline),
-            b.support,
-            b.iou,
-            b.f1,
-            b.balanced_accuracy
-        ));
-    }
-    if !report.scores.localisation.is_empty() {
-        out.push_str(
-            "\nlocalisation of the bouncing ball, taxels\ndecode              M   mean  median  share under 1\n",
-        );
-    }
-    for l in &report.scores.localisation {
-        out.push_str(&format!(
-            "{:<16} {:>4}  {:>5.2}   {:>5.2}  {:>13.2}\n",
-            locator_label(l.decode),
-            l.m,
-            l.mean_px,
-            l.median_px,
-            l.share_under_1px
-        ));
-    }
-    out.pop();
-    out
+    out.trim_end().to_owned()
 }
 
 #[cfg(test)]

@@ -10,8 +10,6 @@ use spts_eval::in_time::{self, InTimeBoard};
 use spts_eval::{ScoredSession, Source};
 use spts_models::SkinLayout;
 
-pub(crate) use spts_eval::decode::FILES as DECODE_FILES;
-
 /// Where the commands are that this program lacks.
 pub(crate) const COMMANDS_ELSEWHERE: &str = "; this build has decode, score, dataset, device and record; simulate, reproduce, live and the \
      studies are in the program that `make install` makes of the repository";

@@ -349,9 +349,6 @@ const COLUMNS: [&str; 13] = [
     "col",
 ];
 
-/// Names of the result files that do not depend on the session.
-pub const FILES: &[&str] = &["windows.csv"];
-
 /// Writes `windows.csv` and one `NAME.npz` for each session into the folder `out`.
 ///
 /// # Errors

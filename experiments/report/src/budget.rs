@@ -12,9 +12,6 @@ use spts_studies::budget::{
     BudgetReport, BudgetRow, CHANCE, CHANGES, CONTACT, Direction, EndPoint, WHOLE_STAGE, stands_out,
 };
 
-/// Files outside of folders of their own.
-pub const FILES: &[&str] = &["budget.csv", "end_points.csv", "summary.md", "provenance.json"];
-
 /// Headings of [`CHANGES`], in the order in which readers see them: place of the change, and what it is called.
 const SHOWN: [(usize, &str); CHANGES.len()] = [
     (0, "support"),

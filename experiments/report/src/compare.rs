@@ -15,18 +15,6 @@ use spts_studies::compare::{
 use spts_studies::per_object::PerObjectReport;
 use std::path::Path;
 
-/// Files outside of folders of their own.
-pub const FILES: &[&str] = &[
-    "compare.csv",
-    "curves.csv",
-    "predicted.csv",
-    per_object::TABLES[0],
-    per_object::TABLES[1],
-    per_object::TABLES[2],
-    ARM[0],
-    ARM[1],
-];
-
 /// Tables of the bent skin.
 const ARM: [&str; 2] = ["arm.csv", "arm.json"];
 

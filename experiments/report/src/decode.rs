@@ -8,9 +8,6 @@ use spts_eval::decode::{self, DecodedSession, DecodedWindow};
 use spts_eval::decoders::short_label;
 use std::path::Path;
 
-/// Files outside of folders of their own.
-pub const FILES: &[&str] = &["windows.csv", "decoded.svg", "decoded.png"];
-
 /// Writes `windows.csv`, one `NAME.npz` a session and the picture `decoded` (.svg and .png) into the folder `out`: all
 /// of them, or none.
 ///

@@ -13,9 +13,6 @@ use spts_studies::design::{
 use spts_studies::electronics::ElectronicsStudy;
 use std::path::Path;
 
-/// Files of `spts design` outside of folders of their own.
-pub const FILES: &[&str] = &["design.json", "profile.toml", "scene.toml", "rows.txt", "curves.csv"];
-
 /// Largest file of a design, bytes.
 const MAX_BYTES: u64 = 1 << 24;
 

@@ -7,9 +7,6 @@ use spts_circuit::amplifier::{Budget, Remedied, Remedy};
 use spts_eval::{Cell, Table};
 use spts_studies::electronics::{ElectronicsReport, ElectronicsStudy};
 
-/// Files outside of folders of their own.
-pub const FILES: &[&str] = &["circuit.csv", "parameters.json"];
-
 /// Writes `circuit.csv`, `parameters.json` and `figures/circuit` into the folder `out`: all of them, or none.
 ///
 /// # Errors
@@ -91,10 +88,8 @@ fn scaled(value: f64, unit: &str) -> String {
         (1e-6, "µ"),
         (1e-9, "n"),
     ];
-    let (scale, prefix) = prefixes
-        .into_iter()
-        .find(|(scale, _)| value >= *scale)
-        .unwrap_or((1e-9, "n"));
+    let found = prefixes.into_iter().find(|(scale, _)| value >= *scale);
+    let (scale, prefix) = found.unwrap_or((1e-9, "n"));
     let lead = value / scale;
     let decimals = if lead < 10.0 { 2 } else { usize::from(lead < 100.0) };
     format!("{lead:.decimals$} {prefix}{unit}")
@@ -105,21 +100,16 @@ const STYLES: [(Style, u8); 4] = [(Style::Real, 0), (Style::Raster, 0), (Style::
 /// Ink of what must not be passed.
 const BOUND: Style = Style::Baseline;
 
-/// Settling, sum, ratio to the noise, and parts needed, over the number of taxels.
+/// Settling, sum, ratio to the noise, and the sources of the noise, over the number of taxels.
 fn charts(report: &ElectronicsReport) -> Vec<Chart> {
     let rows = report.rows.as_slice();
-    let range_v = rows.first().map_or(f64::NAN, |r| r.budget.range_v);
-    let panel = |title: &str, y_label: &str, y_log: bool, get: &dyn Fn(&Remedied) -> f64| {
-        let curve = |r: &Remedied| {
+    let of = |get: fn(&Budget) -> f64| rows.first().map_or(f64::NAN, |r| get(&r.budget));
+    let over_taxels = || Plot::new(rows).x("taxels", |r| f64::from(r.taxels)).log_x();
+    let by_remedy = || {
+        over_taxels().by(|r| {
             let place = Remedy::ALL.iter().position(|remedy| *remedy == r.remedy).unwrap_or(0);
             Curve::new(r.remedy.name(), STYLES[place].0, STYLES[place].1)
-        };
-        let plot = Plot::new(rows)
-            .x("taxels", |r| f64::from(r.taxels))
-            .log_x()
-            .y(y_label, get)
-            .by(curve);
-        if y_log { plot.log_y() } else { plot }.chart(title)
+        })
     };
     let with = |mut chart: Chart, name: &str, level: f64| {
         let ends = [rows.first(), rows.last()].into_iter().flatten();
@@ -127,72 +117,47 @@ fn charts(report: &ElectronicsReport) -> Vec<Chart> {
         chart.series.push(Series::new(name, BOUND, 0, points));
         chart
     };
+    let settling = by_remedy().log_y().y("settling and slewing, µs", |r| {
+        (r.budget.settle_s + r.budget.slew_s) * 1e6
+    });
+    let sum = by_remedy().log_y().y("4σ of the sum, V", |r| r.budget.excursion_v);
+    let ratio = by_remedy().y("SNR with the converter's step, dB", |r| r.budget.snr_adc_db);
+    let sources: [(Curve, fn(&Budget) -> f64); 5] = [
+        (Curve::new("amplifier's voltage", Style::Real, 0), |b| b.noise_v.voltage),
+        (Curve::new("taxels", Style::Twin, 0), |b| b.noise_v.taxels),
+        (Curve::new("feedback", Style::Raster, 0), |b| b.noise_v.feedback),
+        (Curve::new("amplifier's current", Style::Twin, 1), |b| b.noise_v.current),
+        (Curve::new("converter's step", BOUND, 0), |b| b.adc_noise_v),
+    ];
+    let as_built: Vec<&Remedied> = rows.iter().filter(|r| r.remedy == Remedy::AsBuilt).collect();
+    let noise = sources
+        .iter()
+        .flat_map(|source| as_built.iter().map(move |r| (source, *r)));
+    let noise = Plot::new(noise)
+        .x("taxels", |(_, r)| f64::from(r.taxels))
+        .log_x()
+        .y("noise at the output, mV rms", |((_, get), r)| get(&r.budget) * 1e3)
+        .log_y()
+        .by(|((curve, _), _)| curve.clone());
     vec![
         with(
-            panel(
-                "Settling to half a step of the converter",
-                "settling and slewing, µs",
-                true,
-                &|r| (r.budget.settle_s + r.budget.slew_s) * 1e6,
-            ),
+            settling.chart("Settling to half a step of the converter"),
             "time there is",
             report.available_s * 1e6,
         ),
         with(
-            panel("Sum of all taxels at the converter", "4σ of the sum, V", true, &|r| {
-                r.budget.excursion_v
-            }),
+            sum.chart("Sum of all taxels at the converter"),
             "range of amplifier and converter",
-            range_v,
+            of(|b| b.range_v),
         ),
         with(
-            panel(
-                "One pressed taxel over all noise",
-                "SNR with the converter's step, dB",
-                false,
-                &|r| r.budget.snr_adc_db,
-            ),
+            ratio.chart("One pressed taxel over all noise"),
             "one step of the converter",
-            step_db(rows),
+            // the signal is one step, over step/√12
+            of(|b| 20.0 * (b.adc_step_v / b.adc_noise_v).log10()),
         ),
-        sources(rows),
+        noise.chart("Noise by source, one wire, as built"),
     ]
-}
-
-/// Ratio at which a taxel's signal is one step of the converter, dB: step over step/√12.
-fn step_db(rows: &[Remedied]) -> f64 {
-    rows.first().map_or(f64::NAN, |r| {
-        let Budget {
-            adc_step_v,
-            adc_noise_v,
-            ..
-        } = r.budget;
-        20.0 * (adc_step_v / adc_noise_v).log10()
-    })
-}
-
-/// Noise by source with one wire as built.
-fn sources(rows: &[Remedied]) -> Chart {
-    let of = |name: &str, style: Style, variant: u8, get: fn(&Budget) -> f64| {
-        let as_built = rows.iter().filter(|r| r.remedy == Remedy::AsBuilt);
-        let points = as_built.map(|r| (f64::from(r.taxels), get(&r.budget) * 1e3)).collect();
-        Series::new(name, style, variant, points)
-    };
-    Chart {
-        title: "Noise by source, one wire, as built".to_owned(),
-        x_label: "taxels".to_owned(),
-        y_label: "noise at the output, mV rms".to_owned(),
-        x_log: true,
-        y_log: true,
-        series: vec![
-            of("amplifier's voltage", Style::Real, 0, |b| b.noise_v.voltage),
-            of("taxels", Style::Twin, 0, |b| b.noise_v.taxels),
-            of("feedback", Style::Raster, 0, |b| b.noise_v.feedback),
-            of("amplifier's current", Style::Twin, 1, |b| b.noise_v.current),
-            of("converter's step", BOUND, 0, |b| b.adc_noise_v),
-        ],
-        ..Chart::default()
-    }
 }
 
 #[cfg(test)]

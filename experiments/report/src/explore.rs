@@ -9,17 +9,6 @@ use spts_eval::{Cell, Table};
 use spts_studies::electronics::ElectronicsStudy;
 use spts_studies::explore::{CostFit, ExploreReport, ExploreStudy, ExploreTrial, SizeRow, Way};
 
-/// Files outside of folders of their own.
-pub const FILES: &[&str] = &[
-    "explore.csv",
-    "trials.csv",
-    "fits.csv",
-    "timings.csv",
-    "timing.json",
-    "parameters.json",
-    "provenance.json",
-];
-
 /// The results in words.
 #[must_use]
 pub fn text(report: &ExploreReport) -> String {

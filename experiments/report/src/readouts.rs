@@ -8,16 +8,6 @@ use spts_eval::Table;
 use spts_recon::statistics::Band;
 use spts_studies::readouts::{GOOD_IOU, READOUTS, ReadoutRow, ReadoutTrial, ReadoutsReport, ReadoutsStudy};
 
-/// Files outside of folders of their own.
-pub const FILES: &[&str] = &[
-    "readouts.csv",
-    "readouts.json",
-    "readouts.md",
-    "published.csv",
-    "parameters.json",
-    "provenance.json",
-];
-
 /// A line of the table: a readout with a number of measurements, and how long a measurement takes, s.
 type Line<'a> = (&'a ReadoutRow, &'a ReadoutTrial, f64);
 

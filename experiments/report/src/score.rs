@@ -12,9 +12,6 @@ use spts_eval::place::{PlaceRow, locator_label};
 use spts_eval::{Sensing, unique};
 use std::path::Path;
 
-/// Files outside of folders of their own.
-pub use spts_eval::board::FILES;
-
 /// Writes `board.json`, `board.csv`, `objects.csv`, `localisation.csv` and the figures into the folder `out`: all of
 /// them, or none.
 ///

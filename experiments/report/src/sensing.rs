@@ -2,10 +2,10 @@
 
 use crate::figures::{Sheet, Tile, TileRow, save_sheet};
 use crate::write_all_or_none;
-use serde::Serialize;
 use spts::chain::start_message;
-use spts::output::{OutputError, OutputFolder, write_bytes, write_json, write_table};
+use spts::output::{OutputError, OutputFolder, write_bytes, write_json};
 use spts_circuit::FIRST_ADDRESS;
+use spts_eval::Table;
 use spts_firmware::LAST_BUS_ADDRESS;
 use spts_studies::sensing::RowDesignReport;
 
@@ -15,18 +15,6 @@ const SHOWN: usize = 40;
 const A_LINE: usize = 8;
 /// Side of a row's picture, CSS pixels.
 const TILE_PX: usize = 96;
-
-/// What the master writes to a cell.
-#[derive(Debug, Serialize)]
-struct PatternWrite {
-    taxel: usize,
-    address: u8,
-    /// Bytes in hexadecimal, in the order they are sent: mode, number of bits, bits.
-    bytes: String,
-}
-
-/// Files of `spts sensing design` outside of folders of their own.
-pub const FILES: &[&str] = &["rows.txt", "design.json", "weights.json", "bus.csv", "seeds.txt"];
 
 /// Writes the rows, what they are like, what is written to the cells, and a picture of every row into the folder `out`:
 /// all of them, or none.
@@ -39,7 +27,11 @@ pub fn write(report: &RowDesignReport, out: OutputFolder) -> Result<(), OutputEr
         write_json(&out.path("design.json"), report)?;
         write_json(&out.path("weights.json"), &report.weights)?;
         if let Some(writes) = writes(report) {
-            write_table(&out.path("bus.csv"), &writes)?;
+            Table::new("bus", &writes)
+                .file("taxel", |(taxel, ..)| *taxel)
+                .file("address", |(_, address, _)| *address)
+                .file("bytes", |(.., bytes)| bytes)
+                .write(out)?;
         }
         if let Some(seeds) = &report.seeds {
             let cols = report.skin[1].max(1);
@@ -54,19 +46,16 @@ pub fn write(report: &RowDesignReport, out: OutputFolder) -> Result<(), OutputEr
     })
 }
 
-/// What the master writes to give every cell its pattern, when one bus has addresses for all of them and the cells hold
+/// What the master writes to give every cell its pattern: taxel, address, and bytes in hexadecimal in the order they are
+/// sent, which are mode, number of bits and bits. `None` unless one bus has addresses for all of them and the cells hold
 /// it.
-fn writes(report: &RowDesignReport) -> Option<Vec<PatternWrite>> {
+fn writes(report: &RowDesignReport) -> Option<Vec<(usize, u8, String)>> {
     report.bytes_a_cell?;
     let write = |taxel: usize| {
         let address = u8::try_from(FIRST_ADDRESS as usize + taxel).ok()?;
         let bytes = start_message(&report.weights, taxel, address).ok()?;
         let bytes: Vec<String> = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
-        (address <= LAST_BUS_ADDRESS).then_some(PatternWrite {
-            taxel,
-            address,
-            bytes: bytes.join(" "),
-        })
+        (address <= LAST_BUS_ADDRESS).then(|| (taxel, address, bytes.join(" ")))
     };
     (0..report.patterns.taxels()).map(write).collect()
 }

@@ -9,7 +9,7 @@ use spts::Mode;
 use spts::output::{CsvFile, NpyFile, OutputError, OutputFolder, write_bytes, write_json, write_npy};
 use spts::provenance::Machine;
 use spts::scene::Task;
-use spts::session::{SESSION_FILE, SessionWriter};
+use spts::session::SessionWriter;
 use spts::simulate::{Prepared, SimulatedPiece, Simulation, Summary};
 use spts_contact::Frame;
 use spts_eval::decode::DecodedSession;
@@ -17,62 +17,6 @@ use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout};
 use spts_sim::World;
 use spts_sim::render::{Camera, Picture, Renderer};
-use std::path::PathBuf;
-
-/// Results of a simulation that were not written, or not all of them.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SimulationWriteError {
-    /// A file cannot be written, or the pressure map cannot be drawn: there are no new results.
-    #[error(transparent)]
-    Report(#[from] OutputError),
-    /// The scene cannot be drawn; everything else was written.
-    #[error("{source}; everything else was written to {}", folder.display())]
-    Scene {
-        /// Cause.
-        source: Refusal,
-        /// Where the rest is.
-        folder: PathBuf,
-    },
-}
-
-/// How long a run took, and on what: a file of its own, so that all others compare byte for byte.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SimulationTiming {
-    /// The machine.
-    pub machine: Machine,
-    /// Time of the mechanics, s.
-    pub mechanics_s: f64,
-    /// Time of transducer and readout, s.
-    pub recording_s: f64,
-}
-
-impl SimulationTiming {
-    /// Timing of `simulation` on this machine.
-    #[must_use]
-    pub fn of(simulation: &Simulation) -> Self {
-        Self {
-            machine: Machine::here(),
-            mechanics_s: simulation.mechanics.as_secs_f64(),
-            recording_s: simulation.recording.as_secs_f64(),
-        }
-    }
-}
-
-/// Files of every run.
-pub const FILES: &[&str] = &[
-    "scene.toml",
-    "summary.json",
-    "timing.json",
-    "frames.csv",
-    "pressure.png",
-    "scene.png",
-    "scene_close.png",
-    "decoded.png",
-    "decoded.svg",
-    ANIMATION_FILE,
-    SESSION_FILE,
-];
 
 /// The results of a run, which are written while it goes on. All of them appear at its end, or none.
 pub struct SimulationFiles<'a> {
@@ -148,18 +92,24 @@ impl<'a> SimulationFiles<'a> {
     }
 
     /// Writes what is known at the end, with a picture of the `decoded` first blocks, and puts all files in place. With
-    /// `render`, pictures of the scene as well; when those cannot be drawn, the rest is put in place first. Returns the
-    /// names of the files.
+    /// `render`, pictures of the scene as well; when those cannot be drawn, the rest is put in place first. How long the
+    /// run took has a file of its own, so that all others compare byte for byte. Returns the names of the files.
     ///
     /// # Errors
-    /// [`SimulationWriteError`] when a file cannot be written or the scene cannot be drawn.
+    /// [`Refusal`] when a file cannot be written or the scene cannot be drawn.
     pub fn finish(
         self,
         simulation: &Simulation,
         summary: &Summary,
         render: bool,
         decoded: Option<DecodedSession>,
-    ) -> Result<Vec<String>, SimulationWriteError> {
+    ) -> Result<Vec<String>, Refusal> {
+        #[derive(Serialize)]
+        struct SimulationTiming {
+            machine: Machine,
+            mechanics_s: f64,
+            recording_s: f64,
+        }
         let Self {
             mut out,
             prepared,
@@ -172,7 +122,12 @@ impl<'a> SimulationFiles<'a> {
             maps.finish()?;
             session.map(SessionWriter::finish).transpose()?;
             write_json(&out.path("summary.json"), summary)?;
-            write_json(&out.timed_path("timing.json"), &SimulationTiming::of(simulation))
+            let timing = SimulationTiming {
+                machine: Machine::here(),
+                mechanics_s: simulation.mechanics.as_secs_f64(),
+                recording_s: simulation.recording.as_secs_f64(),
+            };
+            write_json(&out.timed_path("timing.json"), &timing)
         };
         let written = numbers();
         let pictures = || -> Result<(), OutputError> {
@@ -196,10 +151,9 @@ impl<'a> SimulationFiles<'a> {
         }
         let folder = out.shown().to_owned();
         let names = out.commit()?;
-        match drawn {
-            Ok(_) => Ok(names),
-            Err(source) => Err(SimulationWriteError::Scene { source, folder }),
-        }
+        drawn
+            .map(|_| names)
+            .map_err(|source| Refusal::new(format!("{source}; everything else was written to {}", folder.display())))
     }
 }
 

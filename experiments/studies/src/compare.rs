@@ -115,7 +115,7 @@ fn twin_of(
     let readout = streams.child(&format!("compare/{}", pair.session), 0);
     match images {
         Images::Recorded => {
-            let images = recorded_images(real, fitted, profile);
+            let images = |block| recorded_image(real, block, fitted, profile);
             replay(real, &blocks, &images, profile, readout, draw)
         }
         Images::Simulated { gains } => {
@@ -508,20 +508,11 @@ fn curve_distances(real: &[ScoreRow], twin: &[ScoreRow]) -> Vec<CurveDistance> {
     out
 }
 
-/// Which profile predicts a session: one fitted to the other sessions, or a given one.
-#[derive(Debug, Clone)]
-pub enum Predictor {
-    /// A profile fitted to all presses of the other sessions.
-    Others,
-    /// The given profile.
-    Profile(Box<Profile>),
-}
-
 /// Settings of `spts compare --profile`: sessions are predicted by a profile that was not fitted to them.
 #[derive(Debug, Clone)]
 pub struct Prediction {
-    /// The profile.
-    pub predictor: Predictor,
+    /// The profile; `None` for one that is fitted to all presses of the other sessions.
+    pub profile: Option<Profile>,
     /// Number of twins of every session, each with other values from the spans of the profile; [2, 1000].
     pub draws: u64,
 }
@@ -555,15 +546,15 @@ fn predicted_statistics(
     let sessions: Vec<SessionEstimates> = pairs.par_iter().map(whole).collect::<Result<_, _>>()?;
     let mut rows = Vec::new();
     for (pair, fitted) in pairs.iter().zip(&sessions) {
-        let profile = match &asked.predictor {
-            Predictor::Profile(profile) => profile.as_ref().clone(),
-            Predictor::Others if sessions.len() < 2 => {
+        let profile = match &asked.profile {
+            Some(profile) => profile.clone(),
+            None if sessions.len() < 2 => {
                 return Err(Refusal::new(format!(
                     "{} compressive: the only session, and no other to fit a profile to; name a profile",
                     pair.session
                 )));
             }
-            Predictor::Others => {
+            None => {
                 let others = sessions.iter().filter(|other| !std::ptr::eq(*other, fitted));
                 profile_of(&others.cloned().collect::<Vec<_>>(), pair)?
             }
@@ -603,15 +594,20 @@ pub(crate) fn replay(
     let profile = profile
         .on(real.layout())
         .and_then(|profile| profile.with_weights(real.weights()));
-    let profile = &profile.map_err(readout_refused)?;
-    let anew: Vec<(usize, Block)> = blocks
-        .par_iter()
-        .map(|&block| {
-            let mut readout =
-                Readout::new(profile, Mode::Compressive, real.layout(), streams, session).map_err(readout_refused)?;
-            Ok((block, record_again(real, block, &mut source(block)?, &mut readout)?))
-        })
-        .collect::<Result<_, Refusal>>()?;
+    let profile = profile.map_err(readout_refused)?;
+    let again = |&block: &usize| {
+        let mut press = source(block)?;
+        let before = &real.blocks()[block];
+        let mut record = || {
+            let mut readout = Readout::new(&profile, Mode::Compressive, real.layout(), streams, session)?;
+            readout.seek(block as u64, before.frame_position - real.frames() as u64);
+            readout.acquire(&mut press, real.frames() * real.measurements_per_frame())
+        };
+        let anew = record().map_err(readout_refused)?;
+        let idle_frames = before.idle_frames;
+        Ok((block, Block { idle_frames, ..anew }))
+    };
+    let anew = blocks.par_iter().map(again).collect::<Result<Vec<_>, Refusal>>()?;
     let mut all = real.blocks().to_vec();
     for (block, recorded) in anew {
         all[block] = recorded;
@@ -619,40 +615,12 @@ pub(crate) fn replay(
     real.with_blocks(all)
 }
 
-fn record_again(
-    real: &Recording,
-    block: usize,
-    source: &mut Interpolated,
-    readout: &mut Readout,
-) -> Result<Block, Refusal> {
-    let Block {
-        frame_position,
-        idle_frames,
-        ..
-    } = real.blocks()[block];
-    readout.seek(block as u64, frame_position - real.frames() as u64);
-    let anew = readout
-        .acquire(source, real.frames() * real.measurements_per_frame())
-        .map_err(readout_refused)?;
-    Ok(Block { idle_frames, ..anew })
-}
-
-/// Conductance of the skin in the presses of `real`, measured by least squares in windows of [`WINDOW_FRAMES`], for a
-/// readout with `profile`.
+/// Conductance of the skin in the course of a press of `real`, S, for a readout with `profile`: the image measured by
+/// least squares in windows of [`WINDOW_FRAMES`], at the middle of each, joined by straight lines.
 ///
 /// The noise of the windows adds √(p/n) = 0.2 of one measurement's noise to the twin's output, 4 % of its variance. It
 /// is constant within a window, so the estimators, which fit the image again, are not affected.
-pub(crate) fn recorded_images<'a>(
-    real: &'a Recording,
-    fitted: &'a SessionEstimates,
-    profile: &'a Profile,
-) -> impl Fn(usize) -> Result<Interpolated, Refusal> + Sync + 'a {
-    move |block| conductance(real, block, fitted, profile)
-}
-
-/// Conductance of the skin in the course of a press, S: the image at the middle of every window, joined by straight
-/// lines.
-fn conductance(
+pub(crate) fn recorded_image(
     real: &Recording,
     block: usize,
     fitted: &SessionEstimates,

@@ -1,6 +1,6 @@
 //! The summing amplifier with skins of any size, in closed form, and what larger skins need.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use spts_circuit::amplifier::{
     Amplifier, Budget, Network, OpAmp, Remedied, Remedy, Setting, Skin, fewest_wires, remedied,
 };
@@ -71,11 +71,7 @@ impl ElectronicsStudy {
     /// # Errors
     /// [`Refusal`], with the value outside its range.
     pub fn of(&self, taxels: u32) -> Result<Vec<Remedied>, Refusal> {
-        let setting = Setting {
-            skin: self.skin,
-            adc: self.adc,
-            available_s: self.available_s()?,
-        };
+        let setting = self.setting()?;
         let bus_f = self.bus_f(taxels);
         if !(0.0..=LARGEST_BUS_F).contains(&bus_f) {
             return Err(Refusal::new(format!(
@@ -96,6 +92,15 @@ impl ElectronicsStudy {
             remedied(&self.amplifier(on_bus)?, taxels, self.sub_array, remedy, &setting)
         });
         ways.collect()
+    }
+
+    /// How a skin is pressed and sampled.
+    fn setting(&self) -> Result<Setting, Refusal> {
+        Ok(Setting {
+            skin: self.skin,
+            adc: self.adc,
+            available_s: self.available_s()?,
+        })
     }
 
     /// Capacitance of a bus with `taxels` taxels, F.
@@ -147,32 +152,31 @@ impl ElectronicsStudy {
     /// # Errors
     /// [`Refusal`] if the profile has no amplifier or no converter.
     pub fn as_designed() -> Result<Self, Refusal> {
-        let profile = Profile::named("as_designed").map_err(designed)?;
-        let stage = |stage: &'static str| {
+        /// The amplifier of the profile.
+        #[derive(Deserialize)]
+        struct Parts {
+            #[serde(default)]
+            op_amp: OpAmp,
+            feedback_f: f64,
+            bus_f: f64,
+            temperature_k: f64,
+            update_s: f64,
+            sample_s: f64,
+        }
+        let designed = |error: &dyn std::fmt::Display| Refusal::new(format!("profile as_designed: {error}"));
+        let profile = Profile::named("as_designed").map_err(|e| designed(&e))?;
+        let stage = |stage: &str| {
             let table = profile.compressive.get(stage).cloned();
-            table.ok_or_else(|| Refusal::new(format!("profile as_designed: no `compressive.{stage}`")))
+            table.ok_or_else(|| designed(&format_args!("no `compressive.{stage}`")))
         };
-        let parts = stage("amplifier")?;
-        let number = |field: &'static str| {
-            let value = parts.get(field).and_then(toml::Value::as_float);
-            value.ok_or_else(|| {
-                Refusal::new(format!(
-                    "profile as_designed: no number `compressive.amplifier.{field}`"
-                ))
-            })
-        };
-        let op_amp: OpAmp = match parts.get("op_amp") {
-            Some(table) => table.clone().try_into().map_err(designed)?,
-            None => OpAmp::default(),
-        };
-        let adc: Adc = stage("adc")?.try_into().map_err(designed)?;
+        let parts: Parts = stage("amplifier")?.try_into().map_err(|e| designed(&e))?;
         Ok(Self {
-            op_amp,
+            op_amp: parts.op_amp,
             network: Network {
                 feedback_ohm: profile.feedback_ohm,
-                feedback_f: number("feedback_f")?,
-                bus_f: number("bus_f")?,
-                temperature_k: number("temperature_k")?,
+                feedback_f: parts.feedback_f,
+                bus_f: parts.bus_f,
+                temperature_k: parts.temperature_k,
                 ..Network::default()
             },
             taxel_f: 0.0,
@@ -181,16 +185,11 @@ impl ElectronicsStudy {
                 ..Skin::default()
             },
             rate_hz: profile.sample_rate_hz,
-            busy_s: number("update_s")? + 1.0 / profile.sample_rate_hz - number("sample_s")?,
+            busy_s: parts.update_s + 1.0 / profile.sample_rate_hz - parts.sample_s,
             sub_array: SUB_ARRAY,
-            adc,
+            adc: stage("adc")?.try_into().map_err(|e| designed(&e))?,
         })
     }
-}
-
-/// What is wrong with the profile.
-fn designed(error: impl std::fmt::Display) -> Refusal {
-    Refusal::new(format!("profile as_designed: {error}"))
 }
 
 /// Ratio of the sizes that are looked at, one after another.
@@ -219,20 +218,15 @@ impl ElectronicsStudy {
     /// As [`ElectronicsStudy::of`].
     pub fn largest_on_one_wire(&self) -> Result<Option<u32>, Refusal> {
         self.skin.validate()?;
-        let setting = Setting {
-            skin: self.skin,
-            adc: self.adc,
-            available_s: self.available_s()?,
-        };
+        let setting = self.setting()?;
         // a bus of too large a capacitance is none
         let works = |taxels: u32| {
             let amplifier = self.amplifier(taxels);
             amplifier.is_ok_and(|a| Budget::new(&a, f64::from(taxels), &setting).limit.is_none())
         };
-        let mut sizes = vec![1_u32];
-        while let Some(next) = next_size(*sizes.last().unwrap_or(&1)) {
-            sizes.push(next);
-        }
+        #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
+        let next = |taxels: &u32| Some((f64::from(*taxels) * RATIO).ceil() as u32).filter(|next| next > taxels);
+        let sizes: Vec<u32> = std::iter::successors(Some(1), next).collect();
         let Some(at) = sizes.iter().rposition(|taxels| works(*taxels)) else {
             return Ok(None);
         };
@@ -250,36 +244,19 @@ impl ElectronicsStudy {
 
     /// Describes the result of [`ElectronicsStudy::largest_on_one_wire`].
     pub fn one_wire_text(&self, taxels: Option<u32>) -> String {
-        let pressing = format!(
-            "{:.4} % of them pressed to {:.4} µS, the others at {:.4} µS",
+        let works = match taxels {
+            Some(taxels) => format!("up to {taxels} taxels"),
+            None => "with no number of taxels".to_owned(),
+        };
+        let short = |number: f64| (number * 1e4).round() / 1e4;
+        let [pressed, pressed_us, idle_us] = [
             100.0 * self.skin.pressed_share,
             self.skin.pressed_s * 1e6,
-            self.skin.idle_s * 1e6
-        );
-        match taxels {
-            Some(taxels) => format!("one wire works up to {taxels} taxels, {}", shortened(&pressing)),
-            None => format!("one wire works with no number of taxels, {}", shortened(&pressing)),
-        }
+            self.skin.idle_s * 1e6,
+        ]
+        .map(short);
+        format!("one wire works {works}, {pressed} % of them pressed to {pressed_us} µS, the others at {idle_us} µS")
     }
-}
-
-/// The next size after `taxels`; `None` at the end.
-fn next_size(taxels: u32) -> Option<u32> {
-    #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
-    let next = (f64::from(taxels) * RATIO).ceil() as u32;
-    (next > taxels).then_some(next)
-}
-
-/// `text` without the zeros that end a number.
-fn shortened(text: &str) -> String {
-    let word = |word: &str| {
-        if word.parse::<f64>().is_ok() && word.contains('.') {
-            word.trim_end_matches('0').trim_end_matches('.').to_owned()
-        } else {
-            word.to_owned()
-        }
-    };
-    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

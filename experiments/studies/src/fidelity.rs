@@ -9,14 +9,13 @@ use spts::chain::Acquisition;
 use spts::output::write_bytes;
 use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
-use spts::record::TwinError;
 use spts::scene::{DropConfig, PressConfig, Scene, SceneConfig, Task};
 use spts_circuit::Mode;
 use spts_contact::Frame;
 use spts_contact::mesh::{TriMesh, cylinder, extrude, sphere};
 use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
 use spts_eval::training::Learned;
-use spts_eval::{Press, ScoreError, Scorer, Tally, Window};
+use spts_eval::{Press, Scorer, Tally, Window};
 use spts_input::Refusal;
 use spts_models::Streams;
 use spts_recon::Matrix;
@@ -77,10 +76,9 @@ impl FidelityStudy {
         let references = scenes
             .into_par_iter()
             .map(|scene| {
-                let setting = self.grid.reference(scene.is_drop());
-                let at_reference = scene.at(setting)?;
-                let [learned, scored] =
-                    [(0, ONCE), (1, TIMED)].map(|(index, runs)| run_contact(&at_reference, index, runs));
+                let at_reference = scene.at(self.grid.reference(scene.is_drop()))?;
+                let run = |index, runs| run_contact(&at_reference, index, runs);
+                let (learned, scored) = (run(0, ONCE), run(1, TIMED));
                 progress.step();
                 Ok(Reference {
                     learned: learned?,
@@ -89,56 +87,58 @@ impl FidelityStudy {
                     scene,
                 })
             })
-            .collect::<Result<Vec<_>, TwinError>>()
-            .map_err(Refusal::from_error)?;
-        let others: Vec<(Scene, ContactRun)> = others(&references, self.seed, meshes)?
-            .into_par_iter()
-            .filter_map(|scene| {
-                let run = run_contact(&scene, 0, ONCE).ok()?;
-                Some((scene, run))
-            })
-            .collect();
-        let learned = ReferenceScores::learn(&references, &others, self.seed)?;
+            .collect::<Result<Vec<_>, Refusal>>()?;
+        let others = others(&references, self.seed, meshes)?.into_par_iter();
+        let others = others.filter_map(|scene| run_contact(&scene, 0, ONCE).ok().map(|run| (scene, run)));
+        let learned = ReferenceScores::learn(&references, &others.collect::<Vec<_>>(), self.seed)?;
         let jobs: Vec<(usize, ContactSetting)> = (0..references.len())
             .flat_map(|i| {
                 let settings = self.grid.settings(references[i].scene.is_drop());
                 settings.into_iter().map(move |setting| (i, setting))
             })
             .collect();
-        let results: Vec<SettingResult> = jobs
-            .into_par_iter()
-            .map(|(i, setting)| {
-                let result = measure(&references[i], i, setting, &learned);
-                progress.step();
-                result
-            })
-            .collect::<Result<_, Refusal>>()?;
+        let results = jobs.into_par_iter().map(|(i, setting)| {
+            let result = measure(&references[i], i, setting, &learned)?;
+            progress.step();
+            Ok((i, result))
+        });
+        let results = results.collect::<Result<Vec<_>, Refusal>>()?;
         progress.end();
-        let hash = provenance_hash(&references).map_err(Refusal::from_error)?;
-        let mut report = FidelityReport::new(Provenance::new(self.seed, hash));
-        for result in results {
-            report.add(result);
+        let (mut measured, mut refusals) = (Vec::new(), Vec::new());
+        for (i, result) in results {
+            match result {
+                Ok(found) => measured.push((i, found)),
+                Err(refusal) => refusals.push(refusal),
+            }
         }
-        for reference in &references {
+        measured.extend(references.iter().enumerate().map(|(i, reference)| {
             let setting = self.grid.reference(reference.scene.is_drop());
             let scored = &reference.scored;
-            let taxel_rms_rel = taxel_error(scored, scored);
-            report.add(row(reference, scored, setting, taxel_rms_rel, [0.0; 3]));
-        }
-        Ok(report)
+            (
+                i,
+                row(reference, scored, setting, taxel_error(scored, scored), [0.0; 3]),
+            )
+        }));
+        // scene by scene, levels from cheap to dear, then resolution and step
+        measured.sort_by_key(|(i, (row, _))| {
+            let level = LEVELS.iter().position(|level| level.name == row.level);
+            (*i, level, row.cells_per_taxel, row.timestep_s.to_bits())
+        });
+        let (rows, fine) = measured.into_iter().map(|(_, found)| found).unzip();
+        // what every other setting follows from
+        let hashes = references.iter().map(|r| r.at_reference.hash());
+        let hash = combined_hash(&hashes.collect::<Result<Vec<_>, Refusal>>()?);
+        Ok(FidelityReport {
+            rows,
+            refusals,
+            fine,
+            provenance: Provenance::new(self.seed, hash),
+        })
     }
 }
 
-/// Hash of the references' scenes: what every other setting follows from.
-fn provenance_hash(references: &[Reference]) -> Result<String, TwinError> {
-    let hashes = references.iter().map(|r| r.at_reference.hash());
-    Ok(combined_hash(&hashes.collect::<Result<Vec<_>, TwinError>>()?))
-}
-
-enum SettingResult {
-    Measured(Box<MeasuredSetting>, FinePressure),
-    Refused(RefusedSetting),
-}
+/// A line of the table, and the pressure that it is of.
+type Measured = (MeasuredSetting, FinePressure);
 
 /// Runs one setting of the scene with the index `label` and compares it with its reference.
 fn measure(
@@ -146,32 +146,31 @@ fn measure(
     label: usize,
     setting: ContactSetting,
     learned: &ReferenceScores,
-) -> Result<SettingResult, Refusal> {
-    let refused = |error: &dyn std::fmt::Display| {
-        SettingResult::Refused(RefusedSetting {
-            scene: reference.scene.name.clone(),
-            level: setting.level.name,
-            cells_per_taxel: setting.cells_per_taxel,
-            timestep_s: setting.timestep_s,
-            reason: error.to_string(),
-        })
+) -> Result<Result<Measured, RefusedSetting>, Refusal> {
+    let run = || {
+        let scene = reference.scene.at(setting)?;
+        let found = run_contact(&scene, 1, TIMED)?;
+        let taxel_rms_rel = taxel_error(&found, &reference.scored);
+        if taxel_rms_rel.is_finite() {
+            return Ok((scene, found, taxel_rms_rel));
+        }
+        Err(Refusal::new("the ball meets nothing, or the reference nothing like it"))
     };
-    let scene = match reference.scene.at(setting) {
-        Ok(scene) => scene,
-        Err(error) => return Ok(refused(&error)),
-    };
-    let found = match run_contact(&scene, 1, TIMED) {
+    let (scene, found, taxel_rms_rel) = match run() {
         Ok(found) => found,
-        Err(error) => return Ok(refused(&error)),
+        Err(refusal) => {
+            return Ok(Err(RefusedSetting {
+                scene: reference.scene.name.clone(),
+                level: setting.level.name,
+                cells_per_taxel: setting.cells_per_taxel,
+                timestep_s: setting.timestep_s,
+                reason: refusal.to_string(),
+            }));
+        }
     };
-    let taxel_rms_rel = taxel_error(&found, &reference.scored);
-    if !taxel_rms_rel.is_finite() {
-        return Ok(refused(&"the ball meets nothing, or the reference nothing like it"));
-    }
-    let ChainScores { support, iou, class } = learned.score(&scene, &found, label)?;
-    let truth = learned.reference(label);
-    let deltas = [support - truth.support, iou - truth.iou, class - truth.class];
-    Ok(row(reference, &found, setting, taxel_rms_rel, deltas))
+    let (scores, truth) = (learned.score(&scene, &found, label)?, learned.references[label]);
+    let deltas = [0, 1, 2].map(|k| scores[k] - truth[k]);
+    Ok(Ok(row(reference, &found, setting, taxel_rms_rel, deltas)))
 }
 
 /// The line of the table for `found`, with the error of the taxels' pressures and the changes of support accuracy, IoU
@@ -182,12 +181,12 @@ fn row(
     setting: ContactSetting,
     taxel_rms_rel: f64,
     [support_delta, iou_delta, class_delta]: [f64; 3],
-) -> SettingResult {
+) -> Measured {
     let row = MeasuredSetting {
         scene: reference.scene.name.clone(),
         task: if reference.scene.is_drop() { "drop" } else { "press" }.to_owned(),
         level: setting.level.name.to_owned(),
-        cells: found.fine.shape(),
+        cells: format!("{}x{}", found.fine.rows, found.fine.cols),
         cells_per_taxel: setting.cells_per_taxel,
         timestep_s: setting.timestep_s,
         cost_us_per_step: found.cost_us_per_step,
@@ -198,7 +197,7 @@ fn row(
         iou_delta,
         class_delta,
     };
-    SettingResult::Measured(Box::new(row), found.fine.clone())
+    (row, found.fine.clone())
 }
 
 /// Resolutions and time steps at which `spts fidelity` runs every contact model.
@@ -311,7 +310,7 @@ impl FidelityScene {
     }
 
     /// The scene on a level.
-    fn at(&self, setting: ContactSetting) -> Result<Scene, TwinError> {
+    fn at(&self, setting: ContactSetting) -> Result<Scene, Refusal> {
         let mut config = self.config.clone();
         setting.level.apply(&mut config.contact, setting.cells_per_taxel);
         config.timestep_s = Some(setting.timestep_s.into());
@@ -356,15 +355,13 @@ fn others(references: &[Reference], seed: u64, folder: &Path) -> Result<Vec<Scen
         .iter()
         .filter(|name| references.iter().all(|r| r.scene.name != **name));
     let scenes = left.map(|name| {
-        let scene = built_in(name, seed, folder)?;
-        let config = SceneConfig { skin, ..scene.config };
+        let config = SceneConfig {
+            skin,
+            ..built_in(name, seed, folder)?.config
+        };
         Ok(Scene::new(config, folder).ok())
     });
-    Ok(scenes
-        .collect::<Result<Vec<_>, Refusal>>()?
-        .into_iter()
-        .flatten()
-        .collect())
+    scenes.filter_map(Result::transpose).collect()
 }
 
 fn built_in(name: &str, seed: u64, folder: &Path) -> Result<FidelityScene, Refusal> {
@@ -376,10 +373,9 @@ fn built_in(name: &str, seed: u64, folder: &Path) -> Result<FidelityScene, Refus
     match name {
         "T" | "tape" | "comb" => press.object = Some(name.to_owned()),
         "drop" => {
-            // one bounce from the full height, and the start of the next
-            let drops = REPEATS;
             ball = Some(DropConfig {
-                drops,
+                drops: REPEATS,
+                // one bounce from the full height, and the start of the next
                 duration_s: 0.7,
                 ..DropConfig::default()
             });
@@ -392,7 +388,7 @@ fn built_in(name: &str, seed: u64, folder: &Path) -> Result<FidelityScene, Refus
                 )));
             };
             let file = format!("{name}.obj");
-            write_bytes(&folder.join(&file), mesh.to_obj(name).as_bytes()).map_err(Refusal::from_error)?;
+            write_bytes(&folder.join(&file), mesh.to_obj(name).as_bytes())?;
             press.mesh = Some(file);
             [press.row, press.col] = PLACE.map(Some);
             press.rotation_deg = Some(ROTATION_DEG);
@@ -432,27 +428,26 @@ fn shape(name: &str) -> Option<TriMesh> {
 
 /// A user's scene: its first two presses or drops, without what the levels decide.
 fn from_file(path: &Path) -> Result<FidelityScene, Refusal> {
-    let scene = Scene::load(path).map_err(Refusal::from_error)?;
+    let scene = Scene::load(path)?;
     let mut config = scene.config().clone();
     match scene.task() {
         Task::Press(press) => {
-            let press = press.clone();
             config.press = Some(PressConfig {
                 presses: REPEATS,
-                ..press
+                ..press.clone()
             });
         }
         Task::Drop(ball) => {
-            let ball = ball.clone();
-            config.drop = Some(DropConfig { drops: REPEATS, ..ball });
+            config.drop = Some(DropConfig {
+                drops: REPEATS,
+                ..ball.clone()
+            });
         }
     }
     // the levels bring their own
     config.frame_interval_s = None;
     Ok(FidelityScene {
-        name: path
-            .file_stem()
-            .map_or_else(String::new, |s| s.to_string_lossy().into_owned()),
+        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         config,
         folder: path.parent().unwrap_or(Path::new("")).to_owned(),
     })
@@ -467,13 +462,6 @@ pub struct FinePressure {
     pub cols: usize,
     /// Pressure on every square, Pa, row-major.
     pub pressure_pa: Vec<f64>,
-}
-
-impl FinePressure {
-    /// "rows x cols", as in "60x60".
-    fn shape(&self) -> String {
-        format!("{}x{}", self.rows, self.cols)
-    }
 }
 
 /// What one run gave.
@@ -496,7 +484,7 @@ const ENOUGH_S: f64 = 0.3;
 
 /// Runs press or drop `index` of `scene`. The cost is that of the quickest of at most `most_runs` runs, set-up
 /// included; long runs are made once.
-fn run_contact(scene: &Scene, index: usize, most_runs: usize) -> Result<ContactRun, TwinError> {
+fn run_contact(scene: &Scene, index: usize, most_runs: usize) -> Result<ContactRun, Refusal> {
     let (mut least_s, mut spent_s) = (f64::INFINITY, 0.0);
     let mut last = None;
     for _ in 0..most_runs {
@@ -530,7 +518,7 @@ fn run_contact(scene: &Scene, index: usize, most_runs: usize) -> Result<ContactR
 }
 
 /// Fine pressure in the middle of the span.
-fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<FinePressure, TwinError> {
+fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<FinePressure, Refusal> {
     let mut field = scene.mechanics().build_contact()?;
     let cells = field.cells_per_taxel();
     let (rows, cols) = (scene.skin().rows() * cells, scene.skin().cols() * cells);
@@ -548,8 +536,7 @@ fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<F
     if let Some(refined) = field.refine(&body, force_n) {
         pressure_pa.copy_from_slice(refined);
     } else if let Some(reason) = field.failure() {
-        let time_s = frame.time_s;
-        return Err(no_pressure(force_n, time_s, &reason));
+        return Err(no_pressure(force_n, frame.time_s, &reason));
     }
     Ok(FinePressure {
         rows,
@@ -571,42 +558,30 @@ fn nearest(frames: &[Frame], time_s: f64) -> Option<usize> {
     Some(if nearer { before } else { after })
 }
 
-/// Sums of a relative root mean square.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    error: f64,
-    reference: f64,
-}
-
-impl Sums {
-    fn add(&mut self, value: f64, reference: f64) {
-        self.error += (value - reference).powi(2);
-        self.reference += reference * reference;
+/// Root mean square of the differences of values from what was expected, relative to that of the expected ones; 0 when
+/// nothing was expected and nothing found.
+fn relative_rms(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (mut error, mut reference) = (0.0, 0.0);
+    for (value, expected) in pairs {
+        error += (value - expected).powi(2);
+        reference += expected * expected;
     }
-
-    /// 0 when nothing was expected and nothing found.
-    fn relative(self) -> f64 {
-        if self.error <= 0.0 {
-            0.0
-        } else {
-            (self.error / self.reference).sqrt()
-        }
+    if error > 0.0 || error.is_nan() {
+        (error / reference).sqrt()
+    } else {
+        0.0
     }
 }
 
 /// Error of a fine field on the grid of the reference: every cell of it takes the value of the cell its centre falls
 /// into.
 fn fine_error(found: &FinePressure, reference: &FinePressure) -> f64 {
-    let mut sums = Sums::default();
     let at = |i: usize, cells: usize, of: usize| (2 * i + 1) * cells / (2 * of);
-    for row in 0..reference.rows {
-        let line = at(row, found.rows, reference.rows) * found.cols;
-        for col in 0..reference.cols {
-            let value = found.pressure_pa[line + at(col, found.cols, reference.cols)];
-            sums.add(value, reference.pressure_pa[row * reference.cols + col]);
-        }
-    }
-    sums.relative()
+    relative_rms(reference.pressure_pa.iter().enumerate().map(|(k, expected)| {
+        let row = at(k / reference.cols, found.rows, reference.rows);
+        let col = at(k % reference.cols, found.cols, reference.cols);
+        (found.pressure_pa[row * found.cols + col], *expected)
+    }))
 }
 
 /// Times at which drops are compared, s: finer than any contact's structure.
@@ -615,32 +590,27 @@ const DROP_SAMPLE_S: f64 = 5e-5;
 /// Error of the taxels' pressures, over all frames of a press, or over the first contact of a drop, both counted from
 /// when the force first passes half its peak: what a step's delay adds to the flight is no error of the contact.
 fn taxel_error(found: &ContactRun, reference: &ContactRun) -> f64 {
-    let mut sums = Sums::default();
-    if let Some(contact) = reference.bounces.first() {
-        let (Some(middle_s), Some(found_s)) = (half_rise_s(reference), half_rise_s(found)) else {
-            return f64::INFINITY;
-        };
-        let (mut time_s, end_s) = (
-            contact.start_s - DROP_SAMPLE_S,
-            contact.start_s + 1.2 * contact.contact_s,
-        );
-        while time_s <= end_s {
-            let expected = pressure_at(&reference.frames, time_s);
-            let values = pressure_at(&found.frames, time_s - middle_s + found_s);
-            for (value, expected) in values.iter().zip(&expected) {
-                sums.add(*value, *expected);
-            }
-            time_s += DROP_SAMPLE_S;
+    // times in the reference and in the run
+    let times_s: Vec<(f64, f64)> = match reference.bounces.first() {
+        None => reference
+            .frames
+            .iter()
+            .map(|frame| (frame.time_s, frame.time_s))
+            .collect(),
+        Some(contact) => {
+            let (Some(middle_s), Some(found_s)) = (half_rise_s(reference), half_rise_s(found)) else {
+                return f64::INFINITY;
+            };
+            let end_s = contact.start_s + 1.2 * contact.contact_s;
+            let samples = std::iter::successors(Some(contact.start_s - DROP_SAMPLE_S), |s| Some(s + DROP_SAMPLE_S));
+            let samples = samples.take_while(|time_s| *time_s <= end_s);
+            samples.map(|time_s| (time_s, time_s - middle_s + found_s)).collect()
         }
-        return sums.relative();
-    }
-    for frame in &reference.frames {
-        let values = pressure_at(&found.frames, frame.time_s);
-        for (value, expected) in values.iter().zip(frame.pressure.values()) {
-            sums.add(*value, *expected);
-        }
-    }
-    sums.relative()
+    };
+    relative_rms(times_s.into_iter().flat_map(|(expected_s, found_s)| {
+        let expected = pressure_at(&reference.frames, expected_s);
+        pressure_at(&found.frames, found_s).into_iter().zip(expected)
+    }))
 }
 
 /// When the force of the first contact passes half its peak, between frames by linear interpolation, s.
@@ -684,16 +654,8 @@ const PRESSES_BEFORE: usize = 2;
 /// Share of the time to the first touch that is idle for sure.
 const IDLE: f64 = 0.8;
 
-/// Scores of one run.
-#[derive(Debug, Clone, Copy)]
-struct ChainScores {
-    /// Support accuracy.
-    support: f64,
-    /// Intersection over union.
-    iou: f64,
-    /// Share of windows classified correctly.
-    class: f64,
-}
+/// Support accuracy, intersection over union, and share of windows classified correctly.
+type ChainScores = [f64; 3];
 
 /// Images of a run: conductance above that of the idle skin, relative to its peak, frame by frame.
 type Images = Vec<Vec<f64>>;
@@ -718,7 +680,7 @@ impl ReferenceScores {
         let (mut training, mut library, mut labels) = (Images::new(), Images::new(), Vec::new());
         let known = references.iter().map(|r| (&r.at_reference, &r.learned));
         for (label, (scene, run)) in known.chain(others.iter().map(|(s, r)| (s, r))).enumerate() {
-            let images = images(scene, run).map_err(Refusal::from_error)?;
+            let images = images(scene, run);
             let stride = images.len().div_ceil(TRAINING_IMAGES).max(1);
             training.extend(images.iter().step_by(stride).cloned());
             let full: Vec<&Vec<f64>> = images.iter().filter(|image| peak(image) > 0.7).collect();
@@ -741,34 +703,27 @@ impl ReferenceScores {
             n_iter: SWEEPS,
             ..Ksvd::default()
         };
+        let nothing = |of: &'static str| move |e: Refusal| Refusal::new(format!("no training data for the {of}: {e}"));
         let dictionary = ksvd
             .learn(&chosen, &mut streams.rng("ksvd", 0))
-            .map_err(|e| Refusal::new(format!("no training data for the dictionary: {e}")))?;
+            .map_err(nothing("dictionary"))?;
         let columns: Vec<&[f64]> = library.iter().map(Vec::as_slice).collect();
         let library = Library::new(&Matrix::from_column_slices(dictionary.nrows(), &columns), &labels)
-            .map_err(|e| Refusal::new(format!("no training data for the library: {e}")))?;
+            .map_err(nothing("library"))?;
         let cols = references.first().map_or(1, |r| r.at_reference.skin().cols());
         let learned = Learned::new(dictionary, None, library, cols);
+        let truths = references
+            .iter()
+            .map(|reference| Truth::new(&reference.at_reference, &reference.scored));
         let mut learned = Self {
-            decoder: PublishedDecode::Matched
-                .decoder(&learned)
-                .map_err(Refusal::from_error)?,
-            truths: Vec::new(),
+            decoder: PublishedDecode::Matched.decoder(&learned)?,
+            truths: truths.collect(),
             references: Vec::new(),
         };
-        for (label, reference) in references.iter().enumerate() {
-            learned
-                .truths
-                .push(Truth::new(&reference.at_reference, &reference.scored).map_err(Refusal::from_error)?);
-            let scores = learned.score(&reference.at_reference, &reference.scored, label)?;
-            learned.references.push(scores);
-        }
+        let scores = references.iter().enumerate();
+        let scores = scores.map(|(label, r)| learned.score(&r.at_reference, &r.scored, label));
+        learned.references = scores.collect::<Result<_, Refusal>>()?;
         Ok(learned)
-    }
-
-    /// Scores of the reference of the scene with the index `label`.
-    fn reference(&self, label: usize) -> ChainScores {
-        self.references[label]
     }
 
     /// Records and decodes `run`, of the scene with the index `label`.
@@ -782,10 +737,7 @@ impl ReferenceScores {
             conditioning_presses: PRESSES_BEFORE,
             ..of_task(Mode::Compressive, label as u64)
         };
-        let recording = scene
-            .chain()
-            .record(&[&run.frames], scene.duration_s(), &acquisition)
-            .map_err(Refusal::from_error)?;
+        let recording = scene.chain().record(&[&run.frames], scene.duration_s(), &acquisition)?;
         let volts = &recording.blocks()[0].volts;
         let rate_hz = recording.sample_rate_hz();
         #[expect(clippy::cast_possible_truncation, reason = "cut to the recording's length")]
@@ -798,10 +750,7 @@ impl ReferenceScores {
         let stride = (press.len() / WINDOWS).max(M);
         let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = press.windows(0..press.len(), M, stride).unzip();
         let mut scorer = Scorer::new(&self.decoder);
-        let answers = scorer
-            .answers(&windows)
-            .map_err(ScoreError::from)
-            .map_err(Refusal::from_error)?;
+        let answers = scorer.answers(&windows)?;
         let mut tally = Tally::default();
         for (window, answer) in starts.iter().zip(&answers) {
             let time_s = (start + window + M / 2) as f64 / rate_hz;
@@ -812,26 +761,21 @@ impl ReferenceScores {
         let decisions: Vec<Option<usize>> = answers.iter().map(|a| scorer.class(a)).collect();
         tally.decisions(&decisions, label, decisions.len());
         let scores = tally.scores();
-        Ok(ChainScores {
-            support: scores.support.unwrap_or(0.0),
-            iou: scores.iou.unwrap_or(0.0),
-            class: scores.class_single.unwrap_or(0.0),
-        })
+        Ok([scores.support, scores.iou, scores.class_single].map(Option::unwrap_or_default))
     }
 }
 
 impl Truth {
-    fn new(scene: &Scene, run: &ContactRun) -> Result<Self, TwinError> {
-        let images = images(scene, run)?;
-        let masks = images.iter().map(|image| {
+    fn new(scene: &Scene, run: &ContactRun) -> Self {
+        let masks = images(scene, run).into_iter().map(|image| {
             let mut mask = Vec::new();
-            support(image, SUPPORT_THRESHOLD, &mut mask);
+            support(&image, SUPPORT_THRESHOLD, &mut mask);
             mask
         });
-        Ok(Self {
+        Self {
             masks: masks.collect(),
             run: run.clone(),
-        })
+        }
     }
 
     fn mask(&self, time_s: f64) -> Option<&[bool]> {
@@ -841,7 +785,7 @@ impl Truth {
 }
 
 /// Conductance of every frame above that of the first, with nothing on the skin, relative to the run's peak.
-fn images(scene: &Scene, run: &ContactRun) -> Result<Images, TwinError> {
+fn images(scene: &Scene, run: &ContactRun) -> Images {
     let same: Vec<&[spts_contact::Frame]> = vec![&run.frames; PRESSES_BEFORE + 1];
     let maps = scene.chain().conductance_maps(&same, 0).pop().unwrap_or_default();
     let idle = maps.first().map_or_else(Vec::new, |map| map.values().to_vec());
@@ -854,7 +798,7 @@ fn images(scene: &Scene, run: &ContactRun) -> Result<Images, TwinError> {
     if full > 0.0 {
         images.iter_mut().flatten().for_each(|v| *v /= full);
     }
-    Ok(images)
+    images
 }
 
 fn peak(image: &[f64]) -> f64 {
@@ -874,40 +818,6 @@ pub struct FidelityReport {
     /// Provenance of the rows.
     #[serde(skip)]
     pub provenance: Provenance,
-}
-
-impl FidelityReport {
-    /// A report without rows.
-    fn new(provenance: Provenance) -> Self {
-        Self {
-            rows: Vec::new(),
-            refusals: Vec::new(),
-            fine: Vec::new(),
-            provenance,
-        }
-    }
-
-    /// Takes the result of one setting in. Rows stay sorted: scene by scene as they come, levels from cheap to dear,
-    /// then resolution and step.
-    fn add(&mut self, result: SettingResult) {
-        match result {
-            SettingResult::Refused(refusal) => self.refusals.push(refusal),
-            SettingResult::Measured(row, fine) => {
-                let scenes: Vec<&str> = self.rows.iter().map(|r| r.scene.as_str()).collect();
-                let key = |r: &MeasuredSetting| {
-                    (
-                        scenes.iter().position(|s| *s == r.scene).unwrap_or(usize::MAX),
-                        LEVELS.iter().position(|level| level.name == r.level),
-                        r.cells_per_taxel,
-                        r.timestep_s.to_bits(),
-                    )
-                };
-                let at = self.rows.partition_point(|r| key(r) <= key(&row));
-                self.rows.insert(at, *row);
-                self.fine.insert(at, fine);
-            }
-        }
-    }
 }
 
 #[cfg(test)]
@@ -984,13 +894,5 @@ mod tests {
             assert!(row(scene, "winkler", 2).cost_us_per_step > 0.0);
         }
         assert!(report.rows.iter().all(|r| r.scene != "drop" || r.level != "footprint"));
-    }
-
-    #[test]
-    fn unknown_scenes_are_refused_by_name() {
-        let dir = tempfile::tempdir().unwrap();
-        let names = ["spher".to_owned()];
-        let error = build(&names, 1, dir.path()).unwrap_err().to_string();
-        assert!(error.contains("spher") && error.contains("sphere, punch"), "{error}");
     }
 }

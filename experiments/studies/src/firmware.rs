@@ -22,73 +22,42 @@ const SETTLED_TICKS: u64 = 2000;
 /// How cells are started. As text: its `mode`, and for a pattern also its `period`.
 ///
 /// ```
+/// use spts_circuit::WeightMode;
 /// use spts_studies::firmware::CellTask;
 ///
-/// assert_eq!(CellTask::Pattern(20).period(), Some(20));
-/// assert_eq!(CellTask::ALL[0].mode(), "raster");
+/// let pattern = CellTask { mode: WeightMode::Binary, period: Some(20) };
+/// assert_eq!((pattern.mode(), pattern.name().as_str()), ("pattern", "pattern 20"));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CellTask {
-    /// With seeds, in a mode of the generator or the raster.
-    Mode(WeightMode),
-    /// With patterns of this number of bits, in [1, 64]: the first outputs of cells with mixed seeds.
-    Pattern(usize),
+pub struct CellTask {
+    /// Mode of the generator or the raster, whose levels the codes are.
+    pub mode: WeightMode,
+    /// Number of bits of a pattern, in [1, 64]: the first outputs of cells with mixed seeds. `None` for cells that are
+    /// started with seeds.
+    pub period: Option<usize>,
 }
 
 impl CellTask {
-    /// All modes, in the order of their bytes, and patterns of three lengths.
-    pub const ALL: [Self; 6] = [
-        Self::Mode(WeightMode::Raster),
-        Self::Mode(WeightMode::Analog),
-        Self::Mode(WeightMode::Binary),
-        Self::Pattern(7),
-        Self::Pattern(20),
-        Self::Pattern(64),
-    ];
     /// Name of the mode.
     pub fn mode(self) -> &'static str {
-        match self {
-            Self::Mode(mode) => mode.name(),
-            Self::Pattern(_) => "pattern",
-        }
-    }
-
-    /// Number of bits of the pattern; `None` for other modes.
-    pub fn period(self) -> Option<usize> {
-        match self {
-            Self::Mode(_) => None,
-            Self::Pattern(period) => Some(period),
-        }
+        self.period.map_or(self.mode.name(), |_| "pattern")
     }
 
     /// Name of the mode, with the number of bits for a pattern.
     pub fn name(self) -> String {
-        match self {
-            Self::Mode(mode) => mode.name().to_owned(),
-            Self::Pattern(period) => format!("pattern {period}"),
-        }
-    }
-
-    /// Mode that the codes are levels of.
-    fn levels(self) -> WeightMode {
-        match self {
-            Self::Mode(mode) => mode,
-            Self::Pattern(_) => WeightMode::Binary,
-        }
+        self.period
+            .map_or_else(|| self.mode().to_owned(), |period| format!("pattern {period}"))
     }
 
     /// The twin's weights of `cells` cells that are started with this.
     fn weights(self, seeding: Seeding, cells: usize) -> Result<Weights, Refusal> {
         let taxels = u32::try_from(cells).unwrap_or(u32::MAX);
-        match self {
-            Self::Mode(mode) => Ok(Weights::new(mode, seeding, taxels)),
-            Self::Pattern(period) => {
-                let mut codes = vec![0; period * cells];
-                Weights::new(WeightMode::Binary, Seeding::Mixed, taxels).fill_codes(0, &mut codes);
-                let patterns = Patterns::new(period, codes)?;
-                Weights::with_patterns(WeightMode::Binary, patterns)
-            }
-        }
+        let Some(period) = self.period else {
+            return Ok(Weights::new(self.mode, seeding, taxels));
+        };
+        let mut codes = vec![0; period * cells];
+        Weights::new(self.mode, Seeding::Mixed, taxels).fill_codes(0, &mut codes);
+        Weights::with_patterns(self.mode, Patterns::new(period, codes)?)
     }
 }
 
@@ -100,8 +69,11 @@ impl Serialize for CellTask {
             #[serde(skip_serializing_if = "Option::is_none")]
             period: Option<usize>,
         }
-        let (mode, period) = (self.mode(), self.period());
-        Text { mode, period }.serialize(serializer)
+        Text {
+            mode: self.mode(),
+            period: self.period,
+        }
+        .serialize(serializer)
     }
 }
 
@@ -192,26 +164,13 @@ pub struct Verification {
     pub instructions_per_s: f64,
 }
 
-/// Reads the weights that emulated cells put out, in blocks of up to 4096 clock edges, so that any number of edges fits
-/// into memory.
-#[derive(Debug)]
-pub struct EmulatedWeights {
-    array: Array,
-    clock: Clock,
-    mode: WeightMode,
-    edges: usize,
-    cells: usize,
-    left: usize,
-    codes: Vec<u8>,
-    levels: Vec<f64>,
-}
-
 impl EmulatedCells {
     /// The twin's weights of these cells. The firmware's raster counts to a hundred, however many cells there are.
     fn expected_weights(&self, task: CellTask) -> Result<Weights, Refusal> {
-        let taxels = match task {
-            CellTask::Mode(WeightMode::Raster) => RASTER_PERIOD,
-            _ => self.cells,
+        let taxels = if task.mode == WeightMode::Raster {
+            RASTER_PERIOD
+        } else {
+            self.cells
         };
         task.weights(self.seeding, taxels).map_err(|e| self.unusable(e))
     }
@@ -242,8 +201,10 @@ impl EmulatedCells {
     /// # Errors
     /// [`Refusal`] if the array cannot be built, or a cell does not answer.
     pub fn verify(&self, progress: &dyn Progress) -> Result<Verification, Refusal> {
-        let blocks = usize::try_from(self.edges).unwrap_or(usize::MAX).div_ceil(BLOCK);
-        progress.stage("clocking the cells", Some(blocks.saturating_mul(self.tasks.len())));
+        progress.stage(
+            "clocking the cells",
+            Some(self.blocks().saturating_mul(self.tasks.len())),
+        );
         let started = Instant::now();
         let (mut modes, mut first_mismatch, mut instructions) = (Vec::new(), None, 0);
         for &task in &self.tasks {
@@ -282,37 +243,59 @@ impl EmulatedCells {
         first: &mut Option<Mismatch>,
         progress: &dyn Progress,
     ) -> Result<u64, Refusal> {
-        let (weights, mode) = (self.expected_weights(task)?, task.levels());
-        let (cells, taxels) = (self.cells, weights.taxels());
-        let (mut codes, mut levels) = (Vec::new(), Vec::new());
-        let (mut done, mut mismatches) = (0, 0);
-        while done < self.edges {
-            let edges = usize::try_from(self.edges - done).map_or(BLOCK, |left| left.min(BLOCK));
-            codes.resize(edges * cells, 0);
-            levels.resize(edges * taxels, 0.0);
-            array.clock(self.clock, &mut codes).map_err(|e| self.unusable(e))?;
+        let (weights, mode) = (self.expected_weights(task)?, task.mode);
+        let taxels = weights.taxels();
+        let (mut levels, mut mismatches) = (Vec::new(), 0);
+        self.clock(array, progress, &mut |done, codes| {
+            levels.resize(codes.len() / self.cells * taxels, 0.0);
             weights.fill_rows(done, &mut levels);
-            for ((edge, codes), levels) in (done..).zip(codes.chunks_exact(cells)).zip(levels.chunks_exact(taxels)) {
+            let edges = codes.chunks_exact(self.cells).zip(levels.chunks_exact(taxels));
+            for (edge, (codes, levels)) in (done..).zip(edges) {
                 // a cell beyond the raster's hundred is never selected
                 let expected = levels.iter().copied().chain(std::iter::repeat(0.0));
                 for ((taxel, &code), expected) in codes.iter().enumerate().zip(expected) {
-                    if mode.code_level(code).to_bits() != expected.to_bits() {
+                    let level = mode.code_level(code);
+                    if level.to_bits() != expected.to_bits() {
                         mismatches += 1;
                         first.get_or_insert(Mismatch {
                             task,
                             edge,
                             taxel,
                             code,
-                            level: mode.code_level(code),
+                            level,
                             expected_level: expected,
                         });
                     }
                 }
             }
+            Ok(())
+        })?;
+        Ok(mismatches)
+    }
+
+    /// Number of blocks of edges.
+    fn blocks(&self) -> usize {
+        usize::try_from(self.edges).unwrap_or(usize::MAX).div_ceil(BLOCK)
+    }
+
+    /// Clocks `array` through all edges, block by block, so that any number of them fits into memory: `block` gets the
+    /// number of edges before, and the codes of every edge and cell.
+    fn clock(
+        &self,
+        array: &mut Array,
+        progress: &dyn Progress,
+        block: &mut dyn FnMut(u64, &[u8]) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        let (mut codes, mut done) = (Vec::new(), 0);
+        while done < self.edges {
+            let edges = usize::try_from(self.edges - done).map_or(BLOCK, |left| left.min(BLOCK));
+            codes.resize(edges * self.cells, 0);
+            array.clock(self.clock, &mut codes).map_err(|e| self.unusable(e))?;
+            block(done, &codes)?;
             done += edges as u64;
             progress.step();
         }
-        Ok(mismatches)
+        Ok(())
     }
 
     /// Number of cells that, asked over the bus, do not give the reply of the behavioural cell: mode, state, counter
@@ -344,23 +327,23 @@ impl EmulatedCells {
         Ok(reply)
     }
 
-    /// Starts the cells with `task` and returns a reader of the weights that they put out at the following
-    /// [`EmulatedCells::edges`] clock edges.
+    /// Gives `block` the weights in [−1, 1] that the cells, started with `task`, put out: of all edges in order, some at
+    /// once, edges × cells, row-major.
     ///
     /// # Errors
-    /// [`Refusal`] if a cell does not answer, or there are more edges than an array has rows.
-    pub fn emulated_weights(&self, task: CellTask) -> Result<EmulatedWeights, Refusal> {
-        let edges = usize::try_from(self.edges).map_err(|e| Refusal::from_error(e).at("`--edges`"))?;
-        Ok(EmulatedWeights {
-            array: self.started(task)?,
-            clock: self.clock,
-            mode: task.levels(),
-            edges,
-            cells: self.cells,
-            left: edges,
-            codes: Vec::new(),
-            levels: Vec::new(),
-        })
+    /// [`Refusal`] if a cell does not answer, and those of `block`.
+    pub fn weights(
+        &self,
+        task: CellTask,
+        progress: &dyn Progress,
+        block: &mut dyn FnMut(&[f64]) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        progress.stage("clocking the cells", Some(self.blocks()));
+        self.clock(&mut self.started(task)?, progress, &mut |_, codes| {
+            block(&codes.iter().map(|code| task.mode.code_level(*code)).collect::<Vec<_>>())
+        })?;
+        progress.end();
+        Ok(())
     }
 
     /// Calls `line` for every step of the cell of `taxel`, started with `task`, during [`EmulatedCells::edges`] edges.
@@ -400,37 +383,6 @@ impl EmulatedCells {
         let program = Device::program(self.image.flash()).map_err(|e| self.unusable(e))?;
         Device::new(program, &[address]).trace_until(ticks, line);
         Ok(())
-    }
-}
-
-impl EmulatedWeights {
-    /// Number of clock edges in all, and number of cells.
-    pub fn shape(&self) -> [usize; 2] {
-        [self.edges, self.cells]
-    }
-
-    /// Number of blocks that [`Self::next_block`] returns.
-    pub fn blocks(&self) -> usize {
-        self.edges.div_ceil(BLOCK)
-    }
-
-    /// Clocks the cells through the next block. Returns their weights in [−1, 1], edges × cells, row-major; `None`
-    /// after the last edge.
-    ///
-    /// # Errors
-    /// [`Refusal`] if the cells cannot be clocked.
-    pub fn next_block(&mut self) -> Result<Option<&[f64]>, Refusal> {
-        let rows = self.left.min(BLOCK);
-        if rows == 0 {
-            return Ok(None);
-        }
-        self.left -= rows;
-        self.codes.resize(rows * self.cells, 0);
-        self.array.clock(self.clock, &mut self.codes)?;
-        self.levels.clear();
-        self.levels
-            .extend(self.codes.iter().map(|code| self.mode.code_level(*code)));
-        Ok(Some(&self.levels))
     }
 }
 

@@ -10,7 +10,7 @@ mod table;
 
 pub use stopper::StopScores;
 pub(crate) use stopper::{End, PressStops, Stopper, intervals, mean, pool};
-pub use table::{FILES, table, write};
+pub use table::{table, write};
 
 use crate::algorithm::{ScoreError, Subject};
 use crate::board::{Entry, TrainedBoard};

@@ -8,9 +8,6 @@ use crate::table::{Cell, Table, TextTable};
 use crate::tally::{ScoreColumn, unique};
 use spts::output::{OutputError, OutputFolder, write_json};
 
-/// Names of the result files.
-pub const FILES: &[&str] = &["anytime.json", "anytime.csv", "objects.csv"];
-
 /// Columns of the scores in files.
 const SCORES: [ScoreColumn<StopScores>; 7] = [
     ("samples", |s| s.samples),

@@ -10,7 +10,7 @@ mod table;
 pub use crate::decoders::{DECODERS, find};
 pub use crate::windows::{Press, Window};
 pub use against::{Difference, Regression, differences, regressions};
-pub use table::{FILES, table, write};
+pub use table::{table, write};
 
 use crate::algorithm::{Contender, DecodeError, ScoreError};
 use crate::alignment::SessionSlip;

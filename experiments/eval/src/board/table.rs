@@ -10,9 +10,6 @@ use crate::training::{PUBLISHED, RASTER};
 use crate::unique;
 use spts::output::{OutputError, OutputFolder, write_json};
 
-/// Names of the result files.
-pub const FILES: &[&str] = &["board.json", "board.csv", "objects.csv", "localisation.csv"];
-
 /// Writes `board.json`, `board.csv`, `objects.csv` and `localisation.csv` into the folder `out`.
 ///
 /// # Errors

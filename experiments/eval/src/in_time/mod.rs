@@ -15,7 +15,7 @@ mod table;
 
 pub(crate) use follow::{Followed, Moment, drops, follow, press, scores};
 pub use follow::{FollowedImage, InTimeScores, Interval, followed_images};
-pub use table::{FILES, table, write};
+pub use table::{table, write};
 
 use crate::algorithm::ScoreError;
 use crate::board::{Entry, TrainedBoard, no_session};

@@ -7,9 +7,6 @@ use crate::table::{Cell, Table, TextTable};
 use crate::tally::{ScoreColumn, unique};
 use spts::output::{OutputError, OutputFolder, write_json};
 
-/// Names of the result files.
-pub const FILES: &[&str] = &["in_time.json", "in_time.csv", "objects.csv"];
-
 /// Columns of the scores in files.
 const SCORES: [ScoreColumn<InTimeScores>; 8] = [
     ("iou_alone", |s| s.iou_alone),

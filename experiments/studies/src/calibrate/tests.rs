@@ -1,7 +1,7 @@
 //! What is put into a simulated recording is found in it.
 
 use super::{FittedReadout, SessionEstimates, SessionPair, fitted_profile};
-use crate::compare::{recorded_images, replay};
+use crate::compare::{recorded_image, replay};
 use approx::assert_abs_diff_eq;
 use spts_circuit::{Interpolated, Mode, Profile, Readout, Recording, Seeding};
 use spts_eval::protocol::PLATEAU;
@@ -91,7 +91,7 @@ fn the_profile_and_the_replay_have_the_weights_and_the_rate_of_the_recording() {
     // a base profile seeds with the addresses: the replay's weights are those of the recording all the same
     let mut addressed = fitted;
     addressed.seeding = Seeding::Address;
-    let images = recorded_images(&pair.compressive, &found, &addressed);
+    let images = |block| recorded_image(&pair.compressive, block, &found, &addressed);
     let twin = replay(&pair.compressive, &[1], &images, &addressed, Streams::new(1), 0).unwrap();
     let twin = SessionEstimates::of(&pair, &twin, &[1]).unwrap();
     // Φ of other weights would leave nearly the whole output, 3 V
