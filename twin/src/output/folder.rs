@@ -112,7 +112,9 @@ impl OutputFolder {
         check_ours(&self.folder, &self.shown)?;
         // from here on the stage may be the earlier results, which no signal may remove unseen
         if let Some(entry) = self.entry.take() {
-            entry.finish(|| put_in_place(&self.stage, &self.folder)).map_err(failed)?;
+            entry
+                .finish(|| put_in_place(&self.stage, &self.folder))
+                .map_err(failed)?;
         }
         self.stage.clear();
         self.made.keep();
