@@ -3,13 +3,14 @@
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseError, TestRunner};
 use spts_contact::Frame;
+use spts_input::Refusal;
 use spts_models::Grid;
 use spts_sim::World;
-use spts_sim::mechanics::{DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Timestep};
+use spts_sim::mechanics::{DropConfig, Mechanics, MechanicsConfig, PressConfig, Timestep};
 use std::cell::Cell;
 use std::path::Path;
 
-fn read(text: &str) -> Result<Mechanics, MechanicsError> {
+fn read(text: &str) -> Result<Mechanics, Refusal> {
     Mechanics::from_toml(text, Path::new(""))
 }
 

@@ -1,12 +1,13 @@
 //! Cost of one answer of each contact field: 60 × 60 cells, a sphere of 2208 triangles and a flat plate, pressed 3 mm
 //! and 0.5 mm deep. `moving` turns a little at every call, `still` comes again with the same pose. `shape` is the cost
-//! of one procedural shape of every family.
+//! of one procedural shape of every family. `press` is a raw solution of the peers' problem on one thread (E = 150 kPa,
+//! ν = 0.2, 20 N, 45 mm; Tamaas and aspher are raced on it by `scripts/oracles/speed.py`).
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use spts_contact::mesh::{TriMesh, sphere};
 use spts_contact::objects::by_name;
 use spts_contact::shapes::{SHAPE_FAMILIES, ShapeRanges};
-use spts_contact::{CONTACT_FIELDS, PosedMesh};
+use spts_contact::{CONTACT_FIELDS, ElasticKernel, ElasticSolver, PosedMesh};
 use spts_models::SkinLayout;
 use std::hint::black_box;
 
@@ -51,5 +52,42 @@ fn shape(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, respond, shape);
+const LENGTH_M: f64 = 0.045;
+
+fn heights(cells: u32, height: impl Fn(f64) -> f64) -> Vec<f64> {
+    let at = |i: u32| (f64::from(i) + 0.5 - 0.5 * f64::from(cells)) * LENGTH_M / f64::from(cells);
+    (0..cells * cells)
+        .map(|i| height(at(i % cells).hypot(at(i / cells))))
+        .collect()
+}
+
+fn elastic(c: &mut Criterion) {
+    let (modulus_pa, poisson) = (150e3, 0.2);
+    let layer = ElasticKernel::Layer {
+        modulus_pa,
+        poisson,
+        thickness_m: 6e-3,
+    };
+    let kernels = [
+        ("half_space", ElasticKernel::HalfSpace { modulus_pa, poisson }),
+        ("layer", layer),
+    ];
+    let mut group = c.benchmark_group("press");
+    for (name, kernel) in kernels {
+        for cells in [64_u32, 128, 256] {
+            let sphere = heights(cells, |r| r * r / (2.0 * 33.4e-3));
+            let punch = heights(cells, |r| if r <= 0.01 { 0.0 } else { f64::INFINITY });
+            let n = cells as usize;
+            let mut solver = ElasticSolver::new(kernel, [n, n], LENGTH_M / f64::from(cells));
+            for (shape, height_m) in [("sphere", &sphere), ("punch", &punch)] {
+                group.bench_function(format!("{name}/{shape}/{cells}"), |b| {
+                    b.iter(|| solver.press(black_box(height_m), 20.0, 5e-7));
+                });
+            }
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, respond, shape, elastic);
 criterion_main!(benches);

@@ -190,6 +190,42 @@ impl Patch {
         (rows[0]..rows[1]).map(move |row| row * grid_cols + cols[0]..row * grid_cols + cols[1])
     }
 
+    /// All of a grid of `[rows, cols]`.
+    pub(crate) fn whole([rows, cols]: [usize; 2]) -> Self {
+        Self {
+            rows: [0, rows],
+            cols: [0, cols],
+        }
+    }
+
+    /// Number of rows and columns.
+    pub(crate) fn shape(&self) -> [usize; 2] {
+        [self.height(), self.width()]
+    }
+
+    /// Whether all of `other` is in the patch.
+    pub(crate) fn holds(&self, other: Self) -> bool {
+        let holds = |own: [usize; 2], other: [usize; 2]| own[0] <= other[0] && other[1] <= own[1];
+        holds(self.rows, other.rows) && holds(self.cols, other.cols)
+    }
+
+    /// Smallest patch with every square for which `inside` holds, by its index in a grid of `grid_cols` columns; empty
+    /// if there is none.
+    pub(crate) fn shrunk(&self, grid_cols: usize, inside: impl Fn(usize) -> bool) -> Self {
+        let mut out = Self::default();
+        for (row, line) in (self.rows[0]..).zip(self.lines(grid_cols)) {
+            let mut found = line.filter(|square| inside(*square));
+            if let Some(first) = found.next() {
+                let last = found.next_back().unwrap_or(first);
+                out.include(Self {
+                    rows: [row, row + 1],
+                    cols: [first - row * grid_cols, last + 1 - row * grid_cols],
+                });
+            }
+        }
+        out
+    }
+
     /// Grows to the smallest rectangle that has `other` too.
     pub(crate) fn include(&mut self, other: Self) {
         if self.is_empty() {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, in_range, within};
+use spts_models::{SkinLayout, in_interval, in_range};
 
 /// Parameters of the foam and of friction on it, as the contact fields `winkler` and `footprint` take them from a
 /// scene. A missing one takes its value in [`Foam::default`].
@@ -47,18 +47,12 @@ impl Default for Foam {
 impl Foam {
     /// Checks the range of everything but the grid.
     pub(crate) fn check(&self) -> Result<(), Refusal> {
-        parameter(
-            "stiffness_pa_per_m",
-            self.stiffness_pa_per_m,
-            [1e4, 1e9],
-            "[1e4, 1e9] Pa/m",
-        )?;
-        parameter("thickness_m", self.thickness_m, [1e-4, 10.0], "[1e-4, 10] m")?;
-        parameter("damping_s", self.damping_s, [0.0, 0.02], "[0, 0.02] s")?;
-        parameter("max_strain", self.max_strain, [0.3, 1.0], "[0.3, 1]")?;
-        parameter("friction", self.friction, [0.0, 5.0], "[0, 5]")?;
-        let speed = self.friction_speed_m_per_s;
-        parameter("friction_speed_m_per_s", speed, [1e-6, 1.0], "[1e-6, 1] m/s")
+        parameter("stiffness_pa_per_m", self.stiffness_pa_per_m, "[1e4, 1e9] Pa/m")?;
+        parameter("thickness_m", self.thickness_m, "[1e-4, 10] m")?;
+        parameter("damping_s", self.damping_s, "[0, 0.02] s")?;
+        parameter("max_strain", self.max_strain, "[0.3, 1]")?;
+        parameter("friction", self.friction, "[0, 5]")?;
+        parameter("friction_speed_m_per_s", self.friction_speed_m_per_s, "[1e-6, 1] m/s")
     }
 
     /// Checks every range, for a grid over `skin` of at most `most` squares.
@@ -78,9 +72,9 @@ impl Foam {
     }
 }
 
-/// Checks that `contact.field` lies in `[low, high]`; `text` is that range with its unit.
-pub(crate) fn parameter(field: &str, value: f64, [low, high]: [f64; 2], text: &'static str) -> Result<(), Refusal> {
-    within(&format!("contact.{field}"), value, low, high, text)
+/// Checks that `contact.field` lies in `range`.
+pub(crate) fn parameter(field: &str, value: f64, range: &'static str) -> Result<(), Refusal> {
+    in_interval(&format!("contact.{field}"), value, range)
 }
 
 /// Most squares of a grid, and the range of their number as text.
@@ -90,7 +84,7 @@ pub(crate) type Most = (f64, &'static str);
 /// over `skin`.
 pub(crate) fn check_cells(skin: &SkinLayout, cells_per_taxel: usize, most: Most) -> Result<(), Refusal> {
     let cells = cells_per_taxel as f64;
-    parameter("cells_per_taxel", cells, [1.0, 64.0], "[1, 64]")?;
+    parameter("cells_per_taxel", cells, "[1, 64]")?;
     let count = skin.taxels() as f64 * cells * cells;
     in_range("rows × cols × contact.cells_per_taxel²", count, count <= most.0, most.1).map(drop)
 }

@@ -1,6 +1,6 @@
 //! A mesh prepared for contact fields.
 
-use crate::mesh::TriMesh;
+use crate::mesh::{TriMesh, span};
 use std::ops::{Deref, Range};
 use std::sync::Arc;
 
@@ -94,11 +94,7 @@ impl Sorted {
             self.push(triangles);
             return;
         }
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for (centre, _) in triangles.iter() {
-            low = [0, 1, 2].map(|k| low[k].min(centre[k]));
-            high = [0, 1, 2].map(|k| high[k].max(centre[k]));
-        }
+        let [low, high] = span(triangles.iter().map(|(centre, _)| *centre));
         let sides = [0, 1, 2].map(|k| high[k] - low[k]);
         let longest = (0..3).max_by(|&i, &j| sides[i].total_cmp(&sides[j])).unwrap_or(0);
         let middle = triangles.len() / 2;
@@ -122,11 +118,7 @@ impl Sorted {
             });
             self.triangles.push(local);
         }
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for p in &self.points_m[first_point..] {
-            low = [0, 1, 2].map(|k| low[k].min(p[k]));
-            high = [0, 1, 2].map(|k| high[k].max(p[k]));
-        }
+        let [low, high] = span(self.points_m[first_point..].iter().copied());
         self.blocks.push(Block {
             centre_m: [0, 1, 2].map(|k| 0.5 * (low[k] + high[k])),
             half_m: [0, 1, 2].map(|k| 0.5 * (high[k] - low[k])),

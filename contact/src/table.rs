@@ -77,7 +77,7 @@ pub fn build_contact_from(
     build(parameters, skin)
 }
 
-/// What every contact field of the table must have: the force balances the pressure, there is no tension, there is no
+/// What every contact field of the table must have: force and torque balance the pressure, there is no tension, there is no
 /// force without touch, the force is finite and grows with depth, earlier calls change no answer, friction opposes
 /// sliding, there is no pressure beside the skin, a pose or velocity that is not finite gives NaN, and `parameters`
 /// rebuild the same contact field.
@@ -85,11 +85,13 @@ pub fn build_contact_from(
 mod tests {
     use super::*;
     use crate::field::PosedMesh;
-    use crate::mesh::TriMesh;
+    use crate::mesh::{TriMesh, cuboid, sphere};
+    use proptest::prelude::*;
+    use proptest::test_runner::RngSeed;
 
     /// A 40 × 30 × 10 mm block whose underside rises by 1 mm along x: pressure, torque and a partial contact.
     fn wedge() -> TriMesh {
-        let block = crate::mesh::cuboid([0.04, 0.03, 0.01]);
+        let block = cuboid([0.04, 0.03, 0.01]);
         block.mapped(|[x, y, z]| if z > 0.0 { [x, y, z] } else { [x, y, 0.025 * (x + 0.02)] })
     }
 
@@ -118,27 +120,11 @@ mod tests {
         let skin = SkinLayout::default();
         let make = |table| build(table, &skin).unwrap();
         let mut field = make(toml::Table::new());
-        let cells = field.cells_per_taxel();
-        let area_m2 = (skin.pitch_m() / cells as f64).powi(2);
         let mesh = wedge();
         let poses = poses(&mesh);
         let mut last_n = 0.0;
         for body in &poses {
-            let response = field.respond(body);
-            let (wrench, pressure_pa) = (response.wrench, response.pressure_pa);
-            assert_eq!(pressure_pa.len(), skin.taxels() * cells * cells, "{name}");
-            let parts = wrench.force_n.iter().chain(&wrench.torque_nm);
-            assert!(pressure_pa.iter().all(|p| *p >= 0.0), "{name}: tension");
-            assert!(
-                pressure_pa.iter().chain(parts).all(|v| v.is_finite()),
-                "{name}: {wrench:?}"
-            );
-            // sums of the same numbers in another order
-            let (normal_n, sum_n) = (wrench.force_n[2], pressure_pa.iter().sum::<f64>() * area_m2);
-            assert!(
-                (normal_n - sum_n).abs() <= 1e-9 * sum_n,
-                "{name}: {normal_n} N, Σ p A = {sum_n} N"
-            );
+            let (normal_n, _) = sound(name, field.as_mut(), body, &skin);
             if body.velocity_m_per_s.iter().all(|v| v.abs() <= 0.0) {
                 assert!(
                     normal_n >= last_n,
@@ -172,6 +158,149 @@ mod tests {
             b.map(f64::to_bits),
             "{name}: parameters build another field"
         );
+    }
+
+    /// Answers with finite numbers, no tension and nothing outside the patch; force and torque are those of the pressure
+    /// (sums of the same numbers in another order; friction has a torque of its own). The force, N, and the cells under
+    /// pressure.
+    fn sound(name: &str, field: &mut dyn ContactField, body: &PosedMesh<'_>, skin: &SkinLayout) -> (f64, usize) {
+        let cells = field.cells_per_taxel();
+        let (rows, cols) = (skin.rows() * cells, skin.cols() * cells);
+        let cell_m = skin.pitch_m() / cells as f64;
+        let response = field.respond(body);
+        let (wrench, pressure_pa) = (response.wrench, response.pressure_pa);
+        assert_eq!(pressure_pa.len(), rows * cols, "{name}");
+        let parts = wrench.force_n.iter().chain(&wrench.torque_nm);
+        assert!(pressure_pa.iter().all(|p| *p >= 0.0), "{name}: tension");
+        assert!(
+            pressure_pa.iter().chain(parts).all(|v| v.is_finite()),
+            "{name}: {wrench:?}"
+        );
+        let at = |i: usize, n: usize| (i as f64 + 0.5 - 0.5 * n as f64) * cell_m;
+        let (mut force_n, mut torque_nm) = (0.0, [0.0; 2]);
+        for (i, p) in pressure_pa.iter().enumerate() {
+            let (x, y) = (at(i % cols, cols), -at(i / cols, rows));
+            let arm = [y - body.centre_of_mass_m[1], body.centre_of_mass_m[0] - x];
+            let part_n = p * cell_m * cell_m;
+            force_n += part_n;
+            torque_nm = [0, 1].map(|k| torque_nm[k] + arm[k] * part_n);
+        }
+        let size_nm = force_n * (rows + cols) as f64 * cell_m;
+        let near = |a: f64, b: f64, size: f64| (a - b).abs() <= 1e-9 * size;
+        assert!(
+            near(wrench.force_n[2], force_n, force_n),
+            "{name}: {wrench:?}, Σ p A = {force_n} N"
+        );
+        let moves = body.velocity_m_per_s.iter().chain(&body.angular_velocity_rad_per_s);
+        if moves.copied().all(|v| v == 0.0) {
+            for (found_nm, sum_nm) in wrench.torque_nm.into_iter().zip(torque_nm) {
+                assert!(
+                    near(found_nm, sum_nm, size_nm),
+                    "{name}: {wrench:?}, Σ p A r = {torque_nm:?} N m"
+                );
+            }
+        }
+        if let Some(patch) = response.patch {
+            let inside: f64 = patch.lines(cols).flat_map(|line| &pressure_pa[line]).sum();
+            assert!(
+                near(inside * cell_m * cell_m, force_n, force_n),
+                "{name}: outside {patch:?}"
+            );
+        }
+        (wrench.force_n[2], pressure_pa.iter().filter(|p| **p > 0.0).count())
+    }
+
+    /// One cell a taxel, and the parameters that a field of the table takes.
+    fn coarse(name: &str, thickness_m: f64, poisson: f64) -> toml::Table {
+        let mut table = toml::toml! { cells_per_taxel = 1 };
+        table.insert("thickness_m".to_owned(), thickness_m.into());
+        if ["layer", "half_space"].contains(&name) {
+            table.insert("poisson".to_owned(), poisson.into());
+        }
+        table
+    }
+
+    /// One taxel, a small square and a strip, of 0.1 mm, 15 mm and 0.1 m, thicknesses from 0.1 mm to 10 m: a ball that
+    /// touches one cell, presses, drowns and lies beside the skin, and a plate over everything. Up to 1000 cells of 1000
+    /// thicknesses.
+    #[test]
+    fn any_skin() {
+        let squares = [(1, 1, 1e-4), (1, 1, 0.1), (5, 7, 1e-4), (5, 7, 0.1), (5, 7, 3e-3)];
+        let strips = [(1, 1000, 15e-3), (1, 1000, 1e-4)];
+        for (rows, cols, pitch_m) in squares.into_iter().chain(strips) {
+            let skin = SkinLayout::new(rows, cols, pitch_m, 0.5 * pitch_m).unwrap();
+            for (thickness_m, poisson) in [(1e-4, 0.49), (6e-3, 0.2), (10.0, 0.0)] {
+                for (name, build) in CONTACT_FIELDS {
+                    let mut field = build(coarse(name, thickness_m, poisson), &skin).unwrap();
+                    any_body(name, field.as_mut(), &skin);
+                }
+            }
+        }
+    }
+
+    fn any_body(name: &str, field: &mut dyn ContactField, skin: &SkinLayout) {
+        let pitch_m = skin.pitch_m();
+        let ball = sphere(pitch_m.min(0.05), 8, 12);
+        // the lowest vertex on a cell's centre
+        let even = skin.cols().is_multiple_of(2);
+        let x_m = if even { 0.5 * pitch_m } else { 0.0 };
+        let at = |z| PosedMesh::at_rest(&ball, [x_m, 0.0, z]);
+        assert!(sound(name, field, &at(1e-9), skin).0 <= 0.0);
+        let (force_n, loaded) = sound(name, field, &at(-1e-3 * pitch_m), skin);
+        assert!(
+            force_n > 0.0 && loaded == 1,
+            "{name}: {force_n} N on {loaded} cells of {pitch_m} m"
+        );
+        for depth_m in [0.5 * pitch_m, 10.0] {
+            assert!(sound(name, field, &at(-depth_m), skin).0 > 0.0);
+        }
+        let beside = PosedMesh::at_rest(&ball, [1e3 * pitch_m, 0.0, -1e-3 * pitch_m]);
+        assert!(sound(name, field, &beside, skin).0 <= 0.0);
+        let plate = cuboid([2e3 * pitch_m, 20.0 * pitch_m, pitch_m]);
+        let flooding = PosedMesh::at_rest(&plate, [0.0, 0.0, -1e-2 * pitch_m]);
+        let (force_n, loaded) = sound(name, field, &flooding, skin);
+        assert!(
+            force_n > 0.0 && loaded == skin.taxels(),
+            "{name}: {force_n} N on {loaded} cells"
+        );
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::with_cases(48) })]
+        /// Soups of triangles, many of them without area, in any pose and motion; then again, from memory.
+        #[test]
+        fn any_soup(
+            points in prop::collection::vec(prop::array::uniform3(-0.05..0.05_f64), 3..12),
+            picks in prop::collection::vec(prop::array::uniform3(0..12_usize), 1..20),
+            q in prop::array::uniform4(-1.0..1.0_f64),
+            position in prop::array::uniform3(-0.08..0.08_f64),
+            velocity in prop::array::uniform3(-5.0..5.0_f64),
+            spin in prop::array::uniform3(-50.0..50.0_f64),
+            poisson in 0.0..0.49_f64,
+            flat in prop::bool::ANY,
+        ) {
+            let n = points.len();
+            let mesh = TriMesh {
+                vertices: points.iter().map(|p| if flat { [p[0], p[1], 0.0] } else { *p }).collect(),
+                triangles: picks.iter().map(|t| t.map(|i| u32::try_from(i % n).unwrap())).collect(),
+            };
+            let skin = SkinLayout::new(8, 8, 15e-3, 7.5e-3).unwrap();
+            let turn = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0] + 1.1, q[1], q[2], q[3]));
+            let body = PosedMesh {
+                rotation: turn.to_rotation_matrix().matrix().transpose().into(),
+                velocity_m_per_s: velocity,
+                angular_velocity_rad_per_s: spin,
+                ..PosedMesh::at_rest(&mesh, position)
+            };
+            for (name, build) in CONTACT_FIELDS {
+                let mut table = coarse(name, 6e-3, poisson);
+                table.insert("cells_per_taxel".to_owned(), 2.into());
+                let mut field = build(table, &skin).unwrap();
+                for _ in 0..2 {
+                    sound(name, field.as_mut(), &body, &skin);
+                }
+            }
+        }
     }
 
     /// The first answer of a fresh field, its second and that of a used one.

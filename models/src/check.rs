@@ -45,6 +45,43 @@ pub fn within(field: &str, value: f64, least: f64, most: f64, range: &'static st
     in_range(field, value, (least..=most).contains(&value), range).map(drop)
 }
 
+/// Checks that `value` lies in `interval`, written as in an error: "[0.5, 100] N", "(0, 1]" or "(0, ∞)".
+///
+/// ```
+/// use spts_models::in_interval;
+///
+/// assert!(in_interval("press.force_n", 20.0, "[0.5, 100] N").is_ok());
+/// let error = in_interval("press.scale", 0.0, "(0, 1000]").unwrap_err();
+/// assert_eq!(error.to_string(), "`press.scale` = 0 is outside (0, 1000]");
+/// ```
+///
+/// # Errors
+/// [`Refusal`] if `value` is outside the interval, or NaN.
+pub fn in_interval(field: &str, value: f64, interval: &'static str) -> Result<(), Refusal> {
+    in_range(field, value, holds(interval, value) == Some(true), interval).map(drop)
+}
+
+/// Whether `interval` holds `value`; `None` for a text that is no interval.
+fn holds(interval: &str, value: f64) -> Option<bool> {
+    let number = |text: &str| {
+        if text == "∞" {
+            Some(f64::INFINITY)
+        } else {
+            text.parse().ok()
+        }
+    };
+    let (low, rest) = interval.get(1..)?.split_once(", ")?;
+    let (high, _) = rest.split_once([')', ']'])?;
+    let closed = rest[high.len()..].starts_with(']');
+    let (low, high): (f64, f64) = (number(low)?, number(high)?);
+    let above = if interval.starts_with('[') {
+        value >= low
+    } else {
+        value > low
+    };
+    Some(above && if closed { value <= high } else { value < high })
+}
+
 /// Names the section of a TOML file in an error about one of its keys. `message` is the error as the section's reader
 /// gives it; the result is one line.
 ///
@@ -167,7 +204,26 @@ mod tests {
         assert_eq!(in_section("adc", "unknown field\nhere\n"), "`adc`: unknown field; here");
     }
 
-    #[derive(Debug, Deserialize)]
+    #[test]
+    fn an_interval_is_what_its_text_says() {
+        for (interval, inside, outside) in [
+            ("[1e-3, 4] kg", [1e-3, 4.0], [0.999e-3, 4.001]),
+            ("(-1, 1)", [-0.999, 0.999], [-1.0, 1.0]),
+            ("(0, ∞)", [1e-300, 1e300], [0.0, f64::INFINITY]),
+            ("[-5, 5]", [-5.0, 5.0], [f64::NAN, f64::NEG_INFINITY]),
+        ] {
+            assert!(
+                inside.iter().all(|v| in_interval("x", *v, interval).is_ok()),
+                "{interval}"
+            );
+            assert!(
+                outside.iter().all(|v| in_interval("x", *v, interval).is_err()),
+                "{interval}"
+            );
+        }
+    }
+
+    #[derive(Debug, Default, Deserialize)]
     #[serde(deny_unknown_fields, default)]
     struct Fields {
         share: f64,
@@ -176,19 +232,6 @@ mod tests {
         pair: [f64; 2],
         list: Vec<u8>,
         inner: Inner,
-    }
-
-    impl Default for Fields {
-        fn default() -> Self {
-            Self {
-                share: 0.0,
-                name: String::new(),
-                on: false,
-                pair: [0.0; 2],
-                list: Vec::new(),
-                inner: Inner::default(),
-            }
-        }
     }
 
     #[derive(Debug, Default, Deserialize)]

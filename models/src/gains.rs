@@ -1,6 +1,6 @@
 //! Known gains of the taxels of one skin.
 
-use crate::check::{explain_toml, in_range, within};
+use crate::check::{explain_toml, in_interval, in_range};
 use crate::layout::SkinLayout;
 use crate::streams::Streams;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -53,9 +53,9 @@ impl TaxelGains {
     /// # Errors
     /// [`Refusal`] for another number of values than `taxels`, or for the first value outside its range.
     pub fn check(&self, taxels: usize) -> Result<(), Refusal> {
-        for (field, values, least, most, range) in [
-            ("log_mean", &self.log_mean, -5.0, 5.0, "[-5, 5]"),
-            ("log_sd", &self.log_sd, 0.0, 2.0, "[0, 2]"),
+        for (field, values, range) in [
+            ("log_mean", &self.log_mean, "[-5, 5]"),
+            ("log_sd", &self.log_sd, "[0, 2]"),
         ] {
             let count = values.len();
             in_range(
@@ -65,10 +65,10 @@ impl TaxelGains {
                 "what a skin needs: one value a taxel",
             )?;
             for (taxel, &value) in values.iter().enumerate() {
-                within(&format!("gains.{field}[{taxel}]"), value, least, most, range)?;
+                in_interval(&format!("gains.{field}[{taxel}]"), value, range)?;
             }
         }
-        within("gains.mounting_log_sd", self.mounting_log_sd, 0.0, 2.0, "[0, 2]")
+        in_interval("gains.mounting_log_sd", self.mounting_log_sd, "[0, 2]")
     }
 
     /// Checks all values, and that they belong to `skin`.
@@ -124,7 +124,7 @@ impl Spread {
     /// # Errors
     /// [`Refusal`] for a value outside its range.
     pub(crate) fn new(field: &str, log_sd: f64) -> Result<Self, Refusal> {
-        within(field, log_sd, 0.0, 2.0, "[0, 2]")?;
+        in_interval(field, log_sd, "[0, 2]")?;
         Ok(Self { log_sd })
     }
 

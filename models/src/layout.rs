@@ -1,6 +1,6 @@
 //! Geometry of the skin.
 
-use crate::check::{in_range, within};
+use crate::check::{in_interval, in_range};
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
 use std::marker::PhantomData;
@@ -15,11 +15,6 @@ pub struct SkinLayout {
     pitch_m: f64,
     electrode_m: f64,
 }
-
-/// Smallest pitch, m: below a micrometre a sheet of carbon-filled film is no continuum.
-const MIN_PITCH_M: f64 = 1e-6;
-/// Largest pitch, m: beyond it the arm's reach ends within a taxel.
-const MAX_PITCH_M: f64 = 1.0;
 
 /// Most taxels a skin may have.
 const MAX_TAXELS: usize = 1 << 24;
@@ -82,7 +77,8 @@ impl SkinLayout {
         in_range("cols", cols as f64, cols > 0, "[1, ∞)")?;
         let taxels = rows.saturating_mul(cols);
         in_range("rows × cols", taxels as f64, taxels <= MAX_TAXELS, "[1, 2^24]")?;
-        within("pitch_m", pitch_m, MIN_PITCH_M, MAX_PITCH_M, "[1e-6, 1] m")?;
+        // below a micrometre a sheet of carbon-filled film is no continuum; beyond a metre the arm's reach ends in a taxel
+        in_interval("pitch_m", pitch_m, "[1e-6, 1] m")?;
         in_range(
             "electrode_m",
             electrode_m,

@@ -18,7 +18,7 @@
 //!     velostat.rest(10.0);
 //! }
 //! assert!(conductance.values()[42] > 0.0);
-//! # Ok::<(), spts_models::TransducerError>(())
+//! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
 mod check;
@@ -30,19 +30,14 @@ mod streams;
 mod transducer;
 mod transducers;
 
-pub use check::{explain_toml, in_range, in_section, parsed, within};
+pub use check::{explain_toml, in_interval, in_range, in_section, parsed, within};
 pub use conformance::check_transducer;
 pub use gains::TaxelGains;
 pub use layout::{ConductanceMap, Grid, Pascal, PressureMap, Siemens, SkinLayout};
-pub use memory::{
-    Conditioning, ConditioningConfig, Creep, CreepConfig, CreepDecays, CreepKind, Hysteresis, HysteresisConfig, Presses,
-};
+pub use memory::{Conditioning, Creep, CreepConfig, CreepDecays, CreepKind, Hysteresis, HysteresisConfig, Presses};
 pub use streams::Streams;
 pub use transducer::Transducer;
 pub use transducers::{
-    BuildTransducer, Linear, LinearConfig, REFERENCE_C, REFERENCE_PA, TRANSDUCERS, TransducerError, Velostat,
-    VelostatConfig, build_transducer,
+    BuildTransducer, Linear, LinearConfig, REFERENCE_C, REFERENCE_PA, TRANSDUCERS, Velostat, VelostatConfig,
+    build_transducer,
 };
-
-/// The error of a parameter outside its range.
-pub type ConfigError = spts_input::Refusal;

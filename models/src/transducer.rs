@@ -21,7 +21,7 @@ use crate::layout::{ConductanceMap, PressureMap};
 /// sheet.step(&pressure, 0.01, &mut early);
 /// sheet.step(&pressure, 1.0, &mut late);
 /// assert!(late.sum() > early.sum(), "Velostat creeps under a constant pressure");
-/// # Ok::<(), spts_models::TransducerError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 pub trait Transducer: Send + Sync {
     /// Advances the state by `dt_s` seconds under `pressure`, Pa, and writes the conductance at the end of the step, S,

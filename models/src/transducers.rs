@@ -12,23 +12,6 @@ use crate::streams::Streams;
 use crate::transducer::{OnElectrode, Transducer};
 use spts_input::Refusal;
 
-/// Why a transducer cannot be built.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum TransducerError {
-    /// Parameters that cannot be read, a value outside its range, or gains that do not belong to the skin.
-    #[error(transparent)]
-    Refused(#[from] Refusal),
-    /// A name that is not in the table.
-    #[error("`{name}` is not a transducer; known: {known}")]
-    Unknown {
-        /// Name asked for.
-        name: String,
-        /// All known names.
-        known: String,
-    },
-}
-
 /// Builds a transducer for a skin from its parameters. `streams` determine what differs from skin to skin. The
 /// conductance is that of electrodes of 10 mm × 10 mm, whatever the skin has: [`build_transducer`] scales it.
 pub type BuildTransducer = fn(toml::Table, &SkinLayout, Streams) -> Result<Box<dyn Transducer>, Refusal>;
@@ -57,19 +40,18 @@ pub const TRANSDUCERS: &[(&str, BuildTransducer)] = &[
 /// ```
 ///
 /// # Errors
-/// [`TransducerError`] for an unknown name, or parameters that the transducer refuses.
+/// [`Refusal`] for an unknown name, or parameters that the transducer refuses.
 pub fn build_transducer(
     name: &str,
     parameters: toml::Table,
     skin: &SkinLayout,
     streams: Streams,
-) -> Result<Box<dyn Transducer>, TransducerError> {
+) -> Result<Box<dyn Transducer>, Refusal> {
     let Some((_, build)) = TRANSDUCERS.iter().find(|(known, _)| *known == name) else {
         let known: Vec<_> = TRANSDUCERS.iter().map(|(known, _)| *known).collect();
-        return Err(TransducerError::Unknown {
-            name: name.to_owned(),
-            known: known.join(", "),
-        });
+        let known = known.join(", ");
+        let why = format!("`transducer` = \"{name}\" is not a transducer; known: {known}");
+        return Err(Refusal::new(why));
     };
     let transducer = build(parameters, skin, streams)?;
     Ok(OnElectrode::wrap(transducer, skin.relative_area()))
@@ -93,23 +75,11 @@ mod tests {
         assert!(build("velostat", "exponnt = 0.4").contains("exponnt"));
         assert!(build("velostat", "creep.kind = 'burgers'").contains("`log` or `prony`"));
         assert!(build("velostat", "creep.shares = [0.1]").contains("creep.tau_s (length)"));
-        for text in [
-            "exponent = nan",
-            "reference_s = -1.0",
-            "saturation_pa = inf",
-            "creep.fast_s = nan",
-            "creep.fast_fall_s = 2.0",
-            "creep.instant = -0.1",
-            "creep.start_s = 1e9",
-            "creep.shares = [0.1, nan, 0.1]",
-            "creep.shares = [0.1, -0.01, 0.1]",
-            "creep.tau_s = [1.0, 0.0, 2.0]",
-            "session_log_sd = nan",
-            "temperature_c = 70.0",
-            "resistance_per_k = 0.1",
-            "conditioning.first = 0.0",
-            "hysteresis.width = 0.5",
-        ] {
+        let outside = "exponent = nan; reference_s = -1.0; saturation_pa = inf; creep.fast_s = nan; \
+            creep.fast_fall_s = 2.0; creep.instant = -0.1; creep.start_s = 1e9; creep.shares = [0.1, nan, 0.1]; \
+            creep.shares = [0.1, -0.01, 0.1]; creep.tau_s = [1.0, 0.0, 2.0]; session_log_sd = nan; temperature_c = 70.0; \
+            resistance_per_k = 0.1; conditioning.first = 0.0; hysteresis.width = 0.5";
+        for text in outside.split("; ") {
             let field = text.split(' ').next().unwrap();
             let message = build("velostat", text);
             assert!(

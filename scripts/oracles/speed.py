@@ -10,7 +10,7 @@ machine, so that others at work do not favour short solutions.
     python scripts/oracles/speed.py [--json] [--rounds 5] [--cells 64 128 256]
 
 Ours is the example `elastic_time`, timed as a process of many repeats less a process of one. The T by ours, cold and warm:
-`cargo bench -p spts-contact --bench elastic -- T/`.
+`cargo bench -p spts-contact --bench contact -- respond/`.
 """
 
 import peers
@@ -45,15 +45,13 @@ class Ours:
     name = "ours"
 
     def __init__(self, n, shape):
-        self.arguments = ["--model", "half_space", "--shape", shape, "--cells", n, "--length-m", LENGTH_M]
-        self.arguments += ["--force-n", FORCE_N, "--modulus-pa", MODULUS_PA, "--poisson", POISSON]
+        self.arguments = [shape, n, LENGTH_M, FORCE_N, MODULUS_PA, POISSON]
         self.n = n
 
     def run(self, tolerance, repeats=1, dump=None):
-        command = [OURS, *self.arguments, "--tolerance", tolerance, "--repeats", repeats]
-        command += ["--dump", dump] if dump else []
-        text = subprocess.run(list(map(str, command)), check=True, capture_output=True, text=True).stdout
-        return json.loads(text)
+        command = [OURS, *self.arguments, tolerance, repeats]
+        command += [dump] if dump else []
+        subprocess.run(list(map(str, command)), check=True)
 
     def pressure(self, tolerance):
         with tempfile.NamedTemporaryFile() as file:

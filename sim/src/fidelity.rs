@@ -20,42 +20,28 @@ pub struct FidelityLevel {
 
 /// Every fidelity level, the cheapest first. The last but one is the reference.
 pub const LEVELS: &[FidelityLevel] = &[
-    FidelityLevel {
-        name: "footprint",
-        label: "columns, at rest",
-        model: "footprint",
-        coupled: None,
-        dynamic: false,
-    },
-    FidelityLevel {
-        name: "winkler",
-        label: "columns",
-        model: "winkler",
-        coupled: None,
-        dynamic: true,
-    },
-    FidelityLevel {
-        name: "layer_after",
-        label: "layer, frames only",
-        model: "layer",
-        coupled: Some(false),
-        dynamic: true,
-    },
-    FidelityLevel {
-        name: "layer",
-        label: "layer",
-        model: "layer",
-        coupled: Some(true),
-        dynamic: true,
-    },
-    FidelityLevel {
-        name: "half_space",
-        label: "half-space",
-        model: "half_space",
-        coupled: Some(true),
-        dynamic: true,
-    },
+    level("footprint", "columns, at rest", "footprint", None, false),
+    level("winkler", "columns", "winkler", None, true),
+    level("layer_after", "layer, frames only", "layer", Some(false), true),
+    level("layer", "layer", "layer", Some(true), true),
+    level("half_space", "half-space", "half_space", Some(true), true),
 ];
+
+const fn level(
+    name: &'static str,
+    label: &'static str,
+    model: &'static str,
+    coupled: Option<bool>,
+    dynamic: bool,
+) -> FidelityLevel {
+    FidelityLevel {
+        name,
+        label,
+        model,
+        coupled,
+        dynamic,
+    }
+}
 
 /// Name of the level with which the others are compared.
 pub const REFERENCE: &str = "layer";
@@ -215,18 +201,12 @@ mod tests {
     fn row(scene: &str, level: &str, cells_per_taxel: usize, cost: f64, error: f64) -> MeasuredSetting {
         MeasuredSetting {
             scene: scene.to_owned(),
-            task: "press".to_owned(),
             level: level.to_owned(),
-            cells: String::new(),
             cells_per_taxel,
             timestep_s: 5e-4,
-            cost_us_per_step: cost * 500.0,
             cost_s_per_s: cost,
-            pressure_rms_rel: error,
             taxel_rms_rel: error,
-            support_delta: 0.0,
-            iou_delta: 0.0,
-            class_delta: 0.0,
+            ..measured().iter().find(|row| row.task == "press").unwrap().clone()
         }
     }
 

@@ -1,6 +1,6 @@
 //! Quasi-static contact: the pose in which the columns carry a load, without time steps.
 
-use super::winkler::{MAX_CELLS, PreloadedRow, WinklerLayer};
+use super::winkler::{MAX_CELLS, WinklerLayer};
 use crate::field::{
     Balance, ContactField, EquilibriumError, Holder, Load, Patch, PosedMesh, QuasiStatic, Response, Seat, Wrench,
     depth_limit_m,
@@ -50,30 +50,19 @@ impl Row {
         self.slope_pa_per_m.resize(width, 0.0);
     }
 
-    /// Pressures at the depths drop − base − height + turn · arm.
+    /// Pressures of the `law` of every cell at the depths drop − base − height + turn · arm.
     #[inline]
-    pub(super) fn press(&mut self, task: &Task<'_>, height_m: f64, turn_rad: f64, drop_m: &[f64]) {
-        let cells = self.pressure_pa.iter_mut().zip(&mut self.slope_pa_per_m);
-        for (((p, s), drop_m), arm_m) in cells.zip(drop_m).zip(&self.arm_m) {
-            let depth_m = (drop_m - task.base_m) - height_m + turn_rad * arm_m;
-            (*p, *s) = task.law.pressure_and_slope(depth_m);
-        }
-    }
-
-    /// The same where the foam is under preload.
-    #[inline]
-    pub(super) fn press_preloaded(
+    pub(super) fn press(
         &mut self,
-        task: &Task<'_>,
-        height_m: f64,
-        turn_rad: f64,
+        base_m: f64,
+        [height_m, turn_rad]: [f64; 2],
         drop_m: &[f64],
-        preload: &PreloadedRow<'_>,
+        law: impl Fn(usize, f64) -> (f64, f64),
     ) {
         let cells = self.pressure_pa.iter_mut().zip(&mut self.slope_pa_per_m);
         for (k, (((p, s), drop_m), arm_m)) in cells.zip(drop_m).zip(&self.arm_m).enumerate() {
-            let depth_m = (drop_m - task.base_m) - height_m + turn_rad * arm_m;
-            (*p, *s) = preload.pressure_and_slope(k, &task.law, depth_m);
+            let depth_m = (drop_m - base_m) - height_m + turn_rad * arm_m;
+            (*p, *s) = law(k, depth_m);
         }
     }
 }
@@ -181,11 +170,15 @@ impl Footprint {
             let ry = self.layer.envelope.centre_m(i, 0)[1] - py;
             let height_m = state[0] + state[1] * ry;
             let start = i * width + patch.cols[0];
+            let seat = [height_m, state[2]];
             match &self.layer.preload {
-                None => row.press(task, height_m, state[2], drops),
+                None => row.press(task.base_m, seat, drops, |_, depth_m| {
+                    task.law.pressure_and_slope(depth_m)
+                }),
                 Some(preload) => {
                     let preload = preload.row(start..start + drops.len(), task.body_pa_per_m);
-                    row.press_preloaded(task, height_m, state[2], drops, &preload);
+                    let law = |k, depth_m| preload.pressure_and_slope(k, &task.law, depth_m);
+                    row.press(task.base_m, seat, drops, law);
                 }
             }
             let (p, s) = (&row.pressure_pa, &row.slope_pa_per_m);
@@ -423,11 +416,8 @@ fn seated(body: &PosedMesh<'_>, load: &Load, seat: &Seat) -> ([[f64; 3]; 3], [f6
     let [x, y, z] = body.position_m;
     let centre = Vector3::from(body.centre_of_mass_m) - Vector3::new(x, y, z);
     let position = pivot + turn * (Vector3::new(x, y, seat.height_m) - pivot);
-    (
-        std::array::from_fn(|i| std::array::from_fn(|j| rotation[(i, j)])),
-        position.into(),
-        (position + turn * centre).into(),
-    )
+    let centre_m = position + turn * centre;
+    (rotation.transpose().into(), position.into(), centre_m.into())
 }
 
 impl ContactField for Footprint {

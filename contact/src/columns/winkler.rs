@@ -35,7 +35,7 @@ use spts_models::SkinLayout;
 pub struct WinklerLayer {
     config: Foam,
     pub(super) envelope: Envelope,
-    pub(super) pressure_pa: Vec<f64>,
+    pub(crate) pressure_pa: Vec<f64>,
     pub(super) patch: Patch,
     /// Initial compression of the columns, if there is any.
     pub(super) preload: Option<Preload>,

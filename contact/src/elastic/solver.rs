@@ -65,82 +65,42 @@ fn computed(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Tables {
 
 // One resolution of the solver: coefficients, operators by size, and fields.
 
-/// Half-open rectangle of cells inside a patch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Window {
-    pub(crate) first: [usize; 2],
-    pub(crate) end: [usize; 2],
-}
-
-impl Window {
-    pub(crate) fn whole(shape: [usize; 2]) -> Self {
+/// Patches that are solved on: windows of the cells of another patch.
+impl Patch {
+    /// Window whose sides are multiples of [`ROUND`] cells, as far as the patch of `shape` goes: contacts that grow need
+    /// few operators.
+    pub(crate) fn rounded(&self, [rows, cols]: [usize; 2]) -> Self {
+        let rounded = |[first, end]: [usize; 2], most: usize| {
+            let side = (end - first).next_multiple_of(ROUND);
+            let end = (first + side).min(most);
+            // what does not fit at the end goes before the beginning
+            [end.saturating_sub(side).min(first), end]
+        };
         Self {
-            first: [0, 0],
-            end: shape,
+            rows: rounded(self.rows, rows),
+            cols: rounded(self.cols, cols),
         }
     }
 
-    pub(crate) fn shape(&self) -> [usize; 2] {
-        [self.end[0] - self.first[0], self.end[1] - self.first[1]]
-    }
-
-    pub(crate) fn cells(&self) -> usize {
-        let [rows, cols] = self.shape();
-        rows * cols
-    }
-
-    /// Window whose sides are multiples of [`ROUND`] cells, as far as the patch goes: contacts that grow need few
-    /// operators.
-    pub(crate) fn rounded(&self, shape: [usize; 2]) -> Self {
-        let sides = self.shape();
-        let end = [0, 1].map(|i| (self.first[i] + sides[i].next_multiple_of(ROUND)).min(shape[i]));
-        // what does not fit at the end goes before the beginning
-        let first = [0, 1].map(|i| {
-            end[i]
-                .saturating_sub(sides[i].next_multiple_of(ROUND))
-                .min(self.first[i])
-        });
-        Self { first, end }
-    }
-
-    /// Smallest window with every cell for which `inside(cell)`; `None` when there is none.
-    pub(crate) fn around([rows, cols]: [usize; 2], inside: impl Fn(usize) -> bool) -> Option<Self> {
-        let (mut first, mut end) = ([rows, cols], [0, 0]);
-        for r in 0..rows {
-            for c in 0..cols {
-                if inside(r * cols + c) {
-                    first = [first[0].min(r), first[1].min(c)];
-                    end = [end[0].max(r + 1), end[1].max(c + 1)];
-                }
-            }
+    /// Window with `margin` more cells on every side, as far as the patch of `shape` goes.
+    fn grown(&self, margin: usize, [rows, cols]: [usize; 2]) -> Self {
+        let grown = |[first, end]: [usize; 2], most: usize| [first.saturating_sub(margin), (end + margin).min(most)];
+        Self {
+            rows: grown(self.rows, rows),
+            cols: grown(self.cols, cols),
         }
-        (end[0] > 0).then_some(Self { first, end })
-    }
-
-    /// Window with `margin` more cells on every side, as far as the patch goes.
-    pub(crate) fn grown(&self, margin: usize, shape: [usize; 2]) -> Self {
-        let first = self.first.map(|i| i.saturating_sub(margin));
-        let end = [0, 1].map(|i| (self.end[i] + margin).min(shape[i]));
-        Self { first, end }
-    }
-
-    /// Ranges of the window's rows in a patch `cols` wide.
-    pub(crate) fn lines(self, cols: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
-        (self.first[0]..self.end[0]).map(move |r| r * cols + self.first[1]..r * cols + self.end[1])
     }
 
     /// Copies the window out of a patch `cols` wide.
-    pub(crate) fn cut(self, patch: &[f64], cols: usize, out: &mut [f64]) {
-        let width = self.shape()[1];
-        for (line, out) in self.lines(cols).zip(out.chunks_exact_mut(width)) {
+    fn cut(self, patch: &[f64], cols: usize, out: &mut [f64]) {
+        for (line, out) in self.lines(cols).zip(out.chunks_exact_mut(self.width())) {
             out.copy_from_slice(&patch[line]);
         }
     }
 
     /// Copies the window's cells into a patch `cols` wide.
-    pub(crate) fn paste(self, cells: &[f64], patch: &mut [f64], cols: usize) {
-        let width = self.shape()[1];
-        for (line, cells) in self.lines(cols).zip(cells.chunks_exact(width)) {
+    fn paste(self, cells: &[f64], patch: &mut [f64], cols: usize) {
+        for (line, cells) in self.lines(cols).zip(cells.chunks_exact(self.width())) {
             patch[line].copy_from_slice(cells);
         }
     }
@@ -167,7 +127,7 @@ pub(crate) struct Level {
     /// C · pressure where it was solved for, 0 elsewhere.
     pub(crate) displacement: Vec<f64>,
     /// Where the displacement is known.
-    known: Window,
+    known: Patch,
 }
 
 impl Level {
@@ -181,7 +141,7 @@ impl Level {
             target: Vec::new(),
             pressure: Vec::new(),
             displacement: Vec::new(),
-            known: Window::whole([0, 0]),
+            known: Patch::default(),
         }
     }
 
@@ -218,13 +178,13 @@ impl Level {
         &mut self,
         planners: &mut Planners,
         cols: usize,
-        window: Window,
+        window: Patch,
         goal: Goal,
         stop: Stop,
     ) -> Outcome {
         let index = self.system(planners, window.shape());
         let f = &mut self.fields;
-        f.resize(window.cells());
+        f.resize(window.height() * window.width());
         window.cut(&self.target, cols, &mut f.target);
         window.cut(&self.pressure, cols, &mut f.pressure);
         let started = f.pressure.iter().any(|p| *p > 0.0);
@@ -247,12 +207,12 @@ impl Level {
     }
 
     /// Completes the displacement on `window`, at the price of a convolution; true when there was something to do.
-    pub(crate) fn complete(&mut self, planners: &mut Planners, cols: usize, window: Window) -> bool {
+    pub(crate) fn complete(&mut self, planners: &mut Planners, cols: usize, window: Patch) -> bool {
         let missing = self.known != window;
         if missing {
             let index = self.system(planners, window.shape());
             let f = &mut self.fields;
-            f.resize(window.cells());
+            f.resize(window.height() * window.width());
             window.cut(&self.pressure, cols, &mut f.pressure);
             self.systems[index].displace(&f.pressure, &mut f.displacement);
             window.paste(&f.displacement, &mut self.displacement, cols);
@@ -267,7 +227,7 @@ impl Level {
         &mut self,
         planners: &mut Planners,
         cols: usize,
-        window: Window,
+        window: Patch,
         approach_m: f64,
         tolerance: f64,
     ) -> bool {
@@ -277,11 +237,8 @@ impl Level {
         // nowhere does the surface rise by more than this
         let bulge_m = self.influence.bulge_below_m(highest, sum);
         let reach = |cell: usize| self.target[cell] + approach_m > -bulge_m || self.pressure[cell] > 0.0;
-        let Some(wide) = Window::around(shape, reach) else {
-            return false;
-        };
-        let inside = |i: usize| window.first[i] <= wide.first[i] && window.end[i] >= wide.end[i];
-        if inside(0) && inside(1) {
+        let wide = Patch::whole(shape).shrunk(cols, reach);
+        if wide.is_empty() || window.holds(wide) {
             return false;
         }
         let wide = wide.rounded(shape);
@@ -291,12 +248,14 @@ impl Level {
         };
         let limit_m = tolerance * highest / system.stiffness_pa_per_m;
         let mut found = false;
-        for r in wide.first[0]..wide.end[0] {
-            for c in wide.first[1]..wide.end[1] {
-                let within =
-                    (window.first[0]..window.end[0]).contains(&r) && (window.first[1]..window.end[1]).contains(&c);
-                let cell = r * cols + c;
-                if !within && self.target[cell] + approach_m - self.displacement[cell] > limit_m {
+        for (row, line) in (wide.rows[0]..).zip(wide.lines(cols)) {
+            let known = if (window.rows[0]..window.rows[1]).contains(&row) {
+                row * cols + window.cols[0]..row * cols + window.cols[1]
+            } else {
+                0..0
+            };
+            for cell in line.filter(|cell| !known.contains(cell)) {
+                if self.target[cell] + approach_m - self.displacement[cell] > limit_m {
                     self.pressure[cell] = SEED * highest;
                     found = true;
                 }
@@ -475,9 +434,9 @@ impl Memory {
 }
 
 fn shifted(field: &[f64], old: Patch, new: Patch, out: &mut Vec<f64>) {
-    let (old_width, width) = (old.cols[1] - old.cols[0], new.cols[1] - new.cols[0]);
+    let (old_width, width) = (old.width(), new.width());
     out.clear();
-    out.resize((new.rows[1] - new.rows[0]) * width, 0.0);
+    out.resize(new.height() * width, 0.0);
     let [first, end] = [old.cols[0].max(new.cols[0]), old.cols[1].min(new.cols[1])];
     if first >= end {
         return;
@@ -592,7 +551,7 @@ impl ElasticSolver {
     /// # Panics
     /// If `target_m` does not have one value for each square of the patch.
     pub fn sink(&mut self, patch: Patch, target_m: &[f64], tolerance: f64) -> Outcome {
-        let shape = [patch.rows, patch.cols].map(|[first, end]| end.saturating_sub(first));
+        let shape = patch.shape();
         assert_eq!(
             target_m.len(),
             shape[0] * shape[1],
@@ -608,7 +567,7 @@ impl ElasticSolver {
         top.target.extend_from_slice(target_m);
         let warm = self.memory.start(patch, target_m, &mut top.pressure);
         let mut outcome = if warm {
-            self.on_window(0, shape, Window::whole(shape), None, tolerance)
+            self.on_window(0, shape, Patch::whole(shape), None, tolerance)
         } else {
             self.nested(0, shape, None, tolerance)
         };
@@ -625,7 +584,7 @@ impl ElasticSolver {
         }
         // a combination of answers needs their displacement on all of the patch
         let top = &mut self.levels[0];
-        outcome.convolutions += usize::from(top.complete(&mut self.planners, shape[1], Window::whole(shape)));
+        outcome.convolutions += usize::from(top.complete(&mut self.planners, shape[1], Patch::whole(shape)));
         self.memory.keep(&top.pressure, &top.displacement);
         outcome
     }
@@ -675,7 +634,7 @@ impl ElasticSolver {
     /// Solves level `index` for the target that is in it, from the next coarser one's answer.
     fn nested(&mut self, index: usize, shape: [usize; 2], force_n: Option<f64>, tolerance: f64) -> Outcome {
         let mut convolutions = 0;
-        let mut window = Window::whole(shape);
+        let mut window = Patch::whole(shape);
         if shape[0].min(shape[1]) > COARSEST && index + 1 < self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(index + 1);
             restrict(&fine[index].target, shape, &mut coarse[0].target);
@@ -685,7 +644,8 @@ impl ElasticSolver {
             let (fine, coarse) = self.levels.split_at_mut(index + 1);
             prolong(&coarse[0].pressure, &coarse[0].target, shape, &mut fine[index].pressure);
             let pressure = &fine[index].pressure;
-            if let Some(contact) = Window::around(shape, |cell| pressure[cell] > 0.0) {
+            let contact = window.shrunk(shape[1], |cell| pressure[cell] > 0.0);
+            if !contact.is_empty() {
                 window = contact.grown(MARGIN, shape).rounded(shape);
             }
         } else {
@@ -703,7 +663,7 @@ impl ElasticSolver {
         &mut self,
         index: usize,
         shape: [usize; 2],
-        mut window: Window,
+        mut window: Patch,
         force_n: Option<f64>,
         tolerance: f64,
     ) -> Outcome {
@@ -725,7 +685,7 @@ impl ElasticSolver {
                 outcome.iterations += before.iterations;
                 outcome.convolutions += before.convolutions;
             }
-            let whole = window == Window::whole(shape);
+            let whole = window == Patch::whole(shape);
             if whole || index > 0 {
                 return outcome;
             }
@@ -733,7 +693,7 @@ impl ElasticSolver {
             if !level.add_outside(&mut self.planners, shape[1], window, outcome.approach_m, tolerance) {
                 return outcome;
             }
-            window = Window::whole(shape);
+            window = Patch::whole(shape);
             sum = Some(outcome);
         }
     }

@@ -1,5 +1,4 @@
-//! The rasterised envelope against rays, against every triangle of arbitrary meshes, and against itself when a pose
-//! comes again.
+//! The rasterised envelope against every triangle of arbitrary meshes, and against itself when a pose comes again.
 
 use super::Envelope;
 use crate::field::PosedMesh;
@@ -11,99 +10,19 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use spts_models::SkinLayout;
 
-/// Lowest z at which the vertical line through (x, y) meets the solid box, by clipping the line against the box's
-/// slabs in its own axes: shares nothing with the rasteriser.
-fn ray(half: [f64; 3], rotation: &Rotation3<f64>, position: Vector3<f64>, x: f64, y: f64) -> Option<f64> {
-    let origin = rotation.inverse() * (Vector3::new(x, y, 0.0) - position);
-    let direction = rotation.inverse() * Vector3::z();
-    let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
-    for axis in 0..3 {
-        if direction[axis].abs() < 1e-12 {
-            if origin[axis].abs() > half[axis] {
-                return None;
-            }
-            continue;
-        }
-        let a = (-half[axis] - origin[axis]) / direction[axis];
-        let b = (half[axis] - origin[axis]) / direction[axis];
-        enter = enter.max(a.min(b));
-        leave = leave.min(a.max(b));
-    }
-    (enter <= leave).then_some(enter)
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), ..ProptestConfig::with_cases(200) })]
-    /// Exact at every centre, up to round-off; centres within 1e-9 m of the silhouette may fall on either side.
-    #[test]
-    fn equals_ray_casting(
-        half in prop::array::uniform3(0.002..0.05_f64),
-        axis in prop::array::uniform3(-1.0..1.0_f64),
-        angle in -3.1..3.1_f64,
-        place in prop::array::uniform2(-0.09..0.09_f64),
-        height in -0.03..0.05_f64,
-        cells in 1..8_usize,
-    ) {
-        let mesh = cuboid(half.map(|h| 2.0 * h)).translated([0.0, 0.0, -half[2]]);
-        let axis = Unit::new_normalize(Vector3::from(axis) + Vector3::new(0.0, 0.0, 1e-6));
-        let rotation = Rotation3::from_axis_angle(&axis, angle);
-        let position = Vector3::new(place[0], place[1], height);
-        let matrix = rotation.matrix();
-        let body = PosedMesh {
-            rotation: std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)])),
-            ..PosedMesh::at_rest(&mesh, position.into())
-        };
-        let mut envelope = Envelope::new(&SkinLayout::default(), cells);
-        // something else first: its cells have to be cleared
-        envelope.rasterise(&PosedMesh::at_rest(&mesh, [-0.03, 0.02, half[2] - 0.005]));
-        let patch = envelope.rasterise(&body);
-        let [rows, cols] = envelope.shape();
-        for row in 0..rows {
-            for col in 0..cols {
-                let [x, y] = envelope.centre_m(row, col);
-                let found = envelope.depth_m()[row * cols + col];
-                let expected = ray(half, &rotation, position, x, y).map_or(0.0, |z| (-z).max(0.0));
-                if (found - expected).abs() > 1e-9 {
-                    let near = [(1e-9, 0.0), (-1e-9, 0.0), (0.0, 1e-9), (0.0, -1e-9)];
-                    let edge = near.iter().any(|(dx, dy)| {
-                        let z = ray(half, &rotation, position, x + dx, y + dy).map_or(0.0, |z| (-z).max(0.0));
-                        (z - found).abs() < 1e-6
-                    });
-                    prop_assert!(edge, "({row}, {col}): {found} against {expected}");
-                }
-                let inside = (patch.rows[0]..patch.rows[1]).contains(&row) && (patch.cols[0]..patch.cols[1]).contains(&col);
-                prop_assert!(found <= 0.0 || inside);
-            }
-        }
-    }
-}
-
 /// A solid is seen by its lower side alone, a surface that is open or inside out by all of it: the same depths, since
 /// the sides that are left out are never the lowest.
 #[test]
 fn solids_are_seen_from_below() {
     let skin = SkinLayout::default();
     let ball = sphere(20e-3, 12, 16);
-    let mut inside_out = ball.clone();
-    for triangle in &mut inside_out.triangles {
-        triangle.swap(1, 2);
-    }
+    let inside_out = ball.clone().flipped();
+    // without the top of the ball, far above the skin
+    let highest = |t: &usize| ball.corners(*t).map(|p| p[2]).into_iter().fold(f64::INFINITY, f64::min);
+    let top = (0..ball.triangles.len()).max_by(|a, b| highest(a).total_cmp(&highest(b)));
     let mut open = ball.clone();
-    // the top of the ball, far above the skin
-    let highest = |t: &[u32; 3]| {
-        t.iter()
-            .map(|i| ball.vertices[*i as usize][2])
-            .fold(f64::INFINITY, f64::min)
-    };
-    let top =
-        (0..open.triangles.len()).max_by(|a, b| highest(&ball.triangles[*a]).total_cmp(&highest(&ball.triangles[*b])));
     open.triangles.remove(top.unwrap());
-    let mut pair = ball.clone();
-    let base = u32::try_from(ball.vertices.len()).unwrap();
-    pair.vertices
-        .extend(ball.vertices.iter().map(|v| [v[0] + 50e-3, v[1], v[2]]));
-    pair.triangles
-        .extend(inside_out.triangles.iter().map(|t| t.map(|i| i + base)));
+    let pair = ball.clone().merged(&inside_out.clone().translated([50e-3, 0.0, 0.0]));
     assert!(ball.is_solid() && !inside_out.is_solid() && !open.is_solid() && !pair.is_solid());
     let depths = |mesh: &TriMesh| {
         let mut envelope = Envelope::new(&skin, 5);
@@ -142,9 +61,8 @@ proptest! {
             let step = Vector3::from(direction) * 10_f64.powf(exponent);
             position += step;
             rotation = Rotation3::new(0.5 * step) * rotation;
-            let matrix = rotation.matrix();
             let body = PosedMesh {
-                rotation: std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)])),
+                rotation: rotation.matrix().transpose().into(),
                 ..PosedMesh::at_rest(&mesh, position.into())
             };
             let mut fresh = Envelope::new(&SkinLayout::default(), cells);
@@ -155,27 +73,17 @@ proptest! {
     }
 }
 
-// The rasterised envelope against every triangle of arbitrary meshes, and against itself when a pose comes again.
-
-type Matrix = [[f64; 3]; 3];
-
-fn matrix(r: &Rotation3<f64>) -> Matrix {
-    std::array::from_fn(|i| std::array::from_fn(|j| r.matrix()[(i, j)]))
+/// The mesh of a body in world axes.
+fn posed(body: &PosedMesh<'_>) -> TriMesh {
+    body.mesh.clone().rotated(body.rotation).translated(body.position_m)
 }
 
-/// World positions of the corners.
-fn posed(body: &PosedMesh<'_>) -> Vec<[f64; 3]> {
-    let at =
-        |v: &[f64; 3]| [0, 1, 2].map(|i| (0..3).map(|j| body.rotation[i][j] * v[j]).sum::<f64>() + body.position_m[i]);
-    body.mesh.vertices.iter().map(at).collect()
-}
-
-/// Least and largest height of the surface over the disc of `slack_m` around (x, y), by brute force over the triangles:
-/// clips every triangle to the square around the point. Shares nothing with the rasteriser.
-fn heights_near(world: &[[f64; 3]], triangles: &[[u32; 3]], [x, y]: Point, slack_m: f64) -> Option<f64> {
+/// Least height of the surface over the square of `slack_m` around (x, y), by brute force over the triangles: clips every
+/// triangle to the square. Shares nothing with the rasteriser.
+fn lowest_near_m(world: &TriMesh, [x, y]: Point, slack_m: f64) -> Option<f64> {
     let mut lowest: Option<f64> = None;
-    for t in triangles {
-        let mut polygon: Vec<[f64; 3]> = t.iter().map(|&i| world[i as usize]).collect();
+    for t in 0..world.triangles.len() {
+        let mut polygon = world.corners(t).to_vec();
         for (axis, sign, bound) in [
             (0, 1.0, x + slack_m),
             (0, -1.0, slack_m - x),
@@ -208,25 +116,6 @@ fn clipped(polygon: &[[f64; 3]], axis: usize, sign: f64, bound: f64) -> Vec<[f64
     out
 }
 
-/// Height at (x, y) itself: the least over the triangles whose projection holds the point, by barycentric coordinates.
-fn height_at(world: &[[f64; 3]], triangles: &[[u32; 3]], [x, y]: Point) -> Option<f64> {
-    let mut lowest: Option<f64> = None;
-    for t in triangles {
-        let [a, b, c] = t.map(|i| Vector3::from(world[i as usize]));
-        let (u, v) = (b - a, c - a);
-        let det = u.x * v.y - u.y * v.x;
-        let (s, r) = (
-            ((x - a.x) * v.y - (y - a.y) * v.x) / det,
-            ((y - a.y) * u.x - (x - a.x) * u.y) / det,
-        );
-        if s >= 0.0 && r >= 0.0 && s + r <= 1.0 {
-            let z = a.z + s * u.z + r * v.z;
-            lowest = Some(lowest.map_or(z, |low| low.min(z)));
-        }
-    }
-    lowest
-}
-
 /// Round-off of positions below 1 m, m: a few ulp, times the steepest gradient that matters.
 const ROUND_OFF_M: f64 = 1e-12;
 /// The envelope may take any point this far from a centre, m: the slack over the shortest edges met here (10 µm).
@@ -234,7 +123,7 @@ const NEAR_M: f64 = 1e-9;
 
 /// At every centre the depth is that of the surface: where the brute force is the same all around the centre, to
 /// round-off; on edges and walls between the deepest point of the neighbourhood and the point itself.
-fn check(mesh: &TriMesh, rotation: Matrix, position_m: [f64; 3], cells: usize) -> Result<(), TestCaseError> {
+fn check(mesh: &TriMesh, rotation: [[f64; 3]; 3], position_m: [f64; 3], cells: usize) -> Result<(), TestCaseError> {
     let body = PosedMesh {
         rotation,
         ..PosedMesh::at_rest(mesh, position_m)
@@ -249,8 +138,8 @@ fn check(mesh: &TriMesh, rotation: Matrix, position_m: [f64; 3], cells: usize) -
             let centre = envelope.centre_m(row, col);
             let found = moving[row * cols + col];
             let depth = |z: Option<f64>| z.map_or(0.0, |z| (-z).max(0.0));
-            let exact = depth(height_at(&world, &mesh.triangles, centre));
-            let most = depth(heights_near(&world, &mesh.triangles, centre, NEAR_M));
+            let exact = depth(world.underside_m(centre));
+            let most = depth(lowest_near_m(&world, centre, NEAR_M));
             prop_assert!(
                 found >= exact - ROUND_OFF_M - 1e-6 * (most - exact) && found <= most + ROUND_OFF_M,
                 "({row}, {col}): {found:e}, brute force {exact:e} to {most:e}"
@@ -322,7 +211,8 @@ proptest! {
         let half_cell_m = 0.5 * 0.015 / f64::from(u32::try_from(cells).unwrap());
         let on = |x: f64| if snap { (x / half_cell_m).round() * half_cell_m } else { x };
         let mesh = if snap && kind == 0 { cuboid([on(size[0]).max(half_cell_m), on(size[1]).max(half_cell_m), 0.02]) } else { mesh };
-        check(&mesh, matrix(&Rotation3::from_axis_angle(&axis, angle)), [on(place[0]), on(place[1]), height], cells)?;
+        let rotation = Rotation3::from_axis_angle(&axis, angle);
+        check(&mesh, rotation.matrix().transpose().into(), [on(place[0]), on(place[1]), height], cells)?;
     }
 }
 

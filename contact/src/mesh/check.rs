@@ -3,7 +3,7 @@
 use super::polygon::{Point, signed_area_m2, triangulate};
 use super::tri_mesh::{
     MAX_COORDINATE_M, MAX_EXTENT_M, MAX_TRIANGLES, MAX_VERTICES, MIN_EXTENT_M, SOFT_MAX_TRIANGLES, Side, Sides,
-    TriMesh, Unions, balance, cross, dot, index, sub,
+    TriMesh, Unions, balance, cross, dot, index, span, sub,
 };
 use serde::Serialize;
 use spts_input::Refusal;
@@ -303,19 +303,10 @@ const MAX_EVALUATIONS: usize = 30_000_000;
 /// Only so many of the largest bodies are asked what they contain.
 const MAX_CONTAINERS: usize = 256;
 
-/// Why a surface cannot be mended, and where, m.
+/// Why a surface cannot be mended, in words with `{at}` for the place; and the place, m.
 struct Broken {
     at_m: [f64; 3],
-    kind: BrokenKind,
-}
-
-enum BrokenKind {
-    /// So many triangles meet in an edge that has no outside that they agree on.
-    Branching(usize),
-    /// On a closed path over the surface, a triangle meets itself turned over.
-    OneSided,
-    /// So many open edges, of so many in all, and why they stay open.
-    NotClosed(usize, usize, &'static str),
+    why: String,
 }
 
 impl Broken {
@@ -323,21 +314,7 @@ impl Broken {
     fn error(&self, scale: f64, file: &str) -> MeshError {
         let [x, y, z] = self.at_m.map(|x| x / scale);
         let at = format!("({x:.4}, {y:.4}, {z:.4}) of the file");
-        refused(
-            file,
-            match self.kind {
-                BrokenKind::Branching(triangles) => format!(
-                    "{triangles} triangles meet in an edge at {at}, with no outside that all agree on; a solid has 2, \
-                     export without inner walls"
-                ),
-                BrokenKind::OneSided => {
-                    format!("the surface has one side only (noticed at {at}): it has no outside")
-                }
-                BrokenKind::NotClosed(open, edges, why) => {
-                    format!("not closed: {open} of {edges} edges lack a partner, one at {at}: {why}")
-                }
-            },
-        )
+        refused(file, self.why.replace("{at}", &at))
     }
 }
 
@@ -348,9 +325,11 @@ fn agree(mesh: &mut TriMesh, sides: &Sides) -> Result<(Vec<u32>, usize), Broken>
     for edge in sides.edges() {
         if let [a, b] = edge {
             if !unions.join(a.triangle, b.triangle, a.rising == b.rising) {
-                let at_m = mesh.middle_m(a.edge);
-                let kind = BrokenKind::OneSided;
-                return Err(Broken { at_m, kind });
+                // on a closed path over the surface, a triangle meets itself turned over
+                return Err(Broken {
+                    at_m: mesh.middle_m(a.edge),
+                    why: "the surface has one side only (noticed at {at}): it has no outside".to_owned(),
+                });
             }
         } else if edge.len() > 1 && edge.len() % 2 == 1 {
             return Err(branching(mesh, edge));
@@ -384,9 +363,13 @@ fn agree(mesh: &mut TriMesh, sides: &Sides) -> Result<(Vec<u32>, usize), Broken>
 }
 
 fn branching(mesh: &TriMesh, edge: &[Side]) -> Broken {
+    let count = edge.len();
     Broken {
         at_m: mesh.middle_m(edge[0].edge),
-        kind: BrokenKind::Branching(edge.len()),
+        why: format!(
+            "{count} triangles meet in an edge at {{at}}, with no outside that all agree on; a solid has 2, export without \
+             inner walls"
+        ),
     }
 }
 
@@ -536,9 +519,12 @@ fn close_holes(mesh: &mut TriMesh, sides: &Sides) -> Result<Closed, Broken> {
     let Some(&first) = missing.first() else {
         return Ok(closed);
     };
-    let open = |edge: [u32; 2], why: &'static str, mesh: &TriMesh| Broken {
-        at_m: mesh.middle_m(edge),
-        kind: BrokenKind::NotClosed(missing.len(), sides.edges().count(), why),
+    let open = |edge: [u32; 2], why: &str, mesh: &TriMesh| {
+        let (found, all) = (missing.len(), sides.edges().count());
+        Broken {
+            at_m: mesh.middle_m(edge),
+            why: format!("not closed: {found} of {all} edges lack a partner, one at {{at}}: {why}"),
+        }
     };
     let Some(loops) = loops(&missing, mesh.vertices.len()) else {
         return Err(open(first, "its border does not close", mesh));
@@ -644,15 +630,13 @@ impl Outline {
         let at = |i: usize| mesh.vertices[ring[i % ring.len()] as usize];
         let points = || (0..ring.len()).map(at);
         let mut normal_m2 = [0.0; 3];
-        let (mut low, mut high) = (at(0), at(0));
         for i in 0..ring.len() {
             let n = cross(sub(at(i), at(0)), sub(at(i + 1), at(0)));
             for k in 0..3 {
                 normal_m2[k] += 0.5 * n[k];
-                low[k] = low[k].min(at(i)[k]);
-                high[k] = high[k].max(at(i)[k]);
             }
         }
+        let [low, high] = span(points());
         let farthest = |from: [f64; 3]| {
             let square = |p: [f64; 3]| dot(sub(p, from), sub(p, from));
             points().fold(from, |best, p| if square(p) > square(best) { p } else { best })

@@ -4,21 +4,16 @@ use super::check::{
     MeshError, MeshReport, checked, malformed, not_finite, out_of_range, refused, too_large, within_budget,
 };
 use super::tri_mesh::{MAX_FILE_BYTES, TriMesh, index};
-use gltf::accessor::{DataType, Dimensions};
-use gltf::json::validation::Checked;
-use gltf::json::{Index, Root};
+use gltf::Semantic;
+use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::mesh::{Mode, Primitive};
+use gltf::json::validation::{Checked, USize64};
+use gltf::json::{Index, Node, Root};
+use gltf::scene::Transform;
 use nalgebra::Matrix4;
+use std::borrow::Cow;
 use std::fmt::{Display, Write as _};
-use std::io::Cursor;
 use std::path::Path;
-
-/// The error of a file that is valid but uses what is not read here.
-fn unsupported(file: &str, feature: impl Display) -> MeshError {
-    refused(
-        file,
-        format_args!("{feature} is not supported; export plain indexed triangles"),
-    )
-}
 
 /// A reader of one format: bytes, scale, name for errors.
 type Reader = fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError>;
@@ -72,87 +67,65 @@ pub fn unknown_extension(file: &str, extension: &str) -> MeshError {
 /// # Errors
 /// As [`load`].
 pub fn read_obj(bytes: &[u8], scale: f64, file: &str) -> Result<(TriMesh, MeshReport), MeshError> {
-    let malformed = |why: String| malformed(file, why);
-    let text = spts_input::text(bytes).map_err(|e| malformed(e.to_string()))?;
-    let geometry = obj_geometry(text, file)?;
-    let options = tobj::LoadOptions {
-        triangulate: true,
-        ignore_lines: true,
-        ignore_points: true,
-        ..tobj::LoadOptions::default()
-    };
-    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
-    let (models, _) =
-        tobj::load_obj_buf(&mut geometry.as_bytes(), &options, no_materials).map_err(|e| malformed(e.to_string()))?;
-    let mut raw = TriMesh::default();
-    for model in models {
-        let base = index(raw.vertices.len());
-        let positions = model.mesh.positions.chunks_exact(3);
-        raw.vertices
-            .extend(positions.map(|p| [p[0], p[1], p[2]].map(f64::from)));
-        let corners = model.mesh.indices.chunks_exact(3);
-        raw.triangles
-            .extend(corners.map(|t| [t[0], t[1], t[2]].map(|i| i.saturating_add(base))));
-    }
-    checked(&raw, scale, file)
-}
-
-/// The `v` and `f` lines of an OBJ, with only the position index of each corner. Finds what the reader would not
-/// report by number: a coordinate that is not finite, an index out of range.
-fn obj_geometry(text: &str, file: &str) -> Result<String, MeshError> {
+    let text = spts_input::text(bytes).map_err(|e| malformed(file, e))?;
+    let starts_with_v = |line: &&str| line.split_whitespace().next() == Some("v");
     // counted first: a face may name vertices that only follow later
-    let all = text
-        .lines()
-        .filter(|l| l.split_whitespace().next() == Some("v"))
-        .count();
+    let all = text.lines().filter(starts_with_v).count();
     within_budget(all, 0, file)?;
-    let mut out = String::with_capacity(text.len());
-    let (mut vertices, mut triangle) = (0_usize, 0_usize);
+    let mut raw = TriMesh::default();
     for line in text.lines() {
         let mut words = line.split_whitespace();
         match words.next() {
-            Some("v") => {
-                for (axis, word) in ['x', 'y', 'z'].into_iter().zip(words.clone()) {
-                    if let Some(value) = word.parse::<f64>().ok().filter(|x| !x.is_finite()) {
-                        return Err(not_finite(file, vertices, axis, value));
-                    }
-                }
-                vertices += 1;
-                out.push('v');
-                words
-                    .take(3)
-                    .for_each(|w| [" ", w].into_iter().for_each(|s| out.push_str(s)));
-                out.push('\n');
-            }
+            Some("v") => raw.vertices.push(point(words, raw.vertices.len(), file)?),
             Some("f") => {
-                within_budget(all, triangle + words.clone().count().saturating_sub(2), file)?;
-                let corners: Vec<&str> = words.map(|w| w.split('/').next().unwrap_or(w)).collect();
-                for corner in &corners {
-                    check_obj_index(corner, vertices, all, triangle, file)?;
-                }
-                if corners.len() >= 3 {
-                    out.push_str("f ");
-                    out.push_str(&corners.join(" "));
-                    out.push('\n');
-                    triangle += corners.len() - 2;
-                }
+                let count = raw.triangles.len();
+                within_budget(all, count + words.clone().count().saturating_sub(2), file)?;
+                let corners = words.map(|word| obj_index(word, raw.vertices.len(), all, count, file));
+                let corners: Vec<u32> = corners.collect::<Result<_, _>>()?;
+                let fan = corners.windows(2).skip(1);
+                raw.triangles.extend(fan.map(|pair| [corners[0], pair[0], pair[1]]));
             }
             _ => {}
         }
     }
-    Ok(out)
+    // of vertices that coincide, the one that a face names first is kept
+    checked(&raw.with_triangles(&raw.triangles), scale, file)
 }
 
-/// OBJ counts from 1, or backwards from −1 for the last vertex so far; `seen` of `all` vertices precede the face.
-fn check_obj_index(word: &str, seen: usize, all: usize, triangle: usize, file: &str) -> Result<(), MeshError> {
-    // what is not a number is reported by the parser
-    let Ok(i) = word.parse::<i64>() else { return Ok(()) };
+/// The vertex that a corner such as `3/1/2` names. OBJ counts from 1, or backwards from −1 for the last vertex so far;
+/// `seen` of `all` vertices precede the face.
+fn obj_index(word: &str, seen: usize, all: usize, triangle: usize, file: &str) -> Result<u32, MeshError> {
+    let number = word.split('/').next().unwrap_or(word);
+    let given: i64 = number.parse().map_err(|_| {
+        malformed(
+            file,
+            format_args!("triangle {triangle}: `{number}` is not a whole number"),
+        )
+    })?;
     let limit = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
-    if (1..=limit(all)).contains(&i) || (-limit(seen)..=-1).contains(&i) {
-        return Ok(());
+    let from_0 = if given < 0 { limit(seen) + given } else { given - 1 };
+    let vertex = usize::try_from(from_0).ok().filter(|vertex| *vertex < all);
+    vertex.map(index).ok_or_else(|| {
+        let why = format!("triangle {triangle} uses vertex {given}, outside [1, {all}] or [-{seen}, -1]");
+        malformed(file, why)
+    })
+}
+
+/// The three coordinates that `words` begin with, in the precision of files: f32. `vertex` is its number in errors.
+fn point<'t>(mut words: impl Iterator<Item = &'t str>, vertex: usize, file: &str) -> Result<[f64; 3], MeshError> {
+    let mut out = [0.0; 3];
+    for (axis, to) in ['x', 'y', 'z'].into_iter().zip(&mut out) {
+        let word = words.next().unwrap_or_default();
+        let number: f32 = word.parse().map_err(|_| {
+            let at = format_args!("vertex {vertex}, coordinate {axis} = `{word}` is not a number").to_string();
+            malformed(file, at)
+        })?;
+        *to = f64::from(number);
+        if !to.is_finite() {
+            return Err(not_finite(file, vertex, axis, *to));
+        }
     }
-    let why = format!("triangle {triangle} uses vertex {i}, outside [1, {all}] or [-{seen}, -1]");
-    Err(malformed(file, why))
+    Ok(out)
 }
 
 /// As [`load`], from the bytes of a GLB file. `file` is the name in errors.
@@ -160,7 +133,7 @@ fn check_obj_index(word: &str, seen: usize, all: usize, triangle: usize, file: &
 /// # Errors
 /// As [`load`].
 pub fn read_glb(bytes: &[u8], scale: f64, file: &str) -> Result<(TriMesh, MeshReport), MeshError> {
-    checked(&glb_mesh(bytes, file)?, scale, file)
+    checked(&Glb::new(bytes, file)?.mesh()?, scale, file)
 }
 
 /// As [`load`], from the bytes of an STL file, text or binary. `file` is the name in errors.
@@ -183,231 +156,239 @@ const MAX_VISITS: usize = 100_000;
 /// Largest description (the JSON chunk) that is read, bytes: parsed, it takes up to 200 times its size, and those of
 /// models of many parts have some 100 kB.
 const MAX_JSON_BYTES: usize = 1 << 21;
-/// Bytes of the file's header, and of that of its first chunk, which begins with the chunk's length.
-const HEADERS: std::ops::Range<usize> = 12..16;
 
-/// All triangles of the default scene (or of the first, or of every root node when there is none), in the file's unit.
-pub(super) fn glb_mesh(bytes: &[u8], file: &str) -> Result<TriMesh, MeshError> {
-    let malformed = |why: String| malformed(file, why);
-    let declared = bytes.get(8..12).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    match declared {
-        None => return Err(malformed(format!("{} bytes, a GLB header has 12", bytes.len()))),
-        Some(length) if (length as usize) < 12 || length as usize > bytes.len() => {
-            return Err(malformed(format!(
-                "header declares {length} bytes, the file has {}",
-                bytes.len()
-            )));
+/// A GLB file: its description, whose references are checked where they are followed, and its binary chunk. (The
+/// validation of the `gltf` crate, version 1.4.1, indexes before it checks, so that a damaged file could end the
+/// process.)
+struct Glb<'a> {
+    root: Root,
+    blob: Cow<'a, [u8]>,
+    file: &'a str,
+}
+
+impl<'a> Glb<'a> {
+    fn new(bytes: &'a [u8], file: &'a str) -> Result<Self, MeshError> {
+        let Some(declared) = bytes.get(8..12).map(|b| le_u32(b) as usize) else {
+            return Err(malformed(
+                file,
+                format_args!("{} bytes, a GLB header has 12", bytes.len()),
+            ));
+        };
+        if declared < 12 || declared > bytes.len() {
+            let why = format!("header declares {declared} bytes, the file has {}", bytes.len());
+            return Err(malformed(file, why));
         }
-        Some(_) => {}
+        if &bytes[..4] != b"glTF" {
+            return Err(malformed(file, "does not start with the bytes `glTF`"));
+        }
+        if let Some(found) = bytes
+            .get(12..16)
+            .map(|b| le_u32(b) as usize)
+            .filter(|n| *n > MAX_JSON_BYTES)
+        {
+            return Err(too_large(file, "bytes of the JSON chunk", found, MAX_JSON_BYTES));
+        }
+        let glb = gltf::Glb::from_slice(bytes).map_err(|e| malformed(file, e))?;
+        let root: Root = gltf::json::deserialize::from_slice(&glb.json).map_err(|e| malformed(file, e))?;
+        let blob = glb.bin.unwrap_or_default();
+        Ok(Self { root, blob, file })
     }
-    if &bytes[..4] != b"glTF" {
-        return Err(malformed("does not start with the bytes `glTF`".to_owned()));
+
+    fn malformed(&self, why: impl Display) -> MeshError {
+        malformed(self.file, why)
     }
-    if let Some(&[a, b, c, d]) = bytes.get(HEADERS)
-        && u32::from_le_bytes([a, b, c, d]) as usize > MAX_JSON_BYTES
+
+    /// The error of a file that is valid but uses what is not read here.
+    fn unsupported(&self, feature: impl Display) -> MeshError {
+        let why = format_args!("{feature} is not supported; export plain indexed triangles").to_string();
+        refused(self.file, why)
+    }
+
+    /// The `what` that `at` refers to.
+    fn get<T>(&self, what: &str, at: Index<T>) -> Result<&T, MeshError>
+    where
+        Root: AsRef<[T]>,
     {
-        let found = u32::from_le_bytes([a, b, c, d]) as usize;
-        return Err(too_large(file, "bytes of the JSON chunk", found, MAX_JSON_BYTES));
+        let all = self.root.as_ref();
+        let outside = || self.malformed(format_args!("{what} {} is outside [0, {})", at.value(), all.len()));
+        all.get(at.value()).ok_or_else(outside)
     }
-    let gltf = gltf::Gltf::from_slice_without_validation(bytes).map_err(|e| malformed(e.to_string()))?;
-    let root = gltf.document.as_json();
-    if let Some(extension) = root.extensions_required.first() {
-        return Err(unsupported(file, format_args!("extension {extension}")));
-    }
-    if let Some(reason) = broken_reference(root) {
-        return Err(malformed(reason));
-    }
-    let blob = gltf.blob.as_deref().unwrap_or(&[]);
-    let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
-    let roots: Vec<gltf::Node<'_>> = scene.map_or_else(|| gltf.nodes().collect(), |s| s.nodes().collect());
-    let mut visits = roots.len();
-    let mut stack: Vec<(gltf::Node<'_>, Matrix4<f64>, usize)> =
-        roots.into_iter().map(|node| (node, Matrix4::identity(), 0)).collect();
-    let mut raw = TriMesh::default();
-    while let Some((node, parent, depth)) = stack.pop() {
-        // counted before they are visited, so that nothing is kept of more than are allowed
-        visits += node.children().len() + node.mesh().map_or(0, |mesh| mesh.primitives().len());
-        if depth > MAX_DEPTH || visits > MAX_VISITS {
-            return Err(malformed(format!(
-                "node {} is more than {MAX_DEPTH} deep, or {visits} nodes and primitives are visited of at most \
-                 {MAX_VISITS}: the node tree is cyclic, or its nodes are shared too often",
-                node.index()
-            )));
+
+    /// All triangles of the default scene (or of the first, or of every node when there is none), in the file's unit.
+    fn mesh(&self) -> Result<TriMesh, MeshError> {
+        if let Some(extension) = self.root.extensions_required.first() {
+            return Err(self.unsupported(format_args!("extension {extension}")));
         }
-        // column-major, as nalgebra stores it
-        let local = Matrix4::from_fn(|r, c| f64::from(node.transform().matrix()[c][r]));
-        let world = parent * local;
-        if let Some(mesh) = node.mesh() {
-            for primitive in mesh.primitives() {
-                append(&mut raw, &primitive, blob, &world, file)?;
+        let scene = match self.root.scene {
+            Some(at) => Some(self.get("scene", at)?),
+            None => self.root.scenes.first(),
+        };
+        let all = || (0..self.root.nodes.len()).map(index).map(Index::new).collect();
+        let roots: Vec<Index<Node>> = scene.map_or_else(all, |scene| scene.nodes.clone());
+        let mut visits = roots.len();
+        let mut stack: Vec<_> = roots.into_iter().map(|at| (at, Matrix4::identity(), 0)).collect();
+        let mut raw = TriMesh::default();
+        while let Some((at, parent, depth)) = stack.pop() {
+            let node = self.get("node", at)?;
+            let mesh = node.mesh.map(|at| self.get("mesh", at)).transpose()?;
+            let primitives = mesh.map_or(&[][..], |mesh| &mesh.primitives);
+            let children = node.children.as_deref().unwrap_or_default();
+            // counted before they are visited, so that nothing is kept of more than are allowed
+            visits += children.len() + primitives.len();
+            if depth > MAX_DEPTH || visits > MAX_VISITS {
+                return Err(self.malformed(format_args!(
+                    "node {} is more than {MAX_DEPTH} deep, or {visits} nodes and primitives are visited of at most \
+                     {MAX_VISITS}: the node tree is cyclic, or its nodes are shared too often",
+                    at.value()
+                )));
             }
+            let world: Matrix4<f64> = parent * transform(node);
+            for primitive in primitives {
+                self.append(&mut raw, primitive, &world)?;
+            }
+            stack.extend(children.iter().map(|child| (*child, world, depth + 1)));
         }
-        stack.extend(node.children().map(|child| (child, world, depth + 1)));
+        Ok(raw)
     }
-    Ok(raw)
+
+    fn append(&self, raw: &mut TriMesh, primitive: &Primitive, world: &Matrix4<f64>) -> Result<(), MeshError> {
+        match primitive.mode {
+            Checked::Valid(Mode::Triangles) => {}
+            Checked::Valid(mode) => return Err(self.unsupported(format_args!("primitive mode {mode:?}"))),
+            Checked::Invalid => return Err(self.malformed("a primitive has an unknown mode")),
+        }
+        let Some(at) = primitive.attributes.get(&Checked::Valid(Semantic::Positions)) else {
+            return Err(self.malformed("a primitive lacks POSITION"));
+        };
+        let points = Elements::new(self, *at)?;
+        let corners = primitive.indices.map(|at| Elements::new(self, at)).transpose()?;
+        let count = corners.as_ref().map_or(points.count, |corners| corners.count);
+        within_budget(
+            raw.vertices.len().saturating_add(points.count),
+            raw.triangles.len().saturating_add(count / 3),
+            self.file,
+        )?;
+        let points: Vec<[f32; 3]> = points.read(&[(ComponentType::F32, 12)], Type::Vec3, le_point)?;
+        const INDICES: [(ComponentType, usize); 3] =
+            [(ComponentType::U8, 1), (ComponentType::U16, 2), (ComponentType::U32, 4)];
+        let corners: Vec<u32> = match corners {
+            Some(corners) => corners.read(&INDICES, Type::Scalar, le_u32)?,
+            None => (0..points.len()).map(index).collect(),
+        };
+        let (corners, rest) = corners.as_chunks::<3>();
+        if !rest.is_empty() {
+            return Err(self.malformed(format_args!("{count} indices are not a multiple of 3")));
+        }
+        if let Some(k) = corners.as_flattened().iter().position(|&i| i as usize >= points.len()) {
+            return Err(out_of_range(self.file, k / 3, corners.as_flattened()[k], points.len()));
+        }
+        let mirrors = world.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
+        let base = index(raw.vertices.len());
+        raw.vertices.extend(points.iter().map(|p| {
+            let [x, y, z] = p.map(f64::from);
+            let q = world * nalgebra::Vector4::new(x, y, z, 1.0);
+            [q.x, q.y, q.z]
+        }));
+        raw.triangles.extend(corners.iter().map(|t| {
+            let [a, b, c] = t.map(|i| i.saturating_add(base));
+            if mirrors { [a, c, b] } else { [a, b, c] }
+        }));
+        Ok(())
+    }
 }
 
-fn append(
-    raw: &mut TriMesh,
-    primitive: &gltf::Primitive<'_>,
-    blob: &[u8],
-    world: &Matrix4<f64>,
-    file: &str,
-) -> Result<(), MeshError> {
-    if primitive.mode() != gltf::mesh::Mode::Triangles {
-        return Err(unsupported(file, format_args!("primitive mode {:?}", primitive.mode())));
-    }
-    let Some(accessor) = primitive.get(&gltf::Semantic::Positions) else {
-        return Err(malformed(file, "a primitive lacks POSITION"));
-    };
-    let count = primitive.indices().map_or(accessor.count(), |indices| indices.count());
-    within_budget(
-        raw.vertices.len().saturating_add(accessor.count()),
-        raw.triangles.len().saturating_add(count / 3),
-        file,
-    )?;
-    let points = positions(&accessor, blob, file)?;
-    let corners = match primitive.indices() {
-        Some(accessor) => indices(&accessor, blob, file)?,
-        None => (0..points.len()).map(index).collect(),
-    };
-    if corners.len() % 3 != 0 {
-        let why = format!("{} indices are not a multiple of 3", corners.len());
-        return Err(malformed(file, why));
-    }
-    if let Some(k) = corners.iter().position(|&i| i as usize >= points.len()) {
-        return Err(out_of_range(file, k / 3, corners[k], points.len()));
-    }
-    let mirrors = world.fixed_view::<3, 3>(0, 0).determinant() < 0.0;
-    let base = index(raw.vertices.len());
-    raw.vertices.extend(points.iter().map(|p| {
-        let q = world * nalgebra::Vector4::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]), 1.0);
-        [q.x, q.y, q.z]
-    }));
-    raw.triangles.extend(corners.chunks_exact(3).map(|t| {
-        let [a, b, c] = [t[0], t[1], t[2]].map(|i| i.saturating_add(base));
-        if mirrors { [a, c, b] } else { [a, b, c] }
-    }));
-    Ok(())
+/// From the axes of `node` to those of its parent.
+fn transform(node: &Node) -> Matrix4<f64> {
+    let matrix = node.matrix.unwrap_or_else(|| {
+        let transform = Transform::Decomposed {
+            translation: node.translation.unwrap_or_default(),
+            rotation: node.rotation.unwrap_or_default().0,
+            scale: node.scale.unwrap_or([1.0; 3]),
+        };
+        let mut flat = [0.0; 16];
+        flat.copy_from_slice(transform.matrix().as_flattened());
+        flat
+    });
+    // column-major, as nalgebra stores it
+    Matrix4::from_column_slice(&matrix.map(f64::from))
 }
 
-// Bounds-checked access to the numbers of a GLB file.
+/// The elements of an accessor.
+struct Elements<'g> {
+    glb: &'g Glb<'g>,
+    at: Index<Accessor>,
+    accessor: &'g Accessor,
+    count: usize,
+}
 
-/// Start, stride and count of an accessor's elements of `size` bytes inside `blob`, or why it does not fit.
-fn elements<'b>(
-    accessor: &gltf::Accessor<'_>,
-    blob: &'b [u8],
-    size: usize,
-    file: &str,
-) -> Result<impl Iterator<Item = &'b [u8]> + use<'b>, MeshError> {
-    let outside = || {
-        let (index, count, bytes) = (accessor.index(), accessor.count(), blob.len());
-        let why = format!(
-            "accessor {index} ({count} elements of {size} bytes) reaches outside the {bytes} bytes of the BIN chunk"
-        );
-        malformed(file, why)
-    };
-    let unsupported = |feature: &str| unsupported(file, feature);
-    if accessor.sparse().is_some() {
-        return Err(unsupported("a sparse accessor"));
+impl<'g> Elements<'g> {
+    fn new(glb: &'g Glb<'g>, at: Index<Accessor>) -> Result<Self, MeshError> {
+        let accessor = glb.get("accessor", at)?;
+        let count = usize::try_from(accessor.count.0).unwrap_or(usize::MAX);
+        Ok(Self {
+            glb,
+            at,
+            accessor,
+            count,
+        })
     }
-    let view = accessor
-        .view()
-        .ok_or_else(|| unsupported("an accessor without buffer view"))?;
-    if !matches!(view.buffer().source(), gltf::buffer::Source::Bin) {
-        return Err(unsupported("a buffer outside the file"));
+
+    /// The elements as `number` makes them of their bytes, when they are `kind` of one of the component types in
+    /// `types`, each with the bytes of an element.
+    fn read<T>(
+        &self,
+        types: &[(ComponentType, usize)],
+        kind: Type,
+        number: impl Fn(&[u8]) -> T,
+    ) -> Result<Vec<T>, MeshError> {
+        let (glb, accessor, at) = (self.glb, self.accessor, self.at.value());
+        let (Checked::Valid(found), Checked::Valid(shape)) = (&accessor.component_type, &accessor.type_) else {
+            return Err(glb.malformed(format_args!("accessor {at} has an unknown type")));
+        };
+        let fits = types
+            .iter()
+            .find(|(component, _)| *component == found.0 && *shape == kind);
+        let Some(&(_, size)) = fits else {
+            let expected: Vec<String> = types.iter().map(|(component, _)| format!("{component:?}")).collect();
+            let expected = expected.join(" or ");
+            let why = format!(
+                "accessor {at} holds {shape:?} {:?}, {kind:?} {expected} expected",
+                found.0
+            );
+            return Err(glb.malformed(why));
+        };
+        if accessor.sparse.is_some() {
+            return Err(glb.unsupported("a sparse accessor"));
+        }
+        let Some(view) = accessor.buffer_view else {
+            return Err(glb.unsupported("an accessor without buffer view"));
+        };
+        let view = glb.get("buffer view", view)?;
+        if glb.get("buffer", view.buffer)?.uri.is_some() {
+            return Err(glb.unsupported("a buffer outside the file"));
+        }
+        let bytes = |offset: Option<USize64>| offset.map_or(Some(0), |n| usize::try_from(n.0).ok());
+        let stride = view.byte_stride.map_or(size, |stride| stride.0);
+        let data = bytes(view.byte_offset)
+            .zip(bytes(Some(view.byte_length)))
+            .and_then(|(start, length)| {
+                let data = glb
+                    .blob
+                    .get(start..start.checked_add(length)?)?
+                    .get(bytes(accessor.byte_offset)?..)?;
+                let end = self.count.saturating_sub(1).checked_mul(stride)?.checked_add(size)?;
+                (stride >= size && (self.count == 0 || end <= data.len())).then_some(data)
+            });
+        let Some(data) = data else {
+            let (count, length) = (self.count, glb.blob.len());
+            let why = format!(
+                "accessor {at} ({count} elements of {size} bytes) reaches outside the {length} bytes of the BIN chunk"
+            );
+            return Err(glb.malformed(why));
+        };
+        let element = |i: usize| number(&data[i * stride..i * stride + size]);
+        Ok((0..self.count).map(element).collect())
     }
-    let stride = view.stride().unwrap_or(size);
-    let count = accessor.count();
-    let view_end = view.offset().checked_add(view.length()).ok_or_else(outside)?;
-    let data = blob.get(view.offset()..view_end).ok_or_else(outside)?;
-    let data = data.get(accessor.offset()..).ok_or_else(outside)?;
-    let end = count
-        .saturating_sub(1)
-        .checked_mul(stride)
-        .and_then(|last| last.checked_add(size))
-        .ok_or_else(outside)?;
-    if stride < size || (count > 0 && end > data.len()) {
-        return Err(outside());
-    }
-    Ok((0..count).map(move |i| &data[i * stride..i * stride + size]))
-}
-
-/// Vertex positions: three f32 each.
-pub(super) fn positions(accessor: &gltf::Accessor<'_>, blob: &[u8], file: &str) -> Result<Vec<[f32; 3]>, MeshError> {
-    if (accessor.data_type(), accessor.dimensions()) != (DataType::F32, Dimensions::Vec3) {
-        return Err(wrong_type(accessor, "three f32", file));
-    }
-    let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-    Ok(elements(accessor, blob, 12, file)?
-        .map(|b| [number(&b[..4]), number(&b[4..8]), number(&b[8..])])
-        .collect())
-}
-
-/// Corner indices: unsigned 8, 16 or 32 bits.
-pub(super) fn indices(accessor: &gltf::Accessor<'_>, blob: &[u8], file: &str) -> Result<Vec<u32>, MeshError> {
-    let size = match (accessor.data_type(), accessor.dimensions()) {
-        (DataType::U8, Dimensions::Scalar) => 1,
-        (DataType::U16, Dimensions::Scalar) => 2,
-        (DataType::U32, Dimensions::Scalar) => 4,
-        _ => return Err(wrong_type(accessor, "one u8, u16 or u32", file)),
-    };
-    let number = |b: &[u8]| b.iter().rev().fold(0_u32, |n, &byte| n << 8 | u32::from(byte));
-    Ok(elements(accessor, blob, size, file)?.map(number).collect())
-}
-
-fn wrong_type(accessor: &gltf::Accessor<'_>, expected: &str, file: &str) -> MeshError {
-    let (index, dimensions, kind) = (accessor.index(), accessor.dimensions(), accessor.data_type());
-    malformed(
-        file,
-        format_args!("accessor {index} holds {dimensions:?} {kind:?}, {expected} expected"),
-    )
-}
-
-// Checks that every reference in a GLB file that the mesh reader follows is valid.
-//
-// The validation of the `gltf` crate (version 1.4.1) indexes before it checks, so a damaged file could end the
-// process. This check runs in its place.
-
-/// First reference or enumeration of `root` that is wrong, in words.
-pub(super) fn broken_reference(root: &Root) -> Option<String> {
-    let nodes = root.scenes.iter().flat_map(|s| &s.nodes);
-    let children = root.nodes.iter().filter_map(|n| n.children.as_ref()).flatten();
-    let scene = root.scene.iter().map(|i| ("scene", i.value(), root.scenes.len()));
-    let nodes = nodes.chain(children).map(|i| ("node", i.value(), root.nodes.len()));
-    let meshes = root.nodes.iter().filter_map(|n| n.mesh);
-    let meshes = meshes.map(|i| ("mesh", i.value(), root.meshes.len()));
-    let views = root.accessors.iter().filter_map(|a| a.buffer_view);
-    let views = views.map(|i| ("buffer view", i.value(), root.buffer_views.len()));
-    let buffers = root.buffer_views.iter();
-    let buffers = buffers.map(|v| ("buffer", v.buffer.value(), root.buffers.len()));
-    let mut indices = scene.chain(nodes).chain(meshes).chain(views).chain(buffers);
-    let outside = |(what, i, n): (&str, usize, usize)| (i >= n).then(|| format!("{what} {i} is outside [0, {n})"));
-    let unreadable = || root.accessors.iter().position(|a| !is_readable(a));
-    let mut primitives = root.meshes.iter().flat_map(|m| &m.primitives);
-    indices
-        .find_map(outside)
-        .or_else(|| primitives.find_map(|p| broken_primitive(root, p)))
-        .or_else(|| unreadable().map(|i| format!("accessor {i} has an unknown type")))
-}
-
-fn broken_primitive(root: &Root, primitive: &gltf::json::mesh::Primitive) -> Option<String> {
-    let n = root.accessors.len();
-    let outside = |i: &Index<gltf::json::Accessor>| {
-        (i.value() >= n).then(|| format!("accessor {} is outside [0, {n})", i.value()))
-    };
-    if matches!(primitive.mode, Checked::Invalid) {
-        return Some("a primitive has an unknown mode".to_owned());
-    }
-    primitive
-        .attributes
-        .get(&Checked::Valid(gltf::Semantic::Positions))
-        .and_then(outside)
-        .or_else(|| primitive.indices.as_ref().and_then(outside))
-}
-
-fn is_readable(accessor: &gltf::json::Accessor) -> bool {
-    matches!(accessor.component_type, Checked::Valid(_)) && matches!(accessor.type_, Checked::Valid(_))
 }
 
 // Triangles of an STL file, text or binary.
@@ -421,34 +402,27 @@ const TRIANGLE: usize = 50;
 ///
 /// A file whose length is the one its header promises is binary, also when the header starts with `solid`, as those of
 /// some exporters do.
-pub(super) fn stl_mesh(bytes: &[u8], file: &str) -> Result<TriMesh, MeshError> {
-    let malformed = |why: String| malformed(file, why);
-    let declared = bytes
-        .get(HEADER - 4..HEADER)
-        .map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-    let length = declared.map(|n| HEADER as u64 + TRIANGLE as u64 * u64::from(n));
-    if length == Some(bytes.len() as u64) {
-        within_budget(0, (bytes.len() - HEADER) / TRIANGLE, file)?;
-        let mut binary = bytes.to_vec();
-        // the reader takes every header that starts with `solid` for text
-        binary[..5].fill(0);
-        return triangles(binary, file);
+fn stl_mesh(bytes: &[u8], file: &str) -> Result<TriMesh, MeshError> {
+    let declared = bytes.get(HEADER - 4..HEADER).map(|b| u64::from(le_u32(b)));
+    let length = declared.map(|n| HEADER as u64 + TRIANGLE as u64 * n);
+    let found = bytes.len() as u64;
+    if length == Some(found) {
+        return binary_stl(&bytes[HEADER..], file);
     }
     if is_text(bytes) {
-        let text = spts_input::text(bytes).map_err(|e| malformed(e.to_string()))?;
-        return triangles(plain_text(text, file)?.into_bytes(), file);
+        return text_stl(spts_input::text(bytes).map_err(|e| malformed(file, e))?, file);
     }
-    Err(malformed(match (declared, length) {
+    let why = match (declared, length) {
         (Some(n), Some(length)) => {
-            let found = bytes.len() as u64;
             let what = match found.checked_sub(length) {
                 Some(more) => format!("{more} bytes too many: something was appended, or it is not STL"),
                 None => "truncated, or not STL".to_owned(),
             };
             format!("header declares {n} triangles = {length} bytes, the file has {found} ({what})")
         }
-        _ => format!("{} bytes, the header of a binary STL has {HEADER}", bytes.len()),
-    }))
+        _ => format!("{found} bytes, the header of a binary STL has {HEADER}"),
+    };
+    Err(malformed(file, why))
 }
 
 /// Whether the file starts like a text STL and has no zero byte, which a binary one always has.
@@ -457,66 +431,68 @@ fn is_text(bytes: &[u8]) -> bool {
     start.get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid")) && !bytes.contains(&0)
 }
 
-/// The text as the reader wants it: one solid, lower case, no normals (some exporters write `nan` for those of
-/// triangles without area). Several solids become one. Finds coordinates that are not finite, and a missing end.
-fn plain_text(text: &str, file: &str) -> Result<String, MeshError> {
-    let mut out = String::with_capacity(text.len());
-    out.push_str("solid x\n");
-    let (mut vertex, mut facets, mut ended) = (0, 0, false);
+/// A mesh of triangles that share no corners: three of `vertices` each.
+fn soup(vertices: Vec<[f64; 3]>) -> TriMesh {
+    let corners = (0..vertices.len() / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2].map(index));
+    TriMesh {
+        triangles: corners.collect(),
+        vertices,
+    }
+}
+
+fn binary_stl(records: &[u8], file: &str) -> Result<TriMesh, MeshError> {
+    within_budget(0, records.len() / TRIANGLE, file)?;
+    let corners = records
+        .chunks_exact(TRIANGLE)
+        .flat_map(|record| record[12..48].chunks_exact(12));
+    Ok(soup(corners.map(|b| le_point(b).map(f64::from)).collect()))
+}
+
+/// What the lines of a triangle start with.
+const FACET: [&str; 7] = ["facet", "outer", "vertex", "vertex", "vertex", "endloop", "endfacet"];
+
+/// Any number of solids, which become one. Normals are not read: some exporters write `nan` for those of triangles
+/// without area.
+fn text_stl(text: &str, file: &str) -> Result<TriMesh, MeshError> {
+    let last = text.lines().rev().find_map(|line| line.split_whitespace().next());
+    if !last.is_some_and(|word| word.eq_ignore_ascii_case("endsolid")) {
+        return Err(malformed(file, "does not end with `endsolid` (truncated?)"));
+    }
+    let (mut vertices, mut step) = (Vec::new(), 0);
     for line in text.lines() {
         let mut words = line.split_whitespace();
         let Some(first) = words.next() else { continue };
-        match first.to_ascii_lowercase().as_str() {
-            "solid" => ended = false,
-            "endsolid" => ended = true,
-            "facet" => {
-                facets += 1;
-                within_budget(vertex, facets, file)?;
-                out.push_str("facet normal 0 0 0\n");
-            }
-            "vertex" => {
-                out.push_str("vertex");
-                for (axis, word) in ['x', 'y', 'z', '?'].into_iter().zip(words) {
-                    if let Some(value) = word.parse::<f64>().ok().filter(|x| !x.is_finite()) {
-                        return Err(not_finite(file, vertex, axis, value));
-                    }
-                    out.push(' ');
-                    out.push_str(word);
-                }
-                out.push('\n');
-                vertex += 1;
-                within_budget(vertex, facets, file)?;
-            }
-            other => {
-                out.push_str(other);
-                for word in words {
-                    out.push(' ');
-                    out.push_str(&word.to_ascii_lowercase());
-                }
-                out.push('\n');
-            }
+        let is = |word: &str| first.eq_ignore_ascii_case(word);
+        if step == 0 && (is("solid") || is("endsolid")) {
+            continue;
         }
+        // the corners of the present one are there already at its last two lines
+        let triangle = (vertices.len() - usize::from(step > 4)) / 3;
+        let wanted = FACET[step];
+        if !is(wanted) {
+            let why = format!("triangle {triangle}: `{wanted}` expected, found `{}`", line.trim());
+            return Err(malformed(file, why));
+        }
+        if wanted == "vertex" {
+            within_budget(vertices.len() + 1, triangle + 1, file)?;
+            vertices.push(point(words, vertices.len(), file)?);
+        }
+        step = (step + 1) % FACET.len();
     }
-    if !ended {
-        return Err(malformed(file, "does not end with `endsolid` (truncated?)"));
-    }
-    out.push_str("endsolid x\n");
-    Ok(out)
+    Ok(soup(vertices))
 }
 
-fn triangles(bytes: Vec<u8>, file: &str) -> Result<TriMesh, MeshError> {
-    let mut mesh = TriMesh::default();
-    let mut cursor = Cursor::new(bytes);
-    let broken = |triangle: usize, e: &std::io::Error| malformed(file, format_args!("triangle {triangle}: {e}"));
-    let reader = stl_io::create_stl_reader(&mut cursor).map_err(|e| broken(0, &e))?;
-    for (t, triangle) in reader.enumerate() {
-        let triangle = triangle.map_err(|e| broken(t, &e))?;
-        let base = index(mesh.vertices.len());
-        mesh.vertices
-            .extend(triangle.vertices.iter().map(|v| v.0.map(f64::from)));
-        mesh.triangles.push([0, 1, 2].map(|k| base.saturating_add(k)));
-    }
-    Ok(mesh)
+/// The number in four bytes, the least significant first.
+fn le_u32(bytes: &[u8]) -> u32 {
+    bytes
+        .iter()
+        .rev()
+        .fold(0, |number, byte| number << 8 | u32::from(*byte))
+}
+
+/// Three f32 in twelve bytes.
+fn le_point(bytes: &[u8]) -> [f32; 3] {
+    [0, 4, 8].map(|start| f32::from_bits(le_u32(&bytes[start..start + 4])))
 }
 
 // Writers: OBJ text, GLB.

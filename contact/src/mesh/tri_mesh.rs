@@ -139,6 +139,18 @@ impl Unions {
 
 // Bounds, area, volume and closedness of a mesh.
 
+/// The least and the largest coordinates of `points`; ∞ and −∞ of none.
+pub(crate) fn span<const N: usize>(points: impl IntoIterator<Item = [f64; N]>) -> [[f64; N]; 2] {
+    let mut ends = [[f64::INFINITY; N], [f64::NEG_INFINITY; N]];
+    for p in points {
+        for k in 0..N {
+            ends[0][k] = ends[0][k].min(p[k]);
+            ends[1][k] = ends[1][k].max(p[k]);
+        }
+    }
+    ends
+}
+
 pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
@@ -168,14 +180,8 @@ impl TriMesh {
     /// Smallest box around the vertices, m: `(low, high)`. `None` for a mesh without vertices.
     #[must_use]
     pub fn bounds(&self) -> Option<([f64; 3], [f64; 3])> {
-        let first = *self.vertices.first()?;
-        Some(self.vertices.iter().fold((first, first), |(mut low, mut high), v| {
-            for k in 0..3 {
-                low[k] = low[k].min(v[k]);
-                high[k] = high[k].max(v[k]);
-            }
-            (low, high)
-        }))
+        let [low, high] = span(self.vertices.iter().copied());
+        (!self.vertices.is_empty()).then_some((low, high))
     }
 
     /// Longest side of the box around the vertices, m; 0 for a mesh without vertices.
@@ -402,74 +408,36 @@ fn square_distance(p: [f64; 3], q: [f64; 3]) -> f64 {
 
 // Joins coinciding vertices and drops triangles that collapse.
 
-/// No vertex.
-const NONE: u32 = u32::MAX;
 /// Side of a cell of the search grid in tolerances: large enough that a search seldom needs a neighbour cell, small
 /// enough that a cell holds few vertices.
 const CELL_TOLERANCES: f64 = 8.0;
 
-/// Hash table of the kept vertices by their cell in space; vertices of one slot are chained.
+/// The kept vertices by their cell in space.
 struct Grid {
     side_m: f64,
-    heads: Vec<u32>,
-    next: Vec<u32>,
+    cells: HashMap<[i64; 3], Vec<u32>>,
 }
 
 impl Grid {
-    fn new(side_m: f64, vertices: usize) -> Self {
-        Self {
-            side_m,
-            heads: vec![NONE; vertices.next_power_of_two().max(16)],
-            next: Vec::new(),
-        }
-    }
-
     /// Cell along one axis. Saturation far outside the grid only makes the search slower.
     #[expect(clippy::cast_possible_truncation, reason = "float-to-int casts saturate")]
     fn cell(&self, x: f64) -> i64 {
         (x / self.side_m).floor() as i64
     }
 
-    /// Slot of a cell. Cells that share a slot only make the search slower: the distance decides.
-    fn slot(&self, [x, y, z]: [i64; 3]) -> usize {
-        const ODD: [u64; 4] = [
-            0x9e37_79b9_7f4a_7c15,
-            0xc2b2_ae3d_27d4_eb4f,
-            0x1656_67b1_9e37_79f9,
-            0xd6e8_feb8_6659_fd93,
-        ];
-        let mixed = (x as u64).wrapping_mul(ODD[0]) ^ (y as u64).wrapping_mul(ODD[1]) ^ (z as u64).wrapping_mul(ODD[2]);
-        let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(ODD[3]);
-        (mixed >> 24) as usize & (self.heads.len() - 1)
-    }
-
     /// The first of `kept` within `tolerance_m` of `v`.
     fn find(&self, v: [f64; 3], tolerance_m: f64, kept: &[[f64; 3]]) -> Option<u32> {
-        let mut found = NONE;
         let [xs, ys, zs] = v.map(|x| self.cell(x - tolerance_m)..=self.cell(x + tolerance_m));
-        for x in xs {
-            for y in ys.clone() {
-                for z in zs.clone() {
-                    let mut k = self.heads[self.slot([x, y, z])];
-                    while k != NONE {
-                        let p = kept[k as usize];
-                        let square = (0..3).map(|a| (p[a] - v[a]).powi(2)).sum::<f64>();
-                        if square <= tolerance_m.powi(2) {
-                            found = found.min(k);
-                        }
-                        k = self.next[k as usize];
-                    }
-                }
-            }
-        }
-        (found != NONE).then_some(found)
+        let columns = xs.flat_map(|x| ys.clone().map(move |y| [x, y]));
+        let cells = columns.flat_map(|[x, y]| zs.clone().map(move |z| [x, y, z]));
+        let known = cells.filter_map(|cell| self.cells.get(&cell)).flatten();
+        let near = |k: &&u32| square_distance(kept[**k as usize], v) <= tolerance_m.powi(2);
+        known.filter(near).min().copied()
     }
 
-    /// Adds the next vertex, in the order of their indices.
-    fn push(&mut self, v: [f64; 3]) {
-        let slot = self.slot(v.map(|x| self.cell(x)));
-        self.next.push(self.heads[slot]);
-        self.heads[slot] = index(self.next.len() - 1);
+    fn push(&mut self, v: [f64; 3], vertex: u32) {
+        let cell = v.map(|x| self.cell(x));
+        self.cells.entry(cell).or_default().push(vertex);
     }
 }
 
@@ -510,14 +478,18 @@ impl TriMesh {
     #[must_use]
     pub fn welded(&self, tolerance_m: f64) -> (Self, usize, usize) {
         let side_m = (CELL_TOLERANCES * tolerance_m).max(f64::MIN_POSITIVE.sqrt());
-        let mut grid = Grid::new(side_m, self.vertices.len());
+        let mut grid = Grid {
+            side_m,
+            cells: HashMap::new(),
+        };
         let mut kept: Vec<[f64; 3]> = Vec::new();
         let mut target: Vec<u32> = Vec::with_capacity(self.vertices.len());
         for &v in &self.vertices {
             target.push(grid.find(v, tolerance_m, &kept).unwrap_or_else(|| {
-                grid.push(v);
+                let vertex = index(kept.len());
+                grid.push(v, vertex);
                 kept.push(v);
-                index(kept.len() - 1)
+                vertex
             }));
         }
         let joined = self.vertices.len() - kept.len();
@@ -533,6 +505,24 @@ impl TriMesh {
 }
 
 impl TriMesh {
+    /// Lowest z of the surface above (x, y), m, by trying every triangle: an oracle for tests. `None` beside it.
+    #[cfg(test)]
+    pub(crate) fn underside_m(&self, [x, y]: [f64; 2]) -> Option<f64> {
+        let mut lowest: Option<f64> = None;
+        for t in 0..self.triangles.len() {
+            let [a, b, c] = self.corners(t);
+            let side = |p: [f64; 3], q: [f64; 3]| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
+            let parts = [side(b, c), side(c, a), side(a, b)];
+            let whole = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+            let [u, v, w] = parts.map(|part| part / whole);
+            if u >= 0.0 && v >= 0.0 && w >= 0.0 {
+                let z = u * a[2] + v * b[2] + w * c[2];
+                lowest = Some(lowest.map_or(z, |low| low.min(z)));
+            }
+        }
+        lowest
+    }
+
     /// Middle of an edge, m.
     pub(super) fn middle_m(&self, edge: [u32; 2]) -> [f64; 3] {
         let [p, q] = edge.map(|i| self.vertices[i as usize]);

@@ -2,6 +2,7 @@
 
 use super::plan::Plan;
 use crate::mesh::polygon::{Point, signed_area_m2};
+use crate::mesh::span;
 use i_overlay::core::fill_rule::FillRule;
 use i_overlay::core::overlay_rule::OverlayRule;
 use i_overlay::float::single::SingleFloatOverlay as _;
@@ -82,11 +83,7 @@ pub(super) struct Bands {
 impl Bands {
     /// For questions about distances up to `reach_m`.
     pub(super) fn of(loops: &[Vec<Point>], reach_m: f64) -> Self {
-        let along = || loops.iter().flatten().map(|p| p[1]);
-        let (low_m, high_m) = (
-            along().fold(f64::INFINITY, f64::min),
-            along().fold(f64::NEG_INFINITY, f64::max),
-        );
+        let [[_, low_m], [_, high_m]] = span(loops.iter().flatten().copied());
         let mut bands = Self {
             low_m,
             height_m: ((high_m - low_m) / BANDS as f64).max(f64::MIN_POSITIVE),
@@ -242,11 +239,8 @@ impl Region {
 
     /// Extent along x and y, m.
     pub(super) fn extent_m(&self) -> [f64; 2] {
-        [0, 1].map(|k| {
-            let along = self.loops.iter().flatten().map(|p| p[k]);
-            let (low, high) = along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
-            (high - low).max(0.0)
-        })
+        let [low, high] = span(self.loops.iter().flatten().copied());
+        [0, 1].map(|k| (high[k] - low[k]).max(0.0))
     }
 
     /// Area of the footprint, m², and its centroid, m.
@@ -314,14 +308,8 @@ fn directed(mut outline: Vec<Point>, counter_clockwise: bool) -> Vec<Point> {
 /// The boolean operation is exact on a grid of 2⁻³⁰ of the extent.
 fn united(plan: &Plan) -> Vec<Vec<Point>> {
     let shapes = plan.add.overlay(&plan.cut, OverlayRule::Difference, FillRule::NonZero);
-    let all = || shapes.iter().flatten().flatten();
-    let extent = [0, 1].map(|k| {
-        let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
-            (l.min(p[k]), h.max(p[k]))
-        });
-        high - low
-    });
-    let extent = extent[0].max(extent[1]);
+    let [low, high] = span(shapes.iter().flatten().flatten().copied());
+    let extent = (high[0] - low[0]).max(high[1] - low[1]);
     let mut loops = Vec::new();
     for shape in &shapes {
         for (i, outline) in shape.iter().enumerate() {

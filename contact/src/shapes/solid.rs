@@ -2,8 +2,8 @@
 
 use super::plan::{Dice, Dome};
 use super::region::Bands;
-use crate::mesh::TriMesh;
 use crate::mesh::polygon::Point;
+use crate::mesh::{TriMesh, span};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 use std::f64::consts::TAU;
@@ -242,14 +242,8 @@ impl Underside {
 
     /// Points of a triangular lattice at least `margin_m` inside.
     fn add_lattice(&mut self, loops: &[Vec<Point>], sides: &Bands, margin_m: f64, spacing_m: f64) {
-        let mut low = [f64::INFINITY; 2];
-        let mut high = [f64::NEG_INFINITY; 2];
-        for p in loops.iter().flatten() {
-            for k in 0..2 {
-                low[k] = low[k].min(p[k] + margin_m);
-                high[k] = high[k].max(p[k] - margin_m);
-            }
-        }
+        let [low, high] = span(loops.iter().flatten().copied());
+        let (low, high) = (low.map(|x| x + margin_m), high.map(|x| x - margin_m));
         let row_m = spacing_m * 0.75_f64.sqrt();
         let (mut y, mut odd) = (low[1], false);
         while y <= high[1] {

@@ -69,17 +69,23 @@ fn undersides_are_flat_inside_their_edges() {
 }
 
 #[test]
-fn an_unknown_family_is_told_the_known_ones() {
+fn what_is_asked_for_in_vain_is_told() {
     let error = build_shape("banana", &ShapeRanges::default(), 1)
         .unwrap_err()
         .to_string();
     assert!(error.starts_with("shape family \"banana\" is not one of \"plate\", \"perforated\""));
-    let ranges = ShapeRanges {
-        size_m: [1.0, 2.0],
-        ..ShapeRanges::default()
-    };
-    let error = build_shape("plate", &ranges, 1).unwrap_err().to_string();
-    assert_eq!(error, "`size_m[0]` = 1 is outside [5e-3, 0.3] m");
+    for (toml, told) in [
+        ("size_m = [1e-3, 0.1]", "`size_m[0]` = 0.001 is outside [5e-3, 0.3] m"),
+        ("relief_m = [0.0, nan]", "`relief_m[1]` = NaN is outside [0, 5e-3] m"),
+        (
+            "edge_m = [2e-3, 1e-3]",
+            "`edge_m[0]` = 0.002 is outside the range that ends at the second number",
+        ),
+    ] {
+        let ranges: ShapeRanges = toml::from_str(toml).unwrap();
+        assert_eq!(build_shape("plate", &ranges, 1).unwrap_err().to_string(), told);
+    }
+    assert!(toml::from_str::<ShapeRanges>("height_m = [0.0, 1.0]").is_err());
 }
 
 /// A family that draws a crossed outline, or a dome with a hole, is refused and does not panic.
@@ -107,13 +113,6 @@ fn a_family_without_solids_is_refused() {
         };
         let error = family.build(&ShapeRanges::default(), 3).unwrap_err().to_string();
         assert_eq!(error, "shape family \"odd\" has no closed solid for seed 3 in 16 tries");
-    }
-}
-
-#[test]
-fn names_are_distinct() {
-    for (i, family) in SHAPE_FAMILIES.iter().enumerate() {
-        assert!(SHAPE_FAMILIES[..i].iter().all(|other| other.name != family.name));
     }
 }
 

@@ -5,7 +5,7 @@ use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhLeafCost};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, in_range};
+use spts_models::{SkinLayout, in_interval, in_range};
 use std::f64::consts::TAU;
 
 /// Share of a triangle by which rays beside it count as hits, so that none passes between two triangles.
@@ -223,7 +223,7 @@ impl SurfacePoints {
         }
         for (i, p) in positions_m.iter().enumerate() {
             for v in p {
-                in_range(&format!("positions_m[{i}]"), *v, v.abs() <= 1e3, "[-1000, 1000] m")?;
+                in_interval(&format!("positions_m[{i}]"), *v, "[-1000, 1000] m")?;
             }
         }
         let mut units = normals;
@@ -234,26 +234,21 @@ impl SurfacePoints {
             *n = n.map(|v| v / length);
         }
         for (i, area) in areas_m2.iter().enumerate() {
-            in_range(
-                &format!("areas_m2[{i}]"),
-                *area,
-                *area > 0.0 && *area <= 1.0,
-                "(0, 1] m²",
-            )?;
+            in_interval(&format!("areas_m2[{i}]"), *area, "(0, 1] m²")?;
         }
         let taxel_count = taxels.iter().copied().max().map_or(0, |k| k as usize + 1);
-        in_range(
-            "taxels",
-            taxel_count as f64,
-            taxel_count <= count,
-            "numbers below that of the points",
-        )?;
+        let (found, range) = (taxel_count as f64, "numbers below that of the points");
+        in_range("taxels", found, taxel_count <= count, range)?;
         let mut taxel_areas_m2 = vec![0.0; taxel_count];
         for (taxel, area) in taxels.iter().zip(&areas_m2) {
             taxel_areas_m2[*taxel as usize] += area;
         }
         if let Some(k) = taxel_areas_m2.iter().position(|area| *area <= 0.0) {
-            in_range("taxels", k as f64, false, "a point for every taxel up to the last one")?;
+            return Err(Refusal::range(
+                "taxels",
+                k,
+                "a point for every taxel up to the last one",
+            ));
         }
         Ok(Self {
             positions_m,
@@ -326,12 +321,6 @@ impl SurfacePoints {
     #[must_use]
     pub fn areas_m2(&self) -> &[f64] {
         &self.areas_m2
-    }
-
-    /// Taxel of every point.
-    #[must_use]
-    pub fn taxel_of(&self) -> &[u32] {
-        &self.taxels
     }
 
     /// Area of every taxel, m².
@@ -418,12 +407,7 @@ impl SurfacePoints {
     /// # Errors
     /// [`Refusal`] for a value outside its range.
     pub fn on_cylinder(winding: &Winding, radius_m: f64) -> Result<Self, Refusal> {
-        in_range(
-            "radius",
-            radius_m,
-            radius_m > 1e-4 && radius_m <= 100.0,
-            "(1e-4, 100] m",
-        )?;
+        in_interval("radius", radius_m, "(1e-4, 100] m")?;
         winding.points(|_, _, _| Ok((radius_m, None)))
     }
 
@@ -444,21 +428,12 @@ impl SurfacePoints {
             let met = solid.surface(on_axis + outward * reach_m, -outward, reach_m);
             let field = format!("mesh under taxel {taxel}");
             let Some((distance_m, normal)) = met else {
-                in_range(
-                    &field,
-                    0.0,
-                    false,
-                    "a surface between each point of the axis and its outside",
-                )?;
-                return Ok((0.0, None));
+                let range = "a surface between each point of the axis and its outside";
+                return Err(Refusal::range(&field, 0, range));
             };
             let cosine = normal.dot(outward);
-            in_range(
-                &field,
-                cosine,
-                cosine >= STEEPEST,
-                "a normal within 84° of the way out from the axis",
-            )?;
+            let range = "a normal within 84° of the way out from the axis";
+            in_range(&field, cosine, cosine >= STEEPEST, range)?;
             Ok((reach_m - distance_m, Some(normal)))
         })
     }
@@ -473,36 +448,23 @@ impl Winding {
     ) -> Result<SurfacePoints, Refusal> {
         let [rows, cols] = self.shape;
         let side = self.points_per_side;
-        in_range("rows", rows as f64, (1..=1 << 17).contains(&rows), "[1, 131072]")?;
-        in_range("cols", cols as f64, (1..=1 << 17).contains(&cols), "[1, 131072]")?;
-        in_range("points", side as f64, (1..=64).contains(&side), "[1, 64]")?;
-        in_range(
-            "rows × cols × points²",
-            (rows * cols * side * side) as f64,
-            rows * cols * side * side <= 1 << 24,
-            "[1, 2^24]",
-        )?;
+        in_interval("rows", rows as f64, "[1, 131072]")?;
+        in_interval("cols", cols as f64, "[1, 131072]")?;
+        in_interval("points", side as f64, "[1, 64]")?;
+        let count = rows * cols * side * side;
+        in_range("rows × cols × points²", count as f64, count <= MOST_POINTS, "[1, 2^24]")?;
         let [first, last] = self.arc_rad;
         let arc = last - first;
-        in_range(
-            "arc",
-            arc,
-            arc > 0.0 && arc <= TAU + 1e-9,
-            "(0, 2π] rad from its first angle to its last",
-        )?;
+        let range = "(0, 2π] rad from its first angle to its last";
+        in_range("arc", arc, arc > 0.0 && arc <= TAU + 1e-9, range)?;
         let [low, high] = self.span_m;
-        in_range(
-            "span",
-            high - low,
-            high > low && (high - low).is_finite(),
-            "above 0 m from its lowest to its highest",
-        )?;
+        let range = "above 0 m from its lowest to its highest";
+        in_range("span", high - low, high > low && (high - low).is_finite(), range)?;
         let along = axis(self.axis);
         let (across, beyond) = (axis((self.axis + 1) % 3), axis((self.axis + 2) % 3));
         let (lines, rays) = (rows * side, cols * side);
         let (height_m, angle_rad) = ((high - low) / lines as f64, arc / rays as f64);
         let centre = Vector::from(self.centre_m);
-        let count = lines * rays;
         let (mut positions, mut normals) = (Vec::with_capacity(count), Vec::with_capacity(count));
         let (mut areas, mut taxels) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for line in 0..lines {
@@ -588,38 +550,18 @@ mod tests {
 
     #[test]
     fn what_cannot_be_wound_is_refused() {
-        let cases: [(&str, Winding); 5] = [
-            ("rows", Winding { shape: [0, 6], ..HALF }),
-            (
-                "arc",
-                Winding {
-                    arc_rad: [1.0, 1.0],
-                    ..HALF
-                },
-            ),
-            (
-                "arc",
-                Winding {
-                    arc_rad: [0.0, 7.0],
-                    ..HALF
-                },
-            ),
-            (
-                "span",
-                Winding {
-                    span_m: [0.1, f64::NAN],
-                    ..HALF
-                },
-            ),
-            (
-                "points",
-                Winding {
-                    points_per_side: 0,
-                    ..HALF
-                },
-            ),
-        ];
-        for (field, winding) in cases {
+        let with = |change: fn(&mut Winding)| {
+            let mut winding = HALF;
+            change(&mut winding);
+            winding
+        };
+        for (field, winding) in [
+            ("rows", with(|w| w.shape = [0, 6])),
+            ("arc", with(|w| w.arc_rad = [1.0, 1.0])),
+            ("arc", with(|w| w.arc_rad = [0.0, 7.0])),
+            ("span", with(|w| w.span_m = [0.1, f64::NAN])),
+            ("points", with(|w| w.points_per_side = 0)),
+        ] {
             let error = SurfacePoints::on_cylinder(&winding, 0.05).unwrap_err().to_string();
             assert!(error.contains(field), "{error}");
         }

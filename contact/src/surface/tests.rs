@@ -13,11 +13,6 @@ use proptest::test_runner::RngSeed;
 use spts_models::SkinLayout;
 use std::f64::consts::{PI, TAU};
 
-fn rotated(rotation: &Rotation3<f64>) -> [[f64; 3]; 3] {
-    let matrix = rotation.matrix();
-    std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
-}
-
 /// On a flat skin it is `winkler`: same points, same law, so the same pressures and wrench but for round-off, for all
 /// objects, turned, tilted and moving. Depths are good to 1e-15 m of some mm; a cell on a silhouette, within 1e-9 m of
 /// it, may fall on either side: none does at these poses.
@@ -32,7 +27,7 @@ fn a_flat_skin_is_winkler() {
         let turn = f64::from(k);
         let rotation = Rotation3::from_euler_angles(0.01, -0.015, turn);
         let body = PosedMesh {
-            rotation: rotated(&rotation),
+            rotation: rotation.matrix().transpose().into(),
             ..PosedMesh::at_rest(&mesh, [3.1e-3, -2.3e-3, 0.0])
         };
         let [lowest_m, _] = body.heights_m();

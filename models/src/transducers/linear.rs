@@ -1,6 +1,6 @@
 //! The simplest transducer.
 
-use crate::check::in_range;
+use crate::check::in_interval;
 use crate::layout::{ConductanceMap, PressureMap};
 use crate::transducer::{Transducer, loaded_pa};
 use serde::Deserialize;
@@ -16,7 +16,7 @@ use spts_input::Refusal;
 /// let mut conductance = ConductanceMap::zeros(10, 10);
 /// linear.step(&PressureMap::from_values(10, 10, vec![5e3; 100]), 0.0, &mut conductance);
 /// assert!((conductance.values()[0] - 1e-4).abs() < 1e-15);
-/// # Ok::<(), spts_models::TransducerError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, try_from = "LinearConfig")]
@@ -42,9 +42,9 @@ impl Default for LinearConfig {
 impl TryFrom<LinearConfig> for Linear {
     type Error = Refusal;
     fn try_from(c: LinearConfig) -> Result<Self, Refusal> {
-        let k = c.slope_s_per_pa;
-        in_range("slope_s_per_pa", k, k > 0.0 && k <= 1.0, "(0, 1]")?;
-        Ok(Self { slope_s_per_pa: k })
+        in_interval("slope_s_per_pa", c.slope_s_per_pa, "(0, 1]")?;
+        let slope_s_per_pa = c.slope_s_per_pa;
+        Ok(Self { slope_s_per_pa })
     }
 }
 

@@ -1,11 +1,9 @@
 //! The piezoresistive sheet.
 
-use crate::check::{in_range, within};
+use crate::check::in_interval;
 use crate::gains::{Spread, TaxelGains};
 use crate::layout::{ConductanceMap, PressureMap, SkinLayout};
-use crate::memory::{
-    Conditioning, ConditioningConfig, Creep, CreepConfig, CreepDecays, Hysteresis, HysteresisConfig, Presses,
-};
+use crate::memory::{Conditioning, Creep, CreepConfig, CreepDecays, Hysteresis, HysteresisConfig, Presses};
 use crate::streams::Streams;
 use crate::transducer::{Transducer, elapsed_s, loaded_pa};
 use serde::Deserialize;
@@ -58,7 +56,7 @@ pub struct VelostatConfig {
     /// Creep: the conductance grows while a load is held, and follows a change with a delay.
     pub creep: CreepConfig,
     /// Conditioning: the conductance grows from press to press of a session.
-    pub conditioning: ConditioningConfig,
+    pub conditioning: Conditioning,
 }
 
 impl Default for VelostatConfig {
@@ -75,7 +73,7 @@ impl Default for VelostatConfig {
             resistance_per_k: 0.004,
             hysteresis: HysteresisConfig::default(),
             creep: CreepConfig::default(),
-            conditioning: ConditioningConfig::default(),
+            conditioning: Conditioning::default(),
         }
     }
 }
@@ -136,7 +134,7 @@ impl Velostat {
     /// [`Refusal`] for a parameter outside its range.
     pub fn new(config: VelostatConfig, skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
         let c = config;
-        within("unloaded_s", c.unloaded_s, 0.0, 1.0, "[0, 1]")?;
+        in_interval("unloaded_s", c.unloaded_s, "[0, 1]")?;
         let hysteresis = Hysteresis::try_from(c.hysteresis)?;
         let creep = Creep::try_from(c.creep)?;
         let taxels = skin.taxels();
@@ -156,7 +154,7 @@ impl Velostat {
             warmth: conductance_factor(c.temperature_c, c.resistance_per_k)?,
             session: Spread::new("session_log_sd", session_log_sd)?,
             fixed,
-            conditioning: Conditioning::try_from(c.conditioning)?,
+            conditioning: c.conditioning.checked()?,
             taxels: Vec::with_capacity(taxels),
             plays: vec![0.0; taxels * hysteresis.operators()],
             slow: vec![0.0; taxels * creep.branches()],
@@ -258,10 +256,9 @@ impl PressureLaw {
     /// # Errors
     /// [`Refusal`] for a value outside its range.
     pub(crate) fn new(reference_s: f64, exponent: f64, saturation_pa: f64) -> Result<Self, Refusal> {
-        let ok = reference_s > 0.0 && reference_s <= 1.0;
-        in_range("reference_s", reference_s, ok, "(0, 1]")?;
-        within("exponent", exponent, 0.05, 2.0, "[0.05, 2]")?;
-        within("saturation_pa", saturation_pa, 1.0, 1e12, "[1, 1e12]")?;
+        in_interval("reference_s", reference_s, "(0, 1]")?;
+        in_interval("exponent", exponent, "[0.05, 2]")?;
+        in_interval("saturation_pa", saturation_pa, "[1, 1e12]")?;
         Ok(Self {
             reference_s,
             exponent,
@@ -295,8 +292,8 @@ pub const REFERENCE_C: f64 = 25.0;
 /// [`Refusal`] for a temperature outside [-45, 65] °C, the range of use of the sheet, or a coefficient outside
 /// [-0.02, 0.02] 1/K.
 pub(crate) fn conductance_factor(temperature_c: f64, resistance_per_k: f64) -> Result<f64, Refusal> {
-    within("temperature_c", temperature_c, -45.0, 65.0, "[-45, 65]")?;
-    within("resistance_per_k", resistance_per_k, -0.02, 0.02, "[-0.02, 0.02]")?;
+    in_interval("temperature_c", temperature_c, "[-45, 65]")?;
+    in_interval("resistance_per_k", resistance_per_k, "[-0.02, 0.02]")?;
     Ok((-resistance_per_k * (temperature_c - REFERENCE_C)).exp())
 }
 

@@ -7,18 +7,19 @@ use spts::Mode;
 use spts::assign::Assignment;
 use spts::output::{OutputError, OutputFolder};
 use spts::session::SessionWriter;
-use spts::simulate::{Request, SimulateError, run};
+use spts::Refusal;
+use spts::simulate::{Request, run};
 use std::path::PathBuf;
 
 /// Why a scene gives no session.
 #[derive(Debug)]
 enum Failure {
-    Scene(SimulateError),
+    Scene(Refusal),
     Output(OutputError),
 }
 
-impl From<SimulateError> for Failure {
-    fn from(error: SimulateError) -> Self {
+impl From<Refusal> for Failure {
+    fn from(error: Refusal) -> Self {
         Self::Scene(error)
     }
 }

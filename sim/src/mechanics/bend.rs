@@ -4,7 +4,8 @@ use rand::RngExt as _;
 use rand_distr::{Distribution as _, Exp1, StandardNormal};
 use serde::{Deserialize, Serialize};
 use spts_contact::mesh::TriMesh;
-use spts_models::{ConfigError, SkinLayout, Streams, in_range};
+use spts_input::Refusal;
+use spts_models::{SkinLayout, Streams, in_interval};
 
 /// Section `[bend]`: the skin is wrapped round a cylinder along its columns, so that its rows run round the cylinder.
 ///
@@ -66,19 +67,14 @@ impl BendConfig {
     /// Checks every value.
     ///
     /// # Errors
-    /// [`ConfigError`] for the first one outside its range.
-    pub(super) fn check(&self) -> Result<(), ConfigError> {
-        for (field, value, range, text) in [
-            ("bend.radius_m", self.radius_m, [0.02, 10.0], "[0.02, 10] m"),
-            ("bend.taut_share", self.taut_share, [0.0, 1.0], "[0, 1]"),
-            ("bend.strain", self.strain, [0.0, 0.3], "[0, 0.3]"),
-            ("bend.strain_log_sd", self.strain_log_sd, [0.0, 2.0], "[0, 2]"),
-            ("bend.press_log_sd", self.press_log_sd, [0.0, 1.0], "[0, 1]"),
-            ("bend.touch_slack", self.touch_slack, [0.0, 2.0], "[0, 2]"),
-        ] {
-            in_range(field, value, (range[0]..=range[1]).contains(&value), text)?;
-        }
-        Ok(())
+    /// [`Refusal`] for the first one outside its range.
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        in_interval("bend.radius_m", self.radius_m, "[0.02, 10] m")?;
+        in_interval("bend.taut_share", self.taut_share, "[0, 1]")?;
+        in_interval("bend.strain", self.strain, "[0, 0.3]")?;
+        in_interval("bend.strain_log_sd", self.strain_log_sd, "[0, 2]")?;
+        in_interval("bend.press_log_sd", self.press_log_sd, "[0, 1]")?;
+        in_interval("bend.touch_slack", self.touch_slack, "[0, 2]")
     }
 
     /// Strain of the foam under every taxel of `skin` before press `index`; 0 where the cover is slack. It depends only

@@ -24,4 +24,4 @@ pub use press::{DropConfig, MAX_LIDDED_TILT_DEG, PressConfig};
 #[cfg(feature = "engine")]
 pub(crate) use press::{RAMP_CORNER, ramp_s};
 pub use scene::{ARM_MASS_KG, GRAVITY_M_PER_S2, Mechanics, MechanicsConfig, Overhang, Task};
-pub use timestep::{BLOCK_S, LONGEST_STEP_S, MechanicsError, SHORTEST_STEP_S, Timestep};
+pub use timestep::{BLOCK_S, LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};

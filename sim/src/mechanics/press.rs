@@ -1,12 +1,12 @@
 //! The sections `[press]` and `[drop]`: their fields, the places and times that these give, and their checks.
 
-use super::timestep::{BLOCK_S, MechanicsError, refused};
+use super::timestep::BLOCK_S;
 use serde::{Deserialize, Serialize};
 use spts_contact::PreparedMesh;
 use spts_contact::mesh::{MeshReport, load};
 use spts_contact::objects::{BALL_STIFFNESS_PA_PER_M, Placement, pressable};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, in_range, within};
+use spts_models::{SkinLayout, in_interval, in_range, within};
 use std::path::Path;
 
 /// A place as a scene writes it; at most one of the three ways is used.
@@ -32,14 +32,14 @@ impl Place<'_> {
     /// Turns whatever was written into a row and a column; where nothing was, these are `usual`.
     ///
     /// # Errors
-    /// [`MechanicsError`] for two ways at once, and for a place out of reach of the sheet.
-    fn resolve(mut self, skin: &SkinLayout, usual: [f64; 2]) -> Result<(), MechanicsError> {
+    /// [`Refusal`] for two ways at once, and for a place out of reach of the sheet.
+    fn resolve(mut self, skin: &SkinLayout, usual: [f64; 2]) -> Result<(), Refusal> {
         let in_taxels = self.row.is_some() || self.col.is_some();
         let found = [in_taxels, self.position_m.is_some(), self.position_share.is_some()];
         let found = found.into_iter().filter(|given| *given).count();
         if found > 1 {
             let section = self.section;
-            return Err(refused(format!(
+            return Err(Refusal::new(format!(
                 "give at most one of `{section}.row` with `{section}.col`, `{section}.position_m` and \
                  `{section}.position_share`; found {found}"
             )));
@@ -47,7 +47,7 @@ impl Place<'_> {
         if let Some(share) = self.position_share.take() {
             for (axis, s) in ["x", "y"].into_iter().zip(share) {
                 let field = format!("{}.position_share ({axis})", self.section);
-                in_range(&field, s, (-1.0..=1.0).contains(&s), "[-1, 1]")?;
+                in_interval(&field, s, "[-1, 1]")?;
             }
             let [width_m, height_m] = skin.extent_m();
             self.set(skin, [share[0] * width_m, share[1] * height_m]);
@@ -59,7 +59,7 @@ impl Place<'_> {
                 let within = p.abs() <= most_m * (1.0 + 1e-12);
                 if !within {
                     let section = self.section;
-                    return Err(refused(format!(
+                    return Err(Refusal::new(format!(
                         "`{section}.position_m`: {axis} = {p} is outside [{:.4}, {most_m:.4}] m; the limit is 75 mm or 5 \
                          taxels beyond the outer taxels",
                         -most_m
@@ -72,8 +72,7 @@ impl Place<'_> {
         self.row.get_or_insert(usual[0]);
         self.col.get_or_insert(usual[1]);
         // a usual place far beside a small sheet ends in an error that says that nothing is touched
-        check_place(&format!("{}.", self.section), [row, col], skin)?;
-        Ok(())
+        check_place(&format!("{}.", self.section), [row, col], skin)
     }
 
     fn set(&mut self, skin: &SkinLayout, [x, y]: [f64; 2]) {
@@ -140,49 +139,38 @@ fn of_published([row, col]: [f64; 2], skin: &SkinLayout) -> [f64; 2] {
 /// assert_eq!((scene.repeats(), scene.config().press.as_ref().map(|p| p.force_n)), (10, Some(12.0)));
 /// let error = Mechanics::from_toml("[press]\nobject = \"T\"\nforce_n = 500.0", ".".as_ref()).err();
 /// assert!(error.expect("too hard").to_string().contains("`press.force_n` = 500 is outside"));
-/// # Ok::<(), spts_sim::mechanics::MechanicsError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PressConfig {
     /// Name of one of the seventeen objects, or `finger` for a fingertip. Either this or `mesh`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub object: Option<String>,
     /// Mesh file (`.obj`, `.glb` or `.stl`), relative to the scene file. Either this or `object`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub mesh: Option<String>,
     /// Number of metres in a unit of the mesh file; (0, 1000], default 1, as in GLB. It is never guessed: an object 40
     /// units wide may be 40 mm, 40 cm or 40 inches wide.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
     /// Row of the object's origin, in taxels. Default: for an object its own place, at the same distance in metres from
     /// the middle of the sheet as on the published skin; for a mesh the middle.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub row: Option<f64>,
     /// Column of the object's origin, in taxels. Default: as for `row`.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub col: Option<f64>,
     /// Replaces `row` and `col`: position (x, y) of the object's origin relative to the middle of the sheet, m; x
     /// towards large columns, y towards small rows; at most 75 mm or 5 taxels beyond the outer taxels.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub position_m: Option<[f64; 2]>,
     /// Replaces `row` and `col`: the position relative to the sheet's width and height; each [−1, 1], with the edges at
     /// ±0.5.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub position_share: Option<[f64; 2]>,
     /// Replaces `row` and `col`: [row, col] of each press in turn, in taxels; the list repeats.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub places: Option<Vec<[f64; 2]>>,
     /// Rotation about the skin's normal, counter-clockwise seen from above, degrees; [−360, 360].
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub rotation_deg: Option<f64>,
     /// Tilt about the skin's x and y axes, degrees; each [−60, 60]. A mesh that opens upwards may be tilted by
     /// [`MAX_LIDDED_TILT_DEG`](super::MAX_LIDDED_TILT_DEG) in all.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub tilt_deg: Option<[f64; 2]>,
     /// Stiffness of the object's surface in series with the skin, Pa/m; [1e5, 1e12]. Default: the object's own value
     /// (tennis ball, eraser pad); other objects are rigid.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub stiffness_pa_per_m: Option<f64>,
     /// Force at the plateau, N; [0.5, 100].
     pub force_n: f64,
@@ -313,9 +301,6 @@ impl PressConfig {
 /// mm of foam.
 pub const MAX_LIDDED_TILT_DEG: f64 = 5.0;
 
-/// Largest scale of a mesh: a file in kilometres.
-const MAX_SCALE: f64 = 1e3;
-
 impl PressConfig {
     /// Fills what depends on the object, checks every value and loads the mesh, unless it is `given`; with the report
     /// on a mesh from a file.
@@ -324,22 +309,25 @@ impl PressConfig {
         skin: &SkinLayout,
         folder: &Path,
         given: Option<PreparedMesh>,
-    ) -> Result<(PreparedMesh, Option<MeshReport>), MechanicsError> {
+    ) -> Result<(PreparedMesh, Option<MeshReport>), Refusal> {
         if let Some(scale) = self.scale {
-            in_range("press.scale", scale, scale > 0.0 && scale <= MAX_SCALE, "(0, 1000]")?;
+            // at most that of a file in kilometres
+            in_interval("press.scale", scale, "(0, 1000]")?;
         }
         let (mesh, report, place) = match (&self.object, &self.mesh, given) {
             (None, None, Some(mesh)) => (mesh, None, middle(skin)),
             (Some(name), None, None) => {
                 if self.scale.is_some() {
-                    return Err(refused(format!(
+                    return Err(Refusal::new(format!(
                         "`press.scale` is for a mesh, and `press.object` = \"{name}\" has its own size; leave the scale out"
                     )));
                 }
                 let Some(object) = pressable().find(|object| object.name == name) else {
                     let known: Vec<_> = pressable().map(|object| object.name).collect();
                     let known = known.join(", ");
-                    return Err(refused(format!("`press.object` = \"{name}\" is not one of {known}")));
+                    return Err(Refusal::new(format!(
+                        "`press.object` = \"{name}\" is not one of {known}"
+                    )));
                 };
                 self.stiffness_pa_per_m = self.stiffness_pa_per_m.or(object.stiffness_pa_per_m);
                 let [row, col] = of_published([object.placement.row, object.placement.col], skin);
@@ -353,14 +341,16 @@ impl PressConfig {
             (None, Some(file), None) => {
                 let scale = *self.scale.get_or_insert(1.0);
                 let (mesh, report) =
-                    load(&folder.join(file), scale).map_err(|error| refused(format!("`press.mesh`: {error}")))?;
+                    load(&folder.join(file), scale).map_err(|error| Refusal::new(format!("`press.mesh`: {error}")))?;
                 (mesh.into(), Some(report), middle(skin))
             }
             (object, mesh, given) => {
                 let found = [object.is_some(), mesh.is_some(), given.is_some()];
                 let found = found.into_iter().filter(|named| *named).count();
                 let choices = "`press.object` and `press.mesh`";
-                return Err(refused(format!("exactly one of {choices} is needed, found {found}")));
+                return Err(Refusal::new(format!(
+                    "exactly one of {choices} is needed, found {found}"
+                )));
             }
         };
         for [row, col] in self.places.iter().flatten() {
@@ -384,7 +374,7 @@ impl PressConfig {
         }
         let [start_s, end_s] = self.plateau_s();
         if start_s >= end_s {
-            return Err(refused(format!(
+            return Err(Refusal::new(format!(
                 "no plateau: with `press.onset_s` = {}, `press.onset_spread_s` = {} and `press.rise_s` = {} the force is \
                  steady from {start_s:.3} s, but with `press.lift_s` = {} and `press.lift_spread_s` = {} only until \
                  {end_s:.3} s",
@@ -395,15 +385,17 @@ impl PressConfig {
     }
 
     /// Makes the first of `places` the place that is written as `row` and `col`; a saved scene has both.
-    fn resolve_places(&mut self) -> Result<(), MechanicsError> {
+    fn resolve_places(&mut self) -> Result<(), Refusal> {
         let Some(places) = &self.places else { return Ok(()) };
         let Some(&[row, col]) = places.first() else {
-            return Err(refused("`press.places` = [] is empty; valid: one [row, col] or more"));
+            return Err(Refusal::new(
+                "`press.places` = [] is empty; valid: one [row, col] or more",
+            ));
         };
         let same = |written: Option<f64>, first: f64| written.is_none_or(|at| at.to_bits() == first.to_bits());
         let elsewhere = self.position_m.is_some() || self.position_share.is_some();
         if elsewhere || !same(self.row, row) || !same(self.col, col) {
-            return Err(refused(
+            return Err(Refusal::new(
                 "`press.places` gives the place of every press: remove `press.row`, `press.col`, `press.position_m` and \
                  `press.position_share`",
             ));
@@ -414,7 +406,7 @@ impl PressConfig {
 
     /// Refuses a tilt that would press with the walls and the lid that close a mesh from above. The scatter counts with
     /// three times its standard deviation.
-    fn check_lids(&self, lids: usize) -> Result<(), MechanicsError> {
+    fn check_lids(&self, lids: usize) -> Result<(), Refusal> {
         let [_, _, up] = self.placement().matrix();
         let leaning_deg = up[2].clamp(-1.0, 1.0).acos().to_degrees() + 3.0 * self.rotation_sd_deg;
         if leaning_deg <= MAX_LIDDED_TILT_DEG {
@@ -422,7 +414,7 @@ impl PressConfig {
         }
         let [tilt_x_deg, tilt_y_deg] = self.tilt_deg.unwrap_or_default();
         let (mesh, sd_deg) = (self.mesh.as_deref().unwrap_or_default(), self.rotation_sd_deg);
-        Err(refused(format!(
+        Err(Refusal::new(format!(
             "`press.mesh` = \"{mesh}\" opens upwards ({lids} holes were closed there): `press.tilt_deg` = [{tilt_x_deg}, \
              {tilt_y_deg}] and three times `press.rotation_sd_deg` = {sd_deg} tilt it by {leaning_deg:.1}°, outside [0, \
              {MAX_LIDDED_TILT_DEG}]°, so that the closed holes would touch the skin; close the mesh, or tilt it in its file"
@@ -430,38 +422,28 @@ impl PressConfig {
     }
 
     fn check(&self) -> Result<(), Refusal> {
-        let within = |field: &str, value, low, high, text| within(&format!("press.{field}"), value, low, high, text);
-        within(
-            "rotation_deg",
-            self.rotation_deg.unwrap_or_default(),
-            -360.0,
-            360.0,
-            "[-360, 360]",
-        )?;
+        let check = |field: &str, value, range| in_interval(&format!("press.{field}"), value, range);
+        check("rotation_deg", self.rotation_deg.unwrap_or_default(), "[-360, 360]")?;
         for tilt_deg in self.tilt_deg.unwrap_or_default() {
-            within("tilt_deg", tilt_deg, -60.0, 60.0, "[-60, 60]")?;
+            check("tilt_deg", tilt_deg, "[-60, 60]")?;
         }
         if let Some(stiffness) = self.stiffness_pa_per_m {
-            within("stiffness_pa_per_m", stiffness, 1e5, 1e12, "[1e5, 1e12] Pa/m")?;
+            check("stiffness_pa_per_m", stiffness, "[1e5, 1e12] Pa/m")?;
         }
-        within("force_n", self.force_n, 0.5, 100.0, "[0.5, 100] N")?;
-        within("presses", self.presses as f64, 1.0, 1e5, "[1, 100000]")?;
-        within("mass_kg", self.mass_kg, 1e-3, 4.0, "[1e-3, 4] kg")?;
-        within("duration_s", self.duration_s, 0.5, 60.0, "[0.5, 60] s")?;
-        within("onset_spread_s", self.onset_spread_s, 0.0, 1.0, "[0, 1] s")?;
-        within(
-            "onset_s",
-            self.onset_s - self.onset_spread_s,
-            0.25,
-            30.0,
-            "[0.25 + onset_spread_s, 30] s",
-        )?;
-        within("rise_s", self.rise_s, 0.1, 10.0, "[0.1, 10] s")?;
-        within("fall_s", self.fall_s, 0.05, 10.0, "[0.05, 10] s")?;
-        within("lift_spread_s", self.lift_spread_s, 0.0, 1.0, "[0, 1] s")?;
-        within("lift_s", self.lift_s, 0.0, self.duration_s, "[0, duration_s]")?;
-        within("position_sd_m", self.position_sd_m, 0.0, 0.01, "[0, 0.01] m")?;
-        within("rotation_sd_deg", self.rotation_sd_deg, 0.0, 5.0, "[0, 5]")
+        check("force_n", self.force_n, "[0.5, 100] N")?;
+        check("presses", self.presses as f64, "[1, 100000]")?;
+        check("mass_kg", self.mass_kg, "[1e-3, 4] kg")?;
+        check("duration_s", self.duration_s, "[0.5, 60] s")?;
+        check("onset_spread_s", self.onset_spread_s, "[0, 1] s")?;
+        let earliest_s = self.onset_s - self.onset_spread_s;
+        let range = "[0.25 + onset_spread_s, 30] s";
+        within("press.onset_s", earliest_s, 0.25, 30.0, range)?;
+        check("rise_s", self.rise_s, "[0.1, 10] s")?;
+        check("fall_s", self.fall_s, "[0.05, 10] s")?;
+        check("lift_spread_s", self.lift_spread_s, "[0, 1] s")?;
+        within("press.lift_s", self.lift_s, 0.0, self.duration_s, "[0, duration_s]")?;
+        check("position_sd_m", self.position_sd_m, "[0, 0.01] m")?;
+        check("rotation_sd_deg", self.rotation_sd_deg, "[0, 5]")
     }
 }
 
@@ -486,17 +468,13 @@ pub struct DropConfig {
     /// Height of the ball's lowest point above the skin at release, m; [0.001, 5].
     pub height_m: f64,
     /// Row of the landing point, in taxels; inside the skin. Default: the middle.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub row: Option<f64>,
     /// Column of the landing point, in taxels; inside the skin. Default: the middle.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub col: Option<f64>,
     /// Replaces `row` and `col`: landing point (x, y) relative to the middle of the sheet, m; x towards large columns,
     /// y towards small rows; inside the skin.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub position_m: Option<[f64; 2]>,
     /// Replaces `row` and `col`: landing point relative to the sheet's width and height; each [−0.5, 0.5].
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub position_share: Option<[f64; 2]>,
     /// Mass, kg; [1e-3, 50].
     pub mass_kg: f64,
@@ -539,7 +517,7 @@ impl Default for DropConfig {
 
 impl DropConfig {
     /// Fills what depends on the skin and checks every value.
-    pub(super) fn resolve(&mut self, skin: &SkinLayout) -> Result<(), MechanicsError> {
+    pub(super) fn resolve(&mut self, skin: &SkinLayout) -> Result<(), Refusal> {
         let (last_row, last_col) = (skin.rows() as f64 - 1.0, skin.cols() as f64 - 1.0);
         let written = Place {
             section: "drop",
@@ -549,35 +527,24 @@ impl DropConfig {
             position_share: &mut self.position_share,
         };
         written.resolve(skin, [0.5 * last_row, 0.5 * last_col])?;
-        Ok(self.check([last_row, last_col])?)
+        self.check([last_row, last_col])
     }
 
     fn check(&self, [last_row, last_col]: [f64; 2]) -> Result<(), Refusal> {
         let (row, col) = (self.row.unwrap_or_default(), self.col.unwrap_or_default());
-        let within = |field: &str, value, low, high, text| within(&format!("drop.{field}"), value, low, high, text);
-        within("height_m", self.height_m, 1e-3, 5.0, "[0.001, 5] m")?;
-        within("row", row, -0.5, last_row + 0.5, "[-0.5, rows - 0.5]")?;
-        within("col", col, -0.5, last_col + 0.5, "[-0.5, cols - 0.5]")?;
-        within("mass_kg", self.mass_kg, 1e-3, 50.0, "[1e-3, 50] kg")?;
-        within("radius_m", self.radius_m, 5e-3, 0.2, "[5e-3, 0.2] m")?;
-        within(
-            "stiffness_pa_per_m",
-            self.stiffness_pa_per_m,
-            1e5,
-            1e12,
-            "[1e5, 1e12] Pa/m",
-        )?;
-        within("drops", self.drops as f64, 1.0, 1e5, "[1, 100000]")?;
-        within("duration_s", self.duration_s, 0.05, 60.0, "[0.05, 60] s")?;
-        within("release_s", self.release_s, 0.0, 10.0, "[0, 10] s")?;
-        within(
-            "release_spread_s",
-            self.release_spread_s,
-            0.0,
-            self.release_s,
-            "[0, release_s]",
-        )?;
-        within("position_sd_m", self.position_sd_m, 0.0, 0.05, "[0, 0.05] m")
+        let check = |field: &str, value, range| in_interval(&format!("drop.{field}"), value, range);
+        check("height_m", self.height_m, "[0.001, 5] m")?;
+        within("drop.row", row, -0.5, last_row + 0.5, "[-0.5, rows - 0.5]")?;
+        within("drop.col", col, -0.5, last_col + 0.5, "[-0.5, cols - 0.5]")?;
+        check("mass_kg", self.mass_kg, "[1e-3, 50] kg")?;
+        check("radius_m", self.radius_m, "[5e-3, 0.2] m")?;
+        check("stiffness_pa_per_m", self.stiffness_pa_per_m, "[1e5, 1e12] Pa/m")?;
+        check("drops", self.drops as f64, "[1, 100000]")?;
+        check("duration_s", self.duration_s, "[0.05, 60] s")?;
+        check("release_s", self.release_s, "[0, 10] s")?;
+        let (spread_s, most_s) = (self.release_spread_s, self.release_s);
+        within("drop.release_spread_s", spread_s, 0.0, most_s, "[0, release_s]")?;
+        check("position_sd_m", self.position_sd_m, "[0, 0.05] m")
     }
 }
 

@@ -9,57 +9,6 @@ use spts_models::in_range;
 use std::fmt;
 use std::str::FromStr;
 
-/// Why a scene is not valid.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MechanicsError {
-    /// Anything but the time step.
-    #[error(transparent)]
-    Refused(#[from] Refusal),
-    /// The time step does not resolve the contact.
-    #[error(
-        "`timestep_s` = {timestep_s} is outside [1e-6, {limit_s:.2e}]: the contact reaches {stiffness_n_per_m:.3e} N/m \
-         on {mass_kg:.3} kg; \"auto\" takes a step that fits"
-    )]
-    Timestep {
-        /// Time step in the scene, s.
-        timestep_s: f64,
-        /// Largest valid time step, s.
-        limit_s: f64,
-        /// Largest stiffness of the contact, N/m.
-        stiffness_n_per_m: f64,
-        /// Oscillating mass, kg.
-        mass_kg: f64,
-    },
-    /// No valid time step resolves the contact.
-    #[error(
-        "no valid `timestep_s`: the contact reaches {stiffness_n_per_m:.3e} N/m on {mass_kg:.3} kg and allows at most {limit_s:.2e} s, \
-         but the shortest step is 1e-6 s; soften the contact (`contact.stiffness_pa_per_m`, `contact.damping_s`) or drop from lower"
-    )]
-    NoTimestep {
-        /// Largest valid time step, s.
-        limit_s: f64,
-        /// Largest stiffness of the contact, N/m.
-        stiffness_n_per_m: f64,
-        /// Oscillating mass, kg.
-        mass_kg: f64,
-    },
-}
-
-impl From<MechanicsError> for Refusal {
-    fn from(error: MechanicsError) -> Self {
-        match error {
-            MechanicsError::Refused(refusal) => refusal,
-            error => Self::from_error(error),
-        }
-    }
-}
-
-/// The error that says `message`.
-pub(super) fn refused(message: impl Into<String>) -> MechanicsError {
-    Refusal::new(message).into()
-}
-
 /// Length of one recorded block: 1000 frames × 100 measurements at 64.3 kHz, s.
 pub const BLOCK_S: f64 = 100_000.0 / 64_300.0;
 
@@ -82,7 +31,7 @@ pub const SHORTEST_STEP_S: f64 = 1e-6;
 /// let scene = Mechanics::from_toml("timestep_s = \"auto\"\n[press]\nobject = \"T\"", ".".as_ref())?;
 /// let steps = scene.frame_interval_s() / scene.timestep_s();
 /// assert!((steps - steps.round()).abs() < 1e-9, "the step divides the time between frames");
-/// # Ok::<(), spts_sim::mechanics::MechanicsError>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Timestep {
@@ -202,10 +151,15 @@ impl StepLimit {
         }
     }
 
+    /// The largest stable step, s.
+    pub(super) fn limit_s(&self) -> f64 {
+        self.limit_s
+    }
+
     /// The step of a scene that asks for `asked`. `auto` is `longest_s` over the smallest whole number that brings it
     /// within the limit.
-    pub(super) fn resolve(&self, asked: Timestep, longest_s: f64) -> Result<f64, MechanicsError> {
-        let (limit_s, stiffness_n_per_m, mass_kg) = (self.limit_s, self.stiffness_n_per_m, self.mass_kg);
+    pub(super) fn resolve(&self, asked: Timestep, longest_s: f64) -> Result<f64, Refusal> {
+        let (limit_s, mass_kg) = (self.limit_s, self.mass_kg);
         let timestep_s = match asked {
             Timestep::Seconds(step_s) => step_s,
             Timestep::Auto => longest_s / (longest_s / limit_s).ceil().max(1.0),
@@ -214,20 +168,20 @@ impl StepLimit {
         if timestep_s <= limit_s && timestep_s >= SHORTEST_STEP_S {
             return Ok(timestep_s);
         }
-        Err(if limit_s >= SHORTEST_STEP_S && asked != Timestep::Auto {
-            MechanicsError::Timestep {
-                timestep_s,
-                limit_s,
-                stiffness_n_per_m,
-                mass_kg,
-            }
+        let contact = format!(
+            "the contact reaches {:.3e} N/m on {mass_kg:.3} kg",
+            self.stiffness_n_per_m
+        );
+        Err(Refusal::new(if limit_s >= SHORTEST_STEP_S && asked != Timestep::Auto {
+            format!(
+                "`timestep_s` = {timestep_s} is outside [1e-6, {limit_s:.2e}]: {contact}; \"auto\" takes a step that fits"
+            )
         } else {
-            MechanicsError::NoTimestep {
-                limit_s,
-                stiffness_n_per_m,
-                mass_kg,
-            }
-        })
+            format!(
+                "no valid `timestep_s`: {contact} and allows at most {limit_s:.2e} s, but the shortest step is 1e-6 s; soften \
+                 the contact (`contact.stiffness_pa_per_m`, `contact.damping_s`) or drop from lower"
+            )
+        }))
     }
 }
 

@@ -17,8 +17,6 @@ pub(crate) struct Visuals {
     pub(crate) assets: String,
     /// Room, table, skin, base of the arm, lights and cameras.
     pub(crate) world: String,
-    /// Shapes of each link.
-    pub(crate) links: [String; 6],
     /// Shape of the object or ball.
     pub(crate) body: String,
 }
@@ -52,7 +50,6 @@ impl Visuals {
         Self {
             assets: assets(scene.mesh(), width, height),
             world: world(scene, thickness_m, press),
-            links: links(),
             body: format!(
                 "<geom name=\"{BODY_GEOM}\" type=\"mesh\" mesh=\"body\" mass=\"0\" contype=\"0\" conaffinity=\"0\" rgba=\"{hue} 1\" material=\"object\"/>{}",
                 if press { adapter(scene.mesh()) } else { String::new() }
@@ -86,32 +83,11 @@ fn assets(mesh: &TriMesh, width: usize, height: usize) -> String {
     for [a, b, c] in &mesh.triangles {
         let _ = write!(faces, "{a} {b} {c} ");
     }
-    format!(
-        r#"<visual>
-<global offwidth="{width}" offheight="{height}"/>
-<quality shadowsize="8192" offsamples="8"/>
-<headlight ambient="0.36 0.36 0.38" diffuse="0.22 0.22 0.22" specular="0.1 0.1 0.1"/>
-<map znear="0.01" zfar="20" shadowclip="0.75"/>
-<rgba haze="0.86 0.89 0.93 1"/>
-</visual>
-<statistic center="-0.2 0 0.2" extent="1"/>
-<asset>
-<texture type="skybox" builtin="gradient" rgb1="0.93 0.95 0.98" rgb2="0.70 0.76 0.84" width="256" height="256"/>
-<texture name="floor" type="2d" builtin="checker" rgb1="0.80 0.82 0.85" rgb2="0.76 0.78 0.81" width="512" height="512"/>
-<material name="floor" texture="floor" texrepeat="8 8" reflectance="0.02" specular="0.1"/>
-<material name="table" rgba="0.62 0.63 0.65 1" specular="0.1" shininess="0.3"/>
-<material name="grey" rgba="0.76 0.78 0.80 1" specular="0.6" shininess="0.6"/>
-<material name="blue" rgba="0.33 0.60 0.80 1" specular="0.5" shininess="0.6"/>
-<material name="dark" rgba="0.22 0.23 0.25 1" specular="0.3" shininess="0.4"/>
-<material name="steel" rgba="0.55 0.57 0.60 1" specular="0.8" shininess="0.8"/>
-<material name="object" specular="0.35" shininess="0.45"/>
-<material name="foam" rgba="0.10 0.10 0.11 1" specular="0.05" shininess="0.1"/>
-<material name="carrier" rgba="0.62 0.40 0.10 1" specular="0.4" shininess="0.5"/>
-<material name="pad" rgba="1 1 1 1" specular="0.1" shininess="0.2"/>
-<mesh name="body" inertia="shell" vertex="{vertices}" face="{faces}"/>
-</asset>
-"#
-    )
+    let look = include_str!("../../assets/look.xml");
+    let look = look
+        .replace("{width}", &width.to_string())
+        .replace("{height}", &height.to_string());
+    look.replace("{vertices}", &vertices).replace("{faces}", &faces)
 }
 
 fn world(scene: &Mechanics, thickness_m: f64, press: bool) -> String {
@@ -213,72 +189,13 @@ fn geom(kind: &str, from: [f64; 3], to: [f64; 3], radius: f64, material: &str) -
     )
 }
 
-/// Shapes in each body's frame (the joint's axis is z, the next joint at the link's tail): grey tubes, and joints with
-/// blue caps, offset sideways as on the real arm.
-fn links() -> [String; 6] {
-    let tube = |from, to, radius| geom("capsule", from, to, radius, "grey");
-    let drum = |from, to, radius, cap| {
-        geom("cylinder", from, to, radius, "grey") + &geom("cylinder", to, cap, radius * 0.97, "blue")
-    };
-    let z = |z: f64| [0.0, 0.0, z];
-    [
-        // shoulder: turret up to the second axis, drum along it (that axis is −y here)
-        geom("cylinder", z(-0.055), z(0.02), 0.062, "dark")
-            + &geom("cylinder", z(0.02), z(0.089), 0.060, "grey")
-            + &drum(
-                [0.0, 0.062, 0.089_159],
-                [0.0, -0.075, 0.089_159],
-                0.060,
-                [0.0, -0.075, 0.089_159],
-            )
-            + &geom(
-                "cylinder",
-                [0.0, 0.062, 0.089_159],
-                [0.0, 0.070, 0.089_159],
-                0.058,
-                "blue",
-            ),
-        drum(z(0.077), z(0.192), 0.060, z(0.200))
-            + &tube([0.0, 0.0, 0.136], [-0.425, 0.0, 0.136], 0.050)
-            + &drum([-0.425, 0.0, 0.085], [-0.425, 0.0, 0.186], 0.056, [-0.425, 0.0, 0.194]),
-        drum(z(0.085), z(-0.028), 0.050, z(-0.036))
-            + &tube([0.0, 0.0, 0.0165], [-0.392_25, 0.0, 0.0165], 0.040)
-            + &drum(
-                [-0.392_25, 0.0, 0.057],
-                [-0.392_25, 0.0, -0.03],
-                0.042,
-                [-0.392_25, 0.0, -0.038],
-            ),
-        geom("cylinder", z(0.058), z(0.109), 0.0375, "grey")
-            + &drum(
-                [0.0, 0.042, 0.109_15],
-                [0.0, -0.046, 0.109_15],
-                0.0375,
-                [0.0, -0.052, 0.109_15],
-            )
-            + &geom(
-                "cylinder",
-                [0.0, 0.042, 0.109_15],
-                [0.0, 0.050, 0.109_15],
-                0.036,
-                "blue",
-            ),
-        geom("cylinder", z(0.046), z(0.094_65), 0.0375, "grey")
-            + &drum(
-                [0.0, -0.042, 0.094_65],
-                [0.0, 0.042, 0.094_65],
-                0.0375,
-                [0.0, 0.042, 0.094_65],
-            )
-            + &geom(
-                "cylinder",
-                [0.0, -0.042, 0.094_65],
-                [0.0, -0.050, 0.094_65],
-                0.036,
-                "blue",
-            ),
-        geom("cylinder", z(0.042), z(0.074), 0.0375, "grey") + &geom("cylinder", z(0.074), z(0.0823), 0.0315, "steel"),
-    ]
+/// Shapes in the frame of every link (the joint's axis is z, the next joint at the link's tail): grey tubes, and joints
+/// with blue caps, offset sideways as on the real arm.
+fn links() -> impl Iterator<Item = &'static str> {
+    let links = include_str!("../../assets/arm.xml").split("<!-- link ");
+    links
+        .skip(1)
+        .map(|link| link.split_once("-->").map_or("", |(_, shapes)| shapes.trim()))
 }
 
 /// MuJoCo version for which this crate is made.
@@ -314,7 +231,10 @@ pub(super) fn rejected(why: &str) -> Refusal {
 pub(super) fn mjcf(scene: &Mechanics, visuals: Option<&Visuals>) -> String {
     let part = |pick: fn(&Visuals) -> &str| visuals.map_or("", pick);
     let body = match scene.task() {
-        Task::Press(press) => arm(&object(scene.mesh(), press.mass_kg, part(|v| &v.body)), visuals),
+        Task::Press(press) => {
+            let tool = object(scene.mesh(), press.mass_kg, part(|v| &v.body));
+            arm(&tool, visuals.is_some())
+        }
         Task::Drop(ball) => {
             // a thin shell: I = 2/3 m R²
             let inertia = 2.0 / 3.0 * ball.mass_kg * ball.radius_m * ball.radius_m;
@@ -343,10 +263,10 @@ pub(super) fn mjcf(scene: &Mechanics, visuals: Option<&Visuals>) -> String {
 
 /// The six links nested in each other, `tool` on the flange. Weights are compensated, as the real arm's controller
 /// does.
-fn arm(tool: &str, visuals: Option<&Visuals>) -> String {
+fn arm(tool: &str, visual: bool) -> String {
     let mut xml = String::new();
     let mut frame = nalgebra::Isometry3::translation(arm::BASE_M[0], arm::BASE_M[1], arm::BASE_M[2]);
-    for (i, link) in arm::LINKS.iter().enumerate() {
+    for ((i, link), shapes) in arm::LINKS.iter().enumerate().zip(links()) {
         let [x, y, z] = frame.translation.vector.into();
         let tail = link.tail();
         let centre = tail * nalgebra::Point3::from(link.centre_m);
@@ -364,7 +284,7 @@ fn arm(tool: &str, visuals: Option<&Visuals>) -> String {
             quaternion(&tail.rotation),
             link.rotor_kg_m2,
             arm::JOINT_DAMPING,
-            visuals.map_or("", |v| &v.links[i]),
+            if visual { shapes } else { "" },
         );
         frame = tail;
     }

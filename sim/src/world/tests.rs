@@ -17,30 +17,39 @@ fn run(scene: &Mechanics, index: usize) -> Vec<Frame> {
     world.frames().collect::<Result<_, _>>().unwrap()
 }
 
-/// All seventeen objects: balance of force in every frame, plateau, rise, overshoot, lift and fall as recorded.
+/// All seventeen objects: balance of force in every frame, plateau, rise, overshoot, lift and fall as recorded. A press
+/// without dynamics keeps the course that is asked for, exactly on the plateau.
 #[test]
 fn presses_follow_the_recorded_course() {
     for (i, object) in OBJECTS.iter().enumerate() {
-        let name = object.name;
-        let scene = Mechanics::press(name).unwrap();
-        let frames = run(&scene, i % 10);
-        let plateau_s = scene.config().press.as_ref().unwrap().plateau_s();
-        let course = PressCourse::of(&frames, 20.0, plateau_s, cell_area_m2()).unwrap();
-        // sums of at most 3600 positive numbers in two orders
-        assert!(course.imbalance < 1e-9, "{name}: {course:?}");
-        assert!(course.plateau_error_n < 0.1, "{name}: {course:?}");
-        assert!(course.overshoot < 0.05, "{name}: {course:?}");
-        assert!((0.2..=0.3).contains(&course.rise_s), "{name}: {course:?}");
-        assert!((1.03..1.18).contains(&course.lift_s), "{name}: {course:?}");
-        assert!((0.11..0.17).contains(&course.fall_s), "{name}: {course:?}");
-        // idle before and after
-        assert!(
-            frames
-                .iter()
-                .filter(|f| f.time_s < 0.2 || f.time_s > 1.5)
-                .all(|f| f.pressure.max() <= 0.0)
-        );
-        assert!(frames.iter().flat_map(|f| f.pressure.values()).all(|p| *p >= 0.0));
+        for model in ["winkler", "footprint"] {
+            let text = format!("contact.model = \"{model}\"\n[press]\nobject = \"{}\"", object.name);
+            let scene = Mechanics::from_toml(&text, Path::new("")).unwrap();
+            let press = scene.config().press.as_ref().unwrap();
+            let frames = run(&scene, i % 10);
+            assert_eq!(frames.len(), 778, "{text}");
+            let course = PressCourse::of(&frames, 20.0, press.plateau_s(), cell_area_m2()).unwrap();
+            let told = format!("{text}: {course:?}");
+            // sums of at most 3600 positive numbers in two orders
+            assert!(course.imbalance < 1e-9, "{told}");
+            if model == "footprint" {
+                // the balance leaves 1e-12 of the force; ramps are within a frame of what they are made for
+                assert!(course.plateau_error_n < 1e-9 && course.overshoot < 1e-9, "{told}");
+                assert!((course.rise_s - press.rise_s).abs() < 4e-3, "{told}");
+                assert!((course.fall_s - press.fall_s).abs() < 4e-3, "{told}");
+                assert!((course.onset_s - press.onset_s).abs() <= press.onset_spread_s + 2e-3);
+            }
+            assert!(course.plateau_error_n < 0.1 && course.overshoot < 0.05, "{told}");
+            assert!((0.2..=0.3).contains(&course.rise_s), "{told}");
+            assert!((1.03..1.18).contains(&course.lift_s), "{told}");
+            assert!((0.11..0.17).contains(&course.fall_s), "{told}");
+            // idle before and after
+            let mut idle = frames.iter().filter(|f| f.time_s < 0.2 || f.time_s > 1.5);
+            assert!(idle.all(|f| f.pressure.max() <= 0.0));
+            assert!(frames.iter().flat_map(|f| f.pressure.values()).all(|p| *p >= 0.0));
+            let norm = |f: &Frame| f.pose.quaternion.iter().map(|q| q * q).sum::<f64>();
+            assert!(frames.iter().all(|f| (norm(f) - 1.0).abs() < 1e-12));
+        }
     }
 }
 
@@ -137,10 +146,9 @@ fn limit_of_the_step_is_safe_and_not_needlessly_small() {
              release_spread_s = 0.0\nduration_s = 1.1"
         );
         let read = |step: &str| Mechanics::from_toml(&format!("timestep_s = {step}\n{text}"), Path::new(""));
-        let Err(crate::mechanics::MechanicsError::Timestep { limit_s, .. }) = read("1.0") else {
-            panic!("a step of a second is accepted")
-        };
+        assert!(read("1.0").is_err());
         let base = read("\"auto\"").unwrap();
+        let limit_s = base.step_limit_s();
         let restitution = |share: f64| {
             let mut world = World::new(&base.clone().with_step(share * limit_s)).unwrap();
             assert!(world.frames().all(|f| f.is_ok()));

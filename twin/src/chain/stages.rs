@@ -10,7 +10,7 @@ use spts_circuit::{Constant, FaultConfig, Interpolated, Mode, PROFILES, Profile,
 use spts_contact::Frame;
 use spts_input::Refusal;
 use spts_models::{
-    ConductanceMap, PressureMap, REFERENCE_PA, SkinLayout, Streams, Transducer, TransducerError, build_transducer,
+    ConductanceMap, PressureMap, REFERENCE_PA, SkinLayout, Streams, TRANSDUCERS, Transducer, build_transducer,
     explain_toml, in_section,
 };
 use std::fmt;
@@ -61,7 +61,7 @@ impl Chain {
         let streams = Streams::new(seed);
         let name = config.transducer.as_deref().unwrap_or(DEFAULT_TRANSDUCER);
         let transducer = build_transducer(name, config.transducer_parameters.clone(), skin, streams);
-        let transducer = transducer.map_err(|error| refused_transducer(name, &error))?;
+        let transducer = transducer.map_err(|error| refused_transducer(name, error))?;
         let readout = config.readout.as_deref().unwrap_or(DEFAULT_READOUT);
         let profile_file = ProfileFile::of(readout, folder)?;
         let path = profile_file.as_ref().map(|file| file.path.as_path());
@@ -268,17 +268,13 @@ fn with_faults(mut profile: Profile, faults: &[toml::Table], taxels: u32) -> Res
     Ok(profile)
 }
 
-/// What the transducer called `name` refuses.
-fn refused_transducer(name: &str, error: &TransducerError) -> Refusal {
-    match error {
-        TransducerError::Unknown { name, known } => {
-            Refusal::new(format!("`transducer` = \"{name}\" is not a transducer; known: {known}"))
-        }
-        other => {
-            let message = in_section("transducer_parameters", &other.to_string());
-            Refusal::new(format!("{message} (transducer `{name}`)"))
-        }
+/// What is refused of the transducer called `name`: the name itself, or its parameters.
+fn refused_transducer(name: &str, error: Refusal) -> Refusal {
+    if TRANSDUCERS.iter().all(|(known, _)| *known != name) {
+        return error;
     }
+    let message = in_section("transducer_parameters", &error.to_string());
+    Refusal::new(format!("{message} (transducer `{name}`)"))
 }
 
 /// What is wrong with the readout profile, which is in the file `path` unless it goes by a name.

@@ -23,13 +23,7 @@ mod tests;
 pub use crate::assign::Assignment;
 pub use crate::chain::RowsConfig;
 pub use config::SceneConfig;
-// the other name of a refusal, until all crates have it
-pub use spts_input::Refusal as SceneError;
-// another name of a refusal, until all crates have it
-pub use spts_input::Refusal as AssignError;
-pub use spts_sim::mechanics::{
-    BendConfig, DropConfig, Mechanics, MechanicsConfig, MechanicsError, PressConfig, Task, Timestep,
-};
+pub use spts_sim::mechanics::{BendConfig, DropConfig, Mechanics, MechanicsConfig, PressConfig, Task, Timestep};
 
 use crate::chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS, read_gains};
 use crate::provenance::hash_text;

@@ -9,5 +9,3 @@ mod tests;
 pub use request::{NAMED_SCENES, Prepared, Request};
 pub use run::{BounceSummary, CourseSummary, Peak, PressSummary, Saturated, SimulatedPiece, Simulation, run};
 pub use summary::Summary;
-// the other name of a refusal, until all crates have it
-pub use spts_input::Refusal as SimulateError;

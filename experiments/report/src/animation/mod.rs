@@ -34,14 +34,15 @@ pub const ANIMATION_FILE: &str = "animation.gif";
 /// One press or drop in motion.
 ///
 /// ```no_run
-/// use spts::simulate::{Request, SimulateError, run};
+/// use spts::Refusal;
+/// use spts::simulate::{Request, run};
 /// use spts_report::animation::Animation;
 ///
 /// let prepared = Request { scene: "bounce".to_owned(), assignments: Vec::new() }.prepare()?;
 /// let mut frames = Vec::new();
 /// let simulation = run(&prepared, true, &|| (), |piece| {
 ///     frames = piece.presses[0].frames.clone();
-///     Ok::<_, SimulateError>(())
+///     Ok::<_, Refusal>(())
 /// })?;
 /// let session = simulation.first.as_ref().expect("it was recorded");
 /// let animation = Animation::new(&prepared, &frames, session, None)?;

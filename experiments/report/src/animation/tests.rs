@@ -5,8 +5,9 @@ use super::gif::gif;
 use super::timeline::{Timeline, pressure_pa};
 use super::{Animation, MOTION_FIGURES};
 use gif::{ColorOutput, DecodeOptions};
+use spts::Refusal;
 use spts::Session;
-use spts::simulate::{Prepared, Request, SimulateError, run};
+use spts::simulate::{Prepared, Request, run};
 use spts_contact::Frame;
 use spts_eval::training::TrainingData;
 use spts_models::{PressureMap, Streams};
@@ -28,7 +29,7 @@ fn simulated(scene: &str, assignments: &[&str]) -> Simulated {
         if piece.first == 0 {
             frames.clone_from(&piece.presses[0].frames);
         }
-        Ok::<_, SimulateError>(())
+        Ok::<_, Refusal>(())
     });
     Simulated {
         training: TrainingData::for_layout(prepared.scene.skin(), Streams::new(1)).unwrap(),
