@@ -14,15 +14,25 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 const K: f64 = 1e7;
 
-/// A layer so thick that densification vanishes (δ/δ_m < 1e-3), with `cells` fine cells a taxel side.
-fn layer(cells: usize) -> WinklerLayer {
-    let config = Foam {
+/// So thick that densification vanishes (δ/δ_m < 1e-3).
+fn thick() -> Foam {
+    Foam {
         stiffness_pa_per_m: K,
         thickness_m: 10.0,
-        cells_per_taxel: cells,
         ..Foam::default()
-    };
+    }
+}
+
+fn winkler(config: Foam) -> WinklerLayer {
     WinklerLayer::new(config, &SkinLayout::default()).unwrap()
+}
+
+/// A thick layer with `cells` fine cells a taxel side.
+fn layer(cells: usize) -> WinklerLayer {
+    winkler(Foam {
+        cells_per_taxel: cells,
+        ..thick()
+    })
 }
 
 /// Block over [x0, x1] × [y0, y1] that stands on z = 0.
@@ -110,7 +120,7 @@ fn damping_and_depth_beyond_the_foam() {
     let force_n = skin.respond(&body).wrench.force_n[2];
     let tau_s = Foam::default().damping_s;
     assert_relative_eq!(force_n, K * 9e-4 * (1e-3 + tau_s), max_relative = 1e-3);
-    let mut foam = WinklerLayer::new(Foam::default(), &SkinLayout::default()).unwrap();
+    let mut foam = winkler(Foam::default());
     let (shallow_n, _) = pressed(&mut foam, &mesh, [0.0, 0.0, -3e-3]);
     let (deep_n, _) = pressed(&mut foam, &mesh, [0.0, 0.0, -12e-3]);
     assert!(deep_n > 4.0 * shallow_n && deep_n.is_finite());
@@ -298,7 +308,7 @@ fn law(c: &Foam) -> FoamLaw {
 #[test]
 fn rest_pressure_is_the_foams_law_at_the_strain() {
     let config = Foam::default();
-    let mut layer = WinklerLayer::new(config, &SkinLayout::default()).unwrap();
+    let mut layer = winkler(config);
     let strain = strains(|k| 1e-3 * k as f64);
     let rest_pa = layer.preload(&strain).unwrap();
     for (strain, rest_pa) in strain.iter().zip(&rest_pa) {
@@ -319,15 +329,11 @@ fn a_body_adds_what_the_stiffened_foam_gives() {
     let depth_m = 0.8e-3;
     let body = PosedMesh::at_rest(&mesh, [0.0, 0.0, -low_m - depth_m]);
     let force_n = |strain: f64| {
-        let mut layer = WinklerLayer::new(config, &SkinLayout::default()).unwrap();
+        let mut layer = winkler(config);
         layer.preload(&strains(|_| strain)).unwrap();
         layer.respond(&body).wrench.force_n[2]
     };
-    let fresh_n = WinklerLayer::new(config, &SkinLayout::default())
-        .unwrap()
-        .respond(&body)
-        .wrench
-        .force_n[2];
+    let fresh_n = winkler(config).respond(&body).wrench.force_n[2];
     let area_m2 = fresh_n / law(&config).pressure_pa(depth_m);
     for strain in [0.02, 0.08, 0.3] {
         let start_m = strain * config.thickness_m;
@@ -344,7 +350,7 @@ fn a_soft_body_gives_way_to_what_is_added() {
     let mesh = cuboid([FLAT_M, FLAT_M, 5e-3]);
     let low_m = mesh.bounds().unwrap().0[2];
     let (strain, depth_m, body_pa_per_m) = (0.1, 1e-3, 2e7);
-    let mut layer = WinklerLayer::new(config, &SkinLayout::default()).unwrap();
+    let mut layer = winkler(config);
     let rest_pa = layer.preload(&strains(|_| strain)).unwrap()[0];
     let body = PosedMesh {
         stiffness_pa_per_m: body_pa_per_m,
@@ -363,16 +369,9 @@ fn no_preload_is_the_flat_skin() {
     let mesh = cuboid([FLAT_M, 25e-3, 5e-3]);
     let low_m = mesh.bounds().unwrap().0[2];
     let body = PosedMesh::at_rest(&mesh, [3e-3, -2e-3, -low_m - 1e-3]);
-    let load = Load {
-        force_n: 9.0,
-        axis_m: [3e-3, -2e-3],
-        holder: Holder::Rigid,
-        from: None,
-    };
-    let skin = SkinLayout::default();
+    let load = load(9.0, [3e-3, -2e-3], Holder::Rigid);
     let answers = |preloaded: bool| {
-        let mut layer = WinklerLayer::new(Foam::default(), &skin).unwrap();
-        let mut footprint = Footprint::new(Foam::default(), &skin).unwrap();
+        let (mut layer, mut footprint) = (winkler(Foam::default()), footprint(Foam::default()));
         if preloaded {
             for field in [&mut layer as &mut dyn ContactField, &mut footprint] {
                 assert_eq!(field.preload(&[0.0; 100]), Some(vec![0.0; 100]));
@@ -390,16 +389,11 @@ fn no_preload_is_the_flat_skin() {
 fn a_balance_on_uneven_preload_carries_the_force() {
     let skin = SkinLayout::default();
     let mesh = cuboid([FLAT_M, FLAT_M, 5e-3]);
-    let mut field = Footprint::new(Foam::default(), &skin).unwrap();
+    let mut field = footprint(Foam::default());
     field
         .preload(&strains(|k| if k % 3 == 0 { 0.08 } else { 0.0 }))
         .unwrap();
-    let load = Load {
-        force_n: 12.0,
-        axis_m: [0.0, 0.0],
-        holder: Holder::Rigid,
-        from: None,
-    };
+    let load = load(12.0, [0.0, 0.0], Holder::Rigid);
     let body = PosedMesh::at_rest(&mesh, [0.0; 3]);
     let cell_m = skin.pitch_m() / field.cells_per_taxel() as f64;
     let balance = field.quasi_static().unwrap().carry(&body, &load).unwrap();
@@ -409,15 +403,6 @@ fn a_balance_on_uneven_preload_carries_the_force() {
 }
 
 // The quasi-static level against closed forms and against the sums it has to fulfil.
-
-/// So thick that densification vanishes (δ/δ_m ≈ 1e-4).
-fn thick() -> Foam {
-    Foam {
-        stiffness_pa_per_m: K,
-        thickness_m: 10.0,
-        ..Foam::default()
-    }
-}
 
 fn footprint(config: Foam) -> Footprint {
     Footprint::new(config, &SkinLayout::default()).unwrap()
@@ -479,7 +464,7 @@ fn same_pressure_as_winkler() {
     let balance = field
         .carry(&body, &load(20.0, [0.0031, -0.0017], Holder::Rigid))
         .unwrap();
-    let mut layer = WinklerLayer::new(config, &SkinLayout::default()).unwrap();
+    let mut layer = winkler(config);
     let com_m = balance.position_m;
     let there = PosedMesh {
         position_m: balance.position_m,

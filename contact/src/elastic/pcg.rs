@@ -23,14 +23,12 @@ pub(crate) struct Stop {
 }
 
 /// How the elastic solver ended: the rigid approach, the iterations, and whether it converged.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Outcome {
     /// Rigid approach added to the given displacement, m; 0 when the displacement itself is prescribed.
     pub approach_m: f64,
     /// Number of iterations.
     pub iterations: usize,
-    /// Number of convolutions.
-    pub convolutions: usize,
     /// Whether the tolerance was reached. If not, the best pressure is kept.
     pub converged: bool,
 }
@@ -88,13 +86,8 @@ const PATIENCE_GROWTH: f64 = 1.1;
 /// set revised as in the primal–dual active-set method (M. Hintermüller, K. Ito, K. Kunisch, SIAM J. Optim. 13 (2002)
 /// 865). With the sum of pressure given, directions are kept at sum 0 and the approach is the multiplier of that.
 pub(crate) fn solve(system: &mut System, f: &mut Fields, goal: Goal, stop: Stop) -> Outcome {
-    let mut done = Outcome {
-        approach_m: 0.0,
-        iterations: 0,
-        convolutions: 0,
-        converged: false,
-    };
-    f.start(system, goal, &mut done);
+    let mut done = Outcome::default();
+    f.start(system, goal);
     let (mut fresh, mut last_power, mut revise) = (true, 0.0, REVISE);
     while done.iterations < stop.iterations {
         done.iterations += 1;
@@ -122,7 +115,6 @@ pub(crate) fn solve(system: &mut System, f: &mut Fields, goal: Goal, stop: Stop)
         if state.violation > revise * revise * state.error {
             if f.revise(done.approach_m, goal) {
                 system.displace(&f.pressure, &mut f.displacement);
-                done.convolutions += 1;
             }
             fresh = true;
             continue;
@@ -137,7 +129,6 @@ pub(crate) fn solve(system: &mut System, f: &mut Fields, goal: Goal, stop: Stop)
             *t = z + turn * *t;
         }
         system.displace(&f.direction, &mut f.step);
-        done.convolutions += 1;
         if !f.advance() {
             break;
         }
@@ -162,7 +153,7 @@ struct State {
 
 impl Fields {
     /// Displacement of the first pressure, which is brought to the sum that is asked for.
-    fn start(&mut self, system: &mut System, goal: Goal, done: &mut Outcome) {
+    fn start(&mut self, system: &mut System, goal: Goal) {
         self.residual.fill(0.0);
         if self.pressure.iter().all(|p| p.abs() <= 0.0) {
             self.displacement.fill(0.0);
@@ -177,7 +168,6 @@ impl Fields {
         }
         self.rescale(goal);
         system.displace(&self.pressure, &mut self.displacement);
-        done.convolutions += 1;
     }
 
     fn rescale(&mut self, goal: Goal) {

@@ -206,10 +206,9 @@ impl Level {
         outcome
     }
 
-    /// Completes the displacement on `window`, at the price of a convolution; true when there was something to do.
-    pub(crate) fn complete(&mut self, planners: &mut Planners, cols: usize, window: Patch) -> bool {
-        let missing = self.known != window;
-        if missing {
+    /// Completes the displacement on `window`, at the price of a convolution.
+    pub(crate) fn complete(&mut self, planners: &mut Planners, cols: usize, window: Patch) {
+        if self.known != window {
             let index = self.system(planners, window.shape());
             let f = &mut self.fields;
             f.resize(window.height() * window.width());
@@ -218,7 +217,6 @@ impl Level {
             window.paste(&f.displacement, &mut self.displacement, cols);
             self.known = window;
         }
-        missing
     }
 
     /// Adds a small pressure to the cells outside `window` that the surface penetrates by more than the tolerance;
@@ -576,7 +574,6 @@ impl ElasticSolver {
             let misled = outcome;
             outcome = self.nested(0, shape, None, tolerance);
             outcome.iterations += misled.iterations;
-            outcome.convolutions += misled.convolutions;
         }
         if !outcome.converged {
             self.forget();
@@ -584,7 +581,7 @@ impl ElasticSolver {
         }
         // a combination of answers needs their displacement on all of the patch
         let top = &mut self.levels[0];
-        outcome.convolutions += usize::from(top.complete(&mut self.planners, shape[1], Patch::whole(shape)));
+        top.complete(&mut self.planners, shape[1], Patch::whole(shape));
         self.memory.keep(&top.pressure, &top.displacement);
         outcome
     }
@@ -596,10 +593,8 @@ impl ElasticSolver {
         pressure.clear();
         pressure.resize(cells, 0.0);
         Outcome {
-            approach_m: 0.0,
-            iterations: 0,
-            convolutions: 0,
             converged,
+            ..Outcome::default()
         }
     }
 
@@ -633,14 +628,11 @@ impl ElasticSolver {
 
     /// Solves level `index` for the target that is in it, from the next coarser one's answer.
     fn nested(&mut self, index: usize, shape: [usize; 2], force_n: Option<f64>, tolerance: f64) -> Outcome {
-        let mut convolutions = 0;
         let mut window = Patch::whole(shape);
         if shape[0].min(shape[1]) > COARSEST && index + 1 < self.levels.len() {
             let (fine, coarse) = self.levels.split_at_mut(index + 1);
             restrict(&fine[index].target, shape, &mut coarse[0].target);
-            convolutions += self
-                .nested(index + 1, coarser(shape), force_n, COARSE_TOLERANCE.max(tolerance))
-                .convolutions;
+            self.nested(index + 1, coarser(shape), force_n, COARSE_TOLERANCE.max(tolerance));
             let (fine, coarse) = self.levels.split_at_mut(index + 1);
             prolong(&coarse[0].pressure, &coarse[0].target, shape, &mut fine[index].pressure);
             let pressure = &fine[index].pressure;
@@ -653,9 +645,7 @@ impl ElasticSolver {
             pressure.clear();
             pressure.resize(shape[0] * shape[1], 0.0);
         }
-        let mut outcome = self.on_window(index, shape, window, force_n, tolerance);
-        outcome.convolutions += convolutions;
-        outcome
+        self.on_window(index, shape, window, force_n, tolerance)
     }
 
     /// Solves on `window`, and on the whole patch when that proves too small.
@@ -678,23 +668,19 @@ impl ElasticSolver {
             start_tolerance: tolerance,
             iterations: MAX_ITERATIONS,
         };
-        let mut sum: Option<Outcome> = None;
+        let mut iterations = 0;
         loop {
             let mut outcome = level.solve(&mut self.planners, shape[1], window, goal, stop);
-            if let Some(before) = sum {
-                outcome.iterations += before.iterations;
-                outcome.convolutions += before.convolutions;
-            }
+            outcome.iterations += iterations;
             let whole = window == Patch::whole(shape);
             if whole || index > 0 {
                 return outcome;
             }
-            outcome.convolutions += 1;
             if !level.add_outside(&mut self.planners, shape[1], window, outcome.approach_m, tolerance) {
                 return outcome;
             }
             window = Patch::whole(shape);
-            sum = Some(outcome);
+            iterations = outcome.iterations;
         }
     }
 }

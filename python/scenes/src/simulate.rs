@@ -4,10 +4,10 @@ use crate::common::{refuse, stoppable, table};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use spts::Mode;
+use spts::Refusal;
 use spts::assign::Assignment;
 use spts::output::{OutputError, OutputFolder};
 use spts::session::SessionWriter;
-use spts::Refusal;
 use spts::simulate::{Request, run};
 use std::path::PathBuf;
 

@@ -109,6 +109,9 @@ not toml => TOML parse error
 [press] ; object = "T" ; position_m = [0.0, 0.0] ; row = 3.0 => `press.position_m` and `press.position_share`; found 2
 [drop] ; position_share = [0.6, 0.0] => `drop.col`
 [press] ; object = "T" ; places = [] => `press.places` = [] is empty
+skin = { rows = 500, cols = 500 } ; contact.cells_per_taxel = 64 ; [drop] => cells_per_taxel | 2^24
+skin = { pitch_m = 1e-4, electrode_m = 5e-5 } ; contact.cells_per_taxel = 1 ; [press] ; object = "rec" ; force_n = 100.0 =>
+    press.force_n | carries at most
 tolerance = 0 ; [press] ; object = "T" => `tolerance` = 0 is outside [0.03, 1]
 tolerance = nan ; [press] ; object = "T" => `tolerance` = NaN is outside [0.03, 1]
 tolerance = 2 ; [press] ; object = "T" => `tolerance` = 2 is outside [0.03, 1]
