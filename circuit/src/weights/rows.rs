@@ -3,7 +3,7 @@
 
 use super::kernels::{Drives, Jumps, LANES, Lines, Sums, analog_sums, signed_sums, signed_sums_2};
 use super::lcg::{ANALOG_SCALE, Jump};
-use super::sequence::{FULL_SCALE, NEUTRAL, WeightMode, Weights};
+use super::sequence::{FULL_SCALE, NEUTRAL, Patterns, WeightMode, Weights};
 use spts_input::Refusal;
 use std::convert::Infallible;
 
@@ -43,6 +43,18 @@ pub trait CellCodes: Send {
     /// # Errors
     /// [`Refusal`] if the cells cannot reach these rows.
     fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal>;
+}
+
+/// The cells repeat the pattern.
+impl CellCodes for Patterns {
+    fn taxels(&self) -> usize {
+        Patterns::taxels(self)
+    }
+
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
+        self.fill(first_row, out);
+        Ok(())
+    }
 }
 
 /// Checks the property that every source of codes must have: rows are the same when requested at once, in pieces of

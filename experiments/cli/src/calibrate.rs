@@ -90,7 +90,7 @@ impl CalibrateCommand {
             return self.fit_skin();
         }
         if let Some(path) = &self.out {
-            check_profile(path)?;
+            check_ours(path, |text| !text.contains('#') && Profile::from_toml(text).is_ok())?;
         }
         let study = CalibrationStudy {
             session: self.session,
@@ -112,11 +112,7 @@ impl CalibrateCommand {
     /// Fits the gains of the taxels.
     fn fit_skin(&self) -> Result<(), CliError> {
         if let Some(path) = &self.out {
-            check_writable(path)?;
-            let text = spts_input::read_text(path, MAX_PROFILE_BYTES);
-            if path.exists() && !text.is_ok_and(|text| TaxelGains::from_toml(&text).is_ok()) {
-                return Err(OutputError::not_ours(path).into());
-            }
+            check_ours(path, |text| TaxelGains::from_toml(text).is_ok())?;
             for picture in ["png", "svg"].map(|extension| path.with_extension(extension)) {
                 check_writable(&picture)?;
                 // pictures of our own stand beside gains
@@ -145,17 +141,13 @@ impl CalibrateCommand {
 /// Largest profile that is taken for one of this command's, bytes.
 const MAX_PROFILE_BYTES: u64 = 1 << 20;
 
-/// Refuses to write a profile where one cannot be written, and in place of a file that this command did not write: one
-/// with comments, or no profile.
-fn check_profile(path: &Path) -> Result<(), CliError> {
+/// Refuses to write where no file can be written, and in place of a file that this command did not write: one whose text
+/// is not `ours`.
+fn check_ours(path: &Path, ours: impl Fn(&str) -> bool) -> Result<(), CliError> {
     check_writable(path)?;
-    if !path.exists() {
-        return Ok(());
-    }
     let text = spts_input::read_text(path, MAX_PROFILE_BYTES);
-    let ours = text.is_ok_and(|text| !text.contains('#') && Profile::from_toml(&text).is_ok());
-    if ours {
-        return Ok(());
+    if path.exists() && !text.is_ok_and(|text| ours(&text)) {
+        return Err(OutputError::not_ours(path).into());
     }
-    Err(OutputError::not_ours(path).into())
+    Ok(())
 }

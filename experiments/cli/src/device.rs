@@ -141,10 +141,11 @@ impl DeviceCommand {
             Some(path) => {
                 let set = SessionSet::open(path)?;
                 let recording = self.recording(path, &set)?;
-                let there = recording.blocks().len() as u64;
-                let blocks = self.blocks.map_or(there, |asked| asked.min(there));
-                let mut source = First(Played::new(recording)?, blocks);
-                self.serve(&mut source, recording.taxels(), Some(blocks))
+                let asked = self.blocks.and_then(|asked| usize::try_from(asked).ok());
+                let blocks = recording.blocks().iter().take(asked.unwrap_or(usize::MAX));
+                let sent = spts::Recording::new(recording.info().clone(), blocks.cloned().collect())?;
+                let blocks = sent.blocks().len() as u64;
+                self.serve(&mut Played::new(&sent)?, sent.taxels(), Some(blocks))
             }
         }
     }
@@ -188,27 +189,6 @@ impl DeviceCommand {
         let _ = rustix::termios::tcdrain(&terminal.host);
         std::thread::sleep(std::time::Duration::from_millis(200));
         Ok(())
-    }
-}
-
-/// The first blocks of a source.
-struct First<S>(S, u64);
-
-impl<S: BlockSource> BlockSource for First<S> {
-    fn mode(&self) -> Mode {
-        self.0.mode()
-    }
-
-    fn sample_rate_hz(&self) -> f64 {
-        self.0.sample_rate_hz()
-    }
-
-    fn next_block(&mut self) -> Result<Option<spts::device::DeviceBlock>, spts::Refusal> {
-        if self.1 == 0 {
-            return Ok(None);
-        }
-        self.1 -= 1;
-        self.0.next_block()
     }
 }
 

@@ -44,7 +44,7 @@ pub(super) struct ReadoutsCommand {
     taxels: Vec<Side>,
     /// Readouts [default: all]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…", value_parser = readout_named())]
-    readout: Vec<ReadoutArg>,
+    readout: Vec<&'static ReadoutLine>,
     /// Repetitions; [1, 1000] [default: 5, with --quick 2]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=1000))]
     repetitions: Option<usize>,
@@ -67,19 +67,9 @@ pub(super) struct ReadoutsCommand {
 /// Sides of the skins by default; the first two with `--quick`.
 const SIDES: [usize; 3] = [10, 32, 100];
 
-/// A line of the table of readouts.
-#[derive(Clone)]
-struct ReadoutArg(&'static ReadoutLine);
-
-impl std::fmt::Debug for ReadoutArg {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.0.name)
-    }
-}
-
-fn readout_named() -> impl TypedValueParser<Value = ReadoutArg> {
-    let named = |name: String| ReadoutArg(readout(&name).unwrap_or(&READOUTS[0]));
-    PossibleValuesParser::new(READOUTS.iter().map(|line| line.name)).map(named)
+fn readout_named() -> impl TypedValueParser<Value = &'static ReadoutLine> {
+    PossibleValuesParser::new(READOUTS.iter().map(|line| line.name))
+        .map(|name: String| readout(&name).unwrap_or(&READOUTS[0]))
 }
 
 impl ReadoutsCommand {
@@ -87,7 +77,7 @@ impl ReadoutsCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let out = open_folder(&self.out)?;
-        let asked = |line: &&ReadoutLine| self.readout.is_empty() || self.readout.iter().any(|r| r.0.name == line.name);
+        let asked = |line: &&ReadoutLine| self.readout.is_empty() || self.readout.iter().any(|r| r.name == line.name);
         let study = ReadoutsStudy {
             readouts: READOUTS.iter().filter(asked).collect(),
             sides: match (&self.taxels[..], self.quick) {

@@ -97,7 +97,7 @@ impl RecordCommand {
             .ok_or_else(|| CliError::usage(format!("`--readout` = {:?} has no converter", self.readout)))?;
         let frame = info.measurements_per_frame;
         let frame_s = frame as f64 / info.sample_rate_hz;
-        let session = self.session([f64::from(first) * frame_s, f64::from(end) * frame_s])?;
+        let mut session = self.session([f64::from(first) * frame_s, f64::from(end) * frame_s])?;
         let mut host = Host::greet(self.open()?)?;
         let bar = progress(usize::try_from(self.blocks).unwrap_or(usize::MAX), "blocks");
         let mut blocks = Vec::new();
@@ -131,16 +131,7 @@ impl RecordCommand {
             conditioning: usize::try_from(self.conditioning).unwrap_or_default().min(count),
             ..Recorded::new(recording)
         };
-        let session = match self.mode.readout() {
-            Mode::Raster => Session {
-                raster: Some(recorded),
-                ..session
-            },
-            Mode::Compressive => Session {
-                compressive: Some(recorded),
-                ..session
-            },
-        };
+        *self.slot(&mut session) = Some(recorded);
         session.write(&self.out)?;
         let report = Report {
             session: self.out.clone(),
@@ -169,7 +160,7 @@ impl RecordCommand {
         if !self.out.join(SESSION_FILE).exists() {
             return Ok(new);
         }
-        let there = Session::read(&self.out)?;
+        let mut there = Session::read(&self.out)?;
         if there.object != self.object {
             return Err(CliError::usage(format!(
                 "`--object` = {:?}: {} holds a session of {:?}",
@@ -178,11 +169,7 @@ impl RecordCommand {
                 there.object
             )));
         }
-        let taken = match self.mode.readout() {
-            Mode::Raster => there.raster.is_some(),
-            Mode::Compressive => there.compressive.is_some(),
-        };
-        if taken {
+        if self.slot(&mut there).is_some() {
             note(&format!(
                 "note: the recording of this mode in {} is replaced",
                 self.out.display()
@@ -192,6 +179,14 @@ impl RecordCommand {
             hold_s: Some(hold_s),
             ..there
         })
+    }
+
+    /// The recording of `session` in this mode.
+    fn slot<'a>(&self, session: &'a mut Session) -> &'a mut Option<Recorded> {
+        match self.mode.readout() {
+            Mode::Raster => &mut session.raster,
+            Mode::Compressive => &mut session.compressive,
+        }
     }
 
     /// Root mean square of the first frame of the hold about the mean of the idle part, V.

@@ -2,11 +2,12 @@
 
 use crate::figures::{Sheet, Tile, TileRow, save_sheet};
 use spts::output::OutputError;
-use spts_eval::{Table, TextTable};
+use spts_eval::Table;
+use spts_eval::training::GainCheck;
 use spts_recon::statistics::mean;
 use spts_studies::calibrate::{
-    CalibrationReport, Estimated, NOT_IDENTIFIABLE, NOT_MODELLED, NUMBERS, PredictedInside, SessionEstimates,
-    SkinReport,
+    Beat, CalibrationReport, Estimated, Mounting, NOT_IDENTIFIABLE, NOT_MODELLED, NUMBERS, PredictedInside,
+    SessionEstimates, SessionGains, SkinReport,
 };
 use std::path::Path;
 
@@ -19,23 +20,19 @@ const MOST_SHOWN: usize = 20;
 /// The estimates as a text table, with what the recordings cannot determine.
 #[must_use]
 pub fn text(report: &CalibrationReport) -> String {
-    let number = |(name, unit, _): &(&str, &str, _)| {
-        let label = if unit.is_empty() {
-            (*name).to_owned()
-        } else {
-            format!("{name} [{unit}]")
-        };
-        let values = report
-            .sessions
-            .iter()
-            .map(|s| s.numbers.get(*name).map_or_else(String::new, estimated));
-        [label].into_iter().chain(values).collect()
+    let label = |(name, unit): (&str, &str)| match unit {
+        "" => name.to_owned(),
+        unit => format!("{name} [{unit}]"),
     };
-    let sessions = report.sessions.iter().map(|s| s.session.clone());
-    let table = TextTable {
-        head: [String::new()].into_iter().chain(sessions).collect(),
-        rows: NUMBERS.iter().map(number).collect(),
-    };
+    let numbers = report
+        .sessions
+        .iter()
+        .fold(Table::new("numbers", NUMBERS).shown("", label), |table, s| {
+            table.shown(&s.session, |(name, _)| {
+                s.numbers.get(name).map_or_else(String::new, estimated)
+            })
+        });
+    let table = numbers.text();
     format!(
         "{table}{}\n{}not identifiable from these recordings:\n- {}\nin the recordings, not modelled:\n- {}",
         report.sessions.iter().flat_map(remarks).collect::<Vec<_>>().join("\n"),
@@ -55,36 +52,32 @@ fn estimated(e: &Estimated) -> String {
 
 /// What was found in a session beside its numbers, a line each.
 fn remarks(s: &SessionEstimates) -> Vec<String> {
-    let beats: Vec<String> = s
-        .beats
-        .iter()
-        .map(|b| format!("{:.2} (taxel {})", b.period_measurements, b.taxel))
-        .collect();
+    let beat = |b: &Beat| format!("{:.2} (taxel {})", b.period_measurements, b.taxel);
+    let beats = match &s.beats[..] {
+        [] => "none seen".to_owned(),
+        beats => beats.iter().map(beat).collect::<Vec<_>>().join(", "),
+    };
     let grid = s.steps.map_or_else(
         || "values on no grid".to_owned(),
         |steps| format!("step {:.4} mV", 1e3 * steps.step_v),
     );
-    let beats = if beats.is_empty() {
-        "none seen".to_owned()
-    } else {
-        beats.join(", ")
-    };
-    let mut found = vec![format!(
-        "{} presses, {grid}, beats [measurements]: {beats}",
-        s.presses.len()
-    )];
-    found.extend(s.gains.as_ref().map(|gains| {
-        format!(
-            "gains of {} taxels against the raster session: log-sd {:.3} ± {:.3}",
-            gains.taxels.len(),
-            gains.log_sd,
-            gains.standard_error
-        )
-    }));
+    let presses = s.presses.len();
+    let mut found = vec![format!("{presses} presses, {grid}, beats [measurements]: {beats}")];
+    if let Some(SessionGains {
+        taxels,
+        log_sd,
+        standard_error,
+    }) = &s.gains
+    {
+        let taxels = taxels.len();
+        found.push(format!(
+            "gains of {taxels} taxels against the raster session: log-sd {log_sd:.3} ± {standard_error:.3}"
+        ));
+    }
     found.extend(s.faults.iter().map(ToString::to_string));
     found.extend(s.overdriven.iter().map(ToString::to_string));
     found.extend(s.missed.iter().map(ToString::to_string));
-    if s.presses.len() == 1 {
+    if presses == 1 {
         found.push("one press only: no number has an uncertainty".to_owned());
     }
     found.into_iter().map(|what| format!("{}: {what}", s.session)).collect()
@@ -100,10 +93,9 @@ fn predictions(found: &PredictedInside) -> String {
         100.0 * found.share_of_range
     );
     for n in &found.numbers {
-        let outside = if n.outside.is_empty() {
-            String::new()
-        } else {
-            format!(", not {}", n.outside.join(", "))
+        let outside = match &n.outside[..] {
+            [] => String::new(),
+            names => format!(", not {}", names.join(", ")),
         };
         out.push_str(&format!("- {}: {} of {}{outside}\n", n.name, n.inside, n.sessions));
     }
@@ -118,11 +110,11 @@ pub fn skin_text(report: &SkinReport) -> String {
     let mountings = if report.mountings.is_empty() {
         "(not measured: no session has both recordings)".to_owned()
     } else {
-        let each = report
-            .mountings
-            .iter()
-            .map(|m| format!("{} {:.3}", m.session, m.log_sd));
-        format!("(median of {})", each.collect::<Vec<_>>().join(", "))
+        let each = |m: &Mounting| format!("{} {:.3}", m.session, m.log_sd);
+        format!(
+            "(median of {})",
+            report.mountings.iter().map(each).collect::<Vec<_>>().join(", ")
+        )
     };
     let mut out = format!(
         "gains of {rows} × {cols} taxels, {} of them touched; objects: {}\n\
@@ -156,13 +148,9 @@ pub fn skin_text(report: &SkinReport) -> String {
         .digits(3)
         .shown("ratios inside 90 %", |o| o.check.inside)
         .digits(2);
-    let checks_of = || report.objects.iter().map(|o| &o.check);
-    let means = [
-        mean(checks_of().map(|c| c.correlation)),
-        mean(checks_of().map(|c| c.correlation_with_gains)),
-        mean(checks_of().map(|c| c.inside)),
-    ];
-    let [plain, with_gains, inside] = means.map(Option::unwrap_or_default);
+    let mean_of = |get: fn(&GainCheck) -> f64| mean(report.objects.iter().map(|o| get(&o.check))).unwrap_or_default();
+    let (plain, with_gains) = (mean_of(|c| c.correlation), mean_of(|c| c.correlation_with_gains));
+    let inside = mean_of(|c| c.inside);
     format!(
         "{out}\nsimulated image beside the skin's, with the gains that the other objects tell\n{}\
          mean: correlation {plain:.3}, with gains {with_gains:.3}, ratios inside {inside:.2}",

@@ -1,7 +1,7 @@
 //! `spts design` as text, files and figures, and its folder, read again.
 
 use super::write_all_or_none;
-use crate::figures::{Chart, Series, Style, save_charts};
+use crate::figures::{Chart, Curve, Plot, Series, Style, save_charts};
 use spts::output::{OutputError, OutputFolder, write_bytes, write_json};
 use spts_circuit::{MAX_PATTERNS_BYTES, Profile};
 use spts_eval::Table;
@@ -47,8 +47,7 @@ fn curves_table(report: &DesignReport) -> Table<'_, (&DesignCurve, &DesignPoint)
         .file("m_per_wire", |(_, p)| p.m_per_wire)
         .file("acquisition_s", move |(_, p)| p.m_per_wire as f64 * period_s)
         .file("iou", |(_, p)| p.iou.mean)
-        .file("iou_low", |(_, p)| p.iou.low)
-        .file("iou_high", |(_, p)| p.iou.high)
+        .interval("iou", |(_, p)| Some([p.iou.low, p.iou.high]))
         .file("place_px", |(_, p)| p.place_px)
 }
 
@@ -65,7 +64,8 @@ pub fn read_design(path: &Path, seed: u64) -> Result<DesignCheck, Refusal> {
     };
     let content = |name: &str, reason: String| Refusal::new(reason).at(path.join(name).display());
     let text = read("design.json", MAX_BYTES)?;
-    let design = design_of(&text).map_err(|e| content("design.json", e.to_string()))?;
+    // the file says more than the design
+    let design: Design = serde_json::from_str(&text).map_err(|e| content("design.json", e.to_string()))?;
     let text = read("profile.toml", MAX_BYTES)?;
     let profile = Profile::from_toml(&text).map_err(|e| content("profile.toml", e.to_string()))?;
     let pattern = match design.row_source {
@@ -78,30 +78,6 @@ pub fn read_design(path: &Path, seed: u64) -> Result<DesignCheck, Refusal> {
         pattern,
         seed,
     })
-}
-
-/// The fields of the design itself among all that the file says.
-fn design_of(text: &str) -> Result<Design, serde_json::Error> {
-    const FIELDS: [&str; 15] = [
-        "rows",
-        "cols",
-        "taxels",
-        "pitch_m",
-        "electrode_m",
-        "objects",
-        "wires",
-        "sub_arrays",
-        "wire",
-        "row_source",
-        "m_per_wire",
-        "m",
-        "decoder",
-        "expected",
-        "seed",
-    ];
-    let mut all: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text)?;
-    all.retain(|field, _| FIELDS.contains(&field.as_str()));
-    serde_json::from_value(all.into())
 }
 
 /// The design as text.
@@ -144,114 +120,87 @@ pub fn text(report: &DesignReport) -> String {
         (Some(class), _) => promise(class, 3),
         (None, why) => format!("not said: {}", why.as_deref().unwrap_or_default()),
     };
-    let buses = if c.buses == 1 {
-        "1 bus".to_owned()
-    } else {
-        format!("{} buses", c.buses)
-    };
-    let designed = ElectronicsStudy::as_designed().map(|s| s.one_wire_text(report.one_wire_taxels));
-    // lines that do not apply are None
-    let lines = [
-        (
-            "skin",
-            Some(format!(
-                "{} × {} = {} taxels, pitch {} mm, electrodes {} mm",
-                d.rows,
-                d.cols,
-                d.taxels,
-                mm(d.pitch_m),
-                mm(d.electrode_m)
-            )),
+    let buses = format!("{} bus{}", c.buses, if c.buses == 1 { "" } else { "es" });
+    let mut lines = String::new();
+    let mut line = |what: &str, says: String| lines.push_str(&format!("{what:<16} {says}\n"));
+    let (pitch_mm, electrode_mm) = (mm(d.pitch_m), mm(d.electrode_m));
+    line(
+        "skin",
+        format!(
+            "{} × {} = {} taxels, pitch {pitch_mm} mm, electrodes {electrode_mm} mm",
+            d.rows, d.cols, d.taxels
         ),
-        (
-            "wires",
-            Some(format!(
-                "{}, {each} taxels each, read at the same time",
-                counted(d.wires, "wire")
-            )),
+    );
+    let wires = counted(d.wires, "wire");
+    line("wires", format!("{wires}, {each} taxels each, read at the same time"));
+    let (rate_khz, settle_us, available_us) = (1e-3 * w.rate_hz, 1e6 * w.settle_s, 1e6 * w.available_s);
+    line(
+        "clock",
+        format!("{rate_khz:.1} kHz; the output settles in {settle_us:.2} of {available_us:.2} µs"),
+    );
+    line(
+        "amplifier",
+        format!(
+            "{} with {:.0} Ω of feedback, which the {decides}; noise gain {:.1}, sums up to {:.1} of {:.1} V",
+            w.amplifier, w.feedback_ohm, w.noise_gain, w.excursion_v, w.range_v
         ),
-        (
-            "clock",
-            Some(format!(
-                "{:.1} kHz; the output settles in {:.2} of {:.2} µs",
-                1e-3 * w.rate_hz,
-                1e6 * w.settle_s,
-                1e6 * w.available_s
-            )),
+    );
+    let (bits, step_mv, steps) = (w.adc_bits, 1e3 * w.adc_step_v, w.steps_per_taxel);
+    line(
+        "converter",
+        format!("{bits} bits, steps of {step_mv:.1} mV; a pressed taxel is worth {steps:.1} of them"),
+    );
+    if let Some(limit) = &w.limit {
+        line("", format!("beyond its closed form: {limit}"));
+    }
+    line("rows", rows);
+    line("measurements", format!("M = {}{each_wire}", d.m));
+    let (decoder, places, memory) = (&d.decoder.name, d.decoder.places, bytes(d.decoder.bytes));
+    line(
+        "decoder",
+        format!("{decoder}: separable Gaussian prior, non-negative on {places} taxels at most; {memory}"),
+    );
+    line("expected IoU", promise(&e.iou, 3));
+    line("expected place", format!("{} taxels", promise(&e.place_px, 2)));
+    line("", format!("{} mm", promise(&e.place_mm, 2)));
+    line("expected class", class);
+    let (repetitions, touches, outside) = (e.repetitions, e.touches, 100.0 * e.outside);
+    line(
+        "",
+        format!(
+            "means of {repetitions} repetitions of {touches} touches; in brackets the band for a check of as many, \
+             {outside:.0} % of which lie outside"
         ),
-        (
-            "amplifier",
-            Some(format!(
-                "{} with {:.0} Ω of feedback, which the {decides}; noise gain {:.1}, sums up to {:.1} of {:.1} V",
-                w.amplifier, w.feedback_ohm, w.noise_gain, w.excursion_v, w.range_v
-            )),
+    );
+    let (acquisition, decode) = (ms(report.latency.acquisition_s), ms(report.latency.decode_estimate_s));
+    line(
+        "latency",
+        format!(
+            "{acquisition} ms of acquisition; about {decode} ms of decoding beside it, at 10⁹ multiplications a second"
         ),
-        (
-            "converter",
-            Some(format!(
-                "{} bits, steps of {:.1} mV; a pressed taxel is worth {:.1} of them",
-                w.adc_bits,
-                1e3 * w.adc_step_v,
-                w.steps_per_taxel
-            )),
+    );
+    line(
+        "cost drivers",
+        format!(
+            "{} cells, {}, {}, {}; {} bytes a cell over {buses}, {} ms",
+            c.cells,
+            counted(c.wires, "wire"),
+            counted(c.amplifiers, "amplifier"),
+            counted(c.converters, "converter"),
+            c.bytes_a_cell,
+            ms(c.load_s)
         ),
-        (
+    );
+    line(
+        "binding",
+        format!("{}: {}", report.binding.name(), report.binding_reason),
+    );
+    if let Ok(designed) = ElectronicsStudy::as_designed() {
+        line(
             "",
-            w.limit.as_ref().map(|limit| format!("beyond its closed form: {limit}")),
-        ),
-        ("rows", Some(rows)),
-        ("measurements", Some(format!("M = {}{each_wire}", d.m))),
-        (
-            "decoder",
-            Some(format!(
-                "{}: separable Gaussian prior, non-negative on {} taxels at most; {}",
-                d.decoder.name,
-                d.decoder.places,
-                bytes(d.decoder.bytes)
-            )),
-        ),
-        ("expected IoU", Some(promise(&e.iou, 3))),
-        ("expected place", Some(format!("{} taxels", promise(&e.place_px, 2)))),
-        ("", Some(format!("{} mm", promise(&e.place_mm, 2)))),
-        ("expected class", Some(class)),
-        (
-            "",
-            Some(format!(
-                "means of {} repetitions of {} touches; in brackets the band for a check of as many, {:.0} % of which lie outside",
-                e.repetitions,
-                e.touches,
-                100.0 * e.outside
-            )),
-        ),
-        (
-            "latency",
-            Some(format!(
-                "{} ms of acquisition; about {} ms of decoding beside it, at 10⁹ multiplications a second",
-                ms(report.latency.acquisition_s),
-                ms(report.latency.decode_estimate_s)
-            )),
-        ),
-        (
-            "cost drivers",
-            Some(format!(
-                "{} cells, {}, {}, {}; {} bytes a cell over {buses}, {} ms",
-                c.cells,
-                counted(c.wires, "wire"),
-                counted(c.amplifiers, "amplifier"),
-                counted(c.converters, "converter"),
-                c.bytes_a_cell,
-                ms(c.load_s)
-            )),
-        ),
-        (
-            "binding",
-            Some(format!("{}: {}", report.binding.name(), report.binding_reason)),
-        ),
-        ("", designed.ok().map(|one_wire| format!("as designed, {one_wire}"))),
-    ];
-    let lines = lines
-        .into_iter()
-        .filter_map(|(what, says)| Some(format!("{what:<16} {}\n", says?)));
+            format!("as designed, {}", designed.one_wire_text(report.one_wire_taxels)),
+        );
+    }
     let alternatives = Table::new("alternatives", &report.alternatives)
         .shown("alternative", |a| &a.what)
         .shown("taxels", |a| a.taxels)
@@ -266,7 +215,7 @@ pub fn text(report: &DesignReport) -> String {
         .digits(2)
         .shown("place, mm", |a| a.place_mm)
         .digits(2);
-    format!("{heading}\n\n{}\n{}", lines.collect::<String>(), alternatives.text())
+    format!("{heading}\n\n{lines}\n{}", alternatives.text())
 }
 
 /// The check of a design as text.
@@ -322,97 +271,66 @@ fn bytes(count: usize) -> String {
     }
 }
 
-/// Vertical axis of IoU.
-const IOU: (f64, f64) = (0.0, 1.0);
-
-/// IoU and place error against the time of acquisition, with the target, the latency and the design itself.
+/// IoU and place error against the time of acquisition, with the target, the latency and the design itself: everything
+/// that was tried with as many wires as the design, and with one.
 fn charts(report: &DesignReport) -> Vec<Chart> {
     let (d, e) = (&report.design, &report.design.expected);
     let (limit_ms, at) = (1e3 * report.latency.limit_s, 1e3 * report.latency.acquisition_s);
-    let place_mm = |p: &DesignPoint| 1e3 * d.pitch_m * p.place_px;
-    let mut image = curves(report, &|p| p.iou.mean);
-    let mut place = curves(report, &place_mm);
-    for (series, band) in [(&mut image, &e.iou), (&mut place, &e.place_mm)] {
-        let points = vec![(at, band.low), (at, band.mean), (at, band.high)];
-        series.push(Series::new(
-            "the design, with the band of its check",
-            Style::Raster,
-            0,
-            points,
-        ));
-    }
-    let times = image.iter().flat_map(|s| s.points.iter().map(|(t, _)| *t));
-    let first = times.fold(limit_ms, f64::min);
-    let farthest = place
-        .iter()
-        .flat_map(|s| s.points.iter().map(|(_, mm)| *mm))
-        .fold(0.0, f64::max);
-    let level = vec![(first, report.iou_wanted), (limit_ms, report.iou_wanted)];
-    image.push(Series::new(
-        format!("IoU of {} asked for", report.iou_wanted),
-        Style::Paper,
-        0,
-        level,
-    ));
-    for (series, top) in [(&mut image, IOU.1), (&mut place, farthest)] {
-        let line = vec![(limit_ms, 0.0), (limit_ms, top)];
-        series.push(Series::new(format!("latency of {limit_ms} ms"), Style::Paper, 1, line));
-    }
-    let (pitch_mm, wires) = (mm(d.pitch_m), counted(d.wires, "wire"));
-    let title = format!("{} × {} taxels, {pitch_mm} mm, {wires}, M = {}", d.rows, d.cols, d.m);
-    let panel = |title: String, y_label: &str, series: Vec<Series>| Chart {
-        title,
-        x_label: "acquisition, ms".to_owned(),
-        y_label: y_label.to_owned(),
-        x_log: true,
-        series,
-        ..Chart::default()
-    };
-    vec![
-        Chart {
-            y_range: Some(IOU),
-            ..panel(title, "IoU", image)
-        },
-        panel("Place of the touch".to_owned(), "median place error, mm", place),
-    ]
-}
-
-/// A curve of everything that was tried with as many wires as the design, and with one.
-fn curves(report: &DesignReport, of: &dyn Fn(&DesignPoint) -> f64) -> Vec<Series> {
-    let wires = report.design.wires;
-    let several = wires > 1;
+    let period_ms = 1e3 * d.wire.period_s;
     let shown: Vec<&DesignCurve> = report
         .curves
         .iter()
-        .filter(|c| c.wires == wires || c.wires == 1)
+        .filter(|c| c.wires == d.wires || c.wires == 1)
         .collect();
-    let series = shown.iter().map(|c| {
-        let name = match (&c.rows, several) {
-            (rows, false) => format!("{} rows", plain(rows)),
-            (rows, true) => format!("{} rows, wires: {}", plain(rows), c.wires),
+    let points = || shown.iter().flat_map(|c| c.points.iter().map(move |p| (*c, p)));
+    let curve = |(c, _): (&DesignCurve, &DesignPoint)| {
+        let random = |c: &DesignCurve| c.rows == RowSource::Generator;
+        let before = shown.iter().take_while(|other| !std::ptr::eq(**other, c));
+        let like = before.filter(|other| random(other) == random(c)).count();
+        let rows = c.rows.name().replace('_', " ");
+        let name = match d.wires {
+            1 => format!("{rows} rows"),
+            _ => format!("{rows} rows, wires: {}", c.wires),
         };
-        let style = match c.rows {
-            RowSource::Generator => Style::Twin,
-            RowSource::Designer(_) => Style::Baseline,
-        };
-        let like = shown
-            .iter()
-            .take_while(|other| !std::ptr::eq(**other, *c))
-            .filter(|other| (other.rows == RowSource::Generator) == (c.rows == RowSource::Generator));
-        let variant = u8::try_from(like.count() % 4).unwrap_or_default();
-        Series::new(name, style, variant, points(report, c, of))
-    });
-    series.collect()
-}
-
-/// Name of rows in the figure.
-fn plain(rows: &RowSource) -> String {
-    rows.name().replace('_', " ")
-}
-
-/// Points of a curve, ms.
-fn points(report: &DesignReport, curve: &DesignCurve, of: &dyn Fn(&DesignPoint) -> f64) -> Vec<(f64, f64)> {
-    let period_ms = 1e3 * report.design.wire.period_s;
-    let point = |p: &DesignPoint| (p.m_per_wire as f64 * period_ms, of(p));
-    curve.points.iter().map(point).collect()
+        let style = if random(c) { Style::Twin } else { Style::Baseline };
+        Curve::new(name, style, u8::try_from(like % 4).unwrap_or_default())
+    };
+    let panel = |title: String, y_label: &str, of: &dyn Fn(&DesignPoint) -> f64| {
+        Plot::new(points())
+            .x("acquisition, ms", |(_, p)| p.m_per_wire as f64 * period_ms)
+            .log_x()
+            .y(y_label, |(_, p)| of(p))
+            .by(curve)
+            .chart(title)
+    };
+    let (pitch_mm, wires) = (mm(d.pitch_m), counted(d.wires, "wire"));
+    let title = format!("{} × {} taxels, {pitch_mm} mm, {wires}, M = {}", d.rows, d.cols, d.m);
+    let mut image = panel(title, "IoU", &|p| p.iou.mean);
+    image.y_range = Some((0.0, 1.0));
+    let place_mm = |p: &DesignPoint| 1e3 * d.pitch_m * p.place_px;
+    let mut place = panel("Place of the touch".to_owned(), "median place error, mm", &place_mm);
+    let of_design = |band: &Band| {
+        let points = vec![(at, band.low), (at, band.mean), (at, band.high)];
+        Series::new("the design, with the band of its check", Style::Raster, 0, points)
+    };
+    image.series.push(of_design(&e.iou));
+    place.series.push(of_design(&e.place_mm));
+    let ends = |chart: &Chart, of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
+        chart.series.iter().flat_map(|s| s.points.iter().map(of)).collect()
+    };
+    let first = ends(&image, |(time_ms, _)| *time_ms)
+        .into_iter()
+        .fold(limit_ms, f64::min);
+    let farthest = ends(&place, |(_, mm)| *mm).into_iter().fold(0.0, f64::max);
+    let asked = report.iou_wanted;
+    let level = vec![(first, asked), (limit_ms, asked)];
+    image
+        .series
+        .push(Series::new(format!("IoU of {asked} asked for"), Style::Paper, 0, level));
+    for (chart, top) in [(&mut image, 1.0), (&mut place, farthest)] {
+        let line = vec![(limit_ms, 0.0), (limit_ms, top)];
+        let name = format!("latency of {limit_ms} ms");
+        chart.series.push(Series::new(name, Style::Paper, 1, line));
+    }
+    vec![image, place]
 }

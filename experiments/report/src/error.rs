@@ -1,6 +1,8 @@
 //! Results that are written whole or not at all.
 
-use spts::output::{OutputError, OutputFolder};
+use serde::Serialize;
+use spts::output::{OutputError, OutputFolder, write_json};
+use spts::provenance::{Provenance, hash_text};
 
 /// Writes what `write` makes into the folder `out`: all files or, after an error, none.
 ///
@@ -13,4 +15,13 @@ pub fn write_all_or_none(
     write(&mut out).map_err(|error| out.unstaged(error))?;
     out.commit()?;
     Ok(())
+}
+
+/// Writes the settings of a study as `parameters.json`, and `provenance.json` with their hash.
+pub(crate) fn write_parameters(out: &OutputFolder, parameters: &impl Serialize, seed: u64) -> Result<(), OutputError> {
+    let path = out.path("parameters.json");
+    let text = serde_json::to_string(parameters).map_err(|e| OutputError::write(&path)(e.into()))?;
+    write_json(&path, parameters)?;
+    let provenance = Provenance::new(seed, hash_text(text.as_bytes()));
+    write_json(&out.path("provenance.json"), &provenance)
 }

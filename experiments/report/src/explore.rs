@@ -1,9 +1,10 @@
 //! `spts explore` as text, files and figures.
 
 use super::write_all_or_none;
+use crate::error::write_parameters;
 use crate::figures::{Chart, Curve, Plot, Style, save_charts};
 use spts::output::{OutputError, OutputFolder, write_json};
-use spts::provenance::{Machine, Provenance, hash_text};
+use spts::provenance::Machine;
 use spts_circuit::amplifier::Limit;
 use spts_eval::{Cell, Table};
 use spts_studies::electronics::ElectronicsStudy;
@@ -30,11 +31,10 @@ pub fn text(report: &ExploreReport) -> String {
 /// [`OutputError`] when a file cannot be written.
 pub fn write(study: &ExploreStudy, report: &ExploreReport, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
-        let path = out.path("parameters.json");
-        let parameters = serde_json::to_string(study).map_err(|e| OutputError::write(&path)(e.into()))?;
+        write_parameters(out, study, study.seed)?;
         sizes(report).write(out)?;
         trials("trials", report)
-            .file("wires", |(r, _)| r.wires)
+            .file("wires", |(r, _)| r.wiring.wires)
             .file("measurements", |(_, t)| t.measurements)
             .file("iou", |(_, t)| t.iou)
             .file("located", |(_, t)| t.located)
@@ -50,9 +50,6 @@ pub fn write(study: &ExploreStudy, report: &ExploreReport, out: OutputFolder) ->
             &out.timed_path("timing.json"),
             &(Machine::here(), fits("timing", timed)),
         )?;
-        write_json(&path, study)?;
-        let provenance = Provenance::new(study.seed, hash_text(parameters.as_bytes()));
-        write_json(&out.path("provenance.json"), &provenance)?;
         let figures = out.folder("figures")?;
         save_charts(&charts(report), &figures, "explore")?;
         save_charts(&[timing(report)], &figures, "timing")?;
@@ -64,18 +61,18 @@ fn sizes(report: &ExploreReport) -> Table<'_, &SizeRow> {
     Table::new("explore", &report.rows)
         .column("taxels", "taxels", |r| r.taxels)
         .file("contacts", |r| r.contacts)
-        .file("way", |r| Cell::name_of(r.way))
-        .shown("readout", |r| r.way.name())
-        .column("wires", "wires", |r| r.wires)
-        .file("limit", |r| r.limit.map_or("", Limit::name))
-        .shown("fails by", |r| r.limit.map(Limit::name))
-        .file("feedback_ohm", |r| r.feedback_ohm)
-        .file("noise_gain", |r| r.noise_gain)
-        .file("settle_s", |r| r.settle_s)
-        .column("period_s", "period", |r| r.period_s)
+        .file("way", |r| Cell::name_of(r.wiring.way))
+        .shown("readout", |r| r.wiring.way.name())
+        .column("wires", "wires", |r| r.wiring.wires)
+        .file("limit", |r| r.wiring.limit.map_or("", Limit::name))
+        .shown("fails by", |r| r.wiring.limit.map(Limit::name))
+        .file("feedback_ohm", |r| r.wiring.feedback_ohm)
+        .file("noise_gain", |r| r.wiring.noise_gain)
+        .file("settle_s", |r| r.wiring.settle_s)
+        .column("period_s", "period", |r| r.wiring.period_s)
         .unit("µs", 1e6)
         .digits(1)
-        .file("steps_per_taxel", |r| r.steps_per_taxel)
+        .file("steps_per_taxel", |r| r.wiring.steps_per_taxel)
         .column("m_iou", "M, IoU .8", |r| r.m_iou)
         .shown("M/N", |r| r.m_iou.map(|m| m as f64 / r.taxels as f64))
         .unit("%", 100.0)
@@ -102,7 +99,7 @@ fn trials<'a>(name: &str, report: &'a ExploreReport) -> Table<'a, (&'a SizeRow, 
     let tried = report.rows.iter().flat_map(|r| r.trials.iter().map(move |t| (r, t)));
     Table::new(name, tried)
         .file("taxels", |(r, _)| r.taxels)
-        .file("way", |(r, _)| Cell::name_of(r.way))
+        .file("way", |(r, _)| Cell::name_of(r.wiring.way))
 }
 
 fn fits<'a>(name: &str, fits: impl IntoIterator<Item = &'a CostFit>) -> Table<'a, &'a CostFit> {
@@ -121,15 +118,15 @@ fn fits<'a>(name: &str, fits: impl IntoIterator<Item = &'a CostFit>) -> Table<'a
 fn panel(report: &ExploreReport, title: &str, y_label: &str, value: fn(&SizeRow) -> Option<f64>) -> Chart {
     let rows = Way::ALL
         .into_iter()
-        .flat_map(|way| report.rows.iter().filter(move |r| r.way == way));
+        .flat_map(|way| report.rows.iter().filter(move |r| r.wiring.way == way));
     let curve = |r: &SizeRow| {
-        let style = match r.way {
+        let style = match r.wiring.way {
             Way::Ideal => Style::Baseline,
             Way::AsDesigned => Style::Real,
             Way::Fitted => Style::Raster,
             Way::Wires => Style::Twin,
         };
-        Curve::new(r.way.name(), style, 0)
+        Curve::new(r.wiring.way.name(), style, 0)
     };
     Plot::new(rows)
         .x("taxels", |r| r.taxels as f64)

@@ -1,9 +1,9 @@
 //! `spts readouts` as text, files and figures.
 
 use super::write_all_or_none;
+use crate::error::write_parameters;
 use crate::figures::{Chart, Claim, Curve, Plot, Style, save_charts};
 use spts::output::{OutputError, OutputFolder, write_bytes, write_json, write_table};
-use spts::provenance::{Provenance, hash_text};
 use spts_eval::Table;
 use spts_recon::statistics::Band;
 use spts_studies::readouts::{GOOD_IOU, READOUTS, ReadoutRow, ReadoutTrial, ReadoutsReport, ReadoutsStudy};
@@ -17,12 +17,7 @@ type Line<'a> = (&'a ReadoutRow, &'a ReadoutTrial, f64);
 /// [`OutputError`] when a file cannot be written.
 pub fn write(study: &ReadoutsStudy, report: &ReadoutsReport, out: OutputFolder) -> Result<(), OutputError> {
     write_all_or_none(out, |out| {
-        let path = out.path("parameters.json");
-        let parameters = study.parameters();
-        let hashed = serde_json::to_string(&parameters).map_err(|e| OutputError::write(&path)(e.into()))?;
-        write_json(&path, &parameters)?;
-        let provenance = Provenance::new(study.seed, hash_text(hashed.as_bytes()));
-        write_json(&out.path("provenance.json"), &provenance)?;
+        write_parameters(out, &study.parameters(), study.seed)?;
         table(lines(report)).write(out)?;
         write_table(&out.path("published.csv"), report.published)?;
         write_json(&out.path("readouts.json"), report)?;
@@ -108,8 +103,7 @@ fn banded<'a>(
     };
     table
         .file(key, move |(_, t, _)| band(t).map(|b| b.mean))
-        .file(format!("{key}_low"), move |(_, t, _)| band(t).map(|b| b.low))
-        .file(format!("{key}_high"), move |(_, t, _)| band(t).map(|b| b.high))
+        .interval(key, move |(_, t, _)| band(t).map(|b| [b.low, b.high]))
         .shown(head, move |(_, t, _)| band(t).map(shown))
 }
 

@@ -4,8 +4,8 @@
 //! The comparison can therefore fail.
 
 use crate::calibrate::{
-    Estimated, FitRequest, FittedReadout, SessionEstimates, SessionPair, WINDOW_FRAMES, fit_windows, fitted_profile,
-    predicted, reseeded,
+    Estimated, FittedReadout, SessionEstimates, SessionPair, WINDOW_FRAMES, fit_windows, fitted_profile, predicted,
+    reseeded,
 };
 use rand::RngExt as _;
 use rayon::prelude::*;
@@ -627,12 +627,7 @@ pub(crate) fn recorded_image(
     profile: &Profile,
 ) -> Result<Interpolated, Refusal> {
     let cells = reseeded(&fitted.faults);
-    let ask = FitRequest {
-        block,
-        reseeded: &cells,
-        parity: false,
-    };
-    let windows = fit_windows(real, ask, 0..real.frames(), WINDOW_FRAMES);
+    let windows = fit_windows(real, block, &cells, false, 0..real.frames(), WINDOW_FRAMES);
     let middle_s = |first_row: u64| {
         let before = (first_row - real.first_row(block, 0)) as f64;
         (before + 0.5 * (WINDOW_FRAMES * real.measurements_per_frame()) as f64) / profile.sample_rate_hz

@@ -13,3 +13,4 @@ pub mod per_object;
 pub mod readouts;
 pub mod sensing;
 pub mod touches;
+mod wiring;

@@ -13,7 +13,7 @@
 //! // one weight for every taxel and measurement, ±1
 //! let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, 100);
 //! let mut wire = TouchWire::new(&Profile::named("ideal")?, &weights, &scene.layout, Streams::new(1))?;
-//! let volts = wire.measure(&touches[0], 0, 0, 20)?;
+//! let volts = wire.measure(touches[0].conductance_s.clone(), 0, 20)?;
 //! assert_eq!(volts.len(), 20);
 //! // the image itself shows the touch as it is
 //! let score = TouchScore::of(touches[0].conductance_s.values(), &touches[0], &scene.layout);
@@ -187,8 +187,8 @@ const IDLE_BLOCK: u64 = 1 << 40;
 /// let profile = Profile::named("ideal").expect("it ships");
 /// let weights = profile.weights(Mode::Compressive, 100).expect("100 taxels");
 /// let mut wire = TouchWire::new(&profile, &weights, &layout, Streams::new(1))?;
-/// let touch = &TouchScene::new(layout, TouchObjects::Objects, 1, 1).draw()?[0];
-/// assert_eq!(wire.measure(touch, 0, 0, 20)?.len(), 20);
+/// let touch = TouchScene::new(layout, TouchObjects::Objects, 1, 1).draw()?.remove(0);
+/// assert_eq!(wire.measure(touch.conductance_s, 0, 20)?.len(), 20);
 /// # Ok::<(), spts_input::Refusal>(())
 /// ```
 pub struct TouchWire {
@@ -219,8 +219,7 @@ impl TouchWire {
         Self { readout, idle_v: 0.0 }
     }
 
-    /// Unmodified samples of a skin with this conductance at the rows `first_row..first_row + measurements`, V.
-    /// `number` determines the noise.
+    /// Unmodified samples of a skin with this conductance at the first rows, V. `number` determines the noise.
     ///
     /// # Errors
     /// [`Refusal`] if the skin has another size.
@@ -228,27 +227,24 @@ impl TouchWire {
         &mut self,
         conductance_s: ConductanceMap,
         number: u64,
-        first_row: u64,
         measurements: usize,
     ) -> Result<Vec<f64>, Refusal> {
         let mut source = Constant::new(conductance_s)?;
-        self.readout.seek_row(number, first_row);
+        self.readout.seek_row(number, 0);
         self.readout.measure(&mut source, measurements)
     }
 
-    /// Samples of `touch` at the rows `first_row..first_row + measurements`, minus the mean of the untouched skin, V.
-    /// `number` determines the noise.
+    /// The same samples, minus the mean of the untouched skin, V.
     ///
     /// # Errors
-    /// [`Refusal`] if the touch is on a skin of another size.
+    /// As [`TouchWire::volts`].
     pub fn measure(
         &mut self,
-        touch: &Touch,
+        conductance_s: ConductanceMap,
         number: u64,
-        first_row: u64,
         measurements: usize,
     ) -> Result<Vec<f64>, Refusal> {
-        let mut volts = self.volts(touch.conductance_s.clone(), number, first_row, measurements)?;
+        let mut volts = self.volts(conductance_s, number, measurements)?;
         volts.iter_mut().for_each(|v| *v -= self.idle_v);
         Ok(volts)
     }

@@ -163,20 +163,36 @@ impl LinearOperator for Matrix {
     }
 }
 
-impl SelectColumns for Matrix {
-    type Selected = Self;
+impl SelectColumns for MatrixView<'_> {
+    type Selected = Matrix;
 
-    fn select_columns(&self, columns: &[usize]) -> Self {
-        let columns: Vec<Vec<f64>> = columns.iter().map(|&k| self.column(k)).collect();
-        let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-        Self::from_column_slices(self.nrows(), &slices)
+    fn select_columns(&self, columns: &[usize]) -> Matrix {
+        let mut selected = Matrix::zeros((*self).nrows(), columns.len());
+        for (r, row) in self.values().chunks_exact((*self).ncols().max(1)).enumerate() {
+            let out = selected.row_mut(r).iter_mut();
+            out.zip(columns).for_each(|(out, k)| *out = row[*k]);
+        }
+        selected
     }
 
     fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
         check_shape(self, variance, r);
-        for (k, variance) in variance.iter_mut().enumerate() {
-            *variance = self.column(k).iter().zip(r).map(|(a, r)| (a * r).powi(2)).sum();
+        variance.fill(0.0);
+        for (row, r) in self.values().chunks_exact(variance.len().max(1)).zip(r) {
+            variance.iter_mut().zip(row).for_each(|(v, a)| *v += (a * r).powi(2));
         }
+    }
+}
+
+impl SelectColumns for Matrix {
+    type Selected = Self;
+
+    fn select_columns(&self, columns: &[usize]) -> Self {
+        self.view().select_columns(columns)
+    }
+
+    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
+        self.view().chance_variance(r, variance);
     }
 }
 

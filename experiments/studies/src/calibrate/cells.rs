@@ -1,7 +1,7 @@
 //! Cells that do not run their own sequence, because of another seed or missed edges.
 
-use super::press::{FitRequest, Reseeded, WINDOW_FRAMES, fit_windows};
-use super::statistics::{OUTLIER_SD, mean, robust_sd, sd};
+use super::statistics::{mean, robust_sd, sd};
+use super::windows::{OUTLIER_SD, Reseeded, TAPS, WINDOW_FRAMES, fit_windows};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use spts_circuit::{Recording, WeightMode};
@@ -47,18 +47,16 @@ impl std::fmt::Display for CellFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
             Self::MisSeeded {
-                taxel: Some(taxel),
+                taxel,
                 seed,
                 amplitude_v,
-            } => write!(f, "taxel {taxel} runs on seed {seed}, amplitude {amplitude_v:.3} V"),
-            Self::MisSeeded {
-                taxel: None,
-                seed,
-                amplitude_v,
-            } => write!(
-                f,
-                "some taxel runs on seed {seed}, amplitude {amplitude_v:.3} V; a raster session would say which"
-            ),
+            } => {
+                let (cell, hint) = match taxel {
+                    Some(taxel) => (format!("taxel {taxel}"), ""),
+                    None => ("some taxel".to_owned(), "; a raster session would say which"),
+                };
+                write!(f, "{cell} runs on seed {seed}, amplitude {amplitude_v:.3} V{hint}")
+            }
             Self::Lagging {
                 taxel,
                 lag,
@@ -82,15 +80,11 @@ pub(super) fn find(
     let Some(&block) = blocks.last() else {
         return Vec::new();
     };
-    let ask = FitRequest {
-        block,
-        reseeded: &[],
-        parity: true,
-    };
-    let Some(window) = fit_windows(recording, ask, hold.clone(), hold.len().max(WINDOW_FRAMES)).pop() else {
+    let frames = hold.len().max(WINDOW_FRAMES);
+    let Some(window) = fit_windows(recording, block, &[], true, hold.clone(), frames).pop() else {
         return Vec::new();
     };
-    let first_row = recording.first_row(ask.block, hold.start);
+    let first_row = recording.first_row(block, hold.start);
     let limit = OUTLIER_SD * robust_sd(&window.residual_v).unwrap_or(0.0);
     // NaN is not within the limit
     let core: Vec<f64> = window
@@ -134,7 +128,7 @@ pub(super) fn find(
             continue;
         };
         // lags of 1, 2 and 3 are the memory's
-        for lag in (TAPS..=LAGS).filter(|lag| *lag <= first_row) {
+        for lag in (TAPS as u64 + 1..=LAGS).filter(|lag| *lag <= first_row) {
             let sum = correlate(seed, first_row - lag);
             if believed(sum) {
                 faults.push(CellFault::Lagging {
@@ -151,8 +145,6 @@ pub(super) fn find(
 /// A taxel is touched when it has this share of the raster session's largest: ten times the noise of a mean over its
 /// frames.
 const TOUCHED: f64 = 0.1;
-/// First lag that is not the memory's.
-const TAPS: u64 = super::statistics::TAPS as u64 + 1;
 
 /// The taxel of the contact that shows least of what the raster session has there, none of `taken`.
 fn missing(image: &[f64], raster: &[f64], taken: &[u32]) -> Option<u32> {
@@ -163,17 +155,23 @@ fn missing(image: &[f64], raster: &[f64], taken: &[u32]) -> Option<u32> {
     free.min_by(|p, q| p.1.total_cmp(&q.1)).map(|(k, _)| k)
 }
 
+impl CellFault {
+    /// The cell, if it runs with another seed and its taxel is known.
+    pub(super) fn reseeded(&self) -> Option<Reseeded> {
+        match *self {
+            Self::MisSeeded {
+                taxel: Some(taxel),
+                seed,
+                ..
+            } => Some(Reseeded { taxel, seed }),
+            _ => None,
+        }
+    }
+}
+
 /// The cells with another seed among `faults` whose taxel is known.
 pub fn reseeded(faults: &[CellFault]) -> Vec<Reseeded> {
-    let cell = |fault: &CellFault| match *fault {
-        CellFault::MisSeeded {
-            taxel: Some(taxel),
-            seed,
-            ..
-        } => Some(Reseeded { taxel, seed }),
-        _ => None,
-    };
-    faults.iter().filter_map(cell).collect()
+    faults.iter().filter_map(CellFault::reseeded).collect()
 }
 
 /// Output of the cell: clamp(gain·aₙ + carry·aₙ₋₁ + bias, −1, 1), where a is the analog level of its generator.
@@ -280,13 +278,8 @@ fn samples(recording: &Recording, hold: &Range<usize>, blocks: &[usize], cell: R
     let analog = WeightMode::Analog;
     let mut out = Vec::new();
     for &block in blocks {
-        let ask = FitRequest {
-            block,
-            reseeded: &[cell],
-            parity: false,
-        };
         let first_row = recording.first_row(block, hold.start);
-        for window in fit_windows(recording, ask, hold.clone(), hold.len()) {
+        for window in fit_windows(recording, block, &[cell], false, hold.clone(), hold.len()) {
             let x = window.image[cell.taxel as usize];
             let mut before = analog.level_from_seed(cell.seed, first_row.saturating_sub(1));
             for (i, &residual_v) in window.residual_v.iter().enumerate() {

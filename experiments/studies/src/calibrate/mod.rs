@@ -6,8 +6,8 @@
 //! expected.
 
 use cells::gains;
-use late::{Counts, beat, missed};
-use press::{PressAnalysis, analyse};
+use late::{Counts, beat};
+use press::{PressAnalysis, analyse, missed};
 use profile::predicted_inside;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -32,15 +32,17 @@ mod skin;
 mod statistics;
 #[cfg(test)]
 mod tests;
+mod windows;
 
 pub use cells::{CellFault, Overdriven, SessionGains, TaxelGain, reseeded};
-pub use late::{Beat, LateCell, MissedPress};
+pub use late::{Beat, LateCell};
 pub use predict::{COVERAGE, PredictedInside, PredictedNumber, predicted};
-pub(crate) use press::{FitRequest, fit_windows};
-pub use press::{PressNumbers, Reseeded, WINDOW_FRAMES};
+pub use press::{MissedPress, NUMBERS};
 pub use profile::{FittedParameter, FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED, fitted_profile};
 pub use skin::{Mounting, ObjectCheck, SkinReport, SkinStudy};
-pub use statistics::{ConverterSteps, Estimated, OUTLIER_SD, quantiles};
+pub use statistics::{ConverterSteps, Estimated, quantiles};
+pub(crate) use windows::fit_windows;
+pub use windows::{Reseeded, WINDOW_FRAMES};
 
 /// Both recordings of a session; the raster recording may be missing.
 #[derive(Debug, Clone)]
@@ -269,35 +271,6 @@ impl CalibrationReport {
     }
 }
 
-/// A number of [`PressNumbers`]: name, unit, value.
-pub type Number = (&'static str, &'static str, fn(&PressNumbers) -> f64);
-
-/// Every number of a press.
-pub const NUMBERS: [Number; 22] = [
-    ("idle_mean", "V", |p| p.idle_mean_v),
-    ("idle_sd", "V", |p| p.idle_sd_v),
-    ("idle_noise", "V", |p| p.idle_noise_v),
-    ("idle_parity", "V", |p| p.idle_parity_v),
-    ("idle_sum", "V", |p| p.idle_sum_v),
-    ("residual", "V", |p| p.residual_v),
-    ("clean_residual", "V", |p| p.clean_v),
-    ("core_residual", "V", |p| p.core_v),
-    ("h1", "", |p| p.h1),
-    ("h2", "", |p| p.h2),
-    ("h3", "", |p| p.h3),
-    ("offset", "V", |p| p.offset_v),
-    ("parity", "V", |p| p.parity_v),
-    ("sum", "V", |p| p.sum_v),
-    ("norm", "V", |p| p.norm_v),
-    ("constant", "V", |p| p.constant_v),
-    ("asymmetry", "", |p| p.asymmetry),
-    ("outliers_5sd", "", |p| p.outliers),
-    ("kurtosis", "", |p| p.kurtosis),
-    ("late_per_flip", "", |p| p.late_per_flip),
-    ("unexplained_outliers", "", |p| p.unexplained),
-    ("contact_fraction", "", |p| p.contact_fraction),
-];
-
 /// Number of quantiles of the output that are compared.
 pub const QUANTILES: usize = 100;
 
@@ -367,9 +340,7 @@ impl SessionEstimates {
         if analysed.is_empty() {
             return None;
         }
-        let numbers: Vec<(usize, PressNumbers)> =
-            analysed.iter().map(|(block, press)| (*block, press.numbers)).collect();
-        let missed = missed(&numbers);
+        let missed = missed(&analysed);
         if !missed.is_empty() {
             // their outliers and residuals reach the faults, too: everything is found anew without them
             let hit = |block: &usize| missed.iter().all(|m| m.press != block + 1);
@@ -379,8 +350,9 @@ impl SessionEstimates {
             found.missed.sort_by_key(|m| m.press);
             return Some(found);
         }
-        let values = |get: fn(&PressNumbers) -> f64| -> Vec<f64> {
-            analysed.iter().map(|(_, press)| get(&press.numbers)).collect()
+        let number = |(name, _): (&'static str, &str)| {
+            let values: Vec<f64> = analysed.iter().map(|(_, press)| press.numbers[name]).collect();
+            (name, Estimated::median_of(&values))
         };
         let image_v = middle_image(&analysed);
         let faulty: Vec<usize> = cells.iter().map(|cell| cell.taxel as usize).collect();
@@ -389,10 +361,7 @@ impl SessionEstimates {
             session: pair.session.clone(),
             presses: used.iter().map(|block| block + 1).collect(),
             missed,
-            numbers: NUMBERS
-                .iter()
-                .map(|(name, _, get)| (*name, Estimated::median_of(&values(*get))))
-                .collect(),
+            numbers: NUMBERS.into_iter().map(number).collect(),
             steps: steps(recording, &used),
             late_cells: late_cells(&analysed),
             beats: beats(&analysed),

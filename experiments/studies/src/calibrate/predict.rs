@@ -67,50 +67,46 @@ pub struct PredictedInside {
     pub numbers: Vec<PredictedNumber>,
 }
 
-/// A parameter of several sessions.
-pub(super) struct SessionValues<'a> {
-    /// Name of the parameter.
-    pub(super) name: &'static str,
-    /// Smallest and largest valid value of the readout.
-    pub(super) limits: [f64; 2],
-    /// Sessions that determine it, with their values.
-    pub(super) sessions: Vec<(&'a str, f64)>,
+impl PredictedInside {
+    /// All `numbers` together; `None` without one.
+    pub(super) fn of(numbers: Vec<PredictedNumber>) -> Option<Self> {
+        let all: usize = numbers.iter().map(|n| n.sessions).sum();
+        let share = |get: fn(&PredictedNumber) -> usize| numbers.iter().map(get).sum::<usize>() as f64 / all as f64;
+        (all > 0).then(|| Self {
+            coverage: COVERAGE,
+            share: share(|n| n.inside),
+            share_of_range: share(|n| n.inside_range),
+            numbers: numbers.clone(),
+        })
+    }
 }
 
-/// Leaves every session out in turn. `None` when no parameter has three sessions: two are the fewest that predict a
-/// third.
-pub(super) fn leave_one_out(numbers: &[SessionValues<'_>]) -> Option<PredictedInside> {
-    let tested = numbers.iter().filter(|number| number.sessions.len() > 2);
-    let numbers: Vec<PredictedNumber> = tested.map(one_number).collect();
-    let all: usize = numbers.iter().map(|n| n.sessions).sum();
-    let share = |get: fn(&PredictedNumber) -> usize| numbers.iter().map(get).sum::<usize>() as f64 / all as f64;
-    (all > 0).then(|| PredictedInside {
-        coverage: COVERAGE,
-        share: share(|n| n.inside),
-        share_of_range: share(|n| n.inside_range),
-        numbers: numbers.clone(),
-    })
-}
-
-fn one_number(number: &SessionValues<'_>) -> PredictedNumber {
-    let SessionValues { name, limits, sessions } = number;
+/// Leaves each of the `sessions`, with their values of the parameter `name`, out in turn; `limits` are the smallest and
+/// the largest valid value. `None` with fewer than three sessions: two are the fewest that predict a third.
+pub(super) fn leave_one_out(name: &'static str, limits: [f64; 2], sessions: &[(&str, f64)]) -> Option<PredictedNumber> {
+    if sessions.len() < 3 {
+        return None;
+    }
     let (mut outside, mut inside_range) = (Vec::new(), 0);
     for (left_out, (session, value)) in sessions.iter().enumerate() {
         let others = sessions.iter().enumerate().filter(|(i, _)| *i != left_out);
         let others: Vec<f64> = others.map(|(_, (_, v))| *v).collect();
-        let contains = |span: Option<(f64, f64)>| span.is_some_and(|(low, high)| low <= *value && *value <= high);
-        if !contains(predicted(&others).map(|span| clipped(span, *limits))) {
+        if !predicted(&others).is_some_and(|span| {
+            let (low, high) = clipped(span, limits);
+            (low..=high).contains(value)
+        }) {
             outside.push((*session).to_owned());
         }
-        inside_range += usize::from(contains(super::statistics::range(&others)));
+        let inside = others.iter().any(|v| v <= value) && others.iter().any(|v| v >= value);
+        inside_range += usize::from(inside);
     }
-    PredictedNumber {
+    Some(PredictedNumber {
         name,
         sessions: sessions.len(),
         inside: sessions.len() - outside.len(),
         inside_range,
         outside,
-    }
+    })
 }
 
 /// `span` within `limits`, lowest and highest.
@@ -150,19 +146,16 @@ mod tests {
 
     #[test]
     fn every_session_is_held_against_the_others() {
-        let values = |name, sessions: &[(&'static str, f64)]| SessionValues {
-            name,
-            limits: [0.0, 10.0],
-            sessions: sessions.to_vec(),
-        };
-        let four = values("x", &[("a", 1.0), ("b", 2.0), ("c", 1.5), ("far", 9.0)]);
-        let found = leave_one_out(&[four, values("rare", &[("a", 0.5)])]).unwrap();
-        assert_eq!(found.numbers.len(), 1, "two sessions at least predict a third");
+        let limits = [0.0, 10.0];
+        let four = leave_one_out("x", limits, &[("a", 1.0), ("b", 2.0), ("c", 1.5), ("far", 9.0)]);
+        let two = leave_one_out("x", limits, &[("a", 0.1), ("b", 0.2)]);
+        assert_eq!(two, None, "two sessions at least predict a third");
+        let found = PredictedInside::of(four.into_iter().collect()).unwrap();
         assert_eq!(found.numbers[0].outside, ["far"]);
         assert_abs_diff_eq!(found.share, 0.75);
         // a and far are ends of the range
         assert_abs_diff_eq!(found.share_of_range, 0.5);
-        assert_eq!(leave_one_out(&[values("x", &[("a", 0.1), ("b", 0.2)])]), None);
+        assert_eq!(PredictedInside::of(Vec::new()), None);
     }
 
     #[test]

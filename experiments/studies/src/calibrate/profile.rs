@@ -1,12 +1,14 @@
 //! Turns estimates into a readout profile.
 
 use super::SessionEstimates;
-use super::cells::CellFault;
-use super::predict::{COVERAGE, PredictedInside, SessionValues, clipped, leave_one_out, predicted};
+use super::cells::Overdriven;
+use super::predict::{COVERAGE, PredictedInside, clipped, leave_one_out, predicted};
 use super::statistics::{ConverterSteps, Estimated, mean, sd};
+use super::windows::Reseeded;
+use crate::wiring::shipped;
 use serde::Serialize;
 use spts::chain::DEFAULT_READOUT;
-use spts_circuit::{LevelSource, PROFILES, Profile, Seeding, Weights};
+use spts_circuit::{LevelSource, Profile, Seeding, Weights};
 use spts_input::Refusal;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -72,7 +74,7 @@ impl FittedReadout {
         let periods = periods(sessions);
         let beat = (!periods.is_empty()).then(|| Estimated::mean_of(&periods));
         Self {
-            values: fitted_parameters(sessions),
+            values: PARAMETERS.iter().map(|parameter| fitted(parameter, sessions)).collect(),
             beat,
             beat_sd: sd(&periods),
             sample_rate_hz: beat.map(|b| (b.value * CELL_TIMER_HZ / RATE_STEP_HZ).round() * RATE_STEP_HZ),
@@ -85,45 +87,52 @@ impl FittedReadout {
     }
 
     /// The profile as TOML. Parameters that the recordings do not determine are taken from the TOML table `base`.
-    ///
-    /// # Errors
-    /// An error if `base` cannot be written as TOML.
-    pub fn to_toml(&self, base: &toml::Table) -> Result<String, toml::ser::Error> {
+    fn to_toml(&self, base: &toml::Table) -> Result<String, toml::ser::Error> {
         let mut out = self.header();
         let kept = |key: &str| {
             base.get(key)
                 .map(|v| format!("{key} = {v}  # kept\n"))
                 .unwrap_or_default()
         };
-        out.push_str(&match self.weights_lines(base)? {
-            Some(lines) => lines,
-            None => kept("weights"),
-        });
+        let weights = self.weights_lines(base)?;
+        out.push_str(&weights.unwrap_or_else(|| kept("weights")));
         out.push_str(&self.rate_line(base));
         out.push_str(&kept("drive_v"));
         out.push_str(&kept("feedback_ohm"));
+        let kept = |effect: &str, key: &str| base.get("compressive")?.get(effect)?.get(key);
+        let mut line = |text: String| out.push_str(&(text + "\n"));
         let mut section = "";
         for value in &self.values {
             let (effect, key) = value.name.split_once('.').unwrap_or(("", value.name));
             if effect != section {
-                let _ = writeln!(out, "\n[compressive.{effect}]");
+                line(format!("\n[compressive.{effect}]"));
                 section = effect;
             }
-            let kept = || base.get("compressive")?.get(effect)?.get(key);
-            match (value.span, kept()) {
-                (None, None) => {}
-                (None, Some(kept)) => {
-                    let _ = writeln!(
-                        out,
-                        "{key} = {kept}  # kept: not identified, no press says anything about it"
-                    );
-                }
-                (Some(span), _) => {
-                    let _ = writeln!(out, "{key} = {}  # {}", span_text(span), words(&value.estimate));
-                }
+            if let Some(span) = value.span {
+                line(format!("{key} = {}  # {}", span_text(span), words(&value.estimate)));
+            } else if let Some(kept) = kept(effect, key) {
+                line(format!(
+                    "{key} = {kept}  # kept: not identified, no press says anything about it"
+                ));
             }
-            if key == "rate" {
-                self.push_beat(&mut out, base);
+            match self.beat {
+                _ if key != "rate" => {}
+                Some(beat) => {
+                    let (period, error) = (beat.value, error_text(beat, 1.0, 2));
+                    let sd = self.beat_sd.min(0.1 * period);
+                    line(format!(
+                        "period_measurements = {period:.2}  # mean{error}, {} beats of cells",
+                        beat.n
+                    ));
+                    line(format!("period_sd_measurements = {sd:.2}"));
+                }
+                None => {
+                    for key in ["period_measurements", "period_sd_measurements"] {
+                        if let Some(kept) = kept(effect, key) {
+                            line(format!("{key} = {kept}  # kept: no beat seen"));
+                        }
+                    }
+                }
             }
         }
         out.push_str(&self.faults);
@@ -132,10 +141,7 @@ impl FittedReadout {
             ("Not identifiable from these recordings", NOT_IDENTIFIABLE.as_slice()),
             ("In the recordings, not modelled", NOT_MODELLED.as_slice()),
         ] {
-            let _ = writeln!(out, "\n# {title}:");
-            for line in lines {
-                let _ = writeln!(out, "# - {line}");
-            }
+            let _ = write!(out, "\n# {title}:\n# - {}\n", lines.join("\n# - "));
         }
         Ok(out)
     }
@@ -204,28 +210,6 @@ impl FittedReadout {
         }
     }
 
-    fn push_beat(&self, out: &mut String, base: &toml::Table) {
-        if let Some(beat) = self.beat {
-            let _ = writeln!(
-                out,
-                "period_measurements = {:.2}  # {}\nperiod_sd_measurements = {:.2}",
-                beat.value,
-                format_args!("mean{}, {} beats of cells", error_text(beat, 1.0, 2), beat.n),
-                self.beat_sd.min(0.1 * beat.value)
-            );
-            return;
-        }
-        for key in ["period_measurements", "period_sd_measurements"] {
-            let kept = base
-                .get("compressive")
-                .and_then(|c| c.get("late_updates"))
-                .and_then(|l| l.get(key));
-            if let Some(kept) = kept {
-                let _ = writeln!(out, "{key} = {kept}  # kept: no beat seen");
-            }
-        }
-    }
-
     /// Effects of the base profile that the recordings say nothing about.
     fn push_rest(&self, out: &mut String, base: &toml::Table) -> Result<(), toml::ser::Error> {
         let fitted = |name: &str| self.values.iter().any(|v| v.name.split('.').next() == Some(name));
@@ -255,15 +239,12 @@ const SAME_STEP: f64 = 1e-6;
 /// Gives the converter `adc` the divider and offset that put its values on the grid `steps`, unless they are on it.
 fn on_grid(adc: &mut toml::Value, steps: ConverterSteps) {
     let number = |key: &str| {
-        adc.get(key)
-            .and_then(|v| v.as_float().or(v.as_integer().map(|i| i as f64)))
+        let value = adc.get(key)?;
+        value.as_float().or(value.as_integer().map(|i| i as f64))
     };
-    let (Some(bits), Some(reference_v), Some(divider), Some(offset_v)) = (
-        number("bits"),
-        number("reference_v"),
-        number("divider"),
-        number("offset_v"),
-    ) else {
+    let [Some(bits), Some(reference_v), Some(divider), Some(offset_v)] =
+        ["bits", "reference_v", "divider", "offset_v"].map(number)
+    else {
         return;
     };
     let fitted = steps.step_v * (bits.exp2() - 1.0) / reference_v;
@@ -332,31 +313,23 @@ fn fault_lines(sessions: &[SessionEstimates]) -> String {
         return out;
     };
     for cell in &session.overdriven {
-        let _ = writeln!(
-            out,
-            "\n[[faults]]\nname = \"overdriven\"\ntaxel = {}\nseed = {}\ngain = {:.3}\ncarry = {:.3}\nbias = {:.3}",
-            cell.taxel, cell.seed, cell.gain, cell.carry, cell.bias
-        );
+        let (fault, Overdriven { gain, carry, bias, .. }) = (fault("overdriven", cell.taxel, cell.seed), cell);
+        let _ = writeln!(out, "{fault}\ngain = {gain:.3}\ncarry = {carry:.3}\nbias = {bias:.3}");
     }
-    for fault in &session.faults {
-        match *fault {
-            CellFault::MisSeeded { taxel: Some(taxel), .. } if session.overdriven.iter().any(|o| o.taxel == taxel) => {}
-            CellFault::MisSeeded {
-                taxel: Some(taxel),
-                seed,
-                ..
-            } => {
-                let _ = writeln!(
-                    out,
-                    "\n[[faults]]\nname = \"mis_seeded\"\ntaxel = {taxel}\nseed = {seed}"
-                );
-            }
-            _ => {
-                let _ = writeln!(out, "\n# found, not modelled: {fault}");
-            }
-        }
+    let described = |cell: &Reseeded| session.overdriven.iter().any(|o| o.taxel == cell.taxel);
+    for found in &session.faults {
+        let _ = match found.reseeded() {
+            Some(cell) if described(&cell) => Ok(()),
+            Some(cell) => writeln!(out, "{}", fault("mis_seeded", cell.taxel, cell.seed)),
+            None => writeln!(out, "\n# found, not modelled: {found}"),
+        };
     }
     out
+}
+
+/// A fault of a cell in a profile.
+fn fault(name: &str, taxel: u32, seed: u32) -> String {
+    format!("\n[[faults]]\nname = \"{name}\"\ntaxel = {taxel}\nseed = {seed}")
 }
 
 /// The profile of `readings` and its text, for a skin of `taxels` taxels. Undetermined parameters are taken from the
@@ -365,42 +338,43 @@ fn fault_lines(sessions: &[SessionEstimates]) -> String {
 /// # Errors
 /// [`Refusal`] if a value is outside its range.
 pub fn fitted_profile(readings: &FittedReadout, taxels: u32) -> Result<(Profile, String), Refusal> {
-    let base = PROFILES.iter().find(|(name, _)| *name == DEFAULT_READOUT);
-    let base: toml::Table =
-        toml::from_str(base.map_or("", |(_, text)| text)).map_err(|e| Refusal::from_error(e).at(DEFAULT_READOUT))?;
+    let base = shipped(DEFAULT_READOUT)?;
     let text = readings.to_toml(&base).map_err(Refusal::from_error)?;
     let profile = Profile::from_toml(&text)?;
     profile.validate(taxels)?;
     Ok((profile, text))
 }
 
-/// A parameter and where it comes from: section and key of the profile; name of the value in [`super::PressNumbers`]
-/// that has its uncertainty; smallest and largest valid value of the readout (rates, shares and noise are not
-/// negative); and its value of a session, NaN if the session does not determine it.
-type Parameter = (&'static str, &'static str, [f64; 2], fn(&SessionEstimates) -> f64);
+/// A parameter and where it comes from: section and key of the profile; name of its value in [`super::NUMBERS`];
+/// smallest and largest valid value of the readout (rates, shares and noise are not negative).
+type Parameter = (&'static str, &'static str, [f64; 2]);
 
 /// In the order of the profile.
 const PARAMETERS: [Parameter; 8] = [
     // half a beat of 52.4 measurements; see the effect `late_updates`
-    (LATE_RATE, "late_per_flip", [0.0, 0.5 / 53.0], |s| {
-        s.value("late_per_flip")
-    }),
-    ("drive_offset.constant_v", "constant", [-5.0, 5.0], |s| {
-        s.value("constant")
-    }),
-    ("drive_offset.asymmetry", "asymmetry", [-0.5, 0.5], |s| {
-        s.value("asymmetry")
-    }),
-    ("memory.h1", "h1", [-0.4, 0.4], |s| s.value("h1")),
-    ("memory.h2", "h2", [-0.4, 0.4], |s| s.value("h2")),
-    ("clock_pattern.amplitude_v", "parity", [-2.0, 2.0], |s| {
-        s.value("parity")
-    }),
-    ("contact_noise.fraction", "contact_fraction", [0.0, 1.0], |s| {
-        s.value("contact_fraction")
-    }),
-    ("idle_noise.sd_v", "idle_noise", [0.0, 10.0], idle_noise_v),
+    (LATE_RATE, "late_per_flip", [0.0, 0.5 / 53.0]),
+    ("drive_offset.constant_v", "constant", [-5.0, 5.0]),
+    ("drive_offset.asymmetry", "asymmetry", [-0.5, 0.5]),
+    ("memory.h1", "h1", [-0.4, 0.4]),
+    ("memory.h2", "h2", [-0.4, 0.4]),
+    ("clock_pattern.amplitude_v", "parity", [-2.0, 2.0]),
+    ("contact_noise.fraction", "contact_fraction", [0.0, 1.0]),
+    ("idle_noise.sd_v", IDLE_NOISE, [0.0, 10.0]),
 ];
+
+/// The number that the converter's rounding adds step²/12 to.
+const IDLE_NOISE: &str = "idle_noise";
+
+/// A session's value of a parameter, NaN if the session does not determine it; of the idle noise, the noise floor
+/// before the converter.
+fn session_value(s: &SessionEstimates, number: &str) -> f64 {
+    let value = s.value(number);
+    if number != IDLE_NOISE {
+        return value;
+    }
+    let step_v = s.steps.map_or(0.0, |s| s.step_v);
+    (value.powi(2) - step_v.powi(2) / 12.0).max(0.0).sqrt()
+}
 
 /// The one parameter that is drawn once a taxel, not once a session.
 const LATE_RATE: &str = "late_updates.rate";
@@ -419,13 +393,10 @@ pub struct FittedParameter {
     pub estimate: Estimated,
 }
 
-/// Every parameter, from all `sessions` together, or of one.
-pub(super) fn fitted_parameters(sessions: &[SessionEstimates]) -> Vec<FittedParameter> {
-    PARAMETERS.iter().map(|parameter| fitted(parameter, sessions)).collect()
-}
-
-fn fitted(&(name, number, limits, value): &Parameter, sessions: &[SessionEstimates]) -> FittedParameter {
-    let values: Vec<f64> = sessions.iter().map(value).filter(|v| v.is_finite()).collect();
+/// A parameter, from all `sessions` together, or of one.
+fn fitted(&(name, number, limits): &Parameter, sessions: &[SessionEstimates]) -> FittedParameter {
+    let values = sessions.iter().map(|s| session_value(s, number));
+    let values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     let estimate = match sessions {
         [only] => Estimated {
             value: values.first().copied().unwrap_or(f64::NAN),
@@ -450,21 +421,11 @@ fn fitted(&(name, number, limits, value): &Parameter, sessions: &[SessionEstimat
 /// Whether every session lies in the spans that the others predict; of the late rate, its mean over the taxels. `None`
 /// with fewer than three sessions.
 pub(super) fn predicted_inside(sessions: &[SessionEstimates]) -> Option<PredictedInside> {
-    let of = |&(name, _, limits, value): &Parameter| {
-        let values = sessions.iter().map(|s| (s.session.as_str(), value(s)));
-        SessionValues {
-            name,
-            limits,
-            sessions: values.filter(|(_, v)| v.is_finite()).collect(),
-        }
+    let of = |&(name, number, limits): &Parameter| {
+        let values = sessions.iter().map(|s| (s.session.as_str(), session_value(s, number)));
+        leave_one_out(name, limits, &values.filter(|(_, v)| v.is_finite()).collect::<Vec<_>>())
     };
-    leave_one_out(&PARAMETERS.iter().map(of).collect::<Vec<_>>())
-}
-
-/// Noise floor before the converter, whose rounding adds step²/12.
-fn idle_noise_v(s: &SessionEstimates) -> f64 {
-    let step_v = s.steps.map_or(0.0, |s| s.step_v);
-    (s.value("idle_noise").powi(2) - step_v.powi(2) / 12.0).max(0.0).sqrt()
+    PredictedInside::of(PARAMETERS.iter().filter_map(of).collect())
 }
 
 /// Span of a uniform distribution over the taxels about `centre`, not below 0: standard deviation of the shares of late

@@ -1,12 +1,11 @@
 //! Consequences of a design: costs, the limiting constraint, alternatives, and files to simulate it.
 
-use super::search::{Bench, Tried, draw, mean};
-use super::wire::{BandRows, FeedbackLimit, RowSource};
+use super::search::{Tried, draw, mean};
+use super::wire::{FeedbackLimit, RowSource, WireDesign};
 use super::{Alternative, Binding, CostDrivers, Design, DesignReport, DesignStudy, Ground, LatencyParts, WireChoice};
 use crate::sensing::load_s;
 use spts_firmware::{FIRST_ADDRESS, LAST_BUS_ADDRESS, Pattern};
 use spts_input::Refusal;
-use spts_models::SkinLayout;
 
 /// Multiplications a second of the estimate of the decoder's time: one core, one lane.
 const PRODUCTS_PER_S: f64 = 1e9;
@@ -26,21 +25,32 @@ impl DesignStudy {
     pub(super) fn report(
         &self,
         ground: &Ground,
-        chosen: Tried,
-        others: Vec<Tried>,
+        chosen: Tried<'_>,
+        others: Vec<Tried<'_>>,
         design: Design,
     ) -> Result<DesignReport, Refusal> {
         let reached = chosen.reached.is_some();
         let acquisition_s = design.m_per_wire as f64 * design.wire.period_s;
-        let (binding, binding_reason) = self.binding(&design, &chosen, &others, reached, acquisition_s);
+        let (binding, binding_reason) = self.binding(&design, &chosen, &others, acquisition_s);
         let mut alternatives: Vec<Alternative> = Vec::new();
         for other in &others {
             alternatives.extend(searched(ground, &chosen, other));
         }
         alternatives.extend(self.more_wires(ground, &design)?);
         alternatives.extend(self.coarser(&design)?);
-        alternatives.push(raster(&design));
-        let profile = design.wire.profile(design.row_source == RowSource::Generator)?;
+        // a scan of every taxel of every wire at the same clock
+        let most = design.sub_arrays.iter().copied().max().unwrap_or_default();
+        let what = "a scan of every taxel, without a decoder";
+        alternatives.push(alternative(
+            ground,
+            what,
+            design.wires,
+            "raster",
+            most,
+            &design.wire,
+            None,
+        ));
+        let (_, profile) = design.wire.profile(design.row_source == RowSource::Generator)?;
         let pattern = chosen.bench.rows.text();
         let scene = scene(&design);
         let mut curves: Vec<_> = others.into_iter().map(|t| t.curve).collect();
@@ -72,73 +82,57 @@ impl DesignStudy {
     fn binding(
         &self,
         design: &Design,
-        chosen: &Tried,
-        others: &[Tried],
-        reached: bool,
+        chosen: &Tried<'_>,
+        others: &[Tried<'_>],
         acquisition_s: f64,
     ) -> (Binding, String) {
         let latency_ms = 1e3 * self.latency_s;
-        let (iou, wires) = (self.iou, design.wires);
-        if design.wire.feedback_limit == FeedbackLimit::SlowerClock {
-            let reason = format!(
-                "the output takes {:.1} µs to settle, so that the clock is slowed to {:.1} kHz",
-                1e6 * design.wire.settle_s,
-                1e-3 * design.wire.rate_hz
-            );
+        let (iou, most, wires, wire) = (self.iou, chosen.wired.most, design.wires, &design.wire);
+        if wire.feedback_limit == FeedbackLimit::SlowerClock {
+            let (settle_us, rate_khz) = (1e6 * wire.settle_s, 1e-3 * wire.rate_hz);
+            let slower = format!("so that the clock is slowed to {rate_khz:.1} kHz");
+            let reason = format!("the output takes {settle_us:.1} µs to settle, {slower}");
             return (Binding::AmplifierSettling, reason);
         }
-        if !reached {
-            let most = chosen.most;
-            if chosen.by_latency {
+        let of_limit = |tried: &Tried<'_>| match tried.wired.by_latency {
+            true => Binding::Latency,
+            false => Binding::Measurements,
+        };
+        if chosen.reached.is_none() {
+            let reason = if chosen.wired.by_latency {
                 let wires_in_words = match self.wires {
                     WireChoice::Exactly(1) => "one wire was asked for".to_owned(),
                     WireChoice::Exactly(wires) => format!("{wires} wires were asked for"),
                     WireChoice::UpTo(most) => format!("no more than {most} are allowed"),
                 };
-                let reason = format!(
-                    "{most} measurements a wire fit into {latency_ms} ms, and {wires_in_words}: that is not enough for an IoU of {iou}"
-                );
-                return (Binding::Latency, reason);
-            }
+                let fit = format!("{most} measurements a wire fit into {latency_ms} ms");
+                format!("{fit}, and {wires_in_words}: that is not enough for an IoU of {iou}")
+            } else {
+                let limits = "the most that there are rows, taxels and memory of the decoder for";
+                format!("an IoU of {iou} is not reached with {most} measurements a wire, {limits}")
+            };
+            return (of_limit(chosen), reason);
+        }
+        let fewer = others.iter().filter(|t| t.curve.wires < wires);
+        let best = fewer.max_by(|a, b| a.iou().total_cmp(&b.iou()));
+        if let (WireChoice::UpTo(_), Some(best)) = (self.wires, best) {
+            let (wires, reached) = (counted(best.curve.wires, "wire"), best.iou());
             let reason = format!(
-                "an IoU of {iou} is not reached with {most} measurements a wire, the most that there are rows, taxels and memory of the decoder for"
+                "with {wires} an IoU of {reached:.2} is reached within {latency_ms} ms, and {iou} is asked for"
             );
-            return (Binding::Measurements, reason);
+            return (of_limit(best), reason);
         }
-        if wires > 1 && matches!(self.wires, WireChoice::UpTo(_)) {
-            let fewer = others.iter().filter(|t| t.curve.wires < wires);
-            let best = fewer.max_by(|a, b| a.iou().total_cmp(&b.iou()));
-            if let Some(best) = best {
-                let reason = format!(
-                    "with {} an IoU of {:.2} is reached within {latency_ms} ms, and {iou} is asked for",
-                    counted(best.curve.wires, "wire"),
-                    best.iou()
-                );
-                return (
-                    if best.by_latency {
-                        Binding::Latency
-                    } else {
-                        Binding::Measurements
-                    },
-                    reason,
-                );
-            }
-        }
-        let used = acquisition_s / self.latency_s;
+        let (m, used) = (design.m_per_wire, acquisition_s / self.latency_s);
+        let percent = 100.0 * used;
         if used > FULL {
-            let reason = format!(
-                "{} measurements a wire fill {:.0} % of the {latency_ms} ms",
-                design.m_per_wire,
-                100.0 * used
-            );
+            let reason = format!("{m} measurements a wire fill {percent:.0} % of the {latency_ms} ms");
             return (Binding::Latency, reason);
         }
-        let reason = format!(
-            "an IoU of {iou} takes {} measurements a wire, which are {:.0} % of the {latency_ms} ms",
-            design.m_per_wire,
-            100.0 * used
-        );
-        (Binding::Iou, reason)
+        let which = format!("which are {percent:.0} % of the {latency_ms} ms");
+        (
+            Binding::Iou,
+            format!("an IoU of {iou} takes {m} measurements a wire, {which}"),
+        )
     }
 
     /// Twice the wires, half the measurements.
@@ -185,62 +179,66 @@ impl DesignStudy {
         if m > wired.most {
             return Ok(None);
         }
-        let rows = BandRows::new(source, &ground.prior, wires, m, self.seed)?;
-        let places = self.objects.places(&ground.layout);
-        let mut bench = Bench::new(ground.layout, rows, wired.profile, ground.prior.clone(), places)?;
+        let mut bench = self.bench(ground, &wired, source, wires, m)?;
         bench.prepare(m)?;
         let drawn = draw(&self.objects, &ground.layout, "design/compared", self.seed, COMPARED)?;
         let scores = bench.score(&bench.measure(drawn, m)?, m, None)?;
-        Ok(Some(Alternative {
-            what: what.to_owned(),
-            taxels: ground.layout.taxels(),
-            pitch_m: ground.layout.pitch_m(),
+        let found = (mean(&scores, |s| s.iou), mean(&scores, |s| s.place_px));
+        let rows = source.name();
+        Ok(Some(alternative(
+            ground,
+            what,
             wires,
-            rows: source.name().to_owned(),
-            m_per_wire: m,
-            acquisition_s: m as f64 * wired.wire.period_s,
-            iou: Some(mean(&scores, |s| s.iou)),
-            place_mm: Some(1e3 * ground.layout.pitch_m() * mean(&scores, |s| s.place_px)),
-        }))
+            rows,
+            m,
+            &wired.wire,
+            Some(found),
+        )))
     }
 }
 
 /// What the search found beside the design: the other rows, and fewer wires.
-fn searched(ground: &Ground, chosen: &Tried, other: &Tried) -> Option<Alternative> {
-    let at = other.chosen();
+fn searched(ground: &Ground, chosen: &Tried<'_>, other: &Tried<'_>) -> Option<Alternative> {
+    let (at, wires, rows) = (other.chosen(), other.curve.wires, other.curve.rows.name());
     let point = other.curve.points.iter().find(|p| p.m_per_wire == at)?;
-    let what = if other.curve.wires < chosen.curve.wires {
-        format!("{}, all the time there is", counted(other.curve.wires, "wire"))
+    let what = if wires < chosen.curve.wires {
+        format!("{}, all the time there is", counted(wires, "wire"))
     } else {
-        format!("{} rows", other.source.name())
+        format!("{rows} rows")
     };
-    let pitch_m = ground.layout.pitch_m();
-    Some(Alternative {
-        what,
-        taxels: ground.layout.taxels(),
-        pitch_m,
-        wires: other.curve.wires,
-        rows: other.source.name().to_owned(),
-        m_per_wire: at,
-        acquisition_s: at as f64 * other.wire.period_s,
-        iou: Some(point.iou.mean),
-        place_mm: Some(1e3 * pitch_m * point.place_px),
-    })
+    let found = (point.iou.mean, point.place_px);
+    Some(alternative(
+        ground,
+        &what,
+        wires,
+        rows,
+        at,
+        &other.wired.wire,
+        Some(found),
+    ))
 }
 
-/// A scan of every taxel of every wire at the same clock: no decoder is needed.
-fn raster(design: &Design) -> Alternative {
-    let most = design.sub_arrays.iter().copied().max().unwrap_or_default();
+/// `what` differs from the design: `m` measurements of every wire, where IoU and place error, taxels, were `found`.
+fn alternative(
+    ground: &Ground,
+    what: &str,
+    wires: usize,
+    rows: &str,
+    m: usize,
+    wire: &WireDesign,
+    found: Option<(f64, f64)>,
+) -> Alternative {
+    let pitch_m = ground.layout.pitch_m();
     Alternative {
-        what: "a scan of every taxel, without a decoder".to_owned(),
-        taxels: design.taxels,
-        pitch_m: design.pitch_m,
-        wires: design.wires,
-        rows: "raster".to_owned(),
-        m_per_wire: most,
-        acquisition_s: most as f64 * design.wire.period_s,
-        iou: None,
-        place_mm: None,
+        what: what.to_owned(),
+        taxels: ground.layout.taxels(),
+        pitch_m,
+        wires,
+        rows: rows.to_owned(),
+        m_per_wire: m,
+        acquisition_s: m as f64 * wire.period_s,
+        iou: found.map(|(iou, _)| iou),
+        place_mm: found.map(|(_, place_px)| 1e3 * pitch_m * place_px),
     }
 }
 
@@ -289,9 +287,4 @@ fn scene(design: &Design) -> String {
 /// "1 wire", "2 wires".
 pub fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
-}
-
-/// The layout of a design.
-pub(super) fn layout_of(design: &Design) -> Result<SkinLayout, Refusal> {
-    SkinLayout::new(design.rows, design.cols, design.pitch_m, design.electrode_m)
 }

@@ -1,6 +1,5 @@
 //! Checks a design with other touches.
 
-use super::answer::layout_of;
 use super::search::{Bench, draw, mean};
 use super::wire::{BandRows, RowSource, bands};
 use super::{Design, DesignStudy, WireChoice};
@@ -9,7 +8,7 @@ use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Profile, parse_patterns};
 use spts_input::Refusal;
-use spts_models::Streams;
+use spts_models::{SkinLayout, Streams};
 use spts_recon::statistics::Band;
 
 /// A design, its files, and the seed of the check.
@@ -61,7 +60,7 @@ impl DesignCheck {
     /// [`Refusal`] if the design is not valid, or its files do not belong to it.
     pub fn run(&self, progress: &dyn Progress) -> Result<CheckReport, Refusal> {
         let design = &self.design;
-        let layout = layout_of(design)?;
+        let layout = SkinLayout::new(design.rows, design.cols, design.pitch_m, design.electrode_m)?;
         let refused = |what: &str, reason: String| Refusal::new(format!("{what}: {reason}"));
         let expected = &design.expected;
         if design.wires == 0 || design.wires > design.rows || design.m_per_wire == 0 || expected.repetitions < 2 {
@@ -93,12 +92,11 @@ impl DesignCheck {
                 let bands = bands(design.rows, design.wires);
                 let taxels = bands.first().map_or(0, std::ops::Range::len) * design.cols;
                 let pattern = parse_patterns(text).map_err(|e| refused("rows.txt", e.to_string()))?;
-                if pattern.taxels() != taxels || pattern.period() != design.m_per_wire {
+                let (found, wanted) = ((pattern.period(), pattern.taxels()), (design.m_per_wire, taxels));
+                if found != wanted {
                     let reason = format!(
-                        "{} rows of {} taxels; the design has {} of {taxels}",
-                        pattern.period(),
-                        pattern.taxels(),
-                        design.m_per_wire
+                        "{} rows of {} taxels; the design has {} of {}",
+                        found.0, found.1, wanted.0, wanted.1
                     );
                     return Err(refused("rows.txt", reason));
                 }
@@ -113,18 +111,11 @@ impl DesignCheck {
             None => None,
         };
         let m = design.m_per_wire;
-        let places = design.decoder.places;
-        let mut bench = Bench::new(layout, rows, self.profile.clone(), ground.prior.clone(), places)?;
+        let mut bench = Bench::new(&ground, rows, self.profile.clone(), design.decoder.places)?;
         bench.prepare(m)?;
         progress.stage("simulating", None);
-        let label = "design/checked";
-        let drawn = draw(
-            &design.objects,
-            &layout,
-            label,
-            Streams::new(self.seed).rng("design/check", 0).random(),
-            expected.repetitions,
-        )?;
+        let seed = Streams::new(self.seed).rng("design/check", 0).random();
+        let drawn = draw(&design.objects, &layout, "design/checked", seed, expected.repetitions)?;
         let scores = bench.score(&bench.measure(drawn, m)?, m, classes.as_ref())?;
         progress.end();
         let quantity = |quantity, promised: Band, found: f64| CheckedQuantity {

@@ -10,7 +10,7 @@ use search::{best, draw};
 use serde::{Deserialize, Serialize};
 use spts::progress::Progress;
 use spts_input::Refusal;
-use spts_models::SkinLayout;
+use spts_models::{SkinLayout, within};
 use spts_recon::matrix_free::SheetPrior;
 use spts_recon::statistics::Band;
 
@@ -109,13 +109,6 @@ impl DesignStudy {
     /// # Errors
     /// [`Refusal`] for an input outside its range, or a skin that is too small, too large or has fewer rows than wires.
     pub fn layout(&self) -> Result<SkinLayout, Refusal> {
-        let within = |field, value: f64, least: f64, most: f64, range| {
-            if (least..=most).contains(&value) {
-                Ok(())
-            } else {
-                Err(Refusal::range(field, value, range))
-            }
-        };
         for side_m in self.area_m {
             within("area", side_m, 1e-3, 10.0, "[0.001, 10] m a side")?;
         }
@@ -157,7 +150,6 @@ impl DesignStudy {
 
 /// A designed skin: everything needed to simulate it again, and its expected performance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Design {
     /// Rows of taxels.
     pub rows: usize,

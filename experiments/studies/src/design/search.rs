@@ -1,16 +1,18 @@
 //! The search for rows and wires: more and more measurements, until the images are as good as wanted.
 
 use super::objects::{Classes, DesignObjects};
-use super::wire::{BandRows, Pressing, RowSource, WireDesign, bands};
+use super::wire::{BandRows, RowSource, WireDesign, bands};
 use super::{DecoderDesign, Design, DesignCurve, DesignPoint, DesignStudy, Expectation, Ground, WireChoice};
 use crate::touches::{Touch, TouchScore, TouchWire, band};
+use crate::wiring::sums;
 use rand::RngExt as _;
 use rayon::prelude::*;
 use spts_circuit::Profile;
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
-use spts_recon::matrix_free::{SheetDecoder, SheetNoise, SheetPrior};
-use spts_recon::statistics::{Band, Sample};
+use spts_recon::matrix_free::{SheetDecoder, SheetNoise};
+use spts_recon::metrics::median;
+use spts_recon::statistics::{self, Band, Sample};
 
 /// Fewest measurements of a wire that are looked at.
 const FEWEST: usize = 6;
@@ -24,23 +26,28 @@ const HALVINGS: usize = 2;
 const SEARCHED: usize = 8;
 
 /// Rows and wires that were looked at, and how far they go.
-pub(super) struct Tried {
-    pub(super) bench: Bench,
-    pub(super) wire: WireDesign,
+pub(super) struct Tried<'a> {
+    pub(super) bench: Bench<'a>,
+    pub(super) wired: Wired,
     pub(super) curve: DesignCurve,
-    pub(super) source: RowSource,
-    /// Largest number of measurements of a wire within the latency.
-    pub(super) most: usize,
-    /// Whether this limit comes from the latency, and not from the rows, the taxels or the decoder.
-    pub(super) by_latency: bool,
     /// Smallest number of measurements with the required IoU.
     pub(super) reached: Option<usize>,
 }
 
-impl Tried {
+/// Electronics of a number of wires with some rows.
+pub(super) struct Wired {
+    pub(super) wire: WireDesign,
+    profile: Profile,
+    /// Largest number of measurements of a wire within the latency.
+    pub(super) most: usize,
+    /// Whether this limit comes from the latency, and not from the rows, the taxels or the decoder.
+    pub(super) by_latency: bool,
+}
+
+impl Tried<'_> {
     /// Measurements of a wire that are chosen.
     pub(super) fn chosen(&self) -> usize {
-        self.reached.unwrap_or(self.most)
+        self.reached.unwrap_or(self.wired.most)
     }
 
     /// IoU there.
@@ -50,17 +57,9 @@ impl Tried {
     }
 }
 
-/// Electronics of a number of wires with some rows.
-pub(super) struct Wired {
-    pub(super) wire: WireDesign,
-    pub(super) profile: Profile,
-    pub(super) most: usize,
-    by_latency: bool,
-}
-
 impl DesignStudy {
     /// Looks at more and more wires, until some rows reach the IoU.
-    pub(super) fn search(&self, ground: &Ground) -> Result<Vec<Tried>, Refusal> {
+    pub(super) fn search<'a>(&self, ground: &'a Ground) -> Result<Vec<Tried<'a>>, Refusal> {
         let rows = ground.layout.rows();
         let numbers: Vec<usize> = match self.wires {
             WireChoice::Exactly(wires) => vec![wires],
@@ -89,15 +88,20 @@ impl DesignStudy {
         let layout = &ground.layout;
         let bands = bands(layout.rows(), wires);
         let taxels = bands.first().map_or(0, std::ops::Range::len) * layout.cols();
-        let touches: Vec<&Touch> = ground.learned.iter().collect();
+        // ΣG and ΣG² of the fullest touch on one of the bands
+        let mut pressing = (f64::MIN_POSITIVE, f64::MIN_POSITIVE);
+        for (touch, band) in ground
+            .learned
+            .iter()
+            .flat_map(|touch| bands.iter().map(move |band| (touch, band)))
+        {
+            let (sum_s, squares) =
+                sums(&touch.conductance_s.values()[band.start * layout.cols()..band.end * layout.cols()]);
+            pressing = (pressing.0.max(sum_s), pressing.1.max(squares));
+        }
         let alike = *source != RowSource::Generator;
-        let wire = WireDesign::new(
-            &ground.electronics,
-            taxels,
-            pressing(&touches, &bands, layout.cols()),
-            alike,
-        )?;
-        let profile = Profile::from_toml(&wire.profile(!alike)?)?;
+        let wire = WireDesign::new(&ground.electronics, taxels, pressing, alike)?;
+        let (profile, _) = wire.profile(!alike)?;
         #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
         let in_time = (self.latency_s / wire.period_s * (1.0 + 1e-9)) as usize;
         if in_time < FEWEST {
@@ -118,12 +122,23 @@ impl DesignStudy {
         })
     }
 
+    /// The design with the first `measurements` rows of every wire.
+    pub(super) fn bench<'a>(
+        &self,
+        ground: &'a Ground,
+        wired: &Wired,
+        source: &RowSource,
+        wires: usize,
+        measurements: usize,
+    ) -> Result<Bench<'a>, Refusal> {
+        let rows = BandRows::new(source, &ground.prior, wires, measurements, self.seed)?;
+        Bench::new(ground, rows, wired.profile.clone(), self.objects.places(&ground.layout))
+    }
+
     /// Raises M until the IoU is reached or there is no more.
-    fn look(&self, ground: &Ground, wires: usize, source: RowSource) -> Result<Tried, Refusal> {
+    fn look<'a>(&self, ground: &'a Ground, wires: usize, source: RowSource) -> Result<Tried<'a>, Refusal> {
         let wired = self.wired(ground, wires, &source)?;
-        let rows = BandRows::new(&source, &ground.prior, wires, wired.most, self.seed)?;
-        let places = self.objects.places(&ground.layout);
-        let mut bench = Bench::new(ground.layout, rows, wired.profile, ground.prior.clone(), places)?;
+        let mut bench = self.bench(ground, &wired, &source, wires, wired.most)?;
         let drawn = draw(&self.objects, &ground.layout, "design/searched", self.seed, SEARCHED)?;
         let measured = bench.measure(drawn, wired.most)?;
         let mut points: Vec<DesignPoint> = Vec::new();
@@ -153,15 +168,12 @@ impl DesignStudy {
         };
         let mut tried = Tried {
             bench,
-            wire: wired.wire,
+            wired,
             curve: DesignCurve {
                 wires,
-                rows: source.clone(),
+                rows: source,
                 points,
             },
-            source,
-            most: wired.most,
-            by_latency: wired.by_latency,
             reached,
         };
         self.refine(&mut tried, &measured)?;
@@ -169,7 +181,7 @@ impl DesignStudy {
     }
 
     /// Halves what is between the last M that does not do and the first that does.
-    fn refine(&self, tried: &mut Tried, measured: &[Repetition]) -> Result<(), Refusal> {
+    fn refine(&self, tried: &mut Tried<'_>, measured: &[Repetition]) -> Result<(), Refusal> {
         let points = &mut tried.curve.points;
         for _ in 0..HALVINGS {
             let Some(high) = tried.reached else { return Ok(()) };
@@ -191,7 +203,7 @@ impl DesignStudy {
 }
 
 /// IoU and place at `m` measurements.
-fn point(bench: &mut Bench, measured: &[Repetition], m: usize) -> Result<Option<DesignPoint>, Refusal> {
+fn point(bench: &mut Bench<'_>, measured: &[Repetition], m: usize) -> Result<Option<DesignPoint>, Refusal> {
     bench.prepare(m)?;
     let scores = bench.score(measured, m, None)?;
     let iou: Vec<f64> = scores.iter().map(|s| s.iou).collect();
@@ -204,7 +216,7 @@ fn point(bench: &mut Bench, measured: &[Repetition], m: usize) -> Result<Option<
 
 /// The one to build: of those that reach the IoU the one with the fewest wires and then the fewest measurements, else
 /// the one with the best IoU.
-pub(super) fn best(tried: &[Tried]) -> usize {
+pub(super) fn best(tried: &[Tried<'_>]) -> usize {
     let reaching = (0..tried.len()).filter(|k| tried[*k].reached.is_some());
     let fewest = reaching.min_by_key(|k| (tried[*k].curve.wires, tried[*k].chosen()));
     fewest.unwrap_or_else(|| {
@@ -254,29 +266,12 @@ pub(super) fn draw(
         .collect()
 }
 
-/// ΣG and ΣG² of the fullest touch on one of the bands.
-pub(super) fn pressing(touches: &[&Touch], bands: &[std::ops::Range<usize>], cols: usize) -> Pressing {
-    let mut most = Pressing {
-        sum_s: f64::MIN_POSITIVE,
-        square_s2: f64::MIN_POSITIVE,
-    };
-    for touch in touches {
-        for band in bands {
-            let values = &touch.conductance_s.values()[band.start * cols..band.end * cols];
-            let (sum, square) = values.iter().fold((0.0, 0.0), |(s, q), g| (s + g, q + g * g));
-            most.sum_s = most.sum_s.max(sum);
-            most.square_s2 = most.square_s2.max(square);
-        }
-    }
-    most
-}
-
 /// A design with its decoder, which learns rows as they are asked for.
-pub(super) struct Bench {
-    pub(super) layout: SkinLayout,
+pub(super) struct Bench<'a> {
+    ground: &'a Ground,
     pub(super) rows: BandRows,
     profile: Profile,
-    pub(super) decoder: SheetDecoder,
+    decoder: SheetDecoder,
     places: usize,
 }
 
@@ -286,28 +281,20 @@ const PLACES_SHARE: f64 = 0.75;
 /// Fewest taxels that are solved for.
 const FEWEST_PLACES: usize = 4;
 
-impl Bench {
-    /// A design on `layout` with these rows and this readout, whose decoder expects images as `prior` says and solves
-    /// for at most `places` taxels.
-    pub(super) fn new(
-        layout: SkinLayout,
-        rows: BandRows,
-        profile: Profile,
-        prior: SheetPrior,
-        places: usize,
-    ) -> Result<Self, Refusal> {
-        let decoder = SheetDecoder::new(prior, SheetNoise::default(), rows.bands.len())?;
+impl<'a> Bench<'a> {
+    /// A design with these rows and this readout, whose decoder solves for at most `places` taxels.
+    pub(super) fn new(ground: &'a Ground, rows: BandRows, profile: Profile, places: usize) -> Result<Self, Refusal> {
         Ok(Self {
-            layout,
+            decoder: SheetDecoder::new(ground.prior.clone(), SheetNoise::default(), rows.bands.len())?,
+            ground,
             rows,
             profile,
-            decoder,
             places,
         })
     }
 
     /// Taxels that are solved for with `measurements` of every wire.
-    pub(super) fn places(&self, measurements: usize) -> usize {
+    fn places(&self, measurements: usize) -> usize {
         #[expect(clippy::cast_possible_truncation, reason = "thousands of measurements")]
         let of_rows = (PLACES_SHARE * measurements as f64).round() as usize;
         self.places.min(of_rows.max(FEWEST_PLACES))
@@ -330,21 +317,17 @@ impl Bench {
         measurements: usize,
     ) -> Result<Vec<Repetition>, Refusal> {
         let one = |(touches, streams): (Vec<Touch>, Streams)| -> Result<Repetition, Refusal> {
-            let cols = self.layout.cols();
-            let wires = self.rows.bands.len();
+            let (skin, wires) = (&self.ground.layout, self.rows.bands.len());
+            let cols = skin.cols();
             let mut volts = vec![vec![0.0; wires * measurements]; touches.len()];
             for (wire, (band, weights)) in self.rows.bands.iter().zip(&self.rows.weights).enumerate() {
-                let layout = SkinLayout::new(band.len(), cols, self.layout.pitch_m(), self.layout.electrode_m())?;
+                let layout = SkinLayout::new(band.len(), cols, skin.pitch_m(), skin.electrode_m())?;
                 let device = streams.child("design/wire", wire as u64);
                 let mut line = TouchWire::new(&self.profile, weights, &layout, device)?;
                 for ((number, touch), volts) in (0..).zip(&touches).zip(&mut volts) {
                     let own = touch.conductance_s.values()[band.start * cols..band.end * cols].to_vec();
-                    let part = Touch {
-                        conductance_s: ConductanceMap::from_values(band.len(), cols, own),
-                        support: Vec::new(),
-                        ..touch.clone()
-                    };
-                    let samples = line.measure(&part, number, 0, measurements)?;
+                    let part = ConductanceMap::from_values(band.len(), cols, own);
+                    let samples = line.measure(part, number, measurements)?;
                     for (k, v) in samples.into_iter().enumerate() {
                         volts[k * wires + wire] = v;
                     }
@@ -381,17 +364,18 @@ impl Bench {
                 (Some(classes), Some(rows)) => Some(classes.is_right(rows, volts, &touch.name)?),
                 _ => None,
             };
-            Ok((r, TouchScore::of(&image, touch, &self.layout), right))
+            Ok((r, TouchScore::of(&image, touch, &self.ground.layout), right))
         };
         let scores = touches.into_par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
-        let far = (self.layout.rows() as f64).hypot(self.layout.cols() as f64);
+        let far = (self.ground.layout.rows() as f64).hypot(self.ground.layout.cols() as f64);
         let of = |repetition: usize| {
             let own: Vec<_> = scores.iter().filter(|(r, _, _)| *r == repetition).collect();
             let share = 1.0 / own.len().max(1) as f64;
             let right = own.iter().map(|(_, _, right)| *right).collect::<Option<Vec<bool>>>();
+            let places: Vec<f64> = own.iter().map(|(_, s, _)| s.place_px.unwrap_or(far)).collect();
             RepetitionScore {
                 iou: own.iter().map(|(_, s, _)| share * s.iou).sum(),
-                place_px: median(own.iter().map(|(_, s, _)| s.place_px.unwrap_or(far)).collect()),
+                place_px: median(&places).unwrap_or_default(),
                 class: right.map(|right| share * right.iter().filter(|right| **right).count() as f64),
             }
         };
@@ -401,17 +385,7 @@ impl Bench {
 
 /// Mean of a quantity over repetitions.
 pub(super) fn mean(scores: &[RepetitionScore], of: impl Fn(&RepetitionScore) -> f64) -> f64 {
-    scores.iter().map(of).sum::<f64>() / scores.len().max(1) as f64
-}
-
-/// The middle one, or the mean of both.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let n = values.len();
-    if n == 0 {
-        return 0.0;
-    }
-    0.5 * (values[(n - 1) / 2] + values[n / 2])
+    statistics::mean(scores.iter().map(of)).unwrap_or_default()
 }
 
 /// Repetitions that the promise rests on.
@@ -432,15 +406,19 @@ const PROMISES: [&str; 5] = [
 impl DesignStudy {
     /// What the chosen design promises, from touches and specimens that the search has not seen. Where that is short of
     /// the IoU, there are more measurements.
-    pub(super) fn promised(&self, ground: &Ground, mut tried: Tried) -> Result<(Tried, Design), Refusal> {
+    pub(super) fn promised<'a>(
+        &self,
+        ground: &'a Ground,
+        mut tried: Tried<'a>,
+    ) -> Result<(Tried<'a>, Design), Refusal> {
         let wires = tried.curve.wires;
         let classes = self.classes(ground)?;
         let mut m = tried.chosen();
         for raise in 0.. {
-            let rows = match tried.source {
+            let rows = match tried.curve.rows {
                 RowSource::Generator => tried.bench.rows.clone(),
                 // the pattern that the cells repeat has as many rows as are measured
-                RowSource::Designer(_) => BandRows::new(&tried.source, &ground.prior, wires, m, self.seed)?,
+                RowSource::Designer(_) => BandRows::new(&tried.curve.rows, &ground.prior, wires, m, self.seed)?,
             };
             tried.bench.rows = rows;
             tried.bench.prepare(m)?;
@@ -450,10 +428,10 @@ impl DesignStudy {
             let scores = tried.bench.score(&measured, m, classes.as_ref())?;
             let expected = self.expectation(ground, &scores)?;
             let short = expected.iou.mean < self.iou && tried.reached.is_some();
-            if short && m < tried.most && raise < RAISE.1 {
+            if short && m < tried.wired.most && raise < RAISE.1 {
                 #[expect(clippy::cast_possible_truncation, reason = "thousands of measurements")]
                 let more = (m as f64 * RAISE.0).ceil() as usize;
-                m = more.min(tried.most);
+                m = more.min(tried.wired.most);
                 continue;
             }
             tried.reached = (!short && tried.reached.is_some()).then_some(m);
@@ -508,7 +486,7 @@ impl DesignStudy {
         })
     }
 
-    fn design(&self, ground: &Ground, tried: &Tried, m: usize, expected: Expectation) -> Design {
+    fn design(&self, ground: &Ground, tried: &Tried<'_>, m: usize, expected: Expectation) -> Design {
         let layout = &ground.layout;
         let (rows, cols, wires) = (layout.rows(), layout.cols(), tried.curve.wires);
         let decoder = &tried.bench.decoder;
@@ -522,8 +500,8 @@ impl DesignStudy {
             objects: self.objects.clone(),
             wires,
             sub_arrays: tried.bench.rows.bands.iter().map(|band| band.len() * cols).collect(),
-            wire: tried.wire.clone(),
-            row_source: tried.source.clone(),
+            wire: tried.wired.wire.clone(),
+            row_source: tried.curve.rows.clone(),
             m_per_wire: m,
             m: m * wires,
             decoder: DecoderDesign {
@@ -566,13 +544,8 @@ pub(super) fn promise(repetitions: &[f64], quantities: usize, range: [f64; 2]) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::RowSource;
-
-    #[test]
-    fn the_middle_of_numbers() {
-        assert!((median(vec![5.0, 1.0, 2.0]) - 2.0).abs() < 1e-15);
-        assert!((median(vec![4.0, 1.0]) - 2.5).abs() < 1e-15 && median(Vec::new()).abs() < 1e-15);
-    }
+    use crate::electronics::ElectronicsStudy;
+    use spts_recon::matrix_free::SheetPrior;
 
     /// An ideal wire with as many measurements as taxels shows touches nearly as they are, on one wire and on two; and
     /// any number of threads finds the same.
@@ -586,10 +559,15 @@ mod tests {
                 pool.install(|| {
                     let drawn = draw(&objects, &layout, "test", 1, 2).unwrap();
                     let images: Vec<Touch> = drawn.iter().flat_map(|(t, _)| t.clone()).collect();
-                    let prior = SheetPrior::like(images.iter().map(|t| t.conductance_s.values()), [8, 8]).unwrap();
-                    let rows = BandRows::new(&RowSource::Generator, &prior, wires, 64, 1).unwrap();
+                    let ground = Ground {
+                        layout,
+                        electronics: ElectronicsStudy::as_designed().unwrap(),
+                        prior: SheetPrior::like(images.iter().map(|t| t.conductance_s.values()), [8, 8]).unwrap(),
+                        learned: Vec::new(),
+                    };
+                    let rows = BandRows::new(&RowSource::Generator, &ground.prior, wires, 64, 1).unwrap();
                     let ideal = Profile::named("ideal").unwrap();
-                    let mut bench = Bench::new(layout, rows, ideal, prior, 64).unwrap();
+                    let mut bench = Bench::new(&ground, rows, ideal, 64).unwrap();
                     bench.prepare(64 / wires).unwrap();
                     let measured = bench.measure(drawn, 64 / wires).unwrap();
                     bench.score(&measured, 64 / wires, None).unwrap()

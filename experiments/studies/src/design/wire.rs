@@ -1,14 +1,14 @@
 //! Amplifier, clock and converter of a wire.
 
 use crate::electronics::ElectronicsStudy;
+use crate::wiring::{amplifier, bisected, pressed_skin, profile};
 use serde::{Deserialize, Serialize};
-use spts_circuit::amplifier::{Amplifier, Budget, Network, Setting, Skin};
-use spts_circuit::{PROFILES, Patterns, Profile, Seeding, WeightMode, Weights};
+use spts_circuit::amplifier::{Budget, Setting};
+use spts_circuit::{Patterns, Profile, Seeding, WeightMode, Weights};
 use spts_input::Refusal;
 use spts_recon::matrix_free::SheetPrior;
 use spts_recon::rows::{Expected, RowTask, designer};
 use std::ops::Range;
-use toml::{Table, Value};
 
 /// Share of the range that the sums of the touches use that were drawn: others press harder.
 const HEADROOM: f64 = 0.7;
@@ -16,13 +16,6 @@ const HEADROOM: f64 = 0.7;
 const SMALLEST_FEEDBACK: f64 = 1e-3;
 /// Halvings of the search, on a logarithmic scale.
 const HALVINGS: usize = 40;
-
-/// ΣG and ΣG² of a wire's taxels, S and S², the largest of the touches that were drawn.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Pressing {
-    pub(super) sum_s: f64,
-    pub(super) square_s2: f64,
-}
 
 /// What keeps the feedback resistance of a designed skin's amplifier from being larger.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -76,30 +69,21 @@ pub struct WireDesign {
 const AMPLIFIER: &str = "TLV9362";
 
 impl WireDesign {
-    /// A wire of `taxels` taxels pressed as `pressing`; `alike` if rows may add up all of a touch with one sign.
+    /// A wire of `taxels` taxels whose ΣG and ΣG², S and S², are `pressing`; `alike` if rows may add up all of a touch
+    /// with one sign.
     pub(super) fn new(
         electronics: &ElectronicsStudy,
         taxels: usize,
-        pressing: Pressing,
+        pressing: (f64, f64),
         alike: bool,
     ) -> Result<Self, Refusal> {
-        let Pressing { sum_s, square_s2 } = pressing;
-        let skin = Skin {
-            pressed_share: (sum_s * sum_s / square_s2 / taxels as f64).min(1.0),
-            pressed_s: square_s2 / sum_s,
-            ..electronics.skin
-        };
         let mut setting = Setting {
-            skin,
+            skin: pressed_skin(pressing, taxels, electronics),
             adc: electronics.adc,
             available_s: electronics.available_s()?,
         };
         let budget = |feedback_ohm: f64, setting: &Setting| -> Result<Budget, Refusal> {
-            let network = Network {
-                feedback_ohm,
-                ..electronics.network
-            };
-            let amplifier = Amplifier::new(electronics.op_amp, network)?;
+            let amplifier = amplifier(electronics, feedback_ohm)?;
             Ok(Budget::new(&amplifier, taxels as f64, setting))
         };
         let excursion_of = |b: &Budget| if alike { b.sum_worst_v } else { b.excursion_v };
@@ -116,16 +100,9 @@ impl WireDesign {
         let (feedback_ohm, feedback_limit) = if fits(most_ohm, &setting)? {
             (most_ohm, FeedbackLimit::Range)
         } else if fits(SMALLEST_FEEDBACK * most_ohm, &setting)? {
-            let (mut low, mut high) = (SMALLEST_FEEDBACK.ln(), 0.0);
-            for _ in 0..HALVINGS {
-                let middle = 0.5 * (low + high);
-                if fits(most_ohm * f64::exp(middle), &setting)? {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
-            (most_ohm * f64::exp(low), FeedbackLimit::Settling)
+            let ends = [SMALLEST_FEEDBACK.ln(), 0.0];
+            let share = bisected(ends, HALVINGS, |log| fits(most_ohm * log.exp(), &setting))?;
+            (most_ohm * share.exp(), FeedbackLimit::Settling)
         } else {
             let b = budget(most_ohm, &setting)?;
             setting.available_s = (b.settle_s + b.slew_s) * (1.0 + 1e-9);
@@ -145,77 +122,28 @@ impl WireDesign {
             noise_gain: b.noise_gain,
             excursion_v: excursion_of(&b),
             range_v: b.range_v,
-            adc_bits: bits(&profile_table("as_designed")?)?,
+            #[expect(clippy::cast_possible_truncation, reason = "at most 2^24 codes")]
+            adc_bits: (electronics.adc.code(f64::MIN) as u32 + 1).ilog2(),
             adc_step_v: b.adc_step_v,
             steps_per_taxel: b.signal_v / b.adc_step_v,
             limit: b.limit.map(|limit| limit.name().to_owned()),
         })
     }
 
-    /// Readout profile of the wire as TOML: as_designed with this feedback and clock. What the parts do not explain is
-    /// as the recordings of the device show it: contact noise, late updates and idle noise of as_built.
-    pub(super) fn profile(&self, mixed: bool) -> Result<String, Refusal> {
-        let (mut table, built) = (profile_table("as_designed")?, profile_table("as_built")?);
-        table.insert("sample_rate_hz".to_owned(), self.rate_hz.into());
-        table.insert("feedback_ohm".to_owned(), self.feedback_ohm.into());
+    /// Readout profile of the wire, and its TOML: as_designed with this feedback and clock. What the parts do not explain
+    /// is as the recordings of the device show it: contact noise, late updates and idle noise of as_built.
+    pub(super) fn profile(&self, mixed: bool) -> Result<(Profile, String), Refusal> {
+        let effects = ["late_updates", "contact_noise", "idle_noise"];
+        let mut table = profile(self.feedback_ohm, self.rate_hz, self.available_s, &effects)?;
         table.insert("feedback_scales".to_owned(), false.into());
         if mixed {
             table.insert("seeding".to_owned(), "mixed".into());
         }
-        for mode in ["compressive", "raster"] {
-            let measured: Vec<(String, Value)> = stage(&built, mode)?
-                .iter()
-                .filter(|(effect, _)| MEASURED.contains(&effect.as_str()))
-                .map(|(effect, value)| (effect.clone(), value.clone()))
-                .collect();
-            let effects = table.get_mut(mode).and_then(Value::as_table_mut);
-            let effects = effects.ok_or_else(|| no_stage("as_designed", "compressive or raster"))?;
-            effects.extend(measured);
-            let amplifier = effects.get_mut("amplifier").and_then(Value::as_table_mut);
-            let amplifier = amplifier.ok_or_else(|| no_stage("as_designed", "amplifier"))?;
-            let update_s = amplifier.get("update_s").and_then(Value::as_float).unwrap_or(0.0);
-            amplifier.insert("sample_s".to_owned(), (update_s + self.available_s).into());
-        }
         let text = toml::to_string(&table).map_err(|e| Refusal::from_error(e).at("profile"))?;
         let profile = Profile::from_toml(&text)?;
         profile.validate(1)?;
-        Ok(text)
+        Ok((profile, text))
     }
-}
-
-/// Effects of as_built that the parts of as_designed do not explain.
-const MEASURED: [&str; 3] = ["contact_noise", "late_updates", "idle_noise"];
-
-/// A stage that a profile lacks, as an error.
-fn no_stage(profile: &str, name: &str) -> Refusal {
-    Refusal::new(format!("profile {profile}: no `{name}`"))
-}
-
-/// Taxels of a wire that no number of 32 bits counts, as an error.
-pub(super) fn too_many_taxels(error: std::num::TryFromIntError) -> Refusal {
-    Refusal::from_error(error).at("taxels of a wire")
-}
-
-/// A shipped profile as a table.
-fn profile_table(name: &'static str) -> Result<Table, Refusal> {
-    let found = PROFILES.iter().find(|(known, _)| *known == name);
-    found
-        .and_then(|(_, text)| text.parse().ok())
-        .ok_or_else(|| no_stage(name, "text"))
-}
-
-fn stage<'a>(profile: &'a Table, name: &'static str) -> Result<&'a Table, Refusal> {
-    profile
-        .get(name)
-        .and_then(Value::as_table)
-        .ok_or_else(|| no_stage("as_built", name))
-}
-
-/// Resolution of a profile's converter.
-fn bits(profile: &Table) -> Result<u32, Refusal> {
-    let adc = stage(profile, "compressive")?.get("adc").and_then(Value::as_table);
-    let bits = adc.and_then(|adc| adc.get("bits")).and_then(Value::as_integer);
-    u32::try_from(bits.unwrap_or_default()).map_err(too_many_taxels)
 }
 
 /// Most rows that a cell holds as a pattern.
@@ -290,50 +218,49 @@ impl BandRows {
     ) -> Result<Self, Refusal> {
         let [rows, cols] = prior.shape();
         let bands = bands(rows, wires);
-        match source {
-            RowSource::Generator => Self::generator(bands, cols),
-            RowSource::Designer(name) => {
-                let height = bands.first().map_or(0, Range::len);
-                let expected = Expected::smooth([height, cols], length(prior))?;
-                let task = RowTask {
-                    seed,
-                    ..RowTask::new(measurements, &expected)
-                };
-                let found = designer(name).ok_or_else(|| Refusal::new(format!("rows: no designer {name:?}")))?;
-                let matrix = (found.build)().design(&task)?;
-                let signs = (0..matrix.nrows()).flat_map(|r| matrix.row(r).to_vec());
-                let codes = signs.map(|v| if v > 0.0 { u8::MAX } else { 0 }).collect();
-                Self::pattern(&Patterns::new(matrix.nrows(), codes)?, bands, cols)
-            }
-        }
-    }
-
-    /// Every wire with the same generators.
-    fn generator(bands: Vec<Range<usize>>, cols: usize) -> Result<Self, Refusal> {
-        let weights = bands.iter().map(|band| -> Result<Weights, Refusal> {
-            let taxels = u32::try_from(band.len() * cols).map_err(too_many_taxels)?;
-            Ok(Weights::new(WeightMode::Binary, Seeding::Mixed, taxels))
-        });
-        Ok(Self {
-            cols,
-            weights: weights.collect::<Result<_, _>>()?,
-            bands,
-        })
+        let RowSource::Designer(name) = source else {
+            return Self::of(bands, cols, |taxels| {
+                let taxels = u32::try_from(taxels).map_err(|e| Refusal::from_error(e).at("taxels of a wire"))?;
+                Ok(Weights::new(WeightMode::Binary, Seeding::Mixed, taxels))
+            });
+        };
+        let height = bands.first().map_or(0, Range::len);
+        let expected = Expected::smooth([height, cols], length(prior))?;
+        let task = RowTask {
+            seed,
+            ..RowTask::new(measurements, &expected)
+        };
+        let found = designer(name).ok_or_else(|| Refusal::new(format!("rows: no designer {name:?}")))?;
+        let matrix = (found.build)().design(&task)?;
+        let codes = matrix.view().values().iter();
+        let codes = codes.map(|v| if *v > 0.0 { u8::MAX } else { 0 }).collect();
+        Self::pattern(&Patterns::new(matrix.nrows(), codes)?, bands, cols)
     }
 
     /// Every wire with the same pattern, that of the highest band; a band that is a row lower has its first taxels.
     pub(super) fn pattern(pattern: &Patterns, bands: Vec<Range<usize>>, cols: usize) -> Result<Self, Refusal> {
-        let weights = bands.iter().map(|band| -> Result<Weights, Refusal> {
+        Self::of(bands, cols, |taxels| {
             let rows = (0..pattern.period() as u64).flat_map(|row| {
                 let codes = pattern.row(row);
-                codes[..codes.len().min(band.len() * cols)].to_vec()
+                codes[..codes.len().min(taxels)].to_vec()
             });
             let patterns = Patterns::new(pattern.period(), rows.collect())?;
             Weights::with_patterns(WeightMode::Binary, patterns)
-        });
+        })
+    }
+
+    /// Every wire with the weights of its number of taxels.
+    fn of(
+        bands: Vec<Range<usize>>,
+        cols: usize,
+        weights: impl Fn(usize) -> Result<Weights, Refusal>,
+    ) -> Result<Self, Refusal> {
         Ok(Self {
             cols,
-            weights: weights.collect::<Result<_, _>>()?,
+            weights: bands
+                .iter()
+                .map(|band| weights(band.len() * cols))
+                .collect::<Result<_, _>>()?,
             bands,
         })
     }
@@ -391,10 +318,7 @@ mod tests {
     #[test]
     fn the_feedback_uses_the_range() {
         let electronics = ElectronicsStudy::as_designed().unwrap();
-        let pressing = Pressing {
-            sum_s: 20.0 * 100e-6,
-            square_s2: 20.0 * 1e-8,
-        };
+        let pressing = (20.0 * 100e-6, 20.0 * 1e-8);
         let wire = WireDesign::new(&electronics, 100, pressing, false).unwrap();
         let by_hand = 0.7 * 14.9 / (4.0 * 3.3 * (20.0 * 1e-8_f64).sqrt());
         assert!(
@@ -413,10 +337,7 @@ mod tests {
     #[test]
     fn a_full_skin_settles_with_a_smaller_feedback() {
         let electronics = ElectronicsStudy::as_designed().unwrap();
-        let pressing = Pressing {
-            sum_s: 4000.0 * 100e-6,
-            square_s2: 4000.0 * 1e-8,
-        };
+        let pressing = (4000.0 * 100e-6, 4000.0 * 1e-8);
         let wire = WireDesign::new(&electronics, 10_000, pressing, false).unwrap();
         assert_eq!(wire.feedback_limit, FeedbackLimit::Settling);
         assert!(wire.settle_s <= wire.available_s * (1.0 + 1e-6) && wire.excursion_v < 0.7 * wire.range_v);
@@ -425,12 +346,8 @@ mod tests {
     #[test]
     fn the_profile_says_what_the_wire_is() {
         let electronics = ElectronicsStudy::as_designed().unwrap();
-        let pressing = Pressing {
-            sum_s: 2e-3,
-            square_s2: 2e-7,
-        };
-        let wire = WireDesign::new(&electronics, 100, pressing, false).unwrap();
-        let profile = Profile::from_toml(&wire.profile(true).unwrap()).unwrap();
+        let wire = WireDesign::new(&electronics, 100, (2e-3, 2e-7), false).unwrap();
+        let (profile, _) = wire.profile(true).unwrap();
         assert!((profile.feedback_ohm - wire.feedback_ohm).abs() < 1e-9 * wire.feedback_ohm);
         assert!(!profile.feedback_scales && profile.compressive.contains_key("contact_noise"));
         assert!(profile.compressive.contains_key("idle_noise") && profile.raster.contains_key("idle_noise"));

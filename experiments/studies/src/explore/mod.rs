@@ -1,22 +1,20 @@
 //! Number of measurements that a large skin needs, on one or several wires, including the limits of the electronics.
 
 use crate::electronics::ElectronicsStudy;
+use crate::wiring::{Wiring, wirings};
 use scene::{ExploreScene, MeasuredWires, located, scene};
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::Seeding;
-use spts_circuit::amplifier::Limit;
 use spts_input::Refusal;
 use spts_models::Streams;
 use spts_recon::matrix_free::RegionPursuit;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
 use std::time::Instant;
-use wiring::{Wiring, wirings};
 
-pub(crate) mod scene;
-pub(crate) mod wiring;
+mod scene;
 
-pub use wiring::Way;
+pub use crate::wiring::Way;
 
 /// Wanted IoU.
 pub const WANTED_IOU: f64 = 0.8;
@@ -51,22 +49,16 @@ impl ExploreStudy {
     /// [`Refusal`] if the electronics cannot be built, or a wire cannot be measured.
     pub fn run(&self, progress: &dyn Progress) -> Result<ExploreReport, Refusal> {
         let electronics = ElectronicsStudy::as_designed()?;
+        let pressed_s = electronics.skin.pressed_s;
         progress.stage("exploring", Some(self.sides.len() * Way::ALL.len()));
         let mut rows = Vec::new();
         for &side in &self.sides {
             let scenes: Vec<ExploreScene> = (0..self.scenes)
-                .map(|index| {
-                    scene(
-                        side as usize,
-                        electronics.skin.pressed_s,
-                        Streams::new(self.seed),
-                        index,
-                    )
-                })
+                .map(|index| scene(side as usize, pressed_s, Streams::new(self.seed), index))
                 .collect();
             let Some(first) = scenes.first() else { continue };
-            for wiring in wirings(side * side, first, self.seeding, &electronics)? {
-                rows.push(self.search(side as usize, &wiring, &scenes, &electronics)?);
+            for wiring in wirings(&first.image_s, self.seeding, &electronics)? {
+                rows.push(self.search(side as usize, wiring, &scenes, &electronics)?);
                 progress.step();
             }
         }
@@ -78,7 +70,7 @@ impl ExploreStudy {
     fn search(
         &self,
         side: usize,
-        wiring: &Wiring,
+        wiring: Wiring,
         scenes: &[ExploreScene],
         electronics: &ElectronicsStudy,
     ) -> Result<SizeRow, Refusal> {
@@ -86,48 +78,45 @@ impl ExploreStudy {
         let mut measured = Vec::with_capacity(scenes.len());
         for (index, scene) in (0..).zip(scenes) {
             let streams = streams.child("explore/skin", index);
-            measured.push(MeasuredWires::new(wiring, scene, electronics.skin.idle_s, streams)?);
+            measured.push(MeasuredWires::new(&wiring, scene, electronics.skin.idle_s, streams)?);
         }
         let taxels = side * side;
         let most = most_measurements(taxels).div_ceil(wiring.wires);
         let contacts = scenes.first().map_or(1, |scene| scene.contacts);
         let mut rows = (FIRST_PER_CONTACT * contacts).div_ceil(wiring.wires).max(8).min(most);
+        let mut at = |rows| trial(side, &wiring, scenes, &mut measured, rows);
         let mut trials: Vec<ExploreTrial> = Vec::new();
         loop {
-            trials.push(trial(side, wiring, scenes, &mut measured, rows)?);
+            trials.push(at(rows)?);
             let reached = |aim: fn(&ExploreTrial) -> bool| trials.iter().any(aim);
             if rows == most || (reached(ExploreTrial::has_iou) && reached(ExploreTrial::has_located)) {
                 break;
             }
             rows = (2 * rows).min(most);
         }
-        if !self.quick {
-            refine(&mut trials, |rows| trial(side, wiring, scenes, &mut measured, rows))?;
+        let aims = [ExploreTrial::has_iou, ExploreTrial::has_located];
+        for aim in aims.into_iter().filter(|_| !self.quick) {
+            // half an octave below the least M that reaches the aim
+            let least = trials.iter().filter(|t| aim(t)).map(|t| t.rows_per_wire).min();
+            #[expect(clippy::cast_possible_truncation, reason = "thousands of rows")]
+            let between = least.map(|rows| (rows as f64 * std::f64::consts::FRAC_1_SQRT_2).round() as usize);
+            if let Some(rows) = between.filter(|rows| trials.iter().all(|t| t.rows_per_wire != *rows) && *rows >= 4) {
+                trials.push(at(rows)?);
+                trials.sort_by_key(|t| t.rows_per_wire);
+            }
         }
-        Ok(SizeRow::new(wiring, taxels, contacts, trials))
+        let [iou, located] = aims.map(|aim| trials.iter().filter(|t| aim(t)).min_by_key(|t| t.measurements));
+        Ok(SizeRow {
+            taxels,
+            contacts,
+            m_iou: iou.map(|t| t.measurements),
+            m_located: located.map(|t| t.measurements),
+            acquire_s: iou.map(|t| t.rows_per_wire as f64 * wiring.period_s),
+            raster_s: taxels.div_ceil(wiring.wires) as f64 * wiring.period_s,
+            wiring,
+            trials,
+        })
     }
-}
-
-/// Half an octave below the least M that reaches an aim.
-fn refine(
-    trials: &mut Vec<ExploreTrial>,
-    mut at: impl FnMut(usize) -> Result<ExploreTrial, Refusal>,
-) -> Result<(), Refusal> {
-    for aim in [ExploreTrial::has_iou, ExploreTrial::has_located] {
-        let least = trials.iter().filter(|t| aim(t)).map(|t| t.rows_per_wire).min();
-        let between = least.map(half_octave_below);
-        if let Some(rows) = between.filter(|rows| trials.iter().all(|t| t.rows_per_wire != *rows) && *rows >= 4) {
-            trials.push(at(rows)?);
-            trials.sort_by_key(|t| t.rows_per_wire);
-        }
-    }
-    Ok(())
-}
-
-/// `rows`/√2.
-#[expect(clippy::cast_possible_truncation, reason = "thousands of rows")]
-fn half_octave_below(rows: usize) -> usize {
-    (rows as f64 * std::f64::consts::FRAC_1_SQRT_2).round() as usize
 }
 
 /// Measurements at which the search ends.
@@ -149,7 +138,11 @@ fn trial(
         max_rounds: MAX_ROUNDS,
         ..RegionPursuit::new(side, side)
     };
-    let mut sum = ExploreTrial::none(rows, rows * wiring.wires);
+    let mut sum = ExploreTrial {
+        rows_per_wire: rows,
+        measurements: rows * wiring.wires,
+        ..ExploreTrial::default()
+    };
     let share = 1.0 / scenes.len() as f64;
     let (mut truth, mut mask) = (Vec::new(), Vec::new());
     for (scene, measured) in scenes.iter().zip(measured) {
@@ -168,7 +161,7 @@ fn trial(
 }
 
 /// Results with one number of measurements; means over the scenes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct ExploreTrial {
     /// Number of measurements of every wire.
     pub rows_per_wire: usize,
@@ -185,25 +178,13 @@ pub struct ExploreTrial {
 }
 
 impl ExploreTrial {
-    /// Nothing added up yet.
-    pub(super) fn none(rows_per_wire: usize, measurements: usize) -> Self {
-        Self {
-            rows_per_wire,
-            measurements,
-            iou: 0.0,
-            located: 0.0,
-            bytes: 0,
-            decode_s: 0.0,
-        }
-    }
-
     /// Whether the IoU is as wanted.
-    pub(super) fn has_iou(&self) -> bool {
+    fn has_iou(&self) -> bool {
         self.iou >= WANTED_IOU
     }
 
     /// Whether the contacts are where they should be.
-    pub(super) fn has_located(&self) -> bool {
+    fn has_located(&self) -> bool {
         self.located >= WANTED_LOCATED
     }
 }
@@ -215,22 +196,9 @@ pub struct SizeRow {
     pub taxels: usize,
     /// Number of contacts in a scene.
     pub contacts: usize,
-    /// Wiring.
-    pub way: Way,
-    /// Wires.
-    pub wires: usize,
-    /// Limit that the amplifier's closed forms show as exceeded; `None` if there is none.
-    pub limit: Option<Limit>,
-    /// Feedback resistance, Ω.
-    pub feedback_ohm: f64,
-    /// 1 + Rf·ΣG of the wire with the most taxels.
-    pub noise_gain: f64,
-    /// Settling time including slewing, s.
-    pub settle_s: f64,
-    /// Duration of a measurement, s.
-    pub period_s: f64,
-    /// Signal of a fully pressed taxel, in steps of the converter.
-    pub steps_per_taxel: f64,
+    /// Wires, electronics and clock.
+    #[serde(flatten)]
+    pub wiring: Wiring,
     /// Smallest number of measurements, among those tried, with the wanted IoU.
     pub m_iou: Option<usize>,
     /// Smallest number of measurements, among those tried, with the wanted share of located contacts.
@@ -244,28 +212,6 @@ pub struct SizeRow {
 }
 
 impl SizeRow {
-    pub(super) fn new(wiring: &Wiring, taxels: usize, contacts: usize, trials: Vec<ExploreTrial>) -> Self {
-        let least = |aim: fn(&ExploreTrial) -> bool| trials.iter().filter(|t| aim(t)).min_by_key(|t| t.measurements);
-        let iou = least(ExploreTrial::has_iou);
-        Self {
-            taxels,
-            contacts,
-            way: wiring.way,
-            wires: wiring.wires,
-            limit: wiring.limit,
-            feedback_ohm: wiring.feedback_ohm,
-            noise_gain: wiring.noise_gain,
-            settle_s: wiring.settle_s,
-            period_s: wiring.period_s,
-            steps_per_taxel: wiring.steps_per_taxel,
-            m_iou: iou.map(|t| t.measurements),
-            m_located: least(ExploreTrial::has_located).map(|t| t.measurements),
-            acquire_s: iou.map(|t| t.rows_per_wire as f64 * wiring.period_s),
-            raster_s: taxels.div_ceil(wiring.wires) as f64 * wiring.period_s,
-            trials,
-        }
-    }
-
     /// The trial with the wanted IoU and the fewest measurements; otherwise the last one.
     pub fn deciding(&self) -> Option<&ExploreTrial> {
         let found = self.trials.iter().find(|t| Some(t.measurements) == self.m_iou);
@@ -328,11 +274,11 @@ const DECODING: &str = "decoding";
 
 impl ExploreReport {
     /// Report of `rows`, with the fits that there are points enough for.
-    pub(super) fn new(rows: Vec<SizeRow>, one_wire_taxels: Option<u32>) -> Self {
+    fn new(rows: Vec<SizeRow>, one_wire_taxels: Option<u32>) -> Self {
         let mut fits = Vec::new();
         for way in Way::ALL {
             for (cost, value) in COSTS {
-                let of = rows.iter().filter(|r| r.way == way);
+                let of = rows.iter().filter(|r| r.wiring.way == way);
                 let points: Vec<_> = of.filter_map(|r| Some((r.taxels as f64, value(r)?))).collect();
                 fits.extend(power_law(&points).map(|law| CostFit { way, cost, law }));
             }
@@ -359,7 +305,7 @@ pub struct PowerLaw {
 }
 
 /// Power law through points above 0; `None` for fewer than 3 of them, or all at one x.
-pub(super) fn power_law(points: &[(f64, f64)]) -> Option<PowerLaw> {
+fn power_law(points: &[(f64, f64)]) -> Option<PowerLaw> {
     let logs = points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0 && y.is_finite());
     let logs: Vec<(f64, f64)> = logs.map(|(x, y)| (x.ln(), y.ln())).collect();
     let n = logs.len() as f64;
@@ -399,9 +345,9 @@ mod tests {
         let rows = |threads: usize| -> Vec<SizeRow> {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let scenes: Vec<ExploreScene> = (0..2).map(|i| scene(20, 150e-6, Streams::new(5), i)).collect();
-            let wirings = wirings(400, &scenes[0], Seeding::Mixed, &electronics).unwrap();
-            let search = |wiring: &Wiring| explore.search(20, wiring, &scenes, &electronics).unwrap();
-            let mut rows: Vec<SizeRow> = pool.install(|| wirings.iter().map(search).collect());
+            let wirings = wirings(&scenes[0].image_s, Seeding::Mixed, &electronics).unwrap();
+            let search = |wiring: Wiring| explore.search(20, wiring, &scenes, &electronics).unwrap();
+            let mut rows: Vec<SizeRow> = pool.install(|| wirings.into_iter().map(search).collect());
             rows.iter_mut()
                 .flat_map(|r| &mut r.trials)
                 .for_each(|t| t.decode_s = 0.0);

@@ -1,6 +1,6 @@
 //! Contacts at random places of a large skin, and their places in an image.
 
-use super::wiring::Wiring;
+use crate::wiring::Wiring;
 use rand::RngExt as _;
 use rayon::prelude::*;
 use spts_circuit::{Constant, INCREMENT, MULTIPLIER, Mode, Readout};
@@ -20,11 +20,11 @@ const PEAK: std::ops::Range<f64> = 0.5..1.0;
 
 /// A pressed skin.
 #[derive(Debug, Clone)]
-pub(crate) struct ExploreScene {
+pub(super) struct ExploreScene {
     /// Conductance minus that of the idle skin, S, row-major, `side` × `side`.
-    pub(crate) image_s: Vec<f64>,
+    pub(super) image_s: Vec<f64>,
     /// Contacts.
-    pub(crate) contacts: usize,
+    pub(super) contacts: usize,
 }
 
 /// Half-ellipsoids of conductance, G = peak·√(1 − d²/R²), with radius, peak and place uniform at random; where two
@@ -173,8 +173,7 @@ impl Wire {
 mod tests {
     use super::*;
     use crate::electronics::ElectronicsStudy;
-    use crate::explore::scene::scene;
-    use crate::explore::wiring::{Way, wirings};
+    use crate::wiring::{Way, wirings};
     use spts_circuit::{Seeding, WeightMode, Weights};
     use spts_recon::LinearOperator as _;
 
@@ -229,7 +228,7 @@ mod tests {
         let electronics = ElectronicsStudy::as_designed().unwrap();
         let scene = scene(40, 150e-6, Streams::new(1), 0);
         for seeding in [Seeding::Address, Seeding::Mixed] {
-            let mut wiring = wirings(1600, &scene, seeding, &electronics).unwrap().swap_remove(0);
+            let mut wiring = wirings(&scene.image_s, seeding, &electronics).unwrap().swap_remove(0);
             assert_eq!(wiring.way, Way::Ideal);
             for wires in [1, 3] {
                 wiring.wires = wires;

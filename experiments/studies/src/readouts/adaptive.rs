@@ -1,7 +1,7 @@
 //! Scans taxels one by one, guided by the contacts found.
 
-use super::wire::{HeldWire, WireFrame};
-use super::{PreparedReadout, Reading, ReadoutSkin, WireReadout, until_noticed};
+use super::wire::{WireFrame, WireSession};
+use super::{Reading, ReadoutSkin, WireReadout, until_noticed};
 use spts_input::Refusal;
 use std::collections::VecDeque;
 
@@ -10,28 +10,12 @@ use std::collections::VecDeque;
 ///
 /// After A. Slepyan et al., arXiv 2410.13847 (ACTS): their binary sampling. Their reconstruction takes a learned
 /// dictionary; here a taxel that was not read has the value of the nearest one that was.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Adaptive;
-
-/// The order of the grids on one skin.
-struct Grids {
+pub(super) struct Adaptive {
     rows: usize,
     cols: usize,
     /// Taxels in order of scanning, coarse grids first.
     order: Vec<usize>,
     counts: Vec<usize>,
-}
-
-impl WireReadout for Adaptive {
-    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
-        let (rows, cols) = (skin.layout.rows(), skin.layout.cols());
-        Ok(Box::new(Grids {
-            rows,
-            cols,
-            order: coarse_to_fine(rows, cols),
-            counts: skin.measurements(),
-        }))
-    }
 }
 
 /// All taxels of a sheet: those of the coarsest grid first, then those that halve its pitch along both axes, and so on;
@@ -60,7 +44,17 @@ fn coarse_to_fine(rows: usize, cols: usize) -> Vec<usize> {
     order
 }
 
-impl Grids {
+impl Adaptive {
+    pub(super) fn new(skin: &ReadoutSkin) -> Self {
+        let (rows, cols) = (skin.layout.rows(), skin.layout.cols());
+        Self {
+            rows,
+            cols,
+            order: coarse_to_fine(rows, cols),
+            counts: skin.measurements(),
+        }
+    }
+
     /// The taxels within one row and column of `taxel`, itself among them.
     fn around(&self, taxel: usize, reach: usize) -> impl Iterator<Item = usize> + '_ {
         let (r, c) = (taxel / self.cols, taxel % self.cols);
@@ -131,12 +125,12 @@ impl Grids {
     }
 }
 
-impl PreparedReadout for Grids {
+impl WireReadout for Adaptive {
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
         conductance_s.iter().copied().fold(0.0, f64::max)
     }
 
-    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal> {
+    fn read(&self, wire: &mut WireSession<'_>) -> Result<Vec<Reading>, Refusal> {
         // all taxels are measured once, and the samples are those at the taxels that are asked for
         let frame = wire.scan()?;
         let beyond: Vec<bool> = self.order.iter().map(|k| frame.volts[*k] > frame.alarm_v).collect();
@@ -177,7 +171,7 @@ mod tests {
     /// A patch of 3 × 3 whose middle is on a grid is read as a whole, with a rim, once the grid has found it.
     #[test]
     fn a_contact_is_read_densely() {
-        let grids = Grids {
+        let grids = Adaptive {
             rows: 32,
             cols: 32,
             order: coarse_to_fine(32, 32),

@@ -1,14 +1,13 @@
 //! Decodes images from few rows of ±1 that are the same in every frame.
 
-use super::rows::StoredRows;
-use super::wire::HeldWire;
-use super::{PreparedReadout, Reading, ReadoutSkin, until_noticed};
+use super::wire::WireSession;
+use super::{Reading, ReadoutSkin, WireReadout};
+use spts_circuit::Patterns;
 use spts_input::Refusal;
-use spts_recon::Matrix;
 use spts_recon::matrix_free::{RegionPursuit, SheetDecoder, SheetNoise, SheetPrior};
-use spts_recon::operator::{Centred, LinearOperator, SelectColumns, centre};
-use spts_recon::recover::{Fixed, Noise};
-use std::sync::Arc;
+use spts_recon::operator::{Centred, LinearOperator as _, SelectColumns as _, centre};
+use spts_recon::recover::{Fixed, FixedWindow, Noise};
+use spts_recon::{Matrix, MatrixView};
 
 /// Contact noise and what a prior misses, as a share of the root mean square of the samples: as on the board.
 const NOISE: Noise = Noise::Relative(0.12);
@@ -19,177 +18,143 @@ const MOST_PLACES: usize = 256;
 /// Most taxels that are decoded under a prior of whole images.
 pub(super) const WHOLE_IMAGES: usize = 400;
 
-/// What the rows are like, which decides how skins of more than [`WHOLE_IMAGES`] taxels are decoded.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Rows {
-    /// Pseudorandom; contacts are found as patches.
-    Random,
-    /// Products of rows along the axes, for images that are smooth over this distance, taxels.
-    Smooth(f64),
-}
-
-/// Few rows, measured once a touch: a number of measurements M is the first M of them.
+/// Few rows of ±1, measured once a touch: a number of measurements M is the first M of them.
 pub(super) struct FewRows {
-    rows: StoredRows,
+    rows: Matrix,
+    /// The same for the cells.
+    codes: Patterns,
     shape: [usize; 2],
-    decoders: Vec<(usize, Decoder)>,
+    counts: Vec<usize>,
+    decoder: Decoder,
 }
 
 /// How the image is found.
 enum Decoder {
-    /// The most probable non-negative image under a prior, `nn_lmmse`; and the root mean square of the sums expected
-    /// under the prior.
-    Gaussian(Box<Fixed>, f64),
+    /// For each number of measurements, the most probable non-negative image under a prior, `nn_lmmse`; and the root
+    /// mean square of the sums expected under the prior.
+    Gaussian(Vec<(Fixed, f64)>),
     /// Patches found by [`RegionPursuit`]; then their taxels are solved for.
     Patches,
-    /// The non-negative estimate of smooth images, on the given number of taxels with the largest linear estimates.
-    Sheet(Arc<SheetDecoder>, usize),
+    /// The non-negative estimate of smooth images, on the taxels with the largest linear estimates.
+    Sheet(Box<SheetDecoder>),
 }
 
-/// The estimate under the skin's prior from the first `count` rows.
-fn gaussian(skin: &ReadoutSkin, rows: &StoredRows, count: usize) -> Result<Decoder, Refusal> {
-    let (prior, taxels) = (skin.prior()?, rows.taxels());
-    let mut matrix = Matrix::zeros(count, taxels);
-    let (mut product, mut square) = (vec![0.0; taxels], 0.0);
-    for r in 0..count {
-        let row = matrix.row_mut(r);
-        row.iter_mut()
-            .zip(rows.row(r))
-            .for_each(|(out, w)| *out = f64::from(*w));
+/// The estimate under the skin's prior from `rows`.
+fn gaussian(skin: &ReadoutSkin, rows: MatrixView<'_>) -> Result<(Fixed, f64), Refusal> {
+    let prior = skin.prior()?;
+    let (mut product, mut square) = (vec![0.0; rows.ncols()], 0.0);
+    for row in rows.values().chunks_exact(rows.ncols()) {
         prior.covariance().apply(row, &mut product);
-        square += row.iter().zip(&product).map(|(a, b)| a * b).sum::<f64>() / count as f64;
+        square += row.iter().zip(&product).map(|(a, b)| a * b).sum::<f64>() / rows.nrows() as f64;
     }
-    let fixed = Fixed::new(matrix.view(), prior, NOISE)?;
-    Ok(Decoder::Gaussian(Box::new(fixed), square.sqrt()))
-}
-
-/// The decoder of a large sheet on which images are alike over `length` taxels, its rows prepared.
-fn sheet(rows: &StoredRows, shape: [usize; 2], length: f64) -> Result<SheetDecoder, Refusal> {
-    let mut decoder = SheetDecoder::new(SheetPrior::smooth(shape, length)?, SheetNoise::default(), 1)?;
-    let levels: Vec<f64> = (0..rows.len())
-        .flat_map(|r| rows.row(r).iter().map(|w| f64::from(*w)))
-        .collect();
-    decoder.extend(&levels, &vec![0; rows.len()])?;
-    Ok(decoder)
-}
-
-/// Taxels that are solved for with `count` measurements: three quarters as many, as in `spts design`, and no more than
-/// any of the touches covers.
-fn places(count: usize) -> usize {
-    (3 * count / 4).clamp(4, MOST_PLACES)
+    Ok((Fixed::new(rows, prior, NOISE)?, square.sqrt()))
 }
 
 impl FewRows {
-    pub(super) fn new(skin: &ReadoutSkin, rows: StoredRows, kind: Rows) -> Result<Self, Refusal> {
-        let (taxels, shape) = (rows.taxels(), [skin.layout.rows(), skin.layout.cols()]);
-        let sheet = match kind {
-            Rows::Smooth(length) if taxels > WHOLE_IMAGES => Some(Arc::new(sheet(&rows, shape, length)?)),
-            _ => None,
+    /// The readout with these `rows`. On skins of more than [`WHOLE_IMAGES`] taxels, images are smooth over the
+    /// distance `smooth`, taxels, where the rows are made for that; else contacts are found as patches.
+    pub(super) fn new(skin: &ReadoutSkin, rows: Matrix, smooth: Option<f64>) -> Result<Self, Refusal> {
+        let (shape, counts) = ([skin.layout.rows(), skin.layout.cols()], skin.measurements());
+        let decoder = match smooth {
+            _ if rows.ncols() <= WHOLE_IMAGES => {
+                let each = counts.iter().map(|count| gaussian(skin, rows.view().rows(0, *count)));
+                Decoder::Gaussian(each.collect::<Result<_, _>>()?)
+            }
+            None => Decoder::Patches,
+            Some(length) => {
+                let mut sheet = SheetDecoder::new(SheetPrior::smooth(shape, length)?, SheetNoise::default(), 1)?;
+                sheet.extend(rows.view().values(), &vec![0; rows.nrows()])?;
+                Decoder::Sheet(Box::new(sheet))
+            }
         };
-        let mut decoders = Vec::new();
-        for count in skin.measurements() {
-            let decoder = match &sheet {
-                _ if taxels <= WHOLE_IMAGES => gaussian(skin, &rows, count)?,
-                None => Decoder::Patches,
-                Some(sheet) => Decoder::Sheet(Arc::clone(sheet), places(count)),
-            };
-            decoders.push((count, decoder));
-        }
-        Ok(Self { rows, shape, decoders })
+        Ok(Self {
+            codes: Patterns::of_levels(rows.nrows(), rows.view().values())?,
+            rows,
+            shape,
+            counts,
+            decoder,
+        })
     }
 
-    /// The image that the first samples show; where it takes time to keep it from being negative, not yet so if
-    /// `quick`.
-    fn image(&self, decoder: &Decoder, samples: &[f64], quick: bool) -> Result<Vec<f64>, Refusal> {
-        match decoder {
-            Decoder::Gaussian(fixed, expected) => {
-                let rms = (samples.iter().map(|v| v * v).sum::<f64>() / samples.len() as f64).sqrt();
-                let mut window = fixed.window();
-                samples
-                    .iter()
-                    .for_each(|v| window.push(v * expected / rms.max(f64::MIN_POSITIVE)));
-                Ok(if quick {
-                    window.image()?.to_vec()
-                } else {
-                    window.non_negative()?.to_vec()
-                })
-            }
-            Decoder::Sheet(sheet, places) => Ok(sheet.non_negative(samples, *places)?),
-            Decoder::Patches => {
-                let [rows, cols] = self.shape;
-                let pursuit = RegionPursuit {
-                    max_rounds: MAX_ROUNDS,
-                    ..RegionPursuit::new(rows, cols)
-                };
-                let phi = Centred::new(FirstRows {
-                    rows: &self.rows,
-                    count: samples.len(),
-                });
-                let mut centred = samples.to_vec();
-                centre(&mut centred);
-                let mut image = pursuit.recover(&phi, &centred, None)?.image;
-                // a pursuit's bumps are wider than a taxel
-                if let Some(taxels) = contact_taxels(&image, samples.len()) {
-                    let mut columns = phi.inner().select_columns(&taxels);
-                    without_means(&mut columns);
-                    let start: Vec<f64> = taxels.iter().map(|k| image[*k]).collect();
-                    image.fill(0.0);
-                    for (k, v) in taxels.iter().zip(non_negative(&columns, &centred, &start)) {
-                        image[*k] = v;
-                    }
-                }
-                Ok(image)
+    /// Patches that the first samples show. Where there are measurements enough to tell their taxels apart, these are
+    /// solved for: a pursuit's bumps are wider than a taxel.
+    fn patches(&self, phi: MatrixView<'_>, samples: &[f64]) -> Result<Vec<f64>, Refusal> {
+        let [rows, cols] = self.shape;
+        let pursuit = RegionPursuit {
+            max_rounds: MAX_ROUNDS,
+            ..RegionPursuit::new(rows, cols)
+        };
+        let mut centred = samples.to_vec();
+        centre(&mut centred);
+        let mut image = pursuit.recover(&Centred::new(phi), &centred, None)?.image;
+        if let Some(taxels) = contact_taxels(&image, samples.len()) {
+            let mut columns = phi.select_columns(&taxels);
+            without_means(&mut columns);
+            let start: Vec<f64> = taxels.iter().map(|k| image[*k]).collect();
+            image.fill(0.0);
+            for (k, v) in taxels.iter().zip(non_negative(&columns, &centred, &start)) {
+                image[*k] = v;
             }
         }
+        Ok(image)
     }
 }
 
-impl PreparedReadout for FewRows {
+impl WireReadout for FewRows {
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
-        let sums = self.rows.sums(conductance_s);
+        let mut sums = vec![0.0; self.rows.nrows()];
+        self.rows.apply(conductance_s, &mut sums);
         sums.iter().fold(0.0, |largest, sum| largest.max(sum.abs()))
     }
 
-    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal> {
-        let [low, high] = wire.levels();
+    fn read(&self, wire: &mut WireSession<'_>) -> Result<Vec<Reading>, Refusal> {
+        let [low, high] = wire.levels;
         let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
-        let frame = wire.signs(&self.rows, self.rows.len())?;
+        let frame = wire.signs(&self.codes, self.rows.nrows())?;
         let samples: Vec<f64> = frame.volts.iter().map(|v| v / half).collect();
-        let beyond: Vec<bool> = frame.volts.iter().map(|v| v.abs() > frame.alarm_v).collect();
-        let read = |(count, decoder): &(usize, Decoder)| {
-            let first = &samples[..*count];
-            let image = if matches!(decoder, Decoder::Patches | Decoder::Sheet(..)) {
-                self.image(decoder, first, false)?
-            } else {
-                // what the middle of the levels adds with all that is pressed, from a first image
-                let share = self.sum_of(&self.image(decoder, first, true)?, first) * middle / half;
-                let lesser: Vec<f64> = first.iter().map(|v| v - share).collect();
-                self.image(decoder, &lesser, false)?
+        let read = |(k, &count): (usize, &usize)| {
+            let (phi, first) = (self.rows.view().rows(0, count), &samples[..count]);
+            let image = match &self.decoder {
+                Decoder::Patches => self.patches(phi, first)?,
+                // three quarters as many as measurements, as in `spts design`, and no more than any touch covers
+                Decoder::Sheet(sheet) => sheet.non_negative(first, (3 * count / 4).clamp(4, MOST_PLACES))?,
+                Decoder::Gaussian(each) => {
+                    let (fixed, expected) = &each[k];
+                    // what the middle of the levels adds with all that is pressed, from a first image
+                    let rough = sum_of(window(fixed, *expected, first).image()?, phi, first);
+                    let share = rough * middle / half;
+                    let lesser: Vec<f64> = first.iter().map(|v| v - share).collect();
+                    window(fixed, *expected, &lesser).non_negative()?.to_vec()
+                }
             };
             Ok(Reading {
-                measurements: *count,
+                measurements: count,
                 image,
-                noticed: until_noticed(&beyond[..*count]),
-                placed: Some(*count as f64 - 0.5),
+                noticed: frame.noticed(count),
+                placed: Some(count as f64 - 0.5),
             })
         };
-        self.decoders.iter().map(read).collect()
+        self.counts.iter().enumerate().map(read).collect()
     }
 }
 
-impl FewRows {
-    /// Σ of the image in the unit of the samples: the factor between the two is that of least squares.
-    fn sum_of(&self, image: &[f64], samples: &[f64]) -> f64 {
-        let phi = FirstRows {
-            rows: &self.rows,
-            count: samples.len(),
-        };
-        let mut sums = vec![0.0; samples.len()];
-        phi.apply(image, &mut sums);
-        let square: f64 = sums.iter().map(|s| s * s).sum();
-        let product: f64 = sums.iter().zip(samples).map(|(s, y)| s * y).sum();
-        image.iter().sum::<f64>() * product / square.max(f64::MIN_POSITIVE)
+/// The samples with the root mean square that is `expected` of them.
+fn window<'a>(fixed: &'a Fixed, expected: f64, samples: &[f64]) -> FixedWindow<'a> {
+    let rms = (samples.iter().map(|v| v * v).sum::<f64>() / samples.len() as f64).sqrt();
+    let mut window = fixed.window();
+    for v in samples {
+        window.push(v * expected / rms.max(f64::MIN_POSITIVE));
     }
+    window
+}
+
+/// Σ of the image in the unit of the samples: the factor between the two is that of least squares.
+fn sum_of(image: &[f64], phi: MatrixView<'_>, samples: &[f64]) -> f64 {
+    let mut sums = vec![0.0; samples.len()];
+    phi.apply(image, &mut sums);
+    let square: f64 = sums.iter().map(|s| s * s).sum();
+    let product: f64 = sums.iter().zip(samples).map(|(s, y)| s * y).sum();
+    image.iter().sum::<f64>() * product / square.max(f64::MIN_POSITIVE)
 }
 
 /// Takes the mean off every column.
@@ -201,61 +166,6 @@ fn without_means(columns: &mut Matrix) {
     }
 }
 
-/// The first rows of stored signs, as an operator.
-#[derive(Clone)]
-struct FirstRows<'a> {
-    rows: &'a StoredRows,
-    count: usize,
-}
-
-impl LinearOperator for FirstRows<'_> {
-    fn nrows(&self) -> usize {
-        self.count
-    }
-
-    fn ncols(&self) -> usize {
-        self.rows.taxels()
-    }
-
-    fn apply(&self, x: &[f64], y: &mut [f64]) {
-        let used: Vec<(usize, f64)> = x.iter().copied().enumerate().filter(|(_, x)| *x != 0.0).collect();
-        for (r, y) in y.iter_mut().enumerate() {
-            let row = self.rows.row(r);
-            *y = used.iter().map(|(k, x)| f64::from(row[*k]) * x).sum();
-        }
-    }
-
-    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
-        x.fill(0.0);
-        for (r, y) in y.iter().enumerate() {
-            x.iter_mut()
-                .zip(self.rows.row(r))
-                .for_each(|(x, w)| *x += f64::from(*w) * y);
-        }
-    }
-}
-
-impl SelectColumns for FirstRows<'_> {
-    type Selected = Matrix;
-
-    fn select_columns(&self, columns: &[usize]) -> Matrix {
-        let mut selected = Matrix::zeros(self.count, columns.len());
-        for r in 0..self.count {
-            let row = self.rows.row(r);
-            selected
-                .row_mut(r)
-                .iter_mut()
-                .zip(columns)
-                .for_each(|(out, k)| *out = f64::from(row[*k]));
-        }
-        selected
-    }
-
-    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
-        variance.fill(r.iter().map(|r| r * r).sum());
-    }
-}
-
 /// Taxels count as part of a contact from this share of the image's maximum on: half the share of a support.
 const PART: f64 = 0.1;
 /// Measurements a taxel at least: with fewer, smoothness has to do.
@@ -264,7 +174,7 @@ const MEASUREMENTS_A_TAXEL: usize = 2;
 const SWEEPS: usize = 100;
 
 /// The taxels that belong to the contacts of `image`, when `measurements` are enough to tell them apart.
-pub(super) fn contact_taxels(image: &[f64], measurements: usize) -> Option<Vec<usize>> {
+fn contact_taxels(image: &[f64], measurements: usize) -> Option<Vec<usize>> {
     let least = PART * image.iter().copied().fold(0.0, f64::max);
     let taxels: Vec<usize> = (0..image.len()).filter(|k| image[*k] > least).collect();
     (!taxels.is_empty() && MEASUREMENTS_A_TAXEL * taxels.len() <= measurements).then_some(taxels)
@@ -272,7 +182,7 @@ pub(super) fn contact_taxels(image: &[f64], measurements: usize) -> Option<Vec<u
 
 /// The x ≥ 0 with the least ‖`columns` x − y‖, from `start` on: coordinate descent on the normal equations, in the
 /// order of the columns. Source: V. Franc, V. Hlaváč, M. Navara, CAIP 2005, "Sequential coordinate-wise algorithm".
-pub(super) fn non_negative(columns: &Matrix, y: &[f64], start: &[f64]) -> Vec<f64> {
+fn non_negative(columns: &Matrix, y: &[f64], start: &[f64]) -> Vec<f64> {
     let n = columns.ncols();
     let columns: Vec<Vec<f64>> = (0..n).map(|k| columns.column(k)).collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();

@@ -1,9 +1,9 @@
 //! Event-driven code division: a taxel that changes sends its own signature at any time.
 
-use super::rows::StoredRows;
-use super::wire::HeldWire;
-use super::{PreparedReadout, Reading, ReadoutSkin, WireReadout};
+use super::wire::{NEUTRAL, WireSession};
+use super::{Reading, ReadoutSkin, WireReadout};
 use rand::RngExt as _;
+use spts_circuit::Patterns;
 use spts_circuit::amplifier::Skin;
 use spts_input::Refusal;
 use spts_models::Streams;
@@ -11,7 +11,7 @@ use spts_models::Streams;
 /// Slots of a signature that are tried.
 const SLOTS: [usize; 4] = [128, 256, 512, 1024];
 /// A touched taxel sends within so many slots of the onset: a millisecond of the published clock.
-pub(super) const SPREAD: usize = 64;
+const SPREAD: usize = 64;
 /// A cell sends when its taxel's conductance rises by this many times that of an idle taxel.
 const EVENT: f64 = 10.0;
 /// Conductance of the largest value, over that of a fully pressed taxel.
@@ -23,27 +23,19 @@ const LARGEST: f64 = 4.0;
 ///
 /// After W. W. Lee et al., Science Robotics 4 (2019) eaax2198: their messages take 1 ms, and their receiver resolves
 /// less than 60 ns, far less than a measurement of this wire.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Events;
-
-struct Signatures {
+pub(super) struct Events {
     taxels: usize,
-    /// Conductance of a cell's output, S.
-    sender_s: f64,
     messages: Vec<Message>,
 }
 
-impl WireReadout for Events {
-    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal> {
+impl Events {
+    pub(super) fn new(skin: &ReadoutSkin) -> Self {
         let taxels = skin.layout.taxels();
-        Ok(Box::new(Signatures {
+        let message = |slots| Message::new(taxels, slots, skin.streams);
+        Self {
             taxels,
-            sender_s: Skin::default().pressed_s,
-            messages: SLOTS
-                .iter()
-                .map(|slots| Message::new(taxels, *slots, skin.streams))
-                .collect(),
-        }))
+            messages: SLOTS.map(message).into(),
+        }
     }
 }
 
@@ -64,18 +56,19 @@ fn conductance_s(value: u8, largest_s: f64) -> f64 {
     (f64::from(value).max(0.5) / levels).powi(2) * largest_s
 }
 
-impl PreparedReadout for Signatures {
+impl WireReadout for Events {
     /// Pulses of all cells that send, in a slot where four standard deviations of them have one sign.
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
         // idle taxels are the least of all
         let idle_s = conductance_s.iter().copied().fold(f64::INFINITY, f64::min);
         let senders = conductance_s.iter().filter(|g| **g > (1.0 + EVENT) * idle_s).count() as f64;
         let at_once = (4.0 * (senders * Message::DENSITY).sqrt()).max(1.0);
-        at_once.min(senders.max(1.0)) * self.sender_s
+        at_once.min(senders.max(1.0)) * Skin::default().pressed_s
     }
 
-    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal> {
-        let (event_s, largest_s) = (EVENT * wire.idle_s(), LARGEST * wire.pressed_s());
+    fn read(&self, wire: &mut WireSession<'_>) -> Result<Vec<Reading>, Refusal> {
+        let Skin { idle_s, pressed_s, .. } = wire.skin.electronics.skin;
+        let (event_s, largest_s) = (EVENT * idle_s, LARGEST * pressed_s);
         let values = wire.own_values_s();
         let senders: Vec<Sender> = (0..self.taxels)
             .filter(|k| values[*k] > event_s)
@@ -85,14 +78,15 @@ impl PreparedReadout for Signatures {
                 value: value(values[taxel], largest_s),
             })
             .collect();
-        let amplitude_v = wire.pressed_s() * wire.volts_per_siemens();
+        let amplitude_v = pressed_s * wire.profile.volts_per_siemens();
         let read = |message: &Message| {
             let count = SPREAD + message.len();
-            let chips = (!senders.is_empty()).then(|| StoredRows::new(senders.len(), message.chips(&senders, count)));
+            let chips = (!senders.is_empty()).then(|| Patterns::new(count, message.chips(&senders, count)));
+            let chips = chips.transpose()?;
             let frame = wire.transmissions(chips.as_ref(), count)?;
             let samples: Vec<f64> = frame.volts.iter().map(|v| v / amplitude_v).collect();
             let mut image = vec![0.0; self.taxels];
-            let found = receive(message, SPREAD, &samples);
+            let found = receive(message, &samples);
             for sender in &found {
                 image[sender.taxel] = conductance_s(sender.value, largest_s);
             }
@@ -101,7 +95,7 @@ impl PreparedReadout for Signatures {
                 measurements: count,
                 image,
                 noticed: noticed.map(|first| first as f64 + 0.5),
-                placed: (!found.is_empty()).then_some((SPREAD + message.slots()) as f64 - 0.5),
+                placed: (!found.is_empty()).then_some((SPREAD + message.slots) as f64 - 0.5),
             })
         };
         self.messages.iter().map(read).collect()
@@ -117,45 +111,43 @@ const RIDGE: f64 = 0.1;
 /// A message counts as sent when its amplitude is more than half of what it should be.
 const PRESENT: f64 = 0.5;
 
-/// A pulse: slot and sign.
-type Pulse = (u16, i8);
-
 /// Signatures of all taxels, and how messages are made of them.
-pub(super) struct Message {
+struct Message {
     slots: usize,
-    /// Pulses of every taxel, in the order of their slots.
-    signatures: Vec<Vec<Pulse>>,
+    /// Pulses of every taxel, slot and sign, in the order of their slots.
+    signatures: Vec<Vec<(usize, f64)>>,
 }
 
 /// A transmission.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Sender {
+struct Sender {
     /// Sending taxel.
-    pub(super) taxel: usize,
+    taxel: usize,
     /// First slot of the message.
-    pub(super) start: usize,
+    start: usize,
     /// Value that is sent, in [0, [`Message::LEVELS`]).
-    pub(super) value: u8,
+    value: u8,
 }
 
 impl Message {
     /// Bits of a value.
-    pub(super) const BITS: usize = 4;
+    const BITS: usize = 4;
     /// Values.
-    pub(super) const LEVELS: u8 = 1 << Self::BITS;
+    const LEVELS: u8 = 1 << Self::BITS;
     /// Share of the slots with a pulse.
-    pub(super) const DENSITY: f64 = 1.0 / 16.0;
+    const DENSITY: f64 = 1.0 / 16.0;
 
     /// Signatures of `taxels` taxels: in every sixteen of the `slots` slots one pulse of either sign, at random.
-    pub(super) fn new(taxels: usize, slots: usize, streams: Streams) -> Self {
+    fn new(taxels: usize, slots: usize, streams: Streams) -> Self {
         let signature = |taxel: usize| {
             let mut rng = streams
                 .child("readouts/signatures", slots as u64)
                 .rng("taxel", taxel as u64);
-            let starts = (0_u16..).step_by(16).take(slots / 16);
-            starts
-                .map(|start| (start + rng.random_range(0..16_u16), if rng.random() { 1 } else { -1 }))
-                .collect()
+            let pulse = |start: usize| {
+                let slot = start + usize::from(rng.random_range(0..16_u16));
+                (slot, if rng.random() { 1.0 } else { -1.0 })
+            };
+            (0..slots).step_by(16).map(pulse).collect()
         };
         Self {
             slots,
@@ -163,13 +155,8 @@ impl Message {
         }
     }
 
-    /// Slots of a signature.
-    pub(super) fn slots(&self) -> usize {
-        self.slots
-    }
-
     /// Slots of a message: the signature alone, then once a bit.
-    pub(super) fn len(&self) -> usize {
+    fn len(&self) -> usize {
         (1 + Self::BITS) * self.slots
     }
 
@@ -178,18 +165,18 @@ impl Message {
     fn pulses(&self, taxel: usize, start: usize, piece: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let first = start + piece * self.slots;
         let pulses = self.signatures[taxel].iter();
-        pulses.map(move |(slot, sign)| (first + usize::from(*slot), f64::from(*sign)))
+        pulses.map(move |(slot, sign)| (first + slot, *sign))
     }
 
-    /// Levels of the senders at `count` slots, slot after slot.
-    pub(super) fn chips(&self, senders: &[Sender], count: usize) -> Vec<i8> {
-        let mut chips = vec![0; count * senders.len()];
+    /// Codes of the senders at `count` slots, slot after slot.
+    fn chips(&self, senders: &[Sender], count: usize) -> Vec<u8> {
+        let mut chips = vec![NEUTRAL; count * senders.len()];
         for (k, sender) in senders.iter().enumerate() {
             for piece in 0..=Self::BITS {
                 let inverted = piece > 0 && sender.value >> (piece - 1) & 1 == 0;
                 for (slot, sign) in self.pulses(sender.taxel, sender.start, piece) {
                     if let Some(chip) = chips.get_mut(slot * senders.len() + k) {
-                        *chip = if (sign > 0.0) == inverted { -1 } else { 1 };
+                        *chip = if (sign > 0.0) == inverted { 0 } else { u8::MAX };
                     }
                 }
             }
@@ -198,13 +185,13 @@ impl Message {
     }
 }
 
-/// Who sent what in `samples`, in which a pulse has height 1, when messages start in the first `spread` slots: a
+/// Who sent what in `samples`, in which a pulse has height 1, when messages start in the first [`SPREAD`] slots: a
 /// subspace pursuit. As many taxels as the energy of the samples stands for join those of the round before, each at the
 /// moment at which its signature correlates most; the amplitudes of all their pieces are solved for together, and those
 /// stay whose signature is there.
 /// Source: W. Dai, O. Milenkovic, IEEE Trans. Inf. Theory 55 (2009) 2230, with known amplitudes in place of a known
 /// number.
-pub(super) fn receive(message: &Message, spread: usize, samples: &[f64]) -> Vec<Sender> {
+fn receive(message: &Message, samples: &[f64]) -> Vec<Sender> {
     let pulses = message.slots as f64 * Message::DENSITY * (1 + Message::BITS) as f64;
     let energy: f64 = samples.iter().map(|v| v * v).sum();
     #[expect(clippy::cast_possible_truncation, reason = "at most the number of samples")]
@@ -213,7 +200,7 @@ pub(super) fn receive(message: &Message, spread: usize, samples: &[f64]) -> Vec<
     let (mut amplitudes, mut residual) = (Vec::new(), samples.to_vec());
     for _ in 0..ROUNDS {
         let mut tried = kept.clone();
-        tried.extend(strongest(message, spread, &residual, &kept, count));
+        tried.extend(strongest(message, &residual, &kept, count));
         let solved = solve(message, &tried, samples);
         let present: Vec<usize> = (0..tried.len()).filter(|k| solved[k * PIECES] > PRESENT).collect();
         let found: Vec<(usize, usize)> = present.iter().map(|k| tried[*k]).collect();
@@ -246,25 +233,17 @@ pub(super) fn receive(message: &Message, spread: usize, samples: &[f64]) -> Vec<
 const PIECES: usize = 1 + Message::BITS;
 
 /// The `count` taxels, none of those `kept`, whose signatures correlate most with the residual, each at its best start.
-fn strongest(
-    message: &Message,
-    spread: usize,
-    residual: &[f64],
-    kept: &[(usize, usize)],
-    count: usize,
-) -> Vec<(usize, usize)> {
+fn strongest(message: &Message, residual: &[f64], kept: &[(usize, usize)], count: usize) -> Vec<(usize, usize)> {
     let mut best: Vec<(f64, usize, usize)> = Vec::new();
-    let mut sums = vec![0.0; spread];
+    let mut sums = [0.0; SPREAD];
     for taxel in (0..message.signatures.len()).filter(|taxel| kept.iter().all(|(k, _)| k != taxel)) {
         sums.fill(0.0);
         for (slot, sign) in message.pulses(taxel, 0, 0) {
-            let window = residual.get(slot..slot + spread).unwrap_or_default();
+            let window = residual.get(slot..slot + SPREAD).unwrap_or_default();
             sums.iter_mut().zip(window).for_each(|(sum, v)| *sum += sign * v);
         }
-        let start = (0..spread).reduce(|a, b| if sums[b] > sums[a] { b } else { a });
-        if let Some(start) = start {
-            best.push((sums[start], taxel, start));
-        }
+        let start = (1..SPREAD).fold(0, |a, b| if sums[b] > sums[a] { b } else { a });
+        best.push((sums[start], taxel, start));
     }
     best.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     best.iter()
@@ -288,18 +267,17 @@ fn add(message: &Message, senders: &[(usize, usize)], amplitudes: &[f64], factor
 
 /// What the samples correlate with every piece.
 fn correlate(message: &Message, senders: &[(usize, usize)], samples: &[f64]) -> Vec<f64> {
-    let mut sums = Vec::with_capacity(senders.len() * PIECES);
-    for (taxel, start) in senders {
-        for piece in 0..PIECES {
-            let pulses = message.pulses(*taxel, *start, piece);
-            sums.push(
-                pulses
-                    .map(|(slot, sign)| sign * samples.get(slot).copied().unwrap_or(0.0))
-                    .sum(),
-            );
-        }
-    }
-    sums
+    let sample = |slot: usize| samples.get(slot).copied().unwrap_or(0.0);
+    let sum = |(taxel, start), piece| {
+        message
+            .pulses(taxel, start, piece)
+            .map(|(slot, sign)| sign * sample(slot))
+            .sum()
+    };
+    let each = senders
+        .iter()
+        .flat_map(|sender| (0..PIECES).map(move |piece| (*sender, piece)));
+    each.map(|(sender, piece)| sum(sender, piece)).collect()
 }
 
 /// Amplitudes of all pieces by least squares with a small ridge: conjugate gradients on the normal equations.
@@ -353,8 +331,12 @@ mod tests {
 
     fn samples(message: &Message, senders: &[Sender], count: usize) -> Vec<f64> {
         let chips = message.chips(senders, count);
+        let level = |code: &u8| match *code {
+            NEUTRAL => 0.0,
+            code => f64::from(code) / 127.5 - 1.0,
+        };
         let slots = chips.chunks(senders.len().max(1));
-        let mut samples: Vec<f64> = slots.map(|s| s.iter().map(|c| f64::from(*c)).sum()).collect();
+        let mut samples: Vec<f64> = slots.map(|s| s.iter().map(level).sum()).collect();
         samples.resize(count, 0.0);
         samples
     }
@@ -372,21 +354,21 @@ mod tests {
             })
             .collect();
         let mut heard = samples(&message, &senders, 64 + message.len());
-        assert_eq!(receive(&message, 64, &heard), senders);
+        assert_eq!(receive(&message, &heard), senders);
         // and through noise of a fifth of a pulse
         let mut rng = Streams::new(4).rng("noise", 0);
         heard.iter_mut().for_each(|v| *v += 0.35 * rng.random_range(-1.0..1.0));
-        assert_eq!(receive(&message, 64, &heard), senders);
+        assert_eq!(receive(&message, &heard), senders);
     }
 
     #[test]
     fn silence_is_nobody() {
         let message = Message::new(100, 128, Streams::new(3));
-        assert_eq!(receive(&message, 64, &vec![0.0; 64 + message.len()]), []);
+        assert_eq!(receive(&message, &vec![0.0; 64 + message.len()]), []);
         let mut rng = Streams::new(4).rng("noise", 0);
         let noise: Vec<f64> = (0..64 + message.len())
             .map(|_| 0.2 * rng.random_range(-1.0..1.0))
             .collect();
-        assert_eq!(receive(&message, 64, &noise), []);
+        assert_eq!(receive(&message, &noise), []);
     }
 }

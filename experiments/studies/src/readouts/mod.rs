@@ -1,7 +1,7 @@
 //! Compares readouts with few wires: skins, touches, amplifier, noise, converter and clock are the same for all.
 //!
-//! A [`WireReadout`] requests measurements from a [`HeldWire`] and returns images. [`READOUTS`] is the table of
-//! readouts, and [`conformance`] checks every line. [`ReadoutsStudy`] measures them; docs/readouts.md describes the
+//! A [`WireReadout`] requests measurements from a [`WireSession`] and returns images. [`READOUTS`] is the table of
+//! readouts, and a conformance suite checks every line. [`ReadoutsStudy`] measures them; docs/readouts.md describes the
 //! protocol.
 //!
 //! ```no_run
@@ -18,13 +18,12 @@
 //! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
-use crate::touches::{Touch, TouchScore};
 use adaptive::Adaptive;
 use events::Events;
-use rows::{CodeDivision, DesignedSigns, RandomSigns, Raster};
+use rows::{CodeDivision, Raster, designed_signs, random_signs};
 use spts_eval::training::TrainingData;
 use spts_input::Refusal;
-use spts_models::{ConductanceMap, SkinLayout, Streams};
+use spts_models::{SkinLayout, Streams};
 use spts_recon::recover::{Gaussian, ImagePrior};
 use std::sync::{Arc, OnceLock};
 
@@ -35,19 +34,16 @@ mod rows;
 mod study;
 mod wire;
 
-pub use rows::{StoredRows, WalshRows};
-pub use study::{
-    GOOD_IOU, PUBLISHED, PublishedSystem, ReadoutRow, ReadoutTrial, ReadoutsParameters, ReadoutsReport, ReadoutsStudy,
-    SizeWire, Templates,
-};
-pub use wire::{FALSE_ALARM_S, HeldWire, ReadoutWire, SkinWire, WireFrame, WireSession};
+pub use study::{GOOD_IOU, PublishedSystem, ReadoutRow, ReadoutTrial, ReadoutsReport, ReadoutsStudy, SizeWire};
+pub use wire::{SkinWire, WireFrame, WireSession};
 
 /// Shares of the taxels that readouts with a free number of measurements are tried with.
 const SHARES: [f64; 6] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5];
 /// Fewest and most measurements of those.
 const MEASUREMENTS: std::ops::RangeInclusive<usize> = 5..=2000;
 
-/// A method to read a skin over few wires, such as a raster scan or random signs; `spts readouts` compares them.
+/// A method to read a skin over few wires, such as a raster scan or random signs, with everything computed that depends
+/// only on the skin; `spts readouts` compares them.
 ///
 /// ```
 /// use spts_studies::readouts::{READOUTS, readout};
@@ -56,25 +52,16 @@ const MEASUREMENTS: std::ops::RangeInclusive<usize> = 5..=2000;
 /// assert_eq!(READOUTS.len(), 6);
 /// ```
 pub trait WireReadout: Send + Sync {
-    /// Computes rows, gains and everything else that depends only on the skin.
-    ///
-    /// # Errors
-    /// [`Refusal`] if the readout does not support this skin.
-    fn prepare(&self, skin: &ReadoutSkin) -> Result<Box<dyn PreparedReadout>, Refusal>;
-}
-
-/// A readout method with everything computed that depends only on the skin: it measures touches.
-pub trait PreparedReadout: Send + Sync {
     /// Largest magnitude of Σ wₖ·gₖ, S, over all its measurements of a skin with the conductances `conductance_s`, idle
     /// measurements included. The feedback resistance is chosen for it.
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64;
 
-    /// Reads the touch on `wire`. Returns one reading for every number of measurements with which this readout is
-    /// tested, in increasing order; every touch has the same number of readings.
+    /// Reads the touch that is held on `wire`. Returns one reading for every number of measurements with which this
+    /// readout is tested, in increasing order; every touch has the same number of readings.
     ///
     /// # Errors
     /// [`Refusal`] if the wire cannot be measured, or an image cannot be recovered.
-    fn read(&self, wire: &mut HeldWire<'_, '_>) -> Result<Vec<Reading>, Refusal>;
+    fn read(&self, wire: &mut WireSession<'_>) -> Result<Vec<Reading>, Refusal>;
 }
 
 /// What a readout method answers for one touch and one number of measurements: the image, and how soon the touch was
@@ -134,6 +121,11 @@ impl ReadoutSkin {
         let counts = SHARES.iter().map(rounded);
         counts.filter(|count| MEASUREMENTS.contains(count)).collect()
     }
+
+    /// The largest of them.
+    fn most_measurements(&self) -> usize {
+        self.measurements().last().copied().unwrap_or(1)
+    }
 }
 
 /// Mean number of measurements from the onset of a touch to the first sample beyond the alarm threshold. `beyond` says
@@ -162,7 +154,7 @@ pub fn until_noticed(beyond: &[bool]) -> Option<f64> {
 /// assert_eq!(designed.wires, 1);
 /// assert!(readout("telepathy").is_none());
 /// ```
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub struct ReadoutLine {
     /// Name on the command line and in files.
     pub name: &'static str,
@@ -174,8 +166,8 @@ pub struct ReadoutLine {
     pub source: &'static str,
     /// Number of measured wires, without those of the supply and of the bus or clock for the cells.
     pub wires: usize,
-    /// Builds the readout.
-    pub build: fn() -> Box<dyn WireReadout>,
+    /// Builds the readout of a skin: rows, gains and everything else that depends only on it.
+    pub build: fn(&ReadoutSkin) -> Result<Box<dyn WireReadout>, Refusal>,
 }
 
 /// Every readout.
@@ -186,7 +178,10 @@ pub const READOUTS: &[ReadoutLine] = &[
         cell: "level 1 in its own slot, the neutral level in all others: the published cell in raster mode",
         source: "A. Slepyan et al., arXiv 2511.16898 (SPTS)",
         wires: 1,
-        build: || Box::new(Raster),
+        build: |skin| {
+            let cols = skin.layout.cols();
+            Ok(Box::new(Raster { cols }))
+        },
     },
     ReadoutLine {
         name: "random",
@@ -194,7 +189,7 @@ pub const READOUTS: &[ReadoutLine] = &[
         cell: "pseudorandom levels of ±1: the published cell, with a 32-bit seed",
         source: "A. Slepyan et al., arXiv 2511.16898 (SPTS)",
         wires: 1,
-        build: || Box::new(RandomSigns),
+        build: |skin| Ok(Box::new(random_signs(skin)?)),
     },
     ReadoutLine {
         name: "designed",
@@ -202,7 +197,7 @@ pub const READOUTS: &[ReadoutLine] = &[
         cell: "a stored pattern of ±1, M bits: our firmware holds 64, more take more memory",
         source: "docs/rows.md",
         wires: 1,
-        build: || Box::new(DesignedSigns),
+        build: |skin| Ok(Box::new(designed_signs(skin)?)),
     },
     ReadoutLine {
         name: "code_division",
@@ -210,7 +205,10 @@ pub const READOUTS: &[ReadoutLine] = &[
         cell: "a Walsh function, from a counter and its own number: ±1",
         source: "arXiv 2509.10888 (CDMA skin)",
         wires: 1,
-        build: || Box::new(CodeDivision),
+        build: |skin| {
+            let taxels = skin.layout.taxels();
+            Ok(Box::new(CodeDivision { taxels }))
+        },
     },
     ReadoutLine {
         name: "adaptive",
@@ -218,7 +216,7 @@ pub const READOUTS: &[ReadoutLine] = &[
         cell: "level 1 when it is called, the neutral level otherwise: a call by address before every measurement",
         source: "A. Slepyan et al., arXiv 2410.13847 (ACTS)",
         wires: 1,
-        build: || Box::new(Adaptive),
+        build: |skin| Ok(Box::new(Adaptive::new(skin))),
     },
     ReadoutLine {
         name: "events",
@@ -226,7 +224,7 @@ pub const READOUTS: &[ReadoutLine] = &[
         cell: "a converter for its own taxel, an output of its own of −1, +1 or switched off, and a stored signature",
         source: "W. W. Lee et al., Science Robotics 4 (2019) eaax2198 (ACES)",
         wires: 1,
-        build: || Box::new(Events),
+        build: |skin| Ok(Box::new(Events::new(skin))),
     },
 ];
 
@@ -235,110 +233,105 @@ pub fn readout(name: &str) -> Option<&'static ReadoutLine> {
     READOUTS.iter().find(|line| line.name == name)
 }
 
-/// IoU with the most measurements, of a contact that stands out, at least: two thirds of the taxels are right.
-const LEAST_IOU: f64 = 0.6;
-
-/// Rows and columns of the skins: one that is decoded under a prior of whole images, and a larger one.
-const SKINS: [[usize; 2]; 2] = [[12, 9], [24, 20]];
-
-/// A plate of 4 × 3 taxels pressed on a skin, or nothing.
-fn plate(layout: &SkinLayout, pressed_s: f64) -> Touch {
-    let (rows, cols) = (layout.rows(), layout.cols());
-    let inside = |k: usize| (5..9).contains(&(k / cols)) && (2..5).contains(&(k % cols));
-    let values = (0..rows * cols)
-        .map(|k| if inside(k) { pressed_s } else { 0.0 })
-        .collect();
-    Touch {
-        name: Arc::from("plate"),
-        conductance_s: ConductanceMap::from_values(rows, cols, values),
-        support: (0..rows * cols).map(inside).collect(),
-        centre_px: Some([6.5, 3.0]),
-    }
-}
-
-/// Checks a readout on skins that are not square. Numbers of measurements must increase; images must have one finite
-/// value ≥ 0 for each taxel; times must be positive and in order. A strong contact must be shown and noticed, and an
-/// untouched skin must not be. Equal wires must give equal readings, in any order of touches.
-///
-/// # Panics
-/// If a property fails; the message names the readout.
-pub fn conformance(line: &ReadoutLine) {
-    SKINS.iter().for_each(|skin| on_skin(line, *skin));
-}
-
-fn on_skin(line: &ReadoutLine, [rows, cols]: [usize; 2]) {
-    let name = line.name;
-    let layout = SkinLayout::with_pitch(rows, cols, 15e-3).expect("a skin");
-    let taxels = u32::try_from(layout.taxels()).expect("few");
-    let skin = ReadoutSkin::new(layout, 7);
-    let readout = (line.build)().prepare(&skin).expect(name);
-    let (touch, nothing) = (plate(&layout, 150e-6), plate(&layout, 0.0));
-    let wire = SkinWire::new(taxels, touch.conductance_s.values()).expect(name);
-    let pressed: Vec<f64> = touch.conductance_s.values().iter().map(|g| g + wire.idle_s).collect();
-    let largest_sum_s = readout.largest_sum_s(&pressed);
-    let all_s: f64 = pressed.iter().sum();
-    assert!(
-        largest_sum_s > 0.0 && largest_sum_s <= all_s + 1e-12,
-        "{name}: {largest_sum_s} S of {all_s} S"
-    );
-    let device = Streams::new(11);
-    let fitted = wire.fitted(largest_sum_s, device).expect(name);
-    let session = || WireSession::new(&fitted, layout, device, wire.period_s, [wire.idle_s, wire.pressed_s()]);
-
-    let mut first = session();
-    let readings = readout.read(&mut first.hold(&touch, 0)).expect(name);
-    assert!(!readings.is_empty(), "{name}: no reading");
-    for pair in readings.windows(2) {
-        assert!(pair[0].measurements < pair[1].measurements, "{name}: measurements rise");
-    }
-    for reading in &readings {
-        assert!(
-            reading.measurements > 0 && reading.image.len() == layout.taxels(),
-            "{name}"
-        );
-        assert!(
-            reading.image.iter().all(|v| v.is_finite() && *v >= 0.0),
-            "{name}: {:?}",
-            reading.image
-        );
-        if let (Some(noticed), Some(placed)) = (reading.noticed, reading.placed) {
-            assert!(
-                0.5 <= noticed && noticed <= placed,
-                "{name}: noticed {noticed}, placed {placed}"
-            );
-        }
-    }
-    let best = readings.last().expect("one reading");
-    let score = TouchScore::of(&best.image, &touch, &layout);
-    assert!(score.iou >= LEAST_IOU, "{name}: IoU {}", score.iou);
-    assert!(
-        score.place_px.is_some_and(|place| place < 1.0),
-        "{name}: place {:?}",
-        score.place_px
-    );
-    assert!(best.noticed.is_some(), "{name}: a contact is not noticed");
-
-    let idle = readout.read(&mut first.hold(&nothing, 1)).expect(name);
-    assert_eq!(idle.len(), readings.len(), "{name}: as many readings of nothing");
-    assert!(
-        idle.iter().all(|reading| reading.noticed.is_none()),
-        "{name}: noticed nothing"
-    );
-
-    let mut second = session();
-    let before = readout.read(&mut second.hold(&nothing, 1)).expect(name);
-    let again = readout.read(&mut second.hold(&touch, 0)).expect(name);
-    assert!(
-        before == idle && again == readings,
-        "{name}: the order of touches shows"
-    );
-    let other = readout.read(&mut second.hold(&touch, 2)).expect(name);
-    assert!(other != readings, "{name}: no noise");
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::touches::{Touch, TouchScore};
+    use spts_models::ConductanceMap;
+
+    /// IoU with the most measurements, of a contact that stands out, at least: two thirds of the taxels are right.
+    const LEAST_IOU: f64 = 0.6;
+
+    /// Rows and columns of the skins: one that is decoded under a prior of whole images, and a larger one.
+    const SKINS: [[usize; 2]; 2] = [[12, 9], [24, 20]];
+
+    /// A plate of 4 × 3 taxels pressed on a skin, or nothing.
+    fn plate(layout: &SkinLayout, pressed_s: f64) -> Touch {
+        let (rows, cols) = (layout.rows(), layout.cols());
+        let inside = |k: usize| (5..9).contains(&(k / cols)) && (2..5).contains(&(k % cols));
+        let values = (0..rows * cols)
+            .map(|k| if inside(k) { pressed_s } else { 0.0 })
+            .collect();
+        Touch {
+            name: Arc::from("plate"),
+            conductance_s: ConductanceMap::from_values(rows, cols, values),
+            support: (0..rows * cols).map(inside).collect(),
+            centre_px: Some([6.5, 3.0]),
+        }
+    }
+
+    /// Checks a readout on skins that are not square. Numbers of measurements must increase; images must have one finite
+    /// value ≥ 0 for each taxel; times must be positive and in order. A strong contact must be shown and noticed, and an
+    /// untouched skin must not be. Equal wires must give equal readings, in any order of touches.
+    fn conformance(line: &ReadoutLine) {
+        SKINS.iter().for_each(|skin| on_skin(line, *skin));
+    }
+
+    fn on_skin(line: &ReadoutLine, [rows, cols]: [usize; 2]) {
+        let name = line.name;
+        let layout = SkinLayout::with_pitch(rows, cols, 15e-3).expect("a skin");
+        let skin = ReadoutSkin::new(layout, 7);
+        let readout = (line.build)(&skin).expect(name);
+        let (touch, nothing) = (plate(&layout, 150e-6), plate(&layout, 0.0));
+        let wire = SkinWire::new(layout, touch.conductance_s.values()).expect(name);
+        let largest_sum_s = wire.largest_sum_s(&*readout, &touch);
+        let all_s: f64 = 12.0 * 150e-6 + layout.taxels() as f64 * wire.electronics.skin.idle_s;
+        assert!(
+            largest_sum_s > 0.0 && largest_sum_s <= all_s + 1e-12,
+            "{name}: {largest_sum_s} S of {all_s} S"
+        );
+        let session = || wire.session(largest_sum_s, Streams::new(11)).expect(name);
+
+        let mut first = session();
+        let readings = readout.read(first.hold(&touch, 0)).expect(name);
+        assert!(!readings.is_empty(), "{name}: no reading");
+        for pair in readings.windows(2) {
+            assert!(pair[0].measurements < pair[1].measurements, "{name}: measurements rise");
+        }
+        for reading in &readings {
+            assert!(
+                reading.measurements > 0 && reading.image.len() == layout.taxels(),
+                "{name}"
+            );
+            assert!(
+                reading.image.iter().all(|v| v.is_finite() && *v >= 0.0),
+                "{name}: {:?}",
+                reading.image
+            );
+            if let (Some(noticed), Some(placed)) = (reading.noticed, reading.placed) {
+                assert!(
+                    0.5 <= noticed && noticed <= placed,
+                    "{name}: noticed {noticed}, placed {placed}"
+                );
+            }
+        }
+        let best = readings.last().expect("one reading");
+        let score = TouchScore::of(&best.image, &touch, &layout);
+        assert!(score.iou >= LEAST_IOU, "{name}: IoU {}", score.iou);
+        assert!(
+            score.place_px.is_some_and(|place| place < 1.0),
+            "{name}: place {:?}",
+            score.place_px
+        );
+        assert!(best.noticed.is_some(), "{name}: a contact is not noticed");
+
+        let idle = readout.read(first.hold(&nothing, 1)).expect(name);
+        assert_eq!(idle.len(), readings.len(), "{name}: as many readings of nothing");
+        assert!(
+            idle.iter().all(|reading| reading.noticed.is_none()),
+            "{name}: noticed nothing"
+        );
+
+        let mut second = session();
+        let before = readout.read(second.hold(&nothing, 1)).expect(name);
+        let again = readout.read(second.hold(&touch, 0)).expect(name);
+        assert!(
+            before == idle && again == readings,
+            "{name}: the order of touches shows"
+        );
+        let other = readout.read(second.hold(&touch, 2)).expect(name);
+        assert!(other != readings, "{name}: no noise");
+    }
 
     /// By hand: with one sample of four beyond, 1, 2, 3 or 4 measurements, less the half that passes before the first.
     #[test]

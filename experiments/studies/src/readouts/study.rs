@@ -1,7 +1,7 @@
 //! The benchmark: every readout with the same skins, touches, wire, noise and clock.
 
-use super::wire::{SkinWire, WireSession};
-use super::{PreparedReadout, Reading, ReadoutLine, ReadoutSkin};
+use super::wire::SkinWire;
+use super::{Reading, ReadoutLine, ReadoutSkin, WireReadout};
 use crate::touches::{Touch, TouchObjects, TouchScene, TouchScore, band};
 use rand::RngExt as _;
 use rayon::prelude::*;
@@ -9,6 +9,8 @@ use serde::Serialize;
 use spts::progress::Progress;
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
+use spts_recon::Matrix;
+use spts_recon::dictionary::shifted;
 use spts_recon::statistics::{Band, mean};
 use std::sync::Arc;
 
@@ -36,18 +38,6 @@ pub struct ReadoutsStudy {
     pub seed: u64,
 }
 
-/// The settings of a run of `spts readouts` as they are written to `parameters.json`.
-#[derive(Debug, Clone, Serialize)]
-pub struct ReadoutsParameters {
-    readouts: Vec<&'static str>,
-    taxels: Vec<usize>,
-    pitch_m: f64,
-    repetitions: usize,
-    shapes: usize,
-    objects: usize,
-    seed: u64,
-}
-
 /// One repetition on one size of skin.
 struct Repetition {
     device: Streams,
@@ -70,9 +60,19 @@ struct Means {
 }
 
 impl ReadoutsStudy {
-    /// The parameters of the study.
-    pub fn parameters(&self) -> ReadoutsParameters {
-        ReadoutsParameters {
+    /// The settings as they are written to `parameters.json`.
+    pub fn parameters(&self) -> impl Serialize + use<> {
+        #[derive(Serialize)]
+        struct Parameters {
+            readouts: Vec<&'static str>,
+            taxels: Vec<usize>,
+            pitch_m: f64,
+            repetitions: usize,
+            shapes: usize,
+            objects: usize,
+            seed: u64,
+        }
+        Parameters {
             readouts: self.readouts.iter().map(|line| line.name).collect(),
             taxels: self.sides.iter().map(|side| side * side).collect(),
             pitch_m: PITCH_M,
@@ -90,7 +90,11 @@ impl ReadoutsStudy {
     pub fn run(&self, progress: &dyn Progress) -> Result<ReadoutsReport, Refusal> {
         let a_size = self.readouts.len() * (1 + self.repetitions);
         progress.stage("comparing readouts", Some(self.sides.len() * a_size));
-        let mut report = ReadoutsReport::default();
+        let mut report = ReadoutsReport {
+            wires: Vec::new(),
+            rows: Vec::new(),
+            published: PUBLISHED,
+        };
         for &side in &self.sides {
             self.size(side, &mut report, progress)?;
         }
@@ -105,7 +109,7 @@ impl ReadoutsStudy {
         let sum = |touch: &Touch| touch.conductance_s.values().iter().sum::<f64>();
         let largest = calibration.iter().max_by(|a, b| sum(a).total_cmp(&sum(b)));
         let largest_s = largest.map_or_else(Vec::new, |touch| touch.conductance_s.values().to_vec());
-        let wire = SkinWire::new(u32::try_from(layout.taxels()).unwrap_or(u32::MAX), &largest_s)?;
+        let wire = SkinWire::new(layout, &largest_s)?;
         let skin = ReadoutSkin::new(layout, self.seed);
         let repetitions: Vec<Repetition> = (0..self.repetitions as u64)
             .into_par_iter()
@@ -114,11 +118,8 @@ impl ReadoutsStudy {
         // a prior is prepared once, whoever asks for it first
         let mut prepared = Vec::with_capacity(self.readouts.len());
         for line in &self.readouts {
-            let readout = (line.build)().prepare(&skin)?;
-            let sums = calibration.iter().map(|touch| {
-                let pressed: Vec<f64> = touch.conductance_s.values().iter().map(|g| g + wire.idle_s).collect();
-                readout.largest_sum_s(&pressed)
-            });
+            let readout = (line.build)(&skin)?;
+            let sums = calibration.iter().map(|touch| wire.largest_sum_s(&*readout, touch));
             let largest_sum_s = sums.fold(0.0, f64::max);
             prepared.push((*line, readout, largest_sum_s));
             progress.step();
@@ -131,7 +132,7 @@ impl ReadoutsStudy {
             .with_max_len(1)
             .map(|(line, repetition)| {
                 let (_, readout, largest_sum_s) = &prepared[line];
-                let means = measure(&**readout, *largest_sum_s, &wire, layout, &repetitions[repetition]);
+                let means = measure(&**readout, *largest_sum_s, &wire, &repetitions[repetition]);
                 progress.step();
                 means
             })
@@ -186,38 +187,35 @@ impl ReadoutsStudy {
             device,
             shapes: shapes.draw()?,
             objects: objects("objects", 1).draw()?,
-            templates: Templates::new(&learned, layout.rows(), layout.cols()),
+            templates: Templates::new(&learned, layout.cols()),
         })
     }
 }
 
 /// One readout in one repetition: its feedback, Ω, and its means.
 fn measure(
-    readout: &dyn PreparedReadout,
+    readout: &dyn WireReadout,
     largest_sum_s: f64,
     skin: &SkinWire,
-    layout: SkinLayout,
     repetition: &Repetition,
 ) -> Result<(f64, Vec<Means>), Refusal> {
-    let wire = skin.fitted(largest_sum_s, repetition.device.child("session", 0))?;
-    let conductances = [skin.idle_s, skin.pressed_s()];
-    let mut session = WireSession::new(&wire, layout, repetition.device, skin.period_s, conductances);
+    let mut session = skin.session(largest_sum_s, repetition.device)?;
     let mut means: Vec<Means> = Vec::new();
     let touches = repetition.shapes.iter().chain(&repetition.objects);
     for (number, touch) in (0..).zip(touches) {
-        let readings = readout.read(&mut session.hold(touch, number))?;
+        let readings = readout.read(session.hold(touch, number))?;
         means.resize(readings.len(), Means::default());
         for (means, reading) in means.iter_mut().zip(&readings) {
             means.measurements = reading.measurements;
             if number < repetition.shapes.len() as u64 {
-                means.add_shape(reading, touch, &layout, repetition.shapes.len() as f64);
+                means.add_shape(reading, touch, &skin.layout, repetition.shapes.len() as f64);
             } else {
                 let named = repetition.templates.name(&reading.image);
                 means.named += usize::from(named == Some(&*touch.name));
             }
         }
     }
-    Ok((wire.feedback_ohm, means))
+    Ok((session.profile.feedback_ohm, means))
 }
 
 impl Means {
@@ -340,84 +338,48 @@ pub struct ReadoutsReport {
     pub published: &'static [PublishedSystem],
 }
 
-impl Default for ReadoutsReport {
-    fn default() -> Self {
-        Self {
-            wires: Vec::new(),
-            rows: Vec::new(),
-            published: PUBLISHED,
-        }
-    }
-}
-
 /// Shifts that are tried along either axis, taxels.
-const REACH: isize = 1;
+const REACH: usize = 1;
 
-/// Images of known objects from other presses on the same skin. An image is classified by the most similar one.
-#[derive(Debug, Clone)]
-pub struct Templates {
-    rows: usize,
-    cols: usize,
-    known: Vec<Known>,
-}
-
-/// One object.
-#[derive(Debug, Clone)]
-struct Known {
-    name: Arc<str>,
-    /// Indices and values of non-zero taxels, normalised to length 1.
-    taxels: Vec<(usize, f64)>,
-}
+/// Names of known objects, and their images from other presses on the same skin, shifted by up to a taxel along each
+/// axis: an image is classified by the most similar one.
+struct Templates(Vec<(Arc<str>, Matrix)>);
 
 impl Templates {
-    /// Templates from `touches` on a skin of `rows` × `cols`: the mean of all touches of an object, normalised to
-    /// length 1.
-    pub fn new(touches: &[Touch], rows: usize, cols: usize) -> Self {
+    /// Templates from `touches` on a skin of `cols` columns: the mean of all touches of an object, normalised to length
+    /// 1.
+    fn new(touches: &[Touch], cols: usize) -> Self {
+        let length = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
         let mut sums: Vec<(Arc<str>, Vec<f64>)> = Vec::new();
         for touch in touches {
             let values = touch.conductance_s.values();
-            let length = values.iter().map(|v| v * v).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
+            let own = length(values);
             match sums.iter_mut().find(|(name, _)| *name == touch.name) {
-                Some((_, sum)) => sum.iter_mut().zip(values).for_each(|(sum, v)| *sum += v / length),
-                None => sums.push((touch.name.clone(), values.iter().map(|v| v / length).collect())),
+                Some((_, sum)) => sum.iter_mut().zip(values).for_each(|(sum, v)| *sum += v / own),
+                None => sums.push((touch.name.clone(), values.iter().map(|v| v / own).collect())),
             }
         }
         let known = sums.into_iter().map(|(name, sum)| {
-            let length = sum.iter().map(|v| v * v).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
-            let taxels = sum.iter().enumerate().filter(|(_, v)| **v > 0.0);
-            Known {
+            let own = length(&sum);
+            let mean: Vec<f64> = sum.iter().map(|v| v / own).collect();
+            (
                 name,
-                taxels: taxels.map(|(k, v)| (k, v / length)).collect(),
-            }
+                shifted(&Matrix::from_column_slices(mean.len(), &[&mean]), cols, REACH),
+            )
         });
-        Self {
-            rows,
-            cols,
-            known: known.collect(),
-        }
+        Self(known.collect())
     }
 
-    /// The object whose template, shifted by up to a taxel along each axis, correlates most with `image`. The length of
-    /// `image` does not matter. `None` for an empty image.
-    pub fn name(&self, image: &[f64]) -> Option<&str> {
-        let shifts = (-REACH..=REACH).flat_map(|r| (-REACH..=REACH).map(move |c| (r, c)));
-        let scores = self.known.iter().map(|known| {
-            let score = |shift| self.correlation(known, image, shift);
-            (shifts.clone().map(score).fold(0.0, f64::max), &*known.name)
+    /// The object whose template correlates most with `image`. The length of `image` does not matter. `None` for an
+    /// empty image.
+    fn name(&self, image: &[f64]) -> Option<&str> {
+        let scores = self.0.iter().map(|(name, shifted)| {
+            let mut correlations = vec![0.0; shifted.ncols()];
+            shifted.accumulate_row(image, &mut correlations);
+            (correlations.into_iter().fold(0.0, f64::max), &**name)
         });
         let best = scores.reduce(|a, b| if b.0 > a.0 { b } else { a });
         best.filter(|(score, _)| *score > 0.0).map(|(_, name)| name)
-    }
-
-    /// Σ template·image with the template moved by `shift`; what leaves the skin counts nothing.
-    fn correlation(&self, known: &Known, image: &[f64], (down, right): (isize, isize)) -> f64 {
-        let moved = |k: usize, by: isize, most: usize| k.checked_add_signed(by).filter(|k| *k < most);
-        let terms = known.taxels.iter().filter_map(|(k, v)| {
-            let row = moved(k / self.cols, down, self.rows)?;
-            let col = moved(k % self.cols, right, self.cols)?;
-            Some(v * image[row * self.cols + col])
-        });
-        terms.sum()
     }
 }
 
@@ -456,7 +418,7 @@ const fn system(
 }
 
 /// Published systems, from few taxels to many.
-pub const PUBLISHED: &[PublishedSystem] = &[
+const PUBLISHED: &[PublishedSystem] = &[
     system("CDMA skin", 16, 78.0, ["1", "measured", "arXiv 2509.10888"]),
     system(
         "SPTS",
@@ -518,7 +480,7 @@ mod tests {
             specimen: Some(5),
             ..TouchScene::new(SkinLayout::default(), TouchObjects::Objects, 34, 1)
         };
-        let templates = Templates::new(&scene.draw().unwrap(), 10, 10);
+        let templates = Templates::new(&scene.draw().unwrap(), 10);
         let others = TouchScene {
             seed: 2,
             touches: 17,
