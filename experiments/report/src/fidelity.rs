@@ -1,7 +1,7 @@
 //! The files of a fidelity study.
 
 use crate::figures::colour::heat;
-use crate::figures::{Chart, Curve, Plot, Sheet, Style, Tile, TileRow, save_charts, save_sheet};
+use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow, save_charts, save_sheet};
 use crate::{Origin, write_all_or_none};
 use spts::output::{OutputError, OutputFolder, write_bytes, write_json, write_table};
 use spts_eval::{Table, unique};
@@ -92,17 +92,17 @@ fn mean(setting: &Setting<'_>, get: fn(&MeasuredSetting) -> f64) -> f64 {
 
 /// Every setting of the scenes of `task`, the cheapest level first.
 fn settings<'a>(rows: &'a [MeasuredSetting], task: &str) -> Vec<Setting<'a>> {
-    let key = |r: &&MeasuredSetting| (level_of(r), r.cells_per_taxel, r.timestep_s.to_bits());
+    let key = |r: &&MeasuredSetting| {
+        (
+            LEVELS.iter().position(|level| level.name == r.level),
+            r.cells_per_taxel,
+            r.timestep_s.to_bits(),
+        )
+    };
     let mut rows: Setting<'_> = rows.iter().filter(|r| r.task == task).collect();
     rows.sort_by_key(key);
     let same = |a: &&MeasuredSetting, b: &&MeasuredSetting| key(a) == key(b) && a.cells == b.cells;
     rows.chunk_by(same).map(<[_]>::to_vec).collect()
-}
-
-/// Place of the level of a row in [`LEVELS`].
-fn level_of(row: &MeasuredSetting) -> usize {
-    let place = LEVELS.iter().position(|level| level.name == row.level);
-    place.unwrap_or(LEVELS.len())
 }
 
 /// What a fidelity level is called in tables.
@@ -129,17 +129,22 @@ fn pareto(rows: &[MeasuredSetting]) -> Vec<Chart> {
             continue;
         }
         for (k, (y_label, quantity)) in quantities.into_iter().enumerate() {
-            let plot = Plot::new(&settings)
-                .x("wall time of a simulated second, s", |s| mean(s, |r| r.cost_s_per_s))
-                .log_x()
-                .y(y_label, |s| mean(s, quantity))
-                .by(|s| {
-                    let (style, variant) = STYLES[level_of(s[0]).min(STYLES.len() - 1)];
-                    Curve::new(label(&s[0].level), style, variant)
-                });
-            // scores differ by shares of one, pressures by orders of magnitude
-            let plot = if k == 0 { plot.log_y() } else { plot };
-            charts.push(plot.chart(format!("{heading}: {y_label}")));
+            let of_level = |(level, (style, variant)): (&FidelityLevel, (Style, u8))| {
+                let own = settings.iter().filter(|s| s[0].level == level.name);
+                let points = own.map(|s| (mean(s, |r| r.cost_s_per_s), mean(s, quantity)));
+                Series::new(level.label, style, variant, points.collect())
+            };
+            charts.push(Chart {
+                title: format!("{heading}: {y_label}"),
+                x_label: "wall time of a simulated second, s".to_owned(),
+                y_label: y_label.to_owned(),
+                x_log: true,
+                // scores differ by shares of one, pressures by orders of magnitude
+                y_log: k == 0,
+                // every level, so that the panels share a legend
+                series: LEVELS.iter().zip(STYLES).map(of_level).collect(),
+                ..Chart::default()
+            });
         }
     }
     charts
