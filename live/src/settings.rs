@@ -5,7 +5,7 @@ use serde::Serialize;
 use spts::Refusal;
 use spts_circuit::{PROFILES, Profile};
 use spts_contact::objects::pressable;
-use spts_eval::decoders::{DECODERS, DecoderSpec, Needs, PublishedDecode};
+use spts_eval::decoders::{DECODERS, DecoderSpec, Needs, PUBLISHED_DECODES};
 use spts_models::{SkinLayout, in_range, within};
 use spts_recon::rows::{DESIGNERS, Designer, RowNeeds};
 use std::collections::BTreeMap;
@@ -232,7 +232,7 @@ impl Options {
             name: spec.name,
             label: spec.label.to_owned(),
             about: spec.about.to_owned(),
-            group: if PublishedDecode::ALL.iter().any(|decode| decode.name() == spec.name) {
+            group: if PUBLISHED_DECODES.contains(&spec.name) {
                 "Published with the skin"
             } else {
                 "Others"

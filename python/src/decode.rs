@@ -215,8 +215,7 @@ fn images_in(images: &PyReadonlyArray2<'_, f64>, taxels: usize) -> PyResult<Matr
         bail!("`images[{k}, {taxel}]` = {v} is not finite");
     }
     let columns: Vec<Vec<f64>> = images.rows().into_iter().map(|row| row.to_vec()).collect();
-    let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-    Ok(Matrix::from_column_slices(taxels, &slices))
+    Ok(Matrix::from_column_slices(taxels, &columns))
 }
 
 /// One class an image.

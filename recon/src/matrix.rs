@@ -74,10 +74,10 @@ impl Matrix {
     /// # Panics
     /// If a column has another length than `nrows`.
     #[must_use]
-    pub fn from_column_slices(nrows: usize, columns: &[&[f64]]) -> Self {
+    pub fn from_column_slices(nrows: usize, columns: &[impl AsRef<[f64]>]) -> Self {
         let ncols = columns.len();
         let mut out = Self::zeros(nrows, ncols);
-        for (c, column) in columns.iter().enumerate() {
+        for (c, column) in columns.iter().map(AsRef::as_ref).enumerate() {
             assert_eq!(
                 column.len(),
                 nrows,
@@ -267,8 +267,7 @@ pub fn shifted(dictionary: &Matrix, cols: usize, reach: usize) -> Matrix {
             }
         }
     }
-    let slices: Vec<&[f64]> = atoms.iter().map(Vec::as_slice).collect();
-    Matrix::from_column_slices(dictionary.nrows(), &slices)
+    Matrix::from_column_slices(dictionary.nrows(), &atoms)
 }
 
 /// Another number of values than the shape needs.
@@ -292,7 +291,7 @@ mod tests {
     #[test]
     #[should_panic(expected = "column 1 must have one value for each of the 2 rows")]
     fn columns_of_unequal_length_are_named() {
-        let _ = Matrix::from_column_slices(2, &[&[1.0, 2.0], &[1.0, 2.0, 3.0]]);
+        let _ = Matrix::from_column_slices(2, &[vec![1.0, 2.0], vec![1.0, 2.0, 3.0]]);
     }
 
     #[test]

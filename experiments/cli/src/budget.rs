@@ -5,7 +5,7 @@ use crate::error::CliError;
 use crate::options::{Side, parse_measurements, seed, sorted, square};
 use clap::Args;
 use spts::chain::DEFAULT_READOUT;
-use spts_eval::decoders::PublishedDecode;
+use spts_eval::decoders::PUBLISHED_DECODES;
 use spts_studies::budget::BudgetStudy;
 use std::path::PathBuf;
 
@@ -54,7 +54,7 @@ pub(super) struct BudgetCommand {
     /// ±1 and without the output of the idle skin
     #[arg(long, value_delimiter = ',', value_name = "DECODE,…", value_parser = parse_decode,
           default_value = "matched,script_s20")]
-    decode: Vec<PublishedDecode>,
+    decode: Vec<&'static str>,
     /// Objects that are pressed and told apart, or all [default: brain,center,eraser,rec,trig]
     #[arg(long, value_delimiter = ',', value_name = "NAME,…")]
     objects: Vec<String>,
@@ -76,12 +76,9 @@ pub(super) struct BudgetCommand {
     common: Common,
 }
 
-fn parse_decode(text: &str) -> Result<PublishedDecode, String> {
-    let found = PublishedDecode::ALL.into_iter().find(|decode| decode.name() == text);
-    found.ok_or_else(|| {
-        let known = PublishedDecode::ALL.map(PublishedDecode::name);
-        format!("known: {}", known.join(", "))
-    })
+fn parse_decode(text: &str) -> Result<&'static str, String> {
+    let found = PUBLISHED_DECODES.into_iter().find(|decode| *decode == text);
+    found.ok_or_else(|| format!("known: {}", PUBLISHED_DECODES.join(", ")))
 }
 
 impl BudgetCommand {

@@ -99,7 +99,7 @@ fn table(report: &ValidationOutput) -> String {
     out.push_str(&table.text());
     if !scores.localisation.is_empty() {
         let places = Table::new("places", &scores.localisation)
-            .shown("decode", |l| locator_label(l.decode))
+            .shown("decode", |l| locator_label(&l.decode))
             .shown("M", |l| l.m)
             .shown("mean", |l| l.mean_px)
             .digits(2)

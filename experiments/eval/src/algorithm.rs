@@ -1,7 +1,7 @@
 //! Algorithms that turn windows into images or classes, and are scored on them.
 
 use crate::labels::Labels;
-use crate::training::{LearnError, TrainingData};
+use crate::training::TrainingData;
 use crate::windows::Window;
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
@@ -267,12 +267,6 @@ impl From<ExternalError> for ScoreError {
     }
 }
 
-impl From<LearnError> for ScoreError {
-    fn from(error: LearnError) -> Self {
-        Self::Refused(error.into())
-    }
-}
-
 impl From<ScoreError> for Refusal {
     fn from(error: ScoreError) -> Self {
         Self::from_error(error)
@@ -282,13 +276,6 @@ impl From<ScoreError> for Refusal {
 impl From<DecodeError> for Refusal {
     fn from(error: DecodeError) -> Self {
         Self::from_error(error)
-    }
-}
-
-impl ScoreError {
-    /// The error of rows that cannot be chosen.
-    pub(crate) fn rows(refusal: Refusal) -> Self {
-        Self::Refused(refusal.at("rows"))
     }
 }
 

@@ -3,15 +3,17 @@
 use crate::algorithm::{Answer, Trained};
 use crate::decoders::{DecoderSpec, Needs};
 use crate::place::{RecordedTouch, find_bounces, find_touches};
+use crate::protocol::{Truth, mask};
 use crate::session::ScoredSession;
-use crate::training::{LearnError, TrainedNetwork, TrainingData};
+use crate::table::Table;
+use crate::training::{TrainedNetwork, TrainingData};
 use crate::windows::{Untouched, Window};
 use crate::{Labels, unique};
 use npyz::WriterBuilder as _;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts::Session;
-use spts::output::{OutputError, OutputFolder, write_csv};
+use spts::output::{OutputError, OutputFolder};
 use spts::session::Event;
 use spts_circuit::Recording;
 use spts_input::Refusal;
@@ -19,7 +21,7 @@ use spts_models::{SkinLayout, Streams};
 use spts_recon::Workspace;
 use spts_recon::classify::Src;
 use spts_recon::localise::centre_of_mass;
-use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, pearson, support};
+use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, pearson};
 use std::fs::File;
 use std::io;
 use std::io::{BufWriter, Write as _};
@@ -133,7 +135,7 @@ pub(crate) fn too_many(session: &Session, m: usize, windows: usize, [start, most
 }
 
 /// Why `decoder` cannot be trained.
-pub(crate) fn untrained(decoder: &str, error: LearnError) -> Refusal {
+pub(crate) fn untrained(decoder: &str, error: Refusal) -> Refusal {
     Refusal::from_error(error).at(format_args!("decoder `{decoder}`"))
 }
 
@@ -147,16 +149,6 @@ impl DecodeRequest {
         shares
     }
 
-    /// Shapes on a skin of this `layout`, where a decoder learns from them.
-    fn shapes(&self, layout: &SkinLayout) -> Result<Option<TrainingData>, Refusal> {
-        let Some(spec) = self.decoders.iter().find(|spec| spec.needs == Needs::Shapes) else {
-            return Ok(None);
-        };
-        let data = TrainingData::for_shapes(layout, Streams::new(self.seed));
-        let data = data.map_err(|e| untrained(spec.name, e))?;
-        Ok(Some(data.with_network(self.network.clone())))
-    }
-
     /// Trains the decoders with `training` for a skin of this `layout`. `classes` are the names of its labels; `None`
     /// without classes.
     ///
@@ -168,11 +160,13 @@ impl DecodeRequest {
         training: &TrainingData,
         classes: Option<&Labels>,
     ) -> Result<LearnedDecoders, Refusal> {
-        let shapes = self.shapes(layout)?;
         let named = training.clone().with_network(self.network.clone());
         let trained = self.decoders.iter().map(|spec| {
-            let own = shapes.as_ref().filter(|_| spec.needs == Needs::Shapes);
-            let trained = (spec.train)(own.unwrap_or(&named));
+            let shapes = match spec.needs {
+                Needs::Shapes => TrainingData::for_shapes(layout, Streams::new(self.seed)).map(Some),
+                _ => Ok(None),
+            };
+            let trained = shapes.and_then(|shapes| (spec.train)(shapes.as_ref().unwrap_or(&named)));
             trained.map_err(|e| untrained(spec.name, e))
         });
         Ok(LearnedDecoders {
@@ -202,15 +196,9 @@ impl DecodeRequest {
         }
         let layout = recording.layout();
         let longest = self.measurements.iter().copied().max().unwrap_or(0) * self.windows;
-        let judge = Judge {
-            session,
-            scored: &scored,
-            classifier: learned.classifier.as_ref(),
-            classes: learned.classes.as_ref(),
-        };
         let blocks = begins.par_iter().enumerate().map(|(block, &(start, ref untouched))| {
-            let range = start..start + longest;
-            let press = untouched.press(recording, block, range);
+            let press = untouched.press(recording, block, start..start + longest);
+            let truth = scored.truth(block);
             let all = |m: usize| press.windows(0..m * self.windows, m, m);
             let measured = self
                 .measurements
@@ -229,19 +217,18 @@ impl DecodeRequest {
                 let mut algorithm = trained.start();
                 for &m in &self.measurements {
                     let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = all(m).unzip();
-                    let answers = starts
-                        .iter()
-                        .zip(algorithm.decode_all(&windows).map_err(Refusal::from_error)?);
+                    let answers = algorithm.decode_all(&windows).map_err(Refusal::from_error)?;
+                    let answers = starts.iter().zip(answers);
                     rows.extend(answers.map(|(&at, answer)| DecodedWindow {
                         window: at / m,
                         decoder: spec.name,
                         m,
                         start: start + at,
-                        ..judge.judged(block, answer)
+                        ..learned.judged(session, truth.as_ref(), block, answer)
                     }));
                 }
             }
-            Ok((rows, measured, scored.truth(block).map(|truth| truth.image)))
+            Ok((rows, measured, truth.map(|truth| truth.image)))
         });
         let blocks = blocks.collect::<Result<Vec<_>, Refusal>>()?;
         let mut decoded = DecodedSession {
@@ -250,7 +237,7 @@ impl DecodeRequest {
             knows_class: learned
                 .classes
                 .as_ref()
-                .is_some_and(|classes| classes.number(&session.object).is_some()),
+                .is_some_and(|all| all.number(&session.object).is_some()),
             rows: Vec::new(),
             truth: Vec::new(),
             measured: Vec::new(),
@@ -265,33 +252,22 @@ impl DecodeRequest {
     }
 }
 
-/// What an answer is held against.
-struct Judge<'a> {
-    session: &'a Session,
-    scored: &'a ScoredSession,
-    classifier: Option<&'a Src>,
-    classes: Option<&'a Labels>,
-}
-
-impl Judge<'_> {
-    /// The answer to a window of block `block`, scored; what names the window is left empty.
-    fn judged(&self, block: usize, answer: Answer) -> DecodedWindow {
-        let class = match (answer.class, self.classifier) {
-            (Some(class), Some(_)) => class.label(),
-            (None, Some(classifier)) => {
-                let class = classifier.classify(&answer.image, &mut Workspace::default());
-                class.ok().flatten()
-            }
-            (_, None) => None,
-        };
-        let truth = self.scored.truth(block);
+impl LearnedDecoders {
+    /// The answer to a window of block `block`, held against the truth; what names the window is left empty.
+    fn judged(&self, session: &Session, truth: Option<&Truth>, block: usize, answer: Answer) -> DecodedWindow {
+        let classifier = self.classifier.as_ref();
+        let class = classifier.and_then(|classifier| match answer.class {
+            Some(class) => class.label(),
+            None => classifier
+                .classify(&answer.image, &mut Workspace::default())
+                .ok()
+                .flatten(),
+        });
         let truth = truth.filter(|truth| truth.image.len() == answer.image.len());
-        let mut mask = Vec::new();
-        support(&answer.image, SUPPORT_THRESHOLD, &mut mask);
-        let score = truth.as_ref().map(|truth| SupportScore::new(&mask, &truth.support));
-        let cols = self.session.layout().map_or(1, SkinLayout::cols);
+        let score = truth.map(|truth| SupportScore::new(&mask(&answer.image), &truth.support));
+        let cols = session.layout().map_or(1, SkinLayout::cols);
         DecodedWindow {
-            session: self.session.name.clone(),
+            session: session.name.clone(),
             block,
             window: 0,
             decoder: "",
@@ -300,8 +276,12 @@ impl Judge<'_> {
             support: score.map(|s| s.accuracy),
             iou: score.map(|s| s.iou),
             correlation: truth.and_then(|truth| pearson(&answer.image, &truth.image)),
-            label: self.classes.and_then(|labels| labels.name(class?)).map(str::to_owned),
-            label_true: self.session.object.clone(),
+            label: self
+                .classes
+                .as_ref()
+                .and_then(|labels| labels.name(class?))
+                .map(str::to_owned),
+            label_true: session.object.clone(),
             place: centre_of_mass(&answer.image, cols, SUPPORT_THRESHOLD),
             image: answer.image,
         }
@@ -312,14 +292,12 @@ impl Judge<'_> {
 /// something fell on the skin, or touched one that is under preload.
 fn begins(session: &Session, recording: &Recording, scored: &ScoredSession) -> Vec<(usize, Untouched)> {
     let hold = scored.protocol.first_frame * recording.measurements_per_frame();
-    let contacts = match session.event {
-        Event::Drop => find_bounces(recording),
-        Event::Press | Event::Touch => Vec::new(),
-    };
-    let touches = match session.event {
-        Event::Touch => find_touches(recording),
-        Event::Press | Event::Drop => Vec::new(),
-    };
+    let (mut contacts, mut touches) = (Vec::new(), Vec::new());
+    match session.event {
+        Event::Drop => contacts = find_bounces(recording),
+        Event::Touch => touches = find_touches(recording),
+        Event::Press => {}
+    }
     let begin = |block: usize| {
         let preloaded = |touch: &&RecordedTouch| touch.block == block && touch.untouched.image.is_some();
         if let Some(touch) = touches.iter().find(preloaded) {
@@ -332,40 +310,26 @@ fn begins(session: &Session, recording: &Recording, scored: &ScoredSession) -> V
     (0..recording.blocks().len()).map(begin).collect()
 }
 
-/// Columns of `windows.csv`.
-const COLUMNS: [&str; 13] = [
-    "session",
-    "block",
-    "window",
-    "decoder",
-    "m",
-    "start",
-    "support",
-    "iou",
-    "correlation",
-    "label",
-    "label_true",
-    "row",
-    "col",
-];
-
 /// Writes `windows.csv` and one `NAME.npz` for each session into the folder `out`.
 ///
 /// # Errors
 /// [`OutputError`] if a file cannot be written.
 pub fn write(decoded: &[(&Session, DecodedSession)], out: &mut OutputFolder) -> Result<(), OutputError> {
-    let rows = decoded.iter().flat_map(|(_, session)| &session.rows);
-    let line = |r: &DecodedWindow| {
-        let [row, col] = r.place.map_or([None; 2], |place| place.map(Some));
-        let key = (r.session.clone(), r.block, r.window, r.decoder, r.m, r.start);
-        (
-            key,
-            (r.support, r.iou, r.correlation),
-            (r.label.clone(), r.label_true.clone()),
-            (row, col),
-        )
-    };
-    write_csv(&out.path("windows.csv"), &COLUMNS, rows.map(line))?;
+    Table::new("windows", decoded.iter().flat_map(|(_, session)| &session.rows))
+        .file("session", |r| &r.session)
+        .file("block", |r| r.block)
+        .file("window", |r| r.window)
+        .file("decoder", |r| r.decoder)
+        .file("m", |r| r.m)
+        .file("start", |r| r.start)
+        .file("support", |r| r.support)
+        .file("iou", |r| r.iou)
+        .file("correlation", |r| r.correlation)
+        .file("label", |r| r.label.as_deref())
+        .file("label_true", |r| &r.label_true)
+        .file("row", |r| r.place.map(|[row, _]| row))
+        .file("col", |r| r.place.map(|[_, col]| col))
+        .write(out)?;
     for (_, session) in decoded {
         write_arrays(&out.path(&format!("{}.npz", session.session)), session)?;
     }
@@ -388,30 +352,21 @@ fn write_arrays(path: &Path, session: &DecodedSession) -> Result<(), OutputError
         let windows: Vec<_> = session.measured.iter().filter(|w| w.m == m).collect();
         let n = windows.len();
         let column = |of: fn(&MeasuredWindow) -> usize| windows.iter().map(|w| of(w) as f64).collect();
-        arrays.push((
-            format!("phi_m{m}"),
-            vec![n, m, taxels],
-            windows.iter().flat_map(|w| w.phi.clone()).collect(),
-        ));
-        arrays.push((
-            format!("y_m{m}"),
-            vec![n, m],
-            windows.iter().flat_map(|w| w.y.clone()).collect(),
-        ));
+        let values = |of: fn(&MeasuredWindow) -> &[f64]| windows.iter().flat_map(|w| of(w)).copied().collect();
+        arrays.push((format!("phi_m{m}"), vec![n, m, taxels], values(|w| &w.phi)));
+        arrays.push((format!("y_m{m}"), vec![n, m], values(|w| &w.y)));
         arrays.push((format!("block_m{m}"), vec![n], column(|w| w.block)));
         arrays.push((format!("window_m{m}"), vec![n], column(|w| w.window)));
-        let decoders = unique(session.rows.iter().filter(|row| row.m == m).map(|row| row.decoder));
-        for decoder in decoders {
-            let of = session.rows.iter().filter(|row| row.m == m && row.decoder == decoder);
-            let mut of: Vec<_> = of.collect();
+        let own = || session.rows.iter().filter(|row| row.m == m);
+        for decoder in unique(own().map(|row| row.decoder)) {
+            let mut of: Vec<_> = own().filter(|row| row.decoder == decoder).collect();
             of.sort_by_key(|row| (row.block, row.window));
-            let mut images = Vec::with_capacity(of.len() * taxels);
-            for row in &of {
-                // a decoder that answers labels only has no image
+            let image = |row: &&DecodedWindow| {
                 let mut image = row.image.clone();
                 image.resize(taxels, f64::NAN);
-                images.extend(image);
-            }
+                image
+            };
+            let images = of.iter().flat_map(image).collect();
             arrays.push((format!("image_{decoder}_m{m}"), vec![of.len(), rows, cols], images));
         }
     }
@@ -419,7 +374,8 @@ fn write_arrays(path: &Path, session: &DecodedSession) -> Result<(), OutputError
     let truth = session
         .truth
         .iter()
-        .flat_map(|t| t.as_ref().unwrap_or(&unknown).clone())
+        .flat_map(|t| t.as_ref().unwrap_or(&unknown))
+        .copied()
         .collect();
     arrays.push(("truth".to_owned(), vec![session.truth.len(), rows, cols], truth));
     write_npz(path, &arrays).map_err(OutputError::write(path))

@@ -33,7 +33,9 @@ pub use algorithm::ScoreError;
 pub use alignment::{SessionSlip, find_slips, follow_slips, slips_text};
 pub use decoders::RASTER;
 pub use labels::Labels;
-pub use published::{BaselineRow, ScoreRow, ScoredSkin, SkinScores, baselines, mean_rows, score_raster, score_session};
+pub use published::{
+    BaselineRow, ScoreRow, ScoredSkin, SkinScores, baselines, mean_rows, score_raster, score_sessions,
+};
 pub use scorer::{Scorer, decode_us};
 pub use sensing::{RowChooser, Sensing};
 pub use session::ScoredSession;

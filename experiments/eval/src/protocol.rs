@@ -141,8 +141,21 @@ impl Truth {
         let press = protocol.truth.0.min(raster.blocks().len() - 1);
         let frame = protocol.truth.1.min(raster.frames() - 1);
         let image = raster.volts(press, frame).to_vec();
-        let mut mask = Vec::new();
-        support(&image, SUPPORT_THRESHOLD, &mut mask);
-        Self { image, support: mask }
+        Self::of(image)
     }
+
+    /// The truth that is `image`.
+    pub(crate) fn of(image: Vec<f64>) -> Self {
+        Self {
+            support: mask(&image),
+            image,
+        }
+    }
+}
+
+/// The support of `image`.
+pub(crate) fn mask(image: &[f64]) -> Vec<bool> {
+    let mut mask = Vec::new();
+    support(image, SUPPORT_THRESHOLD, &mut mask);
+    mask
 }

@@ -1,13 +1,13 @@
 //! The published evaluation of a skin.
 
-use crate::algorithm::{DecodeError, ScoreError};
-use crate::decoders::{PublishedDecode, RASTER, TrainedDecoder};
+use crate::algorithm::ScoreError;
+use crate::board::{Entry, Run};
+use crate::decoders::{RASTER, TrainedDecoder, published_decodes};
 use crate::place::{LocalisationRow, PlaceRow, localise, places};
 use crate::protocol::Truth;
-use crate::scorer::{ScoredPress, Scorer};
 use crate::sensing::Sensing;
 use crate::session::ScoredSession;
-use crate::tally::{Scores, Tally, pool};
+use crate::tally::{Tally, pool};
 use crate::training::Learned;
 use crate::unique;
 use rayon::prelude::*;
@@ -59,14 +59,16 @@ impl ScoredSkin {
         more: &[(&'static str, TrainedDecoder)],
         done: &(dyn Fn() + Sync),
     ) -> Result<SkinScores, ScoreError> {
-        let mut decoders = PublishedDecode::named(&self.learned)?;
+        let mut decoders = published_decodes(&self.learned)?;
         decoders.extend(more.iter().cloned());
-        let (mut compressive, mut raster) = (Vec::new(), Vec::new());
-        for session in &self.sessions {
-            compressive.extend(score_session(session, &decoders, measurements, done)?);
-            raster.extend(score_raster(session, &self.learned, measurements));
+        let sessions: Vec<&ScoredSession> = self.sessions.iter().collect();
+        let compressive = score_sessions(&sessions, &decoders, measurements, done)?;
+        let raster = self.sessions.iter().flat_map(|session| {
+            let rows = score_raster(session, &self.learned, measurements);
             done();
-        }
+            rows
+        });
+        let raster: Vec<ScoreRow> = raster.collect();
         let located = match &self.bounces {
             Some(recording) => localise(recording, &self.learned.shifted, self.learned.cols, localisation)?,
             None => Vec::new(),
@@ -135,8 +137,9 @@ pub struct ScoreRow {
 }
 
 impl ScoreRow {
-    /// The scores of `session`; `None` when a score is missing, as without a window.
-    pub(crate) fn new(session: &ScoredSession, decode: &'static str, m: usize, scores: &Scores) -> Option<Self> {
+    /// The scores of the presses of `session`; `None` when a score is missing, as without a window.
+    fn new(session: &ScoredSession, decode: &'static str, m: usize, presses: &[Tally]) -> Option<Self> {
+        let scores = pool(presses);
         Some(Self {
             object: session.title().to_owned(),
             decode,
@@ -152,37 +155,37 @@ impl ScoreRow {
     }
 }
 
-/// Scores every press of the compressive recording of `session` at every M with every decoder, each beside its name.
-/// Presses run in parallel; the result does not depend on the number of threads. `done` is called after every press.
+/// Scores every press of `sessions` at every M with every decoder, each beside its name: the board with decoders that
+/// are trained already. `done` is called after every press.
 ///
 /// # Errors
-/// [`DecodeError::External`] alone.
-pub fn score_session(
-    session: &ScoredSession,
+/// [`ScoreError`] of an external program.
+pub fn score_sessions(
+    sessions: &[&ScoredSession],
     decoders: &[(&'static str, TrainedDecoder)],
     measurements: &[usize],
     done: &(dyn Fn() + Sync),
-) -> Result<Vec<ScoreRow>, DecodeError> {
-    let each = |(decode, decoder)| measurements.iter().map(move |&m| (decode, decoder, m));
-    let keys: Vec<(&'static str, &TrainedDecoder, usize)> =
-        decoders.iter().map(|(d, t)| (*d, t)).flat_map(each).collect();
-    let presses: Vec<Vec<Tally>> = session
-        .scored()
-        .into_par_iter()
-        .filter_map(|block| ScoredPress::new(session, block))
-        .map(|press| {
-            let score = |(_, decoder, m): &(&'static str, &TrainedDecoder, usize)| {
-                Scorer::new(decoder).score(&press, *m, Some(session.label))
-            };
-            let tallies = keys.iter().map(score).collect();
-            done();
-            tallies
-        })
-        .collect::<Result<_, DecodeError>>()?;
-    let row = |(k, (decode, _, m)): (usize, &(&'static str, &TrainedDecoder, usize))| {
-        ScoreRow::new(session, decode, *m, &pool(presses.iter().map(|p| &p[k])))
+) -> Result<Vec<ScoreRow>, ScoreError> {
+    let run = Run {
+        sessions: sessions.to_vec(),
+        measurements: measurements.to_vec(),
+        times: false,
     };
-    Ok(keys.iter().enumerate().filter_map(row).collect())
+    let entries = decoders
+        .iter()
+        .map(|(name, decoder)| Entry::published(name, decoder, sessions.len()));
+    let tallies = run.tallies(&entries.collect::<Vec<_>>(), done)?;
+    let slots = decoders
+        .iter()
+        .flat_map(|(decode, _)| measurements.iter().map(move |&m| (*decode, m)));
+    let slots: Vec<((&str, usize), Vec<Vec<Tally>>)> = slots.zip(tallies).collect();
+    let of_session = |(at, session): (usize, &&ScoredSession)| {
+        let rows = slots
+            .iter()
+            .filter_map(|((decode, m), tallies)| ScoreRow::new(session, decode, *m, &tallies[at]));
+        rows.collect::<Vec<_>>()
+    };
+    Ok(sessions.iter().enumerate().flat_map(of_session).collect())
 }
 
 /// Mean over all objects for every decoding variant and M, in the order of the first object's rows.
@@ -240,7 +243,7 @@ pub fn score_raster(session: &ScoredSession, learned: &Learned, measurements: &[
                     tally
                 })
                 .collect();
-            ScoreRow::new(session, RASTER, m, &pool(&presses))
+            ScoreRow::new(session, RASTER, m, &presses)
         })
         .collect()
 }

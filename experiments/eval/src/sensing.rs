@@ -4,7 +4,7 @@
 //! looking at the samples can therefore be scored on real samples. The order in time is lost: memory effects of the
 //! cells, and changes during the press, are those of the recording and not of the window.
 
-use crate::training::{LearnError, TrainingData, in_rows, in_templates};
+use crate::training::TrainingData;
 use crate::windows::Press;
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
@@ -65,22 +65,19 @@ impl RowChooser {
     /// A chooser for images and classes like those of `data`.
     ///
     /// # Errors
-    /// [`LearnError`] if they make no prior.
-    pub fn new(data: &TrainingData) -> Result<Self, LearnError> {
+    /// [`Refusal`] if they make no prior.
+    pub fn new(data: &TrainingData) -> Result<Self, Refusal> {
         let prior = data.prior(ImagePrior::UNSEEN)?;
         let templates = &data.templates;
-        let mut labels = templates.labels().to_vec();
-        labels.sort_unstable();
-        labels.dedup();
-        let classes = if labels.len() > 1 {
-            TemplateModel::new(data.shape[1])
-                .classes(templates)
-                .map_err(in_templates)?
+        let several = templates.labels().iter().any(|label| *label != templates.labels()[0]);
+        let classes = if several {
+            let model = TemplateModel::new(data.shape[1]);
+            model.classes(templates).map_err(|e| e.at("templates"))?
         } else {
             Vec::new()
         };
         Ok(Self {
-            images: Expected::like(&prior, data.shape, Tolerances::default()).map_err(in_rows)?,
+            images: Expected::like(&prior, data.shape, Tolerances::default()).map_err(|e| e.at("rows"))?,
             classes,
         })
     }
@@ -151,8 +148,7 @@ fn blobs(shape: [usize; 2]) -> Matrix {
         .iter()
         .flat_map(|&width| (0..rows * cols).map(move |centre| (width, centre)));
     let images: Vec<Vec<f64>> = all.map(|(width, centre)| blob(width, centre)).collect();
-    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
-    Matrix::from_column_slices(rows * cols, &slices)
+    Matrix::from_column_slices(rows * cols, &images)
 }
 
 /// A window for every offset: up to `most` of every third of the first `pool` measurements, chosen by `choose`. A
@@ -165,10 +161,10 @@ fn chosen(
 ) -> Result<Vec<Press>, Refusal> {
     let mut windows = Vec::with_capacity(OFFSETS);
     for offset in 0..OFFSETS {
-        let candidates: Vec<usize> = (offset..pool)
+        let candidates = (offset..pool)
             .step_by(OFFSETS)
-            .filter(|k| press.window(*k, 1).is_some())
-            .collect();
+            .filter(|k| press.window(*k, 1).is_some());
+        let candidates: Vec<usize> = candidates.collect();
         if candidates.is_empty() {
             continue;
         }
@@ -241,10 +237,6 @@ mod tests {
         for ((_, y), (_, before)) in windows(lost, 6).iter().zip(&long) {
             assert!(y.iter().all(|v| v.is_finite() && v.to_bits() != before[0].to_bits()));
         }
-    }
-
-    #[test]
-    fn a_press_without_samples_has_no_windows() {
-        assert!(chosen_places(&press(vec![f64::NAN; 9]), SHAPE, 4).unwrap().is_empty());
+        assert!(windows(vec![f64::NAN; 9], 4).is_empty());
     }
 }

@@ -4,7 +4,6 @@ use crate::protocol::{Protocol, Truth};
 use spts::Session;
 use spts::session::Event;
 use spts_circuit::Recording;
-use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 
 /// Both recordings of an object, with the number of its class and the scored blocks and frames.
 #[derive(Debug, Clone)]
@@ -65,10 +64,7 @@ impl ScoredSession {
         if let Some(raster) = self.raster.as_ref().filter(|_| self.held) {
             return Some(Truth::new(raster, &self.raster_protocol));
         }
-        let image = self.simulated.get(block)?.clone()?;
-        let mut mask = Vec::new();
-        support(&image, SUPPORT_THRESHOLD, &mut mask);
-        Some(Truth { image, support: mask })
+        Some(Truth::of(self.simulated.get(block)?.clone()?))
     }
 
     /// Name in score tables: the object's; for a further session of the same object, the session's own.

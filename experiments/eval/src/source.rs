@@ -4,7 +4,7 @@ use crate::alignment::{SessionSlip, follow_slips};
 use crate::labels::Labels;
 use crate::published::ScoredSkin;
 use crate::session::ScoredSession;
-use crate::training::{LearnError, Learned, SHIFT_REACH, TrainingData, TrainingPresses};
+use crate::training::{Learned, SHIFT_REACH, TrainingData, TrainingPresses};
 use spts::Refusal;
 use spts::Session;
 use spts::data::{DataError, Published, SessionSet};
@@ -82,11 +82,8 @@ impl Source {
             mut missing,
         } = set;
         let simulated = sessions.iter().all(|s| s.provenance.is_some());
-        let touches = sessions.iter().filter(|s| s.event == Event::Touch);
-        let touches: Vec<(String, Recording)> = touches
-            .filter_map(|s| Some((s.name.clone(), s.compressive()?.clone())))
-            .collect();
-        let presses: Vec<Session> = sessions.into_iter().filter(|s| s.event == Event::Press).collect();
+        let (presses, others): (Vec<Session>, Vec<Session>) =
+            sessions.into_iter().partition(|s| s.event == Event::Press);
         let layout = presses.iter().find_map(|s| s.layout().copied());
         let layout = layout.or(bounces.as_ref().map(|b| *b.layout())).unwrap_or_default();
         let labels = Labels::of(presses.iter().map(|s| s.object.as_str()));
@@ -101,8 +98,9 @@ impl Source {
             }
             fits
         });
+        let touches = others.iter().filter(|s| s.event == Event::Touch);
+        let touches = touches.filter_map(|s| Some((s.name.clone(), s.compressive()?.clone())));
         let touches = touches
-            .into_iter()
             .filter(|(_, touches)| shape(touches.layout()) == shape(&layout))
             .collect();
         let mut scored: Vec<ScoredSession> = Vec::with_capacity(presses.len());
@@ -136,8 +134,8 @@ impl Source {
     /// classes.
     ///
     /// # Errors
-    /// [`LearnError`] if the images are not usable.
-    pub fn training(&self, streams: Streams) -> Result<(TrainingData, Option<&Labels>), LearnError> {
+    /// [`Refusal`] if the images are not usable.
+    pub fn training(&self, streams: Streams) -> Result<(TrainingData, Option<&Labels>), Refusal> {
         let presses = self.sessions.iter().filter_map(TrainingPresses::unscored);
         let presses: Vec<TrainingPresses<'_>> = presses.filter(|t| !t.is_empty()).collect();
         if presses.is_empty() {

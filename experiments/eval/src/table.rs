@@ -1,5 +1,6 @@
 //! The one shape of results: rows with columns, as text, HTML, CSV and JSON.
 
+use crate::tally::ScoreColumn;
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 use spts::output::{CsvFile, OutputError, OutputFolder};
 use std::fmt::{self, Display};
@@ -147,6 +148,19 @@ impl<'a, R: Copy> Table<'a, R> {
         self.with(None, Some(head.into()), value)
     }
 
+    /// A column of numbers with `digits` decimals, for readers alone.
+    #[must_use]
+    pub fn number<V: Into<Cell>>(self, head: impl Into<String>, digits: usize, value: impl Fn(R) -> V + 'a) -> Self {
+        self.shown(head, value).digits(digits)
+    }
+
+    /// Columns of scores, for files alone.
+    #[must_use]
+    pub(crate) fn files<S: 'a>(self, scores: &[ScoreColumn<S>], of: impl Fn(R) -> &'a S + Copy + 'a) -> Self {
+        let columns = scores.iter().copied();
+        columns.fold(self, |table, (name, get)| table.file(name, move |row| get(of(row))))
+    }
+
     fn with<V: Into<Cell>>(mut self, key: Option<String>, head: Option<String>, value: impl Fn(R) -> V + 'a) -> Self {
         self.columns.push(Column {
             key,
@@ -271,7 +285,19 @@ pub struct TextTable {
     pub rows: Vec<Vec<String>>,
 }
 
+/// A number with `digits` decimals, or a dash.
+pub(crate) fn fixed(value: Option<f64>, digits: usize) -> String {
+    value.map_or_else(|| "–".to_owned(), |v| format!("{v:.digits$}"))
+}
+
 impl TextTable {
+    pub(crate) fn new<'a>(head: impl IntoIterator<Item = &'a str>, rows: impl Iterator<Item = Vec<String>>) -> Self {
+        Self {
+            head: head.into_iter().map(str::to_owned).collect(),
+            rows: rows.collect(),
+        }
+    }
+
     /// The table as an HTML element; cells of numbers have the class `number`.
     #[must_use]
     pub fn html(&self) -> String {

@@ -1,10 +1,11 @@
 //! Counts of one press, and the resulting scores.
 
+use crate::protocol::mask;
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
 use spts_models::Streams;
 use spts_recon::classify::{VoteScore, vote_groups};
-use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
+use spts_recon::metrics::{MeanScore, SupportScore};
 
 /// Times presses are drawn anew for a confidence interval.
 const RESAMPLES: usize = 1000;
@@ -78,8 +79,7 @@ impl Tally {
     /// Scores `image` against the true support `truth`. If other windows have an image and this one has none, it counts
     /// as an empty one.
     pub fn image(&mut self, image: &[f64], truth: &[bool]) {
-        let mut mask = Vec::new();
-        support(image, SUPPORT_THRESHOLD, &mut mask);
+        let mut mask = mask(image);
         mask.resize(truth.len(), false);
         self.supports.push(SupportScore::new(&mask, truth));
         self.has_images |= !image.is_empty();
@@ -150,12 +150,9 @@ pub(crate) fn mean(objects: &[Scores]) -> Scores {
 }
 
 /// 95 % intervals of support, IoU and single windows, see [`bootstrap`].
-pub(crate) fn intervals(objects: &[Vec<&Tally>], streams: Streams) -> [Option<[f64; 2]>; 3] {
-    bootstrap(objects, streams, |drawn| {
-        let means: Vec<Scores> = drawn
-            .iter()
-            .map(|presses| pool(presses.iter().copied().copied()))
-            .collect();
+pub(crate) fn intervals(objects: &[Vec<Tally>]) -> [Option<[f64; 2]>; 3] {
+    bootstrap(objects, |drawn| {
+        let means: Vec<Scores> = drawn.iter().map(|presses| pool(presses.iter().copied())).collect();
         let scores = mean(&means);
         [scores.support, scores.iou, scores.class_single]
     })
@@ -167,10 +164,9 @@ pub(crate) fn intervals(objects: &[Vec<&Tally>], streams: Streams) -> [Option<[f
 /// no interval.
 pub(crate) fn bootstrap<T, const K: usize>(
     objects: &[Vec<T>],
-    streams: Streams,
     score: impl Fn(&[Vec<&T>]) -> [Option<f64>; K],
 ) -> [Option<[f64; 2]>; K] {
-    let mut rng = streams.rng("bootstrap", 0);
+    let mut rng = Streams::new(1).rng("bootstrap", 0);
     let mut values: [Option<Vec<f64>>; K] = std::array::from_fn(|_| Some(Vec::with_capacity(RESAMPLES)));
     for _ in 0..RESAMPLES {
         let drawn: Vec<Vec<&T>> = objects

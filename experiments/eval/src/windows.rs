@@ -159,21 +159,21 @@ impl Press {
     /// Measurements `range` of block `block` of `recording`. The output of the untouched skin is `idle_v`, V.
     #[must_use]
     pub fn within(recording: &Recording, block: usize, range: Range<usize>, idle_v: f64) -> Self {
-        let volts = recording.blocks()[block].volts[range.clone()].to_vec();
-        Self::on(Arc::new(PressRows::new(recording.rows(block, range))), volts, idle_v)
+        let untouched = Untouched {
+            offset_v: idle_v,
+            image: None,
+        };
+        untouched.press(recording, block, range)
     }
 
     /// The measurements `volts`, V, with the rows `rows`. The output of the untouched skin is `idle_v`, V.
     #[must_use]
     pub fn on(rows: Arc<PressRows>, volts: Vec<f64>, idle_v: f64) -> Self {
-        let y = volts.iter().map(|v| v - idle_v).collect();
-        Self::measured(rows, volts, y)
-    }
-
-    /// The measurements `volts` at the rows `rows`, which are `y` without what the untouched skin gives, V; one each a
-    /// row.
-    pub(crate) fn measured(rows: Arc<PressRows>, volts: Vec<f64>, y: Vec<f64>) -> Self {
-        Self { rows, volts, y }
+        Self {
+            y: volts.iter().map(|v| v - idle_v).collect(),
+            rows,
+            volts,
+        }
     }
 
     /// The measurements with the numbers `indices`, in this order, with their rows.
@@ -328,9 +328,11 @@ impl Untouched {
     /// output.
     #[must_use]
     pub fn press(&self, recording: &Recording, block: usize, range: Range<usize>) -> Press {
-        let volts = recording.blocks()[block].volts[range.clone()].to_vec();
-        let y = self.without(recording, block, range.clone());
-        Press::measured(Arc::new(PressRows::new(recording.rows(block, range))), volts, y)
+        Press {
+            volts: recording.blocks()[block].volts[range.clone()].to_vec(),
+            y: self.without(recording, block, range.clone()),
+            rows: Arc::new(PressRows::new(recording.rows(block, range))),
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use crate::labels::{object_label, score_label, statistic_label};
 use crate::{per_object, write_all_or_none};
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, write_json};
-use spts_eval::decoders::{PublishedDecode, label, short_label};
+use spts_eval::decoders::{label, short_label};
 use spts_eval::{ScoreRow, Table};
 use spts_studies::arm::{ArmBand, ArmReport};
 use spts_studies::calibrate::quantiles;
@@ -218,11 +218,7 @@ pub fn draw(report: &CompareReport, folder: &Path) -> Result<(), OutputError> {
     let charts: Vec<Chart> = report.compared.iter().map(quantile_plot).collect();
     save_charts(&charts, folder, "quantiles")?;
     let Some(curves) = &report.curves else { return Ok(()) };
-    let panels = [
-        PublishedDecode::Matched,
-        PublishedDecode::ScriptS20,
-        PublishedDecode::ScriptM4,
-    ];
+    let panels = ["matched", "script_s20", "script_m4"];
     save_charts(&panels.map(|decode| scores(curves, decode)), folder, "scores")
 }
 
@@ -292,7 +288,7 @@ fn quantile_plot(compared: &ComparedSession) -> Chart {
     }
 }
 
-fn scores(curves: &ScoreCurves, decode: PublishedDecode) -> Chart {
+fn scores(curves: &ScoreCurves, decode: &str) -> Chart {
     type Score = (u8, &'static str, fn(&ScoreRow) -> f64);
     let all: [Score; 3] = [
         (0, "support", |r| r.support),
@@ -306,7 +302,7 @@ fn scores(curves: &ScoreCurves, decode: PublishedDecode) -> Chart {
     let mut rows = Vec::new();
     for score in &all {
         for (style, whose, of_skin) in skins {
-            let here = of_skin.iter().filter(|r| r.decode == decode.name());
+            let here = of_skin.iter().filter(|r| r.decode == decode);
             rows.extend(here.map(|r| (score, style, whose, r)));
         }
     }
@@ -316,7 +312,7 @@ fn scores(curves: &ScoreCurves, decode: PublishedDecode) -> Chart {
         .y("score, mean over the objects", |((_, _, get), .., r)| get(r))
         .within(0.0, 1.02)
         .by(|((variant, name, _), style, whose, _)| Curve::new(format!("{whose}, {name}"), style, *variant))
-        .chart(label(decode.name()))
+        .chart(label(decode))
 }
 
 #[cfg(test)]

@@ -65,7 +65,7 @@ fn draw_board(board: &ScoreBoard, folder: &Path) -> Result<(), OutputError> {
         scores(board, "IoU, learned objects", "IoU", Over::M, false, iou),
         scores(board, same, "", Over::Time, false, iou),
     ];
-    if board.rows.iter().any(|r| r.left_out) {
+    if board.rows.iter().any(|r| r.key.left_out) {
         images.push(scores(board, "IoU, object left out", "IoU", Over::M, true, iou));
     }
     save_charts(&drawn(images), folder, "reconstruction")?;
@@ -96,31 +96,31 @@ enum Over {
 
 /// One score of all decoders; a decoder has a curve for every source that it learned from, and for every kind of rows.
 fn scores(board: &ScoreBoard, title: &str, y_label: &str, over: Over, left_out: bool, get: Score) -> Chart {
-    let rows: Vec<&BoardRow> = board.rows.iter().filter(|r| r.left_out == left_out).collect();
-    let names = unique(board.rows.iter().map(|r| r.decoder.as_str()));
+    let rows: Vec<&BoardRow> = board.rows.iter().filter(|r| r.key.left_out == left_out).collect();
+    let names = unique(board.rows.iter().map(|r| r.key.decoder.as_str()));
     let sources = |name: &str| {
-        let own = rows.iter().filter(|r| r.decoder == name);
-        unique(own.map(|r| (r.learned_from.as_str(), r.sensing)))
+        let own = rows.iter().filter(|r| r.key.decoder == name);
+        unique(own.map(|r| (r.key.learned_from.as_str(), r.key.sensing)))
     };
     let curve = |r: &BoardRow| {
-        let sources = sources(&r.decoder);
-        let own = (r.learned_from.as_str(), r.sensing);
-        let mut words = short_label(&r.decoder).to_owned();
+        let sources = sources(&r.key.decoder);
+        let own = (r.key.learned_from.as_str(), r.key.sensing);
+        let mut words = short_label(&r.key.decoder).to_owned();
         if sources.iter().any(|(other, _)| *other != own.0) {
-            words.push_str(&format!(", {}", r.learned_from));
+            words.push_str(&format!(", {}", r.key.learned_from));
         }
         if sources.iter().any(|(_, other)| *other != own.1) {
-            words.push_str(&format!(", {} rows", r.sensing.name()));
+            words.push_str(&format!(", {} rows", r.key.sensing.name()));
         }
         let k = sources.iter().position(|source| *source == own).unwrap_or(0);
-        Curve::of_decoder(words, &r.decoder, Stroke::of(k))
+        Curve::of_decoder(words, &r.key.decoder, Stroke::of(k))
     };
     let by_name = names
         .iter()
-        .flat_map(|name| rows.iter().copied().filter(move |r| r.decoder == *name));
+        .flat_map(|name| rows.iter().copied().filter(move |r| r.key.decoder == *name));
     let plot = Plot::new(by_name).y(y_label, get).by(curve).log_x().within(0.0, 1.02);
     let plot = match over {
-        Over::M => plot.x("measurements M", |r| r.m as f64),
+        Over::M => plot.x("measurements M", |r| r.key.m as f64),
         Over::Time => plot.x("time, µs", |r| Some(r.acquire_us + r.decode_us?)),
     };
     plot.chart(title)
@@ -150,25 +150,30 @@ fn localisation(ball: &[&PlaceRow]) -> [Chart; 2] {
 /// number: a panel of the classes and one of the images. Images are those of objects that were left out, where there
 /// are such.
 fn stops(board: &AnytimeBoard) -> Vec<Chart> {
-    let left_out = board.rows.iter().any(|r| r.left_out);
+    let left_out = board.rows.iter().any(|r| r.key.left_out);
     let panel = |title: &str, y_label: &str, subject: Subject, left_out: bool| {
         let here = board
             .rows
             .iter()
-            .filter(|r| r.subject == subject && r.left_out == left_out);
-        let several = unique(here.clone().map(|r| (r.decoder.as_str(), r.learned_from.as_str()))).len() > 1;
+            .filter(|r| r.key.subject == subject && r.key.left_out == left_out);
+        let several = unique(
+            here.clone()
+                .map(|r| (r.key.decoder.as_str(), r.key.learned_from.as_str())),
+        )
+        .len()
+            > 1;
         let curve = move |r: &AnytimeRow| {
-            let style = match r.sensing {
+            let style = match r.key.sensing {
                 Sensing::Random => Style::Twin,
                 Sensing::Chosen => Style::Raster,
             };
-            let (shade, how) = match r.confidence {
+            let (shade, how) = match r.key.confidence {
                 Some(_) => (0, "stops when sure"),
                 None => (1, "fixed number"),
             };
-            let mut name = format!("{} rows, {how}", r.sensing.name());
+            let mut name = format!("{} rows, {how}", r.key.sensing.name());
             if several {
-                name.push_str(&format!(", {}, {}", short_label(&r.decoder), r.learned_from));
+                name.push_str(&format!(", {}, {}", short_label(&r.key.decoder), r.key.learned_from));
             }
             Curve::new(name, style, shade)
         };

@@ -13,7 +13,7 @@ use spts::scene::{PressConfig, Scene, SceneConfig};
 use spts_circuit::{EFFECTS, FAULTS, Interpolated, Mode, Profile, Recording};
 use spts_contact::Frame;
 use spts_contact::objects::{OBJECTS, ObjectSpec, by_name};
-use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
+use spts_eval::decoders::{TrainedDecoder, published};
 use spts_eval::protocol::{PUBLISHED_TAXELS, Protocol, Truth};
 use spts_eval::training::{Learned, Learning};
 use spts_eval::{Press, RASTER, ScoredSession, Scorer, Tally, Window, idle_mean, unique};
@@ -41,7 +41,7 @@ pub struct BudgetStudy {
     /// Numbers of measurements; empty for 7, 20 and 50, or the same shares of a larger skin's taxels.
     pub measurements: Vec<usize>,
     /// Decoding variants.
-    pub decodes: Vec<PublishedDecode>,
+    pub decodes: Vec<&'static str>,
     /// Number of taxels along one side of the skin. Range [10, 40].
     pub side: usize,
     /// Seed of all random numbers.
@@ -115,7 +115,7 @@ impl BudgetStudy {
             let place = variants.iter().position(|v| *v == variant);
             &scores[place.unwrap_or_default()]
         };
-        let each_m = |decode: &PublishedDecode| measurements.iter().map(|&m| (decode.name(), m)).collect::<Vec<_>>();
+        let each_m = |&decode: &&'static str| measurements.iter().map(|&m| (decode, m)).collect::<Vec<_>>();
         let keys: Vec<(&'static str, usize)> = self.decodes.iter().flat_map(each_m).collect();
         let (mut rows, mut ends) = (Vec::new(), Vec::new());
         for line in &comparisons {
@@ -619,7 +619,7 @@ impl<'a> LearnedSkin<'a> {
         let learned = (0..size.sessions).into_par_iter().map(|session| {
             let streams = Streams::new(study.seed).child("learning", session as u64);
             let learned = Learned::learn(&scanned, &size.learning, scene.skin().cols(), streams)?;
-            let decoders = study.decodes.iter().map(|decode| decode.decoder(&learned));
+            let decoders = study.decodes.iter().map(|decode| published(decode, &learned));
             Ok((decoders.collect::<Result<Vec<_>, _>>()?, learned))
         });
         let learned = learned.map(|found| found.map(|(decoders, learned)| (learned, decoders)));

@@ -14,9 +14,9 @@ use spts::record::Twin;
 use spts::scene::Scene;
 use spts_circuit::{Block, Interpolated, Mode, Profile, Readout, Recording};
 use spts_contact::objects::OBJECTS;
-use spts_eval::decoders::PublishedDecode;
+use spts_eval::decoders::published_decodes;
 use spts_eval::protocol::{PLATEAU, PUBLISHED_RATE_HZ, PUBLISHED_TAXELS, Protocol};
-use spts_eval::{PublishedSkin, ScoreRow, ScoredSession, footprint_scene, mean_rows, score_session, unique};
+use spts_eval::{PublishedSkin, ScoreRow, ScoredSession, footprint_scene, mean_rows, score_sessions, unique};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, Streams, TaxelGains};
 use std::path::Path;
@@ -470,12 +470,11 @@ fn curves(
     real: &PublishedSkin,
     done: &(dyn Fn() + Sync),
 ) -> Result<ScoreCurves, Refusal> {
-    let decoders = PublishedDecode::named(&real.skin.learned)?;
+    let decoders = published_decodes(&real.skin.learned)?;
     let [skin, twin] = sessions.each_ref().map(|sessions| {
-        let rows = sessions
-            .iter()
-            .map(|session| score_session(session, &decoders, &MEASUREMENTS, done));
-        Ok::<_, Refusal>(mean_rows(&rows.collect::<Result<Vec<_>, _>>()?.concat()))
+        let sessions: Vec<&ScoredSession> = sessions.iter().collect();
+        let rows = score_sessions(&sessions, &decoders, &MEASUREMENTS, done)?;
+        Ok::<_, Refusal>(mean_rows(&rows))
     });
     let (real, twin) = (skin?, twin?);
     Ok(ScoreCurves {

@@ -13,7 +13,7 @@ use spts::scene::{DropConfig, PressConfig, Scene, SceneConfig, Task};
 use spts_circuit::Mode;
 use spts_contact::Frame;
 use spts_contact::mesh::{TriMesh, cylinder, extrude, sphere};
-use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
+use spts_eval::decoders::{TrainedDecoder, published};
 use spts_eval::training::Learned;
 use spts_eval::{Press, Scorer, Tally, Window};
 use spts_input::Refusal;
@@ -707,8 +707,7 @@ impl ReferenceScores {
         let dictionary = ksvd
             .learn(&chosen, &mut streams.rng("ksvd", 0))
             .map_err(nothing("dictionary"))?;
-        let columns: Vec<&[f64]> = library.iter().map(Vec::as_slice).collect();
-        let library = Library::new(&Matrix::from_column_slices(dictionary.nrows(), &columns), &labels)
+        let library = Library::new(&Matrix::from_column_slices(dictionary.nrows(), &library), &labels)
             .map_err(nothing("library"))?;
         let cols = references.first().map_or(1, |r| r.at_reference.skin().cols());
         let learned = Learned::new(dictionary, None, library, cols);
@@ -716,7 +715,7 @@ impl ReferenceScores {
             .iter()
             .map(|reference| Truth::new(&reference.at_reference, &reference.scored));
         let mut learned = Self {
-            decoder: PublishedDecode::Matched.decoder(&learned)?,
+            decoder: published("matched", &learned)?,
             truths: truths.collect(),
             references: Vec::new(),
         };

@@ -145,8 +145,8 @@ fn scores(source: &Source, objects: &[String], seed: u64) -> Result<Vec<(ObjectS
     let of_row = |row: &ObjectRow| {
         let value = |&(score, get): &(&'static str, fn(&Scores) -> Option<f64>)| {
             let key = ObjectScore {
-                decoder: row.decoder.clone(),
-                m: row.m,
+                decoder: row.key.decoder.clone(),
+                m: row.key.m,
                 score,
                 object: row.object.clone(),
             };

@@ -282,8 +282,7 @@ pub(super) fn planted() -> (EvidenceClassifier, Vec<Vec<f64>>) {
         shape(&[21, 22, 23, 24, 27, 28]),
         shape(&[10, 16, 22, 28]),
     ];
-    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
-    let library = Library::new(&Matrix::from_column_slices(36, &slices), &[3, 1, 2]).unwrap();
+    let library = Library::new(&Matrix::from_column_slices(36, &images), &[3, 1, 2]).unwrap();
     let model = TemplateModel::new(6);
     let mut components = model.classes(&library).unwrap();
     components.push(model.unknown(&library).unwrap());
@@ -317,8 +316,7 @@ fn finds_planted_classes() {
 #[test]
 fn shifted_templates_find_shifted_objects() {
     let (_, images) = planted();
-    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
-    let images = Matrix::from_column_slices(36, &slices);
+    let images = Matrix::from_column_slices(36, &images);
     let library = Library::new(&images, &[3, 1, 2]).unwrap();
     let share = |reach: usize, shift: [usize; 2]| {
         let model = TemplateModel {

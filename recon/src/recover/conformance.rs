@@ -319,8 +319,7 @@ impl Regularised<'_> {
         // an iteration that stops at a relative gap of 1e-6 knows its answer to about the square root of it
         assert_near(self.suite.name, "twice the measurements", &twice, &expected, 1e-2);
         let columns: Vec<Vec<f64>> = (0..K).rev().map(|k| a.column(k)).collect();
-        let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-        let mut turned = self.solve(&Matrix::from_column_slices(a.nrows(), &slices), &y);
+        let mut turned = self.solve(&Matrix::from_column_slices(a.nrows(), &columns), &y);
         turned.reverse();
         assert_near(self.suite.name, "the unknowns in reverse order", &turned, &x, 1e-2);
     }

@@ -250,8 +250,7 @@ impl ImagePrior {
                 image.iter_mut().for_each(|v| *v *= common / length);
             }
         }
-        let slices: Vec<&[f64]> = kept.iter().map(Vec::as_slice).collect();
-        Matrix::from_column_slices(images.nrows(), &slices)
+        Matrix::from_column_slices(images.nrows(), &kept)
     }
 }
 

@@ -101,21 +101,15 @@ impl PreviewCommand {
         let name = &spec.config().name;
         let file = self.out.unwrap_or_else(|| PathBuf::from(format!("{name}-preview.png")));
         check_writable(&file)?;
-        let (mut rows, mut wrong) = (Vec::new(), None);
+        let mut rows = Vec::new();
         let size = (spec.skin().rows(), spec.skin().cols());
         let each = |row| -> Result<(), Refusal> {
-            match PreviewRow::of(&row, size) {
-                Ok(row) => rows.push(row),
-                Err(error) => wrong = wrong.take().or(Some(error)),
-            }
+            rows.push(PreviewRow::of(&row, size).map_err(|e| e.at(&self.source))?);
             Ok(())
         };
         match &source {
             Source::Files(dataset) => dataset.rows(&wanted, PREVIEW_COLUMNS, each)?,
             Source::Spec(spec) => spec.rows(&wanted, PREVIEW_COLUMNS, each)?,
-        }
-        if let Some(error) = wrong {
-            return Err(CliError::usage(format!("{}: {error}", self.source)));
         }
         let preview = Preview {
             name: name.clone(),

@@ -1,9 +1,9 @@
 //! Compares what two score tables have scored: their objects, decoders, numbers of measurements and so on.
 
-use super::{BoardRow, ScoreBoard};
+use super::{RowKey, ScoreBoard};
 use crate::place::PlaceRow;
 use crate::sensing::Sensing;
-use crate::tally::{ScoreColumn, Scores};
+use crate::tally::{ScoreColumn, Scores, unique};
 use serde::Serialize;
 
 /// Names of one kind, such as decoders, that only one of two score tables has. Where there are any, means of the two
@@ -23,28 +23,32 @@ type Names = fn(&ScoreBoard) -> Vec<String>;
 /// What is compared, in the order in which it is told.
 const KINDS: &[(&str, Names)] = &[
     ("objects", |b| b.objects.iter().map(|o| o.object.clone()).collect()),
-    ("decoders", |b| of_rows(b, |row| row.decoder.clone())),
-    ("numbers of measurements", |b| of_rows(b, |row| row.m.to_string())),
-    ("training data", |b| of_rows(b, |row| row.learned_from.clone())),
-    ("scores", |b| of_rows(b, |row| left_out(row).to_owned())),
-    ("rows of a window", |b| of_rows(b, |row| row.sensing.name().to_owned())),
-    ("places of", |b| of_places(b, |row| row.contact.clone())),
-    ("locators", |b| of_places(b, |row| row.decoder.clone())),
+    ("decoders", |b| b.rows.iter().map(|r| r.key.decoder.clone()).collect()),
+    ("numbers of measurements", |b| {
+        b.rows.iter().map(|r| r.key.m.to_string()).collect()
+    }),
+    ("training data", |b| {
+        b.rows.iter().map(|r| r.key.learned_from.clone()).collect()
+    }),
+    ("scores", |b| {
+        b.rows.iter().map(|r| left_out(&r.key).to_owned()).collect()
+    }),
+    ("rows of a window", |b| {
+        b.rows.iter().map(|r| r.key.sensing.name().to_owned()).collect()
+    }),
+    ("places of", |b| {
+        b.localisation.iter().map(|r| r.contact.clone()).collect()
+    }),
+    ("locators", |b| {
+        b.localisation.iter().map(|r| r.decoder.clone()).collect()
+    }),
     ("numbers of measurements of places", |b| {
-        of_places(b, |row| row.m.to_string())
+        b.localisation.iter().map(|r| r.m.to_string()).collect()
     }),
 ];
 
-fn of_rows(board: &ScoreBoard, name: fn(&BoardRow) -> String) -> Vec<String> {
-    board.rows.iter().map(name).collect()
-}
-
-fn of_places(board: &ScoreBoard, name: fn(&PlaceRow) -> String) -> Vec<String> {
-    board.localisation.iter().map(name).collect()
-}
-
-fn left_out(row: &BoardRow) -> &'static str {
-    if row.left_out {
+fn left_out(key: &RowKey) -> &'static str {
+    if key.left_out {
         "of objects left out of the training data"
     } else {
         "of objects in the training data"
@@ -77,13 +81,7 @@ pub fn differences(before: &ScoreBoard, now: &ScoreBoard) -> Vec<Difference> {
 
 /// The names in `these` that `those` lack, each once.
 fn without(these: &[String], those: &[String]) -> Vec<String> {
-    let mut found: Vec<String> = Vec::new();
-    for name in these {
-        if !those.contains(name) && !found.contains(name) {
-            found.push(name.clone());
-        }
-    }
-    found
+    unique(these.iter().filter(|name| !those.contains(name)).cloned())
 }
 
 /// A score that is lower than in an earlier score table, or is not there any more.
@@ -111,31 +109,31 @@ const PLACES: &[ScoreColumn<PlaceRow>] = &[
 pub fn regressions(before: &ScoreBoard, now: &ScoreBoard, tolerance: f64) -> Vec<Regression> {
     let mut found = Vec::new();
     for old in &before.rows {
-        let new = now.row_like(old);
-        let kind = if old.left_out { ", left out" } else { "" };
-        let rows = chosen(old.sensing);
-        let what = format!("{} at M = {} from {}{kind}{rows}", old.decoder, old.m, old.learned_from);
-        let new = new.map(|row| &row.scores);
+        let RowKey {
+            decoder,
+            m,
+            learned_from,
+            ..
+        } = &old.key;
+        let kind = if old.key.left_out { ", left out" } else { "" };
+        let what = format!(
+            "{decoder} at M = {m} from {learned_from}{kind}{}",
+            chosen(old.key.sensing)
+        );
+        let new = now.row_like(&old.key).map(|row| &row.scores);
         compare(&Scores::COLUMNS, &what, &old.scores, new, tolerance, &mut found);
     }
     for old in &before.localisation {
         let key = |r: &PlaceRow| (r.m, r.relabelled, r.sensing);
         let named = |r: &PlaceRow| r.decoder == old.decoder && r.contact == old.contact;
-        let same = |r: &&PlaceRow| named(r) && key(r) == key(old);
+        let new = now.localisation.iter().find(|r| named(r) && key(r) == key(old));
         let kind = if old.relabelled { ", relabelled" } else { "" };
         let rows = chosen(old.sensing);
         let what = format!(
             "place of {} by {} at M = {}{kind}{rows}",
             old.contact, old.decoder, old.m
         );
-        compare(
-            PLACES,
-            &what,
-            old,
-            now.localisation.iter().find(same),
-            tolerance,
-            &mut found,
-        );
+        compare(PLACES, &what, old, new, tolerance, &mut found);
     }
     found
 }
@@ -174,17 +172,21 @@ fn compare<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::board::ObjectRow;
-    use crate::sensing::Sensing;
-    use crate::tally::Scores;
+    use crate::board::{BoardRow, ObjectRow};
 
-    fn row(decoder: &str, m: usize, scores: Scores) -> BoardRow {
-        BoardRow {
+    fn key(decoder: &str, m: usize) -> RowKey {
+        RowKey {
             decoder: decoder.to_owned(),
             m,
             left_out: false,
             learned_from: "raster".to_owned(),
             sensing: Sensing::Random,
+        }
+    }
+
+    fn row(decoder: &str, m: usize, scores: Scores) -> BoardRow {
+        BoardRow {
+            key: key(decoder, m),
             scores,
             support_ci: None,
             iou_ci: None,
@@ -196,44 +198,35 @@ mod tests {
         }
     }
 
-    fn of_objects(cells: &[(&str, &str, usize)]) -> ScoreBoard {
-        let objects = cells.iter().map(|(object, decoder, m)| ObjectRow {
-            decoder: (*decoder).to_owned(),
-            m: *m,
-            left_out: false,
-            learned_from: "raster".to_owned(),
-            sensing: Sensing::Random,
-            object: (*object).to_owned(),
-            scores: Scores::default(),
-            iou_ci: None,
-            class_single_ci: None,
-        });
-        ScoreBoard {
-            objects: objects.collect(),
-            rows: cells
-                .iter()
-                .map(|(_, decoder, m)| row(decoder, *m, Scores::default()))
-                .collect(),
-            ..ScoreBoard::default()
-        }
-    }
-
     #[test]
     fn what_only_one_board_has_is_named_once() {
-        let before = of_objects(&[("T", "omp", 7), ("T", "omp", 20), ("rec", "omp", 20)]);
-        let now = of_objects(&[("T", "omp", 20), ("T", "evidence", 20)]);
-        let found = differences(&before, &now);
-        let found: Vec<_> = found
+        let board = |cells: &[(&str, &str, usize)]| {
+            let objects = cells.iter().map(|(object, decoder, m)| ObjectRow {
+                key: key(decoder, *m),
+                object: (*object).to_owned(),
+                scores: Scores::default(),
+                iou_ci: None,
+                class_single_ci: None,
+            });
+            let rows = cells.iter().map(|(_, decoder, m)| row(decoder, *m, Scores::default()));
+            ScoreBoard {
+                objects: objects.collect(),
+                rows: rows.collect(),
+                ..ScoreBoard::default()
+            }
+        };
+        let before = board(&[("T", "omp", 7), ("T", "omp", 20), ("rec", "omp", 20)]);
+        let found = differences(&before, &board(&[("T", "omp", 20), ("T", "evidence", 20)]));
+        let found = found
             .iter()
-            .map(|d| (d.what, d.only_before.join(","), d.only_now.join(",")))
-            .collect();
-        let text = |a: &str, b: &str| (a.to_owned(), b.to_owned());
+            .map(|d| (d.what, d.only_before.join(","), d.only_now.join(",")));
         let expected = [
-            ("objects", text("rec", "")),
-            ("decoders", text("", "evidence")),
-            ("numbers of measurements", text("7", "")),
+            ("objects", "rec", ""),
+            ("decoders", "", "evidence"),
+            ("numbers of measurements", "7", ""),
         ];
-        assert_eq!(found, expected.map(|(what, (a, b))| (what, a, b)));
+        let expected = expected.map(|(what, a, b)| (what, a.to_owned(), b.to_owned()));
+        assert_eq!(found.collect::<Vec<_>>(), expected);
     }
 
     fn board(iou: f64, mean_px: f64) -> ScoreBoard {
@@ -254,8 +247,7 @@ mod tests {
                 mean_px,
                 share_under_1px: 0.9,
             }],
-            objects: Vec::new(),
-            slips: Vec::new(),
+            ..ScoreBoard::default()
         }
     }
 

@@ -1,5 +1,6 @@
 //! Trains every algorithm of a board with every source of training data.
 
+use super::BoardSettings;
 use crate::algorithm::{Contender, ScoreError};
 use crate::decoders::{DecoderSpec, Needs, TrainedDecoder};
 use crate::labels::Labels;
@@ -7,12 +8,13 @@ use crate::sensing::{RowChooser, Sensing};
 use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::training::{
-    LAYOUT, LearnError, PUBLISHED, RASTER, SHAPES, SkinGains, TrainedNetwork, TrainingData, TrainingPresses,
-    TrainingSource, gain_sds, in_gains, in_library, on_skins_with, templates,
+    LAYOUT, PUBLISHED, SHAPES, SkinGains, TrainingData, TrainingPresses, TrainingSource, gain_sds, on_skins_with,
+    templates,
 };
 use spts_circuit::Recording;
 use spts_input::Refusal;
 use spts_models::{Streams, TaxelGains, VelostatConfig};
+use spts_recon::Matrix;
 use std::borrow::Cow;
 use std::sync::Arc;
 
@@ -30,22 +32,19 @@ pub(crate) struct Entry {
     pub(crate) choosers: Vec<Arc<RowChooser>>,
 }
 
-/// What is to be trained.
-pub(super) struct TrainingRequest<'a> {
-    /// Algorithms.
-    pub(super) decoders: &'a [&'static DecoderSpec],
-    /// External ones.
-    pub(super) external: &'a [Arc<dyn Contender>],
-    /// Sources of training data, each for every algorithm.
-    pub(super) training: &'a [TrainingSource],
-    /// Whether every algorithm is also trained without the scored object.
-    pub(super) left_out: bool,
-    /// Ways to obtain the rows of windows, each for every algorithm.
-    pub(super) sensing: &'a [Sensing],
-    /// The network for decoders that use one; `None` for the one shipped with the program.
-    pub(super) network: Option<&'a TrainedNetwork>,
-    /// The scored objects.
-    pub(super) objects: &'a [&'a str],
+impl Entry {
+    /// A decoder of the published evaluation, the same for all `sessions`.
+    pub(crate) fn published(name: &str, decoder: &TrainedDecoder, sessions: usize) -> Self {
+        Self {
+            name: name.to_owned(),
+            learned_from: PUBLISHED.to_owned(),
+            left_out: false,
+            sensing: Sensing::Random,
+            knows_classes: true,
+            decoders: vec![decoder.clone(); sessions],
+            choosers: Vec::new(),
+        }
+    }
 }
 
 /// An algorithm of the table or from outside.
@@ -55,48 +54,40 @@ enum Algorithm<'a> {
     External(&'a dyn Contender),
 }
 
-impl Algorithm<'_> {
-    fn name(self) -> String {
-        match self {
-            Self::Own(spec) => spec.name.to_owned(),
-            Self::External(given) => given.name().to_owned(),
-        }
-    }
+/// The scored object, where training depends on it, and whether its raster images are left out.
+type Scored<'a> = Option<(&'a str, bool)>;
 
-    fn needs(self) -> Needs {
-        match self {
-            Self::Own(spec) => spec.needs,
-            Self::External(_) => Needs::Dictionary,
-        }
-    }
+/// One set of training data.
+struct Prepared {
+    /// Name of the source, and the scored object.
+    key: (String, Option<(String, bool)>),
+    data: TrainingData,
+    /// Chooses rows for this training data; built on request.
+    chooser: Option<Arc<RowChooser>>,
 }
 
-/// What algorithms learn from.
-struct Training<'a> {
-    source: &'a TrainingSource,
-    /// Whether this is the published dictionary.
-    published: bool,
-    left_out: bool,
-}
-
-/// Training data that are prepared, and the object that they are for, where it matters.
-#[derive(Clone, Copy)]
-struct At<'a> {
-    place: usize,
-    scored: Option<(&'a str, bool)>,
-}
-
-/// Trains decoders, each with the training data that it needs.
+/// Trains decoders, each with the training data that it needs; every set of training data is prepared once.
 pub(super) struct Trainer<'a> {
     source: &'a Source,
-    pub(super) sets: TrainingSets<'a>,
+    settings: &'a BoardSettings,
+    streams: Streams,
+    /// Classes of the scored sessions and of all training data.
+    labels: Labels,
+    prepared: Vec<Prepared>,
+    /// Whether every raster press of the source is scored, so that none may be used for training.
+    layout_only: bool,
 }
 
 impl<'a> Trainer<'a> {
-    pub(super) fn new(source: &'a Source, seed: u64) -> Self {
+    pub(super) fn new(source: &'a Source, settings: &'a BoardSettings) -> Self {
+        let mut unscored = source.sessions.iter().filter_map(TrainingPresses::unscored);
         Self {
             source,
-            sets: TrainingSets::new(source, seed),
+            settings,
+            streams: Streams::new(settings.seed),
+            labels: source.labels.clone(),
+            prepared: Vec::new(),
+            layout_only: unscored.all(|t| t.is_empty()),
         }
     }
 
@@ -104,56 +95,82 @@ impl<'a> Trainer<'a> {
     ///
     /// # Errors
     /// [`ScoreError`].
-    pub(super) fn entries(&mut self, asked: &TrainingRequest<'_>) -> Result<Vec<Entry>, ScoreError> {
+    pub(super) fn entries(&mut self, sessions: &[&ScoredSession]) -> Result<Vec<Entry>, ScoreError> {
+        let asked = self.settings;
         let own = asked.decoders.iter().map(|spec| Algorithm::Own(spec));
-        let algorithms: Vec<Algorithm<'_>> = own
-            .chain(asked.external.iter().map(|given| Algorithm::External(&**given)))
-            .collect();
+        let external = asked.external.iter().map(|given| Algorithm::External(&**given));
+        let algorithms: Vec<Algorithm<'_>> = own.chain(external).collect();
         let mut entries: Vec<Entry> = Vec::new();
         let mut without_classes: Vec<String> = Vec::new();
-        self.sets.network = asked.network.cloned();
-        for source in asked.training {
+        for source in &asked.training {
             self.check(source)?;
             for left_out in [false, true] {
                 for &algorithm in algorithms.iter().filter(|_| asked.left_out || !left_out) {
-                    let shapes = TrainingSource::Shapes;
-                    let source = if algorithm.needs().shapes() { &shapes } else { source };
+                    let (name, needs) = match algorithm {
+                        Algorithm::Own(spec) => (spec.name.to_owned(), spec.needs),
+                        Algorithm::External(given) => (given.name().to_owned(), Needs::Dictionary),
+                    };
+                    let source = if needs.shapes() {
+                        &TrainingSource::Shapes
+                    } else {
+                        source
+                    };
+                    let shapes = matches!(source, TrainingSource::Shapes);
                     // no object is in the shapes, so that all of them are left out
-                    if matches!(source, TrainingSource::Shapes) && left_out != asked.left_out {
+                    if shapes && left_out != asked.left_out {
                         continue;
                     }
-                    let (name, from) = (algorithm.name(), self.learned_from(algorithm.needs(), source, left_out));
-                    let there = |e: &Entry| e.name == name && e.learned_from == from && e.left_out == left_out;
-                    let nothing_known = from == LAYOUT || from == SHAPES;
-                    let no_classes = nothing_known && algorithm.needs() == Needs::Classes;
-                    if no_classes {
+                    let published = self.source.published.is_some() && needs == Needs::Dictionary && !left_out;
+                    let learned_from = match source {
+                        _ if needs == Needs::Nothing => "nothing",
+                        TrainingSource::Published if published => PUBLISHED,
+                        TrainingSource::Published | TrainingSource::Raster if self.layout_only => LAYOUT,
+                        source => source.name(),
+                    };
+                    let nothing_known = learned_from == LAYOUT || learned_from == SHAPES;
+                    if nothing_known && needs == Needs::Classes {
                         if !without_classes.contains(&name) {
                             without_classes.push(name);
                         }
                         continue;
                     }
+                    let there = |e: &Entry| e.name == name && e.learned_from == learned_from && e.left_out == left_out;
                     if entries.iter().any(there) {
                         continue;
                     }
-                    let training = Training {
-                        source,
-                        published: from == PUBLISHED,
-                        left_out,
+                    let published = learned_from == PUBLISHED;
+                    let of_object =
+                        left_out && !shapes || matches!(source, TrainingSource::Calibrated { gains: None, .. });
+                    let mut places = Vec::with_capacity(sessions.len());
+                    for session in sessions {
+                        let scored = of_object.then_some((session.object.as_str(), left_out));
+                        places.push((self.place(source, published, scored)?, scored));
+                    }
+                    let decoders = places
+                        .iter()
+                        .map(|&(place, scored)| self.decoder(algorithm, place, scored));
+                    let decoders = if of_object {
+                        decoders.collect::<Result<Vec<_>, ScoreError>>()?
+                    } else {
+                        let one = decoders.take(1).collect::<Result<Vec<_>, ScoreError>>()?;
+                        one.into_iter().cycle().take(sessions.len()).collect()
                     };
-                    let decoders = self.each(&training, asked.objects, |own, at| own.decoder(algorithm, at))?;
-                    for &sensing in asked.sensing {
-                        let chooser = |own: &mut Self, at: At<'_>| Ok(own.sets.chooser(at.place)?);
+                    for &sensing in &asked.sensing {
+                        let choosers = match sensing {
+                            Sensing::Random => Vec::new(),
+                            Sensing::Chosen => {
+                                let each = places.iter().map(|&(place, _)| self.chooser(place));
+                                each.collect::<Result<_, Refusal>>()?
+                            }
+                        };
                         entries.push(Entry {
                             name: name.clone(),
-                            learned_from: from.clone(),
+                            learned_from: learned_from.to_owned(),
                             left_out,
                             sensing,
                             knows_classes: !left_out && !nothing_known,
                             decoders: decoders.clone(),
-                            choosers: match sensing {
-                                Sensing::Random => Vec::new(),
-                                Sensing::Chosen => self.each(&training, asked.objects, chooser)?,
-                            },
+                            choosers,
                         });
                     }
                 }
@@ -170,177 +187,76 @@ impl<'a> Trainer<'a> {
         Ok(entries)
     }
 
+    /// The published dictionary, or the one that is learned without it.
+    pub(super) fn dictionary(&mut self) -> Result<Matrix, Refusal> {
+        if let Some(published) = &self.source.published {
+            return Ok(published.dictionary.clone());
+        }
+        let place = self.place(&TrainingSource::Raster, false, None)?;
+        Ok(self.prepared[place].data.dictionary()?.atoms.clone())
+    }
+
     /// Refuses recordings of a sheet of another size.
     ///
     /// # Errors
     /// [`Refusal`] with the first of them.
     fn check(&self, source: &TrainingSource) -> Result<(), Refusal> {
         let needed = self.source.layout.taxels();
-        let taxels = |s: &ScoredSession| s.raster.as_ref().map_or(needed, Recording::taxels);
-        let other = |sessions: &[ScoredSession]| {
-            let other = sessions.iter().find(|s| taxels(s) != needed)?;
-            Some((other.object.clone(), taxels(other)))
-        };
-        let (name, other) = match source {
-            TrainingSource::Published | TrainingSource::Raster | TrainingSource::Shapes => return Ok(()),
-            TrainingSource::Poses { name, objects } => {
-                let other = objects.iter().find(|o| o.images.nrows() != needed);
-                (name, other.map(|o| (o.name.to_owned(), o.images.nrows())))
+        let of_session = |s: &ScoredSession| (s.object.clone(), s.raster.as_ref().map_or(needed, Recording::taxels));
+        let all: Vec<(String, usize)> = match source {
+            TrainingSource::Published | TrainingSource::Raster | TrainingSource::Shapes => Vec::new(),
+            TrainingSource::Poses { objects, .. } => {
+                objects.iter().map(|o| (o.name.to_owned(), o.images.nrows())).collect()
             }
-            TrainingSource::Other { name, sessions, .. } => (name, other(sessions)),
-            TrainingSource::Calibrated { name, simulated, .. } => (name, other(simulated)),
+            TrainingSource::Other { sessions, .. }
+            | TrainingSource::Calibrated {
+                simulated: sessions, ..
+            } => sessions.iter().map(of_session).collect(),
         };
-        other.map_or(Ok(()), |(object, taxels)| {
-            Err(Refusal::new(format!(
-                "{name}: the raster session of {object} has {taxels} taxels; the scored skin has {needed}"
-            )))
-        })
+        all.iter()
+            .find(|(_, taxels)| *taxels != needed)
+            .map_or(Ok(()), |(object, taxels)| {
+                Err(Refusal::new(format!(
+                    "{}: the raster session of {object} has {taxels} taxels; the scored skin has {needed}",
+                    source.name()
+                )))
+            })
     }
 
-    fn learned_from(&self, needs: Needs, source: &TrainingSource, left_out: bool) -> String {
-        let published = self.source.published.is_some() && needs == Needs::Dictionary && !left_out;
-        match (needs, source) {
-            (Needs::Nothing, _) => "nothing".to_owned(),
-            (_, TrainingSource::Published) if published => PUBLISHED.to_owned(),
-            (_, TrainingSource::Published | TrainingSource::Raster) if self.sets.layout_only => LAYOUT.to_owned(),
-            (_, TrainingSource::Published | TrainingSource::Raster) => RASTER.to_owned(),
-            (
-                _,
-                TrainingSource::Other { name, .. }
-                | TrainingSource::Poses { name, .. }
-                | TrainingSource::Calibrated { name, .. },
-            ) => name.clone(),
-            (_, TrainingSource::Shapes) => SHAPES.to_owned(),
-        }
-    }
-
-    /// One of what `make` makes for a scored object; one for all where they learn from the same.
-    fn each<T: Clone>(
-        &mut self,
-        training: &Training<'_>,
-        objects: &[&str],
-        make: impl Fn(&mut Self, At<'_>) -> Result<T, ScoreError>,
-    ) -> Result<Vec<T>, ScoreError> {
-        let mut made = |scored| {
-            let place = self.sets.place(training.source, training.published, scored)?;
-            make(self, At { place, scored })
-        };
-        let shapes = matches!(training.source, TrainingSource::Shapes);
-        if !shapes && training.left_out || matches!(training.source, TrainingSource::Calibrated { gains: None, .. }) {
-            let each = objects.iter();
-            each.map(|object| made(Some((object, training.left_out)))).collect()
-        } else {
-            Ok(vec![made(None)?; objects.len()])
-        }
-    }
-
-    fn decoder(&self, algorithm: Algorithm<'_>, at: At<'_>) -> Result<TrainedDecoder, ScoreError> {
-        let data = self.sets.at(at.place);
+    fn decoder(
+        &self,
+        algorithm: Algorithm<'_>,
+        place: usize,
+        scored: Scored<'_>,
+    ) -> Result<TrainedDecoder, ScoreError> {
+        let data = &self.prepared[place].data;
         Ok(match algorithm {
             Algorithm::Own(spec) => TrainedDecoder::new(spec, data)?,
-            Algorithm::External(given) => {
-                TrainedDecoder::of(given.learn(data, &self.sets.labels, left_out(at.scored))?, data)
-            }
+            Algorithm::External(given) => TrainedDecoder::of(given.learn(data, &self.labels, left_out(scored))?, data),
         })
-    }
-}
-
-/// What one set of training data is for.
-#[derive(Debug, Clone, PartialEq, Eq)]
-struct TrainingKey {
-    /// Name of the source.
-    source: String,
-    /// The scored object, if the training depends on it.
-    object: Option<String>,
-    /// Whether this object is excluded from the training data.
-    left_out: bool,
-}
-
-/// One set of training data.
-struct Prepared {
-    key: TrainingKey,
-    data: TrainingData,
-    /// Chooses rows for this training data; built on request.
-    chooser: Option<Arc<RowChooser>>,
-}
-
-/// Sets of training data, prepared on request.
-pub(super) struct TrainingSets<'a> {
-    source: &'a Source,
-    streams: Streams,
-    /// Classes of the scored sessions and of all training data.
-    pub(super) labels: Labels,
-    prepared: Vec<Prepared>,
-    /// Whether every raster press of the source is scored, so that none may be used for training.
-    pub(super) layout_only: bool,
-    /// The network for decoders that use one; `None` for the one shipped with the program.
-    pub(super) network: Option<TrainedNetwork>,
-}
-
-impl<'a> TrainingSets<'a> {
-    /// None prepared yet.
-    pub(super) fn new(source: &'a Source, seed: u64) -> Self {
-        Self {
-            source,
-            streams: Streams::new(seed),
-            labels: source.labels.clone(),
-            prepared: Vec::new(),
-            network: None,
-            layout_only: source
-                .sessions
-                .iter()
-                .filter_map(TrainingPresses::unscored)
-                .all(|t| t.is_empty()),
-        }
-    }
-
-    /// The set at a place that [`Self::place`] gave.
-    pub(super) fn at(&self, place: usize) -> &TrainingData {
-        &self.prepared[place].data
     }
 
     /// What chooses rows for the set at this place, built once.
-    pub(super) fn chooser(&mut self, place: usize) -> Result<Arc<RowChooser>, LearnError> {
+    fn chooser(&mut self, place: usize) -> Result<Arc<RowChooser>, Refusal> {
         let prepared = &mut self.prepared[place];
-        if let Some(chooser) = &prepared.chooser {
-            return Ok(Arc::clone(chooser));
-        }
-        let chooser = Arc::new(RowChooser::new(&prepared.data)?);
+        let chooser = match &prepared.chooser {
+            Some(chooser) => Arc::clone(chooser),
+            None => Arc::new(RowChooser::new(&prepared.data)?),
+        };
         prepared.chooser = Some(Arc::clone(&chooser));
         Ok(chooser)
     }
 
-    /// What may be learned when `scored` is the object; with `true` beside it, its raster images are left out.
-    pub(super) fn data(
-        &mut self,
-        source: &TrainingSource,
-        published: bool,
-        scored: Option<(&str, bool)>,
-    ) -> Result<&TrainingData, LearnError> {
-        let at = self.place(source, published, scored)?;
-        Ok(&self.prepared[at].data)
-    }
-
-    /// Place of this training data among those that are prepared; see [`Self::data`].
-    pub(super) fn place(
-        &mut self,
-        source: &TrainingSource,
-        published: bool,
-        scored: Option<(&str, bool)>,
-    ) -> Result<usize, LearnError> {
+    /// Place of the training data that may be used for `scored` among those that are prepared.
+    fn place(&mut self, source: &TrainingSource, published: bool, scored: Scored<'_>) -> Result<usize, Refusal> {
         let name = match source {
             TrainingSource::Published if published => PUBLISHED,
-            TrainingSource::Published | TrainingSource::Raster => RASTER,
-            TrainingSource::Other { name, .. }
-            | TrainingSource::Poses { name, .. }
-            | TrainingSource::Calibrated { name, .. } => name,
-            TrainingSource::Shapes => SHAPES,
+            source => source.name(),
         };
-        let key = TrainingKey {
-            source: name.to_owned(),
-            object: scored.map(|(object, _)| object.to_owned()),
-            left_out: left_out(scored).is_some(),
-        };
+        let key = (
+            name.to_owned(),
+            scored.map(|(object, left_out)| (object.to_owned(), left_out)),
+        );
         if let Some(at) = self.prepared.iter().position(|prepared| prepared.key == key) {
             return Ok(at);
         }
@@ -356,67 +272,56 @@ impl<'a> TrainingSets<'a> {
         Ok(self.prepared.len() - 1)
     }
 
-    fn prepare(&mut self, source: &TrainingSource, scored: Option<(&str, bool)>) -> Result<TrainingData, LearnError> {
+    fn prepare(&mut self, source: &TrainingSource, scored: Scored<'_>) -> Result<TrainingData, Refusal> {
         let own = self.source;
         match source {
             TrainingSource::Published | TrainingSource::Raster if self.layout_only => {
                 TrainingData::for_layout(&own.layout, self.streams)
             }
             TrainingSource::Poses { objects, .. } => {
-                let left_out = left_out(scored);
-                let kept = objects.iter().filter(|o| Some(o.name) != left_out);
+                let kept = objects.iter().filter(|o| Some(o.name) != left_out(scored));
                 let kept: Vec<_> = kept.map(|o| (self.labels.add(o.name), o)).collect();
                 TrainingData::of_poses(&kept, own.layout.cols(), self.streams)
             }
             TrainingSource::Shapes => {
-                Ok(TrainingData::for_shapes(&own.layout, self.streams)?.with_network(self.network.clone()))
+                let shapes = TrainingData::for_shapes(&own.layout, self.streams)?;
+                Ok(shapes.with_network(self.settings.network.clone()))
             }
             TrainingSource::Published | TrainingSource::Raster => {
                 self.learn(&own.sessions, TrainingPresses::unscored, Vec::new(), scored)
             }
             TrainingSource::Other {
-                sessions,
-                gain_sd,
-                all: true,
-                ..
-            } => self.learn(sessions, TrainingPresses::all, self.same_for_all(*gain_sd), scored),
-            TrainingSource::Other { sessions, gain_sd, .. } => {
-                self.learn(sessions, TrainingPresses::unscored, self.same_for_all(*gain_sd), scored)
+                sessions, gain_sd, all, ..
+            } => {
+                let of = if *all {
+                    TrainingPresses::all
+                } else {
+                    TrainingPresses::unscored
+                };
+                let taxels = if *gain_sd > 0.0 { own.layout.taxels() } else { 0 };
+                self.learn(sessions, of, vec![*gain_sd; taxels], scored)
             }
             TrainingSource::Calibrated { simulated, gains, .. } => {
                 let gains = match gains {
                     Some(gains) => Cow::Borrowed(gains),
                     None => Cow::Owned(self.gains_by_others(simulated, scored)?),
                 };
-                let shown = on_skins_with(&gains, simulated, self.streams.child("calibrated", 0)).map_err(in_gains)?;
+                let streams = self.streams.child("calibrated", 0);
+                let shown = on_skins_with(&gains, simulated, streams).map_err(|e| e.at("gains"))?;
                 self.learn(&shown, TrainingPresses::all, gain_sds(&gains), scored)
             }
         }
     }
 
     /// Gains of the scored skin, from unscored raster presses of all objects but the scored one.
-    fn gains_by_others(
-        &self,
-        simulated: &[ScoredSession],
-        scored: Option<(&str, bool)>,
-    ) -> Result<TaxelGains, LearnError> {
+    fn gains_by_others(&self, simulated: &[ScoredSession], scored: Scored<'_>) -> Result<TaxelGains, Refusal> {
         let others = self.source.sessions.iter();
         let others = others.filter(|s| scored.is_none_or(|(o, _)| s.object != o));
         let skin: Vec<TrainingPresses<'_>> = others.filter_map(TrainingPresses::unscored).collect();
         let twin: Vec<TrainingPresses<'_>> = simulated.iter().filter_map(TrainingPresses::all).collect();
-        let mounting = VelostatConfig::default().session_log_sd;
-        let [skin, twin] = [templates(&skin), templates(&twin)];
-        let gains = SkinGains::estimate(&skin.map_err(in_library)?, &twin.map_err(in_library)?, mounting);
-        Ok(gains.map_err(in_gains)?.gains)
-    }
-
-    /// The same γ for every taxel.
-    fn same_for_all(&self, gain_sd: f64) -> Vec<f64> {
-        if gain_sd > 0.0 {
-            vec![gain_sd; self.source.layout.taxels()]
-        } else {
-            Vec::new()
-        }
+        let of = |presses: &[TrainingPresses<'_>]| templates(presses).map_err(|e| e.at("library"));
+        let gains = SkinGains::estimate(&of(&skin)?, &of(&twin)?, VelostatConfig::default().session_log_sd);
+        Ok(gains.map_err(|e| e.at("gains"))?.gains)
     }
 
     fn learn<'s>(
@@ -424,10 +329,9 @@ impl<'a> TrainingSets<'a> {
         sessions: &'s [ScoredSession],
         training: impl Fn(&'s ScoredSession) -> Option<TrainingPresses<'s>>,
         gain_sd: Vec<f64>,
-        scored: Option<(&str, bool)>,
-    ) -> Result<TrainingData, LearnError> {
-        let left_out = left_out(scored);
-        let kept = sessions.iter().filter(|s| Some(s.object.as_str()) != left_out);
+        scored: Scored<'_>,
+    ) -> Result<TrainingData, Refusal> {
+        let kept = sessions.iter().filter(|s| Some(s.object.as_str()) != left_out(scored));
         // another source may have numbered its classes otherwise
         let training: Vec<TrainingPresses<'_>> = kept
             .filter_map(|s| Some(training(s)?.labelled(self.labels.add(&s.object))))
@@ -438,6 +342,6 @@ impl<'a> TrainingSets<'a> {
 }
 
 /// The object whose raster images are left out.
-pub(super) fn left_out(scored: Option<(&str, bool)>) -> Option<&str> {
+fn left_out(scored: Scored<'_>) -> Option<&str> {
     scored.filter(|(_, left_out)| *left_out).map(|(object, _)| object)
 }

@@ -21,14 +21,13 @@ use crate::sensing::{RowChooser, Sensing};
 use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::tally::{Scores, Tally, intervals, mean, pool};
-use crate::training::{LearnError, TrainedNetwork, TrainingSource};
+use crate::training::{TrainedNetwork, TrainingSource};
 pub(crate) use learning::Entry;
-use learning::{Trainer, TrainingRequest};
+use learning::Trainer;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts_circuit::Recording;
 use spts_input::Refusal;
-use spts_models::Streams;
 use spts_recon::Matrix;
 use std::sync::Arc;
 
@@ -83,9 +82,9 @@ impl TrainedBoard<'_> {
         let (rows, objects) = self.run.score(&self.entries, done)?;
         Ok(ScoreBoard {
             rows,
-            localisation: Vec::new(),
             objects,
             slips: self.source.slips.clone(),
+            ..ScoreBoard::default()
         })
     }
 
@@ -95,10 +94,7 @@ impl TrainedBoard<'_> {
     /// # Errors
     /// [`ScoreError`].
     pub fn localise(&self) -> Result<Vec<PlaceRow>, ScoreError> {
-        let shifted = self
-            .dictionary
-            .as_ref()
-            .map(|dictionary| self.source.shifted(dictionary));
+        let shifted = self.dictionary.as_ref().map(|atoms| self.source.shifted(atoms));
         let measurements = &self.settings.localisation;
         let mut rows = Vec::new();
         for (name, touches) in self.source.touches.iter().filter(|_| !measurements.is_empty()) {
@@ -111,31 +107,10 @@ impl TrainedBoard<'_> {
         }
         Ok(rows)
     }
-}
 
-impl TrainedBoard<'_> {
-    /// Recording of the bouncing ball, where it is to be scored.
-    pub(crate) fn ball(&self) -> Option<&Recording> {
-        let asked = !self.settings.localisation.is_empty();
-        self.source.bounces.as_ref().filter(|_| asked)
-    }
-
-    /// Columns of the sheet.
-    pub(crate) fn cols(&self) -> usize {
-        self.source.layout.cols()
-    }
-}
-
-/// The published dictionary, or the one that is learned without it.
-fn dictionary(source: &Source, trainer: &mut Trainer<'_>) -> Result<Matrix, LearnError> {
-    match &source.published {
-        Some(published) => Ok(published.dictionary.clone()),
-        None => Ok(trainer
-            .sets
-            .data(&TrainingSource::Raster, false, None)?
-            .dictionary()?
-            .atoms
-            .clone()),
+    /// Whether places are scored.
+    pub(crate) fn scores_places(&self) -> bool {
+        !self.settings.localisation.is_empty()
     }
 }
 
@@ -156,63 +131,44 @@ impl BoardSettings {
     /// # Errors
     /// [`ScoreError`] if there is nothing to score, or no training data.
     pub fn learn<'a>(&'a self, source: &'a Source) -> Result<TrainedBoard<'a>, ScoreError> {
-        let run = self.run(source);
-        let scored: Vec<&str> = run.sessions.iter().map(|s| s.object.as_str()).collect();
-        let known = |name: &String| run.sessions.iter().any(|s| s.object == *name || s.name == *name);
+        let asked = |s: &&ScoredSession| {
+            self.objects.is_empty() || self.objects.contains(&s.object) || self.objects.contains(&s.name)
+        };
+        let scorable = || source.sessions.iter().filter(|s| s.scorable());
+        let sessions: Vec<&ScoredSession> = scorable().filter(asked).collect();
+        let known = |name: &&String| sessions.iter().any(|s| s.object == **name || s.name == **name);
         if let Some(name) = self.objects.iter().find(|name| !known(name)) {
-            let valid = source.sessions.iter().filter(|s| s.scorable());
-            let valid: Vec<&str> = valid.map(ScoredSession::title).collect();
+            let valid: Vec<&str> = scorable().map(ScoredSession::title).collect();
             return Err(ScoreError::Sessions(Refusal::new(format!(
                 "object {name:?} has no compressive session; valid: {}",
                 valid.join(", ")
             ))));
         }
-        let touches = !self.localisation.is_empty() && !source.touches.is_empty();
-        if run.sessions.is_empty() && touches && self.objects.is_empty() {
-            // touches alone are located; nothing is learned, and no image is scored
-            return Ok(TrainedBoard {
-                settings: self,
-                source,
-                run,
-                entries: Vec::new(),
-                dictionary: None,
-            });
-        }
-        if run.sessions.is_empty() {
+        let places = !self.localisation.is_empty();
+        let touches = places && !source.touches.is_empty();
+        if sessions.is_empty() && !touches {
             return Err(no_session(source));
         }
-        let mut trainer = Trainer::new(source, self.seed);
-        let asked = TrainingRequest {
-            decoders: &self.decoders,
-            external: &self.external,
-            training: &self.training,
-            left_out: self.left_out,
-            sensing: &self.sensing,
-            network: self.network.as_ref(),
-            objects: &scored,
-        };
-        let entries = trainer.entries(&asked)?;
-        let ball = touches || (!self.localisation.is_empty() && source.bounces.is_some());
-        let dictionary = ball.then(|| dictionary(source, &mut trainer)).transpose()?;
+        let (mut entries, mut dictionary) = (Vec::new(), None);
+        // touches alone are located; nothing is learned, and no image is scored
+        if !sessions.is_empty() {
+            let mut trainer = Trainer::new(source, self);
+            entries = trainer.entries(&sessions)?;
+            if touches || places && source.bounces.is_some() {
+                dictionary = Some(trainer.dictionary()?);
+            }
+        }
         Ok(TrainedBoard {
             settings: self,
             source,
-            run,
+            run: Run {
+                sessions,
+                measurements: self.measurements.clone(),
+                times: self.times,
+            },
             entries,
             dictionary,
         })
-    }
-
-    fn run<'a>(&self, source: &'a Source) -> Run<'a> {
-        let asked = |s: &&ScoredSession| {
-            self.objects.is_empty() || self.objects.contains(&s.object) || self.objects.contains(&s.name)
-        };
-        let sessions = source.sessions.iter().filter(|s| s.scorable()).filter(asked);
-        Run {
-            sessions: sessions.collect(),
-            measurements: self.measurements.clone(),
-            times: self.times,
-        }
     }
 }
 
@@ -255,101 +211,126 @@ impl Run<'_> {
         self.sessions.iter().enumerate().flat_map(each).collect()
     }
 
-    /// Scores `entries`; `done` is called after every press.
+    /// What `measure` finds in every press, `slots` values each: by slot, then by session. Presses run in parallel, and
+    /// `done` is called after each; the result does not depend on the number of threads.
+    ///
+    /// # Errors
+    /// The first error of `measure`.
+    pub(crate) fn each_press<T: Send>(
+        &self,
+        slots: usize,
+        done: &(dyn Fn() + Sync),
+        measure: impl Fn(usize, usize) -> Result<Vec<T>, ScoreError> + Sync,
+    ) -> Result<Vec<Vec<Vec<T>>>, ScoreError> {
+        let presses = self.presses();
+        let each = presses.par_iter().map(|&(session, block)| {
+            let values = measure(session, block);
+            done();
+            values
+        });
+        let each = each.collect::<Result<Vec<Vec<T>>, ScoreError>>()?;
+        let of_slot = |_| self.sessions.iter().map(|_| Vec::new()).collect();
+        let mut slots: Vec<Vec<Vec<T>>> = (0..slots).map(of_slot).collect();
+        for ((session, _), values) in presses.iter().zip(each) {
+            for (slot, value) in slots.iter_mut().zip(values) {
+                slot[*session].push(value);
+            }
+        }
+        Ok(slots)
+    }
+
+    /// Every entry at every M, in the order of [`Run::tallies`].
+    pub(crate) fn slots<'e>(&self, entries: &'e [Entry]) -> impl Iterator<Item = (&'e Entry, usize)> {
+        entries
+            .iter()
+            .flat_map(|entry| self.measurements.iter().map(move |&m| (entry, m)))
+    }
+
+    /// Scores every press by every entry at every M: the one loop over windows of the board and of the published
+    /// evaluation. `done` is called after every press.
     ///
     /// # Errors
     /// [`ScoreError`] of an external program, or when no rows can be chosen.
+    pub(crate) fn tallies(
+        &self,
+        entries: &[Entry],
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Vec<Vec<Tally>>>, ScoreError> {
+        let slots = entries.len() * self.measurements.len();
+        self.each_press(slots, done, |session, block| {
+            let scored = self.sessions[session];
+            let Some(press) = ScoredPress::new(scored, block) else {
+                return Ok(Vec::new());
+            };
+            let classes = |entry: &Entry| entry.knows_classes;
+            let tallies = self.each_entry(entries, session, &press, classes, |entry, press| {
+                let mut scorer = Scorer::new(&entry.decoders[session]);
+                let label = entry.knows_classes.then_some(scored.label);
+                let each = self.measurements.iter();
+                each.map(|&m| Ok(scorer.score(press, m, label)?))
+                    .collect::<Result<Vec<Tally>, ScoreError>>()
+            })?;
+            Ok(tallies.concat())
+        })
+    }
+
     fn score(
         &self,
         entries: &[Entry],
         done: &(dyn Fn() + Sync),
     ) -> Result<(Vec<BoardRow>, Vec<ObjectRow>), ScoreError> {
-        let presses = self.presses();
-        let tallies = presses
-            .par_iter()
-            .map(|&(session, block)| {
-                let tallies = self.press(entries, session, block);
-                done();
-                tallies
-            })
-            .collect::<Result<Vec<_>, ScoreError>>()?;
+        let tallies = self.tallies(entries, done)?;
         let times = if self.times { self.times(entries)? } else { Vec::new() };
         for decoder in entries.iter().flat_map(|entry| &entry.decoders) {
             decoder.trained.finish()?;
         }
+        let rate_hz = self
+            .sessions
+            .first()
+            .and_then(|s| s.compressive.as_ref())
+            .map(Recording::sample_rate_hz);
+        let times = times.into_iter().chain(std::iter::repeat(None));
         let (mut rows, mut objects) = (Vec::new(), Vec::new());
-        for (e, entry) in entries.iter().enumerate() {
-            for (i, &m) in self.measurements.iter().enumerate() {
-                let at = e * self.measurements.len() + i;
-                let by_object: Vec<Vec<&Tally>> = (0..self.sessions.len())
-                    .map(|s| {
-                        let of_session = presses.iter().zip(&tallies).filter(|(p, _)| p.0 == s);
-                        of_session.map(|(_, t)| &t[at]).collect()
-                    })
-                    .collect();
-                let scores: Vec<Scores> = by_object.iter().map(|p| pool(p.iter().copied())).collect();
-                rows.push(self.row(entry, m, &by_object, &scores, times.get(at).copied().flatten()));
-                for (session, (presses, scores)) in self.sessions.iter().zip(by_object.into_iter().zip(scores)) {
-                    let [_, iou_ci, class_single_ci] = intervals(&[presses], Streams::new(1));
-                    objects.push(ObjectRow {
-                        decoder: entry.name.clone(),
-                        m,
-                        left_out: entry.left_out,
-                        learned_from: entry.learned_from.clone(),
-                        sensing: entry.sensing,
-                        object: session.title().to_owned(),
-                        scores,
-                        iou_ci,
-                        class_single_ci,
-                    });
-                }
-            }
+        for (((entry, m), presses), decode_us) in self.slots(entries).zip(&tallies).zip(times) {
+            let key = RowKey {
+                decoder: entry.name.clone(),
+                m,
+                left_out: entry.left_out,
+                learned_from: entry.learned_from.clone(),
+                sensing: entry.sensing,
+            };
+            let scores: Vec<Scores> = presses.iter().map(pool).collect();
+            let [support_ci, iou_ci, class_single_ci] = intervals(presses);
+            let acquire_us = rate_hz.map_or(0.0, |rate_hz| m as f64 / rate_hz * 1e6);
+            rows.push(BoardRow {
+                key: key.clone(),
+                scores: mean(&scores),
+                support_ci,
+                iou_ci,
+                class_single_ci,
+                decode_us,
+                acquire_us,
+                too_slow: decode_us.map(|us| us >= acquire_us),
+                failed: presses.iter().flatten().map(|t| t.failed).sum(),
+            });
+            objects.extend(
+                self.sessions
+                    .iter()
+                    .zip(presses)
+                    .zip(scores)
+                    .map(|((session, presses), scores)| {
+                        let [_, iou_ci, class_single_ci] = intervals(std::slice::from_ref(presses));
+                        ObjectRow {
+                            key: key.clone(),
+                            object: session.title().to_owned(),
+                            scores,
+                            iou_ci,
+                            class_single_ci,
+                        }
+                    }),
+            );
         }
         Ok((rows, objects))
-    }
-
-    fn row(
-        &self,
-        entry: &Entry,
-        m: usize,
-        presses: &[Vec<&Tally>],
-        scores: &[Scores],
-        decode_us: Option<f64>,
-    ) -> BoardRow {
-        let [support_ci, iou_ci, class_single_ci] = intervals(presses, Streams::new(1));
-        let rate_hz = self.sessions.first().and_then(|s| s.compressive.as_ref());
-        let acquire_us = rate_hz.map_or(0.0, |c| m as f64 / c.sample_rate_hz() * 1e6);
-        BoardRow {
-            decoder: entry.name.clone(),
-            m,
-            left_out: entry.left_out,
-            learned_from: entry.learned_from.clone(),
-            sensing: entry.sensing,
-            scores: mean(scores),
-            support_ci,
-            iou_ci,
-            class_single_ci,
-            decode_us,
-            acquire_us,
-            too_slow: decode_us.map(|us| us >= acquire_us),
-            failed: presses.iter().flatten().map(|t| t.failed).sum(),
-        }
-    }
-
-    fn press(&self, entries: &[Entry], session: usize, block: usize) -> Result<Vec<Tally>, ScoreError> {
-        let scored = self.sessions[session];
-        let Some(press) = ScoredPress::new(scored, block) else {
-            return Ok(vec![Tally::default(); entries.len() * self.measurements.len()]);
-        };
-        let classes = |entry: &Entry| entry.knows_classes;
-        let tallies = self.each_entry(entries, session, &press, classes, |entry, press| {
-            let mut scorer = Scorer::new(&entry.decoders[session]);
-            let label = entry.knows_classes.then_some(scored.label);
-            let each = self.measurements.iter();
-            let tallies = each.map(|&m| Ok(scorer.score(press, m, label)?));
-            tallies.collect::<Result<Vec<Tally>, ScoreError>>()
-        })?;
-        Ok(tallies.concat())
     }
 
     /// What `score` makes of `press` for every entry: the press as it is, or at rows that are chosen for the entry, as
@@ -371,18 +352,12 @@ impl Run<'_> {
                 continue;
             };
             let classes = classes(entry);
-            let mut each = chosen.iter();
-            let at = match each.position(|(other, with, _)| Arc::ptr_eq(other, chooser) && *with == classes) {
-                Some(at) => at,
-                None => {
-                    chosen.push((
-                        chooser,
-                        classes,
-                        press.chosen(chooser, self.most(), classes).map_err(ScoreError::rows)?,
-                    ));
-                    chosen.len() - 1
-                }
-            };
+            let same = |(other, with, _): &(&Arc<RowChooser>, bool, _)| Arc::ptr_eq(other, chooser) && *with == classes;
+            let at = chosen.iter().position(same).unwrap_or(chosen.len());
+            if at == chosen.len() {
+                let press = press.chosen(chooser, self.most(), classes).map_err(|e| e.at("rows"))?;
+                chosen.push((chooser, classes, press));
+            }
             scores.push(score(entry, &chosen[at].2)?);
         }
         Ok(scores)
@@ -395,26 +370,22 @@ impl Run<'_> {
 
     /// Median time of a decode for every entry and M, µs, on the first scored press.
     fn times(&self, entries: &[Entry]) -> Result<Vec<Option<f64>>, DecodeError> {
-        let first = self.presses().first().copied();
-        let Some((press, session)) = first.and_then(|(session, block)| {
-            let recording = self.sessions[session].compressive.as_ref()?;
-            Some((Press::new(recording, block, &self.sessions[session].protocol), session))
-        }) else {
+        let Some(&(session, block)) = self.presses().first() else {
             return Ok(Vec::new());
         };
-        let mut times = Vec::new();
-        for entry in entries {
-            for &m in &self.measurements {
-                times.push(decode_us(&entry.decoders[session], &press, m, TIMED_WINDOWS)?);
-            }
-        }
-        Ok(times)
+        let Some(recording) = &self.sessions[session].compressive else {
+            return Ok(Vec::new());
+        };
+        let press = Press::new(recording, block, &self.sessions[session].protocol);
+        let each = self.slots(entries);
+        each.map(|(entry, m)| decode_us(&entry.decoders[session], &press, m, TIMED_WINDOWS))
+            .collect()
     }
 }
 
-/// A row of the score table: one decoder at one M, means over the objects.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BoardRow {
+/// What a row of the score table is about.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RowKey {
     /// Algorithm.
     pub decoder: String,
     /// Number of measurements, M.
@@ -427,6 +398,14 @@ pub struct BoardRow {
     /// How the rows of a window are obtained.
     #[serde(default)]
     pub sensing: Sensing,
+}
+
+/// A row of the score table: one decoder at one M, means over the objects.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BoardRow {
+    /// Decoder and conditions.
+    #[serde(flatten)]
+    pub key: RowKey,
     /// Scores, means over the objects.
     #[serde(flatten)]
     pub scores: Scores,
@@ -450,17 +429,9 @@ pub struct BoardRow {
 /// A row of the score table of single objects: one decoder at one M on one object.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ObjectRow {
-    /// Algorithm.
-    pub decoder: String,
-    /// Number of measurements, M.
-    pub m: usize,
-    /// As in [`BoardRow`].
-    pub left_out: bool,
-    /// As in [`BoardRow`].
-    pub learned_from: String,
-    /// As in [`BoardRow`].
-    #[serde(default)]
-    pub sensing: Sensing,
+    /// Decoder and conditions.
+    #[serde(flatten)]
+    pub key: RowKey,
     /// Object.
     pub object: String,
     /// Scores.
@@ -489,22 +460,9 @@ pub struct ScoreBoard {
 }
 
 impl ScoreBoard {
-    /// The row of `decoder`, `m`, `left_out` and `learned_from` with consecutive measurements.
+    /// The row with this key.
     #[must_use]
-    pub fn row(&self, decoder: &str, m: usize, left_out: bool, learned_from: &str) -> Option<&BoardRow> {
-        let same = |r: &&BoardRow| {
-            let conditions = r.left_out == left_out && r.learned_from == learned_from;
-            r.decoder == decoder && r.m == m && conditions && r.sensing == Sensing::Random
-        };
-        self.rows.iter().find(same)
-    }
-
-    /// The row with the same decoder and conditions as `other`.
-    #[must_use]
-    pub fn row_like(&self, other: &BoardRow) -> Option<&BoardRow> {
-        let key = |r: &BoardRow| (r.m, r.left_out, r.sensing);
-        let same =
-            |r: &&BoardRow| key(r) == key(other) && r.decoder == other.decoder && r.learned_from == other.learned_from;
-        self.rows.iter().find(same)
+    pub fn row_like(&self, key: &RowKey) -> Option<&BoardRow> {
+        self.rows.iter().find(|row| row.key == *key)
     }
 }

@@ -1,10 +1,10 @@
 //! The board as files, and as text.
 
-use super::{BoardRow, ObjectRow, ScoreBoard};
+use super::{BoardRow, ObjectRow, RowKey, ScoreBoard};
 use crate::decoders::short_label;
 use crate::place::{PlaceRow, locator_label};
 use crate::sensing::Sensing;
-use crate::table::{Cell, Table, TextTable};
+use crate::table::{Cell, Table, TextTable, fixed};
 use crate::tally::Scores;
 use crate::training::{PUBLISHED, RASTER};
 use crate::unique;
@@ -17,14 +17,9 @@ use spts::output::{OutputError, OutputFolder, write_json};
 pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), OutputError> {
     write_json(&out.path("board.json"), board)?;
     rows(&board.rows).write(out)?;
-    let objects = Table::new("objects", &board.objects)
-        .file("decoder", |r| &r.decoder)
-        .file("m", |r| r.m)
-        .file("left_out", |r| r.left_out)
-        .file("learned_from", |r| &r.learned_from)
-        .file("sensing", |r| r.sensing.name())
-        .file("object", |r| &r.object);
-    with_scores(objects, |r: &ObjectRow| &r.scores)
+    keyed(Table::new("objects", &board.objects), |r| &r.key)
+        .file("object", |r| &r.object)
+        .files(&Scores::COLUMNS, |r| &r.scores)
         .interval("iou", |r| r.iou_ci)
         .interval("class_single", |r| r.class_single_ci)
         .write(out)?;
@@ -34,22 +29,21 @@ pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), OutputErr
     Ok(())
 }
 
-fn with_scores<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> &'a Scores + Copy + 'a) -> Table<'a, R> {
-    let columns = Scores::COLUMNS.into_iter();
-    columns.fold(table, |table, (name, get)| table.file(name, move |r| get(of(r))))
+fn keyed<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> &'a RowKey + Copy + 'a) -> Table<'a, R> {
+    table
+        .file("decoder", move |r| &of(r).decoder)
+        .file("m", move |r| of(r).m)
+        .file("left_out", move |r| of(r).left_out)
+        .file("learned_from", move |r| &of(r).learned_from)
+        .file("sensing", move |r| of(r).sensing.name())
 }
 
 /// `board.csv`, and what a reader sees of it.
 fn rows<'a>(rows: impl IntoIterator<Item = &'a BoardRow>) -> Table<'a, &'a BoardRow> {
     let rows: Vec<&BoardRow> = rows.into_iter().collect();
     let rows_with_remarks = rows.iter().any(|r| r.too_slow == Some(true) || r.failed > 0);
-    let keys = Table::new("board", rows)
-        .file("decoder", |r: &BoardRow| &r.decoder)
-        .file("m", |r| r.m)
-        .file("left_out", |r| r.left_out)
-        .file("learned_from", |r| &r.learned_from)
-        .file("sensing", |r| r.sensing.name());
-    let mut table = with_scores(keys, |r: &BoardRow| &r.scores)
+    let mut table = keyed(Table::new("board", rows), |r: &BoardRow| &r.key)
+        .files(&Scores::COLUMNS, |r| &r.scores)
         .interval("support", |r| r.support_ci)
         .interval("iou", |r| r.iou_ci)
         .interval("class_single", |r| r.class_single_ci)
@@ -57,27 +51,19 @@ fn rows<'a>(rows: impl IntoIterator<Item = &'a BoardRow>) -> Table<'a, &'a Board
         .file("acquire_us", |r| r.acquire_us)
         .file("too_slow", |r| r.too_slow)
         .file("failed", |r| r.failed)
-        .shown("decoder", |r| short_label(&r.decoder))
-        .shown("learned", |r| &r.learned_from)
-        .shown("rows", |r| r.sensing.name())
-        .shown("M", |r| r.m)
-        .shown("support", |r| r.scores.support)
-        .digits(3)
-        .shown("IoU", |r| r.scores.iou)
-        .digits(3)
+        .shown("decoder", |r| short_label(&r.key.decoder))
+        .shown("learned", |r| &r.key.learned_from)
+        .shown("rows", |r| r.key.sensing.name())
+        .shown("M", |r| r.key.m)
+        .number("support", 3, |r| r.scores.support)
+        .number("IoU", 3, |r| r.scores.iou)
         .shown("(95 %)", |r| Cell::span(r.iou_ci, 3))
-        .shown("F1", |r| r.scores.f1)
-        .digits(3)
-        .shown("single", |r| r.scores.class_single)
-        .digits(3)
-        .shown("vote20", |r| r.scores.class_vote20)
-        .digits(3)
-        .shown("evidence", |r| r.scores.class_evidence)
-        .digits(3)
-        .shown("decode, µs", |r| r.decode_us)
-        .digits(1)
-        .shown("window, µs", |r| r.acquire_us)
-        .digits(0);
+        .number("F1", 3, |r| r.scores.f1)
+        .number("single", 3, |r| r.scores.class_single)
+        .number("vote20", 3, |r| r.scores.class_vote20)
+        .number("evidence", 3, |r| r.scores.class_evidence)
+        .number("decode, µs", 1, |r| r.decode_us)
+        .number("window, µs", 0, |r| r.acquire_us);
     // a remark on some rows has a column where there are such rows
     if rows_with_remarks {
         table = table.shown("", |r| {
@@ -117,13 +103,13 @@ pub fn table(board: &ScoreBoard) -> String {
         (false, "objects that were learned from"),
         (true, "\nleft out: the object was not learned from"),
     ] {
-        let own: Vec<&BoardRow> = board.rows.iter().filter(|r| r.left_out == left_out).collect();
+        let own: Vec<&BoardRow> = board.rows.iter().filter(|r| r.key.left_out == left_out).collect();
         if !own.is_empty() {
             out.push_str(&format!("{title}\n{}", rows(own).text()));
         }
     }
     out.push_str("\nclasses: share correct of single windows, of votes of 20, of evidence added over 20; support counts every taxel, so that an empty image is right about all that is not touched\n");
-    if board.rows.iter().any(|r| r.sensing == Sensing::Chosen) {
+    if board.rows.iter().any(|r| r.key.sensing == Sensing::Chosen) {
         out.push_str("chosen rows: picked from those of a press for what was learned, before a sample is seen; their order in time is lost, and there are no votes\n");
     }
     if !board.localisation.is_empty() {
@@ -131,8 +117,7 @@ pub fn table(board: &ScoreBoard) -> String {
     }
     out.push_str(&objects(board));
     out.push_str(&gaps(board));
-    out.truncate(out.trim_end().len());
-    out
+    out.trim_end().to_owned()
 }
 
 /// IoU and single windows, object by object, at one M.
@@ -141,25 +126,15 @@ fn objects(board: &ScoreBoard) -> String {
     let (Some(m), true) = (shown_m(board), names.len() > 1) else {
         return String::new();
     };
-    let line = |row: &BoardRow| {
-        let learned = if row.left_out { "left out" } else { &row.learned_from };
-        let same = board.objects.iter().filter(|o| {
-            let conditions = (o.m, o.left_out, o.sensing) == (m, row.left_out, row.sensing);
-            conditions && o.decoder == row.decoder && o.learned_from == row.learned_from
-        });
-        let number = |value: Option<f64>, digits: usize| value.map_or("–".to_owned(), |v| format!("{v:.digits$}"));
-        let cells = same.map(|o| format!("{}/{}", number(o.scores.iou, 2), number(o.scores.class_single, 3)));
-        let key = [short_label(&row.decoder), learned, row.sensing.name()].map(str::to_owned);
-        key.into_iter().chain(cells).collect()
+    let line = |BoardRow { key, .. }: &BoardRow| {
+        let learned = if key.left_out { "left out" } else { &key.learned_from };
+        let same = board.objects.iter().filter(|o| o.key == *key);
+        let cells = same.map(|o| format!("{}/{}", fixed(o.scores.iou, 2), fixed(o.scores.class_single, 3)));
+        let head = [short_label(&key.decoder), learned, key.sensing.name()].map(str::to_owned);
+        head.into_iter().chain(cells).collect()
     };
-    let table = TextTable {
-        head: ["decoder", "learned", "rows"]
-            .into_iter()
-            .chain(names)
-            .map(str::to_owned)
-            .collect(),
-        rows: board.rows.iter().filter(|r| r.m == m).map(line).collect(),
-    };
+    let head = ["decoder", "learned", "rows"].into_iter().chain(names);
+    let table = TextTable::new(head, board.rows.iter().filter(|r| r.key.m == m).map(line));
     format!("\nobject by object at M = {m}: IoU / single windows\n{table}")
 }
 
@@ -169,13 +144,14 @@ fn gaps(board: &ScoreBoard) -> String {
     let Some(m) = shown_m(board) else {
         return String::new();
     };
-    let elsewhere = |r: &&ObjectRow| r.m == m && ![RASTER, PUBLISHED, "nothing"].contains(&r.learned_from.as_str());
+    let elsewhere =
+        |r: &&ObjectRow| r.key.m == m && ![RASTER, PUBLISHED, "nothing"].contains(&r.key.learned_from.as_str());
     let own = |row: &ObjectRow| {
-        let same = |o: &&ObjectRow| {
-            let conditions = (o.m, o.left_out, o.sensing) == (m, row.left_out, row.sensing);
-            conditions && o.decoder == row.decoder && o.learned_from == RASTER && o.object == row.object
+        let key = RowKey {
+            learned_from: RASTER.to_owned(),
+            ..row.key.clone()
         };
-        board.objects.iter().find(same)
+        board.objects.iter().find(|o| o.key == key && o.object == row.object)
     };
     let pairs: Vec<(&ObjectRow, &ObjectRow)> = board
         .objects
@@ -188,8 +164,8 @@ fn gaps(board: &ScoreBoard) -> String {
     }
     let gap = |own: Option<f64>, other: Option<f64>| Some(format!("{:+.3}", other? - own?));
     let table = Table::new("", pairs)
-        .shown("decoder", |(row, _)| short_label(&row.decoder))
-        .shown("learned from", |(row, _)| &row.learned_from)
+        .shown("decoder", |(row, _)| short_label(&row.key.decoder))
+        .shown("learned from", |(row, _)| &row.key.learned_from)
         .shown("object", |(row, _)| &row.object)
         .shown("IoU", |(row, own)| gap(own.scores.iou, row.scores.iou))
         .shown("single", |(row, own)| {
@@ -200,5 +176,5 @@ fn gaps(board: &ScoreBoard) -> String {
 
 /// The M of the tables by object: the largest up to 20.
 fn shown_m(board: &ScoreBoard) -> Option<usize> {
-    board.rows.iter().map(|r| r.m).filter(|m| *m <= 20).max()
+    board.rows.iter().map(|r| r.key.m).filter(|m| *m <= 20).max()
 }

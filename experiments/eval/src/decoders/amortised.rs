@@ -1,15 +1,16 @@
 //! Images by a network that was trained on procedural shapes.
 
 use crate::algorithm::{Algorithm, Answer, Belief, Confidence, DecodeError, Subject, Trained};
-use crate::training::{LearnError, TrainingData};
+use crate::training::TrainingData;
 use crate::windows::Window;
+use spts_input::Refusal;
 use spts_recon::recover::Unrolled;
 use spts_recon::{MatrixView, Problem, Workspace};
 use std::sync::Arc;
 
 struct Network(Arc<Unrolled>);
 
-pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     Ok(Box::new(Network(data.network()?)))
 }
 

@@ -1,8 +1,9 @@
 //! Baselines: images that ignore the measurements, and the mean image whose predicted measurements correlate best.
 
 use crate::algorithm::{Algorithm, Answer, Class, DecodeError, Trained};
-use crate::training::{Dictionary, LearnError, TrainingData};
+use crate::training::{Dictionary, TrainingData};
 use crate::windows::Window;
+use spts_input::Refusal;
 
 /// One image for every window.
 #[derive(Debug, Clone)]
@@ -10,13 +11,13 @@ struct Constant {
     image: Vec<f64>,
 }
 
-pub(super) fn empty(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn empty(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     let image = vec![0.0; data.images.nrows()];
     Ok(Box::new(Constant { image }))
 }
 
 /// Mean of the library, in which all objects have as many images.
-pub(super) fn mean_image(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn mean_image(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     let images = data.library.images();
     let image = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
     Ok(Box::new(Constant { image }))
@@ -42,7 +43,7 @@ struct Correlate {
     labels: Vec<usize>,
 }
 
-pub(super) fn correlate(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn correlate(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     Ok(Box::new(Correlate {
         templates: Dictionary::new(data.templates.images().clone()),
         labels: data.templates.labels().to_vec(),

@@ -1,13 +1,14 @@
 //! Gaussian components weighed by their evidence given y: classes with an image each, and a mixture of shapes.
 
 use crate::algorithm::{Algorithm, Answer, Belief, Class, Confidence, DecodeError, Subject, Trained};
-use crate::training::{LearnError, TrainingData, in_parameter, in_range, in_templates, simulated_gain_sd};
+use crate::training::{TrainingData, simulated_gain_sd};
 use crate::windows::Window;
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use spts_input::Refusal;
 use spts_recon::classify::{
-    ClusterModel, Clusters, Evidence, EvidenceClassifier, ImageEstimator, Posterior, Preparation, TemplateModel,
+    ClusterModel, Clusters, Component, Evidence, EvidenceClassifier, ImageEstimator, Posterior, Preparation,
+    TemplateModel,
 };
 use spts_recon::{AmplitudeRange, Matrix, SignTables, Workspace};
 
@@ -62,7 +63,7 @@ const APART: f64 = 0.99;
 /// Components that are solved with non-negative taxels.
 const SOLVED: usize = 2;
 
-pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     if let Some((images, labels)) = data.posed() {
         return posed(images, labels);
     }
@@ -71,59 +72,56 @@ pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError>
         model.gains.clone_from(&data.gain_sd);
         model.rank = OTHER_SKIN_RANK;
     }
-    let components = model.classes(&data.templates).map_err(in_templates)?;
-    let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1]).map_err(in_range)?;
-    let classifier = EvidenceClassifier::new(&components, amplitude, UNKNOWN_PRIOR).map_err(in_templates)?;
-    let priors = model.image_priors(&data.templates).map_err(in_templates)?;
-    let images = ImageEstimator::new(priors, IMAGE_NOISE).map_err(in_parameter)?;
-    Ok(Classes::trained(classifier, images, true))
+    let templates = |e: Refusal| e.at("templates");
+    let components = model.classes(&data.templates).map_err(templates)?;
+    let priors = model.image_priors(&data.templates).map_err(templates)?;
+    let images = ImageEstimator::new(priors, IMAGE_NOISE).map_err(|e| e.at("parameter"))?;
+    Classes::trained(&components, AMPLITUDES_V, UNKNOWN_PRIOR, images, true)
 }
 
 /// A mixture of clusters of procedural shapes: images alone, weighted by the evidence given y.
-pub(super) fn mixture(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn mixture(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     let clusters = Clusters::with_wide(&SHAPES, data.alike(), APART, &mut ChaCha8Rng::seed_from_u64(SEED));
-    let clusters = clusters.map_err(in_templates)?;
-    let amplitude = AmplitudeRange::new(LENGTHS_V[0], LENGTHS_V[1]).map_err(in_range)?;
+    let clusters = clusters.map_err(|e| e.at("templates"))?;
+    let images = ImageEstimator::non_negative(clusters.priors, SHAPES.noise, SOLVED).map_err(|e| e.at("parameter"))?;
     // every component has the same label, so that no unknown one is weighed
-    let classifier = EvidenceClassifier::new(&clusters.components, amplitude, 0.5).map_err(in_templates)?;
-    let images = ImageEstimator::non_negative(clusters.priors, SHAPES.noise, SOLVED).map_err(in_parameter)?;
-    Ok(Classes::trained(classifier, images, false))
+    Classes::trained(&clusters.components, LENGTHS_V, 0.5, images, false)
 }
 
 /// Classes of objects in many poses, which are marginalised; the gains are not known.
-fn posed(images: &Matrix, labels: &[usize]) -> Result<Box<dyn Trained>, LearnError> {
+fn posed(images: &Matrix, labels: &[usize]) -> Result<Box<dyn Trained>, Refusal> {
     let gain = simulated_gain_sd();
     let model = ClusterModel { gain, ..POSES };
     let mut classes = labels.to_vec();
     classes.dedup();
     let mut all = Clusters::default();
     for label in classes {
-        let own: Vec<Vec<f64>> = (0..labels.len())
-            .filter(|&k| labels[k] == label)
-            .map(|k| images.column(k))
-            .collect();
-        let slices: Vec<&[f64]> = own.iter().map(Vec::as_slice).collect();
-        let own = Matrix::from_column_slices(images.nrows(), &slices);
-        all.add(
-            model
-                .learn(&own, label, &mut ChaCha8Rng::seed_from_u64(SEED))
-                .map_err(in_templates)?,
-        );
+        let own = (0..labels.len()).filter(|&k| labels[k] == label);
+        let own: Vec<Vec<f64>> = own.map(|k| images.column(k)).collect();
+        let own = Matrix::from_column_slices(images.nrows(), &own);
+        let clusters = model.learn(&own, label, &mut ChaCha8Rng::seed_from_u64(SEED));
+        all.add(clusters.map_err(|e| e.at("templates"))?);
     }
-    let amplitude = AmplitudeRange::new(LENGTHS_V[0], LENGTHS_V[1]).map_err(in_range)?;
-    let classifier = EvidenceClassifier::new(&all.components, amplitude, UNKNOWN_PRIOR).map_err(in_templates)?;
-    let images = ImageEstimator::new(all.priors, model.noise).map_err(in_parameter)?;
-    Ok(Classes::trained(classifier, images, true))
+    let images = ImageEstimator::new(all.priors, model.noise).map_err(|e| e.at("parameter"))?;
+    Classes::trained(&all.components, LENGTHS_V, UNKNOWN_PRIOR, images, true)
 }
 
 impl Classes {
-    fn trained(classifier: EvidenceClassifier, images: ImageEstimator, named: bool) -> Box<dyn Trained> {
-        Box::new(Self {
+    fn trained(
+        components: &[Component],
+        [least_v, most_v]: [f64; 2],
+        unknown: f64,
+        images: ImageEstimator,
+        named: bool,
+    ) -> Result<Box<dyn Trained>, Refusal> {
+        let amplitude = AmplitudeRange::new(least_v, most_v).map_err(|e| e.at("range"))?;
+        let classifier = EvidenceClassifier::new(components, amplitude, unknown).map_err(|e| e.at("templates"))?;
+        Ok(Box::new(Self {
             bank: Bank::new(classifier.bank()),
             classifier,
             images,
             named,
-        })
+        }))
     }
 
     fn at_work(&self) -> AtWork<'_> {

@@ -1,7 +1,7 @@
 //! Decoders that reconstruct an image, from atoms of a dictionary or directly from taxels.
 
 use crate::algorithm::{Algorithm, Answer, Belief, Confidence, DecodeError, Subject, Trained};
-use crate::training::{Dictionary, LearnError, TrainingData, in_parameter, in_prior};
+use crate::training::{Dictionary, TrainingData};
 use crate::windows::Window;
 use spts_input::Refusal;
 use spts_recon::metrics::SUPPORT_THRESHOLD;
@@ -61,7 +61,7 @@ fn on_atoms(
     data: &TrainingData,
     weights: Weights,
     build: impl Fn(usize) -> Box<dyn Recover> + Send + Sync + 'static,
-) -> Result<Box<dyn Trained>, LearnError> {
+) -> Result<Box<dyn Trained>, Refusal> {
     Ok(Box::new(ImageDecoder {
         unknowns: Unknowns::Atoms(data.dictionary()?),
         weights,
@@ -71,7 +71,7 @@ fn on_atoms(
     }))
 }
 
-fn on_taxels(recover: impl Recover + Clone + 'static) -> Result<Box<dyn Trained>, LearnError> {
+fn on_taxels(recover: impl Recover + Clone + 'static) -> Result<Box<dyn Trained>, Refusal> {
     Ok(Box::new(taxels(recover)))
 }
 
@@ -85,51 +85,53 @@ fn taxels(recover: impl Recover + Clone + 'static) -> ImageDecoder {
     }
 }
 
-pub(super) fn script_s20(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn script_s20(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     on_atoms(data, Weights::Script, |_| Box::new(ReferenceOmp::new(SCRIPT_ATOMS)))
 }
 
-pub(super) fn script_m4(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn script_m4(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     on_atoms(data, Weights::Script, |m| Box::new(ReferenceOmp::new(quarter(m))))
 }
 
-pub(super) fn matched(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn matched(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     on_atoms(data, Weights::Signs, |m| Box::new(ReferenceOmp::new(quarter(m))))
 }
 
-pub(super) fn omp(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn omp(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     on_atoms(data, Weights::Signs, |m| Box::new(Omp::new(quarter(m))))
 }
 
-pub(super) fn nn_omp(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn nn_omp(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     on_atoms(data, Weights::Signs, |m| Box::new(NnOmp::new(quarter(m))))
 }
 
-pub(super) fn nn_lasso(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    let lasso = NnLasso::new(LASSO).map_err(in_parameter)?.with_normalised_columns();
+pub(super) fn nn_lasso(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    let lasso = NnLasso::new(LASSO)
+        .map_err(|e| e.at("parameter"))?
+        .with_normalised_columns();
     on_atoms(data, Weights::Signs, move |_| Box::new(lasso))
 }
 
-pub(super) fn lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    on_taxels(Lmmse::new(data.prior(ImagePrior::SEEN)?, NOISE).map_err(in_parameter)?)
+pub(super) fn lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    on_taxels(Lmmse::new(data.prior(ImagePrior::SEEN)?, NOISE).map_err(|e| e.at("parameter"))?)
 }
 
-pub(super) fn nn_lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
+pub(super) fn nn_lmmse(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
     let prior = data.prior(ImagePrior::UNSEEN)?;
-    let confidence = ImageConfidence::new(Arc::clone(&prior), NOISE).map_err(in_prior)?;
+    let confidence = ImageConfidence::new(Arc::clone(&prior), NOISE).map_err(|e| e.at("prior"))?;
     Ok(Box::new(ImageDecoder {
         confidence: Some(confidence),
         prior: Some(Arc::clone(&prior)),
-        ..taxels(NnLmmse::new(prior, NOISE).map_err(in_parameter)?)
+        ..taxels(NnLmmse::new(prior, NOISE).map_err(|e| e.at("parameter"))?)
     }))
 }
 
-pub(super) fn nn_lmmse_seen(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    on_taxels(NnLmmse::new(data.prior(ImagePrior::SEEN)?, NOISE).map_err(in_parameter)?)
+pub(super) fn nn_lmmse_seen(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    on_taxels(NnLmmse::new(data.prior(ImagePrior::SEEN)?, NOISE).map_err(|e| e.at("parameter"))?)
 }
 
-pub(super) fn tv(data: &TrainingData) -> Result<Box<dyn Trained>, LearnError> {
-    on_taxels(Tv::new(data.shape[0], data.shape[1], VARIATION).map_err(in_parameter)?)
+pub(super) fn tv(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    on_taxels(Tv::new(data.shape[0], data.shape[1], VARIATION).map_err(|e| e.at("parameter"))?)
 }
 
 impl Trained for ImageDecoder {

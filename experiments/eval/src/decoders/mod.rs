@@ -8,9 +8,8 @@ mod image;
 pub use image::quarter;
 
 use crate::algorithm::Trained;
-use crate::training::{LearnError, Learned, TrainingData};
+use crate::training::{Learned, TrainingData};
 use Needs::{Classes, Dictionary, Images, Network, Nothing, Shapes};
-use serde::{Serialize, Serializer};
 use spts_input::Refusal;
 use spts_recon::classify::Src;
 use std::sync::Arc;
@@ -69,7 +68,7 @@ pub struct DecoderSpec {
     pub train: Train,
 }
 
-type Train = fn(&TrainingData) -> Result<Box<dyn Trained>, LearnError>;
+type Train = fn(&TrainingData) -> Result<Box<dyn Trained>, Refusal>;
 
 const fn spec(name: &'static str, label: &'static str, needs: Needs, shown: bool, train: Train) -> DecoderSpec {
     DecoderSpec {
@@ -104,29 +103,6 @@ impl DecoderSpec {
     }
 }
 
-// The decodes of the published evaluation, which [`PublishedDecode`] names.
-const SCRIPT_S20: DecoderSpec = spec("script_s20", "published script", Dictionary, true, image::script_s20)
-    .short("script, 20 atoms")
-    .about("the published script: weights {0, 1}, no offset, 20 atoms");
-const SCRIPT_M4: DecoderSpec = spec(
-    "script_m4",
-    "published script, M/4 atoms",
-    Dictionary,
-    false,
-    image::script_m4,
-)
-.short("script, M/4 atoms")
-.about("the published text: weights {0, 1}, no offset, M/4 atoms");
-const MATCHED: DecoderSpec = spec(
-    "matched",
-    "published pursuit, matched to ±1",
-    Dictionary,
-    true,
-    image::matched,
-)
-.short("matched")
-.about("the published pursuit with weights ±1 and the idle output removed");
-
 /// Every algorithm: name, label, training data, whether it is shown by default, training function, shorter label,
 /// description.
 pub const DECODERS: &[DecoderSpec] = &[
@@ -135,9 +111,27 @@ pub const DECODERS: &[DecoderSpec] = &[
         .about("baseline: the mean of all images learned from"),
     spec("correlate", "best correlated", Classes, true, baselines::correlate)
         .about("baseline: the object's mean image that correlates best with y"),
-    SCRIPT_S20,
-    SCRIPT_M4,
-    MATCHED,
+    spec("script_s20", "published script", Dictionary, true, image::script_s20)
+        .short("script, 20 atoms")
+        .about("the published script: weights {0, 1}, no offset, 20 atoms"),
+    spec(
+        "script_m4",
+        "published script, M/4 atoms",
+        Dictionary,
+        false,
+        image::script_m4,
+    )
+    .short("script, M/4 atoms")
+    .about("the published text: weights {0, 1}, no offset, M/4 atoms"),
+    spec(
+        "matched",
+        "published pursuit, matched to ±1",
+        Dictionary,
+        true,
+        image::matched,
+    )
+    .short("matched")
+    .about("the published pursuit with weights ±1 and the idle output removed"),
     spec("omp", "OMP", Dictionary, true, image::omp).about("orthogonal matching pursuit, columns normalised"),
     spec("nn_omp", "non-negative OMP", Dictionary, true, image::nn_omp)
         .about("non-negative orthogonal matching pursuit"),
@@ -186,8 +180,8 @@ impl TrainedDecoder {
     /// Trains the algorithm `spec` with `data`.
     ///
     /// # Errors
-    /// [`LearnError`] if `data` is not usable.
-    pub fn new(spec: &DecoderSpec, data: &TrainingData) -> Result<Self, LearnError> {
+    /// [`Refusal`] if `data` is not usable.
+    pub fn new(spec: &DecoderSpec, data: &TrainingData) -> Result<Self, Refusal> {
         Ok(Self::of(Arc::from((spec.train)(data)?), data))
     }
 
@@ -237,75 +231,33 @@ pub fn short_label(name: &str) -> &str {
     }
 }
 
-/// How the published evaluation turns a window of measurements into an image.
+/// The decodes of the published evaluation: the published script (weights {0, 1}, no offset, 20 atoms), the paper's text
+/// (the same with M/4 atoms), and the pursuit adapted to the device (weights ±1, the idle mean subtracted, M/4 atoms).
 ///
 /// ```
-/// use spts_eval::decoders::{PublishedDecode, find, quarter};
+/// use spts_eval::decoders::{PUBLISHED_DECODES, find, quarter};
 ///
 /// assert_eq!((quarter(20), quarter(50), quarter(1)), (5, 13, 1));
-/// assert!(PublishedDecode::ALL.iter().all(|decode| find(decode.name()).is_some()));
+/// assert!(PUBLISHED_DECODES.iter().all(|name| find(name).is_some()));
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PublishedDecode {
-    /// As in the published script: weights {0, 1}, no offset, 20 atoms.
-    ScriptS20,
-    /// As in the paper's text: weights {0, 1}, no offset, M/4 atoms.
-    ScriptM4,
-    /// Adapted to the device: weights ±1, the idle mean subtracted, M/4 atoms.
-    Matched,
+pub const PUBLISHED_DECODES: [&str; 3] = ["script_s20", "script_m4", "matched"];
+
+/// The decoder called `name`, with dictionary and library of `learned`.
+///
+/// # Errors
+/// [`Refusal`] if there is no such decoder, or `learned` is not usable.
+pub fn published(name: &str, learned: &Learned) -> Result<TrainedDecoder, Refusal> {
+    let spec = find(name).ok_or_else(|| Refusal::new(format!("no decoder is called {name:?}")))?;
+    TrainedDecoder::new(spec, &TrainingData::given(learned))
 }
 
-impl PublishedDecode {
-    /// Every variant.
-    pub const ALL: [Self; 3] = [Self::ScriptS20, Self::ScriptM4, Self::Matched];
-
-    /// Its line of the table of algorithms.
-    fn line(self) -> &'static DecoderSpec {
-        match self {
-            Self::ScriptS20 => &SCRIPT_S20,
-            Self::ScriptM4 => &SCRIPT_M4,
-            Self::Matched => &MATCHED,
-        }
-    }
-
-    /// Name in the table of algorithms.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.line().name
-    }
-
-    /// The decoder of this variant, with dictionary and library of `learned`.
-    ///
-    /// # Errors
-    /// [`LearnError`] if `learned` is not usable.
-    pub fn decoder(self, learned: &Learned) -> Result<TrainedDecoder, LearnError> {
-        TrainedDecoder::new(self.line(), &TrainingData::given(learned))
-    }
-
-    /// The decoders of all variants.
-    ///
-    /// # Errors
-    /// [`LearnError`] if `learned` is not usable.
-    pub fn decoders(learned: &Learned) -> Result<Vec<(Self, TrainedDecoder)>, LearnError> {
-        let each = Self::ALL.into_iter();
-        each.map(|decode| Ok((decode, decode.decoder(learned)?))).collect()
-    }
-
-    /// All of them, each beside its name.
-    ///
-    /// # Errors
-    /// [`LearnError`] when one of them cannot use what was learned.
-    pub fn named(learned: &Learned) -> Result<Vec<(&'static str, TrainedDecoder)>, LearnError> {
-        let each = Self::ALL.into_iter();
-        each.map(|decode| Ok((decode.name(), decode.decoder(learned)?)))
-            .collect()
-    }
-}
-
-impl Serialize for PublishedDecode {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.name())
-    }
+/// All [`PUBLISHED_DECODES`], each beside its name.
+///
+/// # Errors
+/// As for [`published`].
+pub fn published_decodes(learned: &Learned) -> Result<Vec<(&'static str, TrainedDecoder)>, Refusal> {
+    let each = PUBLISHED_DECODES.into_iter();
+    each.map(|name| Ok((name, published(name, learned)?))).collect()
 }
 
 /// Why `decoder` cannot be stopped by its confidence.

@@ -1,9 +1,9 @@
-//! Algorithms that locate a contact. A new one is a type here and a line in [`LOCATORS`].
+//! Algorithms that locate a contact. A new one is a function here and a line in [`LOCATORS`].
 
 use crate::decoders::quarter;
 use crate::training::Dictionary;
 use crate::windows::{Press, Window};
-use spts_recon::localise::{BlobEvidence, Localiser, centre_of_mass};
+use spts_recon::localise::{Localiser, centre_of_mass};
 use spts_recon::metrics::SUPPORT_THRESHOLD;
 use spts_recon::recover::ReferenceOmp;
 use spts_recon::{MatrixView, Problem, Recover as _, Solution, Workspace};
@@ -16,14 +16,9 @@ pub(super) struct Tools {
     pub(super) localiser: Localiser,
 }
 
-/// Tells places of one contact.
-pub(super) trait Locate {
-    /// Place (row, col) by `window`, which begins with measurement `start` of the contact; `None` when it cannot be
-    /// used.
-    fn locate(&mut self, start: usize, window: &Window<'_>) -> Option<[f64; 2]>;
-}
-
-pub(super) type StartLocator = for<'a> fn(&'a Tools, &'a Press) -> Box<dyn Locate + 'a>;
+/// Tells the place (row, col) of one contact by a window, which begins with the measurement of the given number of the
+/// contact; `None` when it cannot be used.
+pub(super) type Locate<'a> = Box<dyn FnMut(usize, &Window<'_>) -> Option<[f64; 2]> + 'a>;
 
 /// A locator under its names.
 pub(super) struct LocatorSpec {
@@ -31,16 +26,14 @@ pub(super) struct LocatorSpec {
     pub(super) name: &'static str,
     /// Label in figures and printed tables.
     label: &'static str,
-    pub(super) start: StartLocator,
+    pub(super) start: for<'a> fn(&'a Tools, &'a Press) -> Locate<'a>,
 }
 
 /// Label of the locator `name` in figures and printed tables; an unknown name is its own label.
 #[must_use]
 pub fn locator_label(name: &str) -> &str {
-    LOCATORS
-        .iter()
-        .find(|spec| spec.name == name)
-        .map_or(name, |spec| spec.label)
+    let known = LOCATORS.iter().find(|spec| spec.name == name);
+    known.map_or(name, |spec| spec.label)
 }
 
 /// Locator of a contact as small as a taxel; the ball's is larger.
@@ -48,143 +41,100 @@ pub(super) const TAXEL: &str = "taxel";
 
 /// Every locator.
 pub(super) const LOCATORS: &[LocatorSpec] = &[
-    spec("middle", "middle of the sheet", |tools, _| {
-        Box::new(Middle(middle(tools.shape)))
-    }),
-    spec("script_s5", "script, 5 atoms", |tools, press| {
-        Box::new(Pursuit::new(tools, press, true))
-    }),
-    spec("matched", "matched", |tools, press| {
-        Box::new(Pursuit::new(tools, press, false))
-    }),
-    spec("blob", "blob evidence", |tools, press| {
-        Box::new(Blob::new(tools, press))
-    }),
-    spec(TAXEL, "touched taxel", |tools, _| Box::new(Taxel(tools.shape))),
+    LocatorSpec {
+        name: "middle",
+        label: "middle of the sheet",
+        start: |tools, _| Box::new(|_, _| Some(middle(tools.shape))),
+    },
+    LocatorSpec {
+        name: "script_s5",
+        label: "script, 5 atoms",
+        start: |tools, press| pursuit(tools, press, true),
+    },
+    LocatorSpec {
+        name: "matched",
+        label: "matched",
+        start: |tools, press| pursuit(tools, press, false),
+    },
+    LocatorSpec {
+        name: "blob",
+        label: "blob evidence",
+        start: blob,
+    },
+    LocatorSpec {
+        name: TAXEL,
+        label: "touched taxel",
+        start: |tools, _| Box::new(|_, window| taxel(tools.shape, window)),
+    },
 ];
-
-const fn spec(name: &'static str, label: &'static str, start: StartLocator) -> LocatorSpec {
-    LocatorSpec { name, label, start }
-}
 
 /// Middle of a sheet.
 pub(super) fn middle(shape: [usize; 2]) -> [f64; 2] {
     shape.map(|n| n.saturating_sub(1) as f64 / 2.0)
 }
 
-/// Baseline: the middle of the sheet, whatever was measured.
-struct Middle([f64; 2]);
-
-impl Locate for Middle {
-    fn locate(&mut self, _: usize, _: &Window<'_>) -> Option<[f64; 2]> {
-        Some(self.0)
+/// The published pursuit on the dictionary at all places, as in the script or matched to the device.
+fn pursuit<'a>(tools: &'a Tools, press: &'a Press, script: bool) -> Locate<'a> {
+    let dictionary = &tools.dictionary;
+    let atoms = dictionary.sums.len();
+    let mut operator = vec![0.0; press.len() * atoms];
+    // a contact with a lost measurement has zeros, and no window of it is located
+    if let Some(all) = press.window(0, press.len()) {
+        dictionary.project(all.phi, all.signs, &mut operator);
     }
-}
-
-/// Centre of mass of the image that the published pursuit recovers: as the script does, with weights {0, 1}, 5 atoms
-/// and the centre over the positive values; or matched, with weights ±1, M/4 atoms and the centre above .23 of the
-/// maximum. An empty image is the middle.
-struct Pursuit<'a> {
-    tools: &'a Tools,
-    /// Φ·D of the whole contact.
-    operator: Vec<f64>,
-    script: bool,
-    work: Workspace,
-    solution: Solution,
-    image: Vec<f64>,
-}
-
-impl<'a> Pursuit<'a> {
-    fn new(tools: &'a Tools, press: &'a Press, script: bool) -> Self {
-        let dictionary = &tools.dictionary;
-        let mut operator = vec![0.0; press.len() * dictionary.sums.len()];
-        // a contact of which a sample was lost has no true place either, and is not asked for
-        if let Some(all) = press.window(0, press.len()) {
-            dictionary.project(all.phi, all.signs, &mut operator);
-        }
-        if script {
-            dictionary.to_unit_weights(&mut operator);
-        }
-        Self {
-            tools,
-            operator,
-            script,
-            work: Workspace::default(),
-            solution: Solution::default(),
-            image: vec![0.0; dictionary.atoms.nrows()],
-        }
+    if script {
+        dictionary.to_unit_weights(&mut operator);
     }
-}
-
-impl Locate for Pursuit<'_> {
-    fn locate(&mut self, start: usize, window: &Window<'_>) -> Option<[f64; 2]> {
-        let (dictionary, m) = (&self.tools.dictionary, window.y.len());
-        let atoms = dictionary.sums.len();
-        let (sparsity, threshold) = if self.script {
-            (5, 0.0)
+    let (mut work, mut solution) = (Workspace::default(), Solution::default());
+    let mut image = vec![0.0; dictionary.atoms.nrows()];
+    Box::new(move |start, window| {
+        let m = window.y.len();
+        let (sparsity, threshold, y) = if script {
+            (5, 0.0, window.volts)
         } else {
-            (quarter(m), SUPPORT_THRESHOLD)
+            (quarter(m), SUPPORT_THRESHOLD, window.y)
         };
-        let a = MatrixView::new(m, atoms, &self.operator[start * atoms..(start + m) * atoms]).ok()?;
-        let y = if self.script { window.volts } else { window.y };
+        let a = MatrixView::new(m, atoms, &operator[start * atoms..(start + m) * atoms]).ok()?;
         let problem = Problem::new(a, y).ok()?;
-        ReferenceOmp::new(sparsity)
-            .recover_into(&problem, &mut self.work, &mut self.solution)
-            .ok()?;
-        self.solution.synthesise(dictionary.atoms.view(), &mut self.image);
-        let centre = centre_of_mass(&self.image, self.tools.shape[1], threshold);
-        Some(centre.unwrap_or_else(|| middle(self.tools.shape)))
-    }
+        let pursuit = ReferenceOmp::new(sparsity);
+        pursuit.recover_into(&problem, &mut work, &mut solution).ok()?;
+        solution.synthesise(dictionary.atoms.view(), &mut image);
+        let centre = centre_of_mass(&image, tools.shape[1], threshold);
+        Some(centre.unwrap_or_else(|| middle(tools.shape)))
+    })
 }
 
-/// Posterior mean over blobs.
-struct Blob<'a> {
-    tools: &'a Tools,
-    /// φᵀ·blob of every blob for every measurement; empty if the projection fails.
-    projected: Vec<Vec<f64>>,
-    evidence: BlobEvidence,
-}
-
-impl<'a> Blob<'a> {
-    fn new(tools: &'a Tools, press: &'a Press) -> Self {
-        let taxels = tools.shape[0] * tools.shape[1];
-        let project = |row: &[f64]| {
-            let mut projected = Vec::new();
-            // weights of ±1 are in range; a blob without its row is refused below
-            let _ = tools.localiser.project(row, &mut projected);
-            projected
-        };
-        let all = press.window(0, press.len());
-        let rows = all.map_or(&[][..], |all| all.phi.values()).chunks_exact(taxels);
-        Self {
-            tools,
-            projected: rows.map(project).collect(),
-            evidence: tools.localiser.evidence(),
+/// The evidence of round blobs of all widths at all places.
+fn blob<'a>(tools: &'a Tools, press: &'a Press) -> Locate<'a> {
+    let project = |row: &[f64]| {
+        let mut projected = Vec::new();
+        // rows of another size leave it empty, which no window accepts
+        let _ = tools.localiser.project(row, &mut projected);
+        projected
+    };
+    let all = press.window(0, press.len());
+    let rows = all.map_or(&[][..], |all| all.phi.values());
+    let projected: Vec<Vec<f64>> = rows
+        .chunks_exact(tools.shape[0] * tools.shape[1])
+        .map(project)
+        .collect();
+    let mut evidence = tools.localiser.evidence();
+    Box::new(move |start, window| {
+        evidence.clear();
+        for (projected, &y) in projected.get(start..)?.iter().zip(window.y) {
+            evidence.observe(projected, y).ok()?;
         }
-    }
+        Some(tools.localiser.estimate(&mut evidence).position_px)
+    })
 }
 
-impl Locate for Blob<'_> {
-    fn locate(&mut self, start: usize, window: &Window<'_>) -> Option<[f64; 2]> {
-        self.evidence.clear();
-        for (projected, &y) in self.projected.get(start..)?.iter().zip(window.y) {
-            self.evidence.observe(projected, y).ok()?;
-        }
-        Some(self.tools.localiser.estimate(&mut self.evidence).position_px)
+/// The taxel that alone explains most of a window: that with the largest Φᵀ y.
+pub(super) fn taxel(shape: [usize; 2], window: &Window<'_>) -> Option<[f64; 2]> {
+    let (taxels, cols) = (window.phi.ncols(), shape[1].max(1));
+    let mut sums = vec![0.0; taxels];
+    for (row, y) in window.phi.values().chunks_exact(taxels).zip(window.y) {
+        sums.iter_mut().zip(row).for_each(|(sum, w)| *sum += w * y);
     }
-}
-
-/// The taxel that explains most of the output on its own: the largest Φᵀy, as all columns are equally long.
-pub(super) struct Taxel(pub(super) [usize; 2]);
-
-impl Locate for Taxel {
-    fn locate(&mut self, _: usize, window: &Window<'_>) -> Option<[f64; 2]> {
-        let (taxels, cols) = (window.phi.ncols(), self.0[1].max(1));
-        let mut sums = vec![0.0; taxels];
-        for (row, y) in window.phi.values().chunks_exact(taxels).zip(window.y) {
-            sums.iter_mut().zip(row).for_each(|(sum, w)| *sum += w * y);
-        }
-        let most = (0..taxels).max_by(|a, b| sums[*a].total_cmp(&sums[*b]))?;
-        Some([(most / cols) as f64, (most % cols) as f64])
-    }
+    let most = (0..taxels).max_by(|a, b| sums[*a].total_cmp(&sums[*b]))?;
+    Some([(most / cols) as f64, (most % cols) as f64])
 }

@@ -11,7 +11,7 @@ use crate::algorithm::ScoreError;
 use crate::sensing::{Sensing, chosen_places};
 use crate::training::Dictionary;
 use crate::windows::Press;
-use locators::{LOCATORS, Locate, LocatorSpec, TAXEL, Taxel, Tools, middle};
+use locators::{LOCATORS, LocatorSpec, TAXEL, Tools, middle, taxel};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts_circuit::Recording;
@@ -34,15 +34,17 @@ pub(crate) fn localise(
     cols: usize,
     measurements: &[usize],
 ) -> Result<Vec<LocalisationRow>, ScoreError> {
-    let asked = PlacesRequest {
-        locators: LOCATORS.iter().filter(|spec| PUBLISHED.contains(&spec.name)).collect(),
-        relabelled: false,
-        measurements,
-        sensing: &[Sensing::Random],
-    };
+    let asked = PlacesRequest::new(measurements, |name| PUBLISHED.contains(&name));
     let tools = Tools::new(recording, shifted.clone(), cols)?;
-    let found = asked.locate(&tools, &bounces(recording, tools.shape))?;
-    Ok(found.iter().filter_map(Located::localisation_row).collect())
+    let found = asked.locate(BALL, &tools, &bounces(recording, tools.shape))?;
+    let row = |(row, median_px): (PlaceRow, f64)| LocalisationRow {
+        decode: row.decoder,
+        m: row.m,
+        mean_px: row.mean_px,
+        median_px,
+        share_under_1px: row.share_under_1px,
+    };
+    Ok(found.into_iter().map(row).collect())
 }
 
 /// Rows of every locator at every M of `measurements`, as recorded and relabelled, by windows of every kind of
@@ -58,14 +60,13 @@ pub(crate) fn places(
     sensing: &[Sensing],
 ) -> Result<Vec<PlaceRow>, ScoreError> {
     let asked = PlacesRequest {
-        locators: LOCATORS.iter().filter(|spec| spec.name != TAXEL).collect(),
         relabelled: true,
-        measurements,
         sensing,
+        ..PlacesRequest::new(measurements, |name| name != TAXEL)
     };
     let tools = Tools::new(recording, shifted, cols)?;
-    let found = asked.locate(&tools, &bounces(recording, tools.shape))?;
-    Ok(found.iter().filter_map(|row| row.place_row(BALL)).collect())
+    let found = asked.locate(BALL, &tools, &bounces(recording, tools.shape))?;
+    Ok(found.into_iter().map(|(row, _)| row).collect())
 }
 
 /// Rows of every locator at every M of `measurements` for the touches of the session `name`, by windows of measurements
@@ -80,21 +81,12 @@ pub(crate) fn touch_places(
     shifted: Option<&Matrix>,
     measurements: &[usize],
 ) -> Result<Vec<PlaceRow>, ScoreError> {
-    let usable = |name: &str| shifted.is_some() || !PUBLISHED.contains(&name);
-    let asked = PlacesRequest {
-        locators: LOCATORS.iter().filter(|spec| usable(spec.name)).collect(),
-        relabelled: false,
-        measurements,
-        sensing: &[Sensing::Random],
-    };
+    let asked = PlacesRequest::new(measurements, |name| shifted.is_some() || !PUBLISHED.contains(&name));
     let shifted = shifted.cloned().unwrap_or_else(|| Matrix::zeros(recording.taxels(), 1));
     let tools = Tools::new(recording, shifted, recording.layout().cols())?;
-    let touches = find_touches(recording);
-    let touches = touches
-        .iter()
-        .filter_map(|touch| Contact::of_touch(recording, touch, tools.shape));
-    let found = asked.locate(&tools, &touches.collect::<Vec<_>>())?;
-    Ok(found.iter().filter_map(|row| row.place_row(name)).collect())
+    let contacts = touches(recording, &find_touches(recording), tools.shape);
+    let found = asked.locate(name, &tools, &contacts)?;
+    Ok(found.into_iter().map(|(row, _)| row).collect())
 }
 
 /// Mean distance, taxels, between the touched taxel of `touches` and the taxel that alone explains most of a window
@@ -103,16 +95,13 @@ pub(crate) fn touch_places(
 pub fn touch_errors_px(recording: &Recording, touches: &[RecordedTouch], measurements: &[usize]) -> Vec<Option<f64>> {
     let cols = recording.layout().cols();
     let shape = [recording.layout().rows(), cols];
-    let contacts = touches
-        .iter()
-        .filter_map(|touch| Contact::of_touch(recording, touch, shape));
-    let contacts: Vec<Contact> = contacts.collect();
+    let contacts = self::touches(recording, touches, shape);
     let mean_px = |m: usize| {
         let mut errors_px = Vec::new();
         for contact in &contacts {
             let (press, truth) = (contact.relabelled([0, 0]), contact.moved([0, 0]));
-            for (start, window) in press.windows(0..press.len(), m, m) {
-                let place = Taxel(shape).locate(start, &window).unwrap_or(middle(shape));
+            for (_, window) in press.windows(0..press.len(), m, m) {
+                let place = taxel(shape, &window).unwrap_or(middle(shape));
                 errors_px.push(distance(place, truth));
             }
         }
@@ -124,10 +113,17 @@ pub fn touch_errors_px(recording: &Recording, touches: &[RecordedTouch], measure
 /// Contacts of the ball.
 fn bounces(recording: &Recording, shape: [usize; 2]) -> Vec<Contact> {
     let bounces = find_bounces(recording);
-    let contacts = bounces
+    bounces
         .iter()
-        .filter_map(|bounce| Contact::new(recording, bounce, shape));
-    contacts.collect()
+        .filter_map(|bounce| Contact::new(recording, bounce, shape))
+        .collect()
+}
+
+fn touches(recording: &Recording, touches: &[RecordedTouch], shape: [usize; 2]) -> Vec<Contact> {
+    touches
+        .iter()
+        .filter_map(|touch| Contact::of_touch(recording, touch, shape))
+        .collect()
 }
 
 impl Tools {
@@ -151,17 +147,29 @@ struct PlacesRequest<'a> {
     sensing: &'a [Sensing],
 }
 
-impl PlacesRequest<'_> {
-    /// The truth is the centre of mass of the ball's least-squares image, or the touched taxel; every window of M
-    /// consecutive measurements in contact is located, or windows of rows that are chosen among those of the contact.
-    fn locate(&self, tools: &Tools, contacts: &[Contact]) -> Result<Vec<Located>, ScoreError> {
+impl<'a> PlacesRequest<'a> {
+    /// The locators whose names are `wanted`, for contacts as recorded and measurements that follow each other.
+    fn new(measurements: &'a [usize], wanted: impl Fn(&str) -> bool) -> Self {
+        Self {
+            locators: LOCATORS.iter().filter(|spec| wanted(spec.name)).collect(),
+            relabelled: false,
+            measurements,
+            sensing: &[Sensing::Random],
+        }
+    }
+
+    /// Rows of `contacts`, called `name`, each with the median of its distances; none without a window.
+    ///
+    /// # Errors
+    /// [`ScoreError`] when no rows can be chosen.
+    fn locate(&self, name: &str, tools: &Tools, contacts: &[Contact]) -> Result<Vec<(PlaceRow, f64)>, ScoreError> {
         let mut views: Vec<(bool, &Contact, [usize; 2])> = contacts.iter().flat_map(views).collect();
         views.retain(|(relabelled, ..)| self.relabelled || !relabelled);
         let errors: Vec<Vec<Vec<f64>>> = views
             .par_iter()
             .map(|&(_, contact, shift)| self.errors(tools, contact, shift))
             .collect::<Result<_, Refusal>>()
-            .map_err(ScoreError::rows)?;
+            .map_err(|e| e.at("rows"))?;
         let kinds = self
             .sensing
             .iter()
@@ -172,13 +180,19 @@ impl PlacesRequest<'_> {
                 for (i, &m) in self.measurements.iter().enumerate() {
                     let at = (k / 2 * self.locators.len() + l) * self.measurements.len() + i;
                     let of = views.iter().zip(&errors).filter(|(view, _)| view.0 == relabelled);
-                    found.push(Located {
-                        locator: spec.name,
+                    let errors_px: Vec<f64> = of.flat_map(|(_, e)| e[at].iter().copied()).collect();
+                    let Some(median_px) = median(&errors_px) else { continue };
+                    let count = errors_px.len() as f64;
+                    let row = PlaceRow {
+                        contact: name.to_owned(),
+                        decoder: spec.name.to_owned(),
                         m,
                         relabelled,
                         sensing,
-                        errors_px: of.flat_map(|(_, e)| e[at].iter().copied()).collect(),
-                    });
+                        mean_px: errors_px.iter().sum::<f64>() / count,
+                        share_under_1px: errors_px.iter().filter(|e| **e < 1.0).count() as f64 / count,
+                    };
+                    found.push((row, median_px));
                 }
             }
         }
@@ -196,8 +210,7 @@ impl PlacesRequest<'_> {
                 Sensing::Chosen => chosen_places(&press, tools.shape, most)?,
             };
             for spec in &self.locators {
-                let mut locators: Vec<Box<dyn Locate + '_>> =
-                    presses.iter().map(|press| (spec.start)(tools, press)).collect();
+                let mut locators: Vec<_> = presses.iter().map(|press| (spec.start)(tools, press)).collect();
                 for &m in self.measurements {
                     let mut errors = Vec::new();
                     for (press, locator) in presses.iter().zip(&mut locators) {
@@ -206,7 +219,7 @@ impl PlacesRequest<'_> {
                         // a window that a locator fails on counts as a guess, so that all are compared on the same ones
                         let places = press
                             .windows(0..end, m, m)
-                            .map(|(start, window)| locator.locate(start, &window).unwrap_or(middle(tools.shape)));
+                            .map(|(start, window)| locator(start, &window).unwrap_or(middle(tools.shape)));
                         errors.extend(places.map(|p| distance(p, truth)));
                     }
                     found.push(errors);
@@ -312,7 +325,7 @@ pub struct PlaceRow {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LocalisationRow {
     /// Decoding variant.
-    pub decode: &'static str,
+    pub decode: String,
     /// Number of measurements.
     pub m: usize,
     /// Mean distance between the estimated and the true centre, taxels.
@@ -321,46 +334,4 @@ pub struct LocalisationRow {
     pub median_px: f64,
     /// Share of windows within one taxel.
     pub share_under_1px: f64,
-}
-
-/// Distances from the true centre, taxels.
-struct Located {
-    locator: &'static str,
-    m: usize,
-    relabelled: bool,
-    sensing: Sensing,
-    errors_px: Vec<f64>,
-}
-
-impl Located {
-    /// Mean distance and share of windows within one taxel; `None` without a window.
-    fn mean(&self) -> Option<(f64, f64)> {
-        let count = self.errors_px.len() as f64;
-        let near = self.errors_px.iter().filter(|e| **e < 1.0).count() as f64;
-        (count > 0.0).then(|| (self.errors_px.iter().sum::<f64>() / count, near / count))
-    }
-
-    fn place_row(&self, contact: &str) -> Option<PlaceRow> {
-        let (mean_px, share_under_1px) = self.mean()?;
-        Some(PlaceRow {
-            contact: contact.to_owned(),
-            decoder: self.locator.to_owned(),
-            m: self.m,
-            relabelled: self.relabelled,
-            sensing: self.sensing,
-            mean_px,
-            share_under_1px,
-        })
-    }
-
-    fn localisation_row(&self) -> Option<LocalisationRow> {
-        let (mean_px, share_under_1px) = self.mean()?;
-        Some(LocalisationRow {
-            decode: self.locator,
-            m: self.m,
-            mean_px,
-            median_px: median(&self.errors_px)?,
-            share_under_1px,
-        })
-    }
 }

@@ -4,7 +4,6 @@ use super::gains::{gain_sds, on_skins_with};
 use super::network::TrainedNetwork;
 use super::presses::{TrainingPresses, library, prior_images, templates, training_images};
 use super::shapes::{PosedObject, blobs, outline_images, shape_images, with_gains};
-use super::{LearnError, in_dictionary, in_gains, in_library, in_prior};
 use crate::session::ScoredSession;
 use rand::RngExt as _;
 use rand::seq::SliceRandom as _;
@@ -31,7 +30,7 @@ const POSES_OF_A_LIBRARY: usize = 30;
 /// let images = Matrix::from_columns(4, 2, &[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]).unwrap();
 /// let data = TrainingData::of_images(images, &[1, 2], 2, Streams::new(1))?;
 /// assert_eq!((data.shape, data.templates.labels()), ([2, 2], &[1, 2][..]));
-/// # Ok::<(), spts_eval::training::LearnError>(())
+/// # Ok::<(), spts_eval::training::Refusal>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct TrainingData {
@@ -67,19 +66,19 @@ impl TrainingData {
     /// request.
     ///
     /// # Errors
-    /// [`LearnError`] if there is no training image.
+    /// [`Refusal`] if there is no training image.
     pub fn new(
         training: &[TrainingPresses<'_>],
         cols: usize,
         gain_sd: Vec<f64>,
         streams: Streams,
-    ) -> Result<Self, LearnError> {
+    ) -> Result<Self, Refusal> {
         let images = prior_images(training);
         Ok(Self {
-            templates: templates(training).map_err(in_library)?,
+            templates: templates(training).map_err(|e| e.at("library"))?,
             gain_sd,
             candidates: Arc::new(training_images(training)),
-            ..Self::of_library(library(training).map_err(in_library)?, images, cols, streams)
+            ..Self::of_library(library(training).map_err(|e| e.at("library"))?, images, cols, streams)
         })
     }
 
@@ -106,14 +105,14 @@ impl TrainingData {
     /// anew within their uncertainty. The sheet has `cols` columns.
     ///
     /// # Errors
-    /// As [`Self::new`]; [`LearnError`] if a gain makes a sample infinite.
+    /// As [`Self::new`]; [`Refusal`] if a gain makes a sample infinite.
     pub fn of_skin(
         simulated: &[ScoredSession],
         gains: &TaxelGains,
         cols: usize,
         streams: Streams,
-    ) -> Result<Self, LearnError> {
-        let shown = on_skins_with(gains, simulated, streams.child("calibrated", 0)).map_err(in_gains)?;
+    ) -> Result<Self, Refusal> {
+        let shown = on_skins_with(gains, simulated, streams.child("calibrated", 0)).map_err(|e| e.at("gains"))?;
         let training: Vec<TrainingPresses<'_>> = shown.iter().filter_map(TrainingPresses::all).collect();
         Self::new(&training, cols, gain_sds(gains), streams)
     }
@@ -122,11 +121,11 @@ impl TrainingData {
     /// is learned with `streams` on request. Negative values are used as they are.
     ///
     /// # Errors
-    /// [`LearnError`] if all images are zero.
+    /// [`Refusal`] if all images are zero.
     ///
     /// # Panics
     /// If the number of labels differs from that of the images.
-    pub fn of_images(images: Matrix, labels: &[usize], cols: usize, streams: Streams) -> Result<Self, LearnError> {
+    pub fn of_images(images: Matrix, labels: &[usize], cols: usize, streams: Streams) -> Result<Self, Refusal> {
         assert_eq!(images.ncols(), labels.len(), "labels");
         let columns: Vec<Vec<f64>> = (0..images.ncols()).map(|k| images.column(k)).collect();
         let mut classes = labels.to_vec();
@@ -134,23 +133,24 @@ impl TrainingData {
         classes.dedup();
         let means = classes.iter().map(|class| {
             let mut mean = vec![0.0; images.nrows()];
-            let own = columns.iter().zip(labels).filter(|(_, label)| *label == class);
-            let count = own.clone().count() as f64;
-            for (column, _) in own {
-                mean.iter_mut()
-                    .zip(column)
-                    .for_each(|(mean, v)| *mean += v.max(0.0) / count);
+            let own: Vec<_> = columns
+                .iter()
+                .zip(labels)
+                .filter(|(_, label)| *label == class)
+                .collect();
+            for (column, _) in &own {
+                let each = mean.iter_mut().zip(*column);
+                each.for_each(|(mean, v)| *mean += v.max(0.0) / own.len() as f64);
             }
             mean
         });
         let means: Vec<Vec<f64>> = means.collect();
-        let slices: Vec<&[f64]> = means.iter().map(Vec::as_slice).collect();
         Ok(Self {
-            templates: Library::new(&Matrix::from_column_slices(images.nrows(), &slices), &classes)
-                .map_err(in_library)?,
+            templates: Library::new(&Matrix::from_column_slices(images.nrows(), &means), &classes)
+                .map_err(|e| e.at("library"))?,
             candidates: Arc::new(columns),
             ..Self::of_library(
-                Library::new(&images, labels).map_err(in_library)?,
+                Library::new(&images, labels).map_err(|e| e.at("library"))?,
                 images,
                 cols,
                 streams,
@@ -162,8 +162,8 @@ impl TrainingData {
     /// of blobs, and no classes.
     ///
     /// # Errors
-    /// [`LearnError`] for more than [`TrainingData::MOST_TAXELS`], or if the images are not usable.
-    pub fn for_layout(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
+    /// [`Refusal`] for more than [`TrainingData::MOST_TAXELS`], or if the images are not usable.
+    pub fn for_layout(skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
         let (taxels, most) = (skin.taxels(), Self::MOST_TAXELS);
         if taxels > most {
             let message =
@@ -172,7 +172,8 @@ impl TrainingData {
         }
         let images = outline_images(skin, streams);
         let mean: Vec<f64> = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
-        let library = Library::new(&Matrix::from_column_slices(images.nrows(), &[&mean]), &[0]).map_err(in_library)?;
+        let library =
+            Library::new(&Matrix::from_column_slices(images.nrows(), &[&mean]), &[0]).map_err(|e| e.at("library"))?;
         Ok(Self {
             random_shapes: true,
             dictionary: OnceLock::from(Arc::new(Dictionary::new(blobs(skin)))),
@@ -184,8 +185,8 @@ impl TrainingData {
     /// on taxels with the usual spread of gains.
     ///
     /// # Errors
-    /// As [`Self::for_layout`]; [`LearnError`] if no shape can be pressed on the skin.
-    pub fn for_shapes(skin: &SkinLayout, streams: Streams) -> Result<Self, LearnError> {
+    /// As [`Self::for_layout`]; [`Refusal`] if no shape can be pressed on the skin.
+    pub fn for_shapes(skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
         let data = Self::for_layout(skin, streams)?;
         let alike = shape_images(skin, streams.rng("shapes", 0).random()).map_err(|e| e.at("shapes"))?;
         Ok(Self {
@@ -200,16 +201,13 @@ impl TrainingData {
     ///
     /// # Errors
     /// As [`Self::of_images`].
-    pub fn of_poses(objects: &[(usize, &PosedObject)], cols: usize, streams: Streams) -> Result<Self, LearnError> {
+    pub fn of_poses(objects: &[(usize, &PosedObject)], cols: usize, streams: Streams) -> Result<Self, Refusal> {
         let (mut columns, mut labels) = (Vec::new(), Vec::new());
         for (label, object) in objects {
             columns.extend((0..object.images.ncols()).map(|k| object.images.column(k)));
             labels.resize(columns.len(), *label);
         }
-        let matrix = |columns: &[Vec<f64>]| {
-            let slices: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-            Matrix::from_column_slices(columns.first().map_or(0, Vec::len), &slices)
-        };
+        let matrix = |columns: &[Vec<f64>]| Matrix::from_column_slices(columns.first().map_or(0, Vec::len), &columns);
         let alike = matrix(&columns);
         let images = with_gains(&alike, streams);
         // the library and the dictionary take few images of every object
@@ -246,8 +244,8 @@ impl TrainingData {
     /// The network for this sheet.
     ///
     /// # Errors
-    /// [`LearnError`] if it is for another sheet.
-    pub fn network(&self) -> Result<Arc<Unrolled>, LearnError> {
+    /// [`Refusal`] if it is for another sheet.
+    pub fn network(&self) -> Result<Arc<Unrolled>, Refusal> {
         let network = self.network.clone().unwrap_or_else(TrainedNetwork::shipped);
         Ok(network.on(self.shape)?)
     }
@@ -275,14 +273,14 @@ impl TrainingData {
     /// The given dictionary, or one learned by K-SVD with the published preprocessing.
     ///
     /// # Errors
-    /// [`LearnError`].
-    pub fn dictionary(&self) -> Result<Arc<Dictionary>, LearnError> {
+    /// [`Refusal`].
+    pub fn dictionary(&self) -> Result<Arc<Dictionary>, Refusal> {
         if let Some(dictionary) = self.dictionary.get() {
             return Ok(Arc::clone(dictionary));
         }
         let candidates = self.candidates.as_ref().clone();
         let atoms = learn_dictionary(candidates, &(Selection::default(), Ksvd::default()), self.streams)
-            .map_err(in_dictionary)?;
+            .map_err(|e| e.at("dictionary"))?;
         let learned = Arc::new(Dictionary::new(atoms));
         Ok(Arc::clone(self.dictionary.get_or_init(|| learned)))
     }
@@ -290,8 +288,8 @@ impl TrainingData {
     /// A prior of the images, cleaned and shifted as `how` says.
     ///
     /// # Errors
-    /// [`LearnError`].
-    pub fn prior(&self, how: ImagePrior) -> Result<Arc<Gaussian>, LearnError> {
+    /// [`Refusal`].
+    pub fn prior(&self, how: ImagePrior) -> Result<Arc<Gaussian>, Refusal> {
         let how = if self.random_shapes {
             ImagePrior {
                 reach: 0,
@@ -302,7 +300,9 @@ impl TrainingData {
         } else {
             how
         };
-        Ok(Arc::new(how.learn(&self.images, self.shape[1]).map_err(in_prior)?))
+        Ok(Arc::new(
+            how.learn(&self.images, self.shape[1]).map_err(|e| e.at("prior"))?,
+        ))
     }
 }
 
@@ -339,23 +339,23 @@ impl Learned {
     /// for an array with `cols` columns.
     ///
     /// # Errors
-    /// [`LearnError`] if no raster image is strong enough.
+    /// [`Refusal`] if no raster image is strong enough.
     pub fn learn(
         sessions: &[ScoredSession],
         learning: &Learning,
         cols: usize,
         streams: Streams,
-    ) -> Result<Self, LearnError> {
+    ) -> Result<Self, Refusal> {
         let training: Vec<TrainingPresses<'_>> = sessions
             .iter()
             .filter_map(|s| TrainingPresses::within(s, &learning.presses))
             .collect();
-        let dictionary =
-            learn_dictionary(training_images(&training), &learning.dictionary(), streams).map_err(in_dictionary)?;
+        let dictionary = learn_dictionary(training_images(&training), &learning.dictionary(), streams)
+            .map_err(|e| e.at("dictionary"))?;
         Ok(Self::new(
             dictionary,
             None,
-            library(&training).map_err(in_library)?,
+            library(&training).map_err(|e| e.at("library"))?,
             cols,
         ))
     }

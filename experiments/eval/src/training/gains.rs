@@ -55,24 +55,21 @@ impl SkinGains {
             )));
         }
         let (mut ratios, mut count, mut sessions) = (Vec::new(), vec![0; taxels], 0);
-        for (k, &label) in skin.labels().iter().enumerate() {
-            let Some(l) = simulated.labels().iter().position(|s| *s == label) else {
+        for (k, &object) in skin.labels().iter().enumerate() {
+            let Some(l) = simulated.labels().iter().position(|s| *s == object) else {
                 continue;
             };
             let logs = logs(&skin.images().column(k), &simulated.images().column(l));
-            if logs.is_empty() {
-                continue;
-            }
             for &(taxel, log) in &logs {
                 count[taxel] += 1;
                 ratios.push(Ratio {
                     session: sessions,
-                    object: label,
+                    object,
                     taxel,
                     log,
                 });
             }
-            sessions += 1;
+            sessions += usize::from(!logs.is_empty());
         }
         if sessions == 0 {
             return Err(Refusal::new(
@@ -127,23 +124,17 @@ impl SkinGains {
     /// one value a taxel. `None` if fewer than two taxels are touched.
     #[must_use]
     pub fn check(&self, skin: &[f64], simulated: &[f64]) -> Option<GainCheck> {
-        let with_gains: Vec<f64> = simulated
-            .iter()
-            .zip(&self.gains.log_mean)
-            .map(|(v, log)| v * log.exp())
-            .collect();
+        let with_gains = simulated.iter().zip(&self.gains.log_mean).map(|(v, log)| v * log.exp());
+        let with_gains: Vec<f64> = with_gains.collect();
         let logs = logs(skin, simulated);
         // what is left of a ratio without the gain, and its variance
-        let left: Vec<(f64, f64)> = logs
-            .iter()
-            .map(|&(i, log)| {
-                let sd = self.gains.log_sd[i]
-                    .hypot(self.contact_log_sd)
-                    .hypot(self.gains.mounting_log_sd);
-                (log - self.gains.log_mean[i], sd * sd)
-            })
-            .collect();
-        // one alone is its own amplitude
+        let left = logs.iter().map(|&(i, log)| {
+            let sd = self.gains.log_sd[i]
+                .hypot(self.contact_log_sd)
+                .hypot(self.gains.mounting_log_sd);
+            (log - self.gains.log_mean[i], sd * sd)
+        });
+        let left: Vec<(f64, f64)> = left.collect();
         if left.len() < 2 {
             return None;
         }
@@ -503,11 +494,7 @@ mod tests {
         let gains: Vec<f64> = (0..taxels).map(|_| effects.gain * normal()).collect();
         let mut ratios = Vec::new();
         for object in 0..objects {
-            let sessions = if object + 1 == objects {
-                object..object + 2
-            } else {
-                object..object + 1
-            };
+            let sessions = object..object + 1 + usize::from(object + 1 == objects);
             let amplitudes = [normal(), normal()];
             for (taxel, gain) in gains.iter().enumerate() {
                 if (taxel + object) % 3 == 0 {
@@ -564,11 +551,7 @@ mod tests {
             assert!((found.sd[k] - covariance[(k, k)].sqrt()).abs() < 1e-11, "{k}");
         }
         let likelihood = -0.5 * (v.determinant().ln() + xvx.determinant().ln() + y.dot(&(&p * &y)));
-        assert!(
-            (found.log_likelihood - likelihood).abs() < 1e-9,
-            "{} for {likelihood}",
-            found.log_likelihood
-        );
+        assert!((found.log_likelihood - likelihood).abs() < 1e-9, "{likelihood}");
     }
 
     /// 400 taxels under 12 objects: a standard deviation is known to about 1/√(2n) = 4 %, less what the other effect
@@ -576,22 +559,16 @@ mod tests {
     /// 400 ± 5 √800.
     #[test]
     fn planted_effects_are_found() {
-        let planted_effects = Effects {
-            gain: 0.25,
-            contact: 0.45,
+        let effects = |gain, contact| Effects {
+            gain,
+            contact,
             mounting: 0.1,
         };
-        let (ratios, gains) = planted(planted_effects, 400, 12, 8);
+        let expected = effects(0.25, 0.45);
+        let (ratios, gains) = planted(expected, 400, 12, 8);
         let model = MixedModel::new(ratios, 400, 13);
-        let found = model.fitted(Effects {
-            gain: 0.3,
-            contact: 0.35,
-            mounting: 0.1,
-        });
-        for (found, expected) in [
-            (found.gain, planted_effects.gain),
-            (found.contact, planted_effects.contact),
-        ] {
+        let found = model.fitted(effects(0.3, 0.35));
+        for (found, expected) in [(found.gain, expected.gain), (found.contact, expected.contact)] {
             assert!((found / expected - 1.0).abs() < 0.15, "{found} for {expected}");
         }
         let solution = model.solve(found);

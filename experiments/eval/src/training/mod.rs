@@ -17,7 +17,6 @@ pub use shapes::{PoseKnowledge, PosedObject, SHAPES_SPEC, shape_images};
 pub use skins::Skins;
 
 use crate::session::ScoredSession;
-use spts_input::Refusal;
 use spts_models::TaxelGains;
 
 /// Name of the dictionary and library published with the recordings.
@@ -72,33 +71,14 @@ pub enum TrainingSource {
     },
 }
 
-/// Why a decoder cannot be trained.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error(transparent)]
-pub struct LearnError(#[from] Refusal);
-
-impl From<LearnError> for Refusal {
-    fn from(error: LearnError) -> Self {
-        error.0
-    }
-}
-
-macro_rules! places {
-    ($($name:ident, $place:literal;)*) => {$(
-        #[doc = concat!("The refusal, said of \"", $place, "\".")]
-        pub(crate) fn $name(refusal: Refusal) -> LearnError {
-            refusal.at($place).into()
+impl TrainingSource {
+    /// Name on the board.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Published | Self::Raster => RASTER,
+            Self::Shapes => SHAPES,
+            Self::Other { name, .. } | Self::Poses { name, .. } | Self::Calibrated { name, .. } => name,
         }
-    )*};
-}
-
-places! {
-    in_dictionary, "dictionary";
-    in_library, "library";
-    in_prior, "prior";
-    in_parameter, "parameter";
-    in_templates, "templates";
-    in_rows, "rows";
-    in_range, "range";
-    in_gains, "gains";
+    }
 }

@@ -162,20 +162,13 @@ fn numbers(tensor: &TensorView<'_>) -> Option<Vec<f32>> {
     match tensor.dtype() {
         Dtype::F16 => Some(
             bytes
-                .as_chunks::<2>()
+                .as_chunks()
                 .0
                 .iter()
                 .map(|b| half::f16::from_le_bytes(*b).to_f32())
                 .collect(),
         ),
-        Dtype::F32 => Some(
-            bytes
-                .as_chunks::<4>()
-                .0
-                .iter()
-                .map(|b| f32::from_le_bytes(*b))
-                .collect(),
-        ),
+        Dtype::F32 => Some(bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect()),
         _ => None,
     }
 }

@@ -34,14 +34,12 @@ impl<'a> TrainingPresses<'a> {
     #[must_use]
     pub fn within(session: &'a ScoredSession, presses: &Range<usize>) -> Option<Self> {
         let raster = session.raster.as_ref().filter(|_| !session.shared_raster)?;
-        let (end, hold) = (
-            presses.end.min(raster.blocks().len()),
-            session.raster_protocol.first_frame..,
-        );
+        let end = presses.end.min(raster.blocks().len());
+        let first = session.raster_protocol.first_frame;
         Some(Self {
             label: session.label,
             raster,
-            hold: hold.start..hold.start + session.raster_protocol.frames,
+            hold: first..first + session.raster_protocol.frames,
             presses: (presses.start.min(end)..end).collect(),
         })
     }
@@ -164,8 +162,7 @@ fn class_library(
             labels.push(t.label);
         }
     }
-    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
-    Library::new(&Matrix::from_column_slices(taxels(training), &slices), &labels)
+    Library::new(&Matrix::from_column_slices(taxels(training), &images), &labels)
 }
 
 /// Images that a decoder's prior is learned from, taxels × images, V: three raster images of every press, from early,

@@ -9,6 +9,7 @@ use spts_dataset::{Maker, Spec};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams, VelostatConfig};
 use spts_recon::Matrix;
+use std::ops::Range;
 
 /// The data set of these shapes.
 pub const SHAPES_SPEC: &str = "unseen-shapes";
@@ -28,43 +29,37 @@ const CHUNK: u64 = 50;
 /// [`Refusal`] if the layout is too large.
 pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
     let presses = (VALUES / layout.taxels().max(1) as u64).clamp(FEWEST, PRESSES);
-    let skin: toml::Table = [
-        ("rows".to_owned(), toml::Value::Integer(layout.rows() as i64)),
-        ("cols".to_owned(), toml::Value::Integer(layout.cols() as i64)),
-        ("pitch_m".to_owned(), layout.pitch_m().into()),
-        ("electrode_m".to_owned(), layout.electrode_m().into()),
-    ]
-    .into_iter()
-    .collect();
-    let overrides: toml::Table = [
-        ("rows".to_owned(), toml::Value::Integer(presses as i64)),
-        ("seed".to_owned(), toml::Value::Integer((seed >> 2) as i64)),
-        ("skin".to_owned(), skin.into()),
-    ]
-    .into_iter()
-    .collect();
+    let mut overrides = toml::Table::new();
+    let skin = [
+        ("rows", (layout.rows() as i64).into()),
+        ("cols", (layout.cols() as i64).into()),
+        ("pitch_m", layout.pitch_m().into()),
+        ("electrode_m", layout.electrode_m().into()),
+    ];
+    let skin: toml::Table = skin
+        .map(|(key, value): (&str, toml::Value)| (key.to_owned(), value))
+        .into_iter()
+        .collect();
+    overrides.insert("rows".to_owned(), (presses as i64).into());
+    overrides.insert("seed".to_owned(), ((seed >> 2) as i64).into());
+    overrides.insert("skin".to_owned(), skin.into());
     let spec = Spec::load(SHAPES_SPEC, &overrides).map_err(Refusal::from_error)?;
-    let chunks: Vec<Vec<Vec<f64>>> = (0..presses.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| {
-            let mut maker = Maker::new(&spec);
-            let rows = chunk * CHUNK..((chunk + 1) * CHUNK).min(presses);
-            rows.map(|row| {
-                Ok(scaled(
-                    maker.row(row).map_err(Refusal::from_error)?.conductance().values(),
-                ))
-            })
-            .collect()
-        })
-        .collect::<Result<_, Refusal>>()?;
-    let columns: Vec<&[f64]> = chunks.iter().flatten().map(Vec::as_slice).collect();
+    let chunks = (0..presses.div_ceil(CHUNK)).into_par_iter();
+    let chunks = chunks.map(|chunk| conductances(&spec, chunk * CHUNK..((chunk + 1) * CHUNK).min(presses)));
+    let columns = chunks.collect::<Result<Vec<_>, Refusal>>()?.concat();
     Ok(Matrix::from_column_slices(layout.taxels(), &columns))
 }
 
-/// The image with a maximum of 1; of zeros where nothing is touched.
-pub(super) fn scaled(image: &[f64]) -> Vec<f64> {
-    let peak = image.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    image.iter().map(|v| v / peak).collect()
+/// Conductances of `rows` of a data set, each as a share of its largest.
+fn conductances(spec: &Spec, rows: Range<u64>) -> Result<Vec<Vec<f64>>, Refusal> {
+    let mut maker = Maker::new(spec);
+    let scaled = |row| {
+        let made = maker.row(row).map_err(Refusal::from_error)?;
+        let image = made.conductance().values();
+        let peak = image.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        Ok(image.iter().map(|v| v / peak).collect())
+    };
+    rows.map(scaled).collect()
 }
 
 /// How accurately the pose of an object is known: its place to half a taxel and its rotation to 15°, as read by eye;
@@ -156,16 +151,8 @@ impl PoseKnowledge {
             tilt = self.tilt_sd_deg,
         );
         let spec = Spec::from_toml(&text, &toml::Table::new(), ".".as_ref()).map_err(Refusal::from_error)?;
-        let mut maker = Maker::new(&spec);
-        let images = (0..PRESSES_OF_AN_OBJECT)
-            .map(|row| {
-                Ok(scaled(
-                    maker.row(row).map_err(Refusal::from_error)?.conductance().values(),
-                ))
-            })
-            .collect::<Result<Vec<_>, Refusal>>()?;
-        let columns: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
-        Ok(Matrix::from_column_slices(layout.taxels(), &columns))
+        let images = conductances(&spec, 0..PRESSES_OF_AN_OBJECT)?;
+        Ok(Matrix::from_column_slices(layout.taxels(), &images))
     }
 }
 
@@ -211,8 +198,7 @@ pub(super) fn outline_images(layout: &SkinLayout, streams: Streams) -> Matrix {
     let images: Vec<Vec<f64>> = (0..SHAPES as u64)
         .map(|index| image(layout, gain_log_sd, &mut streams.rng("layout/shape", index)))
         .collect();
-    let slices: Vec<&[f64]> = images.iter().map(Vec::as_slice).collect();
-    Matrix::from_column_slices(layout.taxels(), &slices)
+    Matrix::from_column_slices(layout.taxels(), &images)
 }
 
 /// One shape, on taxels whose gains have logarithms with the standard deviation `gain_log_sd`.
@@ -285,8 +271,7 @@ pub(super) fn blobs(layout: &SkinLayout) -> Matrix {
             atoms.push(atom.iter().map(|v| v / length).collect());
         }
     }
-    let slices: Vec<&[f64]> = atoms.iter().map(Vec::as_slice).collect();
-    Matrix::from_column_slices(rows * cols, &slices)
+    Matrix::from_column_slices(rows * cols, &atoms)
 }
 
 #[cfg(test)]

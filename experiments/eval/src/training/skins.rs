@@ -89,13 +89,11 @@ impl Skins {
         self.check()?;
         let labels = Labels::default();
         let sessions = OBJECTS.par_iter().map(|object| {
-            let blocks = (0..self.skins)
-                .into_par_iter()
-                .map(|skin| self.press_one(object, seed, skin, done))
-                .collect::<Result<Vec<_>, _>>();
             let refused = |e: Refusal| e.at(object.name);
-            let blocks = blocks.map_err(|e: TwinError| refused(Refusal::from_error(e)))?;
-            let raster = joined(blocks).map_err(refused)?;
+            let blocks = (0..self.skins).into_par_iter();
+            let blocks = blocks.map(|skin| self.press_one(object, seed, skin, done));
+            let blocks = blocks.collect::<Result<Vec<_>, TwinError>>();
+            let raster = joined(blocks.map_err(|e| refused(Refusal::from_error(e)))?).map_err(refused)?;
             let session = Session {
                 hold_s: Some(PUBLISHED_HOLD_S),
                 raster: Some(Recorded::new(raster)),
@@ -130,12 +128,13 @@ impl Skins {
             press.position_sd_m = self.position_sd_m;
             press.rotation_sd_deg = self.rotation_sd_deg;
         }
-        let gains = [
-            ("spread_log_sd".to_owned(), self.spread_log_sd.into()),
-            ("session_log_sd".to_owned(), self.session_log_sd.into()),
-        ];
         config.skin = self.layout;
-        config.transducer_parameters = gains.into_iter().collect();
+        config
+            .transducer_parameters
+            .insert("spread_log_sd".to_owned(), self.spread_log_sd.into());
+        config
+            .transducer_parameters
+            .insert("session_log_sd".to_owned(), self.session_log_sd.into());
         config.readout = Some(self.readout.to_owned());
         let scene = Scene::new(config, Path::new(""))?;
         let index = usize::from(object.label);
@@ -160,15 +159,7 @@ fn joined(recordings: Vec<Recording>) -> Result<Recording, Refusal> {
 mod tests {
     use super::*;
     use crate::protocol::PLATEAU;
-
-    fn plateau(session: &ScoredSession, press: usize) -> Vec<f64> {
-        let mut image = vec![0.0; 100];
-        for frame in PLATEAU {
-            let volts = session.raster.as_ref().unwrap().volts(press, frame);
-            image.iter_mut().zip(volts).for_each(|(sum, v)| *sum += v);
-        }
-        image
-    }
+    use spts_recon::metrics::pearson;
 
     /// Gains of one skin are the same for every object, up to the spread of a session: the logarithm of the ratio of
     /// two skins' images is correlated between objects that touch the same taxels. With σ = 0.30 fixed and 0.10 a
@@ -176,34 +167,33 @@ mod tests {
     #[test]
     fn a_skin_is_the_same_for_all_objects() {
         let skins = Skins {
-            layout: SkinLayout::default(),
             skins: 2,
             spread_log_sd: 0.30,
             session_log_sd: 0.10,
             position_sd_m: 0.0,
             rotation_sd_deg: 0.0,
-            readout: DEFAULT_READOUT,
+            ..Skins::default()
         };
         let sessions = skins.press(3, &|| ()).unwrap();
         assert_eq!(sessions.len(), OBJECTS.len());
-        let of = |name: &str| {
+        let plateaus = |name: &str| {
             let session = sessions.iter().find(|s| s.object == name).unwrap();
-            [plateau(session, 0), plateau(session, 1)]
+            [0, 1].map(|press| {
+                let mut image = vec![0.0; 100];
+                for frame in PLATEAU {
+                    let volts = session.raster.as_ref().unwrap().volts(press, frame);
+                    image.iter_mut().zip(volts).for_each(|(sum, v)| *sum += v);
+                }
+                image
+            })
         };
-        let (rec, eraser) = (of("rec"), of("eraser"));
+        let (rec, eraser) = (plateaus("rec"), plateaus("eraser"));
         let strong = |image: &[f64], k: usize| image[k] > 0.3 * image.iter().copied().fold(0.0, f64::max);
-        let both: Vec<usize> = (0..100)
-            .filter(|&k| rec.iter().chain(&eraser).all(|image| strong(image, k)))
-            .collect();
+        let all = || rec.iter().chain(&eraser);
+        let both: Vec<usize> = (0..100).filter(|&k| all().all(|image| strong(image, k))).collect();
         assert!(both.len() > 10, "{both:?}");
-        let ratios = |images: &[Vec<f64>; 2]| -> Vec<f64> {
-            let logs: Vec<f64> = both.iter().map(|&k| (images[0][k] / images[1][k]).ln()).collect();
-            let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-            logs.iter().map(|l| l - mean).collect()
-        };
-        let (a, b) = (ratios(&rec), ratios(&eraser));
-        let dot = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>();
-        let r = dot(&a, &b) / (dot(&a, &a) * dot(&b, &b)).sqrt();
+        let ratios = |[a, b]: &[Vec<f64>; 2]| both.iter().map(|&k| (a[k] / b[k]).ln()).collect::<Vec<f64>>();
+        let r = pearson(&ratios(&rec), &ratios(&eraser)).unwrap();
         assert!(r > 0.7, "{r}");
     }
 

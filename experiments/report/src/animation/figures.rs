@@ -4,7 +4,7 @@ use super::Animation;
 use spts::output::{OutputError, write_bytes};
 use spts::scene::Assignment;
 use spts::simulate::{Request, run};
-use spts_eval::training::{LearnError, TrainingData};
+use spts_eval::training::TrainingData;
 use spts_input::Refusal;
 use spts_models::Streams;
 use std::path::Path;
@@ -57,9 +57,6 @@ pub enum MotionError {
         /// The scene.
         scene: &'static str,
     },
-    /// The decoder cannot learn for its skin.
-    #[error(transparent)]
-    Learn(#[from] LearnError),
     /// The scene cannot be simulated, or its recording not be decoded.
     #[error(transparent)]
     Refused(#[from] Refusal),
@@ -89,16 +86,9 @@ pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), MotionError> {
         let session = simulation.first.as_ref().ok_or(unrecorded)?;
         let training = TrainingData::for_layout(prepared.scene.skin(), Streams::new(1))?;
         let animation = Animation::new(&prepared, &frames, session, Some(&training))?;
-        for (name, gif) in [(figure.file, true), (figure.still, false)] {
-            let path = folder.join(name);
-            let bytes = if gif {
-                animation.gif(&path)
-            } else {
-                animation.still(&path)
-            };
-            let bytes = bytes?;
-            write_bytes(&path, &bytes)?;
-        }
+        let [moving, still] = [figure.file, figure.still].map(|name| folder.join(name));
+        write_bytes(&moving, &animation.gif(&moving)?)?;
+        write_bytes(&still, &animation.still(&still)?)?;
     }
     Ok(())
 }

@@ -11,9 +11,8 @@ mod timeline;
 pub use figures::{MOTION_FIGURES, MotionError, MotionFigure, simulate_motion};
 
 use self::gif::{Palette, gif};
-use crate::figures::canvas::Canvas;
-use crate::figures::pixels::{paint, png_of};
-use picture::{COLUMNS, Moment, Stage};
+use crate::figures::canvas::{Canvas, paint, png_of};
+use picture::COLUMNS;
 use rayon::prelude::*;
 use spts::Session;
 use spts::output::OutputError;
@@ -50,7 +49,20 @@ pub const ANIMATION_FILE: &str = "animation.gif";
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct Animation {
-    stage: Stage,
+    title: String,
+    /// Rows and columns of taxels.
+    shape: (usize, usize),
+    timeline: Timeline,
+    trace: Trace,
+    rate_hz: f64,
+    /// Samples of a window.
+    m: usize,
+    /// Largest pressure of all, Pa.
+    peak_pa: f64,
+    /// Largest value of all decoded images, V; the reason where nothing is decoded.
+    peak_v: Result<f64, String>,
+    /// Largest output of all without that of the idle skin, V.
+    largest_v: f64,
     /// Pressure at every instant, Pa.
     pressures: Vec<Vec<f64>>,
     /// Image and window at every instant.
@@ -83,15 +95,22 @@ impl Animation {
 
         // a fifth of the taxels, and no more samples than come between two pictures
         let shares = DecodeRequest::default_measurements(layout.taxels());
-        let between = ends
-            .windows(2)
-            .map(|pair| pair[1] - pair[0])
-            .min()
-            .unwrap_or(usize::MAX);
-        let m = shares.get(1).copied().unwrap_or(1).min(between).max(1);
+        let between = ends.windows(2).map(|pair| pair[1] - pair[0]).min();
+        let m = shares
+            .get(1)
+            .copied()
+            .unwrap_or(1)
+            .min(between.unwrap_or(usize::MAX))
+            .max(1);
         let images = match training {
             Some(training) => followed_images(session, 0, training, m, &ends)?,
-            None => ends.iter().map(|&end| undecoded(end, m)).collect(),
+            None => {
+                let undecoded = |&end: &usize| FollowedImage {
+                    window: end.saturating_sub(m)..end,
+                    image: Vec::new(),
+                };
+                ends.iter().map(undecoded).collect()
+            }
         };
         let pressures = timeline.instants_s.iter().map(|time_s| pressure_pa(frames, *time_s));
         let pressures: Vec<Vec<f64>> = pressures.collect();
@@ -100,20 +119,18 @@ impl Animation {
         let shown = sample(timeline.from_s)..sample(timeline.to_s);
         let largest = |values: &mut dyn Iterator<Item = f64>| values.filter(|v| v.is_finite()).fold(0.0, f64::max);
         Ok(Self {
-            stage: Stage {
-                title: title(prepared),
-                shape: (layout.rows(), layout.cols()),
-                trace: Trace::new(volts, shown.clone(), COLUMNS),
-                rate_hz,
-                m,
-                peak_pa: largest(&mut pressures.iter().flatten().copied()),
-                peak_v: match training {
-                    Some(_) => Ok(largest(&mut images.iter().flat_map(|at| &at.image).copied())),
-                    None => Err(format!("a skin of {} taxels is not decoded here", layout.taxels())),
-                },
-                largest_v: largest(&mut output_v[shown].iter().map(|v| v.abs())).max(f64::MIN_POSITIVE),
-                timeline,
+            title: title(prepared),
+            shape: (layout.rows(), layout.cols()),
+            trace: Trace::new(volts, shown.clone(), COLUMNS),
+            rate_hz,
+            m,
+            peak_pa: largest(&mut pressures.iter().flatten().copied()),
+            peak_v: match training {
+                Some(_) => Ok(largest(&mut images.iter().flat_map(|at| &at.image).copied())),
+                None => Err(format!("a skin of {} taxels is not decoded here", layout.taxels())),
             },
+            largest_v: largest(&mut output_v[shown].iter().map(|v| v.abs())).max(f64::MIN_POSITIVE),
+            timeline,
             pressures,
             images,
             output_v,
@@ -132,18 +149,6 @@ impl Animation {
         self.images.is_empty()
     }
 
-    /// Picture number `k`.
-    fn picture(&self, k: usize) -> Canvas {
-        let at = &self.images[k];
-        self.stage.draw(&Moment {
-            time_s: self.stage.timeline.instants_s[k],
-            pressure_pa: &self.pressures[k],
-            image: &at.image,
-            window: &at.window,
-            samples: &self.output_v[at.window.clone()],
-        })
-    }
-
     /// The animation as the bytes of a GIF file that repeats for ever; the same on any number of threads. `path` is the
     /// file they are for, named in errors.
     ///
@@ -156,9 +161,8 @@ impl Animation {
             Ok((palette.numbers(&rgb), [width, height]))
         };
         let painted = (0..self.len()).into_par_iter().map(paint);
-        let painted = painted
-            .collect::<std::io::Result<Vec<_>>>()
-            .map_err(OutputError::write(path))?;
+        let painted: std::io::Result<Vec<_>> = painted.collect();
+        let painted = painted.map_err(OutputError::write(path))?;
         let size = painted.first().map_or([1; 2], |(_, size)| *size);
         let [width, height] = size.map(|side| u16::try_from(side).unwrap_or(u16::MAX));
         let pictures: Vec<Vec<u8>> = painted.into_iter().map(|(picture, _)| picture).collect();
@@ -176,14 +180,6 @@ impl Animation {
         let strongest = (0..self.len()).max_by(|a, b| sum(a).total_cmp(&sum(b)));
         let canvas = strongest.map_or_else(|| Canvas::new(1.0, 1.0, ""), |k| self.picture(k));
         png_of(&canvas).map_err(OutputError::write(path))
-    }
-}
-
-/// The window before `end` where nothing is decoded.
-fn undecoded(end: usize, m: usize) -> FollowedImage {
-    FollowedImage {
-        window: end.saturating_sub(m)..end,
-        image: Vec::new(),
     }
 }
 

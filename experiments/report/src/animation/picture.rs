@@ -1,12 +1,12 @@
 //! One picture: pressure, the samples of the current window, the image decoded from the wire, and the wire's trace.
 
+use super::Animation;
 use super::gif::{AHEAD, TRACE, WINDOW, step_of};
-use super::timeline::{Timeline, Trace};
+use super::timeline::Timeline;
 use crate::figures::axis::Axis;
 use crate::figures::canvas::{Anchor, Canvas, Point, TextStyle, text_width, wrap};
 use crate::figures::colour::{FRAME, INK, MUTED, Rgb, heat};
 use crate::figures::draw_heat;
-use std::ops::Range;
 
 /// Width of the picture, CSS pixels; the trace has two columns of pixels to each.
 const WIDTH: f64 = 420.0;
@@ -28,37 +28,10 @@ const TITLE: TextStyle = TextStyle::new(15.0, INK).bold();
 const HEADING: TextStyle = TextStyle::new(10.5, INK).bold();
 const SMALL: TextStyle = TextStyle::new(10.0, MUTED);
 
-/// What all pictures of an animation share.
-pub(super) struct Stage {
-    pub(super) title: String,
-    pub(super) shape: (usize, usize),
-    pub(super) timeline: Timeline,
-    pub(super) trace: Trace,
-    pub(super) rate_hz: f64,
-    /// Samples of a window.
-    pub(super) m: usize,
-    /// Largest pressure of all, Pa.
-    pub(super) peak_pa: f64,
-    /// Largest value of all decoded images, V; `None` where nothing is decoded, with the reason.
-    pub(super) peak_v: Result<f64, String>,
-    /// Largest output of all without that of the idle skin, V.
-    pub(super) largest_v: f64,
-}
-
-/// What moves.
-pub(super) struct Moment<'a> {
-    pub(super) time_s: f64,
-    pub(super) pressure_pa: &'a [f64],
-    pub(super) image: &'a [f64],
-    /// Samples that were decoded last, of the block.
-    pub(super) window: &'a Range<usize>,
-    /// The same without the idle output, V.
-    pub(super) samples: &'a [f64],
-}
-
-impl Stage {
-    /// The picture of `moment`.
-    pub(super) fn draw(&self, moment: &Moment<'_>) -> Canvas {
+impl Animation {
+    /// Picture number `k`.
+    pub(super) fn picture(&self, k: usize) -> Canvas {
+        let time_s = self.timeline.instants_s[k];
         let mut canvas = Canvas::new(WIDTH, HEIGHT, &self.title);
         let fit = (WIDTH - 2.0 * MARGIN) / text_width(&self.title, TITLE.size, true);
         let title = TextStyle {
@@ -69,27 +42,22 @@ impl Stage {
         let line = TextStyle::new(12.0, MUTED);
         canvas.text((MARGIN, 42.0), &self.timeline.speed(), line);
         let clock = TextStyle::new(12.0, INK).anchored(Anchor::End);
-        canvas.text((WIDTH - MARGIN, 42.0), &self.timeline.clock(moment.time_s), clock);
+        canvas.text((WIDTH - MARGIN, 42.0), &self.timeline.clock(time_s), clock);
 
         let right = WIDTH - MARGIN - TILE;
         let scale = |peak: f64| if peak > 0.0 { peak } else { 1.0 };
+        let (pressure_pa, image) = (&self.pressures[k], &self.images[k].image);
         self.tile(
             &mut canvas,
             MARGIN,
             "pressure on the skin",
-            moment.pressure_pa,
+            pressure_pa,
             scale(self.peak_pa),
         );
         scale_bar(&mut canvas, MARGIN, &pressure_label(self.peak_pa));
         match &self.peak_v {
             Ok(peak_v) => {
-                self.tile(
-                    &mut canvas,
-                    right,
-                    "decoded from the wire",
-                    moment.image,
-                    scale(*peak_v),
-                );
+                self.tile(&mut canvas, right, "decoded from the wire", image, scale(*peak_v));
                 scale_bar(&mut canvas, right, &format!("{peak_v:.1} V"));
             }
             Err(reason) => {
@@ -99,8 +67,8 @@ impl Stage {
                 canvas.lines((right + 8.0, TILES_TOP + 20.0), &lines, SMALL);
             }
         }
-        self.bars(&mut canvas, moment.samples);
-        self.trace(&mut canvas, moment);
+        self.bars(&mut canvas, &self.output_v[self.images[k].window.clone()]);
+        self.trace(&mut canvas, k);
         canvas
     }
 
@@ -118,11 +86,8 @@ impl Stage {
             ..HEADING
         };
         let heading = format!("{} samples", self.m);
-        canvas.text(
-            (left + width / 2.0, TILES_TOP - 10.0),
-            &heading,
-            coloured.anchored(Anchor::Middle),
-        );
+        let at = (left + width / 2.0, TILES_TOP - 10.0);
+        canvas.text(at, &heading, coloured.anchored(Anchor::Middle));
         let middle = TILES_TOP + TILE / 2.0;
         let half = TILE / 2.0 - 6.0;
         let pitch = width / samples.len().max(1) as f64;
@@ -139,7 +104,8 @@ impl Stage {
     }
 
     /// The trace, with what is past in colour and the current window marked.
-    fn trace(&self, canvas: &mut Canvas, moment: &Moment<'_>) {
+    fn trace(&self, canvas: &mut Canvas, k: usize) {
+        let window = &self.images[k].window;
         let ((left, top), (width, height)) = (TRACE_AT, TRACE_SIZE);
         let Timeline { from_s, to_s, .. } = self.timeline;
         let span_s = (to_s - from_s).max(f64::MIN_POSITIVE);
@@ -159,9 +125,9 @@ impl Stage {
         };
         canvas.text((left + width, top - 12.0), &marked, coloured);
 
-        let now = at(moment.time_s);
+        let now = at(self.timeline.instants_s[k]);
         // the window is wide enough to be seen
-        let ends = [moment.window.start, moment.window.end].map(|sample| at(sample as f64 / self.rate_hz));
+        let ends = [window.start, window.end].map(|sample| at(sample as f64 / self.rate_hz));
         let wide = half_pixel(ends[1] - ends[0]).max(1.5);
         let begin = half_pixel(ends[1] - wide).max(left);
         canvas.rect((begin, top), (wide, height), WINDOW, 0.4);
@@ -183,24 +149,17 @@ impl Stage {
             canvas.line(&[(left - 4.0, y), (left, y)], FRAME, 1.0);
             canvas.text((left - 7.0, y), &label, SMALL.anchored(Anchor::End));
         }
-        canvas.text(
-            (MARGIN - 2.0, top + height / 2.0),
-            "V",
-            SMALL.upwards().anchored(Anchor::Middle),
-        );
+        let middle = SMALL.anchored(Anchor::Middle);
+        canvas.text((MARGIN - 2.0, top + height / 2.0), "V", middle.upwards());
         let (zero_s, name) = self.timeline.zero();
         let ms = |time_s: f64| 1e3 * (time_s - zero_s);
         let times = Axis::new([].into_iter(), false, Some((ms(from_s), ms(to_s))));
         for (tick, label) in times.ticks(6) {
             let x = at(zero_s + 1e-3 * tick);
             canvas.line(&[(x, top + height), (x, top + height + 4.0)], FRAME, 1.0);
-            canvas.text((x, top + height + 11.0), &label, SMALL.anchored(Anchor::Middle));
+            canvas.text((x, top + height + 11.0), &label, middle);
         }
-        canvas.text(
-            (left + width / 2.0, top + height + 26.0),
-            name,
-            SMALL.anchored(Anchor::Middle),
-        );
+        canvas.text((left + width / 2.0, top + height + 26.0), name, middle);
     }
 }
 

@@ -114,8 +114,8 @@ fn the_animations_of_the_report() {
         assert!(animation.pressures[at][taxel] > 0.0, "{}: taxel {taxel}", figure.file);
         for image in &animation.images {
             assert!(image.image.iter().all(|v| v.is_finite()));
-            let (instant, rate_hz) = (image.window.end, animation.stage.rate_hz);
-            assert!(instant as f64 <= animation.stage.timeline.to_s * rate_hz + 1.0);
+            let (instant, rate_hz) = (image.window.end, animation.rate_hz);
+            assert!(instant as f64 <= animation.timeline.to_s * rate_hz + 1.0);
         }
     }
 }
@@ -148,7 +148,7 @@ fn any_skin_and_no_contact_are_drawn() {
         frame.wrench.force_n = [0.0; 3];
     }
     let animation = nothing.animation();
-    assert_eq!(animation.stage.timeline.touch_s, None);
+    assert_eq!(animation.timeline.touch_s, None);
     let bytes = animation.gif(Path::new("nothing.gif")).unwrap();
     assert_eq!(decoded(&bytes).0.len(), animation.len());
     // and of a skin that is too large to decode
@@ -167,7 +167,7 @@ fn any_skin_and_no_contact_are_drawn() {
 fn times_are_those_of_the_contact() {
     let bounce = simulated("bounce", &["drop.duration_s=0.6"]);
     let timeline = Timeline::of(&bounce.frames, 0.6);
-    let touch_s = timeline.touch_s.unwrap();
+    let (touch_s, instants_s) = (timeline.touch_s.unwrap(), &timeline.instants_s);
     // a ball is on the skin for 8 to 9 ms, of which a frame on each side is counted too
     let shown_s = timeline.to_s - timeline.from_s;
     assert!(
@@ -182,39 +182,21 @@ fn times_are_those_of_the_contact() {
     let step_s = 0.07 / timeline.slower;
     // times of up to 0.6 s, to a few parts in 10^16
     assert!(
-        timeline
-            .instants_s
+        instants_s
             .windows(2)
             .all(|pair| (pair[1] - pair[0] - step_s).abs() < 1e-15)
     );
-    assert!(
-        timeline
-            .instants_s
-            .iter()
-            .all(|t| (timeline.from_s..=timeline.to_s).contains(t))
-    );
+    assert!(instants_s.iter().all(|t| (timeline.from_s..=timeline.to_s).contains(t)));
     assert_eq!(timeline.clock(touch_s + 1.23e-3), "1.2 ms after the touch");
     assert_eq!(timeline.clock(touch_s - 0.5e-3), "0.5 ms before the touch");
 
     // pressure on a straight line between two frames
-    let pair = bounce
-        .frames
-        .windows(2)
-        .find(|pair| pair[1].pressure.max() > 0.0)
-        .unwrap();
+    let mut pairs = bounce.frames.windows(2);
+    let pair = pairs.find(|pair| pair[1].pressure.max() > 0.0).unwrap();
     let middle = pressure_pa(pair, 0.5 * (pair[0].time_s + pair[1].time_s));
-    let means = pair[0]
-        .pressure
-        .values()
-        .iter()
-        .zip(pair[1].pressure.values())
-        .map(|(a, b)| 0.5 * (a + b));
+    let both = pair[0].pressure.values().iter().zip(pair[1].pressure.values());
     // half of a difference, rounded
-    assert!(
-        middle
-            .iter()
-            .zip(means)
-            .all(|(found, mean)| (found - mean).abs() <= 1e-9 * mean)
-    );
+    let near = |(found, (a, b)): (&f64, (&f64, &f64))| (found - 0.5 * (a + b)).abs() <= 1e-9 * 0.5 * (a + b);
+    assert!(middle.iter().zip(both).all(near));
     assert!(Timeline::of(&[], 0.0).instants_s.is_empty());
 }

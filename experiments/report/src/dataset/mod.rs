@@ -5,5 +5,5 @@ mod shapes;
 #[cfg(test)]
 mod tests;
 
-pub use preview::{MOST_PREVIEW_ROWS, PREVIEW_COLUMNS, Preview, PreviewRow, PreviewRowError, save_preview};
+pub use preview::{MOST_PREVIEW_ROWS, PREVIEW_COLUMNS, Preview, PreviewRow, save_preview};
 pub use shapes::{drawn_shapes, save_shapes};

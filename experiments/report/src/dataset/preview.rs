@@ -1,11 +1,11 @@
 //! Rows of a data set as a picture.
 
-use crate::figures::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, text_width, wrap};
+use crate::figures::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, save_png, text_width, wrap};
 use crate::figures::colour::{FRAME, INK, MUTED, Rgb};
 use crate::figures::draw_heat;
-use crate::figures::pixels::save_png;
 use serde_json::Value;
 use spts::output::OutputError;
+use spts_input::Refusal;
 use std::path::Path;
 
 /// Most rows of a picture. Those of a large skin with three objects each are then 28,000 pixels high; figures are cut
@@ -310,26 +310,12 @@ pub struct PreviewRow {
     pub(super) samples: (Vec<f64>, &'static str),
 }
 
-/// A row that lacks a column of the needed length.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("row {row}: `{column}` has {found} values; {needed} are needed")]
-pub struct PreviewRowError {
-    /// Number of the row.
-    pub row: u64,
-    /// Name of the column.
-    pub column: &'static str,
-    /// Values that it has.
-    pub found: usize,
-    /// Values that it should have.
-    pub needed: usize,
-}
-
 impl PreviewRow {
     /// The row `row`, an object of its columns as `spts_dataset` reads it, of a skin of `rows` × `cols` taxels.
     ///
     /// # Errors
-    /// [`PreviewRowError`] when a map does not fill the skin.
-    pub fn of(row: &Value, (rows, cols): (usize, usize)) -> Result<Self, PreviewRowError> {
+    /// [`Refusal`] when a map does not fill the skin.
+    pub fn of(row: &Value, (rows, cols): (usize, usize)) -> Result<Self, Refusal> {
         let index = row["index"].as_u64().unwrap_or_default();
         let map = |column: &'static str| {
             let values = numbers(&row[column]);
@@ -337,12 +323,9 @@ impl PreviewRow {
             if found == needed {
                 return Ok(values);
             }
-            Err(PreviewRowError {
-                row: index,
-                column,
-                found,
-                needed,
-            })
+            Err(Refusal::new(format!(
+                "row {index}: `{column}` has {found} values; {needed} are needed"
+            )))
         };
         let image_v = if row["image_v"].is_array() {
             Some(map("image_v")?)

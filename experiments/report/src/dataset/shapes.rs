@@ -1,8 +1,7 @@
 //! A contact sheet of procedural shapes.
 
-use crate::figures::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, wrap};
+use crate::figures::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, resample, save_png, wrap};
 use crate::figures::colour::{FRAME, INK, MUTED, Rgb, WHITE};
-use crate::figures::pixels::{resample, save_png};
 use rayon::prelude::*;
 use spts::output::OutputError;
 use spts_contact::mesh::TriMesh;

@@ -10,9 +10,11 @@ use spts_contact::shapes::SHAPE_FAMILIES;
 
 /// Elements `tag` of a picture.
 fn elements(canvas: &Canvas, tag: &str) -> Vec<String> {
-    let svg = canvas.svg();
-    svg.lines()
-        .filter(|line| line.starts_with(&format!("<{tag} ")))
+    let start = format!("<{tag} ");
+    canvas
+        .svg()
+        .lines()
+        .filter(|line| line.starts_with(&start))
         .map(str::to_owned)
         .collect()
 }
@@ -95,7 +97,7 @@ fn a_row_that_does_not_fill_its_skin_is_refused() {
         "row 1234567: `image_v` has 100 values; 110 are needed"
     );
     let none = PreviewRow::of(&json!({}), (2, 2)).unwrap_err();
-    assert_eq!((none.column, none.found), ("pressure_pa", 0));
+    assert!(none.to_string().contains("`pressure_pa` has 0 values"), "{none}");
 }
 
 /// Every number of a card may be missing or the same as all others, and nothing is drawn outside the picture.

@@ -53,15 +53,10 @@ impl Axis {
         }
         // A single value, to rounding: 1e-9 is far above the rounding of a sum and below any tick.
         if high - low <= 1e-9 * low.abs().max(high.abs()) {
-            let half = if log {
-                0.5
-            } else {
-                (0.1 * low.abs()).max(f64::MIN_POSITIVE.sqrt())
-            };
-            let half = if !log && low.abs() < f64::MIN_POSITIVE {
-                1.0
-            } else {
-                half
+            let half = match low.abs() {
+                _ if log => 0.5,
+                size if size < f64::MIN_POSITIVE => 1.0,
+                size => (0.1 * size).max(f64::MIN_POSITIVE.sqrt()),
             };
             return Self {
                 low: low - half,
@@ -217,18 +212,14 @@ impl PanelFrame {
 
     /// Height of a value, if inside.
     pub(super) fn level(&self, y: f64) -> Option<f64> {
-        self.y
-            .place(y)
-            .filter(|v| (0.0..=1.0).contains(v))
-            .map(|v| self.top + (1.0 - v) * self.height)
+        let inside = self.y.place(y).filter(|v| (0.0..=1.0).contains(v));
+        inside.map(|v| self.top + (1.0 - v) * self.height)
     }
 
     /// Horizontal place of a value, if inside.
     pub(super) fn column(&self, x: f64) -> Option<f64> {
-        self.x
-            .place(x)
-            .filter(|u| (0.0..=1.0).contains(u))
-            .map(|u| self.left + u * self.width)
+        let inside = self.x.place(x).filter(|u| (0.0..=1.0).contains(u));
+        inside.map(|u| self.left + u * self.width)
     }
 
     /// Whether a place is inside, the border included.
@@ -245,57 +236,32 @@ impl PanelFrame {
 mod tests {
     use super::Axis;
 
-    fn labels(axis: &Axis) -> Vec<String> {
-        axis.ticks(5).into_iter().map(|(_, label)| label).collect()
-    }
-
     #[test]
-    fn measurement_counts_have_familiar_ticks() {
-        let axis = Axis::new([2.0, 100.0].into_iter(), true, None);
-        assert_eq!(labels(&axis), ["2", "5", "10", "20", "50", "100"]);
-    }
-
-    /// One tick says where, but not how far: a short logarithmic axis has more.
-    #[test]
-    fn a_short_logarithmic_axis_has_several_ticks() {
+    fn ticks_are_readable() {
+        let cases: [(f64, f64, bool, &[&str]); 6] = [
+            (2.0, 100.0, true, &["2", "5", "10", "20", "50", "100"]),
+            // it begins above a decade
+            (
+                1.6e-4,
+                0.07,
+                true,
+                &["2·10⁻⁴", "5·10⁻⁴", "0.001", "0.002", "0.005", "0.01", "0.02", "0.05"],
+            ),
+            (1e-7, 1e-5, true, &["10⁻⁷", "2·10⁻⁷"]),
+            (12.0, 98.0, false, &["0", "25", "50", "75", "100"]),
+            (0.0, 4e7, false, &["0", "1·10⁷"]),
+            (-0.3, 0.3, false, &["−0.2", "0.0", "0.2"]),
+        ];
+        for (low, high, log, expected) in cases {
+            let ticks = Axis::new([low, high].into_iter(), log, None).ticks(5);
+            let labels: Vec<&str> = ticks.iter().map(|(_, label)| label.as_str()).collect();
+            assert_eq!(labels[..expected.len()], *expected);
+        }
+        // a short logarithmic axis has several ticks
         for (low, high) in [(11.0, 19.0), (55.0, 65.0), (0.012, 0.014), (2.1, 2.9)] {
-            let axis = Axis::new([low, high].into_iter(), true, None);
-            let ticks = labels(&axis);
+            let ticks = Axis::new([low, high].into_iter(), true, None).ticks(5);
             assert!(ticks.len() >= 3, "{low} {high} {ticks:?}");
         }
-    }
-
-    /// Nearly three decades with two whole ones inside: the ticks still cover all of the axis.
-    #[test]
-    fn ticks_cover_an_axis_that_begins_above_a_decade() {
-        let axis = Axis::new([1.6e-4, 0.07].into_iter(), true, None);
-        assert_eq!(
-            labels(&axis),
-            ["2·10⁻⁴", "5·10⁻⁴", "0.001", "0.002", "0.005", "0.01", "0.02", "0.05"]
-        );
-    }
-
-    #[test]
-    fn percentages_run_from_nought() {
-        let axis = Axis::new([12.0, 98.0].into_iter(), false, None);
-        assert_eq!(labels(&axis), ["0", "25", "50", "75", "100"]);
-        assert_eq!(axis.place(0.0), Some(0.0));
-    }
-
-    #[test]
-    fn small_and_large_values_are_readable() {
-        assert_eq!(
-            labels(&Axis::new([1e-7, 1e-5].into_iter(), true, None))[..2],
-            ["10⁻⁷", "2·10⁻⁷"]
-        );
-        assert_eq!(
-            labels(&Axis::new([0.0, 4e7].into_iter(), false, None))[..2],
-            ["0", "1·10⁷"]
-        );
-        assert_eq!(
-            labels(&Axis::new([-0.3, 0.3].into_iter(), false, None)),
-            ["−0.2", "0.0", "0.2"]
-        );
     }
 
     #[test]
@@ -306,11 +272,8 @@ mod tests {
                 let axis = Axis::new(values.iter().copied(), log, Some((3.0, 3.0)));
                 let ticks = axis.ticks(5);
                 assert!(!ticks.is_empty() && ticks.len() < 20, "{values:?} {log} {ticks:?}");
-                assert!(
-                    ticks
-                        .iter()
-                        .all(|(tick, _)| axis.place(*tick).is_some_and(|p| (-0.01..=1.01).contains(&p)))
-                );
+                let inside = |tick: f64| axis.place(tick).is_some_and(|p| (-0.01..=1.01).contains(&p));
+                assert!(ticks.iter().all(|(tick, _)| inside(*tick)));
             }
         }
     }

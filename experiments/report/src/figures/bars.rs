@@ -1,10 +1,9 @@
 //! Horizontal bars with error bars, and intervals with a mark beside each: one row a quantity, panels side by side.
 
 use super::axis::Axis;
-use super::canvas::{Anchor, Canvas, Point, TextStyle, text_width, widest};
+use super::canvas::{Anchor, Canvas, Point, TextStyle, save, text_width, widest};
 use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
 use super::looks::{Style, draw_marker, ink};
-use super::pixels::save;
 use spts::output::OutputError;
 use std::path::Path;
 
@@ -120,6 +119,21 @@ impl BarFrame {
         self.axis.place(value).map(|u| self.at.0 + u * self.size.0)
     }
 
+    /// A line and a label for every tick.
+    fn ticks(&self, canvas: &mut Canvas) {
+        let (top, bottom) = (self.at.1, self.at.1 + self.size.1);
+        for (value, label) in self.axis.ticks(4) {
+            let Some(x) = self.column(value) else { continue };
+            canvas.line(&[(x, top), (x, bottom)], GRID, 1.0);
+            canvas.line(&[(x, bottom), (x, bottom + 5.0)], CLAIM, 1.0);
+            canvas.text(
+                (x, bottom + 15.0),
+                &label,
+                TextStyle::new(SIZE, MUTED).anchored(Anchor::Middle),
+            );
+        }
+    }
+
     fn draw(&self, canvas: &mut Canvas, chart: &BarChart, panel: usize, row: f64) {
         let ((left, top), (width, height)) = (self.at, self.size);
         let bottom = top + height;
@@ -127,7 +141,7 @@ impl BarFrame {
         for (index, _) in chart.rows.iter().enumerate().filter(|(_, r)| r.heading) {
             canvas.rect((left, top + row * index as f64), (width, row), GRID, 0.6);
         }
-        draw_ticks(canvas, &self.axis, self.at, self.size);
+        self.ticks(canvas);
         if let Some(zero) = self.column(0.0) {
             canvas.line(&[(zero, top), (zero, bottom)], CLAIM, 1.2);
         }
@@ -173,19 +187,6 @@ fn legend(canvas: &mut Canvas, chart: &BarChart, y: f64, width: f64) {
         canvas.rect((x, y - 0.5 * BAR), (SAMPLE, BAR), ink(group.style, 0), 1.0);
         canvas.text((x + SAMPLE + 8.0, y), &group.name, TextStyle::new(SIZE, INK));
         x += wide(group);
-    }
-}
-
-/// The grid of a panel, with ticks below it.
-fn draw_ticks(canvas: &mut Canvas, axis: &Axis, (left, top): Point, (width, height): Point) {
-    let bottom = top + height;
-    let tick = TextStyle::new(SIZE, MUTED).anchored(Anchor::Middle);
-    for (value, label) in axis.ticks(4) {
-        let Some(place) = axis.place(value) else { continue };
-        let x = left + place * width;
-        canvas.line(&[(x, top), (x, bottom)], GRID, 1.0);
-        canvas.line(&[(x, bottom), (x, bottom + 5.0)], CLAIM, 1.0);
-        canvas.text((x, bottom + 15.0), &label, tick);
     }
 }
 
@@ -286,63 +287,49 @@ fn interval_layout(chart: &IntervalChart) -> Canvas {
 }
 
 fn draw_panel(canvas: &mut Canvas, panel: &IntervalPanel, (left, top): Point, height: f64) {
-    let axis = Axis::new([0.0, 1.0].into_iter(), false, Some((0.0, 1.0)));
-    let column = |value: f64| axis.place(value).map(|u| left + u * PANEL);
-    canvas.rect((left, top), (PANEL, height), WHITE, 1.0);
-    draw_ticks(canvas, &axis, (left, top), (PANEL, height));
-    canvas.frame((left, top), (PANEL, height), CLAIM, 1.0);
+    let frame = BarFrame {
+        at: (left, top),
+        size: (PANEL, height),
+        axis: Axis::new([0.0, 1.0].into_iter(), false, Some((0.0, 1.0))),
+    };
+    canvas.rect(frame.at, frame.size, WHITE, 1.0);
+    frame.ticks(canvas);
+    canvas.frame(frame.at, frame.size, CLAIM, 1.0);
     let heading = TextStyle::new(SIZE, INK).anchored(Anchor::Middle);
     canvas.text((left + 0.5 * PANEL, top - 0.25 * HEAD), &panel.title, heading);
-    for (k, interval) in panel.intervals.iter().enumerate() {
+    for (k, i) in panel.intervals.iter().enumerate() {
+        let Some(i) = i else { continue };
+        let places = [i.low, i.middle, i.high, i.mark].map(|value| frame.column(value));
+        let [Some(low), Some(middle), Some(high), Some(mark)] = places else {
+            continue;
+        };
         let y = top + ROW * (k as f64 + 0.5);
-        if let Some(interval) = interval {
-            draw_interval(canvas, *interval, y, &column);
-        }
+        draw_band(canvas, (low, y), (high - low).max(2.0), middle);
+        let inside = (i.low..=i.high).contains(&i.mark);
+        draw_marker(canvas, (mark, y), if inside { Style::Real } else { Style::Raster }, 0);
     }
 }
 
-fn draw_interval(canvas: &mut Canvas, i: Interval, y: f64, column: &dyn Fn(f64) -> Option<f64>) {
-    let (Some(low), Some(middle), Some(high), Some(mark)) =
-        (column(i.low), column(i.middle), column(i.high), column(i.mark))
-    else {
-        return;
-    };
+/// A band from `left` on, with a line at its middle.
+fn draw_band(canvas: &mut Canvas, (left, y): Point, width: f64, middle: f64) {
     let twin = ink(Style::Twin, 0);
-    // a band of no width is still seen
-    let width = (high - low).max(2.0);
-    canvas.rect((low, y - 0.5 * BAND), (width, BAND), twin, 0.35);
+    canvas.rect((left, y - 0.5 * BAND), (width, BAND), twin, 0.35);
     canvas.line(&[(middle, y - 0.8 * BAND), (middle, y + 0.8 * BAND)], twin, 2.0);
-    if (i.low..=i.high).contains(&i.mark) {
-        draw_marker(canvas, (mark, y), Style::Real, 0);
-    } else {
-        draw_marker(canvas, (mark, y), Style::Raster, 0);
-    }
 }
 
 /// What bands and marks are, in a line.
 fn interval_legend(canvas: &mut Canvas, chart: &IntervalChart, (left, y): Point) {
     let style = TextStyle::new(SIZE, INK);
-    let twin = ink(Style::Twin, 0);
-    canvas.rect((left, y - 0.5 * BAND), (24.0, BAND), twin, 0.35);
-    canvas.line(
-        &[(left + 12.0, y - 0.8 * BAND), (left + 12.0, y + 0.8 * BAND)],
-        twin,
-        2.0,
-    );
+    draw_band(canvas, (left, y), 24.0, left + 12.0);
     canvas.text((left + 32.0, y), &chart.legend[0], style);
     let mut x = left + 32.0 + text_width(&chart.legend[0], SIZE, false) + 2.0 * BORDER;
-    for (marked, variant, words) in [
-        (Style::Real, 0, chart.legend[1].clone()),
-        (Style::Raster, 0, format!("{}, outside the band", chart.legend[1])),
-    ] {
-        draw_marker(canvas, (x, y), marked, variant);
-        canvas.text((x + 12.0, y), &words, style);
-        x += 12.0 + text_width(&words, SIZE, false) + 2.0 * BORDER;
+    let outside = format!("{}, outside the band", chart.legend[1]);
+    for (marked, words) in [(Style::Real, &chart.legend[1]), (Style::Raster, &outside)] {
+        draw_marker(canvas, (x, y), marked, 0);
+        canvas.text((x + 12.0, y), words, style);
+        x += 12.0 + text_width(words, SIZE, false) + 2.0 * BORDER;
     }
-    let right = x - BORDER;
-    if right > canvas.width {
-        canvas.width = right;
-    }
+    canvas.width = canvas.width.max(x - BORDER);
 }
 
 #[cfg(test)]
@@ -351,8 +338,9 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    fn bars_of(values: Vec<Vec<Option<Bar>>>) -> BarChart {
-        BarChart {
+    /// Left and right ends of the rectangles of one colour.
+    fn ends(values: Vec<Vec<Option<Bar>>>, colour: Rgb) -> Vec<(f64, f64)> {
+        let chart = BarChart {
             title: "made up".to_owned(),
             x_label: "loss".to_owned(),
             panels: vec![String::new(); values.len()],
@@ -365,82 +353,67 @@ mod tests {
                 heading: false,
                 values,
             }],
-        }
-    }
-
-    /// Left and right ends of every rectangle of a colour.
-    fn ends(canvas: &Canvas, colour: Rgb) -> Vec<(f64, f64)> {
-        let svg = canvas.svg();
-        let rects = svg
-            .lines()
-            .filter(|line| line.starts_with("<rect") && line.contains(&colour.hex()));
+        };
+        let svg = layout(&chart).svg();
         let number = |line: &str, name: &str| -> f64 {
             let (_, rest) = line.split_once(&format!(" {name}=\"")).unwrap();
             rest.split_once('"').unwrap().0.parse().unwrap()
         };
+        let rects = svg
+            .lines()
+            .filter(|line| line.starts_with("<rect") && line.contains(&colour.hex()));
         rects
             .map(|line| (number(line, "x"), number(line, "x") + number(line, "width")))
             .collect()
     }
 
-    /// Bars of 2 and −1: the second is half as long, ends where the first begins, and both share one axis in two
-    /// panels. Coordinates are written to a hundredth of a pixel.
+    /// The sample of the legend is a bar, too; what has no length is left out.
     #[test]
     fn lengths_are_values() {
-        let canvas = layout(&bars_of(vec![vec![Some((2.0, 0.0))], vec![Some((-1.0, 0.5))]]));
-        let found = ends(&canvas, ink(Style::Twin, 0));
-        // the third is the legend's sample
+        let twin = ink(Style::Twin, 0);
+        let found = ends(vec![vec![Some((2.0, 0.0))], vec![Some((-1.0, 0.5))]], twin);
         assert_eq!(found.len(), 3);
-        let (first, second) = (found[0], found[1]);
-        assert_relative_eq!(first.1 - first.0, 2.0 * (second.1 - second.0), epsilon = 0.03);
-        // panels of 340 stand side by side, and zero at the same place in each
-        assert_relative_eq!(second.1 - first.0, 340.0, epsilon = 0.03);
-    }
-
-    #[test]
-    fn what_has_no_length_is_left_out() {
+        assert_relative_eq!(found[0].1 - found[0].0, 2.0 * (found[1].1 - found[1].0), epsilon = 0.03);
+        // the two panels have one scale, so that noughts lie one panel apart
+        assert_relative_eq!(found[1].1 - found[0].0, 340.0, epsilon = 0.03);
         for (bar, count) in [
             (None, 1),
             (Some((f64::NAN, 1.0)), 1),
             (Some((f64::INFINITY, 0.0)), 1),
             (Some((0.0, f64::NAN)), 2),
         ] {
-            let canvas = layout(&bars_of(vec![vec![bar], vec![]]));
-            assert_eq!(ends(&canvas, ink(Style::Twin, 0)).len(), count, "{bar:?}");
+            assert_eq!(ends(vec![vec![bar], vec![]], twin).len(), count, "{bar:?}");
         }
-        let dir = tempfile::tempdir().unwrap();
-        save_bars(&bars_of(vec![]), dir.path(), "none").unwrap();
-        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2);
+        assert_eq!(ends(vec![], twin).len(), 1);
     }
 
-    fn interval_of(mark: f64) -> IntervalChart {
-        IntervalChart {
-            title: "made up".to_owned(),
-            legend: ["twin".to_owned(), "skin".to_owned()],
-            rows: vec!["brain".to_owned(), "trig".to_owned()],
-            lines: vec![IntervalLine {
-                title: "IoU".to_owned(),
-                panels: vec![IntervalPanel {
-                    title: "M = 20".to_owned(),
-                    intervals: vec![
-                        Some(Interval {
-                            low: 0.4,
-                            middle: 0.5,
-                            high: 0.6,
-                            mark,
-                        }),
-                        None,
-                    ],
-                }],
-            }],
-        }
-    }
-
-    /// Red shapes: one in the legend, one more for a mark that lies outside.
     #[test]
     fn a_mark_outside_its_band_is_red() {
         let red = ink(Style::Raster, 0).hex();
-        let count = |mark: f64| interval_layout(&interval_of(mark)).svg().matches(&red).count();
+        let count = |mark: f64| {
+            let [low, middle, high] = [0.4, 0.5, 0.6];
+            let chart = IntervalChart {
+                title: "made up".to_owned(),
+                legend: ["twin".to_owned(), "skin".to_owned()],
+                rows: vec!["brain".to_owned(), "trig".to_owned()],
+                lines: vec![IntervalLine {
+                    title: "IoU".to_owned(),
+                    panels: vec![IntervalPanel {
+                        title: "M = 20".to_owned(),
+                        intervals: vec![
+                            Some(Interval {
+                                low,
+                                middle,
+                                high,
+                                mark,
+                            }),
+                            None,
+                        ],
+                    }],
+                }],
+            };
+            interval_layout(&chart).svg().matches(&red).count()
+        };
         assert_eq!((count(0.5), count(0.7)), (1, 2));
     }
 }

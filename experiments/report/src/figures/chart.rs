@@ -99,6 +99,36 @@ pub struct Chart {
     pub published: Vec<Claim>,
 }
 
+impl Chart {
+    /// The chart with points that the paper states: label, x and y of each.
+    #[must_use]
+    pub fn with_claims(self, claims: &[(&str, f64, f64)]) -> Self {
+        let claim = |&(label, x, y): &(&str, f64, f64)| Claim {
+            label: label.to_owned(),
+            x: Some(x),
+            y: Some(y),
+        };
+        Self {
+            claims: claims.iter().map(claim).collect(),
+            ..self
+        }
+    }
+
+    /// The chart with ranges of x that the paper states: label and ends of each.
+    #[must_use]
+    pub fn with_ranges(self, ranges: &[(&str, f64, f64)]) -> Self {
+        let range = |&(label, from, to): &(&str, f64, f64)| StatedRange {
+            label: label.to_owned(),
+            from,
+            to,
+        };
+        Self {
+            ranges: ranges.iter().map(range).collect(),
+            ..self
+        }
+    }
+}
+
 /// Rows as curves: what is on the axes, which curve a row belongs to, and which panel.
 ///
 /// Curves and panels are in the order in which the rows first have them. A row without a value on one of the axes has

@@ -3,7 +3,7 @@
 
 use super::axis::PanelFrame;
 use super::canvas::{Anchor, Canvas, Point, TextStyle, text_width, widest, wrap};
-use super::chart::{Chart, Claim};
+use super::chart::{Chart, Claim, Series};
 use super::colour::{CLAIM, INK, MUTED, WHITE};
 use super::looks::{Style, dash, draw_marker, ink, ring, star};
 
@@ -43,31 +43,30 @@ pub(super) struct Legend {
 /// What a chart's legend names, each once.
 pub(super) fn entries(chart: &Chart) -> Vec<(LegendKey, String)> {
     let mut out: Vec<(LegendKey, String)> = Vec::new();
-    for series in &chart.series {
-        let entry = (
-            LegendKey::Curve(series.style, series.variant % series.style.variants()),
-            series.name.clone(),
-        );
-        if !series.name.is_empty() && !out.contains(&entry) {
+    let mut add = |key: LegendKey, name: &str| {
+        let entry = (key, name.to_owned());
+        if !name.is_empty() && !out.contains(&entry) {
             out.push(entry);
         }
+    };
+    for Series {
+        style, variant, name, ..
+    } in &chart.series
+    {
+        add(LegendKey::Curve(*style, variant % style.variants()), name);
     }
     for claim in &chart.claims {
-        let key = if claim.x.is_some() && claim.y.is_some() {
-            LegendKey::Star
-        } else {
-            LegendKey::Dashes
-        };
-        let entry = (key, "stated in the paper".to_owned());
-        if (claim.x.is_some() || claim.y.is_some()) && !out.contains(&entry) {
-            out.push(entry);
+        match (claim.x, claim.y) {
+            (Some(_), Some(_)) => add(LegendKey::Star, "stated in the paper"),
+            (None, None) => {}
+            _ => add(LegendKey::Dashes, "stated in the paper"),
         }
     }
     if !chart.ranges.is_empty() {
-        out.push((LegendKey::Shade, "range in the paper".to_owned()));
+        add(LegendKey::Shade, "range in the paper");
     }
     if !chart.published.is_empty() {
-        out.push((LegendKey::Ring, "published, as stated".to_owned()));
+        add(LegendKey::Ring, "published, as stated");
     }
     out
 }
@@ -191,27 +190,18 @@ pub(super) fn draw_marks(
 /// Draws the marks of points, above the curves, and the labels where they cover least.
 pub(super) fn draw_labels(canvas: &mut Canvas, marks: &[Mark], frame: &PanelFrame, busy: &[Point]) {
     let mut busy = busy.to_vec();
+    let along = |at: &dyn Fn(f64) -> Point| {
+        let points = (0..).map(|i| at(4.0 * f64::from(i)));
+        points.take_while(|p| frame.holds(*p)).collect::<Vec<Point>>()
+    };
     for mark in marks {
         match mark.place {
-            Place::Point(place) => {
-                (mark.draw)(canvas, place);
-                // The star and its surroundings.
-                busy.extend(
-                    [-6.0, 0.0, 6.0]
-                        .iter()
-                        .flat_map(|&d| [(place.0 + d, place.1), (place.0, place.1 + d)]),
-                );
+            Place::Point((x, y)) => {
+                (mark.draw)(canvas, (x, y));
+                busy.extend([-6.0, 0.0, 6.0].iter().flat_map(|&d| [(x + d, y), (x, y + d)]));
             }
-            Place::Level(y) => busy.extend(
-                (0..)
-                    .map(|i| (frame.left + 4.0 * f64::from(i), y))
-                    .take_while(|p| frame.holds(*p)),
-            ),
-            Place::Column(x) => busy.extend(
-                (0..)
-                    .map(|i| (x, frame.top + 4.0 * f64::from(i)))
-                    .take_while(|p| frame.holds(*p)),
-            ),
+            Place::Level(y) => busy.extend(along(&|far| (frame.left + far, y))),
+            Place::Column(x) => busy.extend(along(&|far| (x, frame.top + far))),
         }
     }
     let mut taken: Vec<(Point, Point)> = Vec::new();

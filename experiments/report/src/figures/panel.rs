@@ -1,12 +1,11 @@
 //! Charts as figures: where the panels stand, and what each shows.
 
 use super::axis::{Axis, PanelFrame};
-use super::canvas::{Anchor, Canvas, Point, TextStyle, text_width, widest, wrap};
+use super::canvas::{Anchor, Canvas, Point, TextStyle, save, text_width, widest, wrap};
 use super::chart::{Chart, Claim, Series};
 use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
 use super::legend::{Legend, LegendKey, RANGE_OPACITY, draw_labels, draw_marks, entries};
 use super::looks::{Style, dash, draw_marker, ink, ring, star};
-use super::pixels::save;
 use spts::output::OutputError;
 use std::path::Path;
 

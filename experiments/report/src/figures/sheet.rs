@@ -1,9 +1,8 @@
 //! Tactile images: sheets of them beside pictures and bars, and one large image with its colour bar.
 
 use super::axis::Axis;
-use super::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, text_width, widest, wrap};
+use super::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, save, save_png, text_width, widest, wrap};
 use super::colour::{FRAME, GRID, INK, MISSING, MUTED, OUTLINE, Rgb, WHITE, heat};
-use super::pixels::{save, save_png};
 use spts::output::OutputError;
 use std::path::Path;
 

@@ -3,6 +3,7 @@
 use super::canvas::{Canvas, TextStyle};
 use super::colour::heat;
 use super::{Chart, Claim, Series, Sheet, StatedRange, Style, Tile, TileRow, pressure_png, save_charts, save_sheet};
+use spts::output::OutputError;
 use std::path::Path;
 
 /// Tags of a document, checked to open and close in pairs; text must hold no bare `&` and attributes be quoted.
@@ -47,62 +48,162 @@ pub(crate) fn check_markup(text: &str, void: &[&str]) -> Result<usize, String> {
     }
 }
 
-/// Width and height in the header of a PNG file (W3C PNG, §11.2.2).
-fn png_size(path: &Path) -> (u32, u32) {
-    let bytes = std::fs::read(path).unwrap();
-    assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n", "{path:?}");
-    assert_eq!(&bytes[bytes.len() - 8..bytes.len() - 4], b"IEND", "{path:?}");
-    let word = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap());
-    (word(16), word(20))
-}
-
-/// Every figure is written twice, at the size of its layout, with nothing left behind.
-#[test]
-fn figures_are_well_formed() {
+/// Writes `charts` and a sheet, and checks that their files are well formed and of one size.
+fn check(name: &str, save: impl Fn(&Path) -> Result<(), OutputError>) {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().join("figures");
-    save_charts(&awkward(), &folder, "awkward").unwrap();
-    save_charts(&[], &folder, "none").unwrap();
-    save_charts(&[accuracy("one"), accuracy("other")], &folder, "two").unwrap();
-    save_sheet(&objects(10), &folder, "objects").unwrap();
-    save_sheet(&objects(2), &folder, "few").unwrap();
-    save_sheet(&Sheet::default(), &folder, "empty").unwrap();
-    let names = ["awkward", "none", "two", "objects", "few", "empty"];
-    for name in names {
-        let text = std::fs::read_to_string(folder.join(format!("{name}.svg"))).unwrap();
-        assert!(check_markup(&text, &[]).unwrap() > 4, "{name}");
-        let (width, height) = png_size(&folder.join(format!("{name}.png")));
-        let size = format!("width=\"{}\" height=\"{}\"", width / 2, height / 2);
-        assert!(text.contains(&size), "{name}: {size}");
-        assert!(!text.contains("NaN") && !text.contains("inf\""), "{name}");
+    save(&folder).unwrap();
+    let text = std::fs::read_to_string(folder.join("figure.svg")).unwrap();
+    assert!(check_markup(&text, &[]).unwrap() > 4, "{name}");
+    assert!(!text.contains("NaN") && !text.contains("inf\""), "{name}");
+    let bytes = std::fs::read(folder.join("figure.png")).unwrap();
+    assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n", "{name}");
+    let side = |at: usize| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()) / 2;
+    let size = format!("width=\"{}\" height=\"{}\"", side(16), side(20));
+    assert!(text.contains(&size), "{name}: {size}");
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2);
+}
+
+#[test]
+fn charts_are_well_formed() {
+    let points = |title: &str, points: Vec<(f64, f64)>| Chart {
+        title: title.to_owned(),
+        x_log: true,
+        y_log: title == "one point",
+        series: vec![Series::new("made up", Style::Twin, 0, points)],
+        ..Chart::default()
+    };
+    let awkward = [
+        points("empty <&> list", vec![]),
+        points("one point", vec![(7.0, 3.0)]),
+        points("constant", vec![(1.0, 0.0), (10.0, 0.0), (100.0, 0.0)]),
+        points(
+            "no number",
+            vec![(f64::NAN, 1.0), (2.0, f64::INFINITY), (-3.0, 1.0), (0.0, 2.0)],
+        ),
+        Chart::default(),
+        Chart {
+            y_range: Some((f64::NAN, 1.0)),
+            claims: vec![claim("", None, None)],
+            ..accuracy("claims")
+        },
+    ];
+    for charts in [&awkward[..], &[], &[accuracy("one"), accuracy("other")]] {
+        check("charts", |folder| save_charts(charts, folder, "figure"));
     }
-    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 2 * names.len());
+}
+
+fn claim(label: &str, x: Option<f64>, y: Option<f64>) -> Claim {
+    Claim {
+        label: label.to_owned(),
+        x,
+        y,
+    }
+}
+
+/// A chart of everything: made-up curves, spans, scatter, claims, a range and a published system.
+fn accuracy(title: &str) -> Chart {
+    let curve = |level: f64, rate: f64| {
+        let counts = [2.0, 5.0, 10.0, 20.0, 50.0, 100.0_f64];
+        counts.map(|m| (m, level * (1.0 - (-m / rate).exp()))).to_vec()
+    };
+    let styles = [
+        Style::Twin,
+        Style::Real,
+        Style::Raster,
+        Style::RasterReal,
+        Style::Baseline,
+    ];
+    let styles = styles.into_iter().zip(0_u8..);
+    let mut series: Vec<Series> = styles
+        .map(|(style, k)| Series::new(format!("made up {k}"), style, k, curve(97.0 - f64::from(k), 7.0)))
+        .collect();
+    // the same curve again
+    series.push(Series::new("the same", Style::Twin, 1, curve(97.0, 7.0)));
+    series[0] = series[0]
+        .clone()
+        .with_spans(vec![(10.0, 60.0, 80.0)])
+        .with_scatter(vec![(2.0, 10.0, 30.0), (100.0, 90.0, 99.0)]);
+    Chart {
+        title: title.to_owned(),
+        x_label: "measurements M".to_owned(),
+        y_label: "accuracy (%)".to_owned(),
+        x_log: true,
+        y_range: Some((0.0, 105.0)),
+        series,
+        claims: vec![
+            claim("paper: ≥ 98 % at M = 20", Some(20.0), Some(98.0)),
+            claim("made-up level", None, Some(30.0)),
+            claim("made-up column", Some(8.0), None),
+        ],
+        ranges: vec![StatedRange {
+            label: "made-up range".to_owned(),
+            from: 15.0,
+            to: 20.0,
+        }],
+        published: vec![claim("made-up system", Some(50.0), Some(50.0))],
+        ..Chart::default()
+    }
+}
+
+fn heat_tile(values: Vec<f64>, (rows, cols): (usize, usize), max: Option<f64>, caption: &str) -> Tile {
+    Tile::Heat {
+        outline: Some(values.iter().map(|v| *v > 15.0).collect()),
+        values,
+        rows,
+        cols,
+        max,
+        caption: caption.to_owned(),
+    }
+}
+
+fn sheet(label: &str, rows: usize, tiles: Vec<Tile>) -> Sheet {
+    let row = |k: usize| TileRow {
+        label: format!("{label} {k}"),
+        tiles: tiles.clone(),
+    };
+    Sheet {
+        title: "made up".to_owned(),
+        column_titles: ["object", "wire", "raster scan"].map(str::to_owned).to_vec(),
+        rows: (0..rows).map(row).collect(),
+        tile_px: 50,
+    }
+}
+
+#[test]
+fn sheets_are_well_formed() {
+    let values: Vec<f64> = (0..100).map(|k| 31.0 * (f64::from(k) * 0.3).sin()).collect();
+    let tiles = vec![
+        Tile::Picture {
+            width: 64,
+            height: 48,
+            rgb: vec![160; 64 * 48 * 3],
+            caption: String::new(),
+        },
+        Tile::Bars {
+            values: vec![0.4, -0.1, f64::NAN],
+            highlight: 1,
+            caption: "first 1 of 3".to_owned(),
+        },
+        Tile::Text("words in a tile".to_owned()),
+        Tile::Empty,
+        heat_tile(values, (10, 10), None, "M = 10"),
+    ];
+    for sheet in [
+        sheet("made-up object", 10, tiles.clone()),
+        sheet("few", 2, tiles),
+        Sheet::default(),
+    ] {
+        check("sheet", |folder| save_sheet(&sheet, folder, "figure"));
+    }
 }
 
 #[test]
 fn tiles_with_the_wrong_number_of_values_are_refused() {
     let dir = tempfile::tempdir().unwrap();
-    let tile = Tile::Heat {
-        values: vec![1.0; 9],
-        rows: 2,
-        cols: 5,
-        max: None,
-        caption: String::new(),
-        outline: None,
-    };
-    let sheet = Sheet {
-        rows: vec![TileRow {
-            label: String::new(),
-            tiles: vec![tile],
-        }],
-        tile_px: 50,
-        ..Sheet::default()
-    };
-    let error = save_sheet(&sheet, dir.path(), "wrong").unwrap_err();
-    assert!(
-        error.to_string().contains("9 values do not fill 2 × 5 cells"),
-        "{error}"
-    );
+    let wrong = sheet("wrong", 1, vec![heat_tile(vec![1.0; 9], (2, 5), None, "")]);
+    let said = save_sheet(&wrong, dir.path(), "wrong").unwrap_err().to_string();
+    assert!(said.contains("9 values do not fill 2 × 5 cells"), "{said}");
     assert!(pressure_png(&[], 0, 0, "kPa", 1.0, "", &dir.path().join("x.png")).is_err());
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
 }
@@ -110,33 +211,16 @@ fn tiles_with_the_wrong_number_of_values_are_refused() {
 #[test]
 fn images_without_values_are_drawn() {
     let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("map.png");
     for values in [
         vec![f64::NAN; 6],
         vec![0.0; 6],
         vec![-1.0; 6],
         vec![1e-12, 0.0, 2e-12, f64::INFINITY, 1.0, 5.0],
     ] {
-        pressure_png(&values, 2, 3, "kPa", 1e-3, "made up", &path).unwrap();
-        assert!(png_size(&path).0 > 500);
-        let heat = |max| Tile::Heat {
-            values: values.clone(),
-            rows: 2,
-            cols: 3,
-            max,
-            caption: String::new(),
-            outline: None,
-        };
-        let tiles = vec![heat(None), heat(Some(0.0)), heat(Some(f64::NAN))];
-        let sheet = Sheet {
-            rows: vec![TileRow {
-                label: String::new(),
-                tiles,
-            }],
-            tile_px: 30,
-            ..Sheet::default()
-        };
-        save_sheet(&sheet, dir.path(), "sheet").unwrap();
+        pressure_png(&values, 2, 3, "kPa", 1e-3, "made up", &dir.path().join("map.png")).unwrap();
+        let heat = |max| heat_tile(values.clone(), (2, 3), max, "");
+        let sheet = sheet("", 1, vec![heat(None), heat(Some(0.0)), heat(Some(f64::NAN))]);
+        check("no values", |folder| save_sheet(&sheet, folder, "figure"));
     }
 }
 
@@ -174,151 +258,4 @@ fn text_is_escaped() {
     canvas.text((1.0, f64::NAN), "</text><b>", TextStyle::new(10.0, super::colour::INK));
     canvas.disc((f64::NAN, 0.0), 1.0, super::colour::INK);
     check_markup(&canvas.svg(), &[]).unwrap();
-}
-
-/// A saturating curve.
-fn curve(level: f64, rate: f64) -> Vec<(f64, f64)> {
-    let counts = [
-        2.0, 3.0, 5.0, 7.0, 10.0, 13.0, 15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 75.0, 100.0_f64,
-    ];
-    counts.iter().map(|&m| (m, level * (1.0 - (-m / rate).exp()))).collect()
-}
-
-fn claim(label: &str, x: Option<f64>, y: Option<f64>) -> Claim {
-    Claim {
-        label: label.to_owned(),
-        x,
-        y,
-    }
-}
-
-/// Accuracy against M, all skins.
-fn accuracy(title: &str) -> Chart {
-    Chart {
-        title: title.to_owned(),
-        x_label: "measurements M".to_owned(),
-        y_label: "accuracy (%)".to_owned(),
-        x_log: true,
-        y_range: Some((0.0, 105.0)),
-        series: vec![
-            Series::new("twin, compressive", Style::Twin, 0, curve(97.0, 7.0))
-                .with_spans(vec![(10.0, 60.0, 80.0)])
-                .with_scatter(vec![(2.0, 10.0, 30.0), (100.0, 90.0, 99.0)]),
-            Series::new("twin, the same", Style::Twin, 1, curve(97.0, 7.0)),
-            Series::new("sensor, compressive", Style::Real, 0, curve(95.0, 9.0)),
-            Series::new("twin, raster", Style::Raster, 0, curve(94.0, 17.0)),
-            Series::new("sensor, raster", Style::RasterReal, 0, curve(92.0, 21.0)),
-            Series::new("chance", Style::Baseline, 0, vec![(2.0, 5.9), (100.0, 5.9)]),
-        ],
-        claims: vec![
-            claim("paper: ≥ 98 % at M = 20", Some(20.0), Some(98.0)),
-            claim("paper: ≥ 80 % at M = 13", Some(13.0), Some(80.0)),
-            claim("made-up level", None, Some(30.0)),
-            claim("made-up column", Some(8.0), None),
-        ],
-        ranges: vec![StatedRange {
-            label: "made-up range".to_owned(),
-            from: 15.0,
-            to: 20.0,
-        }],
-        published: vec![claim("made-up system", Some(50.0), Some(50.0))],
-        ..Chart::default()
-    }
-}
-
-/// A made-up bump on a 10 × 10 grid, with its support.
-fn bump(row: f64, col: f64, width: f64) -> (Vec<f64>, Vec<bool>) {
-    let place = |i: u32| ((f64::from(i / 10) - row).hypot(f64::from(i % 10) - col)) / width;
-    let values = (0..100).map(|i| (-place(i).powi(2)).exp() * 31.0 - 0.4).collect();
-    (values, (0..100).map(|i| place(i) < 1.0).collect())
-}
-
-fn heat_tile(row: f64, col: f64, width: f64, caption: &str) -> Tile {
-    let (values, support) = bump(row, col, width);
-    Tile::Heat {
-        values,
-        rows: 10,
-        cols: 10,
-        max: None,
-        caption: caption.to_owned(),
-        outline: Some(support),
-    }
-}
-
-/// Seventeen rows of pictures and tactile images.
-fn objects(count: u32) -> Sheet {
-    let picture = |shade: u8| Tile::Picture {
-        width: 64,
-        height: 48,
-        rgb: (0..64 * 48)
-            .flat_map(|i: u32| [shade, u8::try_from(i % 64 * 4).unwrap(), 160])
-            .collect(),
-        caption: String::new(),
-    };
-    let bars = |i: u32| Tile::Bars {
-        values: (0..15).map(|k| 0.4 + 0.5 * (f64::from(k) * 1.7).sin()).collect(),
-        highlight: i as usize,
-        caption: format!("first {i} of 15"),
-    };
-    let row = |i: u32| TileRow {
-        label: format!("made-up object {}", i + 1),
-        tiles: [
-            picture(u8::try_from(i * 14 % 255).unwrap()),
-            bars(i),
-            Tile::Text("words in a tile".to_owned()),
-            Tile::Empty,
-        ]
-        .into_iter()
-        .chain(
-            [("M = 10", 3.6), ("M = 25", 3.1), ("M = 50", 2.8), ("raster", 2.6)]
-                .map(|(caption, width)| heat_tile(3.0 + f64::from(i % 4), 3.0 + f64::from(i % 5), width, caption)),
-        )
-        .collect(),
-    };
-    Sheet {
-        title: "Reconstructions of 17 objects (synthetic)".to_owned(),
-        column_titles: [
-            "object",
-            "wire",
-            "words",
-            "",
-            "M = 10",
-            "M = 25",
-            "M = 50",
-            "raster scan",
-        ]
-        .map(str::to_owned)
-        .to_vec(),
-        rows: (0..count).map(row).collect(),
-        tile_px: 110,
-    }
-}
-
-/// Awkward charts: nothing, one point, constants, not-a-number.
-fn awkward() -> Vec<Chart> {
-    let with = |title: &str, points: Vec<(f64, f64)>| Chart {
-        title: title.to_owned(),
-        x_log: true,
-        y_log: title == "one point",
-        series: vec![Series::new("made up", Style::Twin, 0, points)],
-        ..Chart::default()
-    };
-    vec![
-        Chart {
-            title: "empty <&> list".to_owned(),
-            ..Chart::default()
-        },
-        with("no points", vec![]),
-        with("one point", vec![(7.0, 3.0)]),
-        with("constant", vec![(1.0, 0.0), (10.0, 0.0), (100.0, 0.0)]),
-        with(
-            "not a number",
-            vec![(f64::NAN, 1.0), (2.0, f64::INFINITY), (-3.0, 1.0), (0.0, 2.0)],
-        ),
-        Chart {
-            y_range: Some((f64::NAN, 1.0)),
-            claims: vec![claim("", None, None)],
-            ..accuracy("claims")
-        },
-    ]
 }

@@ -1,7 +1,8 @@
 //! The readout beside the recordings it is fitted to: the skin's own images through the twin's electronics.
 
 use super::ReproduceError;
-use crate::{PageFigure, PageTable, Section, compare};
+use super::page::section;
+use crate::{PageTable, Section, compare};
 use spts::output::OutputError;
 use spts::progress::Progress;
 use spts_eval::PublishedSkin;
@@ -41,29 +42,6 @@ impl ReadoutSection {
     /// Section of the page.
     pub(super) fn section(&self) -> Section {
         Section {
-            id: "readout".to_owned(),
-            title: "The readout".to_owned(),
-            lead: "The electronics alone: images of the real skin, found from its recordings by least squares, go through the twin's readout with the \
-                   same weights. The readout is fitted to the odd presses of each recording, and compared and scored on the even ones."
-                .to_owned(),
-            figures: vec![
-                PageFigure::new(
-                    "residuals",
-                    "Histograms of the residuals of twin and real skin, one panel a recording.",
-                    "What the fitted image does not explain of the wire, without the memory of earlier samples: share of samples in each bin.",
-                ),
-                PageFigure::new(
-                    "quantiles",
-                    "Quantiles of the twin over those of the real skin, one panel a recording, close to the diagonal.",
-                    "Quantiles of the wire's voltage, and of ten times the residual. Equal distributions lie on the dotted line.",
-                ),
-                PageFigure::new(
-                    "scores",
-                    "Score curves over the number of measurements for twin and real skin, one panel a published decoder.",
-                    "Scores of the published decoders, mean over the objects, with the published dictionary and library. The real skin's raster \
-                     image is the truth for both.",
-                ),
-            ],
             tables: vec![
                 PageTable::new(
                     "Statistics of the even presses, ± standard error",
@@ -76,6 +54,7 @@ impl ReadoutSection {
                     "readout_curves_real.csv",
                 ),
             ],
+            ..section("readout", true)
         }
     }
 }

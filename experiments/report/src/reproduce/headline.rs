@@ -1,14 +1,12 @@
-//! The most important numbers of a report: every one by its key, and the cards of the page that show them.
+//! The most important numbers of a report: every one by its key, which the cards of the page show.
 
 use super::dataset::SimulatedData;
 use super::results::{BothSkins, MEAN_COMMON, SHOWN, SkinResults, TimingRow};
 use super::tables::CorrelationRow;
-use crate::Card;
-use crate::labels::object_list;
 use serde::{Serialize, Serializer};
-use spts_eval::decoders::label;
 use spts_eval::{Cell, ScoreRow};
 use spts_recon::metrics::median;
+use spts_recon::statistics;
 use spts_sim::world::Bounce;
 use spts_studies::per_object::{PerObjectReport, ScoreDistance};
 
@@ -145,14 +143,8 @@ const HEADLINE: &[Entry] = &[
     ("wall_s", |f| f.wall_s.into()),
 ];
 
-/// Mean of the finite values, or `None` without one.
 fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for v in values.filter(|v| v.is_finite()) {
-        sum += v;
-        count += 1.0;
-    }
-    (count > 0.0).then(|| sum / count)
+    statistics::mean(values.filter(|v| v.is_finite()))
 }
 
 /// The most important numbers of a report by their keys; `null` in JSON where there is none, as without recordings.
@@ -182,11 +174,17 @@ impl Headline {
 
     /// The first number that there is.
     #[must_use]
-    pub fn first(&self, keys: &[&str]) -> Option<f64> {
-        keys.iter().find_map(|key| self.number(key))
+    pub fn first(&self, keys: &[impl AsRef<str>]) -> Option<f64> {
+        keys.iter().find_map(|key| self.number(key.as_ref()))
     }
 
-    fn words(&self, key: &str) -> &str {
+    /// Every number is `value`.
+    #[cfg(test)]
+    pub(super) fn of(value: f64) -> Self {
+        Self(HEADLINE.iter().map(|(key, _)| (*key, Cell::Number(value))).collect())
+    }
+
+    pub(super) fn words(&self, key: &str) -> &str {
         match self.cell(key) {
             Some(Cell::Text(words)) => words,
             _ => "",
@@ -197,248 +195,5 @@ impl Headline {
 impl Serialize for Headline {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().map(|(key, cell)| (key, cell)))
-    }
-}
-
-/// A card of the page: a number of the headline beside what it is held against. Where several keys are given, the first
-/// with a number counts; a card without a number is left out, and so is what is not known beside it.
-struct CardLine {
-    label: &'static str,
-    of: &'static str,
-    keys: &'static [&'static str],
-    digits: usize,
-    unit: &'static str,
-    /// Whose number (a decoder by its name), and its keys.
-    others: &'static [(&'static str, &'static [&'static str])],
-    /// Words of the paper, after so many of the others.
-    paper: Option<(usize, &'static str)>,
-    note: fn(&Headline) -> String,
-}
-
-/// A card of a share, without words of the paper.
-const SHARE: CardLine = CardLine {
-    label: "",
-    of: "twin, published decoder",
-    keys: &[],
-    digits: 3,
-    unit: "",
-    others: &[],
-    paper: None,
-    note: |_| String::new(),
-};
-
-/// Every card, in the order of the page.
-const CARDS: &[CardLine] = &[
-    CardLine {
-        label: "Twin against real skin: overlap, M = 20",
-        of: "mean difference, published decoder",
-        keys: &["iou_m20_matched_mean_abs_difference"],
-        others: &[
-            ("evidence", &["iou_m20_evidence_mean_abs_difference"]),
-            ("nn_lmmse", &["iou_m20_nn_lmmse_mean_abs_difference"]),
-            ("two simulated skins", &["iou_m20_matched_between_skins"]),
-        ],
-        note: |h| {
-            let outside = match object_list(h.words("iou_m20_matched_outside")) {
-                none if none.is_empty() => {
-                    "Every object of the real skin lies within the band of the simulated skins.".to_owned()
-                }
-                objects => format!("Outside the band of the simulated skins: {objects}."),
-            };
-            let skins = h.number("per_object_skins").unwrap_or(0.0);
-            format!(
-                "Mean over the objects of the difference in IoU, without its sign; {skins} simulated skins. {outside}"
-            )
-        },
-        ..SHARE
-    },
-    CardLine {
-        label: "Twin against real skin: classes, M = 20",
-        of: "mean difference, published decoder",
-        keys: &["class_single_m20_matched_mean_abs_difference"],
-        others: &[("evidence", &["class_single_m20_evidence_mean_abs_difference"])],
-        note: |_| {
-            "Mean over the objects of the difference in the share of single windows classified correctly.".to_owned()
-        },
-        ..SHARE
-    },
-    CardLine {
-        label: "Objects recognised, M = 20",
-        keys: &["class_vote20_m20_matched_common_twin", "class_vote20_m20_matched_twin"],
-        others: &[
-            (
-                "twin, evidence",
-                &[
-                    "class_vote20_m20_evidence_common_twin",
-                    "class_vote20_m20_evidence_twin",
-                ],
-            ),
-            ("real skin, published", &["class_vote20_m20_matched_real"]),
-            ("real skin, evidence", &["class_vote20_m20_evidence_real"]),
-        ],
-        paper: Some((3, "≥ 0.98")),
-        note: |h| {
-            format!(
-                "Share of votes of 20 windows that name the right one of 17 objects; {}.",
-                over(h)
-            )
-        },
-        ..SHARE
-    },
-    CardLine {
-        label: "Overlap with the true contact, M = 20",
-        keys: &["iou_m20_matched_common_twin", "iou_m20_matched_twin"],
-        others: &[
-            (
-                "twin, evidence",
-                &["iou_m20_evidence_common_twin", "iou_m20_evidence_twin"],
-            ),
-            ("real skin, published", &["iou_m20_matched_real"]),
-            ("real skin, evidence", &["iou_m20_evidence_real"]),
-        ],
-        note: |h| format!("Intersection over union (IoU) of the touched taxels; {}.", over(h)),
-        ..SHARE
-    },
-    CardLine {
-        label: "Taxels on the right side, M = 20",
-        keys: &["support_m20_matched_common_twin", "support_m20_matched_twin"],
-        others: &[("real skin, published", &["support_m20_matched_real"])],
-        note: |h| {
-            format!(
-                "Support accuracy, the paper's measure: touched and untouched taxels count alike; {}.",
-                over(h)
-            )
-        },
-        ..SHARE
-    },
-    CardLine {
-        label: "Place of a bouncing ball, M = 25",
-        keys: &["localisation_px_m25_twin"],
-        digits: 2,
-        unit: " taxels",
-        others: &[
-            ("real skin", &["localisation_px_m25_real"]),
-            ("always the middle, twin", &["localisation_px_middle_twin"]),
-            ("always the middle, real", &["localisation_px_middle_real"]),
-        ],
-        paper: Some((1, "< 1 taxel")),
-        note: |_| "Mean distance of the estimated from the true centre of the contact.".to_owned(),
-        ..SHARE
-    },
-    CardLine {
-        label: "Contact of the ball",
-        of: "twin, median",
-        keys: &["bounce_contact_recorded_ms_twin"],
-        digits: 2,
-        unit: " ms",
-        others: &[("real skin, median", &["bounce_contact_ms_real"])],
-        paper: Some((1, "≈ 8 ms")),
-        note: |h| {
-            let [contact, restitution] = ["bounce_contact_ms_twin", "bounce_cor_twin"].map(|key| h.number(key));
-            let mechanics = contact.zip(restitution).map_or_else(String::new, |(ms, cor)| {
-                format!(
-                    " In the twin's mechanics the contact takes {ms:.2} ms, and the ball keeps {cor:.3} of its speed (means)."
-                )
-            });
-            format!("As the recordings show it.{mechanics}")
-        },
-    },
-    CardLine {
-        label: "Raster images, twin and real skin",
-        of: "mean correlation r",
-        keys: &["raster_corr_mean"],
-        digits: 2,
-        note: |h| {
-            let least = h.number("raster_corr_min");
-            let least = least.map_or_else(String::new, |r| format!(" The least is {r:.2}."));
-            format!("Pearson's r over the taxels, mean over the objects.{least}")
-        },
-        ..SHARE
-    },
-    CardLine {
-        label: "Press force",
-        of: "twin, mean",
-        keys: &["press_plateau_n"],
-        unit: " N",
-        note: |h| {
-            let off = h.number("press_plateau_error_max_n").map_or_else(String::new, |n| {
-                format!(" No press deviates by more than {n:.3} N while it holds.")
-            });
-            format!("The target is 20 N.{off}")
-        },
-        ..SHARE
-    },
-    CardLine {
-        label: "Time of one decode, M = 25",
-        of: "twin, median",
-        keys: &["decode_us_m25_median"],
-        digits: 1,
-        unit: " µs",
-        note: |_| {
-            "Published decoder on one thread of this machine, its matrix ready. To acquire 25 measurements takes 389 µs."
-                .to_owned()
-        },
-        ..SHARE
-    },
-];
-
-/// What the scores are means over.
-fn over(h: &Headline) -> &'static str {
-    if h.number("support_m20_matched_real").is_some() {
-        "mean over the objects that both skins recorded in compressed form"
-    } else {
-        "mean over the 17 objects"
-    }
-}
-
-/// Every card that there are numbers for.
-pub(super) fn cards(h: &Headline) -> Vec<Card> {
-    let card = |line: &CardLine| {
-        let text = |keys: &[&str]| {
-            let value = h.first(keys).filter(|value| value.is_finite())?;
-            Some(format!("{value:.*}{}", line.digits, line.unit))
-        };
-        let mut others: Vec<(String, Option<String>)> = line
-            .others
-            .iter()
-            .map(|(whose, keys)| (label(whose).to_owned(), text(keys)))
-            .collect();
-        if let Some((place, words)) = line.paper {
-            others.insert(place, ("paper".to_owned(), Some(words.to_owned())));
-        }
-        Some(Card {
-            label: line.label.to_owned(),
-            of: line.of.to_owned(),
-            value: text(line.keys)?,
-            others: others
-                .into_iter()
-                .filter_map(|(whose, value)| Some((whose, value?)))
-                .collect(),
-            note: (line.note)(h),
-        })
-    };
-    CARDS.iter().filter_map(card).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Every key of a card is one of the headline, and the others of a card stand before the paper's words.
-    #[test]
-    fn cards_show_numbers_of_the_headline() {
-        let headline = Headline(HEADLINE.iter().map(|(key, _)| (*key, Cell::Number(0.5))).collect());
-        let shown = cards(&headline);
-        assert_eq!(shown.len(), CARDS.len());
-        for (card, line) in shown.iter().zip(CARDS) {
-            assert_eq!(
-                card.others.len(),
-                line.others.len() + usize::from(line.paper.is_some()),
-                "{}",
-                card.label
-            );
-        }
-        let empty = Headline(HEADLINE.iter().map(|(key, _)| (*key, Cell::Unknown)).collect());
-        assert!(cards(&empty).is_empty());
     }
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
-use spts_eval::decoders::{PublishedDecode, TrainedDecoder};
+use spts_eval::decoders::TrainedDecoder;
 use spts_eval::{Press, ScoreError, ScoredSession, ScoredSkin, Scorer, idle_mean};
 use spts_recon::Workspace;
 use spts_recon::classify::majority;
@@ -76,7 +76,7 @@ fn keys(rate_hz: f64) -> Vec<LatencyRow> {
         let window_s = m as f64 / rate_hz;
         let row = |rule, time_s: f64| LatencyRow {
             rule,
-            decode: PublishedDecode::Matched.name(),
+            decode: "matched",
             m,
             time_ms: time_s * 1e3,
             accuracy: f64::NAN,
@@ -137,49 +137,44 @@ fn press_hits(
 
 /// The control: whole raster frames, the first one complete after N measurements.
 fn raster(skin: &ScoredSkin) -> Vec<LatencyRow> {
-    let mut rows = Vec::new();
-    let frames = |rate_hz: f64, per_frame: usize| {
-        let frame_s = per_frame as f64 / rate_hz;
-        (1..=8)
-            .map(move |k| (k, f64::from(k) * frame_s))
-            .take_while(|(_, t)| *t <= PUBLISHED_SPAN_S)
-    };
     let Some(first) = skin.sessions.first().and_then(|s| s.raster.as_ref()) else {
-        return rows;
+        return Vec::new();
     };
-    for (k, end_s) in frames(first.sample_rate_hz(), first.measurements_per_frame()) {
-        let hits: Vec<bool> = skin
+    let frame_s = first.measurements_per_frame() as f64 / first.sample_rate_hz();
+    let right = |session: &ScoredSession, recording: &Recording, block: usize, frames: usize| {
+        let start = onset_frame(recording, block)? + PUBLISHED_DELAY;
+        let mut work = Workspace::default();
+        let classify = |frame| {
+            skin.learned
+                .classifier
+                .classify(recording.volts(block, frame), &mut work)
+        };
+        let frames = (start..start + frames).filter(|frame| *frame < recording.frames());
+        let votes: Vec<Option<usize>> = frames.map(classify).map(Result::unwrap_or_default).collect();
+        Some(majority(&votes) == Some(session.label))
+    };
+    let ends = (1..=8)
+        .map(|k| (k, k as f64 * frame_s))
+        .take_while(|(_, t)| *t <= PUBLISHED_SPAN_S);
+    let row = |(frames, end_s): (usize, f64)| {
+        let with = skin
             .sessions
             .par_iter()
-            .filter_map(|session| Some((session, session.raster.as_ref()?)))
-            .flat_map_iter(|(session, recording)| {
-                session.raster_protocol.presses_of(recording).filter_map(move |block| {
-                    let start = onset_frame(recording, block)? + PUBLISHED_DELAY;
-                    let mut work = Workspace::default();
-                    let votes: Vec<Option<usize>> = (start..start + usize::try_from(k).unwrap_or(0))
-                        .filter(|frame| *frame < recording.frames())
-                        .map(|frame| {
-                            let decision = skin
-                                .learned
-                                .classifier
-                                .classify(recording.volts(block, frame), &mut work);
-                            decision.unwrap_or_default()
-                        })
-                        .collect();
-                    Some(majority(&votes) == Some(session.label))
-                })
-            })
-            .collect();
-        let accuracy = hits.iter().filter(|h| **h).count() as f64 / hits.len().max(1) as f64;
-        rows.push(LatencyRow {
+            .filter_map(|session| Some((session, session.raster.as_ref()?)));
+        let hits = with.flat_map_iter(|(session, recording)| {
+            let presses = session.raster_protocol.presses_of(recording);
+            presses.filter_map(move |block| right(session, recording, block, frames))
+        });
+        let hits: Vec<bool> = hits.collect();
+        LatencyRow {
             rule: "published",
             decode: "raster",
             m: first.taxels(),
             time_ms: end_s * 1e3,
-            accuracy,
-        });
-    }
-    rows
+            accuracy: hits.iter().filter(|h| **h).count() as f64 / hits.len().max(1) as f64,
+        }
+    };
+    ends.map(row).collect()
 }
 
 /// A frame is in contact when its distance from the idle frame is above this many times the idle frames' median.

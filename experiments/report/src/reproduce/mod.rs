@@ -29,7 +29,6 @@ use spts::progress::Progress;
 use spts::provenance::Provenance;
 use spts_eval::ScoreError;
 use spts_eval::protocol::Protocol;
-use spts_eval::training::LearnError;
 use spts_eval::training::{Learned, TrainingPresses};
 use spts_eval::{PublishedSkin, ScoredSession, ScoredSkin};
 use spts_input::Refusal;
@@ -66,9 +65,6 @@ pub enum ReproduceError {
     /// The animations cannot be made.
     #[error(transparent)]
     Motion(#[from] MotionError),
-    /// Nothing is learned from the twin's raster images.
-    #[error(transparent)]
-    Learn(#[from] LearnError),
     /// A skin cannot be scored.
     #[error(transparent)]
     Score(#[from] ScoreError),

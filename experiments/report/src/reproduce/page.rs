@@ -1,72 +1,154 @@
-//! The report's page.
+//! The page of the report: its sections, tables and words.
 
 use super::ReproductionSummary;
-use super::figures::FIGURES;
-use super::headline::cards;
+use super::headline::Headline;
 use super::results::{BEST, BothSkins};
 use super::tables::{CorrelationRow, REAL, TWIN, skin_file};
-use crate::labels::object_label;
-use crate::{Page, PageFigure, PageTable, Section};
+use crate::labels::{object_label, object_list};
+use crate::{Card, Page, PageFigure, PageTable, Section};
+use serde::Deserialize;
+use spts_eval::Table;
 use spts_eval::decoders::label;
-use spts_eval::{BaselineRow, RASTER, ScoreRow, Table};
+use std::sync::LazyLock;
+
+/// The words of the page, which `page.toml` has.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Words {
+    title: String,
+    summary: SummaryWords,
+    sections: Vec<SectionWords>,
+    pub(super) figures: Vec<FigureWords>,
+    pub(super) cards: Vec<CardWords>,
+    terms: Vec<Term>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SummaryWords {
+    text: String,
+    compared: String,
+    alone: String,
+    quick: String,
+    missing: String,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SectionWords {
+    id: String,
+    title: String,
+    lead: String,
+    #[serde(default)]
+    compared: String,
+    #[serde(default)]
+    alone: String,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FigureWords {
+    pub(super) file: String,
+    section: String,
+    alt: String,
+    caption: String,
+    compared: Option<String>,
+}
+
+/// A card that shows a number of the headline: the first of `keys` that is known, beside others.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct CardWords {
+    label: String,
+    #[serde(default = "twin_published")]
+    of: String,
+    keys: Vec<String>,
+    #[serde(default = "three")]
+    digits: usize,
+    #[serde(default)]
+    unit: String,
+    #[serde(default)]
+    pub(super) others: Vec<OtherWords>,
+    note: String,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct OtherWords {
+    of: String,
+    #[serde(default)]
+    keys: Vec<String>,
+    text: Option<String>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Term {
+    term: String,
+    meaning: String,
+    /// Whether it is used where the real skin is shown alone.
+    #[serde(default)]
+    compared: bool,
+    /// Whether the term is the name of a decoder, which its label stands for.
+    #[serde(default)]
+    decoder: bool,
+}
+
+fn twin_published() -> String {
+    "twin, published decoder".to_owned()
+}
+
+fn three() -> usize {
+    3
+}
+
+pub(super) static WORDS: LazyLock<Words> =
+    LazyLock::new(|| toml::from_str(include_str!("page.toml")).unwrap_or_else(|e| panic!("page.toml: {e}")));
 
 /// What the page is made of.
 pub(super) struct PageContent<'a> {
-    /// Main figures and provenance.
     pub(super) summary: &'a ReproductionSummary,
-    /// The scored skins.
     pub(super) skins: &'a BothSkins<'a>,
-    /// How alike their raster images are; none without recordings.
     pub(super) correlations: &'a [CorrelationRow],
-    /// Recordings of the real skin that are not there.
     pub(super) missing: &'a [String],
-    /// Whether it was a short run.
     pub(super) quick: bool,
-    /// Twin and skin object by object.
     pub(super) per_object: Option<Section>,
-    /// Moving pictures.
     pub(super) animations: Vec<PageFigure>,
 }
 
-/// The page, but for the section of the readout.
+/// The page of the report.
 #[must_use]
 pub(super) fn page(content: &PageContent<'_>) -> Page {
     let compared = content.skins.real.is_some();
-    let mut sections: Vec<Section> = content.per_object.iter().cloned().collect();
-    if !content.animations.is_empty() {
-        sections.push(Section {
-            id: "motion".to_owned(),
-            title: "In motion".to_owned(),
-            lead: "The pressure on the skin, and beside it the image that is decoded from the one wire at the same instant."
-                .to_owned(),
-            figures: content.animations.clone(),
-            tables: vec![],
-        });
-    }
-    let mut objects = section("objects", "The objects", &objects_lead(compared), compared);
+    let section = |id| section(id, compared);
+    let motion = Section {
+        figures: content.animations.clone(),
+        ..section("motion")
+    };
+    let mut objects = section("objects");
     if !content.correlations.is_empty() {
         objects.tables.push(correlations_table(content.correlations));
     }
-    let mut scores = section(
-        "classification",
-        "Classification and images",
-        &scores_lead(compared),
-        compared,
-    );
+    let mut scores = section("classification");
     scores.tables.push(means_table(content.skins));
-    sections.push(objects);
-    sections.push(scores);
-    sections.push(section(
-        "adaptive",
-        "More measurements, better images",
-        "An image can be decoded from the first few measurements and refined with every one that follows. Cyan lines mark \
-         the true contact: the taxels above 0.23 of the maximum of a raster scan.",
-        compared,
-    ));
-    sections.push(section("bounce", "The bouncing ball", &ball_lead(compared), compared));
+    let mut sections: Vec<Section> = content.per_object.iter().cloned().collect();
+    sections.extend(Some(motion).filter(|motion| !motion.figures.is_empty()));
+    sections.extend([objects, scores, section("adaptive"), section("bounce")]);
+    let words = &WORDS.summary;
+    let summary = [
+        (true, &words.text),
+        (compared, &words.compared),
+        (!compared, &words.alone),
+        (content.quick, &words.quick),
+        (!content.missing.is_empty(), &words.missing),
+    ];
+    let summary = summary
+        .into_iter()
+        .filter(|(said, _)| *said)
+        .map(|(_, words)| words.as_str());
     Page {
-        title: "A tactile skin with one wire, and its digital twin".to_owned(),
-        summary: summary(content),
+        title: WORDS.title.clone(),
+        summary: summary.collect(),
         cards: cards(&content.summary.headline),
         sections,
         glossary: terms(compared),
@@ -74,83 +156,90 @@ pub(super) fn page(content: &PageContent<'_>) -> Page {
     }
 }
 
-/// A section with its figures.
-fn section(id: &str, title: &str, lead: &str, compared: bool) -> Section {
-    let figures = FIGURES.iter().filter(|figure| figure.section == id);
-    let figures = figures.map(|figure| {
-        let caption = match figure.compared {
-            Some(more) if compared => format!("{} {more}", figure.caption),
-            _ => figure.caption.to_owned(),
-        };
-        PageFigure::new(figure.file, figure.alt, caption)
+/// The section `id` with its figures.
+pub(super) fn section(id: &str, compared: bool) -> Section {
+    let figures = WORDS
+        .figures
+        .iter()
+        .filter(|figure| figure.section == id)
+        .map(|figure| {
+            let more = figure.compared.as_ref().filter(|_| compared);
+            let caption = more.map_or_else(|| figure.caption.clone(), |more| format!("{} {more}", figure.caption));
+            PageFigure::new(&figure.file, &figure.alt, caption)
+        });
+    let found = WORDS.sections.iter().find(|section| section.id == id);
+    debug_assert!(found.is_some(), "no section is called {id}");
+    let (title, lead) = found.map_or_else(Default::default, |words| {
+        let more = if compared { &words.compared } else { &words.alone };
+        let best = BEST.map(|name| format!("“{}”", label(name))).join(" and ");
+        (
+            words.title.clone(),
+            words.lead.replace("{best}", &best).replace("{compared}", more),
+        )
     });
     Section {
         id: id.to_owned(),
-        title: title.to_owned(),
-        lead: lead.to_owned(),
+        title,
+        lead,
         figures: figures.collect(),
         tables: vec![],
     }
 }
 
-fn summary(content: &PageContent<'_>) -> String {
-    let mut text = String::from(
-        "This page shows what a simulated copy of the single-pixel tactile skin feels, recognises and locates, figure by \
-         figure as in the paper that introduced the skin.",
-    );
-    text.push_str(
-        "\n\nA robot presses 17 objects on the simulated skin, and a tennis ball bounces on it. The skin's 100 taxels share \
-         one wire. Decoders turn M samples of that wire into an image of the contact and the name of the object.",
-    );
-    text.push_str(if content.skins.real.is_some() {
-        " Beside the twin stands the real skin: its published recordings, scored by the same code."
+/// A card for every number that the headline has.
+pub(super) fn cards(h: &Headline) -> Vec<Card> {
+    let say = |key: &str, words: &dyn Fn(f64) -> String| h.number(key).map_or_else(String::new, words);
+    let outside = match object_list(h.words("iou_m20_matched_outside")) {
+        none if none.is_empty() => {
+            "Every object of the real skin lies within the band of the simulated skins.".to_owned()
+        }
+        objects => format!("Outside the band of the simulated skins: {objects}."),
+    };
+    let over = if h.number("support_m20_matched_real").is_some() {
+        "mean over the objects that both skins recorded in compressed form"
     } else {
-        " No recordings of the real skin were given; `spts reproduce --recordings DIR` shows them beside the twin."
+        "mean over the 17 objects"
+    };
+    let [contact, restitution] = ["bounce_contact_ms_twin", "bounce_cor_twin"].map(|key| h.number(key));
+    let mechanics = contact.zip(restitution).map_or_else(String::new, |(ms, cor)| {
+        format!(
+            " In the twin's mechanics the contact takes {ms:.2} ms, and the ball keeps {cor:.3} of its speed (means)."
+        )
     });
-    if content.quick {
-        text.push_str(" This was a quick run with few presses and windows, so the scores scatter by a few per cent.");
-    }
-    if !content.missing.is_empty() {
-        text.push_str(" Twin and real skin are compared by what both recorded; Provenance lists what is missing.");
-    }
-    text
-}
-
-fn objects_lead(compared: bool) -> String {
-    let beside = if compared {
-        " The last column is the raster image that was recorded with the real skin."
-    } else {
-        ""
+    let phrases = [
+        ("{skins}", h.number("per_object_skins").unwrap_or(0.0).to_string()),
+        ("{outside}", outside),
+        ("{over}", over.to_owned()),
+        ("{mechanics}", mechanics),
+        ("{least}", say("raster_corr_min", &|r| format!(" The least is {r:.2}."))),
+        (
+            "{off}",
+            say("press_plateau_error_max_n", &|n| {
+                format!(" No press deviates by more than {n:.3} N while it holds.")
+            }),
+        ),
+    ];
+    let card = |words: &CardWords| {
+        let text = |keys: &[String]| {
+            let value = h.first(keys).filter(|value| value.is_finite())?;
+            Some(format!("{value:.*}{}", words.digits, words.unit))
+        };
+        let other = |other: &OtherWords| {
+            let value = other.text.clone().or_else(|| text(&other.keys))?;
+            Some((label(&other.of).to_owned(), value))
+        };
+        let note = phrases
+            .iter()
+            .fold(words.note.clone(), |note, (name, phrase)| note.replace(name, phrase));
+        Some(Card {
+            label: words.label.clone(),
+            of: words.of.clone(),
+            value: text(&words.keys)?,
+            others: words.others.iter().filter_map(other).collect(),
+            note,
+        })
     };
-    format!(
-        "A UR5 robot presses each of 17 objects on the skin with 20 N. The pictures show the object, the pressure on the taxels, and the raster image that the wire gives of it.{beside} Every image has a \
-         colour scale of its own, from its smallest to its largest value."
-    )
-}
-
-fn scores_lead(compared: bool) -> String {
-    let from = if compared {
-        " The twin's decoders have learned from simulated raster images alone. The real skin's published decoders use the \
-         published dictionary and library; its best decoders have learned from those of its raster presses that are not \
-         scored."
-    } else {
-        " All decoders have learned from simulated raster images alone."
-    };
-    format!(
-        "Windows of M measurements are decoded into images and classified: by the two decoders that were published with \
-         the skin, and by the two that do best here, “{}” and “{}”.{from}",
-        label(BEST[0]),
-        label(BEST[1])
-    )
-}
-
-fn ball_lead(compared: bool) -> String {
-    let both = if compared {
-        " Contacts are found in the recordings of both skins by the same rule."
-    } else {
-        ""
-    };
-    format!("A tennis ball is dropped from half a metre on eight places near the middle of the skin.{both}")
+    WORDS.cards.iter().filter_map(card).collect()
 }
 
 /// Objects by what was not recorded of them, for the provenance; entries of `missing` have the form "object: what".
@@ -191,16 +280,19 @@ fn origin(summary: &ReproductionSummary) -> Vec<(String, String)> {
 /// Numbers of measurements shown in the table of mean scores; its files have all.
 const SHOWN: [usize; 7] = [5, 7, 10, 20, 25, 50, 100];
 
-/// A row of the table of mean scores: whose, and scores with measurements or without.
-#[derive(Clone, Copy)]
-enum MeanRow<'a> {
-    Decoded(&'static str, &'a ScoreRow),
-    Baseline(&'static str, &'a BaselineRow),
-}
+/// Skin, decoder, M and scores of a line of the table of means.
+type MeanRow = (&'static str, &'static str, usize, [Option<f64>; 6]);
 
-/// Table of the mean scores.
+/// Scores of decoders and baselines, mean over the objects.
 fn means_table(skins: &BothSkins<'_>) -> PageTable {
-    use MeanRow::{Baseline, Decoded};
+    const HEADS: [&str; 6] = [
+        "mean support accuracy",
+        "mean IoU",
+        "mean F1",
+        "mean balanced accuracy",
+        "single windows",
+        "votes of 20",
+    ];
     let compared = skins.real.is_some();
     let mut shown = vec![("twin", skins.twin, skins.common())];
     if let Some(real) = skins.real {
@@ -209,50 +301,36 @@ fn means_table(skins: &BothSkins<'_>) -> PageTable {
             ("twin, all 17 objects", skins.twin, "mean"),
         ]);
     }
-    let mut rows = Vec::new();
+    let mut rows: Vec<MeanRow> = Vec::new();
     for (whose, results, object) in shown {
         let scored = results
             .scores
             .rows
             .iter()
             .filter(|r| r.object == object && SHOWN.contains(&r.m));
-        rows.extend(scored.map(|r| Decoded(whose, r)));
+        rows.extend(scored.map(|r| {
+            let images = [r.support, r.iou, r.f1, r.balanced_accuracy];
+            let [a, b, c, d] = images.map(Some);
+            (
+                whose,
+                r.decode,
+                r.m,
+                [a, b, c, d, Some(r.class_single), Some(r.class_vote20)],
+            )
+        }));
         let level = results.scores.baselines.iter().filter(|b| b.object == object);
-        rows.extend(level.map(|b| Baseline(whose, b)));
+        rows.extend(level.map(|b| {
+            let [support, iou, f1, balanced] = [b.support, b.iou, b.f1, b.balanced_accuracy].map(Some);
+            (whose, b.baseline, 0, [support, iou, f1, balanced, None, None])
+        }));
     }
-    let mut table = Table::new("", rows);
+    let mut table = Table::new("", &rows);
     if compared {
-        table = table.shown("skin", |(Decoded(whose, _) | Baseline(whose, _))| whose);
+        table = table.shown("skin", |r: &MeanRow| r.0);
     }
-    table = table
-        .shown("decoder", |r| match r {
-            Decoded(_, r) => label(r.decode),
-            Baseline(_, b) => label(b.baseline),
-        })
-        .shown("M", |r| match r {
-            Decoded(_, r) => r.m,
-            Baseline(..) => 0,
-        });
-    /// What a score is called, and its value for a decoder and, if it has one, a baseline.
-    type Score = (&'static str, fn(&ScoreRow) -> f64, Option<fn(&BaselineRow) -> f64>);
-    let scores: [Score; 6] = [
-        ("mean support accuracy", |r| r.support, Some(|b| b.support)),
-        ("mean IoU", |r| r.iou, Some(|b| b.iou)),
-        ("mean F1", |r| r.f1, Some(|b| b.f1)),
-        (
-            "mean balanced accuracy",
-            |r| r.balanced_accuracy,
-            Some(|b| b.balanced_accuracy),
-        ),
-        ("single windows", |r| r.class_single, None),
-        ("votes of 20", |r| r.class_vote20, None),
-    ];
-    for (name, decoded, level) in scores {
-        let value = move |row| match row {
-            Decoded(_, r) => Some(decoded(r)),
-            Baseline(_, b) => level.map(|level| level(b)),
-        };
-        table = table.shown(name, value).digits(3);
+    table = table.shown("decoder", |r: &MeanRow| label(r.1)).shown("M", |r| r.2);
+    for (k, head) in HEADS.into_iter().enumerate() {
+        table = table.number(head, 3, move |r| r.3[k]);
     }
     let caption = if compared {
         "Means over the objects that both skins recorded in compressed form, and over all 17 objects of the twin"
@@ -277,86 +355,42 @@ fn correlations_table(rows: &[CorrelationRow]) -> PageTable {
     PageTable::new(caption, &table, "raster_correlation.csv")
 }
 
-/// Terms that need the real skin.
-const COMPARED: [(&str, &str); 2] = [
-    (
-        "band",
-        "Where the score of one more simulated skin lies nine times in ten. Every simulated skin has taxels, mounting and noise of its own.",
-    ),
-    (
-        "real skin",
-        "The skin that the recordings were made with, published with the paper.",
-    ),
-];
-
-/// Terms of every page.
-const ALWAYS: [(&str, &str); 10] = [
-    (
-        "taxel",
-        "One touch-sensitive element of the skin, as a pixel of an image. The skin has 10 × 10, 15 mm apart.",
-    ),
-    (
-        "measurement",
-        "One sample of the wire: the sum of all taxels, each with a weight of +1 or −1.",
-    ),
-    (
-        "M",
-        "How many measurements a decoder makes one image from. A raster scan needs 100.",
-    ),
-    ("window", "M measurements that follow each other, decoded together."),
-    (
-        "raster scan",
-        "Reading the taxels one after another: the true image, and the slow way to get it.",
-    ),
-    (
-        "support",
-        "The touched taxels: those above 0.23 of the largest value of an image.",
-    ),
-    (
-        "support accuracy",
-        "Share of taxels that decoded and true image agree on, touched or not.",
-    ),
-    (
-        "IoU",
-        "Intersection over union: taxels touched in both the decoded and the true image, over those touched in either. 1 is perfect, 0 is no overlap.",
-    ),
-    ("vote of 20", "The object that most of 20 windows in a row name."),
-    (
-        "gain",
-        "How much a taxel answers to a pressure. It differs from taxel to taxel by some 20 %, and a raster image shows it as mottle.",
-    ),
-];
-
-/// Decoders and the control of every page, which stand there under their labels.
-const SCORED: [(&str, &str); 4] = [
-    (
-        RASTER,
-        "The control: M taxels of a raster scan, the others filled in between them. It takes as long as M measurements.",
-    ),
-    (
-        "matched",
-        "The published decoder with weights of ±1, as the skin has them, and the output without contact taken off. The published script uses weights of 0 and 1.",
-    ),
-    (
-        "evidence",
-        "A decoder that knows typical images of every object. It weighs which object explains the measurements best, and the image is the mean of what remains possible.",
-    ),
-    (
-        "nn_lmmse",
-        "Linear minimum mean square error with no negative pressure: a decoder that knows how touched taxels usually go together. It needs no object to be known.",
-    ),
-];
-
-/// Terms, in the order of the alphabet.
+/// The glossary, in the order of its terms.
 fn terms(compared: bool) -> Vec<(String, String)> {
-    let more: &[_] = if compared { &COMPARED } else { &[] };
-    let mut all: Vec<(String, String)> = ALWAYS
-        .iter()
-        .chain(more)
-        .copied()
-        .chain(SCORED.map(|(name, meaning)| (label(name), meaning)))
-        .map(|(term, meaning)| (term.to_owned(), meaning.to_owned()))
-        .collect();
+    let said = WORDS.terms.iter().filter(|term| compared || !term.compared);
+    let named = said.map(|term| {
+        let name = if term.decoder { label(&term.term) } else { &term.term };
+        (name.to_owned(), term.meaning.clone())
+    });
+    let mut all: Vec<(String, String)> = named.collect();
     all.sort_by_key(|(term, _)| term.to_lowercase());
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::figures::FIGURES;
+    use super::*;
+
+    /// Figures that other sections draw.
+    const ELSEWHERE: [&str; 3] = ["residuals", "quantiles", "scores"];
+
+    #[test]
+    fn cards_show_numbers_of_the_headline_and_figures_are_drawn() {
+        let shown = cards(&Headline::of(0.5));
+        assert_eq!(shown.len(), WORDS.cards.len());
+        for (card, words) in shown.iter().zip(&WORDS.cards) {
+            assert_eq!(card.others.len(), words.others.len(), "{}", card.label);
+            assert!(!card.note.contains('{'), "{}", card.note);
+        }
+        assert!(cards(&Headline::of(f64::NAN)).is_empty());
+        let drawn = FIGURES.iter().map(|(file, _)| *file).chain(ELSEWHERE);
+        let (mut drawn, mut told): (Vec<&str>, Vec<&str>) = (
+            drawn.collect(),
+            WORDS.figures.iter().map(|figure| figure.file.as_str()).collect(),
+        );
+        drawn.sort_unstable();
+        told.sort_unstable();
+        assert_eq!(drawn, told);
+    }
 }

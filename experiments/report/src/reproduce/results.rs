@@ -5,11 +5,12 @@ use super::latency::{LatencyRow, latency};
 use super::tracking::{TraceRow, TrackingRow, traces, tracking};
 use crate::figures::Stroke;
 use serde::Serialize;
-use spts_eval::decoders::{PublishedDecode, TrainedDecoder, find};
+use spts_eval::decoders::{TrainedDecoder, find, published};
 use spts_eval::place::{PlaceRow, RecordedBounce, find_bounces};
 use spts_eval::protocol::{MEASUREMENTS, Protocol};
-use spts_eval::training::{LearnError, Learning, TrainingData, TrainingPresses};
+use spts_eval::training::{Learning, TrainingData, TrainingPresses};
 use spts_eval::{BaselineRow, Press, ScoreError, ScoredSkin, SkinScores, decode_us, mean_rows};
+use spts_input::Refusal;
 use spts_models::Streams;
 use spts_recon::metrics::median;
 
@@ -64,13 +65,13 @@ impl SkinResults {
         done: &(dyn Fn() + Sync),
     ) -> Result<Self, ScoreError> {
         let scores = skin.score(measurements, localisation, &best, done)?;
-        let matched = PublishedDecode::Matched.decoder(&skin.learned)?;
+        let matched = published("matched", &skin.learned)?;
         let latency = latency(&skin, &matched)?;
         let places = skin.ball_places(localisation)?;
         let (mut bounces, mut traces) = (Vec::new(), Vec::new());
         if let Some(recording) = &skin.bounces {
             bounces = find_bounces(recording);
-            let matched = PublishedDecode::Matched.decoder(&skin.learned.at_all_places())?;
+            let matched = published("matched", &skin.learned.at_all_places())?;
             traces = self::traces(recording, &bounces, &matched)?;
         }
         let tracking = tracking(&bounces, &traces);
@@ -148,12 +149,12 @@ pub(super) const SHOWN: &str = BEST[0];
 /// none without presses.
 ///
 /// # Errors
-/// [`LearnError`] when the presses cannot be learned from.
+/// [`Refusal`] when the presses cannot be learned from.
 pub(super) fn best<'a>(
     presses: impl Iterator<Item = TrainingPresses<'a>>,
     cols: usize,
     streams: Streams,
-) -> Result<Vec<(&'static str, TrainedDecoder)>, LearnError> {
+) -> Result<Vec<(&'static str, TrainedDecoder)>, Refusal> {
     let presses: Vec<_> = presses.filter(|p| !p.is_empty()).collect();
     if presses.is_empty() {
         return Ok(Vec::new());

@@ -36,27 +36,42 @@ fn find<'a>(results: &'a SkinResults, object: &str) -> Option<&'a ScoredSession>
     results.skin.sessions.iter().find(|s| s.object == object)
 }
 
-/// One window of an object decoded at several M, and its raster image.
+/// The images of one window by its first measurements.
 struct ShownWindow {
-    found: ProgressiveImages,
+    /// Number of measurements of each image.
+    images: Vec<(usize, Vec<f64>)>,
+    y: Vec<f64>,
     truth: Truth,
 }
 
 impl ShownWindow {
-    /// The window in the middle of the plateau of the last press scored, as `decoder` decodes it.
+    /// A window of the last press of `object`; `None` without one.
     fn new(results: &SkinResults, decoder: &TrainedDecoder, object: &str, measurements: &[usize]) -> Option<Self> {
         let session = find(results, object)?;
-        let press = session.scored().last()?;
+        let block = session.scored().last()?;
+        let recording = session.compressive.as_ref()?;
+        let longest = measurements.iter().copied().max()?;
+        let start = FRAME * recording.measurements_per_frame();
+        if start + longest > recording.blocks()[block].volts.len() {
+            return None;
+        }
+        let press = Press::within(recording, block, start..start + longest, idle_mean(recording, block));
+        let mut scorer = Scorer::new(decoder);
+        let mut images = Vec::new();
+        for &m in measurements {
+            let answer = scorer.answers(&[press.window(0, m)?]).ok()?.pop()?;
+            images.push((m, answer.image));
+        }
         Some(Self {
-            found: progressive(decoder, session, press, FRAME, measurements)?,
-            truth: session.truth(press)?,
+            images,
+            y: press.window(0, longest)?.y.to_vec(),
+            truth: session.truth(block)?,
         })
     }
 
-    /// Reconstructions with the true support outlined.
     fn images(&self, cols: usize) -> impl Iterator<Item = Tile> + '_ {
         let outline = || Some(self.truth.support.clone());
-        let images = self.found.images.iter();
+        let images = self.images.iter();
         images.map(move |(_, image)| heat(image, cols, String::new(), outline()))
     }
 
@@ -129,8 +144,8 @@ pub(super) fn adaptive(skins: &BothSkins<'_>, cols: usize) -> Sheet {
                 continue;
             };
             if index == 0 {
-                let bars = shown.found.images.iter().map(|(m, _)| Tile::Bars {
-                    values: shown.found.y.clone(),
+                let bars = shown.images.iter().map(|(m, _)| Tile::Bars {
+                    values: shown.y.clone(),
                     highlight: *m,
                     caption: String::new(),
                 });
@@ -153,13 +168,13 @@ pub(super) fn adaptive(skins: &BothSkins<'_>, cols: usize) -> Sheet {
             add(", real skin", "rec", real);
         }
     }
+    let titles = PROGRESS
+        .iter()
+        .map(|m| format!("M = {m}"))
+        .chain(["raster image".to_owned()]);
     Sheet {
         title: "Images from the first M of 15 measurements".to_owned(),
-        column_titles: PROGRESS
-            .iter()
-            .map(|m| format!("M = {m}"))
-            .chain(["raster image".to_owned()])
-            .collect(),
+        column_titles: titles.collect(),
         rows,
         tile_px: 96,
     }
@@ -169,14 +184,8 @@ pub(super) fn adaptive(skins: &BothSkins<'_>, cols: usize) -> Sheet {
 #[must_use]
 pub(super) fn examples(skins: &BothSkins<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
-    let both = [("twin", Some(skins.twin)), ("real skin", skins.real)];
     for object in EXAMPLE_OBJECTS {
-        for (whose, results) in both.iter().filter_map(|(whose, results)| Some((whose, (*results)?))) {
-            let whose = if skins.real.is_some() {
-                format!(", {whose}")
-            } else {
-                String::new()
-            };
+        for (results, whose, _) in skins.named() {
             let decoders = [Some(("published", &results.matched)), results.shown()];
             for (name, decoder) in decoders.into_iter().flatten() {
                 let Some(shown) = ShownWindow::new(results, decoder, object, &EXAMPLES) else {
@@ -189,12 +198,12 @@ pub(super) fn examples(skins: &BothSkins<'_>, cols: usize) -> Sheet {
             }
         }
     }
+    let titles = ["raster image".to_owned()]
+        .into_iter()
+        .chain(EXAMPLES.iter().map(|m| format!("M = {m}")));
     Sheet {
         title: "Images at several M".to_owned(),
-        column_titles: ["raster image".to_owned()]
-            .into_iter()
-            .chain(EXAMPLES.iter().map(|m| format!("M = {m}")))
-            .collect(),
+        column_titles: titles.collect(),
         rows,
         tile_px: 80,
     }
@@ -239,39 +248,4 @@ fn signed(atom: &[f64]) -> Vec<f64> {
         .copied()
         .fold(0.0_f64, |a, v| if v.abs() > a.abs() { v } else { a });
     atom.iter().map(|v| v * largest.signum()).collect()
-}
-
-/// A window of measurements and the images reconstructed from its first M, for several M.
-#[derive(Debug, Clone)]
-pub(super) struct ProgressiveImages {
-    /// Measurements less the idle mean, V.
-    pub(super) y: Vec<f64>,
-    /// M and image.
-    pub(super) images: Vec<(usize, Vec<f64>)>,
-}
-
-/// Reconstructs the first M measurements of frame `frame` of press `block`, for every M, as `decoder` decodes them.
-#[must_use]
-pub(super) fn progressive(
-    decoder: &TrainedDecoder,
-    session: &ScoredSession,
-    block: usize,
-    frame: usize,
-    measurements: &[usize],
-) -> Option<ProgressiveImages> {
-    let recording = session.compressive.as_ref().filter(|r| block < r.blocks().len())?;
-    let longest = measurements.iter().copied().max()?;
-    let start = frame * recording.measurements_per_frame();
-    if start + longest > recording.blocks()[block].volts.len() {
-        return None;
-    }
-    let press = Press::within(recording, block, start..start + longest, idle_mean(recording, block));
-    let mut scorer = Scorer::new(decoder);
-    let mut images = Vec::new();
-    for &m in measurements {
-        let answer = scorer.answers(&[press.window(0, m)?]).ok()?.pop()?;
-        images.push((m, answer.image));
-    }
-    let y = press.window(0, longest)?.y.to_vec();
-    Some(ProgressiveImages { y, images })
 }

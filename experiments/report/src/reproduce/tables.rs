@@ -4,11 +4,11 @@ use super::dataset::SimulatedData;
 use super::results::SkinResults;
 use super::tracking::{CourseRow, TRACKING_MEASUREMENTS, over_bounces};
 use serde::Serialize;
-use spts::output::{OutputError, OutputFolder, write_csv, write_npy, write_table};
+use spts::output::{OutputError, OutputFolder, write_npy, write_table};
 use spts_circuit::Recording;
+use spts_eval::Table;
 use spts_eval::protocol::PLATEAU;
 use spts_recon::metrics::{median, pearson};
-use spts_sim::world::PressCourse;
 use std::path::Path;
 
 /// Step between the frames that enter the median.
@@ -52,33 +52,6 @@ pub(super) fn correlations(twin: &SkinResults, real: &SkinResults) -> Vec<Correl
     pairs.collect()
 }
 
-/// Columns of `presses_twin.csv`.
-const PRESS_COLUMNS: [&str; 10] = [
-    "object",
-    "press",
-    "onset_s",
-    "rise_s",
-    "plateau_n",
-    "plateau_error_n",
-    "overshoot",
-    "lift_s",
-    "fall_s",
-    "imbalance",
-];
-
-/// One bounce of the ball, from the mechanics.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct BounceRow {
-    drop: usize,
-    bounce: usize,
-    start_s: f64,
-    contact_ms: f64,
-    speed_in_m_per_s: f64,
-    restitution: f64,
-    peak_force_n: f64,
-    imbalance: f64,
-}
-
 /// The twin in the names of tables.
 pub(super) const TWIN: &str = "twin";
 /// The real skin in the names of tables.
@@ -117,46 +90,34 @@ pub(super) fn write_skin(dir: &Path, whose: &str, results: &SkinResults) -> Resu
 pub(super) fn write_mechanics(dir: &Path, dataset: &SimulatedData) -> Result<(), OutputError> {
     let presses = dataset.objects.iter().flat_map(|object| {
         let each = object.courses.iter().enumerate();
-        each.map(|(press, course)| {
-            (
-                &object.session.object,
-                press,
-                course.as_ref().map_or([None; 8], course_cells),
-            )
-        })
+        each.map(move |(press, course)| (&object.session.object, press, course.as_ref()))
     });
-    write_csv(&dir.join("presses_twin.csv"), &PRESS_COLUMNS, presses)?;
-    let mut bounces = Vec::new();
-    for (drop, ball) in dataset.drops.iter().enumerate() {
-        for (bounce, b) in ball.bounces.iter().enumerate() {
-            bounces.push(BounceRow {
-                drop,
-                bounce,
-                start_s: b.start_s,
-                contact_ms: b.contact_s * 1e3,
-                speed_in_m_per_s: b.speed_in_m_per_s,
-                restitution: b.restitution(),
-                peak_force_n: b.peak_force_n,
-                imbalance: ball.imbalance,
-            });
-        }
-    }
-    write_table(&dir.join("bounces_twin.csv"), &bounces)
-}
-
-/// The last columns of `presses_twin.csv`.
-fn course_cells(c: &PressCourse) -> [Option<f64>; 8] {
-    [
-        c.onset_s,
-        c.rise_s,
-        c.plateau_n,
-        c.plateau_error_n,
-        c.overshoot,
-        c.lift_s,
-        c.fall_s,
-        c.imbalance,
-    ]
-    .map(Some)
+    Table::new("", presses)
+        .file("object", |(object, ..)| object)
+        .file("press", |(_, press, _)| press)
+        .file("onset_s", |(.., c)| c.map(|c| c.onset_s))
+        .file("rise_s", |(.., c)| c.map(|c| c.rise_s))
+        .file("plateau_n", |(.., c)| c.map(|c| c.plateau_n))
+        .file("plateau_error_n", |(.., c)| c.map(|c| c.plateau_error_n))
+        .file("overshoot", |(.., c)| c.map(|c| c.overshoot))
+        .file("lift_s", |(.., c)| c.map(|c| c.lift_s))
+        .file("fall_s", |(.., c)| c.map(|c| c.fall_s))
+        .file("imbalance", |(.., c)| c.map(|c| c.imbalance))
+        .write_csv(&dir.join("presses_twin.csv"))?;
+    let bounces = dataset.drops.iter().enumerate().flat_map(|(drop, ball)| {
+        let each = ball.bounces.iter().enumerate();
+        each.map(move |(bounce, b)| (drop, bounce, b, ball.imbalance))
+    });
+    Table::new("", bounces)
+        .file("drop", |(drop, ..)| drop)
+        .file("bounce", |(_, bounce, ..)| bounce)
+        .file("start_s", |(.., b, _)| b.start_s)
+        .file("contact_ms", |(.., b, _)| b.contact_s * 1e3)
+        .file("speed_in_m_per_s", |(.., b, _)| b.speed_in_m_per_s)
+        .file("restitution", |(.., b, _)| b.restitution())
+        .file("peak_force_n", |(.., b, _)| b.peak_force_n)
+        .file("imbalance", |(.., imbalance)| imbalance)
+        .write_csv(&dir.join("bounces_twin.csv"))
 }
 
 /// Writes the arrays: pressure maps, median raster images, dictionary and library.
@@ -187,15 +148,8 @@ pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResul
             matrix.view().values(),
         )?;
     }
-    let labels: Vec<f64> = twin
-        .skin
-        .learned
-        .classifier
-        .library()
-        .labels()
-        .iter()
-        .map(|&l| f64::from(u32::try_from(l).unwrap_or(u32::MAX)))
-        .collect();
+    let labels = twin.skin.learned.classifier.library().labels();
+    let labels: Vec<f64> = labels.iter().map(|&label| label as f64).collect();
     write_npy(&dir.join("library_labels.npy"), &[labels.len()], &labels)
 }
 

@@ -150,10 +150,9 @@ impl Classes {
             mean
         };
         let means: Vec<Vec<f64>> = names.iter().map(mean_of).collect();
-        let slices: Vec<&[f64]> = means.iter().map(Vec::as_slice).collect();
-        let taxels = slices.first().map_or(0, |m| m.len());
+        let taxels = means.first().map_or(0, Vec::len);
         let labels: Vec<usize> = (0..names.len()).collect();
-        let templates = Library::new(&Matrix::from_column_slices(taxels, &slices), &labels)?;
+        let templates = Library::new(&Matrix::from_column_slices(taxels, &means), &labels)?;
         let model = TemplateModel {
             gains: vec![GAIN_SD; taxels],
             rank: RANK,

@@ -1,34 +1,180 @@
-//! Contacts that are followed in time: their samples, scored moments and ground truth, the scores, and images at chosen
-//! instants for a moving picture.
+//! Contacts tracked in time, compared with decoding each window alone: what memory gains while a contact arrives,
+//! grows, holds and bounces.
+//!
+//! A decoder with a Gaussian prior of images ([`crate::algorithm::Trained::prior`]) gets all windows of a press or drop
+//! in order, from before the touch on, and keeps their information ([`spts_recon::recover::TrackedImage`]). At set
+//! times after the touch its image is scored, together with the decoder's images for the last window alone and for a
+//! longer window with as many samples as there are taxels. [`crate::board::TrainedBoard::in_time`] trains the decoders.
+//!
+//! During the rise of a press the true support is that of the least-squares image of the samples after the window,
+//! which no decoder has used; during the hold it is the board's. The ground truth of a drop is the least-squares image
+//! of the whole contact, as for places; it includes the decoded samples.
 
-use crate::algorithm::DecodeError;
+use crate::algorithm::{DecodeError, ScoreError};
+use crate::board::{Entry, TrainedBoard, no_session};
 use crate::chunk::Chunk;
 use crate::decode::{no_recording, too_many, untrained};
-use crate::decoders::{TrainedDecoder, find};
+use crate::decoders::{TrainedDecoder, find, not_in_time, short_label};
 use crate::place::{RecordedBounce, contact_image, find_bounces, touch_of};
+use crate::protocol::mask;
 use crate::scorer::Scorer;
 use crate::session::ScoredSession;
-use crate::tally::bootstrap;
-use crate::training::TrainingData;
+use crate::table::{Cell, Table, TextTable, fixed};
+use crate::tally::{ScoreColumn, bootstrap, unique};
+use crate::training::{SHAPES, TrainingData};
 use crate::windows::{Press, Untouched};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts::Session;
+use spts::output::{OutputError, OutputFolder, write_json};
 use spts::session::Event;
 use spts_circuit::Recording;
 use spts_input::Refusal;
-use spts_models::Streams;
 use spts_recon::localise::{centre_of_mass, distance};
-use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
-use spts_recon::recover::{Gaussian, Motion, TrackedImage};
+use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore};
+use spts_recon::recover::{Motion, TrackedImage};
 use spts_recon::statistics::mean;
 use std::ops::Range;
-use std::sync::Arc;
+
+/// Kind of contact.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ContactKind {
+    /// A press, from the touch to the hold.
+    Press,
+    /// A bouncing ball, from the touch to the end of the contact.
+    Drop,
+}
+
+impl ContactKind {
+    /// Name in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Press => "press",
+            Self::Drop => "drop",
+        }
+    }
+}
+
+/// One decoder with windows of one size at one moment: means over the objects.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct InTimeRow {
+    /// Algorithm for single windows, whose prior is used for tracking.
+    pub decoder: String,
+    /// Whether the scored object was excluded from the training data.
+    pub left_out: bool,
+    /// Training data, named as on the board.
+    pub learned_from: String,
+    /// Kind of contact.
+    pub contact: ContactKind,
+    /// Number of samples in a window.
+    pub m: usize,
+    /// Time from the touch to the end of the window, s; `None` while the contact is steady.
+    pub since_touch_s: Option<f64>,
+    /// Scores, means over the objects.
+    #[serde(flatten)]
+    pub scores: InTimeScores,
+    /// Number of presses or drops that are scored.
+    pub contacts: usize,
+}
+
+/// Results of `spts score --in-time` for one decoder on one object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct InTimeObject {
+    /// Object.
+    pub object: String,
+    /// Its results.
+    #[serde(flatten)]
+    pub row: InTimeRow,
+}
+
+/// Results of `spts score --in-time`: images of contacts that are followed in time, at set times after the touch.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct InTimeBoard {
+    /// Means over the objects.
+    pub rows: Vec<InTimeRow>,
+    /// Single objects, for presses.
+    pub objects: Vec<InTimeObject>,
+}
+
+impl TrainedBoard<'_> {
+    /// Tracks every scored press, and every drop of the ball, with every decoder and number of measurements. `done` is
+    /// called after every press. Drops are not scored when an object is left out, because the ball is not one of the
+    /// objects.
+    ///
+    /// # Errors
+    /// [`ScoreError`] for a decoder without a Gaussian prior, or if a window cannot be processed.
+    pub fn in_time(&self, done: &(dyn Fn() + Sync)) -> Result<InTimeBoard, ScoreError> {
+        if self.run.sessions.is_empty() && self.source.bounces.is_none() {
+            return Err(no_session(self.source));
+        }
+        for entry in &self.entries {
+            if entry.decoders.iter().any(|decoder| decoder.trained.prior().is_none()) {
+                return Err(not_in_time(&entry.name).into());
+            }
+        }
+        let (measurements, cols) = (&self.run.measurements, self.source.layout.cols());
+        let all = |contact: &FollowedContact, session: usize| {
+            let each = self.run.slots(&self.entries);
+            let each = each.map(|(entry, m)| Ok(follow(contact, &entry.decoders[session], m, cols)?));
+            each.collect::<Result<Vec<Followed>, ScoreError>>()
+        };
+        let slots = self.entries.len() * measurements.len();
+        let pressed = self.run.each_press(slots, done, |session, block| {
+            let contact = press(self.run.sessions[session], block);
+            contact.map_or_else(|| Ok(Vec::new()), |contact| all(&contact, session))
+        })?;
+        let ball = self.source.bounces.as_ref().filter(|_| self.scores_places());
+        let balls = ball.map_or_else(Vec::new, |ball| drops(ball, cols));
+        let dropped = balls.par_iter().map(|contact| all(contact, 0));
+        let dropped = dropped.collect::<Result<Vec<_>, ScoreError>>()?;
+        let mut board = InTimeBoard::default();
+        for (at, ((entry, m), objects)) in self.run.slots(&self.entries).zip(&pressed).enumerate() {
+            board.rows.extend(lines(entry, ContactKind::Press, m, objects));
+            for (session, contacts) in self.run.sessions.iter().zip(objects) {
+                let own = lines(entry, ContactKind::Press, m, std::slice::from_ref(contacts));
+                let object = session.title();
+                board.objects.extend(own.into_iter().map(|row| InTimeObject {
+                    object: object.to_owned(),
+                    row,
+                }));
+            }
+            if !entry.left_out || entry.learned_from == SHAPES {
+                let drops: Vec<Followed> = dropped.iter().map(|all| all[at].clone()).collect();
+                board.rows.extend(lines(entry, ContactKind::Drop, m, &[drops]));
+            }
+        }
+        Ok(board)
+    }
+}
+
+/// A line for every moment that the contacts of the objects have; the hold comes last.
+fn lines(entry: &Entry, contact: ContactKind, m: usize, objects: &[Vec<Followed>]) -> Vec<InTimeRow> {
+    let mut moments: Vec<Moment> = unique(objects.iter().flatten().flatten().map(|(moment, _)| *moment));
+    let time_s = |moment: &Moment| moment.unwrap_or(f64::INFINITY);
+    moments.sort_by(|a, b| time_s(a).total_cmp(&time_s(b)));
+    let each = moments.into_iter().map(|since_touch_s| {
+        let (scores, contacts) = scores(objects, since_touch_s);
+        InTimeRow {
+            decoder: entry.name.clone(),
+            left_out: entry.left_out,
+            learned_from: entry.learned_from.clone(),
+            contact,
+            m,
+            since_touch_s,
+            scores,
+            contacts,
+        }
+    });
+    each.collect()
+}
 
 /// Time in which the shape of a contact is forgotten, s. Chosen on single presses of the recordings, among 3 to 300 ms:
 /// the scores are flat from 10 to 100 ms. A ball is on the skin for 8 to 15 ms.
-pub(super) const MEMORY_S: f64 = 0.02;
+const MEMORY_S: f64 = 0.02;
 /// Time over which the strength of a contact is averaged, s; a hundred samples of the published skin.
-pub(super) const STRENGTH_MEMORY_S: f64 = 0.0015;
+const STRENGTH_MEMORY_S: f64 = 0.0015;
 /// Noise that grows with the contact, as a share of the samples' root mean square: that of `nn_lmmse`.
 const NOISE: f64 = 0.12;
 
@@ -42,25 +188,29 @@ fn motion(rate_hz: f64, idle_noise_v: f64) -> Motion {
     }
 }
 
-/// What is scored of one contact, moment by moment.
-pub(crate) type Followed = Vec<(Moment, Compared)>;
+/// Time since the touch, s; `None` for the hold.
+type Moment = Option<f64>;
 
-/// Follows `contact` on a sheet of `cols` columns by windows of `m` samples, with `decoder` for windows alone and
-/// `prior`, its own, in time.
+/// Intersection over union, and for a drop the distance of the place in taxels.
+type Judged = (f64, Option<f64>);
+
+/// What is scored of one contact, moment by moment: the window alone, a longer one, and in time.
+type Followed = Vec<(Moment, [Option<Judged>; 3])>;
+
+/// Follows `contact` on a sheet of `cols` columns by windows of `m` samples, with `decoder` for windows alone and its
+/// prior in time.
 ///
 /// # Errors
 /// [`DecodeError`] when a window cannot be followed.
-pub(crate) fn follow(
-    contact: &FollowedContact,
-    decoder: &TrainedDecoder,
-    prior: &Arc<Gaussian>,
-    m: usize,
-    cols: usize,
-) -> Result<Followed, DecodeError> {
-    let mut image = TrackedImage::new(Arc::clone(prior), motion(contact.rate_hz, contact.idle_noise_v))?;
+fn follow(contact: &FollowedContact, decoder: &TrainedDecoder, m: usize, cols: usize) -> Result<Followed, DecodeError> {
+    let prior = decoder
+        .trained
+        .prior()
+        .ok_or_else(|| Refusal::new("no Gaussian prior"))?;
+    let taxels = prior.mean().len();
+    let mut image = TrackedImage::new(prior, motion(contact.rate_hz, contact.idle_noise_v))?;
     let mut scorer = Scorer::new(decoder);
     let mut followed = Followed::new();
-    let taxels = prior.mean().len();
     // windows follow each other, one of them from the touch on
     let mut start = contact.touch % m;
     let mut last = start;
@@ -81,7 +231,7 @@ pub(crate) fn follow(
                 *score = answers.first().map(|answer| one(&answer.image, moment, cols));
             }
             scores[2] = Some(one(image.image(), moment, cols));
-            followed.push((moment.at, Compared { scores }));
+            followed.push((moment.at, scores));
             continue;
         }
         if let Some(window) = contact.press.window(start, m) {
@@ -94,15 +244,13 @@ pub(crate) fn follow(
 }
 
 /// Intersection over union of the support of `image`, and the distance of its centre from the true one, px.
-fn one(image: &[f64], moment: &crate::in_time::follow::ScoredMoment, cols: usize) -> (f64, Option<f64>) {
-    let mut found = Vec::new();
-    support(image, SUPPORT_THRESHOLD, &mut found);
+fn one(image: &[f64], moment: &ScoredMoment, cols: usize) -> Judged {
     let error_px = moment.centre.map(|truth| {
         let rows = image.len() / cols.max(1);
         let middle = [rows, cols].map(|n| n.saturating_sub(1) as f64 / 2.0);
         distance(centre_of_mass(image, cols, SUPPORT_THRESHOLD).unwrap_or(middle), truth)
     });
-    (SupportScore::new(&found, &moment.support).iou, error_px)
+    (SupportScore::new(&mask(image), &moment.support).iou, error_px)
 }
 
 /// Times after the touch at which presses are scored, s.
@@ -118,49 +266,43 @@ const IDLE_S: [f64; 2] = [0.06, 0.008];
 const TRUTH_PER_TAXEL: usize = 7;
 
 /// A contact that is followed.
-pub(crate) struct FollowedContact {
+struct FollowedContact {
     /// Samples from before the touch on.
-    pub(super) press: Press,
+    press: Press,
     /// Sample of the touch.
-    pub(super) touch: usize,
-    pub(super) rate_hz: f64,
-    pub(super) idle_noise_v: f64,
-    pub(super) moments: Vec<ScoredMoment>,
+    touch: usize,
+    rate_hz: f64,
+    idle_noise_v: f64,
+    moments: Vec<ScoredMoment>,
 }
 
 /// When an image is scored, and against what.
-pub(super) struct ScoredMoment {
-    pub(super) at: Moment,
+struct ScoredMoment {
+    at: Moment,
     /// The last window ends with this sample or before it.
-    pub(super) end: usize,
-    pub(super) support: Vec<bool>,
+    end: usize,
+    support: Vec<bool>,
     /// True position of a ball.
-    pub(super) centre: Option<[f64; 2]>,
+    centre: Option<[f64; 2]>,
 }
 
-pub(super) fn samples(time_s: f64, rate_hz: f64) -> usize {
+fn samples(time_s: f64, rate_hz: f64) -> usize {
     #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
     let count = (time_s * rate_hz).round().max(0.0) as usize;
     count
 }
 
 /// Root mean square of the samples before the one with the number `touch`, V; 0 where there is none.
-pub(super) fn idle_noise(recording: &Recording, block: usize, untouched: &Untouched, touch: usize) -> f64 {
+fn idle_noise(recording: &Recording, block: usize, untouched: &Untouched, touch: usize) -> f64 {
     let [from, to] = IDLE_S.map(|time_s| touch.saturating_sub(samples(time_s, recording.sample_rate_hz())));
     let y = untouched.without(recording, block, from..to);
     let finite = || y.iter().filter(|v| v.is_finite());
     (finite().map(|v| v * v).sum::<f64>() / finite().count().max(1) as f64).sqrt()
 }
 
-fn mask(image: &[f64]) -> Vec<bool> {
-    let mut mask = Vec::new();
-    support(image, SUPPORT_THRESHOLD, &mut mask);
-    mask
-}
-
 /// The press of block `block` of `session`, from before its touch to the end of its hold. `None` without a compressive
 /// recording, a true image or a touch before the hold.
-pub(crate) fn press(session: &ScoredSession, block: usize) -> Option<FollowedContact> {
+fn press(session: &ScoredSession, block: usize) -> Option<FollowedContact> {
     let recording = session.compressive.as_ref()?;
     let truth = session.truth(block)?;
     let touch = touch_of(recording, block)?;
@@ -183,7 +325,7 @@ pub(crate) fn press(session: &ScoredSession, block: usize) -> Option<FollowedCon
             image.iter_mut().zip(idle).for_each(|(x, idle)| *x -= idle);
         }
         Some(ScoredMoment {
-            at: Moment::After(time_s),
+            at: Some(time_s),
             end: end - first,
             support: mask(&image),
             centre: None,
@@ -192,7 +334,7 @@ pub(crate) fn press(session: &ScoredSession, block: usize) -> Option<FollowedCon
     let mut moments: Vec<ScoredMoment> = rises.collect();
     let held = hold.clone().step_by(protocol.support_stride.max(1)).skip(1);
     moments.extend(held.map(|frame| ScoredMoment {
-        at: Moment::Hold,
+        at: None,
         end: frame * per_frame - first,
         support: truth.support.clone(),
         centre: None,
@@ -208,7 +350,7 @@ pub(crate) fn press(session: &ScoredSession, block: usize) -> Option<FollowedCon
 }
 
 /// Drops of a ball on a sheet of `cols` columns, from before the touch to the end of the contact.
-pub(crate) fn drops(recording: &Recording, cols: usize) -> Vec<FollowedContact> {
+fn drops(recording: &Recording, cols: usize) -> Vec<FollowedContact> {
     let bounces = find_bounces(recording);
     bounces
         .iter()
@@ -224,7 +366,7 @@ fn drop(recording: &Recording, bounce: &RecordedBounce, cols: usize) -> Option<F
     let moments = DROP_S.iter().filter_map(|&time_s| {
         let end = bounce.start + samples(time_s, rate_hz);
         (end <= bounce.end).then(|| ScoredMoment {
-            at: Moment::After(time_s),
+            at: Some(time_s),
             end: end - first,
             support: mask(&image),
             centre: Some(centre),
@@ -241,32 +383,6 @@ fn drop(recording: &Recording, bounce: &RecordedBounce, cols: usize) -> Option<F
         rate_hz,
         idle_noise_v: idle_noise(recording, bounce.block, &untouched, bounce.start),
     })
-}
-
-/// When an image is scored.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Moment {
-    /// This long after the touch, s.
-    After(f64),
-    /// While the contact is steady.
-    Hold,
-}
-
-impl Moment {
-    /// Time since the touch, s; `None` for the hold.
-    pub(crate) fn since_touch_s(self) -> Option<f64> {
-        match self {
-            Self::After(time_s) => Some(time_s),
-            Self::Hold => None,
-        }
-    }
-}
-
-/// Intersection over union and, for a ball, distance of its place, px: of the last window alone, of a longer window and
-/// in time.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Compared {
-    pub(super) scores: [Option<(f64, Option<f64>)>; 3],
 }
 
 /// 95 % interval.
@@ -302,26 +418,15 @@ pub struct InTimeScores {
     pub error_gain_ci: Interval,
 }
 
-/// Sum and count of the six numbers of [`Compared`] and the two differences, of one contact.
+/// Sum and count of three overlaps and their gain, and of three distances and their gain, of one contact.
 type Sums = [[f64; 2]; 8];
 
 fn sums(followed: &Followed, at: Moment) -> Sums {
     let mut sums = [[0.0; 2]; 8];
-    for (_, compared) in followed.iter().filter(|(moment, _)| *moment == at) {
-        let [alone, longer, in_time] = compared.scores;
-        let iou = [alone, longer, in_time].map(|score| score.map(|s| s.0));
-        let error = [alone, longer, in_time].map(|score| score.and_then(|s| s.1));
-        let less = |[alone, _, in_time]: [Option<f64>; 3]| Some(in_time? - alone?);
-        let all = [
-            iou[0],
-            iou[1],
-            iou[2],
-            less(iou),
-            error[0],
-            error[1],
-            error[2],
-            less(error),
-        ];
+    for (_, scores) in followed.iter().filter(|(moment, _)| *moment == at) {
+        let (iou, error) = (scores.map(|s| Some(s?.0)), scores.map(|s| s?.1));
+        let gain = |[alone, _, in_time]: [Option<f64>; 3]| Some(in_time? - alone?);
+        let all = iou.into_iter().chain([gain(iou)]).chain(error).chain([gain(error)]);
         for (sum, value) in sums.iter_mut().zip(all) {
             if let Some(value) = value {
                 *sum = [sum[0] + value, sum[1] + 1.0];
@@ -343,7 +448,7 @@ fn means(objects: &[Vec<&Sums>]) -> [Option<f64>; 8] {
 }
 
 /// Scores at the moment `at` of the contacts of every object, and how many contacts have them.
-pub(crate) fn scores(objects: &[Vec<&Followed>], at: Moment) -> (InTimeScores, usize) {
+fn scores(objects: &[Vec<Followed>], at: Moment) -> (InTimeScores, usize) {
     let objects = objects.iter().map(|contacts| {
         let sums = contacts.iter().map(|followed| sums(followed, at));
         sums.filter(|s| s[2][1] > 0.0).collect()
@@ -352,11 +457,11 @@ pub(crate) fn scores(objects: &[Vec<&Followed>], at: Moment) -> (InTimeScores, u
     objects.retain(|contacts| !contacts.is_empty());
     let all: Vec<Vec<&Sums>> = objects.iter().map(|contacts| contacts.iter().collect()).collect();
     let m = means(&all);
-    let ci = bootstrap(&objects, Streams::new(1), |drawn| {
+    let ci = bootstrap(&objects, |drawn| {
         let m = means(drawn);
         [m[0], m[2], m[3]]
     });
-    let error_ci = bootstrap(&objects, Streams::new(1), |drawn| [means(drawn)[7]]);
+    let error_ci = bootstrap(&objects, |drawn| [means(drawn)[7]]);
     let scores = InTimeScores {
         iou_alone: m[0],
         iou_alone_ci: ci[0],
@@ -470,15 +575,151 @@ fn idle_skin(session: &Session, recording: &Recording, block: usize) -> Untouche
     preloaded.map_or_else(|| Untouched::of(recording, block), |touch| touch.untouched)
 }
 
+/// Columns of the scores in files.
+const SCORES: [ScoreColumn<InTimeScores>; 8] = [
+    ("iou_alone", |s| s.iou_alone),
+    ("iou_longer", |s| s.iou_longer),
+    ("iou_in_time", |s| s.iou_in_time),
+    ("iou_gain", |s| s.iou_gain),
+    ("error_alone_px", |s| s.error_alone_px),
+    ("error_longer_px", |s| s.error_longer_px),
+    ("error_in_time_px", |s| s.error_in_time_px),
+    ("error_gain_px", |s| s.error_gain_px),
+];
+
+/// Writes `in_time.json`, `in_time.csv` and `objects.csv` into the folder `out`.
+///
+/// # Errors
+/// [`OutputError`] if a file cannot be written.
+pub fn write(board: &InTimeBoard, out: &mut OutputFolder) -> Result<(), OutputError> {
+    write_json(&out.path("in_time.json"), board)?;
+    in_files(Table::new("in_time", &board.rows), |row| row).write(out)?;
+    let objects = Table::new("objects", &board.objects).file("object", |o| &o.object);
+    in_files(objects, |object| &object.row).write(out)
+}
+
+fn in_files<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> &'a InTimeRow + Copy + 'a) -> Table<'a, R> {
+    table
+        .file("decoder", move |r| &of(r).decoder)
+        .file("left_out", move |r| of(r).left_out)
+        .file("learned_from", move |r| &of(r).learned_from)
+        .file("contact", move |r| of(r).contact.name())
+        .file("m", move |r| of(r).m)
+        .file("since_touch_s", move |r| of(r).since_touch_s)
+        .files(&SCORES, move |r| &of(r).scores)
+        .interval("iou_alone", move |r| of(r).scores.iou_alone_ci)
+        .interval("iou_in_time", move |r| of(r).scores.iou_in_time_ci)
+        .interval("iou_gain", move |r| of(r).scores.iou_gain_ci)
+        .interval("error_gain", move |r| of(r).scores.error_gain_ci)
+        .file("contacts", move |r| of(r).contacts)
+        .file("memory_s", |_| MEMORY_S)
+        .file("strength_memory_s", |_| STRENGTH_MEMORY_S)
+}
+
+/// One table for presses and one for drops, with a line for every decoder, number of samples and moment; then objects
+/// during the hold and at the first moments of the rise.
+#[must_use]
+pub fn table(board: &InTimeBoard) -> String {
+    let mut out = String::new();
+    for (kind, title) in [
+        (ContactKind::Press, "presses: IoU of windows alone and in time"),
+        (
+            ContactKind::Drop,
+            "drops of the ball: IoU, and distance of its place in taxels",
+        ),
+    ] {
+        let rows: Vec<&InTimeRow> = board.rows.iter().filter(|row| row.contact == kind).collect();
+        if !rows.is_empty() {
+            out.push_str(&format!("\n{title}\n{}", text(&rows, kind)));
+        }
+    }
+    out.push_str(
+        "\nalone: the decoder by the last window alone; longer: by as many of the last samples as there are taxels; in \
+         time: all windows since before the touch, the older the less\n",
+    );
+    out.push_str(&objects(board));
+    out.trim().to_owned()
+}
+
+fn text(rows: &[&InTimeRow], kind: ContactKind) -> String {
+    let mut table = Table::new("", rows.iter().copied())
+        .shown("decoder", |r: &InTimeRow| short_label(&r.decoder))
+        .shown("learned", learned)
+        .shown("M", |r| r.m)
+        .shown("time", |r| moment(r.since_touch_s))
+        .number("alone", 2, |r| r.scores.iou_alone)
+        .shown("(95 %)", |r| Cell::span(r.scores.iou_alone_ci, 2))
+        .number("longer", 2, |r| r.scores.iou_longer)
+        .number("in time", 2, |r| r.scores.iou_in_time)
+        .shown("(95 %)", |r| Cell::span(r.scores.iou_in_time_ci, 2))
+        .number("gain", 2, |r| r.scores.iou_gain)
+        .shown("(95 %)", |r| Cell::span(r.scores.iou_gain_ci, 2));
+    if kind == ContactKind::Drop {
+        table = table
+            .number("alone, px", 2, |r| r.scores.error_alone_px)
+            .number("longer, px", 2, |r| r.scores.error_longer_px)
+            .number("in time, px", 2, |r| r.scores.error_in_time_px)
+            .shown("gain, px (95 %)", |r| Cell::span(r.scores.error_gain_ci, 2));
+    }
+    table.text()
+}
+
+/// Time since the touch, or that the contact is steady.
+fn moment(since_touch_s: Option<f64>) -> String {
+    since_touch_s.map_or_else(|| "hold".to_owned(), |time_s| format!("{:.0} ms", 1e3 * time_s))
+}
+
+fn learned(row: &InTimeRow) -> String {
+    let out = if row.left_out { ", out" } else { "" };
+    format!("{}{out}", row.learned_from)
+}
+
+/// Alone and in time, object by object.
+fn objects(board: &InTimeBoard) -> String {
+    let names = unique(board.objects.iter().map(|object| object.object.as_str()));
+    if names.len() < 2 {
+        return String::new();
+    }
+    let key = |row: &InTimeRow| {
+        let way = (row.decoder.clone(), row.learned_from.clone(), row.left_out);
+        (way, row.m, row.since_touch_s.map(f64::to_bits))
+    };
+    let line = |row: &InTimeRow| {
+        let cell = |name: &&str| {
+            let same = board.objects.iter();
+            let same = same.filter(|object| object.object == *name && key(&object.row) == key(row));
+            let text = same.map(|object| {
+                let s = &object.row.scores;
+                let ci = s.iou_in_time_ci;
+                let ci = ci.map_or_else(|| "–".to_owned(), |[low, high]| format!("{low:.2}–{high:.2}"));
+                format!("{} / {} ({ci})", fixed(s.iou_alone, 2), fixed(s.iou_in_time, 2))
+            });
+            text.collect::<String>()
+        };
+        let head = [
+            short_label(&row.decoder).to_owned(),
+            learned(row),
+            row.m.to_string(),
+            moment(row.since_touch_s),
+        ];
+        head.into_iter().chain(names.iter().map(cell)).collect()
+    };
+    let presses = board.rows.iter().filter(|row| row.contact == ContactKind::Press);
+    let head = ["decoder", "learned", "M", "time"]
+        .into_iter()
+        .chain(names.iter().copied());
+    let table = TextTable::new(head, presses.map(line));
+    format!("\nobject by object: alone / in time (95 %)\n{table}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn followed(ious: &[(f64, f64)]) -> Followed {
-        let each = ious.iter().map(|&(alone, in_time)| {
-            let scores = [Some((alone, None)), None, Some((in_time, None))];
-            (Moment::Hold, Compared { scores })
-        });
+        let each = ious
+            .iter()
+            .map(|&(alone, in_time)| (None, [Some((alone, None)), None, Some((in_time, None))]));
         each.collect()
     }
 
@@ -486,7 +727,7 @@ mod tests {
     #[test]
     fn objects_count_alike() {
         let (few, many) = (followed(&[(0.2, 0.8)]), followed(&[(0.6, 0.6); 9]));
-        let (found, contacts) = scores(&[vec![&few], vec![&many]], Moment::Hold);
+        let (found, contacts) = scores(&[vec![few.clone()], vec![many]], None);
         let near = |found: Option<f64>, value: f64| found.is_some_and(|found| (found - value).abs() < 1e-12);
         assert!(near(found.iou_alone, 0.4) && near(found.iou_in_time, 0.7) && near(found.iou_gain, 0.3));
         assert!(
@@ -495,7 +736,7 @@ mod tests {
                 .is_some_and(|ci| ci.iter().all(|v| near(Some(*v), 0.3)))
         );
         assert_eq!((contacts, found.iou_longer, found.error_gain_px), (2, None, None));
-        let (nothing, contacts) = scores(&[vec![&few]], Moment::After(0.001));
+        let (nothing, contacts) = scores(&[vec![few]], Some(0.001));
         assert_eq!((nothing.iou_alone, contacts), (None, 0));
     }
 }
