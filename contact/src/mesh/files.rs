@@ -588,9 +588,9 @@ mod tests {
     #[test]
     fn glb_is_read_by_the_gltf_crate() {
         let block = cuboid([0.02, 0.03, 0.04]);
-        let (document, buffers, _) = gltf::import_slice(block.to_glb("block \"quoted\"")).unwrap();
+        let document = gltf::Gltf::from_slice(&block.to_glb("block \"quoted\"")).unwrap();
         let primitive = document.meshes().next().unwrap().primitives().next().unwrap();
-        let reader = primitive.reader(|b| Some(&buffers[b.index()]));
+        let reader = primitive.reader(|_| document.blob.as_deref());
         assert_eq!(reader.read_positions().unwrap().count(), 8);
         assert_eq!(reader.read_indices().unwrap().into_u32().max(), Some(7));
         let high = primitive.bounding_box().max;
