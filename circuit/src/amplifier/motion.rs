@@ -40,6 +40,11 @@ impl Decay {
         -self.slow
     }
 
+    /// Rate at which the motion follows at most, 1/s: that of the fast mode or of the oscillation.
+    pub(super) fn fastest_per_s(&self) -> f64 {
+        self.root.max(-self.sigma)
+    }
+
     /// Slow and fast mode, 1/s; both σ where they oscillate.
     fn modes(&self) -> (f64, f64) {
         if self.delta >= 0.0 {

@@ -1,7 +1,7 @@
 //! Bus and output as functions of time, for time steps from zero to hours.
 
 use super::motion::{Decay, crossing};
-use super::parts::{Amplifier, BusLoad, State};
+use super::parts::{Amplifier, BusLoad, Network, OpAmp, State};
 
 /// What the output does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,9 +108,15 @@ impl Transient {
             }
             phase = next;
         }
-        let rail_v = self.amplifier.op_amp().rail_v;
+        let (
+            OpAmp {
+                rail_v, slew_v_per_s, ..
+            },
+            before_v,
+        ) = (*self.amplifier.op_amp(), self.state.output_v);
+        let most_v = slew_v_per_s * left_s;
         self.state = linear.after(self.state, left_s);
-        self.state.output_v = self.state.output_v.clamp(-rail_v, rail_v);
+        self.state.output_v = (self.state.output_v.clamp(before_v - most_v, before_v + most_v)).clamp(-rail_v, rail_v);
     }
 
     /// Phase in which a step begins.
@@ -195,13 +201,20 @@ pub(super) enum Exit {
 pub(super) struct Linear {
     decay: Decay,
     m: [[f64; 2]; 2],
+    /// Rates at 0 V: v′ and o′ are `m` (v, o) plus these.
+    still: [f64; 2],
     rest: State,
 }
 
 impl Linear {
     pub(super) fn new(amplifier: &Amplifier, load: BusLoad) -> Self {
         let (unity, pole) = (amplifier.unity_rad_per_s(), amplifier.pole_rad_per_s());
-        let (feedback_ohm, feedback_f) = (amplifier.network().feedback_ohm, amplifier.network().feedback_f);
+        let Network {
+            feedback_ohm,
+            feedback_f,
+            offset_v,
+            ..
+        } = *amplifier.network();
         let (bus_s, capacitance_f) = (amplifier.bus_s(load.conductance_s), amplifier.capacitance_f());
         let m = [
             [
@@ -214,6 +227,10 @@ impl Linear {
         let delta = (0.5 * (m[0][0] - m[1][1])).powi(2) + m[0][1] * m[1][0];
         Self {
             decay: Decay::new(0.5 * (m[0][0] + m[1][1]), product, delta),
+            still: [
+                (feedback_f * unity * offset_v + load.current_a) / capacitance_f,
+                unity * offset_v,
+            ],
             m,
             rest: rest(amplifier, load),
         }
@@ -238,7 +255,7 @@ impl Linear {
     /// enough to look at those, and to search where a limit is passed between one and the next.
     pub(super) fn exit(&self, state: State, dt_s: f64, slew_v_per_s: f64, rail_v: f64) -> Option<(f64, Exit)> {
         let d = [state.sum_v - self.rest.sum_v, state.output_v - self.rest.output_v];
-        let first = self.derivative(d);
+        let (first, lost_v_per_s) = self.rates(state, d, slew_v_per_s);
         let second = self.derivative(first);
         let third = self.derivative(second);
         let rate = |t: f64| self.decay.value(first[1], second[1], t);
@@ -248,8 +265,7 @@ impl Linear {
         // an extremum that its cancelling modes hide from `zeros` is where the fast one has died away
         let mut nodes = [a, b, c, e, self.decay.fast_gone_s(), dt_s].map(|t| t.min(dt_s));
         nodes.sort_unstable_by(f64::total_cmp);
-        let [ov, oo] = self.m[1];
-        let slew_limit = slew_v_per_s * (1.0 + MARGIN) + ROUNDING * (ov * d[0]).abs().max((oo * d[1]).abs());
+        let slew_limit = slew_v_per_s * (1.0 + MARGIN) + lost_v_per_s;
         let rail_limit = rail_v * (1.0 + MARGIN) + ROUNDING * self.rest.output_v.abs().max(d[1].abs());
         let mut from = 0.0;
         for to in nodes {
@@ -275,6 +291,29 @@ impl Linear {
             from = to;
         }
         None
+    }
+
+    /// Rates at `state`, which is `d` from rest, and what rounding may take from the output's. Where the rest is so far
+    /// away that the slew rate is lost in it, the rates are those of the amplifier's equations themselves.
+    fn rates(&self, state: State, d: [f64; 2], slew_v_per_s: f64) -> ([f64; 2], f64) {
+        let terms = |[v, o]: [f64; 2]| {
+            self.m
+                .map(|[from_v, from_o]| (from_v * v).abs().max((from_o * o).abs()))
+        };
+        let lost = ROUNDING * terms(d)[1];
+        if lost <= MARGIN * slew_v_per_s {
+            return (self.derivative(d), lost);
+        }
+        let own = [state.sum_v, state.output_v];
+        let [bus, output] = terms(own);
+        // what the bus's rate has lost adds to the output's until the faster mode has died away
+        let of_bus = bus.max(self.still[0].abs()) * self.m[1][0].abs() / self.decay.fastest_per_s();
+        let own_lost = ROUNDING * (output.max(self.still[1].abs()) + of_bus);
+        if own_lost >= lost {
+            return (self.derivative(d), lost);
+        }
+        let [v, o] = self.derivative(own);
+        ([v + self.still[0], o + self.still[1]], own_lost)
     }
 
     fn derivative(&self, x: [f64; 2]) -> [f64; 2] {

@@ -439,6 +439,29 @@ fn a_ringing_amplifier_keeps_to_its_slew_rate() {
 }
 
 /// Everything short, everything open, and far too much: the rails hold, and the way back is as fast as the way there.
+/// 300 A on a farad: the rest is at 6e8 V, where the slew rate of 1 V/s is lost in rounding.
+#[test]
+fn a_rest_far_away_does_not_hide_the_slew_rate() {
+    let op_amp = OpAmp {
+        gain_bandwidth_hz: 5.8e10,
+        dc_gain: 10.0,
+        slew_v_per_s: 1.0,
+        rail_v: 33e3,
+        ..OpAmp::default()
+    };
+    let network = Network {
+        feedback_ohm: 2.08e6,
+        bus_f: 1.0,
+        offset_v: 4e-4,
+        ..Network::default()
+    };
+    let mut transient = Transient::new(Amplifier::new(op_amp, network).unwrap());
+    let before_v = transient.output_v();
+    transient.advance(load(4.3e-8, -300.0), 1.0);
+    let change_v = (transient.output_v() - before_v).abs();
+    assert!((0.9..=1.0 + 1e-6).contains(&change_v), "{change_v} V in 1 s");
+}
+
 #[test]
 fn saturation_at_every_sample() {
     let amplifier = amplifier(Network::default());
