@@ -7,11 +7,8 @@ use nalgebra::{DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use spts_recon::classify::{Library, Src};
-use spts_recon::recover::{
-    BatchOmp, Fixed, Gaussian, ImagePrior, Layer, Lmmse, NnLmmse, Noise, RECOVER, Unrolled, UnrolledStep,
-    UnrolledWeights,
-};
-use spts_recon::{Matrix, Problem, Recover, SignTables, Solution, Workspace};
+use spts_recon::recover::{Fixed, ImagePrior, Lmmse, NnLmmse, Noise, RECOVER};
+use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
 use std::hint::black_box;
 use std::sync::Arc;
 
@@ -46,37 +43,10 @@ fn decode(c: &mut Criterion) {
                 });
             });
         }
-        let shared = BatchOmp::new(rows.view(), sparsity).expect("a finite matrix");
-        group.bench_function(BenchmarkId::new("omp, shared operator", m), |b| {
-            b.iter(|| shared.recover_into(black_box(y.as_slice()), &mut work, &mut solution));
-        });
         group.bench_function(BenchmarkId::new("nalgebra pseudo-inverse", m), |b| {
             b.iter(|| pseudo_inverse_pursuit(&a, black_box(&y), sparsity));
         });
     }
-    group.finish();
-}
-
-/// Φ·D of a window of ±1 weights, by look-up and as a product.
-fn form(c: &mut Criterion) {
-    let (n, m) = (100, 25);
-    let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let dictionary = DMatrix::from_fn(n, ATOMS, |_, _| rng.random_range(-1.0..1.0));
-    let phi = DMatrix::from_fn(m, n, |_, _| if rng.random() { 1.0 } else { -1.0 });
-    let signs: Vec<u64> = (0..m * n.div_ceil(64)).map(|_| rng.random()).collect();
-    let mut rows = vec![0.0; m * ATOMS];
-    let mut group = c.benchmark_group("form");
-    let (double, single) = (
-        SignTables::<f64>::new(Matrix::from(&dictionary).view()),
-        SignTables::<f32>::new(Matrix::from(&dictionary).view()),
-    );
-    group.bench_function("f64 tables", |b| {
-        b.iter(|| double.fill_rows(black_box(&signs), &mut rows))
-    });
-    group.bench_function("f32 tables", |b| {
-        b.iter(|| single.fill_rows(black_box(&signs), &mut rows))
-    });
-    group.bench_function("nalgebra product", |b| b.iter(|| black_box(&phi) * &dictionary));
     group.finish();
 }
 
@@ -164,55 +134,6 @@ fn fixed(c: &mut Criterion) {
     group.finish();
 }
 
-/// Taxels, hidden values, and values from step to step of the network that ships.
-const N: usize = 100;
-const HIDDEN: usize = 160;
-const MEMORY: usize = 48;
-
-fn layer(rng: &mut ChaCha8Rng, inputs: usize, outputs: usize) -> Layer {
-    let weights = (0..inputs * outputs).map(|_| rng.random_range(-0.1..0.1)).collect();
-    Layer::new(weights, vec![0.0; outputs])
-}
-
-/// An image by the unrolled network, from rows and samples to support, in the size that ships; the peer is the
-/// non-negative Gaussian estimate of the same window.
-fn unrolled(c: &mut Criterion) {
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let steps = (0..3).map(|_| UnrolledStep {
-        hidden: layer(&mut rng, 4 * N + MEMORY + 2, HIDDEN),
-        change: layer(&mut rng, HIDDEN, N + MEMORY),
-    });
-    let steps: Vec<UnrolledStep> = steps.collect();
-    let prior = |i: usize, j: usize| {
-        let d = (i / 10).abs_diff(j / 10).pow(2) + (i % 10).abs_diff(j % 10).pow(2);
-        1e-2 * (-0.2 * d as f64).exp()
-    };
-    let values = (0..N * N).map(|k| prior(k / N, k % N) + if k / N == k % N { 1e-3 } else { 0.0 });
-    let prior = Matrix::from_rows(N, N, values.collect()).expect("N × N");
-    let output = layer(&mut rng, MEMORY + N, N);
-    let weights = UnrolledWeights::new(prior.clone(), 0.012, steps, output).expect("layers that fit");
-    let network = Unrolled::new(weights);
-    let gaussian = Gaussian::new(vec![0.0; N], prior).expect("a covariance");
-    let peer = NnLmmse::new(Arc::new(gaussian), Noise::Relative(0.12)).expect("a noise");
-    let mut group = c.benchmark_group("unrolled");
-    for m in [7, 20, 50] {
-        let values = (0..m * N).map(|_| if rng.random() { 1.0 } else { -1.0 });
-        let rows = Matrix::from_rows(m, N, values.collect()).expect("M × N");
-        let y: Vec<f64> = (0..m).map(|_| rng.random_range(-2.0..2.0)).collect();
-        let (mut work, mut solution) = (Workspace::default(), Solution::default());
-        let methods: [(&str, &dyn Recover); 2] = [("network", &network), ("nn_lmmse", &peer)];
-        for (name, method) in methods {
-            group.bench_function(BenchmarkId::new(name, m), |b| {
-                b.iter(|| {
-                    let problem = Problem::new(rows.view(), black_box(&y));
-                    problem.and_then(|p| method.recover_into(&p, &mut work, &mut solution))
-                });
-            });
-        }
-    }
-    group.finish();
-}
-
 /// A disc or a bar somewhere on the sheet.
 fn touch(seed: u64, cols: usize) -> DVector<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -230,5 +151,5 @@ fn touch(seed: u64, cols: usize) -> DVector<f64> {
     })
 }
 
-criterion_group!(benches, form, decode, classify, fixed, unrolled);
+criterion_group!(benches, decode, classify, fixed);
 criterion_main!(benches);

@@ -8,9 +8,9 @@
 //! `FILE` holds little-endian 64-bit words: taxels N, atoms K, measurements M, sparsity S, windows W; the dictionary (N
 //! × K, `f64`); W × M rows of ⌈N/64⌉ words of signs; W × M measurements (`f64`). `MODE`: `form` forms Φ·D from `f64`
 //! tables, `form32` from `f32` tables; `decode` is what is left when the last sample arrives, Φ·D ready; `all` and
-//! `all32` do both for every window; `shared` decodes all windows with the first window's Φ·D.
+//! `all32` do both for every window.
 
-use spts_recon::recover::{BatchOmp, Omp};
+use spts_recon::recover::Omp;
 use spts_recon::{Matrix, MatrixView, Problem, Recover as _, SignTables, Solution, TableFloat, Workspace};
 use std::error::Error;
 use std::hint::black_box;
@@ -112,19 +112,6 @@ fn decode(windows: &Windows, repeats: usize) -> Result<Vec<Vec<usize>>, Box<dyn 
     Ok(supports)
 }
 
-fn shared(windows: &Windows, repeats: usize) -> Result<Vec<Vec<usize>>, Box<dyn Error>> {
-    let (m, k) = (windows.m, windows.dictionary.ncols());
-    let rows = formed(windows);
-    let pursuit = BatchOmp::new(MatrixView::new(m, k, &rows[..m * k])?, windows.sparsity)?;
-    let (mut work, mut supports) = (Workspace::default(), Vec::new());
-    for _ in 0..repeats {
-        supports = run(windows, |_, _, y, solution| {
-            Ok(pursuit.recover_into(y, &mut work, solution)?)
-        })?;
-    }
-    Ok(supports)
-}
-
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [file, mode, repeats] = arguments.as_slice() else {
@@ -137,8 +124,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "all" => form_and::<f64>(&windows, repeats, true),
         "all32" => form_and::<f32>(&windows, repeats, true),
         "decode" => decode(&windows, repeats),
-        "shared" => shared(&windows, repeats),
-        other => Err(format!("mode {other}: not form, form32, all, all32, decode or shared").into()),
+        other => Err(format!("mode {other}: not form, form32, all, all32 or decode").into()),
     }?;
     writeln!(std::io::stdout(), "{{\"supports\": {supports:?}}}")?;
     Ok(())

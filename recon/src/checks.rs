@@ -73,6 +73,16 @@ pub(crate) fn not_converged(iterations: usize, error: f64, tol: f64) -> Refusal 
     ))
 }
 
+/// An argument of the wrong length.
+pub(crate) fn other_length(what: &str, len: usize, expected: usize) -> Refusal {
+    Refusal::new(format!("{what} has {len} values, expected {expected}"))
+}
+
+/// An image without a value above zero.
+pub(crate) fn no_contact(index: usize) -> Refusal {
+    Refusal::new(format!("image {index} has no value above zero"))
+}
+
 /// Whether `result` is refused, with a sentence that has this part.
 #[cfg(test)]
 pub(crate) fn says<T>(result: &Result<T, Refusal>, part: &str) -> bool {

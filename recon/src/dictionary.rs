@@ -3,11 +3,10 @@
 pub use crate::matrix::shifted;
 
 use crate::checks::within;
-use crate::kernels::{axpy, dot};
+use crate::kernels::{self, axpy, dot};
 use crate::matrix::Matrix;
-use crate::problem::power_of_two;
-use crate::problem::{Solution, Workspace};
-use crate::recover::BatchOmp;
+use crate::problem::{Solution, power_of_two};
+use crate::recover::{CONVERGED, back_substitute};
 use rand::seq::SliceRandom as _;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -132,7 +131,7 @@ impl Ksvd {
             direction: vec![0.0; training.rows.ncols()],
         };
         for _ in 0..self.n_iter {
-            sweep.code(&training, self.n_nonzero_coefs)?;
+            sweep.code(&training, self.n_nonzero_coefs);
             for atom in 0..sweep.atoms.nrows() {
                 sweep.power_step(atom);
             }
@@ -160,11 +159,15 @@ impl Sweep {
     ///
     /// # Errors
     /// [`Refusal`].
-    fn code(&mut self, training: &Training, n_nonzero_coefs: usize) -> Result<(), Refusal> {
-        code(training, &self.atoms, n_nonzero_coefs, &mut self.codes)?;
+    fn code(&mut self, training: &Training, n_nonzero_coefs: usize) {
+        let pursuit = GramPursuit::new(&self.atoms, n_nonzero_coefs);
+        self.codes.resize_with(training.len(), Solution::default);
+        let codes = self.codes.par_iter_mut().enumerate();
+        codes.for_each_init(GramScratch::default, |scratch, (image, code)| {
+            pursuit.run(training.rows.row(image), scratch, code);
+        });
         self.errors = errors(training, &self.atoms, &self.codes);
         self.users.collect(&self.codes, self.atoms.nrows());
-        Ok(())
     }
 
     /// d ← E g/‖E g‖ and g ← Eᵀ d, where E = errors + d gᵀ over the atom's users.
@@ -200,30 +203,123 @@ impl Sweep {
     }
 }
 
-/// Codes `codes` of all images by a pursuit of `n_nonzero_coefs` atoms, on all threads.
+/// Smallest share of an atom's square outside the span of the chosen ones.
+const DEPENDENT_SQUARE: f64 = 1e-10;
+
+/// Share of ‖y‖² below which the recurrence ‖r‖² ← ‖r‖² − p² holds rounding only.
+const CONVERGED_SQUARE: f64 = 1e-14;
+
+/// Scratch memory of a [`GramPursuit`].
+#[derive(Debug, Default)]
+struct GramScratch {
+    weights: Vec<f64>,
+    /// Aᵀ r: before the pursuit Aᵀ y.
+    correlation: Vec<f64>,
+    /// vᵢ, one after the other.
+    images: Vec<f64>,
+    /// Columns of R, one after the other; column n has n + 1 entries.
+    upper: Vec<f64>,
+    projections: Vec<f64>,
+}
+
+/// Orthogonal matching pursuit for many images with the same atoms, whose Gram matrix G = Aᵀ A it looks at instead of
+/// A. It selects atoms like [`Omp`](crate::recover::Omp).
 ///
-/// # Errors
-/// [`Refusal`].
-pub(super) fn code(
-    training: &Training,
-    atoms: &Matrix,
-    n_nonzero_coefs: usize,
-    codes: &mut Vec<Solution>,
-) -> Result<(), Refusal> {
-    let failed = |error: Refusal| error.at("coding the training images");
-    let pursuit = BatchOmp::new(transposed(atoms).view(), n_nonzero_coefs).map_err(failed)?;
-    codes.resize_with(training.len(), Solution::default);
-    codes
-        .par_iter_mut()
-        .enumerate()
-        .try_for_each_init(Workspace::default, |workspace, (image, code)| {
-            pursuit.recover_into(training.rows.row(image), workspace, code)
-        })
-        .map_err(failed)
+/// With the directions qᵢ of the chosen atoms, vᵢ = Aᵀ qᵢ follows from the row g of G that belongs to the new atom k,
+/// vₙ = (g − Σᵢ vᵢₖ vᵢ) / d with d² = ‖aₖ‖² − Σᵢ vᵢₖ², and the correlations from vₙ: a step costs O(n·K). (The source
+/// updates the correlations from the coefficients instead, Aᵀ r = Aᵀ y − G_S α, to the same effect.) d² is a
+/// difference, exact to a few 1e-16 of ‖a‖²: atoms with less than 1e-10 of their square outside the span of the chosen
+/// ones are passed over, and a pursuit ends when ‖r‖² is below 1e-14 of ‖y‖².
+/// Source: R. Rubinstein, M. Zibulevsky, M. Elad, "Efficient implementation of the K-SVD algorithm using batch
+/// orthogonal matching pursuit", Technion CS-2008-08 (2008).
+struct GramPursuit {
+    /// A, pixels × K.
+    a: Matrix,
+    /// G, K × K.
+    gram: Matrix,
+    /// 1/‖aₖ‖ of every atom.
+    weights: Vec<f64>,
+    /// Largest number of atoms.
+    limit: usize,
+}
+
+impl GramPursuit {
+    /// A pursuit with `atoms`, one a row, of which it chooses at most `n_nonzero_coefs`. Costs O(pixels·K²).
+    fn new(atoms: &Matrix, n_nonzero_coefs: usize) -> Self {
+        let (k, pixels) = (atoms.nrows(), atoms.ncols());
+        let (a, mut gram) = (transposed(atoms), Matrix::zeros(k, k));
+        for c in 0..k {
+            kernels::adjoint(a.view().values(), atoms.row(c), gram.row_mut(c));
+        }
+        let (mut squares, mut weights) = (vec![0.0; k], vec![0.0; k]);
+        kernels::column_squares(a.view().values(), &vec![1.0; pixels], &mut squares);
+        kernels::inverse_roots(&squares, &mut weights);
+        Self {
+            a,
+            gram,
+            weights,
+            limit: n_nonzero_coefs.min(pixels).min(k),
+        }
+    }
+
+    /// Chooses the atoms of the image `y` and writes their coefficients.
+    fn run(&self, y: &[f64], scratch: &mut GramScratch, solution: &mut Solution) {
+        let k = self.weights.len();
+        scratch.correlation.resize(k, 0.0);
+        kernels::adjoint(self.a.view().values(), y, &mut scratch.correlation);
+        scratch.weights.clear();
+        scratch.weights.extend_from_slice(&self.weights);
+        scratch.images.resize(self.limit * k, 0.0);
+        scratch.upper.clear();
+        scratch.projections.clear();
+        let (y_square, support) = (dot(y, y), &mut solution.support);
+        let mut residual_square = y_square;
+        support.clear();
+        while support.len() < self.limit && residual_square > CONVERGED_SQUARE * y_square {
+            let Some((atom, score)) = kernels::best_magnitude(&scratch.correlation, &scratch.weights) else {
+                break;
+            };
+            if score <= CONVERGED * y_square.sqrt() {
+                break;
+            }
+            // chosen, or in the span of the chosen ones: not again
+            scratch.weights[atom] = 0.0;
+            if let Some(projection) = self.push(atom, scratch, support.len()) {
+                residual_square -= projection * projection;
+                support.push(atom);
+            }
+        }
+        back_substitute(&scratch.upper, &scratch.projections, &mut solution.coefficients);
+    }
+
+    /// Appends `atom` as column `n` and returns the projection of `y` on its direction; the correlations follow when
+    /// there are steps to come. `None`, and nothing is changed, when it lies in the span of the others.
+    fn push(&self, atom: usize, scratch: &mut GramScratch, n: usize) -> Option<f64> {
+        let (k, start) = (self.weights.len(), scratch.upper.len());
+        let g = self.gram.row(atom);
+        let (done, rest) = scratch.images.split_at_mut(n * k);
+        scratch.upper.extend(done.chunks_exact(k).map(|v| v[atom]));
+        let overlaps = &scratch.upper[start..];
+        let square = g[atom] - overlaps.iter().map(|r| r * r).sum::<f64>();
+        // not `<=`: a NaN must be passed over as well
+        if square.partial_cmp(&(DEPENDENT_SQUARE * g[atom])) != Some(std::cmp::Ordering::Greater) {
+            scratch.upper.truncate(start);
+            return None;
+        }
+        let length = square.sqrt();
+        let projection = scratch.correlation[atom] / length;
+        if n + 1 < self.limit {
+            let v = &mut rest[..k];
+            kernels::gram_step(g, done, overlaps, length, projection, v, &mut scratch.correlation);
+        }
+        scratch.upper.push(length);
+        scratch.projections.push(projection);
+        Some(projection)
+    }
 }
 
 /// What the codes leave of every image, X − A D as rows.
-pub(super) fn errors(training: &Training, atoms: &Matrix, codes: &[Solution]) -> Matrix {
+fn errors(training: &Training, atoms: &Matrix, codes: &[Solution]) -> Matrix {
     let mut errors = training.rows.clone();
     for (image, code) in codes.iter().enumerate() {
         for (&k, &c) in code.support.iter().zip(&code.coefficients) {
@@ -236,8 +332,8 @@ pub(super) fn errors(training: &Training, atoms: &Matrix, codes: &[Solution]) ->
 /// Images as rows, all multiplied by the power of two that brings the largest value into [1, 2): their squares neither
 /// overflow nor vanish, and no digit is lost.
 #[derive(Debug)]
-pub(super) struct Training {
-    pub(super) rows: Matrix,
+struct Training {
+    rows: Matrix,
 }
 
 /// Least square of an image that can be learned from; that of the strongest one is at least 1.
@@ -246,7 +342,7 @@ const SMALLEST_SQUARE: f64 = 1e-300;
 impl Training {
     /// # Errors
     /// [`Refusal`], [`Refusal`], [`Refusal`].
-    pub(super) fn new(images: &[Vec<f64>]) -> Result<Self, Refusal> {
+    fn new(images: &[Vec<f64>]) -> Result<Self, Refusal> {
         let expected = images
             .first()
             .ok_or(Refusal::new("no training image is left after preprocessing"))?
@@ -279,12 +375,12 @@ impl Training {
     }
 
     /// Number of images.
-    pub(super) fn len(&self) -> usize {
+    fn len(&self) -> usize {
         self.rows.nrows()
     }
 
     /// `count` of the images in random order, or all of them when there are fewer, as rows of length 1.
-    pub(super) fn draw(&self, count: usize, rng: &mut ChaCha8Rng) -> Matrix {
+    fn draw(&self, count: usize, rng: &mut ChaCha8Rng) -> Matrix {
         let mut order: Vec<usize> = (0..self.len()).collect();
         order.shuffle(rng);
         order.truncate(count);
@@ -297,7 +393,7 @@ impl Training {
 }
 
 /// Scales `direction` to length 1 and writes it to `out`; false, and `out` stays, when it has no direction.
-pub(super) fn set_unit(out: &mut [f64], direction: &[f64]) -> bool {
+fn set_unit(out: &mut [f64], direction: &[f64]) -> bool {
     let square = dot(direction, direction);
     if !square.is_normal() {
         return false;
@@ -313,19 +409,19 @@ pub(super) fn set_unit(out: &mut [f64], direction: &[f64]) -> bool {
 ///
 /// # Errors
 /// [`Refusal`].
-pub(super) fn at_least(field: &'static str, value: usize, least: usize) -> Result<(), Refusal> {
+fn at_least(field: &'static str, value: usize, least: usize) -> Result<(), Refusal> {
     within(field, value as f64, least as f64, f64::MAX).map(|_| ())
 }
 
 /// Columns of `rows`: the dictionary whose atoms are the rows.
-pub(super) fn transposed(rows: &Matrix) -> Matrix {
+fn transposed(rows: &Matrix) -> Matrix {
     let atoms: Vec<&[f64]> = (0..rows.nrows()).map(|k| rows.row(k)).collect();
     Matrix::from_column_slices(rows.ncols(), &atoms)
 }
 
 /// The images that use each atom, and where in their codes.
 #[derive(Debug, Default)]
-pub(super) struct Users {
+struct Users {
     /// First entry of every atom in `entries`, and the end of the last.
     starts: Vec<usize>,
     entries: Vec<(usize, usize)>,
@@ -333,7 +429,7 @@ pub(super) struct Users {
 
 impl Users {
     /// Collects the users of `n_atoms` atoms from the codes of all images.
-    pub(super) fn collect(&mut self, codes: &[Solution], n_atoms: usize) {
+    fn collect(&mut self, codes: &[Solution], n_atoms: usize) {
         self.starts.clear();
         self.starts.resize(n_atoms + 1, 0);
         for &atom in codes.iter().flat_map(|c| &c.support) {
@@ -354,7 +450,7 @@ impl Users {
     }
 
     /// (image, place in its code) of every user of `atom`, in the order of the images.
-    pub(super) fn of(&self, atom: usize) -> &[(usize, usize)] {
+    fn of(&self, atom: usize) -> &[(usize, usize)] {
         &self.entries[self.starts[atom]..self.starts[atom + 1]]
     }
 }
@@ -368,7 +464,7 @@ const REPRESENTED: f64 = 1e-20;
 
 /// Replaces atoms (rows) without users and, of two that are equal up to sign, the one with fewer users, by the images
 /// with the largest `errors`, each image once. Stops when all images that are left are represented.
-pub(super) fn replace_useless(training: &Training, errors: &Matrix, used: &[usize], atoms: &mut Matrix) {
+fn replace_useless(training: &Training, errors: &Matrix, used: &[usize], atoms: &mut Matrix) {
     let useless = useless(atoms, used);
     if useless.is_empty() {
         return;
@@ -408,6 +504,8 @@ fn degenerate(index: usize) -> Refusal {
 mod tests {
     use super::*;
     use crate::checks::says;
+    use crate::problem::{Problem, Recover as _, Workspace};
+    use crate::recover::Omp;
     use rand::{RngExt as _, SeedableRng as _};
     use rayon::ThreadPoolBuilder;
 
@@ -478,6 +576,31 @@ mod tests {
         assert!(found.iter().all(|&n| n >= 42), "{found:?} of 50 atoms");
     }
 
+    /// The pursuit by Gram matrices is `Omp`, whose supports are those of scikit-learn.
+    #[test]
+    fn gram_matrices_give_the_codes_of_omp() {
+        let mut rng = ChaCha8Rng::seed_from_u64(4);
+        for (pixels, count, s) in [(10, 40, 3), (25, 100, 6), (50, 100, 20), (40, 24, 8)] {
+            let images: Vec<Vec<f64>> = (0..50).map(|_| unit_vector(pixels, &mut rng)).collect();
+            let atoms = (0..count).flat_map(|_| unit_vector(pixels, &mut rng)).collect();
+            let atoms = Matrix::from_rows(count, pixels, atoms).unwrap();
+            let (pursuit, a) = (GramPursuit::new(&atoms, s), transposed(&atoms));
+            let (mut scratch, mut code) = (GramScratch::default(), Solution::default());
+            for image in &images {
+                pursuit.run(image, &mut scratch, &mut code);
+                let problem = Problem::new(a.view(), image).unwrap();
+                let expected = Omp::new(s).recover(&problem, &mut Workspace::default()).unwrap();
+                assert_eq!(code.support, expected.support, "{pixels} pixels, {count} atoms");
+                for (found, expected) in code.coefficients.iter().zip(&expected.coefficients) {
+                    assert!(
+                        (found - expected).abs() <= 1e-7 * expected.abs().max(1.0),
+                        "{found}, {expected}"
+                    );
+                }
+            }
+        }
+    }
+
     /// A power step never leaves more than the codes before it, and the kept errors are those of the codes.
     #[test]
     fn a_power_step_leaves_no_more_and_keeps_the_errors() {
@@ -491,7 +614,7 @@ mod tests {
             users: Users::default(),
             direction: vec![0.0; 10],
         };
-        sweep.code(&training, 2).unwrap();
+        sweep.code(&training, 2);
         let square = |errors: &Matrix| dot(errors.view().values(), errors.view().values());
         let before = square(&sweep.errors);
         sweep.power_step(0);

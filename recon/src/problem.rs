@@ -234,14 +234,6 @@ impl Scaling {
             y_scale,
         })
     }
-
-    /// Measurements alone, divided by the power of two that is returned if they have to be.
-    ///
-    /// # Errors
-    /// [`Refusal`].
-    pub(crate) fn measurements<'a>(&'a mut self, y: &'a [f64]) -> Result<(&'a [f64], f64), Refusal> {
-        scale_measurements(y, &mut self.y)
-    }
 }
 
 fn scale_measurements<'a>(y: &'a [f64], copy: &'a mut Vec<f64>) -> Result<(&'a [f64], f64), Refusal> {
@@ -264,43 +256,31 @@ impl Scaled<'_> {
         kernels::inverse_roots(self.squares, out);
     }
 
-    /// Power of two that the operator was divided by.
-    pub(crate) fn matrix_scale(&self) -> f64 {
-        self.matrix_scale
-    }
-
     /// Takes the scaling back out of a solution.
     ///
     /// # Errors
     /// [`Refusal`] when a coefficient is beyond the range of numbers.
+    #[expect(clippy::float_cmp, reason = "1 is what an unscaled problem has, to the bit")]
     pub(crate) fn unscale(&self, solution: &mut Solution) -> Result<(), Refusal> {
-        unscale(solution, self.y_scale, self.matrix_scale)
-    }
-}
-
-/// Takes powers of two back out of a solution.
-///
-/// # Errors
-/// [`Refusal`] when a coefficient is beyond the range of numbers.
-#[expect(clippy::float_cmp, reason = "1 is what an unscaled problem has, to the bit")]
-pub(crate) fn unscale(solution: &mut Solution, y_scale: f64, matrix_scale: f64) -> Result<(), Refusal> {
-    if y_scale == 1.0 && matrix_scale == 1.0 {
-        return Ok(());
-    }
-    solution.residual_norm = (solution.residual_norm * y_scale).min(f64::MAX);
-    let ratio = y_scale / matrix_scale;
-    for (coefficient, &atom) in solution.coefficients.iter_mut().zip(&solution.support) {
-        // one product that is exact, or two where 2^±1074 lies between the scales
-        *coefficient = if ratio.is_normal() {
-            *coefficient * ratio
-        } else {
-            *coefficient * y_scale / matrix_scale
-        };
-        if !coefficient.is_finite() {
-            return Err(overflow(atom));
+        let (y_scale, matrix_scale) = (self.y_scale, self.matrix_scale);
+        if y_scale == 1.0 && matrix_scale == 1.0 {
+            return Ok(());
         }
+        solution.residual_norm = (solution.residual_norm * y_scale).min(f64::MAX);
+        let ratio = y_scale / matrix_scale;
+        for (coefficient, &atom) in solution.coefficients.iter_mut().zip(&solution.support) {
+            // one product that is exact, or two where 2^±1074 lies between the scales
+            *coefficient = if ratio.is_normal() {
+                *coefficient * ratio
+            } else {
+                *coefficient * y_scale / matrix_scale
+            };
+            if !coefficient.is_finite() {
+                return Err(overflow(atom));
+            }
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 /// Largest power of two that is at most the largest magnitude of `values`, or 1 when all of them are zero. Dividing by

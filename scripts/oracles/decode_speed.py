@@ -5,7 +5,6 @@ pursuit of S atoms on the columns of Φ·D scaled to length 1 (SPAMS: orthogonal
 
     formed  Φ·D given for every window
     all     Φ·D formed from Φ, and its columns scaled where the program does not do it
-    shared  all windows with the Φ·D of the first one, given at once
 
 The peers' Φ·D is one matrix product for all windows, the fastest way there is in numpy. Times are the thread's CPU time, medians over
 alternating rounds; their ratios are the result (float32 against our `f32` tables). Ours is the example `decode_time`, timed as a process of many repeats less a process of
@@ -39,7 +38,7 @@ OURS = ROOT / "target/release/examples/decode_time"
 ROUND_S = 0.2
 # scikit-learn is timed on the first of this many windows
 FEW = 200
-OUR_MODES = ["form", "form32", "decode", "all", "all32", "shared"]
+OUR_MODES = ["form", "form32", "decode", "all", "all32"]
 
 
 class Windows:
@@ -57,16 +56,15 @@ class Windows:
         image = alpha @ self.dictionary.T
         clean = np.einsum("wmn,wn->wm", self.phi, image)
         self.y = clean + NOISE * np.std(clean) * rng.standard_normal((count, M))
-        self.shared_y = image @ self.phi[0].T
         words = -(-N // 64)
         padded = np.zeros((count, M, 64 * words), np.uint8)
         padded[:, :, :N] = bits
         self.signs = np.packbits(padded, axis=2, bitorder="little").view("<u8")
 
-    def write(self, path, y):
+    def write(self, path):
         with open(path, "wb") as file:
             np.array([N, K, M, S, self.count], "<u8").tofile(file)
-            for part in (self.dictionary, self.signs, y):
+            for part in (self.dictionary, self.signs, self.y):
                 part.tofile(file)
 
 
@@ -81,17 +79,9 @@ def sklearn_own(a, y):
     return [orthogonal_mp(a, y, n_nonzero_coefs=S) for a, y in zip(a, y)]
 
 
-def sklearn_shared(a, y):
-    return orthogonal_mp(a, y.T, n_nonzero_coefs=S, precompute=True).T
-
-
 def spams_own(a, y):
     # SPAMS wants columns one after the other
     return [spams.omp(y[:, None], np.asfortranarray(a), L=S, eps=0.0, numThreads=1) for a, y in zip(a, y)]
-
-
-def spams_shared(a, y):
-    return spams.omp(np.asfortranarray(y.T), np.asfortranarray(a), L=S, eps=0.0, numThreads=1)
 
 
 def timed(action, *arguments):
@@ -118,20 +108,16 @@ def peers_round(windows):
         forming, a = seconds / windows.count, out.reshape(-1, M, K)
         # as SPAMS wants them, not counted: a program built around it would form them so
         fortran = [np.asfortranarray(one) for one in a]
-        y, shared = windows.y.astype(dtype), np.asfortranarray(windows.shared_y.astype(dtype))
+        y = windows.y.astype(dtype)
         seconds, _ = timed(spams_own, fortran, y)
         times[f"SPAMS {name}", "formed"] = seconds / windows.count
         times[f"SPAMS {name}", "all"] = seconds / windows.count + forming
-        seconds, _ = timed(spams_shared, a[0], shared)
-        times[f"SPAMS {name}", "shared"] = seconds / windows.count
         times[f"numpy {name}", "form"] = forming
         if dtype is np.float64:
             seconds, codes = timed(sklearn_own, a[:FEW], y[:FEW])
             times["scikit-learn", "formed"] = seconds / len(codes)
             times["scikit-learn", "all"] = seconds / len(codes) + forming
-            seconds, shared_codes = timed(sklearn_shared, a[0], shared)
-            times["scikit-learn", "shared"] = seconds / windows.count
-    supports = [[set(np.flatnonzero(code)) for code in codes] for codes in (codes, shared_codes)]
+    supports = [set(np.flatnonzero(code)) for code in codes]
     return {key: 1e6 * seconds for key, seconds in times.items()}, supports
 
 
@@ -144,22 +130,19 @@ def race(windows, rounds):
     """Median µs of every (program, task), and how often our supports are scikit-learn's."""
     times, agreements = {}, {}
     with tempfile.TemporaryDirectory() as folder:
-        own, shared = f"{folder}/own", f"{folder}/shared"
-        windows.write(own, windows.y)
-        windows.write(shared, windows.shared_y)
+        file = f"{folder}/windows"
+        windows.write(file)
         repeats = {}
         for mode in OUR_MODES:
-            file = shared if mode == "shared" else own
             spent = ours_seconds(file, mode, 21)[0] - ours_seconds(file, mode, 1)[0]
             repeats[mode] = max(20, int(20 * ROUND_S / max(spent, 1e-3)))
         for _ in range(rounds):
-            theirs, (own_supports, shared_supports) = peers_round(windows)
+            theirs, own_supports = peers_round(windows)
             for mode in OUR_MODES:
-                file = shared if mode == "shared" else own
                 many, supports = ours_seconds(file, mode, 1 + repeats[mode])
                 theirs["ours", mode] = 1e6 * (many - ours_seconds(file, mode, 1)[0]) / (repeats[mode] * windows.count)
-                if mode in ("decode", "all", "all32", "shared"):
-                    agreements[mode] = agreement(supports, shared_supports if mode == "shared" else own_supports)
+                if mode in ("decode", "all", "all32"):
+                    agreements[mode] = agreement(supports, own_supports)
             for key, value in theirs.items():
                 times.setdefault(key, []).append(value)
     return {key: statistics.median(values) for key, values in times.items()}, agreements

@@ -1,8 +1,7 @@
 //! Gaussian components learned from many images of a class: clusters of similar images.
 
-use crate::checks::within;
+use crate::checks::{no_contact, within};
 use crate::classify::evidence::Component;
-use crate::classify::evidence::no_contact;
 use crate::classify::templates::principal;
 use crate::kernels::{axpy, dot, norm};
 use crate::matrix::Matrix;

@@ -6,7 +6,7 @@
 //! [`Evidence`] the result of the samples so far. [`ImageEstimator`] computes the image that belongs to a decision.
 
 use crate::amplitude::{AmplitudeRange, Marginals};
-use crate::checks::within;
+use crate::checks::{other_length, within};
 use crate::classify::filter::{Evidence, LANES, Preparation, Shape};
 use crate::matrix::{Matrix, MatrixView};
 use crate::problem::{Problem, Recover as _, Solution, Workspace};
@@ -430,14 +430,4 @@ impl ImageEstimator {
         let weight = order.get(most - 1).or(order.last()).copied().unwrap_or(0.0);
         weight.max(SMALLEST_WEIGHT)
     }
-}
-
-/// An argument of the wrong length.
-pub(super) fn other_length(what: &str, len: usize, expected: usize) -> Refusal {
-    Refusal::new(format!("{what} has {len} values, expected {expected}"))
-}
-
-/// An image without a value above zero.
-pub(super) fn no_contact(index: usize) -> Refusal {
-    Refusal::new(format!("image {index} has no value above zero"))
 }

@@ -7,8 +7,7 @@
 //! Source: B. Anderson, J. Moore, *Optimal Filtering* (1979), §5.3 and §10.1 (innovations and likelihood).
 
 use crate::amplitude::{AmplitudeRange, Marginals};
-use crate::checks::{measurement, within};
-use crate::classify::evidence::other_length;
+use crate::checks::{measurement, other_length, within};
 use crate::kernels::ln;
 use multiversion::multiversion;
 use spts_input::Refusal;

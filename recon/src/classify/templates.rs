@@ -1,10 +1,8 @@
 //! Gaussian classes from images on a grid.
 
-use crate::checks::within;
+use crate::checks::{no_contact, other_length, within};
 use crate::classify::Library;
 use crate::classify::evidence::Component;
-use crate::classify::evidence::no_contact;
-use crate::classify::evidence::other_length;
 use crate::matrix::{Matrix, shifted};
 use crate::recover::Gaussian;
 use nalgebra::DMatrix;

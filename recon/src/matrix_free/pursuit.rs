@@ -2,7 +2,7 @@
 
 use crate::checks::{not_finite, other_columns, overflow, shape_mismatch};
 use crate::kernels::{axpy, dot, norm};
-use crate::operator::{Atom, Composition, LinearOperator, SelectColumns, ShiftedDictionary};
+use crate::operator::{Composition, LinearOperator, SelectColumns};
 use spts_input::Refusal;
 
 /// Finds contacts, smooth patches of a few taxels, in measurements y = Φ x + noise of a large image x ≥ 0. It needs
@@ -20,7 +20,7 @@ use spts_input::Refusal;
 ///
 /// // one contact on 20 × 20 taxels, 150 measurements
 /// let seeds = (1..401_u32).map(|k| (k * k).wrapping_mul(2_654_435_761)).collect();
-/// let phi = SignOperator::new(SignGenerator::NUMERICAL_RECIPES, seeds, 0, 150);
+/// let phi = SignOperator::new(SignGenerator::new(1_664_525, 1_013_904_223, 31)?, seeds, 0, 150);
 /// let (mut image, mut y) = ([0.0; 400], [0.0; 150]);
 /// for (k, pixel) in image.iter_mut().enumerate() {
 ///     let square = (k as f64 / 20.0).floor() - 8.0;
@@ -143,7 +143,7 @@ struct Search<'a, A> {
 impl<'a, A: SelectColumns> Search<'a, A> {
     fn new(pursuit: &'a RegionPursuit, phi: &'a A, y: &'a [f64], start: Option<&[f64]>) -> Self {
         let taxels = pursuit.rows * pursuit.cols;
-        let detector = Detector::new(pursuit.rows, pursuit.cols, &RADII_TAXELS.map(Atom::cap));
+        let detector = Detector::new([pursuit.rows, pursuit.cols], &RADII_TAXELS);
         let mut weights = vec![0.0; taxels];
         let mut residual = y.to_vec();
         if let Some(start) = start {
@@ -261,36 +261,39 @@ impl<'a, A: SelectColumns> Search<'a, A> {
 }
 
 /// Matched filters: blobs at every place.
-pub(super) struct Detector {
-    blobs: ShiftedDictionary,
-    /// The same with every value squared.
-    squares: ShiftedDictionary,
-    taxels: usize,
+struct Detector {
+    shape: [usize; 2],
+    blobs: Vec<Vec<f64>>,
 }
 
 /// A place, and how far its correlation stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Detection {
-    pub(super) place: usize,
+struct Detection {
+    place: usize,
     /// Value in standard deviations of what chance gives.
-    pub(super) score: f64,
+    score: f64,
 }
 
 impl Detector {
-    /// Filters for `blobs` in images of `rows` × `cols`.
-    pub(super) fn new(rows: usize, cols: usize, blobs: &[Atom]) -> Self {
-        let squares: Vec<Atom> = blobs.iter().map(Atom::squared).collect();
-        Self {
-            blobs: ShiftedDictionary::new(rows, cols, blobs),
-            squares: ShiftedDictionary::new(rows, cols, &squares),
-            taxels: rows * cols,
-        }
+    /// Filters for [`cap`]s of these radii in images of this shape.
+    fn new(shape: [usize; 2], radii_taxels: &[f64]) -> Self {
+        let blobs = radii_taxels.iter().map(|radius| cap(*radius)).collect();
+        Self { shape, blobs }
+    }
+
+    /// Number of places and blobs.
+    fn filters(&self) -> usize {
+        self.blobs.len() * self.taxels()
+    }
+
+    fn taxels(&self) -> usize {
+        self.shape[0] * self.shape[1]
     }
 
     /// Score that chance reaches `false_alarms` times in all places and blobs together: the z of a normal tail,
     /// P(Z > z) ≤ e^(−z²/2)/2.
-    pub(super) fn threshold(&self, false_alarms: f64) -> f64 {
-        (2.0 * (0.5 * self.blobs.ncols() as f64 / false_alarms).ln())
+    fn threshold(&self, false_alarms: f64) -> f64 {
+        (2.0 * (0.5 * self.filters() as f64 / false_alarms).ln())
             .max(0.0)
             .sqrt()
     }
@@ -298,19 +301,20 @@ impl Detector {
     /// Places whose best blob scores more than `threshold`, in increasing order. `correlation` is Φᵀ r of a residual,
     /// `variance` what chance gives its entries
     /// ([`SelectColumns::chance_variance`](crate::operator::SelectColumns::chance_variance)).
-    pub(super) fn detect(&self, correlation: &[f64], variance: &[f64], threshold: f64) -> Vec<Detection> {
-        let (mut scores, mut variances) = (vec![0.0; self.blobs.ncols()], vec![0.0; self.blobs.ncols()]);
-        self.blobs.apply_adjoint(correlation, &mut scores);
-        self.squares.apply_adjoint(variance, &mut variances);
+    fn detect(&self, correlation: &[f64], variance: &[f64], threshold: f64) -> Vec<Detection> {
+        let taxels = self.taxels().max(1);
+        let (mut scores, mut variances) = (vec![0.0; self.filters()], vec![0.0; self.filters()]);
+        let outputs = scores.chunks_exact_mut(taxels).zip(variances.chunks_exact_mut(taxels));
+        for (blob, (scores, variances)) in self.blobs.iter().zip(outputs) {
+            let squares: Vec<f64> = blob.iter().map(|v| v * v).collect();
+            correlate(self.shape, correlation, blob, scores);
+            correlate(self.shape, variance, &squares, variances);
+        }
         let largest = variances.iter().copied().fold(0.0, f64::max);
-        let mut best = vec![0.0_f64; self.taxels];
-        for (scores, variances) in scores
-            .chunks_exact(self.taxels)
-            .zip(variances.chunks_exact(self.taxels))
-        {
+        let mut best = vec![0.0_f64; self.taxels()];
+        for (scores, variances) in scores.chunks_exact(taxels).zip(variances.chunks_exact(taxels)) {
             for (best, (score, variance)) in best.iter_mut().zip(scores.iter().zip(variances)) {
-                // where the edge leaves next to nothing of a blob, or a wire next to nothing of the residual, there is
-                // but rounding
+                // where the edge leaves next to nothing of a blob, or a wire next to nothing of the residual
                 if *variance > ROUNDING * largest {
                     *best = best.max(score / variance.sqrt());
                 }
@@ -320,19 +324,51 @@ impl Detector {
         above.map(|(place, &score)| Detection { place, score }).collect()
     }
 
-    /// Numbers of bytes that the filters and one detection hold: both sets of spectra, and two numbers a place and
-    /// blob.
-    pub(super) fn bytes(&self) -> usize {
-        4 * self.blobs.ncols() * size_of::<f64>() + 3 * self.taxels * size_of::<f64>()
+    /// Bytes that a detection holds: two numbers a place and blob, and three a place.
+    fn bytes(&self) -> usize {
+        (2 * self.filters() + 3 * self.taxels()) * size_of::<f64>()
     }
 }
 
-/// Variance over the largest one below which transforms leave but rounding.
+/// Variance over the largest one below which a score says nothing.
 const ROUNDING: f64 = 1e-10;
+
+/// Half an ellipsoid of unit height, √(1 − d²/(`radius_taxels` + ½)²), as a square image: the pressure under a ball. It
+/// extends by the radius, rounded up to whole taxels, to each side of its middle.
+#[expect(clippy::cast_possible_truncation, reason = "a radius is a few taxels")]
+fn cap(radius_taxels: f64) -> Vec<f64> {
+    let reach = radius_taxels.ceil() as usize;
+    let side = 2 * reach + 1;
+    let off = |i: usize| i as f64 - reach as f64;
+    let height = |k: usize| {
+        let square = off(k / side).powi(2) + off(k % side).powi(2);
+        (1.0 - square / (radius_taxels + 0.5).powi(2)).max(0.0).sqrt()
+    };
+    (0..side * side).map(height).collect()
+}
+
+/// Writes the product of `image` with the square `blob` around every place. Outside the image there is nothing.
+fn correlate([rows, cols]: [usize; 2], image: &[f64], blob: &[f64], out: &mut [f64]) {
+    let side = blob.len().isqrt();
+    let reach = side / 2;
+    out.fill(0.0);
+    for (r, out) in out.chunks_exact_mut(cols.max(1)).enumerate() {
+        for (i, shares) in blob.chunks_exact(side).enumerate() {
+            let Some(row) = (r + i).checked_sub(reach).filter(|row| *row < rows) else {
+                continue;
+            };
+            let row = &image[row * cols..(row + 1) * cols];
+            for (j, &share) in shares.iter().enumerate().filter(|(_, share)| **share != 0.0) {
+                let [to, from] = [reach.saturating_sub(j).min(cols), j.saturating_sub(reach).min(cols)];
+                axpy(share, &row[from..], &mut out[to..]);
+            }
+        }
+    }
+}
 
 /// Adds every place within `reach` taxels of one that is `marked`; with a reach of 2.5, the 21 places of a rounded
 /// square.
-pub(super) fn dilate((rows, cols): (usize, usize), marked: &[usize], reach: f64, out: &mut [bool]) {
+fn dilate((rows, cols): (usize, usize), marked: &[usize], reach: f64, out: &mut [bool]) {
     #[expect(clippy::cast_possible_truncation, reason = "a reach is a few taxels")]
     let side = reach.max(0.0).floor() as isize;
     let near = |dr: isize, dc: isize| (dr * dr + dc * dc) as f64 <= reach * reach;
@@ -351,7 +387,7 @@ pub(super) fn dilate((rows, cols): (usize, usize), marked: &[usize], reach: f64,
 }
 
 /// Length of a residual beyond which it counts as nothing: rounding of the measurements.
-pub(super) fn is_nothing(residual: &[f64], y: &[f64]) -> bool {
+fn is_nothing(residual: &[f64], y: &[f64]) -> bool {
     norm(residual) <= 1e-12 * norm(y)
 }
 
@@ -361,7 +397,7 @@ const REACH_SD: f64 = 3.0;
 /// Dictionary of one bump, a Gaussian of unit sum, at some places of an image; its rows are the taxels that the bumps
 /// touch.
 #[derive(Debug)]
-pub(super) struct Grains {
+struct Grains {
     /// Places, increasing.
     places: Vec<usize>,
     /// Taxels covered by a bump, in increasing order.
@@ -373,7 +409,7 @@ pub(super) struct Grains {
 impl Grains {
     /// Bumps with the standard deviation `sd_taxels` ≥ 0 at `places`, in increasing order, of an image of `rows` ×
     /// `cols`. With 0, a bump is a taxel.
-    pub(super) fn new((rows, cols): (usize, usize), places: Vec<usize>, sd_taxels: f64) -> Self {
+    fn new((rows, cols): (usize, usize), places: Vec<usize>, sd_taxels: f64) -> Self {
         let bump = bump(sd_taxels);
         let around = |place: usize| {
             let (r, c) = (place / cols, place % cols);
@@ -403,22 +439,22 @@ impl Grains {
     }
 
     /// Places of the columns.
-    pub(super) fn places(&self) -> &[usize] {
+    fn places(&self) -> &[usize] {
         &self.places
     }
 
     /// Taxels of the rows.
-    pub(super) fn taxels(&self) -> &[usize] {
+    fn taxels(&self) -> &[usize] {
         &self.taxels
     }
 
     /// Length of a bump that no edge cuts.
-    pub(super) fn length(sd_taxels: f64) -> f64 {
+    fn length(sd_taxels: f64) -> f64 {
         bump(sd_taxels).iter().map(|(_, _, v)| v * v).sum::<f64>().sqrt()
     }
 
     /// Numbers of bytes that the dictionary holds.
-    pub(super) fn bytes(&self) -> usize {
+    fn bytes(&self) -> usize {
         let entries: usize = self.entries.iter().map(Vec::len).sum();
         entries * size_of::<(usize, f64)>() + (self.places.len() + self.taxels.len()) * size_of::<usize>()
     }
@@ -477,13 +513,13 @@ const HALVINGS: usize = 60;
 /// Source: A. Beck, M. Teboulle, SIAM J. Imaging Sci. 2 (2009) 183; B. O'Donoghue, E. Candès, Found. Comput. Math. 15
 /// (2015) 715.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct NnFista {
+struct NnFista {
     /// λ, in units of y·A. Range (0, ∞); at 0 the duality gap says nothing.
-    pub(super) penalty: f64,
+    penalty: f64,
     /// Duality gap over ½ ‖y‖². Range (0, 1].
-    pub(super) tol: f64,
+    tol: f64,
     /// Largest number of iterations.
-    pub(super) max_iter: usize,
+    max_iter: usize,
 }
 
 /// How an iterative minimisation ended.
@@ -540,7 +576,7 @@ impl NnFista {
     ///
     /// # Panics
     /// When `x` is not as long as A has columns.
-    pub(super) fn descend(&self, a: &impl LinearOperator, y: &[f64], x: &mut [f64]) -> Result<Descent, Refusal> {
+    fn descend(&self, a: &impl LinearOperator, y: &[f64], x: &mut [f64]) -> Result<Descent, Refusal> {
         check(a, y)?;
         assert_eq!(x.len(), a.ncols(), "a start for every column");
         let mut now = State::at(a, x.iter().map(|v| v.max(0.0)).collect());
@@ -628,7 +664,7 @@ fn first_curvature(a: &impl LinearOperator, y: &[f64]) -> f64 {
 }
 
 /// Shapes and values that a recovery can work with.
-pub(super) fn check(a: &impl LinearOperator, y: &[f64]) -> Result<(), Refusal> {
+fn check(a: &impl LinearOperator, y: &[f64]) -> Result<(), Refusal> {
     if y.len() != a.nrows() {
         return Err(shape_mismatch(a.nrows(), y.len()));
     }
@@ -639,7 +675,7 @@ pub(super) fn check(a: &impl LinearOperator, y: &[f64]) -> Result<(), Refusal> {
 }
 
 /// y −= A x.
-pub(super) fn subtract(a: &impl LinearOperator, x: &[f64], y: &mut [f64]) {
+fn subtract(a: &impl LinearOperator, x: &[f64], y: &mut [f64]) {
     let mut image = vec![0.0; y.len()];
     a.apply(x, &mut image);
     axpy(-1.0, &image, y);
@@ -662,11 +698,26 @@ mod tests {
 
     /// Caps at places that do not touch.
     fn scene(places: &[(usize, usize, f64)]) -> Vec<f64> {
-        let dictionary = ShiftedDictionary::new(SIDE, SIDE, &[Atom::cap(2.0)]);
-        let (mut x, mut image) = (vec![0.0; SIDE * SIDE], vec![0.0; SIDE * SIDE]);
-        places.iter().for_each(|&(r, c, peak)| x[r * SIDE + c] = peak);
-        dictionary.apply(&x, &mut image);
+        let mut image = vec![0.0; SIDE * SIDE];
+        places
+            .iter()
+            .for_each(|&(r, c, peak)| place(&mut image, SIDE, 2.0, (r, c), peak));
         image
+    }
+
+    /// Adds a [`cap`] of height `peak` with its middle at a row and a column; parts outside are cut off.
+    fn place(image: &mut [f64], cols: usize, radius: f64, (r, c): (usize, usize), peak: f64) {
+        let blob = cap(radius);
+        let side = blob.len().isqrt();
+        for (k, v) in image.iter_mut().enumerate() {
+            let [i, j] = [
+                (k / cols + side / 2).wrapping_sub(r),
+                (k % cols + side / 2).wrapping_sub(c),
+            ];
+            if i < side && j < side {
+                *v += peak * blob[i * side + j];
+            }
+        }
     }
 
     fn signs(n: usize, m: usize, rng: &mut ChaCha8Rng) -> SignOperator {
@@ -758,28 +809,27 @@ mod tests {
 
     #[test]
     fn a_blob_is_found_where_it_is() {
-        let blobs = [Atom::cap(1.0), Atom::cap(3.0)];
-        let detector = Detector::new(12, 9, &blobs);
-        let mut image = vec![0.0; 12 * 9];
-        let mut x = vec![0.0; 2 * 12 * 9];
-        x[108 + 4 * 9 + 5] = 2.0;
-        ShiftedDictionary::new(12, 9, &blobs).apply(&x, &mut image);
-        let found = detector.detect(&image, &[1.0; 108], 0.5);
-        let best = found.iter().max_by(|a, b| a.score.total_cmp(&b.score)).unwrap();
-        // the score of the blob itself is its length times 2
-        let length = norm(blobs[1].values());
-        assert_eq!(best.place, 4 * 9 + 5);
-        assert!(
-            (best.score - 2.0 * length).abs() < 1e-9,
-            "{} against {}",
-            best.score,
-            2.0 * length
-        );
+        let detector = Detector::new([12, 9], &[1.0, 3.0]);
+        // in the middle, and cut off by a corner
+        for (r, c) in [(4, 5), (0, 8)] {
+            let mut image = vec![0.0; 12 * 9];
+            place(&mut image, 9, 3.0, (r, c), 2.0);
+            let found = detector.detect(&image, &[1.0; 108], 0.5);
+            let best = found.iter().max_by(|a, b| a.score.total_cmp(&b.score)).unwrap();
+            // the score of the blob itself is its length, times 2
+            assert_eq!(best.place, r * 9 + c);
+            assert!(
+                (best.score - norm(&image)).abs() < 1e-9,
+                "{} against {}",
+                best.score,
+                norm(&image)
+            );
+        }
     }
 
     #[test]
     fn chance_stays_below_the_threshold() {
-        let detector = Detector::new(100, 100, &[Atom::cap(0.0)]);
+        let detector = Detector::new([100, 100], &[0.0]);
         // P(Z > z) = 1e-2/1e4: z = 4.75; the bound is above it
         let z = detector.threshold(0.01);
         assert!((4.75..5.2).contains(&z), "{z}");

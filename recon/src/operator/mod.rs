@@ -1,5 +1,4 @@
-//! Linear operators: dense matrices, ±1 matrices that are not stored, shifted atoms by Fourier transforms, and
-//! combinations of them.
+//! Linear operators: dense matrices, ±1 matrices that are not stored, and combinations of them.
 //!
 //! ```
 //! use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator};
@@ -15,10 +14,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod shifted;
 mod sign;
 
-pub use shifted::{Atom, ShiftedDictionary};
 pub use sign::{SignGenerator, SignOperator};
 
 use crate::kernels::{self, dot, norm};
@@ -181,18 +178,6 @@ impl SelectColumns for MatrixView<'_> {
         for (row, r) in self.values().chunks_exact(variance.len().max(1)).zip(r) {
             variance.iter_mut().zip(row).for_each(|(v, a)| *v += (a * r).powi(2));
         }
-    }
-}
-
-impl SelectColumns for Matrix {
-    type Selected = Self;
-
-    fn select_columns(&self, columns: &[usize]) -> Self {
-        self.view().select_columns(columns)
-    }
-
-    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
-        self.view().chance_variance(r, variance);
     }
 }
 
@@ -483,13 +468,6 @@ mod tests {
             check_operator(&MatrixView::new(12, 7, &a).unwrap());
             let a = Matrix::from_rows(12, 7, a).unwrap();
             check_operator(&a);
-            let some = a.select_columns(&[6, 0]);
-            let (r, mut variance): (Vec<f64>, _) = ((0..12).map(f64::from).collect(), [f64::NAN; 7]);
-            a.chance_variance(&r, &mut variance);
-            let squares: f64 = a.column(3).iter().zip(&r).map(|(a, r)| a * a * r * r).sum();
-            // a dozen roundings of numbers below 121
-            prop_assert!((variance[3] - squares).abs() < 1e-11);
-            prop_assert_eq!((some.nrows(), some.column(0), some.column(1)), (12, a.column(6), a.column(0)));
         }
     }
 
@@ -507,24 +485,6 @@ mod tests {
         assert!(y.iter().zip(&with).all(|(a, b)| (a - b).abs() < 1e-14));
     }
 
-    #[test]
-    fn it_is_the_product_of_the_matrices() {
-        let a = Matrix::from_rows(2, 3, vec![1.0, 2.0, -1.0, 0.5, 0.0, 3.0]).unwrap();
-        let b = Matrix::from_rows(3, 2, vec![1.0, -2.0, 0.0, 4.0, 2.0, 1.0]).unwrap();
-        let both = Composition::new(&a, &b);
-        check_operator(&both);
-        let mut y = [0.0; 2];
-        both.apply(&[1.0, 1.0], &mut y);
-        // b·(1, 1) = (−1, 4, 3): exact in binary
-        assert_eq!(y.map(f64::to_bits), [4.0_f64, 8.5].map(f64::to_bits));
-    }
-
-    #[test]
-    #[should_panic(expected = "columns of the outer operator")]
-    fn shapes_that_do_not_fit_are_refused() {
-        let _ = Composition::new(Matrix::zeros(2, 3), Matrix::zeros(2, 3));
-    }
-
     fn parts() -> SubArrays<Matrix> {
         let first = Matrix::from_rows(1, 2, vec![1.0, 2.0]).unwrap();
         let second = Matrix::from_rows(2, 1, vec![3.0, -1.0]).unwrap();
@@ -539,14 +499,5 @@ mod tests {
         let mut y = [0.0; 3];
         a.apply(&[1.0, 1.0, 2.0], &mut y);
         assert_eq!(y.map(f64::to_bits), [3.0_f64, 6.0, -2.0].map(f64::to_bits));
-    }
-
-    #[test]
-    fn columns_keep_their_wires() {
-        let some = parts().select_columns(&[1, 2]);
-        let mut y = [0.0; 3];
-        some.apply(&[1.0, 1.0], &mut y);
-        assert_eq!(y.map(f64::to_bits), [2.0_f64, 3.0, -1.0].map(f64::to_bits));
-        assert_eq!(parts().select_columns(&[]).nrows(), 3);
     }
 }

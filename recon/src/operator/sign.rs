@@ -16,20 +16,13 @@ const FEWEST_ROWS: usize = 64;
 /// Linear congruential generator s ↦ a·s + c mod 2³². One bit of its state is the sign of a weight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SignGenerator {
-    step: Step,
+    multiplier: u32,
+    increment: u32,
+    /// By how much a state is shifted to bring its bit to the sign of a number.
+    shift: u32,
 }
 
 impl SignGenerator {
-    /// The generator of the cells: a = 1,664,525, c = 1,013,904,223, the top bit.
-    /// Source: W. H. Press et al., *Numerical Recipes in C*, 2nd ed. (1992), §7.1.
-    pub const NUMERICAL_RECIPES: Self = Self {
-        step: Step {
-            multiplier: 1_664_525,
-            increment: 1_013_904_223,
-            shift: 63 - 31,
-        },
-    };
-
     /// A generator with `multiplier` a and `increment` c. A weight is +1 if bit `bit` of the state is set, and −1
     /// otherwise.
     ///
@@ -37,13 +30,10 @@ impl SignGenerator {
     /// [`Refusal`] for a `bit` beyond 31.
     pub fn new(multiplier: u32, increment: u32, bit: u32) -> Result<Self, Refusal> {
         within("bit", f64::from(bit), 0.0, 31.0)?;
-        let shift = 63 - bit;
         Ok(Self {
-            step: Step {
-                multiplier,
-                increment,
-                shift,
-            },
+            multiplier,
+            increment,
+            shift: 63 - bit,
         })
     }
 
@@ -51,7 +41,7 @@ impl SignGenerator {
     fn jump(self, steps: u64) -> (u32, u32) {
         let then = |(a, c): (u32, u32), (b, d): (u32, u32)| (a.wrapping_mul(b), b.wrapping_mul(c).wrapping_add(d));
         let mut left = steps & 0xffff_ffff;
-        let (mut jump, mut square) = ((1, 0), (self.step.multiplier, self.step.increment));
+        let (mut jump, mut square) = ((1, 0), (self.multiplier, self.increment));
         while left > 0 {
             if left & 1 == 1 {
                 jump = then(jump, square);
@@ -110,7 +100,7 @@ impl SignOperator {
         y.fill(0.0);
         for (block, minus_x) in minus_x.chunks(BLOCK).enumerate() {
             let mut states = self.states(block, first);
-            add_rows(self.generator.step, &mut states[..minus_x.len()], minus_x, y);
+            add_rows(self.generator, &mut states[..minus_x.len()], minus_x, y);
         }
     }
 }
@@ -141,7 +131,7 @@ impl LinearOperator for SignOperator {
             let mut states = self.states(block, 0);
             let mut sums = [[0.0; LANES]; BLOCK];
             let groups = x.len().div_ceil(LANES);
-            add_columns(self.generator.step, &mut states[..groups], y, &mut sums[..groups]);
+            add_columns(self.generator, &mut states[..groups], y, &mut sums[..groups]);
             x.copy_from_slice(&sums.as_flattened()[..x.len()]);
         });
     }
@@ -172,18 +162,7 @@ const ROWS: usize = 4;
 /// Sign of an `f64`.
 const SIGN: u64 = 1 << 63;
 
-/// One step of the generators, s ↦ a·s + c mod 2³², and the place of the bit that is the sign.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Step {
-    /// a.
-    pub(super) multiplier: u32,
-    /// c.
-    pub(super) increment: u32,
-    /// Shift that brings the sign's bit of a widened state to bit 63.
-    pub(super) shift: u32,
-}
-
-impl Step {
+impl SignGenerator {
     /// Moves the generators on; −`v` where the sign's bit is clear, `v` where it is set, for `minus_v` = −`v`.
     #[inline(always)]
     fn signed(self, state: &mut u32, minus_v: f64) -> f64 {
@@ -194,14 +173,14 @@ impl Step {
 
 /// Sums of `R` rows over the columns that `states` and `minus_x` hold.
 #[inline(always)]
-fn rows<const R: usize>(step: Step, states: &mut [[u32; LANES]], minus_x: &[[f64; LANES]]) -> [f64; R] {
+fn rows<const R: usize>(generator: SignGenerator, states: &mut [[u32; LANES]], minus_x: &[[f64; LANES]]) -> [f64; R] {
     let mut sums = [[0.0; LANES]; R];
     for (states, minus_x) in states.iter_mut().zip(minus_x) {
         // a copy stays in registers
         let mut now = *states;
         for sums in &mut sums {
             for lane in 0..LANES {
-                sums[lane] += step.signed(&mut now[lane], minus_x[lane]);
+                sums[lane] += generator.signed(&mut now[lane], minus_x[lane]);
             }
         }
         *states = now;
@@ -219,26 +198,31 @@ fn rows<const R: usize>(step: Step, states: &mut [[u32; LANES]], minus_x: &[[f64
 
 /// `y[r]` += Σₖ ±xₖ over a block of columns, one row after the other.
 #[inline(always)]
-fn add_rows_of(step: Step, states: &mut [[u32; LANES]], minus_x: &[[f64; LANES]], y: &mut [f64]) {
+fn add_rows_of(generator: SignGenerator, states: &mut [[u32; LANES]], minus_x: &[[f64; LANES]], y: &mut [f64]) {
     let (fours, rest) = y.as_chunks_mut::<ROWS>();
     for out in fours {
-        let sums: [f64; ROWS] = rows(step, states, minus_x);
+        let sums: [f64; ROWS] = rows(generator, states, minus_x);
         out.iter_mut().zip(sums).for_each(|(out, sum)| *out += sum);
     }
     for out in rest {
-        let [sum] = rows(step, states, minus_x);
+        let [sum] = rows(generator, states, minus_x);
         *out += sum;
     }
 }
 
 /// `x[k]` += ±`y[r]` for `R` rows.
 #[inline(always)]
-fn columns<const R: usize>(step: Step, states: &mut [[u32; LANES]], y: &[f64; R], x: &mut [[f64; LANES]]) {
+fn columns<const R: usize>(
+    generator: SignGenerator,
+    states: &mut [[u32; LANES]],
+    y: &[f64; R],
+    x: &mut [[f64; LANES]],
+) {
     for (states, x) in states.iter_mut().zip(x) {
         let (mut now, mut sums) = (*states, *x);
         for y in y {
             for lane in 0..LANES {
-                sums[lane] += step.signed(&mut now[lane], -y);
+                sums[lane] += generator.signed(&mut now[lane], -y);
             }
         }
         (*states, *x) = (now, sums);
@@ -247,26 +231,26 @@ fn columns<const R: usize>(step: Step, states: &mut [[u32; LANES]], y: &[f64; R]
 
 /// `x[k]` += Σᵣ ±`y[r]` over a block of columns.
 #[inline(always)]
-fn add_columns_of(step: Step, states: &mut [[u32; LANES]], y: &[f64], x: &mut [[f64; LANES]]) {
+fn add_columns_of(generator: SignGenerator, states: &mut [[u32; LANES]], y: &[f64], x: &mut [[f64; LANES]]) {
     let (fours, rest) = y.as_chunks::<ROWS>();
     for y in fours {
-        columns(step, states, y, x);
+        columns(generator, states, y, x);
     }
     for y in rest {
-        columns(step, states, &[*y], x);
+        columns(generator, states, &[*y], x);
     }
 }
 
 /// [`add_rows_of`] with the best instructions of this machine.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-pub(super) fn add_rows(step: Step, states: &mut [[u32; LANES]], minus_x: &[[f64; LANES]], y: &mut [f64]) {
-    add_rows_of(step, states, minus_x, y);
+pub(super) fn add_rows(generator: SignGenerator, states: &mut [[u32; LANES]], minus_x: &[[f64; LANES]], y: &mut [f64]) {
+    add_rows_of(generator, states, minus_x, y);
 }
 
 /// [`add_columns_of`] with the best instructions of this machine.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-pub(super) fn add_columns(step: Step, states: &mut [[u32; LANES]], y: &[f64], x: &mut [[f64; LANES]]) {
-    add_columns_of(step, states, y, x);
+pub(super) fn add_columns(generator: SignGenerator, states: &mut [[u32; LANES]], y: &[f64], x: &mut [[f64; LANES]]) {
+    add_columns_of(generator, states, y, x);
 }
 
 #[cfg(test)]
@@ -355,7 +339,7 @@ mod tests {
     /// The chosen instructions against the ones that every machine has.
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
-        let step = Step {
+        let generator = SignGenerator {
             multiplier: 1_664_525,
             increment: 1_013_904_223,
             shift: 32,
@@ -365,12 +349,12 @@ mod tests {
         let y: Vec<f64> = (0..43).map(value).collect();
         let (mut a, mut b) = (states(), states());
         let (mut out_a, mut out_b) = (vec![0.0; 43], vec![0.0; 43]);
-        add_rows(step, &mut a, &minus_x, &mut out_a);
-        add_rows_of(step, &mut b, &minus_x, &mut out_b);
+        add_rows(generator, &mut a, &minus_x, &mut out_a);
+        add_rows_of(generator, &mut b, &minus_x, &mut out_b);
         assert!(a == b && out_a.iter().zip(&out_b).all(|(a, b)| a.to_bits() == b.to_bits()));
         let (mut out_a, mut out_b) = (minus_x.clone(), minus_x.clone());
-        add_columns(step, &mut a, &y, &mut out_a);
-        add_columns_of(step, &mut b, &y, &mut out_b);
+        add_columns(generator, &mut a, &y, &mut out_a);
+        add_columns_of(generator, &mut b, &y, &mut out_b);
         let bits = |v: &[[f64; LANES]]| -> Vec<u64> { v.iter().flatten().map(|v| v.to_bits()).collect() };
         assert!(a == b && bits(&out_a) == bits(&out_b));
     }

@@ -2,10 +2,8 @@
 //! in [`RECOVER`]; one with a prior has a line in [`REGULARISED`]. [`conformance`] and [`conformance_regularised`] run
 //! on all of them.
 //!
-//! Three algorithms have another interface: [`BatchOmp`] uses one operator for many measurements,
-//! [`SequentialEstimate`] accepts rows one by one, and [`TrackedImage`] follows a changing image from window to window.
+//! Two algorithms have another interface: [`SequentialEstimate`] accepts rows one by one, and [`TrackedImage`] follows a changing image from window to window.
 
-mod batch_omp;
 mod conformance;
 mod fixed;
 mod gaussian;
@@ -18,13 +16,13 @@ mod sequential;
 mod tv;
 mod unrolled;
 
-pub use batch_omp::BatchOmp;
 pub use conformance::{conformance, conformance_regularised};
 pub use fixed::{Fixed, FixedWindow};
 pub use gaussian::{Lmmse, NnLmmse};
 pub use nn_lasso::NnLasso;
 pub(crate) use prior::no_images;
 pub use prior::{Gaussian, ImagePrior, Noise, Penalty, Stopping};
+pub(crate) use pursuit::{CONVERGED, back_substitute};
 pub use pursuit::{NnOmp, Omp};
 pub use reference::ReferenceOmp;
 pub use sequential::{Motion, SequentialEstimate, SequentialGains, TrackedImage};

@@ -4,7 +4,6 @@ use crate::kernels;
 use crate::kernels::LANES;
 use crate::matrix::MatrixView;
 use crate::problem::{Problem, Recover, Scaled, Scaling, Solution, Workspace};
-use crate::recover::batch_omp::GramScratch;
 use spts_input::Refusal;
 
 /// Orthogonal matching pursuit. Each step selects argmaxₖ |aₖᵀ r| / ‖aₖ‖₂ and makes the residual r orthogonal to all
@@ -183,7 +182,6 @@ impl Recover for NnOmp {
 pub(crate) struct Greedy {
     pub(crate) scaling: Scaling,
     pub(crate) state: State,
-    pub(crate) gram: GramScratch,
 }
 
 impl Greedy {

@@ -8,7 +8,7 @@ use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use spts_input::Refusal;
 use spts_recon::classify::{EvidenceClassifier, ImageEstimator, Library, Posterior, Src, TemplateModel};
-use spts_recon::recover::{BatchOmp, Build, RECOVER, REGULARISED};
+use spts_recon::recover::{Build, RECOVER, REGULARISED};
 use spts_recon::{AmplitudeRange, Matrix, MatrixView, Problem, Recover, SignTables, Solution, Workspace};
 
 /// Both tables, for K unknowns and S atoms.
@@ -186,44 +186,6 @@ fn operators_and_measurements_of_any_scale_are_the_same_problem() {
     }
 }
 
-#[test]
-fn a_shared_operator_of_any_scale_is_the_same_problem() {
-    let (m, k) = (20, 60);
-    let (values, y) = drawn(m, k);
-    let solve = |a_scale: f64, y_scale: f64| {
-        let a = Matrix::from_rows(m, k, values.iter().map(|v| v * a_scale).collect()).unwrap();
-        let y: Vec<f64> = y.iter().map(|v| v * y_scale).collect();
-        let mut solution = Solution::default();
-        let result = BatchOmp::new(a.view(), 5)
-            .unwrap()
-            .recover_into(&y, &mut Workspace::default(), &mut solution);
-        result.map(|()| solution)
-    };
-    let unit = solve(1.0, 1.0).unwrap();
-    for scale in [2.0_f64.powi(-900), 2.0_f64.powi(900)] {
-        let got = solve(scale, scale).unwrap();
-        assert_eq!(
-            (got.support, got.coefficients),
-            (unit.support.clone(), unit.coefficients.clone())
-        );
-    }
-    assert!(says(&solve(1e-300, 1e300), "the coefficient of atom"));
-    let zero = solve(1.0, 0.0).unwrap();
-    assert!(zero.support.is_empty() && zero.residual_norm == 0.0);
-}
-
-#[test]
-fn an_operator_that_is_not_finite_is_refused() {
-    let mut values = drawn(20, 60).0;
-    values[67] = f64::NAN;
-    let a = Matrix::from_rows(20, 60, values).unwrap();
-    assert!(says(&BatchOmp::new(a.view(), 3), "operator[1, 7] = NaN"));
-    assert!(says(
-        &BatchOmp::new(Matrix::zeros(0, 3).view(), 3),
-        "operator has shape 0 × 3"
-    ));
-}
-
 /// Unknowns where allocations are counted.
 const K: usize = 40;
 
@@ -250,11 +212,6 @@ fn no_decode_allocates() {
         for (name, build) in REGULARISED {
             assert_none(name, &*build(K).unwrap(), &a, &y);
         }
-        let (mut work, mut solution) = (Workspace::default(), Solution::default());
-        let shared = BatchOmp::new(a.view(), 6).unwrap();
-        let mut decode = || shared.recover_into(&y, &mut work, &mut solution).unwrap();
-        decode();
-        assert_eq!(measure(decode).count_total, 0, "shared operator, M = {m}");
     }
 }
 
