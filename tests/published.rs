@@ -43,12 +43,11 @@ const DIGESTS: [(usize, usize, &str); 5] = [
 /// Φ·D with weights 0 and 1, and the measurements, of the first `m` samples of a frame.
 fn window(recording: &Recording, dictionary: &Matrix, press: usize, frame: usize, m: usize) -> (Matrix, Vec<f64>) {
     let start = frame * recording.measurements_per_frame();
-    let mut clock = recording.rows(press, start..start + m).clock();
-    let (mut row, mut a) = (vec![0.0; recording.taxels()], Matrix::zeros(m, dictionary.ncols()));
-    for r in 0..m {
-        clock.next_row(&mut row);
-        row.iter_mut().for_each(|w| *w = 0.5 * (*w + 1.0));
-        dictionary.accumulate_row(&row, a.row_mut(r));
+    let mut rows = recording.rows(press, start..start + m).to_vec();
+    rows.iter_mut().for_each(|w| *w = 0.5 * (*w + 1.0));
+    let mut a = Matrix::zeros(m, dictionary.ncols());
+    for (r, row) in rows.chunks(recording.taxels()).enumerate() {
+        dictionary.accumulate_row(row, a.row_mut(r));
     }
     (a, recording.volts(press, frame)[..m].to_vec())
 }

@@ -66,6 +66,6 @@ pub use recording::{Block, Recording, RecordingInfo, Slip};
 pub use source::{ConductanceSource, Constant, Interpolated, Segment, Started};
 pub use weights::{
     CellCodes, FIRST_ADDRESS, INCREMENT, Jump, LevelSource, MAX_PATTERNS_BYTES, MAX_SEEDS_BYTES, MULTIPLIER, Mode,
-    Patterns, Seeding, WeightClock, WeightMode, WeightRows, Weights, check_codes, parse_patterns, parse_seeds,
+    Patterns, Seeding, WeightMode, WeightRows, Weights, check_codes, parse_patterns, parse_seeds,
     seeds_of_first_window,
 };

@@ -1,5 +1,5 @@
-//! Deciding by evidence, 17 classes and the unknown, images sample by sample, and localising a blob: what is done
-//! before a sample arrives, and after it.
+//! Deciding by evidence, 17 classes and the unknown, a mixture of shapes, and localising a blob: what is done before a
+//! sample arrives, and after it.
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::{RngExt as _, SeedableRng as _};
@@ -7,19 +7,12 @@ use rand_chacha::ChaCha8Rng;
 use spts_recon::classify::{
     ClusterModel, Clusters, EvidenceClassifier, ImageEstimator, Library, Posterior, TemplateModel,
 };
-use spts_recon::localise::{BlobConfig, Localiser};
-use spts_recon::metrics::SUPPORT_THRESHOLD;
-use spts_recon::recover::{Gaussian, Lmmse, Motion, Noise, SequentialEstimate, SequentialGains, TrackedImage};
-use spts_recon::{AmplitudeRange, Matrix, Problem, Recover as _, SignTables, Solution, Workspace};
+use spts_recon::localise::Localiser;
+use spts_recon::{AmplitudeRange, Matrix, SignTables, Workspace};
 use std::hint::black_box;
-use std::sync::Arc;
 
 /// Rows and columns of the sheet.
 const SIDE: usize = 10;
-/// Taxels.
-const N: usize = SIDE * SIDE;
-/// Samples of a window.
-const M: usize = 20;
 
 fn signs(rng: &mut ChaCha8Rng) -> Vec<f64> {
     (0..SIDE * SIDE)
@@ -76,7 +69,7 @@ fn evidence(c: &mut Criterion) {
 
 fn localise(c: &mut Criterion) {
     let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let localiser = Localiser::new(&BlobConfig::new(SIDE, SIDE)).expect("valid parameters");
+    let localiser = Localiser::new([SIDE, SIDE]).expect("valid parameters");
     let (mut evidence, mut projected) = (localiser.evidence(), Vec::new());
     let weights = signs(&mut rng);
     c.bench_function("blob/project a row", |b| {
@@ -154,79 +147,9 @@ fn mixture(c: &mut Criterion) {
     group.finish();
 }
 
-/// Images sample by sample. The peer is the estimate of the whole window so far,
-/// computed anew, as it would be without rank-one updates.
-fn anytime(c: &mut Criterion) {
-    let mut rng = ChaCha8Rng::seed_from_u64(2);
-    let rows: Vec<Vec<f64>> = (0..M).map(|_| signs(&mut rng)).collect();
-    let y: Vec<f64> = (0..M).map(|_| rng.random_range(-3.0..3.0)).collect();
-    let covariance = {
-        let mut covariance = Matrix::zeros(N, N);
-        for i in 0..N {
-            for j in 0..N {
-                let (down, across) = ((i / SIDE).abs_diff(j / SIDE), (i % SIDE).abs_diff(j % SIDE));
-                let nugget = if i == j { 0.05 } else { 0.0 };
-                covariance.row_mut(i)[j] = (-0.25 * (down * down + across * across) as f64).exp() + nugget;
-            }
-        }
-        covariance
-    };
-    let prior = Arc::new(Gaussian::new(vec![0.0; N], covariance).expect("positive definite"));
-    let noise = Noise::Relative(0.12);
-    let mut gains = SequentialGains::new(Arc::clone(&prior), noise).expect("a prior without a mean");
-    let mut estimate = SequentialEstimate::new(&gains);
-    let mut group = c.benchmark_group("anytime/image");
-    group.bench_function("a window of 20 rows and samples", |b| {
-        b.iter(|| {
-            gains.clear();
-            estimate.clear();
-            for (row, y) in rows.iter().zip(&y) {
-                gains.push(black_box(row)).expect("finite");
-                estimate.observe(&gains, *y).expect("finite");
-            }
-        });
-    });
-    group.bench_function("a window of 20 samples, rows prepared", |b| {
-        b.iter(|| {
-            estimate.clear();
-            for y in black_box(&y) {
-                estimate.observe(&gains, *y).expect("finite");
-            }
-        });
-    });
-    group.bench_function("expected IoU", |b| {
-        b.iter(|| black_box(&estimate).expected_iou(&gains, SUPPORT_THRESHOLD));
-    });
-    let motion = Motion {
-        memory: 1286.0,
-        strength_memory: 96.0,
-        noise: 0.12,
-        idle_noise: 0.1,
-    };
-    let mut tracked = TrackedImage::new(Arc::clone(&prior), motion).expect("a prior without a mean");
-    let window = Matrix::from_rows(M, N, rows.concat()).expect("the sizes fit");
-    group.bench_function("a window of 20 rows and samples, followed in time", |b| {
-        b.iter(|| tracked.observe(20.0, black_box(window.view()), &y).expect("finite"));
-    });
-    let lmmse = Lmmse::new(prior, noise).expect("in range");
-    let (mut work, mut solution) = (Workspace::default(), Solution::default());
-    let windows: Vec<Matrix> = (1..=M)
-        .map(|m| Matrix::from_rows(m, N, rows[..m].concat()).expect("the sizes fit"))
-        .collect();
-    group.bench_function("peer: 20 estimates of the window so far", |b| {
-        b.iter(|| {
-            for (window, m) in windows.iter().zip(1..) {
-                let problem = Problem::new(window.view(), black_box(&y[..m])).expect("the sizes fit");
-                lmmse.recover_into(&problem, &mut work, &mut solution).expect("finite");
-            }
-        });
-    });
-    group.finish();
-}
-
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-criterion_group!(benches, evidence, mixture, anytime, localise);
+criterion_group!(benches, evidence, mixture, localise);
 criterion_main!(benches);

@@ -283,18 +283,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn column_slices_become_columns() {
-        let matrix = Matrix::from_column_slices(3, &[&[1.0, 2.0, 3.0], &[4.0, 5.0, 6.0]]);
-        assert_eq!(matrix.view().values(), [1.0, 4.0, 2.0, 5.0, 3.0, 6.0]);
-    }
-
-    #[test]
-    #[should_panic(expected = "column 1 must have one value for each of the 2 rows")]
-    fn columns_of_unequal_length_are_named() {
-        let _ = Matrix::from_column_slices(2, &[vec![1.0, 2.0], vec![1.0, 2.0, 3.0]]);
-    }
-
-    #[test]
     fn a_corner_pixel_moves_to_every_place_in_reach() {
         let corner = Matrix::from_rows(9, 1, vec![1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
         let all = shifted(&corner, 3, 1);

@@ -204,14 +204,6 @@ mod tests {
     }
 
     #[test]
-    fn an_hour_of_a_nanosecond_system_is_nothing() {
-        for product in [1e17, 1e18, 1e20] {
-            let (c, s) = Decay::new(-1e9, product, 1e18 - product).at(3600.0);
-            assert!(c.abs() < 1e-300 && s.abs() < 1e-300);
-        }
-    }
-
-    #[test]
     fn zeros_are_found_to_rounding() {
         assert_relative_eq!(
             crossing(&|t: f64| t.cos(), 0.0, 3.0),
@@ -229,12 +221,5 @@ mod tests {
             2_f64.ln() * 1e-6,
             max_relative = 1e-14
         );
-    }
-
-    #[test]
-    fn ends_count() {
-        assert_relative_eq!(crossing(&|t: f64| t, 0.0, 1.0), 0.0);
-        assert_relative_eq!(crossing(&|t: f64| 1.0 - t, 0.0, 1.0), 1.0);
-        assert_relative_eq!(crossing(&|t: f64| 1.0 + t, 0.0, 1.0), 0.0);
     }
 }

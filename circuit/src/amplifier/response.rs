@@ -65,12 +65,6 @@ impl AmplifierResponse {
         self.unity / (a0 - a2 * omega * omega).hypot(a1 * omega)
     }
 
-    /// f₀ = √(a₀/a₂)/2π, Hz; far beyond the bandwidth when the bus has no capacitance.
-    #[must_use]
-    pub fn natural_hz(&self) -> f64 {
-        (self.a[0] / self.a[2]).sqrt() / TAU
-    }
-
     /// Quality factor Q = √(a₀ a₂)/a₁. The output rings when it is above ½.
     #[must_use]
     pub fn quality(&self) -> f64 {

@@ -448,9 +448,32 @@ impl Weights {
             out.len(),
             self.taxels
         );
-        let mut clock = self.clock(first_row);
-        for row in out.chunks_exact_mut(self.taxels().max(1)) {
-            clock.next_row(row);
+        let taxels = self.taxels().max(1);
+        if let (Some(seeds), WeightMode::Analog | WeightMode::Binary) = (self.seeds(), self.mode) {
+            let jump = Jump::new(first_row);
+            let mut states: Vec<u32> = (0..self.taxels()).map(|k| jump.apply(seeds.seed(k))).collect();
+            match self.mode {
+                WeightMode::Analog => generate(&mut states, out, analog),
+                _ => generate(&mut states, out, binary),
+            }
+            return;
+        }
+        for (row, out) in (first_row..).zip(out.chunks_exact_mut(taxels)) {
+            match &self.source {
+                LevelSource::Patterns(patterns) => {
+                    let codes = patterns.row(row).iter();
+                    out.iter_mut()
+                        .zip(codes)
+                        .for_each(|(out, code)| *out = self.mode.code_level(*code));
+                }
+                _ => {
+                    out.fill(0.0);
+                    let scanned = row.checked_rem(u64::from(self.taxels)).map(usize::try_from);
+                    if let Some(level) = scanned.and_then(|k| out.get_mut(k.ok()?)) {
+                        *level = 1.0;
+                    }
+                }
+            }
         }
     }
 
@@ -459,79 +482,27 @@ impl Weights {
     /// # Panics
     /// If the length of `out` is not a whole number of rows.
     pub fn fill_codes(&self, first_row: u64, out: &mut [u8]) {
-        let taxels = self.taxels().max(1);
-        assert!(
-            out.len().is_multiple_of(taxels),
-            "{} codes are not a whole number of rows of {}",
-            out.len(),
-            self.taxels
-        );
-        let (mut clock, mut row) = (self.clock(first_row), vec![0.0; self.taxels()]);
-        for out in out.chunks_exact_mut(taxels) {
-            clock.next_row(&mut row);
-            for (out, level) in out.iter_mut().zip(&row) {
-                *out = code_of(*level);
-            }
-        }
-    }
-
-    /// A clock whose next row is `row`.
-    #[must_use]
-    pub fn clock(&self, row: u64) -> WeightClock {
-        let jump = Jump::new(row);
-        let states = match (self.mode, self.seeds()) {
-            (WeightMode::Raster, _) | (_, None) => Vec::new(),
-            (_, Some(seeds)) => (0..self.taxels()).map(|k| jump.apply(seeds.seed(k))).collect(),
-        };
-        WeightClock {
-            weights: self.clone(),
-            row,
-            states,
-        }
+        let mut levels = vec![0.0; out.len()];
+        self.fill_rows(first_row, &mut levels);
+        out.iter_mut()
+            .zip(&levels)
+            .for_each(|(out, level)| *out = code_of(*level));
     }
 }
 
-/// Iterates over rows; holds the generator state of every cell.
-#[derive(Debug, Clone)]
-pub struct WeightClock {
-    weights: Weights,
-    row: u64,
-    states: Vec<u32>,
-}
-
-impl WeightClock {
-    /// Writes the next row and advances. `out` has one entry a taxel.
-    pub fn next_row(&mut self, out: &mut [f64]) {
-        let mode = self.weights.mode;
-        if let Some(patterns) = self.weights.patterns() {
-            for (out, code) in out.iter_mut().zip(patterns.row(self.row)) {
-                *out = mode.code_level(*code);
-            }
-            self.row += 1;
-            return;
-        }
-        match mode {
-            WeightMode::Raster => {
-                out.fill(0.0);
-                let taxels = u64::from(self.weights.taxels).max(1);
-                if let Some(level) = usize::try_from(self.row % taxels).ok().and_then(|k| out.get_mut(k)) {
-                    *level = 1.0;
-                }
-            }
-            WeightMode::Analog => self.step_into(out, analog),
-            WeightMode::Binary => self.step_into(out, binary),
-        }
-        self.row += 1;
-    }
-
-    #[inline(always)]
-    fn step_into(&mut self, out: &mut [f64], level: impl Fn(u32) -> f64) {
-        for (state, out) in self.states.iter_mut().zip(out) {
+/// Steps the generators once a row, and writes what `level` makes of their states.
+#[inline(always)]
+fn generate(states: &mut [u32], out: &mut [f64], level: impl Fn(u32) -> f64) {
+    for out in out.chunks_exact_mut(states.len().max(1)) {
+        for (state, out) in states.iter_mut().zip(out) {
             *state = Jump::ONE.apply(*state);
             *out = level(*state);
         }
     }
 }
+
+/// Rows that are written at a time where each is needed but once.
+const PIECE: usize = 64;
 
 /// Consecutive rows of the weight matrix Φ, one for each measurement. No row is stored; the matrix of a large skin can
 /// be filled piece by piece with [`WeightRows::chunks`].
@@ -637,21 +608,15 @@ impl<'a> WeightRows<'a> {
     #[must_use]
     pub fn sign_bits(&self) -> Option<Vec<u64>> {
         (self.weights.mode() == WeightMode::Binary).then(|| {
-            let (mut bits, mut row) = (Vec::new(), vec![0.0; self.taxels()]);
-            let mut clock = self.clock();
-            for _ in 0..self.len {
-                clock.next_row(&mut row);
-                let word = |levels: &[f64]| levels.iter().rev().fold(0, |word, w| word << 1 | u64::from(*w > 0.0));
-                bits.extend(row.chunks(64).map(word));
+            let word = |levels: &[f64]| levels.iter().rev().fold(0, |word, w| word << 1 | u64::from(*w > 0.0));
+            let mut bits = Vec::new();
+            for piece in self.chunks(PIECE) {
+                for row in piece.to_vec().chunks_exact(self.taxels().max(1)) {
+                    bits.extend(row.chunks(64).map(word));
+                }
             }
             bits
         })
-    }
-
-    /// Iterates over rows, from the first one on and beyond the last.
-    #[must_use]
-    pub fn clock(&self) -> WeightClock {
-        self.weights.clock(self.first_row)
     }
 }
 

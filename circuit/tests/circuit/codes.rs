@@ -4,10 +4,9 @@ use crate::effects::assert_close;
 use crate::readout::{press_v, profile, skin, start, strip};
 use spts_circuit::{
     Block, CellCodes, CompressiveWeights, Interpolated, Jump, Mode, PROFILES, Profile, Readout, Seeding, WeightMode,
-    check_codes,
 };
 use spts_input::Refusal;
-use spts_models::{ConductanceMap, SkinLayout, Streams};
+use spts_models::{ConductanceMap, Streams};
 
 /// Cells whose code is a function of row and taxel.
 struct Cells<F> {
@@ -117,29 +116,6 @@ fn sound_cells_do_not_show() {
                 let without = record(&mut readout(), taxels as usize);
                 assert!(with_cells == without, "{taxels} taxels, {mode:?}: {profile:?}");
             }
-        }
-    }
-}
-
-/// Blocks in any order, each from a readout of its own, are those in order.
-#[test]
-fn blocks_of_codes_may_be_sought() {
-    let profile = Profile::named("as_built").unwrap();
-    for mode in [Mode::Raster, Mode::Compressive] {
-        let readout = || {
-            let readout = Readout::new(&profile, mode, &SkinLayout::default(), Streams::new(8), 1).unwrap();
-            let code = |row, taxel| if taxel % 3 == 0 { any_code(row, taxel) } else { 126 };
-            readout.with_codes(Box::new(Cells { taxels: 100, code })).unwrap()
-        };
-        let in_order = record(&mut readout(), 100);
-        for (block, press) in presses(100).iter_mut().enumerate().rev() {
-            let mut readout = readout();
-            readout.seek(block as u64, 3 + 77 * block as u64);
-            let volts = readout.acquire(press, 2000).unwrap().volts;
-            assert!(
-                volts.iter().map(|v| v.to_bits()).eq(in_order[block].iter().copied()),
-                "{mode:?}, block {block}"
-            );
         }
     }
 }
@@ -279,17 +255,4 @@ fn codes_that_cannot_be_had_are_an_error() {
     // the readout can be used on
     readout.seek(0, 1);
     assert!(readout.acquire(&mut skin(&press_v()), 100).is_ok());
-}
-
-#[test]
-fn the_cells_of_these_tests_conform() {
-    for mode in [Mode::Raster, Mode::Compressive] {
-        check_codes(&|| sound_cells(&profile(""), mode, 100));
-    }
-    check_codes(&|| {
-        Box::new(Cells {
-            taxels: 5,
-            code: any_code,
-        })
-    });
 }

@@ -128,15 +128,6 @@ fn offset_asymmetry_and_pattern_are_exact() {
     }
 }
 
-#[test]
-fn the_next_scanned_taxel_undershoots() {
-    let e = error("[raster.memory]\nh1 = -0.06\nh2 = 0.015", Mode::Raster);
-    let x = press_v();
-    // taxels 67 and 68 follow the last pressed one
-    assert_close(e[67], -0.06 * x[66] + 0.015 * x[65], 8.0 * f64::EPSILON);
-    assert_close(e[68], 0.015 * x[66], 8.0 * f64::EPSILON);
-}
-
 /// In a raster scan a cell that has missed n edges answers n measurements late. After R edges it has missed R·p of
 /// them, p between 0 and 2e-4: over a hundred cells as many as the sum of their p says, to which their spread adds
 /// R·2e-4/√12 a cell.
@@ -405,23 +396,6 @@ fn offset_gain_and_floor_are_exact() {
             // a hundred roundings of values up to 10
             assert_close(*y, expected, 1000.0 * f64::EPSILON);
         }
-    }
-}
-
-/// The floor alone makes the drive asymmetric: y gains half the error of the low level times Σx, less what the weights
-/// lose.
-#[test]
-fn a_floor_is_an_asymmetry() {
-    let parameters = "floor_v = 0.2\noffset_v = 0.0\ngain_lsb = 0.0\ninl_lsb = 0.0\ndnl_lsb = 0.0";
-    let x = press_v();
-    let (y, u) = (
-        volts(&profile(&dac("compressive", parameters)), Mode::Compressive, &x, 1000),
-        volts(&profile(""), Mode::Compressive, &x, 1000),
-    );
-    let half = 0.5 * 0.2 / (4.34 / 256.0) / 127.5;
-    let sum: f64 = x.iter().sum();
-    for (y, u) in y.iter().zip(&u) {
-        assert_close(*y, (1.0 - half) * u + half * sum, 1000.0 * f64::EPSILON);
     }
 }
 

@@ -76,20 +76,6 @@ fn every_profile_is_valid_in_both_modes() {
     assert!(bad.validate(100).unwrap_err().to_string().contains("sample_rate_hz"));
 }
 
-#[test]
-fn an_ideal_raster_is_the_skin() {
-    let x = press_v();
-    let block = readout("ideal", Mode::Raster).acquire(&mut skin(&x), 300).unwrap();
-    for (k, y) in block.volts.iter().enumerate() {
-        let expected = x[k % 100];
-        // one division and one product by 4300
-        assert!(
-            (y - expected).abs() <= 2.0 * f64::EPSILON * expected,
-            "taxel {k}: {y} V, expected {expected} V"
-        );
-    }
-}
-
 /// 150 rows have rank 100; their condition squared times the rounding of a sum of 100 terms stays far below 1e-9.
 #[test]
 fn a_noiseless_recording_is_inverted() {
@@ -227,35 +213,6 @@ fn a_short_skin_saturates() {
     }
 }
 
-/// A skin of one shorted taxel lies on a rail at every sample.
-#[test]
-fn saturation_on_every_sample() {
-    let rails = profile("[compressive.rails]\nlimit_v = 5.0\n[raster.rails]\nlimit_v = 5.0");
-    for mode in MODES {
-        let (y, ideal) = (volts(&rails, mode, 1, 1.0), volts(&profile(""), mode, 1, 1.0));
-        for (y, u) in y.iter().zip(&ideal) {
-            assert!(u.abs() > 5.0);
-            assert_close(*y, 5.0_f64.copysign(*u), 0.0);
-        }
-    }
-}
-
-#[test]
-fn a_skin_of_one_taxel() {
-    let g = 1e-4;
-    let weights = Weights::new(WeightMode::Binary, Seeding::Address, 1);
-    for (y, row) in volts(&profile(""), Mode::Compressive, 1, g).iter().zip(0_u64..) {
-        assert_close(*y, weights.level(0, row) * g * 4300.0, 2.0 * f64::EPSILON);
-    }
-    for y in volts(&profile(""), Mode::Raster, 1, g) {
-        assert_close(y, g * 4300.0, 2.0 * f64::EPSILON);
-    }
-    for mode in MODES {
-        let y = volts(&Profile::named("as_built").unwrap(), mode, 1, g);
-        assert!(y.iter().all(|y| y.is_finite()), "{mode:?}");
-    }
-}
-
 /// A million taxels, few of them pressed, against the sum over the pressed ones. The matrix would have 3e8 entries.
 #[test]
 fn a_skin_of_a_million_taxels() {
@@ -303,22 +260,6 @@ fn impossible_conductances_are_refused_and_tiny_ones_are_finite() {
             assert!(y.iter().all(|y| y.is_finite()), "{name}, {mode:?}");
         }
     }
-}
-
-/// More conductance never lowers a raster's volts, up to the clip; the noise is the same for both.
-#[test]
-fn raster_volts_rise_with_conductance() {
-    let adc = "[raster.adc]\nbits = 10\nreference_v = 3.3\ndivider = 3.0787878787878786\noffset_v = 4.3";
-    let quiet = profile(&format!(
-        "[raster.idle_noise]\nsd_v = 0.05\n[raster.rails]\nlimit_v = 4.0\n{adc}"
-    ));
-    let mut below = f64::NEG_INFINITY;
-    for k in 0..400 {
-        let y = volts(&quiet, Mode::Raster, 100, 1e-9 * 1.1_f64.powi(k / 2))[57];
-        assert!(y >= below, "{y} V after {below} V");
-        below = y;
-    }
-    assert!(below > 3.9, "{below} V: the clip was not reached");
 }
 
 /// Knots so close that a slope between them would be infinite.

@@ -9,7 +9,7 @@ use crate::windows::Press;
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
 use spts_recon::classify::{Component, TemplateModel};
-use spts_recon::localise::BlobConfig;
+use spts_recon::localise::WIDTHS_PX;
 use spts_recon::recover::ImagePrior;
 use spts_recon::rows::{Expected, RowTask, Tolerances, choose_for_classes, choose_for_images};
 use spts_recon::{Matrix, MatrixView};
@@ -136,7 +136,6 @@ pub(crate) fn chosen_places(press: &Press, shape: [usize; 2], most: usize) -> Re
 /// One round blob at every taxel, of every width that the locator knows.
 fn blobs(shape: [usize; 2]) -> Matrix {
     let [rows, cols] = shape;
-    let widths = BlobConfig::new(rows, cols).widths_px;
     let blob = |width: f64, centre: usize| {
         let at = |k: usize| {
             let d = ((k / cols) as f64 - (centre / cols) as f64).hypot((k % cols) as f64 - (centre % cols) as f64);
@@ -144,7 +143,7 @@ fn blobs(shape: [usize; 2]) -> Matrix {
         };
         (0..rows * cols).map(at).collect::<Vec<f64>>()
     };
-    let all = widths
+    let all = WIDTHS_PX
         .iter()
         .flat_map(|&width| (0..rows * cols).map(move |centre| (width, centre)));
     let images: Vec<Vec<f64>> = all.map(|(width, centre)| blob(width, centre)).collect();

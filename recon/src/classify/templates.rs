@@ -33,19 +33,9 @@ use spts_input::Refusal;
 pub struct TemplateModel {
     /// Number of columns of the grid.
     pub cols: usize,
-    /// m: standard deviation of an image's values relative to the blurred image, [0, 10].
-    pub mismatch: f64,
-    /// Standard deviation of the blur, taxels, [0, 100]; 0 for no blur.
-    pub blur_px: f64,
-    /// ρ: share of the variance that is smooth, [0, 1].
-    pub smooth_share: f64,
-    /// ℓ: correlation length of the smooth part, taxels, [0.01, 1000].
-    pub length_px: f64,
     /// γ: relative standard deviation of every taxel's gain compared with that in the images, one value a taxel in [0,
     /// 10]; empty for images of the same skin.
     pub gains: Vec<f64>,
-    /// f: standard deviation of every taxel, relative to the maximum, [0, 10].
-    pub floor: f64,
     /// Standard deviation of the noise of one measurement, relative to the image's maximum, [1e-6, 1e5].
     pub noise: f64,
     /// Number of eigenvectors of the smooth part that are kept.
@@ -54,18 +44,24 @@ pub struct TemplateModel {
     pub reach: usize,
 }
 
+/// m: standard deviation of an image's values relative to the blurred image.
+const MISMATCH: f64 = 0.22;
+/// Standard deviation of the blur, taxels.
+const BLUR_PX: f64 = 0.7;
+/// ρ: share of the variance that is smooth.
+const SMOOTH_SHARE: f64 = 0.8;
+/// ℓ: correlation length of the smooth part, taxels.
+const LENGTH_PX: f64 = 2.0;
+/// f: standard deviation of every taxel, relative to the maximum.
+const FLOOR: f64 = 0.025;
+
 impl TemplateModel {
     /// Values for presses that are repeated accurately. `noise` also covers the differences between sessions.
     #[must_use]
     pub fn new(cols: usize) -> Self {
         Self {
             cols,
-            mismatch: 0.22,
-            blur_px: 0.7,
-            smooth_share: 0.8,
-            length_px: 2.0,
             gains: Vec::new(),
-            floor: 0.025,
             noise: 0.4,
             rank: 8,
             reach: 0,
@@ -86,11 +82,6 @@ impl TemplateModel {
     }
 
     fn check(&self, taxels: usize) -> Result<(), Refusal> {
-        within("mismatch", self.mismatch, 0.0, 10.0)?;
-        within("blur_px", self.blur_px, 0.0, 100.0)?;
-        within("smooth_share", self.smooth_share, 0.0, 1.0)?;
-        within("length_px", self.length_px, 0.01, 1000.0)?;
-        within("floor", self.floor, 0.0, 10.0)?;
         within("noise", self.noise, 1e-6, 1e5)?;
         if !self.gains.is_empty() && self.gains.len() != taxels {
             return Err(other_length("gains", self.gains.len(), taxels));
@@ -120,7 +111,7 @@ impl TemplateModel {
     /// The components of [`Self::classes`] as full Gaussians, in the same order, for [`super::ImageEstimator`].
     ///
     /// # Errors
-    /// As [`Self::classes`]; [`Refusal`] if there is no deviation, as with `floor` = 0 and `mismatch` = 0.
+    /// As [`Self::classes`].
     pub fn image_priors(&self, library: &Library) -> Result<Vec<Gaussian>, Refusal> {
         let places = self.places(library, self.reach)?.into_iter();
         places
@@ -166,7 +157,7 @@ impl TemplateModel {
     pub fn unknown(&self, library: &Library) -> Result<Component, Refusal> {
         let (mean, covariance) = self.moments(library)?;
         let (factors, rest) = principal(covariance, self.rank);
-        let independent = mean.len() as f64 * self.floor.powi(2);
+        let independent = mean.len() as f64 * FLOOR.powi(2);
         Ok(Component {
             label: None,
             weight: 1.0,
@@ -174,18 +165,6 @@ impl TemplateModel {
             factors,
             noise_variance: self.noise.powi(2) + independent + rest,
         })
-    }
-
-    /// [`Self::unknown`] as a full Gaussian.
-    ///
-    /// # Errors
-    /// As [`Self::image_priors`].
-    pub fn unknown_prior(&self, library: &Library) -> Result<Gaussian, Refusal> {
-        let (mean, mut covariance) = self.moments(library)?;
-        for i in 0..mean.len() {
-            covariance[(i, i)] += self.floor.powi(2);
-        }
-        Gaussian::new(mean, Matrix::from(&covariance))
     }
 
     /// Mean and covariance of all images, each at its place and one taxel to every side.
@@ -209,30 +188,25 @@ fn peak_one(image: &[f64]) -> Option<Vec<f64>> {
 impl TemplateModel {
     /// Smooth part of Σ and variances of the independent one, for the template `mean`.
     pub(super) fn covariance(&self, mean: &[f64]) -> (DMatrix<f64>, Vec<f64>) {
-        let deviation: Vec<f64> = self.blur(mean).iter().map(|v| self.mismatch * v).collect();
+        let deviation: Vec<f64> = self.blur(mean).iter().map(|v| MISMATCH * v).collect();
         let smooth = DMatrix::from_fn(mean.len(), mean.len(), |i, j| {
             let d2 = distance_squared(i, j, self.cols);
             let gain = match self.gains.get(i) {
                 Some(gain) if i == j => gain * mean[i],
                 _ => 0.0,
             };
-            self.smooth_share * deviation[i] * deviation[j] * (-d2 / (2.0 * self.length_px.powi(2))).exp() + gain * gain
+            SMOOTH_SHARE * deviation[i] * deviation[j] * (-d2 / (2.0 * LENGTH_PX.powi(2))).exp() + gain * gain
         });
-        let independent = deviation
-            .iter()
-            .map(|a| (1.0 - self.smooth_share) * a * a + self.floor.powi(2));
+        let independent = deviation.iter().map(|a| (1.0 - SMOOTH_SHARE) * a * a + FLOOR.powi(2));
         (smooth, independent.collect())
     }
 
     /// Gaussian blur with zeros around the image.
     fn blur(&self, image: &[f64]) -> Vec<f64> {
-        if self.blur_px <= 0.0 {
-            return image.to_vec();
-        }
-        let kernel = |d2: f64| (-d2 / (2.0 * self.blur_px.powi(2))).exp();
+        let kernel = |d2: f64| (-d2 / (2.0 * BLUR_PX.powi(2))).exp();
         // the sum of the kernel over all taxels of the plane; beyond 40 deviations nothing is left in double precision
         let (mut line, mut d) = (1.0, 1.0);
-        while d <= 40.0 * self.blur_px + 1.0 {
+        while d <= 40.0 * BLUR_PX + 1.0 {
             line += 2.0 * kernel(d * d);
             d += 1.0;
         }
@@ -274,7 +248,6 @@ pub(super) fn principal(covariance: DMatrix<f64>, rank: usize) -> (Vec<Vec<f64>>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::checks::says;
 
     /// The priors are the stated Σ, independent part included, in the order of the classes.
     #[test]
@@ -293,40 +266,6 @@ mod tests {
             let factors: f64 = class.factors.iter().flatten().map(|v| v * v).sum();
             assert!((trace + model.noise.powi(2) - factors - class.noise_variance).abs() < 1e-13);
         }
-        let unknown = (model.unknown(&library).unwrap(), model.unknown_prior(&library).unwrap());
-        assert_eq!((unknown.0.label, &unknown.0.mean[..]), (None, unknown.1.mean()));
-        let flat = TemplateModel {
-            floor: 0.0,
-            mismatch: 0.0,
-            ..model.clone()
-        };
-        assert!(says(
-            &flat.image_priors(&library),
-            "covariance is not positive definite"
-        ));
-    }
-
-    #[test]
-    fn refuses_bad_parameters() {
-        let (library, good) = (library(), TemplateModel::new(4));
-        let bad: [fn(&mut TemplateModel); 8] = [
-            |m| m.cols = 0,
-            |m| m.cols = 5,
-            |m| m.noise = 0.0,
-            |m| m.mismatch = f64::NAN,
-            |m| m.smooth_share = 1.1,
-            |m| m.length_px = 0.0,
-            |m| m.gains = vec![-0.1; 12],
-            |m| m.gains = vec![0.1; 5],
-        ];
-        for change in bad {
-            let mut bad = good.clone();
-            change(&mut bad);
-            let refused = bad.classes(&library).is_err() && bad.unknown(&library).is_err();
-            assert!(refused, "{bad:?}");
-        }
-        let negative = Library::new(&Matrix::from_column_slices(4, &[&[-1.0; 4]]), &[1]).unwrap();
-        assert!(says(&good.classes(&negative), "image 0 has no value"));
     }
 
     fn library() -> Library {
@@ -339,21 +278,20 @@ mod tests {
     fn covariance_is_the_stated_one() {
         let model = TemplateModel {
             rank: 12,
-            blur_px: 0.0,
             ..TemplateModel::new(4)
         };
         let c = &model.classes(&library()).unwrap()[0];
-        let t = &c.mean;
+        let (t, a) = (&c.mean, model.blur(&c.mean));
         assert!((t.iter().copied().fold(0.0, f64::max) - 1.0).abs() < 1e-15);
         for i in 0..12 {
             for j in 0..12 {
                 let got: f64 = c.factors.iter().map(|f| f[i] * f[j]).sum();
-                let expected = 0.22_f64.powi(2) * 0.8 * t[i] * t[j] * (-distance_squared(i, j, 4) / 8.0).exp();
+                let expected = 0.22_f64.powi(2) * 0.8 * a[i] * a[j] * (-distance_squared(i, j, 4) / 8.0).exp();
                 // an eigendecomposition of a matrix of norm below 1
                 assert!((got - expected).abs() < 1e-14, "({i}, {j}): {got}, expected {expected}");
             }
         }
-        let square: f64 = t.iter().map(|v| v * v).sum();
+        let square: f64 = a.iter().map(|v| v * v).sum();
         let white = 0.16 + 0.2 * 0.22_f64.powi(2) * square + 12.0 * 0.025_f64.powi(2);
         assert!(
             (c.noise_variance - white).abs() < 1e-14,

@@ -235,18 +235,11 @@ fn refuses_what_it_cannot_use() {
     );
     let new = |c: &[Component]| EvidenceClassifier::new(c, range(), 0.1);
     assert!(new(&[]).unwrap_err().to_string().contains("there is no component"));
-    let bad: [fn(&mut Component); 4] = [
-        |c| c.noise_variance = 0.0,
-        |c| c.weight = -1.0,
-        |c| c.mean = vec![f64::NAN; 4],
-        |c| c.factors = vec![vec![1.0; 3]],
-    ];
-    for change in bad {
-        let mut bad = good.clone();
-        change(&mut bad);
-        assert!(new(&[good.clone(), bad.clone()]).is_err(), "{bad:?}");
-    }
-    assert!(EvidenceClassifier::new(&[good], range(), 1.0).is_err());
+    let bad = Component {
+        factors: vec![vec![1.0; 3]],
+        ..good.clone()
+    };
+    assert!(new(&[good, bad]).is_err());
 }
 
 /// A window of `amplitude` times an image through ±1 weights, with noise.
@@ -310,46 +303,6 @@ fn finds_planted_classes() {
     }
     assert!(right >= 99, "{right} of {trials}");
     assert!(sure[1] > 95.0 && sure[1] > sure[0] + 5.0, "{sure:?}");
-}
-
-/// A library off by one taxel still classifies when its images are expected anywhere within reach.
-#[test]
-fn shifted_templates_find_shifted_objects() {
-    let (_, images) = planted();
-    let images = Matrix::from_column_slices(36, &images);
-    let library = Library::new(&images, &[3, 1, 2]).unwrap();
-    let share = |reach: usize, shift: [usize; 2]| {
-        let model = TemplateModel {
-            reach,
-            ..TemplateModel::new(6)
-        };
-        let classifier = EvidenceClassifier::new(&model.classes(&library).unwrap(), range(), 0.05).unwrap();
-        let mut right = 0;
-        for trial in 0..60_u64 {
-            let which = usize::try_from(trial % 3).unwrap();
-            let mut moved = vec![0.0; 36];
-            for (i, v) in images.column(which).iter().enumerate().filter(|(_, v)| **v > 0.0) {
-                // up and to the left: there the planted shapes stay on the sheet
-                moved[i - 6 * shift[0] - shift[1]] = *v;
-            }
-            let window = PlantedWindow::new(100 + trial, 20, &moved, 1.0, 0.2);
-            let decision = run(&classifier, &window.phi, &window.y).3;
-            right += usize::from(decision.label == Some([3, 1, 2][which]));
-        }
-        right
-    };
-    for (reach, shift) in [
-        (1, [1, 0]),
-        (1, [0, 1]),
-        (1, [1, 1]),
-        (2, [1, 1]),
-        (2, [0, 1]),
-        (2, [0, 0]),
-    ] {
-        let right = share(reach, shift);
-        assert!(right >= 57, "reach {reach}, shift {shift:?}: {right} of 60");
-    }
-    assert!(share(0, [1, 1]) < 45, "what a shift does to templates that do not move");
 }
 
 /// Noise without any shape is more likely unknown than any class.

@@ -1,12 +1,10 @@
 //! Gaussian estimates of large sheets.
 
-use crate::checks::within;
-use crate::checks::{not_finite, not_positive_definite, shape_mismatch};
+use crate::checks::{not_finite, not_positive_definite, shape_mismatch, within};
 use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::Matrix;
 use crate::problem::{Problem, Recover as _, Solution, Workspace};
-use crate::recover::no_images;
-use crate::recover::{Gaussian, NnLmmse, Noise};
+use crate::recover::{Gaussian, NnLmmse, Noise, no_images};
 use rayon::prelude::*;
 use spts_input::Refusal;
 use std::ops::Range;
@@ -60,7 +58,7 @@ impl SheetPrior {
         let mut count = 0;
         for image in images {
             if image.len() != rows * cols {
-                return Err(of_images(count, image.len(), cols));
+                return Err(no_images(count, image.len(), cols));
             }
             let square: f64 = image.iter().map(|v| v * v).sum();
             if !(square > 0.0 && square.is_finite()) {
@@ -79,7 +77,7 @@ impl SheetPrior {
             }
         }
         if count == 0 {
-            return Err(of_images(0, rows * cols, cols));
+            return Err(no_images(0, rows * cols, cols));
         }
         Ok(Self::stationary(sums))
     }
@@ -123,7 +121,7 @@ impl SheetPrior {
     }
 
     /// C x, as A X B with the image X as a grid; O(N (R + C)), and rows of X that are zero cost nothing.
-    pub(super) fn apply(&self, x: &[f64]) -> Vec<f64> {
+    fn apply(&self, x: &[f64]) -> Vec<f64> {
         let cols = self.cols.nrows();
         let mut out = vec![0.0; x.len()];
         let mut along = vec![0.0; cols];
@@ -143,13 +141,9 @@ impl SheetPrior {
     }
 }
 
-fn of_images(images: usize, pixels: usize, cols: usize) -> Refusal {
-    no_images(images, pixels, cols)
-}
-
 fn check_shape([rows, cols]: [usize; 2], images: usize) -> Result<(), Refusal> {
     if rows.checked_mul(cols).is_none_or(|taxels| taxels == 0) {
-        return Err(of_images(images, 0, cols));
+        return Err(no_images(images, 0, cols));
     }
     Ok(())
 }
@@ -200,16 +194,16 @@ impl Default for SheetNoise {
 /// ```
 #[derive(Debug, Clone)]
 pub struct SheetDecoder {
-    pub(super) prior: SheetPrior,
-    pub(super) noise: SheetNoise,
+    prior: SheetPrior,
+    noise: SheetNoise,
     /// Number of wires.
-    pub(super) count: usize,
+    count: usize,
     /// Φ, M × N.
-    pub(super) rows: Vec<f64>,
+    rows: Vec<f64>,
     /// Φ C, M × N.
     cross: Vec<f64>,
     /// Wire of every row.
-    pub(super) wires: Vec<usize>,
+    wires: Vec<usize>,
     /// Range of the taxels that the wire of each row reads.
     spans: Vec<Range<usize>>,
     /// Cholesky factor; row i has i + 1 entries and follows the rows before it.

@@ -374,15 +374,6 @@ mod tests {
     use crate::checks::says;
 
     #[test]
-    fn the_precision_is_the_inverse() {
-        let covariance = Matrix::from_rows(2, 2, vec![2.0, 1.0, 1.0, 2.0]).unwrap();
-        let prior = Gaussian::new(vec![0.0; 2], covariance).unwrap();
-        for (got, expected) in prior.precision().view().values().iter().zip([2.0, -1.0, -1.0, 2.0]) {
-            assert!((got - expected / 3.0).abs() < 1e-15);
-        }
-    }
-
-    #[test]
     fn what_is_no_gaussian_is_refused() {
         let matrix = |v: [f64; 4]| Matrix::from_rows(2, 2, v.to_vec()).unwrap();
         let new = |mean: &[f64], v| Gaussian::new(mean.to_vec(), matrix(v));
@@ -481,16 +472,5 @@ mod tests {
             let refused = prior.learn(&image, 2);
             assert!(says(&refused, &format!("`{field}` = ")), "{refused:?}");
         }
-    }
-
-    #[test]
-    fn parameters_are_refused_by_name() {
-        for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            let error = Noise::Absolute(value).checked().unwrap_err();
-            assert!(error.to_string().ends_with("is outside (0, ∞)"), "{error}");
-            assert!(Penalty::Relative(value).checked().is_err());
-        }
-        assert!(Penalty::Relative(1.5).checked().is_err());
-        assert_eq!(Penalty::Relative(1.0).checked(), Ok(Penalty::Relative(1.0)));
     }
 }

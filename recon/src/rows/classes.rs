@@ -5,13 +5,12 @@ use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::{Matrix, MatrixView};
 use crate::posterior::GaussianPosterior;
 use crate::rows::expected::Headroom;
-use crate::rows::greedy::{Worth, climb, unreachable_limit};
+use crate::rows::greedy::{Worth, best_row};
 use crate::rows::other_grid;
 use crate::rows::simple::random_signs;
 use crate::rows::{DesignRows, RowTask};
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 use spts_input::Refusal;
 
 /// Rows of ±1 that distinguish Gaussian classes of unknown amplitude, designed one after the other.
@@ -21,18 +20,10 @@ use spts_input::Refusal;
 /// The union bound of the errors is Σ Q(√D/2) ≤ ½ Σ exp(−D/8) over ordered pairs of different classes (J. G. Proakis,
 /// *Digital Communications*, 4th ed., §5.2). Every row is the one that reduces this sum most.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Classes {
-    /// Number of initial rows that are tried.
-    pub starts: usize,
-    /// Largest number of sweeps over all taxels for each of them.
-    pub sweeps: usize,
-}
+pub struct Classes;
 
-impl Default for Classes {
-    fn default() -> Self {
-        Self { starts: 24, sweeps: 3 }
-    }
-}
+/// Rows that the search for one starts from, and most sweeps over all taxels for each of them.
+const SEARCH: (usize, usize) = (24, 3);
 
 impl DesignRows for Classes {
     fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
@@ -43,21 +34,8 @@ impl DesignRows for Classes {
         let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
         let mut rows = Matrix::zeros(task.rows, n);
         for r in 0..task.rows {
-            let starts = apart.starts(self.starts, &mut rng);
-            let climbed = starts.into_par_iter().map(|mut row| {
-                let mut headroom = headroom.clone();
-                let mut worth = Separation::new(&apart);
-                let found = climb(&mut worth, headroom.as_mut(), self.sweeps, &mut row);
-                found.map(|worth| (worth, row))
-            });
-            let climbed: Vec<Option<(f64, Vec<f64>)>> = climbed.collect();
-            let best = climbed
-                .into_iter()
-                .flatten()
-                .reduce(|a, b| if b.0 > a.0 { b } else { a });
-            let Some((_, row)) = best else {
-                return Err(unreachable_limit(task, headroom));
-            };
+            let starts = apart.starts(SEARCH.0, &mut rng);
+            let row = best_row(task, &headroom, starts, SEARCH.1, || Separation::new(&apart))?;
             apart.observe(&row);
             rows.row_mut(r).copy_from_slice(&row);
         }
@@ -405,12 +383,12 @@ mod tests {
             classes: &classes,
             ..RowTask::new(1, &expected)
         };
-        let rows = Classes::default().design(&task).unwrap();
+        let rows = Classes.design(&task).unwrap();
         let row = rows.row(0);
         let alike = |i: usize, j: usize| row[i] * row[j] > 0.0;
         assert!(alike(0, 1) && alike(2, 3) && !alike(0, 2), "{row:?}");
         let one = [component(1, [1.0; 4])];
-        let refused = Classes::default().design(&RowTask { classes: &one, ..task });
+        let refused = Classes.design(&RowTask { classes: &one, ..task });
         assert!(says(&refused, "`classes` has 1 classes"));
     }
 

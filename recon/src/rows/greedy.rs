@@ -19,25 +19,16 @@ use spts_input::Refusal;
 /// reduction by a row a is |P a|² / (aᵀP a + σ²). The search for a row starts from the signs of P's leading
 /// eigenvectors, of pairs of them, and of random vectors; single levels then change as long as the reduction grows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Greedy {
-    /// Number of initial rows that are tried.
-    pub starts: usize,
-    /// Largest number of sweeps over all taxels for each of them.
-    pub sweeps: usize,
-}
+pub struct Greedy;
 
+/// Rows that the search for one starts from, and most sweeps over all taxels for each of them.
+const SEARCH: (usize, usize) = (24, 4);
 /// Most taxels whose covariance is kept whole: 128 MiB twice.
 const MOST_TAXELS: usize = 4096;
 /// Leading eigenvectors that rows start from.
 const LEADING: usize = 8;
 /// Power iterations before the first row, and before every other one, which begins with the vectors of the last.
 const ITERATIONS: [usize; 2] = [30, 3];
-
-impl Default for Greedy {
-    fn default() -> Self {
-        Self { starts: 24, sweeps: 4 }
-    }
-}
 
 impl DesignRows for Greedy {
     fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
@@ -51,22 +42,8 @@ impl DesignRows for Greedy {
         let mut rows = Matrix::zeros(task.rows, n);
         for r in 0..task.rows {
             leading.iterate(&covariances.posterior.covariance, ITERATIONS[usize::from(r > 0)]);
-            let starts = self.starts_of(&leading, n, &mut rng);
-            let climbed = starts.into_par_iter().map(|mut row| {
-                let mut headroom = headroom.clone();
-                let mut worth = Fall::new(&covariances);
-                let found = climb(&mut worth, headroom.as_mut(), self.sweeps, &mut row);
-                found.map(|worth| (worth, row))
-            });
-            let climbed: Vec<Option<(f64, Vec<f64>)>> = climbed.collect();
-            // the first of equals, whatever thread it came from
-            let best = climbed
-                .into_iter()
-                .flatten()
-                .reduce(|a, b| if b.0 > a.0 { b } else { a });
-            let Some((_, row)) = best else {
-                return Err(unreachable_limit(task, headroom));
-            };
+            let starts = starts(&leading, n, &mut rng);
+            let row = best_row(task, &headroom, starts, SEARCH.1, || Fall::new(&covariances))?;
             covariances.observe(&row);
             rows.row_mut(r).copy_from_slice(&row);
         }
@@ -74,25 +51,47 @@ impl DesignRows for Greedy {
     }
 }
 
-impl Greedy {
-    fn starts_of(&self, leading: &Leading, n: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
-        let signs = |v: &[f64]| v.iter().map(|x| if *x < 0.0 { -1.0 } else { 1.0 }).collect();
-        let vectors: Vec<&[f64]> = leading.vectors.chunks_exact(n).collect();
-        let mut starts: Vec<Vec<f64>> = vectors.iter().map(|v| signs(v)).collect();
-        for pair in vectors.windows(2) {
-            let sum: Vec<f64> = pair[0].iter().zip(pair[1]).map(|(a, b)| a + b).collect();
-            starts.push(signs(&sum));
-        }
-        while starts.len() < self.starts {
-            starts.push(random_signs(n, rng));
-        }
-        starts.truncate(self.starts.max(1));
-        starts
+fn starts(leading: &Leading, n: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {
+    let signs = |v: &[f64]| v.iter().map(|x| if *x < 0.0 { -1.0 } else { 1.0 }).collect();
+    let vectors: Vec<&[f64]> = leading.vectors.chunks_exact(n).collect();
+    let mut starts: Vec<Vec<f64>> = vectors.iter().map(|v| signs(v)).collect();
+    for pair in vectors.windows(2) {
+        let sum: Vec<f64> = pair[0].iter().zip(pair[1]).map(|(a, b)| a + b).collect();
+        starts.push(signs(&sum));
+    }
+    while starts.len() < SEARCH.0 {
+        starts.push(random_signs(n, rng));
+    }
+    starts.truncate(SEARCH.0);
+    starts
+}
+
+/// The row of the greatest worth that is climbed to from one of `starts`; the first of equals, whatever thread it came
+/// from.
+///
+/// # Errors
+/// [`Refusal`] if none keeps to the headroom.
+pub(super) fn best_row<W: Worth>(
+    task: &RowTask<'_>,
+    headroom: &Option<Headroom>,
+    starts: Vec<Vec<f64>>,
+    sweeps: usize,
+    worth: impl Fn() -> W + Sync,
+) -> Result<Vec<f64>, Refusal> {
+    let climbed = starts.into_par_iter().map(|mut row| {
+        let found = climb(&mut worth(), headroom.clone().as_mut(), sweeps, &mut row);
+        found.map(|worth| (worth, row))
+    });
+    let climbed: Vec<Option<(f64, Vec<f64>)>> = climbed.collect();
+    let climbed = climbed.into_iter().flatten();
+    match climbed.reduce(|a, b| if b.0 > a.0 { b } else { a }) {
+        Some((_, row)) => Ok(row),
+        None => Err(unreachable_limit(task, headroom.clone())),
     }
 }
 
 /// The smallest sum that can be had, for an error.
-pub(super) fn unreachable_limit(task: &RowTask<'_>, headroom: Option<Headroom>) -> Refusal {
+fn unreachable_limit(task: &RowTask<'_>, headroom: Option<Headroom>) -> Refusal {
     let mut row: Vec<f64> = (0..task.expected.taxels())
         .map(|i| if i % 2 == 0 { 1.0 } else { -1.0 })
         .collect();
@@ -243,12 +242,7 @@ const LEAST_GAIN: f64 = 1e-9;
 /// Turns single signs of `row` while its worth grows, at most `sweeps` times through all of them. A row whose sum is
 /// too large is brought within `headroom` first, by the turns that cost the least worth for what they take off the sum;
 /// `None` when that cannot be done.
-pub(super) fn climb(
-    worth: &mut dyn Worth,
-    mut headroom: Option<&mut Headroom>,
-    sweeps: usize,
-    row: &mut [f64],
-) -> Option<f64> {
+fn climb(worth: &mut impl Worth, mut headroom: Option<&mut Headroom>, sweeps: usize, row: &mut [f64]) -> Option<f64> {
     worth.start(row);
     if let Some(headroom) = headroom.as_deref_mut() {
         headroom.start(row);
@@ -278,7 +272,7 @@ pub(super) fn climb(
 }
 
 /// Brings `row` within `headroom`.
-fn settle(worth: &mut dyn Worth, headroom: &mut Headroom, row: &mut [f64]) -> Option<()> {
+fn settle(worth: &mut impl Worth, headroom: &mut Headroom, row: &mut [f64]) -> Option<()> {
     while !headroom.kept() {
         let now = worth.worth();
         let (mut least, mut best) = (f64::INFINITY, None);
@@ -441,7 +435,7 @@ mod tests {
             noise: 0.01,
             ..RowTask::new(8, &expected)
         };
-        let rows = Greedy::default().design(&task).unwrap();
+        let rows = Greedy.design(&task).unwrap();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| variances[*b].total_cmp(&variances[*a]));
         for (r, &k) in order[..8].iter().enumerate() {
@@ -469,22 +463,6 @@ mod tests {
         assert!((posterior_trace(&task, &rows).unwrap() - left / all).abs() < 1e-7);
     }
 
-    /// No rows of energy N each leave less than water-filling over the eigenvectors does, and greedy signs come within
-    /// a fifth of what it explains.
-    #[test]
-    fn signs_come_near_the_bound() {
-        let expected = Expected::smooth([8, 8], 1.5).unwrap();
-        let task = RowTask::new(12, &expected);
-        let rows = Greedy::default().design(&task).unwrap();
-        let c = expected.covariance();
-        let dense = nalgebra::DMatrix::from_row_slice(64, 64, c.view().values());
-        let eigen: Vec<f64> = dense.symmetric_eigenvalues().iter().map(|v| v.max(0.0)).collect();
-        let bound = water_filling(&eigen, 12.0 * 64.0 / task.variance()) / 64.0;
-        let left = posterior_trace(&task, &rows).unwrap();
-        assert!(left >= bound, "{left} below the bound {bound}");
-        assert!(1.0 - left > 0.8 * (1.0 - bound), "{left}, bound {bound}");
-    }
-
     /// Least Σ λ/(1 + λ e) over energies e ≥ 0 of sum `energy`: e = (μ − 1/λ)₊, by bisection of μ.
     fn water_filling(eigen: &[f64], energy: f64) -> f64 {
         let spent = |mu: f64| eigen.iter().map(|l| (mu - 1.0 / l.max(1e-300)).max(0.0)).sum::<f64>();
@@ -501,6 +479,22 @@ mod tests {
             .iter()
             .map(|l| l / (1.0 + l * (low - 1.0 / l.max(1e-300)).max(0.0)))
             .sum()
+    }
+
+    /// No rows of energy N each leave less than water-filling over the eigenvectors does, and greedy signs come within
+    /// a fifth of what it explains.
+    #[test]
+    fn signs_come_near_the_bound() {
+        let expected = Expected::smooth([8, 8], 1.5).unwrap();
+        let task = RowTask::new(12, &expected);
+        let rows = Greedy.design(&task).unwrap();
+        let c = expected.covariance();
+        let dense = nalgebra::DMatrix::from_row_slice(64, 64, c.view().values());
+        let eigen: Vec<f64> = dense.symmetric_eigenvalues().iter().map(|v| v.max(0.0)).collect();
+        let bound = water_filling(&eigen, 12.0 * 64.0 / task.variance()) / 64.0;
+        let left = posterior_trace(&task, &rows).unwrap();
+        assert!(left >= bound, "{left} below the bound {bound}");
+        assert!(1.0 - left > 0.8 * (1.0 - bound), "{left}, bound {bound}");
     }
 
     /// Against the batch form of the posterior: P = C − C Aᵀ (A C Aᵀ + σ² I)⁻¹ A C.

@@ -177,7 +177,7 @@ pub const DESIGNERS: &[Designer] = &[
         "greedy",
         Moments,
         "row by row, the one that lowers the posterior variance most",
-        || Box::new(Greedy::default()),
+        || Box::new(Greedy),
     ),
     line(
         "separable",
@@ -191,7 +191,7 @@ pub const DESIGNERS: &[Designer] = &[
         "for classes",
         RowNeeds::Classes,
         "row by row, the one that lowers the bound of classification errors most",
-        || Box::new(Classes::default()),
+        || Box::new(Classes),
     ),
 ];
 

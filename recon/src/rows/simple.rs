@@ -106,7 +106,7 @@ impl DesignRows for Separable {
                     covariance: covariance.clone(),
                 },
             };
-            let designed = Greedy::default().design(&RowTask {
+            let designed = Greedy.design(&RowTask {
                 rows: n.min(task.rows),
                 expected: &along,
                 classes: &[],

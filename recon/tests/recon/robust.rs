@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use spts_input::Refusal;
 use spts_recon::classify::{EvidenceClassifier, ImageEstimator, Library, Posterior, Src, TemplateModel};
 use spts_recon::recover::{Build, RECOVER, REGULARISED};
-use spts_recon::{AmplitudeRange, Matrix, MatrixView, Problem, Recover, SignTables, Solution, Workspace};
+use spts_recon::{AmplitudeRange, Matrix, Problem, Recover, Solution, Workspace};
 
 /// Both tables, for K unknowns and S atoms.
 fn methods(k: usize, n_nonzero_coefs: usize) -> Vec<(&'static str, Box<dyn Recover>)> {
@@ -57,86 +57,6 @@ proptest! {
                 Ok(solution) => prop_assert!(is_finite(&solution), "{name}: {solution:?}"),
                 Err(error) => prop_assert!(is_out_of_range(&error), "{name}: {error}"),
             }
-        }
-    }
-}
-
-/// ±1 weights of the skin's generators: 1664525·s + 1013904223 mod 2³² from seeds 8…107, positive where the top byte is
-/// at least 128. Rows 1, 46 and 63 are constant, so that the first 100 × 100 are of low rank.
-fn generator_rows(m: usize) -> (Vec<f64>, Vec<u64>) {
-    let mut states: Vec<u32> = (8..108).collect();
-    let (mut rows, mut signs) = (Vec::new(), Vec::new());
-    for _ in 0..m {
-        let mut words = [0_u64; 2];
-        for (n, state) in states.iter_mut().enumerate() {
-            *state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let positive = *state >> 31 == 1;
-            words[n / 64] |= u64::from(positive) << (n % 64);
-            rows.push(if positive { 1.0 } else { -1.0 });
-        }
-        signs.extend(words);
-    }
-    (rows, signs)
-}
-
-#[test]
-fn a_rank_deficient_sequence_is_decoded() {
-    let (rows, _) = generator_rows(100);
-    let a = Matrix::from_rows(100, 100, rows).unwrap();
-    let dense = nalgebra::DMatrix::from_row_slice(100, 100, a.view().values());
-    assert!(dense.rank(1e-9) < 100);
-    let mut x = vec![0.0; 100];
-    for taxel in [33, 34, 43, 44, 45, 54] {
-        x[taxel] = 1.0;
-    }
-    let y: Vec<f64> = (0..100)
-        .map(|r| a.row(r).iter().zip(&x).map(|(w, x)| w * x).sum())
-        .collect();
-    for (name, method) in methods(100, 100) {
-        let solution = method.recover(&Problem::new(a.view(), &y).unwrap(), &mut Workspace::default());
-        let solution = solution.unwrap_or_else(|e| panic!("{name}: {e}"));
-        assert!(is_finite(&solution), "{name}");
-        // every method explains what was measured without noise: the weakest penalties and noises of the tables are
-        // 1e-3
-        let length = y.iter().map(|v| v * v).sum::<f64>().sqrt();
-        assert!(
-            solution.residual_norm <= 0.05 * length,
-            "{name}: {}",
-            solution.residual_norm
-        );
-    }
-}
-
-/// Rows from `f32` tables differ by some 1e-6 of a column's magnitude, so that answers differ by that times the
-/// condition.
-#[test]
-fn single_precision_tables_give_the_answers_of_double_precision() {
-    let (m, n, k, s) = (60, 100, 40, 4);
-    let mut rng = ChaCha8Rng::seed_from_u64(17);
-    let dictionary = Matrix::from_rows(n, k, (0..n * k).map(|_| rng.random_range(-1.0..1.0)).collect()).unwrap();
-    let (_, signs) = generator_rows(m);
-    let (mut double, mut single) = (vec![0.0; m * k], vec![0.0; m * k]);
-    SignTables::<f64>::new(dictionary.view()).fill_rows(&signs, &mut double);
-    SignTables::<f32>::new(dictionary.view()).fill_rows(&signs, &mut single);
-    let (double, single) = [&double, &single].map(|v| MatrixView::new(m, k, v).unwrap()).into();
-    let mut alpha = vec![0.0; k];
-    for atom in [3, 11, 20, 37] {
-        alpha[atom] = rng.random_range(0.5..1.5);
-    }
-    let y: Vec<f64> = (0..m)
-        .map(|r| double.rows(r, 1).values().iter().zip(&alpha).map(|(a, x)| a * x).sum())
-        .collect();
-    for (name, method) in methods(k, s) {
-        let solve = |a| {
-            let mut x = vec![0.0; k];
-            let solution = method.recover(&Problem::new(a, &y).unwrap(), &mut Workspace::default());
-            solution.unwrap_or_else(|e| panic!("{name}: {e}")).scatter(&mut x);
-            x
-        };
-        for (a, b) in solve(double).iter().zip(solve(single)) {
-            // 60 measurements of 40 unknowns: condition below 100; iterations that stop at a gap of 1e-6 know 1e-3 of
-            // the answer
-            assert!((a - b).abs() <= 1e-2, "{name}: {a} from f64, {b} from f32");
         }
     }
 }

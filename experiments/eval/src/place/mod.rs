@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use spts_circuit::Recording;
 use spts_input::Refusal;
 use spts_recon::Matrix;
-use spts_recon::localise::{BlobConfig, Localiser, centre_of_mass, distance};
+use spts_recon::localise::{Localiser, centre_of_mass, distance};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, median};
 use spts_recon::statistics::mean;
 
@@ -133,7 +133,7 @@ impl Tools {
         Ok(Self {
             shape,
             dictionary: Dictionary::new(shifted),
-            localiser: Localiser::new(&BlobConfig::new(shape[0], shape[1]))?,
+            localiser: Localiser::new(shape)?,
         })
     }
 }
