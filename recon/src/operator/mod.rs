@@ -66,7 +66,8 @@ pub trait LinearOperator {
 /// ```
 /// use spts_recon::operator::{LinearOperator as _, SelectColumns as _, SignGenerator, SignOperator};
 ///
-/// let phi = SignOperator::new(SignGenerator::NUMERICAL_RECIPES, (8..108).collect(), 0, 20);
+/// let generator = SignGenerator::new(1_664_525, 1_013_904_223, 31)?;
+/// let phi = SignOperator::new(generator, (8..108).collect(), 0, 20);
 /// let few = phi.select_columns(&[3, 42]);
 /// let (mut all, mut selected) = ([0.0; 20], [0.0; 20]);
 /// let mut image = [0.0; 100];
@@ -74,6 +75,7 @@ pub trait LinearOperator {
 /// phi.apply(&image, &mut all);
 /// few.apply(&[1.0, 2.0], &mut selected);
 /// assert_eq!(all, selected);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait SelectColumns: LinearOperator {
     /// Operator of the selected columns.
@@ -312,13 +314,15 @@ impl<A: LinearOperator, B: LinearOperator> LinearOperator for Composition<A, B> 
 /// use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator, SubArrays};
 ///
 /// // 200 taxels on two wires, 20 measurements of each
-/// let wire = |seeds| SignOperator::new(SignGenerator::NUMERICAL_RECIPES, seeds, 0, 20);
+/// let generator = SignGenerator::new(1_664_525, 1_013_904_223, 31)?;
+/// let wire = |seeds| SignOperator::new(generator, seeds, 0, 20);
 /// let skin = SubArrays::new(vec![wire((8..108).collect()), wire((108..208).collect())]);
 /// assert_eq!((skin.nrows(), skin.ncols()), (40, 200));
 /// let (mut image, mut y) = ([0.0; 200], [0.0; 40]);
 /// image[150] = 1.0; // on the second wire
 /// skin.apply(&image, &mut y);
 /// assert!(y[..20].iter().all(|v| *v == 0.0) && y[20..].iter().all(|v| v.abs() == 1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct SubArrays<A> {
