@@ -122,7 +122,8 @@ fn charts(report: &ElectronicsReport) -> Vec<Chart> {
     });
     let sum = by_remedy().log_y().y("4σ of the sum, V", |r| r.budget.excursion_v);
     let ratio = by_remedy().y("SNR with the converter's step, dB", |r| r.budget.snr_adc_db);
-    let sources: [(Curve, fn(&Budget) -> f64); 5] = [
+    type Source = (Curve, fn(&Budget) -> f64);
+    let sources: [Source; 5] = [
         (Curve::new("amplifier's voltage", Style::Real, 0), |b| b.noise_v.voltage),
         (Curve::new("taxels", Style::Twin, 0), |b| b.noise_v.taxels),
         (Curve::new("feedback", Style::Raster, 0), |b| b.noise_v.feedback),

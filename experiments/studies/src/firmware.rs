@@ -246,7 +246,7 @@ impl EmulatedCells {
         let (weights, mode) = (self.expected_weights(task)?, task.mode);
         let taxels = weights.taxels();
         let (mut levels, mut mismatches) = (Vec::new(), 0);
-        self.clock(array, progress, &mut |done, codes| {
+        self.clock(array, progress, |done, codes| {
             levels.resize(codes.len() / self.cells * taxels, 0.0);
             weights.fill_rows(done, &mut levels);
             let edges = codes.chunks_exact(self.cells).zip(levels.chunks_exact(taxels));
@@ -284,7 +284,7 @@ impl EmulatedCells {
         &self,
         array: &mut Array,
         progress: &dyn Progress,
-        block: &mut dyn FnMut(u64, &[u8]) -> Result<(), Refusal>,
+        mut block: impl FnMut(u64, &[u8]) -> Result<(), Refusal>,
     ) -> Result<(), Refusal> {
         let (mut codes, mut done) = (Vec::new(), 0);
         while done < self.edges {
@@ -339,7 +339,7 @@ impl EmulatedCells {
         block: &mut dyn FnMut(&[f64]) -> Result<(), Refusal>,
     ) -> Result<(), Refusal> {
         progress.stage("clocking the cells", Some(self.blocks()));
-        self.clock(&mut self.started(task)?, progress, &mut |_, codes| {
+        self.clock(&mut self.started(task)?, progress, |_, codes| {
             block(&codes.iter().map(|code| task.mode.code_level(*code)).collect::<Vec<_>>())
         })?;
         progress.end();

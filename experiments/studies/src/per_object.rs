@@ -143,7 +143,7 @@ fn scores(source: &Source, objects: &[String], seed: u64) -> Result<Vec<(ObjectS
     };
     let board = settings.learn(source)?.score(&|| ())?;
     let of_row = |row: &ObjectRow| {
-        let value = |&(score, get): &(&'static str, fn(&Scores) -> Option<f64>)| {
+        let value = |&(score, get): &ScoreOf| {
             let key = ObjectScore {
                 decoder: row.key.decoder.clone(),
                 m: row.key.m,
@@ -164,7 +164,7 @@ fn raster_images(real: &Source, objects: &[String]) -> Result<Vec<(String, Vec<f
     let images = trained
         .filter(|(_, training)| !training.is_empty())
         .map(|(session, training)| {
-            let library = templates(&[training]).map_err(|e| Refusal::from(e).at("raster images"))?;
+            let library = templates(&[training]).map_err(|e| e.at("raster images"))?;
             Ok((session.object.clone(), library.images().column(0)))
         });
     images.collect()
@@ -186,9 +186,11 @@ fn compressive_images(recordings: &Path, objects: &[String]) -> Result<Vec<(Stri
     Ok(pairs.filter_map(image).collect())
 }
 
-/// The scores that are compared: intersection over union of the supports, and the share of single windows classified;
-/// `None` for a decoder without it.
-pub const SCORES: [(&str, fn(&Scores) -> Option<f64>); 2] = [("iou", |s| s.iou), ("class_single", |s| s.class_single)];
+/// Name of a score and its value; `None` for a decoder without it.
+pub type ScoreOf = (&'static str, fn(&Scores) -> Option<f64>);
+
+/// The scores that are compared: intersection over union of the supports, and the share of single windows classified.
+pub const SCORES: [ScoreOf; 2] = [("iou", |s| s.iou), ("class_single", |s| s.class_single)];
 
 /// Which score of which object, such as its IoU.
 #[derive(Debug, Clone, PartialEq, Eq)]
