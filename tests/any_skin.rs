@@ -1,7 +1,7 @@
 //! Skins of any size, from the press to the score: every layout and source of rows decodes with its own rows, and with
 //! no others.
 
-use crate::command::succeeds;
+use crate::command::{json, succeeds};
 use serde_json::Value;
 use spts::chain::{Chain, ChainConfig, RowsConfig};
 use spts_circuit::{CompressiveWeights, Constant, Mode, Profile, Readout, Seeding};
@@ -73,11 +73,10 @@ impl Skin {
     /// Mean IoU of `windows` decoded windows of both presses at each M of `measurements`.
     fn decoded(&self, folder: &Path, session: &str, measurements: &[usize], windows: usize) -> Vec<f64> {
         let (m, w) = (listed(measurements), windows.to_string());
-        let output = succeeds(
+        let found: Value = json(
             folder,
             &["decode", session, "--measurements", &m, "--windows", &w, "--json"],
         );
-        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
         let rows = found["rows"].as_array().unwrap();
         let mean = |m: &usize| {
             let of_m = rows.iter().filter(|row| row["m"] == *m);
@@ -92,11 +91,10 @@ impl Skin {
     fn scored(&self, folder: &Path, session: &str) -> [f64; 2] {
         let m = self.measurements[1].to_string();
         let decoders = ["--decoder", "nn_lmmse,mean_image", "--no-times", "--no-ball", "--json"];
-        let output = succeeds(
+        let board: Value = json(
             folder,
             &[&["score", session, "--measurements", &m][..], &decoders].concat(),
         );
-        let board: Value = serde_json::from_slice(&output.stdout).unwrap();
         ["nn_lmmse", "mean_image"].map(|name| {
             let row = board["rows"]
                 .as_array()

@@ -1,6 +1,6 @@
 //! Decoders that stop as soon as they are sure enough, through the command.
 
-use crate::command::{refused, spts, succeeds, words};
+use crate::command::{json, words};
 use crate::score::score;
 use serde_json::Value;
 use std::path::Path;
@@ -28,8 +28,7 @@ fn twin(dir: &Path, threads: &str) -> Value {
         "score --anytime --quick --json --sensing random,chosen --left-out --measurements 4,12 --confidence 0.6,0.9 \
          --twin press/T press/rec press/brain --threads",
     );
-    let output = succeeds(dir, &[&arguments[..], &[threads]].concat());
-    serde_json::from_slice(&output.stdout).unwrap()
+    json(dir, &[&arguments[..], &[threads]].concat())
 }
 
 /// What is wanted costs samples, within what a window may take; any number of threads gives the same numbers; tables
@@ -86,21 +85,6 @@ fn simulated_sessions_stop_when_they_are_sure() {
     let saved = std::fs::read(out.join("anytime.json")).unwrap();
     assert_eq!(serde_json::from_slice::<Value>(&saved).unwrap(), board);
     assert_eq!(twin(dir.path(), "2"), board);
-}
-
-#[test]
-fn what_cannot_be_stopped_is_said() {
-    let dir = tempfile::tempdir().unwrap();
-    let start = words("score --twin press/T --quick --anytime");
-    let refuse = |more: &str, fact: &str| refused(dir.path(), &[&start[..], &words(more)].concat(), &[fact]);
-    for bad in ["0.5", "1", "-0.9", "nan", "1e100"] {
-        refuse(&format!("--confidence {bad}"), "outside (0.5, 1)");
-    }
-    refuse("--confidence sure", "--confidence");
-    refuse("--save board.json", "--save");
-    refuse("--decoder omp,evidence", "valid: nn_lmmse, amortised, evidence");
-    let without = spts(dir.path(), &words("score --twin press/T --confidence 0.9"));
-    assert_eq!(without.status.code(), Some(2));
 }
 
 /// Means over five objects of the real skin. A study of its own in numpy found that stopping the classifier at p > .95

@@ -1,6 +1,6 @@
 //! The error budget through its command.
 
-use crate::command::{files, spts, succeeds, words};
+use crate::command::{files, json, words};
 use serde_json::Value;
 use spts_circuit::PROFILES;
 use std::path::Path;
@@ -9,8 +9,7 @@ use std::path::Path;
 fn budget(dir: &Path, readout: &str, threads: &str) -> Value {
     let arguments = words("budget --quick --objects brain,rec --measurements 20 --decode matched");
     let more = ["--readout", readout, "--threads", threads, "--out", threads, "--json"];
-    let output = succeeds(dir, &[&arguments[..], &more].concat());
-    serde_json::from_slice(&output.stdout).unwrap()
+    json(dir, &[&arguments[..], &more].concat())
 }
 
 /// `as_built` with another idle noise in its compressive mode, as a file; its name.
@@ -94,34 +93,4 @@ fn a_huge_noise_is_the_largest_cost() {
         assert_eq!(largest["effect"], "idle_noise", "{mode}: {largest}");
         assert!(cost(&largest) > 2.0 * number(largest, "iou_se"), "{largest}");
     }
-}
-
-#[test]
-fn wrong_budgets_are_refused_in_one_line() {
-    let dir = tempfile::tempdir().unwrap();
-    std::fs::write(dir.path().join("bad.toml"), "weights = \"binary\"").unwrap();
-    for (arguments, words) in [
-        (
-            &["--objects", "brian"][..],
-            "`brian` is neither \"all\" nor one of brain",
-        ),
-        (&["--objects", "rec,rec"], "twice"),
-        (&["--taxels", "150"], "[100, 1600]"),
-        (&["--measurements", "0"], "[1, 1000]"),
-        // 12 frames of 1600 are 20 windows of 960
-        (
-            &["--taxels", "1600", "--measurements", "20,1000"],
-            "1000 is outside [1, 960]",
-        ),
-        (&["--decode", "best"], "script_s20, script_m4, matched"),
-        (&["--readout", "as_bult"], "as_bult"),
-        (&["--readout", "missing.toml"], "missing.toml"),
-        (&["--readout", "bad.toml"], "sample_rate_hz"),
-    ] {
-        let output = spts(dir.path(), &[&["budget"], arguments].concat());
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
-        assert!(error.contains(words), "{arguments:?}: {error}");
-    }
-    assert!(!dir.path().join("out").exists());
 }

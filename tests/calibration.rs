@@ -1,7 +1,7 @@
 //! `spts calibrate` and `spts compare` on the recordings of the real skin, and what they say to recordings that will
 //! not do.
 
-use crate::command::{spts, succeeds};
+use crate::command::{json, succeeds};
 use crate::recordings::recordings;
 use serde_json::Value;
 use spts_circuit::Profile;
@@ -43,7 +43,7 @@ const BIASED_THERE: [&str; 5] = ["resid_isi", "resid_robust", "outlier5", "late_
 const LEAST_INSIDE: f64 = 0.85;
 
 fn calibrated(recordings: &Path, dir: &Path) -> Value {
-    let output = succeeds(
+    json(
         dir,
         &[
             "calibrate",
@@ -52,8 +52,7 @@ fn calibrated(recordings: &Path, dir: &Path) -> Value {
             "skin.toml",
             "--json",
         ],
-    );
-    serde_json::from_slice(&output.stdout).unwrap()
+    )
 }
 
 fn number(report: &Value, session: &str, name: &str) -> f64 {
@@ -129,11 +128,10 @@ fn the_published_recordings_give_the_shipped_profile() {
 fn the_twin_s_recordings_have_the_skin_s_statistics() {
     let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let output = succeeds(
+    let report: Value = json(
         dir.path(),
         &["compare", recordings.to_str().unwrap(), "--no-curves", "--json"],
     );
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let statistics = report["statistics"].as_array().unwrap();
     assert_eq!(statistics.len(), 9 * SESSIONS.len());
     for statistic in statistics {
@@ -150,8 +148,7 @@ fn the_twin_s_recordings_have_the_skin_s_statistics() {
 fn the_twin_s_scores_are_the_skin_s() {
     let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let output = succeeds(dir.path(), &["compare", recordings.to_str().unwrap(), "--json"]);
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let report: Value = json(dir.path(), &["compare", recordings.to_str().unwrap(), "--json"]);
     let curves = report["curves"].as_array().unwrap();
     assert_eq!(curves.len(), 9);
     for curve in curves {
@@ -179,7 +176,7 @@ fn the_twin_s_objects_are_the_skin_s() {
     let dir = tempfile::tempdir().unwrap();
     let source = recordings.to_str().unwrap();
     let arguments = ["compare", source, "--no-curves", "--skins", "8", "--causes", "--json"];
-    let report: Value = serde_json::from_slice(&succeeds(dir.path(), &arguments).stdout).unwrap();
+    let report: Value = json(dir.path(), &arguments);
     let distances = report["per_object"]["distances"].as_array().unwrap();
     for (decoder, images, most) in DISTANCES {
         let same = |d: &&Value| d["decoder"] == decoder && d["images"] == images && d["m"] == 20 && d["score"] == "iou";
@@ -192,35 +189,6 @@ fn the_twin_s_objects_are_the_skin_s() {
         );
     }
     assert!(dir.path().join("out/compare/figures/per_object.svg").is_file());
-}
-
-#[test]
-fn what_cannot_be_calibrated_from_is_one_clear_error() {
-    let dir = tempfile::tempdir().unwrap();
-    std::fs::create_dir_all(dir.path().join("empty")).unwrap();
-    std::fs::create_dir_all(dir.path().join("none/presses")).unwrap();
-    std::fs::create_dir_all(dir.path().join("foreign/presses/brain")).unwrap();
-    std::fs::write(dir.path().join("foreign/presses/brain/brain_random2.mat"), "not MATLAB").unwrap();
-    std::fs::write(
-        dir.path().join("foreign/presses/brain/brain_random2_time.mat"),
-        "not MATLAB",
-    )
-    .unwrap();
-    for command in ["calibrate", "compare"] {
-        for (arguments, says) in [
-            (vec!["nowhere"], "nowhere"),
-            (vec!["empty"], "no recordings found"),
-            (vec!["none"], "no recordings found"),
-            (vec!["foreign"], "brain_random2.mat: not a readable MATLAB v5 file"),
-        ] {
-            let output = spts(dir.path(), &[&[command], arguments.as_slice()].concat());
-            let said = String::from_utf8_lossy(&output.stderr).into_owned();
-            assert_eq!(output.status.code(), Some(2), "{said}");
-            assert!(said.lines().count() == 1 && said.contains(says), "{said}");
-        }
-    }
-    let output = spts(dir.path(), &["calibrate", "none", "--presses", "5-2"]);
-    assert!(String::from_utf8_lossy(&output.stderr).contains("1 ≤ A ≤ B"));
 }
 
 /// The numbers do not depend on the number of threads.
@@ -257,7 +225,7 @@ fn sessions_are_predicted_by_the_others() {
         "4",
         "--json",
     ];
-    let report: Value = serde_json::from_slice(&succeeds(dir.path(), &others).stdout).unwrap();
+    let report: Value = json(dir.path(), &others);
     let rows = report["predicted"].as_array().unwrap();
     assert_eq!(rows.len(), 7 * SESSIONS.len());
     let inside = rows.iter().filter(|row| row["inside"] == true).count();
@@ -283,7 +251,7 @@ fn simulated_images_go_through_the_readout() {
         "simulated",
         "--json",
     ];
-    let report: Value = serde_json::from_slice(&succeeds(dir.path(), &compare).stdout).unwrap();
+    let report: Value = json(dir.path(), &compare);
     let rows = report["statistics"].as_array().unwrap();
     for name in ["h1", "h2", "late_per_flip", "idle_noise", "step_v"] {
         let same: Vec<&Value> = rows.iter().filter(|row| row["name"] == name).collect();

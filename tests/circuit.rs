@@ -1,12 +1,11 @@
 //! The theory of the amplifier through its command.
 
-use crate::command::{files, spts, succeeds, words};
+use crate::command::{files, succeeds, words};
 use serde_json::Value;
 
 fn json(arguments: &[&str]) -> Value {
     let dir = tempfile::tempdir().unwrap();
-    let output = succeeds(dir.path(), &[&["circuit", "--json"], arguments].concat());
-    serde_json::from_slice(&output.stdout).unwrap()
+    crate::command::json(dir.path(), &[&["circuit", "--json"], arguments].concat())
 }
 
 fn number(value: &Value, key: &str) -> f64 {
@@ -87,39 +86,4 @@ fn taxels_with_a_capacitance_have_a_table_of_their_own() {
         "{soft:?} {hard:?}"
     );
     assert!(soft[12] > hard[12], "{soft:?} {hard:?}");
-}
-
-#[test]
-fn wrong_circuits_are_refused_in_one_line() {
-    let dir = tempfile::tempdir().unwrap();
-    for (arguments, words) in [
-        (&["--taxels", "0"][..], &["--taxels", "0"][..]),
-        (
-            &["--taxels", "100", "--pressed", "1.5"],
-            &["--pressed", "1.5", "[0, 1]"],
-        ),
-        (
-            &["--taxels", "100", "--pressed-us", "nan"],
-            &["--pressed-us", "nan", "[0, 1e6] µS"],
-        ),
-        (&["--feedback-ohm", "0"], &["--feedback-ohm", "0", "[1e-9, 1e9] ohm"]),
-        (&["--bus-pf", "-1"], &["--bus-pf", "-1", "[0, 1e6] pF"]),
-        (&["--taxel-pf", "inf"], &["--taxel-pf", "inf", "[0, 1e6] pF"]),
-        // 1.1 nF each is allowed, 1.1 F together is not
-        (
-            &["--taxels", "1000000000", "--taxel-pf", "1100"],
-            &["--taxel-pf", "1.100e12 pF", "[0, 1e12] pF"],
-        ),
-        (&["--rate-hz", "200000"], &["rate-hz", "200000"]),
-        (&["--rate-hz", "nan"], &["rate-hz", "NaN"]),
-        (&["--sub-array", "1"], &["--sub-array"]),
-    ] {
-        let output = spts(dir.path(), &[&["circuit"], arguments].concat());
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
-        for word in words {
-            assert!(error.contains(word), "{arguments:?}: {error}");
-        }
-    }
-    assert!(files(dir.path()).is_empty(), "a refused command left a file");
 }

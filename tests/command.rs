@@ -32,6 +32,11 @@ pub(crate) fn succeeds(dir: &Path, arguments: &[&str]) -> Output {
     output
 }
 
+/// What `spts` prints as JSON.
+pub(crate) fn json(dir: &Path, arguments: &[&str]) -> serde_json::Value {
+    serde_json::from_slice(&succeeds(dir, arguments).stdout).expect("it is JSON")
+}
+
 /// Runs `spts` and expects status 2 and one line with all of `facts` in it.
 #[track_caller]
 pub(crate) fn refused(dir: &Path, arguments: &[&str], facts: &[&str]) {

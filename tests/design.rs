@@ -8,8 +8,7 @@ use std::path::Path;
 const SMALL: &str = "design --area 0.15x0.15 --resolution 15mm --latency 2ms --iou 0.7 --objects large";
 
 fn json(dir: &Path, arguments: &str) -> Value {
-    let output = succeeds(dir, &words(arguments));
-    serde_json::from_slice(&output.stdout).unwrap()
+    crate::command::json(dir, &words(arguments))
 }
 
 /// The design reaches what was asked for, its scene and its profile simulate, its check agrees, and a check of another
@@ -111,59 +110,6 @@ fn what_is_out_of_reach_is_said() {
     assert!(design["expected"]["iou"]["mean"].as_f64().unwrap() < 0.95);
     let output = succeeds(dir.path(), &words(&asked.replace(" --json", "")));
     assert!(String::from_utf8_lossy(&output.stdout).contains("NOT REACHABLE"));
-}
-
-#[test]
-fn what_cannot_be_designed_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    let with = |arguments: &str, facts: &[&str]| {
-        let all = format!("design {arguments} --out out");
-        refused(dir.path(), &words(&all), facts);
-        assert!(!dir.path().join("out").exists(), "{all} left a folder");
-    };
-    let rest = "--resolution 5mm --latency 5ms";
-    with(
-        &format!("--area nanx0.2 {rest}"),
-        &["`--area` = nanx0.2", "[0.001, 10] m"],
-    );
-    with(&format!("--area 0x0.2 {rest}"), &["`--area` = 0x0.2"]);
-    with(
-        "--area 0.3x0.2 --resolution nan --latency 5ms",
-        &["`--resolution` = nan", "[0.1mm, 1m]"],
-    );
-    with(
-        "--area 0.3x0.2 --resolution 0mm --latency 5ms",
-        &["`--resolution` = 0mm"],
-    );
-    with(
-        "--area 0.3x0.2 --resolution 5mm --latency 0",
-        &["`--latency` = 0", "[1us, 10s]"],
-    );
-    with("--area 0.3x0.2 --resolution 5mm --latency nan", &["`--latency` = nan"]);
-    with(
-        &format!("--area 0.3x0.2 {rest} --iou 1.5"),
-        &["`--iou` = 1.5 is outside [0.01, 0.99]"],
-    );
-    with(&format!("--area 0.3x0.2 {rest} --iou nan"), &["`--iou` = nan"]);
-    with(&format!("--area 0.3x0.2 {rest} --wires 0"), &["`--wires` = 0"]);
-    with(
-        &format!("--area 0.3x0.2 {rest} --wires 41"),
-        &["`wires` = 41 is outside [1, 40]"],
-    );
-    with(
-        &format!("--area 0.3x0.2 {rest} --objects cups"),
-        &["`objects` = \"cups\"", "valid: small, large"],
-    );
-    // 10 000 × 10 000 taxels, and one
-    with(
-        "--area 10x10 --resolution 1mm --latency 5ms",
-        &["10000 × 10000 taxels", "[2, 256] a side"],
-    );
-    with("--area 0.01x0.01 --resolution 8mm --latency 5ms", &["1 × 1 taxels"]);
-    with(
-        "--area 0.3x0.2 --resolution 5mm --latency 5us",
-        &["`latency` = 0.000005", "measurements take that long"],
-    );
 }
 
 /// One wire reads as many taxels whatever is explored, and the three commands say the same.

@@ -5,7 +5,7 @@ mod fields;
 mod help;
 mod pages;
 
-use pages::{Block, blocks, inline_code, pages};
+use pages::{Block, blocks, inline_code, pages, root};
 use spts::Scene;
 use spts_cli::{Cli, refusal};
 use std::ffi::OsString;
@@ -141,4 +141,29 @@ fn what_is_wrong_is_noticed() {
     assert_eq!(wrong.len(), 2);
     assert!(refused(&wrong[0]).is_some_and(|reason| reason.contains("--no-such")));
     assert_eq!(refused(&wrong[1]), None);
+}
+
+/// A path of ARCHITECTURE.md is there; of one with a NAME in it, its folder is. `{a,b}` stands for both.
+#[test]
+fn every_path_of_the_architecture_exists() {
+    let mut seen = 0;
+    for code in inline_code(&root().join("ARCHITECTURE.md")) {
+        if !code.contains('/') || code.contains(' ') {
+            continue;
+        }
+        let (before, rest) = code.split_once('{').unwrap_or((&code, ""));
+        let (names, after) = rest.split_once('}').unwrap_or(("", ""));
+        for name in names.split(',') {
+            let path = format!("{before}{name}{after}");
+            let known = path.split("NAME").next().unwrap_or_default();
+            let known = if known == path {
+                known
+            } else {
+                known.rsplit_once('/').map_or("", |(folder, _)| folder)
+            };
+            assert!(root().join(known).exists(), "{code}: {path} is not there");
+            seen += 1;
+        }
+    }
+    assert!(seen > 40, "{seen} paths");
 }

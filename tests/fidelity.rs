@@ -1,7 +1,6 @@
 //! The study of fidelity levels through its command.
 
-use crate::command::{files, spts, succeeds, words};
-use serde_json::Value;
+use crate::command::{files, json, succeeds, words};
 
 /// One line a scene, level and resolution, with the keys that scripts read; errors that do not depend on the threads;
 /// and the same scene chosen by a tolerance.
@@ -10,11 +9,10 @@ fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
     let dir = tempfile::tempdir().unwrap();
     let study = |threads: &str| {
         let arguments = ["fidelity", "--quick", "--scene", "T", "--scene", "drop", "--json"];
-        let output = succeeds(
+        json(
             dir.path(),
             &[&arguments[..], &["--threads", threads, "--out", threads]].concat(),
-        );
-        serde_json::from_slice::<Value>(&output.stdout).unwrap()
+        )
     };
     let (report, _) = (study("1"), study("2"));
     let rows = report["rows"].as_array().unwrap();
@@ -37,23 +35,6 @@ fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
     }
     for name in words("fidelity.csv summary.md figures/pareto.png figures/pressure.svg") {
         assert!(one.contains_key(name), "{name}");
-    }
-}
-
-#[test]
-fn wrong_studies_are_refused_in_one_line() {
-    let dir = tempfile::tempdir().unwrap();
-    for (arguments, words) in [
-        (&["--scene", "spher"][..], "spher"),
-        (&["--scene", "missing.toml"], "missing.toml"),
-        (&["--scene", "T", "--scene", "T"], "twice"),
-        (&["--cells", "0"], "[1, 24]"),
-        (&["--cells", "x"], "--cells"),
-    ] {
-        let output = spts(dir.path(), &[&["fidelity"], arguments].concat());
-        let error = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {error}");
-        assert!(error.contains(words), "{arguments:?}: {error}");
     }
 }
 

@@ -1,6 +1,6 @@
 //! The whole twin on the codes of emulated cells: recordings equal those with the model's weights byte for byte.
 
-use crate::command::{files, spts, succeeds};
+use crate::command::{files, succeeds};
 use nalgebra::{DMatrix, DVector};
 use spts::chain::{Acquisition, Chain, ChainConfig};
 use spts_circuit::{CompressiveWeights, Mode, PROFILES, Patterns, Profile, Seeding, WeightMode, Weights};
@@ -222,16 +222,4 @@ fn lost_edges_are_noted() {
         summary["notes"]
     );
     assert!(String::from_utf8_lossy(&output.stderr).contains("lost edges"));
-}
-
-#[test]
-fn weights_that_cannot_be_had_are_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    let output = spts(dir.path(), &["simulate", "press/T", "--weights", "magic"]);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    for fact in ["`weights` = \"magic\"", "known: model, firmware"] {
-        assert!(said.contains(fact), "`{fact}` is not in: {said}");
-    }
-    assert!(!dir.path().join("out").exists(), "a refused scene left a folder");
 }

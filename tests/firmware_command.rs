@@ -6,8 +6,7 @@ use spts_circuit::{Seeding, WeightMode, Weights};
 use std::path::Path;
 
 fn json(dir: &Path, arguments: &[&str]) -> Value {
-    let output = succeeds(dir, &[&["firmware"], arguments, &["--json"]].concat());
-    serde_json::from_slice(&output.stdout).unwrap()
+    crate::command::json(dir, &[&["firmware"], arguments, &["--json"]].concat())
 }
 
 #[test]
@@ -69,31 +68,6 @@ fn a_trace_shows_the_edge() {
         text.contains("interrupt 3") && text.contains("reti") && text.contains("sleep"),
         "{text}"
     );
-}
-
-#[test]
-fn what_cannot_be_run_is_refused() {
-    let dir = tempfile::tempdir().unwrap();
-    std::fs::write(dir.path().join("broken.hex"), ":0400000001020304FF\n").unwrap();
-    for (arguments, words) in [
-        (&["verify", "--cells", "113"][..], "[1, 112]"),
-        (&["verify", "--edges", "0"], "[1, 1000000000]"),
-        (&["verify", "--mode", "pattern", "--period", "65"], "[1, 64]"),
-        (
-            &["weights", "--out", "w.npy", "--mode", "pattern", "--period", "0"],
-            "[1, 64]",
-        ),
-        (&["verify", "--edge-hz", "nan"], "[1, 1000000]"),
-        (&["verify", "--image", "none.hex"], "none.hex"),
-        (&["verify", "--image", "broken.hex"], "broken.hex"),
-        (&["trace", "--taxel", "100"], "[0, 99]"),
-        (&["weights", "--out", "no/such/folder/w.npy"], "no/such/folder"),
-    ] {
-        let output = spts(dir.path(), &[&["firmware"], arguments].concat());
-        let text = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
-        assert!(text.contains(words), "{arguments:?}: {text}");
-    }
 }
 
 /// The slow suite's check: a hundred million codes in every mode.

@@ -2,7 +2,7 @@
 //! small ones that ask for much. Each ends in one line that names file, field, value and range, with status 2, at once
 //! and with little memory, and nothing is written.
 
-use crate::command::{SPTS, files, succeeds, words};
+use crate::command::{SPTS, files, json, succeeds, words};
 use crate::recordings::recordings;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
@@ -204,11 +204,129 @@ simulat press/T | simulat | simulate
 score d --twin press/T | RECORDINGS | --twin
 validate nowhere | nowhere
 validate . | no recordings found
+score empty | no recordings found
+score empty --decoder magic | `--decoder` = "magic"; valid: all, empty
+score empty --against nowhere.json | nowhere.json
+score | RECORDINGS
+score d --external cat --external-timeout 0 | `--external-timeout` = | valid: [0.1, 86400] s
+score d --external cat --external-timeout -1 | `--external-timeout` = | valid: [0.1, 86400] s
+score d --external cat --external-timeout nan | `--external-timeout` = | valid: [0.1, 86400] s
+score d --external cat --external-timeout 86401 | `--external-timeout` = | valid: [0.1, 86400] s
+score --twin press/T --quick --in-time --decoder evidence | valid: nn_lmmse
+score --twin press/T --quick --in-time --sensing chosen | --sensing
+score --twin press/T --quick --in-time --anytime | --anytime
+score --twin press/T --quick --in-time --save board.json | --save
+score --twin press/T --quick --anytime --confidence 0.5 | outside (0.5, 1)
+score --twin press/T --quick --anytime --confidence 1 | outside (0.5, 1)
+score --twin press/T --quick --anytime --confidence -0.9 | outside (0.5, 1)
+score --twin press/T --quick --anytime --confidence nan | outside (0.5, 1)
+score --twin press/T --quick --anytime --confidence sure | --confidence
+score --twin press/T --quick --anytime --save board.json | --save
+score --twin press/T --quick --anytime --decoder omp,evidence | valid: nn_lmmse, amortised, evidence
+score --twin press/T --confidence 0.9 | --anytime
+calibrate nowhere | nowhere
+calibrate empty | no recordings found
+calibrate none | no recordings found
+calibrate foreign | brain_random2.mat: not a readable MATLAB v5 file
+calibrate none --presses 5-2 | 1 ≤ A ≤ B
+compare nowhere | nowhere
+compare empty | no recordings found
+compare none | no recordings found
+compare foreign | brain_random2.mat: not a readable MATLAB v5 file
+compare empty --arm | empty
+budget --objects brian | `brian` is neither "all" nor one of brain
+budget --objects rec,rec | twice
+budget --taxels 150 | [100, 1600]
+budget --taxels 1600 --measurements 20,1000 | 1000 is outside [1, 960]
+budget --decode best | script_s20, script_m4, matched
+budget --readout as_bult | as_bult
+budget --readout missing.toml | missing.toml
+budget --readout bad.toml | sample_rate_hz
+fidelity --scene spher | spher
+fidelity --scene missing.toml | missing.toml
+fidelity --scene T --scene T | twice
+fidelity --cells 0 | [1, 24]
+fidelity --cells x | --cells
+readouts --taxels 65 | `--taxels` = 65 | [64, 16384]
+readouts --taxels 1000000 | `--taxels` = 1000000 | [64, 16384]
+readouts --readout magic | --readout | magic | raster
+readouts --repetitions 0 | `--repetitions` = 0 | [1, 1000]
+readouts --shapes 0 | `--shapes` = 0 | [1, 1000]
+readouts --seed -1 | `--seed` = -1
+circuit --pressed-us nan | --pressed-us | nan | [0, 1e6] µS
+circuit --bus-pf -1 | --bus-pf | -1 | [0, 1e6] pF
+circuit --taxel-pf inf | --taxel-pf | inf | [0, 1e6] pF
+circuit --taxels 1000000000 --taxel-pf 1100 | --taxel-pf | 1.100e12 pF | [0, 1e12] pF
+circuit --rate-hz 200000 | rate-hz | 200000
+circuit --rate-hz nan | rate-hz | NaN
+design --area nanx0.2 --resolution 5mm --latency 5ms | `--area` = nanx0.2 | [0.001, 10] m
+design --area 0x0.2 --resolution 5mm --latency 5ms | `--area` = 0x0.2
+design --area 0.3x0.2 --resolution nan --latency 5ms | `--resolution` = nan | [0.1mm, 1m]
+design --area 0.3x0.2 --resolution 0mm --latency 5ms | `--resolution` = 0mm
+design --area 0.3x0.2 --resolution 5mm --latency 0 | `--latency` = 0 | [1us, 10s]
+design --area 0.3x0.2 --resolution 5mm --latency nan | `--latency` = nan
+design --area 0.3x0.2 --resolution 5mm --latency 5us | `latency` = 0.000005 | measurements take that long
+design --area 0.3x0.2 --resolution 5mm --latency 5ms --iou nan | `--iou` = nan
+design --area 0.3x0.2 --resolution 5mm --latency 5ms --wires 0 | `--wires` = 0
+design --area 0.3x0.2 --resolution 5mm --latency 5ms --wires 41 | `wires` = 41 is outside [1, 40]
+design --area 0.3x0.2 --resolution 5mm --latency 5ms --objects cups | `objects` = "cups" | valid: small, large
+design --area 10x10 --resolution 1mm --latency 5ms | 10000 × 10000 taxels | [2, 256] a side
+design --area 0.01x0.01 --resolution 8mm --latency 5ms | 1 × 1 taxels
+firmware verify --mode pattern --period 65 | [1, 64]
+firmware verify --edge-hz nan | [1, 1000000]
+firmware verify --image none.hex | none.hex
+firmware verify --image broken.hex | broken.hex
+firmware weights --out w.npy --mode pattern --period 0 | [1, 64]
+firmware weights --out no/such/folder/w.npy | no/such/folder
+firmware trace --taxel 100 | [0, 99]
+simulate press/T --weights magic | `weights` = "magic" | known: model, firmware
+simulate arm --set bend.radius_m=0.01 | bend.radius_m | 0.01 | [0.02, 10] m
+simulate arm --set bend.taut_share=1.5 | bend.taut_share | 1.5 | [0, 1]
+simulate arm --set bend.strain=0.5 | bend.strain | 0.5 | [0, 0.3]
+simulate arm --set bend.strain_log_sd=3.0 | bend.strain_log_sd | 3 | [0, 2]
+simulate arm --set bend.press_log_sd=-1.0 | bend.press_log_sd | -1 | [0, 1]
+simulate arm --set bend.touch_slack=nan | bend.touch_slack | NaN | [0, 2]
+simulate arm --set bend.tight=1 | tight | radius_m | strain
+simulate arm --set contact.model=layer | contact.model | layer | "winkler", "footprint"
+simulate arm --set press.places=[] | press.places | [] | [row, col]
+simulate arm --set press.places=[[1,99]] | press.places: col | 99 | cols + 4
+simulate bounce --set bend={} | [bend] | [press] | drops
+dataset make shapes | shapes | random-shapes
+dataset make missing.toml | missing.toml
+dataset make bad_spec.toml | bad_spec.toml | `press.force_n` = 0 | [0.01, 1000] N
+dataset make faults --rows 0 | --rows | 0 | [1, 1000000000000]
+dataset make faults --shard 4/4 | `--shard` = 4/4 | 0 ≤ i < n
+dataset make faults --out occupied | mine.txt | is not of a data set
+dataset make presses-17 --rows 17 --out set --set transducer.gains="short.toml" | gains.log_mean.length` = 1
+dataset finish occupied | dataset.json
+dataset head nowhere | dataset.json
+dataset specs --show presses | `--show` = presses | presses-17
+dataset preview empty | empty/dataset.json
+dataset preview nowhere | nowhere | random-shapes
+dataset preview faults --rows 0 | --rows | [1, 150]
+dataset preview faults --rows 151 | --rows | [1, 150]
+dataset preview faults --out missing/folder/x.png | missing/folder
+dataset shapes --families gear,cog | cog | gear
+dataset shapes --count 0 | --count | [1, 400]
 "#;
 
 #[test]
 fn command_lines() {
     let attack = Attack::new();
+    for (name, text) in [
+        ("bad.toml", "weights = \"binary\""),
+        ("bad_spec.toml", "rows = 10\n[press]\nforce_n = { uniform = [0, 1] }"),
+        ("short.toml", SHORT_GAINS),
+        ("broken.hex", ":0400000001020304FF\n"),
+        ("occupied/mine.txt", "mine"),
+        ("foreign/presses/brain/brain_random2.mat", "not MATLAB"),
+        ("foreign/presses/brain/brain_random2_time.mat", "not MATLAB"),
+    ] {
+        attack.write(name, text);
+    }
+    for folder in ["empty", "none/presses"] {
+        std::fs::create_dir_all(attack.dir().join(folder)).unwrap();
+    }
     for (command, facts) in cases(COMMANDS) {
         attack.refused(&words(command), &facts);
     }
@@ -216,6 +334,9 @@ fn command_lines() {
         assert!(!succeeds(attack.dir(), &words(command)).stdout.is_empty(), "{command}");
     }
 }
+
+/// Gains of a skin of one taxel.
+const SHORT_GAINS: &str = "log_mean = [0.0]\nlog_sd = [0.1]\nmounting_log_sd = 0.1\n";
 
 /// Scene files: their lines with `;` between them, and `P` for a press of an object.
 const SCENES: &str = r#"
@@ -250,6 +371,9 @@ rows.seeds = [-1] ; P | a whole number in [0, 2^32) is needed
 timestep_s = true ; P | `timestep_s` = true: 
 chosen_for_tolerance = nan ; P | `chosen_for_tolerance` = NaN is outside (0, 1]
 frame_interval_s = inf ; P | `frame_interval_s` = inf is outside [timestep_s, 0.1] s
+[transducer_parameters] ; gains = "short.toml" ; P | gains.log_mean.length` = 1 | one value a taxel
+[transducer_parameters] ; gains = "nothing.toml" ; P | `gains` | nothing.toml
+[transducer_parameters] ; gains = "wrong.toml" ; P | wrong.toml | gains.log_mean[0]` = 9 is outside [-5, 5]
 P ; scale = nan | `press.scale` = NaN is outside (0, 1000]
 P ; scale = 2.0 | `press.scale` is for a mesh, and `press.object` = "T" has its own size
 P ; presses = -1 | `press.presses` = -1: a whole number from 0 on is needed
@@ -264,6 +388,8 @@ P ; position_share = [0.0, 2.0] | `press.position_share (y)` = 2 is outside [-1,
 fn scene_files() {
     let attack = Attack::new();
     let press = "[press]\nobject = \"T\"";
+    attack.write("short.toml", SHORT_GAINS);
+    attack.write("wrong.toml", SHORT_GAINS.replace("[0.0]", "[9.0]"));
     for (scene, facts) in cases(SCENES) {
         let lines = scene.split(" ; ").map(|line| if line == "P" { press } else { line });
         attack.write("mine.toml", lines.collect::<Vec<_>>().join("\n"));
@@ -699,7 +825,7 @@ fn sessions() {
         [&whole[..8], &length, text.as_bytes(), &whole[end..]].concat()
     };
     attack.write(&file, header("9999999999, 9999999999, 9999999999"));
-    decode(&[array, "shape is too large"]);
+    decode(&[array, "9999999999", "expected [2, 10, 8]"]);
     attack.write(&file, [&whole[..6], &[2, 0, 255, 255, 255, 255]].concat());
     decode(&[array, "header length = 4294967295"]);
     attack.write(&file, &whole);
@@ -918,7 +1044,7 @@ fn scenes_and_objects_are_listed() {
     let dir = tempfile::tempdir().unwrap();
     let text = succeeds(dir.path(), &["simulate", "--list"]).stdout;
     let text = String::from_utf8_lossy(&text).into_owned();
-    let json: Value = serde_json::from_slice(&succeeds(dir.path(), &["simulate", "--list", "--json"]).stdout).unwrap();
+    let json: Value = json(dir.path(), &["simulate", "--list", "--json"]);
     assert_eq!(json["objects"].as_array().unwrap().len(), 18);
     for (list, key) in [("scenes", "scene"), ("objects", "name")] {
         for entry in json[list].as_array().unwrap() {

@@ -1,6 +1,6 @@
 //! Contacts followed in time, through the command.
 
-use crate::command::{refused, succeeds, words};
+use crate::command::{json, words};
 use crate::score::score;
 use serde_json::Value;
 use std::path::Path;
@@ -18,8 +18,7 @@ fn rows<'a>(board: &'a Value, table: &str, contact: &str, hold: bool) -> Vec<&'a
 /// Two simulated objects by windows of 5 and 20 samples.
 fn twin(dir: &Path, threads: &str) -> Value {
     let arguments = words("score --in-time --quick --json --measurements 5,20 --twin press/T press/rec --threads");
-    let output = succeeds(dir, &[&arguments[..], &[threads]].concat());
-    serde_json::from_slice(&output.stdout).unwrap()
+    json(dir, &[&arguments[..], &[threads]].concat())
 }
 
 /// Held simulated presses gain; any number of threads gives the same numbers; tables and figure are there. 20 samples
@@ -50,17 +49,6 @@ fn simulated_presses_gain() {
     let saved = std::fs::read(out.join("in_time.json")).unwrap();
     assert_eq!(serde_json::from_slice::<Value>(&saved).unwrap(), board);
     assert_eq!(twin(dir.path(), "2"), board);
-}
-
-#[test]
-fn what_cannot_be_followed_is_said() {
-    let dir = tempfile::tempdir().unwrap();
-    let start = words("score --twin press/T --quick --in-time");
-    let refuse = |more: &str, fact: &str| refused(dir.path(), &[&start[..], &words(more)].concat(), &[fact]);
-    refuse("--decoder evidence", "valid: nn_lmmse");
-    refuse("--sensing chosen", "--sensing");
-    refuse("--anytime", "--anytime");
-    refuse("--save board.json", "--save");
 }
 
 /// Two objects of the real skin, each left out, and its ball, by windows of 10 samples. A study of its own in numpy,

@@ -1,6 +1,6 @@
 //! Where a finger touches the skin around a robot's arm, which is under preload, through the commands.
 
-use crate::command::succeeds;
+use crate::command::json;
 use crate::recordings::recordings;
 use crate::score::score;
 use serde_json::Value;
@@ -42,7 +42,7 @@ fn touches_of_the_arm_are_located() {
     let path = root.to_str().unwrap();
     let arguments = "--session robot_arm --json --measurements 50 --windows 20";
     let arguments: Vec<&str> = ["decode", path].into_iter().chain(arguments.split(' ')).collect();
-    let decoded: Value = serde_json::from_slice(&succeeds(dir.path(), &arguments).stdout).unwrap();
+    let decoded: Value = json(dir.path(), &arguments);
     let rows = decoded["rows"].as_array().unwrap();
     let starts = |block: u64| {
         rows.iter()

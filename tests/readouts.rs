@@ -1,6 +1,6 @@
 //! The benchmark of readouts through its command.
 
-use crate::command::{files, refused, spts, succeeds, words};
+use crate::command::{files, json, succeeds, words};
 use serde_json::Value;
 
 const TINY: &str = "readouts --taxels 64 --repetitions 2 --shapes 2";
@@ -63,7 +63,7 @@ fn readouts_are_chosen_and_other_seeds_give_other_numbers() {
     let dir = tempfile::tempdir().unwrap();
     let run = |seed: u32| {
         let command = format!("{TINY} --readout raster,adaptive --json --out {seed} --seed {seed}");
-        let report: Value = serde_json::from_slice(&succeeds(dir.path(), &words(&command)).stdout).unwrap();
+        let report: Value = json(dir.path(), &words(&command));
         report
     };
     let (one, two) = (run(1), run(2));
@@ -72,20 +72,9 @@ fn readouts_are_chosen_and_other_seeds_give_other_numbers() {
 }
 
 #[test]
-fn wrong_readouts_are_refused_and_the_help_has_examples() {
+fn the_help_has_examples() {
     let dir = tempfile::tempdir().unwrap();
-    for (command, facts) in [
-        ("readouts --taxels 65", &["`--taxels` = 65", "[64, 16384]"][..]),
-        ("readouts --taxels 1000000", &["`--taxels` = 1000000", "[64, 16384]"]),
-        ("readouts --readout magic", &["--readout", "magic", "raster"]),
-        ("readouts --repetitions 0", &["`--repetitions` = 0", "[1, 1000]"]),
-        ("readouts --shapes 0", &["`--shapes` = 0", "[1, 1000]"]),
-        ("readouts --seed -1", &["`--seed` = -1"]),
-    ] {
-        refused(dir.path(), &words(command), facts);
-    }
-    assert!(files(dir.path()).is_empty(), "a refused command left a file");
-    let help = spts(dir.path(), &["readouts", "--help"]);
+    let help = succeeds(dir.path(), &["readouts", "--help"]);
     let said = String::from_utf8_lossy(&help.stdout).into_owned();
     assert!(
         said.contains("spts readouts --quick") && said.contains("code_division"),

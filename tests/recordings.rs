@@ -1,6 +1,6 @@
 //! The recordings of the real skin, scored: `spts validate` must find what an independent analysis found in them.
 
-use crate::command::{spts, succeeds};
+use crate::command::{json, spts};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -44,11 +44,10 @@ fn the_real_skin_scores_what_it_is_known_to_score() {
     let dir = tempfile::tempdir().unwrap();
     let measurements = M.map(|m| m.to_string()).join(",");
     let path = recordings.to_str().unwrap();
-    let output = succeeds(
+    let report: Value = json(
         dir.path(),
         &["validate", path, "--measurements", &measurements, "--json"],
     );
-    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     for (decode, score, expected) in SCORES {
         for (m, expected) in M.into_iter().zip(expected) {
             let row = row(&report, "mean", decode, m);
@@ -109,10 +108,7 @@ fn any_subset_in_the_original_layout_will_do() {
             std::fs::copy(recordings.join(here), to).unwrap();
         }
     }
-    let validate = |root: &str| {
-        let output = succeeds(dir.path(), &["validate", root, "--measurements", "20", "--json"]);
-        serde_json::from_slice::<Value>(&output.stdout).unwrap()
-    };
+    let validate = |root: &str| json(dir.path(), &["validate", root, "--measurements", "20", "--json"]);
     let report = validate("clone");
     assert_eq!(report, validate("own"));
     assert_eq!(report, validate("clone/Data_Analysis"));

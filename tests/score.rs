@@ -130,27 +130,6 @@ fn external_programs_are_scored_or_named() {
     }
 }
 
-#[test]
-fn what_cannot_be_scored_is_said() {
-    let dir = tempfile::tempdir().unwrap();
-    let here = dir.path().to_str().unwrap();
-    for (arguments, expected) in [
-        (&["score", here][..], "no recording"),
-        (
-            &["score", here, "--decoder", "magic"],
-            "`--decoder` = \"magic\"; valid: all, empty",
-        ),
-        (&["score", here, "--against", "nowhere.json"], "nowhere.json"),
-        (&["score", here, "--measurements", "0"], "--measurements"),
-        (&["score"], "RECORDINGS"),
-    ] {
-        let output = spts(dir.path(), arguments);
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(said.contains(expected), "{arguments:?}: {said}");
-    }
-}
-
 /// Floors, not values. Means over five objects that an independent analysis in numpy reached on the same windows:
 /// evidence .982 and .997 single at M = 13 and 20; left out .441, .612 and .662 IoU at M = 7, 20 and 25. Windows of one
 /// session resemble each other, so that a difference of .01 means nothing.

@@ -606,7 +606,7 @@ impl Array {
         self.wait_for_clock()?;
         self.pass(1);
         for cell in &mut self.cells {
-            cell.hear_stop(self.stage != Stage::Bytes);
+            cell.hear_stop();
         }
         self.stage = Stage::Bytes;
         // bus free time

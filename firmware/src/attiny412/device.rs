@@ -1,8 +1,8 @@
 //! One device: core, memory map and time; and its trace, instruction by instruction, for debugging.
 
 use super::space::{FLASH_LEN, RAM_END, Space};
-use super::system::{Accepted, Fault, Faults, ResetCause};
-use crate::avr::{Core, Event, Op, Program, disassemble, sreg};
+use super::system::{Accepted, Fault, Faults};
+use crate::avr::{Core, Event, Program, disassemble, sreg};
 use spts_input::Refusal;
 use std::fmt;
 use std::sync::Arc;
@@ -11,8 +11,6 @@ use std::sync::Arc;
 pub const OSCILLATOR_HZ: f64 = 20e6;
 /// Cycles by which sleep delays an interrupt. Source: DS40002287, section "Interrupt Response Time".
 const WAKE_UP_CYCLES: u64 = 5;
-/// Pin of the clock line, PA3.
-const CLOCK_PIN: u8 = 3;
 
 /// An emulated ATtiny412 microcontroller with the peripherals that a cell uses.
 ///
@@ -20,7 +18,7 @@ const CLOCK_PIN: u8 = 3;
 /// runs until a tick may stop a few cycles after it. The start-up time after a reset is not emulated.
 #[derive(Debug, Clone)]
 pub struct Device {
-    core: Core,
+    pub(super) core: Core,
     program: Arc<Program>,
     space: Space,
     now: u64,
@@ -44,7 +42,7 @@ impl Device {
     /// erased).
     #[must_use]
     pub fn new(program: Arc<Program>, eeprom: &[u8]) -> Self {
-        let space = Space::new(Arc::clone(&program), eeprom);
+        let space = Space::new(eeprom);
         Self {
             core: Core::new(RAM_END),
             program,
@@ -70,12 +68,6 @@ impl Device {
         self.now
     }
 
-    /// The CPU.
-    #[must_use]
-    pub fn core(&self) -> &Core {
-        &self.core
-    }
-
     /// Instructions executed since power-on.
     #[must_use]
     pub fn instructions(&self) -> u64 {
@@ -86,12 +78,6 @@ impl Device {
     #[must_use]
     pub fn is_asleep(&self) -> bool {
         self.asleep
-    }
-
-    /// SRAM, data addresses 0x3F00…0x3FFF.
-    #[must_use]
-    pub fn sram(&self) -> &[u8; 256] {
-        self.space.sram()
     }
 
     /// Accesses without effect since power-on. A correct program causes none.
@@ -112,26 +98,15 @@ impl Device {
         self.space.dac.output_at(tick)
     }
 
-    /// Tick at the end of the last instruction that wrote to the DAC.
-    #[must_use]
-    pub fn dac_written_at(&self) -> u64 {
-        self.space.dac.written_at()
-    }
-
     /// Applies a level to the clock line, pin PA3.
     pub fn set_clock(&mut self, high: bool) {
-        self.set_pin(CLOCK_PIN, high);
-    }
-
-    /// Applies a level to pin `pin` of PORTA. Pins that the package does not have (all but 0…3, 6 and 7) are ignored.
-    pub fn set_pin(&mut self, pin: u8, high: bool) {
-        self.space.port.set_pin(pin, high);
+        self.space.clock.set(high);
         self.space.attention = true;
     }
 
-    /// Resets the device. SRAM is kept except at power-on, EEPROM always; time continues.
-    pub fn reset(&mut self, cause: ResetCause) {
-        self.space.reset(cause);
+    /// Resets the device, as when its supply has dipped. SRAM and EEPROM are kept; time continues.
+    pub fn reset(&mut self) {
+        self.space.reset();
         // the general registers are not reset
         let mut core = Core::new(RAM_END);
         core.registers = self.core.registers;
@@ -184,7 +159,7 @@ impl Device {
     /// Instructions until `limit`, or until something wants to be looked at.
     #[inline]
     fn execute<O: Observer>(&mut self, limit: u64, observer: &mut O) {
-        let ticks_per_cycle = self.space.clkctrl.ticks_per_cycle();
+        let ticks_per_cycle = self.space.ticks_per_cycle;
         // while an interrupt waits for the I flag or for the end of a hold, each instruction may let it in
         let once = self.pending.is_some();
         loop {
@@ -210,7 +185,7 @@ impl Device {
         match event {
             Event::Sleep => {
                 self.space.ccp.close();
-                self.asleep = self.space.slpctrl.enabled();
+                self.asleep = self.space.sleeps;
             }
             Event::Reti => {
                 self.space.cpuint.leave();
@@ -231,7 +206,7 @@ impl Device {
         let space = &mut self.space;
         space.attention = false;
         let wait_cycles = std::mem::take(&mut space.wait_cycles);
-        self.now += u64::from(wait_cycles) * space.clkctrl.ticks_per_cycle();
+        self.now += u64::from(wait_cycles) * space.ticks_per_cycle;
         space.dac.settle(self.now);
         space.advance_timer(self.now);
         space.ccp.advance(self.core.instructions);
@@ -239,27 +214,23 @@ impl Device {
             // counts instructions, and no interrupt comes in between
             space.attention = true;
             self.pending = None;
-            if beside_the_memory_map(self.program.op(self.core.pc)) {
-                space.ccp.close_behind_next(self.core.instructions);
-            }
         } else {
             self.pending = space.cpuint.next(space.requests());
         }
-        self.next_event = space.tca.next_overflow().unwrap_or(u64::MAX);
+        self.next_event = space.tca.next_overflow(space.ticks_per_cycle).unwrap_or(u64::MAX);
     }
 
     fn reset_if_requested<O: Observer>(&mut self, observer: &mut O) {
-        if self.space.rstctrl.requested() {
-            let cause = ResetCause::Software;
-            self.reset(cause);
-            self.hear(observer, TraceStep::Reset { cause });
+        if self.space.reset_requested {
+            self.reset();
+            self.hear(observer, TraceStep::Reset);
         }
     }
 
     /// Wakes up for, or enters, the pending interrupt if the core lets it; returns whether time has passed.
     fn take_interrupt<O: Observer>(&mut self, observer: &mut O) -> bool {
         let Some(accepted) = self.pending else { return false };
-        let ticks_per_cycle = self.space.clkctrl.ticks_per_cycle();
+        let ticks_per_cycle = self.space.ticks_per_cycle;
         if self.asleep && self.core.sreg & sreg::I != 0 {
             self.asleep = false;
             self.hear(observer, TraceStep::Wake);
@@ -287,18 +258,6 @@ impl Device {
         if O::ON {
             observer.hear(TraceRecord { tick: self.now, step });
         }
-    }
-}
-
-/// Whether an instruction ends the window of configuration change protection without passing through the memory map: by
-/// a load of flash, or a store to stack pointer or status register.
-fn beside_the_memory_map(op: Op) -> bool {
-    let own = 0x3d..=0x3f;
-    match op {
-        Op::Lpm { .. } | Op::LpmIncrement { .. } => true,
-        Op::Out { a, .. } => own.contains(&u16::from(a)),
-        Op::Sts { k, .. } => own.contains(&k),
-        _ => false,
     }
 }
 
@@ -332,10 +291,10 @@ impl Device {
         self.space.twi.hear_answer(on_bus, acknowledged);
     }
 
-    /// STOP; `illegal` right behind a START or within a byte.
-    pub(crate) fn hear_stop(&mut self, illegal: bool) {
+    /// STOP.
+    pub(crate) fn hear_stop(&mut self) {
         self.space.attention = true;
-        self.space.twi.hear_stop(illegal);
+        self.space.twi.hear_stop();
     }
 
     /// Whether the client holds the clock.
@@ -379,10 +338,7 @@ pub enum TraceStep {
     /// The CPU wakes up.
     Wake,
     /// The device is reset.
-    Reset {
-        /// Why.
-        cause: ResetCause,
-    },
+    Reset,
 }
 
 impl fmt::Display for TraceRecord {
@@ -398,7 +354,7 @@ impl fmt::Display for TraceRecord {
             }
             TraceStep::Interrupt { vector } => write!(f, "----  interrupt {vector}"),
             TraceStep::Wake => write!(f, "----  wake"),
-            TraceStep::Reset { cause } => write!(f, "----  reset: {cause:?}"),
+            TraceStep::Reset => write!(f, "----  reset"),
         }
     }
 }

@@ -1,14 +1,13 @@
 //! The ATtiny412: an AVRxt core with the peripherals that a cell uses, on the time base of its 20 MHz oscillator.
 //!
-//! Peripherals have the register addresses of the manufacturer's device description. Emulated: memory map
-//! (I/O, SRAM, EEPROM, mapped flash, signature), CPUINT with both levels, configuration change protection, CLKCTRL's
-//! prescaler, PORTA with pin-change interrupts and its mirror, TWI0 as a client byte by byte, DAC0, VREF, idle sleep,
-//! RSTCTRL and the overflow of TCA0. What a program touches beside these is recorded as a [`Fault`] and
-//! has no effect.
+//! Peripherals have the register addresses of the manufacturer's device description. Emulated is what a cell's program
+//! touches: SRAM, EEPROM, CPUINT with both levels, configuration change protection, the main clock's prescaler on and
+//! off, the clock pin PA3 with its interrupt, TWI0 as a client byte by byte, DAC0, idle sleep, software reset and the
+//! overflow of TCA0. Anything else is recorded as a [`Fault`] and has no effect.
 //!
 //! Left out: the start-up time behind a reset, the input synchroniser (up to three cycles, the same for all cells),
-//! analogue settling of the DAC, standby and power-down, more than one wait state an access to EEPROM or mapped flash.
-//! Races are resolved to a whole instruction.
+//! analogue settling of the DAC, standby and power-down, more than one wait state an access to EEPROM. Races are
+//! resolved to a whole instruction.
 //!
 //! ```
 //! use spts_firmware::{Image, attiny412::Device};
@@ -31,4 +30,4 @@ mod tests;
 mod twi;
 
 pub use device::{Device, OSCILLATOR_HZ, TraceRecord, TraceStep};
-pub use system::{Fault, Faults, ResetCause};
+pub use system::{Fault, Faults};

@@ -1,164 +1,123 @@
-//! Memory map: the peripheral at each address.
+//! Memory map: SRAM, and the registers and EEPROM that a cell's program uses.
 
-use super::pins::{DAC, DAC_END, Dac, PORT, PORT_END, PORT_VECTOR, Port, VPORT_LEN, VREF, VREF_END, Vref};
-use super::system::{
-    CLKCTRL, CLKCTRL_END, CPUINT, CPUINT_END, Ccp, Clkctrl, Cpuint, Fault, Faults, RSTCTRL, RSTCTRL_END, ResetCause,
-    Rstctrl, SLPCTRL_CTRLA, Slpctrl,
-};
+use super::pins::{CLOCK_BIT, ClockPin, Dac, PORT_VECTOR};
+use super::system::{Ccp, Cpuint, Fault, Faults};
 use super::tca::{self, Tca};
 use super::twi::{self, Twi};
-use crate::avr::{DataSpace, Program};
-use std::sync::Arc;
+use crate::avr::DataSpace;
 
-/// Size of the SRAM (bytes).
+/// 256 bytes of SRAM at 0x3F00.
 const SRAM_LEN: usize = 256;
-/// High byte of every SRAM address, 0x3F00…0x3FFF.
 const SRAM_PAGE: u16 = 0x3f;
-/// Last address of SRAM, where the stack starts.
+/// Last address of SRAM.
 pub(super) const RAM_END: u16 = 0x3fff;
-/// General purpose I/O registers.
-const GPIO: u16 = 0x1c;
-const GPIO_END: u16 = GPIO + 3;
-const CCP: u16 = 0x34;
-const SIGNATURE: u16 = 0x1100;
-const EEPROM: u16 = 0x1400;
-/// Size of the EEPROM (bytes).
-const EEPROM_LEN: usize = 128;
-/// Identifies an ATtiny412.
-const SIGNATURE_BYTES: [u8; 3] = [0x1e, 0x92, 0x23];
-const FLASH: u16 = 0x8000;
-/// Size of the flash (bytes).
+/// Size of the flash, bytes.
 pub(super) const FLASH_LEN: u16 = 0x1000;
-
+const EEPROM: u16 = 0x1400;
+const EEPROM_LEN: usize = 128;
 const EEPROM_END: u16 = EEPROM + 0x7f;
-const SIGNATURE_END: u16 = SIGNATURE + 2;
-const FLASH_END: u16 = FLASH + FLASH_LEN - 1;
 
-/// Everything with an address but the CPU's own registers.
+const VPORT_INTFLAGS: u16 = 0x0003;
+const CCP: u16 = 0x0034;
+const RSTCTRL_SWRR: u16 = 0x0041;
+const SLPCTRL_CTRLA: u16 = 0x0050;
+const CLKCTRL_MCLKCTRLB: u16 = 0x0061;
+const VREF_CTRLA: u16 = 0x00a0;
+const CPUINT_LVL1VEC: u16 = 0x0113;
+const PORT_PIN3CTRL: u16 = 0x0413;
+const PORT_PIN6CTRL: u16 = 0x0416;
+const DAC_CTRLA: u16 = 0x0680;
+const DAC_DATA: u16 = 0x0681;
+
+/// Ticks of the oscillator a cycle after reset: the prescaler divides by 6.
+const RESET_DIVISION: u64 = 6;
+
+/// Everything in the data space of one device.
 #[derive(Debug, Clone)]
 pub(super) struct Space {
     sram: [u8; SRAM_LEN],
-    gpio: [u8; 4],
     eeprom: [u8; EEPROM_LEN],
-    /// Whether a register was accessed that may change interrupts, clock or the time of the next event.
+    /// Whether something has happened that the device has to look at.
     pub(super) attention: bool,
-    /// Tick at which the present instruction started.
+    /// Tick at which the instruction began.
     pub(super) now: u64,
-    /// Cycles that the present instruction waits for flash or EEPROM; non-zero only with `attention`.
+    /// Cycles that the instruction has waited for memory.
     pub(super) wait_cycles: u32,
+    pub(super) ticks_per_cycle: u64,
+    /// Whether SLEEP sleeps.
+    pub(super) sleeps: bool,
+    /// Whether the program has asked for a reset.
+    pub(super) reset_requested: bool,
     pub(super) ccp: Ccp,
-    pub(super) clkctrl: Clkctrl,
     pub(super) cpuint: Cpuint,
+    pub(super) clock: ClockPin,
     pub(super) dac: Dac,
-    pub(super) port: Port,
-    pub(super) rstctrl: Rstctrl,
-    pub(super) slpctrl: Slpctrl,
     pub(super) tca: Tca,
     pub(super) twi: Twi,
-    pub(super) vref: Vref,
     pub(super) faults: Faults,
-    program: Arc<Program>,
 }
 
 impl Space {
     /// Memory with `eeprom` at the start of the EEPROM. SRAM holds a pattern: what it holds after power-on is
     /// undefined.
-    pub(super) fn new(program: Arc<Program>, eeprom: &[u8]) -> Self {
+    pub(super) fn new(eeprom: &[u8]) -> Self {
         let byte = |k| eeprom.get(k).copied().unwrap_or(u8::MAX);
         Self {
-            sram: power_on_pattern(),
-            gpio: [0; 4],
+            sram: std::array::from_fn(|k| (k.to_le_bytes()[0]).wrapping_mul(0x9d) ^ 0xa5),
             eeprom: std::array::from_fn(byte),
             attention: true,
             now: 0,
             wait_cycles: 0,
+            ticks_per_cycle: RESET_DIVISION,
+            sleeps: false,
+            reset_requested: false,
             ccp: Ccp::default(),
-            clkctrl: Clkctrl::default(),
             cpuint: Cpuint::default(),
+            clock: ClockPin::default(),
             dac: Dac::default(),
-            port: Port::default(),
-            rstctrl: Rstctrl::default().after(ResetCause::PowerOn),
-            slpctrl: Slpctrl::default(),
             tca: Tca::default(),
             twi: Twi::default(),
-            vref: Vref::default(),
             faults: Faults::default(),
-            program,
         }
     }
 
-    /// Peripherals as after a reset by `cause`; EEPROM and, except at power-on, SRAM stay.
-    pub(super) fn reset(&mut self, cause: ResetCause) {
-        let mut fresh = Self::new(Arc::clone(&self.program), &self.eeprom);
-        if cause != ResetCause::PowerOn {
-            fresh.sram = self.sram;
-        }
-        fresh.now = self.now;
-        fresh.port = self.port.after_reset();
-        fresh.rstctrl = self.rstctrl.after(cause);
-        fresh.dac = self.dac.after_reset();
-        fresh.faults = self.faults;
-        *self = fresh;
+    /// Peripherals as after a reset. SRAM and EEPROM stay.
+    pub(super) fn reset(&mut self) {
+        *self = Self {
+            sram: self.sram,
+            now: self.now,
+            clock: self.clock.after_reset(),
+            dac: self.dac.after_reset(),
+            faults: self.faults,
+            ..Self::new(&self.eeprom)
+        };
     }
 
-    /// SRAM, 0x3F00…0x3FFF.
-    pub(super) fn sram(&self) -> &[u8; SRAM_LEN] {
-        &self.sram
-    }
-
-    /// Interrupts asked for, bit = vector number.
+    /// Requests of all interrupts, bit k that of vector k.
     pub(super) fn requests(&self) -> u32 {
-        let port = u32::from(self.port.flags() != 0) << PORT_VECTOR;
+        let port = u32::from(self.clock.flag) << PORT_VECTOR;
         let tca = u32::from(self.tca.requests()) << tca::VECTOR;
         let twi = u32::from(self.twi.requests()) << twi::VECTOR;
         port | tca | twi
     }
 
-    /// Brings the timer to the present with the present clock.
     pub(super) fn advance_timer(&mut self, now: u64) {
-        self.tca.advance(now, self.clkctrl.ticks_per_cycle());
-    }
-
-    /// An access to memory that is not SRAM: one more cycle at least (DS40002198, notes to the cycles), here always
-    /// one.
-    fn wait_for_memory(&mut self) {
-        self.ccp.close();
-        self.wait_cycles += 1;
-        self.attention = true;
+        self.tca.advance(now, self.ticks_per_cycle);
     }
 
     #[inline(never)]
     fn read_io(&mut self, address: u16) -> u8 {
         let value = match address {
-            GPIO..=GPIO_END => Some(self.gpio[usize::from(address - GPIO)]),
-            CCP => Some(self.ccp.read()),
-            RSTCTRL..=RSTCTRL_END => Some(self.rstctrl.read(address)),
-            SLPCTRL_CTRLA => Some(self.slpctrl.read()),
-            CLKCTRL..=CLKCTRL_END => self.clkctrl.read(address),
-            VREF..=VREF_END => self.vref.read(address),
-            CPUINT..=CPUINT_END => self.cpuint.read(address),
-            PORT..=PORT_END => self.port.read(address),
-            DAC..=DAC_END => Some(self.dac.read(address)),
+            VPORT_INTFLAGS => Some(if self.clock.flag { CLOCK_BIT } else { 0 }),
+            DAC_DATA => Some(self.dac.data),
             twi::BASE..=twi::END => {
                 self.attention = true;
                 self.twi.read(address)
             }
-            tca::BASE..=tca::END => {
-                self.advance_timer(self.now);
-                self.attention = true;
-                self.tca.read(address)
-            }
             EEPROM..=EEPROM_END => {
-                self.wait_for_memory();
+                self.wait_cycles += 1;
+                self.attention = true;
                 Some(self.eeprom[usize::from(address - EEPROM)])
-            }
-            SIGNATURE..=SIGNATURE_END => {
-                self.wait_for_memory();
-                Some(SIGNATURE_BYTES[usize::from(address - SIGNATURE)])
-            }
-            FLASH..=FLASH_END => {
-                self.wait_for_memory();
-                Some(self.program.byte(address - FLASH))
             }
             _ => None,
         };
@@ -171,45 +130,43 @@ impl Space {
     #[inline(never)]
     fn write_io(&mut self, address: u16, value: u8) {
         self.attention = true;
-        let unmapped = Err(Fault::Write { address, value });
-        let outcome = match address {
-            GPIO..=GPIO_END => {
-                self.gpio[usize::from(address - GPIO)] = value;
-                Ok(())
-            }
-            CCP => {
-                self.ccp.write(value);
-                Ok(())
-            }
-            RSTCTRL..=RSTCTRL_END => self.rstctrl.write(address, value, &self.ccp),
-            SLPCTRL_CTRLA => self.slpctrl.write(value),
-            CLKCTRL..=CLKCTRL_END => {
-                self.advance_timer(self.now);
-                self.clkctrl.write(address, value, &self.ccp)
-            }
-            VREF..=VREF_END => {
-                self.vref.write(address, value);
-                Ok(())
-            }
-            CPUINT..=CPUINT_END => self.cpuint.write(address, value),
-            PORT..=PORT_END if self.port.write(address, value) => Ok(()),
-            DAC..=DAC_END => {
-                self.dac.write(address, value);
-                Ok(())
-            }
-            twi::BASE..=twi::END => self.twi.write(address, value),
-            tca::BASE..=tca::END => {
-                self.advance_timer(self.now);
-                self.tca.write(address, value, self.now)
-            }
-            _ => unmapped,
-        };
+        if let Err(fault) = self.written(address, value) {
+            self.faults.record(fault);
+        }
         if address != CCP {
             self.ccp.close();
         }
-        if let Err(fault) = outcome {
-            self.faults.record(fault);
+    }
+
+    fn written(&mut self, address: u16, value: u8) -> Result<(), Fault> {
+        match address {
+            CCP => self.ccp.write(value),
+            RSTCTRL_SWRR => {
+                self.ccp.check(address)?;
+                self.reset_requested = value & 1 != 0;
+            }
+            SLPCTRL_CTRLA if value <= 1 => self.sleeps = value == 1,
+            CLKCTRL_MCLKCTRLB => {
+                self.ccp.check(address)?;
+                if value != 0 {
+                    return Err(Fault::Write { address, value });
+                }
+                self.ticks_per_cycle = 1;
+            }
+            CPUINT_LVL1VEC => self.cpuint.level1_vector = value,
+            PORT_PIN3CTRL if self.clock.control(value) => {}
+            // of analogue meaning alone
+            VREF_CTRLA | PORT_PIN6CTRL => {}
+            DAC_CTRLA => self.dac.write_control(value),
+            DAC_DATA => self.dac.write_data(value),
+            twi::BASE..=twi::END => return self.twi.write(address, value),
+            tca::BASE..=tca::END => {
+                self.advance_timer(self.now);
+                return self.tca.write(address, value, self.now);
+            }
+            _ => return Err(Fault::Write { address, value }),
         }
+        Ok(())
     }
 }
 
@@ -218,8 +175,6 @@ impl DataSpace for Space {
     fn read(&mut self, address: u16) -> u8 {
         if address >> 8 == SRAM_PAGE {
             self.sram[usize::from(address & 0xff)]
-        } else if address < VPORT_LEN {
-            self.port.read_mirror(address)
         } else {
             self.read_io(address)
         }
@@ -230,8 +185,8 @@ impl DataSpace for Space {
         if address >> 8 == SRAM_PAGE {
             self.sram[usize::from(address & 0xff)] = value;
             self.ccp.close();
-        } else if address < VPORT_LEN {
-            self.port.write_mirror(address, value);
+        } else if address == VPORT_INTFLAGS {
+            self.clock.flag &= value & CLOCK_BIT == 0;
             self.ccp.close();
             self.attention = true;
         } else {
@@ -241,17 +196,12 @@ impl DataSpace for Space {
 
     #[inline]
     fn write_bit(&mut self, address: u16, mask: u8, set: bool) {
-        if matches!(address, 2 | 3) {
-            // IN and INTFLAGS: a one toggles or clears its own pin, a zero does nothing
-            self.write(address, if set { mask } else { 0 });
+        // flags: a one clears its own, a zero does nothing
+        let old = if address == VPORT_INTFLAGS {
+            0
         } else {
-            let old = self.read(address);
-            self.write(address, if set { old | mask } else { old & !mask });
-        }
+            self.read(address)
+        };
+        self.write(address, if set { old | mask } else { old & !mask });
     }
-}
-
-/// Bytes that no program would leave behind: each differs from its neighbours.
-fn power_on_pattern() -> [u8; SRAM_LEN] {
-    std::array::from_fn(|k| (k.to_le_bytes()[0]).wrapping_mul(0x9d) ^ 0xa5)
 }

@@ -3,7 +3,7 @@
 
 use crate::build::{Substitution, changed, compiler};
 use crate::conformance::FAST;
-use spts_firmware::attiny412::{Device, ResetCause};
+use spts_firmware::attiny412::Device;
 use spts_firmware::{
     Array, BusEvent, BusReply, Cell, CellMode, Clock, FIRST_ADDRESS, Image, NEUTRAL_CODE, REPLY_BYTES,
 };
@@ -204,7 +204,7 @@ fn a_cell_that_holds_the_clock_is_reported() {
     assert_eq!(said(array.write(9, &[1, 2])), stuck);
     assert_eq!(said(array.write(50, &[])), stuck, "the bus stays blocked for all");
     assert_eq!(said(array.read(9, &mut [0])), stuck);
-    array.cell_mut(9).unwrap().reset(ResetCause::External);
+    array.cell_mut(9).unwrap().reset();
     assert_eq!(said(array.write(50, &[])), "no cell acknowledges address 50");
 }
 

@@ -2,7 +2,6 @@
 //! and replies.
 
 use proptest::prelude::*;
-use spts_firmware::attiny412::ResetCause;
 use spts_firmware::{Array, BusEvent, BusReply, Cell, CellMode, Clock, FIRST_ADDRESS, Image, Pattern, REPLY_BYTES};
 
 /// Real timing of the skin at its fastest: 72 kHz, sampled 11 µs behind the edge.
@@ -240,7 +239,7 @@ fn run(image: &Image, clock: Clock, actions: &[Action]) -> Result<(), Difference
 }
 
 fn brown_out(twins: &mut Twins, address: u8) {
-    twins.array.cell_mut(address).unwrap().reset(ResetCause::BrownOut);
+    twins.array.cell_mut(address).unwrap().reset();
     twins.array.idle(1e-3).unwrap();
     twins.cells[usize::from(address - FIRST_ADDRESS)] = Cell::new(address).unwrap();
 }

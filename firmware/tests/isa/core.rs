@@ -29,49 +29,6 @@ const INDIRECT: [(u16, u16, usize, i16, i16); 9] = [
     (asm::LD_Z_DEC, asm::ST_Z_DEC, POINTER_Z, -1, 0),
 ];
 
-/// Also where the low byte of the pointer carries, and where it wraps at 64 KiB; and every displacement.
-#[test]
-fn indirect_accesses() {
-    let check = |load: u16, store: u16, pointer: usize, start: u16, address: u16, end: u16| {
-        let loaded = pointing(&[load], pointer, start).with_memory(address, &[0xA7]).after(1);
-        assert_eq!((loaded.register(5), loaded.pair(pointer)), (0xA7, end), "{load:#06x}");
-        let stored = pointing(&[store], pointer, start).with(&[(5, 0x7A)]).after(1);
-        assert_eq!(
-            (stored.memory.byte(address), stored.pair(pointer)),
-            (0x7A, end),
-            "{store:#06x}"
-        );
-    };
-    for start in [0x3F10, 0x3F00, 0x3EFF, 0x0000, 0xFFFF] {
-        for (load, store, pointer, before, after) in INDIRECT {
-            let address = u16::wrapping_add_signed(start, before);
-            check(
-                one(load, 5),
-                one(store, 5),
-                pointer,
-                start,
-                address,
-                address.wrapping_add_signed(after),
-            );
-        }
-    }
-    for q in 0..64 {
-        for (load, store, pointer) in [(asm::LDD_Y, asm::STD_Y, Y), (asm::LDD_Z, asm::STD_Z, POINTER_Z)] {
-            for start in [0x3F31, 0xFFF0] {
-                let address = u16::wrapping_add(start, q);
-                check(
-                    displaced(load, 5, q),
-                    displaced(store, 5, q),
-                    pointer,
-                    start,
-                    address,
-                    start,
-                );
-            }
-        }
-    }
-}
-
 /// LPM in its three forms; addresses wrap at the end of flash, which is a power of two.
 #[test]
 fn program_memory() {
@@ -98,22 +55,6 @@ fn in_flash(words: &[u16]) -> Machine {
     let mut machine = Machine::new(&flash);
     machine.core.pc = 0x100;
     machine
-}
-
-/// In 4 KiB, relative jumps reach everywhere by wrapping, and so does the program counter.
-#[test]
-fn jumps() {
-    let go = |words: &[u16]| in_flash(words).with(&[(30, 0x21), (31, 0x03)]).after(1).core.pc;
-    for (offset, pc) in [(-1, 0x100), (2047, 0x100), (-0x102, 0x7FF), (-2048, 0x101)] {
-        assert_eq!(go(&[relative(asm::RJMP, offset)]), pc);
-    }
-    assert_eq!(go(&[asm::IJMP]), 0x321);
-    assert_eq!(go(&[asm::JMP, 0x456]), 0x456);
-    assert_eq!(go(&[asm::JMP, 0x1456]), 0x456, "the program counter has 11 bits");
-    let mut machine = in_flash(&[]);
-    machine.core.pc = 0x7FF;
-    machine.run(1);
-    assert_eq!(machine.core.pc, 0);
 }
 
 /// Skips go over one instruction, be it one word or two.

@@ -1,11 +1,9 @@
-//! Variables of a MATLAB v5 file: its elements are decompressed and found first, so that nothing is parsed that would
+//! Variables of a MATLAB v5 file. Its elements are decompressed and found first, so that nothing is converted that would
 //! not fit.
 
 use flate2::read::ZlibDecoder;
-use matfile::{MatFile, NumericData};
 use spts_input::Refusal;
 use std::io::Read as _;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 /// A numeric array: its name, `shape` and column-major `values`.
@@ -43,34 +41,26 @@ pub fn parse_mat(bytes: Vec<u8>, names: &[&'static str], path: &Path) -> Result<
     let plain = inflate(&bytes).map_err(|reason| not_mat(path, &reason))?;
     let not_mat = |reason: String| not_mat(path, &reason);
     drop(bytes);
-    let (header, elements) = plain.split_at(HEADER);
-    let found = mat_elements(elements);
+    let found = mat_elements(&plain[HEADER..]);
     let element_of = |name: &&'static str| Some((*name, found.iter().find(|element| element.name == *name)?));
     let Some((name, element)) = names.iter().find_map(element_of) else {
         let name = names.first().copied().unwrap_or_default();
         return Err(refused(format!("no variable `{name}` (found: {})", listed(&found))));
     };
-    if !element.numeric {
+    let Some((kind, data)) = element.numbers else {
         let class = element.class;
         return Err(refused(format!(
             "variable `{name}` is a {class}; expected an array of numbers"
         )));
-    }
-    if element.values > MAX_VALUES {
+    };
+    let count = data.len() / width(kind);
+    if count > MAX_VALUES {
         return Err(not_mat(format!(
-            "`{name}` holds {} values, outside [0, {MAX_VALUES}]",
-            element.values
+            "`{name}` holds {count} values, outside [0, {MAX_VALUES}]"
         )));
     }
-    let one = [header, element.bytes].concat();
-    drop(plain);
-    let file = parse(&one).map_err(not_mat)?;
-    drop(one);
-    let array = file
-        .find_by_name(name)
-        .ok_or_else(|| not_mat(format!("`{name}` is damaged")))?;
-    let values = real_values(array.data());
-    let shape = array.size().clone();
+    let values = values(kind, data).ok_or_else(|| not_mat(format!("`{name}` is damaged")))?;
+    let shape = element.shape.clone();
     let expected = shape.iter().try_fold(1_usize, |n, &d| n.checked_mul(d));
     if expected != Some(values.len()) {
         return Err(not_mat(format!(
@@ -84,20 +74,6 @@ pub fn parse_mat(bytes: Vec<u8>, names: &[&'static str], path: &Path) -> Result<
 /// The error of a file that is not in MATLAB v5 format, or is damaged.
 pub(super) fn not_mat(path: &Path, reason: &str) -> Refusal {
     Refusal::new(format!("{}: not a readable MATLAB v5 file ({reason})", path.display()))
-}
-
-/// The parsed file. The parser slices without looking on some damaged headers: a panic in it is an unreadable file.
-fn parse(plain: &[u8]) -> Result<MatFile, String> {
-    let hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(|_| {}));
-    let parsed = catch_unwind(AssertUnwindSafe(|| MatFile::parse(plain)));
-    std::panic::set_hook(hook);
-    match parsed {
-        Ok(Ok(file)) => Ok(file),
-        // the parser's messages quote the input; their beginning says what is wrong
-        Ok(Err(error)) => Err(format!("{error:?}").chars().take(80).collect()),
-        Err(_) => Err("damaged header".to_owned()),
-    }
 }
 
 /// Names and classes of the variables, as an error lists them.
@@ -115,21 +91,6 @@ fn listed(found: &[MatElement<'_>]) -> String {
         String::new()
     };
     names.join(", ") + &more
-}
-
-fn real_values(data: &NumericData) -> Vec<f64> {
-    macro_rules! values {
-        ($($kind:ident: $value:expr),*) => {
-            match data {
-                $(NumericData::$kind { real, .. } => real.iter().map($value).collect(),)*
-            }
-        };
-    }
-    values!(
-        Double: |&v| v, Single: |&v| f64::from(v),
-        Int8: |&v| f64::from(v), UInt8: |&v| f64::from(v), Int16: |&v| f64::from(v), UInt16: |&v| f64::from(v),
-        Int32: |&v| f64::from(v), UInt32: |&v| f64::from(v), Int64: |&v| v as f64, UInt64: |&v| v as f64
-    )
 }
 
 /// Length of the file header, bytes.
@@ -203,16 +164,14 @@ struct MatElement<'a> {
     name: String,
     /// Class, in MATLAB's words.
     class: &'static str,
-    /// Whether it is an array of numbers.
-    numeric: bool,
-    /// Number of stored values, real and imaginary.
-    values: usize,
-    /// The whole element, its tag included.
-    bytes: &'a [u8],
+    /// Size along each dimension.
+    shape: Vec<usize>,
+    /// Type and bytes of the real parts; `None` if it is no array of numbers.
+    numbers: Option<(u32, &'a [u8])>,
 }
 
 /// The variables that stand in `elements`, which is what follows a file's header, without compression. What is damaged
-/// is left to the parser: it ends the list, or has the values that there could be at most.
+/// ends the list, or has no values.
 ///
 /// Layout: MathWorks, *MAT-File Format*, chapter "Level 5 MAT-File Format".
 fn mat_elements(elements: &[u8]) -> Vec<MatElement<'_>> {
@@ -236,19 +195,15 @@ fn matrix(bytes: &[u8]) -> Option<MatElement<'_>> {
     let mut rest = bytes.get(TAG..)?;
     let (_, flags) = part(&mut rest)?;
     let (class, numeric) = class(*flags.first()?);
-    let (_, _dimensions) = part(&mut rest)?;
+    let (_, dimensions) = part(&mut rest)?;
     let (_, name) = part(&mut rest)?;
-    let mut values = 0;
-    // with other classes the parts are elements of their own, which nothing reads
-    while numeric && let Some((kind, data)) = part(&mut rest) {
-        values += data.len() / width(kind);
-    }
+    let (sides, _) = dimensions.as_chunks::<4>();
     Some(MatElement {
         name: String::from_utf8_lossy(name).into_owned(),
         class,
-        numeric,
-        values,
-        bytes,
+        shape: sides.iter().map(|side| u32::from_le_bytes(*side) as usize).collect(),
+        // with other classes the parts are elements of their own, which nothing reads
+        numbers: numeric.then(|| part(&mut rest).unwrap_or_default()),
     })
 }
 
@@ -281,6 +236,28 @@ fn width(kind: u32) -> usize {
         5..=7 => 4,
         9 | 12 | 13 => 8,
         _ => 1,
+    }
+}
+
+/// The numbers of the type `kind` in `data`, which need not be that of their class. `None` for a type of no numbers.
+fn values(kind: u32, data: &[u8]) -> Option<Vec<f64>> {
+    fn all<const N: usize>(data: &[u8], value: impl Fn([u8; N]) -> f64) -> Option<Vec<f64>> {
+        let (chunks, rest) = data.as_chunks::<N>();
+        rest.is_empty()
+            .then(|| chunks.iter().map(|chunk| value(*chunk)).collect())
+    }
+    match kind {
+        1 => all(data, |b| i8::from_le_bytes(b).into()),
+        2 => all(data, |b| u8::from_le_bytes(b).into()),
+        3 => all(data, |b| i16::from_le_bytes(b).into()),
+        4 => all(data, |b| u16::from_le_bytes(b).into()),
+        5 => all(data, |b| i32::from_le_bytes(b).into()),
+        6 => all(data, |b| u32::from_le_bytes(b).into()),
+        7 => all(data, |b| f32::from_le_bytes(b).into()),
+        9 => all(data, f64::from_le_bytes),
+        12 => all(data, |b| i64::from_le_bytes(b) as f64),
+        13 => all(data, |b| u64::from_le_bytes(b) as f64),
+        _ => None,
     }
 }
 

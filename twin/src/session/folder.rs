@@ -14,7 +14,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// Version of the schema of `session.json` that is written, and the only one that is read.
-pub const SCHEMA: u64 = 1;
+const SCHEMA: u64 = 1;
 /// The file that makes a folder a session.
 pub const SESSION_FILE: &str = "session.json";
 

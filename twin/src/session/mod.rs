@@ -25,8 +25,8 @@ mod recorded;
 #[cfg(test)]
 mod tests;
 
-pub use folder::{SCHEMA, SESSION_FILE, SessionWriter};
-pub use npy::{MOST_SAMPLES, NpyArray, npy_values, read_npy, read_npy_header, room};
+pub use folder::{SESSION_FILE, SessionWriter};
+pub use npy::{MOST_SAMPLES, NpyArray, read_npy};
 pub use recorded::{Event, PressFacts, PressPose, Recorded, Session};
 #[cfg(feature = "mujoco")]
 pub(crate) use recorded::{NAMES, is_plain};
