@@ -203,7 +203,7 @@ fn inverse_roots_of(squares: &[f64], out: &mut [f64]) {
     }
 }
 
-/// One step of [`crate::recover::BatchOmp`]: `v = (g − Σᵢ overlapᵢ vᵢ) / d`, then `c −= p v`.
+/// One step of the pursuit by Gram matrices of [`crate::dictionary`]: `v = (g − Σᵢ overlapᵢ vᵢ) / d`, then `c −= p v`.
 #[inline(always)]
 fn gram_step_of(g: &[f64], done: &[f64], overlaps: &[f64], d: f64, p: f64, v: &mut [f64], c: &mut [f64]) {
     v.copy_from_slice(g);
