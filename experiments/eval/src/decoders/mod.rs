@@ -231,8 +231,9 @@ pub fn short_label(name: &str) -> &str {
     }
 }
 
-/// The decodes of the published evaluation: the published script (weights {0, 1}, no offset, 20 atoms), the paper's text
-/// (the same with M/4 atoms), and the pursuit adapted to the device (weights ±1, the idle mean subtracted, M/4 atoms).
+/// The decodes of the published evaluation: the published script (weights {0, 1}, no offset, 20 atoms), the text of the
+/// paper (the same with M/4 atoms), and the pursuit adapted to the device (weights ±1, the idle mean subtracted, M/4
+/// atoms).
 ///
 /// ```
 /// use spts_eval::decoders::{PUBLISHED_DECODES, find, quarter};

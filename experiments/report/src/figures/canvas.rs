@@ -1,5 +1,5 @@
-//! A figure while it is drawn: shapes and text, as SVG 1.1; and as a file, of that text or of the pixels that are painted
-//! from it.
+//! A figure while it is drawn: shapes and text, as SVG 1.1; and as a file, of that text or of the pixels that are
+//! painted from it.
 //!
 //! The text of pixels is set in a font that is part of the program (Inter, in `assets`): a figure has the same bytes on
 //! every machine.
