@@ -182,9 +182,9 @@ fn energy_never_grows() {
     assert!(carried >= 90, "{carried}");
 }
 
-/// The same at 10 µs, whatever the limit allows; and at the limit on the elastic fields, whose columns pull at each other:
-/// the step and its limit know the force and its slope only. Undamped, the step may gain what [`check`] argues; damped,
-/// nothing.
+/// The same at 10 µs, whatever the limit allows; and at the limit on the elastic fields, whose columns pull at each
+/// other: the step and its limit know the force and its slope only. Undamped, the step may gain what [`check`] argues;
+/// damped, nothing.
 #[test]
 fn energy_never_grows_with_short_steps_nor_on_elastic_fields() {
     let short = [

@@ -903,8 +903,8 @@ fn an_object_in_no_class_is_not_wrong() {
     let arguments = [&["decode", recordings.to_str().unwrap()][..], &words(command)].concat();
     let output = succeeds(dir.path(), &arguments);
     let said = String::from_utf8_lossy(&output.stdout);
-    let line = said.lines().find(|line| line.starts_with("robot_arm"));
-    assert!(line.is_some_and(|line| line.trim_end().ends_with('–')), "{said}");
+    let line = said.lines().find(|line| line.starts_with("| robot_arm"));
+    assert!(line.is_some_and(|line| line.trim_end().ends_with("– |")), "{said}");
 }
 
 /// Names with escape sequences: what is printed has none, wherever the name comes from.
@@ -1049,8 +1049,11 @@ fn scenes_and_objects_are_listed() {
     for (list, key) in [("scenes", "scene"), ("objects", "name")] {
         for entry in json[list].as_array().unwrap() {
             let [name, about] = [key, "about"].map(|key| entry[key].as_str().unwrap());
-            let line = text.lines().find(|line| line.trim_start().starts_with(name));
-            assert!(line.is_some_and(|line| line.ends_with(about)), "{name}: {text}");
+            let row = [name, about];
+            let mut cells = text
+                .lines()
+                .map(|line| line.split('|').map(str::trim).collect::<Vec<_>>());
+            assert!(cells.any(|cells| cells.get(1..3) == Some(&row)), "{name}: {text}");
         }
     }
     assert!(files(dir.path()).is_empty());

@@ -77,10 +77,10 @@ pub fn build_contact_from(
     build(parameters, skin)
 }
 
-/// What every contact field of the table must have: force and torque balance the pressure, there is no tension, there is no
-/// force without touch, the force is finite and grows with depth, earlier calls change no answer, friction opposes
-/// sliding, there is no pressure beside the skin, a pose or velocity that is not finite gives NaN, and `parameters`
-/// rebuild the same contact field.
+/// What every contact field of the table must have: force and torque balance the pressure, there is no tension, there
+/// is no force without touch, the force is finite and grows with depth, earlier calls change no answer, friction
+/// opposes sliding, there is no pressure beside the skin, a pose or velocity that is not finite gives NaN, and
+/// `parameters` rebuild the same contact field.
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -160,9 +160,9 @@ mod tests {
         );
     }
 
-    /// Answers with finite numbers, no tension and nothing outside the patch; force and torque are those of the pressure
-    /// (sums of the same numbers in another order; friction has a torque of its own). The force, N, and the cells under
-    /// pressure.
+    /// Answers with finite numbers, no tension and nothing outside the patch; force and torque are those of the
+    /// pressure (sums of the same numbers in another order; friction has a torque of its own). The force, N, and the
+    /// cells under pressure.
     fn sound(name: &str, field: &mut dyn ContactField, body: &PosedMesh<'_>, skin: &SkinLayout) -> (f64, usize) {
         let cells = field.cells_per_taxel();
         let (rows, cols) = (skin.rows() * cells, skin.cols() * cells);
@@ -221,8 +221,8 @@ mod tests {
     }
 
     /// One taxel, a small square and a strip, of 0.1 mm, 15 mm and 0.1 m, thicknesses from 0.1 mm to 10 m: a ball that
-    /// touches one cell, presses, drowns and lies beside the skin, and a plate over everything. Up to 1000 cells of 1000
-    /// thicknesses.
+    /// touches one cell, presses, drowns and lies beside the skin, and a plate over everything. Up to 1000 cells of
+    /// 1000 thicknesses.
     #[test]
     fn any_skin() {
         let squares = [(1, 1, 1e-4), (1, 1, 0.1), (5, 7, 1e-4), (5, 7, 0.1), (5, 7, 3e-3)];

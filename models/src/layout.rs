@@ -77,7 +77,8 @@ impl SkinLayout {
         in_range("cols", cols as f64, cols > 0, "[1, ∞)")?;
         let taxels = rows.saturating_mul(cols);
         in_range("rows × cols", taxels as f64, taxels <= MAX_TAXELS, "[1, 2^24]")?;
-        // below a micrometre a sheet of carbon-filled film is no continuum; beyond a metre the arm's reach ends in a taxel
+        // below a micrometre a sheet of carbon-filled film is no continuum; beyond a metre the arm's reach ends in a
+        // taxel
         in_interval("pitch_m", pitch_m, "[1e-6, 1] m")?;
         in_range(
             "electrode_m",

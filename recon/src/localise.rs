@@ -102,8 +102,9 @@ struct Width {
 }
 
 /// Finds the centre of a small round contact in the samples of a window. It compares them with Gaussian blobs at all
-/// centres of a grid and in several widths, [`WIDTHS_PX`], which are numbered by width, then row, then column. Blobs are
-/// x = s·b, bᵢ = exp(−|pᵢ − c|²/2w²), with centre c and width w; a measurement is y = s·(φᵀb + e), e ~ N(0, σ²‖b‖²).
+/// centres of a grid and in several widths, [`WIDTHS_PX`], which are numbered by width, then row, then column. Blobs
+/// are x = s·b, bᵢ = exp(−|pᵢ − c|²/2w²), with centre c and width w; a measurement is y = s·(φᵀb + e), e ~ N(0,
+/// σ²‖b‖²).
 #[derive(Debug, Clone)]
 pub struct Localiser {
     rows: usize,

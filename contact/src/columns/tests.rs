@@ -176,8 +176,8 @@ fn places(depth_m: f64) -> Vec<Case> {
     (0..OFFSETS).map(place).collect()
 }
 
-/// Force on a grid for every case, relative to the exact one, which is that of `share` of the mesh, root mean square; and
-/// the order fitted over the grids. The law is K d + 0.98² K d²/δ_m (the next term is 1e-7 of it).
+/// Force on a grid for every case, relative to the exact one, which is that of `share` of the mesh, root mean square;
+/// and the order fitted over the grids. The law is K d + 0.98² K d²/δ_m (the next term is 1e-7 of it).
 fn order(mesh: &TriMesh, share: f64, cases: &[Case], drop_m: impl Fn(f64) -> f64) -> (f64, f64) {
     let max_depth_m = 0.85 * THICKNESS_M;
     let exact_n = |depth_m: f64| {
@@ -235,14 +235,15 @@ fn round_bodies_converge_with_order_two() {
     let share = 0.15 / 0.4;
     let expected = 4.0 / 3.0 * (2.0 * radius_m).sqrt() * depth_m.powf(1.5) * 0.15;
     assert_relative_eq!(moments(&lying, depth_m)[0] * share, expected, max_relative = 1.5e-2);
-    // the errors of its two straight rims add or cancel with the width in cells, so the depth varies too, by ± a quarter:
-    // the width by ± a cell of the coarsest grid
+    // the errors of its two straight rims add or cancel with the width in cells, so the depth varies too, by ± a
+    // quarter: the width by ± a cell of the coarsest grid
     let spread = places(1.0)
         .into_iter()
         .map(|[x, y, _]| [y, 0.0, depth_m * (1.0 + 0.5 * x / 0.015)]);
     let across: Vec<Case> = spread.collect();
     let slope = |r: f64| 0.2 * r;
-    let all: [(&str, &TriMesh, f64, &[Case], &dyn Fn(f64) -> f64); 3] = [
+    type Drop<'a> = &'a dyn Fn(f64) -> f64;
+    let all: [(&str, &TriMesh, f64, &[Case], Drop<'_>); 3] = [
         ("sphere", &ball, 1.0, &places(depth_m), &round),
         ("cone", &cone, 1.0, &places(depth_m), &slope),
         ("cylinder", &lying, share, &across, &round),

@@ -222,8 +222,8 @@ impl ElasticField {
         })
     }
 
-    /// Leaves the elastic pressure under the body as it is on the skin; the wrench, NaN without an answer (a body that is
-    /// nowhere, an iteration that fails).
+    /// Leaves the elastic pressure under the body as it is on the skin; the wrench, NaN without an answer (a body that
+    /// is nowhere, an iteration that fails).
     fn elastic(&mut self, body: &PosedMesh<'_>) -> Wrench {
         self.failure = None;
         if self.solve(body, 0.0).is_none() {

@@ -67,8 +67,8 @@ fn computed(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Tables {
 
 /// Patches that are solved on: windows of the cells of another patch.
 impl Patch {
-    /// Window whose sides are multiples of [`ROUND`] cells, as far as the patch of `shape` goes: contacts that grow need
-    /// few operators.
+    /// Window whose sides are multiples of [`ROUND`] cells, as far as the patch of `shape` goes: contacts that grow
+    /// need few operators.
     pub(crate) fn rounded(&self, [rows, cols]: [usize; 2]) -> Self {
         let rounded = |[first, end]: [usize; 2], most: usize| {
             let side = (end - first).next_multiple_of(ROUND);

@@ -78,8 +78,8 @@ fn posed(body: &PosedMesh<'_>) -> TriMesh {
     body.mesh.clone().rotated(body.rotation).translated(body.position_m)
 }
 
-/// Least height of the surface over the square of `slack_m` around (x, y), by brute force over the triangles: clips every
-/// triangle to the square. Shares nothing with the rasteriser.
+/// Least height of the surface over the square of `slack_m` around (x, y), by brute force over the triangles: clips
+/// every triangle to the square. Shares nothing with the rasteriser.
 fn lowest_near_m(world: &TriMesh, [x, y]: Point, slack_m: f64) -> Option<f64> {
     let mut lowest: Option<f64> = None;
     for t in 0..world.triangles.len() {

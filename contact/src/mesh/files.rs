@@ -68,28 +68,63 @@ pub fn unknown_extension(file: &str, extension: &str) -> MeshError {
 /// As [`load`].
 pub fn read_obj(bytes: &[u8], scale: f64, file: &str) -> Result<(TriMesh, MeshReport), MeshError> {
     let text = spts_input::text(bytes).map_err(|e| malformed(file, e))?;
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ignore_lines: true,
+        ignore_points: true,
+        ..tobj::LoadOptions::default()
+    };
+    let no_materials = |_: &Path| Err(tobj::LoadError::OpenFileFailed);
+    let geometry = obj_geometry(text, file)?;
+    let loaded = tobj::load_obj_buf(&mut geometry.as_bytes(), &options, no_materials);
+    let (models, _) = loaded.map_err(|e| malformed(file, e))?;
+    let mut raw = TriMesh::default();
+    for tobj::Model { mesh, .. } in models {
+        let base = index(raw.vertices.len());
+        let (positions, corners) = (mesh.positions.as_chunks().0, mesh.indices.as_chunks().0);
+        raw.vertices
+            .extend(positions.iter().map(|p: &[f32; 3]| p.map(f64::from)));
+        raw.triangles
+            .extend(corners.iter().map(|t: &[u32; 3]| t.map(|i| i.saturating_add(base))));
+    }
+    checked(&raw, scale, file)
+}
+
+/// The `v` and `f` lines of an OBJ, with three coordinates of a vertex and only the position of a corner. What is wrong
+/// with them is told by number, which the parser cannot.
+fn obj_geometry(text: &str, file: &str) -> Result<String, MeshError> {
     let starts_with_v = |line: &&str| line.split_whitespace().next() == Some("v");
     // counted first: a face may name vertices that only follow later
     let all = text.lines().filter(starts_with_v).count();
     within_budget(all, 0, file)?;
-    let mut raw = TriMesh::default();
+    let mut out = String::with_capacity(text.len());
+    let (mut vertices, mut triangles) = (0, 0);
+    let mut write = |line: std::fmt::Arguments<'_>| {
+        // a string takes whatever is written to it
+        let _ = writeln!(out, "{line}");
+    };
     for line in text.lines() {
         let mut words = line.split_whitespace();
         match words.next() {
-            Some("v") => raw.vertices.push(point(words, raw.vertices.len(), file)?),
+            Some("v") => {
+                let [x, y, z] = point(words, vertices, file)?;
+                write(format_args!("v {x} {y} {z}"));
+                vertices += 1;
+            }
             Some("f") => {
-                let count = raw.triangles.len();
-                within_budget(all, count + words.clone().count().saturating_sub(2), file)?;
-                let corners = words.map(|word| obj_index(word, raw.vertices.len(), all, count, file));
-                let corners: Vec<u32> = corners.collect::<Result<_, _>>()?;
-                let fan = corners.windows(2).skip(1);
-                raw.triangles.extend(fan.map(|pair| [corners[0], pair[0], pair[1]]));
+                let count = words.clone().count();
+                within_budget(all, triangles + count.saturating_sub(2), file)?;
+                let corners = words.map(|word| Ok((obj_index(word, vertices, all, triangles, file)? + 1).to_string()));
+                let corners: Vec<String> = corners.collect::<Result<_, MeshError>>()?;
+                if count >= 3 {
+                    write(format_args!("f {}", corners.join(" ")));
+                    triangles += count - 2;
+                }
             }
             _ => {}
         }
     }
-    // of vertices that coincide, the one that a face names first is kept
-    checked(&raw.with_triangles(&raw.triangles), scale, file)
+    Ok(out)
 }
 
 /// The vertex that a corner such as `3/1/2` names. OBJ counts from 1, or backwards from −1 for the last vertex so far;

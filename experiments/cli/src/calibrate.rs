@@ -141,8 +141,8 @@ impl CalibrateCommand {
 /// Largest profile that is taken for one of this command's, bytes.
 const MAX_PROFILE_BYTES: u64 = 1 << 20;
 
-/// Refuses to write where no file can be written, and in place of a file that this command did not write: one whose text
-/// is not `ours`.
+/// Refuses to write where no file can be written, and in place of a file that this command did not write: one whose
+/// text is not `ours`.
 fn check_ours(path: &Path, ours: impl Fn(&str) -> bool) -> Result<(), CliError> {
     check_writable(path)?;
     let text = spts_input::read_text(path, MAX_PROFILE_BYTES);

@@ -178,7 +178,7 @@ pub fn score_sessions(
     let slots = decoders
         .iter()
         .flat_map(|(decode, _)| measurements.iter().map(move |&m| (*decode, m)));
-    let slots: Vec<((&str, usize), Vec<Vec<Tally>>)> = slots.zip(tallies).collect();
+    let slots: Vec<_> = slots.zip(tallies).collect();
     let of_session = |(at, session): (usize, &&ScoredSession)| {
         let rows = slots
             .iter()

@@ -46,9 +46,9 @@ pub fn write(report: &RowDesignReport, out: OutputFolder) -> Result<(), OutputEr
     })
 }
 
-/// What the master writes to give every cell its pattern: taxel, address, and bytes in hexadecimal in the order they are
-/// sent, which are mode, number of bits and bits. `None` unless one bus has addresses for all of them and the cells hold
-/// it.
+/// What the master writes to give every cell its pattern: taxel, address, and bytes in hexadecimal in the order they
+/// are sent, which are mode, number of bits and bits. `None` unless one bus has addresses for all of them and the cells
+/// hold it.
 fn writes(report: &RowDesignReport) -> Option<Vec<(usize, u8, String)>> {
     report.bytes_a_cell?;
     let write = |taxel: usize| {

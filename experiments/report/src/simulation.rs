@@ -92,8 +92,8 @@ impl<'a> SimulationFiles<'a> {
     }
 
     /// Writes what is known at the end, with a picture of the `decoded` first blocks, and puts all files in place. With
-    /// `render`, pictures of the scene as well; when those cannot be drawn, the rest is put in place first. How long the
-    /// run took has a file of its own, so that all others compare byte for byte. Returns the names of the files.
+    /// `render`, pictures of the scene as well; when those cannot be drawn, the rest is put in place first. How long
+    /// the run took has a file of its own, so that all others compare byte for byte. Returns the names of the files.
     ///
     /// # Errors
     /// [`Refusal`] when a file cannot be written or the scene cannot be drawn.

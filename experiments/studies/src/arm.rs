@@ -147,8 +147,8 @@ const MEASUREMENTS: [usize; 3] = [7, 10, 25];
 
 /// Label and unit of every statistic that is compared.
 ///
-/// Means over the blocks, without a touch: number of taxels above [`LOADED_V`], sum of the image, its largest taxel, and
-/// the correlation of the images of consecutive blocks. Medians over the touches: share of the sum at rest that the
+/// Means over the blocks, without a touch: number of taxels above [`LOADED_V`], sum of the image, its largest taxel,
+/// and the correlation of the images of consecutive blocks. Medians over the touches: share of the sum at rest that the
 /// loaded taxels lose, largest taxel minus the preload, and its share in the sum of squares. Means over the windows:
 /// distance of the located from the touched taxel, for each of [`MEASUREMENTS`].
 const STATISTICS: [(&str, &str); 10] = [

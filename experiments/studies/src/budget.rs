@@ -580,15 +580,16 @@ struct LearnedObject {
     label: usize,
     /// Conductance as a function of time, one source for each compressive session.
     sources: Vec<Interpolated>,
-    /// The touched taxels by every truth of [`TRUTHS`]: those of a raster frame, as published; of the noiseless image of
-    /// the same skin in the scan's session at the same instant; and of that image on a skin that has the static law
+    /// The touched taxels by every truth of [`TRUTHS`]: those of a raster frame, as published; of the noiseless image
+    /// of the same skin in the scan's session at the same instant; and of that image on a skin that has the static law
     /// alone.
     masks: [Vec<bool>; 3],
     raster: Recording,
 }
 
 impl<'a> LearnedSkin<'a> {
-    /// Presses all objects on a skin with the transducer's parts `acting`, scans the first presses and learns from them.
+    /// Presses all objects on a skin with the transducer's parts `acting`, scans the first presses and learns from
+    /// them.
     fn prepare(
         pressed: &[Pressed],
         acting: &[&str],

@@ -327,8 +327,8 @@ impl EmulatedCells {
         Ok(reply)
     }
 
-    /// Gives `block` the weights in [−1, 1] that the cells, started with `task`, put out: of all edges in order, some at
-    /// once, edges × cells, row-major.
+    /// Gives `block` the weights in [−1, 1] that the cells, started with `task`, put out: of all edges in order, some
+    /// at once, edges × cells, row-major.
     ///
     /// # Errors
     /// [`Refusal`] if a cell does not answer, and those of `block`.

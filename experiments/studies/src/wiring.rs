@@ -176,7 +176,8 @@ pub(crate) fn wirings(
 }
 
 /// as_designed with this feedback and clock, whose output has `available_s` of a measurement to settle. The `effects`
-/// are those that the parts do not explain: in the compressive mode as the recordings of the device show them, as_built.
+/// are those that the parts do not explain: in the compressive mode as the recordings of the device show them,
+/// as_built.
 pub(crate) fn profile(feedback_ohm: f64, rate_hz: f64, available_s: f64, effects: &[&str]) -> Result<Table, Refusal> {
     let (mut table, built) = (shipped("as_designed")?, shipped("as_built")?);
     table.insert("sample_rate_hz".to_owned(), rate_hz.into());

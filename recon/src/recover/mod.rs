@@ -2,7 +2,8 @@
 //! in [`RECOVER`]; one with a prior has a line in [`REGULARISED`]. [`conformance`] and [`conformance_regularised`] run
 //! on all of them.
 //!
-//! Two algorithms have another interface: [`SequentialEstimate`] accepts rows one by one, and [`TrackedImage`] follows a changing image from window to window.
+//! Two algorithms have another interface: [`SequentialEstimate`] accepts rows one by one, and [`TrackedImage`] follows
+//! a changing image from window to window.
 
 mod conformance;
 mod fixed;

@@ -82,7 +82,8 @@ impl MechanicsConfig {
         let Some(tolerance) = self.tolerance.take() else {
             return Ok((self, None));
         };
-        // what taxels feel on the reference itself changed by 3 % when its cells were halved, from 120 to 240 along the skin
+        // what taxels feel on the reference itself changed by 3 % when its cells were halved, from 120 to 240 along the
+        // skin
         in_interval("tolerance", tolerance, "[0.03, 1]")?;
         if let Some(key) = CHOSEN.iter().find(|key| self.contact.contains_key(**key)) {
             return Err(chosen_twice(&format!("contact.{key}")));

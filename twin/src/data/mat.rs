@@ -1,5 +1,5 @@
-//! Variables of a MATLAB v5 file. Its elements are decompressed and found first, so that nothing is converted that would
-//! not fit.
+//! Variables of a MATLAB v5 file. Its elements are decompressed and found first, so that nothing is converted that
+//! would not fit.
 
 use flate2::read::ZlibDecoder;
 use spts_input::Refusal;

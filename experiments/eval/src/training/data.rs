@@ -30,7 +30,7 @@ const POSES_OF_A_LIBRARY: usize = 30;
 /// let images = Matrix::from_columns(4, 2, &[1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0]).unwrap();
 /// let data = TrainingData::of_images(images, &[1, 2], 2, Streams::new(1))?;
 /// assert_eq!((data.shape, data.templates.labels()), ([2, 2], &[1, 2][..]));
-/// # Ok::<(), spts_eval::training::Refusal>(())
+/// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct TrainingData {
@@ -168,7 +168,7 @@ impl TrainingData {
         if taxels > most {
             let message =
                 format!("taxels = {taxels} is outside [1, {most}]: the decoders keep matrices of taxels × taxels");
-            return Err(Refusal::new(message).into());
+            return Err(Refusal::new(message));
         }
         let images = outline_images(skin, streams);
         let mean: Vec<f64> = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
@@ -207,7 +207,7 @@ impl TrainingData {
             columns.extend((0..object.images.ncols()).map(|k| object.images.column(k)));
             labels.resize(columns.len(), *label);
         }
-        let matrix = |columns: &[Vec<f64>]| Matrix::from_column_slices(columns.first().map_or(0, Vec::len), &columns);
+        let matrix = |columns: &[Vec<f64>]| Matrix::from_column_slices(columns.first().map_or(0, Vec::len), columns);
         let alike = matrix(&columns);
         let images = with_gains(&alike, streams);
         // the library and the dictionary take few images of every object
@@ -247,7 +247,7 @@ impl TrainingData {
     /// [`Refusal`] if it is for another sheet.
     pub fn network(&self) -> Result<Arc<Unrolled>, Refusal> {
         let network = self.network.clone().unwrap_or_else(TrainedNetwork::shipped);
-        Ok(network.on(self.shape)?)
+        network.on(self.shape)
     }
 
     /// Training data with only the dictionary and library of `learned`. The library's images also serve as templates

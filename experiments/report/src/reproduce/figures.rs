@@ -29,8 +29,11 @@ pub(super) enum Drawing {
 
 use Drawing::{Charts, Sheet as Images};
 
+/// How a figure is drawn.
+type Draw = fn(&Shown<'_>) -> Drawing;
+
 /// Every figure of the paper: its file, and how it is drawn. `page.toml` has its words.
-pub(super) const FIGURES: &[(&str, fn(&Shown<'_>) -> Drawing)] = &[
+pub(super) const FIGURES: &[(&str, Draw)] = &[
     ("s5_objects.png", |s| {
         Images(sheets::objects(s.dataset, s.skins, s.correlations))
     }),

@@ -35,8 +35,8 @@ pub(crate) struct FitWindow {
 }
 
 /// Fits windows of `window` frames within the `frames` of a block; twice, the second time without the outliers of the
-/// first. A window that does not determine its image is left out. The cells `reseeded` have another seed; with `parity`,
-/// even and odd rows may differ.
+/// first. A window that does not determine its image is left out. The cells `reseeded` have another seed; with
+/// `parity`, even and odd rows may differ.
 pub(crate) fn fit_windows(
     recording: &Recording,
     block: usize,

@@ -130,8 +130,8 @@ impl WireDesign {
         })
     }
 
-    /// Readout profile of the wire, and its TOML: as_designed with this feedback and clock. What the parts do not explain
-    /// is as the recordings of the device show it: contact noise, late updates and idle noise of as_built.
+    /// Readout profile of the wire, and its TOML: as_designed with this feedback and clock. What the parts do not
+    /// explain is as the recordings of the device show it: contact noise, late updates and idle noise of as_built.
     pub(super) fn profile(&self, mixed: bool) -> Result<(Profile, String), Refusal> {
         let effects = ["late_updates", "contact_noise", "idle_noise"];
         let mut table = profile(self.feedback_ohm, self.rate_hz, self.available_s, &effects)?;

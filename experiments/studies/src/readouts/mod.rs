@@ -260,9 +260,9 @@ mod tests {
         }
     }
 
-    /// Checks a readout on skins that are not square. Numbers of measurements must increase; images must have one finite
-    /// value ≥ 0 for each taxel; times must be positive and in order. A strong contact must be shown and noticed, and an
-    /// untouched skin must not be. Equal wires must give equal readings, in any order of touches.
+    /// Checks a readout on skins that are not square. Numbers of measurements must increase; images must have one
+    /// finite value ≥ 0 for each taxel; times must be positive and in order. A strong contact must be shown and
+    /// noticed, and an untouched skin must not be. Equal wires must give equal readings, in any order of touches.
     fn conformance(line: &ReadoutLine) {
         SKINS.iter().for_each(|skin| on_skin(line, *skin));
     }
