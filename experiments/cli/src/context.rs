@@ -1,6 +1,6 @@
 //! What several commands share: thread count, progress bars, printing.
 
-use crate::error::CliError;
+use crate::error::{CliError, one_line};
 use crate::options::whole;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -243,12 +243,6 @@ fn acts(character: char) -> bool {
     (character.is_control() && !layout) || turns
 }
 
-/// `text` on one line, whatever a library or a file put into it.
-pub(crate) fn one_line(text: &str) -> String {
-    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    lines.collect::<Vec<_>>().join("; ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -264,10 +258,5 @@ mod tests {
         ] {
             assert_eq!(plain(text), shown);
         }
-    }
-
-    #[test]
-    fn one_line_is_one_line() {
-        assert_eq!(one_line("\n a \n\n  b\r\nc"), "a; b; c");
     }
 }

@@ -1,6 +1,5 @@
 //! Why a command failed.
 
-use crate::context::one_line;
 use crate::extras::COMMANDS_ELSEWHERE;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use spts_input::Refusal;
@@ -95,5 +94,19 @@ fn joined(reason: &str) -> String {
         format!(" {reason}")
     } else {
         format!(": {reason}")
+    }
+}
+
+/// `text` on one line, whatever a library or a file put into it.
+pub(crate) fn one_line(text: &str) -> String {
+    let lines = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    lines.collect::<Vec<_>>().join("; ")
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn one_line_is_one_line() {
+        assert_eq!(super::one_line("\n a \n\n  b\r\nc"), "a; b; c");
     }
 }

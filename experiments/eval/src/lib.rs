@@ -33,15 +33,13 @@ pub use algorithm::ScoreError;
 pub use alignment::{SessionSlip, find_slips, follow_slips, slips_text};
 pub use decoders::RASTER;
 pub use labels::Labels;
-pub use published::{
-    BaselineRow, ScoreRow, ScoredSkin, SkinScores, baselines, mean_rows, score_raster, score_sessions,
-};
+pub use published::{BaselineRow, ScoreRow, SkinScores, baselines, mean_rows, score_raster, score_sessions};
 pub use scorer::{Scorer, decode_us};
 pub use sensing::{RowChooser, Sensing};
 pub use session::ScoredSession;
 #[cfg(feature = "mujoco")]
 pub use skin_run::{SkinRun, SkinRunPresses, TwinSessions, footprint_scene, twin_set};
-pub use source::{PublishedSkin, Source, check_session};
+pub use source::{PublishedSkin, ScoredSkin, Source, check_session};
 pub use table::{Cell, Table, TextTable, escape};
 pub use tally::{Scores, Tally, unique};
 pub use windows::{Press, PressRows, Untouched, Window, idle_mean};

@@ -7,26 +7,15 @@ use crate::place::{LocalisationRow, PlaceRow, localise, places};
 use crate::protocol::Truth;
 use crate::sensing::Sensing;
 use crate::session::ScoredSession;
+use crate::source::ScoredSkin;
 use crate::tally::{Tally, pool};
 use crate::training::Learned;
 use crate::unique;
 use rayon::prelude::*;
 use serde::Serialize;
-use spts_circuit::Recording;
 use spts_recon::Workspace;
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 use spts_recon::raster::Interpolation;
-
-/// Everything on which a skin, real or simulated, is scored.
-#[derive(Debug, Clone)]
-pub struct ScoredSkin {
-    /// Sessions of the objects.
-    pub sessions: Vec<ScoredSession>,
-    /// Recording of the bouncing ball.
-    pub bounces: Option<Recording>,
-    /// Training results of the published decoder.
-    pub learned: Learned,
-}
 
 /// Scores of one skin by the published evaluation: what `spts validate` prints.
 #[derive(Debug, Clone, Serialize)]

@@ -2,7 +2,6 @@
 
 use crate::alignment::{SessionSlip, follow_slips};
 use crate::labels::Labels;
-use crate::published::ScoredSkin;
 use crate::session::ScoredSession;
 use crate::training::{Learned, SHIFT_REACH, TrainingData, TrainingPresses};
 use spts::Refusal;
@@ -38,6 +37,17 @@ pub struct Source {
     pub labels: Labels,
     /// Slips of the recordings, which have been realigned.
     pub slips: Vec<SessionSlip>,
+}
+
+/// Everything on which a skin, real or simulated, is scored.
+#[derive(Debug, Clone)]
+pub struct ScoredSkin {
+    /// Sessions of the objects.
+    pub sessions: Vec<ScoredSession>,
+    /// Recording of the bouncing ball.
+    pub bounces: Option<Recording>,
+    /// Training results of the published decoder.
+    pub learned: Learned,
 }
 
 /// Recordings of a real skin, with the published dictionary and library.

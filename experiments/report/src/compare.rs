@@ -2,6 +2,7 @@
 
 use crate::figures::{Chart, Curve, Plot, Series, Style, save_charts};
 use crate::labels::{object_label, score_label, statistic_label};
+use crate::per_object::{banded, marked};
 use crate::{per_object, write_all_or_none};
 use serde::Serialize;
 use spts::output::{OutputError, OutputFolder, write_json};
@@ -10,7 +11,7 @@ use spts_eval::{ScoreRow, Table};
 use spts_studies::arm::{ArmBand, ArmReport};
 use spts_studies::calibrate::quantiles;
 use spts_studies::compare::{
-    Banded, CompareReport, ComparedSession, CurveDistance, PredictedStatistic, ScoreCurves, Statistic,
+    CompareReport, ComparedSession, CurveDistance, PredictedStatistic, ScoreCurves, Statistic,
 };
 use spts_studies::per_object::PerObjectReport;
 use std::path::Path;
@@ -27,34 +28,6 @@ pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
         Some(error) if !error.is_nan() => format!("{value:.digits$} ± {error:.digits$}"),
         _ => format!("{value:.digits$}"),
     }
-}
-
-/// Adds a value of the real skin and the band of the twins.
-pub(crate) fn banded<'a, R: Copy + 'a>(
-    table: Table<'a, R>,
-    digits: usize,
-    of: impl Fn(R) -> Banded + Copy + 'a,
-) -> Table<'a, R> {
-    table
-        .column("real", "real skin", move |row| of(row).real)
-        .digits(digits)
-        .column("twin", "twin, mean", move |row| of(row).twin)
-        .digits(digits)
-        .file("low", move |row| of(row).low)
-        .file("high", move |row| of(row).high)
-        .shown("90 % band", move |row| {
-            format!("{:.digits$} – {:.digits$}", of(row).low, of(row).high)
-        })
-}
-
-/// Adds whether the real value lies in the band.
-pub(crate) fn marked<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> Banded + Copy + 'a) -> Table<'a, R> {
-    table.named(
-        "inside",
-        "",
-        move |row| of(row).inside(),
-        |inside| if inside { "" } else { "outside" },
-    )
 }
 
 /// Statistics that are compared, or of what is not modelled.

@@ -1,6 +1,5 @@
 //! Tables and the figure of twin and skin object by object, for `spts compare` and the report.
 
-use crate::compare::{banded, marked};
 use crate::figures::{Interval, IntervalChart, IntervalLine, IntervalPanel, save_intervals};
 use crate::labels::{object_label, object_list, score_label};
 use crate::{PageFigure, PageTable, Section};
@@ -8,6 +7,7 @@ use serde::Serialize;
 use spts::output::{OutputError, write_json};
 use spts_eval::decoders::label;
 use spts_eval::{Cell, Table, unique};
+use spts_studies::compare::Banded;
 use spts_studies::per_object::{MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES, ScoreDistance};
 use std::path::{Path, PathBuf};
 
@@ -15,6 +15,34 @@ use std::path::{Path, PathBuf};
 pub(crate) const FIGURE: &str = "per_object";
 /// Tables, in the folder they are written to.
 pub(crate) const TABLES: [&str; 3] = ["per_object.csv", "per_object_distances.csv", "per_object.json"];
+
+/// Adds a value of the real skin and the band of the twins.
+pub(crate) fn banded<'a, R: Copy + 'a>(
+    table: Table<'a, R>,
+    digits: usize,
+    of: impl Fn(R) -> Banded + Copy + 'a,
+) -> Table<'a, R> {
+    table
+        .column("real", "real skin", move |row| of(row).real)
+        .digits(digits)
+        .column("twin", "twin, mean", move |row| of(row).twin)
+        .digits(digits)
+        .file("low", move |row| of(row).low)
+        .file("high", move |row| of(row).high)
+        .shown("90 % band", move |row| {
+            format!("{:.digits$} – {:.digits$}", of(row).low, of(row).high)
+        })
+}
+
+/// Adds whether the real value lies in the band.
+pub(crate) fn marked<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> Banded + Copy + 'a) -> Table<'a, R> {
+    table.named(
+        "inside",
+        "",
+        move |row| of(row).inside(),
+        |inside| if inside { "" } else { "outside" },
+    )
+}
 
 /// What is written as JSON.
 #[derive(Serialize)]

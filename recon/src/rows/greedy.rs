@@ -7,7 +7,6 @@ use crate::posterior::GaussianPosterior;
 use crate::rows::expected::Headroom;
 use crate::rows::headroom_unreachable;
 use crate::rows::other_grid;
-use crate::rows::simple::random_signs;
 use crate::rows::{DesignRows, RowTask};
 use nalgebra::DMatrix;
 use rand::{RngExt as _, SeedableRng as _};
@@ -49,6 +48,11 @@ impl DesignRows for Greedy {
         }
         Ok(rows)
     }
+}
+
+/// `n` independent random signs.
+pub(super) fn random_signs(n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
+    (0..n).map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 }).collect()
 }
 
 fn starts(leading: &Leading, n: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<f64>> {

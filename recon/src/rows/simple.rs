@@ -2,9 +2,9 @@
 
 use crate::matrix::Matrix;
 use crate::rows::expected::{Expected, Moments, take};
-use crate::rows::greedy::Greedy;
+use crate::rows::greedy::{Greedy, random_signs};
 use crate::rows::{DesignRows, RowTask};
-use rand::{RngExt as _, SeedableRng as _};
+use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
 use spts_input::Refusal;
 
@@ -32,11 +32,6 @@ impl DesignRows for Random {
             "no more of the rows that were drawn keep to the headroom",
         )
     }
-}
-
-/// `n` independent random signs.
-pub(super) fn random_signs(n: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
-    (0..n).map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 }).collect()
 }
 
 /// Signs of the functions cos(π(r + ½)u/R) · cos(π(c + ½)v/C) of the two-dimensional cosine transform, low frequencies
