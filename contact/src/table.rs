@@ -266,7 +266,11 @@ mod tests {
     }
 
     proptest! {
-        #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(7), failure_persistence: None, ..ProptestConfig::with_cases(48) })]
+        #![proptest_config(ProptestConfig {
+            rng_seed: RngSeed::Fixed(7),
+            failure_persistence: None,
+            ..ProptestConfig::with_cases(48)
+        })]
         /// Soups of triangles, many of them without area, in any pose and motion; then again, from memory.
         #[test]
         fn any_soup(

@@ -87,7 +87,12 @@ Files in DIR:
   figures/rows.png    every row as a picture of the skin; rows.svg the same")]
 struct DesignCommand {
     /// Way to choose the rows; see below
-    #[arg(long, value_name = "NAME", default_value = "greedy", value_parser = PossibleValuesParser::new(DESIGNERS.iter().map(|d| d.name)))]
+    #[arg(
+        long,
+        value_name = "NAME",
+        default_value = "greedy",
+        value_parser = PossibleValuesParser::new(DESIGNERS.iter().map(|d| d.name))
+    )]
     designer: String,
     /// Number of rows M; [1, 1024]
     #[arg(long, value_name = "M", default_value_t = 20, value_parser = whole::<usize>(1..=1024))]

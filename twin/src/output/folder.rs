@@ -111,11 +111,9 @@ impl OutputFolder {
         sync_folders(&self.stage).map_err(&failed)?;
         check_ours(&self.folder, &self.shown)?;
         // from here on the stage may be the earlier results, which no signal may remove unseen
-        if let Some(entry) = self.entry.take() {
-            entry
-                .finish(|| put_in_place(&self.stage, &self.folder))
-                .map_err(failed)?;
-        }
+        let put = || put_in_place(&self.stage, &self.folder);
+        let done = self.entry.take().map_or_else(put, |entry| entry.finish(put));
+        done.map_err(failed)?;
         self.stage.clear();
         self.made.keep();
         Ok(names)

@@ -410,7 +410,8 @@ mod tests {
         let noise = |sum_s: f64, seed: u64| session(sum_s, seed).contact_noise;
         assert!((noise(1e-3, 1) - noise(1e-2, 1)).abs() < f64::EPSILON);
         assert!((noise(1e-3, 1) - noise(1e-3, 2)).abs() > 1e-6);
-        assert!((0.04..0.073).contains(&noise(1e-3, 1)));
+        // every session of as_built has a value from this span
+        assert!((0.04225..=0.07291).contains(&noise(1e-3, 1)));
         let [low, high] = session(1e-3, 1).levels;
         assert!((low - (11.797 / 127.5 - 1.0)).abs() < 1e-4 && (high - (1.0 - 1.1797 / 127.5)).abs() < 1e-4);
     }
