@@ -1,56 +1,11 @@
-//! Commands that need the physics engine, the studies or the figures.
+//! What commands take from the physics engine and the figures; without them it is as in `without.rs`.
 
 use crate::context::progress;
 use crate::error::CliError;
-use crate::{
-    budget, calibrate, circuit, compare, design, explore, fidelity, firmware, live, readouts, reproduce, sensing,
-    simulate, validate,
-};
-use clap::Subcommand;
 use spts_contact::objects::OBJECTS;
 use spts_eval::training::Skins;
 use spts_eval::{ScoredSession, Source, TwinSessions};
 use spts_models::SkinLayout;
-
-#[derive(Debug, Subcommand)]
-pub(super) enum FullCommand {
-    Simulate(Box<simulate::SimulateCommand>),
-    Validate(validate::ValidateCommand),
-    Reproduce(reproduce::ReproduceCommand),
-    Fidelity(fidelity::FidelityCommand),
-    Calibrate(calibrate::CalibrateCommand),
-    Compare(compare::CompareCommand),
-    Budget(budget::BudgetCommand),
-    Circuit(circuit::CircuitCommand),
-    Design(Box<design::DesignCommand>),
-    Explore(explore::ExploreCommand),
-    Firmware(firmware::FirmwareCommand),
-    Live(live::LiveCommand),
-    Readouts(readouts::ReadoutsCommand),
-    Sensing(Box<sensing::SensingCommand>),
-}
-
-impl FullCommand {
-    /// Runs the command.
-    pub(super) fn run(self) -> Result<(), CliError> {
-        match self {
-            Self::Simulate(command) => command.run(),
-            Self::Validate(command) => command.run(),
-            Self::Reproduce(command) => command.run(),
-            Self::Fidelity(command) => command.run(),
-            Self::Calibrate(command) => command.run(),
-            Self::Compare(command) => command.run(),
-            Self::Budget(command) => command.run(),
-            Self::Circuit(command) => command.run(),
-            Self::Design(command) => command.run(),
-            Self::Explore(command) => command.run(),
-            Self::Firmware(command) => command.run(),
-            Self::Live(command) => command.run(),
-            Self::Readouts(command) => command.run(),
-            Self::Sensing(command) => command.run(),
-        }
-    }
-}
 
 pub(crate) use spts_report::decode::write as write_decoded;
 pub(crate) use spts_report::score::{write as write_board, write_anytime, write_in_time};

@@ -64,11 +64,54 @@ pub struct Cli {
     command: Command,
 }
 
-#[derive(Debug, Subcommand)]
-enum Command {
+/// Makes the list of commands, and runs the one that was asked for.
+macro_rules! commands {
+    ($($(#[$when:meta])? $name:ident($command:ty),)*) => {
+        #[derive(Debug, Subcommand)]
+        enum Command {
+            $($(#[$when])? $name($command),)*
+        }
+
+        impl Command {
+            fn run(self) -> Result<(), CliError> {
+                match self {
+                    $($(#[$when])? Self::$name(command) => command.run(),)*
+                }
+            }
+        }
+    };
+}
+
+// in the order of the help; those behind a feature need the physics engine, the studies or the figures
+commands! {
     #[cfg(feature = "full")]
-    #[command(flatten)]
-    Full(full::FullCommand),
+    Simulate(Box<simulate::SimulateCommand>),
+    #[cfg(feature = "full")]
+    Validate(validate::ValidateCommand),
+    #[cfg(feature = "full")]
+    Reproduce(reproduce::ReproduceCommand),
+    #[cfg(feature = "full")]
+    Fidelity(fidelity::FidelityCommand),
+    #[cfg(feature = "full")]
+    Calibrate(calibrate::CalibrateCommand),
+    #[cfg(feature = "full")]
+    Compare(compare::CompareCommand),
+    #[cfg(feature = "full")]
+    Budget(budget::BudgetCommand),
+    #[cfg(feature = "full")]
+    Circuit(circuit::CircuitCommand),
+    #[cfg(feature = "full")]
+    Design(Box<design::DesignCommand>),
+    #[cfg(feature = "full")]
+    Explore(explore::ExploreCommand),
+    #[cfg(feature = "full")]
+    Firmware(firmware::FirmwareCommand),
+    #[cfg(feature = "full")]
+    Live(live::LiveCommand),
+    #[cfg(feature = "full")]
+    Readouts(readouts::ReadoutsCommand),
+    #[cfg(feature = "full")]
+    Sensing(Box<sensing::SensingCommand>),
     Decode(decode::DecodeCommand),
     Score(score::ScoreCommand),
     Dataset(dataset::DatasetCommand),
@@ -129,15 +172,7 @@ impl Cli {
     /// [`CliError`] with a message that names file, field and value.
     pub fn run(self) -> Result<(), CliError> {
         spts::cleanup::end_on_signals().map_err(|e| CliError::usage(format!("signal handlers: {e}")))?;
-        match self.command {
-            #[cfg(feature = "full")]
-            Command::Full(command) => command.run(),
-            Command::Decode(command) => command.run(),
-            Command::Score(command) => command.run(),
-            Command::Dataset(command) => command.run(),
-            Command::Device(command) => command.run(),
-            Command::Record(command) => command.run(),
-        }
+        self.command.run()
     }
 }
 

@@ -64,6 +64,8 @@ pub struct DecoderSpec {
     pub shown: bool,
     /// Whether it states its confidence after every sample.
     pub anytime: bool,
+    /// Colour, 0xRRGGBB, and marker of its curves; without one it is drawn as an external program is.
+    pub look: Option<(u32, u8)>,
     /// Trains the algorithm.
     pub train: Train,
 }
@@ -79,6 +81,7 @@ const fn spec(name: &'static str, label: &'static str, needs: Needs, shown: bool
         needs,
         shown,
         anytime: false,
+        look: None,
         train,
     }
 }
@@ -96,6 +99,13 @@ impl DecoderSpec {
         self
     }
 
+    /// The line with the colour, 0xRRGGBB, and the marker of its curves: 0 disc, 1 square, 2 triangle, 3 diamond, 4
+    /// triangle on its tip, 5 pentagon.
+    const fn drawn(mut self, colour: u32, marker: u8) -> Self {
+        self.look = Some((colour, marker));
+        self
+    }
+
     /// The line of an algorithm that says after every sample how sure it is.
     const fn anytime(mut self) -> Self {
         self.anytime = true;
@@ -104,16 +114,21 @@ impl DecoderSpec {
 }
 
 /// Every algorithm: name, label, training data, whether it is shown by default, training function, shorter label,
-/// description.
+/// description, look.
 pub const DECODERS: &[DecoderSpec] = &[
-    spec("empty", "empty image", Nothing, true, baselines::empty).about("baseline: an empty image"),
+    spec("empty", "empty image", Nothing, true, baselines::empty)
+        .about("baseline: an empty image")
+        .drawn(0x8a_8f_98, 3),
     spec("mean_image", "mean image", Images, true, baselines::mean_image)
-        .about("baseline: the mean of all images learned from"),
+        .about("baseline: the mean of all images learned from")
+        .drawn(0x5f_66_70, 1),
     spec("correlate", "best correlated", Classes, true, baselines::correlate)
-        .about("baseline: the object's mean image that correlates best with y"),
+        .about("baseline: the object's mean image that correlates best with y")
+        .drawn(0x9c_86_5a, 2),
     spec("script_s20", "published script", Dictionary, true, image::script_s20)
         .short("script, 20 atoms")
-        .about("the published script: weights {0, 1}, no offset, 20 atoms"),
+        .about("the published script: weights {0, 1}, no offset, 20 atoms")
+        .drawn(0x56_b4_e9, 2),
     spec(
         "script_m4",
         "published script, M/4 atoms",
@@ -122,7 +137,8 @@ pub const DECODERS: &[DecoderSpec] = &[
         image::script_m4,
     )
     .short("script, M/4 atoms")
-    .about("the published text: weights {0, 1}, no offset, M/4 atoms"),
+    .about("the published text: weights {0, 1}, no offset, M/4 atoms")
+    .drawn(0x2c_3f_8f, 5),
     spec(
         "matched",
         "published pursuit, matched to ±1",
@@ -131,17 +147,24 @@ pub const DECODERS: &[DecoderSpec] = &[
         image::matched,
     )
     .short("matched")
-    .about("the published pursuit with weights ±1 and the idle output removed"),
-    spec("omp", "OMP", Dictionary, true, image::omp).about("orthogonal matching pursuit, columns normalised"),
+    .about("the published pursuit with weights ±1 and the idle output removed")
+    .drawn(0x00_72_b2, 0),
+    spec("omp", "OMP", Dictionary, true, image::omp)
+        .about("orthogonal matching pursuit, columns normalised")
+        .drawn(0x6a_3d_9a, 0),
     spec("nn_omp", "non-negative OMP", Dictionary, true, image::nn_omp)
-        .about("non-negative orthogonal matching pursuit"),
+        .about("non-negative orthogonal matching pursuit")
+        .drawn(0xcc_79_a7, 1),
     spec("nn_lasso", "non-negative lasso", Dictionary, true, image::nn_lasso)
-        .about("non-negative lasso on normalised columns"),
+        .about("non-negative lasso on normalised columns")
+        .drawn(0xe6_9f_00, 2),
     spec("lmmse", "LMMSE", Images, false, image::lmmse)
-        .about("linear minimum mean square error, prior of images like those seen"),
+        .about("linear minimum mean square error, prior of images like those seen")
+        .drawn(0x66_a6_1e, 0),
     spec("nn_lmmse", "non-negative LMMSE", Images, true, image::nn_lmmse)
         .about("linear minimum mean square error with non-negative taxels, prior for unseen objects")
-        .anytime(),
+        .anytime()
+        .drawn(0x00_9e_73, 3),
     spec(
         "nn_lmmse_seen",
         "non-negative LMMSE, objects seen",
@@ -150,17 +173,23 @@ pub const DECODERS: &[DecoderSpec] = &[
         image::nn_lmmse_seen,
     )
     .short("NN LMMSE, objects seen")
-    .about("as nn_lmmse, prior for the objects that were seen"),
+    .about("as nn_lmmse, prior for the objects that were seen")
+    .drawn(0x00_5f_45, 1),
     spec("mixture", "mixture of shapes", Shapes, false, evidence::mixture)
-        .about("thirty clusters of simulated shapes weighed by the evidence of y, non-negative taxels"),
+        .about("thirty clusters of simulated shapes weighed by the evidence of y, non-negative taxels")
+        .drawn(0x1b_9a_aa, 5),
     spec("amortised", "trained network", Network, false, amortised::train)
         .short("amortised")
         .about("network trained on simulated shapes: image and the probability that a taxel is touched")
-        .anytime(),
-    spec("tv", "total variation", Nothing, false, image::tv).about("total variation with non-negative taxels"),
+        .anytime()
+        .drawn(0x1a_1a_1a, 2),
+    spec("tv", "total variation", Nothing, false, image::tv)
+        .about("total variation with non-negative taxels")
+        .drawn(0x4a_4a_4a, 4),
     spec("evidence", "evidence", Classes, true, evidence::train)
         .about("Gaussian classes weighed by the evidence of y; the image is the posterior mean")
-        .anytime(),
+        .anytime()
+        .drawn(0xd5_5e_00, 1),
 ];
 
 /// The decoder called `name` in [`DECODERS`]; `None` if there is none.

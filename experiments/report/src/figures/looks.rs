@@ -3,6 +3,7 @@
 
 use super::canvas::{Canvas, Point};
 use super::colour::{CLAIM, INK, Rgb, WHITE};
+use spts_eval::decoders::DECODERS;
 
 /// Whose numbers a series shows. Decides colour and stroke, the same in every figure.
 ///
@@ -74,31 +75,11 @@ pub(super) fn ink(style: Style, variant: u8) -> Rgb {
 /// Colour, and form of the marker.
 pub(super) type Look = (Rgb, u8);
 
-/// Decoders, locators and controls by name.
+/// Locators and controls by name; decoders have their look in [`DECODERS`].
 const NAMED: &[(&str, Look)] = &[
-    // baselines: greys and sands
-    ("empty", (Rgb(0x8a, 0x8f, 0x98), 3)),
     ("middle", (Rgb(0x8a, 0x8f, 0x98), 3)),
-    ("mean_image", (Rgb(0x5f, 0x66, 0x70), 1)),
-    ("correlate", (Rgb(0x9c, 0x86, 0x5a), 2)),
     ("raster", (Rgb(0x7a, 0x3e, 0x00), 4)),
-    // the published decoders: blues
-    ("matched", (Rgb(0x00, 0x72, 0xb2), 0)),
-    ("script_s20", (Rgb(0x56, 0xb4, 0xe9), 2)),
     ("script_s5", (Rgb(0x56, 0xb4, 0xe9), 2)),
-    ("script_m4", (Rgb(0x2c, 0x3f, 0x8f), 5)),
-    // pursuits: violets
-    ("omp", (Rgb(0x6a, 0x3d, 0x9a), 0)),
-    ("nn_omp", (Rgb(0xcc, 0x79, 0xa7), 1)),
-    ("nn_lasso", (Rgb(0xe6, 0x9f, 0x00), 2)),
-    ("tv", (Rgb(0x4a, 0x4a, 0x4a), 4)),
-    // those that learn from images: greens, and red for the best
-    ("nn_lmmse", (Rgb(0x00, 0x9e, 0x73), 3)),
-    ("lmmse", (Rgb(0x66, 0xa6, 0x1e), 0)),
-    ("nn_lmmse_seen", (Rgb(0x00, 0x5f, 0x45), 1)),
-    ("mixture", (Rgb(0x1b, 0x9a, 0xaa), 5)),
-    ("amortised", (Rgb(0x1a, 0x1a, 0x1a), 2)),
-    ("evidence", (Rgb(0xd5, 0x5e, 0x00), 1)),
     ("blob", (Rgb(0xd5, 0x5e, 0x00), 1)),
     ("taxel", (Rgb(0x66, 0xa6, 0x1e), 0)),
 ];
@@ -115,7 +96,7 @@ const OTHERS: [Look; 6] = [
 
 /// Looks there are.
 #[expect(clippy::cast_possible_truncation, reason = "some thirty looks")]
-const LOOKS: u8 = (NAMED.len() + OTHERS.len()) as u8;
+const LOOKS: u8 = (DECODERS.len() + NAMED.len() + OTHERS.len()) as u8;
 /// Strokes that tell several curves of one decoder apart.
 const STROKES: u8 = 4;
 /// Variants of [`Style::Decoder`] that differ.
@@ -160,12 +141,16 @@ impl Stroke {
 /// Variant of [`Style::Decoder`] for the decoder, locator or control called `name`.
 #[must_use]
 pub fn decoder_variant(name: &str, stroke: Stroke) -> u8 {
-    let place = NAMED.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
+    let own = DECODERS
+        .iter()
+        .position(|spec| spec.name == name && spec.look.is_some());
+    let named = || Some(DECODERS.len() + NAMED.iter().position(|(known, _)| *known == name)?);
+    let place = own.or_else(named).unwrap_or_else(|| {
         // FNV-1a: the same program has the same look in every run
         let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| {
             (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
         });
-        NAMED.len() + usize::try_from(hash % OTHERS.len() as u64).unwrap_or(0)
+        DECODERS.len() + NAMED.len() + usize::try_from(hash % OTHERS.len() as u64).unwrap_or(0)
     });
     u8::try_from(place).unwrap_or(0) * STROKES + stroke as u8
 }
@@ -173,8 +158,15 @@ pub fn decoder_variant(name: &str, stroke: Stroke) -> u8 {
 /// Look of a variant.
 pub(super) fn look(variant: u8) -> Look {
     let place = usize::from(variant % VARIANTS / STROKES);
-    let named = NAMED.get(place).map(|(_, look)| *look);
-    named.unwrap_or_else(|| OTHERS[(place - NAMED.len()) % OTHERS.len()])
+    let after = place.saturating_sub(DECODERS.len());
+    let own = DECODERS.get(place).and_then(|spec| spec.look);
+    let own = own.map(|(colour, marker)| {
+        let [_, r, g, b] = colour.to_be_bytes();
+        (Rgb(r, g, b), marker)
+    });
+    let named = || NAMED.get(after).map(|(_, look)| *look);
+    own.or_else(named)
+        .unwrap_or_else(|| OTHERS[after.saturating_sub(NAMED.len()) % OTHERS.len()])
 }
 
 /// Stroke of a variant.
@@ -260,14 +252,16 @@ pub(super) fn star(canvas: &mut Canvas, (x, y): Point) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use spts_eval::decoders::DECODERS;
 
-    /// Every decoder of the table has a look of its own, so that adding or leaving out one changes no other.
+    /// Looks in the table of decoders are used, and no two are equal.
     #[test]
     fn every_decoder_has_a_look_of_its_own() {
         for (k, spec) in DECODERS.iter().enumerate() {
-            assert!(NAMED.iter().any(|(name, _)| *name == spec.name), "{}", spec.name);
             let own = look(decoder_variant(spec.name, Stroke::Solid));
+            if let Some((colour, marker)) = spec.look {
+                let [_, r, g, b] = colour.to_be_bytes();
+                assert_eq!(own, (Rgb(r, g, b), marker), "{}", spec.name);
+            }
             for other in &DECODERS[..k] {
                 assert_ne!(own, look(decoder_variant(other.name, Stroke::Solid)), "{}", spec.name);
             }
