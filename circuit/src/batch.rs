@@ -158,7 +158,7 @@ impl Batch<'_> {
     /// Drive level of `taxel` at the measurement before measurement `i`, in O(1); 0 before the first measurement.
     #[must_use]
     #[inline]
-    pub fn previous_level(&self, taxel: usize, i: usize) -> f64 {
+    pub(crate) fn previous_level(&self, taxel: usize, i: usize) -> f64 {
         match self.cell(taxel) {
             Some(cell) => cell.levels[i],
             None => self.rows.previous_level(taxel, i),
@@ -168,7 +168,7 @@ impl Batch<'_> {
     /// Contribution of `taxel` to measurement `i` at drive level 1, V.
     #[must_use]
     #[inline]
-    pub fn taxel_v(&self, taxel: usize, i: usize) -> f64 {
+    pub(crate) fn taxel_v(&self, taxel: usize, i: usize) -> f64 {
         let gain = self.cell(taxel).map_or(1.0, |cell| cell.gain(i));
         gain * self.sound_v(taxel, i)
     }

@@ -165,7 +165,7 @@ impl Dataset {
 
     /// Path of file number `shard`.
     #[must_use]
-    pub fn shard_file(&self, shard: u64) -> PathBuf {
+    pub(crate) fn shard_file(&self, shard: u64) -> PathBuf {
         let name = shard_name(shard, self.spec.shards());
         self.folder.join(DATA_FOLDER).join(name)
     }

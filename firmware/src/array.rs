@@ -148,7 +148,7 @@ impl Array {
     }
 
     /// Stops the clock line after the sample of its last edge.
-    pub fn stop_clock(&mut self) {
+    pub(crate) fn stop_clock(&mut self) {
         if let Some(train) = self.train
             && let Some(edge) = self.followers[0].unsampled()
         {

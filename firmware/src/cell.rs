@@ -40,7 +40,7 @@ pub enum CellMode {
 impl CellMode {
     /// The mode that `byte` selects; `None` if there is none.
     #[must_use]
-    pub fn from_byte(byte: u8) -> Option<Self> {
+    pub(crate) fn from_byte(byte: u8) -> Option<Self> {
         match byte {
             0 => Some(Self::Raster),
             1 => Some(Self::Analog),

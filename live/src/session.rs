@@ -259,7 +259,7 @@ impl LiveSession {
     }
 
     /// Presses with a mesh that was dropped.
-    pub fn press_with(&mut self, mesh: Arc<UploadedMesh>) -> Shape {
+    pub(crate) fn press_with(&mut self, mesh: Arc<UploadedMesh>) -> Shape {
         let object = mesh.object.clone();
         self.mesh = Some(mesh);
         self.take(object)

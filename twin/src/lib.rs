@@ -79,9 +79,9 @@ pub use spts_sim as sim;
 /// The examples of the README are compiled with the documentation tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../README.md")]
-pub struct Readme;
+pub(crate) struct Readme;
 
 /// The examples of the book's chapter on rows are compiled with the documentation tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../docs/rows.md")]
-pub struct RowsChapter;
+pub(crate) struct RowsChapter;

@@ -90,7 +90,7 @@ impl Twin {
     ///
     /// # Errors
     /// As [`Twin::check`].
-    pub fn check_press(&self, mode: Mode) -> Result<(), Refusal> {
+    pub(crate) fn check_press(&self, mode: Mode) -> Result<(), Refusal> {
         self.check_presses(1, mode)
     }
 
@@ -104,7 +104,7 @@ impl Twin {
     /// Number of presses to simulate together: two a thread, as long as their frames and samples fit easily into
     /// memory. No result depends on it.
     #[must_use]
-    pub fn presses_at_once(&self) -> usize {
+    pub(crate) fn presses_at_once(&self) -> usize {
         let taxels = self.scene.skin().taxels() as f64;
         let rate_hz = taxels / self.scene.mechanics().frame_interval_s() + self.scene.chain().sample_rate_hz();
         #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]

@@ -60,7 +60,7 @@ impl AmplifierResponse {
 
     /// |H| at `frequency_hz` ≥ 0, output over current into the bus, V/A; close to Rf at DC.
     #[must_use]
-    pub fn gain_ohm(&self, frequency_hz: f64) -> f64 {
+    pub(crate) fn gain_ohm(&self, frequency_hz: f64) -> f64 {
         let ([a0, a1, a2], omega) = (self.a, TAU * frequency_hz);
         self.unity / (a0 - a2 * omega * omega).hypot(a1 * omega)
     }

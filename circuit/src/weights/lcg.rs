@@ -28,7 +28,7 @@ pub struct Jump {
 
 impl Jump {
     /// No step.
-    pub const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         multiplier: 1,
         increment: 0,
     };

@@ -53,7 +53,7 @@ impl ElasticKernel {
 
     /// 1/E* = (1 − ν²)/E, 1/Pa.
     #[must_use]
-    pub fn inverse_reduced_modulus_per_pa(&self) -> f64 {
+    pub(crate) fn inverse_reduced_modulus_per_pa(&self) -> f64 {
         let (modulus_pa, poisson) = self.constants();
         (1.0 - poisson * poisson) / modulus_pa
     }
@@ -350,7 +350,8 @@ impl Influence {
 
     /// Largest rise of the surface under unit pressure on one grid square, m/Pa; 0 for a half-space.
     #[must_use]
-    pub fn bulge_m_per_pa(&self) -> f64 {
+    #[cfg(test)]
+    pub(crate) fn bulge_m_per_pa(&self) -> f64 {
         self.bulge.one_m_per_pa
     }
 
@@ -377,7 +378,7 @@ impl Influence {
     /// half-plane under uniform pressure. 0 for a half-space, and approximately 0 for a kernel that is positive
     /// everywhere.
     #[must_use]
-    pub fn bulge(&self) -> f64 {
+    pub(crate) fn bulge(&self) -> f64 {
         if self.bulge.one_m_per_pa <= 0.0 {
             return 0.0;
         }

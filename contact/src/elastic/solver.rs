@@ -512,14 +512,14 @@ impl ElasticSolver {
     ///
     /// [`Influence::bulge`]: super::Influence::bulge
     #[must_use]
-    pub fn bulge(&self) -> f64 {
+    pub(crate) fn bulge(&self) -> f64 {
         // the coarsest level spans the same distance with the fewest cells
         self.levels.last().map_or(0.0, Level::bulge)
     }
 
     /// Makes the pressing body compliant: adds `series_m_per_pa` (1/K of its surface) to the own compliance of each
     /// grid square.
-    pub fn set_series(&mut self, series_m_per_pa: f64) {
+    pub(crate) fn set_series(&mut self, series_m_per_pa: f64) {
         let mut changed = false;
         for level in &mut self.levels {
             // a coarse cell's mean displacement is that of its fine cells: the same for a bed of springs

@@ -320,7 +320,8 @@ impl TriMesh {
 
     /// Joins both meshes into one. They share no vertices (see [`TriMesh::welded`]).
     #[must_use]
-    pub fn merged(mut self, other: &TriMesh) -> Self {
+    #[cfg(test)]
+    pub(crate) fn merged(mut self, other: &TriMesh) -> Self {
         let base = index(self.vertices.len());
         self.vertices.extend_from_slice(&other.vertices);
         self.triangles
@@ -476,7 +477,7 @@ impl TriMesh {
     /// # Panics
     /// If an index is out of range; [`super::checked`] tests the indices first.
     #[must_use]
-    pub fn welded(&self, tolerance_m: f64) -> (Self, usize, usize) {
+    pub(crate) fn welded(&self, tolerance_m: f64) -> (Self, usize, usize) {
         let side_m = (CELL_TOLERANCES * tolerance_m).max(f64::MIN_POSITIVE.sqrt());
         let mut grid = Grid {
             side_m,

@@ -305,12 +305,6 @@ impl SurfacePoints {
         self.taxel_areas_m2.len()
     }
 
-    /// Position of every point, m.
-    #[must_use]
-    pub fn positions_m(&self) -> &[[f64; 3]] {
-        &self.positions_m
-    }
-
     /// Outward unit normal at every point.
     #[must_use]
     pub fn normals(&self) -> &[[f64; 3]] {

@@ -286,7 +286,7 @@ impl Untouched {
 
     /// The untouched skin, from the first `frames` frames of the block.
     #[must_use]
-    pub fn in_frames(recording: &Recording, block: usize, frames: usize) -> Self {
+    pub(crate) fn in_frames(recording: &Recording, block: usize, frames: usize) -> Self {
         let flat = || Self {
             offset_v: idle_mean(recording, block),
             image: None,

@@ -22,7 +22,7 @@ const ARM: [&str; 2] = ["arm.csv", "arm.json"];
 /// A value with its standard error; a dash if it is undefined, such as the share of unexplained outliers when there are
 /// no outliers.
 #[must_use]
-pub fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
+pub(crate) fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
     match error {
         _ if value.is_nan() => "–".to_owned(),
         Some(error) if !error.is_nan() => format!("{value:.digits$} ± {error:.digits$}"),

@@ -35,7 +35,11 @@ const FINE: usize = 24;
 ///
 /// # Errors
 /// [`OutputError`] when a file cannot be written.
-pub fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name: &str) -> Result<(), OutputError> {
+pub(crate) fn save_picture(
+    decoded: &[(&Session, DecodedSession)],
+    folder: &Path,
+    name: &str,
+) -> Result<(), OutputError> {
     let mut rows = Vec::new();
     let mut columns = vec!["pressed".to_owned(), "the wire".to_owned()];
     // sessions of other skins are decoded from other numbers of measurements

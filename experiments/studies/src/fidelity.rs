@@ -293,7 +293,7 @@ pub const SCENES: [&str; 7] = ["sphere", "punch", "edge", "T", "tape", "comb", "
 
 /// A scene of the study, to be run with any level.
 #[derive(Debug, Clone)]
-pub struct FidelityScene {
+pub(crate) struct FidelityScene {
     /// Name in the table.
     pub name: String,
     config: SceneConfig,
@@ -305,7 +305,7 @@ const REPEATS: usize = 2;
 
 impl FidelityScene {
     /// Whether the scene is a drop.
-    pub fn is_drop(&self) -> bool {
+    pub(crate) fn is_drop(&self) -> bool {
         self.config.drop.is_some()
     }
 

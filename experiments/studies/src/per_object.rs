@@ -187,7 +187,7 @@ fn compressive_images(recordings: &Path, objects: &[String]) -> Result<Vec<(Stri
 }
 
 /// Name of a score and its value; `None` for a decoder without it.
-pub type ScoreOf = (&'static str, fn(&Scores) -> Option<f64>);
+pub(crate) type ScoreOf = (&'static str, fn(&Scores) -> Option<f64>);
 
 /// The scores that are compared: intersection over union of the supports, and the share of single windows classified.
 pub const SCORES: [ScoreOf; 2] = [("iou", |s| s.iou), ("class_single", |s| s.class_single)];

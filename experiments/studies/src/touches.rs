@@ -32,7 +32,7 @@ use std::sync::Arc;
 
 /// What simulated touches are made with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TouchObjects {
+pub(crate) enum TouchObjects {
     /// Procedural shapes of all families, a different one for every touch.
     Shapes,
     /// The seventeen objects of the published recordings, in turn.
@@ -57,7 +57,7 @@ const LEAST_SHARE: f64 = 0.3;
 /// # Ok::<(), spts_input::Refusal>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct TouchScene {
+pub(crate) struct TouchScene {
     /// Rows, columns, pitch and electrode.
     pub layout: SkinLayout,
     /// Kind of the objects.
@@ -90,7 +90,7 @@ pub struct Touch {
 
 impl TouchScene {
     /// A scene with `touches` touches of `objects` on a skin.
-    pub fn new(layout: SkinLayout, objects: TouchObjects, touches: usize, seed: u64) -> Self {
+    pub(crate) fn new(layout: SkinLayout, objects: TouchObjects, touches: usize, seed: u64) -> Self {
         Self {
             layout,
             objects,
@@ -106,7 +106,7 @@ impl TouchScene {
     ///
     /// # Errors
     /// [`Refusal`] if the skin or a size is out of range, or a touch cannot be pressed.
-    pub fn draw(&self) -> Result<Vec<Touch>, Refusal> {
+    pub(crate) fn draw(&self) -> Result<Vec<Touch>, Refusal> {
         if self.touches == 0 {
             return Ok(Vec::new());
         }
@@ -191,7 +191,7 @@ const IDLE_BLOCK: u64 = 1 << 40;
 /// assert_eq!(wire.measure(touch.conductance_s, 0, 20)?.len(), 20);
 /// # Ok::<(), spts_input::Refusal>(())
 /// ```
-pub struct TouchWire {
+pub(crate) struct TouchWire {
     readout: Readout,
     idle_v: f64,
 }
@@ -202,7 +202,12 @@ impl TouchWire {
     ///
     /// # Errors
     /// [`Refusal`] if the readout cannot be built.
-    pub fn new(profile: &Profile, weights: &Weights, layout: &SkinLayout, device: Streams) -> Result<Self, Refusal> {
+    pub(crate) fn new(
+        profile: &Profile,
+        weights: &Weights,
+        layout: &SkinLayout,
+        device: Streams,
+    ) -> Result<Self, Refusal> {
         let profile = profile.with_weights(weights)?;
         let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0)?;
         let mut untouched = Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols()))?;
@@ -215,7 +220,7 @@ impl TouchWire {
     }
 
     /// A wire with the given readout. Nothing is subtracted from its samples.
-    pub fn of(readout: Readout) -> Self {
+    pub(crate) fn of(readout: Readout) -> Self {
         Self { readout, idle_v: 0.0 }
     }
 
@@ -223,7 +228,7 @@ impl TouchWire {
     ///
     /// # Errors
     /// [`Refusal`] if the skin has another size.
-    pub fn volts(
+    pub(crate) fn volts(
         &mut self,
         conductance_s: ConductanceMap,
         number: u64,
@@ -238,7 +243,7 @@ impl TouchWire {
     ///
     /// # Errors
     /// As [`TouchWire::volts`].
-    pub fn measure(
+    pub(crate) fn measure(
         &mut self,
         conductance_s: ConductanceMap,
         number: u64,
@@ -252,7 +257,7 @@ impl TouchWire {
 
 /// How well a decoded image shows a simulated touch.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TouchScore {
+pub(crate) struct TouchScore {
     /// Intersection over union of the supports.
     pub iou: f64,
     /// Distance of the centres, taxels; `None` if the image or the touch is empty.
@@ -264,7 +269,7 @@ impl TouchScore {
     ///
     /// # Panics
     /// If image and touch have different numbers of taxels.
-    pub fn of(image: &[f64], touch: &Touch, layout: &SkinLayout) -> Self {
+    pub(crate) fn of(image: &[f64], touch: &Touch, layout: &SkinLayout) -> Self {
         assert_eq!(image.len(), touch.support.len(), "taxels");
         let mut found = Vec::new();
         support(image, SUPPORT_THRESHOLD, &mut found);

@@ -94,7 +94,7 @@ impl Device {
 
     /// [`dac_output`](Self::dac_output) at `tick`, which must not be earlier than the last change but one.
     #[must_use]
-    pub fn dac_output_at(&self, tick: u64) -> Option<u8> {
+    pub(crate) fn dac_output_at(&self, tick: u64) -> Option<u8> {
         self.space.dac.output_at(tick)
     }
 

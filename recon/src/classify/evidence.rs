@@ -170,7 +170,8 @@ impl EvidenceClassifier {
     /// Outcomes in the order of [`Posterior::probabilities`]: labels in increasing order, then `None` if there are
     /// components without a label.
     #[must_use]
-    pub fn outcomes(&self) -> &[Option<usize>] {
+    #[cfg(test)]
+    pub(crate) fn outcomes(&self) -> &[Option<usize>] {
         &self.outcomes
     }
 

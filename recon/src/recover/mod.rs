@@ -50,7 +50,7 @@ pub const RECOVER: &[(&str, Build)] = &[
 ///
 /// # Errors
 /// A message, if K or a parameter is outside its range.
-pub type BuildRegularised = fn(usize) -> Result<Box<dyn Recover>, Refusal>;
+pub(crate) type BuildRegularised = fn(usize) -> Result<Box<dyn Recover>, Refusal>;
 
 /// Share of the largest correlation that the penalties of [`REGULARISED`] have, and of the root mean square of `y` or
 /// of the prior deviation that its noises have.

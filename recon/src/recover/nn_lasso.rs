@@ -41,7 +41,7 @@ pub struct NnLasso {
 
 impl NnLasso {
     /// Default of `stopping`.
-    pub const STOPPING: Stopping = Stopping {
+    pub(crate) const STOPPING: Stopping = Stopping {
         tol: 1e-8,
         max_iter: 10_000,
     };

@@ -57,7 +57,7 @@ const GRADIENT_SQUARE: f64 = 8.0;
 
 impl Tv {
     /// Default of `stopping`.
-    pub const STOPPING: Stopping = Stopping {
+    pub(crate) const STOPPING: Stopping = Stopping {
         tol: 1e-6,
         max_iter: 200_000,
     };

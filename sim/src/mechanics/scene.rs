@@ -568,7 +568,7 @@ const NEGLIGIBLE_M: f64 = 1e-4;
 impl Overhang {
     /// The largest of the four, m.
     #[must_use]
-    pub fn largest_m(&self) -> f64 {
+    pub(crate) fn largest_m(&self) -> f64 {
         self.edges().into_iter().map(|(_, m)| m).fold(0.0, f64::max)
     }
 

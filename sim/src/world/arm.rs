@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 /// One link and the joint that moves it, in standard Denavit–Hartenberg form: `R_z(θ)` `T_z(d)` `T_x(a)` `R_x(α)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Link {
+pub(crate) struct Link {
     /// a, m.
     pub a_m: f64,
     /// d, m.
@@ -31,7 +31,7 @@ pub struct Link {
 /// The six links. Lengths: UR5 CB3 user manual, DH table. Masses, centres and inertias: Universal Robots' ROS 2
 /// description, `ur5/physical_parameters.yaml`. Torques: `joint_limits.yaml` of the same. Rotor inertias and servo
 /// stiffnesses are estimates, chosen so that 20 N move the tool by less than half a millimetre.
-pub const LINKS: [Link; 6] = [
+pub(crate) const LINKS: [Link; 6] = [
     link(
         [0.0, 0.089_159, FRAC_PI_2],
         3.7,
@@ -91,18 +91,18 @@ const fn link(dh: [f64; 3], mass_kg: f64, centre_m: [f64; 3], inertia_kg_m2: [f6
 }
 
 /// Damping of every joint, N m s/rad (estimate).
-pub const JOINT_DAMPING: f64 = 2.0;
+pub(crate) const JOINT_DAMPING: f64 = 2.0;
 
 /// Position of the base in world axes, m: half a metre from the middle of the skin.
-pub const BASE_M: [f64; 3] = [-0.5, 0.0, 0.0];
+pub(crate) const BASE_M: [f64; 3] = [-0.5, 0.0, 0.0];
 
 /// A posture with the tool above the middle of the skin, pointing down, elbow up.
-pub const HOME_RAD: [f64; 6] = [std::f64::consts::PI, -1.4, 1.9, -2.07, -1.57, 0.0];
+pub(crate) const HOME_RAD: [f64; 6] = [std::f64::consts::PI, -1.4, 1.9, -2.07, -1.57, 0.0];
 
 impl Link {
     /// Transformation from the joint's moving side to the link's own frame: `T_z(d)` `T_x(a)` `R_x(α)`.
     #[must_use]
-    pub fn tail(&self) -> Isometry3<f64> {
+    pub(crate) fn tail(&self) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::new(self.a_m, 0.0, self.d_m),
             UnitQuaternion::from_axis_angle(&Vector3::x_axis(), self.alpha_rad),
@@ -156,7 +156,7 @@ pub fn flange(joints_rad: &[f64; 6]) -> Isometry3<f64> {
 /// point in world axes, m/s for 1 rad/s of the joint, and rows 3–5 the angular velocity. `tool` is given in flange
 /// axes, m.
 #[must_use]
-pub fn jacobian(joints_rad: &[f64; 6], tool: &Vector3<f64>) -> Matrix6<f64> {
+pub(crate) fn jacobian(joints_rad: &[f64; 6], tool: &Vector3<f64>) -> Matrix6<f64> {
     kinematics(joints_rad, tool).1
 }
 

@@ -158,7 +158,7 @@ impl Chain {
     /// Number of codes in all recordings by this chain and its copies in which the emulated cells differ from the
     /// model. Such codes show edges that cells have lost because the clock is too fast.
     #[must_use]
-    pub fn unlike_codes(&self) -> u64 {
+    pub(crate) fn unlike_codes(&self) -> u64 {
         self.unlike_codes.load(Ordering::Relaxed)
     }
 
@@ -508,7 +508,11 @@ impl Chain {
     ///
     /// # Errors
     /// [`Refusal`] if a press is too long to record, or the source of the weights cannot provide them.
-    pub fn readout_session(&self, duration_s: f64, acquisition: &Acquisition) -> Result<ReadoutSession, Refusal> {
+    pub(crate) fn readout_session(
+        &self,
+        duration_s: f64,
+        acquisition: &Acquisition,
+    ) -> Result<ReadoutSession, Refusal> {
         let mut readout = self.readout(acquisition.mode, acquisition.session)?;
         readout.skip(acquisition.lead_frames);
         let frame = readout.measurements_per_frame();

@@ -61,7 +61,7 @@ impl OutputError {
 
     /// The same error, with `place` applied to its path.
     #[must_use]
-    pub fn relocated(self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
+    pub(crate) fn relocated(self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
         Self {
             path: place(&self.path),
             ..self

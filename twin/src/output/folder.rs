@@ -127,7 +127,7 @@ impl OutputFolder {
 
     /// Final path of the result that waits at `path`. Any other path is returned unchanged.
     #[must_use]
-    pub fn final_path(&self, path: &Path) -> PathBuf {
+    pub(crate) fn final_path(&self, path: &Path) -> PathBuf {
         let below = path.strip_prefix(&self.stage);
         below.map_or_else(|_| path.to_owned(), |name| self.shown.join(name))
     }

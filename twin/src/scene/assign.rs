@@ -15,7 +15,7 @@ impl Assignment {
     /// # Errors
     /// [`Refusal`], as [`Assignment::apply`], and for two assignments that set the same quantity in two ways, such
     /// as a row and a position in metres.
-    pub fn apply_all(assignments: &[Self], scene: &mut Table) -> Result<(), Refusal> {
+    pub(crate) fn apply_all(assignments: &[Self], scene: &mut Table) -> Result<(), Refusal> {
         for (number, later) in assignments.iter().enumerate() {
             let of = |a: &Self| a.key(scene).to_owned();
             let earlier = assignments[..number].iter().find(|a| conflict(&of(a), &of(later)));

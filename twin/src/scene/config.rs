@@ -136,7 +136,7 @@ impl SceneConfig {
     ///
     /// # Errors
     /// [`Refusal`] for an unknown key or a wrong value.
-    pub fn from_table(table: toml::Table) -> Result<Self, Refusal> {
+    pub(crate) fn from_table(table: toml::Table) -> Result<Self, Refusal> {
         table.try_into().map_err(|error| Refusal::new(explain_toml(&error)))
     }
 

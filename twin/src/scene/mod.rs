@@ -230,7 +230,7 @@ impl Scene {
     /// [`READOUT_COPY`], [`SEEDS_COPY`] and [`PATTERNS_COPY`]. It is written beside the results, together with copies
     /// of these files.
     #[must_use]
-    pub fn portable(&self) -> SceneConfig {
+    pub(crate) fn portable(&self) -> SceneConfig {
         let mut config = self.config.clone();
         if self.chain.profile_file().is_some() {
             config.readout = Some(READOUT_COPY.to_owned());
@@ -252,11 +252,11 @@ impl Scene {
 /// Name of the copy of a mesh, without its extension.
 pub const MESH_COPY: &str = "mesh";
 /// Name of the copy of a profile file.
-pub const READOUT_COPY: &str = "readout.toml";
+pub(crate) const READOUT_COPY: &str = "readout.toml";
 /// Name of the copy of a file of seeds.
-pub const SEEDS_COPY: &str = "seeds.txt";
+pub(crate) const SEEDS_COPY: &str = "seeds.txt";
 /// Name of the copy of a pattern file.
-pub const PATTERNS_COPY: &str = "patterns.txt";
+pub(crate) const PATTERNS_COPY: &str = "patterns.txt";
 
 /// The error of a scene that has no TOML.
 pub(crate) fn unwritable(error: toml::ser::Error) -> Refusal {

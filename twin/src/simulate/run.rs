@@ -68,7 +68,7 @@ pub struct Simulation {
 
 impl Simulation {
     /// Number of blocks of a recording that are kept.
-    pub const FIRST_BLOCKS: usize = 6;
+    pub(crate) const FIRST_BLOCKS: usize = 6;
 }
 
 /// Simulates all presses of the scene, several in parallel. If `record`, records them in both modes as [`Twin::record`]

@@ -462,7 +462,7 @@ pub struct ScoreBoard {
 impl ScoreBoard {
     /// The row with this key.
     #[must_use]
-    pub fn row_like(&self, key: &RowKey) -> Option<&BoardRow> {
+    pub(crate) fn row_like(&self, key: &RowKey) -> Option<&BoardRow> {
         self.rows.iter().find(|row| row.key == *key)
     }
 }

@@ -201,7 +201,7 @@ impl TrainingData {
     ///
     /// # Errors
     /// As [`Self::of_images`].
-    pub fn of_poses(objects: &[(usize, &PosedObject)], cols: usize, streams: Streams) -> Result<Self, Refusal> {
+    pub(crate) fn of_poses(objects: &[(usize, &PosedObject)], cols: usize, streams: Streams) -> Result<Self, Refusal> {
         let (mut columns, mut labels) = (Vec::new(), Vec::new());
         for (label, object) in objects {
             columns.extend((0..object.images.ncols()).map(|k| object.images.column(k)));
@@ -231,7 +231,7 @@ impl TrainingData {
 
     /// The same training data with the network for decoders that use one.
     #[must_use]
-    pub fn with_network(self, network: Option<TrainedNetwork>) -> Self {
+    pub(crate) fn with_network(self, network: Option<TrainedNetwork>) -> Self {
         Self { network, ..self }
     }
 
@@ -264,7 +264,7 @@ impl TrainingData {
 
     /// The same training data with the given dictionary and library.
     #[must_use]
-    pub fn with_published(mut self, dictionary: &Matrix, library: &Library) -> Self {
+    pub(crate) fn with_published(mut self, dictionary: &Matrix, library: &Library) -> Self {
         self.dictionary = OnceLock::from(Arc::new(Dictionary::new(dictionary.clone())));
         self.library = library.clone();
         self

@@ -28,7 +28,7 @@ use std::path::Path;
 use timeline::{Timeline, Trace, pressure_pa};
 
 /// Name of the file of `spts simulate --animate`.
-pub const ANIMATION_FILE: &str = "animation.gif";
+pub(crate) const ANIMATION_FILE: &str = "animation.gif";
 
 /// One press or drop in motion.
 ///

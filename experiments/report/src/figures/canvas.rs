@@ -25,7 +25,7 @@ const FACES: &str = "Inter, 'Helvetica Neue', Helvetica, Arial, 'DejaVu Sans', s
 /// Height of a capital above the base line, halved, in em: moves the anchor from the middle to the base line.
 const HALF_CAPITAL_EM: f64 = 0.36;
 /// Distance between lines of text, in em.
-pub const LINE_HEIGHT: f64 = 1.3;
+pub(crate) const LINE_HEIGHT: f64 = 1.3;
 
 /// Which end of a text its position is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,13 +68,13 @@ impl TextStyle {
 
     /// The same in bold.
     #[must_use]
-    pub const fn bold(self) -> Self {
+    pub(crate) const fn bold(self) -> Self {
         Self { bold: true, ..self }
     }
 
     /// The same at another anchor.
     #[must_use]
-    pub const fn anchored(self, anchor: Anchor) -> Self {
+    pub(crate) const fn anchored(self, anchor: Anchor) -> Self {
         Self { anchor, ..self }
     }
 
@@ -129,7 +129,7 @@ impl Canvas {
     }
 
     /// Adds a filled rectangle.
-    pub fn rect(&mut self, (x, y): Point, (w, h): Point, fill: Rgb, opacity: f64) {
+    pub(crate) fn rect(&mut self, (x, y): Point, (w, h): Point, fill: Rgb, opacity: f64) {
         let (left, top) = (number(x.min(x + w)), number(y.min(y + h)));
         let (w, h, fill, clear) = (number(w.abs()), number(h.abs()), fill.hex(), clear(opacity));
         self.add(&format!(
@@ -158,7 +158,7 @@ impl Canvas {
     }
 
     /// Adds a line with round joins; `dash` has the lengths of dash and gap.
-    pub fn dashed(&mut self, points: &[Point], stroke: Rgb, width: f64, dash: Option<(f64, f64)>) {
+    pub(crate) fn dashed(&mut self, points: &[Point], stroke: Rgb, width: f64, dash: Option<(f64, f64)>) {
         let dash = dash.map_or(String::new(), |(on, off)| format!(" stroke-dasharray=\"{on} {off}\""));
         let (d, stroke) = (path_data(points), stroke.hex());
         self.add(&format!(
@@ -271,7 +271,7 @@ fn advance_em(c: char) -> f64 {
 
 /// Width of a text in the unit of `size`, the em.
 #[must_use]
-pub fn text_width(text: &str, size: f64, bold: bool) -> f64 {
+pub(crate) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
     text.chars().map(advance_em).sum::<f64>() * size * if bold { 1.12 } else { 1.0 }
 }
 
@@ -323,7 +323,7 @@ fn phrases(text: &str) -> Vec<String> {
 }
 
 /// PNG pixels to the CSS pixel.
-pub const PIXELS_PER_UNIT: f64 = 2.0;
+pub(crate) const PIXELS_PER_UNIT: f64 = 2.0;
 /// Longest side of a PNG file, pixels.
 const MOST_PIXELS: usize = 1 << 15;
 /// Effort of the compression. Figures are plain areas and text: level 1 takes a fifth of the time of the usual level 6,
@@ -359,7 +359,7 @@ pub fn save(canvas: &Canvas, dir: &Path, name: &str) -> Result<(), OutputError> 
 ///
 /// # Errors
 /// [`OutputError`] when the file cannot be written.
-pub fn save_png(canvas: &Canvas, path: &Path) -> Result<(), OutputError> {
+pub(crate) fn save_png(canvas: &Canvas, path: &Path) -> Result<(), OutputError> {
     write_bytes(path, &png_of(canvas).map_err(OutputError::write(path))?)
 }
 
@@ -367,7 +367,7 @@ pub fn save_png(canvas: &Canvas, path: &Path) -> Result<(), OutputError> {
 ///
 /// # Errors
 /// When the figure cannot be painted.
-pub fn png_of(canvas: &Canvas) -> io::Result<Vec<u8>> {
+pub(crate) fn png_of(canvas: &Canvas) -> io::Result<Vec<u8>> {
     let (width, height, rgb) = paint(canvas)?;
     encode_png(&rgb, width, height)
 }
@@ -376,7 +376,7 @@ pub fn png_of(canvas: &Canvas) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// When the figure is too large for the memory.
-pub fn paint(canvas: &Canvas) -> io::Result<(usize, usize, Vec<u8>)> {
+pub(crate) fn paint(canvas: &Canvas) -> io::Result<(usize, usize, Vec<u8>)> {
     let side = |value: f64| index(value * PIXELS_PER_UNIT, MOST_PIXELS).max(1);
     let (width, height) = (side(canvas.width), side(canvas.height));
     let tree = Tree::from_str(&canvas.svg(), &PAINTING).map_err(io::Error::other)?;
@@ -423,7 +423,7 @@ fn index(value: f64, limit: usize) -> usize {
 
 /// A picture at another size: the mean over the source pixels under each new one.
 #[must_use]
-pub fn resample(rgb: &[u8], (width, height): (usize, usize), (w, h): (usize, usize)) -> Vec<u8> {
+pub(crate) fn resample(rgb: &[u8], (width, height): (usize, usize), (w, h): (usize, usize)) -> Vec<u8> {
     let mut out = Vec::with_capacity(w * h * 3);
     if rgb.len() != width * height * 3 || rgb.is_empty() {
         return vec![255; w * h * 3];

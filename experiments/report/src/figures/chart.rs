@@ -35,19 +35,19 @@ impl Series {
     }
 
     /// The curve `name` of the decoder, locator or control `decoder`, in that one's own colour.
-    pub fn of_decoder(name: impl Into<String>, decoder: &str, stroke: Stroke, points: Vec<(f64, f64)>) -> Self {
+    pub(crate) fn of_decoder(name: impl Into<String>, decoder: &str, stroke: Stroke, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, Style::Decoder, decoder_variant(decoder, stroke), points)
     }
 
     /// The same curve with a shade of its scatter.
     #[must_use]
-    pub fn with_scatter(self, scatter: Vec<(f64, f64, f64)>) -> Self {
+    pub(crate) fn with_scatter(self, scatter: Vec<(f64, f64, f64)>) -> Self {
         Self { scatter, ..self }
     }
 
     /// The same curve with bands.
     #[must_use]
-    pub fn with_spans(self, spans: Vec<(f64, f64, f64)>) -> Self {
+    pub(crate) fn with_spans(self, spans: Vec<(f64, f64, f64)>) -> Self {
         Self { spans, ..self }
     }
 }
@@ -102,7 +102,7 @@ pub struct Chart {
 impl Chart {
     /// The chart with points that the paper states: label, x and y of each.
     #[must_use]
-    pub fn with_claims(self, claims: &[(&str, f64, f64)]) -> Self {
+    pub(crate) fn with_claims(self, claims: &[(&str, f64, f64)]) -> Self {
         let claim = |&(label, x, y): &(&str, f64, f64)| Claim {
             label: label.to_owned(),
             x: Some(x),
@@ -116,7 +116,7 @@ impl Chart {
 
     /// The chart with ranges of x that the paper states: label and ends of each.
     #[must_use]
-    pub fn with_ranges(self, ranges: &[(&str, f64, f64)]) -> Self {
+    pub(crate) fn with_ranges(self, ranges: &[(&str, f64, f64)]) -> Self {
         let range = |&(label, from, to): &(&str, f64, f64)| StatedRange {
             label: label.to_owned(),
             from,
@@ -195,7 +195,7 @@ impl Curve {
     }
 
     /// The curve `name` of the decoder, locator or control `decoder`, in that one's own colour.
-    pub fn of_decoder(name: impl Into<String>, decoder: &str, stroke: Stroke) -> Self {
+    pub(crate) fn of_decoder(name: impl Into<String>, decoder: &str, stroke: Stroke) -> Self {
         Self::new(name, Style::Decoder, decoder_variant(decoder, stroke))
     }
 }
@@ -260,7 +260,7 @@ impl<'a, R: Copy> Plot<'a, R> {
 
     /// A logarithmic vertical axis.
     #[must_use]
-    pub fn log_y(mut self) -> Self {
+    pub(crate) fn log_y(mut self) -> Self {
         self.axes.y_log = true;
         self
     }

@@ -5,21 +5,21 @@
 pub struct Rgb(pub u8, pub u8, pub u8);
 
 /// Paper.
-pub const WHITE: Rgb = Rgb(255, 255, 255);
+pub(crate) const WHITE: Rgb = Rgb(255, 255, 255);
 /// Text.
-pub const INK: Rgb = Rgb(0x20, 0x24, 0x2a);
+pub(crate) const INK: Rgb = Rgb(0x20, 0x24, 0x2a);
 /// Secondary text, axes.
-pub const MUTED: Rgb = Rgb(0x5a, 0x61, 0x6b);
+pub(crate) const MUTED: Rgb = Rgb(0x5a, 0x61, 0x6b);
 /// Frames of tiles.
-pub const FRAME: Rgb = Rgb(0x9a, 0xa1, 0xab);
+pub(crate) const FRAME: Rgb = Rgb(0x9a, 0xa1, 0xab);
 /// Grid lines.
-pub const GRID: Rgb = Rgb(0xe4, 0xe7, 0xeb);
+pub(crate) const GRID: Rgb = Rgb(0xe4, 0xe7, 0xeb);
 /// Claims of the paper.
-pub const CLAIM: Rgb = Rgb(0x76, 0x76, 0x76);
+pub(crate) const CLAIM: Rgb = Rgb(0x76, 0x76, 0x76);
 /// A cell without a value.
-pub const MISSING: Rgb = Rgb(0xbd, 0xbd, 0xbd);
+pub(crate) const MISSING: Rgb = Rgb(0xbd, 0xbd, 0xbd);
 /// Outline around the taxels that are truly touched: far in hue from every colour of [`heat`].
-pub const OUTLINE: Rgb = Rgb(0x2e, 0xe6, 0xd6);
+pub(crate) const OUTLINE: Rgb = Rgb(0x2e, 0xe6, 0xd6);
 
 impl Rgb {
     /// `#rrggbb`.

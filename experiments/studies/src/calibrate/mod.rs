@@ -272,7 +272,7 @@ impl CalibrationReport {
 }
 
 /// Number of quantiles of the output that are compared.
-pub const QUANTILES: usize = 100;
+pub(crate) const QUANTILES: usize = 100;
 
 /// What the calibration finds in one session: parameters of the readout with their standard errors, faulty cells and
 /// gains.

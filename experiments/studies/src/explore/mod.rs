@@ -17,9 +17,9 @@ mod scene;
 pub use crate::wiring::Way;
 
 /// Wanted IoU.
-pub const WANTED_IOU: f64 = 0.8;
+pub(crate) const WANTED_IOU: f64 = 0.8;
 /// Wanted share of contacts found within less than a taxel of their true place.
-pub const WANTED_LOCATED: f64 = 0.95;
+pub(crate) const WANTED_LOCATED: f64 = 0.95;
 /// Rounds of a recovery.
 const MAX_ROUNDS: usize = 10;
 /// Measurements a contact at which the search begins: it has four unknowns, place, width and peak.

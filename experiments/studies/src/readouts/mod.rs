@@ -132,7 +132,7 @@ impl ReadoutSkin {
 /// of every measurement of a frame whether its sample is beyond the threshold. The frame is measured over and over, and
 /// the onset is at a uniformly distributed moment, so that half a measurement passes on average before the next one
 /// begins. `None` if no sample is beyond the threshold.
-pub fn until_noticed(beyond: &[bool]) -> Option<f64> {
+pub(crate) fn until_noticed(beyond: &[bool]) -> Option<f64> {
     let first = beyond.iter().position(|b| *b)?;
     let count = beyond.len();
     // backwards from the first one, once around

@@ -178,7 +178,7 @@ impl WireSession<'_> {
     /// Each cell's own measurement of its taxel, S: the conductance minus that of the idle skin, with the relative
     /// noise of a contact. It is for cells with a converter of their own; the receiver at the end of the wire does not
     /// know it.
-    pub fn own_values_s(&self) -> Vec<f64> {
+    pub(crate) fn own_values_s(&self) -> Vec<f64> {
         let mut rng = self.device.rng("readouts/cells", self.held.1);
         let noisy = |g: &f64| {
             let normal: f64 = StandardNormal.sample(&mut rng);
@@ -197,7 +197,11 @@ impl WireSession<'_> {
     ///
     /// # Errors
     /// [`Refusal`] if the readout cannot be built.
-    pub fn transmissions(&mut self, chips: Option<&Patterns>, measurements: usize) -> Result<WireFrame, Refusal> {
+    pub(crate) fn transmissions(
+        &mut self,
+        chips: Option<&Patterns>,
+        measurements: usize,
+    ) -> Result<WireFrame, Refusal> {
         let published = SkinLayout::default();
         let line = |chips: &Patterns| -> Result<TouchWire, Refusal> {
             // the cells that transmit, whatever their places
@@ -274,7 +278,7 @@ impl SkinWire {
     }
 
     /// Largest magnitude of Σ wₖ·gₖ that `readout` has with `touch`, S.
-    pub fn largest_sum_s(&self, readout: &dyn super::WireReadout, touch: &Touch) -> f64 {
+    pub(crate) fn largest_sum_s(&self, readout: &dyn super::WireReadout, touch: &Touch) -> f64 {
         let idle_s = self.electronics.skin.idle_s;
         let pressed: Vec<f64> = touch.conductance_s.values().iter().map(|g| g + idle_s).collect();
         readout.largest_sum_s(&pressed)
