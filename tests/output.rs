@@ -2,7 +2,8 @@
 //! file is lost.
 
 use crate::command::{SPTS, files, refused, succeeds, words};
-use spts::output::{DiskOperation, OutputError, OutputFolder, watching_disk, write_bytes};
+use spts::output::{DiskOperation, OutputFolder, watching_disk, write_bytes};
+use spts_input::Refusal;
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::io;
@@ -23,7 +24,7 @@ fn press<'a>(out: &'a str, seed: &'a str) -> Vec<&'a str> {
 type Files = BTreeMap<String, Vec<u8>>;
 
 /// Puts `results` into `out` as every command does.
-fn put(results: &Files, out: &Path) -> Result<(), OutputError> {
+fn put(results: &Files, out: &Path) -> Result<(), Refusal> {
     let folder = OutputFolder::open(out)?;
     for (name, bytes) in results {
         if let Some((parent, _)) = name.rsplit_once('/') {

@@ -92,7 +92,7 @@ pub(crate) fn write_shard(spec: &Spec, shard: u64, path: &Path, done: &dyn Fn())
     let schema = schema(spec);
     let group = (GROUP_BYTES / row_bytes.max(1)).clamp(1, GROUP_ROWS);
     let pieces = PIECE_ROWS.min(group);
-    let mut file = AtomicFile::create(path).map_err(Refusal::from_error)?;
+    let mut file = AtomicFile::create(path)?;
     let properties = properties(spec, shard, group).map_err(failed(path))?;
     let mut writer = ArrowWriter::try_new(&mut file, Arc::clone(&schema), Some(properties)).map_err(failed(path))?;
     let mut maker = Maker::new(spec);
@@ -110,7 +110,7 @@ pub(crate) fn write_shard(spec: &Spec, shard: u64, path: &Path, done: &dyn Fn())
         }
     }
     writer.close().map_err(failed(path))?;
-    file.finish().map_err(Refusal::from_error)
+    file.finish()
 }
 
 fn properties(spec: &Spec, shard: u64, group: usize) -> Result<WriterProperties, ParquetError> {

@@ -5,7 +5,7 @@ use crate::spec::{Spec, SpecError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts::Refusal;
-use spts::output::{Manifest, OutputError, is_temporary, write_bytes, write_json};
+use spts::output::{Manifest, is_temporary, no_folder, write_bytes, write_json};
 use spts::progress::Progress;
 use spts_circuit::RecordingInfo;
 use std::io;
@@ -111,13 +111,12 @@ impl Dataset {
             let problem = "is not of a data set; choose an empty folder, or one that `spts dataset make` began";
             return Err(refused(other, problem));
         }
-        let unmade = |source| OutputError::no_folder(&data, source);
+        let unmade = |source| no_folder(&data, source);
         // the same bytes whoever comes first; the head last, so that what has one has all
         std::fs::create_dir_all(&data)
             .map_err(unmade)
             .and_then(|()| write_bytes(&folder.join(SPEC_FILE), spec.text().as_bytes()))
-            .and_then(|()| write_json(&head_file, &head))
-            .map_err(Refusal::from_error)?;
+            .and_then(|()| write_json(&head_file, &head))?;
         Ok(Self {
             folder: folder.to_owned(),
             spec,

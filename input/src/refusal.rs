@@ -55,8 +55,14 @@ impl Refusal {
     /// The same refusal with the place of the mistake before it: a file, or the section of one.
     #[must_use]
     pub fn at(self, place: impl Display) -> Self {
+        self.reworded(|message| format!("{place}: {message}"))
+    }
+
+    /// The same refusal in other words.
+    #[must_use]
+    pub fn reworded(self, words: impl FnOnce(&str) -> String) -> Self {
         Self {
-            message: format!("{place}: {}", self.message),
+            message: words(&self.message),
             ..self
         }
     }

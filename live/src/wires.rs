@@ -40,7 +40,7 @@ pub(crate) struct Line {
 
 impl Line {
     fn new(rows: &'static str, chain: &Chain) -> Result<Self, Refusal> {
-        let wire = Wire::new(chain, 0).map_err(Refusal::from_error)?;
+        let wire = Wire::new(chain, 0)?;
         Ok(Self {
             rows,
             idle_v: wire.idle_v(Mode::Compressive),
@@ -55,16 +55,12 @@ impl Line {
 
     /// Lets the skin feel the pressure for `dt_s`, and measures it.
     pub(crate) fn record(&mut self, electrode_pressure: &PressureMap, dt_s: f64) -> Result<(), Refusal> {
-        self.wire.feel(electrode_pressure, dt_s).map_err(Refusal::from_error)?;
+        self.wire.feel(electrode_pressure, dt_s)?;
         self.catch_up(dt_s);
-        self.wire
-            .measure(Mode::Compressive, &mut [0.0; SETTLING])
-            .map_err(Refusal::from_error)?;
+        self.wire.measure(Mode::Compressive, &mut [0.0; SETTLING])?;
         let rows = PressRows::new(self.wire.rows(Mode::Compressive, RECORDED));
         self.volts.resize(RECORDED, 0.0);
-        self.wire
-            .measure(Mode::Compressive, &mut self.volts)
-            .map_err(Refusal::from_error)?;
+        self.wire.measure(Mode::Compressive, &mut self.volts)?;
         self.passed += (SETTLING + RECORDED) as u64;
         self.recorded = Some(Press::on(Arc::new(rows), self.volts.clone(), self.idle_v));
         Ok(())
@@ -152,9 +148,9 @@ fn chain(settings: &Settings, patterns: Option<Patterns>, shelf: &Shelf, seed: u
         faults: settings.faults.iter().map(fault).collect(),
         ..ChainConfig::default()
     };
-    let chain = Chain::new(&config, shelf.layout(), seed, Path::new("")).map_err(Refusal::from_error)?;
+    let chain = Chain::new(&config, shelf.layout(), seed, Path::new(""))?;
     let louder = with_noise(chain.profile().clone(), settings.noise);
-    chain.with_profile(louder).map_err(Refusal::from_error)
+    chain.with_profile(louder)
 }
 
 /// `profile` with `factor` times the noise.

@@ -6,10 +6,10 @@ use numpy::{IntoPyArray as _, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyA
 use pyo3::prelude::*;
 use spts::Refusal;
 use spts::recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
-use spts_eval::algorithm::{Algorithm, Answer, Class, Contender, DecodeError, ExternalError, Trained};
+use spts_eval::algorithm::{Algorithm, Answer, Class, Contender, DecodeError, Trained};
 use spts_eval::board::{BoardSettings, DECODERS, Window, find, table};
 use spts_eval::training::{PUBLISHED, RASTER, SHAPES, TrainingData, TrainingSource};
-use spts_eval::{Labels, ScoreError, Sensing, Source};
+use spts_eval::{Labels, Sensing, Source};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -38,7 +38,7 @@ impl Contender for Given {
         data: &TrainingData,
         labels: &Labels,
         left_out: Option<&str>,
-    ) -> Result<Arc<dyn Trained>, ScoreError> {
+    ) -> Result<Arc<dyn Trained>, Refusal> {
         let (images, numbers) = (data.library.images(), data.library.labels());
         let taxels = images.nrows();
         let values: Vec<f64> = (0..images.ncols()).flat_map(|k| images.column(k)).collect();
@@ -61,8 +61,8 @@ impl Contender for Given {
     }
 }
 
-fn failed(name: &str, error: &PyErr) -> ExternalError {
-    ExternalError::Refused(Refusal::new(format!("{name}: {error}")))
+fn failed(name: &str, error: &PyErr) -> Refusal {
+    Refusal::new(error.to_string()).at(name)
 }
 
 impl Trained for Learned {
@@ -97,7 +97,7 @@ impl Algorithm for Asked<'_> {
             let y = y.into_pyarray(py).reshape([count, m])?;
             self.0.answered(self.0.answers.bind(py).call1((phi, y))?, count)
         });
-        Ok(found.map_err(|e| failed(&self.0.name, &e))?)
+        found.map_err(|e| DecodeError::External(failed(&self.0.name, &e)))
     }
 
     fn batched(&self) -> bool {

@@ -115,7 +115,7 @@ impl Wire {
         };
         let line = py.detach(|| {
             let chain = Chain::new(&config, &layout, seed, Path::new(""))?;
-            Ok::<_, spts::ChainError>((chain.sample_rate_hz(), Line::new(&chain, session)?))
+            Ok::<_, spts::Refusal>((chain.sample_rate_hz(), Line::new(&chain, session)?))
         });
         let (sample_rate, line) = line.map_err(refuse)?;
         Ok(Self {

@@ -55,9 +55,9 @@ pub mod session;
 pub mod simulate;
 mod wire;
 
-pub use chain::{Acquisition, Chain, ChainConfig, ChainError};
+pub use chain::{Acquisition, Chain, ChainConfig};
 #[cfg(feature = "mujoco")]
-pub use record::{Twin, TwinError};
+pub use record::Twin;
 #[cfg(feature = "mujoco")]
 pub use scene::Scene;
 pub use session::{PressFacts, Recorded, Session};

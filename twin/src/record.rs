@@ -13,9 +13,6 @@ use spts_sim::World;
 use spts_sim::world::{Bounce, PressCourse};
 use std::ops::Range;
 
-// the other name of a refusal, until all crates have it
-pub use spts_input::Refusal as TwinError;
-
 /// The twin of a scene: the skin, what presses on it, and its readout.
 ///
 /// Presses run in parallel. No result depends on the number of threads.

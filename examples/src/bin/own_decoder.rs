@@ -4,11 +4,12 @@
 //! `cargo run --release --bin own_decoder -- ['NAME=COMMAND']`, such as `'ridge=python3 python/decoder.py'`
 
 use examples::Result;
+use spts::Refusal;
 use spts_eval::algorithm::{Algorithm, Answer, Contender, DecodeError, Trained};
 use spts_eval::board::{BoardSettings, find, table};
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{TrainingData, TrainingSource};
-use spts_eval::{ScoreError, Sensing, Source, TwinSessions, Window};
+use spts_eval::{Sensing, Source, TwinSessions, Window};
 use std::sync::Arc;
 
 /// Projected gradient descent: steps towards Φ x = y, negative values set to zero after each. It learns nothing.
@@ -27,7 +28,7 @@ impl Contender for Descent {
         _data: &TrainingData,
         _labels: &spts_eval::Labels,
         _left_out: Option<&str>,
-    ) -> std::result::Result<Arc<dyn Trained>, ScoreError> {
+    ) -> std::result::Result<Arc<dyn Trained>, Refusal> {
         Ok(Arc::new(Self { steps: self.steps }))
     }
 }

@@ -4,7 +4,7 @@ use crate::context::{Bars, Common, note};
 use crate::error::CliError;
 use crate::options::seed;
 use clap::Args;
-use spts::output::{OutputError, check_writable, write_bytes};
+use spts::output::{check_writable, not_ours, write_bytes};
 use spts_circuit::Profile;
 use spts_eval::slips_text;
 use spts_models::TaxelGains;
@@ -117,7 +117,7 @@ impl CalibrateCommand {
                 check_writable(&picture)?;
                 // pictures of our own stand beside gains
                 if picture.exists() && !path.exists() {
-                    return Err(OutputError::not_ours(picture).into());
+                    return Err(not_ours(&picture).into());
                 }
             }
         }
@@ -147,7 +147,7 @@ fn check_ours(path: &Path, ours: impl Fn(&str) -> bool) -> Result<(), CliError> 
     check_writable(path)?;
     let text = spts_input::read_text(path, MAX_PROFILE_BYTES);
     if path.exists() && !text.is_ok_and(|text| ours(&text)) {
-        return Err(OutputError::not_ours(path).into());
+        return Err(not_ours(path).into());
     }
     Ok(())
 }

@@ -5,9 +5,8 @@ use crate::error::CliError;
 use crate::options::{seed, skin_gains};
 use clap::Args;
 use spts::chain::MAX_TOML_BYTES;
-use spts::data::DataError;
 use spts_circuit::Profile;
-use spts_eval::{PublishedSkin, SessionSlip, slips_text};
+use spts_eval::{PublishedSkin, SessionSlip, Source, slips_text};
 use spts_models::TaxelGains;
 use spts_report::compare::{arm_json, arm_text, json, text, write, write_arm};
 use spts_studies::arm::ArmStudy;
@@ -202,8 +201,10 @@ impl CompareCommand {
 
     /// What the scores need; `None`, with a note, when it is not published with the recordings.
     fn scored(&self) -> Result<Option<PublishedSkin>, CliError> {
-        match PublishedSkin::open(&self.recordings) {
-            Err(e @ DataError::Missing { .. }) => {
+        let source = Source::open(&self.recordings)?;
+        let unpublished = source.published.is_none() && !source.sessions.is_empty();
+        match source.published_skin() {
+            Err(e) if unpublished => {
                 note(&format!("no score curves: {e}"));
                 Ok(None)
             }

@@ -5,8 +5,9 @@ use crate::options::whole;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
-use spts::output::{Manifest, OutputError, OutputFolder};
+use spts::output::{Manifest, OutputFolder};
 use spts::progress::Progress;
+use spts_input::Refusal;
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::{IsTerminal as _, Write as _};
@@ -51,7 +52,7 @@ impl Common {
 ///
 /// # Errors
 /// As for [`OutputFolder::open`].
-pub(super) fn open_folder(path: &Path) -> Result<OutputFolder, OutputError> {
+pub(super) fn open_folder(path: &Path) -> Result<OutputFolder, Refusal> {
     let folder = OutputFolder::open(path)?;
     note_earlier(path);
     Ok(folder)

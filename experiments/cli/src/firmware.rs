@@ -5,7 +5,7 @@ use crate::error::CliError;
 use crate::options::{number, whole, within};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
-use spts::output::{NpyFile, OutputError, check_writable};
+use spts::output::{NpyFile, check_writable, not_ours};
 use spts_circuit::{Seeding, WeightMode};
 use spts_firmware::attiny412::TraceRecord;
 use spts_firmware::{Clock, PATTERN_BITS};
@@ -292,7 +292,7 @@ fn check_array(path: &Path) -> Result<(), CliError> {
     let mut start = [0; MAGIC.len()];
     let found = File::open(path).and_then(|mut file| file.read_exact(&mut start));
     if path.exists() && (found.is_err() || start != *MAGIC) {
-        return Err(OutputError::not_ours(path).into());
+        return Err(not_ours(path).into());
     }
     Ok(())
 }

@@ -9,10 +9,10 @@ use crate::options::{
 };
 use clap::Args;
 use serde::Serialize;
-use spts::output::{OutputError, OutputFolder, check_writable, write_json};
+use spts::output::{OutputFolder, check_writable, not_ours, write_json};
 use spts::progress::Progress as _;
 use spts_contact::objects::OBJECTS;
-use spts_eval::algorithm::{Contender, DecodeError, ExternalError};
+use spts_eval::algorithm::Contender;
 use spts_eval::anytime::{self, StopSettings};
 use spts_eval::board::{
     BoardSettings, Difference, Regression, ScoreBoard, TrainedBoard, differences, regressions, table,
@@ -23,7 +23,8 @@ use spts_eval::training::{
     CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainedNetwork, TrainingSource,
     simulated_gain_sd,
 };
-use spts_eval::{ScoreError, ScoredSession, Sensing, Source, in_time, slips_text};
+use spts_eval::{ScoredSession, Sensing, Source, in_time, slips_text};
+use spts_input::Refusal;
 use spts_models::SkinLayout;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -297,7 +298,7 @@ impl ScoreCommand {
     fn scored<B>(
         &self,
         refused: &dyn Fn(&BoardSettings) -> Option<String>,
-        score: impl FnOnce(&TrainedBoard<'_>, &Bars) -> Result<B, ScoreError>,
+        score: impl FnOnce(&TrainedBoard<'_>, &Bars) -> Result<B, Refusal>,
     ) -> Result<(B, OutputFolder), CliError> {
         self.common.start()?;
         let out = open_folder(self.out())?;
@@ -317,7 +318,7 @@ impl ScoreCommand {
             score(&ready, &bars)
         });
         bars.end();
-        Ok((scored.map_err(|e| explained(&e, &source))?, out))
+        Ok((scored?, out))
     }
 
     /// Prints a board before it is written, so that a disk that is full does not cost the run, and says where it is.
@@ -325,7 +326,7 @@ impl ScoreCommand {
         &self,
         board: &impl Serialize,
         table: String,
-        write: impl FnOnce() -> Result<(), OutputError>,
+        write: impl FnOnce() -> Result<(), Refusal>,
     ) -> Result<(), CliError> {
         self.common.print(board, || table)?;
         write()?;
@@ -460,17 +461,6 @@ impl ScoreCommand {
     }
 }
 
-/// What went wrong, for a reader who knows the options.
-fn explained(e: &ScoreError, source: &Source) -> CliError {
-    match e {
-        ScoreError::Sessions(_) => CliError::usage(format!("{}: {e}", source.root.display())),
-        ScoreError::Decode(DecodeError::External(ExternalError::Late { .. })) => {
-            CliError::usage(format!("{e}; `--external-timeout` sets another limit"))
-        }
-        _ => CliError::usage(e.to_string()),
-    }
-}
-
 fn list() -> String {
     let lines = DECODERS.iter().map(|spec| {
         let mark = if spec.shown { "*" } else { " " };
@@ -539,7 +529,7 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
 fn check_board(path: &Path) -> Result<(), CliError> {
     check_writable(path)?;
     if path.exists() && read_board(path).is_err() {
-        return Err(OutputError::not_ours(path).into());
+        return Err(not_ours(path).into());
     }
     Ok(())
 }

@@ -271,7 +271,7 @@ impl SimulateCommand {
                 if self.animate && piece.first == 0 {
                     first.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
                 }
-                Ok::<_, CliError>(files.push(&piece)?)
+                files.push(&piece)
             })
         };
         let layout = prepared.scene.skin();

@@ -2,12 +2,13 @@
 
 use crate::error::CliError;
 use spts::Session;
-use spts::output::{OutputError, OutputFolder};
+use spts::output::OutputFolder;
 use spts_eval::anytime::{self, AnytimeBoard};
 use spts_eval::board::{self, ScoreBoard};
 use spts_eval::decode::{self, DecodedSession};
 use spts_eval::in_time::{self, InTimeBoard};
 use spts_eval::{ScoredSession, Source};
+use spts_input::Refusal;
 use spts_models::SkinLayout;
 
 /// Where the commands are that this program lacks.
@@ -31,30 +32,27 @@ pub(crate) fn simulated_presses(_: SkinLayout, _: bool, _: u64) -> Result<Vec<Sc
 }
 
 /// Writes the tables of a board.
-pub(crate) fn write_board(board: &ScoreBoard, out: OutputFolder) -> Result<(), OutputError> {
+pub(crate) fn write_board(board: &ScoreBoard, out: OutputFolder) -> Result<(), Refusal> {
     written(out, |out| board::write(board, out))
 }
 
 /// Writes the tables of decoders that stop.
-pub(crate) fn write_anytime(board: &AnytimeBoard, out: OutputFolder) -> Result<(), OutputError> {
+pub(crate) fn write_anytime(board: &AnytimeBoard, out: OutputFolder) -> Result<(), Refusal> {
     written(out, |out| anytime::write(board, out))
 }
 
 /// Writes the tables of contacts that are followed in time.
-pub(crate) fn write_in_time(board: &InTimeBoard, out: OutputFolder) -> Result<(), OutputError> {
+pub(crate) fn write_in_time(board: &InTimeBoard, out: OutputFolder) -> Result<(), Refusal> {
     written(out, |out| in_time::write(board, out))
 }
 
 /// Writes the table and arrays of decoded sessions.
-pub(crate) fn write_decoded(decoded: &[(&Session, DecodedSession)], out: OutputFolder) -> Result<(), OutputError> {
+pub(crate) fn write_decoded(decoded: &[(&Session, DecodedSession)], out: OutputFolder) -> Result<(), Refusal> {
     written(out, |out| decode::write(decoded, out))
 }
 
 /// All files or, after an error, none.
-fn written(
-    mut out: OutputFolder,
-    write: impl FnOnce(&mut OutputFolder) -> Result<(), OutputError>,
-) -> Result<(), OutputError> {
+fn written(mut out: OutputFolder, write: impl FnOnce(&mut OutputFolder) -> Result<(), Refusal>) -> Result<(), Refusal> {
     write(&mut out).map_err(|error| out.unstaged(error))?;
     out.commit()?;
     Ok(())

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
 use spts_recon::recover::Gaussian;
 use std::sync::Arc;
-use std::time::Duration;
 
 /// What a decoder makes of one window of samples: an image, a class, or both.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -48,7 +47,7 @@ pub enum DecodeError {
     Refused(#[from] Refusal),
     /// An external program failed. This ends the run.
     #[error(transparent)]
-    External(#[from] ExternalError),
+    External(Refusal),
 }
 
 /// A trained decoder at work in one thread, with memory of its own: windows of samples in, answers out.
@@ -237,63 +236,14 @@ pub trait Contender: Send + Sync {
     /// excluded from `data`, if any.
     ///
     /// # Errors
-    /// [`ScoreError`] if it cannot be trained or started.
-    fn learn(
-        &self,
-        data: &TrainingData,
-        labels: &Labels,
-        left_out: Option<&str>,
-    ) -> Result<Arc<dyn Trained>, ScoreError>;
-}
-
-/// Why there are no scores.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ScoreError {
-    /// The sessions have nothing to score, or not what was asked for.
-    #[error(transparent)]
-    Sessions(Refusal),
-    /// An algorithm failed, or an external program did not start.
-    #[error(transparent)]
-    Decode(#[from] DecodeError),
-    /// Nothing can be learned, or a setting is out of range.
-    #[error(transparent)]
-    Refused(#[from] Refusal),
-}
-
-impl From<ExternalError> for ScoreError {
-    fn from(error: ExternalError) -> Self {
-        Self::Decode(error.into())
-    }
-}
-
-impl From<ScoreError> for Refusal {
-    fn from(error: ScoreError) -> Self {
-        Self::from_error(error)
-    }
+    /// [`Refusal`] if it cannot be trained or started.
+    fn learn(&self, data: &TrainingData, labels: &Labels, left_out: Option<&str>) -> Result<Arc<dyn Trained>, Refusal>;
 }
 
 impl From<DecodeError> for Refusal {
     fn from(error: DecodeError) -> Self {
-        Self::from_error(error)
+        match error {
+            DecodeError::Refused(refusal) | DecodeError::External(refusal) => refusal,
+        }
     }
-}
-
-/// Why an external algorithm has no answer.
-#[derive(Debug, Clone, thiserror::Error)]
-#[non_exhaustive]
-pub enum ExternalError {
-    /// The command exceeded the time limit.
-    #[error("`{command}` was ended: {waited} took longer than the limit of {} s", limit.as_secs_f64())]
-    Late {
-        /// The command.
-        command: String,
-        /// Which answer was late.
-        waited: String,
-        /// The limit.
-        limit: Duration,
-    },
-    /// The command cannot be started, ended too early, or answered something else than asked for.
-    #[error(transparent)]
-    Refused(#[from] Refusal),
 }

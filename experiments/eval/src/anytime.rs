@@ -5,7 +5,7 @@
 //! scored as on the board. The same decoder with a fixed number of samples is the comparison.
 //! [`crate::board::TrainedBoard::stops`] trains and provides the windows.
 
-use crate::algorithm::{Belief, Class, Confidence, DecodeError, ScoreError, Subject};
+use crate::algorithm::{Belief, Class, Confidence, DecodeError, Subject};
 use crate::board::{Entry, TrainedBoard};
 use crate::decoders::{TrainedDecoder, no_confidence, short_label};
 use crate::protocol::mask;
@@ -15,7 +15,8 @@ use crate::table::{Cell, Table, TextTable, fixed};
 use crate::tally::{ScoreColumn, bootstrap, unique};
 use crate::windows::Window;
 use serde::{Deserialize, Serialize};
-use spts::output::{OutputError, OutputFolder, write_json};
+use spts::output::{OutputFolder, write_json};
+use spts_input::Refusal;
 use spts_recon::metrics::SupportScore;
 use spts_recon::{StopRule, statistics};
 
@@ -110,8 +111,8 @@ impl TrainedBoard<'_> {
     /// Scores decoders that stop when they are confident as `settings` want. `done` is called after every press.
     ///
     /// # Errors
-    /// [`ScoreError`]; in particular for a decoder that states no confidence.
-    pub fn stops(&self, settings: &StopSettings, done: &(dyn Fn() + Sync)) -> Result<AnytimeBoard, ScoreError> {
+    /// [`Refusal`]; in particular for a decoder that states no confidence.
+    pub fn stops(&self, settings: &StopSettings, done: &(dyn Fn() + Sync)) -> Result<AnytimeBoard, Refusal> {
         let stopped = self.stopped(settings)?;
         let slots = stopped.iter().map(|stopped| stopped.ends.len()).sum();
         let stops = self
@@ -159,7 +160,7 @@ impl TrainedBoard<'_> {
     }
 
     /// The entries that are scored, each with all ways to end a window. Classes are scored where they are known.
-    fn stopped(&self, settings: &StopSettings) -> Result<Vec<Stopped<'_>>, ScoreError> {
+    fn stopped(&self, settings: &StopSettings) -> Result<Vec<Stopped<'_>>, Refusal> {
         let mut out = Vec::new();
         for entry in &self.entries {
             let confidence = entry.decoders.first().and_then(|decoder| decoder.trained.confidence());
@@ -174,14 +175,14 @@ impl TrainedBoard<'_> {
             let rules = wanted
                 .iter()
                 .map(|&confidence| Ok(End::Sure(StopRule::new(confidence, self.run.most())?)));
-            let mut ends = rules.collect::<Result<Vec<End>, ScoreError>>()?;
+            let mut ends = rules.collect::<Result<Vec<End>, Refusal>>()?;
             ends.extend(self.run.measurements.iter().map(|m| End::Fixed(*m)));
             out.push(Stopped { entry, subject, ends });
         }
         Ok(out)
     }
 
-    fn press(&self, stopped: &[Stopped<'_>], session: usize, block: usize) -> Result<Vec<PressStops>, ScoreError> {
+    fn press(&self, stopped: &[Stopped<'_>], session: usize, block: usize) -> Result<Vec<PressStops>, Refusal> {
         let scored = self.run.sessions[session];
         let Some(press) = ScoredPress::new(scored, block) else {
             return Ok(Vec::new());
@@ -444,8 +445,8 @@ const SCORES: [ScoreColumn<StopScores>; 7] = [
 /// Writes `anytime.json`, `anytime.csv` and `objects.csv` into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] if a file cannot be written.
-pub fn write(board: &AnytimeBoard, out: &mut OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] if a file cannot be written.
+pub fn write(board: &AnytimeBoard, out: &mut OutputFolder) -> Result<(), Refusal> {
     write_json(&out.path("anytime.json"), board)?;
     keyed(Table::new("anytime", &board.rows), |r| &r.key)
         .files(&SCORES, |r| &r.scores)
@@ -571,7 +572,6 @@ mod tests {
     use crate::algorithm::{Algorithm, Answer, Trained};
     use crate::training::TrainingData;
     use crate::windows::{Press, PressRows};
-    use spts_input::Refusal;
     use spts_models::Streams;
     use spts_recon::Matrix;
     use std::sync::Arc;

@@ -13,7 +13,7 @@ use npyz::WriterBuilder as _;
 use rayon::prelude::*;
 use serde::Serialize;
 use spts::Session;
-use spts::output::{OutputError, OutputFolder};
+use spts::output::{OutputFolder, unwritable};
 use spts::session::Event;
 use spts_circuit::Recording;
 use spts_input::Refusal;
@@ -136,7 +136,7 @@ pub(crate) fn too_many(session: &Session, m: usize, windows: usize, [start, most
 
 /// Why `decoder` cannot be trained.
 pub(crate) fn untrained(decoder: &str, error: Refusal) -> Refusal {
-    Refusal::from_error(error).at(format_args!("decoder `{decoder}`"))
+    error.at(format_args!("decoder `{decoder}`"))
 }
 
 impl DecodeRequest {
@@ -217,7 +217,7 @@ impl DecodeRequest {
                 let mut algorithm = trained.start();
                 for &m in &self.measurements {
                     let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = all(m).unzip();
-                    let answers = algorithm.decode_all(&windows).map_err(Refusal::from_error)?;
+                    let answers = algorithm.decode_all(&windows)?;
                     let answers = starts.iter().zip(answers);
                     rows.extend(answers.map(|(&at, answer)| DecodedWindow {
                         window: at / m,
@@ -313,8 +313,8 @@ fn begins(session: &Session, recording: &Recording, scored: &ScoredSession) -> V
 /// Writes `windows.csv` and one `NAME.npz` for each session into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] if a file cannot be written.
-pub fn write(decoded: &[(&Session, DecodedSession)], out: &mut OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] if a file cannot be written.
+pub fn write(decoded: &[(&Session, DecodedSession)], out: &mut OutputFolder) -> Result<(), Refusal> {
     Table::new("windows", decoded.iter().flat_map(|(_, session)| &session.rows))
         .file("session", |r| &r.session)
         .file("block", |r| r.block)
@@ -341,8 +341,8 @@ pub fn write(decoded: &[(&Session, DecodedSession)], out: &mut OutputFolder) -> 
 /// where none is known.
 ///
 /// # Errors
-/// [`OutputError`] when the file cannot be written.
-fn write_arrays(path: &Path, session: &DecodedSession) -> Result<(), OutputError> {
+/// [`Refusal`] when the file cannot be written.
+fn write_arrays(path: &Path, session: &DecodedSession) -> Result<(), Refusal> {
     let [rows, cols] = session.shape;
     let taxels = rows * cols;
     let mut arrays: Vec<(String, Vec<usize>, Vec<f64>)> = Vec::new();
@@ -378,7 +378,7 @@ fn write_arrays(path: &Path, session: &DecodedSession) -> Result<(), OutputError
         .copied()
         .collect();
     arrays.push(("truth".to_owned(), vec![session.truth.len(), rows, cols], truth));
-    write_npz(path, &arrays).map_err(OutputError::write(path))
+    write_npz(path, &arrays).map_err(unwritable(path))
 }
 
 /// Writes a NumPy archive of arrays of doubles, each with its name and its shape, without compression.

@@ -10,7 +10,7 @@
 //! which no decoder has used; during the hold it is the board's. The ground truth of a drop is the least-squares image
 //! of the whole contact, as for places; it includes the decoded samples.
 
-use crate::algorithm::{DecodeError, ScoreError};
+use crate::algorithm::DecodeError;
 use crate::board::{Entry, TrainedBoard, no_session};
 use crate::chunk::Chunk;
 use crate::decode::{no_recording, too_many, untrained};
@@ -26,7 +26,7 @@ use crate::windows::{Press, Untouched};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts::Session;
-use spts::output::{OutputError, OutputFolder, write_json};
+use spts::output::{OutputFolder, write_json};
 use spts::session::Event;
 use spts_circuit::Recording;
 use spts_input::Refusal;
@@ -104,8 +104,8 @@ impl TrainedBoard<'_> {
     /// objects.
     ///
     /// # Errors
-    /// [`ScoreError`] for a decoder without a Gaussian prior, or if a window cannot be processed.
-    pub fn in_time(&self, done: &(dyn Fn() + Sync)) -> Result<InTimeBoard, ScoreError> {
+    /// [`Refusal`] for a decoder without a Gaussian prior, or if a window cannot be processed.
+    pub fn in_time(&self, done: &(dyn Fn() + Sync)) -> Result<InTimeBoard, Refusal> {
         if self.run.sessions.is_empty() && self.source.bounces.is_none() {
             return Err(no_session(self.source));
         }
@@ -118,7 +118,7 @@ impl TrainedBoard<'_> {
         let all = |contact: &FollowedContact, session: usize| {
             let each = self.run.slots(&self.entries);
             let each = each.map(|(entry, m)| Ok(follow(contact, &entry.decoders[session], m, cols)?));
-            each.collect::<Result<Vec<Followed>, ScoreError>>()
+            each.collect::<Result<Vec<Followed>, Refusal>>()
         };
         let slots = self.entries.len() * measurements.len();
         let pressed = self.run.each_press(slots, done, |session, block| {
@@ -128,7 +128,7 @@ impl TrainedBoard<'_> {
         let ball = self.source.bounces.as_ref().filter(|_| self.scores_places());
         let balls = ball.map_or_else(Vec::new, |ball| drops(ball, cols));
         let dropped = balls.par_iter().map(|contact| all(contact, 0));
-        let dropped = dropped.collect::<Result<Vec<_>, ScoreError>>()?;
+        let dropped = dropped.collect::<Result<Vec<_>, Refusal>>()?;
         let mut board = InTimeBoard::default();
         for (at, ((entry, m), objects)) in self.run.slots(&self.entries).zip(&pressed).enumerate() {
             board.rows.extend(lines(entry, ContactKind::Press, m, objects));
@@ -590,8 +590,8 @@ const SCORES: [ScoreColumn<InTimeScores>; 8] = [
 /// Writes `in_time.json`, `in_time.csv` and `objects.csv` into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] if a file cannot be written.
-pub fn write(board: &InTimeBoard, out: &mut OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] if a file cannot be written.
+pub fn write(board: &InTimeBoard, out: &mut OutputFolder) -> Result<(), Refusal> {
     write_json(&out.path("in_time.json"), board)?;
     in_files(Table::new("in_time", &board.rows), |row| row).write(out)?;
     let objects = Table::new("objects", &board.objects).file("object", |o| &o.object);

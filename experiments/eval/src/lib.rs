@@ -29,7 +29,6 @@ mod tally;
 pub mod training;
 mod windows;
 
-pub use algorithm::ScoreError;
 pub use alignment::{SessionSlip, find_slips, follow_slips, slips_text};
 pub use decoders::RASTER;
 pub use labels::Labels;

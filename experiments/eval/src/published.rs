@@ -1,6 +1,5 @@
 //! The published evaluation of a skin.
 
-use crate::algorithm::ScoreError;
 use crate::board::{Entry, Run};
 use crate::decoders::{RASTER, TrainedDecoder, published_decodes};
 use crate::place::{LocalisationRow, PlaceRow, localise, places};
@@ -13,6 +12,7 @@ use crate::training::Learned;
 use crate::unique;
 use rayon::prelude::*;
 use serde::Serialize;
+use spts_input::Refusal;
 use spts_recon::Workspace;
 use spts_recon::metrics::{MeanScore, SUPPORT_THRESHOLD, SupportScore, support};
 use spts_recon::raster::Interpolation;
@@ -40,14 +40,14 @@ impl ScoredSkin {
     /// recording.
     ///
     /// # Errors
-    /// [`ScoreError`] if the trained dictionary or library does not fit the skin.
+    /// [`Refusal`] if the trained dictionary or library does not fit the skin.
     pub fn score(
         &self,
         measurements: &[usize],
         localisation: &[usize],
         more: &[(&'static str, TrainedDecoder)],
         done: &(dyn Fn() + Sync),
-    ) -> Result<SkinScores, ScoreError> {
+    ) -> Result<SkinScores, Refusal> {
         let mut decoders = published_decodes(&self.learned)?;
         decoders.extend(more.iter().cloned());
         let sessions: Vec<&ScoredSession> = self.sessions.iter().collect();
@@ -74,8 +74,8 @@ impl ScoredSkin {
     /// without a ball.
     ///
     /// # Errors
-    /// [`ScoreError`] when the sheet is no grid or no rows can be chosen.
-    pub fn ball_places(&self, measurements: &[usize]) -> Result<Vec<PlaceRow>, ScoreError> {
+    /// [`Refusal`] when the sheet is no grid or no rows can be chosen.
+    pub fn ball_places(&self, measurements: &[usize]) -> Result<Vec<PlaceRow>, Refusal> {
         let Some(recording) = &self.bounces else {
             return Ok(Vec::new());
         };
@@ -148,13 +148,13 @@ impl ScoreRow {
 /// are trained already. `done` is called after every press.
 ///
 /// # Errors
-/// [`ScoreError`] of an external program.
+/// [`Refusal`] of an external program.
 pub fn score_sessions(
     sessions: &[&ScoredSession],
     decoders: &[(&'static str, TrainedDecoder)],
     measurements: &[usize],
     done: &(dyn Fn() + Sync),
-) -> Result<Vec<ScoreRow>, ScoreError> {
+) -> Result<Vec<ScoreRow>, Refusal> {
     let run = Run {
         sessions: sessions.to_vec(),
         measurements: measurements.to_vec(),

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 use spts::Session;
 use spts::chain::{Acquisition, MAX_TOML_BYTES};
 use spts::data::SessionSet;
-use spts::record::{PressFrames, Twin, TwinError};
+use spts::record::{PressFrames, Twin};
 use spts::scene::{PressConfig, Scene, SceneConfig, Task};
 use spts::session::Recorded;
 use spts::simulate::Request;
@@ -41,8 +41,8 @@ impl SkinRun<'_> {
     /// Simulates and records. `done` is called after each press.
     ///
     /// # Errors
-    /// [`TwinError`] if the mechanics or the readout fail.
-    pub fn record(&self, done: &(dyn Fn() + Sync)) -> Result<SkinRunPresses, TwinError> {
+    /// [`Refusal`] if the mechanics or the readout fail.
+    pub fn record(&self, done: &(dyn Fn() + Sync)) -> Result<SkinRunPresses, Refusal> {
         let twin = Twin::new(self.scene)?;
         let mut presses = twin.presses(0..self.scanned, done)?;
         let scan = Acquisition::presses(Mode::Raster, 2 * self.number);
@@ -181,8 +181,8 @@ impl TwinSessions {
 }
 
 /// Why the scene `name` gives no session.
-fn refused(name: &str, error: impl std::error::Error + Send + Sync + 'static) -> Refusal {
-    Refusal::from_error(error).at(format_args!("--twin {name}"))
+fn refused(name: &str, error: Refusal) -> Refusal {
+    error.at(format_args!("--twin {name}"))
 }
 
 /// Number of presses that a scene file says; `None` for a scene by name and for a file that does not say.

@@ -6,7 +6,7 @@ use crate::session::ScoredSession;
 use crate::training::{Learned, SHIFT_REACH, TrainingData, TrainingPresses};
 use spts::Refusal;
 use spts::Session;
-use spts::data::{DataError, Published, SessionSet};
+use spts::data::{Published, SessionSet, missing_file, nothing_found};
 use spts::session::Event;
 use spts_circuit::{Mode, Recording};
 use spts_models::{SkinLayout, Streams};
@@ -64,7 +64,7 @@ impl PublishedSkin {
     ///
     /// # Errors
     /// As [`Source::open`] and [`Source::published_skin`].
-    pub fn open(root: &Path) -> Result<Self, DataError> {
+    pub fn open(root: &Path) -> Result<Self, Refusal> {
         Source::open(root)?.published_skin()
     }
 }
@@ -73,16 +73,16 @@ impl Source {
     /// Reads the sessions in `root`, like [`SessionSet::open`].
     ///
     /// # Errors
-    /// [`DataError`] if there is no session, or one of them cannot be scored.
-    pub fn open(root: &Path) -> Result<Self, DataError> {
+    /// [`Refusal`] if there is no session, or one of them cannot be scored.
+    pub fn open(root: &Path) -> Result<Self, Refusal> {
         Self::new(SessionSet::open(root)?)
     }
 
     /// Prepares the sessions of `set`. Samples that slipped are realigned ([`follow_slips`]).
     ///
     /// # Errors
-    /// [`DataError`] for a session with nothing to score, or of another skin than the first.
-    pub fn new(mut set: SessionSet) -> Result<Self, DataError> {
+    /// [`Refusal`] for a session with nothing to score, or of another skin than the first.
+    pub fn new(mut set: SessionSet) -> Result<Self, Refusal> {
         let slips = follow_slips(&mut set);
         let bounces = set.drops().cloned();
         let SessionSet {
@@ -177,16 +177,15 @@ impl Source {
     /// added to [`Source::missing`].
     ///
     /// # Errors
-    /// [`DataError::Missing`] without a published dictionary or library, [`DataError`] without a session
-    /// of presses.
-    pub fn published_skin(mut self) -> Result<PublishedSkin, DataError> {
+    /// [`Refusal`] without a published dictionary or library, or a session of presses.
+    pub fn published_skin(mut self) -> Result<PublishedSkin, Refusal> {
         if self.sessions.is_empty() {
-            return Err(DataError::nothing_found(&self.root));
+            return Err(nothing_found(&self.root));
         }
-        let published = self.published.take().ok_or_else(|| DataError::Missing {
-            path: self.root.join("{dictionary,SRC_lib}.mat"),
-            needed_by: "scoring a skin of 10 × 10 taxels with the published decoder (both files, in the folder itself)"
-                .to_owned(),
+        let published = self.published.take().ok_or_else(|| {
+            let needed_by =
+                "scoring a skin of 10 × 10 taxels with the published decoder (both files, in the folder itself)";
+            missing_file(&self.root.join("{dictionary,SRC_lib}.mat"), needed_by)
         })?;
         if published.shifted.is_none() {
             self.missing
@@ -210,12 +209,12 @@ impl Source {
 /// something. `root` is the folder named in errors.
 ///
 /// # Errors
-/// [`DataError`], with the session and what it lacks.
-pub fn check_session(root: &Path, session: &Session, layout: &SkinLayout) -> Result<(), DataError> {
+/// [`Refusal`], with the session and what it lacks.
+pub fn check_session(root: &Path, session: &Session, layout: &SkinLayout) -> Result<(), Refusal> {
     let refuse = |mode: &str, field: &str, value: String, needed: String| {
         let (path, name) = (root.display(), &session.name);
         let problem = format!("session {name:?}, {mode} recording: `{field}` = {value}; scoring needs {needed}");
-        Err(Refusal::new(problem).at(path).into())
+        Err(Refusal::new(problem).at(path))
     };
     let scored = ScoredSession::new(session.clone(), 0);
     let recordings = [

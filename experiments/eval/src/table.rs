@@ -2,7 +2,8 @@
 
 use crate::tally::ScoreColumn;
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
-use spts::output::{CsvFile, OutputError, OutputFolder};
+use spts::output::{CsvFile, OutputFolder};
+use spts_input::Refusal;
 use std::fmt::{self, Display};
 use std::path::Path;
 
@@ -211,16 +212,16 @@ impl<'a, R: Copy> Table<'a, R> {
     /// Writes the table as NAME.csv into the folder `out`.
     ///
     /// # Errors
-    /// [`OutputError`] if the file cannot be written.
-    pub fn write(&self, out: &OutputFolder) -> Result<(), OutputError> {
+    /// [`Refusal`] if the file cannot be written.
+    pub fn write(&self, out: &OutputFolder) -> Result<(), Refusal> {
         self.write_csv(&out.path(&format!("{}.csv", self.name)))
     }
 
     /// Writes the table as CSV.
     ///
     /// # Errors
-    /// [`OutputError`] if the file cannot be written.
-    pub fn write_csv(&self, path: &Path) -> Result<(), OutputError> {
+    /// [`Refusal`] if the file cannot be written.
+    pub fn write_csv(&self, path: &Path) -> Result<(), Refusal> {
         let header: Vec<&str> = self.in_files().map(|(key, _)| key).collect();
         let mut file = CsvFile::create(path, &header)?;
         for row in &self.rows {

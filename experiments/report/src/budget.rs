@@ -3,10 +3,11 @@
 use crate::figures::{BarChart, BarGroup, BarRow, Style, save_bars};
 use crate::write_all_or_none;
 use serde::Serialize;
-use spts::output::{OutputError, OutputFolder, write_bytes, write_json};
+use spts::output::{OutputFolder, write_bytes, write_json};
 use spts::provenance::Provenance;
 use spts_eval::decoders::short_label;
 use spts_eval::{Table, unique};
+use spts_input::Refusal;
 use spts_recon::statistics::Sample;
 use spts_studies::budget::{
     BudgetReport, BudgetRow, CHANCE, CHANGES, CONTACT, Direction, EndPoint, WHOLE_STAGE, stands_out,
@@ -43,8 +44,8 @@ pub fn json(report: &BudgetReport) -> impl Serialize + '_ {
 /// Writes the tables, their summary, the figures and the provenance of `report` into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written or a figure cannot be drawn.
-pub fn write(report: &BudgetReport, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written or a figure cannot be drawn.
+pub fn write(report: &BudgetReport, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         costs(&report.rows).write(out)?;
         end_points(report).write(out)?;

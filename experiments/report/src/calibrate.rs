@@ -1,9 +1,9 @@
 //! `spts calibrate` as text, and the picture of `spts calibrate --skin`.
 
 use crate::figures::{Sheet, Tile, TileRow, save_sheet};
-use spts::output::OutputError;
 use spts_eval::Table;
 use spts_eval::training::GainCheck;
+use spts_input::Refusal;
 use spts_recon::statistics::mean;
 use spts_studies::calibrate::{
     Beat, CalibrationReport, Estimated, Mounting, NOT_IDENTIFIABLE, NOT_MODELLED, NUMBERS, PredictedInside,
@@ -162,8 +162,8 @@ pub fn skin_text(report: &SkinReport) -> String {
 /// `.png`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write_gains(report: &SkinReport, path: &Path) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write_gains(report: &SkinReport, path: &Path) -> Result<(), Refusal> {
     let [rows, cols] = report.shape;
     let tile = |values: Vec<f64>, what: &str| {
         let (least, most) = values

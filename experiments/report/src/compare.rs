@@ -5,9 +5,10 @@ use crate::labels::{object_label, score_label, statistic_label};
 use crate::per_object::{banded, marked};
 use crate::{per_object, write_all_or_none};
 use serde::Serialize;
-use spts::output::{OutputError, OutputFolder, write_json};
+use spts::output::{OutputFolder, write_json};
 use spts_eval::decoders::{label, short_label};
 use spts_eval::{ScoreRow, Table};
+use spts_input::Refusal;
 use spts_studies::arm::{ArmBand, ArmReport};
 use spts_studies::calibrate::quantiles;
 use spts_studies::compare::{
@@ -151,8 +152,8 @@ pub fn arm_json(report: &ArmReport) -> impl Serialize + '_ {
 /// Writes the tables of the bent skin into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write_arm(report: &ArmReport, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write_arm(report: &ArmReport, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         arm(report).write(out)?;
         write_json(&out.path(ARM[1]), &arm_json(report))
@@ -162,8 +163,8 @@ pub fn write_arm(report: &ArmReport, out: OutputFolder) -> Result<(), OutputErro
 /// Writes the tables and the figures of `report`, and of `objects` where there are any, into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written or a figure cannot be drawn.
-pub fn write(report: &CompareReport, objects: Option<&PerObjectReport>, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written or a figure cannot be drawn.
+pub fn write(report: &CompareReport, objects: Option<&PerObjectReport>, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         if !report.predicted.is_empty() {
             return predicted(report).write(out);
@@ -184,8 +185,8 @@ pub fn write(report: &CompareReport, objects: Option<&PerObjectReport>, out: Out
 /// `scores`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written or no font is found.
-pub fn draw(report: &CompareReport, folder: &Path) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written or no font is found.
+pub fn draw(report: &CompareReport, folder: &Path) -> Result<(), Refusal> {
     let charts: Vec<Chart> = report.compared.iter().map(histogram).collect();
     save_charts(&charts, folder, "residuals")?;
     let charts: Vec<Chart> = report.compared.iter().map(quantile_plot).collect();

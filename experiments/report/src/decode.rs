@@ -3,17 +3,18 @@
 use crate::figures::{Sheet, Tile, TileRow, save_sheet};
 use crate::write_all_or_none;
 use spts::Session;
-use spts::output::{OutputError, OutputFolder};
+use spts::output::OutputFolder;
 use spts_eval::decode::{self, DecodedSession, DecodedWindow};
 use spts_eval::decoders::short_label;
+use spts_input::Refusal;
 use std::path::Path;
 
 /// Writes `windows.csv`, one `NAME.npz` a session and the picture `decoded` (.svg and .png) into the folder `out`: all
 /// of them, or none.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write(decoded: &[(&Session, DecodedSession)], out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write(decoded: &[(&Session, DecodedSession)], out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         decode::write(decoded, out)?;
         save_picture(decoded, &out.path(""), "decoded")?;
@@ -34,12 +35,8 @@ const FINE: usize = 24;
 /// image where that is not known, the trace of the wire, and the images at each M with the true support outlined.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub(crate) fn save_picture(
-    decoded: &[(&Session, DecodedSession)],
-    folder: &Path,
-    name: &str,
-) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub(crate) fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name: &str) -> Result<(), Refusal> {
     let mut rows = Vec::new();
     let mut columns = vec!["pressed".to_owned(), "the wire".to_owned()];
     // sessions of other skins are decoded from other numbers of measurements

@@ -2,7 +2,7 @@
 
 use super::write_all_or_none;
 use crate::figures::{Chart, Curve, Plot, Series, Style, save_charts};
-use spts::output::{OutputError, OutputFolder, write_bytes, write_json};
+use spts::output::{OutputFolder, write_bytes, write_json};
 use spts_circuit::{MAX_PATTERNS_BYTES, Profile};
 use spts_eval::Table;
 use spts_input::Refusal;
@@ -20,8 +20,8 @@ const MAX_BYTES: u64 = 1 << 24;
 /// picture of it into the folder `out`: all of them, or none.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write(report: &DesignReport, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write(report: &DesignReport, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         write_json(&out.path("design.json"), report)?;
         write_bytes(&out.path("profile.toml"), report.profile.as_bytes())?;

@@ -2,16 +2,17 @@
 
 use crate::figures::{Chart, Curve, Plot, Series, Style, save_charts};
 use crate::write_all_or_none;
-use spts::output::{OutputError, OutputFolder, write_json};
+use spts::output::{OutputFolder, write_json};
 use spts_circuit::amplifier::{Budget, Remedied, Remedy};
 use spts_eval::{Cell, Table};
+use spts_input::Refusal;
 use spts_studies::electronics::{ElectronicsReport, ElectronicsStudy};
 
 /// Writes `circuit.csv`, `parameters.json` and `figures/circuit` into the folder `out`: all of them, or none.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write(study: &ElectronicsStudy, report: &ElectronicsReport, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write(study: &ElectronicsStudy, report: &ElectronicsReport, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         table(&report.rows).write(out)?;
         write_json(&out.path("parameters.json"), study)?;

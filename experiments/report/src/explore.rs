@@ -3,10 +3,11 @@
 use super::write_all_or_none;
 use crate::error::write_parameters;
 use crate::figures::{Chart, Curve, Plot, Style, save_charts};
-use spts::output::{OutputError, OutputFolder, write_json};
+use spts::output::{OutputFolder, write_json};
 use spts::provenance::Machine;
 use spts_circuit::amplifier::Limit;
 use spts_eval::{Cell, Table};
+use spts_input::Refusal;
 use spts_studies::electronics::ElectronicsStudy;
 use spts_studies::explore::{CostFit, ExploreReport, ExploreStudy, ExploreTrial, SizeRow, Way};
 
@@ -28,8 +29,8 @@ pub fn text(report: &ExploreReport) -> String {
 /// Writes the tables, the figures and what they depend on into the folder `out`: all of them, or none.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write(study: &ExploreStudy, report: &ExploreReport, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write(study: &ExploreStudy, report: &ExploreReport, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         write_parameters(out, study, study.seed)?;
         sizes(report).write(out)?;

@@ -3,16 +3,17 @@
 use crate::figures::colour::heat;
 use crate::figures::{Chart, Series, Sheet, Style, Tile, TileRow, save_charts, save_sheet};
 use crate::{Origin, write_all_or_none};
-use spts::output::{OutputError, OutputFolder, write_bytes, write_json, write_table};
+use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts_eval::{Table, unique};
+use spts_input::Refusal;
 use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
 use spts_studies::fidelity::{FidelityReport, FinePressure};
 
 /// Writes the tables, their summary, the figures and the provenance of `report` beside the scenes that wait in `out`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written or a figure cannot be drawn.
-pub fn write(report: &FidelityReport, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written or a figure cannot be drawn.
+pub fn write(report: &FidelityReport, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         // without what depends on the machine
         Table::new("errors", &report.rows)

@@ -4,9 +4,10 @@ use crate::figures::{Interval, IntervalChart, IntervalLine, IntervalPanel, save_
 use crate::labels::{object_label, object_list, score_label};
 use crate::{PageFigure, PageTable, Section};
 use serde::Serialize;
-use spts::output::{OutputError, write_json};
+use spts::output::write_json;
 use spts_eval::decoders::label;
 use spts_eval::{Cell, Table, unique};
+use spts_input::Refusal;
 use spts_studies::compare::Banded;
 use spts_studies::per_object::{MEASUREMENTS, ObjectBand, PerObjectReport, ReadoutImages, SCORES, ScoreDistance};
 use std::path::{Path, PathBuf};
@@ -62,7 +63,7 @@ pub(crate) fn json(report: &PerObjectReport) -> Printed<'_> {
 }
 
 /// Writes [`TABLES`], each to the path that `path` gives its name.
-pub(crate) fn write_tables(report: &PerObjectReport, path: impl Fn(&str) -> PathBuf) -> Result<(), OutputError> {
+pub(crate) fn write_tables(report: &PerObjectReport, path: impl Fn(&str) -> PathBuf) -> Result<(), Refusal> {
     objects(report).write_csv(&path(TABLES[0]))?;
     distances(report).write_csv(&path(TABLES[1]))?;
     write_json(&path(TABLES[2]), &json(report))
@@ -108,7 +109,7 @@ fn with_images<'a, R: Copy + 'a>(
 
 /// Draws the bands of the twin and the marks of the skin into `folder`: a line of panels a score and decoder, a panel
 /// an M, a row an object.
-pub(crate) fn draw(report: &PerObjectReport, folder: &Path) -> Result<(), OutputError> {
+pub(crate) fn draw(report: &PerObjectReport, folder: &Path) -> Result<(), Refusal> {
     save_intervals(&chart(report), folder, FIGURE)
 }
 

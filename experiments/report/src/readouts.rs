@@ -3,8 +3,9 @@
 use super::write_all_or_none;
 use crate::error::write_parameters;
 use crate::figures::{Chart, Claim, Curve, Plot, Style, save_charts};
-use spts::output::{OutputError, OutputFolder, write_bytes, write_json, write_table};
+use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts_eval::Table;
+use spts_input::Refusal;
 use spts_recon::statistics::Band;
 use spts_studies::readouts::{GOOD_IOU, READOUTS, ReadoutRow, ReadoutTrial, ReadoutsReport, ReadoutsStudy};
 
@@ -14,8 +15,8 @@ type Line<'a> = (&'a ReadoutRow, &'a ReadoutTrial, f64);
 /// Writes the tables, the figure and what they depend on into the folder `out`: all of them, or none.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write(study: &ReadoutsStudy, report: &ReadoutsReport, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write(study: &ReadoutsStudy, report: &ReadoutsReport, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         write_parameters(out, &study.parameters(), study.seed)?;
         table(lines(report)).write(out)?;

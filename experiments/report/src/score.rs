@@ -2,7 +2,7 @@
 
 use super::write_all_or_none;
 use crate::figures::{Chart, Curve, Plot, Stroke, Style, save_charts};
-use spts::output::{OutputError, OutputFolder};
+use spts::output::OutputFolder;
 use spts_eval::algorithm::Subject;
 use spts_eval::anytime::{self, AnytimeBoard, AnytimeRow};
 use spts_eval::board::{self, BoardRow, ScoreBoard};
@@ -10,14 +10,15 @@ use spts_eval::decoders::short_label;
 use spts_eval::in_time::{self, ContactKind, InTimeBoard, InTimeRow};
 use spts_eval::place::{PlaceRow, locator_label};
 use spts_eval::{Sensing, unique};
+use spts_input::Refusal;
 use std::path::Path;
 
 /// Writes `board.json`, `board.csv`, `objects.csv`, `localisation.csv` and the figures into the folder `out`: all of
 /// them, or none.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         board::write(scores, out)?;
         draw_board(scores, &out.folder("figures")?)
@@ -28,8 +29,8 @@ pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), OutputError> 
 /// none.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write_anytime(scores: &AnytimeBoard, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write_anytime(scores: &AnytimeBoard, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         anytime::write(scores, out)?;
         save_charts(&stops(scores), &out.folder("figures")?, "anytime")
@@ -40,8 +41,8 @@ pub fn write_anytime(scores: &AnytimeBoard, out: OutputFolder) -> Result<(), Out
 /// none.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write_in_time(scores: &InTimeBoard, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write_in_time(scores: &InTimeBoard, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         in_time::write(scores, out)?;
         save_charts(&since_touch(scores), &out.folder("figures")?, "in_time")
@@ -58,7 +59,7 @@ fn drawn(charts: impl IntoIterator<Item = Chart>) -> Vec<Chart> {
 }
 
 /// Writes `reconstruction`, `classification` and, with a ball, `localisation`, each as .svg and .png.
-fn draw_board(board: &ScoreBoard, folder: &Path) -> Result<(), OutputError> {
+fn draw_board(board: &ScoreBoard, folder: &Path) -> Result<(), Refusal> {
     let (iou, single): (Score, Score) = (|r| r.scores.iou, |r| r.scores.class_single);
     let same = "The same over acquisition + decode";
     let mut images = vec![

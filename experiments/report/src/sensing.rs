@@ -3,10 +3,11 @@
 use crate::figures::{Sheet, Tile, TileRow, save_sheet};
 use crate::write_all_or_none;
 use spts::chain::start_message;
-use spts::output::{OutputError, OutputFolder, write_bytes, write_json};
+use spts::output::{OutputFolder, write_bytes, write_json};
 use spts_circuit::FIRST_ADDRESS;
 use spts_eval::Table;
 use spts_firmware::LAST_BUS_ADDRESS;
+use spts_input::Refusal;
 use spts_studies::sensing::RowDesignReport;
 
 /// Rows that are drawn, at most.
@@ -20,8 +21,8 @@ const TILE_PX: usize = 96;
 /// all of them, or none.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn write(report: &RowDesignReport, out: OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn write(report: &RowDesignReport, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         write_bytes(&out.path("rows.txt"), report.patterns.to_text().as_bytes())?;
         write_json(&out.path("design.json"), report)?;

@@ -6,7 +6,7 @@ use super::figures::encode_png;
 use crate::figures::pressure_png;
 use serde::Serialize;
 use spts::Mode;
-use spts::output::{CsvFile, NpyFile, OutputError, OutputFolder, write_bytes, write_json, write_npy};
+use spts::output::{CsvFile, NpyFile, OutputFolder, unwritable, write_bytes, write_json, write_npy};
 use spts::provenance::Machine;
 use spts::scene::Task;
 use spts::session::SessionWriter;
@@ -31,8 +31,8 @@ impl<'a> SimulationFiles<'a> {
     /// Begins the results of `prepared` in the folder `out`, with a session if its presses are recorded.
     ///
     /// # Errors
-    /// [`OutputError`] when a file cannot be written.
-    pub fn create(out: OutputFolder, prepared: &'a Prepared, record: bool) -> Result<Self, OutputError> {
+    /// [`Refusal`] when a file cannot be written.
+    pub fn create(out: OutputFolder, prepared: &'a Prepared, record: bool) -> Result<Self, Refusal> {
         let begin = || {
             write_bytes(&out.path("scene.toml"), prepared.scene_toml.as_bytes())?;
             for (name, content) in &prepared.copies {
@@ -57,12 +57,12 @@ impl<'a> SimulationFiles<'a> {
     /// Writes the next presses.
     ///
     /// # Errors
-    /// [`OutputError`] when a file cannot be written.
-    pub fn push(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), OutputError> {
+    /// [`Refusal`] when a file cannot be written.
+    pub fn push(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), Refusal> {
         self.write(piece).map_err(|error| self.out.unstaged(error))
     }
 
-    fn write(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), OutputError> {
+    fn write(&mut self, piece: &SimulatedPiece<'_>) -> Result<(), Refusal> {
         let skin = self.prepared.scene.skin();
         for (press, frames) in (piece.first..).zip(piece.presses) {
             for frame in &frames.frames {
@@ -83,8 +83,8 @@ impl<'a> SimulationFiles<'a> {
     /// Writes the `animation` of a press.
     ///
     /// # Errors
-    /// [`OutputError`] when the file cannot be written.
-    pub fn animate(&self, animation: &Animation) -> Result<(), OutputError> {
+    /// [`Refusal`] when the file cannot be written.
+    pub fn animate(&self, animation: &Animation) -> Result<(), Refusal> {
         let path = self.out.path(ANIMATION_FILE);
         let gif = animation.gif(&path);
         let written = gif.and_then(|gif| write_bytes(&path, &gif));
@@ -130,7 +130,7 @@ impl<'a> SimulationFiles<'a> {
             write_json(&out.timed_path("timing.json"), &timing)
         };
         let written = numbers();
-        let pictures = || -> Result<(), OutputError> {
+        let pictures = || -> Result<(), Refusal> {
             let folder = out.path("");
             let pair = simulation.first.as_ref().zip(decoded);
             let (pressure, decoded) = rayon::join(
@@ -145,7 +145,7 @@ impl<'a> SimulationFiles<'a> {
         let drawn = render.then(|| scene_pictures(prepared, simulation)).transpose();
         for (name, picture) in drawn.iter().flatten().flatten() {
             let path = out.path(name);
-            let png = encode_png(&picture.rgb, picture.width, picture.height).map_err(OutputError::write(&path));
+            let png = encode_png(&picture.rgb, picture.width, picture.height).map_err(unwritable(&path));
             let written = png.and_then(|png| write_bytes(&path, &png));
             written.map_err(|error| out.unstaged(error))?;
         }
@@ -209,7 +209,7 @@ impl MapFiles {
         }
     }
 
-    fn push(&mut self, out: &OutputFolder, piece: &SimulatedPiece<'_>) -> Result<(), OutputError> {
+    fn push(&mut self, out: &OutputFolder, piece: &SimulatedPiece<'_>) -> Result<(), Refusal> {
         let [rows, cols] = self.taxels;
         for (k, press) in piece.presses.iter().enumerate() {
             let frames = &press.frames;
@@ -236,12 +236,12 @@ impl MapFiles {
         Ok(())
     }
 
-    fn finish(self) -> Result<(), OutputError> {
+    fn finish(self) -> Result<(), Refusal> {
         self.maps.into_iter().flatten().try_for_each(NpyFile::finish)
     }
 }
 
-fn create_maps(out: &OutputFolder, suffix: &str, shape: &[usize]) -> Result<Maps, OutputError> {
+fn create_maps(out: &OutputFolder, suffix: &str, shape: &[usize]) -> Result<Maps, Refusal> {
     let file = |name: &str| NpyFile::create(&out.path(&format!("{name}{suffix}.npy")), shape);
     Ok([
         file("pressure_pa")?,
@@ -250,7 +250,7 @@ fn create_maps(out: &OutputFolder, suffix: &str, shape: &[usize]) -> Result<Maps
     ])
 }
 
-fn push_maps(maps: &mut Maps, frames: &[Frame], conductance: &[ConductanceMap]) -> Result<(), OutputError> {
+fn push_maps(maps: &mut Maps, frames: &[Frame], conductance: &[ConductanceMap]) -> Result<(), Refusal> {
     let [pressure, electrode, conductances] = maps;
     for frame in frames {
         pressure.push(frame.pressure.values().iter().copied())?;
@@ -266,7 +266,7 @@ const SCENE_PIXELS: [usize; 2] = [1280, 960];
 const KPA_PER_PA: f64 = 1e-3;
 
 /// `pressure.png`: the pressure map.
-fn pressure_picture(out: &OutputFolder, prepared: &Prepared, simulation: &Simulation) -> Result<(), OutputError> {
+fn pressure_picture(out: &OutputFolder, prepared: &Prepared, simulation: &Simulation) -> Result<(), Refusal> {
     let Some(frame) = simulation.peak.as_ref().map(|peak| &peak.at) else {
         return Ok(());
     };

@@ -151,7 +151,7 @@ fn compare(pair: &SessionPair, images: &Images, streams: Streams) -> Result<Comp
 fn profile_of(sessions: &[SessionEstimates], pair: &SessionPair) -> Result<Profile, Refusal> {
     let taxels = u32::try_from(pair.compressive.taxels()).unwrap_or(u32::MAX);
     let fitted = fitted_profile(&FittedReadout::of(sessions), taxels);
-    Ok(fitted.map_err(|e| Refusal::from_error(e).at("the fitted profile"))?.0)
+    Ok(fitted.map_err(|e| e.at("the fitted profile"))?.0)
 }
 
 /// The images that the twin's readout is given.
@@ -642,11 +642,11 @@ pub(crate) fn recorded_image(
         let siemens = image.iter().map(|x| x.max(0.0) / profile.volts_per_siemens());
         maps.push(ConductanceMap::from_values(1, real.taxels(), siemens.collect()));
     }
-    Interpolated::new(times_s, maps).map_err(|e| Refusal::from_error(e).at("conductance"))
+    Interpolated::new(times_s, maps).map_err(|e| e.at("conductance"))
 }
 
-pub(crate) fn readout_refused(error: impl std::error::Error + Send + Sync + 'static) -> Refusal {
-    Refusal::from_error(error).at("readout")
+pub(crate) fn readout_refused(error: Refusal) -> Refusal {
+    error.at("readout")
 }
 
 /// The lift begins so long after the hold at least, s: as much as it scatters by.

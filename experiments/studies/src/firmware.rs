@@ -318,7 +318,7 @@ impl EmulatedCells {
     /// What the cell of `taxel` replies after all edges.
     fn reply(&self, weights: &Weights, taxel: usize) -> Result<[u8; REPLY_BYTES], Refusal> {
         let mut cell = Cell::new(FIRST_ADDRESS.saturating_add(u8::try_from(taxel).unwrap_or(u8::MAX)))?;
-        cell.receive(&start_message(weights, taxel, cell.address()).map_err(Refusal::from_error)?);
+        cell.receive(&start_message(weights, taxel, cell.address())?);
         for _ in 0..self.edges {
             cell.edge();
         }

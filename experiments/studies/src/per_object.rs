@@ -363,7 +363,7 @@ fn with_skin_gains(set: &SessionSet, real: &Source, seed: u64) -> Result<Source,
         let [skin, median] = [real, &simulated].map(|source| others(&source.sessions, &scored.object));
         let mounting = VelostatConfig::default().session_log_sd;
         let known = SkinGains::estimate(&skin?, &median?, mounting);
-        let known = known.map_err(|e| Refusal::from_error(e).at("gains of the skin"))?;
+        let known = known.map_err(|e| e.at("gains of the skin"))?;
         let gains: Vec<f64> = known.gains.log_mean.iter().map(|log| log.exp()).collect();
         let readout = ReadoutOfImages::new(seed, scored)?;
         let again = |recorded: Option<&Recorded>, mode: Mode| -> Result<Option<Recording>, Refusal> {
@@ -385,7 +385,7 @@ fn with_skin_gains(set: &SessionSet, real: &Source, seed: u64) -> Result<Source,
 fn others(sessions: &[ScoredSession], object: &str) -> Result<Library, Refusal> {
     let others = sessions.iter().filter(|s| s.object != object);
     let training: Vec<TrainingPresses<'_>> = others.filter_map(TrainingPresses::unscored).collect();
-    templates(&training).map_err(|e| Refusal::from_error(e).at("raster images"))
+    templates(&training).map_err(|e| e.at("raster images"))
 }
 
 /// The sessions of `real`, each with a compressive recording of its image in `images` (object, V a taxel)
@@ -460,7 +460,7 @@ impl ReadoutOfImages {
             Interpolated::new(times_s.clone(), vec![idle.clone(), idle, map(image.clone())])
         };
         let presses = images.iter().map(press).collect::<Result<Vec<_>, _>>();
-        let mut presses = presses.map_err(|e| Refusal::from_error(e).at("conductance"))?;
+        let mut presses = presses.map_err(|e| e.at("conductance"))?;
         let session = self.session + u64::from(mode == Mode::Compressive);
         let mut readout =
             Readout::new(&self.profile, mode, &self.layout, self.streams, session).map_err(readout_refused)?;

@@ -169,17 +169,17 @@ impl RowDesign {
                 return Ok((expected, Vec::new()));
             }
             DesignImages::Shapes => {
-                let data = TrainingData::for_layout(&self.layout, streams).map_err(Refusal::from_error)?;
+                let data = TrainingData::for_layout(&self.layout, streams)?;
                 (data, Vec::new())
             }
             DesignImages::Recordings(path) => {
-                let source = Source::open(path).map_err(Refusal::from_error)?;
-                let (data, _) = source.training(streams).map_err(Refusal::from_error)?;
+                let source = Source::open(path)?;
+                let (data, _) = source.training(streams)?;
                 let classes = TemplateModel::new(data.shape[1]).classes(&data.templates);
                 (data, classes?)
             }
         };
-        let prior = data.prior(ImagePrior::UNSEEN).map_err(Refusal::from_error)?;
+        let prior = data.prior(ImagePrior::UNSEEN)?;
         let expected = Expected::like(&prior, data.shape, self.tolerances)?;
         Ok((expected, classes))
     }

@@ -110,11 +110,11 @@ impl TouchScene {
         if self.touches == 0 {
             return Ok(Vec::new());
         }
-        let spec = Spec::from_toml(&self.spec(), &toml::Table::new(), ".".as_ref()).map_err(Refusal::from_error)?;
+        let spec = Spec::from_toml(&self.spec(), &toml::Table::new(), ".".as_ref())?;
         let mut maker = Maker::new(&spec);
         (0..self.touches as u64)
             .map(|index| {
-                let row = maker.row(index).map_err(Refusal::from_error)?;
+                let row = maker.row(index)?;
                 let conductance_s = row.conductance().clone();
                 let mut mask = Vec::new();
                 support(conductance_s.values(), SUPPORT_THRESHOLD, &mut mask);

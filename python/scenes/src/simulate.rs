@@ -6,38 +6,10 @@ use pyo3::types::PyDict;
 use spts::Mode;
 use spts::Refusal;
 use spts::assign::Assignment;
-use spts::output::{OutputError, OutputFolder};
+use spts::output::OutputFolder;
 use spts::session::SessionWriter;
 use spts::simulate::{Request, run};
 use std::path::PathBuf;
-
-/// Why a scene gives no session.
-#[derive(Debug)]
-enum Failure {
-    Scene(Refusal),
-    Output(OutputError),
-}
-
-impl From<Refusal> for Failure {
-    fn from(error: Refusal) -> Self {
-        Self::Scene(error)
-    }
-}
-
-impl From<OutputError> for Failure {
-    fn from(error: OutputError) -> Self {
-        Self::Output(error)
-    }
-}
-
-impl std::fmt::Display for Failure {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Scene(error) => error.fmt(f),
-            Self::Output(error) => error.fmt(f),
-        }
-    }
-}
 
 /// Simulates `scene`, changed by `set`, and writes its session into `out`; notes that the user should read.
 #[pyfunction]
@@ -50,7 +22,7 @@ pub(crate) fn simulate(py: Python<'_>, scene: String, set: &Bound<'_, PyDict>, o
     stoppable(py, |step| simulated(&Request { scene, assignments }, step, out))?.map_err(refuse)
 }
 
-fn simulated(request: &Request, step: &(dyn Fn() + Sync), out: PathBuf) -> Result<Vec<String>, Failure> {
+fn simulated(request: &Request, step: &(dyn Fn() + Sync), out: PathBuf) -> Result<Vec<String>, Refusal> {
     let prepared = request.prepare()?;
     let folder = OutputFolder::open(&out)?;
     let mut writer = SessionWriter::create(&folder.path(""), &prepared.session())?;
@@ -61,13 +33,10 @@ fn simulated(request: &Request, step: &(dyn Fn() + Sync), out: PathBuf) -> Resul
                 writer.push(mode, recorded, piece.of)?;
             }
         }
-        Ok::<(), Failure>(())
+        Ok(())
     });
-    done.and_then(|_| Ok(writer.finish()?))
-        .map_err(|failure| match failure {
-            Failure::Output(error) => Failure::Output(folder.unstaged(error)),
-            other => other,
-        })?;
+    done.and_then(|_| writer.finish())
+        .map_err(|error| folder.unstaged(error))?;
     folder.commit()?;
     Ok(prepared.notes)
 }

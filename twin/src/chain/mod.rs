@@ -12,5 +12,3 @@ pub use config::{
 };
 pub use stages::{Acquisition, Chain, ReadoutSession, SkinSession, TaxelSignal, press_facts};
 pub(crate) use stages::{of_conductance, of_readout};
-// the other name of a refusal, until all crates have it
-pub use spts_input::Refusal as ChainError;

@@ -6,4 +6,4 @@ mod published;
 
 pub use mat::{MatVariable, parse_mat};
 pub use open::SessionSet;
-pub use published::{DataError, Published};
+pub use published::{Published, missing_file, nothing_found};

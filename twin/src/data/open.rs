@@ -1,6 +1,6 @@
 //! Opens recordings: a session, a folder of sessions, or the published recordings.
 
-use super::published::{DataError, Published, PublishedFiles, published_place};
+use super::published::{Published, PublishedFiles, published_place};
 use crate::session::{Event, SESSION_FILE, Session};
 use spts_circuit::Recording;
 use spts_input::Refusal;
@@ -46,8 +46,8 @@ impl SessionSet {
     ///   published repository, or in a clone of it.
     ///
     /// # Errors
-    /// [`DataError`] if there is no session, a session cannot be read, or two sessions have the same name.
-    pub fn open(root: &Path) -> Result<Self, DataError> {
+    /// [`Refusal`] if there is no session, a session cannot be read, or two sessions have the same name.
+    pub fn open(root: &Path) -> Result<Self, Refusal> {
         if !root.is_dir() {
             let beside = root.file_name().is_some_and(|name| name == SESSION_FILE);
             if let Some(folder) = root.parent().filter(|_| beside) {

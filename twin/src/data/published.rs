@@ -16,57 +16,18 @@ use std::path::{Path, PathBuf};
 /// The sessions of a folder, dictionary and library where they are there, and the recordings that are missing.
 pub(super) type Found = (Vec<Session>, Option<Published>, Vec<String>);
 
-/// A recording that cannot be used. Every message names the file.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DataError {
-    /// A required file is missing.
-    #[error("{path}: missing; {needed_by} needs it", path = path.display())]
-    Missing {
-        /// File.
-        path: PathBuf,
-        /// What cannot be used without it.
-        needed_by: String,
-    },
-    /// A session to which no readout can be fitted.
-    #[error("{path}: {session} session: `{field}` = {value}; calibration needs {needed}", path = path.display())]
-    Unfit {
-        /// Folder of the recordings.
-        path: PathBuf,
-        /// Name of the session and mode of its recording.
-        session: String,
-        /// The field that does not fit.
-        field: &'static str,
-        /// Its value.
-        value: String,
-        /// The value that calibration needs.
-        needed: String,
-    },
-    /// No recording to calibrate from.
-    #[error("{path}: no session of presses has a compressive recording; calibration needs one", path = path.display())]
-    NoCompressive {
-        /// Folder of the recordings.
-        path: PathBuf,
-    },
-    /// A file or a session that cannot be read or used.
-    #[error(transparent)]
-    Refused(#[from] Refusal),
+/// The refusal of the folder `root`, which has no recordings.
+#[must_use]
+pub fn nothing_found(root: &Path) -> Refusal {
+    let expected = "session.json, folders with one, or the published recordings (presses/NAME/NAME_raster.mat, \
+                    Measurements_Collected/NAME/NAME_raster.mat, or a clone of their repository)";
+    Refusal::new(format!("no recordings found; expected {expected}")).at(root.display())
 }
 
-impl From<DataError> for Refusal {
-    fn from(error: DataError) -> Self {
-        Self::from_error(error)
-    }
-}
-
-impl DataError {
-    /// The folder `root` has no recordings.
-    #[must_use]
-    pub fn nothing_found(root: &Path) -> Self {
-        let expected = "session.json, folders with one, or the published recordings (presses/NAME/NAME_raster.mat, \
-                        Measurements_Collected/NAME/NAME_raster.mat, or a clone of their repository)";
-        Refusal::new(format!("{}: no recordings found; expected {expected}", root.display())).into()
-    }
+/// The refusal of the file at `path`, which is not there, and which `needed_by` needs.
+#[must_use]
+pub fn missing_file(path: &Path, needed_by: &str) -> Refusal {
+    Refusal::new(format!("missing; {needed_by} needs it")).at(path.display())
 }
 
 /// Dictionary, shifted dictionary and classifier library, as published.
@@ -118,8 +79,8 @@ impl PublishedFiles {
     /// Opens the directory `root`, which may be the root of a clone of the published repository.
     ///
     /// # Errors
-    /// [`DataError`] when it holds no recording in a known layout.
-    pub(super) fn open(root: &Path) -> Result<Self, DataError> {
+    /// [`Refusal`] when it holds no recording in a known layout.
+    pub(super) fn open(root: &Path) -> Result<Self, Refusal> {
         let known = [Self::PRESSES, Self::DROPS, Self::ARM].concat();
         let holds = |base: &PathBuf| known.iter().any(|folder| base.join(folder).is_dir());
         let base = [root.to_owned(), root.join("Data_Analysis")].into_iter().find(holds);
@@ -128,15 +89,15 @@ impl PublishedFiles {
                 root: root.to_owned(),
                 base,
             }),
-            None => Err(DataError::nothing_found(root)),
+            None => Err(nothing_found(root)),
         }
     }
 
     /// Dictionary and library beside the sessions in the folder `root`, where both are there.
     ///
     /// # Errors
-    /// [`DataError`] when a file is there but cannot be used.
-    pub(super) fn beside(root: &Path) -> Result<Option<Published>, DataError> {
+    /// [`Refusal`] when a file is there but cannot be used.
+    pub(super) fn beside(root: &Path) -> Result<Option<Published>, Refusal> {
         let (root, base) = (root.to_owned(), root.to_owned());
         Self { root, base }.published()
     }
@@ -144,8 +105,8 @@ impl PublishedFiles {
     /// Reads all sessions, and dictionary and library where they are there, and names the recordings that are not.
     ///
     /// # Errors
-    /// [`DataError`] when a file is there but cannot be used, or no session is there at all.
-    pub(super) fn read(&self) -> Result<Found, DataError> {
+    /// [`Refusal`] when a file is there but cannot be used, or no session is there at all.
+    pub(super) fn read(&self) -> Result<Found, Refusal> {
         let mut sessions = self.presses()?;
         let mut missing = Vec::new();
         if !sessions.is_empty() {
@@ -168,7 +129,7 @@ impl PublishedFiles {
             sessions.extend(self.events(&folder, Event::Touch)?);
         }
         if sessions.is_empty() {
-            return Err(DataError::nothing_found(&self.root));
+            return Err(nothing_found(&self.root));
         }
         Ok((sessions, self.published()?, missing))
     }
@@ -178,7 +139,7 @@ impl PublishedFiles {
     }
 
     /// Sessions of the presses, one an object and repetition.
-    fn presses(&self) -> Result<Vec<Session>, DataError> {
+    fn presses(&self) -> Result<Vec<Session>, Refusal> {
         let Some(folder) = self.folder_of(&Self::PRESSES) else {
             return Ok(Vec::new());
         };
@@ -201,7 +162,7 @@ impl PublishedFiles {
 
     /// Sessions of events whose blocks follow each other without a gap, so that block k ends at frame (k + 1) · frames:
     /// a fit of the ball's contact with these rows leaves .34–.49 of the signal, with any others .93 or more.
-    fn events(&self, folder: &Path, event: Event) -> Result<Vec<Session>, DataError> {
+    fn events(&self, folder: &Path, event: Event) -> Result<Vec<Session>, Refusal> {
         let mut sessions = Vec::new();
         for files in recording_files(folder, "")? {
             let (name, object) = match event {
@@ -228,7 +189,7 @@ impl PublishedFiles {
     }
 
     /// Published dictionary and library, or `None` when one of the two files is missing.
-    fn published(&self) -> Result<Option<Published>, DataError> {
+    fn published(&self) -> Result<Option<Published>, Refusal> {
         let file = |name: &str| {
             let folders = ["", "Dictionary_Learning/", "SRC_Library/"];
             let paths = folders.map(|folder| self.base.join(format!("{folder}{name}.mat")));
@@ -263,7 +224,7 @@ fn folders(folder: &Path) -> Result<Vec<String>, Refusal> {
 }
 
 /// One recording of the presses of `object`.
-fn press(object: &str, files: &RecordingFiles, raster: Option<&PathBuf>) -> Result<Session, DataError> {
+fn press(object: &str, files: &RecordingFiles, raster: Option<&PathBuf>) -> Result<Session, Refusal> {
     let scans = |path: &PathBuf| {
         let blocks = blocks(path, Mode::Raster)?.into_iter();
         let positioned = blocks.map(|volts| ((volts.len() / TAXELS) as u64, volts));
@@ -290,26 +251,22 @@ fn conditioned(recording: Recording) -> Recorded {
 }
 
 /// The compressive recording at `path`, with the positions of its blocks.
-fn sums(path: &Path, files: &RecordingFiles) -> Result<Recording, DataError> {
+fn sums(path: &Path, files: &RecordingFiles) -> Result<Recording, Refusal> {
     let Some(time_path) = &files.positions else {
-        return Err(DataError::Missing {
-            path: path.with_file_name(
-                path.file_stem()
-                    .map_or_else(String::new, |stem| format!("{}_time.mat", stem.to_string_lossy())),
-            ),
-            needed_by: path.display().to_string(),
-        });
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let positions = path.with_file_name(format!("{stem}_time.mat"));
+        return Err(missing_file(&positions, &path.display().to_string()));
     };
     let blocks = blocks(path, Mode::Compressive)?;
     let positions = read_mat(time_path, &["framePosition"])?;
     if positions.values.len() != blocks.len() {
-        return Err(wrong_shape(time_path, &positions, "one position a press").into());
+        return Err(wrong_shape(time_path, &positions, "one position a press"));
     }
     let mut positioned = Vec::with_capacity(blocks.len());
     for (index, (&value, volts)) in positions.values.iter().zip(blocks).enumerate() {
         positioned.push((frame_position(time_path, index, value)?, volts));
     }
-    Ok(recording(path, Mode::Compressive, Some(IDLE_FRAMES), positioned)?)
+    recording(path, Mode::Compressive, Some(IDLE_FRAMES), positioned)
 }
 
 /// The blocks in the file at `path`: raster scans are called `D` or `C`, sums `C`.

@@ -1,78 +1,39 @@
-//! Every disk operation on the way to a result, so that a test can watch each and make it fail, and the error of those
-//! that fail.
+//! Every disk operation on the way to a result, so that a test can watch each and make it fail, and the refusals of
+//! those that fail.
 
 use spts_input::Refusal;
 use std::cell::RefCell;
+use std::error::Error;
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-/// A result that could not be written. The message names the file or folder.
+/// The refusal of a file at `path` that cannot be written, and why.
 ///
 /// ```
-/// use spts::output::OutputError;
+/// use spts::output::unwritable;
 ///
-/// let error = OutputError::write("out/a.csv".as_ref())(std::io::ErrorKind::StorageFull.into());
-/// assert_eq!(error.to_string(), "out/a.csv: cannot be written: no storage space");
+/// let full = std::io::Error::from(std::io::ErrorKind::StorageFull);
+/// assert_eq!(unwritable("out/a.csv".as_ref())(full).to_string(), "out/a.csv: cannot be written: no storage space");
 /// ```
-#[derive(Debug, thiserror::Error)]
-#[error("{}: {problem}", path.display())]
-pub struct OutputError {
-    path: PathBuf,
-    problem: String,
-    source: Option<io::Error>,
+pub fn unwritable<E: Error + Send + Sync + 'static>(path: &Path) -> impl Fn(E) -> Refusal + use<E> {
+    let path = path.to_owned();
+    move |source| Refusal::from_error(source).at("cannot be written").at(path.display())
 }
 
-impl OutputError {
-    /// The error that `path` has this `problem`.
-    pub fn new(path: impl Into<PathBuf>, problem: impl Into<String>) -> Self {
-        Self {
-            path: path.into(),
-            problem: problem.into(),
-            source: None,
-        }
-    }
-
-    /// Wraps an I/O error with the file that cannot be written.
-    pub fn write(path: &Path) -> impl Fn(io::Error) -> Self + use<> {
-        let path = path.to_owned();
-        move |source| Self {
-            problem: format!("cannot be written: {source}"),
-            source: Some(source),
-            path: path.clone(),
-        }
-    }
-
-    /// A folder that cannot be made.
-    pub fn no_folder(path: impl Into<PathBuf>, source: io::Error) -> Self {
-        Self {
-            path: path.into(),
-            problem: format!("the output folder cannot be made: {source}"),
-            source: Some(source),
-        }
-    }
-
-    /// A file that no run has written has the name of a result.
-    pub fn not_ours(path: impl Into<PathBuf>) -> Self {
-        let problem = "is not a result of an earlier run and is not replaced; move it away or choose another folder";
-        Self::new(path, problem)
-    }
-
-    /// The same error, with `place` applied to its path.
-    #[must_use]
-    pub(crate) fn relocated(self, place: &dyn Fn(&Path) -> PathBuf) -> Self {
-        Self {
-            path: place(&self.path),
-            ..self
-        }
-    }
+/// The refusal of a folder at `path` that cannot be made.
+pub fn no_folder(path: &Path, source: io::Error) -> Refusal {
+    Refusal::from_error(source)
+        .at("the output folder cannot be made")
+        .at(path.display())
 }
 
-impl From<OutputError> for Refusal {
-    fn from(error: OutputError) -> Self {
-        Self::from_error(error)
-    }
+/// The refusal of a file at `path` that has the name of a result, and that no run has written.
+#[must_use]
+pub fn not_ours(path: &Path) -> Refusal {
+    let problem = "is not a result of an earlier run and is not replaced; move it away or choose another folder";
+    Refusal::new(problem).at(path.display())
 }
 
 /// Kind of a disk operation.

@@ -1,9 +1,10 @@
 //! Files that are written completely or not at all: bytes, NumPy arrays, CSV tables and JSON. Their bytes depend only
 //! on the values.
 
-use super::disk::{self, NewFile, OutputError};
+use super::disk::{self, NewFile, unwritable};
 use npyz::WriterBuilder as _;
 use serde::Serialize;
+use spts_input::Refusal;
 use std::fs::File;
 use std::io::{self, BufWriter, Read as _, Seek as _, Write as _};
 use std::marker::PhantomData;
@@ -36,11 +37,11 @@ impl AtomicFile {
     /// Starts the file `path`. It will replace a regular file of that name.
     ///
     /// # Errors
-    /// [`OutputError`] if the file cannot be created, or `path` is something other than a regular file.
-    pub fn create(path: &Path) -> Result<Self, OutputError> {
-        let failed = OutputError::write(path);
+    /// [`Refusal`] if the file cannot be created, or `path` is something other than a regular file.
+    pub fn create(path: &Path) -> Result<Self, Refusal> {
+        let failed = unwritable(path);
         if std::fs::metadata(path).is_ok_and(|found| !found.is_file()) {
-            return Err(OutputError::new(path, "is not a regular file and is not replaced"));
+            return Err(Refusal::new("is not a regular file and is not replaced").at(path.display()));
         }
         if path.file_name().is_none() {
             return Err(failed(io::ErrorKind::InvalidInput.into()));
@@ -62,17 +63,17 @@ impl AtomicFile {
     /// Writes the bytes that `fill` puts into the buffer.
     ///
     /// # Errors
-    /// [`OutputError`] if `fill` fails.
-    pub fn fill(&mut self, fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>) -> Result<(), OutputError> {
-        fill(&mut self.buffer).map_err(OutputError::write(&self.path))
+    /// [`Refusal`] if `fill` fails.
+    pub fn fill(&mut self, fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>) -> Result<(), Refusal> {
+        fill(&mut self.buffer).map_err(unwritable(&self.path))
     }
 
     /// Waits until the bytes are on the disk, then gives the file its name.
     ///
     /// # Errors
-    /// [`OutputError`] if the disk is full or reports an error.
-    pub fn finish(mut self) -> Result<(), OutputError> {
-        let failed = OutputError::write(&self.path);
+    /// [`Refusal`] if the disk is full or reports an error.
+    pub fn finish(mut self) -> Result<(), Refusal> {
+        let failed = unwritable(&self.path);
         self.buffer.flush().map_err(&failed)?;
         // a full disk may only show when the data reach it
         self.buffer.get_ref().sync().map_err(&failed)?;
@@ -87,9 +88,9 @@ impl AtomicFile {
         &mut self,
         start: u64,
         piece: usize,
-        mut each: impl FnMut(&[u8]) -> Result<(), OutputError>,
-    ) -> Result<(), OutputError> {
-        let failed = OutputError::write(&self.path);
+        mut each: impl FnMut(&[u8]) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        let failed = unwritable(&self.path);
         self.buffer.flush().map_err(&failed)?;
         let mut file = File::open(&self.temporary).map_err(&failed)?;
         file.seek(io::SeekFrom::Start(start)).map_err(&failed)?;
@@ -118,12 +119,9 @@ impl io::Write for AtomicFile {
 /// Writes `path` with the bytes that `fill` puts into the buffer. A regular file of that name is replaced.
 ///
 /// # Errors
-/// [`OutputError`] if the file cannot be written, or `path` is something other than a regular file. Nothing is left
+/// [`Refusal`] if the file cannot be written, or `path` is something other than a regular file. Nothing is left
 /// behind then, and an earlier file stays unchanged.
-pub fn write_with(
-    path: &Path,
-    fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>,
-) -> Result<(), OutputError> {
+pub fn write_with(path: &Path, fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>) -> Result<(), Refusal> {
     let mut file = AtomicFile::create(path)?;
     file.fill(fill)?;
     file.finish()
@@ -158,7 +156,7 @@ const RANDOM: usize = 12;
 ///
 /// # Errors
 /// As [`write_with`].
-pub fn check_writable(path: &Path) -> Result<(), OutputError> {
+pub fn check_writable(path: &Path) -> Result<(), Refusal> {
     AtomicFile::create(path).map(drop)
 }
 
@@ -166,7 +164,7 @@ pub fn check_writable(path: &Path) -> Result<(), OutputError> {
 ///
 /// # Errors
 /// As [`write_with`].
-pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Refusal> {
     write_with(path, |out| out.write_all(bytes))
 }
 
@@ -226,8 +224,8 @@ impl<T: NpyValue> NpyFile<T> {
     /// Starts the array `path` with shape `shape`.
     ///
     /// # Errors
-    /// [`OutputError`] if the file cannot be created.
-    pub fn create(path: &Path, shape: &[usize]) -> Result<Self, OutputError> {
+    /// [`Refusal`] if the file cannot be created.
+    pub fn create(path: &Path, shape: &[usize]) -> Result<Self, Refusal> {
         let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
         let mut file = AtomicFile::create(path)?;
         let mut header = Vec::new();
@@ -252,8 +250,8 @@ impl<T: NpyValue> NpyFile<T> {
     /// Writes the next values.
     ///
     /// # Errors
-    /// [`OutputError`] if the disk is full or reports an error.
-    pub fn push(&mut self, values: impl IntoIterator<Item = T>) -> Result<(), OutputError> {
+    /// [`Refusal`] if the disk is full or reports an error.
+    pub fn push(&mut self, values: impl IntoIterator<Item = T>) -> Result<(), Refusal> {
         let written = &mut self.written;
         self.file.fill(|out| {
             values.into_iter().try_for_each(|value| {
@@ -266,17 +264,17 @@ impl<T: NpyValue> NpyFile<T> {
     /// Gives the file its name.
     ///
     /// # Errors
-    /// [`OutputError`] if the number of values differs from that of the shape, or the file cannot be written.
-    pub fn finish(self) -> Result<(), OutputError> {
+    /// [`Refusal`] if the number of values differs from that of the shape, or the file cannot be written.
+    pub fn finish(self) -> Result<(), Refusal> {
         if self.shape.iter().product::<usize>() != self.written {
             let problem = format!("{} values for an array of shape {:?}", self.written, self.shape);
-            return Err(OutputError::new(self.path, problem));
+            return Err(Refusal::new(problem).at(self.path.display()));
         }
         self.file.finish()
     }
 
     /// Hands the bytes of the values that were written so far to `each`, some thousand values at a time.
-    pub(crate) fn read_back(&mut self, each: impl FnMut(&[u8]) -> Result<(), OutputError>) -> Result<(), OutputError> {
+    pub(crate) fn read_back(&mut self, each: impl FnMut(&[u8]) -> Result<(), Refusal>) -> Result<(), Refusal> {
         self.file.read_back(self.header_bytes, size_of::<T>() << 13, each)
     }
 }
@@ -284,8 +282,8 @@ impl<T: NpyValue> NpyFile<T> {
 /// Writes `values` as a NumPy array of little-endian doubles in C order.
 ///
 /// # Errors
-/// [`OutputError`] if the number of values differs from that of the shape, or the file cannot be written.
-pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), OutputError> {
+/// [`Refusal`] if the number of values differs from that of the shape, or the file cannot be written.
+pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), Refusal> {
     let mut file = NpyFile::create(path, shape)?;
     file.push(values.iter().copied())?;
     file.finish()
@@ -314,12 +312,12 @@ impl CsvFile {
     /// Starts the table `path` with the header `header`.
     ///
     /// # Errors
-    /// [`OutputError`] if the file cannot be created.
-    pub fn create(path: &Path, header: &[&str]) -> Result<Self, OutputError> {
+    /// [`Refusal`] if the file cannot be created.
+    pub fn create(path: &Path, header: &[&str]) -> Result<Self, Refusal> {
         let mut options = csv::WriterBuilder::new();
         let mut writer = options.has_headers(false).from_writer(AtomicFile::create(path)?);
         let written = writer.write_record(header);
-        written.map_err(|e| OutputError::write(path)(e.into()))?;
+        written.map_err(unwritable(path))?;
         Ok(Self {
             writer,
             path: path.to_owned(),
@@ -330,19 +328,19 @@ impl CsvFile {
     /// have the fewest digits that read back as the same number.
     ///
     /// # Errors
-    /// [`OutputError`] if the number of fields differs from that of the header, or the disk is full or reports
+    /// [`Refusal`] if the number of fields differs from that of the header, or the disk is full or reports
     /// an error.
-    pub fn push(&mut self, row: impl Serialize) -> Result<(), OutputError> {
+    pub fn push(&mut self, row: impl Serialize) -> Result<(), Refusal> {
         let written = self.writer.serialize(row);
-        written.map_err(|e| OutputError::write(&self.path)(e.into()))
+        written.map_err(unwritable(&self.path))
     }
 
     /// Gives the file its name.
     ///
     /// # Errors
-    /// [`OutputError`] if the file cannot be written.
-    pub fn finish(self) -> Result<(), OutputError> {
-        let failed = OutputError::write(&self.path);
+    /// [`Refusal`] if the file cannot be written.
+    pub fn finish(self) -> Result<(), Refusal> {
+        let failed = unwritable(&self.path);
         let file = self.writer.into_inner().map_err(|e| failed(e.into_error()))?;
         file.finish()
     }
@@ -351,12 +349,8 @@ impl CsvFile {
 /// Writes a table with rows as in [`CsvFile::push`].
 ///
 /// # Errors
-/// [`OutputError`] if the number of fields of a row differs from that of the header, or the file cannot be written.
-pub fn write_csv<R: Serialize>(
-    path: &Path,
-    header: &[&str],
-    rows: impl IntoIterator<Item = R>,
-) -> Result<(), OutputError> {
+/// [`Refusal`] if the number of fields of a row differs from that of the header, or the file cannot be written.
+pub fn write_csv<R: Serialize>(path: &Path, header: &[&str], rows: impl IntoIterator<Item = R>) -> Result<(), Refusal> {
     let mut file = CsvFile::create(path, header)?;
     rows.into_iter().try_for_each(|row| file.push(row))?;
     file.finish()
@@ -365,8 +359,8 @@ pub fn write_csv<R: Serialize>(
 /// Writes a table whose header is the field names of its rows.
 ///
 /// # Errors
-/// [`OutputError`] if the file cannot be written.
-pub fn write_table<R: Serialize>(path: &Path, rows: &[R]) -> Result<(), OutputError> {
+/// [`Refusal`] if the file cannot be written.
+pub fn write_table<R: Serialize>(path: &Path, rows: &[R]) -> Result<(), Refusal> {
     write_with(path, |out| {
         let mut writer = csv::Writer::from_writer(out);
         for row in rows {
@@ -379,8 +373,8 @@ pub fn write_table<R: Serialize>(path: &Path, rows: &[R]) -> Result<(), OutputEr
 /// Writes `value` as indented JSON that ends with a newline.
 ///
 /// # Errors
-/// [`OutputError`] if the file cannot be written.
-pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), OutputError> {
+/// [`Refusal`] if the file cannot be written.
+pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), Refusal> {
     write_with(path, |out| {
         serde_json::to_writer_pretty(&mut *out, value)?;
         out.write_all(b"\n")

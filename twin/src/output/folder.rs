@@ -5,9 +5,10 @@
 //! removed. A file system without such a step first gives the earlier results the name `.NAME.spts-old`. A run that is
 //! ended leaves what the next run with this folder clears up. A run holds `.NAME.spts-lock` locked.
 
-use super::disk::{self, OutputError, parent};
+use super::disk::{self, not_ours, parent, unwritable};
 use super::manifest::{MANIFEST_FILE, Manifest, changed};
 use crate::cleanup::{Entry, Leftover, listed};
+use spts_input::Refusal;
 use std::collections::BTreeSet;
 use std::fs::{File, TryLockError};
 use std::io;
@@ -33,10 +34,10 @@ impl OutputFolder {
     /// Opens the folder `path` for a run. Its parents are created where they are missing.
     ///
     /// # Errors
-    /// [`OutputError`] if `path` is a file, holds a file that is not an unchanged result of an earlier run, or cannot
+    /// [`Refusal`] if `path` is a file, holds a file that is not an unchanged result of an earlier run, or cannot
     /// be created or replaced, and while another run is writing to it.
-    pub fn open(path: &Path) -> Result<Self, OutputError> {
-        let failed = OutputError::write(path);
+    pub fn open(path: &Path) -> Result<Self, Refusal> {
+        let failed = unwritable(path);
         let made = Parents::make(path)?;
         let folder = match path.file_name() {
             // a link to nowhere is no place for a folder
@@ -45,7 +46,7 @@ impl OutputFolder {
         };
         let folder = folder.map_err(&failed)?;
         let (Some(above), Some(_)) = (folder.parent(), folder.file_name()) else {
-            return Err(OutputError::new(path, UNMOVABLE));
+            return Err(Refusal::new(UNMOVABLE).at(path.display()));
         };
         let lock = Lock::take(&folder, path)?;
         recover(&folder).map_err(&failed)?;
@@ -56,7 +57,7 @@ impl OutputFolder {
         }
         let here = std::env::current_dir().and_then(|here| here.canonicalize());
         if here.is_ok_and(|here| here.starts_with(&folder)) || is_mounted(&folder, above) {
-            return Err(OutputError::new(path, UNMOVABLE));
+            return Err(Refusal::new(UNMOVABLE).at(path.display()));
         }
         let stage = beside(&folder, NEW);
         let make = || disk::make_folder(&stage);
@@ -90,8 +91,8 @@ impl OutputFolder {
     /// Creates the folder `name` for results.
     ///
     /// # Errors
-    /// [`OutputError`] if the folder cannot be created.
-    pub fn folder(&self, name: &str) -> Result<PathBuf, OutputError> {
+    /// [`Refusal`] if the folder cannot be created.
+    pub fn folder(&self, name: &str) -> Result<PathBuf, Refusal> {
         let path = self.path(name);
         make_folders(&path)?;
         Ok(path)
@@ -101,10 +102,10 @@ impl OutputFolder {
     /// results, sorted.
     ///
     /// # Errors
-    /// [`OutputError`] if a file that is not an unchanged result of an earlier run has come into the folder, or the
+    /// [`Refusal`] if a file that is not an unchanged result of an earlier run has come into the folder, or the
     /// file system reports an error. The folder then stays unchanged.
-    pub fn commit(mut self) -> Result<Vec<String>, OutputError> {
-        let failed = OutputError::write(&self.shown);
+    pub fn commit(mut self) -> Result<Vec<String>, Refusal> {
+        let failed = unwritable(&self.shown);
         let names = files_below(&self.stage).map_err(&failed)?;
         let manifest = Manifest::of(&self.stage, &names, &self.timed).and_then(|all| all.write(&self.stage));
         manifest.map_err(|error| self.unstaged(error))?;
@@ -121,8 +122,9 @@ impl OutputFolder {
 
     /// The same error, with the result's final path in place of the path where it waits.
     #[must_use]
-    pub fn unstaged(&self, error: OutputError) -> OutputError {
-        error.relocated(&|path| self.final_path(path))
+    pub fn unstaged(&self, error: Refusal) -> Refusal {
+        let [from, to] = [&self.stage, &self.shown].map(|folder| folder.join("").display().to_string());
+        error.reworded(|message| message.replace(&from, &to))
     }
 
     /// Final path of the result that waits at `path`. Any other path is returned unchanged.
@@ -180,7 +182,7 @@ fn beside(folder: &Path, what: &str) -> PathBuf {
 
 /// Refuses `folder`, which the user calls `shown`, if it holds a file that is not an unchanged result of an earlier
 /// run.
-fn check_ours(folder: &Path, shown: &Path) -> Result<(), OutputError> {
+fn check_ours(folder: &Path, shown: &Path) -> Result<(), Refusal> {
     if !disk::exists(folder) {
         return Ok(());
     }
@@ -191,16 +193,13 @@ fn check_ours(folder: &Path, shown: &Path) -> Result<(), OutputError> {
         match &manifest {
             Some(_) if name == MANIFEST_FILE => Ok(()),
             Some(manifest) if manifest.lists(&name) => {
-                if manifest
-                    .is_unchanged(folder, &name)
-                    .map_err(OutputError::write(&path))?
-                {
+                if manifest.is_unchanged(folder, &name).map_err(unwritable(&path))? {
                     return Ok(());
                 }
                 let advice = "it is not replaced: move it away or choose another folder";
                 Err(changed(path, shown, advice))
             }
-            _ => Err(OutputError::not_ours(path)),
+            _ => Err(not_ours(&path)),
         }
     })
 }
@@ -315,18 +314,14 @@ fn sync_folders(folder: &Path) -> io::Result<()> {
 }
 
 /// Calls `each` with every file below `folder` in the folder `below` of it, in order of name.
-fn walk(
-    folder: &Path,
-    below: &Path,
-    each: &mut dyn FnMut(PathBuf) -> Result<(), OutputError>,
-) -> Result<(), OutputError> {
+fn walk(folder: &Path, below: &Path, each: &mut dyn FnMut(PathBuf) -> Result<(), Refusal>) -> Result<(), Refusal> {
     let at = folder.join(below);
     let entries = std::fs::read_dir(&at).and_then(Iterator::collect::<io::Result<Vec<_>>>);
-    let mut entries = entries.map_err(OutputError::write(&at))?;
+    let mut entries = entries.map_err(unwritable(&at))?;
     entries.sort_by_key(std::fs::DirEntry::file_name);
     for entry in entries {
         let name = below.join(entry.file_name());
-        match entry.file_type().map_err(OutputError::write(&at))?.is_dir() {
+        match entry.file_type().map_err(unwritable(&at))?.is_dir() {
             true => walk(folder, &name, each)?,
             false => each(name)?,
         }
@@ -339,7 +334,7 @@ fn files_below(folder: &Path) -> io::Result<Vec<String>> {
     let mut names = Vec::new();
     let walked = walk(folder, Path::new(""), &mut |name| {
         let name = name.into_os_string().into_string();
-        names.push(name.map_err(|name| OutputError::new(name, "has a name that is not text"))?);
+        names.push(name.map_err(|name| Refusal::new("has a name that is not text").at(name.display()))?);
         Ok(())
     });
     walked.map_err(io::Error::other)?;
@@ -357,9 +352,9 @@ struct Parents {
 
 impl Parents {
     /// Makes the missing parents of `path`.
-    fn make(path: &Path) -> Result<Self, OutputError> {
+    fn make(path: &Path) -> Result<Self, Refusal> {
         let made = make_folders(if path.exists() { path } else { parent(path) })?;
-        let entry = listed(|| Ok(()), |()| Leftover::EmptyFolders(made.clone())).map_err(OutputError::write(path));
+        let entry = listed(|| Ok(()), |()| Leftover::EmptyFolders(made.clone())).map_err(unwritable(path));
         Ok(Self { made, _entry: entry?.1 })
     }
 
@@ -375,10 +370,10 @@ impl Drop for Parents {
 }
 
 /// Makes the folder `path` and its parents where they are missing; returns those that were made, deepest first.
-fn make_folders(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
+fn make_folders(path: &Path) -> Result<Vec<PathBuf>, Refusal> {
     let found = path.ancestors().find(|p| p.exists());
     if let Some(found) = found.filter(|found| !found.is_dir()) {
-        return Err(OutputError::new(found, "is a file; the output has to be a folder"));
+        return Err(Refusal::new("is a file; the output has to be a folder").at(found.display()));
     }
     let missing = path
         .ancestors()
@@ -389,7 +384,7 @@ fn make_folders(path: &Path) -> Result<Vec<PathBuf>, OutputError> {
             // another run may make the same parents
             Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
                 missing[k + 1..].iter().for_each(|made| drop(disk::remove_folder(made)));
-                return Err(OutputError::no_folder(path, error));
+                return Err(disk::no_folder(path, error));
             }
             _ => {}
         }
@@ -409,15 +404,15 @@ struct Lock {
 
 impl Lock {
     /// Locks `folder`, which the user calls `shown`.
-    fn take(folder: &Path, shown: &Path) -> Result<Self, OutputError> {
+    fn take(folder: &Path, shown: &Path) -> Result<Self, Refusal> {
         let path = beside(folder, LOCK);
-        let failed = OutputError::write(shown);
+        let failed = unwritable(shown);
         loop {
             let file = disk::open_or_create(&path).map_err(|error| match error.kind() {
                 io::ErrorKind::PermissionDenied if folder.exists() => {
                     let above = parent(folder).display();
                     let problem = format!("cannot be replaced as a whole: {above}: {error}; choose a folder in it");
-                    OutputError::new(shown, problem)
+                    Refusal::new(problem).at(shown.display())
                 }
                 _ => failed(error),
             })?;
@@ -426,7 +421,7 @@ impl Lock {
                 Err(TryLockError::WouldBlock) => {
                     let problem =
                         "another run is writing to this folder; choose another one, or wait until that run has ended";
-                    return Err(OutputError::new(shown, problem));
+                    return Err(Refusal::new(problem).at(shown.display()));
                 }
                 // a file system without locks: one run at a time is then the user's to see to
                 Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
@@ -477,7 +472,7 @@ mod tests {
     }
 
     /// Opens `dir`, writes files with these contents, and commits them.
-    fn run(dir: &Path, files: &[(&str, &str)]) -> Result<Vec<String>, OutputError> {
+    fn run(dir: &Path, files: &[(&str, &str)]) -> Result<Vec<String>, Refusal> {
         let out = OutputFolder::open(dir)?;
         for (name, content) in files {
             if let Some((folder, _)) = name.rsplit_once('/') {

@@ -1,9 +1,10 @@
 //! The manifest: which files of a folder a run has written.
 
-use super::disk::OutputError;
+use super::disk::unwritable;
 use super::files::write_bytes;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
+use spts_input::Refusal;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::Metadata;
 use std::io::{self, Read as _};
@@ -67,13 +68,13 @@ impl Default for Manifest {
 
 impl Manifest {
     /// The manifest of all files below `folder` that `names` lists, which no run will write alike that are `timed`.
-    pub(super) fn of(folder: &Path, names: &[String], timed: &BTreeSet<String>) -> Result<Self, OutputError> {
+    pub(super) fn of(folder: &Path, names: &[String], timed: &BTreeSet<String>) -> Result<Self, Refusal> {
         let entry = |name: &String| {
             if timed.contains(name) {
                 return Ok((name.clone(), FileEntry::default()));
             }
             let path = folder.join(name);
-            let (bytes, sha256) = digest(&path).map_err(OutputError::write(&path))?;
+            let (bytes, sha256) = digest(&path).map_err(unwritable(&path))?;
             let entry = FileEntry {
                 bytes: Some(bytes),
                 sha256: Some(sha256),
@@ -81,7 +82,7 @@ impl Manifest {
             Ok((name.clone(), entry))
         };
         Ok(Self {
-            files: names.iter().map(entry).collect::<Result<_, OutputError>>()?,
+            files: names.iter().map(entry).collect::<Result<_, Refusal>>()?,
             ..Self::default()
         })
     }
@@ -89,8 +90,8 @@ impl Manifest {
     /// Writes the manifest of the files `names` of `folder` into that folder.
     ///
     /// # Errors
-    /// [`OutputError`] if a file cannot be read, or the manifest cannot be written.
-    pub fn write_of(folder: &Path, names: &[String]) -> Result<Self, OutputError> {
+    /// [`Refusal`] if a file cannot be read, or the manifest cannot be written.
+    pub fn write_of(folder: &Path, names: &[String]) -> Result<Self, Refusal> {
         let manifest = Self::of(folder, names, &BTreeSet::new())?;
         manifest.write(folder)?;
         Ok(manifest)
@@ -122,9 +123,9 @@ impl Manifest {
         (ours && manifest.files.keys().all(|name| is_below(name))).then_some(manifest)
     }
 
-    pub(super) fn write(&self, folder: &Path) -> Result<(), OutputError> {
+    pub(super) fn write(&self, folder: &Path) -> Result<(), Refusal> {
         let path = folder.join(MANIFEST_FILE);
-        let text = serde_json::to_string_pretty(self).map_err(|e| OutputError::write(&path)(e.into()))?;
+        let text = serde_json::to_string_pretty(self).map_err(unwritable(&path))?;
         write_bytes(&path, (text + "\n").as_bytes())
     }
 
@@ -164,8 +165,8 @@ impl Manifest {
 /// The manifest may lie in `folder` or in one of the two folders above. A folder without a manifest passes.
 ///
 /// # Errors
-/// [`OutputError`] for a file that has changed or cannot be read.
-pub fn check_whole(folder: &Path, names: &[&str]) -> Result<(), OutputError> {
+/// [`Refusal`] for a file that has changed or cannot be read.
+pub fn check_whole(folder: &Path, names: &[&str]) -> Result<(), Refusal> {
     let Ok(whole) = folder.canonicalize() else {
         return Ok(());
     };
@@ -179,11 +180,7 @@ pub fn check_whole(folder: &Path, names: &[&str]) -> Result<(), OutputError> {
     let below = whole.strip_prefix(above).unwrap_or(Path::new(""));
     for name in names {
         let (path, listed) = (folder.join(name), below.join(name).to_string_lossy().into_owned());
-        if manifest.lists(&listed)
-            && !manifest
-                .is_unchanged(above, &listed)
-                .map_err(OutputError::write(&path))?
-        {
+        if manifest.lists(&listed) && !manifest.is_unchanged(above, &listed).map_err(unwritable(&path))? {
             let advice =
                 "the folder holds results of two runs, or the file was changed by hand: then delete the manifest";
             return Err(changed(path, above, advice));
@@ -193,12 +190,10 @@ pub fn check_whole(folder: &Path, names: &[&str]) -> Result<(), OutputError> {
 }
 
 /// The error that `path` is not as the manifest in `folder` lists it.
-pub(super) fn changed(path: PathBuf, folder: &Path, advice: &str) -> OutputError {
+pub(super) fn changed(path: PathBuf, folder: &Path, advice: &str) -> Refusal {
     let manifest = folder.join(MANIFEST_FILE);
-    OutputError::new(
-        path,
-        format!("is not the file that {} lists; {advice}", manifest.display()),
-    )
+    let problem = format!("is not the file that {} lists; {advice}", manifest.display());
+    Refusal::new(problem).at(path.display())
 }
 
 /// Whether `name` stays below the folder that it is joined to.

@@ -18,7 +18,7 @@ mod files;
 mod folder;
 mod manifest;
 
-pub use disk::{DiskOperation, DiskWatcher, NewFile, OutputError, watching_disk};
+pub use disk::{DiskOperation, DiskWatcher, NewFile, no_folder, not_ours, unwritable, watching_disk};
 pub use files::{
     AtomicFile, CsvFile, NpyFile, NpyValue, check_writable, is_temporary, remove_left, write_bytes, write_csv,
     write_json, write_npy, write_table, write_with,

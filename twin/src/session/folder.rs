@@ -3,7 +3,7 @@
 
 use super::npy::{self, Expected, npy_bytes, read_codes, read_doubles, room};
 use super::recorded::{Event, PressFacts, PressPose, Recorded, Session, check, check_header, check_recorded, is_plain};
-use crate::output::{NpyFile, OutputError, OutputFolder, check_whole, write_bytes};
+use crate::output::{NpyFile, OutputFolder, check_whole, unwritable, write_bytes};
 use crate::provenance::Provenance;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -158,7 +158,7 @@ impl SampleFile {
         mode: &'static str,
         shape: [usize; 3],
         converter: Option<&Converter>,
-    ) -> Result<Self, OutputError> {
+    ) -> Result<Self, Refusal> {
         let path = dir.join(name(mode, converter.is_some()));
         let array = match converter {
             Some(converter) if is_narrow(converter) => Array::Narrow(NpyFile::create(&path, &shape)?),
@@ -177,7 +177,7 @@ impl SampleFile {
     }
 
     /// Writes the next block.
-    fn push(&mut self, block: &Block) -> Result<(), OutputError> {
+    fn push(&mut self, block: &Block) -> Result<(), Refusal> {
         self.missing += block.volts.iter().filter(|v| v.is_nan()).count();
         if let Some(converter) = self.converter {
             let mark = missing_mark(&converter);
@@ -196,7 +196,7 @@ impl SampleFile {
     }
 
     /// Writes volts in place of the codes so far, and from here on.
-    fn become_volts(&mut self, converter: &Converter) -> Result<(), OutputError> {
+    fn become_volts(&mut self, converter: &Converter) -> Result<(), Refusal> {
         self.converter = None;
         let mut volts = NpyFile::create(&self.dir.join(name(self.mode, false)), &self.shape)?;
         let mark = missing_mark(converter);
@@ -218,7 +218,7 @@ impl SampleFile {
     }
 
     /// Gives the array its name, and says what it is.
-    fn finish(self) -> Result<Samples, OutputError> {
+    fn finish(self) -> Result<Samples, Refusal> {
         let contents = self.contents();
         match self.array {
             Array::Narrow(file) => file.finish()?,
@@ -293,8 +293,8 @@ impl SessionWriter {
     /// Starts `session` in the folder `dir`, which must exist. [`SessionWriter::push`] adds its recordings.
     ///
     /// # Errors
-    /// [`OutputError`] for a name or a hold that could not be read again.
-    pub fn create(dir: &Path, session: &Session) -> Result<Self, OutputError> {
+    /// [`Refusal`] for a name or a hold that could not be read again.
+    pub fn create(dir: &Path, session: &Session) -> Result<Self, Refusal> {
         check_header(session).map_err(|invalid| refused(dir, &invalid))?;
         Ok(Self {
             dir: dir.to_owned(),
@@ -324,8 +324,8 @@ impl SessionWriter {
     /// Writes the next blocks of the recording in `mode`, which will have `blocks` blocks in all.
     ///
     /// # Errors
-    /// [`OutputError`] if the blocks contradict the earlier ones, or a file cannot be written.
-    pub fn push(&mut self, mode: Mode, piece: &Recorded, blocks: usize) -> Result<(), OutputError> {
+    /// [`Refusal`] if the blocks contradict the earlier ones, or a file cannot be written.
+    pub fn push(&mut self, mode: Mode, piece: &Recorded, blocks: usize) -> Result<(), Refusal> {
         check_recorded(mode, piece, blocks).map_err(|invalid| refused(&self.dir, &invalid))?;
         let writer = match mode {
             Mode::Raster => &mut self.raster,
@@ -341,12 +341,12 @@ impl SessionWriter {
     /// Completes the session. `session.json` is written last: a folder that holds it is complete.
     ///
     /// # Errors
-    /// [`OutputError`] if a recording has another number of blocks than announced, or a file cannot be written.
-    pub fn finish(mut self) -> Result<(), OutputError> {
+    /// [`Refusal`] if a recording has another number of blocks than announced, or a file cannot be written.
+    pub fn finish(mut self) -> Result<(), Refusal> {
         self.contents.raster = self.raster.map(RecordingWriter::finish).transpose()?;
         self.contents.compressive = self.compressive.map(RecordingWriter::finish).transpose()?;
         let path = self.dir.join(SESSION_FILE);
-        let text = serde_json::to_string_pretty(&self.contents).map_err(|e| OutputError::write(&path)(e.into()))?;
+        let text = serde_json::to_string_pretty(&self.contents).map_err(unwritable(&path))?;
         let text = text + "\n";
         if self.limited {
             bounded(&path, "session", text.len() as u64, MAX_BYTES)?;
@@ -356,19 +356,22 @@ impl SessionWriter {
 }
 
 /// The error of what could not be read again.
-fn refused(dir: &Path, invalid: &Refusal) -> OutputError {
-    OutputError::new(dir.join(SESSION_FILE), format!("cannot be written: {invalid}"))
+fn refused(dir: &Path, invalid: &Refusal) -> Refusal {
+    invalid
+        .clone()
+        .at("cannot be written")
+        .at(dir.join(SESSION_FILE).display())
 }
 
 /// Refuses a file that would be too large to be read again.
-fn bounded(path: &Path, what: &str, bytes: u64, limit: u64) -> Result<(), OutputError> {
+fn bounded(path: &Path, what: &str, bytes: u64, limit: u64) -> Result<(), Refusal> {
     if bytes <= limit {
         return Ok(());
     }
     let problem = format!(
         "cannot be written: `{what}` = {bytes} bytes is outside [0, {limit}], the sizes that can be read again"
     );
-    Err(OutputError::new(path, problem))
+    Err(Refusal::new(problem).at(path.display()))
 }
 
 /// One recording that is being written.
@@ -381,7 +384,7 @@ struct RecordingWriter {
 
 impl RecordingWriter {
     /// Begins a recording like `piece`, of `blocks` blocks.
-    fn create(dir: &Path, mode: Mode, piece: &Recorded, blocks: usize, limited: bool) -> Result<Self, OutputError> {
+    fn create(dir: &Path, mode: Mode, piece: &Recorded, blocks: usize, limited: bool) -> Result<Self, Refusal> {
         let recording = &piece.recording;
         let shape = [blocks, recording.frames(), recording.measurements_per_frame()];
         let samples = SampleFile::create(dir, mode.name(), shape, recording.converter())?;
@@ -412,7 +415,7 @@ impl RecordingWriter {
         })
     }
 
-    fn push(&mut self, piece: &Recorded) -> Result<(), OutputError> {
+    fn push(&mut self, piece: &Recorded) -> Result<(), Refusal> {
         for (k, block) in piece.recording.blocks().iter().enumerate() {
             self.samples.push(block)?;
             let facts = piece.facts(k).cloned().unwrap_or_default();
@@ -423,7 +426,7 @@ impl RecordingWriter {
         Ok(())
     }
 
-    fn finish(self) -> Result<RecordedContents, OutputError> {
+    fn finish(self) -> Result<RecordedContents, Refusal> {
         Ok(RecordedContents {
             samples: self.samples.finish()?,
             pressure_pa: self.pressure.finish()?,
@@ -463,7 +466,7 @@ impl MapFile {
         }
     }
 
-    fn push(&mut self, map: Option<&[f64]>) -> Result<(), OutputError> {
+    fn push(&mut self, map: Option<&[f64]>) -> Result<(), Refusal> {
         let taxels = self.shape[1] * self.shape[2];
         let unknown = |blocks| std::iter::repeat_n(f64::NAN, blocks * taxels);
         match (map, &mut self.file) {
@@ -484,7 +487,7 @@ impl MapFile {
     }
 
     /// Gives the file its name, and gives that back.
-    fn finish(self) -> Result<Option<String>, OutputError> {
+    fn finish(self) -> Result<Option<String>, Refusal> {
         self.file.map(|file| file.finish().map(|()| self.name)).transpose()
     }
 }
@@ -493,7 +496,7 @@ impl Session {
     /// Writes the session into the folder `dir`, which is made where it is missing: all of its files, or none.
     ///
     /// # Errors
-    /// [`OutputError`] when the session or one of its files could not be read again, or the folder cannot be
+    /// [`Refusal`] when the session or one of its files could not be read again, or the folder cannot be
     /// filled, as for [`OutputFolder::open`] and [`OutputFolder::commit`].
     pub fn write(&self, dir: &Path) -> Result<(), Refusal> {
         let out = OutputFolder::open(dir)?;
@@ -507,8 +510,8 @@ impl Session {
     /// place.
     ///
     /// # Errors
-    /// [`OutputError`] when the session or one of its files could not be read again, or a file cannot be written.
-    pub fn write_files(&self, dir: &Path) -> Result<(), OutputError> {
+    /// [`Refusal`] when the session or one of its files could not be read again, or a file cannot be written.
+    pub fn write_files(&self, dir: &Path) -> Result<(), Refusal> {
         check(self).map_err(|invalid| refused(dir, &invalid))?;
         let mut writer = SessionWriter::create(dir, self)?.limited();
         for (mode, recorded) in [(Mode::Raster, &self.raster), (Mode::Compressive, &self.compressive)] {

@@ -79,12 +79,12 @@ impl Simulation {
 /// # Errors
 /// [`Refusal`] if a press is too large, the firmware cannot provide its weights, or mechanics or readout fail; or
 /// the error of `each`.
-pub fn run<E: From<Refusal>>(
+pub fn run(
     prepared: &Prepared,
     record: bool,
     done: &(dyn Fn() + Sync),
-    mut each: impl FnMut(SimulatedPiece<'_>) -> Result<(), E>,
-) -> Result<Simulation, E> {
+    mut each: impl FnMut(SimulatedPiece<'_>) -> Result<(), Refusal>,
+) -> Result<Simulation, Refusal> {
     let twin = Twin::new(&prepared.scene)?;
     let mut run = Run::new(prepared, &twin, record)?;
     let (all, together) = (prepared.scene.repeats(), twin.presses_at_once());

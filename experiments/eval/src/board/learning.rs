@@ -1,7 +1,7 @@
 //! Trains every algorithm of a board with every source of training data.
 
 use super::BoardSettings;
-use crate::algorithm::{Contender, ScoreError};
+use crate::algorithm::Contender;
 use crate::decoders::{DecoderSpec, Needs, TrainedDecoder};
 use crate::labels::Labels;
 use crate::sensing::{RowChooser, Sensing};
@@ -94,8 +94,8 @@ impl<'a> Trainer<'a> {
     /// The entries of the board, in the order source of training data, learned before left out, algorithm; none twice.
     ///
     /// # Errors
-    /// [`ScoreError`].
-    pub(super) fn entries(&mut self, sessions: &[&ScoredSession]) -> Result<Vec<Entry>, ScoreError> {
+    /// [`Refusal`].
+    pub(super) fn entries(&mut self, sessions: &[&ScoredSession]) -> Result<Vec<Entry>, Refusal> {
         let asked = self.settings;
         let own = asked.decoders.iter().map(|spec| Algorithm::Own(spec));
         let external = asked.external.iter().map(|given| Algorithm::External(&**given));
@@ -150,9 +150,9 @@ impl<'a> Trainer<'a> {
                         .iter()
                         .map(|&(place, scored)| self.decoder(algorithm, place, scored));
                     let decoders = if of_object {
-                        decoders.collect::<Result<Vec<_>, ScoreError>>()?
+                        decoders.collect::<Result<Vec<_>, Refusal>>()?
                     } else {
-                        let one = decoders.take(1).collect::<Result<Vec<_>, ScoreError>>()?;
+                        let one = decoders.take(1).collect::<Result<Vec<_>, Refusal>>()?;
                         one.into_iter().cycle().take(sessions.len()).collect()
                     };
                     for &sensing in &asked.sensing {
@@ -223,12 +223,7 @@ impl<'a> Trainer<'a> {
             })
     }
 
-    fn decoder(
-        &self,
-        algorithm: Algorithm<'_>,
-        place: usize,
-        scored: Scored<'_>,
-    ) -> Result<TrainedDecoder, ScoreError> {
+    fn decoder(&self, algorithm: Algorithm<'_>, place: usize, scored: Scored<'_>) -> Result<TrainedDecoder, Refusal> {
         let data = &self.prepared[place].data;
         Ok(match algorithm {
             Algorithm::Own(spec) => TrainedDecoder::new(spec, data)?,

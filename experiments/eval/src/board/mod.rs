@@ -12,7 +12,7 @@ pub use crate::windows::{Press, Window};
 pub use against::{Difference, Regression, differences, regressions};
 pub use table::{table, write};
 
-use crate::algorithm::{Contender, DecodeError, ScoreError};
+use crate::algorithm::{Contender, DecodeError};
 use crate::alignment::SessionSlip;
 use crate::decoders::DecoderSpec;
 use crate::place::{PlaceRow, places, touch_places};
@@ -77,8 +77,8 @@ impl TrainedBoard<'_> {
     /// Decodes and scores every press. `done` is called after each.
     ///
     /// # Errors
-    /// [`ScoreError`].
-    pub fn score(&self, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, ScoreError> {
+    /// [`Refusal`].
+    pub fn score(&self, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, Refusal> {
         let (rows, objects) = self.run.score(&self.entries, done)?;
         Ok(ScoreBoard {
             rows,
@@ -92,8 +92,8 @@ impl TrainedBoard<'_> {
     /// without any recording of either, there are none at all.
     ///
     /// # Errors
-    /// [`ScoreError`].
-    pub fn localise(&self) -> Result<Vec<PlaceRow>, ScoreError> {
+    /// [`Refusal`].
+    pub fn localise(&self) -> Result<Vec<PlaceRow>, Refusal> {
         let shifted = self.dictionary.as_ref().map(|atoms| self.source.shifted(atoms));
         let measurements = &self.settings.localisation;
         let mut rows = Vec::new();
@@ -129,8 +129,8 @@ impl BoardSettings {
     /// Trains everything that [`TrainedBoard::score`] needs.
     ///
     /// # Errors
-    /// [`ScoreError`] if there is nothing to score, or no training data.
-    pub fn learn<'a>(&'a self, source: &'a Source) -> Result<TrainedBoard<'a>, ScoreError> {
+    /// [`Refusal`] if there is nothing to score, or no training data.
+    pub fn learn<'a>(&'a self, source: &'a Source) -> Result<TrainedBoard<'a>, Refusal> {
         let asked = |s: &&ScoredSession| {
             self.objects.is_empty() || self.objects.contains(&s.object) || self.objects.contains(&s.name)
         };
@@ -139,10 +139,11 @@ impl BoardSettings {
         let known = |name: &&String| sessions.iter().any(|s| s.object == **name || s.name == **name);
         if let Some(name) = self.objects.iter().find(|name| !known(name)) {
             let valid: Vec<&str> = scorable().map(ScoredSession::title).collect();
-            return Err(ScoreError::Sessions(Refusal::new(format!(
+            let problem = format!(
                 "object {name:?} has no compressive session; valid: {}",
                 valid.join(", ")
-            ))));
+            );
+            return Err(Refusal::new(problem).at(source.root.display()));
         }
         let places = !self.localisation.is_empty();
         let touches = places && !source.touches.is_empty();
@@ -173,7 +174,7 @@ impl BoardSettings {
 }
 
 /// The error of a `source` without anything to score: its sessions, each with what it has.
-pub(crate) fn no_session(source: &Source) -> ScoreError {
+pub(crate) fn no_session(source: &Source) -> Refusal {
     let each = source.sessions.iter().map(|session| {
         let modes = match (session.raster.is_some(), session.compressive.is_some()) {
             (true, true) => "both",
@@ -187,9 +188,8 @@ pub(crate) fn no_session(source: &Source) -> ScoreError {
         none if none.is_empty() => "no session of presses".to_owned(),
         each => each.join(", "),
     };
-    ScoreError::Sessions(Refusal::new(format!(
-        "scoring needs an object with both a raster and a compressive recording; found: {found}"
-    )))
+    let problem = format!("scoring needs an object with both a raster and a compressive recording; found: {found}");
+    Refusal::new(problem).at(source.root.display())
 }
 
 /// Windows that are timed.
@@ -220,15 +220,15 @@ impl Run<'_> {
         &self,
         slots: usize,
         done: &(dyn Fn() + Sync),
-        measure: impl Fn(usize, usize) -> Result<Vec<T>, ScoreError> + Sync,
-    ) -> Result<Vec<Vec<Vec<T>>>, ScoreError> {
+        measure: impl Fn(usize, usize) -> Result<Vec<T>, Refusal> + Sync,
+    ) -> Result<Vec<Vec<Vec<T>>>, Refusal> {
         let presses = self.presses();
         let each = presses.par_iter().map(|&(session, block)| {
             let values = measure(session, block);
             done();
             values
         });
-        let each = each.collect::<Result<Vec<Vec<T>>, ScoreError>>()?;
+        let each = each.collect::<Result<Vec<Vec<T>>, Refusal>>()?;
         let of_slot = |_| self.sessions.iter().map(|_| Vec::new()).collect();
         let mut slots: Vec<Vec<Vec<T>>> = (0..slots).map(of_slot).collect();
         for ((session, _), values) in presses.iter().zip(each) {
@@ -250,12 +250,8 @@ impl Run<'_> {
     /// evaluation. `done` is called after every press.
     ///
     /// # Errors
-    /// [`ScoreError`] of an external program, or when no rows can be chosen.
-    pub(crate) fn tallies(
-        &self,
-        entries: &[Entry],
-        done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<Vec<Vec<Tally>>>, ScoreError> {
+    /// [`Refusal`] of an external program, or when no rows can be chosen.
+    pub(crate) fn tallies(&self, entries: &[Entry], done: &(dyn Fn() + Sync)) -> Result<Vec<Vec<Vec<Tally>>>, Refusal> {
         let slots = entries.len() * self.measurements.len();
         self.each_press(slots, done, |session, block| {
             let scored = self.sessions[session];
@@ -268,17 +264,13 @@ impl Run<'_> {
                 let label = entry.knows_classes.then_some(scored.label);
                 let each = self.measurements.iter();
                 each.map(|&m| Ok(scorer.score(press, m, label)?))
-                    .collect::<Result<Vec<Tally>, ScoreError>>()
+                    .collect::<Result<Vec<Tally>, Refusal>>()
             })?;
             Ok(tallies.concat())
         })
     }
 
-    fn score(
-        &self,
-        entries: &[Entry],
-        done: &(dyn Fn() + Sync),
-    ) -> Result<(Vec<BoardRow>, Vec<ObjectRow>), ScoreError> {
+    fn score(&self, entries: &[Entry], done: &(dyn Fn() + Sync)) -> Result<(Vec<BoardRow>, Vec<ObjectRow>), Refusal> {
         let tallies = self.tallies(entries, done)?;
         let times = if self.times { self.times(entries)? } else { Vec::new() };
         for decoder in entries.iter().flat_map(|entry| &entry.decoders) {
@@ -342,8 +334,8 @@ impl Run<'_> {
         session: usize,
         press: &ScoredPress<'_>,
         classes: impl Fn(&Entry) -> bool,
-        mut score: impl FnMut(&Entry, &ScoredPress<'_>) -> Result<T, ScoreError>,
-    ) -> Result<Vec<T>, ScoreError> {
+        mut score: impl FnMut(&Entry, &ScoredPress<'_>) -> Result<T, Refusal>,
+    ) -> Result<Vec<T>, Refusal> {
         let mut chosen: Vec<(&Arc<RowChooser>, bool, ScoredPress<'_>)> = Vec::new();
         let mut scores = Vec::new();
         for entry in entries {

@@ -8,13 +8,14 @@ use crate::table::{Cell, Table, TextTable, fixed};
 use crate::tally::Scores;
 use crate::training::{PUBLISHED, RASTER};
 use crate::unique;
-use spts::output::{OutputError, OutputFolder, write_json};
+use spts::output::{OutputFolder, write_json};
+use spts_input::Refusal;
 
 /// Writes `board.json`, `board.csv`, `objects.csv` and `localisation.csv` into the folder `out`.
 ///
 /// # Errors
-/// [`OutputError`] if a file cannot be written.
-pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), OutputError> {
+/// [`Refusal`] if a file cannot be written.
+pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), Refusal> {
     write_json(&out.path("board.json"), board)?;
     rows(&board.rows).write(out)?;
     keyed(Table::new("objects", &board.objects), |r| &r.key)

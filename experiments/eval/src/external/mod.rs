@@ -13,7 +13,7 @@
 
 mod program;
 
-use crate::algorithm::{Algorithm, Answer, Class, Contender, DecodeError, ExternalError, ScoreError, Trained};
+use crate::algorithm::{Algorithm, Answer, Class, Contender, DecodeError, Trained};
 use crate::labels::Labels;
 use crate::training::TrainingData;
 use crate::windows::Window;
@@ -66,12 +66,7 @@ impl Contender for ExternalCommand {
         &self.name
     }
 
-    fn learn(
-        &self,
-        data: &TrainingData,
-        labels: &Labels,
-        left_out: Option<&str>,
-    ) -> Result<Arc<dyn Trained>, ScoreError> {
+    fn learn(&self, data: &TrainingData, labels: &Labels, left_out: Option<&str>) -> Result<Arc<dyn Trained>, Refusal> {
         let valid = Valid::new(data, labels, left_out);
         let ([rows, cols], images) = (data.shape, data.library.images());
         let images: Vec<Vec<f64>> = (0..images.ncols()).map(|k| images.column(k)).collect();
@@ -92,17 +87,14 @@ impl Trained for External {
     }
 
     fn finish(&self) -> Result<(), DecodeError> {
-        Ok(self.0.lock().unwrap_or_else(PoisonError::into_inner).finish()?)
+        let mut stream = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        stream.finish().map_err(DecodeError::External)
     }
 }
 
-fn said(message: String) -> ExternalError {
-    ExternalError::Refused(Refusal::new(message))
-}
-
 /// The error of a command or its pipes.
-fn broken(command: &str, source: std::io::Error) -> ExternalError {
-    ExternalError::Refused(Refusal::from_error(source).at(format_args!("`{command}`")))
+fn broken(command: &str, source: std::io::Error) -> Refusal {
+    Refusal::from_error(source).at(format_args!("`{command}`"))
 }
 
 /// Time for a program that has closed a pipe to end by itself, so that the error can say with which status; no longer
@@ -121,7 +113,7 @@ struct Stream {
     /// Number of windows sent.
     asked: usize,
     /// Why no more windows are sent. All threads that come later get this error at once.
-    failure: Option<ExternalError>,
+    failure: Option<Refusal>,
     finished: bool,
 }
 
@@ -131,7 +123,7 @@ impl Stream {
         ExternalCommand { command, limit, .. }: &ExternalCommand,
         valid: Valid,
         header: &serde_json::Value,
-    ) -> Result<Self, ExternalError> {
+    ) -> Result<Self, Refusal> {
         let mut shell = Command::new("sh");
         shell
             .arg("-c")
@@ -157,7 +149,7 @@ impl Stream {
         })
     }
 
-    fn answer(&mut self, window: &Window<'_>) -> Result<Answer, ExternalError> {
+    fn answer(&mut self, window: &Window<'_>) -> Result<Answer, Refusal> {
         if let Some(failure) = &self.failure {
             return Err(failure.clone());
         }
@@ -169,13 +161,13 @@ impl Stream {
     }
 
     /// Ends the program, which is not asked any more.
-    fn fail(&mut self, error: &ExternalError) {
+    fn fail(&mut self, error: &Refusal) {
         self.failure = Some(error.clone());
         // it has failed already
         let _ = self.process.end();
     }
 
-    fn ask(&mut self, window: &Window<'_>) -> Result<Answer, ExternalError> {
+    fn ask(&mut self, window: &Window<'_>) -> Result<Answer, Refusal> {
         let deadline = Instant::now() + self.limit;
         // what waits here was written before the question
         match self.pipes.waiting() {
@@ -207,20 +199,20 @@ impl Stream {
     }
 
     /// The error of what was waited for.
-    fn too_late(&self, waited: String) -> ExternalError {
-        ExternalError::Late {
-            command: self.command.clone(),
-            waited,
-            limit: self.limit,
-        }
+    fn too_late(&self, waited: String) -> Refusal {
+        Refusal::new(format!(
+            "`{}` was ended: {waited} took longer than the limit of {} s; `--external-timeout` sets another limit",
+            self.command,
+            self.limit.as_secs_f64()
+        ))
     }
 
     /// The error of an answer to `window` with a problem.
-    fn refused(&self, window: &str, problem: &str) -> ExternalError {
-        said(format!("`{}` answered {window} with {problem}", self.command))
+    fn refused(&self, window: &str, problem: &str) -> Refusal {
+        Refusal::new(format!("`{}` answered {window} with {problem}", self.command))
     }
 
-    fn late(&self) -> ExternalError {
+    fn late(&self) -> Refusal {
         let waited = match self.pipes.waits_for() {
             Asked::Write(0) => "reading the header".to_owned(),
             Asked::Write(window) => format!("reading window {window}"),
@@ -230,7 +222,7 @@ impl Stream {
     }
 
     /// The error of `event` in place of an answer.
-    fn unexpected(&mut self, event: &Event, deadline: Instant) -> ExternalError {
+    fn unexpected(&mut self, event: &Event, deadline: Instant) -> Refusal {
         match event {
             Event::Failed(error) => broken(&self.command, error.kind().into()),
             Event::Line(_) => self.surplus(self.asked + 1),
@@ -248,14 +240,14 @@ impl Stream {
                     _ => "closed its input".to_owned(),
                 };
                 let (command, waited) = (&self.command, self.asked.max(1));
-                said(format!("`{command}` {how} before it had answered window {waited}"))
+                Refusal::new(format!("`{command}` {how} before it had answered window {waited}"))
             }
         }
     }
 
-    fn surplus(&self, line: usize) -> ExternalError {
+    fn surplus(&self, line: usize) -> Refusal {
         let Self { command, asked, .. } = self;
-        said(format!(
+        Refusal::new(format!(
             "`{command}` wrote line {line} of its output before it had read window {line} ({asked} windows had been \
              sent); it must write one line a window, after reading the window"
         ))
@@ -263,7 +255,7 @@ impl Stream {
 
     /// Tells the program that nothing comes any more, and waits for its end: it must write nothing else, and end well.
     /// Does nothing for a second time.
-    fn finish(&mut self) -> Result<(), ExternalError> {
+    fn finish(&mut self) -> Result<(), Refusal> {
         if let Some(failure) = &self.failure {
             return Err(failure.clone());
         }
@@ -278,7 +270,7 @@ impl Stream {
         finished
     }
 
-    fn wait_for_end(&mut self) -> Result<(), ExternalError> {
+    fn wait_for_end(&mut self) -> Result<(), Refusal> {
         let deadline = Instant::now() + self.limit;
         self.pipes.close();
         // the program may write for as long as it runs
@@ -302,7 +294,7 @@ impl Stream {
         }
         match status {
             Ok(status) if status.success() => Ok(()),
-            status => Err(said(format!(
+            status => Err(Refusal::new(format!(
                 "`{}` ended with an error ({}) after its last answer; its answers are not scored",
                 self.command,
                 in_words(&status)
@@ -322,7 +314,7 @@ impl Algorithm for Turn<'_> {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
         // a thread that panicked while it held the program leaves it with an answer too many, which is noticed
         let mut stream = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        *answer = stream.answer(window)?;
+        *answer = stream.answer(window).map_err(DecodeError::External)?;
         Ok(())
     }
 }

@@ -7,7 +7,6 @@ pub(crate) use contacts::touch_of;
 pub use contacts::{RecordedBounce, RecordedTouch, contact_image, find_bounces, find_touches};
 pub use locators::locator_label;
 
-use crate::algorithm::ScoreError;
 use crate::sensing::{Sensing, chosen_places};
 use crate::training::Dictionary;
 use crate::windows::Press;
@@ -27,13 +26,13 @@ const PUBLISHED: [&str; 2] = ["script_s5", "matched"];
 /// Rows of the published locators at every M of `measurements`, of the contacts as recorded.
 ///
 /// # Errors
-/// [`ScoreError`] when the sheet is no grid of `cols` columns.
+/// [`Refusal`] when the sheet is no grid of `cols` columns.
 pub(crate) fn localise(
     recording: &Recording,
     shifted: &Matrix,
     cols: usize,
     measurements: &[usize],
-) -> Result<Vec<LocalisationRow>, ScoreError> {
+) -> Result<Vec<LocalisationRow>, Refusal> {
     let asked = PlacesRequest::new(measurements, |name| PUBLISHED.contains(&name));
     let tools = Tools::new(recording, shifted.clone(), cols)?;
     let found = asked.locate(BALL, &tools, &bounces(recording, tools.shape))?;
@@ -51,14 +50,14 @@ pub(crate) fn localise(
 /// `sensing`.
 ///
 /// # Errors
-/// [`ScoreError`] when the sheet is no grid of `cols` columns, or when no rows can be chosen.
+/// [`Refusal`] when the sheet is no grid of `cols` columns, or when no rows can be chosen.
 pub(crate) fn places(
     recording: &Recording,
     shifted: Matrix,
     cols: usize,
     measurements: &[usize],
     sensing: &[Sensing],
-) -> Result<Vec<PlaceRow>, ScoreError> {
+) -> Result<Vec<PlaceRow>, Refusal> {
     let asked = PlacesRequest {
         relabelled: true,
         sensing,
@@ -74,13 +73,13 @@ pub(crate) fn places(
 /// that need one have no rows.
 ///
 /// # Errors
-/// [`ScoreError`] when the sheet is no grid of `cols` columns.
+/// [`Refusal`] when the sheet is no grid of `cols` columns.
 pub(crate) fn touch_places(
     name: &str,
     recording: &Recording,
     shifted: Option<&Matrix>,
     measurements: &[usize],
-) -> Result<Vec<PlaceRow>, ScoreError> {
+) -> Result<Vec<PlaceRow>, Refusal> {
     let asked = PlacesRequest::new(measurements, |name| shifted.is_some() || !PUBLISHED.contains(&name));
     let shifted = shifted.cloned().unwrap_or_else(|| Matrix::zeros(recording.taxels(), 1));
     let tools = Tools::new(recording, shifted, recording.layout().cols())?;
@@ -128,7 +127,7 @@ fn touches(recording: &Recording, touches: &[RecordedTouch], shape: [usize; 2]) 
 
 impl Tools {
     /// Tools for the skin of `recording`, with `cols` columns.
-    fn new(recording: &Recording, shifted: Matrix, cols: usize) -> Result<Self, ScoreError> {
+    fn new(recording: &Recording, shifted: Matrix, cols: usize) -> Result<Self, Refusal> {
         let shape = [recording.taxels() / cols.max(1), cols];
         Ok(Self {
             shape,
@@ -161,8 +160,8 @@ impl<'a> PlacesRequest<'a> {
     /// Rows of `contacts`, called `name`, each with the median of its distances; none without a window.
     ///
     /// # Errors
-    /// [`ScoreError`] when no rows can be chosen.
-    fn locate(&self, name: &str, tools: &Tools, contacts: &[Contact]) -> Result<Vec<(PlaceRow, f64)>, ScoreError> {
+    /// [`Refusal`] when no rows can be chosen.
+    fn locate(&self, name: &str, tools: &Tools, contacts: &[Contact]) -> Result<Vec<(PlaceRow, f64)>, Refusal> {
         let mut views: Vec<(bool, &Contact, [usize; 2])> = contacts.iter().flat_map(views).collect();
         views.retain(|(relabelled, ..)| self.relabelled || !relabelled);
         let errors: Vec<Vec<Vec<f64>>> = views

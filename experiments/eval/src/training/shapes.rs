@@ -43,7 +43,7 @@ pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
     overrides.insert("rows".to_owned(), (presses as i64).into());
     overrides.insert("seed".to_owned(), ((seed >> 2) as i64).into());
     overrides.insert("skin".to_owned(), skin.into());
-    let spec = Spec::load(SHAPES_SPEC, &overrides).map_err(Refusal::from_error)?;
+    let spec = Spec::load(SHAPES_SPEC, &overrides)?;
     let chunks = (0..presses.div_ceil(CHUNK)).into_par_iter();
     let chunks = chunks.map(|chunk| conductances(&spec, chunk * CHUNK..((chunk + 1) * CHUNK).min(presses)));
     let columns = chunks.collect::<Result<Vec<_>, Refusal>>()?.concat();
@@ -54,7 +54,7 @@ pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
 fn conductances(spec: &Spec, rows: Range<u64>) -> Result<Vec<Vec<f64>>, Refusal> {
     let mut maker = Maker::new(spec);
     let scaled = |row| {
-        let made = maker.row(row).map_err(Refusal::from_error)?;
+        let made = maker.row(row)?;
         let image = made.conductance().values();
         let peak = image.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         Ok(image.iter().map(|v| v / peak).collect())
@@ -150,7 +150,7 @@ impl PoseKnowledge {
             layout.electrode_m(),
             tilt = self.tilt_sd_deg,
         );
-        let spec = Spec::from_toml(&text, &toml::Table::new(), ".".as_ref()).map_err(Refusal::from_error)?;
+        let spec = Spec::from_toml(&text, &toml::Table::new(), ".".as_ref())?;
         let images = conductances(&spec, 0..PRESSES_OF_AN_OBJECT)?;
         Ok(Matrix::from_column_slices(layout.taxels(), &images))
     }

@@ -8,7 +8,7 @@ use rand::RngExt as _;
 use rayon::prelude::*;
 use spts::Session;
 use spts::chain::{Acquisition, DEFAULT_READOUT};
-use spts::record::{Twin, TwinError};
+use spts::record::Twin;
 use spts::scene::{PressConfig, Scene};
 use spts::session::{Event, Recorded};
 use spts_circuit::{Block, Mode, Recording};
@@ -92,8 +92,8 @@ impl Skins {
             let refused = |e: Refusal| e.at(object.name);
             let blocks = (0..self.skins).into_par_iter();
             let blocks = blocks.map(|skin| self.press_one(object, seed, skin, done));
-            let blocks = blocks.collect::<Result<Vec<_>, TwinError>>();
-            let raster = joined(blocks.map_err(|e| refused(Refusal::from_error(e)))?).map_err(refused)?;
+            let blocks = blocks.collect::<Result<Vec<_>, Refusal>>();
+            let raster = joined(blocks.map_err(refused)?).map_err(refused)?;
             let session = Session {
                 hold_s: Some(PUBLISHED_HOLD_S),
                 raster: Some(Recorded::new(raster)),
@@ -118,7 +118,7 @@ impl Skins {
         seed: u64,
         skin: usize,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Recording, TwinError> {
+    ) -> Result<Recording, Refusal> {
         let label = u64::from(object.label);
         // the skin follows from the scene's seed, and is the same for all objects
         let seed = Streams::new(seed).rng("learn/skin", skin as u64).random::<u64>() >> 1;

@@ -1,7 +1,7 @@
 //! The two animations of the report.
 
 use super::Animation;
-use spts::output::{OutputError, write_bytes};
+use spts::output::write_bytes;
 use spts::scene::Assignment;
 use spts::simulate::{Request, run};
 use spts_eval::training::TrainingData;
@@ -47,29 +47,11 @@ pub const MOTION_FIGURES: [MotionFigure; 2] = [
     },
 ];
 
-/// An animation of the report that could not be made.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MotionError {
-    /// Its scene records nothing.
-    #[error("{scene}: nothing was recorded")]
-    Unrecorded {
-        /// The scene.
-        scene: &'static str,
-    },
-    /// The scene cannot be simulated, or its recording not be decoded.
-    #[error(transparent)]
-    Refused(#[from] Refusal),
-    /// A file cannot be written.
-    #[error(transparent)]
-    Report(#[from] OutputError),
-}
-
 /// Simulates the scenes of [`MOTION_FIGURES`] with the root `seed` and writes their files into `folder`.
 ///
 /// # Errors
-/// [`MotionError`].
-pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), MotionError> {
+/// [`Refusal`] when a scene cannot be simulated or records nothing, or a file cannot be written.
+pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), Refusal> {
     for figure in MOTION_FIGURES {
         let assignment: Assignment = format!("seed={seed}").parse()?;
         let request = Request {
@@ -80,10 +62,10 @@ pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), MotionError> {
         let mut frames = Vec::new();
         let simulation = run(&prepared, true, &|| (), |piece| {
             frames.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
-            Ok::<_, Refusal>(())
+            Ok(())
         })?;
-        let unrecorded = MotionError::Unrecorded { scene: figure.scene };
-        let session = simulation.first.as_ref().ok_or(unrecorded)?;
+        let unrecorded = || Refusal::new("nothing was recorded").at(figure.scene);
+        let session = simulation.first.as_ref().ok_or_else(unrecorded)?;
         let training = TrainingData::for_layout(prepared.scene.skin(), Streams::new(1))?;
         let animation = Animation::new(&prepared, &frames, session, Some(&training))?;
         let [moving, still] = [figure.file, figure.still].map(|name| folder.join(name));

@@ -8,14 +8,14 @@ mod picture;
 mod tests;
 mod timeline;
 
-pub use figures::{MOTION_FIGURES, MotionError, MotionFigure, simulate_motion};
+pub use figures::{MOTION_FIGURES, MotionFigure, simulate_motion};
 
 use self::gif::{Palette, gif};
 use crate::figures::canvas::{Canvas, paint, png_of};
 use picture::COLUMNS;
 use rayon::prelude::*;
 use spts::Session;
-use spts::output::OutputError;
+use spts::output::unwritable;
 use spts::scene::Task;
 use spts::simulate::Prepared;
 use spts_contact::Frame;
@@ -153,8 +153,8 @@ impl Animation {
     /// file they are for, named in errors.
     ///
     /// # Errors
-    /// [`OutputError`] when there is not enough memory.
-    pub fn gif(&self, path: &Path) -> Result<Vec<u8>, OutputError> {
+    /// [`Refusal`] when there is not enough memory.
+    pub fn gif(&self, path: &Path) -> Result<Vec<u8>, Refusal> {
         let palette = Palette::new();
         let paint = |k: usize| {
             let (width, height, rgb) = paint(&self.picture(k))?;
@@ -162,12 +162,11 @@ impl Animation {
         };
         let painted = (0..self.len()).into_par_iter().map(paint);
         let painted: std::io::Result<Vec<_>> = painted.collect();
-        let painted = painted.map_err(OutputError::write(path))?;
+        let painted = painted.map_err(unwritable(path))?;
         let size = painted.first().map_or([1; 2], |(_, size)| *size);
         let [width, height] = size.map(|side| u16::try_from(side).unwrap_or(u16::MAX));
         let pictures: Vec<Vec<u8>> = painted.into_iter().map(|(picture, _)| picture).collect();
-        gif(&pictures, (width, height), &palette)
-            .map_err(|error| OutputError::write(path)(std::io::Error::other(error)))
+        gif(&pictures, (width, height), &palette).map_err(unwritable(path))
     }
 
     /// The picture with the largest pressure, as the bytes of a PNG file; `path` is the file they are for, named in
@@ -175,11 +174,11 @@ impl Animation {
     ///
     /// # Errors
     /// As [`Animation::gif`].
-    pub fn still(&self, path: &Path) -> Result<Vec<u8>, OutputError> {
+    pub fn still(&self, path: &Path) -> Result<Vec<u8>, Refusal> {
         let sum = |k: &usize| self.pressures[*k].iter().sum::<f64>();
         let strongest = (0..self.len()).max_by(|a, b| sum(a).total_cmp(&sum(b)));
         let canvas = strongest.map_or_else(|| Canvas::new(1.0, 1.0, ""), |k| self.picture(k));
-        png_of(&canvas).map_err(OutputError::write(path))
+        png_of(&canvas).map_err(unwritable(path))
     }
 }
 

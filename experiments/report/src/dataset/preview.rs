@@ -4,7 +4,6 @@ use crate::figures::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, save
 use crate::figures::colour::{FRAME, INK, MUTED, Rgb};
 use crate::figures::draw_heat;
 use serde_json::Value;
-use spts::output::OutputError;
 use spts_input::Refusal;
 use std::path::Path;
 
@@ -57,8 +56,8 @@ struct Card {
 /// so that light touches are seen beside firm ones.
 ///
 /// # Errors
-/// [`OutputError`] when the file cannot be written.
-pub fn save_preview(preview: &Preview, path: &Path) -> Result<(), OutputError> {
+/// [`Refusal`] when the file cannot be written.
+pub fn save_preview(preview: &Preview, path: &Path) -> Result<(), Refusal> {
     save_png(&layout(preview), path)
 }
 

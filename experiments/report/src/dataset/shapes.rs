@@ -3,7 +3,6 @@
 use crate::figures::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, resample, save_png, wrap};
 use crate::figures::colour::{FRAME, INK, MUTED, Rgb, WHITE};
 use rayon::prelude::*;
-use spts::output::OutputError;
 use spts_contact::mesh::TriMesh;
 use spts_contact::shapes::{Shape, ShapeFamily, ShapeRanges};
 use spts_input::Refusal;
@@ -53,8 +52,8 @@ pub fn drawn_shapes(families: &[&ShapeFamily], seed: u64, count: usize) -> Resul
 /// Draws the undersides of `shapes`, those of a family together, all to one scale.
 ///
 /// # Errors
-/// [`OutputError`] when the file cannot be written.
-pub fn save_shapes(shapes: &[Shape], path: &Path) -> Result<(), OutputError> {
+/// [`Refusal`] when the file cannot be written.
+pub fn save_shapes(shapes: &[Shape], path: &Path) -> Result<(), Refusal> {
     save_png(&layout(shapes), path)
 }
 

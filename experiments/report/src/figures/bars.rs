@@ -4,7 +4,7 @@ use super::axis::Axis;
 use super::canvas::{Anchor, Canvas, Point, TextStyle, save, text_width, widest};
 use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
 use super::looks::{Style, draw_marker, ink};
-use spts::output::OutputError;
+use spts_input::Refusal;
 use std::path::Path;
 
 /// The value that a bar shows, and its standard error, which is drawn as an error bar.
@@ -49,8 +49,8 @@ pub struct BarChart {
 /// Writes the figure to `dir/name.svg` and `dir/name.png`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn save_bars(chart: &BarChart, dir: &Path, name: &str) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn save_bars(chart: &BarChart, dir: &Path, name: &str) -> Result<(), Refusal> {
     save(&layout(chart), dir, name)
 }
 
@@ -237,8 +237,8 @@ pub struct IntervalChart {
 /// Writes the figure to `dir/name.svg` and `dir/name.png`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn save_intervals(chart: &IntervalChart, dir: &Path, name: &str) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn save_intervals(chart: &IntervalChart, dir: &Path, name: &str) -> Result<(), Refusal> {
     save(&interval_layout(chart), dir, name)
 }
 

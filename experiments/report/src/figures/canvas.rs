@@ -10,8 +10,9 @@ use base64::engine::general_purpose::STANDARD;
 use png::{ColorType, DeflateCompression, Encoder, Filter};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree, fontdb::Database};
-use spts::output::{OutputError, write_bytes};
+use spts::output::{unwritable, write_bytes};
 use spts_eval::escape;
+use spts_input::Refusal;
 use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
@@ -348,9 +349,9 @@ static PAINTING: LazyLock<Options<'static>> = LazyLock::new(|| {
 /// Writes a figure to `dir/name.svg` and `dir/name.png`. The folder is made if it is missing.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn save(canvas: &Canvas, dir: &Path, name: &str) -> Result<(), OutputError> {
-    std::fs::create_dir_all(dir).map_err(OutputError::write(dir))?;
+/// [`Refusal`] when a file cannot be written.
+pub fn save(canvas: &Canvas, dir: &Path, name: &str) -> Result<(), Refusal> {
+    std::fs::create_dir_all(dir).map_err(unwritable(dir))?;
     write_bytes(&dir.join(format!("{name}.svg")), canvas.svg().as_bytes())?;
     save_png(canvas, &dir.join(format!("{name}.png")))
 }
@@ -358,9 +359,9 @@ pub fn save(canvas: &Canvas, dir: &Path, name: &str) -> Result<(), OutputError> 
 /// Writes a figure as PNG.
 ///
 /// # Errors
-/// [`OutputError`] when the file cannot be written.
-pub(crate) fn save_png(canvas: &Canvas, path: &Path) -> Result<(), OutputError> {
-    write_bytes(path, &png_of(canvas).map_err(OutputError::write(path))?)
+/// [`Refusal`] when the file cannot be written.
+pub(crate) fn save_png(canvas: &Canvas, path: &Path) -> Result<(), Refusal> {
+    write_bytes(path, &png_of(canvas).map_err(unwritable(path))?)
 }
 
 /// A figure as the bytes of a PNG file.

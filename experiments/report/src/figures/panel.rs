@@ -6,7 +6,7 @@ use super::chart::{Chart, Claim, Series};
 use super::colour::{CLAIM, GRID, INK, MUTED, WHITE};
 use super::legend::{Legend, LegendKey, RANGE_OPACITY, draw_labels, draw_marks, entries};
 use super::looks::{Style, dash, draw_marker, ink, ring, star};
-use spts::output::OutputError;
+use spts_input::Refusal;
 use std::path::Path;
 
 /// Size of tick labels.
@@ -29,8 +29,8 @@ const MARKERS: usize = 40;
 /// More than three panels are wrapped into rows.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub fn save_charts(charts: &[Chart], dir: &Path, name: &str) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub fn save_charts(charts: &[Chart], dir: &Path, name: &str) -> Result<(), Refusal> {
     save(&layout(charts), dir, name)
 }
 

@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::canvas::{Anchor, Canvas, LINE_HEIGHT, Point, TextStyle, save, save_png, text_width, widest, wrap};
 use super::colour::{FRAME, GRID, INK, MISSING, MUTED, OUTLINE, Rgb, WHITE, heat};
-use spts::output::OutputError;
+use spts_input::Refusal;
 use std::path::Path;
 
 /// One cell of a sheet.
@@ -114,8 +114,8 @@ struct SheetGrid {
 /// Writes a sheet to `dir/name.svg` and `dir/name.png`.
 ///
 /// # Errors
-/// [`OutputError`] when a tile's values do not fill its grid, or a file cannot be written.
-pub fn save_sheet(sheet: &Sheet, dir: &Path, name: &str) -> Result<(), OutputError> {
+/// [`Refusal`] when a tile's values do not fill its grid, or a file cannot be written.
+pub fn save_sheet(sheet: &Sheet, dir: &Path, name: &str) -> Result<(), Refusal> {
     let path = dir.join(format!("{name}.svg"));
     for tile in sheet.rows.iter().flat_map(|row| &row.tiles) {
         let (len, rows, cols, marks) = match tile {
@@ -338,8 +338,8 @@ fn draw_bars(canvas: &mut Canvas, values: &[f64], highlight: usize, (x, y): Poin
 }
 
 /// The error of values that do not fill the grid that they are said to fill.
-fn misshapen(path: &Path, len: usize, rows: usize, cols: usize) -> OutputError {
-    OutputError::new(path, format!("{len} values do not fill {rows} × {cols} cells"))
+fn misshapen(path: &Path, len: usize, rows: usize, cols: usize) -> Refusal {
+    Refusal::new(format!("{len} values do not fill {rows} × {cols} cells")).at(path.display())
 }
 
 /// Taxels up to which an image is drawn as rectangles; a larger one is a picture.
@@ -440,7 +440,7 @@ const BAR_STEPS: u32 = 140;
 /// one as grey.
 ///
 /// # Errors
-/// [`OutputError`] when the values do not fill the grid, or the file cannot be written.
+/// [`Refusal`] when the values do not fill the grid, or the file cannot be written.
 pub fn pressure_png(
     values: &[f64],
     rows: usize,
@@ -449,7 +449,7 @@ pub fn pressure_png(
     scale: f64,
     title: &str,
     path: &Path,
-) -> Result<(), OutputError> {
+) -> Result<(), Refusal> {
     if values.len() != rows * cols || values.is_empty() {
         return Err(misshapen(path, values.len(), rows, cols));
     }

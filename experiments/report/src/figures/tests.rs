@@ -3,7 +3,7 @@
 use super::canvas::{Canvas, TextStyle};
 use super::colour::heat;
 use super::{Chart, Claim, Series, Sheet, StatedRange, Style, Tile, TileRow, pressure_png, save_charts, save_sheet};
-use spts::output::OutputError;
+use spts_input::Refusal;
 use std::path::Path;
 
 /// Tags of a document, checked to open and close in pairs; text must hold no bare `&` and attributes be quoted.
@@ -49,7 +49,7 @@ pub(crate) fn check_markup(text: &str, void: &[&str]) -> Result<usize, String> {
 }
 
 /// Writes `charts` and a sheet, and checks that their files are well formed and of one size.
-fn check(name: &str, save: impl Fn(&Path) -> Result<(), OutputError>) {
+fn check(name: &str, save: impl Fn(&Path) -> Result<(), Refusal>) {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().join("figures");
     save(&folder).unwrap();

@@ -1,11 +1,10 @@
 //! The readout beside the recordings it is fitted to: the skin's own images through the twin's electronics.
 
-use super::ReproduceError;
 use super::page::section;
 use crate::{PageTable, Section, compare};
-use spts::output::OutputError;
 use spts::progress::Progress;
 use spts_eval::PublishedSkin;
+use spts_input::Refusal;
 use spts_studies::calibrate::read;
 use spts_studies::compare::{CompareReport, CompareStudy, Images};
 use std::path::Path;
@@ -20,7 +19,7 @@ impl ReadoutSection {
         real: &PublishedSkin,
         seed: u64,
         progress: &dyn Progress,
-    ) -> Result<Self, ReproduceError> {
+    ) -> Result<Self, Refusal> {
         let study = CompareStudy {
             recordings,
             pairs: &read(recordings)?,
@@ -33,7 +32,7 @@ impl ReadoutSection {
     }
 
     /// Writes the tables into `tables` and the figures into `figures`.
-    pub(super) fn write(&self, tables: &Path, figures: &Path) -> Result<(), OutputError> {
+    pub(super) fn write(&self, tables: &Path, figures: &Path) -> Result<(), Refusal> {
         compare::statistics(self.0.all_statistics()).write_csv(&tables.join("readout_statistics_real.csv"))?;
         compare::curves(&self.0).write_csv(&tables.join("readout_curves_real.csv"))?;
         compare::draw(&self.0, figures)

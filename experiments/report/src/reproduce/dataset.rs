@@ -5,12 +5,13 @@ use rayon::prelude::*;
 use spts::Session;
 use spts::chain::Acquisition;
 use spts::provenance::{Provenance, combined_hash};
-use spts::record::{Twin, TwinError};
+use spts::record::Twin;
 use spts::scene::{DropConfig, Scene, SceneConfig, Task};
 use spts::session::Event;
 use spts_circuit::Mode;
 use spts_contact::objects::OBJECTS;
 use spts_eval::{SkinRun, SkinRunPresses};
+use spts_input::Refusal;
 use spts_sim::World;
 use spts_sim::render::{Camera, Picture, Renderer};
 use spts_sim::world::{Bounce, PressCourse};
@@ -83,12 +84,8 @@ pub(super) fn steps(size: &ReproductionSize) -> usize {
 /// Simulates the data set with root seed `seed`.
 ///
 /// # Errors
-/// [`TwinError`] when the mechanics or the readout fail.
-pub(super) fn simulate(
-    seed: u64,
-    size: &ReproductionSize,
-    done: &(dyn Fn() + Sync),
-) -> Result<SimulatedData, TwinError> {
+/// [`Refusal`] when the mechanics or the readout fail.
+pub(super) fn simulate(seed: u64, size: &ReproductionSize, done: &(dyn Fn() + Sync)) -> Result<SimulatedData, Refusal> {
     let objects = OBJECTS
         .par_iter()
         .map(|object| {
@@ -117,7 +114,7 @@ pub(super) fn simulate(
                 picture: picture(&scene, plateau_s).map_err(|e| e.to_string()),
             })
         })
-        .collect::<Result<Vec<_>, TwinError>>()?;
+        .collect::<Result<Vec<_>, Refusal>>()?;
     let scenes = LANDINGS
         .iter()
         .enumerate()
@@ -156,7 +153,7 @@ pub(super) fn simulate(
 }
 
 /// Scene of both sessions of an object.
-fn press_scene(object: &str, seed: u64, size: &ReproductionSize) -> Result<Scene, TwinError> {
+fn press_scene(object: &str, seed: u64, size: &ReproductionSize) -> Result<Scene, Refusal> {
     let mut config = Scene::press(object)?.config().clone();
     config.seed = seed;
     if let Some(press) = &mut config.press {
@@ -166,7 +163,7 @@ fn press_scene(object: &str, seed: u64, size: &ReproductionSize) -> Result<Scene
 }
 
 /// Every landing point is a scene of its own; the skin, which follows from the seed, is the same.
-fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, TwinError> {
+fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, Refusal> {
     let ball = DropConfig {
         row: Some(landing[0]),
         col: Some(landing[1]),
@@ -184,7 +181,7 @@ fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, TwinE
 }
 
 /// Picture of the first press at `time_s`: the object as it is, not see-through.
-fn picture(scene: &Scene, time_s: f64) -> Result<Picture, TwinError> {
+fn picture(scene: &Scene, time_s: f64) -> Result<Picture, Refusal> {
     debug_assert!(matches!(scene.task(), Task::Press(_)), "drops are not drawn here");
     let mut world = World::new(scene.mechanics())?;
     let reached = world

@@ -7,7 +7,6 @@ use super::sheets;
 use super::tables::CorrelationRow;
 use super::tracking::{TrackingRow, over_bounces};
 use crate::figures::{Chart, Series, Sheet, Stroke, Style, save_charts, save_sheet};
-use spts::output::OutputError;
 use spts_eval::decoders::label;
 use spts_eval::place::locator_label;
 use spts_eval::{BaselineRow, RASTER, ScoreRow, unique};
@@ -28,6 +27,7 @@ pub(super) enum Drawing {
 }
 
 use Drawing::{Charts, Sheet as Images};
+use spts_input::Refusal;
 
 /// How a figure is drawn.
 type Draw = fn(&Shown<'_>) -> Drawing;
@@ -54,8 +54,8 @@ pub(super) const FIGURES: &[(&str, Draw)] = &[
 /// Draws all figures into `dir`.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub(super) fn draw(dir: &Path, shown: &Shown<'_>) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub(super) fn draw(dir: &Path, shown: &Shown<'_>) -> Result<(), Refusal> {
     for (file, draw) in FIGURES {
         let name = file.trim_end_matches(".png");
         match draw(shown) {

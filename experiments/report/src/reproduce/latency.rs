@@ -4,7 +4,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
 use spts_eval::decoders::TrainedDecoder;
-use spts_eval::{Press, ScoreError, ScoredSession, ScoredSkin, Scorer, idle_mean};
+use spts_eval::{Press, ScoredSession, ScoredSkin, Scorer, idle_mean};
+use spts_input::Refusal;
 use spts_recon::Workspace;
 use spts_recon::classify::majority;
 use spts_recon::metrics::median;
@@ -37,8 +38,8 @@ pub(super) struct LatencyRow {
 /// Curves of a skin, over all presses and objects that have a compressive session, as `decoder` decodes them.
 ///
 /// # Errors
-/// [`ScoreError`] when the decoder does not fit the recordings.
-pub(super) fn latency(skin: &ScoredSkin, decoder: &TrainedDecoder) -> Result<Vec<LatencyRow>, ScoreError> {
+/// [`Refusal`] when the decoder does not fit the recordings.
+pub(super) fn latency(skin: &ScoredSkin, decoder: &TrainedDecoder) -> Result<Vec<LatencyRow>, Refusal> {
     let presses: Vec<(&ScoredSession, &Recording, usize)> = skin
         .sessions
         .iter()
@@ -55,7 +56,7 @@ pub(super) fn latency(skin: &ScoredSkin, decoder: &TrainedDecoder) -> Result<Vec
             let onset = onset_frame(recording, block)?;
             Some(press_hits(decoder, session.label, recording, block, onset, &keys))
         })
-        .collect::<Result<_, ScoreError>>()?;
+        .collect::<Result<_, Refusal>>()?;
     let share = |i: usize| hits.iter().filter(|h| h[i]).count() as f64 / hits.len().max(1) as f64;
     let mut rows: Vec<LatencyRow> = keys
         .iter()
@@ -102,7 +103,7 @@ fn press_hits(
     block: usize,
     onset: usize,
     keys: &[LatencyRow],
-) -> Result<Vec<bool>, ScoreError> {
+) -> Result<Vec<bool>, Refusal> {
     let per_frame = recording.measurements_per_frame();
     let idle_v = idle_mean(recording, block);
     let mut scorer = Scorer::new(decoder);
@@ -113,7 +114,7 @@ fn press_hits(
         let press = Press::within(recording, block, start..start + m, idle_v);
         let window: Vec<_> = press.window(0, m).into_iter().collect();
         let answers = scorer.answers(&window)?;
-        Ok::<_, ScoreError>(answers.first().and_then(|answer| scorer.class(answer)))
+        Ok::<_, Refusal>(answers.first().and_then(|answer| scorer.class(answer)))
     };
     let mut votes: Vec<Option<usize>> = Vec::new();
     let mut last_m = 0;

@@ -13,7 +13,7 @@ mod tracking;
 
 pub use headline::Headline;
 
-use crate::animation::{MOTION_FIGURES, MotionError, simulate_motion};
+use crate::animation::{MOTION_FIGURES, simulate_motion};
 use crate::{Origin, PageFigure, html, per_object};
 use comparison::ReadoutSection;
 use dataset::SimulatedData;
@@ -22,12 +22,9 @@ use headline::Facts;
 use page::PageContent;
 use results::{BothSkins, ReproductionSize, SkinResults, TimingRow, best, timings};
 use serde::Serialize;
-use spts::data::DataError;
-use spts::output::OutputError;
 use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts::progress::Progress;
 use spts::provenance::Provenance;
-use spts_eval::ScoreError;
 use spts_eval::protocol::Protocol;
 use spts_eval::training::{Learned, TrainingPresses};
 use spts_eval::{PublishedSkin, ScoredSession, ScoredSkin};
@@ -55,27 +52,6 @@ pub struct Reproduction {
     pub save_recordings: bool,
 }
 
-/// Why the report cannot be made.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReproduceError {
-    /// The recordings of the real skin cannot be used.
-    #[error(transparent)]
-    Data(#[from] DataError),
-    /// The animations cannot be made.
-    #[error(transparent)]
-    Motion(#[from] MotionError),
-    /// A skin cannot be scored.
-    #[error(transparent)]
-    Score(#[from] ScoreError),
-    /// The twin cannot be run, or not be compared with the skin.
-    #[error(transparent)]
-    Compare(#[from] Refusal),
-    /// The report cannot be written.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-}
-
 /// What was scored.
 #[derive(Clone, Copy)]
 struct Scored<'a> {
@@ -100,8 +76,8 @@ impl Reproduction {
     /// Runs it all, stage by stage as `progress` hears, and writes the report.
     ///
     /// # Errors
-    /// [`ReproduceError`] when the recordings cannot be used, the simulation fails, or a file cannot be written.
-    pub fn run(&self, progress: &dyn Progress) -> Result<ReproductionSummary, ReproduceError> {
+    /// [`Refusal`] when the recordings cannot be used, the simulation fails, or a file cannot be written.
+    pub fn run(&self, progress: &dyn Progress) -> Result<ReproductionSummary, Refusal> {
         let begin = Instant::now();
         let size = if self.quick {
             ReproductionSize::quick()
@@ -114,10 +90,7 @@ impl Reproduction {
         progress.stage("simulating presses", Some(dataset::steps(&size)));
         let dataset = dataset::simulate(self.seed, &size, &|| progress.step())?;
         progress.stage("drawing what moves", None);
-        simulate_motion(self.seed, &out.folder("figures")?).map_err(|error| match error {
-            MotionError::Report(error) => ReproduceError::Output(out.unstaged(error)),
-            error => ReproduceError::Motion(error),
-        })?;
+        simulate_motion(self.seed, &out.folder("figures")?).map_err(|error| out.unstaged(error))?;
         progress.stage("learning", None);
         let twin = self.twin_skin(&dataset, &size)?;
         progress.end();
@@ -179,7 +152,7 @@ impl Reproduction {
     }
 
     /// The twin's skin, its decoder learned from its own raster images.
-    fn twin_skin(&self, dataset: &SimulatedData, size: &ReproductionSize) -> Result<ScoredSkin, ReproduceError> {
+    fn twin_skin(&self, dataset: &SimulatedData, size: &ReproductionSize) -> Result<ScoredSkin, Refusal> {
         let scored = |object: &dataset::SimulatedObject| ScoredSession {
             protocol: size.protocol,
             raster_protocol: size.raster_protocol,
@@ -200,7 +173,7 @@ impl Reproduction {
         results: &Scored<'_>,
         begin: Instant,
         out: &mut OutputFolder,
-    ) -> Result<ReproductionSummary, OutputError> {
+    ) -> Result<ReproductionSummary, Refusal> {
         let Scored {
             skins,
             comparison,

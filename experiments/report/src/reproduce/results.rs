@@ -9,7 +9,7 @@ use spts_eval::decoders::{TrainedDecoder, find, published};
 use spts_eval::place::{PlaceRow, RecordedBounce, find_bounces};
 use spts_eval::protocol::{MEASUREMENTS, Protocol};
 use spts_eval::training::{Learning, TrainingData, TrainingPresses};
-use spts_eval::{BaselineRow, Press, ScoreError, ScoredSkin, SkinScores, decode_us, mean_rows};
+use spts_eval::{BaselineRow, Press, ScoredSkin, SkinScores, decode_us, mean_rows};
 use spts_input::Refusal;
 use spts_models::Streams;
 use spts_recon::metrics::median;
@@ -56,14 +56,14 @@ impl SkinResults {
     /// Scores `skin`, by the published decoders and by its `best` ones.
     ///
     /// # Errors
-    /// [`ScoreError`] when what was learned does not fit the skin.
+    /// [`Refusal`] when what was learned does not fit the skin.
     pub(super) fn new(
         skin: ScoredSkin,
         best: Vec<(&'static str, TrainedDecoder)>,
         measurements: &[usize],
         localisation: &[usize],
         done: &(dyn Fn() + Sync),
-    ) -> Result<Self, ScoreError> {
+    ) -> Result<Self, Refusal> {
         let scores = skin.score(measurements, localisation, &best, done)?;
         let matched = published("matched", &skin.learned)?;
         let latency = latency(&skin, &matched)?;
@@ -255,12 +255,8 @@ pub(super) struct TimingRow {
 /// Times the matched decode at every M on one press of the twin.
 ///
 /// # Errors
-/// [`ScoreError`] when the decoder does not fit the recording.
-pub(super) fn timings(
-    twin: &SkinResults,
-    measurements: &[usize],
-    decodes: usize,
-) -> Result<Vec<TimingRow>, ScoreError> {
+/// [`Refusal`] when the decoder does not fit the recording.
+pub(super) fn timings(twin: &SkinResults, measurements: &[usize], decodes: usize) -> Result<Vec<TimingRow>, Refusal> {
     let Some((recording, block, protocol)) = twin.skin.sessions.iter().find_map(|s| {
         let recording = s.compressive.as_ref()?;
         Some((recording, s.scored().next()?, s.protocol))

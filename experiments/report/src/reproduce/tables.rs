@@ -4,10 +4,11 @@ use super::dataset::SimulatedData;
 use super::results::SkinResults;
 use super::tracking::{CourseRow, TRACKING_MEASUREMENTS, over_bounces};
 use serde::Serialize;
-use spts::output::{OutputError, OutputFolder, write_npy, write_table};
+use spts::output::{OutputFolder, write_npy, write_table};
 use spts_circuit::Recording;
 use spts_eval::Table;
 use spts_eval::protocol::PLATEAU;
+use spts_input::Refusal;
 use spts_recon::metrics::{median, pearson};
 use std::path::Path;
 
@@ -66,8 +67,8 @@ pub(super) fn skin_file(name: &str, whose: &str) -> String {
 /// Writes the tables of one skin, named by `whose`, [`TWIN`] or [`REAL`].
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub(super) fn write_skin(dir: &Path, whose: &str, results: &SkinResults) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub(super) fn write_skin(dir: &Path, whose: &str, results: &SkinResults) -> Result<(), Refusal> {
     let path = |name: &str| dir.join(skin_file(name, whose));
     write_table(&path("scores"), &results.scores.rows)?;
     write_table(&path("localisation"), &results.scores.localisation)?;
@@ -86,8 +87,8 @@ pub(super) fn write_skin(dir: &Path, whose: &str, results: &SkinResults) -> Resu
 /// Writes the tables of the mechanics.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub(super) fn write_mechanics(dir: &Path, dataset: &SimulatedData) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub(super) fn write_mechanics(dir: &Path, dataset: &SimulatedData) -> Result<(), Refusal> {
     let presses = dataset.objects.iter().flat_map(|object| {
         let each = object.courses.iter().enumerate();
         each.map(move |(press, course)| (&object.session.object, press, course.as_ref()))
@@ -123,10 +124,10 @@ pub(super) fn write_mechanics(dir: &Path, dataset: &SimulatedData) -> Result<(),
 /// Writes the arrays: pressure maps, median raster images, dictionary and library.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResults) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResults) -> Result<(), Refusal> {
     let cols = dataset.cols;
-    let stack = |name: &str, maps: Vec<Vec<f64>>| -> Result<(), OutputError> {
+    let stack = |name: &str, maps: Vec<Vec<f64>>| -> Result<(), Refusal> {
         let taxels = maps.first().map_or(0, Vec::len);
         write_npy(&dir.join(name), &[maps.len(), taxels / cols, cols], &maps.concat())
     };
@@ -156,8 +157,8 @@ pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResul
 /// Writes every session of the twin into a folder of its own.
 ///
 /// # Errors
-/// [`OutputError`] when a file cannot be written.
-pub(super) fn write_sessions(out: &OutputFolder, dataset: &SimulatedData) -> Result<(), OutputError> {
+/// [`Refusal`] when a file cannot be written.
+pub(super) fn write_sessions(out: &OutputFolder, dataset: &SimulatedData) -> Result<(), Refusal> {
     let sessions = dataset.objects.iter().map(|o| &o.session).chain([&dataset.bounces]);
     for session in sessions {
         session.write_files(&out.folder(&format!("sessions/{}", session.name))?)?;

@@ -5,7 +5,8 @@ use serde::Serialize;
 use spts_circuit::Recording;
 use spts_eval::decoders::TrainedDecoder;
 use spts_eval::place::RecordedBounce;
-use spts_eval::{Press, ScoreError, Scorer};
+use spts_eval::{Press, Scorer};
+use spts_input::Refusal;
 use spts_recon::statistics::quantile;
 
 /// Numbers of measurements a frame that are compared.
@@ -42,12 +43,12 @@ pub(super) struct TrackingRow {
 /// Peak value over time for every bounce and M, as `decoder` decodes it.
 ///
 /// # Errors
-/// [`ScoreError`] when the decoder does not fit the recording.
+/// [`Refusal`] when the decoder does not fit the recording.
 pub(super) fn traces(
     recording: &Recording,
     bounces: &[RecordedBounce],
     decoder: &TrainedDecoder,
-) -> Result<Vec<TraceRow>, ScoreError> {
+) -> Result<Vec<TraceRow>, Refusal> {
     let of_bounce = |(index, bounce): (usize, &RecordedBounce)| {
         let start = bounce.start.saturating_sub(MARGIN);
         let end = (bounce.end + MARGIN).min(recording.blocks()[bounce.block].volts.len());
@@ -70,7 +71,7 @@ pub(super) fn traces(
         Ok(rows)
     };
     let rows = bounces.par_iter().enumerate().map(of_bounce);
-    Ok(rows.collect::<Result<Vec<_>, ScoreError>>()?.concat())
+    Ok(rows.collect::<Result<Vec<_>, Refusal>>()?.concat())
 }
 
 /// Frames in contact and mean change from frame to frame, over all bounces.

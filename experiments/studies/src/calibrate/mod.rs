@@ -11,7 +11,7 @@ use press::{PressAnalysis, analyse, missed};
 use profile::predicted_inside;
 use rayon::prelude::*;
 use serde::Serialize;
-use spts::data::{DataError, SessionSet};
+use spts::data::SessionSet;
 use spts::progress::Progress;
 use spts::session::Recorded;
 use spts_circuit::{LevelSource, Recording, WeightMode, Weights};
@@ -64,9 +64,9 @@ pub struct SessionPair {
 /// The sessions in `root` with a compressive recording of presses, all usable for calibration.
 ///
 /// # Errors
-/// [`DataError`] if a session is not usable, has weights that are not binary, or holds its contact for less than
+/// [`Refusal`] if a session is not usable, has weights that are not binary, or holds its contact for less than
 /// [`WINDOW_FRAMES`]; or if there is no session.
-pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
+pub fn read(root: &Path) -> Result<Vec<SessionPair>, Refusal> {
     let mut set = SessionSet::open(root)?;
     let slips = follow_slips(&mut set);
     let mut pairs = Vec::new();
@@ -75,12 +75,10 @@ pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
             continue;
         };
         let compressive = &recorded.recording;
-        let unfit = |field, value, needed| DataError::Unfit {
-            path: root.to_owned(),
-            session: format!("{} compressive", session.name),
-            field,
-            value,
-            needed,
+        let unfit = |field: &str, value: String, needed: String| {
+            let problem = format!("`{field}` = {value}; calibration needs {needed}");
+            let session = format!("{} compressive session", session.name);
+            Refusal::new(problem).at(session).at(root.display())
         };
         let mode = compressive.weights().mode();
         if mode != WeightMode::Binary {
@@ -107,7 +105,8 @@ pub fn read(root: &Path) -> Result<Vec<SessionPair>, DataError> {
         });
     }
     if pairs.is_empty() {
-        return Err(DataError::NoCompressive { path: root.to_owned() });
+        let problem = "no session of presses has a compressive recording; calibration needs one";
+        return Err(Refusal::new(problem).at(root.display()));
     }
     Ok(pairs)
 }
@@ -168,7 +167,7 @@ impl CalibrationStudy {
     /// [`Refusal`] if the recordings are not usable, the session does not exist, sessions differ in their
     /// weights or rate, or no press of a session can be fitted.
     pub fn run(&self, recordings: &Path, progress: &dyn Progress) -> Result<CalibrationReport, Refusal> {
-        self.fit_all(read(recordings).map_err(Refusal::from_error)?, progress)
+        self.fit_all(read(recordings)?, progress)
     }
 
     /// Fits the sessions `pairs`.
@@ -265,8 +264,7 @@ impl CalibrationReport {
     /// [`Refusal`] if a value is outside its range.
     pub fn profile_toml(&self) -> Result<String, Refusal> {
         let taxels = u32::try_from(self.taxels).unwrap_or(u32::MAX);
-        let (_, text) =
-            fitted_profile(&self.profile, taxels).map_err(|e| Refusal::from_error(e).at("the fitted profile"))?;
+        let (_, text) = fitted_profile(&self.profile, taxels).map_err(|e| e.at("the fitted profile"))?;
         Ok(text)
     }
 }

@@ -3,7 +3,6 @@
 use super::statistics::middle;
 use super::{CalibrationStudy, SessionEstimates, read};
 use serde::Serialize;
-use spts::data::DataError;
 use spts::progress::Progress;
 use spts_eval::training::{BAND_SD, GainCheck, SkinGains, Skins, TrainingPresses, templates};
 use spts_eval::{ScoredSession, Source};
@@ -68,7 +67,7 @@ impl SkinStudy {
     /// # Errors
     /// [`Refusal`] if the recordings are not usable, or the simulation knows none of their objects.
     pub fn run(&self, root: &Path, progress: &dyn Progress) -> Result<SkinReport, Refusal> {
-        let source = Source::open(root).map_err(Refusal::from_error)?;
+        let source = Source::open(root)?;
         if source.sessions.iter().all(|s| s.raster.is_none()) {
             return Err(Refusal::new(format!(
                 "gains of the skin: {}: no session of presses has a raster recording to fit them to",
@@ -157,11 +156,8 @@ fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Mounting>, Refu
         session: None,
         presses: Some(MOUNTED_PRESSES),
     };
-    let pairs = match read(root) {
-        Ok(pairs) => pairs,
-        Err(DataError::NoCompressive { .. } | DataError::Unfit { .. }) => return Ok(Vec::new()),
-        Err(error) => return Err(Refusal::from_error(error)),
-    };
+    // the recordings in `root` have been read before: those that are refused now are none to fit a readout to
+    let Ok(pairs) = read(root) else { return Ok(Vec::new()) };
     let sessions = study.fit_all(pairs, progress)?.sessions;
     let mounting = |session: SessionEstimates| {
         let both = session.gains?;

@@ -106,10 +106,7 @@ impl ReadoutSkin {
         if let Some(prior) = self.prior.get() {
             return Ok(Arc::clone(prior));
         }
-        let prior = TrainingData::for_layout(&self.layout, self.streams)
-            .map_err(Refusal::from_error)?
-            .prior(ImagePrior::UNSEEN)
-            .map_err(Refusal::from_error)?;
+        let prior = TrainingData::for_layout(&self.layout, self.streams)?.prior(ImagePrior::UNSEEN)?;
         Ok(Arc::clone(self.prior.get_or_init(|| prior)))
     }
 
