@@ -57,7 +57,7 @@ impl Dataset {
         let manifest = write_json(&at(STATISTICS_FILE), &statistics)
             .and_then(|()| write_bytes(&at(CARD_FILE), card(spec, &statistics, bytes).as_bytes()))
             .and_then(|()| write_json(&at(CROISSANT_FILE), &croissant(spec)))
-            .and_then(|()| Manifest::write_of(self.folder(), &[&described[..], &listed].concat()))?;
+            .and_then(|()| Manifest::write_of(self.folder(), &[&described[..], &listed].concat(), &BTreeSet::new()))?;
         Ok(Finished {
             rows: statistics.rows,
             shards: spec.shards(),

@@ -157,7 +157,7 @@ fn a_full_disk_leaves_no_half_file() {
             }
             Ok(())
         };
-        watching_disk(Rc::new(watcher), || write_shard(&spec, 0, &path, &|| ()))
+        watching_disk(watcher, || write_shard(&spec, 0, &path, &|| ()))
     };
     run(0).unwrap();
     let (steps, whole) = (count.get(), std::fs::read(&path).unwrap());

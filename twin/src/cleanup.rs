@@ -36,10 +36,8 @@ const PAUSE: Duration = Duration::from_millis(10);
 pub enum Leftover {
     /// A folder, removed with its contents.
     Folder(PathBuf),
-    /// Folders, removed in this order, each only if it is empty.
-    EmptyFolders(Vec<PathBuf>),
-    /// A file.
-    File(PathBuf),
+    /// Files and folders, removed in this order; a folder only if it is empty.
+    Each(Vec<PathBuf>),
     /// A process group, given by its leader's process number, and ended by SIGKILL.
     Group(Pid),
 }
@@ -141,13 +139,10 @@ fn remove(list: &List) {
                     }
                 }
             }
-            Leftover::EmptyFolders(paths) => {
-                // one that is not empty stays
-                paths.iter().for_each(|path| drop(std::fs::remove_dir(path)));
-            }
-            Leftover::File(path) => {
-                // nothing more can be done about a file that stays
-                let _ = std::fs::remove_file(path);
+            Leftover::Each(paths) => {
+                // nothing more can be done about one that stays
+                let remove = |path| std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
+                paths.iter().for_each(|path| drop(remove(path)));
             }
             Leftover::Group(_) => {}
         }

@@ -5,7 +5,7 @@ use spts_input::Refusal;
 use std::cell::RefCell;
 use std::error::Error;
 use std::fs::File;
-use std::io::{self, Seek, SeekFrom, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -36,80 +36,72 @@ pub fn not_ours(path: &Path) -> Refusal {
     Refusal::new(problem).at(path.display())
 }
 
-/// Kind of a disk operation.
+/// Kind of a disk operation, as far as a watcher answers to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DiskOperation {
-    /// Makes a folder.
-    MakeFolder,
-    /// Makes an empty file.
-    Create,
-    /// Writes a piece of a file.
-    Write,
-    /// Waits until a file or a folder is on the disk.
-    Sync,
-    /// Gives a file or a folder another name.
-    Rename,
     /// Exchanges the names of two folders.
     Exchange,
     /// Removes a file or an empty folder.
     Remove,
+    /// Makes, writes, renames, or waits until something is on the disk.
+    Other,
 }
 
-/// Called before every operation. If it returns an error, the operation fails with that error.
-pub type DiskWatcher = Rc<dyn Fn(DiskOperation, &Path) -> io::Result<()>>;
+type Watcher = Rc<dyn Fn(DiskOperation, &Path) -> io::Result<()>>;
 
 thread_local! {
-    static WATCHER: RefCell<Option<DiskWatcher>> = const { RefCell::new(None) };
+    static WATCHER: RefCell<Option<Watcher>> = const { RefCell::new(None) };
 }
 
-/// Calls `run` while `watcher` observes every disk operation of this thread. Tests use it to see what a full disk or an
-/// interrupted run leaves behind.
-pub fn watching_disk<T>(watcher: DiskWatcher, run: impl FnOnce() -> T) -> T {
-    let before = WATCHER.replace(Some(watcher));
+/// Calls `run` while `watcher` observes every disk operation of this thread: it is called before each, and if it
+/// returns an error, the operation fails with that error. Tests use it to see what a full disk or an interrupted run
+/// leaves behind.
+pub fn watching_disk<T>(
+    watcher: impl Fn(DiskOperation, &Path) -> io::Result<()> + 'static,
+    run: impl FnOnce() -> T,
+) -> T {
+    let before = WATCHER.replace(Some(Rc::new(watcher)));
     let result = run();
     WATCHER.set(before);
     result
 }
 
-fn tell(operation: DiskOperation, path: &Path) -> io::Result<()> {
+/// Tells the watcher of an operation on `path`, and does it.
+pub(super) fn watched<T>(operation: DiskOperation, path: &Path, run: impl FnOnce() -> io::Result<T>) -> io::Result<T> {
     // the watcher may itself write files
     let watcher = WATCHER.with_borrow(Clone::clone);
-    watcher.map_or(Ok(()), |watcher| watcher(operation, path))
+    watcher.map_or(Ok(()), |watcher| watcher(operation, path))?;
+    run()
 }
 
 /// A new file whose writes are reported to the watcher. Behind a buffer, one write is one full buffer.
 #[derive(Debug)]
-pub struct NewFile {
+pub(super) struct NewFile {
     file: File,
     path: PathBuf,
 }
 
 impl NewFile {
-    /// Shows other processes that the file is being written, for as long as it is open; where the file system has no
-    /// locks they cannot tell.
-    pub(super) fn show_in_use(&self) {
-        let _ = self.file.try_lock();
-    }
-
+    /// Makes the file, and locks it to show other processes that it is being written, for as long as it is open; where
+    /// the file system has no locks they cannot tell.
     pub(super) fn create(path: &Path) -> io::Result<Self> {
-        tell(DiskOperation::Create, path)?;
+        let file = watched(DiskOperation::Other, path, || File::create_new(path))?;
+        let _ = file.try_lock();
         Ok(Self {
-            file: File::create_new(path)?,
+            file,
             path: path.to_owned(),
         })
     }
 
     pub(super) fn sync(&self) -> io::Result<()> {
-        tell(DiskOperation::Sync, &self.path)?;
-        self.file.sync_all()
+        watched(DiskOperation::Other, &self.path, || self.file.sync_all())
     }
 }
 
 impl Write for NewFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        tell(DiskOperation::Write, &self.path)?;
-        self.file.write(bytes)
+        watched(DiskOperation::Other, &self.path, || self.file.write(bytes))
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -117,83 +109,66 @@ impl Write for NewFile {
     }
 }
 
-impl Seek for NewFile {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        self.file.seek(to)
-    }
-}
-
-/// Makes the folder `path`, whose parent exists.
-pub(super) fn make_folder(path: &Path) -> io::Result<()> {
-    tell(DiskOperation::MakeFolder, path)?;
-    std::fs::create_dir(path)
-}
-
-/// Opens the file `path` for writing, made where it is missing.
-pub(super) fn open_or_create(path: &Path) -> io::Result<File> {
-    tell(DiskOperation::Create, path)?;
-    File::options().create(true).truncate(false).write(true).open(path)
-}
-
-/// Renames `from` to `to`, replacing a file of that name.
+/// Renames `from` to `to`, replacing a file or an empty folder of that name.
 pub(super) fn rename(from: &Path, to: &Path) -> io::Result<()> {
-    tell(DiskOperation::Rename, to)?;
-    std::fs::rename(from, to)
+    watched(DiskOperation::Other, to, || std::fs::rename(from, to))
 }
 
-/// Renames `from` to `to`, which must not exist.
-pub(super) fn rename_new(from: &Path, to: &Path) -> io::Result<()> {
+/// Lets the folders `a` and `b` change their names in one step; `false` if the file system does not know how.
+pub(super) fn exchange(a: &Path, b: &Path) -> io::Result<bool> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
-    tell(DiskOperation::Rename, to)?;
-    match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
-        // some file systems do not know the flag
-        Err(rustix::io::Errno::INVAL | rustix::io::Errno::NOSYS) if to.symlink_metadata().is_err() => {
-            std::fs::rename(from, to)
-        }
-        other => other.map_err(Into::into),
+    use rustix::io::Errno;
+    let step = || Ok(renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?);
+    let unknown = [Errno::INVAL, Errno::NOSYS, Errno::OPNOTSUPP].map(|error| Some(error.raw_os_error()));
+    match watched(DiskOperation::Exchange, b, step) {
+        Err(error) if unknown.contains(&error.raw_os_error()) => Ok(false),
+        other => other.map(|()| true),
     }
-}
-
-/// Lets the folders `a` and `b` change their names in one step.
-pub(super) fn exchange(a: &Path, b: &Path) -> io::Result<()> {
-    use rustix::fs::{CWD, RenameFlags, renameat_with};
-    tell(DiskOperation::Exchange, b)?;
-    renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE).map_err(Into::into)
 }
 
 /// Waits until the entries of the folder `path` are on the disk.
 pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
-    tell(DiskOperation::Sync, path)?;
-    match File::open(path)?.sync_all() {
+    match watched(DiskOperation::Other, path, || File::open(path)?.sync_all()) {
         // some network file systems have no such thing for folders
         Err(error) if error.kind() == io::ErrorKind::InvalidInput => Ok(()),
         other => other,
     }
 }
 
-/// Removes the file `path`.
-pub(super) fn remove_file(path: &Path) -> io::Result<()> {
-    tell(DiskOperation::Remove, path)?;
-    std::fs::remove_file(path)
+/// Names of the files below the folder `root`, sorted, and of `root` and the folders below it, parents first.
+pub(super) fn below(root: &Path) -> io::Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+    let (mut files, mut folders, mut read) = (Vec::new(), vec![PathBuf::new()], 0);
+    while let Some(folder) = folders.get(read).cloned() {
+        for entry in std::fs::read_dir(root.join(&folder))? {
+            let entry = entry?;
+            let kind = if entry.file_type()?.is_dir() {
+                &mut folders
+            } else {
+                &mut files
+            };
+            kind.push(folder.join(entry.file_name()));
+        }
+        read += 1;
+    }
+    files.sort();
+    Ok((files, folders))
 }
 
-/// Removes the empty folder `path`.
-pub(super) fn remove_folder(path: &Path) -> io::Result<()> {
-    tell(DiskOperation::Remove, path)?;
-    std::fs::remove_dir(path)
+/// Removes the file or the empty folder `path`.
+pub(super) fn remove(path: &Path) -> io::Result<()> {
+    watched(DiskOperation::Remove, path, || {
+        match path.symlink_metadata()?.is_dir() {
+            true => std::fs::remove_dir(path),
+            false => std::fs::remove_file(path),
+        }
+    })
 }
 
 /// Removes the folder `path` and all in it: only for folders whose every file is this program's own.
 pub(super) fn remove_all(path: &Path) -> io::Result<()> {
-    for entry in std::fs::read_dir(path)? {
-        let entry = entry?;
-        if entry.file_type()?.is_dir() {
-            remove_all(&entry.path())?;
-        } else {
-            remove_file(&entry.path())?;
-        }
-    }
-    remove_folder(path)
+    let (files, folders) = below(path)?;
+    let mut all = files.iter().chain(folders.iter().rev());
+    all.try_for_each(|name| remove(&path.join(name)))
 }
 
 /// Whether something has the name `path`, a link to nowhere as well.

@@ -19,7 +19,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # let path = std::env::temp_dir().join(format!("spts-doc-atomic-{}.txt", std::process::id()));
 /// let mut file = AtomicFile::create(&path)?;
-/// file.fill(|buffer| buffer.write_all(b"results"))?;
+/// file.write_all(b"results")?;
 /// assert!(!path.exists(), "the name comes last");
 /// file.finish()?;
 /// assert_eq!(std::fs::read(&path)?, b"results");
@@ -52,20 +52,11 @@ impl AtomicFile {
             .rand_bytes(RANDOM)
             .make_in(disk::parent(path), NewFile::create);
         let (file, temporary) = made.map_err(failed)?.into_parts();
-        file.show_in_use();
         Ok(Self {
             buffer: BufWriter::with_capacity(PIECE, file),
             temporary,
             path: path.to_owned(),
         })
-    }
-
-    /// Writes the bytes that `fill` puts into the buffer.
-    ///
-    /// # Errors
-    /// [`Refusal`] if `fill` fails.
-    pub fn fill(&mut self, fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>) -> Result<(), Refusal> {
-        fill(&mut self.buffer).map_err(unwritable(&self.path))
     }
 
     /// Waits until the bytes are on the disk, then gives the file its name.
@@ -82,28 +73,6 @@ impl AtomicFile {
         let _ = self.temporary.keep();
         Ok(())
     }
-
-    /// Hands what was written so far, from byte `start` on, to `each` in pieces of at most `piece` bytes.
-    fn read_back(
-        &mut self,
-        start: u64,
-        piece: usize,
-        mut each: impl FnMut(&[u8]) -> Result<(), Refusal>,
-    ) -> Result<(), Refusal> {
-        let failed = unwritable(&self.path);
-        self.buffer.flush().map_err(&failed)?;
-        let mut file = File::open(&self.temporary).map_err(&failed)?;
-        file.seek(io::SeekFrom::Start(start)).map_err(&failed)?;
-        let mut bytes = Vec::with_capacity(piece);
-        loop {
-            bytes.clear();
-            let wanted = u64::try_from(piece).unwrap_or(u64::MAX);
-            if (&file).take(wanted).read_to_end(&mut bytes).map_err(&failed)? == 0 {
-                return Ok(());
-            }
-            each(&bytes)?;
-        }
-    }
 }
 
 impl io::Write for AtomicFile {
@@ -116,14 +85,14 @@ impl io::Write for AtomicFile {
     }
 }
 
-/// Writes `path` with the bytes that `fill` puts into the buffer. A regular file of that name is replaced.
+/// Writes `path` with the bytes that `fill` puts into the file. A regular file of that name is replaced.
 ///
 /// # Errors
 /// [`Refusal`] if the file cannot be written, or `path` is something other than a regular file. Nothing is left
 /// behind then, and an earlier file stays unchanged.
-pub fn write_with(path: &Path, fill: impl FnOnce(&mut BufWriter<NewFile>) -> io::Result<()>) -> Result<(), Refusal> {
+fn write_with(path: &Path, fill: impl FnOnce(&mut AtomicFile) -> io::Result<()>) -> Result<(), Refusal> {
     let mut file = AtomicFile::create(path)?;
-    file.fill(fill)?;
+    fill(&mut file).map_err(unwritable(path))?;
     file.finish()
 }
 
@@ -213,7 +182,6 @@ values!(f64: "<f8", u16: "<u2", u32: "<u4");
 #[derive(Debug)]
 pub struct NpyFile<T> {
     file: AtomicFile,
-    path: PathBuf,
     shape: Vec<usize>,
     written: usize,
     header_bytes: u64,
@@ -229,17 +197,17 @@ impl<T: NpyValue> NpyFile<T> {
         let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
         let mut file = AtomicFile::create(path)?;
         let mut header = Vec::new();
-        file.fill(|out| {
-            let kind = T::KIND
-                .parse()
-                .map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
-            let options = npyz::WriteOptions::new_header_only().dtype(npyz::DType::Plain(kind));
-            options.shape(&sides).writer(&mut header).write_header_only()?;
-            out.write_all(&header)
-        })?;
+        let kind = T::KIND.parse().map_err(unwritable(path))?;
+        let options = npyz::WriteOptions::new_header_only()
+            .dtype(npyz::DType::Plain(kind))
+            .shape(&sides);
+        options
+            .writer(&mut header)
+            .write_header_only()
+            .map_err(unwritable(path))?;
+        file.write_all(&header).map_err(unwritable(path))?;
         Ok(Self {
             file,
-            path: path.to_owned(),
             shape: shape.to_vec(),
             written: 0,
             header_bytes: header.len() as u64,
@@ -252,13 +220,11 @@ impl<T: NpyValue> NpyFile<T> {
     /// # Errors
     /// [`Refusal`] if the disk is full or reports an error.
     pub fn push(&mut self, values: impl IntoIterator<Item = T>) -> Result<(), Refusal> {
-        let written = &mut self.written;
-        self.file.fill(|out| {
-            values.into_iter().try_for_each(|value| {
-                *written += 1;
-                out.write_all(value.bytes().as_ref())
-            })
-        })
+        let written = values.into_iter().try_for_each(|value| {
+            self.written += 1;
+            self.file.write_all(value.bytes().as_ref())
+        });
+        written.map_err(unwritable(&self.file.path))
     }
 
     /// Gives the file its name.
@@ -268,14 +234,23 @@ impl<T: NpyValue> NpyFile<T> {
     pub fn finish(self) -> Result<(), Refusal> {
         if self.shape.iter().product::<usize>() != self.written {
             let problem = format!("{} values for an array of shape {:?}", self.written, self.shape);
-            return Err(Refusal::new(problem).at(self.path.display()));
+            return Err(Refusal::new(problem).at(self.file.path.display()));
         }
         self.file.finish()
     }
 
     /// Hands the bytes of the values that were written so far to `each`, some thousand values at a time.
-    pub(crate) fn read_back(&mut self, each: impl FnMut(&[u8]) -> Result<(), Refusal>) -> Result<(), Refusal> {
-        self.file.read_back(self.header_bytes, size_of::<T>() << 13, each)
+    pub(crate) fn read_back(&mut self, mut each: impl FnMut(&[u8]) -> Result<(), Refusal>) -> Result<(), Refusal> {
+        let failed = unwritable(&self.file.path);
+        self.file.flush().map_err(&failed)?;
+        let mut file = File::open(&self.file.temporary).map_err(&failed)?;
+        file.seek(io::SeekFrom::Start(self.header_bytes)).map_err(&failed)?;
+        let (piece, mut bytes) = ((size_of::<T>() as u64) << 13, Vec::new());
+        while (&file).take(piece).read_to_end(&mut bytes).map_err(&failed)? > 0 {
+            each(&bytes)?;
+            bytes.clear();
+        }
+        Ok(())
     }
 }
 
@@ -303,10 +278,7 @@ pub fn write_npy(path: &Path, shape: &[usize], values: &[f64]) -> Result<(), Ref
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]
-pub struct CsvFile {
-    writer: csv::Writer<AtomicFile>,
-    path: PathBuf,
-}
+pub struct CsvFile(csv::Writer<AtomicFile>);
 
 impl CsvFile {
     /// Starts the table `path` with the header `header`.
@@ -316,12 +288,8 @@ impl CsvFile {
     pub fn create(path: &Path, header: &[&str]) -> Result<Self, Refusal> {
         let mut options = csv::WriterBuilder::new();
         let mut writer = options.has_headers(false).from_writer(AtomicFile::create(path)?);
-        let written = writer.write_record(header);
-        written.map_err(unwritable(path))?;
-        Ok(Self {
-            writer,
-            path: path.to_owned(),
-        })
+        writer.write_record(header).map_err(unwritable(path))?;
+        Ok(Self(writer))
     }
 
     /// Writes the next row. A row may be a tuple that contains arrays; their elements become fields in order. Numbers
@@ -331,8 +299,8 @@ impl CsvFile {
     /// [`Refusal`] if the number of fields differs from that of the header, or the disk is full or reports
     /// an error.
     pub fn push(&mut self, row: impl Serialize) -> Result<(), Refusal> {
-        let written = self.writer.serialize(row);
-        written.map_err(unwritable(&self.path))
+        let written = self.0.serialize(row);
+        written.map_err(|error| unwritable(&self.0.get_ref().path)(error))
     }
 
     /// Gives the file its name.
@@ -340,20 +308,10 @@ impl CsvFile {
     /// # Errors
     /// [`Refusal`] if the file cannot be written.
     pub fn finish(self) -> Result<(), Refusal> {
-        let failed = unwritable(&self.path);
-        let file = self.writer.into_inner().map_err(|e| failed(e.into_error()))?;
+        let failed = unwritable(&self.0.get_ref().path);
+        let file = self.0.into_inner().map_err(|e| failed(e.into_error()))?;
         file.finish()
     }
-}
-
-/// Writes a table with rows as in [`CsvFile::push`].
-///
-/// # Errors
-/// [`Refusal`] if the number of fields of a row differs from that of the header, or the file cannot be written.
-pub fn write_csv<R: Serialize>(path: &Path, header: &[&str], rows: impl IntoIterator<Item = R>) -> Result<(), Refusal> {
-    let mut file = CsvFile::create(path, header)?;
-    rows.into_iter().try_for_each(|row| file.push(row))?;
-    file.finish()
 }
 
 /// Writes a table whose header is the field names of its rows.
@@ -393,10 +351,8 @@ mod tests {
         write_npy(&path, &[2, 3], &values).unwrap();
         let bytes = std::fs::read(&path).unwrap();
         let npy = npyz::NpyFile::new(&bytes[..]).unwrap();
-        assert_eq!(
-            (npy.shape(), npy.order(), npy.dtype().descr()),
-            (&[2, 3][..], npyz::Order::C, "'<f8'".to_owned())
-        );
+        let found = (npy.shape(), npy.order(), npy.dtype().descr());
+        assert_eq!(found, (&[2, 3][..], npyz::Order::C, "'<f8'".to_owned()));
         let back: Vec<f64> = npy.into_vec().unwrap();
         assert!(back.iter().zip(&values).all(|(b, v)| b.to_bits() == v.to_bits()));
         write_npy(&path, &[2, 3], &values).unwrap();
@@ -406,37 +362,23 @@ mod tests {
     }
 
     #[test]
-    fn a_table_has_the_shortest_numbers_that_read_back() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("t.csv");
-        write_csv(
-            &path,
-            &["press", "time_s", "x", "y"],
-            [(0_usize, 0.1, [1e-7, 2.0 / 3.0])],
-        )
-        .unwrap();
-        let text = std::fs::read_to_string(&path).unwrap();
-        assert_eq!(text, "press,time_s,x,y\n0,0.1,1e-7,0.6666666666666666\n");
-        assert!(write_csv(&path, &["one"], [(1, 2)]).is_err());
-        assert_eq!(
-            std::fs::read_to_string(&path).unwrap(),
-            text,
-            "damaged by a refused row"
-        );
-    }
-
-    #[test]
     fn a_failed_write_leaves_the_old_file_and_nothing_else() {
         let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("result.csv");
-        write_bytes(&path, b"old").unwrap();
-        let error = write_with(&path, |out| {
+        let path = dir.path().join("t.csv");
+        let mut table = CsvFile::create(&path, &["press", "time_s", "x", "y"]).unwrap();
+        table.push((0_usize, 0.1, [1e-7, 2.0 / 3.0])).unwrap();
+        table.finish().unwrap();
+        let text = "press,time_s,x,y\n0,0.1,1e-7,0.6666666666666666\n";
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+        let mut table = CsvFile::create(&path, &["one"]).unwrap();
+        assert!(table.push((1, 2)).is_err());
+        drop(table);
+        let full = write_with(&path, |out| {
             out.write_all(b"new, and then the disk is full")?;
-            Err(std::io::ErrorKind::StorageFull.into())
-        })
-        .unwrap_err();
-        assert!(error.to_string().contains("result.csv"), "{error}");
-        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+            Err(io::ErrorKind::StorageFull.into())
+        });
+        assert!(full.unwrap_err().to_string().contains("t.csv"));
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), text, "damaged");
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
         let error = write_bytes(dir.path(), b"").unwrap_err().to_string();
         assert!(error.contains("is not a regular file"), "{error}");

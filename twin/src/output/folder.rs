@@ -5,13 +5,15 @@
 //! removed. A file system without such a step first gives the earlier results the name `.NAME.spts-old`. A run that is
 //! ended leaves what the next run with this folder clears up. A run holds `.NAME.spts-lock` locked.
 
-use super::disk::{self, not_ours, parent, unwritable};
+use super::disk::{self, DiskOperation, no_folder, not_ours, parent, unwritable, watched};
 use super::manifest::{MANIFEST_FILE, Manifest, changed};
 use crate::cleanup::{Entry, Leftover, listed};
 use spts_input::Refusal;
 use std::collections::BTreeSet;
-use std::fs::{File, TryLockError};
-use std::io;
+use std::ffi::OsStr;
+use std::fs::{File, Metadata, TryLockError};
+use std::io::{self, ErrorKind};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 /// A folder that a run is filling. From its opening on, no other run can open it. The results wait beside it until
@@ -26,8 +28,7 @@ pub struct OutputFolder {
     timed: BTreeSet<String>,
     /// Lets a signal remove the waiting results; `None` once they are in place.
     entry: Option<Entry>,
-    lock: Option<Lock>,
-    made: Parents,
+    _lock: Lock,
 }
 
 impl OutputFolder {
@@ -38,29 +39,34 @@ impl OutputFolder {
     /// be created or replaced, and while another run is writing to it.
     pub fn open(path: &Path) -> Result<Self, Refusal> {
         let failed = unwritable(path);
-        let made = Parents::make(path)?;
+        let missing = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
+        let made: Vec<PathBuf> = path
+            .ancestors()
+            .skip(1)
+            .take_while(missing)
+            .map(Path::to_owned)
+            .collect();
+        make_folders(if path.exists() { path } else { parent(path) })?;
         let folder = match path.file_name() {
             // a link to nowhere is no place for a folder
-            Some(name) if path.symlink_metadata().is_err() => parent(path).canonicalize().map(|it| it.join(name)),
+            Some(name) if !disk::exists(path) => parent(path).canonicalize().map(|above| above.join(name)),
             _ => path.canonicalize(),
         };
         let folder = folder.map_err(&failed)?;
-        let (Some(above), Some(_)) = (folder.parent(), folder.file_name()) else {
-            return Err(Refusal::new(UNMOVABLE).at(path.display()));
-        };
-        let lock = Lock::take(&folder, path)?;
-        recover(&folder).map_err(&failed)?;
+        if is_unmovable(&folder) {
+            let problem = "is a mount point or the folder that the program works in, so that it cannot be replaced as \
+                           a whole; choose a folder in it";
+            return Err(Refusal::new(problem).at(path.display()));
+        }
+        let lock = Lock::take(&folder, path, made)?;
+        recover(&folder, path)?;
         check_ours(&folder, path)?;
         if folder.exists() {
             let writable = rustix::fs::access(&folder, rustix::fs::Access::WRITE_OK);
             writable.map_err(|error| failed(error.into()))?;
         }
-        let here = std::env::current_dir().and_then(|here| here.canonicalize());
-        if here.is_ok_and(|here| here.starts_with(&folder)) || is_mounted(&folder, above) {
-            return Err(Refusal::new(UNMOVABLE).at(path.display()));
-        }
-        let stage = beside(&folder, NEW);
-        let make = || disk::make_folder(&stage);
+        let stage = beside(&folder, "new");
+        let make = || watched(DiskOperation::Other, &stage, || std::fs::create_dir(&stage));
         let ((), entry) = listed(make, |()| Leftover::Folder(stage.clone())).map_err(failed)?;
         Ok(Self {
             folder,
@@ -68,8 +74,7 @@ impl OutputFolder {
             stage,
             timed: BTreeSet::new(),
             entry: Some(entry),
-            lock: Some(lock),
-            made,
+            _lock: lock,
         })
     }
 
@@ -106,17 +111,20 @@ impl OutputFolder {
     /// file system reports an error. The folder then stays unchanged.
     pub fn commit(mut self) -> Result<Vec<String>, Refusal> {
         let failed = unwritable(&self.shown);
-        let names = files_below(&self.stage).map_err(&failed)?;
-        let manifest = Manifest::of(&self.stage, &names, &self.timed).and_then(|all| all.write(&self.stage));
+        let (files, folders) = disk::below(&self.stage).map_err(&failed)?;
+        let names: Vec<String> = files.iter().map(|name| name.to_string_lossy().into_owned()).collect();
+        let manifest = Manifest::write_of(&self.stage, &names, &self.timed);
         manifest.map_err(|error| self.unstaged(error))?;
-        sync_folders(&self.stage).map_err(&failed)?;
+        let synced = folders
+            .iter()
+            .try_for_each(|folder| disk::sync_folder(&self.stage.join(folder)));
+        synced.map_err(&failed)?;
         check_ours(&self.folder, &self.shown)?;
         // from here on the stage may be the earlier results, which no signal may remove unseen
         let put = || put_in_place(&self.stage, &self.folder);
         let done = self.entry.take().map_or_else(put, |entry| entry.finish(put));
         done.map_err(failed)?;
         self.stage.clear();
-        self.made.keep();
         Ok(names)
     }
 
@@ -125,13 +133,6 @@ impl OutputFolder {
     pub fn unstaged(&self, error: Refusal) -> Refusal {
         let [from, to] = [&self.stage, &self.shown].map(|folder| folder.join("").display().to_string());
         error.reworded(|message| message.replace(&from, &to))
-    }
-
-    /// Final path of the result that waits at `path`. Any other path is returned unchanged.
-    #[must_use]
-    pub(crate) fn final_path(&self, path: &Path) -> PathBuf {
-        let below = path.strip_prefix(&self.stage);
-        below.map_or_else(|_| path.to_owned(), |name| self.shown.join(name))
     }
 
     /// The folder as the user named it.
@@ -147,37 +148,22 @@ impl Drop for OutputFolder {
             // nothing more can be done about what does not go away; the next run in this folder removes it
             let _ = disk::remove_all(&self.stage);
         }
-        // the lock lies in the folders that go after it
-        self.lock = None;
     }
 }
 
-/// Why a folder that is in use cannot be replaced, as a user is told.
-const UNMOVABLE: &str = "is a mount point or the folder that the program works in, so that it cannot be replaced as a \
-                         whole; choose a folder in it";
-
-/// Whether something is mounted on `folder`, which lies in `above`.
-fn is_mounted(folder: &Path, above: &Path) -> bool {
-    use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
-    use std::os::unix::fs::MetadataExt as _;
-    let found = statx(CWD, folder, AtFlags::empty(), StatxFlags::empty());
-    let mounted = found.is_ok_and(|found| found.stx_attributes.contains(StatxAttributes::MOUNT_ROOT));
-    let device = |path: &Path| path.metadata().map(|found| found.dev()).ok();
-    mounted || device(folder).is_some_and(|of| Some(of) != device(above))
+/// Whether `folder` is in use: something is mounted on it, or the program works in it.
+fn is_unmovable(folder: &Path) -> bool {
+    let device = |path: &Path| path.metadata().ok().map(|found| found.dev());
+    let mounted = device(folder).is_some_and(|of| folder.parent().and_then(device) != Some(of));
+    let here = std::env::current_dir().and_then(|here| here.canonicalize());
+    mounted || here.is_ok_and(|here| here.starts_with(folder))
 }
-
-/// End of the name of the new results while they wait, and of the earlier ones once they have been exchanged.
-const NEW: &str = "new";
-/// End of the name of earlier results that have made room for the new ones.
-const OLD: &str = "old";
 
 /// Hidden name beside `folder`. Nothing but this program gives such names.
 fn beside(folder: &Path, what: &str) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(folder.file_name().unwrap_or_default());
-    name.push(".spts-");
-    name.push(what);
-    folder.with_file_name(name)
+    let name = folder.file_name().unwrap_or_default();
+    let parts = [OsStr::new("."), name, OsStr::new(".spts-"), OsStr::new(what)];
+    folder.with_file_name(parts.join(OsStr::new("")))
 }
 
 /// Refuses `folder`, which the user calls `shown`, if it holds a file that is not an unchanged result of an earlier
@@ -187,209 +173,85 @@ fn check_ours(folder: &Path, shown: &Path) -> Result<(), Refusal> {
         return Ok(());
     }
     let manifest = Manifest::read(folder);
-    walk(folder, Path::new(""), &mut |name| {
-        let path = shown.join(&name);
-        let name = name.to_string_lossy();
+    for file in disk::below(folder).map_err(unwritable(shown))?.0 {
+        let (path, name) = (shown.join(&file), file.to_string_lossy());
         match &manifest {
-            Some(_) if name == MANIFEST_FILE => Ok(()),
-            Some(manifest) if manifest.lists(&name) => {
-                if manifest.is_unchanged(folder, &name).map_err(unwritable(&path))? {
-                    return Ok(());
-                }
+            Some(_) if name == MANIFEST_FILE => {}
+            Some(all) if all.is_unchanged(folder, &name).map_err(unwritable(&path))? => {}
+            Some(all) if all.lists(&name) => {
                 let advice = "it is not replaced: move it away or choose another folder";
-                Err(changed(path, shown, advice))
+                return Err(changed(&path, shown, advice));
             }
-            _ => Err(not_ours(&path)),
+            _ => return Err(not_ours(&path)),
         }
-    })
+    }
+    Ok(())
 }
 
 /// Gives the results in `stage` the name `folder`, which holds nothing but an earlier run's results, and removes those.
 fn put_in_place(stage: &Path, folder: &Path) -> io::Result<()> {
-    let empty = match std::fs::read_dir(folder) {
-        Ok(mut entries) => entries.next().is_none(),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => true,
-        Err(error) => return Err(error),
-    };
     if let Ok(found) = folder.metadata() {
         std::fs::set_permissions(stage, found.permissions())?;
     }
     // a new name, or that of an empty folder, is taken in one step
-    if empty {
-        disk::rename(stage, folder)?;
-        let _ = disk::sync_folder(parent(folder));
-        return Ok(());
-    }
-    let earlier = match disk::exchange(stage, folder) {
-        Ok(()) => stage.to_owned(),
-        Err(error) if is_unknown(&error) => {
-            let aside = beside(folder, OLD);
-            disk::rename(folder, &aside)?;
-            if let Err(error) = disk::rename(stage, folder) {
-                let shown = aside.display();
-                return Err(match disk::rename(&aside, folder) {
-                    Ok(()) => error,
-                    Err(_) => io::Error::other(format!(
-                        "{error}; the earlier results are in {shown}; the next run with this folder puts them back"
-                    )),
-                });
-            }
-            aside
+    match disk::rename(stage, folder) {
+        Err(error) if matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists) => {
+            exchange(stage, folder)?;
         }
-        Err(error) => return Err(error),
-    };
+        other => other?,
+    }
     // what does not reach the disk or does not go away does no harm: the next run sees to it
     let _ = disk::sync_folder(parent(folder));
-    let _ = retire(&earlier, folder);
+    let _ = check_ours(stage, stage).map(|()| disk::remove_all(stage));
     Ok(())
 }
 
-/// Whether the file system does not know how to exchange two names.
-fn is_unknown(error: &io::Error) -> bool {
-    use rustix::io::Errno;
-    let unknown = [Errno::INVAL, Errno::NOSYS, Errno::OPNOTSUPP];
-    unknown
-        .iter()
-        .any(|one| error.raw_os_error() == Some(one.raw_os_error()))
+/// Lets the results in `stage` and those in `folder` change their names.
+fn exchange(stage: &Path, folder: &Path) -> io::Result<()> {
+    if disk::exchange(stage, folder)? {
+        return Ok(());
+    }
+    let aside = beside(folder, "old");
+    disk::rename(folder, &aside)?;
+    if let Err(error) = disk::rename(stage, folder) {
+        let shown = aside.display();
+        let left = format!("{error}; the earlier results are in {shown}; the next run with this folder puts them back");
+        let back = disk::rename(&aside, folder);
+        return Err(if back.is_ok() { error } else { io::Error::other(left) });
+    }
+    // the next run does it otherwise
+    let _ = disk::rename(&aside, stage);
+    Ok(())
 }
 
 /// Clears up after a run with this `folder` that was ended. The folder is locked, so all of it is of the past.
-fn recover(folder: &Path) -> io::Result<()> {
-    let [new, old] = [NEW, OLD].map(|what| beside(folder, what));
+fn recover(folder: &Path, shown: &Path) -> Result<(), Refusal> {
+    let [new, old] = ["new", "old"].map(|what| beside(folder, what));
     let is_folder = |path: &Path| path.symlink_metadata().is_ok_and(|found| found.is_dir());
     if is_folder(&old) {
-        match disk::exists(folder) {
-            true => retire(&old, folder)?,
-            false => disk::rename(&old, folder)?,
+        let back = !disk::exists(folder);
+        if !back {
+            check_ours(&old, &old)?;
         }
+        disk::rename(&old, if back { folder } else { &new }).map_err(unwritable(shown))?;
     }
     if is_folder(&new) {
-        // results have a manifest when they are complete; what is exchanged for them has one, too
-        match Manifest::read(&new) {
-            Some(_) => retire(&new, folder)?,
-            None => disk::remove_all(&new)?,
+        // without a manifest, results are not complete, or some of them have been removed
+        if Manifest::read(&new).is_some() {
+            check_ours(&new, &new)?;
         }
+        disk::remove_all(&new).map_err(unwritable(shown))?;
     }
     Ok(())
 }
 
-/// Removes the earlier results in `earlier`. A file that somebody has put there while the run ended moves into
-/// `folder`.
-fn retire(earlier: &Path, folder: &Path) -> io::Result<()> {
-    let manifest = Manifest::read(earlier).unwrap_or_default();
-    let mut names = files_below(earlier)?;
-    // the manifest last: the next run may have to go on with this
-    names.sort_by_key(|name| name == MANIFEST_FILE);
-    for name in names {
-        let (path, to) = (earlier.join(&name), folder.join(&name));
-        if name == MANIFEST_FILE || manifest.is_unchanged(earlier, &name)? {
-            disk::remove_file(&path)?;
-        } else {
-            std::fs::create_dir_all(parent(&to))?;
-            let moved = disk::rename_new(&path, &to);
-            moved
-                .map_err(|error| io::Error::new(error.kind(), format!("{} is in the way: {error}", path.display())))?;
-        }
-    }
-    remove_folders(earlier)
-}
-
-/// Removes `folder` and the folders in it, all of them empty.
-fn remove_folders(folder: &Path) -> io::Result<()> {
-    for entry in std::fs::read_dir(folder)? {
-        remove_folders(&entry?.path())?;
-    }
-    disk::remove_folder(folder)
-}
-
-/// Waits until the entries of `folder` and of the folders in it are on the disk.
-fn sync_folders(folder: &Path) -> io::Result<()> {
-    for entry in std::fs::read_dir(folder)? {
-        let entry = entry?;
-        if entry.file_type()?.is_dir() {
-            sync_folders(&entry.path())?;
-        }
-    }
-    disk::sync_folder(folder)
-}
-
-/// Calls `each` with every file below `folder` in the folder `below` of it, in order of name.
-fn walk(folder: &Path, below: &Path, each: &mut dyn FnMut(PathBuf) -> Result<(), Refusal>) -> Result<(), Refusal> {
-    let at = folder.join(below);
-    let entries = std::fs::read_dir(&at).and_then(Iterator::collect::<io::Result<Vec<_>>>);
-    let mut entries = entries.map_err(unwritable(&at))?;
-    entries.sort_by_key(std::fs::DirEntry::file_name);
-    for entry in entries {
-        let name = below.join(entry.file_name());
-        match entry.file_type().map_err(unwritable(&at))?.is_dir() {
-            true => walk(folder, &name, each)?,
-            false => each(name)?,
-        }
-    }
-    Ok(())
-}
-
-/// Names of all files below `folder`, with `/` between their parts, sorted.
-fn files_below(folder: &Path) -> io::Result<Vec<String>> {
-    let mut names = Vec::new();
-    let walked = walk(folder, Path::new(""), &mut |name| {
-        let name = name.into_os_string().into_string();
-        names.push(name.map_err(|name| Refusal::new("has a name that is not text").at(name.display()))?);
-        Ok(())
-    });
-    walked.map_err(io::Error::other)?;
-    names.sort();
-    Ok(names)
-}
-
-/// Folders that were created on the way to a folder, deepest first. As far as they are empty, they go when dropped.
-#[derive(Debug)]
-struct Parents {
-    made: Vec<PathBuf>,
-    /// Lets a signal remove them.
-    _entry: Entry,
-}
-
-impl Parents {
-    /// Makes the missing parents of `path`.
-    fn make(path: &Path) -> Result<Self, Refusal> {
-        let made = make_folders(if path.exists() { path } else { parent(path) })?;
-        let entry = listed(|| Ok(()), |()| Leftover::EmptyFolders(made.clone())).map_err(unwritable(path));
-        Ok(Self { made, _entry: entry?.1 })
-    }
-
-    fn keep(&mut self) {
-        self.made.clear();
-    }
-}
-
-impl Drop for Parents {
-    fn drop(&mut self) {
-        self.made.iter().for_each(|folder| drop(disk::remove_folder(folder)));
-    }
-}
-
-/// Makes the folder `path` and its parents where they are missing; returns those that were made, deepest first.
-fn make_folders(path: &Path) -> Result<Vec<PathBuf>, Refusal> {
-    let found = path.ancestors().find(|p| p.exists());
-    if let Some(found) = found.filter(|found| !found.is_dir()) {
+/// Makes the folder `path` and its parents where they are missing.
+fn make_folders(path: &Path) -> Result<(), Refusal> {
+    if let Some(found) = path.ancestors().find(|p| p.exists()).filter(|found| !found.is_dir()) {
         return Err(Refusal::new("is a file; the output has to be a folder").at(found.display()));
     }
-    let missing = path
-        .ancestors()
-        .take_while(|p| Some(*p) != found && *p != Path::new(""));
-    let missing: Vec<PathBuf> = missing.map(Path::to_owned).collect();
-    for (k, folder) in missing.iter().enumerate().rev() {
-        match disk::make_folder(folder) {
-            // another run may make the same parents
-            Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
-                missing[k + 1..].iter().for_each(|made| drop(disk::remove_folder(made)));
-                return Err(disk::no_folder(path, error));
-            }
-            _ => {}
-        }
-    }
-    Ok(missing)
+    let made = watched(DiskOperation::Other, path, || std::fs::create_dir_all(path));
+    made.map_err(|error| no_folder(path, error))
 }
 
 /// The lock of a folder, given up when dropped. The operating system holds it (`flock`), not a process number in a
@@ -397,19 +259,21 @@ fn make_folders(path: &Path) -> Result<Vec<PathBuf>, Refusal> {
 #[derive(Debug)]
 struct Lock {
     _file: File,
-    path: PathBuf,
-    /// Lets a signal remove the file.
-    _entry: Option<Entry>,
+    /// The file, and the folders that were made on the way to it, deepest first. They go if nothing else is in them.
+    left: Vec<PathBuf>,
+    /// Lets a signal remove them.
+    _entry: Entry,
 }
 
 impl Lock {
-    /// Locks `folder`, which the user calls `shown`.
-    fn take(folder: &Path, shown: &Path) -> Result<Self, Refusal> {
-        let path = beside(folder, LOCK);
+    /// Locks `folder`, which the user calls `shown`, and for which the parents `made` were made.
+    fn take(folder: &Path, shown: &Path, made: Vec<PathBuf>) -> Result<Self, Refusal> {
+        let path = beside(folder, "lock");
         let failed = unwritable(shown);
+        let open = || File::options().create(true).truncate(false).write(true).open(&path);
         loop {
-            let file = disk::open_or_create(&path).map_err(|error| match error.kind() {
-                io::ErrorKind::PermissionDenied if folder.exists() => {
+            let file = watched(DiskOperation::Other, &path, open).map_err(|error| match error.kind() {
+                ErrorKind::PermissionDenied if folder.exists() => {
                     let above = parent(folder).display();
                     let problem = format!("cannot be replaced as a whole: {above}: {error}; choose a folder in it");
                     Refusal::new(problem).at(shown.display())
@@ -417,23 +281,24 @@ impl Lock {
                 _ => failed(error),
             })?;
             match file.try_lock() {
-                Ok(()) => {}
                 Err(TryLockError::WouldBlock) => {
                     let problem =
                         "another run is writing to this folder; choose another one, or wait until that run has ended";
                     return Err(Refusal::new(problem).at(shown.display()));
                 }
+                Err(TryLockError::Error(error)) if error.kind() != ErrorKind::Unsupported => return Err(failed(error)),
                 // a file system without locks: one run at a time is then the user's to see to
-                Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {}
-                Err(TryLockError::Error(error)) => return Err(failed(error)),
+                _ => {}
             }
             // the run before may have removed the file between its opening and its locking
-            if is_same(&file, &path) {
-                let entry = listed(|| Ok(()), |()| Leftover::File(path.clone())).ok();
+            let identity = |found: io::Result<Metadata>| found.ok().map(|found| (found.dev(), found.ino()));
+            if identity(file.metadata()) == identity(path.metadata()) {
+                let left = [vec![path], made].concat();
+                let entry = listed(|| Ok(()), |()| Leftover::Each(left.clone())).map_err(failed)?;
                 return Ok(Self {
                     _file: file,
-                    _entry: entry.map(|((), entry)| entry),
-                    path,
+                    left,
+                    _entry: entry.1,
                 });
             }
         }
@@ -443,26 +308,21 @@ impl Lock {
 impl Drop for Lock {
     fn drop(&mut self) {
         // while it is still locked, so that no other run holds a file that is gone
-        let _ = disk::remove_file(&self.path);
+        self.left.iter().for_each(|path| drop(disk::remove(path)));
     }
-}
-
-/// End of the name of the file that a run holds locked while the folder is its own.
-const LOCK: &str = "lock";
-
-/// Whether `file` is what has the name `path`.
-fn is_same(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt as _;
-    let identity = |m: std::fs::Metadata| (m.dev(), m.ino());
-    let (held, named) = (file.metadata().map(identity), path.metadata().map(identity));
-    matches!((held, named), (Ok(held), Ok(named)) if held == named)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{check_whole, write_bytes, write_npy};
+    use super::super::{check_whole, watching_disk, write_bytes, write_npy};
     use super::*;
+    use std::cell::Cell;
+    use std::collections::BTreeMap;
     use std::fs;
+    use std::rc::Rc;
+
+    /// Names and contents of the results of a run.
+    type Results<'a> = &'a [(&'a str, &'a str)];
 
     fn names(dir: &Path) -> Vec<String> {
         let entries = fs::read_dir(dir).unwrap();
@@ -471,10 +331,22 @@ mod tests {
         names
     }
 
-    /// Opens `dir`, writes files with these contents, and commits them.
-    fn run(dir: &Path, files: &[(&str, &str)]) -> Result<Vec<String>, Refusal> {
+    /// All files below `dir`, which may be missing.
+    fn there(dir: &Path) -> BTreeMap<PathBuf, String> {
+        let (files, _) = disk::below(dir).unwrap_or_default();
+        let read = |name: PathBuf| (name.clone(), fs::read_to_string(dir.join(name)).unwrap());
+        files.into_iter().map(read).collect()
+    }
+
+    /// Writes `content` as the file `path`, in a folder that may be missing.
+    fn put(path: &Path, content: &str) {
+        fs::create_dir_all(parent(path)).unwrap();
+        fs::write(path, content).unwrap();
+    }
+
+    fn run(dir: &Path, results: Results<'_>) -> Result<Vec<String>, Refusal> {
         let out = OutputFolder::open(dir)?;
-        for (name, content) in files {
+        for (name, content) in results {
             if let Some((folder, _)) = name.rsplit_once('/') {
                 out.folder(folder)?;
             }
@@ -499,9 +371,17 @@ mod tests {
             run(&out, &[("a", "old"), ("tables/b", "old")]).unwrap(),
             ["a", "tables/b"]
         );
-        let dropped = OutputFolder::open(&out).unwrap();
-        write_bytes(&dropped.path("a"), b"half").unwrap();
-        drop(dropped);
+        let first = OutputFolder::open(&out).unwrap();
+        refused(&out, &["deep/er: another run is writing to this folder"]);
+        // whatever fails while results wait, the message names where they would have been
+        write_bytes(&first.path("figures"), b"half").unwrap();
+        let in_the_way = first.folder("figures").unwrap_err();
+        let wrong_shape = write_npy(&first.path("a.npy"), &[4], &[1.0]).unwrap_err();
+        for (error, name) in [(in_the_way, "figures"), (wrong_shape, "a.npy")] {
+            let text = first.unstaged(error).to_string();
+            assert!(text.starts_with(&format!("{}: ", out.join(name).display())), "{text}");
+        }
+        drop(first);
         assert_eq!(fs::read(out.join("a")).unwrap(), b"old");
         // an empty folder and a result that is gone are nobody's loss
         fs::create_dir(out.join("empty")).unwrap();
@@ -515,10 +395,7 @@ mod tests {
         let link = dir.path().join("link");
         std::os::unix::fs::symlink(&out, &link).unwrap();
         run(&link, &[("d", "new")]).unwrap();
-        assert_eq!(
-            (names(&out), link.is_symlink()),
-            (vec!["d".to_owned(), MANIFEST_FILE.to_owned()], true)
-        );
+        assert!(names(&out) == ["d", MANIFEST_FILE] && link.is_symlink());
         // a folder that was made for nothing goes again
         drop(OutputFolder::open(&dir.path().join("x/y")).unwrap());
         assert_eq!(names(dir.path()), ["deep", "link"]);
@@ -527,55 +404,33 @@ mod tests {
     /// Whatever else lies in a folder is somebody's: it is named, and everything stays.
     #[test]
     fn only_unchanged_results_are_replaced() {
-        type Make<'a> = (&'a str, &'a dyn Fn(&Path));
-        let make: [Make<'_>; 6] = [
-            ("notes.txt", &|out| fs::write(out.join("notes.txt"), "mine").unwrap()),
-            ("tables/mine.csv", &|out| {
-                fs::write(out.join("tables/mine.csv"), "mine").unwrap()
-            }),
-            (".hidden/mine", &|out| {
-                fs::create_dir(out.join(".hidden")).unwrap();
-                fs::write(out.join(".hidden/mine"), "mine").unwrap();
-            }),
-            ("a", &|out| fs::write(out.join("a"), "mine").unwrap()),
-            ("a", &|out| {
-                fs::remove_file(out.join("a")).unwrap();
-                std::os::unix::fs::symlink("tables/b", out.join("a")).unwrap();
-            }),
-            // a manifest of somebody's own is nobody's leave to replace what it lists
-            ("a", &|out| {
-                fs::write(out.join(MANIFEST_FILE), r#"{"format": "mine", "files": {"a": {}}}"#).unwrap();
-            }),
-        ];
-        for (name, make) in make {
+        // a manifest of somebody's own is nobody's leave to replace what it lists
+        let mine = r#"{"format": "mine", "files": {"a": {}}}"#;
+        for (put_there, named) in [
+            ("notes.txt", "notes.txt"),
+            ("tables/mine.csv", "tables/mine.csv"),
+            (".hidden/mine", ".hidden/mine"),
+            ("a", "a"),
+            ("link", "a"),
+            (MANIFEST_FILE, "a"),
+        ] {
             let dir = tempfile::tempdir().unwrap();
             let out = dir.path().join("out");
             run(&out, &[("a", "old"), ("tables/b", "old")]).unwrap();
             let early = OutputFolder::open(&out).unwrap();
-            make(&out);
-            let shown = out.join(name).display().to_string();
+            if put_there == "link" {
+                fs::remove_file(out.join("a")).unwrap();
+                std::os::unix::fs::symlink("tables/b", out.join("a")).unwrap();
+            } else {
+                put(&out.join(put_there), mine);
+            }
+            let shown = out.join(named).display().to_string();
             let late = early.commit().unwrap_err().to_string();
             assert!(late.starts_with(&format!("{shown}: is not ")), "{late}");
-            refused(
-                &out,
-                &[&shown, "is not", "replaced", "move it away or choose another folder"],
-            );
+            refused(&out, &[&shown, "replaced", "move it away or choose another folder"]);
             assert_eq!(names(dir.path()), ["out"]);
             assert_eq!(fs::read(out.join("tables/b")).unwrap(), b"old");
         }
-    }
-
-    #[test]
-    fn one_run_at_a_time() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path().join("out");
-        let first = OutputFolder::open(&out).unwrap();
-        write_bytes(&first.path("a"), b"first").unwrap();
-        refused(&out, &["out: another run is writing to this folder"]);
-        first.commit().unwrap();
-        run(&out, &[("a", "second")]).unwrap();
-        assert_eq!(fs::read(out.join("a")).unwrap(), b"second");
-        assert_eq!(names(dir.path()), ["out"]);
     }
 
     /// Results of two runs beside each other are noticed, whoever put them there.
@@ -584,9 +439,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
         run(&out, &[("a", "one"), ("below/b", "one")]).unwrap();
-        check_whole(&out, &["a", "not listed"]).unwrap();
-        check_whole(&out.join("below"), &["b"]).unwrap();
-        fs::write(out.join("below/b"), "two").unwrap();
+        check_whole(&out.join("below"), &["b", "not listed"]).unwrap();
+        put(&out.join("below/b"), "two");
         check_whole(&out, &["a"]).unwrap();
         let error = check_whole(&out.join("below"), &["b"]).unwrap_err().to_string();
         assert!(error.contains("below/b") && error.contains(MANIFEST_FILE), "{error}");
@@ -595,38 +449,18 @@ mod tests {
     #[test]
     fn what_cannot_be_replaced_as_a_whole_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("file");
-        fs::write(&file, b"precious").unwrap();
+        let [file, nowhere] = ["file", "nowhere"].map(|name| dir.path().join(name));
+        put(&file, "mine");
         refused(&file, &["file: is a file; the output has to be a folder"]);
         refused(&file.join("below"), &["file: is a file"]);
-        assert_eq!(fs::read(&file).unwrap(), b"precious");
-        let nowhere = dir.path().join("nowhere");
-        std::os::unix::fs::symlink(dir.path().join("gone"), &nowhere).unwrap();
+        std::os::unix::fs::symlink("gone", &nowhere).unwrap();
         refused(&nowhere, &["nowhere: cannot be written"]);
-        assert_eq!(names(dir.path()), ["file", "nowhere"]);
-        refused(Path::new("/"), &["/: is a mount point", "choose a folder in it"]);
-        assert!(!is_mounted(dir.path(), parent(dir.path())));
-        for mounted in ["/proc", "/dev/shm"]
-            .map(Path::new)
-            .into_iter()
-            .filter(|path| path.exists())
-        {
-            assert!(is_mounted(mounted, parent(mounted)), "{}", mounted.display());
-        }
-    }
-
-    /// Whatever fails while results wait, the message names where they would have been.
-    #[test]
-    fn errors_name_the_final_place() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = dir.path().join("out");
-        let staged = OutputFolder::open(&out).unwrap();
-        write_bytes(&staged.path("figures"), b"in the way").unwrap();
-        let in_the_way = staged.folder("figures").unwrap_err();
-        let wrong_shape = write_npy(&staged.path("a.npy"), &[4], &[1.0]).unwrap_err();
-        for (error, name) in [(in_the_way, "figures"), (wrong_shape, "a.npy")] {
-            let text = staged.unstaged(error).to_string();
-            assert!(text.starts_with(&format!("{}: ", out.join(name).display())), "{text}");
+        assert!(names(dir.path()) == ["file", "nowhere"] && fs::read(&file).unwrap() == b"mine");
+        for mounted in ["/", "/proc"] {
+            refused(
+                Path::new(mounted),
+                &[mounted, ": is a mount point", "choose a folder in it"],
+            );
         }
     }
 
@@ -634,40 +468,145 @@ mod tests {
     #[test]
     fn what_an_ended_run_has_left_is_read_without_trust() {
         let dir = tempfile::tempdir().unwrap();
-        let at = |name: &str| dir.path().join(name);
-        run(&at("out"), &[("a", "old")]).unwrap();
-        // ended between two renames, in the file system that cannot exchange
-        fs::rename(at("out"), at(".out.spts-old")).unwrap();
-        drop(OutputFolder::open(&at("out")).unwrap());
-        assert_eq!(fs::read(at("out/a")).unwrap(), b"old");
-        // a file that came into the earlier results while the run ended goes where it was meant to be
-        run(&at("other"), &[("a", "older")]).unwrap();
-        fs::create_dir(at("other/mine")).unwrap();
-        fs::write(at("other/mine/notes.txt"), "mine").unwrap();
-        fs::rename(at("other"), at(".out.spts-new")).unwrap();
-        refused(&at("out"), &["out/mine/notes.txt: is not a result"]);
-        assert_eq!(fs::read(at("out/mine/notes.txt")).unwrap(), b"mine");
-        fs::remove_dir_all(at("out/mine")).unwrap();
-        assert_eq!(names(dir.path()), ["out"]);
-        // a result that was changed then has a place of its own no more
-        fs::create_dir(at(".out.spts-old")).unwrap();
-        fs::write(at(".out.spts-old/a"), "mine").unwrap();
-        refused(&at("out"), &["out: cannot be written", ".out.spts-old/a is in the way"]);
-        assert_eq!(fs::read(at(".out.spts-old/a")).unwrap(), b"mine");
-        fs::remove_dir_all(at(".out.spts-old")).unwrap();
-        // a link leads to what is not ours, a list may name what is not below, and a pipe never answers
-        fs::create_dir(at("precious")).unwrap();
-        fs::write(at("precious/a"), "mine").unwrap();
-        std::os::unix::fs::symlink(at("precious"), at(".out.spts-new")).unwrap();
-        refused(&at("out"), &["out: cannot be written"]);
-        fs::remove_file(at(".out.spts-new")).unwrap();
+        let [out, new, old, precious] =
+            ["out", ".out.spts-new", ".out.spts-old", "precious"].map(|name| dir.path().join(name));
+        run(&out, &[("a", "old")]).unwrap();
+        for left in [&new, &old] {
+            run(left, &[("a", "older")]).unwrap();
+            put(&left.join("mine/notes.txt"), "mine");
+            refused(&out, &["mine/notes.txt: is not a result", left.to_str().unwrap()]);
+            assert_eq!(fs::read(left.join("mine/notes.txt")).unwrap(), b"mine");
+            fs::remove_dir_all(left.join("mine")).unwrap();
+            drop(OutputFolder::open(&out).unwrap());
+            assert_eq!(names(dir.path()), ["out"]);
+        }
+        // a link leads to what is not ours, a list may name what is not below, and a socket never answers
+        put(&precious.join("a"), "mine");
+        std::os::unix::fs::symlink(&precious, &new).unwrap();
+        refused(&out, &["out: cannot be written"]);
+        fs::remove_file(&new).unwrap();
         let list = r#"{"format": "spts-results", "schema": 1, "files": {"../precious/a": {}}}"#;
-        fs::create_dir(at(".out.spts-old")).unwrap();
-        fs::write(at(".out.spts-old").join(MANIFEST_FILE), list).unwrap();
-        drop(OutputFolder::open(&at("out")).unwrap());
-        let made = std::process::Command::new("mkfifo").arg(at("out/pipe")).status();
-        assert!(made.unwrap().success());
-        refused(&at("out"), &["out/pipe: is not a result"]);
-        assert_eq!(fs::read(at("precious/a")).unwrap(), b"mine");
+        put(&old.join(MANIFEST_FILE), list);
+        refused(&out, &[".out.spts-old/manifest.json: is not a result"]);
+        fs::remove_dir_all(&old).unwrap();
+        std::os::unix::net::UnixListener::bind(out.join("pipe")).unwrap();
+        refused(&out, &["out/pipe: is not a result"]);
+        assert_eq!(fs::read(precious.join("a")).unwrap(), b"mine");
+    }
+
+    fn copy(from: &Path, to: &Path) {
+        let (files, folders) = disk::below(from).unwrap();
+        folders
+            .iter()
+            .for_each(|name| fs::create_dir_all(to.join(name)).unwrap());
+        for name in files {
+            fs::copy(from.join(&name), to.join(name)).unwrap();
+        }
+    }
+
+    /// When an operation on the disk is made to fail.
+    #[derive(Debug, Clone, Copy, PartialEq)]
+    enum Fault {
+        /// This one alone, as when a network folder is away for a moment.
+        Once,
+        /// This one and all that follow, as on a full disk.
+        FromThen,
+        /// None, but what the disk holds before this one is what a killed run leaves.
+        Killed,
+    }
+
+    /// Puts `new` into `run/out` of the folder `work`. The fault comes at the operation `step`; `work/killed` gets what
+    /// a run leaves that is killed there. Returns the number of operations as well.
+    fn run_with(
+        new: Results<'_>,
+        exchanges: bool,
+        work: &Path,
+        (step, fault): (usize, Fault),
+    ) -> (Result<Vec<String>, Refusal>, usize) {
+        const INVALID: i32 = 22;
+        let [from, to] = ["run", "killed"].map(|name| work.join(name));
+        let (out, count) = (from.join("out"), Rc::new(Cell::new(0)));
+        let at = Rc::clone(&count);
+        let watcher = move |operation, _: &Path| {
+            let now = at.replace(at.get() + 1);
+            match fault {
+                Fault::Killed if now == step => copy(&from, &to),
+                Fault::Once if now == step => return Err(ErrorKind::StorageFull.into()),
+                Fault::FromThen if now >= step => return Err(ErrorKind::StorageFull.into()),
+                _ => {}
+            }
+            match operation {
+                DiskOperation::Exchange if !exchanges => Err(io::Error::from_raw_os_error(INVALID)),
+                _ => Ok(()),
+            }
+        };
+        (watching_disk(watcher, || run(&out, new)), count.get())
+    }
+
+    /// Every operation on the disk of a run that puts its results in place of `old` is made to fail once and for good,
+    /// and is the last one. `old` is empty for a new folder, and `away` when a run was ended between two renames.
+    fn check_every_step(old: Results<'_>, away: bool, exchanges: bool) {
+        let new: Results<'_> = &[("a", "new"), ("same", "same"), ("tables/csv/c", "new")];
+        // where the disk does not slow the operations down, if there is such a place
+        let dir = tempfile::tempdir_in("/dev/shm").unwrap_or_else(|_| tempfile::tempdir().unwrap());
+        let [base, whole] = ["base", "whole"].map(|name| dir.path().join(name));
+        fs::create_dir(&base).unwrap();
+        if !old.is_empty() {
+            run(&base.join("out"), old).unwrap();
+        }
+        let before = there(&base.join("out"));
+        if away {
+            fs::rename(base.join("out"), base.join(".out.spts-old")).unwrap();
+        }
+        copy(&base, &whole.join("run"));
+        let (result, steps) = run_with(new, exchanges, &whole, (usize::MAX, Fault::Once));
+        result.unwrap();
+        let after = there(&whole.join("run/out"));
+        assert!(before != after && steps > 30, "{steps} steps");
+        let mut seen = [0; 3];
+        for at in (0..steps).flat_map(|step| [Fault::Once, Fault::FromThen, Fault::Killed].map(|fault| (step, fault))) {
+            let work = tempfile::tempdir_in(dir.path()).unwrap();
+            copy(&base, &work.path().join("run"));
+            let (result, _) = run_with(new, exchanges, work.path(), at);
+            let what = format!("{at:?}, {result:?}");
+            let left = work.path().join(if at.1 == Fault::Killed { "killed" } else { "run" });
+            let (out, aside) = (left.join("out"), left.join(".out.spts-old"));
+            // between two renames there is no folder, never half of one
+            let is_aside = (away || !exchanges) && !out.exists() && there(&aside) == before;
+            let states = [there(&out) == before, there(&out) == after, is_aside];
+            let state = states
+                .iter()
+                .position(|is| *is)
+                .unwrap_or_else(|| panic!("{what}: a mixture"));
+            seen[state] += 1;
+            match (at.1, result.is_ok()) {
+                (Fault::Once, false) => assert!(state == 0 || away && state == 2, "{what}"),
+                (Fault::Once | Fault::FromThen, true) => assert_eq!(state, 1, "{what}"),
+                _ => {}
+            }
+            // a run that writes nothing puts back what was away, and the next one leaves nothing of this one
+            drop(OutputFolder::open(&out).unwrap());
+            assert!([&before, &after].contains(&&there(&out)), "{what}: not put back");
+            run(&out, new).unwrap();
+            assert!(
+                there(&out) == after && names(&left) == ["out"],
+                "{what}: {:?}",
+                names(&left)
+            );
+        }
+        eprintln!("{steps} steps, each with three faults: {seen:?} times earlier, new, put aside and put back results");
+    }
+
+    #[test]
+    fn a_run_fails_or_is_killed_at_every_step() {
+        let old: Results<'_> = &[("a", "old"), ("same", "same"), ("arrays/b", "old")];
+        for (old, away, exchanges) in [
+            (old, false, true),
+            (old, false, false),
+            (old, true, true),
+            (&[], false, true),
+        ] {
+            check_every_step(old, away, exchanges);
+        }
     }
 }

@@ -1,17 +1,17 @@
 //! The manifest: which files of a folder a run has written.
 
 use super::disk::unwritable;
-use super::files::write_bytes;
+use super::files::write_json;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 use spts_input::Refusal;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::Metadata;
 use std::io::{self, Read as _};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, Path};
 
 /// The file that lists the files that a run has written.
-pub const MANIFEST_FILE: &str = "manifest.json";
+pub(super) const MANIFEST_FILE: &str = "manifest.json";
 const FORMAT: &str = "spts-results";
 const SCHEMA: u64 = 1;
 /// Largest manifest that is read, bytes: 100,000 files.
@@ -29,13 +29,11 @@ const PIECE: usize = 1 << 16;
 /// write_bytes(&folder.path("scores.csv"), b"iou\n0.8\n")?;
 /// folder.commit()?;
 /// let manifest = Manifest::read(&path).expect("a run has left its manifest");
-/// assert!(manifest.is_unchanged(&path, "scores.csv")?);
-/// std::fs::write(path.join("scores.csv"), "iou\n1.0\n")?;
-/// assert!(!manifest.is_unchanged(&path, "scores.csv")?);
+/// assert!(manifest.names().eq(["scores.csv"]));
 /// # std::fs::remove_dir_all(&path)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     format: String,
@@ -45,7 +43,7 @@ pub struct Manifest {
 }
 
 /// What is known of a file.
-#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FileEntry {
     /// Size, bytes, and SHA-256 of the content in hexadecimal digits. Both are absent for a file that depends on the
@@ -56,44 +54,42 @@ struct FileEntry {
     sha256: Option<String>,
 }
 
-impl Default for Manifest {
-    fn default() -> Self {
-        Self {
-            format: FORMAT.to_owned(),
-            schema: SCHEMA,
-            files: BTreeMap::new(),
+impl FileEntry {
+    /// The entry of the file at `path`.
+    fn of(path: &Path) -> io::Result<Self> {
+        let (mut file, bytes) = spts_input::open(path, u64::MAX)?;
+        let (mut hash, mut piece) = (Sha256::new(), vec![0; PIECE]);
+        while let read @ 1.. = file.read(&mut piece)? {
+            hash.update(&piece[..read]);
         }
+        Ok(Self {
+            bytes: Some(bytes),
+            sha256: Some(in_digits(hash)),
+        })
     }
 }
 
 impl Manifest {
-    /// The manifest of all files below `folder` that `names` lists, which no run will write alike that are `timed`.
-    pub(super) fn of(folder: &Path, names: &[String], timed: &BTreeSet<String>) -> Result<Self, Refusal> {
-        let entry = |name: &String| {
-            if timed.contains(name) {
-                return Ok((name.clone(), FileEntry::default()));
-            }
-            let path = folder.join(name);
-            let (bytes, sha256) = digest(&path).map_err(unwritable(&path))?;
-            let entry = FileEntry {
-                bytes: Some(bytes),
-                sha256: Some(sha256),
-            };
-            Ok((name.clone(), entry))
-        };
-        Ok(Self {
-            files: names.iter().map(entry).collect::<Result<_, Refusal>>()?,
-            ..Self::default()
-        })
-    }
-
-    /// Writes the manifest of the files `names` of `folder` into that folder.
+    /// Writes the manifest of the files `names` of `folder` into that folder. No two runs write alike what is `timed`.
     ///
     /// # Errors
     /// [`Refusal`] if a file cannot be read, or the manifest cannot be written.
-    pub fn write_of(folder: &Path, names: &[String]) -> Result<Self, Refusal> {
-        let manifest = Self::of(folder, names, &BTreeSet::new())?;
-        manifest.write(folder)?;
+    pub fn write_of(folder: &Path, names: &[String], timed: &BTreeSet<String>) -> Result<Self, Refusal> {
+        let mut files = BTreeMap::new();
+        for name in names {
+            let path = folder.join(name);
+            let entry = match timed.contains(name) {
+                true => FileEntry::default(),
+                false => FileEntry::of(&path).map_err(unwritable(&path))?,
+            };
+            files.insert(name.clone(), entry);
+        }
+        let manifest = Self {
+            format: FORMAT.to_owned(),
+            schema: SCHEMA,
+            files,
+        };
+        write_json(&folder.join(MANIFEST_FILE), &manifest)?;
         Ok(manifest)
     }
 
@@ -101,15 +97,12 @@ impl Manifest {
     /// give equal digests wherever they lie.
     #[must_use]
     pub fn digest_of(&self, within: &str) -> String {
-        let mut digest = Sha256::new();
-        for (name, entry) in self
+        let listed = self
             .files
             .iter()
-            .filter(|(name, _)| Path::new(name).starts_with(within))
-        {
-            digest.update(format!("{}  {name}\n", entry.sha256.as_deref().unwrap_or_default()));
-        }
-        digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+            .filter(|(name, _)| Path::new(name).starts_with(within));
+        let lines = listed.map(|(name, entry)| format!("{}  {name}\n", entry.sha256.as_deref().unwrap_or_default()));
+        in_digits(Sha256::new().chain_update(lines.collect::<String>()))
     }
 
     /// The manifest of `folder`, if a run has left one. A file of that name that no run has written does not count.
@@ -123,12 +116,6 @@ impl Manifest {
         (ours && manifest.files.keys().all(|name| is_below(name))).then_some(manifest)
     }
 
-    pub(super) fn write(&self, folder: &Path) -> Result<(), Refusal> {
-        let path = folder.join(MANIFEST_FILE);
-        let text = serde_json::to_string_pretty(self).map_err(unwritable(&path))?;
-        write_bytes(&path, (text + "\n").as_bytes())
-    }
-
     /// Names of the files, sorted.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.files.keys().map(String::as_str)
@@ -140,24 +127,14 @@ impl Manifest {
     }
 
     /// Whether the file `name` of `folder` is still as the run wrote it; `false` for a file that is not listed.
-    ///
-    /// # Errors
-    /// [`io::Error`] if the file exists but cannot be read.
-    pub fn is_unchanged(&self, folder: &Path, name: &str) -> io::Result<bool> {
-        let Some(entry) = self.files.get(name) else {
-            return Ok(false);
-        };
+    pub(super) fn is_unchanged(&self, folder: &Path, name: &str) -> io::Result<bool> {
         let path = folder.join(name);
-        let found = match path.symlink_metadata() {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(false),
-            other => other?,
-        };
-        Ok(found.is_file()
-            && entry.bytes.is_none_or(|bytes| bytes == found.len())
-            && match &entry.sha256 {
-                Some(sha256) => digest(&path)?.1 == *sha256,
-                None => true,
-            })
+        match self.files.get(name) {
+            Some(entry) if path.symlink_metadata().is_ok_and(|found| found.is_file()) => {
+                Ok(*entry == FileEntry::default() || *entry == FileEntry::of(&path)?)
+            }
+            _ => Ok(false),
+        }
     }
 }
 
@@ -183,14 +160,14 @@ pub fn check_whole(folder: &Path, names: &[&str]) -> Result<(), Refusal> {
         if manifest.lists(&listed) && !manifest.is_unchanged(above, &listed).map_err(unwritable(&path))? {
             let advice =
                 "the folder holds results of two runs, or the file was changed by hand: then delete the manifest";
-            return Err(changed(path, above, advice));
+            return Err(changed(&path, above, advice));
         }
     }
     Ok(())
 }
 
 /// The error that `path` is not as the manifest in `folder` lists it.
-pub(super) fn changed(path: PathBuf, folder: &Path, advice: &str) -> Refusal {
+pub(super) fn changed(path: &Path, folder: &Path, advice: &str) -> Refusal {
     let manifest = folder.join(MANIFEST_FILE);
     let problem = format!("is not the file that {} lists; {advice}", manifest.display());
     Refusal::new(problem).at(path.display())
@@ -204,19 +181,7 @@ fn is_below(name: &str) -> bool {
             .all(|part| matches!(part, Component::Normal(_)))
 }
 
-/// Size and SHA-256 of a file.
-fn digest(path: &Path) -> io::Result<(u64, String)> {
-    let (mut file, _) = spts_input::open(path, u64::MAX)?;
-    let (mut hash, mut bytes, mut piece) = (Sha256::new(), 0, vec![0; PIECE]);
-    loop {
-        match file.read(&mut piece)? {
-            0 => break,
-            n => {
-                hash.update(&piece[..n]);
-                bytes += n as u64;
-            }
-        }
-    }
-    let hex: String = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
-    Ok((bytes, hex))
+/// `hash` in hexadecimal digits.
+fn in_digits(hash: Sha256) -> String {
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
 }
