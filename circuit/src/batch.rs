@@ -127,26 +127,22 @@ pub(crate) struct Scratch {
 
 impl Batch<'_> {
     /// Number of measurements.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.output_v.len()
     }
 
     /// Whether the batch is empty. The readout makes no empty batch.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.output_v.is_empty()
     }
 
     /// Row of the weight matrix at measurement `i`: clock edges since the seeds were loaded.
-    #[must_use]
     #[inline]
     pub fn row(&self, i: usize) -> u64 {
         self.rows.first_row() + i as u64
     }
 
     /// Drive level of `taxel` at measurement `i`, in O(1).
-    #[must_use]
     #[inline]
     pub fn level(&self, taxel: usize, i: usize) -> f64 {
         match self.cell(taxel) {
@@ -156,7 +152,6 @@ impl Batch<'_> {
     }
 
     /// Drive level of `taxel` at the measurement before measurement `i`, in O(1); 0 before the first measurement.
-    #[must_use]
     #[inline]
     pub(crate) fn previous_level(&self, taxel: usize, i: usize) -> f64 {
         match self.cell(taxel) {
@@ -166,7 +161,6 @@ impl Batch<'_> {
     }
 
     /// Contribution of `taxel` to measurement `i` at drive level 1, V.
-    #[must_use]
     #[inline]
     pub(crate) fn taxel_v(&self, taxel: usize, i: usize) -> f64 {
         let gain = self.cell(taxel).map_or(1.0, |cell| cell.gain(i));
@@ -174,7 +168,6 @@ impl Batch<'_> {
     }
 
     /// Kind of the levels that the cells put out.
-    #[must_use]
     pub fn mode(&self) -> WeightMode {
         self.rows.weights().mode()
     }

@@ -65,20 +65,17 @@ impl TryFrom<AdcConfig> for Adc {
 
 impl Adc {
     /// Size of one step, V at the amplifier's output.
-    #[must_use]
     pub fn lsb_v(&self) -> f64 {
         self.lsb_v
     }
 
     /// Code of the output `volts`: the nearest one, limited to the valid codes. It falls as the output rises.
-    #[must_use]
     #[inline]
     pub fn code(&self, volts: f64) -> f64 {
         ((self.offset_v - volts) / self.lsb_v).round().clamp(0.0, self.max_code)
     }
 
     /// Output that belongs to `code`, V.
-    #[must_use]
     #[inline]
     pub fn volts(&self, code: f64) -> f64 {
         self.offset_v - code * self.lsb_v
@@ -210,7 +207,6 @@ impl Converter {
     }
 
     /// Largest code; the smallest is 0.
-    #[must_use]
     pub fn max_code(&self) -> u32 {
         self.0.max_code
     }
@@ -221,7 +217,6 @@ impl Converter {
     }
 
     /// Voltage in the recording for `code`.
-    #[must_use]
     pub fn volts(&self, code: u32) -> f64 {
         let code = f64::from(code);
         let taken = match self.0.scale {
@@ -239,7 +234,6 @@ impl Converter {
     }
 
     /// Smallest code whose voltage equals `volts` bit for bit; `None` if there is no such code, as for NaN.
-    #[must_use]
     pub fn code(&self, volts: f64) -> Option<u32> {
         // volts never rise with the code: the first code that is not above them
         let (mut above, mut not_above) = (0, self.0.max_code);
@@ -258,7 +252,6 @@ impl Converter {
     }
 
     /// Whether this converter can have made `volts`: each of them is the voltage of one of its codes, or NaN.
-    #[must_use]
     pub fn made(&self, volts: &[f64]) -> bool {
         volts.iter().all(|v| v.is_nan() || self.code(*v).is_some())
     }

@@ -35,7 +35,6 @@ impl EffectSession {
     /// assert_eq!(error.to_string(), "`limit_v` = -1 is outside (0, 1e6]");
     /// # Ok::<(), toml::de::Error>(())
     /// ```
-    #[must_use]
     pub fn of(seed: u64, weights: Weights) -> Self {
         Self {
             device: Streams::new(seed),

@@ -169,7 +169,6 @@ impl Profile {
     }
 
     /// Rf·Vd for electrodes of 10 mm × 10 mm, V/S. For another skin, call it on the result of [`Profile::on`].
-    #[must_use]
     pub fn volts_per_siemens(&self) -> f64 {
         self.feedback_ohm * self.drive_v
     }

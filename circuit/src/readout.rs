@@ -97,25 +97,21 @@ impl Readout {
     }
 
     /// Weights that the cells are meant to put out.
-    #[must_use]
     pub fn weights(&self) -> &Weights {
         self.engine.weights()
     }
 
     /// Metadata of its recordings.
-    #[must_use]
     pub fn info(&self) -> &RecordingInfo {
         &self.info
     }
 
     /// Number of measurements in a frame.
-    #[must_use]
     pub fn measurements_per_frame(&self) -> usize {
         self.engine.weights().taxels()
     }
 
     /// Number of measurements a second, Hz.
-    #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
         self.engine.sample_rate_hz()
     }
@@ -187,7 +183,6 @@ impl Readout {
     }
 
     /// Row of the next measurement, counted from loading the seeds.
-    #[must_use]
     pub fn row(&self) -> u64 {
         self.row
     }

@@ -36,7 +36,6 @@ pub struct RecordingInfo {
 
 impl RecordingInfo {
     /// Metadata of a skin whose frames have one measurement for each taxel, without a converter.
-    #[must_use]
     pub fn new(layout: SkinLayout, weights: Weights, sample_rate_hz: f64) -> Self {
         Self {
             measurements_per_frame: layout.taxels(),
@@ -48,7 +47,6 @@ impl RecordingInfo {
     }
 
     /// The readout that made the recording.
-    #[must_use]
     pub fn mode(&self) -> Mode {
         self.weights.mode().readout()
     }
@@ -184,7 +182,6 @@ impl Recording {
 
     /// The same recording, in which the first `idle_frames` frames of every block are marked as idle (at most the whole
     /// block); `None` if it is not known.
-    #[must_use]
     pub fn with_idle_frames(mut self, idle_frames: Option<usize>) -> Self {
         let idle_frames = idle_frames.map(|idle| idle.min(self.frames));
         for block in &mut self.blocks {
@@ -194,25 +191,21 @@ impl Recording {
     }
 
     /// Metadata of the recording.
-    #[must_use]
     pub fn info(&self) -> &RecordingInfo {
         &self.info
     }
 
     /// Layout of the recorded skin.
-    #[must_use]
     pub fn layout(&self) -> &SkinLayout {
         &self.info.layout
     }
 
     /// Weights that the cells were meant to put out. Decoders use [`Recording::rows`] instead.
-    #[must_use]
     pub fn weights(&self) -> &Weights {
         &self.info.weights
     }
 
     /// Scale of the converter; `None` if no converter acted or its scale is not known.
-    #[must_use]
     pub fn converter(&self) -> Option<&Converter> {
         self.info.converter.as_ref()
     }
@@ -222,7 +215,6 @@ impl Recording {
     ///
     /// # Panics
     /// If the recording has no such block, or the block no such measurements.
-    #[must_use]
     pub fn rows(&self, block: usize, measurements: Range<usize>) -> WeightRows<'_> {
         let len = self.blocks[block].volts.len();
         assert!(
@@ -234,37 +226,31 @@ impl Recording {
     }
 
     /// The readout that made the recording.
-    #[must_use]
     pub fn mode(&self) -> Mode {
         self.info.mode()
     }
 
     /// Number of taxels, N.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.info.layout.taxels()
     }
 
     /// Measurements in a frame (100 in the published recordings).
-    #[must_use]
     pub fn measurements_per_frame(&self) -> usize {
         self.info.measurements_per_frame
     }
 
     /// Frames in a block (1000 in the published recordings).
-    #[must_use]
     pub fn frames(&self) -> usize {
         self.frames
     }
 
     /// Measurements a second, Hz.
-    #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
         self.info.sample_rate_hz
     }
 
     /// The blocks, in order of recording.
-    #[must_use]
     pub fn blocks(&self) -> &[Block] {
         &self.blocks
     }
@@ -273,7 +259,6 @@ impl Recording {
     ///
     /// # Panics
     /// If the recording has no such block or frame.
-    #[must_use]
     pub fn volts(&self, block: usize, frame: usize) -> &[f64] {
         let m = self.info.measurements_per_frame;
         &self.blocks[block].volts[frame * m..(frame + 1) * m]
@@ -285,14 +270,12 @@ impl Recording {
     ///
     /// # Panics
     /// If the recording has no such block.
-    #[must_use]
     pub fn first_row(&self, block: usize, frame: usize) -> u64 {
         (self.blocks[block].frame_position - self.frames as u64 + frame as u64)
             * self.info.measurements_per_frame as u64
     }
 
     /// Time of the first measurement of a frame since the start of its block, s.
-    #[must_use]
     pub fn time_s(&self, frame: usize) -> f64 {
         (frame * self.info.measurements_per_frame) as f64 / self.info.sample_rate_hz
     }
@@ -315,7 +298,6 @@ impl Recording {
     /// assert_eq!((recording.saturated(None), recording.saturated(Some(15.0))), (0, 2));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    #[must_use]
     pub fn saturated(&self, rail_v: Option<f64>) -> usize {
         let blocks = self.blocks().iter();
         blocks.map(|block| self.info().saturated(&block.volts, rail_v)).sum()
@@ -324,7 +306,6 @@ impl Recording {
 
 impl RecordingInfo {
     /// As [`Recording::saturated`], for samples outside a recording.
-    #[must_use]
     pub fn saturated(&self, volts: &[f64], rail_v: Option<f64>) -> usize {
         let converter = self.converter.as_ref();
         let step_v = converter.map_or(0.0, |c| c.volts(0) - c.volts(1));
@@ -394,7 +375,6 @@ impl Recording {
     /// assert!(aligned.blocks()[0].volts[5].is_nan());
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    #[must_use]
     pub fn realigned(&self, slips: &[Slip]) -> Self {
         let mut blocks = self.blocks().to_vec();
         for (number, block) in blocks.iter_mut().enumerate() {

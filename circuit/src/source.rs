@@ -115,7 +115,6 @@ impl Constant {
     }
 
     /// Conductance of every taxel, S.
-    #[must_use]
     pub fn values(&self) -> &[f64] {
         self.map.values()
     }
@@ -192,13 +191,11 @@ impl Interpolated {
     }
 
     /// The maps, in order of time.
-    #[must_use]
     pub fn maps(&self) -> &[ConductanceMap] {
         &self.maps
     }
 
     /// Conductance at `time_s`.
-    #[must_use]
     pub fn at(&self, time_s: f64) -> ConductanceMap {
         let after = self.times_s.partition_point(|t| *t <= time_s);
         let (first, second) = (after.saturating_sub(1), after.min(self.maps.len() - 1));
@@ -213,7 +210,6 @@ impl Interpolated {
     }
 
     /// This source with its time shifted: time 0 of the result is the time `start_s` of this source, s.
-    #[must_use]
     pub fn starting_at(&mut self, start_s: f64) -> Started<'_> {
         Started { source: self, start_s }
     }

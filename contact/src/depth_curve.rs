@@ -81,7 +81,6 @@ fn depth_of(force_at: &mut impl FnMut(f64) -> f64, wanted_n: f64, deep_m: f64) -
 
 impl DepthCurve {
     /// The curve of a body that has not been pressed yet: no depth and no force, whatever is asked of it.
-    #[must_use]
     pub fn empty() -> Self {
         let nothing = vec![0.0; 2];
         Self {
@@ -202,14 +201,12 @@ impl DepthCurve {
     }
 
     /// Work to the end of the curve, J.
-    #[must_use]
     pub fn energy_j(&self) -> f64 {
         let pairs = self.depth_m.windows(2).zip(self.force_n.windows(2));
         pairs.map(|(d, f)| 0.5 * (d[1] - d[0]) * (f[0] + f[1])).sum()
     }
 
     /// Depth at `force_n`, limited to the curve, m.
-    #[must_use]
     pub fn depth_m(&self, force_n: f64) -> f64 {
         let i = self.segment(force_n);
         let step_n = self.force_n[i + 1] - self.force_n[i];
@@ -218,7 +215,6 @@ impl DepthCurve {
     }
 
     /// Compliance dδ/dF at `force_n`, m/N.
-    #[must_use]
     pub fn compliance_m_per_n(&self, force_n: f64) -> f64 {
         let i = self.segment(force_n);
         let step_n = (self.force_n[i + 1] - self.force_n[i]).max(1e-9);
@@ -227,7 +223,6 @@ impl DepthCurve {
 
     /// Largest stiffness dF/dδ between an eighth of the last force and the end, N/m. The time step of a simulation must
     /// resolve it. (At smaller forces, single cells make jumps in the curve that no oscillation can follow.)
-    #[must_use]
     pub fn stiffness_n_per_m(&self) -> f64 {
         let last = self.segments();
         let floor_n = self.force_n[last] / 8.0;

@@ -36,7 +36,6 @@ pub struct PosedMesh<'a> {
 
 impl<'a> PosedMesh<'a> {
     /// A rigid body at rest without rotation. Its origin and its centre of mass are at `position_m`.
-    #[must_use]
     pub fn at_rest(mesh: &'a TriMesh, position_m: [f64; 3]) -> Self {
         Self {
             mesh,
@@ -51,7 +50,6 @@ impl<'a> PosedMesh<'a> {
 
     /// Heights of the lowest and the highest vertex above the body's origin in world axes, m. Without a vertex, the
     /// lowest is above the highest.
-    #[must_use]
     pub fn heights_m(&self) -> [f64; 2] {
         let [_, _, up] = self.rotation;
         let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
@@ -63,7 +61,6 @@ impl<'a> PosedMesh<'a> {
     }
 
     /// Whether pose and velocity are finite, and the stiffness is not NaN.
-    #[must_use]
     pub fn is_finite(&self) -> bool {
         let vectors = [
             self.position_m,
@@ -136,7 +133,6 @@ pub struct Frame {
 impl Frame {
     /// Relative difference between force and pressure: |F_z − Σ p A| / F_z, where A is the area of a taxel's whole
     /// cell; 0 without a force.
-    #[must_use]
     pub fn imbalance(&self, cell_area_m2: f64) -> f64 {
         let force_n = self.wrench.force_n[2];
         if force_n <= 0.0 {
@@ -167,19 +163,16 @@ pub struct Patch {
 
 impl Patch {
     /// Whether the patch has no grid squares.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows[0] >= self.rows[1] || self.cols[0] >= self.cols[1]
     }
 
     /// Number of columns.
-    #[must_use]
     pub fn width(&self) -> usize {
         self.cols[1].saturating_sub(self.cols[0])
     }
 
     /// Number of rows.
-    #[must_use]
     pub fn height(&self) -> usize {
         self.rows[1].saturating_sub(self.rows[0])
     }
@@ -439,7 +432,6 @@ impl EquilibriumError {
     }
 
     /// The load is not a positive force.
-    #[must_use]
     pub fn load(force_n: f64) -> Self {
         Refusal::new(format!("`force_n` = {force_n} is outside (0, ∞) N")).into()
     }

@@ -117,7 +117,6 @@ impl FoamLaw {
 
     /// Law for a layer of initial stiffness `stiffness_pa_per_m` (K) whose foam vanishes at the compression
     /// `max_depth_m` (δ_m), pressed by a body of surface stiffness `body_pa_per_m` (∞ for a rigid one). All positive.
-    #[must_use]
     pub(crate) fn new(stiffness_pa_per_m: f64, max_depth_m: f64, body_pa_per_m: f64) -> Self {
         let solid = Self::SOLID_RATIO * stiffness_pa_per_m;
         // the foam alone is a little softer than foam and solid in series, so that K is the slope of the whole
@@ -132,14 +131,12 @@ impl FoamLaw {
     }
 
     /// Pressure at the total compression `depth_m` (foam plus body), Pa; 0 for a negative depth.
-    #[must_use]
     #[inline]
     pub(crate) fn pressure_pa(&self, depth_m: f64) -> f64 {
         self.root(if depth_m > 0.0 { depth_m } else { 0.0 }).0
     }
 
     /// Pressure, Pa, and its slope dp/dδ, Pa/m, at the total compression `depth_m`; both 0 for a negative depth.
-    #[must_use]
     #[inline]
     pub(crate) fn pressure_and_slope(&self, depth_m: f64) -> (f64, f64) {
         let (p, root) = self.root(if depth_m > 0.0 { depth_m } else { 0.0 });

@@ -29,7 +29,6 @@ pub struct TaxelBins {
 
 impl TaxelBins {
     /// Averages of maps with `cells_per_taxel` grid squares along each side of a taxel of `skin`.
-    #[must_use]
     pub fn new(skin: &SkinLayout, cells_per_taxel: usize) -> Self {
         let cell_m = skin.pitch_m() / cells_per_taxel as f64;
         let low_m = 0.5 * (skin.pitch_m() - skin.electrode_m());
@@ -55,7 +54,6 @@ impl TaxelBins {
     ///
     /// # Panics
     /// If `fine` does not have `(rows · cells) × (cols · cells)` values, or `patch` is not inside the map.
-    #[must_use]
     pub fn means(&self, fine: &[f64], patch: Option<Patch>) -> [PressureMap; 2] {
         let patch = patch.unwrap_or_else(|| self.whole());
         let width = self.cols * self.cells;

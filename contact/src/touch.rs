@@ -126,13 +126,11 @@ impl TouchSkin {
     }
 
     /// Rows, columns, pitch and electrodes of the taxels.
-    #[must_use]
     pub fn layout(&self) -> &SkinLayout {
         &self.layout
     }
 
     /// Centre of every taxel on the free surface, m, and the normal there, in row-major order.
-    #[must_use]
     pub fn taxel_centres(&self) -> Vec<([f64; 3], [f64; 3])> {
         match &self.surface {
             Surface::Curved(field) => field.points().taxel_centres(),
@@ -144,7 +142,6 @@ impl TouchSkin {
     }
 
     /// Area of every taxel, m², in row-major order.
-    #[must_use]
     pub fn taxel_areas_m2(&self) -> Vec<f64> {
         match &self.surface {
             Surface::Curved(field) => field.points().taxel_areas_m2().to_vec(),
@@ -153,27 +150,23 @@ impl TouchSkin {
     }
 
     /// Mean pressure over every taxel's area, Pa.
-    #[must_use]
     pub fn pressure(&self) -> &PressureMap {
         &self.pressure
     }
 
     /// Mean pressure over every taxel's electrode, Pa, as the transducer sees it. On a curved skin it is the mean over
     /// the taxel's area.
-    #[must_use]
     pub fn electrode_pressure(&self) -> &PressureMap {
         &self.electrode_pressure
     }
 
     /// Area of the skin under pressure, m².
-    #[must_use]
     pub fn touched_m2(&self) -> f64 {
         self.touched_m2
     }
 
     /// Upper bound of the foam's stiffness in the contact, N/m: the value under the taxel with the largest pressure is
     /// used everywhere. The slope of p = K δ/(1 − δ/δ_m) at the pressure p is K (1 + p/(K δ_m))².
-    #[must_use]
     pub fn stiffness_n_per_m(&self) -> f64 {
         let stiffness_pa_per_m = self.foam.stiffness_pa_per_m;
         let share = self.pressure.max() / (stiffness_pa_per_m * self.foam.max_depth_m());
@@ -181,7 +174,6 @@ impl TouchSkin {
     }
 
     /// Damping time of the foam, s.
-    #[must_use]
     pub fn damping_s(&self) -> f64 {
         self.foam.damping_s
     }

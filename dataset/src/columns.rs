@@ -29,7 +29,6 @@ pub struct Column {
 
 impl Column {
     /// Type as text, such as `float32[100]`.
-    #[must_use]
     pub fn type_name(&self) -> String {
         let name = match self.kind {
             Kind::Text => "text",
@@ -221,7 +220,6 @@ const OBJECT_COLUMNS: &[ObjectColumn] = &[
 /// assert_eq!((pressure.type_name().as_str(), pressure.unit), ("float32[100]", "Pa"));
 /// # Ok::<(), spts::Refusal>(())
 /// ```
-#[must_use]
 pub fn columns(spec: &Spec) -> Vec<Column> {
     let rows = ROW_COLUMNS.iter().filter(|(.., has, _)| has(spec));
     let rows = rows.map(|(name, kind, length, unit, description, ..)| Column {

@@ -66,7 +66,6 @@ pub(crate) fn shard_name(shard: u64, shards: u64) -> String {
 /// assert_eq!(shard_rows(&spec, 2), 2000..2500);
 /// # Ok::<(), spts::Refusal>(())
 /// ```
-#[must_use]
 pub fn shard_rows(spec: &Spec, shard: u64) -> Range<u64> {
     let first = shard * spec.rows_per_shard();
     first..(first + spec.rows_per_shard()).min(spec.config().rows)

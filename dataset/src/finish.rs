@@ -198,7 +198,6 @@ impl Statistics {
     }
 
     /// The column called `name`.
-    #[must_use]
     pub fn column(&self, name: &str) -> Option<&ColumnStatistics> {
         self.columns.iter().find(|c| c.column.name == name)
     }

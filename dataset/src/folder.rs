@@ -151,26 +151,22 @@ impl Dataset {
     }
 
     /// The specification.
-    #[must_use]
     pub fn spec(&self) -> &Spec {
         &self.spec
     }
 
     /// The folder.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Path of file number `shard`.
-    #[must_use]
     pub(crate) fn shard_file(&self, shard: u64) -> PathBuf {
         let name = shard_name(shard, self.spec.shards());
         self.folder.join(DATA_FOLDER).join(name)
     }
 
     /// State of the data set.
-    #[must_use]
     pub fn info(&self) -> Info {
         let sizes = (0..self.spec.shards()).filter_map(|k| std::fs::metadata(self.shard_file(k)).ok());
         let sizes: Vec<u64> = sizes.map(|file| file.len()).collect();

@@ -54,7 +54,6 @@ impl Prepared {
 
 impl<'a> Maker<'a> {
     /// A maker for `spec`.
-    #[must_use]
     pub fn new(spec: &'a Spec) -> Self {
         Self {
             streams: spec.streams(),
@@ -176,50 +175,42 @@ pub(crate) struct Object<'a> {
 
 impl<'a> Row<'a> {
     /// `train`, `validation` or `test`.
-    #[must_use]
     pub fn split(&self) -> &'static str {
         split(self.spec, self.press.number, self.shapes[0].number)
     }
 
     /// Name of the first object that is pressed; of a procedural shape, the name of its family.
-    #[must_use]
     pub fn name(&self) -> Arc<str> {
         Arc::clone(&self.shapes[0].choice.name)
     }
 
     /// Mean pressure over every taxel's area, Pa.
-    #[must_use]
     pub fn pressure(&self) -> &'a PressureMap {
         &self.state().pressure
     }
 
     /// Conductance of every taxel, S.
-    #[must_use]
     pub fn conductance(&self) -> &'a ConductanceMap {
         &self.state().conductance
     }
 
     /// The raster scan, V; empty if none is recorded.
-    #[must_use]
     pub fn image(&self) -> &'a [f64] {
         &self.state().image
     }
 
     /// The samples of the window, V.
-    #[must_use]
     pub fn volts(&self) -> &'a [f64] {
         let m = self.spec.config().record.measurements;
         &self.press.volts[self.window * m..][..m]
     }
 
     /// Row of Φ at the first measurement of the window, counted from loading the seeds.
-    #[must_use]
     pub fn first_row(&self) -> u64 {
         self.press.first_row + self.spec.timing().row_of(self.window as u64)
     }
 
     /// Φ of the window: measurements × taxels, row-major.
-    #[must_use]
     pub fn phi(&self) -> Vec<f64> {
         let m = self.spec.config().record.measurements;
         let mut phi = vec![0.0; m * self.spec.skin().taxels()];
@@ -228,14 +219,12 @@ impl<'a> Row<'a> {
     }
 
     /// Time from the touch to the first measurement of the window, s; negative before the touch.
-    #[must_use]
     pub fn time_s(&self) -> f64 {
         let timing = self.spec.timing();
         self.press.start_s + timing.row_of(self.window as u64) as f64 / timing.rate_hz
     }
 
     /// Normal force on the skin, N: the sum of pressure × area.
-    #[must_use]
     pub fn contact_force_n(&self) -> f64 {
         self.pressure().sum() * self.spec.skin().cell_area_m2()
     }

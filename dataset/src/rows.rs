@@ -158,7 +158,6 @@ impl Spec {
 /// let rows = spread_rows(&[0..100, 200..300], 4);
 /// assert_eq!(rows.into_iter().collect::<Vec<_>>(), [0, 50, 200, 250]);
 /// ```
-#[must_use]
 pub fn spread_rows(held: &[Range<u64>], rows: u64) -> BTreeSet<u64> {
     let all = count(held);
     let rows = rows.min(all);
@@ -170,7 +169,6 @@ pub fn spread_rows(held: &[Range<u64>], rows: u64) -> BTreeSet<u64> {
 impl Spec {
     /// `rows` different rows of the ranges `held`, drawn with `seed`; all rows if there are fewer. Draws with different
     /// `label`s are independent.
-    #[must_use]
     pub fn drawn_rows(&self, label: &str, held: &[Range<u64>], rows: u64, seed: u64) -> BTreeSet<u64> {
         let all = count(held);
         if rows >= all {
@@ -187,7 +185,6 @@ impl Spec {
 
 impl Dataset {
     /// The rows of all existing files, one range a file. The files' contents are not checked.
-    #[must_use]
     pub fn made_rows(&self) -> Vec<Range<u64>> {
         let made = (0..self.spec().shards()).filter(|shard| self.shard_file(*shard).symlink_metadata().is_ok());
         made.map(|shard| shard_rows(self.spec(), shard)).collect()

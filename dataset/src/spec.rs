@@ -238,44 +238,37 @@ impl Spec {
     }
 
     /// The specification as written, with defaults filled in.
-    #[must_use]
     pub fn config(&self) -> &SpecConfig {
         &self.config
     }
 
     /// The text of the specification with overrides applied; it is a complete specification.
-    #[must_use]
     pub fn text(&self) -> &str {
         &self.text
     }
 
     /// SHA-256 of the specification and of the files that it names. Data sets with the same value have the same rows if
     /// the same version of this library made them.
-    #[must_use]
     pub fn identity(&self) -> &str {
         &self.identity
     }
 
     /// The skin.
-    #[must_use]
     pub fn skin(&self) -> &SkinLayout {
         &self.skin
     }
 
     /// Name and parameters of the contact model.
-    #[must_use]
     pub fn contact(&self) -> (&str, &toml::Table) {
         (&self.contact.0, &self.contact.1)
     }
 
     /// Number of rows in a file; the last file may have fewer.
-    #[must_use]
     pub fn rows_per_shard(&self) -> u64 {
         self.rows_per_shard
     }
 
     /// Number of consecutive rows with the same shape.
-    #[must_use]
     pub fn rows_per_shape(&self) -> u64 {
         self.rows_per_shape
     }
@@ -286,7 +279,6 @@ impl Spec {
     }
 
     /// Number of rows of a press or drop.
-    #[must_use]
     pub fn windows(&self) -> u64 {
         self.timing.windows
     }
@@ -297,7 +289,6 @@ impl Spec {
     }
 
     /// Whether a ball falls.
-    #[must_use]
     pub fn drops(&self) -> bool {
         self.timing.what == RecordKind::Drop
     }
@@ -324,19 +315,16 @@ impl Spec {
     }
 
     /// Number of files.
-    #[must_use]
     pub fn shards(&self) -> u64 {
         self.config.rows.div_ceil(self.rows_per_shard)
     }
 
     /// Largest number of objects in a press.
-    #[must_use]
     pub fn most_objects(&self) -> usize {
         whole(self.config.object.count.range()[1])
     }
 
     /// Root of the random streams of the data set.
-    #[must_use]
     pub fn streams(&self) -> Streams {
         Streams::new(self.config.seed).child("dataset", 0)
     }
@@ -358,7 +346,6 @@ impl Spec {
     }
 
     /// Metadata of the recordings: layout, weights, rate and converter.
-    #[must_use]
     pub fn recording(&self) -> &RecordingInfo {
         &self.recording
     }

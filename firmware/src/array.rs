@@ -56,7 +56,6 @@ impl Array {
     }
 
     /// The cells, in order of address.
-    #[must_use]
     pub fn cells(&self) -> &[Device] {
         &self.cells
     }
@@ -69,13 +68,11 @@ impl Array {
     }
 
     /// Time since power-on (s).
-    #[must_use]
     pub fn time_s(&self) -> f64 {
         self.now as f64 / OSCILLATOR_HZ
     }
 
     /// Instructions executed by all cells.
-    #[must_use]
     pub fn instructions(&self) -> u64 {
         self.cells.iter().map(Device::instructions).sum()
     }
@@ -158,7 +155,6 @@ impl Array {
     }
 
     /// Fetches all sampled codes, row-major (edge, cell).
-    #[must_use]
     pub fn codes(&mut self) -> Vec<u8> {
         let rows = self.followers[0].codes.len();
         let mut codes = vec![0; rows * self.cells.len()];
@@ -264,7 +260,6 @@ impl Default for Clock {
 impl Clock {
     /// The skin's clock at another rate. Codes are sampled 11 µs after the edge or, if the period is too short for
     /// that, after the same share of the period.
-    #[must_use]
     pub fn at(edge_hz: f64) -> Self {
         Self {
             edge_hz,

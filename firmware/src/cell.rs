@@ -39,7 +39,6 @@ pub enum CellMode {
 
 impl CellMode {
     /// The mode that `byte` selects; `None` if there is none.
-    #[must_use]
     pub(crate) fn from_byte(byte: u8) -> Option<Self> {
         match byte {
             0 => Some(Self::Raster),
@@ -50,7 +49,6 @@ impl CellMode {
     }
 
     /// The byte that selects this mode.
-    #[must_use]
     pub fn byte(self) -> u8 {
         match self {
             Self::Raster => 0,
@@ -60,13 +58,11 @@ impl CellMode {
     }
 
     /// The message that starts a cell in this mode with a one-byte seed.
-    #[must_use]
     pub fn pair(self, seed: u8) -> [u8; 2] {
         [self.byte(), seed]
     }
 
     /// The message that starts a cell in this mode with a four-byte seed.
-    #[must_use]
     pub fn extended(self, seed: u32) -> [u8; 5] {
         let [s0, s1, s2, s3] = seed.to_le_bytes();
         [EXTENDED | self.byte(), s0, s1, s2, s3]
@@ -125,13 +121,11 @@ impl Cell {
     }
 
     /// I²C address.
-    #[must_use]
     pub fn address(&self) -> u8 {
         self.address
     }
 
     /// Mode; `None` unless the last start was with a seed.
-    #[must_use]
     pub fn mode(&self) -> Option<CellMode> {
         match self.running {
             Running::Seeded(mode) => Some(mode),
@@ -140,7 +134,6 @@ impl Cell {
     }
 
     /// Pattern; `None` unless the last start was with one.
-    #[must_use]
     pub fn pattern(&self) -> Option<Pattern> {
         match self.running {
             Running::Pattern(pattern) => Some(pattern),
@@ -149,7 +142,6 @@ impl Cell {
     }
 
     /// Present DAC code.
-    #[must_use]
     pub fn code(&self) -> u8 {
         self.code
     }
@@ -317,20 +309,17 @@ impl Pattern {
     }
 
     /// Number of bits.
-    #[must_use]
     pub fn bits(self) -> usize {
         usize::from(self.length)
     }
 
     /// Bit at edge `edge`, counted from the start of the pattern.
-    #[must_use]
     pub fn bit(self, edge: u64) -> bool {
         self.word >> (edge % u64::from(self.length)) & 1 == 1
     }
 
     /// The message that starts a cell with this pattern: the mode byte, the number of bits, and the bits in bytes,
     /// starting with the lowest bit.
-    #[must_use]
     pub fn message(self) -> Vec<u8> {
         let bytes = self.word.to_le_bytes();
         let bits = &bytes[..self.bits().div_ceil(8)];

@@ -32,7 +32,6 @@ impl Image {
     ///
     /// # Panics
     /// Never: the image is part of the crate, and a test reads it.
-    #[must_use]
     pub fn shipped() -> Self {
         Self::from_hex(include_str!("../cell/cell.hex")).expect("the committed image is valid")
     }
@@ -42,7 +41,6 @@ impl Image {
     ///
     /// # Panics
     /// Never: the image is part of the crate, and a test reads it.
-    #[must_use]
     pub fn plain() -> Self {
         Self::from_hex(include_str!("../cell/cell_plain.hex")).expect("the committed image is valid")
     }
@@ -91,7 +89,6 @@ impl Image {
     }
 
     /// All of flash, [`FLASH_BYTES`] long. Bytes that are not part of the image are erased, 255.
-    #[must_use]
     pub fn flash(&self) -> &[u8] {
         &self.flash
     }

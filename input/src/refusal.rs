@@ -23,7 +23,6 @@ pub struct Refusal {
 
 impl Refusal {
     /// A refusal that says `message`.
-    #[must_use]
     pub fn new(message: impl Into<String>) -> Self {
         Self {
             message: message.into(),
@@ -32,13 +31,11 @@ impl Refusal {
     }
 
     /// The value of a field that is outside its valid range, such as "[0.5, 100]".
-    #[must_use]
     pub fn range(field: &str, value: impl Display, range: impl Display) -> Self {
         Self::new(format!("`{field}` = {value} is outside {range}"))
     }
 
     /// What `source` says, with `source` kept.
-    #[must_use]
     pub fn from_error(source: impl Error + Send + Sync + 'static) -> Self {
         Self {
             message: source.to_string(),
@@ -53,13 +50,11 @@ impl Refusal {
     }
 
     /// The same refusal with the place of the mistake before it: a file, or the section of one.
-    #[must_use]
     pub fn at(self, place: impl Display) -> Self {
         self.reworded(|message| format!("{place}: {message}"))
     }
 
     /// The same refusal in other words.
-    #[must_use]
     pub fn reworded(self, words: impl FnOnce(&str) -> String) -> Self {
         Self {
             message: words(&self.message),

@@ -71,7 +71,6 @@ impl LiveObject {
     }
 
     /// A rigid body of the shape of `mesh`, on `side`, held over the middle of its box.
-    #[must_use]
     pub fn of_mesh(name: &str, mesh: &TriMesh, side: Side) -> Self {
         let turned = mesh.clone().rotated(side.matrix());
         let middle = [0, 1].map(|axis| {
@@ -90,7 +89,6 @@ impl LiveObject {
     }
 
     /// What of it can be seen from below.
-    #[must_use]
     pub fn shape(&self) -> Shape {
         Shape::of(&self.name, self.degrees, &self.mesh)
     }
@@ -228,7 +226,6 @@ impl UploadedMesh {
     }
 
     /// It lying on `side`.
-    #[must_use]
     pub fn on(&self, side: Side) -> LiveObject {
         LiveObject::of_mesh(&self.name, &self.mesh, side)
     }

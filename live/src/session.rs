@@ -276,7 +276,6 @@ impl LiveSession {
     }
 
     /// The underside of the object.
-    #[must_use]
     pub fn shape(&self) -> Shape {
         self.presser.object().shape()
     }

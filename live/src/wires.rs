@@ -220,13 +220,11 @@ pub struct Shelf {
 
 impl Shelf {
     /// An empty one.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
     /// The skin that everything is for.
-    #[must_use]
     pub fn layout(&self) -> &SkinLayout {
         &self.layout
     }

@@ -88,7 +88,6 @@ fn holds(interval: &str, value: f64) -> Option<bool> {
 /// - A message that begins with a key and its value, "`bits` = 40 is outside [1, 24]", becomes "`adc.bits` = 40 is
 ///   outside [1, 24]" for the `section` "adc".
 /// - Any other message, such as "unknown field", becomes "`adc`: unknown field".
-#[must_use]
 pub fn in_section(section: &str, message: &str) -> String {
     let message = message.trim_end().replace('\n', "; ");
     match message.strip_prefix('`') {
@@ -121,7 +120,6 @@ pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
 /// assert_eq!(explain_toml(&error), "`rows` = -1: a whole number from 0 on is needed");
 /// # Ok::<(), toml::de::Error>(())
 /// ```
-#[must_use]
 pub fn explain_toml(error: &Error) -> String {
     let shown = error.to_string();
     let key = shown

@@ -113,62 +113,52 @@ impl SkinLayout {
     }
 
     /// Default side of the electrode for this pitch, m: 10/15 of the pitch.
-    #[must_use]
     pub fn usual_electrode_m(pitch_m: f64) -> f64 {
         pitch_m * 10.0 / 15.0
     }
 
     /// Number of rows.
-    #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }
 
     /// Number of columns.
-    #[must_use]
     pub fn cols(&self) -> usize {
         self.cols
     }
 
     /// Number of taxels, N.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.rows * self.cols
     }
 
     /// Distance between the centres of neighbouring taxels, m.
-    #[must_use]
     pub fn pitch_m(&self) -> f64 {
         self.pitch_m
     }
 
     /// Side of a taxel's square electrode, m.
-    #[must_use]
     pub fn electrode_m(&self) -> f64 {
         self.electrode_m
     }
 
     /// Area of a taxel's electrode divided by that of the published skin (10 mm × 10 mm), for which transducers and
     /// readouts are calibrated. The conductance of a taxel is proportional to it. Exactly 1 for the published skin.
-    #[must_use]
     pub fn relative_area(&self) -> f64 {
         (self.electrode_m / CALIBRATED_ELECTRODE_M).powi(2)
     }
 
     /// Area of the skin that belongs to one taxel, pitch × pitch, m².
-    #[must_use]
     pub fn cell_area_m2(&self) -> f64 {
         self.pitch_m * self.pitch_m
     }
 
     /// Extent of the sheet along x (columns) and y (rows), m.
-    #[must_use]
     pub fn extent_m(&self) -> [f64; 2] {
         [self.cols as f64 * self.pitch_m, self.rows as f64 * self.pitch_m]
     }
 
     /// Position (x, y), m, of the taxel coordinate `(row, col)`, which may be fractional.
-    #[must_use]
     pub fn position_m(&self, row: f64, col: f64) -> [f64; 2] {
         let [width, height] = self.extent_m();
         [
@@ -213,7 +203,6 @@ pub type ConductanceMap = Grid<Siemens>;
 
 impl<U> Grid<U> {
     /// A map of zeros.
-    #[must_use]
     pub fn zeros(rows: usize, cols: usize) -> Self {
         Self::from_values(rows, cols, vec![0.0; rows * cols])
     }
@@ -222,7 +211,6 @@ impl<U> Grid<U> {
     ///
     /// # Panics
     /// If `values.len() != rows * cols`.
-    #[must_use]
     pub fn from_values(rows: usize, cols: usize, values: Vec<f64>) -> Self {
         assert_eq!(
             values.len(),
@@ -239,19 +227,16 @@ impl<U> Grid<U> {
     }
 
     /// Number of rows.
-    #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }
 
     /// Number of columns.
-    #[must_use]
     pub fn cols(&self) -> usize {
         self.cols
     }
 
     /// Values, row-major.
-    #[must_use]
     pub fn values(&self) -> &[f64] {
         &self.values
     }
@@ -262,13 +247,11 @@ impl<U> Grid<U> {
     }
 
     /// Sum of all values.
-    #[must_use]
     pub fn sum(&self) -> f64 {
         self.values.iter().sum()
     }
 
     /// Largest value, or −∞ for an empty map.
-    #[must_use]
     pub fn max(&self) -> f64 {
         self.values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
     }

@@ -76,7 +76,6 @@ impl TryFrom<HysteresisConfig> for Hysteresis {
 
 impl Hysteresis {
     /// Number of state values a taxel.
-    #[must_use]
     pub fn operators(&self) -> usize {
         self.factors.len()
     }
@@ -407,13 +406,11 @@ pub struct CreepDecays {
 
 impl Creep {
     /// Number of state values a taxel: the slow branches and the fast one.
-    #[must_use]
     pub fn branches(&self) -> usize {
         self.slow.len() + 1
     }
 
     /// Storage for the decay factors of a step.
-    #[must_use]
     pub fn decays(&self) -> CreepDecays {
         CreepDecays {
             slow: vec![0.0; self.slow.len()],
@@ -510,7 +507,6 @@ impl Conditioning {
     }
 
     /// State of a taxel that has not been pressed in this session.
-    #[must_use]
     pub fn fresh(&self) -> Presses {
         Presses {
             count: 0,
@@ -520,7 +516,6 @@ impl Conditioning {
     }
 
     /// Gain at press number `press` of a session, counted from 1.
-    #[must_use]
     pub fn gain(&self, press: u32) -> f64 {
         let b = |press: u32| 1.0 + self.per_ln_press * f64::from(press.max(1)).ln();
         let first = if press <= 1 { self.first } else { 1.0 };

@@ -23,19 +23,16 @@ pub struct Streams {
 
 impl Streams {
     /// The streams of the root seed `root`.
-    #[must_use]
     pub fn new(root: u64) -> Self {
         Self { root }
     }
 
     /// The streams of item `index` for the purpose `label`, such as one session of many.
-    #[must_use]
     pub fn child(self, label: &str, index: u64) -> Self {
         Self::new(self.rng(label, index).random())
     }
 
     /// The generator of item `index` for the purpose `label`.
-    #[must_use]
     pub fn rng(self, label: &str, index: u64) -> ChaCha8Rng {
         // FNV-1a: stable across releases, unlike the standard library's hasher
         let key = label.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| {

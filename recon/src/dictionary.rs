@@ -42,7 +42,6 @@ impl Default for Selection {
 /// // the second resembles the first, and the last is too weak
 /// assert_eq!(select(&images, &Selection::default()), [0, 2]);
 /// ```
-#[must_use]
 pub fn select(images: &[Vec<f64>], selection: &Selection) -> Vec<usize> {
     let mut kept: Vec<usize> = Vec::new();
     let mut directions: Vec<Vec<f64>> = Vec::new();

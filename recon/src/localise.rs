@@ -35,7 +35,6 @@ use spts_input::Refusal;
 /// let centre = centre_of_mass(&image, 3, 0.23).expect("a contact");
 /// assert!(distance(centre, [1.0, 1.5]) < 1e-12);
 /// ```
-#[must_use]
 pub fn centre_of_mass(image: &[f64], cols: usize, threshold: f64) -> Option<[f64; 2]> {
     let max = image.iter().copied().fold(0.0_f64, f64::max);
     let floor = (threshold * max).max(0.0);
@@ -49,7 +48,6 @@ pub fn centre_of_mass(image: &[f64], cols: usize, threshold: f64) -> Option<[f64
 }
 
 /// Euclidean distance between two positions, in taxels.
-#[must_use]
 pub fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
@@ -172,7 +170,6 @@ impl Localiser {
     }
 
     /// Number of blobs: centres × widths.
-    #[must_use]
     pub fn templates(&self) -> usize {
         self.variances.len()
     }
@@ -202,7 +199,6 @@ impl Localiser {
     }
 
     /// Evidence of no sample, to begin a window with.
-    #[must_use]
     pub fn evidence(&self) -> BlobEvidence {
         let zeros = vec![0.0; self.templates()];
         BlobEvidence {

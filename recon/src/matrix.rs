@@ -30,7 +30,6 @@ pub struct MatrixView<'a> {
 
 impl Matrix {
     /// Matrix of zeros.
-    #[must_use]
     pub fn zeros(nrows: usize, ncols: usize) -> Self {
         Self {
             nrows,
@@ -73,7 +72,6 @@ impl Matrix {
     ///
     /// # Panics
     /// If a column has another length than `nrows`.
-    #[must_use]
     pub fn from_column_slices(nrows: usize, columns: &[impl AsRef<[f64]>]) -> Self {
         let ncols = columns.len();
         let mut out = Self::zeros(nrows, ncols);
@@ -89,7 +87,6 @@ impl Matrix {
     }
 
     /// All rows.
-    #[must_use]
     pub fn view(&self) -> MatrixView<'_> {
         MatrixView {
             nrows: self.nrows,
@@ -99,19 +96,16 @@ impl Matrix {
     }
 
     /// Number of rows.
-    #[must_use]
     pub fn nrows(&self) -> usize {
         self.nrows
     }
 
     /// Number of columns.
-    #[must_use]
     pub fn ncols(&self) -> usize {
         self.ncols
     }
 
     /// Row `r`.
-    #[must_use]
     pub fn row(&self, r: usize) -> &[f64] {
         &self.values[r * self.ncols..(r + 1) * self.ncols]
     }
@@ -127,7 +121,6 @@ impl Matrix {
     }
 
     /// Column `c`.
-    #[must_use]
     pub fn column(&self, c: usize) -> Vec<f64> {
         let mut out = vec![0.0; self.nrows];
         self.copy_column(c, &mut out);
@@ -153,7 +146,6 @@ impl Matrix {
     }
 
     /// Sum over all rows: `1ᵀ · self`.
-    #[must_use]
     pub fn column_sums(&self) -> Vec<f64> {
         let mut out = vec![0.0; self.ncols];
         self.accumulate_row(&vec![1.0; self.nrows], &mut out);
@@ -185,19 +177,16 @@ impl<'a> MatrixView<'a> {
     }
 
     /// Number of rows.
-    #[must_use]
     pub fn nrows(self) -> usize {
         self.nrows
     }
 
     /// Number of columns.
-    #[must_use]
     pub fn ncols(self) -> usize {
         self.ncols
     }
 
     /// Values, row-major.
-    #[must_use]
     pub fn values(self) -> &'a [f64] {
         self.values
     }
@@ -206,7 +195,6 @@ impl<'a> MatrixView<'a> {
     ///
     /// # Panics
     /// If the rows do not exist.
-    #[must_use]
     pub fn rows(self, start: usize, nrows: usize) -> Self {
         Self {
             nrows,
@@ -245,7 +233,6 @@ impl<'a> MatrixView<'a> {
 /// assert!(everywhere.column_sums().iter().all(|sum| *sum == 5.0));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-#[must_use]
 pub fn shifted(dictionary: &Matrix, cols: usize, reach: usize) -> Matrix {
     let rows = dictionary.nrows() / cols.max(1);
     let mut atoms: Vec<Vec<f64>> = Vec::new();

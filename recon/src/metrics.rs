@@ -35,7 +35,6 @@ pub struct SupportScore {
 
 impl SupportScore {
     /// Scores `found` against `truth`, which must have the same length.
-    #[must_use]
     pub fn new(found: &[bool], truth: &[bool]) -> Self {
         let (mut both, mut only_found, mut only_truth, mut neither) = (0.0, 0.0, 0.0, 0.0);
         for (&f, &t) in found.iter().zip(truth) {
@@ -74,7 +73,6 @@ impl MeanScore {
     }
 
     /// Mean of all scores added; `None` without scores.
-    #[must_use]
     pub fn mean(&self) -> Option<SupportScore> {
         (self.count > 0.0).then(|| SupportScore {
             accuracy: self.sum.accuracy / self.count,
@@ -86,7 +84,6 @@ impl MeanScore {
 }
 
 /// Pearson correlation of two images; `None` if one of them is constant.
-#[must_use]
 pub fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
     let n = a.len() as f64;
     let (ma, mb) = (a.iter().sum::<f64>() / n, b.iter().sum::<f64>() / n);
@@ -102,7 +99,6 @@ pub fn pearson(a: &[f64], b: &[f64]) -> Option<f64> {
 }
 
 /// Median (for an even count the mean of the middle two); `None` without values. NaN sorts last.
-#[must_use]
 pub fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

@@ -34,13 +34,11 @@ impl<'a> Problem<'a> {
     }
 
     /// Operator A, M × K.
-    #[must_use]
     pub fn matrix(&self) -> MatrixView<'a> {
         self.matrix
     }
 
     /// Measurements, length M.
-    #[must_use]
     pub fn y(&self) -> &'a [f64] {
         self.y
     }

@@ -37,7 +37,6 @@ impl Interpolation {
     /// A scan of `measurements` evenly spaced pixels of a `rows × cols` array: pixels round(i·(N−1)/(M−1)).
     /// Interpolation is linear on their Delaunay triangulation. Outside their convex hull, and everywhere if they lie
     /// on a line, the nearest measured pixel is used.
-    #[must_use]
     pub fn evenly_spaced(rows: usize, cols: usize, measurements: usize) -> Self {
         Self::new(rows, cols, evenly_spaced(rows * cols, measurements))
     }
@@ -73,7 +72,6 @@ impl Interpolation {
     }
 
     /// The measured pixels, in scan order.
-    #[must_use]
     pub fn measured(&self) -> &[usize] {
         &self.measured
     }

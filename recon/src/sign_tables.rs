@@ -40,7 +40,6 @@ pub struct SignTables<T> {
 
 impl<T: TableFloat> SignTables<T> {
     /// Tables of `dictionary` (N × K).
-    #[must_use]
     pub fn new(dictionary: MatrixView<'_>) -> Self {
         let (nrows, ncols) = (dictionary.nrows(), dictionary.ncols());
         let mut values = Vec::with_capacity(nrows.div_ceil(GROUP) * ENTRIES * ncols);
@@ -53,7 +52,6 @@ impl<T: TableFloat> SignTables<T> {
     }
 
     /// Number of 64-bit words for the signs of a row of Φ: ⌈N/64⌉.
-    #[must_use]
     pub fn words(&self) -> usize {
         self.nrows.div_ceil(64)
     }

@@ -19,7 +19,6 @@ pub fn mean(values: impl IntoIterator<Item = impl Borrow<f64>>) -> Option<f64> {
 
 /// The value that the share `share`, in [0, 1], of `sorted` does not exceed, by a straight line between neighbours;
 /// `None` without values.
-#[must_use]
 #[expect(clippy::cast_possible_truncation, reason = "a place in a list")]
 pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
@@ -34,7 +33,6 @@ pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
 /// Source: Abramowitz and Stegun, Handbook of Mathematical Functions, 26.7.3 and 26.7.4: with θ = atan(t/√ν), 1 − p is
 /// sin θ · (1 + ½ cos² θ + … + 1·3·…(ν−3)/(2·4·…(ν−2)) cos^(ν−2) θ) for an even ν, and for an odd one
 /// 2/π · (θ + sin θ · (cos θ + ⅔ cos³ θ + … + 2·4·…(ν−3)/(1·3·…(ν−2)) cos^(ν−2) θ)).
-#[must_use]
 pub fn two_sided(t: f64, freedom: u32) -> f64 {
     let theta = (t.abs() / f64::from(freedom).sqrt()).atan();
     let (sin, cos) = theta.sin_cos();
@@ -53,7 +51,6 @@ pub fn two_sided(t: f64, freedom: u32) -> f64 {
 }
 
 /// The t with P(|T| > t) = `outside`, in (0, 1), for Student's T with `freedom` ≥ 1 degrees of freedom.
-#[must_use]
 pub fn student_t(outside: f64, freedom: u32) -> f64 {
     let mut high = 1.0;
     while two_sided(high, freedom) > outside && high < 1e12 {
@@ -93,7 +90,6 @@ pub struct Sample {
 
 impl Sample {
     /// Of `values`; `None` without one.
-    #[must_use]
     pub fn of(values: &[f64]) -> Option<Self> {
         let (count, mean) = (values.len(), mean(values)?);
         let squares: f64 = values.iter().map(|v| (v - mean).powi(2)).sum();
@@ -102,14 +98,12 @@ impl Sample {
     }
 
     /// Standard error of the mean, s/√n.
-    #[must_use]
     pub fn standard_error(&self) -> f64 {
         (self.variance / self.count as f64).sqrt()
     }
 
     /// The two-sided quantile of Student's distribution of n − 1 degrees of freedom that is exceeded with the
     /// probability `outside`; 0 of a single repetition, which says nothing of an error.
-    #[must_use]
     pub fn t(&self, outside: f64) -> f64 {
         match u32::try_from(self.count - 1).unwrap_or(u32::MAX) {
             0 => 0.0,
@@ -119,7 +113,6 @@ impl Sample {
 
     /// The confidence interval of the mean, mean ± t·s/√n, which misses the true one with the probability `outside`. It
     /// has no width for a single repetition.
-    #[must_use]
     pub fn band(&self, outside: f64) -> Band {
         Band::around(self.mean, self.t(outside) * self.standard_error())
     }
@@ -139,7 +132,6 @@ pub struct Band {
 
 impl Band {
     /// `mean` ± `half`.
-    #[must_use]
     pub fn around(mean: f64, half: f64) -> Self {
         Self {
             mean,
@@ -149,7 +141,6 @@ impl Band {
     }
 
     /// The same mean with the band cut off at `least` and `most`.
-    #[must_use]
     pub fn within(self, [least, most]: [f64; 2]) -> Self {
         Self {
             low: self.low.max(least),
@@ -159,7 +150,6 @@ impl Band {
     }
 
     /// Whether `found` lies in the band.
-    #[must_use]
     pub fn holds(&self, found: f64) -> bool {
         (self.low..=self.high).contains(&found)
     }

@@ -52,20 +52,17 @@ impl StopRule {
     }
 
     /// The wanted confidence, (0.5, 1).
-    #[must_use]
     pub fn confidence(&self) -> f64 {
         self.confidence
     }
 
     /// Largest number of measurements.
-    #[must_use]
     pub fn most(&self) -> usize {
         self.most
     }
 
     /// The end of the series, if it ends after `measurements` samples with this `confidence`. It never ends before the
     /// first sample. NaN never reaches the wanted confidence.
-    #[must_use]
     pub fn after(&self, measurements: usize, confidence: f64) -> Option<Stopped> {
         let reached = confidence >= self.confidence;
         let ends = measurements > 0 && (reached || measurements >= self.most);

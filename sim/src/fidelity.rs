@@ -48,7 +48,6 @@ pub const REFERENCE: &str = "layer";
 
 impl FidelityLevel {
     /// The level called `name`.
-    #[must_use]
     pub fn named(name: &str) -> Option<&'static Self> {
         LEVELS.iter().find(|level| level.name == name)
     }
@@ -139,7 +138,6 @@ pub struct FidelityChoice {
 }
 
 /// The shipped table, measured by `spts fidelity`: default skin and foam, 20 N.
-#[must_use]
 pub fn measured() -> &'static [MeasuredSetting] {
     static TABLE: OnceLock<Vec<MeasuredSetting>> = OnceLock::new();
     TABLE.get_or_init(|| {
@@ -159,7 +157,6 @@ pub fn measured() -> &'static [MeasuredSetting] {
 /// let exact = cheapest(measured(), "press", 0.05).expect("a level meets 5 %");
 /// assert!(rough.cost_s_per_s <= exact.cost_s_per_s && exact.taxel_rms_rel <= 0.05);
 /// ```
-#[must_use]
 pub fn cheapest(table: &[MeasuredSetting], task: &str, tolerance: f64) -> Option<FidelityChoice> {
     let rows: Vec<&MeasuredSetting> = table.iter().filter(|row| row.task == task).collect();
     let mut scenes: Vec<&str> = rows.iter().map(|row| row.scene.as_str()).collect();

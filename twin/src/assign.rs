@@ -70,7 +70,6 @@ impl Assignment {
     ///
     /// # Panics
     /// If `keys` is empty.
-    #[must_use]
     pub fn of_option(option: &str, keys: &[&str], value: Value) -> Self {
         assert!(!keys.is_empty(), "an option stands for a key");
         let shown = match &value {
@@ -85,7 +84,6 @@ impl Assignment {
     }
 
     /// Whether the assignment sets `key`.
-    #[must_use]
     pub fn sets(&self, key: &str) -> bool {
         self.keys.iter().any(|k| k == key)
     }

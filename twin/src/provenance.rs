@@ -25,7 +25,6 @@ pub struct Provenance {
 
 impl Provenance {
     /// Provenance of a result computed from `seed` and the scene with hash `scene_hash`.
-    #[must_use]
     pub fn new(seed: u64, scene_hash: String) -> Self {
         Self {
             seed,
@@ -50,7 +49,6 @@ pub struct Machine {
 
 impl Machine {
     /// The machine on which the program runs.
-    #[must_use]
     pub fn here() -> Self {
         Self {
             cpu: cpu_model(),
@@ -69,13 +67,11 @@ impl Machine {
 /// let hashes = [hash_text(b"a"), hash_text(b"b")];
 /// assert_ne!(combined_hash(&hashes), combined_hash(&[hashes[1].clone(), hashes[0].clone()]));
 /// ```
-#[must_use]
 pub fn hash_text(bytes: &[u8]) -> String {
     format!("{:016x}", fnv1a(bytes))
 }
 
 /// One hash for several scenes, in order.
-#[must_use]
 pub fn combined_hash(hashes: &[String]) -> String {
     hash_text(hashes.concat().as_bytes())
 }

@@ -54,7 +54,6 @@ impl Twin {
     }
 
     /// The scene.
-    #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -100,7 +99,6 @@ impl Twin {
 
     /// Number of presses to simulate together: two a thread, as long as their frames and samples fit easily into
     /// memory. No result depends on it.
-    #[must_use]
     pub(crate) fn presses_at_once(&self) -> usize {
         let taxels = self.scene.skin().taxels() as f64;
         let rate_hz = taxels / self.scene.mechanics().frame_interval_s() + self.scene.chain().sample_rate_hz();
@@ -125,7 +123,6 @@ impl Twin {
     }
 
     /// The acquisition that [`Twin::record`] uses in `mode`.
-    #[must_use]
     pub fn acquisition(&self, mode: Mode) -> Acquisition {
         let session = match mode {
             Mode::Raster => RASTER_SESSION,
@@ -178,7 +175,6 @@ impl Twin {
     }
 
     /// The session of these recordings, with the scene's name, object, event, hold and provenance.
-    #[must_use]
     pub fn session(&self, raster: Option<Recorded>, compressive: Option<Recorded>) -> Session {
         Session {
             raster,
@@ -291,7 +287,6 @@ pub struct PressFrames {
 
 impl PressFrames {
     /// Largest relative difference |force − Σ p·A| / force over all frames; see [`Frame::imbalance`].
-    #[must_use]
     pub fn imbalance(&self, cell_area_m2: f64) -> f64 {
         self.frames
             .iter()
@@ -325,7 +320,6 @@ const PUBLISHED_HOLD_S: [f64; 2] = [50_000.0 / 64_300.0, 70_000.0 / 64_300.0];
 /// Span [start, end) of a press of `scene` in which the contact is steady, s; `None` for a drop. A press with the
 /// default time course, which is that of the recorded presses, has the published span, so that skin and twin are scored
 /// at the same instants.
-#[must_use]
 pub fn hold_s(scene: &Scene) -> Option<[f64; 2]> {
     let Task::Press(press) = scene.task() else {
         return None;

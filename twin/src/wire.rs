@@ -100,26 +100,22 @@ impl Wire {
     }
 
     /// The rows of Φ for the next `count` measurements.
-    #[must_use]
     pub fn rows(&self, mode: Mode, count: usize) -> WeightRows<'_> {
         let readout = &self.lines[index(mode)].readout;
         WeightRows::new(readout.weights(), readout.row(), count)
     }
 
     /// Median of 2000 samples of the untouched skin, taken in [`Wire::new`], V.
-    #[must_use]
     pub fn idle_v(&self, mode: Mode) -> f64 {
         self.lines[index(mode)].idle_v
     }
 
     /// Conductance of the taxels in row-major order, S.
-    #[must_use]
     pub fn conductance_s(&self) -> &[f64] {
         self.felt.values()
     }
 
     /// Metadata of a recording of this wire.
-    #[must_use]
     pub fn info(&self, mode: Mode) -> &RecordingInfo {
         self.lines[index(mode)].readout.info()
     }

@@ -57,7 +57,6 @@ impl Skin {
     }
 
     /// ΣG of `taxels` taxels, S.
-    #[must_use]
     pub fn conductance_s(&self, taxels: f64) -> f64 {
         taxels * self.mean(|g| g)
     }
@@ -103,7 +102,6 @@ pub enum Limit {
 
 impl Limit {
     /// The limit in words.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Settling => "settling",
@@ -168,7 +166,6 @@ pub struct Budget {
 
 impl Budget {
     /// The budget of `amplifier` with `taxels` taxels.
-    #[must_use]
     pub fn new(amplifier: &Amplifier, taxels: f64, setting: &Setting) -> Self {
         let Setting { skin, adc, available_s } = setting;
         let conductance_s = skin.conductance_s(taxels);
@@ -261,7 +258,6 @@ impl Remedy {
     pub const ALL: [Self; 4] = [Self::AsBuilt, Self::FeedbackScaled, Self::SubArrays, Self::Wires];
 
     /// The remedy in words.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::AsBuilt => "one wire, as built",

@@ -122,13 +122,11 @@ impl Amplifier {
     }
 
     /// The operational amplifier.
-    #[must_use]
     pub fn op_amp(&self) -> &OpAmp {
         &self.op_amp
     }
 
     /// The passive parts around it.
-    #[must_use]
     pub fn network(&self) -> &Network {
         &self.network
     }

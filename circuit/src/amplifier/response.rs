@@ -35,7 +35,6 @@ pub struct AmplifierResponse {
 
 impl AmplifierResponse {
     /// Response of `amplifier` with ΣG = `conductance_s` ≥ 0, S.
-    #[must_use]
     pub fn new(amplifier: &Amplifier, conductance_s: f64) -> Self {
         let (unity, pole) = (amplifier.unity_rad_per_s(), amplifier.pole_rad_per_s());
         let network = amplifier.network();
@@ -53,38 +52,32 @@ impl AmplifierResponse {
     }
 
     /// Noise gain 1 + Rf·ΣG, by which noise and offset at the inputs are amplified.
-    #[must_use]
     pub fn noise_gain(&self) -> f64 {
         self.noise_gain
     }
 
     /// |H| at `frequency_hz` ≥ 0, output over current into the bus, V/A; close to Rf at DC.
-    #[must_use]
     pub(crate) fn gain_ohm(&self, frequency_hz: f64) -> f64 {
         let ([a0, a1, a2], omega) = (self.a, TAU * frequency_hz);
         self.unity / (a0 - a2 * omega * omega).hypot(a1 * omega)
     }
 
     /// Quality factor Q = √(a₀ a₂)/a₁. The output rings when it is above ½.
-    #[must_use]
     pub fn quality(&self) -> f64 {
         (self.a[0] * self.a[2]).sqrt() / self.a[1]
     }
 
     /// Frequency of the ringing after a step, Hz: f₀ √(1 − 1/4Q²); `None` without ringing.
-    #[must_use]
     pub fn ringing_hz(&self) -> Option<f64> {
         self.decay().turning().map(|rad_per_s| rad_per_s / TAU)
     }
 
     /// Rate a₁/2a₂ at which the ringing decays, 1/s.
-    #[must_use]
     pub fn damping_per_s(&self) -> f64 {
         -self.decay().sigma()
     }
 
     /// Frequency f at which the response is down by 3 dB, Hz: it solves |a₀ − a₂ω² + i a₁ω|² = 2a₀² for ω = 2πf.
-    #[must_use]
     pub fn bandwidth_hz(&self) -> f64 {
         let [a0, a1, a2] = self.a;
         // a₂² u² + p u = a₀² with u = ω²
@@ -100,7 +93,6 @@ impl AmplifierResponse {
 
     /// Time after a step of the drives from which the output stays within `fraction` of the step, s, if it does not
     /// slew. Half a step of a converter of b bits is the fraction 2^−(b+1) of its range.
-    #[must_use]
     pub fn settle_s(&self, fraction: f64) -> f64 {
         settle_s(&self.decay(), fraction)
     }
@@ -197,7 +189,6 @@ pub struct AmplifierNoise {
 impl AmplifierNoise {
     /// Noise density at the output at `frequency_hz` ≥ 0, V/√Hz, with the conductance `conductance_s` = ΣG of all
     /// taxels on the bus, S.
-    #[must_use]
     pub fn density(amplifier: &Amplifier, conductance_s: f64, frequency_hz: f64) -> Self {
         let response = AmplifierResponse::new(amplifier, conductance_s);
         let per_current = response.gain_ohm(frequency_hz);
@@ -226,7 +217,6 @@ impl AmplifierNoise {
     ///
     /// Source: the integral of |(b₁s + b₀)/(a₂s² + a₁s + a₀)|² over all frequencies, (b₁²a₀ + b₀²a₂)/(2a₀a₁a₂); H. M.
     /// James, N. B. Nichols, R. S. Phillips, *Theory of Servomechanisms* (1947), appendix.
-    #[must_use]
     pub fn rms(amplifier: &Amplifier, conductance_s: f64) -> Self {
         let response = AmplifierResponse::new(amplifier, conductance_s);
         let [a0, a1, a2] = response.a;
@@ -242,7 +232,6 @@ impl AmplifierNoise {
     }
 
     /// Root sum of squares, because the sources are independent.
-    #[must_use]
     pub fn total(&self) -> f64 {
         let Self {
             taxels,

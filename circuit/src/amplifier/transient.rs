@@ -41,7 +41,6 @@ pub struct Transient {
 
 impl Transient {
     /// An amplifier at rest with nothing on its bus.
-    #[must_use]
     pub fn new(amplifier: Amplifier) -> Self {
         let mut transient = Self {
             amplifier,
@@ -55,13 +54,11 @@ impl Transient {
     }
 
     /// Voltage of the bus, V.
-    #[must_use]
     pub fn sum_v(&self) -> f64 {
         self.state.sum_v
     }
 
     /// Output, V.
-    #[must_use]
     pub fn output_v(&self) -> f64 {
         self.state.output_v
     }

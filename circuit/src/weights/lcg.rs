@@ -40,7 +40,6 @@ impl Jump {
 
     /// `steps` steps, by repeated squaring: O(log steps). The generator's period is 2³², so only `steps` mod 2³²
     /// matters.
-    #[must_use]
     pub const fn new(steps: u64) -> Self {
         let mut left = steps & 0xffff_ffff;
         let mut jump = Self::NONE;
@@ -56,7 +55,6 @@ impl Jump {
     }
 
     /// This jump followed by `next`.
-    #[must_use]
     pub const fn then(self, next: Self) -> Self {
         Self {
             multiplier: self.multiplier.wrapping_mul(next.multiplier),
@@ -68,19 +66,16 @@ impl Jump {
     }
 
     /// a of s ↦ a·s + c.
-    #[must_use]
     pub const fn multiplier(self) -> u32 {
         self.multiplier
     }
 
     /// c of s ↦ a·s + c.
-    #[must_use]
     pub const fn increment(self) -> u32 {
         self.increment
     }
 
     /// State after the jump from `state`.
-    #[must_use]
     #[inline]
     pub const fn apply(self, state: u32) -> u32 {
         self.multiplier.wrapping_mul(state).wrapping_add(self.increment)
@@ -113,7 +108,6 @@ pub enum Seeding {
 
 impl Seeding {
     /// Seed of taxel `taxel`.
-    #[must_use]
     #[inline]
     pub fn seed(self, taxel: u32) -> u32 {
         let address = FIRST_ADDRESS.wrapping_add(taxel);

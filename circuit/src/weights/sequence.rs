@@ -18,7 +18,6 @@ pub enum Mode {
 
 impl Mode {
     /// Name of the profile section that lists the effects of this readout.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Raster => "raster",
@@ -62,13 +61,11 @@ impl WeightMode {
 
     /// Level at `row` (counted from loading the seeds) of a cell with the generator seed `seed`. In raster mode no cell
     /// uses its seed, and the level is 0.
-    #[must_use]
     pub fn level_from_seed(self, seed: u32, row: u64) -> f64 {
         self.level(Jump::new(row.wrapping_add(1)).apply(seed))
     }
 
     /// The readout that uses these levels.
-    #[must_use]
     pub fn readout(self) -> Mode {
         match self {
             Self::Raster => Mode::Raster,
@@ -77,7 +74,6 @@ impl WeightMode {
     }
 
     /// Name, as used in profiles and tables.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Raster => "raster",
@@ -96,7 +92,6 @@ impl WeightMode {
     /// Drive level of DAC code k in this mode: (k − 127.5)/127.5, and 0 for the neutral code 126, to which the
     /// amplifier's bias is trimmed. In analog mode 126 is an ordinary level, because the generator's top byte can be
     /// 126.
-    #[must_use]
     pub fn code_level(self, code: u8) -> f64 {
         if code == NEUTRAL && self != Self::Analog {
             return 0.0;
@@ -217,19 +212,16 @@ impl Patterns {
     }
 
     /// Number of rows after which the pattern repeats.
-    #[must_use]
     pub fn period(&self) -> usize {
         self.codes.len() / self.taxels
     }
 
     /// Number of taxels: the length of a row.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.taxels
     }
 
     /// Codes of row `row`, one a taxel. Rows beyond the period repeat.
-    #[must_use]
     pub fn row(&self, row: u64) -> &[u8] {
         let first = usize::try_from(row % self.period() as u64).unwrap_or(0) * self.taxels;
         &self.codes[first..first + self.taxels]
@@ -326,7 +318,6 @@ pub struct Weights {
 
 impl Weights {
     /// Weights of `taxels` taxels whose generators are seeded by a rule.
-    #[must_use]
     pub fn new(mode: WeightMode, seeding: Seeding, taxels: u32) -> Self {
         Self {
             mode,
@@ -369,25 +360,21 @@ impl Weights {
     }
 
     /// Number of taxels: the length of a row, and the period of the raster.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.taxels as usize
     }
 
     /// Kind of the levels.
-    #[must_use]
     pub fn mode(&self) -> WeightMode {
         self.mode
     }
 
     /// Source of the levels.
-    #[must_use]
     pub fn source(&self) -> &LevelSource {
         &self.source
     }
 
     /// The pattern that the levels repeat; `None` if they come from generators.
-    #[must_use]
     pub fn patterns(&self) -> Option<&Patterns> {
         match &self.source {
             LevelSource::Patterns(patterns) => Some(patterns),
@@ -396,7 +383,6 @@ impl Weights {
     }
 
     /// Seed of taxel `taxel`; `None` if the levels come from a pattern, or there is no such taxel.
-    #[must_use]
     pub fn seed(&self, taxel: usize) -> Option<u32> {
         (taxel < self.taxels()).then_some(())?;
         Some(self.seeds()?.seed(taxel))
@@ -412,7 +398,6 @@ impl Weights {
     ///
     /// # Panics
     /// If the levels come from a list or a pattern without such a taxel.
-    #[must_use]
     pub fn level(&self, taxel: u32, row: u64) -> f64 {
         match (self.mode, &self.source) {
             (WeightMode::Raster, _) => f64::from(row.checked_rem(u64::from(self.taxels)) == Some(u64::from(taxel))),
@@ -527,7 +512,6 @@ pub struct WeightRows<'a> {
 
 impl<'a> WeightRows<'a> {
     /// The `len` rows of `weights` from row `first_row` on, counted from loading the seeds.
-    #[must_use]
     pub fn new(weights: &'a Weights, first_row: u64, len: usize) -> Self {
         Self {
             weights,
@@ -537,31 +521,26 @@ impl<'a> WeightRows<'a> {
     }
 
     /// The weights to which the rows belong.
-    #[must_use]
     pub fn weights(&self) -> &'a Weights {
         self.weights
     }
 
     /// Number of the first row, counted from loading the seeds.
-    #[must_use]
     pub fn first_row(&self) -> u64 {
         self.first_row
     }
 
     /// Number of rows.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.len
     }
 
     /// Whether there is no row.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
     /// Number of taxels: the length of a row.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.weights.taxels()
     }
@@ -570,7 +549,6 @@ impl<'a> WeightRows<'a> {
     ///
     /// # Panics
     /// If there are fewer rows.
-    #[must_use]
     pub fn slice(&self, start: usize, len: usize) -> Self {
         assert!(start + len <= self.len, "rows {start}..{} of {}", start + len, self.len);
         Self::new(self.weights, self.first_row + start as u64, len)
@@ -596,7 +574,6 @@ impl<'a> WeightRows<'a> {
     }
 
     /// The levels, each in [−1, 1], row-major.
-    #[must_use]
     pub fn to_vec(&self) -> Vec<f64> {
         let mut rows = vec![0.0; self.len * self.taxels()];
         self.fill(&mut rows);
@@ -605,7 +582,6 @@ impl<'a> WeightRows<'a> {
 
     /// Packed signs of binary weights, ⌈taxels/64⌉ words a row: bit k of a row is set if taxel k has the weight +1.
     /// `None` if the weights are not binary.
-    #[must_use]
     pub fn sign_bits(&self) -> Option<Vec<u64>> {
         (self.weights.mode() == WeightMode::Binary).then(|| {
             let word = |levels: &[f64]| levels.iter().rev().fold(0, |word, w| word << 1 | u64::from(*w > 0.0));

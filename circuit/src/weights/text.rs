@@ -260,7 +260,6 @@ fn signs(word: &str) -> Option<Vec<u8>> {
 
 impl Patterns {
     /// The pattern as text for [`parse_patterns`]: signs if all codes are 0 or 255, otherwise codes.
-    #[must_use]
     pub fn to_text(&self) -> String {
         let rows = (0..self.period() as u64).map(|row| self.row(row));
         let binary = rows.clone().flatten().all(|code| matches!(code, 0 | 255));

@@ -52,7 +52,6 @@ impl ElasticKernel {
     }
 
     /// 1/E* = (1 − ν²)/E, 1/Pa.
-    #[must_use]
     pub(crate) fn inverse_reduced_modulus_per_pa(&self) -> f64 {
         let (modulus_pa, poisson) = self.constants();
         (1.0 - poisson * poisson) / modulus_pa
@@ -64,7 +63,6 @@ impl ElasticKernel {
     /// with x = k h (plane-strain elasticity of a bonded layer; K. L. Johnson, *Contact Mechanics* (1985), §5.8). Both
     /// parts of the fraction are scaled by exp(−2x), so that no x overflows. C(0) = 1/K, see
     /// [`confined_stiffness_pa_per_m`].
-    #[must_use]
     pub fn compliance_m_per_pa(&self, wave_per_m: f64) -> f64 {
         let half_space = 2.0 * self.inverse_reduced_modulus_per_pa() / wave_per_m;
         match *self {
@@ -103,14 +101,12 @@ pub(crate) fn layer_deficit(x: f64, poisson: f64) -> f64 {
 }
 
 /// K, stiffness of a bonded layer under uniform pressure, Pa/m: E (1−ν) / ((1+ν) (1−2ν) h).
-#[must_use]
 pub fn confined_stiffness_pa_per_m(modulus_pa: f64, poisson: f64, thickness_m: f64) -> f64 {
     modulus_pa * (1.0 - poisson) / ((1.0 + poisson) * (1.0 - 2.0 * poisson) * thickness_m)
 }
 
 /// Young's modulus of a layer of stiffness K under uniform pressure, Pa: the inverse of
 /// [`confined_stiffness_pa_per_m`].
-#[must_use]
 pub fn modulus_of_confined_pa(stiffness_pa_per_m: f64, poisson: f64, thickness_m: f64) -> f64 {
     stiffness_pa_per_m * thickness_m * (1.0 + poisson) * (1.0 - 2.0 * poisson) / (1.0 - poisson)
 }
@@ -305,7 +301,6 @@ impl Influence {
     /// Half-space: A. E. H. Love's closed form (Phil. Trans. R. Soc. A 228 (1929) 377) at the squares' centres. Layer:
     /// the same plus g(r) = (1/2π) ∫ (C_layer − C_half-space) J₀(kr) k dk, smooth on the scale of h, averaged over the
     /// square. Squares of 50 thicknesses or more are independent columns of compliance 1/K.
-    #[must_use]
     pub fn new(kernel: &ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
         Self::with_deficit(kernel, deficit(kernel, shape, cell_m).as_ref(), shape, cell_m)
     }
@@ -343,13 +338,11 @@ impl Influence {
     ///
     /// # Panics
     /// If an offset is outside the table.
-    #[must_use]
     pub fn at(&self, row: usize, col: usize) -> f64 {
         self.values[row * self.cols + col]
     }
 
     /// Largest rise of the surface under unit pressure on one grid square, m/Pa; 0 for a half-space.
-    #[must_use]
     #[cfg(test)]
     pub(crate) fn bulge_m_per_pa(&self) -> f64 {
         self.bulge.one_m_per_pa
@@ -377,7 +370,6 @@ impl Influence {
     /// Rise of the surface beside a wide load relative to the depression under it: the largest value outside a
     /// half-plane under uniform pressure. 0 for a half-space, and approximately 0 for a kernel that is positive
     /// everywhere.
-    #[must_use]
     pub(crate) fn bulge(&self) -> f64 {
         if self.bulge.one_m_per_pa <= 0.0 {
             return 0.0;

@@ -493,7 +493,6 @@ const MAX_ITERATIONS: usize = 400;
 
 impl ElasticSolver {
     /// A solver for up to `shape` (rows, columns) grid squares of side `cell_m`, m.
-    #[must_use]
     pub fn new(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
         let tables = tables(kernel, shape, cell_m);
         let levels = tables
@@ -511,7 +510,6 @@ impl ElasticSolver {
     /// Rise of the surface beside a wide load relative to the depression under it; see [`Influence::bulge`].
     ///
     /// [`Influence::bulge`]: super::Influence::bulge
-    #[must_use]
     pub(crate) fn bulge(&self) -> f64 {
         // the coarsest level spans the same distance with the fewest cells
         self.levels.last().map_or(0.0, Level::bulge)
@@ -621,7 +619,6 @@ impl ElasticSolver {
 
     /// Pressure that the last call of [`Self::sink`] or [`Self::press`] has found, Pa: one value for each grid square,
     /// row by row. After `sink` the squares are those of its patch, after `press` those of the whole grid.
-    #[must_use]
     pub fn pressure_pa(&self) -> &[f64] {
         &self.levels[0].pressure
     }

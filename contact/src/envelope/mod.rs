@@ -38,7 +38,6 @@ const REACH_M: f64 = 1e-3;
 
 impl Envelope {
     /// Empty envelope over `skin`, `cells_per_taxel` cells along each side of a taxel.
-    #[must_use]
     pub(crate) fn new(skin: &SkinLayout, cells_per_taxel: usize) -> Self {
         let raster = Raster::new(skin, cells_per_taxel);
         Self {
@@ -50,25 +49,21 @@ impl Envelope {
     }
 
     /// Number of fine rows and columns.
-    #[must_use]
     pub(crate) fn shape(&self) -> [usize; 2] {
         [self.raster.rows, self.raster.cols]
     }
 
     /// Side of a fine cell, m.
-    #[must_use]
     pub(crate) fn cell_m(&self) -> f64 {
         self.raster.cell_m
     }
 
     /// Centre (x, y) of a fine cell, m.
-    #[must_use]
     pub(crate) fn centre_m(&self, row: usize, col: usize) -> [f64; 2] {
         self.raster.centre_m(row, col)
     }
 
     /// Depth below the free surface, m, row-major; 0 where nothing dips below it.
-    #[must_use]
     pub(crate) fn depth_m(&self) -> &[f64] {
         &self.depth_m
     }

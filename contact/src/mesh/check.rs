@@ -141,13 +141,11 @@ pub struct MeshReport {
 
 impl MeshReport {
     /// Whether the origin, by which the object is held and placed, lies beside the box around the mesh in x or y.
-    #[must_use]
     pub(super) fn is_off_centre(&self) -> bool {
         (0..2).any(|k| self.middle_m[k].abs() > 0.5 * self.extent_m[k])
     }
 
     /// Notes for the user, one a line; empty if the mesh needed no repair.
-    #[must_use]
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         let mut counted = |count: usize, one: &str, many: &str| match count {

@@ -26,7 +26,6 @@ impl TriMesh {
     /// Edges are collapsed in the order of their quadric error (meshoptimizer), onto vertices of the original. The
     /// error is measured, not estimated: the largest distance from any vertex of the original to the new surface, and
     /// from seven points on each new triangle (beside its corners, which are the original's) to the original.
-    #[must_use]
     pub(super) fn decimated(&self) -> Option<(Self, f64)> {
         let limit_m = MAX_DECIMATION_ERROR_M.min(MAX_ERROR_FRACTION * self.extent_m());
         let coarse = (self.triangles.len() > 2 * COARSE_TRIANGLES)

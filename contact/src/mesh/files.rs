@@ -54,7 +54,6 @@ pub fn load(path: &Path, scale: f64) -> Result<(TriMesh, MeshReport), MeshError>
 }
 
 /// The error of a mesh file of no known kind.
-#[must_use]
 pub fn unknown_extension(file: &str, extension: &str) -> MeshError {
     refused(
         file,
@@ -540,7 +539,6 @@ fn f32_of(v: [f64; 3]) -> [f32; 3] {
 
 impl TriMesh {
     /// Wavefront OBJ text: positions in metres with 9 decimals (1 nm), triangles 1-based, `name` as the object's name.
-    #[must_use]
     pub fn to_obj(&self, name: &str) -> String {
         let mut out = format!("# metres; contact face towards -z\no {name}\n");
         for v in &self.vertices {
@@ -558,7 +556,6 @@ impl TriMesh {
     /// glTF 2.0 binary: one mesh in one node, positions (f32, m) and 32-bit indices.
     ///
     /// Source: Khronos, *glTF 2.0 Specification*, §4.4 (GLB layout), §3.6.2 (accessors).
-    #[must_use]
     pub fn to_glb(&self, name: &str) -> Vec<u8> {
         let positions: Vec<[f32; 3]> = self.vertices.iter().map(|&v| f32_of(v)).collect();
         let (mut low, mut high) = ([0.0_f32; 3], [0.0_f32; 3]);

@@ -10,14 +10,12 @@ fn ratio(i: usize, n: usize) -> f64 {
 }
 
 /// Rectangle of `width_m` (x) by `height_m` (y), centred on the origin.
-#[must_use]
 pub fn rectangle(width_m: f64, height_m: f64) -> Vec<Point> {
     let (x, y) = (0.5 * width_m, 0.5 * height_m);
     vec![[-x, -y], [x, -y], [x, y], [-x, y]]
 }
 
 /// Ellipse with half axes `a_m` (x) and `b_m` (y), centred on the origin, as a polygon with `sides` points.
-#[must_use]
 pub fn ellipse(a_m: f64, b_m: f64, sides: usize) -> Vec<Point> {
     (0..sides)
         .map(|i| {
@@ -28,13 +26,11 @@ pub fn ellipse(a_m: f64, b_m: f64, sides: usize) -> Vec<Point> {
 }
 
 /// Circle of `radius_m`, centred on the origin, as a polygon with `sides` points.
-#[must_use]
 pub fn circle(radius_m: f64, sides: usize) -> Vec<Point> {
     ellipse(radius_m, radius_m, sides)
 }
 
 /// Equilateral triangle of side `side_m`, centroid at the origin, apex towards +y.
-#[must_use]
 pub fn triangle(side_m: f64) -> Vec<Point> {
     let height = side_m * 0.75_f64.sqrt();
     let half = 0.5 * side_m;
@@ -53,7 +49,6 @@ pub fn triangle(side_m: f64) -> Vec<Point> {
 /// let lost_m2 = (4.0 - std::f64::consts::PI) * 5e-3 * 5e-3;
 /// assert!((signed_area_m2(&sharp) - signed_area_m2(&round) - lost_m2).abs() < 0.01 * lost_m2);
 /// ```
-#[must_use]
 pub fn rounded(outline: &[Point], radius_m: f64, steps: usize) -> Vec<Point> {
     let n = outline.len();
     let mut out = Vec::with_capacity(n * (steps + 1));
@@ -87,7 +82,6 @@ pub fn rounded(outline: &[Point], radius_m: f64, steps: usize) -> Vec<Point> {
 
 /// Outline between the curves y = `low_m(x)` and y = `high_m(x)` over `from_m ≤ x ≤ to_m`, in `steps` equal steps. If
 /// the curves meet at an end, their two points there become one.
-#[must_use]
 pub fn between(
     [from_m, to_m]: Point,
     steps: usize,
@@ -103,7 +97,6 @@ pub fn between(
 }
 
 /// Rotates `outline` by `angle_rad` about the origin, then moves it by `offset_m`.
-#[must_use]
 pub fn placed(outline: &[Point], angle_rad: f64, offset_m: Point) -> Vec<Point> {
     let (s, c) = angle_rad.sin_cos();
     outline
@@ -113,7 +106,6 @@ pub fn placed(outline: &[Point], angle_rad: f64, offset_m: Point) -> Vec<Point> 
 }
 
 /// Enclosed area, m²; negative for a clockwise loop.
-#[must_use]
 pub(crate) fn signed_area_m2(outline: &[Point]) -> f64 {
     let n = outline.len();
     (0..n)

@@ -5,19 +5,16 @@ use super::tri_mesh::{TriMesh, index};
 use std::f64::consts::{PI, TAU};
 
 /// Block with the given sides along x, y, z, m. It is centred on the origin in x and y and stands on z = 0.
-#[must_use]
 pub fn cuboid(sides_m: [f64; 3]) -> TriMesh {
     extrude(&polygon::rectangle(sides_m[0], sides_m[1]), &[], sides_m[2])
 }
 
 /// Upright cylinder that stands on z = 0, as a prism with `sides` sides.
-#[must_use]
 pub fn cylinder(radius_m: f64, height_m: f64, sides: usize) -> TriMesh {
     extrude(&polygon::circle(radius_m, sides), &[], height_m)
 }
 
 /// Prism over `outer` minus `holes`, from z = 0 to `height_m`. The holes go all the way through.
-#[must_use]
 pub fn extrude(outer: &[Point], holes: &[Vec<Point>], height_m: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
     cap(&mut mesh, outer, holes, 0.0, false);
@@ -40,7 +37,6 @@ pub fn extrude(outer: &[Point], holes: &[Vec<Point>], height_m: f64) -> TriMesh 
 /// let exact_m3 = 0.04 * 0.04 * 0.010 - 0.036 * 0.036 * 0.008;
 /// assert!((tray.volume_m3() - exact_m3).abs() < 1e-15);
 /// ```
-#[must_use]
 pub fn extrude_recessed(outer: &[Point], inner: &[Point], height_m: f64, recess_m: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
     cap(&mut mesh, outer, &[inner.to_vec()], 0.0, false);
@@ -99,20 +95,17 @@ fn wall(mesh: &mut TriMesh, outline: &[Point], low_m: f64, high_m: f64, outward:
 /// let exact_m3 = std::f64::consts::PI * 10e-3_f64.powi(2) * 30e-3 / 3.0;
 /// assert!((cone.volume_m3() / exact_m3 - 1.0).abs() < 1e-3);
 /// ```
-#[must_use]
 pub fn revolve(profile: &[Point], segments: usize) -> TriMesh {
     sweep(profile, segments, false)
 }
 
 /// Ring of revolution of the closed loop `section`: points (r, z), m, with r > 0, counter-clockwise in the (r, z)
 /// plane.
-#[must_use]
 pub fn revolve_ring(section: &[Point], segments: usize) -> TriMesh {
     sweep(section, segments, true)
 }
 
 /// Sphere of `radius_m` that stands on z = 0, with `rings` bands from pole to pole and `segments` around the axis.
-#[must_use]
 pub fn sphere(radius_m: f64, rings: usize, segments: usize) -> TriMesh {
     let rings = rings.max(2);
     let mut profile: Vec<Point> = (0..=rings)

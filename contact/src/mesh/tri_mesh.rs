@@ -172,20 +172,17 @@ impl TriMesh {
     ///
     /// # Panics
     /// If `t` or one of its indices is out of range, which cannot happen for a mesh that passed [`super::checked`].
-    #[must_use]
     pub fn corners(&self, t: usize) -> [[f64; 3]; 3] {
         self.triangles[t].map(|i| self.vertices[i as usize])
     }
 
     /// Smallest box around the vertices, m: `(low, high)`. `None` for a mesh without vertices.
-    #[must_use]
     pub fn bounds(&self) -> Option<([f64; 3], [f64; 3])> {
         let [low, high] = span(self.vertices.iter().copied());
         (!self.vertices.is_empty()).then_some((low, high))
     }
 
     /// Longest side of the box around the vertices, m; 0 for a mesh without vertices.
-    #[must_use]
     pub fn extent_m(&self) -> f64 {
         self.bounds().map_or(0.0, |(low, high)| {
             (0..3).fold(0.0, |most: f64, k| most.max(high[k] - low[k]))
@@ -196,14 +193,12 @@ impl TriMesh {
     ///
     /// # Panics
     /// As [`TriMesh::corners`].
-    #[must_use]
     pub fn area_vector_m2(&self, t: usize) -> [f64; 3] {
         let [a, b, c] = self.corners(t);
         cross(sub(b, a), sub(c, a))
     }
 
     /// Surface area, m².
-    #[must_use]
     pub fn area_m2(&self) -> f64 {
         (0..self.triangles.len())
             .map(|t| {
@@ -216,7 +211,6 @@ impl TriMesh {
     /// Enclosed volume, m³: positive when the triangles face outwards, negative when the mesh is inside out.
     ///
     /// The divergence theorem on tetrahedra from the first vertex; exact for a closed mesh.
-    #[must_use]
     pub fn volume_m3(&self) -> f64 {
         let Some(&o) = self.vertices.first() else { return 0.0 };
         (0..self.triangles.len())
@@ -253,7 +247,6 @@ impl TriMesh {
 
     /// Number of edges without a partner in the opposite direction: 0 for a closed, consistently oriented surface.
     /// Bodies that touch along an edge count as closed.
-    #[must_use]
     pub fn open_edges(&self) -> usize {
         Sides::of(self).edges().filter(|edge| balance(edge) != 0).count()
     }
@@ -263,7 +256,6 @@ impl TriMesh {
 
 impl TriMesh {
     /// Applies `f` to every vertex. `f` must keep handedness (see [`TriMesh::flipped`]).
-    #[must_use]
     pub fn mapped(mut self, f: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
         for v in &mut self.vertices {
             *v = f(*v);
@@ -272,14 +264,12 @@ impl TriMesh {
     }
 
     /// Moves the mesh by `offset_m`.
-    #[must_use]
     pub fn translated(self, offset_m: [f64; 3]) -> Self {
         self.mapped(|v| [v[0] + offset_m[0], v[1] + offset_m[1], v[2] + offset_m[2]])
     }
 
     /// Scales along each axis about the origin. An odd number of negative factors mirrors the mesh; its triangles are
     /// then turned to face outwards again.
-    #[must_use]
     pub fn scaled(self, factor: [f64; 3]) -> Self {
         let scaled = self.mapped(|v| [v[0] * factor[0], v[1] * factor[1], v[2] * factor[2]]);
         if factor.iter().product::<f64>() < 0.0 {
@@ -290,27 +280,23 @@ impl TriMesh {
     }
 
     /// Multiplies every vertex by a row-major rotation matrix.
-    #[must_use]
     pub fn rotated(self, matrix: [[f64; 3]; 3]) -> Self {
         self.mapped(|v| matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2]))
     }
 
     /// Rotates by `angle_rad` about the body axis x.
-    #[must_use]
     pub fn rotated_x(self, angle_rad: f64) -> Self {
         let (s, c) = angle_rad.sin_cos();
         self.rotated([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
     }
 
     /// Moves the mesh along z so that its lowest vertex is at z = 0.
-    #[must_use]
     pub fn grounded(self) -> Self {
         let low = self.bounds().map_or(0.0, |(low, _)| low[2]);
         self.translated([0.0, 0.0, -low])
     }
 
     /// Turns every triangle over: inside becomes outside.
-    #[must_use]
     pub fn flipped(mut self) -> Self {
         for t in &mut self.triangles {
             t.swap(1, 2);
@@ -319,7 +305,6 @@ impl TriMesh {
     }
 
     /// Joins both meshes into one. They share no vertices (see [`TriMesh::welded`]).
-    #[must_use]
     #[cfg(test)]
     pub(crate) fn merged(mut self, other: &TriMesh) -> Self {
         let base = index(self.vertices.len());
@@ -339,7 +324,6 @@ impl TriMesh {
     ///
     /// # Panics
     /// If an index is out of range, which cannot happen for a mesh that passed [`super::checked`].
-    #[must_use]
     pub fn refined(mut self, longest_m: f64, bends: impl Fn([f64; 3], [f64; 3]) -> bool) -> Self {
         for _ in 0..12 {
             let mut middle: HashMap<[u32; 2], u32> = HashMap::new();
@@ -476,7 +460,6 @@ impl TriMesh {
     ///
     /// # Panics
     /// If an index is out of range; [`super::checked`] tests the indices first.
-    #[must_use]
     pub(crate) fn welded(&self, tolerance_m: f64) -> (Self, usize, usize) {
         let side_m = (CELL_TOLERANCES * tolerance_m).max(f64::MIN_POSITIVE.sqrt());
         let mut grid = Grid {

@@ -24,13 +24,11 @@ pub fn pressable() -> impl Iterator<Item = &'static ObjectSpec> {
 }
 
 /// The object of [`OBJECTS`] called `name`; `None` if there is none.
-#[must_use]
 pub fn by_name(name: &str) -> Option<&'static ObjectSpec> {
     OBJECTS.iter().find(|o| o.name == name)
 }
 
 /// The placements as CSV text, for scripts in other languages.
-#[must_use]
 pub fn placements_csv() -> String {
     let mut out = String::from("name,label,row,col,rotation_rad,tilt_x_rad,tilt_y_rad\n");
     for o in OBJECTS {
@@ -89,7 +87,6 @@ pub struct Placement {
 
 impl Placement {
     /// Rotation matrix from body to skin axes, row-major: R = `R_y(tilt_y)` · `R_x(tilt_x)` · `R_z(rotation)`.
-    #[must_use]
     pub fn matrix(&self) -> [[f64; 3]; 3] {
         let (sz, cz) = self.rotation_rad.sin_cos();
         let (sx, cx) = self.tilt_x_rad.sin_cos();

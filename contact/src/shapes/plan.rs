@@ -85,7 +85,6 @@ pub struct Dome {
 
 impl Plan {
     /// A simple outline without holes.
-    #[must_use]
     pub fn simple(outline: Vec<Point>, least_width: f64) -> Self {
         Self {
             add: vec![outline],
@@ -95,7 +94,6 @@ impl Plan {
     }
 
     /// A simple outline with holes, or several separate outlines.
-    #[must_use]
     pub fn apart(add: Vec<Vec<Point>>, cut: Vec<Vec<Point>>, least_width: f64) -> Self {
         Self {
             add,
@@ -106,7 +104,6 @@ impl Plan {
     }
 
     /// The union of overlapping outlines.
-    #[must_use]
     pub fn union(add: Vec<Vec<Point>>, cut: Vec<Vec<Point>>, least_width: f64) -> Self {
         Self {
             add,

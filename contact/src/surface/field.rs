@@ -55,19 +55,16 @@ impl SurfaceField {
     }
 
     /// The sample points.
-    #[must_use]
     pub fn points(&self) -> &SurfacePoints {
         &self.points
     }
 
     /// Pressure at every sample point, Pa: the sum over all bodies since [`SurfaceField::clear`].
-    #[must_use]
     pub fn pressure_pa(&self) -> &[f64] {
         &self.pressure_pa
     }
 
     /// Area of the points under pressure, m².
-    #[must_use]
     pub fn touched_m2(&self) -> f64 {
         let pressed = self.pressure_pa.iter().zip(&self.points.areas_m2);
         pressed.filter(|(p, _)| **p > 0.0).map(|(_, area)| area).sum()

@@ -51,7 +51,6 @@ impl BvhLeafCost for Hit {
 
 impl Solid {
     /// The solid of `mesh`, whose indices must be valid.
-    #[must_use]
     pub fn new(mesh: &TriMesh) -> Self {
         let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);
         let triangle = |t: &[u32; 3]| {
@@ -288,43 +287,36 @@ impl SurfacePoints {
     }
 
     /// Number of points.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.positions_m.len()
     }
 
     /// Always `false`: there is at least one point.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.positions_m.is_empty()
     }
 
     /// Number of taxels.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.taxel_areas_m2.len()
     }
 
     /// Outward unit normal at every point.
-    #[must_use]
     pub fn normals(&self) -> &[[f64; 3]] {
         &self.normals
     }
 
     /// Area of every point, m².
-    #[must_use]
     pub fn areas_m2(&self) -> &[f64] {
         &self.areas_m2
     }
 
     /// Area of every taxel, m².
-    #[must_use]
     pub fn taxel_areas_m2(&self) -> &[f64] {
         &self.taxel_areas_m2
     }
 
     /// Centre of every taxel, m, and its mean normal, of length 1 unless the normals of its points cancel.
-    #[must_use]
     pub fn taxel_centres(&self) -> Vec<([f64; 3], [f64; 3])> {
         let mut sums = vec![([0.0; 3], [0.0; 3]); self.taxels()];
         for (i, taxel) in self.taxels.iter().enumerate() {

@@ -56,7 +56,6 @@ pub enum Draw {
 
 impl Draw {
     /// The number of item `index`. It depends only on the draw, `streams`, `label` and `index`.
-    #[must_use]
     pub fn value(&self, streams: Streams, label: &str, index: u64) -> f64 {
         let rng = || streams.rng(label, index);
         match self {
@@ -80,13 +79,11 @@ impl Draw {
     }
 
     /// Whether all items have the same number.
-    #[must_use]
     pub fn is_fixed(&self) -> bool {
         matches!(self, Self::Fixed(_))
     }
 
     /// Smallest and largest possible number.
-    #[must_use]
     pub fn range(&self) -> [f64; 2] {
         match self {
             Self::Fixed(value) => [*value; 2],

@@ -78,7 +78,6 @@ fn target() -> ProgressDrawTarget {
 }
 
 /// Spinner for a stage of unknown length, on standard error; silent when that is not a terminal. Gone when dropped.
-#[must_use]
 pub(crate) fn spinner(what: &'static str) -> Spinner {
     let bar = ProgressBar::with_draw_target(None, target());
     if let Ok(style) = ProgressStyle::with_template("{msg:24} {spinner} {elapsed}") {
@@ -102,7 +101,6 @@ impl Drop for Spinner {
 }
 
 /// Progress bar over `length` items on standard error; silent when that is not a terminal.
-#[must_use]
 pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(length as u64), target());
     if let Ok(style) = ProgressStyle::with_template("{msg:24} {bar:40} {pos}/{len} {elapsed} (left {eta})") {
@@ -176,7 +174,6 @@ enum Shown {
 
 impl Bars {
     /// Bars that leave a line of every stage, with the time that it took: for runs of minutes.
-    #[must_use]
     pub fn with_lines() -> Self {
         Self {
             lines: true,

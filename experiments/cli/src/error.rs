@@ -22,7 +22,6 @@ impl CliError {
     }
 
     /// Exit status: 1 when a check says no, 2 for every error, as for a usage error.
-    #[must_use]
     pub fn status(&self) -> u8 {
         match self {
             Self::Differs(_) => 1,
@@ -49,7 +48,6 @@ impl<E: Error + Send + Sync + 'static> From<E> for CliError {
 
 /// What is wrong with the command line; `None` when the user asked for help or for the version, which are printed as
 /// they are.
-#[must_use]
 pub fn refusal(error: &clap::Error) -> Option<String> {
     let text = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => Some(text.as_str()),

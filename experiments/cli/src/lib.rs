@@ -126,7 +126,6 @@ const WIDTH: usize = 120;
 const REFUSED: u8 = 2;
 
 /// Runs the program with these `arguments`, the first of which is its own name; its exit status.
-#[must_use]
 pub fn main_with(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let command = match Cli::from_arguments(arguments) {
         Ok(command) => command,

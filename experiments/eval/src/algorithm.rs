@@ -30,7 +30,6 @@ pub enum Class {
 
 impl Class {
     /// The label; `None` for [`Class::Unknown`].
-    #[must_use]
     pub fn label(self) -> Option<usize> {
         match self {
             Self::Known(label) => Some(label),

@@ -51,7 +51,6 @@ pub struct SessionSlip {
 /// The slips of `recording`, in order of block and measurement; empty if there are none. If a block lags at its first
 /// contact, the lag is assumed from its first measurement on. Raster scans, skins of more than 1024 taxels, and blocks
 /// shorter than a chunk are not checked.
-#[must_use]
 pub fn find_slips(recording: &Recording) -> Vec<Slip> {
     if recording.mode() != Mode::Compressive || recording.taxels() > MOST_TAXELS {
         return Vec::new();
@@ -91,7 +90,6 @@ pub fn follow_slips(set: &mut SessionSet) -> Vec<SessionSlip> {
 /// let slip = SessionSlip { session: "cup".to_owned(), slip: Slip { block: 2, from: 4100, rows: 1 } };
 /// assert!(slips_text(&[slip]).expect("a line").contains("cup"));
 /// ```
-#[must_use]
 pub fn slips_text(slips: &[SessionSlip]) -> Option<String> {
     /// Places of a session that are named.
     const NAMED: usize = 3;

@@ -474,7 +474,6 @@ fn keyed<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> &'a AnytimeKey
 }
 
 /// The board as tables: classes, then images of known and of left-out objects, then single objects.
-#[must_use]
 pub fn table(board: &AnytimeBoard) -> String {
     let mut out = String::new();
     for (subject, left_out, attained, title) in [

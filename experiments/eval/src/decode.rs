@@ -116,7 +116,6 @@ pub struct MeasuredWindow {
 }
 
 /// Why a session without a compressive recording is not decoded.
-#[must_use]
 pub fn no_recording(session: &Session) -> Refusal {
     Refusal::new(format!(
         "session {:?} has no compressive recording to decode",
@@ -142,7 +141,6 @@ pub(crate) fn untrained(decoder: &str, error: Refusal) -> Refusal {
 impl DecodeRequest {
     /// Default numbers of measurements for a skin of `taxels` taxels: 7, 20 and 50 for 100 taxels, and the same shares
     /// of other numbers.
-    #[must_use]
     pub fn default_measurements(taxels: usize) -> Vec<usize> {
         let mut shares: Vec<usize> = [7, 20, 50].map(|m| (m * taxels).div_ceil(100)).to_vec();
         shares.dedup();

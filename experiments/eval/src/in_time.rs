@@ -48,7 +48,6 @@ pub enum ContactKind {
 
 impl ContactKind {
     /// Name in files.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Press => "press",
@@ -618,7 +617,6 @@ fn in_files<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> &'a InTimeR
 
 /// One table for presses and one for drops, with a line for every decoder, number of samples and moment; then objects
 /// during the hold and at the first moments of the rise.
-#[must_use]
 pub fn table(board: &InTimeBoard) -> String {
     let mut out = String::new();
     for (kind, title) in [

@@ -29,7 +29,6 @@ impl Default for Labels {
 
 impl Labels {
     /// Numbers `objects` in their order, after the published ones.
-    #[must_use]
     pub fn of<'a>(objects: impl IntoIterator<Item = &'a str>) -> Self {
         let mut labels = Self::default();
         for object in objects {
@@ -47,19 +46,16 @@ impl Labels {
     }
 
     /// Number of `object`.
-    #[must_use]
     pub fn number(&self, object: &str) -> Option<usize> {
         self.names.iter().position(|name| name == object)
     }
 
     /// All names, in the order of their numbers.
-    #[must_use]
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
     /// Name of class `number`.
-    #[must_use]
     pub fn name(&self, number: usize) -> Option<&str> {
         self.names.get(number).map(String::as_str)
     }

@@ -72,7 +72,6 @@ impl Protocol {
     /// are scored; otherwise ten after those that condition the skin. Presses that a raster recording marks as
     /// conditioning are never scored, so that they can be used for training. For a recording of the published skin this
     /// is the default.
-    #[must_use]
     pub fn of(recorded: &Recorded, hold_s: Option<[f64; 2]>) -> Self {
         let published = Self::default();
         let recording = &recorded.recording;
@@ -104,14 +103,12 @@ impl Protocol {
     }
 
     /// The scored presses of `recording`.
-    #[must_use]
     pub fn presses_of(&self, recording: &Recording) -> std::ops::Range<usize> {
         let end = (self.first_press + self.presses).min(recording.blocks().len());
         self.first_press.min(end)..end
     }
 
     /// Number of classification windows of `m` measurements in a press; only complete votes count.
-    #[must_use]
     pub fn windows(&self, m: usize, measurements_per_frame: usize) -> usize {
         let fitting = self.frames * measurements_per_frame / m.max(1);
         fitting.min(self.max_windows) / self.vote * self.vote
@@ -136,7 +133,6 @@ pub struct Truth {
 
 impl Truth {
     /// The ground truth from the raster session of the object; from its last press if there are too few.
-    #[must_use]
     pub fn new(raster: &Recording, protocol: &Protocol) -> Self {
         let press = protocol.truth.0.min(raster.blocks().len() - 1);
         let frame = protocol.truth.1.min(raster.frames() - 1);

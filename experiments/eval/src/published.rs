@@ -30,7 +30,6 @@ pub struct SkinScores {
 
 impl ScoredSkin {
     /// Number of progress reports of [`ScoredSkin::score`].
-    #[must_use]
     pub fn steps(&self) -> usize {
         self.sessions.iter().map(|s| s.scored().len() + 1).sum()
     }
@@ -86,14 +85,12 @@ impl ScoredSkin {
 
 impl SkinScores {
     /// Row of `object` ("mean" for the mean) for variant `decode` and `m`.
-    #[must_use]
     pub fn row(&self, object: &str, decode: &str, m: usize) -> Option<&ScoreRow> {
         let found = |r: &&ScoreRow| r.object == object && r.decode == decode && r.m == m;
         self.rows.iter().find(found)
     }
 
     /// Localisation row for variant `decode` and `m`.
-    #[must_use]
     pub fn located(&self, decode: &str, m: usize) -> Option<&LocalisationRow> {
         self.localisation.iter().find(|r| r.decode == decode && r.m == m)
     }
@@ -178,7 +175,6 @@ pub fn score_sessions(
 }
 
 /// Mean over all objects for every decoding variant and M, in the order of the first object's rows.
-#[must_use]
 pub fn mean_rows(rows: &[ScoreRow]) -> Vec<ScoreRow> {
     let keys = unique(rows.iter().map(|row| (row.decode, row.m)));
     keys.into_iter()
@@ -202,7 +198,6 @@ pub fn mean_rows(rows: &[ScoreRow]) -> Vec<ScoreRow> {
 }
 
 /// Scores the raster recording of an object at every M.
-#[must_use]
 pub fn score_raster(session: &ScoredSession, learned: &Learned, measurements: &[usize]) -> Vec<ScoreRow> {
     let Some(recording) = &session.raster else {
         return Vec::new();
@@ -255,7 +250,6 @@ pub struct BaselineRow {
 }
 
 /// Scores of trivial baselines: an empty image, and the mean of all library images.
-#[must_use]
 pub fn baselines(sessions: &[ScoredSession], learned: &Learned) -> Vec<BaselineRow> {
     let library = learned.classifier.library();
     let mut mean_image = vec![0.0; library.images().nrows()];

@@ -109,7 +109,6 @@ pub struct Scorer<'a> {
 
 impl<'a> Scorer<'a> {
     /// Starts `decoder`.
-    #[must_use]
     pub fn new(decoder: &'a TrainedDecoder) -> Self {
         Self {
             algorithm: decoder.trained.start(),

@@ -36,7 +36,6 @@ impl Sensing {
     pub const ALL: [Self; 2] = [Self::Random, Self::Chosen];
 
     /// Name on the command line and in files.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Random => "random",

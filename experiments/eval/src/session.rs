@@ -34,7 +34,6 @@ pub struct ScoredSession {
 
 impl ScoredSession {
     /// Prepares `session`, whose class has the number `label`.
-    #[must_use]
     pub fn new(session: Session, label: usize) -> Self {
         let protocol = session.compressive.as_ref().map(|r| Protocol::of(r, session.hold_s));
         let raster_protocol = session.raster.as_ref().map(|r| Protocol::of(r, session.hold_s));
@@ -59,7 +58,6 @@ impl ScoredSession {
 
     /// Ground truth of block `block` of the compressive recording: the raster scan of the object or, without one, the
     /// image known from the simulation. `None` if there is neither.
-    #[must_use]
     pub fn truth(&self, block: usize) -> Option<Truth> {
         if let Some(raster) = self.raster.as_ref().filter(|_| self.held) {
             return Some(Truth::new(raster, &self.raster_protocol));
@@ -68,19 +66,16 @@ impl ScoredSession {
     }
 
     /// Name in score tables: the object's; for a further session of the same object, the session's own.
-    #[must_use]
     pub fn title(&self) -> &str {
         if self.again { &self.name } else { &self.object }
     }
 
     /// Whether there is a compressive recording and a true image for it.
-    #[must_use]
     pub fn scorable(&self) -> bool {
         self.scored().any(|block| self.truth(block).is_some())
     }
 
     /// Scored blocks of the compressive recording.
-    #[must_use]
     pub fn scored(&self) -> std::ops::Range<usize> {
         self.compressive.as_ref().map_or(0..0, |c| self.protocol.presses_of(c))
     }

@@ -70,7 +70,6 @@ impl SkinRun<'_> {
 }
 
 /// The sessions of a simulated skin as a set.
-#[must_use]
 pub fn twin_set(sessions: Vec<Session>) -> SessionSet {
     SessionSet {
         root: PathBuf::from("the twin"),
@@ -83,7 +82,6 @@ pub fn twin_set(sessions: Vec<Session>) -> SessionSet {
 /// `presses` presses of the object called `object`, at its place in the published recordings, on the skin that follows
 /// from `seed`. Nothing is stepped (contact field `footprint`), so that a press takes milliseconds: its plateau is at
 /// rest in any case.
-#[must_use]
 pub fn footprint_scene(object: &str, presses: usize, seed: u64) -> SceneConfig {
     SceneConfig {
         seed,
@@ -114,7 +112,6 @@ pub struct TwinSessions {
 impl TwinSessions {
     /// Number of presses that are scanned (the last is the ground truth, the others are for training), and number of
     /// presses of the scene `name` that are scored (as in its file, if given there).
-    #[must_use]
     pub fn presses(&self, name: &str) -> [usize; 2] {
         let [scanned, scored] = if self.quick { [4, 2] } else { [8, 6] };
         [scanned, own_presses(name).unwrap_or(scored)]
@@ -130,7 +127,6 @@ impl TwinSessions {
     }
 
     /// Number of presses; [`TwinSessions::simulate`] reports after each.
-    #[must_use]
     pub fn steps(&self) -> usize {
         self.names().iter().flat_map(|name| self.presses(name)).sum()
     }

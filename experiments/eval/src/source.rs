@@ -160,14 +160,12 @@ impl Source {
     }
 
     /// Whether one of the raster recordings is also in `other`.
-    #[must_use]
     pub fn shares_raster(&self, other: &Self) -> bool {
         let same = |a: &ScoredSession| a.raster.is_some() && other.sessions.iter().any(|b| a.raster == b.raster);
         self.sessions.iter().any(same)
     }
 
     /// The dictionary at all places: the published one, or shifted copies of `dictionary`.
-    #[must_use]
     pub fn shifted(&self, dictionary: &Matrix) -> Matrix {
         let published = self.published.as_ref().and_then(|p| p.shifted.clone());
         published.unwrap_or_else(|| shifted(dictionary, self.layout.cols(), SHIFT_REACH))

@@ -79,7 +79,6 @@ pub enum Cell {
 
 impl Cell {
     /// The name by which `value`, such as a variant of an enum, is known in JSON.
-    #[must_use]
     pub fn name_of(value: impl Serialize) -> Self {
         match serde_json::to_value(value) {
             Ok(serde_json::Value::String(name)) => Self::Text(name),
@@ -89,7 +88,6 @@ impl Cell {
     }
 
     /// The two ends of an interval for readers, with `digits` decimals.
-    #[must_use]
     pub fn span(interval: Option<[f64; 2]>, digits: usize) -> Self {
         interval
             .map(|[low, high]| format!("{low:.digits$}–{high:.digits$}"))
@@ -108,7 +106,6 @@ impl<'a, R: Copy> Table<'a, R> {
     }
 
     /// Adds a column for files and readers.
-    #[must_use]
     pub fn column<V: Into<Cell>>(
         self,
         key: impl Into<String>,
@@ -119,13 +116,11 @@ impl<'a, R: Copy> Table<'a, R> {
     }
 
     /// Adds a column for files alone.
-    #[must_use]
     pub fn file<V: Into<Cell>>(self, key: impl Into<String>, value: impl Fn(R) -> V + 'a) -> Self {
         self.with(Some(key.into()), None, value)
     }
 
     /// Adds a column that files know by a short name, and readers by the `words` for it.
-    #[must_use]
     pub fn named<N: Into<Cell>, W: Into<Cell>>(
         self,
         key: &str,
@@ -137,26 +132,22 @@ impl<'a, R: Copy> Table<'a, R> {
     }
 
     /// Adds the two ends of an interval as columns for files alone, `key`_low and `key`_high.
-    #[must_use]
     pub fn interval(self, key: &str, value: impl Fn(R) -> Option<[f64; 2]> + Copy + 'a) -> Self {
         self.file(format!("{key}_low"), move |row| value(row).map(|[low, _]| low))
             .file(format!("{key}_high"), move |row| value(row).map(|[_, high]| high))
     }
 
     /// Adds a column for readers alone.
-    #[must_use]
     pub fn shown<V: Into<Cell>>(self, head: impl Into<String>, value: impl Fn(R) -> V + 'a) -> Self {
         self.with(None, Some(head.into()), value)
     }
 
     /// A column of numbers with `digits` decimals, for readers alone.
-    #[must_use]
     pub fn number<V: Into<Cell>>(self, head: impl Into<String>, digits: usize, value: impl Fn(R) -> V + 'a) -> Self {
         self.shown(head, value).digits(digits)
     }
 
     /// Columns of scores, for files alone.
-    #[must_use]
     pub(crate) fn files<S: 'a>(self, scores: &[ScoreColumn<S>], of: impl Fn(R) -> &'a S + Copy + 'a) -> Self {
         let columns = scores.iter().copied();
         columns.fold(self, |table, (name, get)| table.file(name, move |row| get(of(row))))
@@ -174,7 +165,6 @@ impl<'a, R: Copy> Table<'a, R> {
     }
 
     /// Readers see `digits` decimals in the column before.
-    #[must_use]
     pub fn digits(mut self, digits: usize) -> Self {
         if let Some(column) = self.columns.last_mut() {
             column.digits = Some(digits);
@@ -183,7 +173,6 @@ impl<'a, R: Copy> Table<'a, R> {
     }
 
     /// Readers see the column before in `unit`, of which `scale` are one of the file's; the heading names it.
-    #[must_use]
     pub fn unit(mut self, unit: &str, scale: f64) -> Self {
         if let Some(column) = self.columns.last_mut() {
             column.scale = scale;
@@ -193,7 +182,6 @@ impl<'a, R: Copy> Table<'a, R> {
     }
 
     /// What readers see.
-    #[must_use]
     pub fn for_readers(&self) -> TextTable {
         let shown: Vec<_> = self.columns.iter().filter(|c| c.head.is_some()).collect();
         let row = |row: &R| shown.iter().map(|c| c.text(*row)).collect();
@@ -204,7 +192,6 @@ impl<'a, R: Copy> Table<'a, R> {
     }
 
     /// What readers see, as a Markdown table with aligned columns.
-    #[must_use]
     pub fn text(&self) -> String {
         self.for_readers().to_string()
     }
@@ -300,7 +287,6 @@ impl TextTable {
     }
 
     /// The table as an HTML element; cells of numbers have the class `number`.
-    #[must_use]
     pub fn html(&self) -> String {
         let flush = self.flush_right();
         let row = |cells: &[String], tag: &str| {
@@ -381,7 +367,6 @@ fn is_number(cell: &str) -> bool {
 }
 
 /// Text for XML and HTML, in content and in quoted attributes. Characters that XML forbids are dropped.
-#[must_use]
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

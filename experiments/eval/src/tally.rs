@@ -99,7 +99,6 @@ impl Tally {
     }
 
     /// The scores of this press.
-    #[must_use]
     pub fn scores(&self) -> Scores {
         pool([self])
     }

@@ -53,7 +53,6 @@ pub struct Window<'a> {
 
 impl<'a> Window<'a> {
     /// The first `m` measurements of the window; all if it has fewer.
-    #[must_use]
     pub fn first(&self, m: usize) -> Self {
         self.part(0..m.min(self.y.len()))
     }
@@ -79,7 +78,6 @@ impl<'a> Window<'a> {
 
 impl PressRows {
     /// The weights of `rows`.
-    #[must_use]
     pub fn new(rows: WeightRows<'_>) -> Self {
         Self {
             taxels: rows.taxels(),
@@ -89,7 +87,6 @@ impl PressRows {
     }
 
     /// The weights in `phi`, measurements × taxels.
-    #[must_use]
     pub fn of_matrix(phi: &Matrix) -> Self {
         let (taxels, values) = (phi.ncols(), phi.view().values());
         let binary = values.iter().all(|w| w.abs().to_bits() == 1.0_f64.to_bits());
@@ -118,7 +115,6 @@ impl PressRows {
     }
 
     /// The weights with taxel k renumbered as `to(k)`.
-    #[must_use]
     pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
         let mut phi = vec![0.0; self.phi.len()];
         let taxels = self.taxels.max(1);
@@ -148,7 +144,6 @@ fn sign_bits(phi: &[f64], taxels: usize) -> Vec<u64> {
 
 impl Press {
     /// Scored frames of block `block` of `recording`.
-    #[must_use]
     pub fn new(recording: &Recording, block: usize, protocol: &Protocol) -> Self {
         let per_frame = recording.measurements_per_frame();
         let first = protocol.first_frame.min(recording.frames());
@@ -157,7 +152,6 @@ impl Press {
     }
 
     /// Measurements `range` of block `block` of `recording`. The output of the untouched skin is `idle_v`, V.
-    #[must_use]
     pub fn within(recording: &Recording, block: usize, range: Range<usize>, idle_v: f64) -> Self {
         let untouched = Untouched {
             offset_v: idle_v,
@@ -167,7 +161,6 @@ impl Press {
     }
 
     /// The measurements `volts`, V, with the rows `rows`. The output of the untouched skin is `idle_v`, V.
-    #[must_use]
     pub fn on(rows: Arc<PressRows>, volts: Vec<f64>, idle_v: f64) -> Self {
         Self {
             y: volts.iter().map(|v| v - idle_v).collect(),
@@ -180,7 +173,6 @@ impl Press {
     ///
     /// # Panics
     /// If there is no such measurement.
-    #[must_use]
     pub fn picked(&self, indices: &[usize]) -> Self {
         Self {
             rows: Arc::new(self.rows.picked(indices)),
@@ -190,7 +182,6 @@ impl Press {
     }
 
     /// The same measurements with taxel k renumbered as `to(k)`.
-    #[must_use]
     pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
         Self {
             rows: Arc::new(self.rows.renamed(to)),
@@ -199,19 +190,16 @@ impl Press {
     }
 
     /// Number of measurements.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.y.len()
     }
 
     /// Whether there is no measurement.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.y.is_empty()
     }
 
     /// The measurements `start..start + m`; `None` if they extend beyond the press, or one of them was lost.
-    #[must_use]
     pub fn window(&self, start: usize, m: usize) -> Option<Window<'_>> {
         let y = self.y.get(start..start + m)?;
         let taxels = self.rows.taxels;
@@ -238,7 +226,6 @@ impl Press {
 
 /// Mean of the idle frames at the start of a block, V; the median of the whole block if the idle frames are not known
 /// or all lost. Lost samples are ignored.
-#[must_use]
 pub fn idle_mean(recording: &Recording, block: usize) -> f64 {
     let block = &recording.blocks()[block];
     let end = block.idle_frames.unwrap_or(0) * recording.measurements_per_frame();
@@ -278,14 +265,12 @@ pub struct Untouched {
 
 impl Untouched {
     /// The untouched skin of block `block`, from its idle frames: [`idle_mean`] for a flat skin.
-    #[must_use]
     pub fn of(recording: &Recording, block: usize) -> Self {
         let frames = recording.blocks()[block].idle_frames.unwrap_or(0);
         Self::in_frames(recording, block, frames)
     }
 
     /// The untouched skin, from the first `frames` frames of the block.
-    #[must_use]
     pub(crate) fn in_frames(recording: &Recording, block: usize, frames: usize) -> Self {
         let flat = || Self {
             offset_v: idle_mean(recording, block),
@@ -312,7 +297,6 @@ impl Untouched {
     }
 
     /// Measurements `range` of block `block` minus the output of the untouched skin, V.
-    #[must_use]
     pub fn without(&self, recording: &Recording, block: usize, range: Range<usize>) -> Vec<f64> {
         let volts = recording.blocks()[block].volts[range.clone()].iter();
         let Some(image) = &self.image else {
@@ -326,7 +310,6 @@ impl Untouched {
 
     /// Measurements `range` of block `block` as a press whose [`y`](crate::Window::y) is free of the untouched skin's
     /// output.
-    #[must_use]
     pub fn press(&self, recording: &Recording, block: usize, range: Range<usize>) -> Press {
         Press {
             volts: recording.blocks()[block].volts[range.clone()].to_vec(),

@@ -26,7 +26,6 @@ const IOU: usize = 1;
 const IOU_CONTACT: usize = 4;
 
 /// What `--json` prints.
-#[must_use]
 pub fn json(report: &BudgetReport) -> impl Serialize + '_ {
     #[derive(Serialize)]
     struct Printed<'a> {
@@ -141,7 +140,6 @@ fn find(
 }
 
 /// The end points and the change of the IoU with every effect, as tables to read.
-#[must_use]
 pub fn text(report: &BudgetReport) -> String {
     let mut out = end_points(report).text() + &unexplained(&report.end_points);
     for decode in decodes(report) {

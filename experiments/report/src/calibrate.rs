@@ -18,7 +18,6 @@ const TILE_PX: usize = 240;
 const MOST_SHOWN: usize = 20;
 
 /// The estimates as a text table, with what the recordings cannot determine.
-#[must_use]
 pub fn text(report: &CalibrationReport) -> String {
     let label = |(name, unit): (&str, &str)| match unit {
         "" => name.to_owned(),
@@ -103,7 +102,6 @@ fn predictions(found: &PredictedInside) -> String {
 }
 
 /// The gains of a skin as text.
-#[must_use]
 pub fn skin_text(report: &SkinReport) -> String {
     let [rows, cols] = report.shape;
     let skin = &report.skin;

@@ -22,7 +22,6 @@ const ARM: [&str; 2] = ["arm.csv", "arm.json"];
 
 /// A value with its standard error; a dash if it is undefined, such as the share of unexplained outliers when there are
 /// no outliers.
-#[must_use]
 pub(crate) fn with_error(value: f64, error: Option<f64>, digits: usize) -> String {
     match error {
         _ if value.is_nan() => "–".to_owned(),
@@ -80,7 +79,6 @@ fn arm(report: &ArmReport) -> Table<'_, &ArmBand> {
 }
 
 /// What `--json` prints.
-#[must_use]
 pub fn json<'a>(report: &'a CompareReport, objects: Option<&'a PerObjectReport>) -> impl Serialize + 'a {
     #[derive(Serialize)]
     struct Printed<'a> {
@@ -102,7 +100,6 @@ pub fn json<'a>(report: &'a CompareReport, objects: Option<&'a PerObjectReport>)
 }
 
 /// Statistics and distances of the curves, or what was predicted, as text tables.
-#[must_use]
 pub fn text(report: &CompareReport) -> String {
     if !report.predicted.is_empty() {
         let inside = report.predicted.iter().filter(|row| row.of.inside()).count();
@@ -120,7 +117,6 @@ pub fn text(report: &CompareReport) -> String {
 }
 
 /// The statistics of the bent skin as a text table.
-#[must_use]
 pub fn arm_text(report: &ArmReport) -> String {
     format!(
         "{} ({} touches), twin: {} simulated bent skins (`spts simulate arm`)\n{}",
@@ -132,7 +128,6 @@ pub fn arm_text(report: &ArmReport) -> String {
 }
 
 /// What `--arm --json` prints.
-#[must_use]
 pub fn arm_json(report: &ArmReport) -> impl Serialize + '_ {
     #[derive(Serialize)]
     struct Printed<'a> {

@@ -81,7 +81,6 @@ pub fn read_design(path: &Path, seed: u64) -> Result<DesignCheck, Refusal> {
 }
 
 /// The design as text.
-#[must_use]
 pub fn text(report: &DesignReport) -> String {
     let (d, w, e, c) = (
         &report.design,
@@ -219,7 +218,6 @@ pub fn text(report: &DesignReport) -> String {
 }
 
 /// The check of a design as text.
-#[must_use]
 pub fn check_text(report: &CheckReport) -> String {
     let quantities = report.quantities.iter().map(|q| {
         let verdict = if q.agrees { "agrees" } else { "DOES NOT AGREE" };

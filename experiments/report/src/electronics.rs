@@ -25,7 +25,6 @@ pub fn write(study: &ElectronicsStudy, report: &ElectronicsReport, out: OutputFo
 pub const TABLE_TAXELS: [u32; 5] = [100, 1000, 10_000, 100_000, 1_000_000];
 
 /// Skins of all sizes as a text table.
-#[must_use]
 pub fn text(rows: &[Remedied], available_s: f64) -> String {
     format!(
         "to settle in: {:.2} µs; SNR: one pressed taxel over the amplifier's noise, and with the converter's step\n\n{}",

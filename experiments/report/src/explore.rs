@@ -12,7 +12,6 @@ use spts_studies::electronics::ElectronicsStudy;
 use spts_studies::explore::{CostFit, ExploreReport, ExploreStudy, ExploreTrial, SizeRow, Way};
 
 /// The results in words.
-#[must_use]
 pub fn text(report: &ExploreReport) -> String {
     let mut out = sizes(report).text();
     if let Ok(designed) = ElectronicsStudy::as_designed() {

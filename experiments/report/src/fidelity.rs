@@ -39,7 +39,6 @@ pub fn write(report: &FidelityReport, out: OutputFolder) -> Result<(), Refusal> 
 }
 
 /// The means over the scenes as Markdown tables, which are readable as plain text too.
-#[must_use]
 pub fn text(report: &FidelityReport) -> String {
     let mut out = String::new();
     for (task, heading) in [("press", "Presses"), ("drop", "Drops")] {

@@ -142,7 +142,6 @@ impl PageTable {
 }
 
 /// The page as one HTML document; `figures/` and `tables/` are looked for beside it.
-#[must_use]
 pub fn html(page: &Page) -> String {
     let title = escape(&page.title);
     let entry = |id: &str, title: &str| format!("<li><a href=\"#{}\">{}</a></li>\n", anchor(id), escape(title));

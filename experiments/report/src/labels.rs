@@ -1,7 +1,6 @@
 //! Plain words for what files and programs know by a short name; those for decoders are in the table of decoders.
 
 /// What an object is called in figures and on the page.
-#[must_use]
 pub(crate) fn object_label(name: &str) -> &str {
     match name {
         "center" => "lid with a hole",
@@ -19,7 +18,6 @@ pub(crate) fn object_label(name: &str) -> &str {
 }
 
 /// What a statistic of a recording is called.
-#[must_use]
 pub(crate) fn statistic_label(name: &str) -> String {
     match name {
         "residual" => "residual of the fit, V",
@@ -40,7 +38,6 @@ pub(crate) fn statistic_label(name: &str) -> String {
 }
 
 /// Names of objects in a text, separated by spaces, in plain words.
-#[must_use]
 pub(crate) fn object_list(names: &str) -> String {
     names
         .split_whitespace()
@@ -50,7 +47,6 @@ pub(crate) fn object_list(names: &str) -> String {
 }
 
 /// What a score is called.
-#[must_use]
 pub(crate) fn score_label(name: &str) -> String {
     match name {
         "support" => "support accuracy".to_owned(),

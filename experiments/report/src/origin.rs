@@ -16,7 +16,6 @@ pub struct Origin {
 
 impl Origin {
     /// Results of `provenance`, made on this machine.
-    #[must_use]
     pub fn here(provenance: Provenance) -> Self {
         Self {
             provenance,

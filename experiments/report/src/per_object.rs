@@ -114,7 +114,6 @@ pub(crate) fn draw(report: &PerObjectReport, folder: &Path) -> Result<(), Refusa
 }
 
 /// Distances, then a line an object, as text tables.
-#[must_use]
 pub fn text(report: &PerObjectReport) -> String {
     format!(
         "mean over the objects of |twin − real|, twin: mean of {} simulated skins\n{}\n{}",

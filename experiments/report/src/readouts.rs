@@ -29,7 +29,6 @@ pub fn write(study: &ReadoutsStudy, report: &ReadoutsReport, out: OutputFolder) 
 }
 
 /// The results in words: one table for each size.
-#[must_use]
 pub fn text(report: &ReadoutsReport) -> String {
     let mut out = String::new();
     for wire in &report.wires {

@@ -40,7 +40,6 @@ struct Until {
 impl Device {
     /// A device at power-on, with `program` in flash and `eeprom` at the start of its EEPROM (128 bytes; the rest is
     /// erased).
-    #[must_use]
     pub fn new(program: Arc<Program>, eeprom: &[u8]) -> Self {
         let space = Space::new(eeprom);
         Self {
@@ -63,37 +62,31 @@ impl Device {
     }
 
     /// Present tick.
-    #[must_use]
     pub fn now(&self) -> u64 {
         self.now
     }
 
     /// Instructions executed since power-on.
-    #[must_use]
     pub fn instructions(&self) -> u64 {
         self.core.instructions
     }
 
     /// Whether the CPU sleeps.
-    #[must_use]
     pub fn is_asleep(&self) -> bool {
         self.asleep
     }
 
     /// Accesses without effect since power-on. A correct program causes none.
-    #[must_use]
     pub fn faults(&self) -> Faults {
         self.space.faults
     }
 
     /// DAC code on pin PA6; `None` if the DAC does not drive the pin.
-    #[must_use]
     pub fn dac_output(&self) -> Option<u8> {
         self.space.dac.output()
     }
 
     /// [`dac_output`](Self::dac_output) at `tick`, which must not be earlier than the last change but one.
-    #[must_use]
     pub(crate) fn dac_output_at(&self, tick: u64) -> Option<u8> {
         self.space.dac.output_at(tick)
     }

@@ -37,13 +37,11 @@ pub struct Faults {
 
 impl Faults {
     /// The first fault; `None` if there is none.
-    #[must_use]
     pub fn first(&self) -> Option<Fault> {
         self.first
     }
 
     /// Number of faults.
-    #[must_use]
     pub fn count(&self) -> u64 {
         self.count
     }

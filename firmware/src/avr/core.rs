@@ -77,7 +77,6 @@ pub struct Core {
 
 impl Core {
     /// State after reset, with the stack at `sp` (the last byte of SRAM on AVRxt).
-    #[must_use]
     pub const fn new(sp: u16) -> Self {
         Self {
             registers: [0; 32],
@@ -92,7 +91,6 @@ impl Core {
     /// Whether an interrupt may be executed before the next instruction: the I flag is set, one instruction has been
     /// executed after SEI or RETI, and the hold after a write to SPL has ended (four instructions, or the next write to
     /// I/O memory).
-    #[must_use]
     #[inline]
     pub const fn interrupts_enabled(&self) -> bool {
         self.sreg & I != 0 && self.instructions >= self.hold_until

@@ -96,7 +96,6 @@ pub enum Op {
 
 impl Op {
     /// Length in words, 1 or 2.
-    #[must_use]
     #[inline]
     pub const fn words(self) -> u16 {
         match self {
@@ -112,7 +111,6 @@ const Z: u8 = 30;
 
 impl Op {
     /// Decodes the instruction that starts with `word`. `second` is the following word, used by two-word instructions.
-    #[must_use]
     pub fn decode(word: u16, second: u16) -> Self {
         let (high, k, offset) = (high_d(word), immediate(word), offset_12(word));
         match word >> 12 {

@@ -40,7 +40,6 @@ impl Program {
     }
 
     /// The smallest flash that holds `words`. Words beyond 65536, which cannot be addressed, are dropped.
-    #[must_use]
     pub fn from_words(words: &[u16]) -> Self {
         let words = &words[..words.len().min(0x1_0000)];
         let image: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
@@ -52,34 +51,29 @@ impl Program {
     }
 
     /// Size, in words.
-    #[must_use]
     pub fn words(&self) -> usize {
         self.ops.len()
     }
 
     /// The byte at `address`; addresses wrap at the end of flash, as LPM's do.
-    #[must_use]
     #[inline]
     pub fn byte(&self, address: u16) -> u8 {
         self.bytes[usize::from(address) & (self.bytes.len() - 1)]
     }
 
     /// The word at word address `pc`, which wraps.
-    #[must_use]
     pub fn word(&self, pc: u16) -> u16 {
         let k = 2 * usize::from(self.wrap(pc));
         u16::from_le_bytes([self.bytes[k], self.bytes[k + 1]])
     }
 
     /// The instruction at word address `pc`, which wraps.
-    #[must_use]
     #[inline]
     pub fn op(&self, pc: u16) -> Op {
         self.ops[usize::from(self.wrap(pc))]
     }
 
     /// Wraps the word address `pc` at the end of flash.
-    #[must_use]
     #[inline]
     pub const fn wrap(&self, pc: u16) -> u16 {
         pc & self.mask
@@ -99,7 +93,6 @@ impl Program {
 /// assert_eq!(disassemble(&program, 0), "ldi r24, 0xC8");
 /// assert_eq!(disassemble(&program, 1), "sleep");
 /// ```
-#[must_use]
 pub fn disassemble(program: &Program, pc: u16) -> String {
     let op = program.op(pc);
     let text = if program.word(pc) == LPM_IMPLIED {

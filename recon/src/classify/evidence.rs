@@ -162,27 +162,23 @@ impl EvidenceClassifier {
 
     /// Means and deformations of all components, N × K. [`Preparation::push`] needs rows of Φ times this matrix. For
     /// weights ±1, [`SignTables`](crate::SignTables) compute these products.
-    #[must_use]
     pub fn bank(&self) -> &Matrix {
         &self.bank
     }
 
     /// Outcomes in the order of [`Posterior::probabilities`]: labels in increasing order, then `None` if there are
     /// components without a label.
-    #[must_use]
     #[cfg(test)]
     pub(crate) fn outcomes(&self) -> &[Option<usize>] {
         &self.outcomes
     }
 
     /// An empty preparation for this classifier.
-    #[must_use]
     pub fn preparation(&self) -> Preparation {
         Preparation::new(self.shape, &self.noise)
     }
 
     /// Empty evidence for this classifier.
-    #[must_use]
     pub fn evidence(&self) -> Evidence {
         Evidence::new(self.shape, self.outcomes.len())
     }

@@ -94,7 +94,6 @@ impl Preparation {
     }
 
     /// Number of rows prepared for the window so far.
-    #[must_use]
     pub fn rows(&self) -> usize {
         self.rows
     }
@@ -206,7 +205,6 @@ impl Evidence {
     }
 
     /// Number of samples of this window.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.count
     }

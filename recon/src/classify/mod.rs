@@ -56,13 +56,11 @@ impl Library {
     }
 
     /// Images, N × number of images.
-    #[must_use]
     pub fn images(&self) -> &Matrix {
         &self.images
     }
 
     /// Class of every image.
-    #[must_use]
     pub fn labels(&self) -> &[usize] {
         &self.labels
     }
@@ -108,7 +106,6 @@ impl Src {
 
     /// A classifier that uses at most `n_nonzero_coefs` images of `library` in a combination, found as in the published
     /// code.
-    #[must_use]
     pub fn new(library: Library, n_nonzero_coefs: usize) -> Self {
         let mut classes = library.labels.clone();
         classes.sort_unstable();
@@ -121,7 +118,6 @@ impl Src {
     }
 
     /// The labelled images.
-    #[must_use]
     pub fn library(&self) -> &Library {
         &self.library
     }
@@ -175,7 +171,6 @@ impl Src {
 /// assert_eq!(majority(&[Some(3), None, Some(5), Some(5)]), Some(5));
 /// assert_eq!(majority(&[None, None]), None);
 /// ```
-#[must_use]
 pub fn majority(decisions: &[Option<usize>]) -> Option<usize> {
     let mut labels: Vec<usize> = decisions.iter().flatten().copied().collect();
     labels.sort_unstable();
@@ -190,7 +185,6 @@ pub fn majority(decisions: &[Option<usize>]) -> Option<usize> {
 
 /// Majority of every complete group of `size` consecutive decisions. The published script never clears its list of
 /// decisions between groups; `cumulative` reproduces this, so that each vote counts all decisions so far.
-#[must_use]
 pub fn vote_groups(decisions: &[Option<usize>], size: usize, cumulative: bool) -> Vec<Option<usize>> {
     (1..=decisions.len() / size.max(1))
         .map(|group| {
@@ -225,7 +219,6 @@ impl VoteScore {
     }
 
     /// Share of correct decisions; `None` without decisions.
-    #[must_use]
     pub fn share(&self) -> Option<f64> {
         (self.total > 0.0).then(|| self.correct / self.total)
     }

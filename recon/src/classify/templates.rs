@@ -57,7 +57,6 @@ const FLOOR: f64 = 0.025;
 
 impl TemplateModel {
     /// Values for presses that are repeated accurately. `noise` also covers the differences between sessions.
-    #[must_use]
     pub fn new(cols: usize) -> Self {
         Self {
             cols,
@@ -71,7 +70,6 @@ impl TemplateModel {
     /// Values for a classifier with the outcome "unknown". Its classes are so wide that an unusual press of an object
     /// is still closer to its class than to "unknown". Chosen on windows computed from raster images, leaving each
     /// object in turn out of classes and "unknown".
-    #[must_use]
     pub fn open(cols: usize) -> Self {
         Self {
             noise: 0.8,

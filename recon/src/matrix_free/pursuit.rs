@@ -77,7 +77,6 @@ impl RegionPursuit {
     pub const MAX_ROUNDS: usize = 20;
 
     /// A pursuit of contacts with radii of 1 to 4 taxels in images of `rows` × `cols`.
-    #[must_use]
     pub fn new(rows: usize, cols: usize) -> Self {
         Self {
             rows,

@@ -102,19 +102,16 @@ impl SheetPrior {
     }
 
     /// Rows and columns of the grid.
-    #[must_use]
     pub fn shape(&self) -> [usize; 2] {
         [self.rows.nrows(), self.cols.nrows()]
     }
 
     /// Number of taxels, N.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.rows.nrows() * self.cols.nrows()
     }
 
     /// Covariance of two taxels.
-    #[must_use]
     pub fn covariance(&self, i: usize, j: usize) -> f64 {
         let cols = self.cols.nrows();
         self.rows.row(i / cols)[j / cols] * self.cols.row(i % cols)[j % cols]
@@ -234,13 +231,11 @@ impl SheetDecoder {
     }
 
     /// Number of rows so far.
-    #[must_use]
     pub fn measurements(&self) -> usize {
         self.wires.len()
     }
 
     /// Memory of `measurements` rows, their products with the prior, and the factor, bytes.
-    #[must_use]
     pub fn bytes(&self, measurements: usize) -> usize {
         (2 * measurements * self.prior.taxels() + measurements * (measurements + 1) / 2) * size_of::<f64>()
     }
@@ -248,7 +243,6 @@ impl SheetDecoder {
     /// Approximate number of multiplications for an image from `measurements` rows: the linear estimate, the inverse of
     /// the covariance of `most` taxels, and one solution for all of them. The active-set method solves several times,
     /// for fewer taxels.
-    #[must_use]
     pub fn products(&self, measurements: usize, most: usize) -> usize {
         let (m, n) = (measurements, most.min(self.prior.taxels()));
         m * m + m * self.prior.taxels() + m * n + n * n * n + 2 * m * n * n

@@ -206,13 +206,11 @@ pub struct Centred<A> {
 
 impl<A> Centred<A> {
     /// The operator that applies `inner`, and subtracts from every measurement the mean of all measurements.
-    #[must_use]
     pub fn new(inner: A) -> Self {
         Self { inner }
     }
 
     /// The operator without the subtraction.
-    #[must_use]
     pub fn inner(&self) -> &A {
         &self.inner
     }
@@ -331,13 +329,11 @@ pub struct SubArrays<A> {
 
 impl<A: LinearOperator + Sync> SubArrays<A> {
     /// The given sub-arrays, in order of their columns.
-    #[must_use]
     pub fn new(parts: Vec<A>) -> Self {
         Self { parts }
     }
 
     /// The sub-arrays.
-    #[must_use]
     pub fn parts(&self) -> &[A] {
         &self.parts
     }

@@ -68,7 +68,6 @@ pub struct SignOperator {
 
 impl SignOperator {
     /// Rows `first_row..first_row + nrows` of generators with `seeds`, one for each column.
-    #[must_use]
     pub fn new(generator: SignGenerator, seeds: Vec<u32>, first_row: u64, nrows: usize) -> Self {
         Self {
             generator,
@@ -79,7 +78,6 @@ impl SignOperator {
     }
 
     /// Memory of the operator, bytes: a constant, and 4 for each column, whatever the number of rows.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         size_of::<Self>() + self.seeds.capacity() * size_of::<u32>()
     }

@@ -119,19 +119,16 @@ impl Fixed {
     }
 
     /// Number of measurements in a window.
-    #[must_use]
     pub fn measurements(&self) -> usize {
         self.m
     }
 
     /// Number of pixels in an image.
-    #[must_use]
     pub fn pixels(&self) -> usize {
         self.prior.len()
     }
 
     /// A window whose samples are added one by one.
-    #[must_use]
     pub fn window(&self) -> FixedWindow<'_> {
         let mut window = FixedWindow {
             fixed: self,

@@ -59,7 +59,6 @@ impl NnLasso {
     }
 
     /// The same with columns scaled to unit length first. Coefficients belong to the columns as given.
-    #[must_use]
     pub fn with_normalised_columns(self) -> Self {
         Self {
             normalise: true,

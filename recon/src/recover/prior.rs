@@ -91,13 +91,11 @@ impl Gaussian {
     }
 
     /// Mean μ, length N.
-    #[must_use]
     pub fn mean(&self) -> &[f64] {
         &self.mean
     }
 
     /// Covariance C, N × N.
-    #[must_use]
     pub fn covariance(&self) -> &Matrix {
         &self.covariance
     }
@@ -108,7 +106,6 @@ impl Gaussian {
     }
 
     /// Inverse of the covariance, N × N.
-    #[must_use]
     pub fn precision(&self) -> &Matrix {
         &self.precision
     }

@@ -21,7 +21,6 @@ pub struct Omp {
 
 impl Omp {
     /// A pursuit with at most `n_nonzero_coefs` atoms.
-    #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }
     }
@@ -87,7 +86,6 @@ const STEPS: usize = 10;
 
 impl NnOmp {
     /// A pursuit with at most `n_nonzero_coefs` atoms.
-    #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }
     }

@@ -37,7 +37,6 @@ pub struct ReferenceOmp {
 
 impl ReferenceOmp {
     /// A pursuit with at most `n_nonzero_coefs` atoms.
-    #[must_use]
     pub fn new(n_nonzero_coefs: usize) -> Self {
         Self { n_nonzero_coefs }
     }

@@ -162,13 +162,11 @@ impl SequentialGains {
     }
 
     /// Number of rows.
-    #[must_use]
     pub fn rows(&self) -> usize {
         self.count
     }
 
     /// Posterior covariance after the last row at scale 1, N × N.
-    #[must_use]
     pub fn covariance(&self) -> &[f64] {
         &self.posterior.covariance
     }
@@ -182,7 +180,6 @@ impl SequentialGains {
 
 impl SequentialEstimate {
     /// An estimate without samples, for `gains`.
-    #[must_use]
     pub fn new(gains: &SequentialGains) -> Self {
         Self {
             start: gains.prior.mean().to_vec(),
@@ -227,20 +224,17 @@ impl SequentialEstimate {
     }
 
     /// Number of samples.
-    #[must_use]
     pub fn samples(&self) -> usize {
         self.count
     }
 
     /// Posterior mean x̂, length N, in the unit of the prior.
-    #[must_use]
     pub fn mean(&self) -> &[f64] {
         &self.mean
     }
 
     /// Scale ŝ of image and noise: the standard deviation of pixel i is ŝ √Pᵢᵢ. 1 if the scale is known, and before the
     /// first sample.
-    #[must_use]
     pub fn scale(&self) -> f64 {
         if self.unknown_scale && self.count > 0 {
             (self.squares / self.count as f64).sqrt()
@@ -257,7 +251,6 @@ impl SequentialEstimate {
     ///
     /// # Panics
     /// If `gains` holds fewer rows than there are samples.
-    #[must_use]
     pub fn expected_iou(&self, gains: &SequentialGains, threshold: f64) -> f64 {
         if self.count == 0 {
             return 0.0;
@@ -471,13 +464,11 @@ impl TrackedImage {
     }
 
     /// Image s û, length N, in the unit of the samples. It may have negative values.
-    #[must_use]
     pub fn image(&self) -> &[f64] {
         &self.image
     }
 
     /// Posterior covariance P of the shape, N × N.
-    #[must_use]
     pub fn covariance(&self) -> &[f64] {
         &self.posterior.covariance
     }

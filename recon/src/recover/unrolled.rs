@@ -102,7 +102,6 @@ pub struct Touched {
 
 impl Unrolled {
     /// A network with the numbers that its training has found.
-    #[must_use]
     pub fn new(weights: UnrolledWeights) -> Self {
         let tables = SignTables::new(weights.prior.view());
         Self {
@@ -111,7 +110,6 @@ impl Unrolled {
     }
 
     /// N, taxels.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.model.weights.taxels()
     }
@@ -361,7 +359,6 @@ pub struct Layer {
 impl Layer {
     /// A layer whose `weights` are the matrix W (inputs × outputs, row-major), with one `bias` b for each output.
     /// [`super::UnrolledWeights::new`] checks that layers fit together.
-    #[must_use]
     pub fn new(weights: Vec<f32>, bias: Vec<f32>) -> Self {
         let (outputs, inputs) = (bias.len(), weights.len() / bias.len().max(1));
         let mut tiles = Vec::with_capacity(weights.len());
@@ -519,7 +516,6 @@ impl UnrolledWeights {
     }
 
     /// N, taxels.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.prior.nrows()
     }

@@ -124,13 +124,11 @@ impl Expected {
     }
 
     /// Rows and columns of the grid.
-    #[must_use]
     pub fn shape(&self) -> [usize; 2] {
         self.shape
     }
 
     /// Number of taxels, N.
-    #[must_use]
     pub fn taxels(&self) -> usize {
         self.shape[0] * self.shape[1]
     }
@@ -357,7 +355,6 @@ impl Headroom {
 ///
 /// # Panics
 /// If the rows have another number of taxels than the images.
-#[must_use]
 pub fn largest_sum(expected: &Expected, rows: &Matrix) -> f64 {
     assert_eq!(rows.ncols(), expected.taxels(), "taxels");
     let squares = (0..rows.nrows()).map(|r| expected.square_of_sum(rows.row(r)));

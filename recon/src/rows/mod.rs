@@ -82,7 +82,6 @@ impl<'a> RowTask<'a> {
     pub const NOISE: f64 = 0.15;
 
     /// A task for `rows` rows and the images `expected`, without a limit of the sums.
-    #[must_use]
     pub fn new(rows: usize, expected: &'a Expected) -> Self {
         Self {
             rows,
@@ -203,7 +202,6 @@ pub const DESIGNERS: &[Designer] = &[
 /// assert_eq!(designer("cosine_signs").map(|d| d.needs), Some(RowNeeds::Nothing));
 /// assert!(DESIGNERS.iter().all(|d| designer(d.name).is_some()));
 /// ```
-#[must_use]
 pub fn designer(name: &str) -> Option<&'static Designer> {
     DESIGNERS.iter().find(|d| d.name == name)
 }
@@ -226,7 +224,6 @@ pub fn designer(name: &str) -> Option<&'static Designer> {
 ///
 /// # Panics
 /// If the number of weights differs from that of the taxels.
-#[must_use]
 pub fn fewest_flips(rows: MatrixView<'_>, weights: &[f64]) -> Vec<usize> {
     let (m, n) = (rows.nrows(), rows.ncols());
     assert_eq!(weights.len(), n, "weights");

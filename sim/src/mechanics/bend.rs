@@ -79,7 +79,6 @@ impl BendConfig {
 
     /// Strain of the foam under every taxel of `skin` before press `index`; 0 where the cover is slack. It depends only
     /// on the arguments.
-    #[must_use]
     pub fn strain(&self, skin: &SkinLayout, seed: u64, index: u64) -> Vec<f64> {
         let streams = Streams::new(seed);
         let (mut taxels, mut press) = (streams.rng("bend", 0), streams.rng("bend/press", index));
@@ -98,7 +97,6 @@ impl BendConfig {
 
     /// Decrease of the logarithm of the cover's pressure on every untouched taxel of `skin` at the full force of press
     /// `index`. It depends only on the arguments.
-    #[must_use]
     pub fn slack(&self, skin: &SkinLayout, seed: u64, index: u64) -> Vec<f64> {
         let mut rng = Streams::new(seed).rng("bend/slack", index);
         let mut drawn = || {

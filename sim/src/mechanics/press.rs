@@ -247,13 +247,11 @@ const MARGIN_S: f64 = 0.03;
 
 impl PressConfig {
     /// Duration of a whole ramp, s. The part from 10 to 90 % of the force takes `inner_s`; the corners are rounded.
-    #[must_use]
     pub fn ramp_s(inner_s: f64) -> f64 {
         ramp_s(inner_s)
     }
 
     /// Shortest time from touch to lift, s, with which a press of this `rise_s` and without spread has a plateau.
-    #[must_use]
     pub fn shortest_hold_s(rise_s: f64) -> f64 {
         ramp_s(rise_s) + SETTLE_S + MARGIN_S
     }
@@ -264,7 +262,6 @@ impl PressConfig {
     ///
     /// In a valid scene start < end. A `position_sd_m` far above its default delays the touch, and with it the start,
     /// by up to 3 `position_sd_m` / (5 mm/s).
-    #[must_use]
     pub fn plateau_s(&self) -> [f64; 2] {
         [
             self.onset_s + self.onset_spread_s + ramp_s(self.rise_s) + SETTLE_S,

@@ -45,7 +45,6 @@ pub struct MechanicsConfig {
 
 impl MechanicsConfig {
     /// Ten presses of the object called `name` by the arm, at the object's place.
-    #[must_use]
     pub fn press(name: &str) -> Self {
         Self {
             press: Some(PressConfig {
@@ -57,7 +56,6 @@ impl MechanicsConfig {
     }
 
     /// Ten drops of a tennis ball from half a metre onto the middle of the skin.
-    #[must_use]
     pub fn bounce() -> Self {
         Self {
             drop: Some(DropConfig::default()),
@@ -306,7 +304,6 @@ impl Mechanics {
     }
 
     /// The configuration, with all defaults filled in.
-    #[must_use]
     pub fn config(&self) -> &MechanicsConfig {
         &self.config
     }
@@ -315,7 +312,6 @@ impl Mechanics {
     ///
     /// # Panics
     /// Never: a scene has exactly one task.
-    #[must_use]
     pub fn task(&self) -> Task<'_> {
         match (&self.config.press, &self.config.drop) {
             (Some(press), _) => Task::Press(press),
@@ -325,7 +321,6 @@ impl Mechanics {
     }
 
     /// Number of presses or drops.
-    #[must_use]
     pub fn repeats(&self) -> usize {
         match self.task() {
             Task::Press(press) => press.presses,
@@ -334,7 +329,6 @@ impl Mechanics {
     }
 
     /// Duration of one press or drop, s.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         match self.task() {
             Task::Press(press) => press.duration_s,
@@ -343,43 +337,36 @@ impl Mechanics {
     }
 
     /// The skin.
-    #[must_use]
     pub fn skin(&self) -> &SkinLayout {
         &self.config.skin
     }
 
     /// Seed of all random numbers.
-    #[must_use]
     pub fn seed(&self) -> u64 {
         self.config.seed
     }
 
     /// Time step of the dynamics, s.
-    #[must_use]
     pub fn timestep_s(&self) -> f64 {
         self.timestep_s
     }
 
     /// Largest stable time step of the dynamics, s.
-    #[must_use]
     pub fn step_limit_s(&self) -> f64 {
         self.step_limit_s
     }
 
     /// Time between frames, s; for a drop, while the ball is near the skin.
-    #[must_use]
     pub fn frame_interval_s(&self) -> f64 {
         self.frame_interval_s
     }
 
     /// Mesh of the object or ball, in body axes.
-    #[must_use]
     pub fn mesh(&self) -> &PreparedMesh {
         &self.mesh
     }
 
     /// Report on a mesh from a file; `None` for the seventeen objects and the ball.
-    #[must_use]
     pub fn mesh_report(&self) -> Option<&MeshReport> {
         self.mesh_report.as_ref()
     }
@@ -507,7 +494,6 @@ fn ball_mesh(radius_m: f64) -> TriMesh {
 
 impl Mechanics {
     /// The scene's body at rest in the pose of a frame, to evaluate a contact field at that instant again.
-    #[must_use]
     pub fn posed(&self, pose: &Pose) -> PosedMesh<'_> {
         let (body, _) = self.contact_body();
         PosedMesh {
@@ -567,13 +553,11 @@ const NEGLIGIBLE_M: f64 = 1e-4;
 
 impl Overhang {
     /// The largest of the four, m.
-    #[must_use]
     pub(crate) fn largest_m(&self) -> f64 {
         self.edges().into_iter().map(|(_, m)| m).fold(0.0, f64::max)
     }
 
     /// The edges by name, with the overhang over each, m.
-    #[must_use]
     pub fn edges(&self) -> [(&'static str, f64); 4] {
         [
             ("row 0", self.first_row_m),
@@ -587,7 +571,6 @@ impl Overhang {
 impl Mechanics {
     /// Overhang of the part of the body that is below the free surface at the target force, or at the deepest point of
     /// a drop; `None` if it is less than 0.1 mm. The scatter of presses is not included.
-    #[must_use]
     pub fn overhang(&self) -> Option<Overhang> {
         let (body, _) = self.contact_body();
         let depth_m = match self.task() {

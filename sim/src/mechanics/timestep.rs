@@ -52,7 +52,6 @@ impl Timestep {
     }
 
     /// The step as TOML.
-    #[must_use]
     pub fn to_toml(self) -> toml::Value {
         match self {
             Self::Seconds(step_s) => step_s.into(),

@@ -101,7 +101,6 @@ pub(crate) const HOME_RAD: [f64; 6] = [std::f64::consts::PI, -1.4, 1.9, -2.07, -
 
 impl Link {
     /// Transformation from the joint's moving side to the link's own frame: `T_z(d)` `T_x(a)` `R_x(α)`.
-    #[must_use]
     pub(crate) fn tail(&self) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::new(self.a_m, 0.0, self.d_m),
@@ -147,7 +146,6 @@ fn kinematics(joints_rad: &[f64; 6], tool: &Vector3<f64>) -> (Isometry3<f64>, Ma
 /// let down = pose.rotation * nalgebra::Vector3::z();
 /// assert!(down.z < -0.99, "the tool points down");
 /// ```
-#[must_use]
 pub fn flange(joints_rad: &[f64; 6]) -> Isometry3<f64> {
     kinematics(joints_rad, &Vector3::zeros()).0
 }
@@ -155,7 +153,6 @@ pub fn flange(joints_rad: &[f64; 6]) -> Isometry3<f64> {
 /// How the point `tool` moves when the joints turn: a matrix with one column a joint. Rows 0–2 are the velocity of the
 /// point in world axes, m/s for 1 rad/s of the joint, and rows 3–5 the angular velocity. `tool` is given in flange
 /// axes, m.
-#[must_use]
 pub(crate) fn jacobian(joints_rad: &[f64; 6], tool: &Vector3<f64>) -> Matrix6<f64> {
     kinematics(joints_rad, tool).1
 }

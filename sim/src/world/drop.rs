@@ -27,7 +27,6 @@ pub struct Bounce {
 
 impl Bounce {
     /// Coefficient of restitution.
-    #[must_use]
     pub fn restitution(&self) -> f64 {
         self.speed_out_m_per_s / self.speed_in_m_per_s
     }

@@ -9,7 +9,6 @@ use spts_contact::{ContactField, Frame, Pose, PosedMesh, PreparedMesh, TaxelBins
 use spts_input::Refusal;
 
 /// The error of a frame under the normal force `force_n`, N, whose pressure the contact field cannot compute.
-#[must_use]
 pub fn no_pressure(force_n: f64, time_s: f64, reason: &str) -> Refusal {
     Refusal::new(format!("no pressure under {force_n:e} N at {time_s:.4} s: {reason}"))
 }

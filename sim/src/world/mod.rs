@@ -85,13 +85,11 @@ impl World {
     }
 
     /// The scene.
-    #[must_use]
     pub fn scene(&self) -> &Mechanics {
         &self.scene
     }
 
     /// Time since the start, s.
-    #[must_use]
     pub fn time_s(&self) -> f64 {
         match &self.engine {
             Engine::Dynamics(dynamics) => dynamics.time_s(),
@@ -100,7 +98,6 @@ impl World {
     }
 
     /// Bounces of the ball so far; empty for a press.
-    #[must_use]
     pub fn bounces(&self) -> &[Bounce] {
         match &self.engine {
             Engine::Dynamics(dynamics) => dynamics.bounces(),
@@ -110,7 +107,6 @@ impl World {
 
     /// The first bounce of the ball, finished or not; `None` for a press. During the bounce only its start, speed and
     /// present peak are known.
-    #[must_use]
     pub fn first_bounce(&self) -> Option<Bounce> {
         match &self.engine {
             Engine::Dynamics(dynamics) => dynamics.first_bounce(),
@@ -120,7 +116,6 @@ impl World {
 
     /// Generalised positions: of the arm, joint angles, rad; of the ball, centre, m, and quaternion. Without dynamics
     /// the joint angles are computed on request.
-    #[must_use]
     pub fn positions(&self) -> Vec<f64> {
         match &self.engine {
             Engine::Dynamics(dynamics) => dynamics.data.qpos().to_vec(),
@@ -191,7 +186,6 @@ impl Cover {
 
 /// The dynamics of a scene as MuJoCo's XML (MJCF), for MuJoCo's own tools. Shapes are omitted, because the contact
 /// field does not need them.
-#[must_use]
 pub fn mjcf(scene: &Mechanics) -> String {
     model::mjcf(scene, None)
 }

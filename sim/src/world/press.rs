@@ -12,7 +12,6 @@ use spts_models::Streams;
 use std::sync::Arc;
 
 /// The error of an arm or a ball that has touched nothing by `time_s`.
-#[must_use]
 pub fn no_touch(time_s: f64) -> Refusal {
     Refusal::new(format!("nothing has touched the skin by {time_s:.3} s"))
 }
@@ -266,7 +265,6 @@ pub struct PressCourse {
 impl PressCourse {
     /// Time course of `frames` with the target force `target_n` and the plateau `plateau_s` = [start, end]. `None`
     /// unless the force exceeds 90 % of the target before the plateau's end and falls below 10 % afterwards.
-    #[must_use]
     pub fn of(frames: &[Frame], target_n: f64, plateau_s: [f64; 2], cell_area_m2: f64) -> Option<Self> {
         let force = |f: &Frame| f.wrench.force_n[2];
         let onset_s = frames.iter().find(|f| force(f) > 0.0)?.time_s;

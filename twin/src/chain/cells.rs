@@ -82,7 +82,6 @@ impl FirmwareCells {
 
     /// The same cells, counting in `unlike` every code that differs from `weights`. Cells differ when the clock is too
     /// fast for them.
-    #[must_use]
     pub fn counting(self, unlike: Arc<AtomicU64>) -> Self {
         Self { unlike, ..self }
     }

@@ -173,7 +173,6 @@ pub struct RowsFile {
 
 impl RowsConfig {
     /// Whether the section is empty, so that the readout profile alone determines the rows.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }

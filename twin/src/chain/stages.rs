@@ -95,19 +95,16 @@ impl Chain {
     }
 
     /// Number of measurements a second, Hz.
-    #[must_use]
     pub fn sample_rate_hz(&self) -> f64 {
         self.profile.sample_rate_hz
     }
 
     /// The file from which the readout profile was read; `None` for a profile by name.
-    #[must_use]
     pub fn profile_file(&self) -> Option<&ProfileFile> {
         self.profile_file.as_ref()
     }
 
     /// The file from which seeds or a pattern were read; `None` if there is none.
-    #[must_use]
     pub fn rows_file(&self) -> Option<&RowsFile> {
         self.rows_file.as_ref()
     }
@@ -119,7 +116,6 @@ impl Chain {
 
     /// The readout profile, including the rows and faults of the scene. Its values hold for electrodes of 10 mm × 10
     /// mm.
-    #[must_use]
     pub fn profile(&self) -> &Profile {
         &self.profile
     }
@@ -157,7 +153,6 @@ impl Chain {
 
     /// Number of codes in all recordings by this chain and its copies in which the emulated cells differ from the
     /// model. Such codes show edges that cells have lost because the clock is too fast.
-    #[must_use]
     pub(crate) fn unlike_codes(&self) -> u64 {
         self.unlike_codes.load(Ordering::Relaxed)
     }
@@ -190,7 +185,6 @@ impl Chain {
     /// let chain = chain.with_transducer(Box::new(linear));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    #[must_use]
     pub fn with_transducer(&self, transducer: Box<dyn Transducer>) -> Self {
         Self {
             transducer: transducer.into(),
@@ -240,7 +234,6 @@ impl Chain {
     /// Conductance of every taxel, S, at every frame of every press: a vector for each press, with a map for each
     /// frame. `session` is the number of the session: the gains of its mounting are drawn by this number. The skin
     /// rests between presses.
-    #[must_use]
     pub fn conductance_maps(&self, presses: &[&[Frame]], session: u64) -> Vec<Vec<ConductanceMap>> {
         let mut skin = self.skin_session(session);
         presses.iter().map(|frames| skin.press(frames)).collect()
@@ -332,7 +325,6 @@ pub struct Acquisition {
 impl Acquisition {
     /// The way in which the published device records presses: 57 frames are not recorded after each block, while the
     /// arm returns, and a block begins with an untouched skin.
-    #[must_use]
     pub fn presses(mode: Mode, session: u64) -> Self {
         Self {
             mode,
@@ -346,14 +338,12 @@ impl Acquisition {
 
     /// The way in which the published device records touches by a finger: block follows block without a gap, as for
     /// [`Acquisition::drops`], and nothing says when in a block the skin is touched.
-    #[must_use]
     pub fn touches(mode: Mode, session: u64) -> Self {
         Self::drops(mode, session)
     }
 
     /// The way in which the published device records drops of a ball: block follows block without a gap, and nothing
     /// says when in a block the ball lands.
-    #[must_use]
     pub fn drops(mode: Mode, session: u64) -> Self {
         Self {
             lead_frames: 0,
@@ -492,7 +482,6 @@ impl ReadoutSession {
 
 impl Chain {
     /// The skin, ready for session number `session`.
-    #[must_use]
     pub fn skin_session(&self, session: u64) -> SkinSession {
         let mut transducer = self.transducer.boxed();
         transducer.start_session(session);
@@ -538,7 +527,6 @@ impl Chain {
 
 /// Facts about one press or drop at the middle of its hold or, without a hold, at the instant of the largest force.
 /// `maps` are the conductances at `frames`.
-#[must_use]
 pub fn press_facts(frames: &[Frame], maps: &[ConductanceMap], hold_s: Option<[f64; 2]>) -> PressFacts {
     let at = match hold_s {
         Some([start_s, end_s]) => frames.iter().position(|f| f.time_s >= 0.5 * (start_s + end_s)),
@@ -594,7 +582,6 @@ const LEAST_RATIO: f64 = 2.0;
 impl TaxelSignal {
     /// Whether the signal is less than twice the noise, or less than one step of the converter. An image then needs
     /// many more measurements than there are taxels.
-    #[must_use]
     pub fn below_noise(&self) -> bool {
         self.signal_v < LEAST_RATIO * self.noise_v || self.signal_v < self.step_v
     }

@@ -85,7 +85,6 @@ impl SessionSet {
     }
 
     /// The session called `name`.
-    #[must_use]
     pub fn named(&self, name: &str) -> Option<&Session> {
         self.sessions.iter().find(|s| s.name == name)
     }
@@ -96,7 +95,6 @@ impl SessionSet {
     }
 
     /// Compressive recording of the first session in which an object was dropped.
-    #[must_use]
     pub fn drops(&self) -> Option<&Recording> {
         let drops = self.sessions.iter().filter(|s| s.event == Event::Drop);
         drops.filter_map(Session::compressive).next()

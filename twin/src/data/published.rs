@@ -17,7 +17,6 @@ use std::path::{Path, PathBuf};
 pub(super) type Found = (Vec<Session>, Option<Published>, Vec<String>);
 
 /// The refusal of the folder `root`, which has no recordings.
-#[must_use]
 pub fn nothing_found(root: &Path) -> Refusal {
     let expected = "session.json, folders with one, or the published recordings (presses/NAME/NAME_raster.mat, \
                     Measurements_Collected/NAME/NAME_raster.mat, or a clone of their repository)";
@@ -25,7 +24,6 @@ pub fn nothing_found(root: &Path) -> Refusal {
 }
 
 /// The refusal of the file at `path`, which is not there, and which `needed_by` needs.
-#[must_use]
 pub fn missing_file(path: &Path, needed_by: &str) -> Refusal {
     Refusal::new(format!("missing; {needed_by} needs it")).at(path.display())
 }

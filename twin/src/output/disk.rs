@@ -30,7 +30,6 @@ pub fn no_folder(path: &Path, source: io::Error) -> Refusal {
 }
 
 /// The refusal of a file at `path` that has the name of a result, and that no run has written.
-#[must_use]
 pub fn not_ours(path: &Path) -> Refusal {
     let problem = "is not a result of an earlier run and is not replaced; move it away or choose another folder";
     Refusal::new(problem).at(path.display())

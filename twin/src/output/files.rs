@@ -100,7 +100,6 @@ fn write_with(path: &Path, fill: impl FnOnce(&mut AtomicFile) -> io::Result<()>)
 const TEMPORARY: [&str; 2] = [".spts-", ".part"];
 
 /// Whether `name` is a name that unfinished files have.
-#[must_use]
 pub fn is_temporary(name: &str) -> bool {
     name.starts_with(TEMPORARY[0]) && name.ends_with(TEMPORARY[1])
 }

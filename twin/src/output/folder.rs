@@ -80,14 +80,12 @@ impl OutputFolder {
 
     /// Where to write the result `name`. It may lie in a folder (`tables/scores.csv`) that [`OutputFolder::folder`] has
     /// created.
-    #[must_use]
     pub fn path(&self, name: &str) -> PathBuf {
         self.stage.join(name)
     }
 
     /// Where to write the result `name` if it depends on the machine or the time of the run. The manifest lists only
     /// its name, so that repeated runs write the same manifest.
-    #[must_use]
     pub fn timed_path(&mut self, name: &str) -> PathBuf {
         self.timed.insert(name.to_owned());
         self.path(name)
@@ -129,14 +127,12 @@ impl OutputFolder {
     }
 
     /// The same error, with the result's final path in place of the path where it waits.
-    #[must_use]
     pub fn unstaged(&self, error: Refusal) -> Refusal {
         let [from, to] = [&self.stage, &self.shown].map(|folder| folder.join("").display().to_string());
         error.reworded(|message| message.replace(&from, &to))
     }
 
     /// The folder as the user named it.
-    #[must_use]
     pub fn shown(&self) -> &Path {
         &self.shown
     }

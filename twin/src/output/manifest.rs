@@ -95,7 +95,6 @@ impl Manifest {
 
     /// SHA-256 of the names and digests of the listed files below the folder `within`, in order of name. Equal files
     /// give equal digests wherever they lie.
-    #[must_use]
     pub fn digest_of(&self, within: &str) -> String {
         let listed = self
             .files
@@ -106,7 +105,6 @@ impl Manifest {
     }
 
     /// The manifest of `folder`, if a run has left one. A file of that name that no run has written does not count.
-    #[must_use]
     pub fn read(folder: &Path) -> Option<Self> {
         let path = folder.join(MANIFEST_FILE);
         path.symlink_metadata().ok().filter(Metadata::is_file)?;

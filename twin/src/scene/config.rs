@@ -75,7 +75,6 @@ pub struct SceneConfig {
 
 impl SceneConfig {
     /// The mechanical part: what happens on the skin.
-    #[must_use]
     pub fn mechanics(&self) -> MechanicsConfig {
         MechanicsConfig {
             seed: self.seed,
@@ -92,7 +91,6 @@ impl SceneConfig {
     }
 
     /// The part after the mechanics: transducer, readout and weights.
-    #[must_use]
     pub fn chain(&self) -> ChainConfig {
         ChainConfig {
             transducer: self.transducer.clone(),

@@ -130,32 +130,27 @@ impl Scene {
     }
 
     /// The configuration, with all defaults filled in.
-    #[must_use]
     pub fn config(&self) -> &SceneConfig {
         &self.config
     }
 
     /// The mechanics, from which a [`World`](spts_sim::World) is built.
-    #[must_use]
     pub fn mechanics(&self) -> &Mechanics {
         &self.mechanics
     }
 
     /// Transducer, readout and weights.
-    #[must_use]
     pub fn chain(&self) -> &Chain {
         &self.chain
     }
 
     /// Name of the recorded session.
-    #[must_use]
     pub fn name(&self) -> &str {
         self.config.name.as_deref().unwrap_or_default()
     }
 
     /// Class of the session, that is what is pressed or dropped: the name of the object, the name of the scene for a
     /// mesh, or `ball`.
-    #[must_use]
     pub fn object(&self) -> &str {
         match self.task() {
             Task::Press(press) => press.object.as_deref().unwrap_or(self.name()),
@@ -164,31 +159,26 @@ impl Scene {
     }
 
     /// Whether the scene presses or drops, with the parameters.
-    #[must_use]
     pub fn task(&self) -> Task<'_> {
         self.mechanics.task()
     }
 
     /// Number of presses or drops.
-    #[must_use]
     pub fn repeats(&self) -> usize {
         self.mechanics.repeats()
     }
 
     /// Length of one press or drop, s.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.mechanics.duration_s()
     }
 
     /// The skin.
-    #[must_use]
     pub fn skin(&self) -> &SkinLayout {
         self.mechanics.skin()
     }
 
     /// Root of every random number.
-    #[must_use]
     pub fn seed(&self) -> u64 {
         self.config.seed
     }
@@ -229,7 +219,6 @@ impl Scene {
     /// The configuration with all defaults filled in. Files are named [`MESH_COPY`] (with the extension of the mesh),
     /// [`READOUT_COPY`], [`SEEDS_COPY`] and [`PATTERNS_COPY`]. It is written beside the results, together with copies
     /// of these files.
-    #[must_use]
     pub(crate) fn portable(&self) -> SceneConfig {
         let mut config = self.config.clone();
         if self.chain.profile_file().is_some() {

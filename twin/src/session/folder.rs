@@ -316,7 +316,6 @@ impl SessionWriter {
     }
 
     /// The same writer, which refuses arrays that are too large to be read again.
-    #[must_use]
     fn limited(self) -> Self {
         Self { limited: true, ..self }
     }

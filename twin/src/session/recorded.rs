@@ -58,7 +58,6 @@ pub struct Recorded {
 
 impl Recorded {
     /// A recording without facts about its blocks.
-    #[must_use]
     pub fn new(recording: Recording) -> Self {
         Self {
             recording,
@@ -68,7 +67,6 @@ impl Recorded {
     }
 
     /// The facts about block `block`.
-    #[must_use]
     pub fn facts(&self, block: usize) -> Option<&PressFacts> {
         self.presses.get(block)
     }
@@ -95,7 +93,6 @@ pub struct Session {
 
 impl Session {
     /// A session called `name`, of the object with that name, without recordings.
-    #[must_use]
     pub fn new(name: &str, event: Event) -> Self {
         Self {
             name: name.to_owned(),
@@ -109,19 +106,16 @@ impl Session {
     }
 
     /// The raster recording.
-    #[must_use]
     pub fn raster(&self) -> Option<&Recording> {
         self.raster.as_ref().map(|r| &r.recording)
     }
 
     /// The compressive recording.
-    #[must_use]
     pub fn compressive(&self) -> Option<&Recording> {
         self.compressive.as_ref().map(|r| &r.recording)
     }
 
     /// Layout of the skin; `None` without a recording.
-    #[must_use]
     pub fn layout(&self) -> Option<&SkinLayout> {
         self.compressive().or(self.raster()).map(Recording::layout)
     }

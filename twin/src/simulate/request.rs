@@ -51,7 +51,6 @@ pub struct Prepared {
 
 impl Prepared {
     /// What touches the skin: the name of the object, `mesh`, or `ball`.
-    #[must_use]
     pub fn body(&self) -> &str {
         match self.scene.task() {
             Task::Press(press) => press.object.as_deref().unwrap_or("mesh"),
@@ -60,7 +59,6 @@ impl Prepared {
     }
 
     /// The session of the run, without its recordings.
-    #[must_use]
     pub fn session(&self) -> Session {
         header(&self.scene, &self.scene_hash)
     }

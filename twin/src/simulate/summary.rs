@@ -44,7 +44,6 @@ pub struct Summary {
 
 impl Summary {
     /// The summary of `simulation`, the run of `prepared`.
-    #[must_use]
     pub fn new(prepared: &Prepared, simulation: &Simulation) -> Self {
         let scene = &prepared.scene;
         let (task, force_n) = match scene.task() {
@@ -92,7 +91,6 @@ impl Summary {
     }
 
     /// The summary as text.
-    #[must_use]
     pub fn table(&self) -> String {
         let mut out = format!(
             "{} {} of {}, seed {}, scene {}\n",

@@ -64,7 +64,6 @@ fn left_out(key: &RowKey) -> &'static str {
 /// let board = ScoreBoard::default();
 /// assert!(differences(&board, &board).is_empty());
 /// ```
-#[must_use]
 pub fn differences(before: &ScoreBoard, now: &ScoreBoard) -> Vec<Difference> {
     let kinds = KINDS.iter().map(|(what, names)| {
         let (before, now) = (names(before), names(now));
@@ -105,7 +104,6 @@ const PLACES: &[ScoreColumn<PlaceRow>] = &[
 
 /// Scores of `before` that are worse in `now` by more than `tolerance`, or gone. What only `now` has does not count,
 /// and times never do.
-#[must_use]
 pub fn regressions(before: &ScoreBoard, now: &ScoreBoard, tolerance: f64) -> Vec<Regression> {
     let mut found = Vec::new();
     for old in &before.rows {

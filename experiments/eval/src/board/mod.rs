@@ -69,7 +69,6 @@ pub struct TrainedBoard<'a> {
 
 impl TrainedBoard<'_> {
     /// Number of presses; [`TrainedBoard::score`] reports after each.
-    #[must_use]
     pub fn steps(&self) -> usize {
         self.run.presses().len()
     }
@@ -121,7 +120,6 @@ impl BoardSettings {
     pub const LOCALISATION: [usize; 6] = [5, 7, 10, 15, 20, 25];
 
     /// The algorithms on the board if none is named.
-    #[must_use]
     pub fn shown() -> Vec<&'static DecoderSpec> {
         DECODERS.iter().filter(|spec| spec.shown).collect()
     }
@@ -453,7 +451,6 @@ pub struct ScoreBoard {
 
 impl ScoreBoard {
     /// The row with this key.
-    #[must_use]
     pub(crate) fn row_like(&self, key: &RowKey) -> Option<&BoardRow> {
         self.rows.iter().find(|row| row.key == *key)
     }

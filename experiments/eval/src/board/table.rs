@@ -97,7 +97,6 @@ fn places(rows: &[PlaceRow]) -> Table<'_, &PlaceRow> {
 
 /// The board as tables: rows with known and with left-out objects, then places, then single objects at the largest M up
 /// to 20.
-#[must_use]
 pub fn table(board: &ScoreBoard) -> String {
     let mut out = String::new();
     for (left_out, title) in [

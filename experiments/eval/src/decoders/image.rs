@@ -13,7 +13,6 @@ use spts_recon::{MatrixView, Problem, Recover, Solution, Workspace};
 use std::sync::Arc;
 
 /// M/4 rounded half up, at least 1: the published rule for the number of atoms.
-#[must_use]
 pub fn quarter(m: usize) -> usize {
     ((m + 2) / 4).max(1)
 }

@@ -33,7 +33,6 @@ pub enum Needs {
 
 impl Needs {
     /// Whether the training data are procedural shapes, for every source of training data.
-    #[must_use]
     pub fn shapes(self) -> bool {
         matches!(self, Self::Shapes | Self::Network)
     }
@@ -193,7 +192,6 @@ pub const DECODERS: &[DecoderSpec] = &[
 ];
 
 /// The decoder called `name` in [`DECODERS`]; `None` if there is none.
-#[must_use]
 pub fn find(name: &str) -> Option<&'static DecoderSpec> {
     DECODERS.iter().find(|spec| spec.name == name)
 }
@@ -240,7 +238,6 @@ const CONTROL: [&str; 2] = ["raster scan of M taxels", "raster"];
 /// assert_eq!(short_label("amortised"), "amortised");
 /// assert_eq!(label("my program"), "my program");
 /// ```
-#[must_use]
 pub fn label(name: &str) -> &str {
     match find(name) {
         Some(spec) => spec.label,
@@ -251,7 +248,6 @@ pub fn label(name: &str) -> &str {
 
 /// Label of the decoder or control `name` where space is short: in printed tables, and in figures with many decoders.
 /// An external program is labelled by its name.
-#[must_use]
 pub fn short_label(name: &str) -> &str {
     match find(name) {
         Some(spec) => spec.short,
@@ -291,7 +287,6 @@ pub fn published_decodes(learned: &Learned) -> Result<Vec<(&'static str, Trained
 }
 
 /// Why `decoder` cannot be stopped by its confidence.
-#[must_use]
 pub fn no_confidence(decoder: &str) -> Refusal {
     let valid = DECODERS.iter().filter(|spec| spec.anytime).map(|spec| spec.name);
     let valid = valid.collect::<Vec<_>>().join(", ");
@@ -299,7 +294,6 @@ pub fn no_confidence(decoder: &str) -> Refusal {
 }
 
 /// Why `decoder` cannot track a contact in time.
-#[must_use]
 pub fn not_in_time(decoder: &str) -> Refusal {
     Refusal::new(format!(
         "`--decoder` = {decoder}: has no Gaussian prior to track a contact with; valid: nn_lmmse"

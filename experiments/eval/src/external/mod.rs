@@ -46,7 +46,6 @@ impl ExternalCommand {
     pub const DEFAULT_LIMIT: Duration = Duration::from_secs(60);
 
     /// Parses `NAME=COMMAND`, or a command that is its own name. A name has only letters, digits, `-` and `_`.
-    #[must_use]
     pub fn parse(text: &str) -> Self {
         let is_name = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
         let (name, command) = text

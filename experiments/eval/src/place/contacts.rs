@@ -33,7 +33,6 @@ pub struct RecordedTouch {
 /// Finds one touch in every block that has one: from the first to the last frame in which the output differs from that
 /// of the untouched skin. A touch lasts for five frames or more. The first 20 frames of a block must be without a
 /// touch, because the output of the untouched skin is estimated from them; two touches in a block are found as one.
-#[must_use]
 pub fn find_touches(recording: &Recording) -> Vec<RecordedTouch> {
     let blocks = 0..recording.blocks().len();
     blocks.filter_map(|block| touch_of(recording, block)).collect()
@@ -79,7 +78,6 @@ fn levels(recording: &Recording, block: usize, untouched: &Untouched) -> Vec<f64
 
 impl RecordedTouch {
     /// The least-squares image of the whole touch minus the untouched skin, V.
-    #[must_use]
     pub fn image(&self, recording: &Recording) -> Option<Vec<f64>> {
         let mut image = Chunk::new(recording, self.block, self.start, self.end - self.start)
             .fit(0)?
@@ -91,7 +89,6 @@ impl RecordedTouch {
     }
 
     /// The touched taxel: the largest value of [`RecordedTouch::image`].
-    #[must_use]
     pub fn taxel(&self, recording: &Recording) -> Option<usize> {
         let image = self.image(recording)?;
         (0..image.len()).max_by(|a, b| image[*a].total_cmp(&image[*b]))
@@ -99,7 +96,6 @@ impl RecordedTouch {
 
     /// The middle of the touch as samples with their rows, V: at most `most` measurements. The output of the untouched
     /// skin is subtracted.
-    #[must_use]
     pub fn press(&self, recording: &Recording, most: usize) -> Press {
         let len = (self.end - self.start).min(most);
         let first = (self.start + self.end - len) / 2;
@@ -122,7 +118,6 @@ pub struct RecordedBounce {
 
 impl RecordedBounce {
     /// Duration of the contact, s.
-    #[must_use]
     pub fn duration_s(&self, recording: &Recording) -> f64 {
         (self.end - self.start) as f64 / recording.sample_rate_hz()
     }
@@ -138,7 +133,6 @@ const GAP: usize = 100;
 const SHORTEST: usize = 200;
 
 /// Contacts of the ball in every block, detected by the moving root mean square of the output about its median.
-#[must_use]
 pub fn find_bounces(recording: &Recording) -> Vec<RecordedBounce> {
     recording
         .blocks()
@@ -197,7 +191,6 @@ fn contacts(block: usize, volts: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
 
 /// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with the recording's Φ, negative values set to zero.
 /// `None` if a sample is lost, or the normal equations are singular.
-#[must_use]
 pub fn contact_image(recording: &Recording, bounce: &RecordedBounce) -> Option<Vec<f64>> {
     let (n, m) = (recording.taxels(), bounce.end - bounce.start);
     let rows = recording.rows(bounce.block, bounce.start..bounce.end).to_vec();

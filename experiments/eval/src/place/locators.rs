@@ -30,7 +30,6 @@ pub(super) struct LocatorSpec {
 }
 
 /// Label of the locator `name` in figures and printed tables; an unknown name is its own label.
-#[must_use]
 pub fn locator_label(name: &str) -> &str {
     let known = LOCATORS.iter().find(|spec| spec.name == name);
     known.map_or(name, |spec| spec.label)

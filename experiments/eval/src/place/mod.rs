@@ -90,7 +90,6 @@ pub(crate) fn touch_places(
 
 /// Mean distance, taxels, between the touched taxel of `touches` and the taxel that alone explains most of a window
 /// (locator `taxel`), over all windows, for every M of `measurements`; `None` without a window.
-#[must_use]
 pub fn touch_errors_px(recording: &Recording, touches: &[RecordedTouch], measurements: &[usize]) -> Vec<Option<f64>> {
     let cols = recording.layout().cols();
     let shape = [recording.layout().rows(), cols];

@@ -224,19 +224,16 @@ impl TrainingData {
     }
 
     /// Images of objects in many poses with equal gains of all taxels, and their labels; `None` if the poses are known.
-    #[must_use]
     pub fn posed(&self) -> Option<(&Matrix, &[usize])> {
         Some((self.alike(), self.posed.as_ref()?.as_slice()))
     }
 
     /// The same training data with the network for decoders that use one.
-    #[must_use]
     pub(crate) fn with_network(self, network: Option<TrainedNetwork>) -> Self {
         Self { network, ..self }
     }
 
     /// Images for mixtures, taxels × images; with equal gains of all taxels if a simulation knows them.
-    #[must_use]
     pub fn alike(&self) -> &Matrix {
         self.alike.as_deref().unwrap_or(&self.images)
     }
@@ -252,7 +249,6 @@ impl TrainingData {
 
     /// Training data with only the dictionary and library of `learned`. The library's images also serve as templates
     /// and as images for priors.
-    #[must_use]
     pub fn given(learned: &Learned) -> Self {
         let library = learned.classifier.library().clone();
         let images = library.images().clone();
@@ -263,7 +259,6 @@ impl TrainingData {
     }
 
     /// The same training data with the given dictionary and library.
-    #[must_use]
     pub(crate) fn with_published(mut self, dictionary: &Matrix, library: &Library) -> Self {
         self.dictionary = OnceLock::from(Arc::new(Dictionary::new(dictionary.clone())));
         self.library = library.clone();
@@ -325,7 +320,6 @@ pub struct Learned {
 impl Learned {
     /// Combines a dictionary (taxels × atoms), its shifted copies (computed if not given) and a library, for an array
     /// with `cols` columns.
-    #[must_use]
     pub fn new(dictionary: Matrix, shifted_copies: Option<Matrix>, library: Library, cols: usize) -> Self {
         Self {
             shifted: shifted_copies.unwrap_or_else(|| shifted(&dictionary, cols, SHIFT_REACH)),
@@ -361,7 +355,6 @@ impl Learned {
     }
 
     /// The same with the shifted dictionary in place of the dictionary.
-    #[must_use]
     pub fn at_all_places(&self) -> Self {
         Self {
             dictionary: Arc::new(Dictionary::new(self.shifted.clone())),
@@ -396,7 +389,6 @@ pub struct Dictionary {
 
 impl Dictionary {
     /// The dictionary of `atoms`, taxels × K.
-    #[must_use]
     pub fn new(atoms: Matrix) -> Self {
         Self {
             tables: SignTables::new(atoms.view()),

@@ -122,7 +122,6 @@ pub const BAND_SD: f64 = 1.644_853_626_951_472_7;
 impl SkinGains {
     /// Compares `skin`, an image from the real skin, with `simulated`, the same contact on a skin of gain 1; both have
     /// one value a taxel. `None` if fewer than two taxels are touched.
-    #[must_use]
     pub fn check(&self, skin: &[f64], simulated: &[f64]) -> Option<GainCheck> {
         let with_gains = simulated.iter().zip(&self.gains.log_mean).map(|(v, log)| v * log.exp());
         let with_gains: Vec<f64> = with_gains.collect();
@@ -218,14 +217,12 @@ fn logs(skin: &[f64], simulated: &[f64]) -> Vec<(usize, f64)> {
 
 /// γ of every taxel of a skin with these `gains` in one session: the relative standard deviation √(exp(σ²) − 1) of its
 /// log-normal gain.
-#[must_use]
 pub fn gain_sds(gains: &TaxelGains) -> Vec<f64> {
     gains.session_log_sd().map(relative_sd).collect()
 }
 
 /// γ of an unknown skin: the relative standard deviation of its taxels' log-normal gains in one session, √(exp(σ² +
 /// σₛ²) − 1), with the transducer's σ = `spread_log_sd` and σₛ = `session_log_sd`.
-#[must_use]
 pub fn simulated_gain_sd() -> f64 {
     let sheet = VelostatConfig::default();
     relative_sd(sheet.spread_log_sd.hypot(sheet.session_log_sd))

@@ -73,7 +73,6 @@ pub enum TrainingSource {
 
 impl TrainingSource {
     /// Name on the board.
-    #[must_use]
     pub fn name(&self) -> &str {
         match self {
             Self::Published | Self::Raster => RASTER,

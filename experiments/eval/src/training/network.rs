@@ -37,7 +37,6 @@ impl TrainedNetwork {
     ///
     /// # Panics
     /// Never: a test reads it.
-    #[must_use]
     pub fn shipped() -> Self {
         static NETWORK: LazyLock<TrainedNetwork> = LazyLock::new(|| {
             let path = Path::new("amortised.safetensors");

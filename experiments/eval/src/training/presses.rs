@@ -31,7 +31,6 @@ pub struct TrainingPresses<'a> {
 
 impl<'a> TrainingPresses<'a> {
     /// The presses `presses` of `session`, as far as they exist; `None` without a raster recording.
-    #[must_use]
     pub fn within(session: &'a ScoredSession, presses: &Range<usize>) -> Option<Self> {
         let raster = session.raster.as_ref().filter(|_| !session.shared_raster)?;
         let end = presses.end.min(raster.blocks().len());
@@ -45,7 +44,6 @@ impl<'a> TrainingPresses<'a> {
     }
 
     /// All presses of `session` that are neither scored nor ground truth; `None` without a raster recording.
-    #[must_use]
     pub fn unscored(session: &'a ScoredSession) -> Option<Self> {
         let all = Self::all(session)?;
         let protocol = &session.raster_protocol;
@@ -59,19 +57,16 @@ impl<'a> TrainingPresses<'a> {
     }
 
     /// All presses of `session`; `None` without a raster recording.
-    #[must_use]
     pub fn all(session: &'a ScoredSession) -> Option<Self> {
         Self::within(session, &(0..usize::MAX))
     }
 
     /// The same presses, with the class `label`.
-    #[must_use]
     pub fn labelled(self, label: usize) -> Self {
         Self { label, ..self }
     }
 
     /// Whether there is no press.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.presses.is_empty()
     }
@@ -119,7 +114,6 @@ impl<'a> TrainingPresses<'a> {
 }
 
 /// Candidates for a dictionary's training images, in order of press, frame, session.
-#[must_use]
 pub fn training_images(training: &[TrainingPresses<'_>]) -> Vec<Vec<f64>> {
     let most = training.iter().map(|t| t.presses.len()).max().unwrap_or(0);
     let mut images = Vec::new();
@@ -167,7 +161,6 @@ fn class_library(
 
 /// Images that a decoder's prior is learned from, taxels × images, V: three raster images of every press, from early,
 /// middle and late in the hold.
-#[must_use]
 pub fn prior_images(training: &[TrainingPresses<'_>]) -> Matrix {
     let mut columns: Vec<&[f64]> = Vec::new();
     for t in training {

@@ -66,7 +66,6 @@ impl Default for Skins {
 impl Skins {
     /// Presses on the same number of median skins, which differ only by the arm's repeatability. They are scanned
     /// without readout faults, because y = Φx refers to the true images.
-    #[must_use]
     pub fn median(layout: SkinLayout) -> Self {
         Self {
             layout,

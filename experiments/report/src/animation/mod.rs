@@ -138,13 +138,11 @@ impl Animation {
     }
 
     /// Number of pictures.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.images.len()
     }
 
     /// True without a picture: the block is too short for one.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.images.is_empty()
     }

@@ -25,7 +25,6 @@ impl Axis {
     /// An axis for `values`, or for `range` if one is given. Without values it runs from 0 to 1, or from 1 to 10.
     ///
     /// Values that are all of one sign and come near 0 bring 0 onto a linear axis, exactly at its end.
-    #[must_use]
     pub fn new(values: impl Iterator<Item = f64>, log: bool, range: Option<(f64, f64)>) -> Self {
         let shown = |value: f64| value.is_finite() && (!log || value > 0.0);
         let place = |value: f64| if log { value.log10() } else { value };
@@ -78,14 +77,12 @@ impl Axis {
     }
 
     /// Place of a value: 0 at the lower end, 1 at the upper. `None` if the axis cannot show it at any length.
-    #[must_use]
     pub fn place(&self, value: f64) -> Option<f64> {
         let value = if self.log { value.log10() } else { value };
         value.is_finite().then(|| (value - self.low) / (self.high - self.low))
     }
 
     /// Ticks with their labels; about `count` on a linear axis.
-    #[must_use]
     pub fn ticks(&self, count: usize) -> Vec<(f64, String)> {
         if self.log {
             let ticks = self.log_ticks();

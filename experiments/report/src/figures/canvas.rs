@@ -56,7 +56,6 @@ pub struct TextStyle {
 
 impl TextStyle {
     /// Regular, level text that starts at its position.
-    #[must_use]
     pub const fn new(size: f64, colour: Rgb) -> Self {
         Self {
             size,
@@ -68,19 +67,16 @@ impl TextStyle {
     }
 
     /// The same in bold.
-    #[must_use]
     pub(crate) const fn bold(self) -> Self {
         Self { bold: true, ..self }
     }
 
     /// The same at another anchor.
-    #[must_use]
     pub(crate) const fn anchored(self, anchor: Anchor) -> Self {
         Self { anchor, ..self }
     }
 
     /// The same reading upwards.
-    #[must_use]
     pub const fn upwards(self) -> Self {
         Self { upwards: true, ..self }
     }
@@ -101,7 +97,6 @@ pub struct Canvas {
 
 impl Canvas {
     /// A blank figure.
-    #[must_use]
     pub fn new(width: f64, height: f64, description: &str) -> Self {
         Self {
             width: width.ceil(),
@@ -112,7 +107,6 @@ impl Canvas {
     }
 
     /// The figure as an SVG document.
-    #[must_use]
     pub fn svg(&self) -> String {
         let (w, h) = (number(self.width), number(self.height));
         format!(
@@ -271,7 +265,6 @@ fn advance_em(c: char) -> f64 {
 }
 
 /// Width of a text in the unit of `size`, the em.
-#[must_use]
 pub(crate) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
     text.chars().map(advance_em).sum::<f64>() * size * if bold { 1.12 } else { 1.0 }
 }
@@ -286,7 +279,6 @@ pub fn widest<'a>(texts: impl IntoIterator<Item = &'a str>, size: f64, bold: boo
 
 /// Breaks a text between words into lines no wider than `width`; a longer word keeps a line of its own. A number
 /// stays with its unit, and a relation with both of its sides.
-#[must_use]
 pub fn wrap(text: &str, size: f64, bold: bool, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for phrase in phrases(text) {
@@ -423,7 +415,6 @@ fn index(value: f64, limit: usize) -> usize {
 }
 
 /// A picture at another size: the mean over the source pixels under each new one.
-#[must_use]
 pub(crate) fn resample(rgb: &[u8], (width, height): (usize, usize), (w, h): (usize, usize)) -> Vec<u8> {
     let mut out = Vec::with_capacity(w * h * 3);
     if rgb.len() != width * height * 3 || rgb.is_empty() {

@@ -40,13 +40,11 @@ impl Series {
     }
 
     /// The same curve with a shade of its scatter.
-    #[must_use]
     pub(crate) fn with_scatter(self, scatter: Vec<(f64, f64, f64)>) -> Self {
         Self { scatter, ..self }
     }
 
     /// The same curve with bands.
-    #[must_use]
     pub(crate) fn with_spans(self, spans: Vec<(f64, f64, f64)>) -> Self {
         Self { spans, ..self }
     }
@@ -101,7 +99,6 @@ pub struct Chart {
 
 impl Chart {
     /// The chart with points that the paper states: label, x and y of each.
-    #[must_use]
     pub(crate) fn with_claims(self, claims: &[(&str, f64, f64)]) -> Self {
         let claim = |&(label, x, y): &(&str, f64, f64)| Claim {
             label: label.to_owned(),
@@ -115,7 +112,6 @@ impl Chart {
     }
 
     /// The chart with ranges of x that the paper states: label and ends of each.
-    #[must_use]
     pub(crate) fn with_ranges(self, ranges: &[(&str, f64, f64)]) -> Self {
         let range = |&(label, from, to): &(&str, f64, f64)| StatedRange {
             label: label.to_owned(),
@@ -215,7 +211,6 @@ impl<'a, R: Copy> Plot<'a, R> {
     }
 
     /// The horizontal axis: quantity with unit, and its value.
-    #[must_use]
     pub fn x<V: Into<Option<f64>>>(mut self, label: &str, value: impl Fn(R) -> V + 'a) -> Self {
         label.clone_into(&mut self.axes.x_label);
         self.x = Box::new(move |row| value(row).into());
@@ -223,7 +218,6 @@ impl<'a, R: Copy> Plot<'a, R> {
     }
 
     /// The vertical axis: quantity with unit, and its value.
-    #[must_use]
     pub fn y<V: Into<Option<f64>>>(mut self, label: &str, value: impl Fn(R) -> V + 'a) -> Self {
         label.clone_into(&mut self.axes.y_label);
         self.y = Box::new(move |row| value(row).into());
@@ -231,55 +225,47 @@ impl<'a, R: Copy> Plot<'a, R> {
     }
 
     /// Lower and upper end of an interval about the value, drawn as a thin bar.
-    #[must_use]
     pub fn band(mut self, ends: impl Fn(R) -> Option<(f64, f64)> + 'a) -> Self {
         self.band = Box::new(ends);
         self
     }
 
     /// Lower and upper end of the scatter about the curve, drawn as a shade.
-    #[must_use]
     pub fn scatter(mut self, ends: impl Fn(R) -> Option<(f64, f64)> + 'a) -> Self {
         self.scatter = Box::new(ends);
         self
     }
 
     /// Which curve a row belongs to.
-    #[must_use]
     pub fn by(mut self, curve: impl Fn(R) -> Curve + 'a) -> Self {
         self.curve = Box::new(curve);
         self
     }
 
     /// A logarithmic horizontal axis.
-    #[must_use]
     pub fn log_x(mut self) -> Self {
         self.axes.x_log = true;
         self
     }
 
     /// A logarithmic vertical axis.
-    #[must_use]
     pub(crate) fn log_y(mut self) -> Self {
         self.axes.y_log = true;
         self
     }
 
     /// Ends of the vertical axis; without, it holds every point.
-    #[must_use]
     pub fn within(mut self, low: f64, high: f64) -> Self {
         self.axes.y_range = Some((low, high));
         self
     }
 
     /// All rows in one panel.
-    #[must_use]
     pub fn chart(&self, title: impl Into<String>) -> Chart {
         self.panel(title.into(), &self.rows)
     }
 
     /// The rows divided into panels by what `facet` says, which is also the panel's title.
-    #[must_use]
     pub fn facets(&self, facet: impl Fn(R) -> String) -> Vec<Chart> {
         let titles = unique(self.rows.iter().map(|row| facet(*row)));
         let panel = |title: String| {

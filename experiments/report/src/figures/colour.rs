@@ -23,13 +23,11 @@ pub(crate) const OUTLINE: Rgb = Rgb(0x2e, 0xe6, 0xd6);
 
 impl Rgb {
     /// `#rrggbb`.
-    #[must_use]
     pub fn hex(self) -> String {
         format!("#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
     }
 
     /// This colour moved by `share` (0 to 1) towards `other`.
-    #[must_use]
     pub fn mix(self, other: Self, share: f64) -> Self {
         let part = |a: u8, b: u8| channel((f64::from(a) + share * (f64::from(b) - f64::from(a))) / 255.0);
         Self(part(self.0, other.0), part(self.1, other.1), part(self.2, other.2))
@@ -41,7 +39,6 @@ impl Rgb {
 /// The path is drawn in Oklch (B. Ottosson, "A perceptual color space for image processing", 2020): lightness rises
 /// linearly, so equal steps of value look like equal steps, in colour and in grey. Values outside the range are
 /// clipped; a non-finite one is [`MISSING`].
-#[must_use]
 pub fn heat(value: f64) -> Rgb {
     if !value.is_finite() {
         return MISSING;

@@ -117,7 +117,6 @@ pub enum Stroke {
 
 impl Stroke {
     /// The stroke of the curve `index` of a decoder; after four they repeat.
-    #[must_use]
     pub fn of(index: usize) -> Self {
         [Self::Solid, Self::Dashed, Self::Dotted, Self::DashDot][index % usize::from(STROKES)]
     }
@@ -139,7 +138,6 @@ impl Stroke {
 }
 
 /// Variant of [`Style::Decoder`] for the decoder, locator or control called `name`.
-#[must_use]
 pub fn decoder_variant(name: &str, stroke: Stroke) -> u8 {
     let own = DECODERS
         .iter()

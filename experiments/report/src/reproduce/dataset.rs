@@ -76,7 +76,6 @@ const PLATEAU: f64 = 0.58;
 const PICTURE: [usize; 2] = [360, 300];
 
 /// Number of times [`simulate`] reports progress.
-#[must_use]
 pub(super) fn steps(size: &ReproductionSize) -> usize {
     OBJECTS.len() * (size.raster_presses + size.compressive_presses)
 }

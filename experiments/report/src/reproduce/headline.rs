@@ -163,7 +163,6 @@ impl Headline {
     }
 
     /// The number called `key`.
-    #[must_use]
     pub fn number(&self, key: &str) -> Option<f64> {
         match self.cell(key)? {
             Cell::Number(value) => Some(*value),
@@ -173,7 +172,6 @@ impl Headline {
     }
 
     /// The first number that there is.
-    #[must_use]
     pub fn first(&self, keys: &[impl AsRef<str>]) -> Option<f64> {
         keys.iter().find_map(|key| self.number(key.as_ref()))
     }

@@ -184,7 +184,6 @@ const THRESHOLD: f64 = 2.0;
 const RUN: usize = 3;
 
 /// First frame of `block` in contact; `None` when nothing touches, or when it is not known which frames are idle.
-#[must_use]
 pub(super) fn onset_frame(recording: &Recording, block: usize) -> Option<usize> {
     let idle_frames = recording.blocks()[block].idle_frames?.max(1);
     let mut idle = vec![0.0; recording.measurements_per_frame()];

@@ -117,7 +117,6 @@ pub(super) struct PageContent<'a> {
 }
 
 /// The page of the report.
-#[must_use]
 pub(super) fn page(content: &PageContent<'_>) -> Page {
     let compared = content.skins.real.is_some();
     let section = |id| section(id, compared);

@@ -118,7 +118,6 @@ impl SkinResults {
     }
 
     /// Median duration of the ball's contacts as the recording shows them, ms.
-    #[must_use]
     pub(super) fn contact_ms(&self) -> Option<f64> {
         let recording = self.skin.bounces.as_ref()?;
         let durations: Vec<f64> = self.bounces.iter().map(|b| b.duration_s(recording) * 1e3).collect();
@@ -127,7 +126,6 @@ impl SkinResults {
 
     /// Mean distance of the middle of the skin from the ball in the contacts that windows of `m` measurements fit into,
     /// taxels.
-    #[must_use]
     pub(super) fn middle_px(&self, m: usize) -> Option<f64> {
         let middle = |r: &&PlaceRow| r.decoder == "middle" && !r.relabelled && r.m == m;
         self.places.iter().find(middle).map(|r| r.mean_px)
@@ -191,7 +189,6 @@ pub(super) struct ReproductionSize {
 
 impl ReproductionSize {
     /// The whole reproduction: ten presses an object in either mode.
-    #[must_use]
     pub(super) fn full() -> Self {
         let protocol = Protocol::default();
         Self {
@@ -215,7 +212,6 @@ impl ReproductionSize {
     }
 
     /// A look at everything in a minute: fewer presses, windows and numbers of measurements.
-    #[must_use]
     pub(super) fn quick() -> Self {
         let few = Protocol {
             presses: 2,

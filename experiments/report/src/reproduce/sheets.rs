@@ -82,7 +82,6 @@ impl ShownWindow {
 }
 
 /// Fig. S5: scene, pressure, the twin's raster image and the real one, object by object.
-#[must_use]
 pub(super) fn objects(dataset: &SimulatedData, skins: &BothSkins<'_>, correlations: &[CorrelationRow]) -> Sheet {
     let cols = dataset.cols;
     let rows = dataset.objects.iter().map(|object| {
@@ -133,7 +132,6 @@ pub(super) fn objects(dataset: &SimulatedData, skins: &BothSkins<'_>, correlatio
 
 /// Fig. 4: images from the first 2 to 15 measurements, by the published decoder and by the best. The published
 /// compressive recordings hold no T, so the rows of the real skin show another object.
-#[must_use]
 pub(super) fn adaptive(skins: &BothSkins<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
     let mut add = |whose: &str, object: &str, results: &SkinResults| {
@@ -181,7 +179,6 @@ pub(super) fn adaptive(skins: &BothSkins<'_>, cols: usize) -> Sheet {
 }
 
 /// Fig. S4: reconstructions at several M, by the published decoder and by the best.
-#[must_use]
 pub(super) fn examples(skins: &BothSkins<'_>, cols: usize) -> Sheet {
     let mut rows = Vec::new();
     for object in EXAMPLE_OBJECTS {
@@ -210,7 +207,6 @@ pub(super) fn examples(skins: &BothSkins<'_>, cols: usize) -> Sheet {
 }
 
 /// Fig. S6: dictionaries.
-#[must_use]
 pub(super) fn dictionaries(skins: &BothSkins<'_>, cols: usize) -> Sheet {
     const ACROSS: usize = 10;
     let mut rows = Vec::new();

@@ -17,7 +17,6 @@ const STRIDE: usize = 10;
 
 /// Median raster image over the plateau frames of all presses but the first, which conditions the foam (a single press
 /// is taken as it is), V.
-#[must_use]
 pub(super) fn median_image(raster: &Recording) -> Vec<f64> {
     let presses = raster.blocks().len();
     let first = usize::from(presses > 1);
@@ -41,7 +40,6 @@ pub(super) struct CorrelationRow {
 }
 
 /// Correlations of all objects that were recorded.
-#[must_use]
 pub(super) fn correlations(twin: &SkinResults, real: &SkinResults) -> Vec<CorrelationRow> {
     let pairs = twin.skin.sessions.iter().filter_map(|t| {
         let r = real.skin.sessions.iter().find(|r| r.object == t.object)?;
@@ -59,7 +57,6 @@ pub(super) const TWIN: &str = "twin";
 pub(super) const REAL: &str = "real";
 
 /// File of the table `name` of the skin `whose`, [`TWIN`] or [`REAL`].
-#[must_use]
 pub(super) fn skin_file(name: &str, whose: &str) -> String {
     format!("{name}_{whose}.csv")
 }

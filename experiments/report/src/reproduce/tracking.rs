@@ -75,7 +75,6 @@ pub(super) fn traces(
 }
 
 /// Frames in contact and mean change from frame to frame, over all bounces.
-#[must_use]
 pub(super) fn tracking(bounces: &[RecordedBounce], traces: &[TraceRow]) -> Vec<TrackingRow> {
     let samples: usize = bounces.iter().map(|b| b.end - b.start).sum();
     let mean_samples = samples as f64 / bounces.len().max(1) as f64;
@@ -122,7 +121,6 @@ pub(super) struct CourseRow {
 
 /// The course of all bounces in frames of `m` measurements, at the instants at which at least half of the bounces have
 /// a frame.
-#[must_use]
 pub(super) fn over_bounces(traces: &[TraceRow], m: usize) -> Vec<CourseRow> {
     // frames begin the same number of measurements before first contact, so that their instants agree
     let instant = |t: &TraceRow| (t.time_ms * 1e3).round();
