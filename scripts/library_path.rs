@@ -7,11 +7,7 @@
 pub(crate) fn main() {
     println!("cargo::rerun-if-changed=Cargo.toml");
     if std::env::var("CARGO_CFG_TARGET_OS").is_ok_and(|system| system == "linux") {
-        let folders = [
-            "../../third_party/mujoco/lib",
-            "../../../third_party/mujoco/lib",
-            "../lib",
-        ];
+        let folders = ["../../third_party/mujoco/lib", "../../../third_party/mujoco/lib", "../lib"];
         let path = folders.map(|folder| format!("$ORIGIN/{folder}")).join(":");
         println!("cargo::rustc-link-arg=-Wl,-rpath,{path}");
     }

@@ -49,11 +49,7 @@ fn image(session: usize, scale: f64) -> ConductanceMap {
             0 => (row - 4.0).hypot(col - 5.0) < 2.6,
             _ => (2.0..=3.0).contains(&row) && (1.0..=8.0).contains(&col),
         };
-        if inside {
-            1e-3 * scale * (1.0 + 0.3 * (1.7 * k as f64).sin())
-        } else {
-            0.0
-        }
+        if inside { 1e-3 * scale * (1.0 + 0.3 * (1.7 * k as f64).sin()) } else { 0.0 }
     };
     ConductanceMap::from_values(10, 10, (0..100).map(taxel).collect())
 }
@@ -76,10 +72,7 @@ fn record(session: usize, mode: Mode, blocks: usize, missed: &[(usize, u64, usiz
     let mut presses: Vec<Interpolated> = (0..blocks).map(press).collect();
     let streams = Streams::new(7 + session as u64);
     let mut readout = Readout::new(&profile, mode, &SkinLayout::default(), streams, 0).unwrap();
-    readout
-        .record(&mut presses, FRAMES * 100, 57)
-        .unwrap()
-        .with_idle_frames(Some(100))
+    readout.record(&mut presses, FRAMES * 100, 57).unwrap().with_idle_frames(Some(100))
 }
 
 /// Two sessions, in a folder each.
@@ -87,16 +80,10 @@ fn write(dir: &Path, missed: &[(usize, u64, usize, i64)]) {
     for (session, name) in ["disc", "bar"].iter().enumerate() {
         let [_, held, lift, _] = PRESS_S;
         let compressive = record(session, Mode::Compressive, 12, missed);
-        let facts = PressFacts {
-            conductance: Some(image(session, 1.0)),
-            ..PressFacts::default()
-        };
+        let facts = PressFacts { conductance: Some(image(session, 1.0)), ..PressFacts::default() };
         let whole = Session {
             hold_s: Some([held, lift]),
-            raster: Some(Recorded {
-                conditioning: 3,
-                ..Recorded::new(record(session, Mode::Raster, 6, &[]))
-            }),
+            raster: Some(Recorded { conditioning: 3, ..Recorded::new(record(session, Mode::Raster, 6, &[])) }),
             compressive: Some(Recorded {
                 presses: vec![facts; compressive.blocks().len()],
                 ..Recorded::new(compressive)
@@ -152,10 +139,7 @@ fn slips_are_followed_and_reported() {
     for (sound, slipped) in rows(&sound).iter().zip(&rows(&slipped)) {
         for score in ["support", "iou", "class_single"] {
             let [before, after] = [sound, slipped].map(|row| row[score].as_f64().unwrap());
-            assert!(
-                (before - after).abs() <= TOLERANCE,
-                "{score}: {after}, without slips {before}"
-            );
+            assert!((before - after).abs() <= TOLERANCE, "{score}: {after}, without slips {before}");
         }
     }
 
@@ -173,9 +157,7 @@ fn recordings_of_the_real_skin_are_aligned() {
     let Some(root) = recordings() else { return };
     let mut set = SessionSet::open(&root).unwrap();
     assert_eq!(follow_slips(&mut set), []);
-    let presses = set
-        .presses()
-        .filter_map(|session| Some((&session.name, session.compressive()?)));
+    let presses = set.presses().filter_map(|session| Some((&session.name, session.compressive()?)));
     for (name, recording) in presses {
         for (block, from, rows) in [(6, 55_000, 34), (9, 60_123, -1), (12, 58_000, 500), (13, 52_000, -500)] {
             // samples that lag are those that were recorded `rows` measurements earlier
@@ -183,24 +165,13 @@ fn recordings_of_the_real_skin_are_aligned() {
             let volts = blocks[block].volts.clone();
             for (i, v) in blocks[block].volts.iter_mut().enumerate().skip(from) {
                 let earlier = i64::try_from(i).unwrap() - rows;
-                *v = usize::try_from(earlier)
-                    .ok()
-                    .and_then(|i| volts.get(i))
-                    .copied()
-                    .unwrap_or(f64::NAN);
+                *v = usize::try_from(earlier).ok().and_then(|i| volts.get(i)).copied().unwrap_or(f64::NAN);
             }
             let slipped = recording.with_blocks(blocks).unwrap();
             let found = find_slips(&slipped);
-            let first = found.first().copied().unwrap_or(Slip {
-                block: 0,
-                from: 0,
-                rows: 0,
-            });
+            let first = found.first().copied().unwrap_or(Slip { block: 0, from: 0, rows: 0 });
             assert_eq!((first.block, first.rows), (block, rows), "{name}: {found:?}");
-            assert!(
-                first.from.abs_diff(from) <= 50,
-                "{name}: {found:?}, expected from {from}"
-            );
+            assert!(first.from.abs_diff(from) <= 50, "{name}: {found:?}, expected from {from}");
         }
     }
 }

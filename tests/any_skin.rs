@@ -25,14 +25,8 @@ fn listed(measurements: &[usize]) -> String {
 
 /// An angle of 36 mm × 32 mm, as a file of the user's own.
 fn write_angle(folder: &Path) {
-    let outline = [
-        [-0.018, -0.016],
-        [0.018, -0.016],
-        [0.018, -0.004],
-        [-0.006, -0.004],
-        [-0.006, 0.016],
-        [-0.018, 0.016],
-    ];
+    let outline =
+        [[-0.018, -0.016], [0.018, -0.016], [0.018, -0.004], [-0.006, -0.004], [-0.006, 0.016], [-0.018, 0.016]];
     let mesh = extrude(&outline, &[], 0.01);
     std::fs::write(folder.join("angle.obj"), mesh.to_obj("angle")).unwrap();
 }
@@ -45,26 +39,8 @@ impl Skin {
     /// into `folder/out`.
     fn simulate(&self, folder: &Path, readout: &str, out: &str) {
         let (rows, cols) = (format!("skin.rows={}", self.rows), format!("skin.cols={}", self.cols));
-        let scene = [
-            "simulate",
-            "press",
-            "--mesh",
-            "angle.obj",
-            "--contact",
-            "footprint",
-            "--presses",
-            "2",
-        ];
-        let layout = [
-            "--set",
-            &rows,
-            "--set",
-            &cols,
-            "--set",
-            "skin.pitch_m=0.005",
-            "--set",
-            "rows.seeding=mixed",
-        ];
+        let scene = ["simulate", "press", "--mesh", "angle.obj", "--contact", "footprint", "--presses", "2"];
+        let layout = ["--set", &rows, "--set", &cols, "--set", "skin.pitch_m=0.005", "--set", "rows.seeding=mixed"];
         let place = ["--rotation-deg", "20", "--set", "press.position_share=[0.05, -0.04]"];
         let rest = ["--seed", "4", "--readout", readout, "--out", out];
         succeeds(folder, &[&scene[..], &layout, &place, &rest].concat());
@@ -73,10 +49,7 @@ impl Skin {
     /// Mean IoU of `windows` decoded windows of both presses at each M of `measurements`.
     fn decoded(&self, folder: &Path, session: &str, measurements: &[usize], windows: usize) -> Vec<f64> {
         let (m, w) = (listed(measurements), windows.to_string());
-        let found: Value = json(
-            folder,
-            &["decode", session, "--measurements", &m, "--windows", &w, "--json"],
-        );
+        let found: Value = json(folder, &["decode", session, "--measurements", &m, "--windows", &w, "--json"]);
         let rows = found["rows"].as_array().unwrap();
         let mean = |m: &usize| {
             let of_m = rows.iter().filter(|row| row["m"] == *m);
@@ -91,16 +64,9 @@ impl Skin {
     fn scored(&self, folder: &Path, session: &str) -> [f64; 2] {
         let m = self.measurements[1].to_string();
         let decoders = ["--decoder", "nn_lmmse,mean_image", "--no-times", "--no-ball", "--json"];
-        let board: Value = json(
-            folder,
-            &[&["score", session, "--measurements", &m][..], &decoders].concat(),
-        );
+        let board: Value = json(folder, &[&["score", session, "--measurements", &m][..], &decoders].concat());
         ["nn_lmmse", "mean_image"].map(|name| {
-            let row = board["rows"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .find(|row| row["decoder"] == name);
+            let row = board["rows"].as_array().unwrap().iter().find(|row| row["decoder"] == name);
             let row = row.unwrap_or_else(|| panic!("no row of {name}: {board}"));
             assert_eq!(row["learned_from"], "layout", "{row}");
             row["iou"].as_f64().unwrap()
@@ -117,10 +83,7 @@ impl Skin {
         self.simulate(dir, "as_built", "as_built");
         let name = format!("{} × {}", self.rows, self.cols);
         let [ideal, as_built] = ["ideal", "as_built"].map(|session| self.decoded(dir, session, self.measurements, 1));
-        eprintln!(
-            "{name}: M = {:?}: IoU {ideal:.3?} ideal, {as_built:.3?} as built",
-            self.measurements
-        );
+        eprintln!("{name}: M = {:?}: IoU {ideal:.3?} ideal, {as_built:.3?} as built", self.measurements);
         // above it the images differ by single taxels of some 60, whatever M is
         let seen_well = 0.9;
         for iou in [&ideal, &as_built] {
@@ -130,10 +93,7 @@ impl Skin {
         }
         assert!(ideal[ideal.len() - 1] >= 0.75, "{name}: {ideal:?}");
         let [iou, mean_image] = self.scored(dir, "ideal");
-        eprintln!(
-            "{name}: board at M = {}: {iou:.3}, mean image {mean_image:.3}",
-            self.measurements[1]
-        );
+        eprintln!("{name}: board at M = {}: {iou:.3}, mean image {mean_image:.3}", self.measurements[1]);
         assert!(iou > mean_image + 0.1, "{name}: {iou}, mean image {mean_image}");
 
         // the same samples with other rows
@@ -151,22 +111,12 @@ impl Skin {
 
 #[test]
 fn a_skin_of_12_by_20_taxels_from_press_to_score() {
-    Skin {
-        rows: 12,
-        cols: 20,
-        measurements: &[12, 48, 120, 240],
-    }
-    .check();
+    Skin { rows: 12, cols: 20, measurements: &[12, 48, 120, 240] }.check();
 }
 
 #[test]
 fn a_skin_of_32_by_32_taxels_from_press_to_score() {
-    Skin {
-        rows: 32,
-        cols: 32,
-        measurements: &[51, 205, 512, 1024],
-    }
-    .check();
+    Skin { rows: 32, cols: 32, measurements: &[51, 205, 512, 1024] }.check();
 }
 
 /// Noiseless measurements at as many independent rows as there are taxels give the skin back, whatever the layout, the
@@ -174,11 +124,7 @@ fn a_skin_of_32_by_32_taxels_from_press_to_score() {
 /// square times the rounding of a sum of 2048 products is 5e-9.
 #[test]
 fn a_noiseless_recording_is_recovered_on_any_layout() {
-    let own = |taxels: u32| {
-        (0..taxels)
-            .map(|k| Seeding::Mixed.seed(1_000_003 + 3 * k))
-            .collect::<Vec<u32>>()
-    };
+    let own = |taxels: u32| (0..taxels).map(|k| Seeding::Mixed.seed(1_000_003 + 3 * k)).collect::<Vec<u32>>();
     for (rows, cols, pitch_m) in [(1, 64, 5e-3), (4, 4, 15e-3), (12, 20, 5e-3), (32, 32, 2e-3)] {
         let skin = SkinLayout::with_pitch(rows, cols, pitch_m).unwrap();
         let taxels = u32::try_from(skin.taxels()).unwrap();
@@ -217,12 +163,6 @@ fn check_recovered(profile: &Profile, skin: &SkinLayout) {
     let largest = 16e-6;
     for (k, (x, g)) in x.iter().zip(&truth).enumerate() {
         let error = (x / volts_per_siemens - g).abs() / largest;
-        assert!(
-            error < 5e-9,
-            "{} × {}, {:?}, taxel {k}: {error}",
-            skin.rows(),
-            skin.cols(),
-            profile.weights
-        );
+        assert!(error < 5e-9, "{} × {}, {:?}, taxel {k}: {error}", skin.rows(), skin.cols(), profile.weights);
     }
 }

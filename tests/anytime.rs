@@ -40,11 +40,7 @@ fn simulated_sessions_stop_when_they_are_sure() {
     for (decoder, left_out) in [("evidence", false), ("nn_lmmse", false), ("nn_lmmse", true)] {
         for sensing in ["random", "chosen"] {
             let rows = rows(&board, decoder, sensing, left_out);
-            assert_eq!(
-                rows.len(),
-                4,
-                "{decoder}, {sensing}: two confidences, two fixed numbers"
-            );
+            assert_eq!(rows.len(), 4, "{decoder}, {sensing}: two confidences, two fixed numbers");
             let (less, more) = (at(&rows, 0.6), at(&rows, 0.9));
             for row in [less, more] {
                 assert!((1.0..=12.0).contains(&of(row, "samples")), "{row}");
@@ -56,30 +52,16 @@ fn simulated_sessions_stop_when_they_are_sure() {
                 assert!(of(row, "samples_median") <= of(row, "samples_p90"), "{row}");
             }
             assert!(of(less, "samples") <= of(more, "samples") && of(less, "never") <= of(more, "never"));
-            let fixed: Vec<f64> = rows
-                .iter()
-                .filter(|r| r["confidence"].is_null())
-                .map(|r| of(r, "samples"))
-                .collect();
+            let fixed: Vec<f64> = rows.iter().filter(|r| r["confidence"].is_null()).map(|r| of(r, "samples")).collect();
             assert_eq!(fixed, [4.0, 12.0]);
         }
     }
     // classes that were left out are in no answer
     assert!(rows(&board, "evidence", "random", true).is_empty());
     let objects = board["objects"].as_array().unwrap();
-    assert_eq!(
-        objects.len(),
-        3 * board["rows"].as_array().unwrap().len(),
-        "three objects a row"
-    );
+    assert_eq!(objects.len(), 3 * board["rows"].as_array().unwrap().len(), "three objects a row");
     let out = dir.path().join("out/anytime");
-    for file in [
-        "anytime.json",
-        "anytime.csv",
-        "objects.csv",
-        "figures/anytime.png",
-        "figures/anytime.svg",
-    ] {
+    for file in ["anytime.json", "anytime.csv", "objects.csv", "figures/anytime.png", "figures/anytime.svg"] {
         assert!(out.join(file).is_file(), "{file}");
     }
     let saved = std::fs::read(out.join("anytime.json")).unwrap();
@@ -106,24 +88,15 @@ fn the_real_skin_needs_few_samples_and_fewer_chosen_ones() {
         let (random, chosen) = (at(&random, wanted), at(&chosen, wanted));
         for row in [random, chosen] {
             let attained = of(row, "attained");
-            assert!(
-                attained >= wanted - 0.03,
-                "wanted {wanted}, attained {attained:.4}: {row}"
-            );
+            assert!(attained >= wanted - 0.03, "wanted {wanted}, attained {attained:.4}: {row}");
             assert!(of(row, "never") < 0.05, "{row}");
         }
         let (samples, fewer) = (of(random, "samples"), of(chosen, "samples"));
         assert!(samples < 9.0, "wanted {wanted}: {samples:.2} random samples");
-        assert!(
-            fewer < samples - 1.0,
-            "wanted {wanted}: {fewer:.2} chosen samples, {samples:.2} random ones"
-        );
+        assert!(fewer < samples - 1.0, "wanted {wanted}: {fewer:.2} chosen samples, {samples:.2} random ones");
     }
     // what a fixed number of samples costs for the same error
-    let fixed = random
-        .iter()
-        .find(|r| r["confidence"].is_null() && of(r, "samples") < 5.5)
-        .unwrap();
+    let fixed = random.iter().find(|r| r["confidence"].is_null() && of(r, "samples") < 5.5).unwrap();
     assert!(of(at(&random, 0.95), "attained") > of(fixed, "attained"));
 }
 
@@ -143,9 +116,6 @@ fn images_of_unknown_objects_need_fewer_chosen_rows() {
         let (random, chosen) = (stops("random"), stops("chosen"));
         let (random, chosen) = (at(&random, wanted), at(&chosen, wanted));
         let (samples, fewer) = (of(random, "samples"), of(chosen, "samples"));
-        assert!(
-            fewer < samples,
-            "wanted {wanted}: {fewer:.2} chosen samples, {samples:.2} random ones"
-        );
+        assert!(fewer < samples, "wanted {wanted}: {fewer:.2} chosen samples, {samples:.2} random ones");
     }
 }

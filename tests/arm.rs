@@ -18,10 +18,7 @@ const STATIC: &str = "[transducer_parameters]\nspread_log_sd = 0.0\nsession_log_
 /// Two numbers that are equal up to rounding, which a chain of ten operations keeps far below 1e-9.
 #[track_caller]
 fn close(found: f64, expected: f64) {
-    assert!(
-        (found - expected).abs() <= 1e-9 * expected.abs(),
-        "{found}, expected {expected}"
-    );
+    assert!((found - expected).abs() <= 1e-9 * expected.abs(), "{found}, expected {expected}");
 }
 
 fn scene(text: &str) -> Scene {
@@ -76,11 +73,7 @@ fn a_finger_sinks_in_less_on_a_taut_taxel() {
              strain = {strain:?}\n[press]\nobject = \"finger\"\nforce_n = 9\npresses = 1\nposition_sd_m = 0.0"
         );
         let press = press_frames(&scene(&text), 0).unwrap();
-        -press
-            .frames
-            .iter()
-            .map(|f| f.pose.position_m[2])
-            .fold(f64::INFINITY, f64::min)
+        -press.frames.iter().map(|f| f.pose.position_m[2]).fold(f64::INFINITY, f64::min)
     };
     let depths = [0.0, 0.02, 0.08, 0.2].map(depth_m);
     assert!(depths.windows(2).all(|pair| pair[1] < pair[0]), "{depths:?}");
@@ -89,10 +82,7 @@ fn a_finger_sinks_in_less_on_a_taut_taxel() {
 /// The scene that ships: an idle part under preload, six touches at their places, a session of touches.
 #[test]
 fn the_arm_is_read_like_the_published_one() {
-    let request = Request {
-        scene: NAMED_SCENES[0].0.to_owned(),
-        assignments: vec!["seed=3".parse().unwrap()],
-    };
+    let request = Request { scene: NAMED_SCENES[0].0.to_owned(), assignments: vec!["seed=3".parse().unwrap()] };
     let scene = request.scene().unwrap();
     let session = Twin::new(&scene).unwrap().record(Mode::Compressive).unwrap();
     let recording = session.compressive().unwrap();
@@ -104,11 +94,7 @@ fn the_arm_is_read_like_the_published_one() {
         let taxel = touch.taxel(recording).unwrap();
         // places of this scene are middles of taxels
         let off = ((taxel / 10) as f64 - row).abs() + ((taxel % 10) as f64 - col).abs();
-        assert!(
-            off < 0.5,
-            "block {}: taxel {taxel}, touched at {row}, {col}",
-            touch.block
-        );
+        assert!(off < 0.5, "block {}: taxel {taxel}, touched at {row}, {col}", touch.block);
     }
 }
 

@@ -45,21 +45,14 @@ fn a_quick_budget_is_complete_and_charges_nothing_for_nothing() {
     let effects = profile["compressive"].as_table().unwrap().len();
     assert_eq!(rows.len(), 2 * (PARTS.len() + effects + 5) + 1);
     for part in PARTS {
-        assert!(
-            rows.iter()
-                .any(|row| row["stage"] == "transducer" && row["effect"] == part),
-            "{part}"
-        );
+        assert!(rows.iter().any(|row| row["stage"] == "transducer" && row["effect"] == part), "{part}");
     }
     for row in rows {
         assert!(row["sessions"] == 3);
         assert!(row["stage"].is_string() && row["decode"] == "matched" && row["m"] == 20 && row["taxels"] == 100);
         assert!(["ablation", "addition"].contains(&row["mode"].as_str().unwrap()));
         for change in CHANGES {
-            let (delta, se) = (
-                number(row, &format!("{change}_delta")),
-                number(row, &format!("{change}_se")),
-            );
+            let (delta, se) = (number(row, &format!("{change}_delta")), number(row, &format!("{change}_se")));
             assert!((-1.0..=1.0).contains(&delta) && (0.0..=1.0).contains(&se), "{row}");
             if row["effect"] == "rails" || row["effect"] == "idle_noise" {
                 assert!(delta.abs() <= 0.0 && se <= 0.0, "{row}");
@@ -85,9 +78,7 @@ fn a_huge_noise_is_the_largest_cost() {
     let report = budget(dir.path(), readout, "2");
     let rows = report["rows"].as_array().unwrap();
     for (mode, sign) in [("ablation", 1.0), ("addition", -1.0)] {
-        let of_mode = rows
-            .iter()
-            .filter(|r| r["mode"] == mode && r["effect"] != "whole_stage");
+        let of_mode = rows.iter().filter(|r| r["mode"] == mode && r["effect"] != "whole_stage");
         let cost = |row: &&Value| sign * number(row, "iou_delta");
         let largest = of_mode.max_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap();
         assert_eq!(largest["effect"], "idle_noise", "{mode}: {largest}");

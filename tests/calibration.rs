@@ -43,16 +43,7 @@ const BIASED_THERE: [&str; 5] = ["resid_isi", "resid_robust", "outlier5", "late_
 const LEAST_INSIDE: f64 = 0.85;
 
 fn calibrated(recordings: &Path, dir: &Path) -> Value {
-    json(
-        dir,
-        &[
-            "calibrate",
-            recordings.to_str().unwrap(),
-            "--out",
-            "skin.toml",
-            "--json",
-        ],
-    )
+    json(dir, &["calibrate", recordings.to_str().unwrap(), "--out", "skin.toml", "--json"])
 }
 
 fn number(report: &Value, session: &str, name: &str) -> f64 {
@@ -84,54 +75,32 @@ fn the_published_recordings_give_the_shipped_profile() {
         let known = &reference["forward"][session];
         let close = |name: &str, found: f64, expected: f64, most: f64| {
             eprintln!("{session} {name}: {found:.5}, independent {expected:.5}");
-            assert!(
-                (found - expected).abs() <= most,
-                "{session} {name}: {found}, expected {expected} ± {most}"
-            );
+            assert!((found - expected).abs() <= most, "{session} {name}: {found}, expected {expected} ± {most}");
         };
         for (theirs, ours, share, most) in REFERENCE {
             if session == OVERDRIVEN && BIASED_THERE.contains(&theirs) {
                 continue;
             }
             let expected = known[theirs].as_f64().unwrap();
-            close(
-                ours,
-                number(&report, session, ours),
-                expected,
-                share * expected.abs() + most,
-            );
+            close(ours, number(&report, session, ours), expected, share * expected.abs() + most);
         }
         if session == OVERDRIVEN && BIASED_THERE.contains(&"isi_h123") {
             continue;
         }
-        for (tap, expected) in ["h1", "h2", "h3"]
-            .into_iter()
-            .zip(known["isi_h123"].as_array().unwrap())
-        {
+        for (tap, expected) in ["h1", "h2", "h3"].into_iter().zip(known["isi_h123"].as_array().unwrap()) {
             close(tap, number(&report, session, tap), expected.as_f64().unwrap(), TAPS);
         }
     }
     // the cell of the trig session that took the mode byte, 2, for its seed
-    let trig = report["sessions"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|s| s["session"] == "trig")
-        .unwrap();
-    assert_eq!(
-        (&trig["overdriven"][0]["taxel"], &trig["overdriven"][0]["seed"]),
-        (&56.into(), &2.into())
-    );
+    let trig = report["sessions"].as_array().unwrap().iter().find(|s| s["session"] == "trig").unwrap();
+    assert_eq!((&trig["overdriven"][0]["taxel"], &trig["overdriven"][0]["seed"]), (&56.into(), &2.into()));
 }
 
 #[test]
 fn the_twin_s_recordings_have_the_skin_s_statistics() {
     let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let report: Value = json(
-        dir.path(),
-        &["compare", recordings.to_str().unwrap(), "--no-curves", "--json"],
-    );
+    let report: Value = json(dir.path(), &["compare", recordings.to_str().unwrap(), "--no-curves", "--json"]);
     let statistics = report["statistics"].as_array().unwrap();
     assert_eq!(statistics.len(), 9 * SESSIONS.len());
     for statistic in statistics {
@@ -183,10 +152,7 @@ fn the_twin_s_objects_are_the_skin_s() {
         let found = distances.iter().find(same).unwrap();
         eprintln!("{found}");
         assert_eq!(found["objects"], SESSIONS.len());
-        assert!(
-            found["mean_abs_difference"].as_f64().unwrap() <= most,
-            "{found}, at most {most}"
-        );
+        assert!(found["mean_abs_difference"].as_f64().unwrap() <= most, "{found}, at most {most}");
     }
     assert!(dir.path().join("out/compare/figures/per_object.svg").is_file());
 }
@@ -199,10 +165,7 @@ fn threads_do_not_show() {
     let source = recordings.to_str().unwrap();
     let told = |threads: &str| {
         let calibrated = succeeds(dir.path(), &["calibrate", source, "--json", "--threads", threads]);
-        let compared = succeeds(
-            dir.path(),
-            &["compare", source, "--no-curves", "--json", "--threads", threads],
-        );
+        let compared = succeeds(dir.path(), &["compare", source, "--no-curves", "--json", "--threads", threads]);
         let table = std::fs::read(dir.path().join("out/compare/compare.csv")).unwrap();
         (calibrated.stdout, compared.stdout, table)
     };
@@ -216,24 +179,12 @@ fn threads_do_not_show() {
 fn sessions_are_predicted_by_the_others() {
     let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let others = [
-        "compare",
-        recordings.to_str().unwrap(),
-        "--profile",
-        "others",
-        "--draws",
-        "4",
-        "--json",
-    ];
+    let others = ["compare", recordings.to_str().unwrap(), "--profile", "others", "--draws", "4", "--json"];
     let report: Value = json(dir.path(), &others);
     let rows = report["predicted"].as_array().unwrap();
     assert_eq!(rows.len(), 7 * SESSIONS.len());
     let inside = rows.iter().filter(|row| row["inside"] == true).count();
-    assert!(
-        inside as f64 >= LEAST_INSIDE * rows.len() as f64,
-        "{inside} of {}",
-        rows.len()
-    );
+    assert!(inside as f64 >= LEAST_INSIDE * rows.len() as f64, "{inside} of {}", rows.len());
 }
 
 /// The skin's own images replaced by simulated ones: what the readout adds stays as it was, the output's range follows
@@ -243,14 +194,7 @@ fn sessions_are_predicted_by_the_others() {
 fn simulated_images_go_through_the_readout() {
     let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let compare = [
-        "compare",
-        recordings.to_str().unwrap(),
-        "--no-curves",
-        "--images",
-        "simulated",
-        "--json",
-    ];
+    let compare = ["compare", recordings.to_str().unwrap(), "--no-curves", "--images", "simulated", "--json"];
     let report: Value = json(dir.path(), &compare);
     let rows = report["statistics"].as_array().unwrap();
     for name in ["h1", "h2", "late_per_flip", "idle_noise", "step_v"] {

@@ -26,10 +26,7 @@ fn one_size_has_the_numbers_that_scripts_read() {
         ("snr_db", 78.9),
     ] {
         let found = number(&one, key);
-        assert!(
-            (found / expected - 1.0).abs() < 2e-3,
-            "{key} = {found}, expected {expected}"
-        );
+        assert!((found / expected - 1.0).abs() < 2e-3, "{key} = {found}, expected {expected}");
     }
     assert_eq!(one["saturates"], Value::Bool(false));
     assert_eq!(one["remedies"].as_array().unwrap().len(), 3);
@@ -64,26 +61,18 @@ fn the_table_is_written_whole_and_does_not_depend_on_the_threads() {
 #[test]
 fn taxels_with_a_capacitance_have_a_table_of_their_own() {
     let dir = tempfile::tempdir().unwrap();
-    succeeds(
-        dir.path(),
-        &["circuit", "--taxel-pf", "20", "--pressed", "0.1", "--out", "out/soft"],
-    );
+    succeeds(dir.path(), &["circuit", "--taxel-pf", "20", "--pressed", "0.1", "--out", "out/soft"]);
     let soft = String::from_utf8(files(dir.path())["out/soft/circuit.csv"].clone()).unwrap();
     let hard = tempfile::tempdir().unwrap();
     succeeds(hard.path(), &["circuit", "--pressed", "0.1", "--out", "out"]);
     let hard = String::from_utf8(files(hard.path())["out/circuit.csv"].clone()).unwrap();
     let wires = |table: &str| -> Vec<u32> {
         let of_wires = table.lines().filter(|line| line.split(',').nth(1) == Some("wires"));
-        of_wires
-            .map(|line| line.split(',').nth(2).unwrap().parse().unwrap())
-            .collect()
+        of_wires.map(|line| line.split(',').nth(2).unwrap().parse().unwrap()).collect()
     };
     let (soft, hard) = (wires(&soft), wires(&hard));
     assert_eq!(soft.len(), 13);
     // a capacitance never saves a wire, and costs some on the largest skin
-    assert!(
-        soft.iter().zip(&hard).all(|(soft, hard)| soft >= hard),
-        "{soft:?} {hard:?}"
-    );
+    assert!(soft.iter().zip(&hard).all(|(soft, hard)| soft >= hard), "{soft:?} {hard:?}");
     assert!(soft[12] > hard[12], "{soft:?} {hard:?}");
 }

@@ -14,21 +14,13 @@ pub(crate) fn words(text: &str) -> Vec<&str> {
 
 /// Runs `spts` with `arguments` in the folder `dir`.
 pub(crate) fn spts(dir: &Path, arguments: &[&str]) -> Output {
-    Command::new(SPTS)
-        .args(arguments)
-        .current_dir(dir)
-        .output()
-        .expect("spts can be started")
+    Command::new(SPTS).args(arguments).current_dir(dir).output().expect("spts can be started")
 }
 
 /// Runs `spts` and expects it to succeed.
 pub(crate) fn succeeds(dir: &Path, arguments: &[&str]) -> Output {
     let output = spts(dir, arguments);
-    assert!(
-        output.status.success(),
-        "{arguments:?}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     output
 }
 

@@ -111,10 +111,8 @@ fn relative_rms(a: &[f64], b: &[f64]) -> f64 {
 #[test]
 fn half_space_is_that_of_tamaas_and_aspher() {
     let record = record(include_str!("oracles/half_space.json"));
-    let kernel = ElasticKernel::HalfSpace {
-        modulus_pa: number(&record, "modulus_pa"),
-        poisson: number(&record, "poisson"),
-    };
+    let kernel =
+        ElasticKernel::HalfSpace { modulus_pa: number(&record, "modulus_pa"), poisson: number(&record, "poisson") };
     let solutions = record["solutions"].as_array().unwrap();
     assert_eq!(solutions.len(), 6);
     for solution in solutions {
@@ -147,9 +145,7 @@ fn layer_is_that_of_contact_mechanics() {
     let solutions = record["solutions"].as_array().unwrap();
     assert_eq!(solutions.len(), 8);
     for pair in solutions.chunks_exact(2) {
-        let [coarse, fine] = pair else {
-            unreachable!("chunks of two")
-        };
+        let [coarse, fine] = pair else { unreachable!("chunks of two") };
         assert!(count(coarse, "finer") == 1 && count(fine, "finer") == 4);
         let name = format!("{} ν = {}", coarse["shape"], coarse["poisson"]);
         let kernel = ElasticKernel::Layer {
@@ -158,23 +154,14 @@ fn layer_is_that_of_contact_mechanics() {
             thickness_m: number(&record, "thickness_m"),
         };
         let [rough, ours] = [1, 2].map(|finer| solve(kernel, &record, coarse, finer));
-        assert!(
-            relative(ours.force_n, number(fine, "force_n")) <= 100.0 * TOLERANCE,
-            "{name}"
-        );
+        assert!(relative(ours.force_n, number(fine, "force_n")) <= 100.0 * TOLERANCE, "{name}");
         let [their_rough_m, their_m] = [coarse, fine].map(|s| number(s, "approach_m"));
         let slack = relative(rough.approach_m, ours.approach_m) + relative(their_rough_m, their_m) / 3.0;
         let apart = relative(ours.approach_m, their_m);
-        assert!(
-            apart <= slack,
-            "{name}: approach off by {apart:.2e}, allowed {slack:.2e}"
-        );
+        assert!(apart <= slack, "{name}: approach off by {apart:.2e}, allowed {slack:.2e}");
         let [their_rough_pa, their_pa] = [coarse, fine].map(sample_pa);
         let slack = relative_rms(&rough.sample_pa, &ours.sample_pa) + relative_rms(&their_rough_pa, &their_pa) / 3.0;
         let apart = relative_rms(&ours.sample_pa, &their_pa);
-        assert!(
-            apart <= slack,
-            "{name}: pressure off by {apart:.2e}, allowed {slack:.2e}"
-        );
+        assert!(apart <= slack, "{name}: pressure off by {apart:.2e}, allowed {slack:.2e}");
     }
 }

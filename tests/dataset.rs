@@ -25,45 +25,21 @@ fn a_data_set_from_nothing() {
     assert_eq!(&four["digest"], digest);
     // and again: everything is there
     let again = json(here, &[&make[..], &["--out", "one"]].concat());
-    assert_eq!(
-        (&again["rows"], &again["finished"]["digest"]),
-        (&Value::from(0), digest)
-    );
-    for file in [
-        "manifest.json",
-        "README.md",
-        "croissant.json",
-        "statistics.json",
-        "spec.toml",
-        "dataset.json",
-    ] {
+    assert_eq!((&again["rows"], &again["finished"]["digest"]), (&Value::from(0), digest));
+    for file in ["manifest.json", "README.md", "croissant.json", "statistics.json", "spec.toml", "dataset.json"] {
         let [a, b] = ["one", "four"].map(|folder| std::fs::read(here.join(folder).join(file)).unwrap());
         assert!(a == b && !a.is_empty(), "{file}");
     }
     let columns = json(here, &["dataset", "schema", "random-shapes", "--json"]);
-    let names: Vec<&str> = columns
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter_map(|c| c["name"].as_str())
-        .collect();
+    let names: Vec<&str> = columns.as_array().unwrap().iter().filter_map(|c| c["name"].as_str()).collect();
     let head = succeeds(here, &["dataset", "head", "one", "--rows", "2"]);
     let rows = String::from_utf8(head.stdout).unwrap();
     let row: Value = serde_json::from_str(rows.lines().next().unwrap()).unwrap();
     assert_eq!(row.as_object().unwrap().len(), names.len());
     assert!(names.iter().all(|name| !row[name].is_null()), "{row}");
-    assert_eq!(
-        (
-            row["pressure_pa"].as_array().unwrap().len(),
-            row["y_v"].as_array().unwrap().len()
-        ),
-        (100, 20)
-    );
+    assert_eq!((row["pressure_pa"].as_array().unwrap().len(), row["y_v"].as_array().unwrap().len()), (100, 20));
     let verified = json(here, &["dataset", "verify", "four", "--rows", "50", "--json"]);
-    assert_eq!(
-        (&verified["rows"], verified["differ"].as_array().unwrap().len()),
-        (&Value::from(50), 0)
-    );
+    assert_eq!((&verified["rows"], verified["differ"].as_array().unwrap().len()), (&Value::from(50), 0));
     let info = json(here, &["dataset", "info", "one", "--json"]);
     assert_eq!((&info["made"], &info["digest"]), (&info["shards"], digest));
 }
@@ -112,17 +88,9 @@ fn clusters_are_understood() {
         command.envs(variables.iter().copied()).current_dir(dir.path());
         let output = command.output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        serde_json::from_slice::<Value>(&output.stdout).unwrap()["shards"]
-            .as_u64()
-            .unwrap()
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()["shards"].as_u64().unwrap()
     };
-    let slurm = |task| {
-        [
-            ("SLURM_ARRAY_TASK_ID", task),
-            ("SLURM_ARRAY_TASK_MIN", "10"),
-            ("SLURM_ARRAY_TASK_COUNT", "3"),
-        ]
-    };
+    let slurm = |task| [("SLURM_ARRAY_TASK_ID", task), ("SLURM_ARRAY_TASK_MIN", "10"), ("SLURM_ARRAY_TASK_COUNT", "3")];
     let tasks: Vec<u64> = ["10", "11", "12"].map(|task| run("slurm", &slurm(task), &[])).into();
     let pods: Vec<u64> = ["0", "1", "2"]
         .map(|index| run("pods", &[("JOB_COMPLETION_INDEX", index)], &["--shards", "3"]))
@@ -151,11 +119,7 @@ fn what_cannot_be_made_is_refused() {
     let file = here.join("set/data/part-00000.parquet");
     let whole = std::fs::read(&file).unwrap();
     std::fs::write(&file, &whole[..whole.len() - 9]).unwrap();
-    refused(
-        here,
-        &["dataset", "verify", "set"],
-        &["part-00000.parquet", "not a whole Parquet file"],
-    );
+    refused(here, &["dataset", "verify", "set"], &["part-00000.parquet", "not a whole Parquet file"]);
     std::fs::write(&file, &whole).unwrap();
     succeeds(here, &["dataset", "verify", "set"]);
 }

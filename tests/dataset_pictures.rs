@@ -38,18 +38,8 @@ fn rows_are_drawn() {
     succeeds(here, &[&make[..], &["--shard", "0/2"]].concat());
     let preview = ["dataset", "preview", "half", "--rows", "20", "--json", "--out"];
     let half = json(here, &[&preview[..], &["half.png"]].concat());
-    let rows: Vec<u64> = half["rows"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter_map(Value::as_u64)
-        .collect();
-    assert_eq!(
-        rows,
-        (0..20)
-            .map(|k| k * 10 + if k < 10 { 0 } else { 100 })
-            .collect::<Vec<_>>()
-    );
+    let rows: Vec<u64> = half["rows"].as_array().unwrap().iter().filter_map(Value::as_u64).collect();
+    assert_eq!(rows, (0..20).map(|k| k * 10 + if k < 10 { 0 } else { 100 }).collect::<Vec<_>>());
     let drawn = ["--seed", "4"];
     let random = json(here, &[&preview[..], &["random.png"], &drawn].concat());
     assert_ne!(random["rows"], half["rows"]);
@@ -58,35 +48,15 @@ fn rows_are_drawn() {
     succeeds(here, &[&preview[..], &["files.png"], &drawn].concat());
     let text = std::fs::read_to_string(here.join("half/spec.toml")).unwrap();
     std::fs::write(here.join("same.toml"), text).unwrap();
-    let same = [
-        "dataset",
-        "preview",
-        "same.toml",
-        "--rows",
-        "20",
-        "--seed",
-        "4",
-        "--out",
-        "made.png",
-    ];
+    let same = ["dataset", "preview", "same.toml", "--rows", "20", "--seed", "4", "--out", "made.png"];
     succeeds(here, &same);
     let [files, made] = ["files.png", "made.png"].map(|file| std::fs::read(here.join(file)).unwrap());
     assert!(files == made);
     // nothing was added to the data set
-    let mut held: Vec<_> = std::fs::read_dir(here.join("half"))
-        .unwrap()
-        .map(|e| e.unwrap().file_name())
-        .collect();
+    let mut held: Vec<_> = std::fs::read_dir(here.join("half")).unwrap().map(|e| e.unwrap().file_name()).collect();
     held.sort();
-    let usual = [
-        "README.md",
-        "croissant.json",
-        "data",
-        "dataset.json",
-        "manifest.json",
-        "spec.toml",
-        "statistics.json",
-    ];
+    let usual =
+        ["README.md", "croissant.json", "data", "dataset.json", "manifest.json", "spec.toml", "statistics.json"];
     assert_eq!(held, usual);
 }
 
@@ -94,15 +64,7 @@ fn rows_are_drawn() {
 fn shapes_are_drawn() {
     let dir = tempfile::tempdir().unwrap();
     let here = dir.path();
-    let shapes = [
-        "dataset",
-        "shapes",
-        "--json",
-        "--families",
-        "gear,letter",
-        "--count",
-        "5",
-    ];
+    let shapes = ["dataset", "shapes", "--json", "--families", "gear,letter", "--count", "5"];
     let first = json(here, &shapes);
     assert_eq!(first["file"], "shapes.png");
     let drawn: Vec<(&str, u64)> = first["shapes"]
@@ -111,10 +73,7 @@ fn shapes_are_drawn() {
         .iter()
         .map(|shape| (shape["family"].as_str().unwrap(), shape["number"].as_u64().unwrap()))
         .collect();
-    assert_eq!(
-        drawn,
-        [("letter", 0), ("letter", 1), ("letter", 2), ("gear", 0), ("gear", 1)]
-    );
+    assert_eq!(drawn, [("letter", 0), ("letter", 1), ("letter", 2), ("gear", 0), ("gear", 1)]);
     succeeds(here, &[&shapes[..], &["--out", "again.png", "--threads", "1"]].concat());
     succeeds(here, &[&shapes[..], &["--out", "other.png", "--seed", "1"]].concat());
     let [a, b, other] = ["shapes.png", "again.png", "other.png"].map(|file| std::fs::read(here.join(file)).unwrap());

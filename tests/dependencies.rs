@@ -15,11 +15,7 @@ fn packages(package: &str, features: &[&str]) -> BTreeSet<String> {
         .output()
         .expect("cargo can be started");
     let text = String::from_utf8(output.stdout).expect("names of packages are plain text");
-    assert!(
-        output.status.success(),
-        "{package}: {}",
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{package}: {}", String::from_utf8_lossy(&output.stderr));
     let names = text.lines().filter_map(|line| line.split_whitespace().next());
     names.map(str::to_owned).collect()
 }
@@ -62,9 +58,6 @@ fn the_python_package_has_the_versions_of_the_workspace() {
     let (python, workspace) = (locked("../python/Cargo.lock"), locked("../Cargo.lock"));
     for (name, versions) in &python {
         let Some(known) = workspace.get(name) else { continue };
-        assert!(
-            versions.is_subset(known),
-            "{name}: {versions:?} in python/Cargo.lock, {known:?} in Cargo.lock"
-        );
+        assert!(versions.is_subset(known), "{name}: {versions:?} in python/Cargo.lock, {known:?} in Cargo.lock");
     }
 }

@@ -28,23 +28,14 @@ fn a_design_is_simulated_and_checked() {
     assert!(!design["alternatives"].as_array().unwrap().is_empty());
     let rows = design["row_source"] != "generator";
     let found = files(&dir.path().join("d"));
-    for name in [
-        "design.json",
-        "profile.toml",
-        "scene.toml",
-        "curves.csv",
-        "figures/design.png",
-        "figures/design.svg",
-    ] {
+    for name in ["design.json", "profile.toml", "scene.toml", "curves.csv", "figures/design.png", "figures/design.svg"]
+    {
         assert!(found.contains_key(name), "{name} is missing");
     }
     assert_eq!(found.contains_key("rows.txt"), rows);
 
     succeeds(dir.path(), &words("simulate d/scene.toml --out s"));
-    succeeds(
-        dir.path(),
-        &words("simulate press/T --readout d/profile.toml --contact footprint --presses 1 --out t"),
-    );
+    succeeds(dir.path(), &words("simulate press/T --readout d/profile.toml --contact footprint --presses 1 --out t"));
 
     for seed in [2, 3] {
         let check = json(dir.path(), &format!("design check d --seed {seed} --json"));
@@ -52,13 +43,8 @@ fn a_design_is_simulated_and_checked() {
         assert_eq!(check["quantities"].as_array().unwrap().len(), 2);
     }
     // any number of threads, the same bytes
-    let check = |threads: &str| {
-        succeeds(
-            dir.path(),
-            &words(&format!("design check d --json --threads {threads}")),
-        )
-        .stdout
-    };
+    let check =
+        |threads: &str| succeeds(dir.path(), &words(&format!("design check d --json --threads {threads}"))).stdout;
     assert_eq!(check("1"), check("3"));
 
     // a promise that is too good
@@ -75,11 +61,7 @@ fn a_design_is_simulated_and_checked() {
     // a file that is none
     std::fs::write(&path, "{}").unwrap();
     refused(dir.path(), &words("design check d"), &["design.json", "missing field"]);
-    refused(
-        dir.path(),
-        &words("design check nowhere"),
-        &["nowhere/design.json", "spts design"],
-    );
+    refused(dir.path(), &words("design check nowhere"), &["nowhere/design.json", "spts design"]);
 }
 
 /// Equal questions have equal answers, for any number of threads.
@@ -88,10 +70,7 @@ fn designs_do_not_depend_on_threads() {
     let dir = tempfile::tempdir().unwrap();
     for threads in [1, 3] {
         let out = format!("d{threads}");
-        succeeds(
-            dir.path(),
-            &words(&format!("{SMALL} --seed 5 --threads {threads} --out {out}")),
-        );
+        succeeds(dir.path(), &words(&format!("{SMALL} --seed 5 --threads {threads} --out {out}")));
     }
     let [one, three] = ["d1", "d3"].map(|d| files(&dir.path().join(d)));
     for (name, bytes) in &one {
@@ -118,9 +97,7 @@ fn one_wire_is_the_same_everywhere() {
     let dir = tempfile::tempdir().unwrap();
     let of = |arguments: &str| {
         let said = json(dir.path(), arguments);
-        said["one_wire_taxels"]
-            .as_u64()
-            .unwrap_or_else(|| panic!("{arguments}: {said}"))
+        said["one_wire_taxels"].as_u64().unwrap_or_else(|| panic!("{arguments}: {said}"))
     };
     let circuit = of("circuit --json");
     assert_eq!(of("circuit --taxels 1000 --json"), circuit);
@@ -131,8 +108,5 @@ fn one_wire_is_the_same_everywhere() {
     assert!(of("circuit --pressed 0.05 --taxels 100 --json") > circuit);
     let said = succeeds(dir.path(), &words("circuit --taxels 100")).stdout;
     let said = String::from_utf8_lossy(&said).into_owned();
-    assert!(
-        said.contains(&format!("one wire works up to {circuit} taxels, 25 % of them pressed")),
-        "{said}"
-    );
+    assert!(said.contains(&format!("one wire works up to {circuit} taxels, 25 % of them pressed")), "{said}");
 }

@@ -20,11 +20,7 @@ fn commands(line: &str) -> Vec<Vec<String>> {
     let words = shlex::split(line).unwrap_or_else(|| panic!("quotes that are not closed: {line}"));
     words
         .split(|word| SEPARATORS.contains(&word.as_str()))
-        .filter(|words| {
-            words
-                .first()
-                .is_some_and(|word| word == "spts" || word.ends_with("/spts"))
-        })
+        .filter(|words| words.first().is_some_and(|word| word == "spts" || word.ends_with("/spts")))
         .map(<[String]>::to_vec)
         .collect()
 }
@@ -61,11 +57,8 @@ fn every_command_of_a_block_is_one_that_the_program_takes() {
 /// Inline code may leave out what a command needs, but has no option that the program does not know.
 #[test]
 fn every_command_within_a_sentence_is_one_that_the_program_takes() {
-    const LEFT_OUT: [&str; 3] = [
-        "required arguments were not provided",
-        "requires a subcommand",
-        "a value is required for",
-    ];
+    const LEFT_OUT: [&str; 3] =
+        ["required arguments were not provided", "requires a subcommand", "a value is required for"];
     let mut seen = 0;
     for page in pages() {
         for code in inline_code(&page) {
@@ -108,9 +101,7 @@ fn toml_error(block: &Block, folder: &Path) -> Option<String> {
         known.expect("it ships").1
     };
     match block.mark("toml").unwrap_or("scene") {
-        "scene" => Scene::from_toml(&block.text, folder)
-            .err()
-            .map(|error| error.to_string()),
+        "scene" => Scene::from_toml(&block.text, folder).err().map(|error| error.to_string()),
         "profile" => profile(&block.text),
         "part" => profile(&format!("{}\n{}", ideal(), block.text)),
         "spec" => spts_dataset::Spec::from_toml(&block.text, &toml::Table::new(), folder)
@@ -156,11 +147,7 @@ fn every_path_of_the_architecture_exists() {
         for name in names.split(',') {
             let path = format!("{before}{name}{after}");
             let known = path.split("NAME").next().unwrap_or_default();
-            let known = if known == path {
-                known
-            } else {
-                known.rsplit_once('/').map_or("", |(folder, _)| folder)
-            };
+            let known = if known == path { known } else { known.rsplit_once('/').map_or("", |(folder, _)| folder) };
             assert!(root().join(known).exists(), "{code}: {path} is not there");
             seen += 1;
         }

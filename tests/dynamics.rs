@@ -106,16 +106,9 @@ fn check(drop: &Drop, step_s: f64, share: f64) -> (Vec<Bounce>, Vec<Frame>) {
         let told = format!("{drop:?} at {step_s:e} s: {bounce:?}");
         let drift_j = 0.5 * drop.mass_kg * GRAVITY_M_PER_S2 * step_s * (v_in + v_out);
         let scale_j = kinetic_j + drop.mass_kg * GRAVITY_M_PER_S2 * 0.2;
-        assert!(
-            (bounce.lost_j - bounce.work_j + drift_j).abs() <= 1e-10 * scale_j,
-            "{told}"
-        );
+        assert!((bounce.lost_j - bounce.work_j + drift_j).abs() <= 1e-10 * scale_j, "{told}");
         assert!(bounce.peak_force_n > 0.0 && v_in > 0.0 && v_out > 0.0, "{told}");
-        let allowed = if drop.damping_s > 0.0 {
-            1.0
-        } else {
-            gain.sqrt() + drift_j / kinetic_j
-        };
+        let allowed = if drop.damping_s > 0.0 { 1.0 } else { gain.sqrt() + drift_j / kinetic_j };
         assert!(bounce.restitution() <= allowed, "{told}");
         if drop.damping_s <= 0.0 {
             // each bounce may gain on the one before
@@ -148,14 +141,7 @@ fn energy_never_grows() {
             for mass_kg in [2e-3, 57.7e-3, 50.0] {
                 for height_m in [0.01, 0.5, 5.0] {
                     for damping_s in [0.0, 0.5e-3] {
-                        let drop = Drop {
-                            mass_kg,
-                            height_m,
-                            stiffness_pa_per_m,
-                            damping_s,
-                            ball_pa_per_m,
-                            ..RIGID
-                        };
+                        let drop = Drop { mass_kg, height_m, stiffness_pa_per_m, damping_s, ball_pa_per_m, ..RIGID };
                         match drop.limit_s() {
                             Ok(limit_s) => {
                                 let (bounces, _) = check(&drop, limit_s, 1.0);
@@ -187,30 +173,14 @@ fn energy_never_grows() {
 /// damped, nothing.
 #[test]
 fn energy_never_grows_with_short_steps_nor_on_elastic_fields() {
-    let short = [
-        (2e-3, 0.01, 1e5),
-        (57.7e-3, 0.05, 1.5e7),
-        (50.0, 0.05, 1e9),
-        (2e-3, 0.01, 1e9),
-        (1.0, 0.2, 1e7),
-    ];
-    let on = |case: (f64, f64, f64), drop| Drop {
-        mass_kg: case.0,
-        height_m: case.1,
-        stiffness_pa_per_m: case.2,
-        ..drop
-    };
+    let short = [(2e-3, 0.01, 1e5), (57.7e-3, 0.05, 1.5e7), (50.0, 0.05, 1e9), (2e-3, 0.01, 1e9), (1.0, 0.2, 1e7)];
+    let on =
+        |case: (f64, f64, f64), drop| Drop { mass_kg: case.0, height_m: case.1, stiffness_pa_per_m: case.2, ..drop };
     let mut cases: Vec<(Drop, Option<f64>)> = short.map(|case| (on(case, RIGID), Some(1e-5))).to_vec();
     for model in ["layer", "half_space"] {
         for case in [(57.7e-3, 0.5, 1.5e7), (2e-3, 0.01, 1e9), (1.0, 0.1, 1e8)] {
             for damping_s in [0.0, 0.5e-3] {
-                let field = Drop {
-                    model,
-                    cells_per_taxel: 4,
-                    taxels: 4,
-                    damping_s,
-                    ..RIGID
-                };
+                let field = Drop { model, cells_per_taxel: 4, taxels: 4, damping_s, ..RIGID };
                 cases.push((on(case, field), None));
             }
         }
@@ -235,13 +205,7 @@ fn strong_damping_never_throws_back() {
         (50.0, 0.5, 1e9, 0.02, false),
         (57.7e-3, 0.01, 1e9, 0.02, false),
     ] {
-        let drop = Drop {
-            mass_kg,
-            height_m,
-            stiffness_pa_per_m,
-            damping_s,
-            ..RIGID
-        };
+        let drop = Drop { mass_kg, height_m, stiffness_pa_per_m, damping_s, ..RIGID };
         let limit_s = drop.limit_s().unwrap();
         let (bounces, frames) = check(&drop, limit_s, 1.0);
         assert_eq!(!bounces.is_empty(), leaves, "{drop:?}: {bounces:?}");
@@ -268,21 +232,10 @@ fn strong_damping_never_throws_back() {
 #[test]
 fn contact_time_of_a_sphere() {
     const BETA: f64 = 4.206_546;
-    for (mass_kg, height_m, stiffness_pa_per_m) in [
-        (57.7e-3, 0.5, 1.5e7),
-        (57.7e-3, 2.0, 1e8),
-        (57.7e-3, 0.5, 1e8),
-        (1.0, 0.5, 1e8),
-        (5e-3, 0.5, 3e6),
-    ] {
-        let drop = Drop {
-            mass_kg,
-            height_m,
-            stiffness_pa_per_m,
-            damping_s: 0.0,
-            thickness_m: 10.0,
-            ..RIGID
-        };
+    for (mass_kg, height_m, stiffness_pa_per_m) in
+        [(57.7e-3, 0.5, 1.5e7), (57.7e-3, 2.0, 1e8), (57.7e-3, 0.5, 1e8), (1.0, 0.5, 1e8), (5e-3, 0.5, 3e6)]
+    {
+        let drop = Drop { mass_kg, height_m, stiffness_pa_per_m, damping_s: 0.0, thickness_m: 10.0, ..RIGID };
         let step_s = 2e-5;
         let (bounces, _) = drop.run(step_s);
         let bounce = bounces[0];
@@ -295,16 +248,10 @@ fn contact_time_of_a_sphere() {
             + deepest_m / (9.0 * BALL_RADIUS_M)
             + mass_kg * GRAVITY_M_PER_S2 / (3.0 * spring * deepest_m * deepest_m);
         let error = bounce.contact_s / expected_s - 1.0;
-        assert!(
-            error.abs() < tolerance && tolerance < 0.05,
-            "{drop:?}: {error:.4}, {tolerance:.4}"
-        );
+        assert!(error.abs() < tolerance && tolerance < 0.05, "{drop:?}: {error:.4}, {tolerance:.4}");
         // and the peak force, π K R δ_m² = 3 m v²/(2 δ_m)
         let peak_error = bounce.peak_force_n / (spring * deepest_m * deepest_m) - 1.0;
-        assert!(
-            peak_error.abs() < tolerance,
-            "{drop:?}: {peak_error:.4}, {tolerance:.4}"
-        );
+        assert!(peak_error.abs() < tolerance, "{drop:?}: {peak_error:.4}, {tolerance:.4}");
     }
 }
 
@@ -332,10 +279,7 @@ fn timestep_option() {
     let scene = std::fs::read_to_string(dir.path().join("auto/scene.toml")).unwrap();
     assert!(scene.contains("timestep_s = 0.0001\n"), "{scene}");
     run(&["--timestep", "5e-5", "--out", "half"]);
-    succeeds(
-        dir.path(),
-        &["simulate", "auto/scene.toml", "--no-record", "--out", "again"],
-    );
+    succeeds(dir.path(), &["simulate", "auto/scene.toml", "--no-record", "--out", "again"]);
     let [auto, again, half] = ["auto", "again", "half"].map(|name| files(&dir.path().join(name)));
     for name in ["scene.toml", "frames.csv", "pressure_pa_000.npy", "summary.json"] {
         assert!(auto[name] == again[name], "{name} differs");

@@ -23,11 +23,8 @@ const BINS: usize = 10;
 /// which an evidence classifier written independently in numpy reached at M = 13 and 20 without an unknown outcome. A
 /// calibration error of .02 says 0.98 of what is always right. For the unknown there is no reference: four fifths of
 /// what was measured.
-const EXPECTED: [(usize, f64, f64, f64); 3] = [
-    (13, 0.96, 0.02, 0.246),
-    (20, 0.985, 0.02, 0.386),
-    (25, 0.985, 0.02, 0.450),
-];
+const EXPECTED: [(usize, f64, f64, f64); 3] =
+    [(13, 0.96, 0.02, 0.246), (20, 0.985, 0.02, 0.386), (25, 0.985, 0.02, 0.450)];
 
 /// Classifier by the templates of all objects but `left_out`.
 fn learn(skin: &ScoredSkin, left_out: Option<&str>) -> EvidenceClassifier {
@@ -102,17 +99,8 @@ fn probabilities_mean_what_they_say_and_strangers_are_unknown() {
             unknown += share(&stranger, |d| d.label.is_none()) / OBJECTS.len() as f64;
         }
         eprintln!("M = {m}: single {right:.4}, calibration error {error:.4}; left out: unknown {unknown:.4}");
-        assert!(
-            right >= least_right,
-            "M = {m}: single {right:.4}, at least {least_right}"
-        );
-        assert!(
-            error <= largest_error,
-            "M = {m}: calibration error {error:.4}, at most {largest_error}"
-        );
-        assert!(
-            unknown >= least_unknown,
-            "M = {m}: unknown {unknown:.4}, at least {least_unknown}"
-        );
+        assert!(right >= least_right, "M = {m}: single {right:.4}, at least {least_right}");
+        assert!(error <= largest_error, "M = {m}: calibration error {error:.4}, at most {largest_error}");
+        assert!(unknown >= least_unknown, "M = {m}: unknown {unknown:.4}, at least {least_unknown}");
     }
 }

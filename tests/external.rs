@@ -61,11 +61,7 @@ fn tried(recordings: &Path, (name, program, expected): &(&str, String, &str)) ->
     let fits = output.status.code() == Some(2) && errors.len() == 1 && errors[0].contains(expected);
     let gone = took_s <= LIMIT_S + SLACK_S && alive.is_empty();
     let wrong = format!("{name}: {:?} {took_s:.2} s, {alive:?}\n{said}", output.status);
-    Tried {
-        took_s,
-        orphans: alive.len(),
-        wrong: (!fits || !gone).then_some(wrong),
-    }
+    Tried { took_s, orphans: alive.len(), wrong: (!fits || !gone).then_some(wrong) }
 }
 
 /// Programs that answer as they should: images, classes alone, and the image of the first class that the header has.
@@ -108,9 +104,7 @@ fn signals_end_programs() {
         run.wait_for_start();
         sleep(Duration::from_millis(200));
         let sent = Instant::now();
-        let kill = Command::new("kill")
-            .args([format!("-{signal}"), child.id().to_string()])
-            .status();
+        let kill = Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status();
         assert!(kill.unwrap().success());
         let status = child.wait().unwrap();
         assert!(sent.elapsed().as_secs_f64() < SLACK_S, "{signal}: {:?}", sent.elapsed());

@@ -137,10 +137,7 @@ prop_compose! {
 }
 
 fn spts_toml(values: &[(&str, f64)]) -> toml::Table {
-    values
-        .iter()
-        .map(|(key, value)| ((*key).to_owned(), (*value).into()))
-        .collect()
+    values.iter().map(|(key, value)| ((*key).to_owned(), (*value).into())).collect()
 }
 
 const MODELS: [&str; 4] = ["winkler", "footprint", "layer", "half_space"];
@@ -194,13 +191,7 @@ fn any_scene_is_refused_or_runs() {
         let [pressed, pressed_hard, dropped, dropped_hard] = counts;
         let told = format!("{model}: {counts:?} presses and drops run, and with a force");
         // of 20 each on average; `footprint` stops no ball
-        assert!(
-            pressed >= 6 && dropped >= if *model == "footprint" { 0 } else { 5 },
-            "{told}"
-        );
-        assert!(
-            10 * pressed_hard >= 9 * pressed && 10 * dropped_hard >= 9 * dropped,
-            "{told}"
-        );
+        assert!(pressed >= 6 && dropped >= if *model == "footprint" { 0 } else { 5 }, "{told}");
+        assert!(10 * pressed_hard >= 9 * pressed && 10 * dropped_hard >= 9 * dropped, "{told}");
     }
 }

@@ -9,10 +9,7 @@ fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
     let dir = tempfile::tempdir().unwrap();
     let study = |threads: &str| {
         let arguments = ["fidelity", "--quick", "--scene", "T", "--scene", "drop", "--json"];
-        json(
-            dir.path(),
-            &[&arguments[..], &["--threads", threads, "--out", threads]].concat(),
-        )
+        json(dir.path(), &[&arguments[..], &["--threads", threads, "--out", threads]].concat())
     };
     let (report, _) = (study("1"), study("2"));
     let rows = report["rows"].as_array().unwrap();

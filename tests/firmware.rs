@@ -10,10 +10,7 @@ use std::path::Path;
 
 /// A chain with weights from `weights`.
 fn chain(weights: &str) -> Chain {
-    let config = ChainConfig {
-        weights: Some(weights.to_owned()),
-        ..ChainConfig::default()
-    };
+    let config = ChainConfig { weights: Some(weights.to_owned()), ..ChainConfig::default() };
     Chain::new(&config, &SkinLayout::default(), 4, Path::new("")).unwrap()
 }
 
@@ -26,14 +23,8 @@ fn ramp() -> [Frame; 4] {
             time_s: 0.004 * f64::from(k),
             pressure: map.clone(),
             electrode_pressure: map,
-            wrench: Wrench {
-                force_n: [0.0; 3],
-                torque_nm: [0.0; 3],
-            },
-            pose: Pose {
-                position_m: [0.0; 3],
-                quaternion: [1.0, 0.0, 0.0, 0.0],
-            },
+            wrench: Wrench { force_n: [0.0; 3], torque_nm: [0.0; 3] },
+            pose: Pose { position_m: [0.0; 3], quaternion: [1.0, 0.0, 0.0, 0.0] },
         }
     })
 }
@@ -50,10 +41,7 @@ fn profiles() -> Vec<(String, Profile)> {
     let mut all = Vec::new();
     for (name, text) in PROFILES {
         let plain = Profile::named(name).unwrap();
-        let analog = Profile {
-            weights: CompressiveWeights::Analog,
-            ..plain.clone()
-        };
+        let analog = Profile { weights: CompressiveWeights::Analog, ..plain.clone() };
         let weights = Weights::with_patterns(WeightMode::Binary, patterns()).unwrap();
         let patterned = plain.with_weights(&weights).unwrap();
         let faults = ["mis_seeded", "overdriven", "skipping_clocks", "dead", "drifting"];
@@ -68,13 +56,8 @@ fn profiles() -> Vec<(String, Profile)> {
             effects.insert("missed_clocks".to_owned(), toml::Value::Table(missed));
         }
         all.extend(
-            [
-                ("plain", plain),
-                ("analog", analog),
-                ("pattern", patterned),
-                ("faulty", faulty),
-            ]
-            .map(|(v, p)| (format!("{name}, {v}"), p)),
+            [("plain", plain), ("analog", analog), ("pattern", patterned), ("faulty", faulty)]
+                .map(|(v, p)| (format!("{name}, {v}"), p)),
         );
     }
     all
@@ -86,11 +69,7 @@ fn recordings_do_not_tell_the_firmware_from_the_model() {
     let frames = ramp();
     for (name, profile) in profiles() {
         for mode in [Mode::Raster, Mode::Compressive] {
-            let acquisition = Acquisition {
-                lead_frames: 2,
-                gap_frames: 3,
-                ..Acquisition::presses(mode, 1)
-            };
+            let acquisition = Acquisition { lead_frames: 2, gap_frames: 3, ..Acquisition::presses(mode, 1) };
             let volts = |chain: &Chain| {
                 let chain = chain.with_profile(profile.clone()).unwrap();
                 let recording = chain.record(&[&frames, &frames], 0.008, &acquisition).unwrap();
@@ -120,28 +99,13 @@ fn press_tells_nothing(rows: Option<&Patterns>) {
         pattern.extend(["--set", "rows.kind=pattern", "--set", "rows.patterns_file=rows.txt"]);
     }
     for weights in ["model", "firmware"] {
-        let arguments = [
-            "simulate",
-            "press/T",
-            "--seed",
-            "3",
-            "--weights",
-            weights,
-            "--out",
-            weights,
-        ];
+        let arguments = ["simulate", "press/T", "--seed", "3", "--weights", weights, "--out", weights];
         succeeds(dir.path(), &[&arguments[..], &pattern].concat());
     }
     let (model, firmware) = (files(&dir.path().join("model")), files(&dir.path().join("firmware")));
     assert_eq!(model.keys().collect::<Vec<_>>(), firmware.keys().collect::<Vec<_>>());
     // these say which it was, or how long it took
-    const TOLD: [&str; 5] = [
-        "manifest.json",
-        "scene.toml",
-        "session.json",
-        "summary.json",
-        "timing.json",
-    ];
+    const TOLD: [&str; 5] = ["manifest.json", "scene.toml", "session.json", "summary.json", "timing.json"];
     for (name, bytes) in &model {
         if !TOLD.contains(&name.as_str()) {
             assert!(*bytes == firmware[name], "{name} differs");
@@ -190,10 +154,7 @@ fn a_clock_that_is_too_fast_ruins_the_recording() {
         let chain = Chain::new(&config, &SkinLayout::default(), 0, Path::new("")).unwrap();
         let chain = chain.with_profile(profile).unwrap();
         // one pressure, held
-        let still = [0.0, 1.0].map(|time_s| Frame {
-            time_s,
-            ..ramp()[3].clone()
-        });
+        let still = [0.0, 1.0].map(|time_s| Frame { time_s, ..ramp()[3].clone() });
         let acquisition = Acquisition::presses(Mode::Compressive, 1);
         let recording = chain.record(&[&still[..]], 400.0 / edge_hz, &acquisition).unwrap();
         let phi = DMatrix::from_row_slice(400, 100, &recording.rows(0, 0..400).to_vec());
@@ -216,10 +177,6 @@ fn lost_edges_are_noted() {
     std::fs::write(dir.path().join("scene.toml"), scene).unwrap();
     let output = succeeds(dir.path(), &["simulate", "scene.toml", "--json", "--out", "out"]);
     let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    assert!(
-        summary["notes"].to_string().contains("lost edges at 320000 Hz"),
-        "{}",
-        summary["notes"]
-    );
+    assert!(summary["notes"].to_string().contains("lost edges at 320000 Hz"), "{}", summary["notes"]);
     assert!(String::from_utf8_lossy(&output.stderr).contains("lost edges"));
 }

@@ -13,10 +13,7 @@ fn json(dir: &Path, arguments: &[&str]) -> Value {
 fn verify_says_what_scripts_read() {
     let dir = tempfile::tempdir().unwrap();
     let found = json(dir.path(), &["verify", "--cells", "100", "--edges", "1000"]);
-    assert_eq!(
-        (found["cells"].as_u64(), found["edges"].as_u64()),
-        (Some(100), Some(1000))
-    );
+    assert_eq!((found["cells"].as_u64(), found["edges"].as_u64()), (Some(100), Some(1000)));
     assert_eq!(found["mismatches"], 0);
     let modes = found["modes"].as_array().unwrap();
     let periods: Vec<Option<u64>> = modes.iter().map(|mode| mode["period"].as_u64()).collect();
@@ -24,10 +21,7 @@ fn verify_says_what_scripts_read() {
     assert!(found["instructions_per_s"].as_f64().unwrap() > 0.0);
     // seeds of 32 bits, and more cells than the raster counts
     for seeding in ["address", "mixed"] {
-        let more = json(
-            dir.path(),
-            &["verify", "--cells", "112", "--edges", "300", "--seeding", seeding],
-        );
+        let more = json(dir.path(), &["verify", "--cells", "112", "--edges", "300", "--seeding", seeding]);
         assert_eq!(more["mismatches"], 0, "{seeding}");
     }
 }
@@ -64,10 +58,7 @@ fn a_trace_shows_the_edge() {
     let dir = tempfile::tempdir().unwrap();
     let output = succeeds(dir.path(), &["firmware", "trace", "--taxel", "56", "--mode", "raster"]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(
-        text.contains("interrupt 3") && text.contains("reti") && text.contains("sleep"),
-        "{text}"
-    );
+    assert!(text.contains("interrupt 3") && text.contains("reti") && text.contains("sleep"), "{text}");
 }
 
 /// The slow suite's check: a hundred million codes in every mode.

@@ -52,25 +52,13 @@ impl Attack {
     #[track_caller]
     fn refused(&self, arguments: &[&str], facts: &[&str]) {
         let (before, begin) = (paths(self.dir()), Instant::now());
-        let limited = [
-            "-k",
-            "1",
-            "20",
-            "sh",
-            "-c",
-            "ulimit -v $1; shift; exec \"$0\" \"$@\"",
-            SPTS,
-            MEMORY_KB,
-        ];
+        let limited = ["-k", "1", "20", "sh", "-c", "ulimit -v $1; shift; exec \"$0\" \"$@\"", SPTS, MEMORY_KB];
         let mut command = Command::new("timeout");
         let output = command.args(limited).args(arguments).current_dir(self.dir()).output();
         let took = begin.elapsed();
         assert_refused(&output.unwrap(), &format!("{arguments:?}"), facts);
         assert!(took < LIMIT, "{arguments:?} took {took:?}");
-        assert!(
-            paths(self.dir()) == before,
-            "{arguments:?}: something was written all the same"
-        );
+        assert!(paths(self.dir()) == before, "{arguments:?}: something was written all the same");
     }
 }
 
@@ -93,12 +81,7 @@ fn paths(dir: &Path) -> Vec<PathBuf> {
 fn assert_refused(output: &Output, what: &str, facts: &[&str]) {
     let said = String::from_utf8_lossy(&output.stderr);
     let start: String = said.chars().take(400).collect();
-    assert_eq!(
-        output.status.code(),
-        Some(REFUSED),
-        "{what}: {:?}: {start}",
-        output.status
-    );
+    assert_eq!(output.status.code(), Some(REFUSED), "{what}: {:?}: {start}", output.status);
     let errors: Vec<&str> = said.lines().filter(|line| !line.starts_with("note: ")).collect();
     assert!(errors.len() == 1 && errors[0].starts_with("error: "), "{what}: {start}");
     assert!(said.len() < 1000, "{what}: {} bytes: {start}", said.len());
@@ -413,10 +396,7 @@ fn scene_files() {
     attack.write("seeded.toml", &seeded).pipe("seeds.txt").pipe("pipe.toml");
     let not_regular = "not a regular file";
     attack.refused(&["simulate", "pipe.toml"], &["pipe.toml", not_regular]);
-    attack.refused(
-        &words("simulate press/T --readout pipe.toml"),
-        &["pipe.toml", not_regular],
-    );
+    attack.refused(&words("simulate press/T --readout pipe.toml"), &["pipe.toml", not_regular]);
     attack.refused(&["simulate", "seeded.toml"], &["seeds.txt", not_regular]);
     std::fs::remove_file(attack.dir().join("seeds.txt")).unwrap();
     attack.write("seeds.txt", "x".repeat(1 << 23));
@@ -428,33 +408,12 @@ fn scene_files() {
 #[test]
 fn readout_profiles() {
     let attack = Attack::new();
-    let shipped = |name: &str| {
-        spts_circuit::PROFILES
-            .iter()
-            .find(|(known, _)| *known == name)
-            .unwrap()
-            .1
-    };
+    let shipped = |name: &str| spts_circuit::PROFILES.iter().find(|(known, _)| *known == name).unwrap().1;
     for (name, from, to, facts) in [
         ("ideal", "", "[raster]\nmagic = {}\n", &["magic"][..]),
-        (
-            "ideal",
-            "drive_v = ",
-            "drive_v = -",
-            &["drive_v", "-4.3", "[1e-3, 1e3]"],
-        ),
-        (
-            "ideal",
-            "sample_rate_hz = ",
-            "sample_rate_hz = 1e9 # ",
-            &["presses × measurements"],
-        ),
-        (
-            "as_built",
-            "drive_v = ",
-            "drive_v = \"high\" # ",
-            &["`readout.drive_v` = \"high\": a number is needed"],
-        ),
+        ("ideal", "drive_v = ", "drive_v = -", &["drive_v", "-4.3", "[1e-3, 1e3]"]),
+        ("ideal", "sample_rate_hz = ", "sample_rate_hz = 1e9 # ", &["presses × measurements"]),
+        ("as_built", "drive_v = ", "drive_v = \"high\" # ", &["`readout.drive_v` = \"high\": a number is needed"]),
         ("as_built", "bits = ", "bits = \"many\" # ", &["bits` = \"many\": "]),
         (
             "as_built",
@@ -491,17 +450,8 @@ fn glb(json: &str, bin: &[u8]) -> Vec<u8> {
     let word = |n: usize| u32::try_from(n).unwrap().to_le_bytes();
     let (json, bin) = (padded(json.as_bytes(), b' '), padded(bin, 0));
     let length = 12 + 8 + json.len() + 8 + bin.len();
-    [
-        &b"glTF\x02\0\0\0"[..],
-        &word(length),
-        &word(json.len()),
-        b"JSON",
-        &json,
-        &word(bin.len()),
-        b"BIN\0",
-        &bin,
-    ]
-    .concat()
+    [&b"glTF\x02\0\0\0"[..], &word(length), &word(json.len()), b"JSON", &json, &word(bin.len()), b"BIN\0", &bin]
+        .concat()
 }
 
 /// `nodes` and `primitives` of a scene whose only data are three thousand points.
@@ -530,27 +480,11 @@ fn meshes() {
     let levels: Vec<String> = (1..30).map(|k| format!(r#"{{"children":[{k},{k}]}}"#)).collect();
     let utf16: Vec<u8> = "\u{feff}v 0 0 0\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
     let files: [(&str, Vec<u8>, &[&str]); 17] = [
-        (
-            "nan.obj",
-            TETRAHEDRON.replace("v 0 0 0.03", "v 0 0 nan").into(),
-            &["vertex 3", "z = NaN"],
-        ),
-        (
-            "large.obj",
-            TETRAHEDRON.replace("0.03", "30").into(),
-            &["30", "[0.001, 2] m", "scale = 0.001"],
-        ),
+        ("nan.obj", TETRAHEDRON.replace("v 0 0 0.03", "v 0 0 nan").into(), &["vertex 3", "z = NaN"]),
+        ("large.obj", TETRAHEDRON.replace("0.03", "30").into(), &["30", "[0.001, 2] m", "scale = 0.001"]),
         // the underside is missing; the face with one vertex on top would be closed above it
-        (
-            "open.obj",
-            TETRAHEDRON.replace("f 1 3 2\n", "").into(),
-            &["not closed", "3 of 6", "at (", "downward"],
-        ),
-        (
-            "far.obj",
-            std::fs::read(corpus("obj/far.obj")).unwrap(),
-            &["vertex", "x = 3", "[-1000000, 1000000] m"],
-        ),
+        ("open.obj", TETRAHEDRON.replace("f 1 3 2\n", "").into(), &["not closed", "3 of 6", "at (", "downward"]),
+        ("far.obj", std::fs::read(corpus("obj/far.obj")).unwrap(), &["vertex", "x = 3", "[-1000000, 1000000] m"]),
         ("wide.obj", utf16, &["UTF-16"]),
         ("text.glb", b"not a GLB".into(), &["malformed"]),
         ("short.stl", b"not an STL".into(), &["malformed", "10 bytes"]),
@@ -558,28 +492,13 @@ fn meshes() {
         // 150 visits of 100 primitives of 3000 points
         (
             "shared.glb",
-            shared(
-                &format!(r#"{{"children":[{}]}},{{"mesh":0}}"#, vec!["1"; 150].join(",")),
-                100,
-            ),
+            shared(&format!(r#"{{"children":[{}]}},{{"mesh":0}}"#, vec!["1"; 150].join(",")), 100),
             &["number of triangles", "[0, 1000000]"],
         ),
-        (
-            "levels.glb",
-            shared(&(levels.join(",") + r#",{"mesh":0}"#), 1),
-            &["100000"],
-        ),
+        ("levels.glb", shared(&(levels.join(",") + r#",{"mesh":0}"#), 1), &["100000"]),
         // nodes with many children each: the list of what is to be visited grows, too
-        (
-            "wide.glb",
-            shared(&format!(r#"{{"children":[{wide}]}},{{"children":[{deeper}]}},{{}}"#), 1),
-            &["100000"],
-        ),
-        (
-            "nodes.glb",
-            shared(&vec!["{}"; 1_500_000].join(","), 1),
-            &["JSON", "2097152"],
-        ),
+        ("wide.glb", shared(&format!(r#"{{"children":[{wide}]}},{{"children":[{deeper}]}},{{}}"#), 1), &["100000"]),
+        ("nodes.glb", shared(&vec!["{}"; 1_500_000].join(","), 1), &["JSON", "2097152"]),
         ("counts.stl", counts, &["4294967295 triangles"]),
         ("many.stl", many, &["number of triangles = 2000000", "[0, 1000000]"]),
         (
@@ -587,16 +506,8 @@ fn meshes() {
             (triangle.to_owned() + &" 1 2 3".repeat(4_000_000)).into(),
             &["number of triangles = 11999998"],
         ),
-        (
-            "faces.obj",
-            format!("{triangle} 1 2 3\n{}", "f 1 2 3\n".repeat(2_000_000)).into(),
-            &["number of triangles"],
-        ),
-        (
-            "index.obj",
-            format!("{triangle} 1 2 99999999999999999999999\n").into(),
-            &["malformed"],
-        ),
+        ("faces.obj", format!("{triangle} 1 2 3\n{}", "f 1 2 3\n".repeat(2_000_000)).into(), &["number of triangles"]),
+        ("index.obj", format!("{triangle} 1 2 99999999999999999999999\n").into(), &["malformed"]),
     ];
     for (name, content, facts) in files {
         attack.write(name, content);
@@ -612,10 +523,7 @@ fn meshes() {
     mesh("pipe.stl", &["a pipe, not a regular file"]);
     attack.write("good.obj", TETRAHEDRON);
     for scale in ["0", "-1", "nan", "inf"] {
-        attack.refused(
-            &["simulate", "press", "--mesh", "good.obj", "--scale", scale],
-            &["scale", "(0, "],
-        );
+        attack.refused(&["simulate", "press", "--mesh", "good.obj", "--scale", scale], &["scale", "(0, "]);
     }
 }
 
@@ -633,10 +541,7 @@ fn meshes_that_are_read_all_the_same() {
     let [plain, marked] = ["tetrahedron", "mark"].map(|name| {
         let mesh = corpus(&format!("obj/{name}.obj"));
         let run = ["simulate", "press", "--mesh", mesh.to_str().unwrap(), "--out", name];
-        succeeds(
-            dir.path(),
-            &[&run[..], &words("--scale 0.001 --force 2 --no-record")].concat(),
-        );
+        succeeds(dir.path(), &[&run[..], &words("--scale 0.001 --force 2 --no-record")].concat());
         std::fs::read(dir.path().join(name).join("pressure_pa.npy")).unwrap()
     });
     assert!(plain == marked, "the pressures differ");
@@ -654,10 +559,7 @@ fn meshes_that_are_mended_say_so() {
         .replace("f 1 4 3", "f 1 3 4")
         .replace("f 2 3 4", "v 40 0 0\nf 5 2 1\nf 1 3 5");
     std::fs::write(dir.path().join("cup.obj"), damaged).unwrap();
-    let output = succeeds(
-        dir.path(),
-        &words("simulate press --mesh cup.obj --scale 0.001 --force 2"),
-    );
+    let output = succeeds(dir.path(), &words("simulate press --mesh cup.obj --scale 0.001 --force 2"));
     let said = String::from_utf8(output.stderr).unwrap();
     for fact in [
         "1 vertex of the mesh coincided",
@@ -667,10 +569,7 @@ fn meshes_that_are_mended_say_so() {
         "opens upward and was closed",
         "(25.0, 15.0) mm",
     ] {
-        assert!(
-            said.lines().any(|l| l.starts_with("note: ") && l.contains(fact)),
-            "`{fact}` is not in: {said}"
-        );
+        assert!(said.lines().any(|l| l.starts_with("note: ") && l.contains(fact)), "`{fact}` is not in: {said}");
     }
     let summary = std::fs::read_to_string(dir.path().join("out/cup/summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
@@ -709,9 +608,7 @@ fn mat(bytes: usize) -> Vec<u8> {
     .concat();
     let padded = bytes.next_multiple_of(8);
     let mut packed = ZlibEncoder::new(Vec::new(), Compression::fast());
-    packed
-        .write_all(&[word(14), word(head.len() + padded)].concat())
-        .unwrap();
+    packed.write_all(&[word(14), word(head.len() + padded)].concat()).unwrap();
     packed.write_all(&head).unwrap();
     let zeros = vec![0; 1 << 16];
     let mut left = padded;
@@ -741,10 +638,7 @@ fn published_recordings() {
     hdf5.extend(b"\x89HDF\r\n\x1a\n");
     let of_struct = std::fs::read(corpus("mat/struct.mat")).unwrap();
     // the same variable under the name that is looked for first
-    let at = of_struct
-        .windows(9)
-        .rposition(|w| w == b"\x01\0\0\0\x01\0\0\0C")
-        .unwrap();
+    let at = of_struct.windows(9).rposition(|w| w == b"\x01\0\0\0\x01\0\0\0C").unwrap();
     let mut renamed = of_struct.clone();
     renamed[at + 8] = b'D';
     let name = "presses/T/T_raster.mat";
@@ -770,11 +664,7 @@ fn published_recordings() {
 fn session(dir: &Path) {
     let layout = SkinLayout::new(1, 8, 5e-3, 3e-3).unwrap();
     let info = RecordingInfo::new(layout, Weights::new(WeightMode::Binary, Seeding::Mixed, 8), 64_300.0);
-    let block = |end| Block {
-        frame_position: end,
-        idle_frames: None,
-        volts: vec![0.25; 80],
-    };
+    let block = |end| Block { frame_position: end, idle_frames: None, volts: vec![0.25; 80] };
     let recording = Recording::new(info, vec![block(10), block(20)]).unwrap();
     let mut session = Session::new("cup", Event::Press);
     session.compressive = Some(Recorded::new(recording));
@@ -796,16 +686,8 @@ fn sessions() {
     let nested = format!("\"name\": {}", "[".repeat(1_000_000));
     let endless = format!("\"provenance\": [{}0]", "0,".repeat(10_000_000));
     for (from, to, facts) in [
-        (
-            "\"rows\": 1,",
-            "\"rows\": 1000000000,",
-            &["session.json", "rows × cols"][..],
-        ),
-        (
-            "\"rows\": 1,",
-            "\"rows\": \"one\",",
-            &["session.json", "`compressive.info.layout", "line "],
-        ),
+        ("\"rows\": 1,", "\"rows\": 1000000000,", &["session.json", "rows × cols"][..]),
+        ("\"rows\": 1,", "\"rows\": \"one\",", &["session.json", "`compressive.info.layout", "line "]),
         ("\"frames\": 10", "\"frames\": 18446744073709551615", &[array, "shape"]),
         ("\"name\": \"cup\"", &nested, &["session.json", "line "]),
         ("\"provenance\": null", &endless, &["session.json"]),
@@ -829,10 +711,7 @@ fn sessions() {
     attack.write(&file, [&whole[..6], &[2, 0, 255, 255, 255, 255]].concat());
     decode(&[array, "header length = 4294967295"]);
     attack.write(&file, &whole);
-    let sparse = std::fs::OpenOptions::new()
-        .write(true)
-        .open(attack.dir().join(&file))
-        .unwrap();
+    let sparse = std::fs::OpenOptions::new().write(true).open(attack.dir().join(&file)).unwrap();
     sparse.set_len(1 << 30).unwrap();
     decode(&[array, "bytes of values"]);
     for name in [array, "session.json"] {
@@ -846,25 +725,14 @@ fn sessions() {
 #[test]
 fn sessions_that_cannot_be_used() {
     let attack = Attack::new();
-    for run in [
-        "press/T --out run",
-        "bounce --height 0.05 --out ball",
-        "press/T --out both/a",
-    ] {
+    for run in ["press/T --out run", "bounce --height 0.05 --out ball", "press/T --out both/a"] {
         succeeds(attack.dir(), &[&["simulate"], &words(run)[..]].concat());
     }
     succeeds(attack.dir(), &words("simulate press/X --set skin.rows=12 --out both/b"));
-    let learned = [
-        "`--decoder` = evidence",
-        "raster presses that are not scored",
-        "--learn-from simulation",
-    ];
+    let learned = ["`--decoder` = evidence", "raster presses that are not scored", "--learn-from simulation"];
     attack.refused(&words("score run --decoder evidence"), &learned);
     attack.refused(&["score", "ball"], &["ball: ", "found: no session of presses"]);
-    attack.refused(
-        &["score", "both"],
-        &["both: session \"", " recording: `taxels` = ", "as the first session"],
-    );
+    attack.refused(&["score", "both"], &["both: session \"", " recording: `taxels` = ", "as the first session"]);
     let run = attack.dir().join("run");
     // what is changed is to be judged by itself
     std::fs::remove_file(run.join("manifest.json")).unwrap();
@@ -876,12 +744,7 @@ fn sessions_that_cannot_be_used() {
         let at = damaged.len() - 8;
         damaged[at..].copy_from_slice(&value.to_le_bytes());
         std::fs::write(&file, damaged).unwrap();
-        let facts = [
-            "compressive_conductance_s.npy",
-            "entry 99",
-            &value.to_string(),
-            "[0, ∞)",
-        ];
+        let facts = ["compressive_conductance_s.npy", "entry 99", &value.to_string(), "[0, ∞)"];
         attack.refused(&["decode", "run"], &facts);
     }
     std::fs::write(&file, whole).unwrap();
@@ -943,15 +806,8 @@ fn a_write_that_fails_half_way_damages_nothing() {
     for blocks in ["1", "64", "800"] {
         let script = "trap '' XFSZ; ulimit -f $1; exec \"$0\" simulate press/X --out results";
         let mut command = Command::new("sh");
-        let output = command
-            .args(["-c", script, SPTS, blocks])
-            .current_dir(dir.path())
-            .output();
-        assert_refused(
-            &output.unwrap(),
-            blocks,
-            &["results/", "cannot be written", "File too large"],
-        );
+        let output = command.args(["-c", script, SPTS, blocks]).current_dir(dir.path()).output();
+        assert_refused(&output.unwrap(), blocks, &["results/", "cannot be written", "File too large"]);
         assert!(files(dir.path()) == before, "damaged with a limit of {blocks} blocks");
     }
 }
@@ -983,10 +839,7 @@ fn a_closed_pipe_is_not_an_error() {
     let dir = tempfile::tempdir().unwrap();
     for arguments in ["simulate press/T --json", "simulate press/X", "simulate --help"] {
         let script = format!("{{ \"$0\" {arguments} 2>said; echo $? >status; }} | true");
-        let run = Command::new("sh")
-            .args(["-c", &script, SPTS])
-            .current_dir(dir.path())
-            .status();
+        let run = Command::new("sh").args(["-c", &script, SPTS]).current_dir(dir.path()).status();
         assert!(run.unwrap().success());
         let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
         assert_eq!((read("status").trim(), read("said").as_str()), ("0", ""), "{arguments}");
@@ -1051,9 +904,7 @@ fn scenes_and_objects_are_listed() {
         for entry in json[list].as_array().unwrap() {
             let [name, about] = [key, "about"].map(|key| entry[key].as_str().unwrap());
             let row = [name, about];
-            let mut cells = text
-                .lines()
-                .map(|line| line.split('|').map(str::trim).collect::<Vec<_>>());
+            let mut cells = text.lines().map(|line| line.split('|').map(str::trim).collect::<Vec<_>>());
             assert!(cells.any(|cells| cells.get(1..3) == Some(&row)), "{name}: {text}");
         }
     }

@@ -11,8 +11,7 @@ fn of(row: &Value, score: &str) -> f64 {
 
 fn rows<'a>(board: &'a Value, table: &str, contact: &str, hold: bool) -> Vec<&'a Value> {
     let rows = board[table].as_array().unwrap().iter();
-    rows.filter(|r| r["contact"] == contact && r["since_touch_s"].is_null() == hold)
-        .collect()
+    rows.filter(|r| r["contact"] == contact && r["since_touch_s"].is_null() == hold).collect()
 }
 
 /// Two simulated objects by windows of 5 and 20 samples.
@@ -37,13 +36,7 @@ fn simulated_presses_gain() {
         assert!(of(row, "iou_gain") > -0.05, "{row}");
     }
     let out = dir.path().join("out/in_time");
-    for file in [
-        "in_time.json",
-        "in_time.csv",
-        "objects.csv",
-        "figures/in_time.png",
-        "figures/in_time.svg",
-    ] {
+    for file in ["in_time.json", "in_time.csv", "objects.csv", "figures/in_time.png", "figures/in_time.svg"] {
         assert!(out.join(file).is_file(), "{file}");
     }
     let saved = std::fs::read(out.join("in_time.json")).unwrap();
@@ -58,10 +51,7 @@ fn simulated_presses_gain() {
 #[test]
 fn the_real_skin_gains_in_rise_and_hold_and_on_drops() {
     let dir = tempfile::tempdir().unwrap();
-    let Some(board) = score(
-        dir.path(),
-        &words("--in-time --left-out --measurements 10 --object rec,trig"),
-    ) else {
+    let Some(board) = score(dir.path(), &words("--in-time --left-out --measurements 10 --object rec,trig")) else {
         return;
     };
     let low = |row: &Value, ci: &str, end: usize| row[ci][end].as_f64().unwrap_or_else(|| panic!("no {ci} in {row}"));
@@ -80,9 +70,6 @@ fn the_real_skin_gains_in_rise_and_hold_and_on_drops() {
     let late = drops.iter().filter(|row| of(row, "since_touch_s") > 0.0025);
     assert!(late.clone().count() >= 2);
     for row in late {
-        assert!(
-            low(row, "error_gain_ci", 1) < 0.0 && of(row, "error_in_time_px") < 0.5,
-            "{row}"
-        );
+        assert!(low(row, "error_gain_ci", 1) < 0.0 && of(row, "error_in_time_px") < 0.5, "{row}");
     }
 }

@@ -67,10 +67,7 @@ fn on(layout: &SkinLayout, cells: usize) -> Skin {
 
 /// Centre of a cell, (x, y), cells.
 fn centre([rows, cols]: [usize; 2], row: usize, col: usize) -> [f64; 2] {
-    [
-        col as f64 + 0.5 - 0.5 * cols as f64,
-        0.5 * rows as f64 - row as f64 - 0.5,
-    ]
+    [col as f64 + 0.5 - 0.5 * cols as f64, 0.5 * rows as f64 - row as f64 - 0.5]
 }
 
 /// A sphere with its top `SHELL` below the origin of its body, so that it touches a mesh that is exactly there.
@@ -185,9 +182,7 @@ impl Skin {
         let model = MjModel::from_xml_string(&self.mjcf(body.mesh)).expect("MuJoCo takes the skin");
         let mut data = MjData::new(Box::new(model));
         assert_eq!(data.qpos().len(), self.coordinates);
-        let steps = (HIGHEST_SPEED * depth / (STRIDE * (TIP + SHELL)))
-            .clamp(8.0, 200.0)
-            .ceil();
+        let steps = (HIGHEST_SPEED * depth / (STRIDE * (TIP + SHELL))).clamp(8.0, 200.0).ceil();
         data.reset();
         let options = data.model_opt_mut();
         options.timestep = 1.0 / steps;
@@ -210,11 +205,7 @@ impl Skin {
             if fastest <= SETTLED {
                 let unit_pa = K * self.cell_m;
                 let forces = data.qfrc_constraint();
-                return self
-                    .cell_dofs
-                    .iter()
-                    .map(|&dof| (-forces[dof] * unit_pa).max(0.0))
-                    .collect();
+                return self.cell_dofs.iter().map(|&dof| (-forces[dof] * unit_pa).max(0.0)).collect();
             }
         }
         panic!("the skin has not come to rest");
@@ -268,12 +259,7 @@ fn posed(mesh: &TriMesh, [x, y]: [f64; 2], depth_m: f64, angle_rad: f64) -> Pose
 
 /// Linear springs: densification vanishes in a layer 10 m thick.
 fn winkler(cells_per_taxel: usize, skin: &SkinLayout) -> WinklerLayer {
-    let foam = Foam {
-        stiffness_pa_per_m: K,
-        thickness_m: 10.0,
-        cells_per_taxel,
-        ..Foam::default()
-    };
+    let foam = Foam { stiffness_pa_per_m: K, thickness_m: 10.0, cells_per_taxel, ..Foam::default() };
     WinklerLayer::new(foam, skin).expect("valid")
 }
 
@@ -316,17 +302,11 @@ fn springs_are_a_winkler_layer() {
         let [found, wanted] = [&found_pa, expected.pressure_pa].map(|p| taxel_means(&skin, 2, p));
         let error = relative_rms(&found, &wanted);
         let [force_n, moments_nm @ ..] = bed.wrench(&found_pa);
-        assert!(
-            error <= 0.03,
-            "{name}: relative RMS {error:.4}, {force_n} N for {expected_n} N"
-        );
+        assert!(error <= 0.03, "{name}: relative RMS {error:.4}, {force_n} N for {expected_n} N");
         for (moment_nm, expected_nm) in moments_nm.into_iter().zip(expected.wrench.torque_nm) {
             // the lever of 3 % of the force at the contact's edge
             let apart_nm = moment_nm - expected_nm;
-            assert!(
-                apart_nm.abs() <= 0.03 * expected_n * 0.075,
-                "{name}: torque off by {apart_nm} N m"
-            );
+            assert!(apart_nm.abs() <= 0.03 * expected_n * 0.075, "{name}: torque off by {apart_nm} N m");
         }
     }
 }
@@ -343,10 +323,7 @@ fn finite_elements_under_a_uniform_load() {
         let found_pa = layer.press(&posed(&plate, [0.0, 0.0], depth_m, 0.0))[14];
         let expected_pa = K * depth_m * (1.0 - strain) * (1.0 - 0.5 * strain);
         // what has not settled (1e-5), the tips' sinking (1e-4) and what is left of the rim
-        assert!(
-            (found_pa / expected_pa - 1.0).abs() < 1e-3,
-            "ν {poisson}, ε {strain}: {found_pa} of {expected_pa} Pa"
-        );
+        assert!((found_pa / expected_pa - 1.0).abs() < 1e-3, "ν {poisson}, ε {strain}: {found_pa} of {expected_pa} Pa");
     }
 }
 
@@ -378,10 +355,7 @@ fn apart_from_layer(cells: Option<usize>) -> f64 {
 #[test]
 fn finite_elements_are_near_the_layer() {
     let (columns, elements) = (apart_from_layer(None), apart_from_layer(Some(1)));
-    assert!(
-        elements < columns,
-        "finite elements {elements:.4}, springs {columns:.4}"
-    );
+    assert!(elements < columns, "finite elements {elements:.4}, springs {columns:.4}");
 }
 
 /// Half the cell: the rim's part of the error, about 3.6 of 5.1 %, falls by half in first order, the material's 1.5 %

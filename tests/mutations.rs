@@ -111,14 +111,7 @@ fn mutations_of_the_corpus_are_refused_or_read() {
     let output = Command::new("timeout")
         .args([LONGEST_RUN_S, "sh", "-c", "ulimit -v $1; shift; exec \"$0\" \"$@\""])
         .arg(std::env::current_exe().unwrap())
-        .args([
-            MEMORY_KB,
-            "--exact",
-            this,
-            "--ignored",
-            "--nocapture",
-            "--test-threads=1",
-        ])
+        .args([MEMORY_KB, "--exact", this, "--ignored", "--nocapture", "--test-threads=1"])
         .env(ASKED, dir.path())
         .output()
         .unwrap();

@@ -45,17 +45,8 @@ fn case(taxels: usize, feedback_ohm: f64, bus_f: f64, feedback_f: f64, op_amp: O
         conductance_s: between(25e-6, 300e-6),
         edges: vec![(0.0, between(-3.3, 3.3)), (EDGE_S, between(-3.3, 3.3))],
     });
-    let network = Network {
-        feedback_ohm,
-        feedback_f,
-        bus_f,
-        offset_v: 0.4e-3,
-        temperature_k: 300.0,
-    };
-    Case {
-        drives: drives.collect(),
-        amplifier: Amplifier::new(op_amp, network).unwrap(),
-    }
+    let network = Network { feedback_ohm, feedback_f, bus_f, offset_v: 0.4e-3, temperature_k: 300.0 };
+    Case { drives: drives.collect(), amplifier: Amplifier::new(op_amp, network).unwrap() }
 }
 
 /// Every number of taxels, feedback and capacitance, without slewing and rails.
@@ -71,14 +62,7 @@ fn cases() -> Vec<Case> {
     for taxels in [1, 10, 100] {
         for feedback_ohm in [300.0, 1e3, 3e3] {
             for (bus_f, feedback_f) in [(0.0, 0.0), (5e-9, 0.0), (5e-9, 100e-12)] {
-                cases.push(case(
-                    taxels,
-                    feedback_ohm,
-                    bus_f,
-                    feedback_f,
-                    op_amp,
-                    cases.len() as u64,
-                ));
+                cases.push(case(taxels, feedback_ohm, bus_f, feedback_f, op_amp, cases.len() as u64));
             }
         }
     }
@@ -119,13 +103,7 @@ fn operating_point_noise_and_bandwidth() {
         // 1 Hz … 1 THz: outside is less than 1e-5 of the noise; 1500 points a decade resolve a peak of Q = 20
         let control = "op\nprint v(out)\nnoise v(out) Vd0 dec 1500 1 1e12\nsetplot noise1\nwrdata noise.dat onoise_spectrum\n\
                        setplot noise2\nprint onoise_total\nac dec 1000 100 1e8\nwrdata ac.dat vdb(out)";
-        let spice = run(&netlist(
-            &case.amplifier,
-            &case.drives,
-            Limits::None,
-            "reltol=1e-6 gmin=1e-15",
-            control,
-        ));
+        let spice = run(&netlist(&case.amplifier, &case.drives, Limits::None, "reltol=1e-6 gmin=1e-15", control));
         let load = case.load(0);
         let mut rest = Transient::new(case.amplifier);
         rest.settle(load);
@@ -161,10 +139,7 @@ fn step_response_and_ringing() {
         // steps of a 300th of the fastest turn or time constant, until a millionth of the step is left
         let long_s = response.settle_s(1e-6);
         let step_s = response.ringing_hz().unwrap_or(response.bandwidth_hz()).recip() / 300.0;
-        let control = format!(
-            "tran {step_s:e} {:e} 0 {step_s:e}\nwrdata tran.dat v(out)",
-            EDGE_S + long_s
-        );
+        let control = format!("tran {step_s:e} {:e} 0 {step_s:e}\nwrdata tran.dat v(out)", EDGE_S + long_s);
         let options = "reltol=1e-6 abstol=1e-15 vntol=1e-9 gmin=1e-15";
         let spice = run(&netlist(&case.amplifier, &case.drives, Limits::None, options, &control));
         let wave = spice.data("tran.dat");
@@ -178,13 +153,7 @@ fn step_response_and_ringing() {
             let (hz, damping_per_s) = ringing(&wave, EDGE_S, settled_v);
             rang.fetch_add(1, Ordering::Relaxed);
             assert_within("ringing", response.ringing_hz().unwrap(), hz, 0.02 * hz, case);
-            assert_within(
-                "damping",
-                response.damping_per_s(),
-                damping_per_s,
-                0.02 * damping_per_s,
-                case,
-            );
+            assert_within("damping", response.damping_per_s(), damping_per_s, 0.02 * damping_per_s, case);
         }
     });
     assert!(rang.into_inner() >= 6, "hardly any case rings");
@@ -198,10 +167,7 @@ fn slewing_and_rails() {
     if !found() {
         return;
     }
-    let op_amp = OpAmp {
-        rail_v: 5.0,
-        ..OpAmp::default()
-    };
+    let op_amp = OpAmp { rail_v: 5.0, ..OpAmp::default() };
     let capacitances = [(0.0, 0.0), (5e-9, 0.0), (20e-9, 0.0), (5e-9, 100e-12)];
     let cases: Vec<Case> = (0_u64..)
         .zip(capacitances)

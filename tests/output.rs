@@ -86,11 +86,7 @@ fn a_second_run_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let mut first = start(dir.path(), &press("out", "1"));
     await_lock(&dir.path().join(".out.spts-lock"));
-    refused(
-        dir.path(),
-        &press("out", "2"),
-        &["out: another run is writing to this folder"],
-    );
+    refused(dir.path(), &press("out", "2"), &["out: another run is writing to this folder"]);
     assert!(first.wait().unwrap().success());
     succeeds(dir.path(), &press("alone", "1"));
     assert_eq!(shown(&dir.path().join("out")), shown(&dir.path().join("alone")));
@@ -119,34 +115,19 @@ fn folders_that_are_not_a_run_s_are_refused_first() {
     for (command, path, fact) in [
         (simulate, "out", format!("out/notes.txt: {not_ours}")),
         (simulate, "results", format!("results/frames.csv/mine: {not_ours}")),
-        (
-            simulate,
-            "scene.toml",
-            "scene.toml: is a file; the output has to be a folder".to_owned(),
-        ),
+        (simulate, "scene.toml", "scene.toml: is a file; the output has to be a folder".to_owned()),
         (simulate, "scene.toml/out", "scene.toml: is a file".to_owned()),
-        (
-            simulate,
-            "/proc/none/out",
-            "/proc/none: the output folder cannot be made".to_owned(),
-        ),
+        (simulate, "/proc/none/out", "/proc/none: the output folder cannot be made".to_owned()),
         (simulate, "/", format!("/: {at_work}")),
         (simulate, ".", format!(".: {at_work}")),
         ("score --twin press/T --out ", "/proc/none/out", "/proc/none".to_owned()),
-        (
-            "score --twin press/T --out new --save ",
-            "/proc/none/board.json",
-            "/proc/none".to_owned(),
-        ),
+        ("score --twin press/T --out new --save ", "/proc/none/board.json", "/proc/none".to_owned()),
         ("reproduce --out ", "/proc/none/out", "/proc/none".to_owned()),
     ] {
         let start = Instant::now();
         refused(here, &words(&format!("{command}{path}")), &[&fact]);
         assert!(start.elapsed() < Duration::from_secs(2), "{command}{path}: found late");
-        assert!(
-            files(here) == before,
-            "{command}{path}: something was written all the same"
-        );
+        assert!(files(here) == before, "{command}{path}: something was written all the same");
     }
 }
 
@@ -221,10 +202,7 @@ fn memory_is_flat_in_the_number_of_presses() {
 #[ignore = "a minute, and a gigabyte on the disk"]
 fn ten_thousand_presses_fit() {
     let dir = tempfile::tempdir().unwrap();
-    let memory = memory_mb(
-        dir.path(),
-        &[&press("out", "1"), &["--presses", "10000", "--no-record"][..]].concat(),
-    );
+    let memory = memory_mb(dir.path(), &[&press("out", "1"), &["--presses", "10000", "--no-record"][..]].concat());
     eprintln!("10000 presses: {memory:.0} MB");
     assert!(memory < 400.0, "{memory} MB");
 }

@@ -17,15 +17,7 @@ fn touches_of_the_arm_are_located() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let arguments = [
-        "--no-times",
-        "--decoder",
-        "correlate",
-        "--measurements",
-        "20",
-        "--object",
-        "trig",
-    ];
+    let arguments = ["--no-times", "--decoder", "correlate", "--measurements", "20", "--object", "trig"];
     let Some(board) = score(dir.path(), &arguments) else {
         return;
     };
@@ -44,17 +36,10 @@ fn touches_of_the_arm_are_located() {
     let arguments: Vec<&str> = ["decode", path].into_iter().chain(arguments.split(' ')).collect();
     let decoded: Value = json(dir.path(), &arguments);
     let rows = decoded["rows"].as_array().unwrap();
-    let starts = |block: u64| {
-        rows.iter()
-            .find(|row| row["block"] == block)
-            .map(|row| row["start"].as_u64().unwrap())
-    };
+    let starts = |block: u64| rows.iter().find(|row| row["block"] == block).map(|row| row["start"].as_u64().unwrap());
     // half a second apart at least, where every block without a touch in time would begin in its middle
     for (block, start) in [(1, 43_400), (2, 42_300), (3, 52_000), (4, 61_500), (5, 64_300)] {
         let found = starts(block).unwrap();
-        assert!(
-            found.abs_diff(start) <= 1000,
-            "block {block}: touched at {found}, expected {start}"
-        );
+        assert!(found.abs_diff(start) <= 1000, "block {block}: touched at {found}, expected {start}");
     }
 }

@@ -66,10 +66,7 @@ fn priors() -> Vec<ImagePrior> {
 fn settings_are_chosen_on_raster_presses_that_are_not_scored() {
     let Some(root) = recordings() else { return };
     let real = PublishedSkin::open(&root).unwrap();
-    let mut rows: Vec<Choice> = priors()
-        .into_par_iter()
-        .flat_map(|prior| choices(&real, prior))
-        .collect();
+    let mut rows: Vec<Choice> = priors().into_par_iter().flat_map(|prior| choices(&real, prior)).collect();
     rows.sort_by(|a, b| b.value().total_cmp(&a.value()));
     eprintln!("value  all    worst half  of all at M = {SYNTHETIC_M:?}  settings");
     rows.iter().take(25).for_each(|choice| eprintln!("{choice}"));
@@ -107,23 +104,14 @@ impl std::fmt::Display for Choice {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [all, worst_half] = self.means();
         let Self { of_m, noise, prior, .. } = self;
-        write!(
-            f,
-            "{:.4} {all:.4} {worst_half:.4} {of_m:.3?}  noise {noise} {prior:?}",
-            self.value()
-        )
+        write!(f, "{:.4} {all:.4} {worst_half:.4} {of_m:.3?}  noise {noise} {prior:?}", self.value())
     }
 }
 
 /// One prior with every noise.
 fn choices(real: &PublishedSkin, prior: ImagePrior) -> [Choice; NOISES.len()] {
     let sessions = &real.skin.sessions;
-    let mut choices = NOISES.map(|noise| Choice {
-        prior,
-        noise,
-        objects: Vec::new(),
-        of_m: [0.0; SYNTHETIC_M.len()],
-    });
+    let mut choices = NOISES.map(|noise| Choice { prior, noise, objects: Vec::new(), of_m: [0.0; SYNTHETIC_M.len()] });
     for session in sessions {
         let others = sessions.iter().filter(|s| s.object != session.object);
         let learned = Arc::new(prior.learn(&images(others), real.skin.learned.cols).unwrap());

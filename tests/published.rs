@@ -13,31 +13,11 @@ const OBJECTS: [&str; 5] = ["brain", "center", "eraser", "rec", "trig"];
 /// Measurements, most atoms, and the SHA-256 that `scripts/oracles/published_supports.py` prints for the supports of
 /// its 1,000 windows.
 const DIGESTS: [(usize, usize, &str); 5] = [
-    (
-        20,
-        20,
-        "fbde90e2556f1fa35b78a08eb4063f98cbf88878bcebc362de9e9fc1887e19ee",
-    ),
-    (
-        25,
-        20,
-        "5f5e18a44cdfff519024b3668ceb086d3e36996ae7c54b7f83c06f18c0845741",
-    ),
-    (
-        50,
-        20,
-        "dfe10be0ff8c1019177c3e277dd57a9a25bf35427593a2d7cc835debd92aa63b",
-    ),
-    (
-        25,
-        10,
-        "5cec506592a8042d8870b464eaf909343ee12337e9873d6ee356f3874e7edf48",
-    ),
-    (
-        50,
-        10,
-        "c9a9df5943d7c328e979716d278e5a69fc0d87a696724aaa8819db0c10b2816e",
-    ),
+    (20, 20, "fbde90e2556f1fa35b78a08eb4063f98cbf88878bcebc362de9e9fc1887e19ee"),
+    (25, 20, "5f5e18a44cdfff519024b3668ceb086d3e36996ae7c54b7f83c06f18c0845741"),
+    (50, 20, "dfe10be0ff8c1019177c3e277dd57a9a25bf35427593a2d7cc835debd92aa63b"),
+    (25, 10, "5cec506592a8042d8870b464eaf909343ee12337e9873d6ee356f3874e7edf48"),
+    (50, 10, "c9a9df5943d7c328e979716d278e5a69fc0d87a696724aaa8819db0c10b2816e"),
 ];
 
 /// Φ·D with weights 0 and 1, and the measurements, of the first `m` samples of a frame.
@@ -80,13 +60,8 @@ fn the_reference_chooses_what_the_published_decoder_chooses() {
         let text = supports(&sessions, dictionary, m, most);
         assert_eq!(text.lines().count(), 1000);
         let digest = Sha256::digest(&text);
-        let found = digest
-            .iter()
-            .fold(String::new(), |hex, byte| hex + &format!("{byte:02x}"));
-        assert_eq!(
-            found, expected,
-            "M = {m}, S = {most}: at least one of 1,000 supports differs"
-        );
+        let found = digest.iter().fold(String::new(), |hex, byte| hex + &format!("{byte:02x}"));
+        assert_eq!(found, expected, "M = {m}, S = {most}: at least one of 1,000 supports differs");
     }
 }
 

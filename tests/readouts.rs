@@ -16,13 +16,7 @@ fn a_benchmark_is_written_whole_and_does_not_depend_on_the_threads() {
     assert!(printed[0] == printed[1], "the numbers depend on the number of threads");
     let (one, three) = (files(&dir.path().join("1")), files(&dir.path().join("3")));
     assert!(one == three, "the files depend on the number of threads");
-    for name in [
-        "readouts.csv",
-        "readouts.md",
-        "published.csv",
-        "figures/readouts.png",
-        "figures/readouts.svg",
-    ] {
+    for name in ["readouts.csv", "readouts.md", "published.csv", "figures/readouts.png", "figures/readouts.svg"] {
         assert!(one.contains_key(name), "{name}");
     }
 
@@ -52,10 +46,7 @@ fn a_benchmark_is_written_whole_and_does_not_depend_on_the_threads() {
     );
     // a line a number of measurements, and the head
     let trials: usize = rows.iter().map(|row| row["trials"].as_array().unwrap().len()).sum();
-    assert_eq!(
-        String::from_utf8_lossy(&one["readouts.csv"]).lines().count(),
-        1 + trials
-    );
+    assert_eq!(String::from_utf8_lossy(&one["readouts.csv"]).lines().count(), 1 + trials);
 }
 
 #[test]
@@ -76,8 +67,5 @@ fn the_help_has_examples() {
     let dir = tempfile::tempdir().unwrap();
     let help = succeeds(dir.path(), &["readouts", "--help"]);
     let said = String::from_utf8_lossy(&help.stdout).into_owned();
-    assert!(
-        said.contains("spts readouts --quick") && said.contains("code_division"),
-        "{said}"
-    );
+    assert!(said.contains("spts readouts --quick") && said.contains("code_division"), "{said}");
 }

@@ -44,19 +44,12 @@ fn the_real_skin_scores_what_it_is_known_to_score() {
     let dir = tempfile::tempdir().unwrap();
     let measurements = M.map(|m| m.to_string()).join(",");
     let path = recordings.to_str().unwrap();
-    let report: Value = json(
-        dir.path(),
-        &["validate", path, "--measurements", &measurements, "--json"],
-    );
+    let report: Value = json(dir.path(), &["validate", path, "--measurements", &measurements, "--json"]);
     for (decode, score, expected) in SCORES {
         for (m, expected) in M.into_iter().zip(expected) {
             let row = row(&report, "mean", decode, m);
             let found = row[score].as_f64().unwrap();
-            let tolerance = if score == "class_vote20" {
-                VOTE_TOLERANCE
-            } else {
-                SUPPORT_TOLERANCE
-            };
+            let tolerance = if score == "class_vote20" { VOTE_TOLERANCE } else { SUPPORT_TOLERANCE };
             assert!(
                 (found - expected).abs() <= tolerance,
                 "{decode} {score} at M = {m}: {found:.4}, expected {expected:.3} ± {tolerance}"
@@ -65,10 +58,7 @@ fn the_real_skin_scores_what_it_is_known_to_score() {
     }
     // an empty image scores 1 − contact area, which the recordings' ground truth fixes exactly
     let empty = report["baselines"].as_array().unwrap().iter();
-    let mean = empty
-        .clone()
-        .find(|b| b["object"] == "mean" && b["baseline"] == "empty")
-        .unwrap();
+    let mean = empty.clone().find(|b| b["object"] == "mean" && b["baseline"] == "empty").unwrap();
     assert!((mean["support"].as_f64().unwrap() - 0.848).abs() < 0.0005);
     assert!(report["missing"].as_array().is_some());
     assert!(report["localisation"].as_array().is_some_and(|rows| !rows.is_empty()));
@@ -88,18 +78,9 @@ fn any_subset_in_the_original_layout_will_do() {
     let dir = tempfile::tempdir().unwrap();
     let (own, clone) = (dir.path().join("own"), dir.path().join("clone/Data_Analysis"));
     for (here, there) in [
-        (
-            "presses/brain/brain_raster.mat",
-            "Measurements_Collected/brain/brain_raster.mat",
-        ),
-        (
-            "presses/brain/brain_random2.mat",
-            "Measurements_Collected/brain/brain_random2.mat",
-        ),
-        (
-            "presses/brain/brain_random2_time.mat",
-            "Measurements_Collected/brain/brain_random2_time.mat",
-        ),
+        ("presses/brain/brain_raster.mat", "Measurements_Collected/brain/brain_raster.mat"),
+        ("presses/brain/brain_random2.mat", "Measurements_Collected/brain/brain_random2.mat"),
+        ("presses/brain/brain_random2_time.mat", "Measurements_Collected/brain/brain_random2_time.mat"),
         ("dictionary.mat", "Dictionary_Learning/dictionary.mat"),
         ("SRC_lib.mat", "SRC_Library/SRC_lib.mat"),
     ] {
@@ -112,19 +93,10 @@ fn any_subset_in_the_original_layout_will_do() {
     let report = validate("clone");
     assert_eq!(report, validate("own"));
     assert_eq!(report, validate("clone/Data_Analysis"));
-    assert_eq!(
-        row(&report, "mean", "matched", 20)["iou"],
-        row(&report, "brain", "matched", 20)["iou"]
-    );
+    assert_eq!(row(&report, "mean", "matched", 20)["iou"], row(&report, "brain", "matched", 20)["iou"]);
     let missing = report["missing"].as_array().unwrap();
-    assert!(
-        missing.iter().any(|m| m.as_str().unwrap().contains("center")),
-        "{missing:?}"
-    );
-    assert!(
-        missing.iter().any(|m| m.as_str().unwrap().contains("ball")),
-        "{missing:?}"
-    );
+    assert!(missing.iter().any(|m| m.as_str().unwrap().contains("center")), "{missing:?}");
+    assert!(missing.iter().any(|m| m.as_str().unwrap().contains("ball")), "{missing:?}");
 }
 
 /// A published file that was cut short, as by an interrupted download: one line that says so.

@@ -17,10 +17,7 @@ fn a_quick_report_is_complete_and_does_not_depend_on_the_threads() {
         succeeds(dir.path(), &arguments);
     }
     for folder in ["tables", "arrays"] {
-        let (one, two) = (
-            files(&dir.path().join("1").join(folder)),
-            files(&dir.path().join("2").join(folder)),
-        );
+        let (one, two) = (files(&dir.path().join("1").join(folder)), files(&dir.path().join("2").join(folder)));
         assert!(!one.is_empty());
         assert_eq!(one.keys().collect::<Vec<_>>(), two.keys().collect::<Vec<_>>());
         for (name, bytes) in &one {
@@ -34,18 +31,13 @@ fn a_quick_report_is_complete_and_does_not_depend_on_the_threads() {
         assert!(!summary["provenance"][key].is_null(), "no provenance.{key}");
     }
     let page = std::fs::read_to_string(out.join("index.html")).unwrap();
-    assert!(
-        !page.contains("http://") && !page.contains("https://"),
-        "the page needs a network"
-    );
+    assert!(!page.contains("http://") && !page.contains("https://"), "the page needs a network");
     for figure in words(
         "s5_objects 3b_classification 3c_support 3d_frequency 3e_latency 4_adaptive 5b_change 5c_peak \
           6_localisation s4_examples s6_dictionary",
     ) {
         for ending in ["svg", "png"] {
-            let size = std::fs::metadata(out.join("figures").join(format!("{figure}.{ending}")))
-                .unwrap()
-                .len();
+            let size = std::fs::metadata(out.join("figures").join(format!("{figure}.{ending}"))).unwrap().len();
             assert!(size > 1000, "{figure}.{ending} has {size} bytes");
         }
         assert!(page.contains(figure), "{figure} is not on the page");
@@ -74,10 +66,7 @@ fn check_tables(page: &str, folder: &Path, with_recordings: bool) {
 fn check_headline(h: &Value, with_recordings: bool) {
     let within = |key: &str, low: f64, high: f64| {
         let value = h[key].as_f64().unwrap_or_else(|| panic!("no {key}"));
-        assert!(
-            (low..=high).contains(&value),
-            "{key} = {value} is outside [{low}, {high}]"
-        );
+        assert!((low..=high).contains(&value), "{key} = {value} is outside [{low}, {high}]");
     };
     within("press_plateau_n", 19.9, 20.1);
     within("press_plateau_error_max_n", 0.0, 0.1);

@@ -33,10 +33,7 @@ fn chosen_rows_see_more_of_the_real_skin() {
     }
     let class = |sensing| score_of(&board, "evidence", 5, false, sensing, "class_single");
     let (random, chosen) = (class("random"), class("chosen"));
-    assert!(
-        chosen >= 0.93 && chosen > random,
-        "classes: {chosen:.3}, random {random:.3}"
-    );
+    assert!(chosen >= 0.93 && chosen > random, "classes: {chosen:.3}, random {random:.3}");
     for sensing in ["random", "chosen"] {
         let objects = board["objects"].as_array().unwrap().iter();
         let here = objects.filter(|o| o["decoder"] == "nn_lmmse" && o["m"] == 20 && o["sensing"] == sensing);
@@ -60,10 +57,7 @@ fn chosen_boards_are_reproducible_and_compared() {
     let arguments =
         words("--decoder nn_lmmse --sensing chosen,random --measurements 9 --object trig --no-ball --no-times");
     let on = |threads: &str, more: &[&str]| {
-        score(
-            dir.path(),
-            &[&arguments[..], &["--threads", threads, "--save", "board.json"], more].concat(),
-        )
+        score(dir.path(), &[&arguments[..], &["--threads", threads, "--save", "board.json"], more].concat())
     };
     let Some(first) = on("1", &[]) else { return };
     assert_eq!(first["rows"].as_array().unwrap().len(), 2);
@@ -71,8 +65,7 @@ fn chosen_boards_are_reproducible_and_compared() {
     let mut older: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
     let rows = older["rows"].as_array_mut().unwrap();
     rows.retain(|r| r["sensing"] == "random");
-    rows.iter_mut()
-        .for_each(|r| drop(r.as_object_mut().unwrap().remove("sensing")));
+    rows.iter_mut().for_each(|r| drop(r.as_object_mut().unwrap().remove("sensing")));
     std::fs::write(dir.path().join("older.json"), older.to_string()).unwrap();
     let second = on("2", &["--against", "older.json", "--tolerance", "0"]).unwrap();
     assert_eq!(first["rows"], second["rows"]);

@@ -15,18 +15,13 @@ pub(crate) fn score(dir: &Path, arguments: &[&str]) -> Option<Value> {
 
 fn row<'a>(board: &'a Value, decoder: &str, m: u64, left_out: bool) -> &'a Value {
     let rows = board["rows"].as_array().unwrap();
-    let found = rows
-        .iter()
-        .find(|r| r["decoder"] == decoder && r["m"] == m && r["left_out"] == left_out);
+    let found = rows.iter().find(|r| r["decoder"] == decoder && r["m"] == m && r["left_out"] == left_out);
     found.unwrap_or_else(|| panic!("no row of {decoder} at M = {m}, left out: {left_out}"))
 }
 
 fn at_least(board: &Value, decoder: &str, m: u64, left_out: bool, score: &str, least: f64) {
     let value = row(board, decoder, m, left_out)[score].as_f64().unwrap();
-    assert!(
-        value >= least,
-        "{decoder} at M = {m}, left out: {left_out}: {score} {value:.4}, at least {least}"
-    );
+    assert!(value >= least, "{decoder} at M = {m}, left out: {left_out}: {score} {value:.4}, at least {least}");
 }
 
 /// The same rows for any number of threads, and no score that fell in a board that is held against itself.
@@ -43,10 +38,8 @@ fn boards_are_reproducible_and_compared() {
     assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
     let second = run(&["--threads", "2", "--against", "board.json", "--tolerance", "0"]);
     assert_eq!(second.status.code(), Some(0));
-    let (first, second): (Value, Value) = (
-        serde_json::from_slice(&first.stdout).unwrap(),
-        serde_json::from_slice(&second.stdout).unwrap(),
-    );
+    let (first, second): (Value, Value) =
+        (serde_json::from_slice(&first.stdout).unwrap(), serde_json::from_slice(&second.stdout).unwrap());
     assert_eq!(first["rows"], second["rows"]);
     assert_eq!(first["localisation"], second["localisation"]);
     assert_eq!(second["regressions"], Value::Array(vec![]));
@@ -69,10 +62,7 @@ fn scores_that_fell_are_named() {
     let worse = run("--against board.json");
     assert_eq!(worse.status.code(), Some(1));
     let said = String::from_utf8_lossy(&worse.stderr).into_owned();
-    assert!(
-        said.contains("iou was") && said.contains("1 scores fell, 0 are gone"),
-        "{said}"
-    );
+    assert!(said.contains("iou was") && said.contains("1 scores fell, 0 are gone"), "{said}");
     assert_eq!(run("--against board.json --tolerance 0.02").status.code(), Some(0));
 }
 
@@ -84,9 +74,7 @@ fn what_a_board_lacks_is_named() {
         let start = words("score --twin press/T --quick --no-times --json");
         spts(dir.path(), &[&start[..], more].concat())
     };
-    let saved = run(&words(
-        "--decoder empty,correlate --measurements 7,20 --save board.json",
-    ));
+    let saved = run(&words("--decoder empty,correlate --measurements 7,20 --save board.json"));
     assert!(saved.status.success(), "{}", String::from_utf8_lossy(&saved.stderr));
     let less = run(&words("--decoder empty,omp --measurements 20 --against board.json"));
     assert_eq!(less.status.code(), Some(1));
@@ -119,10 +107,7 @@ fn external_programs_are_scored_or_named() {
     assert!(same["iou"].is_null() && same["iou_ci"].is_null());
     let recordings = recordings().unwrap();
     for (command, expected) in [
-        (
-            "sed -u -e 1d -e 's/.*/{\"image\": [1, 2]}/'",
-            "an image of 2 values; needed are 100",
-        ),
+        ("sed -u -e 1d -e 's/.*/{\"image\": [1, 2]}/'", "an image of 2 values; needed are 100"),
         ("sed -u -e 1d -e 's/.*/hello/'", "answered window 1 with `hello`"),
         ("exit 3", "before it had answered"),
     ] {

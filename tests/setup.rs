@@ -24,10 +24,7 @@ impl Project {
         for (name, text) in [
             ("dpkg-query", "echo installed"),
             ("cargo", "exit 0"),
-            (
-                "python3",
-                "[ \"$3\" = --version ] && exit 0; echo 'no network' >&2; exit 1",
-            ),
+            ("python3", "[ \"$3\" = --version ] && exit 0; echo 'no network' >&2; exit 1"),
         ] {
             let tool = project.0.path().join("tools").join(name);
             fs::write(&tool, format!("#!/bin/sh\n{text}\n")).unwrap();

@@ -17,21 +17,14 @@ const GAPS: [(&str, f64); 2] = [("class_single", 0.03), ("iou", 0.05)];
 #[ignore = "presses 17 objects on 32 skins and decodes every window of fifty presses three times"]
 fn decoders_of_the_real_skin_learn_from_simulation() {
     let dir = tempfile::tempdir().unwrap();
-    let sources = [
-        "--learn-from",
-        "raster,simulation,simulation_fitted,calibrated",
-        "--no-ball",
-        "--no-times",
-    ];
+    let sources = ["--learn-from", "raster,simulation,simulation_fitted,calibrated", "--no-ball", "--no-times"];
     let decoders = ["--decoder", "evidence", "--measurements", "7,20"];
     let Some(board) = score(dir.path(), &[&sources[..], &decoders].concat()) else {
         return;
     };
     let at = |from: &str, score: &str, m: u64| {
         let same = |r: &&Value| r["learned_from"] == from && r["m"] == m;
-        board["rows"].as_array().unwrap().iter().find(same).unwrap()[score]
-            .as_f64()
-            .unwrap()
+        board["rows"].as_array().unwrap().iter().find(same).unwrap()[score].as_f64().unwrap()
     };
     let of = |from: &str, score: &str| at(from, score, 20);
     for (score, most) in GAPS {
@@ -41,10 +34,7 @@ fn decoders_of_the_real_skin_learn_from_simulation() {
     // what was asked for of templates that do not know the pose
     for (score, least) in [("class_single", 0.93), ("class_vote20", 0.99)] {
         let found = of("simulation", score);
-        assert!(
-            found >= least,
-            "{score} without fitted places: {found:.4}, at least {least}"
-        );
+        assert!(found >= least, "{score} without fitted places: {found:.4}, at least {least}");
     }
     // what was asked for of gains that the other objects tell
     let found = at("calibrated", "class_single", 7);
@@ -62,10 +52,7 @@ fn a_skin_is_calibrated_and_decoded_with_its_gains() {
     let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();
     let recordings = recordings.to_str().unwrap();
-    let report: Value = json(
-        dir.path(),
-        &["calibrate", recordings, "--skin", "--out", "gains.toml", "--json"],
-    );
+    let report: Value = json(dir.path(), &["calibrate", recordings, "--skin", "--out", "gains.toml", "--json"]);
     let objects = report["objects"].as_array().unwrap();
     assert_eq!(objects.len(), 17);
     let mean = |key: &str| objects.iter().map(|o| o[key].as_f64().unwrap()).sum::<f64>() / 17.0;
@@ -78,23 +65,9 @@ fn a_skin_is_calibrated_and_decoded_with_its_gains() {
     let spread = report["spread_log_sd"].as_f64().unwrap();
     assert!((0.2..0.45).contains(&spread), "{spread}");
     assert!(dir.path().join("gains.png").exists());
-    let decode = [
-        "decode",
-        recordings,
-        "--session",
-        "rec",
-        "--skin",
-        "gains.toml",
-        "--decoder",
-        "evidence",
-    ];
+    let decode = ["decode", recordings, "--session", "rec", "--skin", "gains.toml", "--decoder", "evidence"];
     let decoded: Value = json(dir.path(), &[&decode[..], &["--windows", "20", "--json"]].concat());
-    let rows: Vec<&Value> = decoded["rows"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .filter(|r| r["m"] == 20)
-        .collect();
+    let rows: Vec<&Value> = decoded["rows"].as_array().unwrap().iter().filter(|r| r["m"] == 20).collect();
     let right = rows.iter().filter(|r| r["label"] == "rec").count();
     assert!(right as f64 >= 0.95 * rows.len() as f64, "{right} of {}", rows.len());
     // a scene takes the gains, and stores them

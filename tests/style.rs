@@ -80,9 +80,6 @@ fn the_main_crates_have_examples() {
             });
             examples += fences.count() / 2;
         }
-        assert!(
-            examples >= least,
-            "{package}: {examples} examples, {least} are expected"
-        );
+        assert!(examples >= least, "{package}: {examples} examples, {least} are expected");
     }
 }

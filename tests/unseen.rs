@@ -23,10 +23,7 @@ fn shapes_alone_show_objects_never_seen() {
         return;
     };
     let rows = board["rows"].as_array().unwrap();
-    assert!(
-        rows.iter()
-            .all(|r| r["learned_from"] == "shapes" && r["left_out"] == true)
-    );
+    assert!(rows.iter().all(|r| r["learned_from"] == "shapes" && r["left_out"] == true));
     let iou = |decoder: &str, m, sensing| of(&board, "rows", decoder, m, sensing)[0]["iou"].as_f64().unwrap();
     for (m, least) in [(7, 0.45), (20, 0.64), (25, 0.68)] {
         let found = iou("amortised", m, "random");

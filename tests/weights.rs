@@ -28,11 +28,7 @@ fn weights_equal_the_cells_output_bit_for_bit() {
             weights.fill_rows(edge, &mut row);
             for (k, (code, w)) in codes.iter().zip(&row).enumerate() {
                 let expected = level(cell_mode, *code);
-                assert_eq!(
-                    w.to_bits(),
-                    expected.to_bits(),
-                    "{cell_mode:?}, edge {edge}, taxel {k}: {w} ≠ {expected}"
-                );
+                assert_eq!(w.to_bits(), expected.to_bits(), "{cell_mode:?}, edge {edge}, taxel {k}: {w} ≠ {expected}");
             }
         }
     }
@@ -49,10 +45,6 @@ fn a_mis_seeded_cell_is_the_fault_model_s() {
     for edge in 0..1000 {
         array.clock(Clock::default(), &mut codes).unwrap();
         let expected = weights.mode().level_from_seed(2, edge);
-        assert_eq!(
-            level(CellMode::Binary, codes[56]).to_bits(),
-            expected.to_bits(),
-            "edge {edge}"
-        );
+        assert_eq!(level(CellMode::Binary, codes[56]).to_bits(), expected.to_bits(), "edge {edge}");
     }
 }

@@ -15,10 +15,7 @@ fn main() {
         }
     }
     let revision = std::env::var("SPTS_GIT_REVISION").ok().or_else(revision);
-    println!(
-        "cargo:rustc-env=SPTS_BUILT_FROM={}",
-        revision.as_deref().unwrap_or("unknown")
-    );
+    println!("cargo:rustc-env=SPTS_BUILT_FROM={}", revision.as_deref().unwrap_or("unknown"));
 }
 
 /// The commit, with "-dirty" where tracked files differ from it.
@@ -26,11 +23,7 @@ fn revision() -> Option<String> {
     let commit = git(&["rev-parse", "HEAD"])?;
     // without locks, because git would else write its index anew, and Cargo build everything once more
     let changed = git(&["--no-optional-locks", "status", "--porcelain", "--untracked-files=no"])?;
-    Some(if changed.is_empty() {
-        commit
-    } else {
-        format!("{commit}-dirty")
-    })
+    Some(if changed.is_empty() { commit } else { format!("{commit}-dirty") })
 }
 
 /// What git answers; `None` without git or outside a repository.

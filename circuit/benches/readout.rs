@@ -9,9 +9,7 @@ use std::hint::black_box;
 const MEASUREMENTS: usize = 10_000;
 
 fn map(scale: f64) -> ConductanceMap {
-    let values = (0_u32..100)
-        .map(|k| if k % 4 == 0 { scale * f64::from(k) } else { 0.0 })
-        .collect();
+    let values = (0_u32..100).map(|k| if k % 4 == 0 { scale * f64::from(k) } else { 0.0 }).collect();
     ConductanceMap::from_values(10, 10, values)
 }
 

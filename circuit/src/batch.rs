@@ -183,11 +183,7 @@ impl Batch<'_> {
             times(to, &mut scratch.to);
             &scratch.to[..]
         });
-        let lines = Lines {
-            from: &scratch.from,
-            to,
-            share: self.skin.share,
-        };
+        let lines = Lines { from: &scratch.from, to, share: self.skin.share };
         self.rows.sum(lines, &mut scratch.sums);
         let total = |values: &[f64]| values.iter().zip(means).map(|(x, mean)| x * mean).sum();
         let (from, to) = (total(self.skin.from), self.skin.to.map(total));

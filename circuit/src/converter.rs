@@ -49,17 +49,8 @@ impl TryFrom<AdcConfig> for Adc {
         let max_code = f64::from((1_u32 << c.bits) - 1);
         // between 1e-6 V / 2^24 and 1e6 V: every code and every output is finite
         let lsb_v = c.reference_v / max_code * c.divider;
-        in_range(
-            "reference_v · divider / (2^bits − 1)",
-            lsb_v,
-            lsb_v.is_normal(),
-            "[5e-14, 1e6]",
-        )?;
-        Ok(Self {
-            offset_v: c.offset_v,
-            lsb_v,
-            max_code,
-        })
+        in_range("reference_v · divider / (2^bits − 1)", lsb_v, lsb_v.is_normal(), "[5e-14, 1e6]")?;
+        Ok(Self { offset_v: c.offset_v, lsb_v, max_code })
     }
 }
 
@@ -87,11 +78,7 @@ impl Adc {
     /// # Errors
     /// [`Refusal`] for a constant outside [−1e6, 1e6] V.
     pub fn converter(&self, subtract_v: Option<f64>) -> Result<Converter, Refusal> {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a whole number below 2^24"
-        )]
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a whole number below 2^24")]
         let max_code = self.max_code as u32;
         Converter::new(ConverterConfig {
             offset_v: self.offset_v,
@@ -181,20 +168,10 @@ impl Converter {
     /// [`Refusal`] for a parameter outside its range.
     pub fn new(config: ConverterConfig) -> Result<Self, Refusal> {
         within("offset_v", config.offset_v, -1e6, 1e6, "[−1e6, 1e6]")?;
-        within(
-            "max_code",
-            f64::from(config.max_code),
-            1.0,
-            16_777_215.0,
-            "[1, 2^24 − 1]",
-        )?;
+        within("max_code", f64::from(config.max_code), 1.0, 16_777_215.0, "[1, 2^24 − 1]")?;
         match config.scale {
             CodeScale::StepV(step_v) => within("scale.step_v", step_v, 5e-14, 1e6, "[5e-14, 1e6]")?,
-            CodeScale::Divider {
-                reference_v,
-                numerator,
-                denominator,
-            } => {
+            CodeScale::Divider { reference_v, numerator, denominator } => {
                 within("scale.divider.reference_v", reference_v, 1e-3, 1e3, "[1e-3, 1e3]")?;
                 within("scale.divider.numerator", numerator, 1e-3, 1e6, "[1e-3, 1e6]")?;
                 within("scale.divider.denominator", denominator, 1e-3, 1e6, "[1e-3, 1e6]")?;
@@ -221,16 +198,12 @@ impl Converter {
         let code = f64::from(code);
         let taken = match self.0.scale {
             CodeScale::StepV(step_v) => code * step_v,
-            CodeScale::Divider {
-                reference_v,
-                numerator,
-                denominator,
-            } => code / f64::from(self.0.max_code) * reference_v * numerator / denominator,
+            CodeScale::Divider { reference_v, numerator, denominator } => {
+                code / f64::from(self.0.max_code) * reference_v * numerator / denominator
+            }
         };
         let volts = self.0.offset_v - taken;
-        self.0
-            .subtract_v
-            .map_or(volts, |subtract_v| (volts - subtract_v).max(0.0))
+        self.0.subtract_v.map_or(volts, |subtract_v| (volts - subtract_v).max(0.0))
     }
 
     /// Smallest code whose voltage equals `volts` bit for bit; `None` if there is no such code, as for NaN.
@@ -264,13 +237,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn adc(divider: f64, offset_v: f64) -> Adc {
-        Adc::try_from(AdcConfig {
-            bits: 10,
-            reference_v: 3.3,
-            divider,
-            offset_v,
-        })
-        .unwrap()
+        Adc::try_from(AdcConfig { bits: 10, reference_v: 3.3, divider, offset_v }).unwrap()
     }
 
     #[test]
@@ -284,13 +251,7 @@ mod tests {
     fn every_corner_of_the_ranges_is_finite() {
         for (bits, offset_v) in [(1, -1e6), (1, 1e6), (24, -1e6), (24, 1e6)] {
             for (reference_v, divider) in [(1e-3, 1e-3), (1e-3, 1e3), (1e3, 1e-3), (1e3, 1e3)] {
-                let adc = Adc::try_from(AdcConfig {
-                    bits,
-                    reference_v,
-                    divider,
-                    offset_v,
-                })
-                .unwrap();
+                let adc = Adc::try_from(AdcConfig { bits, reference_v, divider, offset_v }).unwrap();
                 assert!(adc.lsb_v().is_normal(), "{adc:?}");
                 for volts in [0.0, offset_v, f64::MAX, f64::MIN, f64::MIN_POSITIVE] {
                     assert!(adc.volts(adc.code(volts)).is_finite(), "{volts} V: {adc:?}");
@@ -316,11 +277,7 @@ mod tests {
     fn published(offset_v: f64, numerator: f64, denominator: f64, subtract_v: Option<f64>) -> Converter {
         Converter::new(ConverterConfig {
             offset_v,
-            scale: CodeScale::Divider {
-                reference_v: 3.3,
-                numerator,
-                denominator,
-            },
+            scale: CodeScale::Divider { reference_v: 3.3, numerator, denominator },
             max_code: 1023,
             subtract_v,
         })
@@ -348,10 +305,7 @@ mod tests {
                 let volts = converter.volts(code);
                 let found = converter.code(volts).unwrap();
                 assert_eq!(converter.volts(found).to_bits(), volts.to_bits());
-                assert!(
-                    found == code || (found < code && volts.abs() < f64::MIN_POSITIVE),
-                    "{found}, {code}"
-                );
+                assert!(found == code || (found < code && volts.abs() < f64::MIN_POSITIVE), "{found}, {code}");
             }
             assert!(converter.made(&[converter.volts(1), f64::NAN]) && !converter.made(&[0.012_345]));
             assert_eq!(converter.code(f64::NAN), None);

@@ -48,10 +48,7 @@ impl Engine {
 
     /// The same engine with cells that put out `codes`, as many as the skin has taxels.
     pub(crate) fn with_codes(self, codes: Box<dyn CellCodes>) -> Self {
-        Self {
-            codes: Some(codes),
-            ..self
-        }
+        Self { codes: Some(codes), ..self }
     }
 
     /// Weights of the skin.
@@ -88,10 +85,7 @@ impl Engine {
                 }
                 let row = first_row + done as u64;
                 match &mut self.codes {
-                    Some(codes) => self
-                        .rows
-                        .go_to_codes(&mut **codes, row, len)
-                        .map_err(|e| e.at("cells"))?,
+                    Some(codes) => self.rows.go_to_codes(&mut **codes, row, len).map_err(|e| e.at("cells"))?,
                     None => self.rows.go_to(row, len),
                 }
                 let mut batch = self.sum(&segment, &moments, &mut volts[done..done + len]);
@@ -131,11 +125,7 @@ impl Engine {
     /// The batch before any effect.
     fn sum<'a>(&'a mut self, segment: &Segment<'a>, moments: &Moments, output_v: &'a mut [f64]) -> Batch<'a> {
         let len = output_v.len();
-        let skin = Lines {
-            from: segment.conductance_s,
-            to: segment.end_conductance_s,
-            share: &self.share,
-        };
+        let skin = Lines { from: segment.conductance_s, to: segment.end_conductance_s, share: &self.share };
         let mode = self.rows.weights().mode();
         self.rows.sum(skin, &mut self.sums);
         self.sum_v.resize(len, 0.0);
@@ -194,13 +184,7 @@ impl Moments {
             }
         }
         let [from, to, from_from, from_to, to_to] = lanes.map(|l| l.iter().sum());
-        Self {
-            from,
-            to,
-            from_from,
-            from_to,
-            to_to,
-        }
+        Self { from, to, from_from, from_to, to_to }
     }
 
     /// Σx at `share` of the segment.

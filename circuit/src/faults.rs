@@ -38,17 +38,10 @@ pub(crate) fn build_faults(configs: &[FaultConfig], session: &EffectSession) -> 
         let fault = build_fault(index, config, session)?;
         let cell = match cells.iter_mut().find(|cell| cell.taxel == taxel) {
             Some(cell) => cell,
-            None => cells.push_mut(FaultyCell {
-                taxel,
-                faults: Vec::new(),
-            }),
+            None => cells.push_mut(FaultyCell { taxel, faults: Vec::new() }),
         };
         if fault.drives() && cell.decided() {
-            return Err(refused(
-                index,
-                config,
-                "the cell has another fault that decides its level",
-            ));
+            return Err(refused(index, config, "the cell has another fault that decides its level"));
         }
         cell.faults.push(fault);
     }
@@ -67,11 +60,7 @@ fn build_fault(index: usize, config: &FaultConfig, session: &EffectSession) -> R
     let taxels = session.weights.taxels();
     if config.taxel as usize >= taxels {
         let last = taxels.saturating_sub(1);
-        return Err(refused(
-            index,
-            config,
-            &format!("`taxel` = {} is outside [0, {last}]", config.taxel),
-        ));
+        return Err(refused(index, config, &format!("`taxel` = {} is outside [0, {last}]", config.taxel)));
     }
     build(config.parameters.clone(), config.taxel, session).map_err(|e| refused(index, config, &e.to_string()))
 }
@@ -198,12 +187,7 @@ struct OverdrivenConfig {
 
 impl Default for OverdrivenConfig {
     fn default() -> Self {
-        Self {
-            seed: 2,
-            gain: 1.58,
-            carry: -0.71,
-            bias: 0.08,
-        }
+        Self { seed: 2, gain: 1.58, carry: -0.71, bias: 0.08 }
     }
 }
 
@@ -218,10 +202,7 @@ fn overdriven(table: toml::Table, _taxel: u32, session: &EffectSession) -> Resul
         within(field, value, -100.0, 100.0, "[−100, 100]")?;
     }
     within("bias", config.bias, -1.0, 1.0, "[−1, 1]")?;
-    Ok(Box::new(Overdriven {
-        mode: session.weights.mode(),
-        config,
-    }))
+    Ok(Box::new(Overdriven { mode: session.weights.mode(), config }))
 }
 
 impl Fault for Overdriven {

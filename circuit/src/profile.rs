@@ -90,10 +90,7 @@ impl Profile {
     pub fn named(name: &str) -> Result<Self, Refusal> {
         let Some((_, text)) = PROFILES.iter().find(|(known, _)| *known == name) else {
             let known: Vec<&str> = PROFILES.iter().map(|(known, _)| *known).collect();
-            return Err(Refusal::new(format!(
-                "`{name}` is not a readout profile; known: {}",
-                known.join(", ")
-            )));
+            return Err(Refusal::new(format!("`{name}` is not a readout profile; known: {}", known.join(", "))));
         };
         Self::from_toml(text)
     }
@@ -120,19 +117,11 @@ impl Profile {
     /// # Errors
     /// [`Refusal`] if the scaled Rf is outside [1e-3, 1e9] Ω.
     pub fn on(&self, layout: &SkinLayout) -> Result<Self, Refusal> {
-        let scale = if self.feedback_scales {
-            layout.relative_area()
-        } else {
-            1.0
-        };
+        let scale = if self.feedback_scales { layout.relative_area() } else { 1.0 };
         let feedback_ohm = self.feedback_ohm / scale;
         let field = "feedback_ohm / (electrode_m / 10 mm)²";
         within(field, feedback_ohm, 1e-3, 1e9, "[1e-3, 1e9]")?;
-        Ok(Self {
-            feedback_ohm,
-            feedback_scales: false,
-            ..self.clone()
-        })
+        Ok(Self { feedback_ohm, feedback_scales: false, ..self.clone() })
     }
 
     /// Checks every value by building the effects of both modes once, for a skin of `taxels` taxels with electrodes of
@@ -187,13 +176,7 @@ impl Profile {
         // a rule that is not the default one contradicts a list
         let ruled = self.seeding == Seeding::Mixed || (self.seeds.is_none() && self.patterns.is_none());
         let rule = (ruled.then_some(self.seeding), "`seeding` = \"mixed\"");
-        Weights::from_one(
-            weight_mode,
-            Some(taxels),
-            rule,
-            self.seeds.as_deref(),
-            self.patterns.as_ref(),
-        )
+        Weights::from_one(weight_mode, Some(taxels), rule, self.seeds.as_deref(), self.patterns.as_ref())
     }
 
     /// The profile with `weights` in its compressive mode, replacing earlier ones.
@@ -211,13 +194,7 @@ impl Profile {
             LevelSource::Seeds(seeds) => (Seeding::Address, Some(seeds.to_vec()), None),
             LevelSource::Patterns(patterns) => (Seeding::Address, None, Some(Patterns::clone(patterns))),
         };
-        Ok(Self {
-            weights: mode,
-            seeding,
-            seeds,
-            patterns,
-            ..self.clone()
-        })
+        Ok(Self { weights: mode, seeding, seeds, patterns, ..self.clone() })
     }
 
     /// Scale of the converter of `mode`; `None` if the profile has no converter in this mode.

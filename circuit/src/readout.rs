@@ -90,10 +90,7 @@ impl Readout {
             let readout = format!("the readout has {taxels} taxels");
             return Err(Refusal::new(format!("the codes are those of {cells} cells; {readout}")));
         }
-        Ok(Self {
-            engine: self.engine.with_codes(codes),
-            ..self
-        })
+        Ok(Self { engine: self.engine.with_codes(codes), ..self })
     }
 
     /// Weights that the cells are meant to put out.
@@ -149,11 +146,7 @@ impl Readout {
             return Err(Refusal::new(format!("{measurements} measurements are not {whole}")));
         }
         let volts = self.measure(source, measurements)?;
-        Ok(Block {
-            frame_position: self.row / taxels as u64,
-            idle_frames: None,
-            volts,
-        })
+        Ok(Block { frame_position: self.row / taxels as u64, idle_frames: None, volts })
     }
 
     /// As [`Readout::acquire`], for any number of measurements. A large skin is read with far fewer measurements than
@@ -170,11 +163,7 @@ impl Readout {
 
     /// Starts the next block; the following calls of [`Readout::go_on`] measure in it.
     pub fn begin(&mut self) {
-        let start = BlockStart {
-            block: self.block,
-            first_row: self.row,
-            continuous: self.continuous,
-        };
+        let start = BlockStart { block: self.block, first_row: self.row, continuous: self.continuous };
         for effect in &mut self.effects {
             effect.begin_block(&start);
         }
@@ -196,9 +185,7 @@ impl Readout {
         let taxels = self.measurements_per_frame();
         if source.taxels() != taxels {
             let found = source.taxels();
-            return Err(Refusal::new(format!(
-                "the source has {found} taxels; the readout {taxels}"
-            )));
+            return Err(Refusal::new(format!("the source has {found} taxels; the readout {taxels}")));
         }
         self.engine.run(&mut self.effects, self.row, source, volts)?;
         self.row += volts.len() as u64;
@@ -263,11 +250,7 @@ mod tests {
             for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.0.taxels())) {
                 for (taxel, code) in (0_u32..).zip(out) {
                     let any = Jump::new(row).apply(taxel).to_le_bytes()[2];
-                    *code = if taxel % 3 == 0 {
-                        any
-                    } else {
-                        code_of(self.0.level(taxel, row))
-                    };
+                    *code = if taxel % 3 == 0 { any } else { code_of(self.0.level(taxel, row)) };
                 }
             }
             Ok(())
@@ -283,19 +266,15 @@ mod tests {
         let (_, ideal) = crate::PROFILES.iter().find(|(name, _)| *name == "ideal").unwrap();
         profile.faults = Profile::from_toml(&format!("{ideal}{faults}")).unwrap().faults;
         let designed = Profile::named("as_designed").unwrap();
-        for (effects, parts) in [
-            (&mut profile.compressive, &designed.compressive),
-            (&mut profile.raster, &designed.raster),
-        ] {
+        for (effects, parts) in
+            [(&mut profile.compressive, &designed.compressive), (&mut profile.raster, &designed.raster)]
+        {
             for name in ["dac", "amplifier"] {
                 effects.insert(name.to_owned(), parts[name].clone());
             }
             let missed = toml::from_str("probability = [0.0, 0.01]").unwrap();
             effects.insert("missed_clocks".to_owned(), toml::Value::Table(missed));
-            assert_eq!(
-                effects.len() - usize::from(effects.contains_key("clamp")),
-                crate::EFFECTS.len() - 1
-            );
+            assert_eq!(effects.len() - usize::from(effects.contains_key("clamp")), crate::EFFECTS.len() - 1);
         }
         // and without the converter, whose steps would hide a difference
         let mut analog = profile.clone();
@@ -310,11 +289,8 @@ mod tests {
         for (profile, mode, in_order) in cases.flat_map(|(p, mode)| [(p, mode, true), (p, mode, false)]) {
             let volts = |batch: usize| {
                 let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(8), 0).unwrap();
-                let engine = Engine::new(
-                    readout.engine.weights().clone(),
-                    profile.volts_per_siemens(),
-                    profile.sample_rate_hz,
-                );
+                let engine =
+                    Engine::new(readout.engine.weights().clone(), profile.volts_per_siemens(), profile.sample_rate_hz);
                 readout.engine = engine.with_batch(batch);
                 if !in_order {
                     let cells = OutOfOrder(readout.engine.weights().clone());
@@ -326,10 +302,7 @@ mod tests {
             };
             let whole = volts(128);
             for batch in [1, 7, 64] {
-                assert!(
-                    volts(batch) == whole,
-                    "{mode:?}, in order {in_order}: batches of {batch} differ"
-                );
+                assert!(volts(batch) == whole, "{mode:?}, in order {in_order}: batches of {batch} differ");
             }
         }
     }

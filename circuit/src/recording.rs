@@ -37,13 +37,7 @@ pub struct RecordingInfo {
 impl RecordingInfo {
     /// Metadata of a skin whose frames have one measurement for each taxel, without a converter.
     pub fn new(layout: SkinLayout, weights: Weights, sample_rate_hz: f64) -> Self {
-        Self {
-            measurements_per_frame: layout.taxels(),
-            layout,
-            weights,
-            sample_rate_hz,
-            converter: None,
-        }
+        Self { measurements_per_frame: layout.taxels(), layout, weights, sample_rate_hz, converter: None }
     }
 
     /// The readout that made the recording.
@@ -58,14 +52,11 @@ impl RecordingInfo {
         }
         let (weights, layout) = (self.weights.taxels(), self.layout.taxels());
         if weights != layout {
-            return Err(Refusal::new(format!(
-                "`weights` are those of {weights} taxels; `layout` has {layout}"
-            )));
+            return Err(Refusal::new(format!("`weights` are those of {weights} taxels; `layout` has {layout}")));
         }
         let rate_hz = self.sample_rate_hz;
         let ok = rate_hz > 0.0 && rate_hz.is_finite();
-        ok.then_some(())
-            .ok_or_else(|| Refusal::range("sample_rate_hz", rate_hz, "(0, ∞)"))
+        ok.then_some(()).ok_or_else(|| Refusal::range("sample_rate_hz", rate_hz, "(0, ∞)"))
     }
 }
 
@@ -131,30 +122,22 @@ impl Recording {
             let refuse = |what: String| Err(Refusal::new(format!("block {block}{what}")));
             let (len, position) = (b.volts.len(), b.frame_position);
             if len != frames * measurements {
-                return refuse(format!(
-                    " has {len} samples; expected {frames} frames of {measurements}"
-                ));
+                return refuse(format!(" has {len} samples; expected {frames} frames of {measurements}"));
             }
             if position < frames as u64 {
                 let why = format!("the block is {frames} frames long");
-                return refuse(format!(
-                    " has `frame_position` = {position}, outside [{frames}, ∞): {why}"
-                ));
+                return refuse(format!(" has `frame_position` = {position}, outside [{frames}, ∞): {why}"));
             }
             let limit = u64::MAX / measurements as u64;
             if position > limit {
-                return refuse(format!(
-                    " has `frame_position` = {position}, outside [{frames}, {limit}]"
-                ));
+                return refuse(format!(" has `frame_position` = {position}, outside [{frames}, {limit}]"));
             }
             if let Some(idle) = b.idle_frames.filter(|idle| *idle > frames) {
                 return refuse(format!(" has `idle_frames` = {idle}, outside [0, {frames}]"));
             }
             if let Some(sample) = b.volts.iter().position(|v| v.is_infinite()) {
                 let value = b.volts[sample];
-                return refuse(format!(
-                    ", sample {sample} = {value} V is not finite; NaN marks a lost sample"
-                ));
+                return refuse(format!(", sample {sample} = {value} V is not finite; NaN marks a lost sample"));
             }
         }
         Ok(Self { info, frames, blocks })
@@ -173,11 +156,7 @@ impl Recording {
 
     /// The same recording with blocks whose samples are this recording's own at other places, or lost.
     pub(crate) fn with_samples_of(&self, blocks: Vec<Block>) -> Self {
-        Self {
-            info: self.info.clone(),
-            frames: self.frames,
-            blocks,
-        }
+        Self { info: self.info.clone(), frames: self.frames, blocks }
     }
 
     /// The same recording, in which the first `idle_frames` frames of every block are marked as idle (at most the whole
@@ -330,10 +309,7 @@ struct Ends {
 impl Ends {
     fn of(converter: &Converter) -> Self {
         let [last, before] = [0, 1].map(|k| converter.volts(converter.max_code().saturating_sub(k)).to_bits());
-        Self {
-            first: converter.volts(0).to_bits(),
-            last: (last != before).then_some(last),
-        }
+        Self { first: converter.volts(0).to_bits(), last: (last != before).then_some(last) }
     }
 
     fn reached(self, v: f64) -> bool {
@@ -417,21 +393,14 @@ mod tests {
     }
 
     fn block(frame_position: u64, len: usize) -> Block {
-        Block {
-            frame_position,
-            idle_frames: None,
-            volts: vec![0.0; len],
-        }
+        Block { frame_position, idle_frames: None, volts: vec![0.0; len] }
     }
 
     #[test]
     fn rows_follow_the_published_alignment() {
         let info = info(10, WeightMode::Binary, 64_300.0);
         let r = Recording::new(info, vec![block(1243, 100_000)]).unwrap();
-        assert_eq!(
-            (r.frames(), r.first_row(0, 0), r.first_row(0, 7)),
-            (1000, 24_300, 25_000)
-        );
+        assert_eq!((r.frames(), r.first_row(0, 0), r.first_row(0, 7)), (1000, 24_300, 25_000));
         assert_eq!(r.volts(0, 999).len(), 100);
         let rows = r.rows(0, 700..720);
         assert_eq!((rows.first_row(), rows.len(), rows.taxels()), (25_000, 20, 100));
@@ -439,18 +408,12 @@ mod tests {
 
     #[test]
     fn contradictions_are_refused() {
-        let other = RecordingInfo {
-            layout: SkinLayout::default(),
-            ..info(2, WeightMode::Binary, 1.0)
-        };
+        let other = RecordingInfo { layout: SkinLayout::default(), ..info(2, WeightMode::Binary, 1.0) };
         let said = Recording::new(other, vec![block(1, 100)]).unwrap_err().to_string();
         assert_eq!(said, "`weights` are those of 4 taxels; `layout` has 100");
         let new = |rate, blocks| Recording::new(info(2, WeightMode::Raster, rate), blocks);
         let idle_frames = Some(3);
-        let idle = Block {
-            idle_frames,
-            ..block(2, 8)
-        };
+        let idle = Block { idle_frames, ..block(2, 8) };
         let mut bad = block(1, 4);
         bad.volts[2] = f64::INFINITY;
         let limit = u64::MAX / 4;
@@ -461,22 +424,10 @@ mod tests {
             (1.0, vec![], "`blocks` = 0 is outside [1, ∞)"),
             (1.0, vec![block(1, 3)], "`frames` = 0 is outside [1, ∞)"),
             (f64::NAN, vec![block(1, 4)], "`sample_rate_hz` = NaN is outside (0, ∞)"),
-            (
-                1.0,
-                vec![block(0, 4)],
-                "block 0 has `frame_position` = 0, outside [1, ∞): the block is 1 frames long",
-            ),
+            (1.0, vec![block(0, 4)], "block 0 has `frame_position` = 0, outside [1, ∞): the block is 1 frames long"),
             (1.0, vec![block(limit + 1, 8)], &late),
-            (
-                1.0,
-                vec![block(2, 8), block(9, 7)],
-                "block 1 has 7 samples; expected 2 frames of 4",
-            ),
-            (
-                1.0,
-                vec![bad],
-                "block 0, sample 2 = inf V is not finite; NaN marks a lost sample",
-            ),
+            (1.0, vec![block(2, 8), block(9, 7)], "block 1 has 7 samples; expected 2 frames of 4"),
+            (1.0, vec![bad], "block 0, sample 2 = inf V is not finite; NaN marks a lost sample"),
         ] {
             assert_eq!(new(rate, blocks).unwrap_err().to_string(), expected);
         }
@@ -504,10 +455,7 @@ mod tests {
         };
         assert_eq!(count("", Mode::Compressive, 20.0), 0);
         assert_eq!(count("", Mode::Compressive, 40.0), 400);
-        assert_eq!(
-            count("[compressive.rails]\nlimit_v = 15.0", Mode::Compressive, 20.0),
-            400
-        );
+        assert_eq!(count("[compressive.rails]\nlimit_v = 15.0", Mode::Compressive, 20.0), 400);
         assert_eq!(count("[compressive.rails]\nlimit_v = 15.0", Mode::Compressive, 14.0), 0);
         // a frame of a raster has one measurement of the taxel
         assert_eq!(count("", Mode::Raster, 5.0), 100);

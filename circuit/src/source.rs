@@ -79,18 +79,14 @@ fn check(index: usize, map: &ConductanceMap, expected: usize) -> Result<(), Refu
     let values = map.values();
     if values.len() != expected {
         let taxels = values.len();
-        return Err(Refusal::new(format!(
-            "map {index} has {taxels} taxels; expected {expected}"
-        )));
+        return Err(Refusal::new(format!("map {index} has {taxels} taxels; expected {expected}")));
     }
     match values.iter().position(|g| !(0.0..=MAX_CONDUCTANCE_S).contains(g)) {
         None => Ok(()),
         Some(taxel) => {
             let value_s = values[taxel];
             let place = format!("map {index}, taxel {taxel}");
-            Err(Refusal::new(format!(
-                "{place} has conductance {value_s} S, outside [0, 1e12]"
-            )))
+            Err(Refusal::new(format!("{place} has conductance {value_s} S, outside [0, 1e12]")))
         }
     }
 }
@@ -132,12 +128,7 @@ impl ConductanceSource for Constant {
 
 /// `map` up to `end_s`.
 fn held(end_s: f64, map: &ConductanceMap) -> Segment<'_> {
-    Segment {
-        start_s: 0.0,
-        end_s,
-        conductance_s: map.values(),
-        end_conductance_s: None,
-    }
+    Segment { start_s: 0.0, end_s, conductance_s: map.values(), end_conductance_s: None }
 }
 
 /// Maps at given times with linear interpolation; constant before the first and after the last map.
@@ -183,11 +174,7 @@ impl Interpolated {
                 return Err(Refusal::new(format!("time {index} is {time_s} s, {needed}")));
             }
         }
-        Ok(Self {
-            times_s,
-            maps,
-            segment: 0,
-        })
+        Ok(Self { times_s, maps, segment: 0 })
     }
 
     /// The maps, in order of time.

@@ -56,22 +56,13 @@ const LENGTH_M: f64 = 0.045;
 
 fn heights(cells: u32, height: impl Fn(f64) -> f64) -> Vec<f64> {
     let at = |i: u32| (f64::from(i) + 0.5 - 0.5 * f64::from(cells)) * LENGTH_M / f64::from(cells);
-    (0..cells * cells)
-        .map(|i| height(at(i % cells).hypot(at(i / cells))))
-        .collect()
+    (0..cells * cells).map(|i| height(at(i % cells).hypot(at(i / cells)))).collect()
 }
 
 fn elastic(c: &mut Criterion) {
     let (modulus_pa, poisson) = (150e3, 0.2);
-    let layer = ElasticKernel::Layer {
-        modulus_pa,
-        poisson,
-        thickness_m: 6e-3,
-    };
-    let kernels = [
-        ("half_space", ElasticKernel::HalfSpace { modulus_pa, poisson }),
-        ("layer", layer),
-    ];
+    let layer = ElasticKernel::Layer { modulus_pa, poisson, thickness_m: 6e-3 };
+    let kernels = [("half_space", ElasticKernel::HalfSpace { modulus_pa, poisson }), ("layer", layer)];
     let mut group = c.benchmark_group("press");
     for (name, kernel) in kernels {
         for cells in [64_u32, 128, 256] {

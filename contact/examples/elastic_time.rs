@@ -25,10 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("SHAPE CELLS LENGTH_M FORCE_N MODULUS_PA POISSON TOLERANCE REPEATS are needed".into());
     };
     let (cells, repeats): (usize, usize) = (cells.parse()?, repeats.parse()?);
-    let numbers = numbers
-        .iter()
-        .map(|text| text.parse())
-        .collect::<Result<Vec<f64>, _>>()?;
+    let numbers = numbers.iter().map(|text| text.parse()).collect::<Result<Vec<f64>, _>>()?;
     let [length_m, force_n, modulus_pa, poisson, tolerance] = numbers[..] else {
         return Err("five numbers are needed between CELLS and REPEATS".into());
     };

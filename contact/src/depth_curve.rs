@@ -83,10 +83,7 @@ impl DepthCurve {
     /// The curve of a body that has not been pressed yet: no depth and no force, whatever is asked of it.
     pub fn empty() -> Self {
         let nothing = vec![0.0; 2];
-        Self {
-            depth_m: nothing.clone(),
-            force_n: nothing,
-        }
+        Self { depth_m: nothing.clone(), force_n: nothing }
     }
 
     /// The curve of `body` up to the force `force_n`. The body's velocity and height are ignored.
@@ -123,11 +120,7 @@ impl DepthCurve {
             if deep_m >= limit_m {
                 let (wanted_n, depth_m) = (force_n, deep_m);
                 return Err(if reached_n > 0.0 {
-                    EquilibriumError::Force {
-                        reached_n,
-                        wanted_n,
-                        depth_m,
-                    }
+                    EquilibriumError::Force { reached_n, wanted_n, depth_m }
                 } else {
                     EquilibriumError::beside(depth_m)
                 });
@@ -145,10 +138,7 @@ impl DepthCurve {
             return Err(EquilibriumError::no_answer(depth_m[i]));
         }
         force[0] = 0.0;
-        Ok(Self {
-            depth_m,
-            force_n: force,
-        })
+        Ok(Self { depth_m, force_n: force })
     }
 
     /// The curve up to the depth at which the contact has absorbed `energy_j`.
@@ -267,22 +257,10 @@ mod tests {
     /// A 30 mm square plate on a thick layer of K = 1e7 Pa/m: 12 whole cells a side, k = K A = 9000 N/m.
     #[test]
     fn plate_is_a_linear_spring() {
-        let config = Foam {
-            stiffness_pa_per_m: 1e7,
-            thickness_m: 10.0,
-            ..Foam::default()
-        };
+        let config = Foam { stiffness_pa_per_m: 1e7, thickness_m: 10.0, ..Foam::default() };
         let mut layer = WinklerLayer::new(config, &SkinLayout::default()).unwrap();
-        let vertices = vec![
-            [-0.015, -0.015, 0.0],
-            [0.015, -0.015, 0.0],
-            [0.015, 0.015, 0.0],
-            [-0.015, 0.015, 0.0],
-        ];
-        let mesh = TriMesh {
-            vertices,
-            triangles: vec![[0, 2, 1], [0, 3, 2]],
-        };
+        let vertices = vec![[-0.015, -0.015, 0.0], [0.015, -0.015, 0.0], [0.015, 0.015, 0.0], [-0.015, 0.015, 0.0]];
+        let mesh = TriMesh { vertices, triangles: vec![[0, 2, 1], [0, 3, 2]] };
         let body = PosedMesh::at_rest(&mesh, [0.0; 3]);
         let curve = DepthCurve::up_to_force(&mut layer, &body, 20.0).unwrap();
         // stiffening of 20/9000/8.5 m = 2.6e-4 at the end of the curve
@@ -296,9 +274,7 @@ mod tests {
         // the deepest point, 5 cm below a flat plate, carries less than 9000 N/m · 0.05 m / (1 − 0.05/8.5) = 452.7 N
         // and absorbs less than half of that times the depth
         let error = DepthCurve::up_to_force(&mut layer, &body, 1000.0).unwrap_err();
-        let EquilibriumError::Force { reached_n, depth_m, .. } = error else {
-            panic!("{error}")
-        };
+        let EquilibriumError::Force { reached_n, depth_m, .. } = error else { panic!("{error}") };
         assert_relative_eq!(depth_m, 0.05, max_relative = 1e-12);
         assert_relative_eq!(reached_n, 452.7, max_relative = 1e-3);
         let error = DepthCurve::up_to_energy(&mut layer, &body, 20.0).unwrap_err();

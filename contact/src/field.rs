@@ -62,12 +62,7 @@ impl<'a> PosedMesh<'a> {
 
     /// Whether pose and velocity are finite, and the stiffness is not NaN.
     pub fn is_finite(&self) -> bool {
-        let vectors = [
-            self.position_m,
-            self.centre_of_mass_m,
-            self.velocity_m_per_s,
-            self.angular_velocity_rad_per_s,
-        ];
+        let vectors = [self.position_m, self.centre_of_mass_m, self.velocity_m_per_s, self.angular_velocity_rad_per_s];
         let mut parts = self.rotation.iter().chain(&vectors).flatten();
         parts.all(|v| v.is_finite()) && !self.stiffness_pa_per_m.is_nan()
     }
@@ -93,10 +88,7 @@ pub struct Wrench {
 
 impl Wrench {
     /// The answer of a contact field that has none: NaN everywhere.
-    pub const UNKNOWN: Self = Self {
-        force_n: [f64::NAN; 3],
-        torque_nm: [f64::NAN; 3],
-    };
+    pub const UNKNOWN: Self = Self { force_n: [f64::NAN; 3], torque_nm: [f64::NAN; 3] };
 }
 
 /// State of the contact at one instant.
@@ -185,10 +177,7 @@ impl Patch {
 
     /// All of a grid of `[rows, cols]`.
     pub(crate) fn whole([rows, cols]: [usize; 2]) -> Self {
-        Self {
-            rows: [0, rows],
-            cols: [0, cols],
-        }
+        Self { rows: [0, rows], cols: [0, cols] }
     }
 
     /// Number of rows and columns.
@@ -210,10 +199,7 @@ impl Patch {
             let mut found = line.filter(|square| inside(*square));
             if let Some(first) = found.next() {
                 let last = found.next_back().unwrap_or(first);
-                out.include(Self {
-                    rows: [row, row + 1],
-                    cols: [first - row * grid_cols, last + 1 - row * grid_cols],
-                });
+                out.include(Self { rows: [row, row + 1], cols: [first - row * grid_cols, last + 1 - row * grid_cols] });
             }
         }
         out
@@ -425,10 +411,7 @@ pub enum EquilibriumError {
 impl EquilibriumError {
     /// There is no force down to `depth_m`.
     pub(crate) fn beside(depth_m: f64) -> Self {
-        Refusal::new(format!(
-            "the body meets nothing down to {depth_m:.4} m depth: it lies beside the skin"
-        ))
-        .into()
+        Refusal::new(format!("the body meets nothing down to {depth_m:.4} m depth: it lies beside the skin")).into()
     }
 
     /// The load is not a positive force.

@@ -153,11 +153,7 @@ impl FoamLaw {
         let load = self.foam_pa_per_m * depth_m;
         let root = (b * b + 4.0 * self.quadratic * load).sqrt();
         // the form of the root without cancellation
-        let (above, below) = if b >= 0.0 {
-            (2.0 * load, b + root)
-        } else {
-            (root - b, 2.0 * self.quadratic)
-        };
+        let (above, below) = if b >= 0.0 { (2.0 * load, b + root) } else { (root - b, 2.0 * self.quadratic) };
         (above / below, root)
     }
 }
@@ -204,11 +200,7 @@ mod tests {
             let numeric = (law.pressure_pa(depth_m + h) - law.pressure_pa(depth_m - h)) / (2.0 * h);
             assert_relative_eq!(slope, numeric, max_relative = 1e-6);
         }
-        assert_relative_eq!(
-            FoamLaw::new(K, 1e3, f64::INFINITY).pressure_and_slope(1e-9).1,
-            K,
-            max_relative = 1e-9
-        );
+        assert_relative_eq!(FoamLaw::new(K, 1e3, f64::INFINITY).pressure_and_slope(1e-9).1, K, max_relative = 1e-9);
         let (p, slope) = FoamLaw::new(K, 1e3, 1e9).pressure_and_slope(-1.0);
         assert!(p.abs() + slope.abs() < f64::MIN_POSITIVE);
     }

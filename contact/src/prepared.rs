@@ -51,11 +51,7 @@ impl From<TriMesh> for PreparedMesh {
     fn from(mesh: TriMesh) -> Self {
         let centre = |t: &[u32; 3]| [0, 1, 2].map(|k| t.iter().map(|i| mesh.vertices[*i as usize][k]).sum::<f64>());
         let mut order: Vec<_> = mesh.triangles.iter().map(|t| (centre(t), *t)).collect();
-        let mut sorted = Sorted {
-            solid: mesh.is_solid(),
-            source: mesh,
-            ..Sorted::default()
-        };
+        let mut sorted = Sorted { solid: mesh.is_solid(), source: mesh, ..Sorted::default() };
         sorted.split(&mut order);
         Self(Arc::new(sorted))
     }

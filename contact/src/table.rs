@@ -15,18 +15,10 @@ pub type ContactTable = &'static [(&'static str, ContactBuild)];
 
 /// Every contact field of this crate.
 pub const CONTACT_FIELDS: ContactTable = &[
-    ("winkler", |table, skin| {
-        Ok(Box::new(WinklerLayer::new(parameters(table)?, skin)?))
-    }),
-    ("footprint", |table, skin| {
-        Ok(Box::new(Footprint::new(parameters(table)?, skin)?))
-    }),
-    ("layer", |table, skin| {
-        Ok(Box::new(ElasticField::new(parameters(table)?, true, skin)?))
-    }),
-    ("half_space", |table, skin| {
-        Ok(Box::new(ElasticField::new(parameters(table)?, false, skin)?))
-    }),
+    ("winkler", |table, skin| Ok(Box::new(WinklerLayer::new(parameters(table)?, skin)?))),
+    ("footprint", |table, skin| Ok(Box::new(Footprint::new(parameters(table)?, skin)?))),
+    ("layer", |table, skin| Ok(Box::new(ElasticField::new(parameters(table)?, true, skin)?))),
+    ("half_space", |table, skin| Ok(Box::new(ElasticField::new(parameters(table)?, false, skin)?))),
 ];
 
 /// The parameters of a contact field in the section `[contact]` of a scene.
@@ -70,9 +62,7 @@ pub fn build_contact_from(
     let Some((_, build)) = all().find(|(known, _)| *known == name) else {
         let known: Vec<_> = all().map(|(known, _)| format!("\"{known}\"")).collect();
         let known = known.join(", ");
-        return Err(Refusal::new(format!(
-            "`contact.model` = \"{name}\" is not one of {known}"
-        )));
+        return Err(Refusal::new(format!("`contact.model` = \"{name}\" is not one of {known}")));
     };
     build(parameters, skin)
 }
@@ -126,10 +116,7 @@ mod tests {
         for body in &poses {
             let (normal_n, _) = sound(name, field.as_mut(), body, &skin);
             if body.velocity_m_per_s.iter().all(|v| v.abs() <= 0.0) {
-                assert!(
-                    normal_n >= last_n,
-                    "{name}: {normal_n} N after {last_n} N at less depth"
-                );
+                assert!(normal_n >= last_n, "{name}: {normal_n} N after {last_n} N at less depth");
                 last_n = normal_n;
             }
         }
@@ -137,27 +124,17 @@ mod tests {
         for pose in [1, 2, 8] {
             no_memory(name, field.as_mut(), &poses[pose], make(toml::Table::new()).as_mut());
         }
-        let slide = PosedMesh {
-            velocity_m_per_s: [0.3, -0.1, 0.0],
-            ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3])
-        };
+        let slide = PosedMesh { velocity_m_per_s: [0.3, -0.1, 0.0], ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3]) };
         let drag_n = force_n(field.as_mut(), &slide);
         assert!(drag_n[0] * 0.3 - drag_n[1] * 0.1 <= 0.0, "{name}: friction drives");
         not_finite(name, field.as_mut(), &mesh);
         for position_m in [[0.0, 0.0, 1e-6], [1.0, 0.0, -1e-3], [0.0, -0.4, -1e-3]] {
             let away_n = force_n(field.as_mut(), &PosedMesh::at_rest(&mesh, position_m));
-            assert!(
-                away_n.iter().all(|f| f.abs() <= 0.0),
-                "{name}: {away_n:?} N without touch"
-            );
+            assert!(away_n.iter().all(|f| f.abs() <= 0.0), "{name}: {away_n:?} N without touch");
         }
         let mut again = make(field.parameters());
         let (a, b) = (force_n(field.as_mut(), &poses[2]), force_n(again.as_mut(), &poses[2]));
-        assert_eq!(
-            a.map(f64::to_bits),
-            b.map(f64::to_bits),
-            "{name}: parameters build another field"
-        );
+        assert_eq!(a.map(f64::to_bits), b.map(f64::to_bits), "{name}: parameters build another field");
     }
 
     /// Answers with finite numbers, no tension and nothing outside the patch; force and torque are those of the
@@ -172,10 +149,7 @@ mod tests {
         assert_eq!(pressure_pa.len(), rows * cols, "{name}");
         let parts = wrench.force_n.iter().chain(&wrench.torque_nm);
         assert!(pressure_pa.iter().all(|p| *p >= 0.0), "{name}: tension");
-        assert!(
-            pressure_pa.iter().chain(parts).all(|v| v.is_finite()),
-            "{name}: {wrench:?}"
-        );
+        assert!(pressure_pa.iter().chain(parts).all(|v| v.is_finite()), "{name}: {wrench:?}");
         let at = |i: usize, n: usize| (i as f64 + 0.5 - 0.5 * n as f64) * cell_m;
         let (mut force_n, mut torque_nm) = (0.0, [0.0; 2]);
         for (i, p) in pressure_pa.iter().enumerate() {
@@ -187,25 +161,16 @@ mod tests {
         }
         let size_nm = force_n * (rows + cols) as f64 * cell_m;
         let near = |a: f64, b: f64, size: f64| (a - b).abs() <= 1e-9 * size;
-        assert!(
-            near(wrench.force_n[2], force_n, force_n),
-            "{name}: {wrench:?}, Σ p A = {force_n} N"
-        );
+        assert!(near(wrench.force_n[2], force_n, force_n), "{name}: {wrench:?}, Σ p A = {force_n} N");
         let moves = body.velocity_m_per_s.iter().chain(&body.angular_velocity_rad_per_s);
         if moves.copied().all(|v| v == 0.0) {
             for (found_nm, sum_nm) in wrench.torque_nm.into_iter().zip(torque_nm) {
-                assert!(
-                    near(found_nm, sum_nm, size_nm),
-                    "{name}: {wrench:?}, Σ p A r = {torque_nm:?} N m"
-                );
+                assert!(near(found_nm, sum_nm, size_nm), "{name}: {wrench:?}, Σ p A r = {torque_nm:?} N m");
             }
         }
         if let Some(patch) = response.patch {
             let inside: f64 = patch.lines(cols).flat_map(|line| &pressure_pa[line]).sum();
-            assert!(
-                near(inside * cell_m * cell_m, force_n, force_n),
-                "{name}: outside {patch:?}"
-            );
+            assert!(near(inside * cell_m * cell_m, force_n, force_n), "{name}: outside {patch:?}");
         }
         (wrench.force_n[2], pressure_pa.iter().filter(|p| **p > 0.0).count())
     }
@@ -247,10 +212,7 @@ mod tests {
         let at = |z| PosedMesh::at_rest(&ball, [x_m, 0.0, z]);
         assert!(sound(name, field, &at(1e-9), skin).0 <= 0.0);
         let (force_n, loaded) = sound(name, field, &at(-1e-3 * pitch_m), skin);
-        assert!(
-            force_n > 0.0 && loaded == 1,
-            "{name}: {force_n} N on {loaded} cells of {pitch_m} m"
-        );
+        assert!(force_n > 0.0 && loaded == 1, "{name}: {force_n} N on {loaded} cells of {pitch_m} m");
         for depth_m in [0.5 * pitch_m, 10.0] {
             assert!(sound(name, field, &at(-depth_m), skin).0 > 0.0);
         }
@@ -259,10 +221,7 @@ mod tests {
         let plate = cuboid([2e3 * pitch_m, 20.0 * pitch_m, pitch_m]);
         let flooding = PosedMesh::at_rest(&plate, [0.0, 0.0, -1e-2 * pitch_m]);
         let (force_n, loaded) = sound(name, field, &flooding, skin);
-        assert!(
-            force_n > 0.0 && loaded == skin.taxels(),
-            "{name}: {force_n} N on {loaded} cells"
-        );
+        assert!(force_n > 0.0 && loaded == skin.taxels(), "{name}: {force_n} N on {loaded} cells");
     }
 
     proptest! {
@@ -316,10 +275,7 @@ mod tests {
         for again in [fresh.respond(body), used.respond(body)] {
             let pairs = again.pressure_pa.iter().zip(&pressure_pa);
             let worst = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            assert!(
-                worst <= tolerance * highest,
-                "{name}: {worst} Pa by earlier poses, of {highest} Pa"
-            );
+            assert!(worst <= tolerance * highest, "{name}: {worst} Pa by earlier poses, of {highest} Pa");
             if tolerance <= 0.0 {
                 let bits = |v: [f64; 3]| v.map(f64::to_bits);
                 assert_eq!(bits(again.wrench.force_n), bits(wrench.force_n), "{name}");
@@ -339,10 +295,7 @@ mod tests {
         for body in &broken {
             let response = field.respond(body);
             assert!(response.wrench.force_n[2].is_nan(), "{name}");
-            assert!(
-                response.pressure_pa.iter().all(|p| p.is_finite() && *p >= 0.0),
-                "{name}"
-            );
+            assert!(response.pressure_pa.iter().all(|p| p.is_finite() && *p >= 0.0), "{name}");
         }
         assert!(force_n(field, &sound)[2] > 0.0, "{name} does not go on after NaN");
     }

@@ -39,12 +39,7 @@ impl TaxelBins {
                 ((start_m + cell_m).min(high_m) - start_m.max(low_m)).max(0.0) / skin.electrode_m()
             })
             .collect();
-        Self {
-            rows: skin.rows(),
-            cols: skin.cols(),
-            cells: cells_per_taxel,
-            electrode_weights,
-        }
+        Self { rows: skin.rows(), cols: skin.cols(), cells: cells_per_taxel, electrode_weights }
     }
 
     /// Means of the map `fine`: over each taxel's whole area (the sum of these × pitch² is the normal force), and over
@@ -57,11 +52,7 @@ impl TaxelBins {
     pub fn means(&self, fine: &[f64], patch: Option<Patch>) -> [PressureMap; 2] {
         let patch = patch.unwrap_or_else(|| self.whole());
         let width = self.cols * self.cells;
-        assert_eq!(
-            fine.len(),
-            self.rows * self.cells * width,
-            "fine field of the wrong shape"
-        );
+        assert_eq!(fine.len(), self.rows * self.cells * width, "fine field of the wrong shape");
         let mut maps = [(); 2].map(|()| PressureMap::zeros(self.rows, self.cols));
         if patch.is_empty() {
             return maps;
@@ -85,10 +76,7 @@ impl TaxelBins {
     }
 
     fn whole(&self) -> Patch {
-        Patch {
-            rows: [0, self.rows * self.cells],
-            cols: [0, self.cols * self.cells],
-        }
+        Patch { rows: [0, self.rows * self.cells], cols: [0, self.cols * self.cells] }
     }
 }
 
@@ -118,10 +106,7 @@ mod tests {
     fn patch_is_enough() {
         let skin = SkinLayout::new(4, 5, 15e-3, 10e-3).unwrap();
         let bins = TaxelBins::new(&skin, 3);
-        let patch = Patch {
-            rows: [2, 8],
-            cols: [4, 11],
-        };
+        let patch = Patch { rows: [2, 8], cols: [4, 11] };
         let mut fine = vec![0.0; 12 * 15];
         for (row, line) in (2_u32..).zip(patch.lines(15)) {
             for (col, p) in (4_u32..).zip(&mut fine[line]) {

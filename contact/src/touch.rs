@@ -20,10 +20,7 @@ pub struct TouchBody {
 
 impl From<PreparedMesh> for TouchBody {
     fn from(mesh: PreparedMesh) -> Self {
-        Self {
-            solid: Solid::new(&mesh),
-            mesh,
-        }
+        Self { solid: Solid::new(&mesh), mesh }
     }
 }
 
@@ -115,14 +112,7 @@ impl TouchSkin {
 
     fn with(layout: SkinLayout, foam: Foam, surface: Surface) -> Self {
         let zeros = || PressureMap::zeros(layout.rows(), layout.cols());
-        Self {
-            pressure: zeros(),
-            electrode_pressure: zeros(),
-            touched_m2: 0.0,
-            layout,
-            foam,
-            surface,
-        }
+        Self { pressure: zeros(), electrode_pressure: zeros(), touched_m2: 0.0, layout, foam, surface }
     }
 
     /// Rows, columns, pitch and electrodes of the taxels.
@@ -193,9 +183,7 @@ impl TouchSkin {
                 field.clear();
                 wrenches.extend(bodies.iter().map(|(body, posed)| field.press(&body.solid, posed)));
                 field.points().means(field.pressure_pa(), self.pressure.values_mut());
-                self.electrode_pressure
-                    .values_mut()
-                    .copy_from_slice(self.pressure.values());
+                self.electrode_pressure.values_mut().copy_from_slice(self.pressure.values());
                 self.touched_m2 = field.touched_m2();
             }
         }
@@ -211,8 +199,7 @@ impl FlatSkin {
         mut maps: [&mut PressureMap; 2],
     ) -> f64 {
         self.touches += 1;
-        self.known
-            .resize_with(bodies.len().max(self.known.len()), KnownBody::default);
+        self.known.resize_with(bodies.len().max(self.known.len()), KnownBody::default);
         let mut cells = 0_usize;
         for ((body, posed), known) in bodies.iter().zip(&mut self.known) {
             self.layer.swap_known(known);
@@ -252,14 +239,7 @@ mod tests {
         let fresh = || TouchSkin::flat(SkinLayout::default(), Foam::default()).unwrap();
         let (ball, block) = (body(sphere(20e-3, 16, 32)), body(cuboid([30e-3, 30e-3, 10e-3])));
         let mut used = fresh();
-        let steps = [
-            (0.0, -1e-3),
-            (0.0, -1.2e-3),
-            (0.0, -1.2e-3),
-            (2e-3, -1.2e-3),
-            (2e-3, 1e-3),
-            (2e-3, -2e-3),
-        ];
+        let steps = [(0.0, -1e-3), (0.0, -1.2e-3), (0.0, -1.2e-3), (2e-3, -1.2e-3), (2e-3, 1e-3), (2e-3, -2e-3)];
         for (k, (x_m, z_m)) in steps.into_iter().enumerate() {
             let mut bodies = vec![
                 (&ball, PosedMesh::at_rest(&ball.mesh, [x_m, 0.0, z_m])),

@@ -8,11 +8,7 @@ use crate::foam::Foam;
 #[inline]
 pub(crate) fn velocity_at(body: &PosedMesh<'_>, r: [f64; 3]) -> [f64; 3] {
     let (v, w) = (body.velocity_m_per_s, body.angular_velocity_rad_per_s);
-    [
-        v[0] + w[1] * r[2] - w[2] * r[1],
-        v[1] + w[2] * r[0] - w[0] * r[2],
-        v[2] + w[0] * r[1] - w[1] * r[0],
-    ]
+    [v[0] + w[1] * r[2] - w[2] * r[1], v[1] + w[2] * r[0] - w[0] * r[2], v[2] + w[0] * r[1] - w[1] * r[0]]
 }
 
 /// Traction on a body, summed row by row. Coulomb friction is regularised: t = −μ p v_t / √(|v_t|² + v_reg²).
@@ -98,10 +94,7 @@ impl Tractions {
     /// Wrench about the centre of mass of tractions on cells of `area_m2`.
     #[inline]
     pub(crate) fn wrench(&self, area_m2: f64) -> Wrench {
-        Wrench {
-            force_n: self.force_pa.map(|f| f * area_m2),
-            torque_nm: self.torque.map(|t| t * area_m2),
-        }
+        Wrench { force_n: self.force_pa.map(|f| f * area_m2), torque_nm: self.torque.map(|t| t * area_m2) }
     }
 }
 

@@ -37,8 +37,7 @@ impl Column {
             Kind::I64 => "int64",
             Kind::F32 => "float32",
         };
-        self.length
-            .map_or_else(|| name.to_owned(), |length| format!("{name}[{length}]"))
+        self.length.map_or_else(|| name.to_owned(), |length| format!("{name}[{length}]"))
     }
 }
 
@@ -88,24 +87,9 @@ type Has = fn(&Spec) -> bool;
 /// How long a list column is.
 type Length = fn(&Spec) -> usize;
 /// Name, type, length, unit, description, which specs have it, and how a row fills it.
-type RowColumn = (
-    &'static str,
-    Kind,
-    Option<Length>,
-    &'static str,
-    &'static str,
-    Has,
-    fn(&Row<'_>, &mut Store),
-);
+type RowColumn = (&'static str, Kind, Option<Length>, &'static str, &'static str, Has, fn(&Row<'_>, &mut Store));
 /// Name, type, unit, description, which specs have it, and how an object fills it.
-type ObjectColumn = (
-    &'static str,
-    Kind,
-    &'static str,
-    &'static str,
-    Has,
-    fn(&Object<'_>, &mut Store),
-);
+type ObjectColumn = (&'static str, Kind, &'static str, &'static str, Has, fn(&Object<'_>, &mut Store));
 
 const ONE: Option<Length> = None;
 /// One value a taxel.

@@ -42,11 +42,7 @@ impl Dataset {
         });
         let differ: Result<Vec<_>, _> = compared.collect();
         progress.end();
-        Ok(Verified {
-            rows: sample.len() as u64,
-            shards: shards.len() as u64,
-            differ: differ?.concat(),
-        })
+        Ok(Verified { rows: sample.len() as u64, shards: shards.len() as u64, differ: differ?.concat() })
     }
 
     fn compare(&self, shard: u64, wanted: &[u64], progress: &dyn Progress) -> Result<Vec<(u64, String)>, Refusal> {
@@ -225,13 +221,7 @@ impl Rows {
 
     fn errors(&self) -> Errors {
         let [pressure, conductance, correlation, support_iou] = self.0.each_ref().map(|values| spread(values));
-        Errors {
-            rows: self.0[0].len() as u64,
-            pressure,
-            conductance,
-            correlation,
-            support_iou,
-        }
+        Errors { rows: self.0[0].len() as u64, pressure, conductance, correlation, support_iou }
     }
 }
 

@@ -147,12 +147,8 @@ fn properties(spec: &Spec, shard: u64, group: usize) -> Result<WriterProperties,
 /// [`Refusal`] if it is not, or cannot be read.
 pub(crate) fn check_shard(spec: &Spec, shard: u64, path: &Path) -> Result<(), Refusal> {
     let file = File::open(path).map_err(failed(path))?;
-    let damaged = |e: ParquetError| {
-        refused(
-            path,
-            format!("is not a whole Parquet file ({e}); remove it, and it is made anew"),
-        )
-    };
+    let damaged =
+        |e: ParquetError| refused(path, format!("is not a whole Parquet file ({e}); remove it, and it is made anew"));
     let reader = SerializedFileReader::new(file).map_err(damaged)?;
     let metadata = reader.metadata().file_metadata();
     let facts = metadata.key_value_metadata();

@@ -58,12 +58,7 @@ impl Dataset {
             .and_then(|()| write_bytes(&at(CARD_FILE), card(spec, &statistics, bytes).as_bytes()))
             .and_then(|()| write_json(&at(CROISSANT_FILE), &croissant(spec)))
             .and_then(|()| Manifest::write_of(self.folder(), &[&described[..], &listed].concat(), &BTreeSet::new()))?;
-        Ok(Finished {
-            rows: statistics.rows,
-            shards: spec.shards(),
-            bytes,
-            digest: manifest.digest_of(DATA_FOLDER),
-        })
+        Ok(Finished { rows: statistics.rows, shards: spec.shards(), bytes, digest: manifest.digest_of(DATA_FOLDER) })
     }
 
     /// Checks that all files are there, whole and of this data set, and that there are no others. Returns the files
@@ -151,14 +146,8 @@ impl Statistics {
         let spec = dataset.spec();
         let mut rows = 0;
         let mut sums = vec![0.0; columns(spec).len()];
-        let of = |column| ColumnStatistics {
-            column,
-            count: 0,
-            least: None,
-            mean: None,
-            most: None,
-            texts: BTreeMap::new(),
-        };
+        let of =
+            |column| ColumnStatistics { column, count: 0, least: None, mean: None, most: None, texts: BTreeMap::new() };
         let mut all: Vec<ColumnStatistics> = columns(spec).into_iter().map(of).collect();
         progress.stage("statistics", usize::try_from(spec.shards()).ok());
         for shard in 0..spec.shards() {
@@ -219,10 +208,7 @@ const SIZES: [(u64, &str); 9] = [
 /// The card of a data set: a page with the head that Hugging Face reads.
 pub(crate) fn card(spec: &Spec, statistics: &Statistics, bytes: u64) -> String {
     let config = spec.config();
-    let size = SIZES
-        .iter()
-        .find(|(most, _)| statistics.rows < *most)
-        .map_or("", |(_, size)| size);
+    let size = SIZES.iter().find(|(most, _)| statistics.rows < *most).map_or("", |(_, size)| size);
     let skin = spec.skin();
     let (contact, _) = spec.contact();
     let objects = match config.object.from {
@@ -263,11 +249,8 @@ pub(crate) fn card(spec: &Spec, statistics: &Statistics, bytes: u64) -> String {
         let kind = c.type_name();
         let number = |value: Option<f64>| value.map_or_else(String::new, short);
         let (least, mean, most) = (number(found.least), number(found.mean), number(found.most));
-        let _ = writeln!(
-            text,
-            "| `{}` | {kind} | {} | {least} | {mean} | {most} | {} |",
-            c.name, c.unit, c.description
-        );
+        let _ =
+            writeln!(text, "| `{}` | {kind} | {} | {least} | {mean} | {most} | {} |", c.name, c.unit, c.description);
     }
     text.push_str(
         "\nLists are row by row of the skin: entry r · columns + c is the taxel of row r, column c. `y` = Φ x + noise, where x is the image in \
@@ -368,9 +351,6 @@ mod tests {
     #[test]
     fn numbers_are_short() {
         let told = [0.0, 1.0, -3.0, 0.25, 1234.5678, 1.23456e-5, -2.5e8, 4.194e15].map(short);
-        assert_eq!(
-            told,
-            ["0", "1", "-3", "0.250", "1234.568", "1.23e-5", "-250000000", "4.19e15"]
-        );
+        assert_eq!(told, ["0", "1", "-3", "0.250", "1234.568", "1.23e-5", "-250000000", "4.19e15"]);
     }
 }

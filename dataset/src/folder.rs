@@ -117,10 +117,7 @@ impl Dataset {
             .map_err(unmade)
             .and_then(|()| write_bytes(&folder.join(SPEC_FILE), spec.text().as_bytes()))
             .and_then(|()| write_json(&head_file, &head))?;
-        Ok(Self {
-            folder: folder.to_owned(),
-            spec,
-        })
+        Ok(Self { folder: folder.to_owned(), spec })
     }
 
     /// Opens the data set in `folder`. Files that its specification names are looked up in `files`.
@@ -144,10 +141,7 @@ impl Dataset {
         if found != head {
             return Err(other_data_set(&head_file, &found, &head));
         }
-        Ok(Self {
-            folder: folder.to_owned(),
-            spec,
-        })
+        Ok(Self { folder: folder.to_owned(), spec })
     }
 
     /// The specification.
@@ -187,11 +181,7 @@ impl Dataset {
     /// # Errors
     /// [`Refusal`] if an existing file is not valid, a row cannot be made, or a file cannot be written.
     pub fn make(&self, part: Part, progress: &dyn Progress) -> Result<Made, Refusal> {
-        let mut made = Made {
-            rows: 0,
-            shards: 0,
-            skipped: 0,
-        };
+        let mut made = Made { rows: 0, shards: 0, skipped: 0 };
         for shard in part.shards(self.spec.shards()) {
             if self.is_made(shard)? {
                 made.skipped += 1;
@@ -298,9 +288,7 @@ impl Part {
     /// # Errors
     /// [`Refusal`] if the text is not a valid part.
     pub fn parse(text: &str) -> Result<Self, Refusal> {
-        let numbers = text
-            .split_once('/')
-            .and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
+        let numbers = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         match numbers {
             Some((worker, of)) if worker < of => Ok(Self { worker, of }),
             _ => Err(Refusal::new(format!(
@@ -342,9 +330,7 @@ impl Part {
             return Err(Refusal::new(format!("{name} is needed beside worker number {worker}")));
         };
         if worker >= of {
-            return Err(Refusal::new(format!(
-                "worker number {worker} is not one of {of}, which count from 0"
-            )));
+            return Err(Refusal::new(format!("worker number {worker} is not one of {of}, which count from 0")));
         }
         Ok(Some(Self { worker, of }))
     }
@@ -379,13 +365,8 @@ mod tests {
             Part::from_environment(|name| variables.get(name).map(|v| (*v).to_owned()), workers)
                 .map_err(|e| e.to_string())
         };
-        let slurm = |id| {
-            vec![
-                ("SLURM_ARRAY_TASK_ID", id),
-                ("SLURM_ARRAY_TASK_MIN", "3"),
-                ("SLURM_ARRAY_TASK_COUNT", "4"),
-            ]
-        };
+        let slurm =
+            |id| vec![("SLURM_ARRAY_TASK_ID", id), ("SLURM_ARRAY_TASK_MIN", "3"), ("SLURM_ARRAY_TASK_COUNT", "4")];
         assert_eq!(part(&[], None), Ok(None));
         assert_eq!(part(&slurm("3"), None), Ok(Some(Part { worker: 0, of: 4 })));
         assert_eq!(part(&slurm("6"), None), Ok(Some(Part { worker: 3, of: 4 })));

@@ -43,11 +43,7 @@ struct Prepared {
 impl Prepared {
     fn new(spec: &Spec, number: u64) -> Result<Self, Refusal> {
         let choice = spec.choices().shape(spec.streams(), number)?;
-        let field = if spec.is_moving() {
-            None
-        } else {
-            Some(Field::new(spec, &choice)?)
-        };
+        let field = if spec.is_moving() { None } else { Some(Field::new(spec, &choice)?) };
         Ok(Self { number, choice, field })
     }
 }
@@ -55,13 +51,7 @@ impl Prepared {
 impl<'a> Maker<'a> {
     /// A maker for `spec`.
     pub fn new(spec: &'a Spec) -> Self {
-        Self {
-            streams: spec.streams(),
-            spec,
-            shapes: Vec::new(),
-            skin: None,
-            press: None,
-        }
+        Self { streams: spec.streams(), spec, shapes: Vec::new(), skin: None, press: None }
     }
 
     /// Row number `index`.
@@ -132,11 +122,7 @@ impl<'a> Maker<'a> {
         let count = whole(spec.config().object.count.value(streams, "object.count", number)).min(most);
         let mut held: Vec<Held> = Vec::with_capacity(count);
         for (slot, shape) in (0..count).zip(group * most as u64..) {
-            let drawn = if slot == 0 {
-                streams
-            } else {
-                streams.child("object", slot as u64)
-            };
+            let drawn = if slot == 0 { streams } else { streams.child("object", slot as u64) };
             let (choice, Some(field)) = self.shape(slot, shape)? else {
                 unreachable!("shapes that are held have a field");
             };
@@ -260,9 +246,7 @@ impl<'a> Row<'a> {
     /// Codes of the converter; 0 without one.
     pub(crate) fn codes(&self) -> impl Iterator<Item = u32> + 'a {
         let converter = self.skin.compressive.info().converter;
-        self.volts()
-            .iter()
-            .map(move |v| converter.and_then(|c| c.code(*v)).unwrap_or_default())
+        self.volts().iter().map(move |v| converter.and_then(|c| c.code(*v)).unwrap_or_default())
     }
 }
 

@@ -17,9 +17,7 @@ use std::ops::Range;
 /// Row `row` of a batch with these columns, as a JSON object.
 fn object(schema: &Schema, columns: &[ArrayRef], row: usize) -> Value {
     let fields = schema.fields().iter().zip(columns);
-    fields
-        .map(|(field, array)| (field.name().clone(), json(array, row)))
-        .collect()
+    fields.map(|(field, array)| (field.name().clone(), json(array, row))).collect()
 }
 
 impl Dataset {

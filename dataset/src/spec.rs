@@ -135,12 +135,7 @@ impl Spec {
         check_name(&config.name)?;
         let rows = (1..=MOST_ROWS).contains(&config.rows);
         in_range("rows", config.rows as f64, rows, "[1, 10^12]")?;
-        in_range(
-            "seed",
-            config.seed as f64,
-            i64::try_from(config.seed).is_ok(),
-            "[0, 2^63)",
-        )?;
+        in_range("seed", config.seed as f64, i64::try_from(config.seed).is_ok(), "[0, 2^63)")?;
         let timing = Timing::of(&config)?;
         let windows = timing.windows;
         let s = &config.skin;
@@ -205,10 +200,7 @@ impl Spec {
         let mut identity = Sha256::new();
         identity.update(text.as_bytes());
         choices.digest(&mut identity);
-        let files = [
-            chain.profile_file().map(|f| &f.text),
-            chain.rows_file().map(|f| &f.text),
-        ];
+        let files = [chain.profile_file().map(|f| &f.text), chain.rows_file().map(|f| &f.text)];
         for text in files.into_iter().flatten() {
             identity.update(text.as_bytes());
         }
@@ -301,11 +293,7 @@ impl Spec {
     /// What is never divided between two splits.
     pub(crate) fn split_by(&self) -> SplitBy {
         let files = self.config.object.from == ObjectSource::Meshes && self.most_objects() == 1;
-        let usual = if self.choices.are_procedural() || files {
-            SplitBy::Object
-        } else {
-            SplitBy::Press
-        };
+        let usual = if self.choices.are_procedural() || files { SplitBy::Object } else { SplitBy::Press };
         self.config.split.by.unwrap_or(usual)
     }
 

@@ -83,10 +83,7 @@ fn what_is_not_of_the_data_set_is_refused_and_kept() {
     let refused = |said: &str| {
         let errors = [dataset.finish(&()).err(), dataset.make(Part::WHOLE, &()).err()];
         let errors = errors.map(|error| error.map_or_else(String::new, |e| e.to_string()));
-        assert!(
-            !errors[0].is_empty() && errors.iter().any(|e| e.contains(said)),
-            "{errors:?}"
-        );
+        assert!(!errors[0].is_empty() && errors.iter().any(|e| e.contains(said)), "{errors:?}");
     };
     let file = dataset.shard_file(2);
     let whole = std::fs::read(&file).unwrap();
@@ -103,10 +100,7 @@ fn what_is_not_of_the_data_set_is_refused_and_kept() {
     std::fs::remove_file(&foreign).unwrap();
     std::fs::remove_file(&file).unwrap();
     let said = dataset.finish(&()).unwrap_err().to_string();
-    assert!(
-        said.contains("part-00002.parquet: is missing, as 1 of 5 files are"),
-        "{said}"
-    );
+    assert!(said.contains("part-00002.parquet: is missing, as 1 of 5 files are"), "{said}");
     let other = spec(&SMALL.replace("seed = 3", "seed = 4"));
     let said = Dataset::begin(&folder, other).unwrap_err().to_string();
     assert!(said.contains("dataset.json: another data set was begun here"), "{said}");
@@ -217,10 +211,7 @@ fn a_row_depends_on_its_number_alone() {
             assert!(bits(&mut backward, *row) == *expected, "row {row}");
         }
         let last = rows.len() - 1;
-        assert!(
-            bits(&mut Maker::new(&spec), rows[last]) == there[last],
-            "row {last} alone"
-        );
+        assert!(bits(&mut Maker::new(&spec), rows[last]) == there[last], "row {last} alone");
     }
 }
 
@@ -234,10 +225,7 @@ fn pressure_carries_the_force() {
         let row = maker.row(index).unwrap();
         let forces: f64 = (0..row.objects()).map(|k| row.object(k).unwrap().touch.force_n).sum();
         let carried = row.pressure().sum() * spec.skin().cell_area_m2();
-        assert!(
-            (carried / forces - 1.0).abs() < 1e-11,
-            "row {index}: {carried} N of {forces} N"
-        );
+        assert!((carried / forces - 1.0).abs() < 1e-11, "row {index}: {carried} N of {forces} N");
     }
 }
 
@@ -257,10 +245,7 @@ fn samples_are_the_weighted_sums() {
     for index in 0..30 {
         let row = maker.row(index).unwrap();
         let phi = row.phi();
-        assert!(
-            phi.iter().all(|w| w.abs().to_bits() == 1.0_f64.to_bits()),
-            "weights are ±1"
-        );
+        assert!(phi.iter().all(|w| w.abs().to_bits() == 1.0_f64.to_bits()), "weights are ±1");
         let x = image(&row, volts_per_siemens);
         let size: f64 = x.iter().sum();
         for (y, weights) in row.volts().iter().zip(phi.chunks_exact(100)) {
@@ -286,10 +271,7 @@ fn specs_that_ship_make_rows() {
             let scanned = if spec.config().record.raster { taxels } else { 0 };
             assert_eq!((row.pressure().values().len(), row.image().len()), (taxels, scanned));
             assert!(row.volts().iter().all(|v| v.is_finite()), "{name} {index}");
-            assert!(
-                row.pressure().max() > 0.0 || row.time_s() < 0.01 || spec.is_moving(),
-                "{name} {index}"
-            );
+            assert!(row.pressure().max() > 0.0 || row.time_s() < 0.01 || spec.is_moving(), "{name} {index}");
             touched += u64::from(row.pressure().max() > 0.0);
             refused += row.object(0).unwrap().touch.refused;
         }
@@ -305,17 +287,10 @@ fn splits_divide_neither_shapes_nor_presses() {
     let spec = spec(text);
     let mut maker = Maker::new(&spec);
     let splits: Vec<&str> = (0..4000).map(|k| maker.row(k).unwrap().split()).collect();
-    assert!(
-        splits
-            .chunks(4)
-            .all(|shape| shape.iter().all(|split| *split == shape[0]))
-    );
+    assert!(splits.chunks(4).all(|shape| shape.iter().all(|split| *split == shape[0])));
     for (split, share) in [("train", 0.5_f64), ("validation", 0.2), ("test", 0.3)] {
         let found = splits.iter().step_by(4).filter(|s| **s == split).count() as f64 / 1000.0;
-        assert!(
-            (found - share).abs() < 5.0 * (share * (1.0 - share) / 1000.0).sqrt(),
-            "{split}: {found}"
-        );
+        assert!((found - share).abs() < 5.0 * (share * (1.0 - share) / 1000.0).sqrt(), "{split}: {found}");
     }
 }
 
@@ -345,11 +320,7 @@ fn chosen_rows_are_the_rows_of_files() {
         let numbers: Vec<u64> = read.iter().map(|row| row["index"].as_u64().unwrap()).collect();
         assert!(numbers.iter().eq(&wanted), "{numbers:?}");
         // `phi` is not recorded
-        let kept = if columns.is_empty() {
-            crate::columns(&spec).len()
-        } else {
-            4
-        };
+        let kept = if columns.is_empty() { crate::columns(&spec).len() } else { 4 };
         assert!(read.iter().all(|row| row.as_object().unwrap().len() == kept));
     }
     let head = dataset.head(20).unwrap();
@@ -451,10 +422,7 @@ fn samples_of_a_course_are_the_weighted_sums_of_their_moment() {
         let x = image(&row, volts_per_siemens);
         for (y, weights) in row.volts().iter().zip(row.phi().chunks_exact(100)) {
             let sum: f64 = weights.iter().zip(&x).map(|(w, x)| w * x).sum();
-            assert!(
-                (y - sum).abs() <= 0.01 * plateau,
-                "window {index}: {y} and {sum} of {plateau}"
-            );
+            assert!((y - sum).abs() <= 0.01 * plateau, "window {index}: {y} and {sum} of {plateau}");
         }
     }
 }
@@ -501,11 +469,7 @@ fn drops_have_a_touch_and_an_end() {
         let row = maker.row(16 * drop).unwrap();
         let ball = row.object(0).unwrap().touch.ball.unwrap();
         let expected = (2.0 * 9.806_65 * height_m).sqrt();
-        assert!(
-            (ball.speed_m_per_s / expected - 1.0).abs() < 0.01,
-            "{}",
-            ball.speed_m_per_s
-        );
+        assert!((ball.speed_m_per_s / expected - 1.0).abs() < 0.01, "{}", ball.speed_m_per_s);
         assert!(forces.iter().all(|[t, f]| *t > -2e-4 || *f <= 0.0), "{forces:?}");
         assert!(forces[15][1] <= 0.0, "{forces:?}");
         let most = forces.iter().map(|[_, f]| *f).fold(0.0, f64::max);
@@ -524,9 +488,7 @@ fn a_bounce_need_not_end() {
 }
 
 fn refused(text: &str) -> String {
-    Spec::from_toml(text, &toml::Table::new(), ".".as_ref())
-        .unwrap_err()
-        .to_string()
+    Spec::from_toml(text, &toml::Table::new(), ".".as_ref()).unwrap_err().to_string()
 }
 
 /// Specs that cannot be, and what is said of them.

@@ -32,9 +32,7 @@ pub fn window(recording: &Recording, start_s: f64, m: usize) -> Result<Window> {
 
 /// The compressive recording of `session`, and the time at which its hold begins, s.
 pub fn held(session: &Session) -> Result<(&Recording, f64)> {
-    let recording = session
-        .compressive()
-        .ok_or("the session has no compressive recording")?;
+    let recording = session.compressive().ok_or("the session has no compressive recording")?;
     let [start_s, _] = session.hold_s.ok_or("nothing is held")?;
     Ok((recording, start_s))
 }
@@ -46,10 +44,7 @@ pub fn show(image: &[f64], truth: &[f64], cols: usize) -> f64 {
     support(image, SUPPORT_THRESHOLD, &mut found);
     support(truth, SUPPORT_THRESHOLD, &mut true_support);
     for row in found.chunks(cols) {
-        println!(
-            "{}",
-            row.iter().map(|on| if *on { " #" } else { " ." }).collect::<String>()
-        );
+        println!("{}", row.iter().map(|on| if *on { " #" } else { " ." }).collect::<String>());
     }
     let iou = SupportScore::new(&found, &true_support).iou;
     println!("intersection over union with the true image: {iou:.2}");

@@ -17,9 +17,7 @@ fn clocked(c: &mut Criterion) {
             let mut codes = vec![0; cells * EDGES];
             let mut run = |array: &Array| {
                 let mut array = array.clone();
-                array
-                    .clock(Clock::default(), &mut codes)
-                    .expect("the clock is in range");
+                array.clock(Clock::default(), &mut codes).expect("the clock is in range");
                 array.instructions()
             };
             let instructions = run(&array) - array.instructions();

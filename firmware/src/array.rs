@@ -38,9 +38,7 @@ impl Array {
     /// [`Refusal`] for no cell or more than 112, or an image larger than the flash.
     pub fn new(cells: usize, image: &Image) -> Result<Self, Refusal> {
         if cells == 0 || cells > CELLS_MAX {
-            return Err(Refusal::new(format!(
-                "{cells} cells do not fit on one bus; the range is [1, 112]"
-            )));
+            return Err(Refusal::new(format!("{cells} cells do not fit on one bus; the range is [1, 112]")));
         }
         let program = Device::program(image.flash())?;
         let cell = |k| Device::new(program.clone(), &[Self::address(k)]);
@@ -117,9 +115,7 @@ impl Array {
         let cells = self.cells.len();
         if !codes.len().is_multiple_of(cells) {
             let given = format!("`codes` has {} entries", codes.len());
-            return Err(Refusal::new(format!(
-                "{given}, which is no multiple of the {cells} cells"
-            )));
+            return Err(Refusal::new(format!("{given}, which is no multiple of the {cells} cells")));
         }
         let train = match self.train {
             Some(train) if train.clock == clock => train,
@@ -250,10 +246,7 @@ pub const SKIN_SAMPLE_DELAY_S: f64 = 11e-6;
 impl Default for Clock {
     /// The skin's: 64.3 thousand measurements a second, sampled 11 µs behind the edge.
     fn default() -> Self {
-        Self {
-            edge_hz: SKIN_EDGE_HZ,
-            sample_delay_s: SKIN_SAMPLE_DELAY_S,
-        }
+        Self { edge_hz: SKIN_EDGE_HZ, sample_delay_s: SKIN_SAMPLE_DELAY_S }
     }
 }
 
@@ -261,10 +254,7 @@ impl Clock {
     /// The skin's clock at another rate. Codes are sampled 11 µs after the edge or, if the period is too short for
     /// that, after the same share of the period.
     pub fn at(edge_hz: f64) -> Self {
-        Self {
-            edge_hz,
-            sample_delay_s: SKIN_SAMPLE_DELAY_S * (SKIN_EDGE_HZ / edge_hz).min(1.0),
-        }
+        Self { edge_hz, sample_delay_s: SKIN_SAMPLE_DELAY_S * (SKIN_EDGE_HZ / edge_hz).min(1.0) }
     }
 
     /// Checks that the clock line can run at this rate and delay.
@@ -281,11 +271,7 @@ impl Clock {
         let in_range = (0.0..1.0 / self.edge_hz).contains(&self.sample_delay_s);
         let shortest = (OSCILLATOR_HZ / self.edge_hz * (1.0 + 1e-14)).floor();
         if !in_range || ticks(self.sample_delay_s) as f64 >= shortest {
-            return error(
-                "sample_delay_s",
-                self.sample_delay_s,
-                "[0, 1/edge_hz) in whole ticks of 50 ns",
-            );
+            return error("sample_delay_s", self.sample_delay_s, "[0, 1/edge_hz) in whole ticks of 50 ns");
         }
         Ok(())
     }
@@ -304,12 +290,7 @@ struct Train {
 
 impl Train {
     fn new(clock: Clock, origin: u64, free: bool) -> Self {
-        Self {
-            clock,
-            origin,
-            sample_delay: ticks(clock.sample_delay_s),
-            free,
-        }
+        Self { clock, origin, sample_delay: ticks(clock.sample_delay_s), free }
     }
 
     fn edge_tick(&self, edge: u64) -> u64 {
@@ -322,10 +303,7 @@ impl Train {
 }
 
 /// Oscillator ticks nearest to a time.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "times are non-negative and end centuries before 2^53 ticks"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "times are non-negative and end centuries before 2^53 ticks")]
 fn ticks(time_s: f64) -> u64 {
     (time_s * OSCILLATOR_HZ).round() as u64
 }
@@ -401,11 +379,7 @@ impl Follower {
         let edge = *self.next_tick.get_or_insert_with(|| train.edge_tick(edge));
         let sample = self.edge_tick + train.sample_delay;
         // the delay is shorter than the period
-        if self.sampled < self.edges {
-            (Next::Sample, sample)
-        } else {
-            (Next::Edge, edge)
-        }
+        if self.sampled < self.edges { (Next::Sample, sample) } else { (Next::Edge, edge) }
     }
 }
 
@@ -509,9 +483,7 @@ impl Array {
             _ => None,
         });
         if let Some(bits) = odd {
-            return Err(Refusal::new(format!(
-                "`bits` = {bits} of an incomplete byte is outside [1, 7]"
-            )));
+            return Err(Refusal::new(format!("`bits` = {bits} of an incomplete byte is outside [1, 7]")));
         }
         self.drop_paused_clock();
         let mut replies = vec![];
@@ -568,10 +540,7 @@ impl Array {
         self.wait_for_clock()?;
         self.pass(1);
         // wired: one cell that pulls the line low is enough
-        Ok(self
-            .cells
-            .iter_mut()
-            .fold(false, |any, cell| cell.take_acknowledge() | any))
+        Ok(self.cells.iter_mut().fold(false, |any, cell| cell.take_acknowledge() | any))
     }
 
     /// A byte to the master.
@@ -647,10 +616,7 @@ mod tests {
     /// 20 MHz / 72 kHz = 277.7…; a rounded period of 278 would be 22 222 ticks late after 100 000 edges.
     #[test]
     fn edges_do_not_drift() {
-        let clock = Clock {
-            edge_hz: 72e3,
-            sample_delay_s: 10e-6,
-        };
+        let clock = Clock { edge_hz: 72e3, sample_delay_s: 10e-6 };
         let train = Train::new(clock, 1000, false);
         assert_eq!(train.edge_tick(1), 1278);
         assert_eq!(train.edge_tick(2), 1556);
@@ -660,10 +626,7 @@ mod tests {
 
     #[test]
     fn impossible_clocks_are_refused() {
-        let clock = |edge_hz, sample_delay_s| Clock {
-            edge_hz,
-            sample_delay_s,
-        };
+        let clock = |edge_hz, sample_delay_s| Clock { edge_hz, sample_delay_s };
         for bad in [
             clock(0.0, 0.0),
             clock(f64::NAN, 0.0),

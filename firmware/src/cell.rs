@@ -287,9 +287,7 @@ impl Pattern {
     pub fn new(bits: usize, word: u64) -> Result<Self, Refusal> {
         match u8::try_from(bits) {
             Ok(length) if (1..=PATTERN_BITS).contains(&bits) => Ok(Self { length, word }),
-            _ => Err(Refusal::new(format!(
-                "number of bits of a pattern = {bits} is outside [1, 64]"
-            ))),
+            _ => Err(Refusal::new(format!("number of bits of a pattern = {bits} is outside [1, 64]"))),
         }
     }
 

@@ -132,10 +132,8 @@ mod tests {
     /// Checksums by hand: minus the sum of the bytes, modulo 256.
     #[test]
     fn records_go_where_they_say() {
-        let image = Image::from_hex(&format!(
-            "\u{feff}:020000020010EC\r\n:020004000102F7 \r\n\r\n{END}\r\n\t\n"
-        ))
-        .unwrap();
+        let image =
+            Image::from_hex(&format!("\u{feff}:020000020010EC\r\n:020004000102F7 \r\n\r\n{END}\r\n\t\n")).unwrap();
         assert_eq!(image.flash()[0x103..0x107], [255, 1, 2, 255]);
     }
 
@@ -143,15 +141,9 @@ mod tests {
     fn wrong_text_is_named_by_its_line() {
         let data = ":020000000102FB";
         for (text, expected) in [
-            (
-                format!("{data}\n:0100020001FD\n{END}"),
-                "line 2: invalid checksum 'FC', expecting 'FD'",
-            ),
+            (format!("{data}\n:0100020001FD\n{END}"), "line 2: invalid checksum 'FC', expecting 'FD'"),
             (format!("{data}\nhello\n{END}"), "line 2: missing start code ':'"),
-            (
-                format!("{data}\n:0100010009F5\n{END}"),
-                "line 2: data record repeats address 0x1",
-            ),
+            (format!("{data}\n:0100010009F5\n{END}"), "line 2: data record repeats address 0x1"),
             (
                 format!(":020FFF000102ED\n{END}"),
                 "line 1: data record of 2 bytes at 0xfff is outside flash [0x0, 0x1000)",
@@ -160,10 +152,7 @@ mod tests {
                 format!("{data}\n:0200000400807A\n{data}\n{END}"),
                 "line 3: data record of 2 bytes at 0x800000 is outside flash [0x0, 0x1000)",
             ),
-            (
-                format!("{data}\n{END}\n{data}"),
-                "line 3: record after the end-of-file record",
-            ),
+            (format!("{data}\n{END}\n{data}"), "line 3: record after the end-of-file record"),
             (format!("{data}\n"), "line 1: end-of-file record is missing"),
             (END.to_owned(), "no data record"),
         ] {
@@ -179,10 +168,9 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let folder = Image::read(dir.path()).unwrap_err().to_string();
         assert!(folder.ends_with(": is a folder, not a regular file"), "{folder}");
-        for (bytes, words) in [
-            (vec![0xFF; 9], "not utf-8"),
-            (vec![b'x'; 1 << 19], "524288 bytes is outside [0, 262144]"),
-        ] {
+        for (bytes, words) in
+            [(vec![0xFF; 9], "not utf-8"), (vec![b'x'; 1 << 19], "524288 bytes is outside [0, 262144]")]
+        {
             let path = dir.path().join("wrong.hex");
             std::fs::write(&path, bytes).unwrap();
             let message = Image::read(&path).unwrap_err().to_string();

@@ -24,10 +24,7 @@ pub struct Refusal {
 impl Refusal {
     /// A refusal that says `message`.
     pub fn new(message: impl Into<String>) -> Self {
-        Self {
-            message: message.into(),
-            source: None,
-        }
+        Self { message: message.into(), source: None }
     }
 
     /// The value of a field that is outside its valid range, such as "[0.5, 100]".
@@ -37,10 +34,7 @@ impl Refusal {
 
     /// What `source` says, with `source` kept.
     pub fn from_error(source: impl Error + Send + Sync + 'static) -> Self {
-        Self {
-            message: source.to_string(),
-            source: Some(Arc::new(source)),
-        }
+        Self { message: source.to_string(), source: Some(Arc::new(source)) }
     }
 
     /// What a reader or writer of the file at `path` says, with the path before it.
@@ -56,10 +50,7 @@ impl Refusal {
 
     /// The same refusal in other words.
     pub fn reworded(self, words: impl FnOnce(&str) -> String) -> Self {
-        Self {
-            message: words(&self.message),
-            ..self
-        }
+        Self { message: words(&self.message), ..self }
     }
 }
 

@@ -75,9 +75,8 @@ impl LiveObject {
         let turned = mesh.clone().rotated(side.matrix());
         let middle = [0, 1].map(|axis| {
             let values = turned.vertices.iter().map(|v| v[axis]);
-            let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| {
-                [low.min(v), high.max(v)]
-            });
+            let [low, high] =
+                values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
             0.5 * (low + high)
         });
         Self {
@@ -199,30 +198,18 @@ impl UploadedMesh {
             MeshUnit::Inches => 25.4e-3,
         };
         let (mesh, report) = match read(bytes, scale, &name) {
-            Err(MeshError::FarFromMetres {
-                suggestion: Some((_, fits)),
-                ..
-            }) if unit == MeshUnit::Guess => read(bytes, fits, &name),
+            Err(MeshError::FarFromMetres { suggestion: Some((_, fits)), .. }) if unit == MeshUnit::Guess => {
+                read(bytes, fits, &name)
+            }
             read => read,
         }
         .map_err(Refusal::from_error)?;
         let [x, y, z] = report.extent_m.map(|m| 1e3 * m);
-        let mut notes = vec![format!(
-            "{name}: {x:.0} × {y:.0} × {z:.0} mm, {} triangles",
-            report.triangles
-        )];
+        let mut notes = vec![format!("{name}: {x:.0} × {y:.0} × {z:.0} mm, {} triangles", report.triangles)];
         // it is held over its middle, wherever its origin is
-        let centred = MeshReport {
-            middle_m: [0.0; 3],
-            ..report
-        };
+        let centred = MeshReport { middle_m: [0.0; 3], ..report };
         notes.extend(centred.notes());
-        Ok(Self {
-            object: LiveObject::of_mesh(&name, &mesh, Side::Bottom),
-            mesh,
-            notes,
-            name,
-        })
+        Ok(Self { object: LiveObject::of_mesh(&name, &mesh, Side::Bottom), mesh, notes, name })
     }
 
     /// It lying on `side`.
@@ -266,11 +253,7 @@ mod tests {
         let shape = LiveObject::of_mesh("box.stl", &mesh, Side::Bottom).shape();
         assert_eq!(shape.corners_mm.len(), 2);
         assert!(shape.heights_mm.iter().all(|h| *h < 0.01));
-        let far = shape
-            .corners_mm
-            .iter()
-            .flatten()
-            .fold(0.0_f32, |far, v| far.max(v.abs()));
+        let far = shape.corners_mm.iter().flatten().fold(0.0_f32, |far, v| far.max(v.abs()));
         assert!((far - 20.0).abs() < 1e-6, "{far}");
     }
 
@@ -281,10 +264,7 @@ mod tests {
             assert!(!object.shape().corners_mm.is_empty(), "{}", spec.name);
         }
         let message = LiveObject::named("teapot").unwrap_err().to_string();
-        assert!(
-            message.contains("`object` = \"teapot\"") && message.contains("tennis"),
-            "{message}"
-        );
+        assert!(message.contains("`object` = \"teapot\"") && message.contains("tennis"), "{message}");
     }
 
     #[test]
@@ -300,10 +280,7 @@ mod tests {
             let mesh = UploadedMesh::read("box.OBJ", unit, obj.as_bytes()).unwrap();
             let corners = mesh.object.shape().corners_mm;
             let far = corners.iter().flatten().fold(0.0_f32, |far, v| far.max(v.abs()));
-            assert!(
-                (2.0 * f64::from(far) - wide_mm).abs() < 0.11,
-                "{size:?} {unit:?}: {far}"
-            );
+            assert!((2.0 * f64::from(far) - wide_mm).abs() < 0.11, "{size:?} {unit:?}: {far}");
         }
     }
 
@@ -316,15 +293,9 @@ mod tests {
             ("cup.stl", b"solid nothing", "cup.stl"),
             ("cup.glb", b"glTF", "cup.glb"),
             ("cup.obj", cut.as_bytes(), "cup.obj"),
-            (
-                "cup.obj",
-                b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3",
-                "not a finite number",
-            ),
+            ("cup.obj", b"v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3", "not a finite number"),
         ] {
-            let message = UploadedMesh::read(name, MeshUnit::Guess, bytes)
-                .unwrap_err()
-                .to_string();
+            let message = UploadedMesh::read(name, MeshUnit::Guess, bytes).unwrap_err().to_string();
             assert!(message.contains(fact), "{name}: {message}");
         }
     }

@@ -97,12 +97,7 @@ impl Presser {
             stiffness_pa_per_m: self.object.stiffness_pa_per_m,
             ..PosedMesh::at_rest(&self.object.mesh, [x_m, y_m, 0.0])
         };
-        let load = Load {
-            force_n,
-            axis_m: [x_m, y_m],
-            holder: Holder::Rigid,
-            from: None,
-        };
+        let load = Load { force_n, axis_m: [x_m, y_m], holder: Holder::Rigid, from: None };
         // the field is one that balances a load
         let Some(field) = self.field.quasi_static() else {
             return Err(EquilibriumError::load(force_n));
@@ -177,10 +172,7 @@ mod tests {
                 let presser = pressed(name, Press::new(&skin, at, at, 200.0).unwrap(), 40);
                 assert!(presser.pressure().values().iter().all(|p| p.is_finite()), "{name}");
                 let carried = presser.pressure().sum() * skin.cell_area_m2();
-                assert!(
-                    (carried - presser.force_n()).abs() < 1e-6 * 200.0,
-                    "{name}: {carried} N"
-                );
+                assert!((carried - presser.force_n()).abs() < 1e-6 * 200.0, "{name}: {carried} N");
             }
         }
     }

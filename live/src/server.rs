@@ -73,12 +73,8 @@ impl Server {
     /// [`Refusal`] for an object that is not there, or a port that is taken.
     pub fn bind(config: &LiveConfig) -> Result<Self, Refusal> {
         LiveObject::named(&config.object)?;
-        let refused = |e: std::io::Error| {
-            Refusal::new(format!(
-                "`--port` = {}: {e}; `--port 0` takes any free one",
-                config.port
-            ))
-        };
+        let refused =
+            |e: std::io::Error| Refusal::new(format!("`--port` = {}: {e}; `--port 0` takes any free one", config.port));
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, config.port)).map_err(refused)?;
         listener.set_nonblocking(true).map_err(refused)?;
         Ok(Self {
@@ -175,15 +171,9 @@ fn refusal(headers: &HeaderMap, authority: Option<&str>, port: u16) -> Option<St
     let hosts: Vec<Option<&str>> = headers.get_all(header::HOST).iter().map(|v| v.to_str().ok()).collect();
     let own_host = matches!(hosts.as_slice(), [Some(host)] if is_own(host, port));
     if !own_host || authority.is_some_and(|authority| !is_own(authority, port)) {
-        return Some(format!(
-            "This server answers at http://127.0.0.1:{port}/ alone: the header Host is another one."
-        ));
+        return Some(format!("This server answers at http://127.0.0.1:{port}/ alone: the header Host is another one."));
     }
-    let origins: Vec<Option<&str>> = headers
-        .get_all(header::ORIGIN)
-        .iter()
-        .map(|v| v.to_str().ok())
-        .collect();
+    let origins: Vec<Option<&str>> = headers.get_all(header::ORIGIN).iter().map(|v| v.to_str().ok()).collect();
     let own_origin = match origins.as_slice() {
         [] => !headers.contains_key(header::UPGRADE),
         [Some(origin)] => origin.strip_prefix("http://").is_some_and(|host| is_own(host, port)),
@@ -291,9 +281,7 @@ fn read_mesh(
     told: Sender<Told>,
 ) -> Result<(), Refusal> {
     let Ok(place) = Arc::clone(&shared.meshes).try_acquire_owned() else {
-        return Err(message(
-            "another mesh is being read; drop it again in a moment".to_owned(),
-        ));
+        return Err(message("another mesh is being read; drop it again in a moment".to_owned()));
     };
     tokio::task::spawn_blocking(move || {
         let read = || UploadedMesh::read(&name, unit, &bytes).map(Box::new);
@@ -364,10 +352,7 @@ fn obey(session: &mut LiveSession, told: Vec<Told>, shown: &Sender<String>) -> O
             Told::Request(request) => session.apply(request),
             Told::Mesh(Err(error)) => Err(error),
             Told::Mesh(Ok(mesh)) => {
-                let note = Note::Mesh {
-                    name: &mesh.name,
-                    notes: &mesh.notes,
-                };
+                let note = Note::Mesh { name: &mesh.name, notes: &mesh.notes };
                 tell(shown, &note)?;
                 Ok(Some(session.press_with(Arc::from(mesh))))
             }
@@ -401,12 +386,7 @@ fn tell(shown: &Sender<String>, message: &impl Serialize) -> Option<()> {
 }
 
 fn tell_error(shown: &Sender<String>, error: &Refusal) -> Option<()> {
-    tell(
-        shown,
-        &Note::Error {
-            text: &error.to_string(),
-        },
-    )
+    tell(shown, &Note::Error { text: &error.to_string() })
 }
 
 fn json(message: &impl Serialize) -> String {
@@ -432,10 +412,7 @@ mod tests {
         for host in ["127.0.0.1:7117", "localhost:7117", "LOCALHOST:7117", "[::1]:7117"] {
             let host = ("host", host);
             assert!(!refused(&[host]), "{host:?}");
-            assert!(
-                !refused(&[host, upgrade, ("origin", "http://localhost:7117")]),
-                "{host:?}"
-            );
+            assert!(!refused(&[host, upgrade, ("origin", "http://localhost:7117")]), "{host:?}");
             assert!(refused(&[host, upgrade]), "{host:?}");
         }
         for host in [

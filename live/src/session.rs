@@ -103,9 +103,7 @@ impl Request {
     pub fn from_json(text: &str) -> Result<Self, Refusal> {
         if text.len() > MOST_TEXT_BYTES {
             let found = text.len();
-            return Err(message(format!(
-                "its length = {found} bytes is outside [0, {MOST_TEXT_BYTES}]"
-            )));
+            return Err(message(format!("its length = {found} bytes is outside [0, {MOST_TEXT_BYTES}]")));
         }
         serde_json::from_str(text).map_err(|e| message(e.to_string()))
     }
@@ -284,9 +282,7 @@ impl LiveSession {
     pub fn prepare(&self) {
         let waits = |panel: &Panel| {
             matches!(self.shelf.decoder(panel.decoder), Made::Waiting)
-                || panel
-                    .rows
-                    .is_some_and(|designer| matches!(self.shelf.design(designer), Made::Waiting))
+                || panel.rows.is_some_and(|designer| matches!(self.shelf.design(designer), Made::Waiting))
         };
         while self.settings.panels.iter().any(waits) {
             std::thread::sleep(std::time::Duration::from_millis(2));
@@ -336,11 +332,7 @@ impl LiveSession {
         if self.wired && self.complete {
             return Ok(());
         }
-        let there = if self.wired {
-            std::mem::take(&mut self.lines)
-        } else {
-            Vec::new()
-        };
+        let there = if self.wired { std::mem::take(&mut self.lines) } else { Vec::new() };
         match wires(&self.settings, &self.shelf, self.seed, there) {
             Ok((lines, complete)) => {
                 self.lines = lines;
@@ -357,10 +349,7 @@ impl LiveSession {
     }
 
     fn decoded(&mut self, panel: &Panel, touched: bool) -> PanelFrame {
-        let waiting = |what: String| PanelFrame {
-            waits_for: Some(what),
-            ..PanelFrame::default()
-        };
+        let waiting = |what: String| PanelFrame { waits_for: Some(what), ..PanelFrame::default() };
         let decoder = match self.shelf.decoder(panel.decoder) {
             Made::Ready(decoder) => decoder,
             Made::Waiting => return waiting("The decoder is learning …".to_owned()),

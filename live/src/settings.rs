@@ -26,10 +26,7 @@ impl Press {
             in_range(field, value, value.abs() <= 500.0 * extent_m, "the skin")?;
         }
         within("force_n", force_n, FORCE_N[0], FORCE_N[1], "[0, 200] N")?;
-        Ok(Self {
-            at_m: [1e-3 * x_mm, 1e-3 * y_mm],
-            force_n,
-        })
+        Ok(Self { at_m: [1e-3 * x_mm, 1e-3 * y_mm], force_n })
     }
 }
 
@@ -43,10 +40,7 @@ pub(crate) struct Panel {
 
 impl Panel {
     pub(crate) fn named(decoder: &str, rows: &str) -> Result<Self, Refusal> {
-        Ok(Self {
-            decoder: decoder_of(decoder)?,
-            rows: rows_of(rows)?,
-        })
+        Ok(Self { decoder: decoder_of(decoder)?, rows: rows_of(rows)? })
     }
 
     /// Name of the rows.
@@ -72,10 +66,7 @@ impl Settings {
     pub(crate) fn usual() -> Result<Self, Refusal> {
         Ok(Self {
             measurements: 20,
-            panels: [
-                Panel::named("matched", RANDOM)?,
-                Panel::named("amortised", "cosine_signs")?,
-            ],
+            panels: [Panel::named("matched", RANDOM)?, Panel::named("amortised", "cosine_signs")?],
             readout: spts::chain::DEFAULT_READOUT,
             noise: 1.0,
             faults: BTreeMap::new(),
@@ -104,12 +95,7 @@ impl Settings {
     }
 
     pub(crate) fn fault(&mut self, taxel: u32, name: Option<&str>, taxels: usize) -> Result<(), Refusal> {
-        in_range(
-            "taxel",
-            f64::from(taxel),
-            (taxel as usize) < taxels,
-            "the taxels of the skin",
-        )?;
+        in_range("taxel", f64::from(taxel), (taxel as usize) < taxels, "the taxels of the skin")?;
         if let Some(name) = name {
             self.faults.insert(taxel, fault(name)?);
         } else {
@@ -195,10 +181,10 @@ struct UsualPanel {
 
 impl Usual {
     fn of(settings: &Settings) -> Self {
-        let panels = settings.panels.iter().map(|panel| UsualPanel {
-            decoder: panel.decoder.name,
-            rows: panel.rows_name(),
-        });
+        let panels = settings
+            .panels
+            .iter()
+            .map(|panel| UsualPanel { decoder: panel.decoder.name, rows: panel.rows_name() });
         Self {
             measurements: settings.measurements,
             readout: settings.readout,
@@ -219,12 +205,7 @@ impl Options {
         };
         let objects = pressable().map(|spec| Choice {
             name: spec.name,
-            label: spec
-                .description
-                .split([',', ':'])
-                .next()
-                .unwrap_or(spec.name)
-                .to_owned(),
+            label: spec.description.split([',', ':']).next().unwrap_or(spec.name).to_owned(),
             about: spec.description.to_owned(),
             group: "",
         });
@@ -232,11 +213,7 @@ impl Options {
             name: spec.name,
             label: spec.label.to_owned(),
             about: spec.about.to_owned(),
-            group: if PUBLISHED_DECODES.contains(&spec.name) {
-                "Published with the skin"
-            } else {
-                "Others"
-            },
+            group: if PUBLISHED_DECODES.contains(&spec.name) { "Published with the skin" } else { "Others" },
         });
         let designed = designers().map(|designer| Choice {
             name: designer.name,
@@ -263,10 +240,7 @@ impl Options {
             row_choices: std::iter::once(random).chain(designed).collect(),
             readouts: READOUTS
                 .iter()
-                .map(|pair| Choice {
-                    group: if is_noisy(pair.0) { "noisy" } else { "" },
-                    ..plain(pair)
-                })
+                .map(|pair| Choice { group: if is_noisy(pair.0) { "noisy" } else { "" }, ..plain(pair) })
                 .collect(),
             faults: FAULTS.iter().map(plain).collect(),
             usual: Usual::of(settings),
@@ -287,9 +261,7 @@ pub(crate) const NOISES: [(&str, &str); 2] = [("contact_noise", "fraction"), ("i
 
 /// Decoders that need to know no object.
 fn decoders() -> impl Iterator<Item = &'static DecoderSpec> {
-    DECODERS
-        .iter()
-        .filter(|spec| spec.needs != Needs::Classes && !BLIND.contains(&spec.name))
+    DECODERS.iter().filter(|spec| spec.needs != Needs::Classes && !BLIND.contains(&spec.name))
 }
 
 /// Designers of rows of ±1 for images.
@@ -336,13 +308,10 @@ fn named<T, I>(field: &'static str, name: &str, all: impl Fn() -> I) -> Result<T
 where
     I: Iterator<Item = (&'static str, T)>,
 {
-    all()
-        .find(|(known, _)| *known == name)
-        .map(|(_, found)| found)
-        .ok_or_else(|| {
-            let known: Vec<&str> = all().map(|(known, _)| known).collect();
-            unknown(field, name, &known)
-        })
+    all().find(|(known, _)| *known == name).map(|(_, found)| found).ok_or_else(|| {
+        let known: Vec<&str> = all().map(|(known, _)| known).collect();
+        unknown(field, name, &known)
+    })
 }
 
 #[cfg(test)]
@@ -362,14 +331,8 @@ mod tests {
     #[test]
     fn a_name_that_is_not_there_is_refused_with_those_that_are() {
         for (error, facts) in [
-            (
-                decoder_of("evidence").map(|_| ()),
-                ["`decoder` = \"evidence\"", "amortised"],
-            ),
-            (
-                rows_of("analog").map(|_| ()),
-                ["`rows` = \"analog\"", "random, cosine_signs"],
-            ),
+            (decoder_of("evidence").map(|_| ()), ["`decoder` = \"evidence\"", "amortised"]),
+            (rows_of("analog").map(|_| ()), ["`rows` = \"analog\"", "random, cosine_signs"]),
             (readout("best").map(|_| ()), ["`profile` = \"best\"", "ideal, as_built"]),
             (fault("lame").map(|_| ()), ["`fault` = \"lame\"", "dead, stuck"]),
         ] {

@@ -134,17 +134,11 @@ pub(crate) fn wires(
 fn chain(settings: &Settings, patterns: Option<Patterns>, shelf: &Shelf, seed: u64) -> Result<Chain, Refusal> {
     let fault = |(taxel, name): (&u32, &&'static str)| -> toml::Table {
         let entries = [("name", toml::Value::from(*name)), ("taxel", i64::from(*taxel).into())];
-        entries
-            .map(|(key, value)| (key.to_owned(), value))
-            .into_iter()
-            .collect()
+        entries.map(|(key, value)| (key.to_owned(), value)).into_iter().collect()
     };
     let config = ChainConfig {
         readout: Some(settings.readout.to_owned()),
-        rows: RowsConfig {
-            patterns,
-            ..RowsConfig::default()
-        },
+        rows: RowsConfig { patterns, ..RowsConfig::default() },
         faults: settings.faults.iter().map(fault).collect(),
         ..ChainConfig::default()
     };
@@ -156,10 +150,7 @@ fn chain(settings: &Settings, patterns: Option<Patterns>, shelf: &Shelf, seed: u
 /// `profile` with `factor` times the noise.
 fn with_noise(mut profile: Profile, factor: f64) -> Profile {
     for (effect, parameter) in NOISES {
-        let value = profile
-            .compressive
-            .get_mut(effect)
-            .and_then(|effect| effect.get_mut(parameter));
+        let value = profile.compressive.get_mut(effect).and_then(|effect| effect.get_mut(parameter));
         match value {
             Some(toml::Value::Float(value)) => *value *= factor,
             Some(toml::Value::Array(ends)) => {
@@ -360,11 +351,7 @@ mod tests {
             let mut squares = 0.0;
             for _ in 0..20 {
                 lines[0].record(&PressureMap::zeros(10, 10), 0.025).unwrap();
-                squares += lines[0]
-                    .volts()
-                    .iter()
-                    .map(|v| (v - lines[0].idle_v()).powi(2))
-                    .sum::<f64>();
+                squares += lines[0].volts().iter().map(|v| (v - lines[0].idle_v()).powi(2)).sum::<f64>();
             }
             (squares / 2000.0).sqrt()
         };

@@ -25,8 +25,7 @@ impl std::fmt::Display for Shown {
 /// # Errors
 /// [`Refusal`] if `ok` is false.
 pub fn in_range(field: &str, value: f64, ok: bool, range: &'static str) -> Result<f64, Refusal> {
-    ok.then_some(value)
-        .ok_or_else(|| Refusal::range(field, Shown(value), range))
+    ok.then_some(value).ok_or_else(|| Refusal::range(field, Shown(value), range))
 }
 
 /// Checks that `value` lies in [`least`, `most`]. `range` is the same interval as text.
@@ -64,21 +63,13 @@ pub fn in_interval(field: &str, value: f64, interval: &'static str) -> Result<()
 /// Whether `interval` holds `value`; `None` for a text that is no interval.
 fn holds(interval: &str, value: f64) -> Option<bool> {
     let number = |text: &str| {
-        if text == "∞" {
-            Some(f64::INFINITY)
-        } else {
-            text.parse().ok()
-        }
+        if text == "∞" { Some(f64::INFINITY) } else { text.parse().ok() }
     };
     let (low, rest) = interval.get(1..)?.split_once(", ")?;
     let (high, _) = rest.split_once([')', ']'])?;
     let closed = rest[high.len()..].starts_with(']');
     let (low, high): (f64, f64) = (number(low)?, number(high)?);
-    let above = if interval.starts_with('[') {
-        value >= low
-    } else {
-        value > low
-    };
+    let above = if interval.starts_with('[') { value >= low } else { value > low };
     Some(above && if closed { value <= high } else { value < high })
 }
 
@@ -122,9 +113,7 @@ pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
 /// ```
 pub fn explain_toml(error: &Error) -> String {
     let shown = error.to_string();
-    let key = shown
-        .rsplit_once("in `")
-        .and_then(|(_, rest)| rest.trim_end().strip_suffix('`'));
+    let key = shown.rsplit_once("in `").and_then(|(_, rest)| rest.trim_end().strip_suffix('`'));
     let message = error.message().trim_end();
     match (key, mistake(message)) {
         (Some(key), Some((found, needed))) => format!("`{key}` = {found}: {needed} is needed"),
@@ -195,10 +184,7 @@ mod tests {
         let huge = in_range("pitch_m", -1e308, false, "[0, 1]").unwrap_err().to_string();
         assert_eq!(huge, "`pitch_m` = -1e308 is outside [0, 1]");
         let message = "`inner.count` = 1.5: a whole number is needed";
-        assert_eq!(
-            in_section("adc", message),
-            "`adc.inner.count` = 1.5: a whole number is needed"
-        );
+        assert_eq!(in_section("adc", message), "`adc.inner.count` = 1.5: a whole number is needed");
         assert_eq!(in_section("adc", "unknown field\nhere\n"), "`adc`: unknown field; here");
     }
 
@@ -210,14 +196,8 @@ mod tests {
             ("(0, ∞)", [1e-300, 1e300], [0.0, f64::INFINITY]),
             ("[-5, 5]", [-5.0, 5.0], [f64::NAN, f64::NEG_INFINITY]),
         ] {
-            assert!(
-                inside.iter().all(|v| in_interval("x", *v, interval).is_ok()),
-                "{interval}"
-            );
-            assert!(
-                outside.iter().all(|v| in_interval("x", *v, interval).is_err()),
-                "{interval}"
-            );
+            assert!(inside.iter().all(|v| in_interval("x", *v, interval).is_ok()), "{interval}");
+            assert!(outside.iter().all(|v| in_interval("x", *v, interval).is_err()), "{interval}");
         }
     }
 
@@ -248,14 +228,8 @@ mod tests {
             ("list = 3", "`list` = 3: a list is needed"),
             ("list = [300]", "`list` = 300: a whole number in [0, 255] is needed"),
             ("inner = 1", "`inner` = 1: a table is needed"),
-            (
-                "inner.count = -1",
-                "`inner.count` = -1: a whole number in [0, 2^32) is needed",
-            ),
-            (
-                "inner.count = 1.5",
-                "`inner.count` = 1.5: a whole number in [0, 2^32) is needed",
-            ),
+            ("inner.count = -1", "`inner.count` = -1: a whole number in [0, 2^32) is needed"),
+            ("inner.count = 1.5", "`inner.count` = 1.5: a whole number in [0, 2^32) is needed"),
             ("pair = [1.0]", "`pair` = a list of 1: a list of 2 is needed"),
             ("inner.cuont = 1", "unknown field `cuont`, expected `count`"),
         ] {

@@ -99,9 +99,7 @@ fn steps(transducer: &mut dyn Transducer, skin: &SkinLayout, holds: &[Hold]) -> 
 
 /// Conductance of all taxels after the last of `holds`, S.
 fn end(build: Build<'_>, skin: &SkinLayout, holds: &[Hold]) -> Vec<f64> {
-    run(build, skin, holds)
-        .pop()
-        .map_or_else(Vec::new, |map| map.values().to_vec())
+    run(build, skin, holds).pop().map_or_else(Vec::new, |map| map.values().to_vec())
 }
 
 fn check_extremes(build: Build<'_>, skin: &SkinLayout) {
@@ -114,10 +112,7 @@ fn check_extremes(build: Build<'_>, skin: &SkinLayout) {
                 for (g, g_below) in out.iter().zip(&below) {
                     let text = format!("{g} S at {p} Pa for {dt_s} s after {before:?}");
                     assert!(g.is_finite() && *g >= 0.0, "{text}");
-                    assert!(
-                        *g >= g_below * (1.0 - ORDER_TOLERANCE),
-                        "{text}, but {g_below} S at less"
-                    );
+                    assert!(*g >= g_below * (1.0 - ORDER_TOLERANCE), "{text}, but {g_below} S at less");
                 }
                 below = out;
             }
@@ -172,10 +167,7 @@ fn check_cut(build: Build<'_>, skin: &SkinLayout, name: &str, holds: &[Hold], pi
         .iter()
         .flat_map(|(p, dt_s)| pieces.iter().map(move |piece| (*p, dt_s * piece / total)))
         .collect();
-    let ends = run(build, skin, &cut)
-        .into_iter()
-        .skip(pieces.len() - 1)
-        .step_by(pieces.len());
+    let ends = run(build, skin, &cut).into_iter().skip(pieces.len() - 1).step_by(pieces.len());
     for (k, (whole, cut)) in run(build, skin, holds).iter().zip(ends).enumerate() {
         for (whole, cut) in whole.values().iter().zip(cut.values()) {
             let error = (cut - whole).abs() / whole.max(f64::MIN_POSITIVE);
@@ -235,10 +227,7 @@ fn check_cycle(transducer: &mut dyn Transducer, skin: &SkinLayout, name: &str, h
             work += 0.5 * (p[0].0 + p[1].0) * gained_s;
             error += 0.5 * ((p[1].0 - p[0].0) * gained_s).abs();
         }
-        assert!(
-            work >= -error,
-            "{name}: ∮ P dG = {work} Pa S is below −{error}: the conductance leads"
-        );
+        assert!(work >= -error, "{name}: ∮ P dG = {work} Pa S is below −{error}: the conductance leads");
     }
 }
 

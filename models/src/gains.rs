@@ -53,10 +53,7 @@ impl TaxelGains {
     /// # Errors
     /// [`Refusal`] for another number of values than `taxels`, or for the first value outside its range.
     pub fn check(&self, taxels: usize) -> Result<(), Refusal> {
-        for (field, values, range) in [
-            ("log_mean", &self.log_mean, "[-5, 5]"),
-            ("log_sd", &self.log_sd, "[0, 2]"),
-        ] {
+        for (field, values, range) in [("log_mean", &self.log_mean, "[-5, 5]"), ("log_sd", &self.log_sd, "[0, 2]")] {
             let count = values.len();
             in_range(
                 &format!("gains.{field}.length"),
@@ -98,8 +95,7 @@ impl TaxelGains {
     /// Gains of one skin that may be this one, drawn from item `index` of the streams' purpose `label`.
     pub(crate) fn draw(&self, streams: Streams, label: &str, index: u64) -> Vec<f64> {
         let mut rng = streams.rng(label, index);
-        self.at(std::iter::repeat_with(|| StandardNormal.sample(&mut rng)))
-            .collect()
+        self.at(std::iter::repeat_with(|| StandardNormal.sample(&mut rng))).collect()
     }
 
     /// Standard deviation of the natural logarithm of every taxel's gain in a session that was not part of the
@@ -145,12 +141,7 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn two() -> TaxelGains {
-        TaxelGains {
-            shape: Some([1, 2]),
-            log_mean: vec![0.5, -0.5],
-            log_sd: vec![0.1, 0.3],
-            mounting_log_sd: 0.1,
-        }
+        TaxelGains { shape: Some([1, 2]), log_mean: vec![0.5, -0.5], log_sd: vec![0.1, 0.3], mounting_log_sd: 0.1 }
     }
 
     /// Standard errors of n = 4000 values: σ/√n of the mean, σ/√(2n) of the standard deviation; five of each.
@@ -178,27 +169,12 @@ mod tests {
         let said = two().check_skin(&skin(2, 1)).unwrap_err().to_string();
         assert_eq!(said, "`gains.shape[0]` = 1 is outside what the skin has");
         for (text, part) in [
-            (
-                "log_mean = [0.0]\nlog_sd = [0.0, 1.0]\nmounting_log_sd = 0.1",
-                "gains.log_sd.length` = 2",
-            ),
-            (
-                "log_mean = [nan]\nlog_sd = [0.0]\nmounting_log_sd = 0.1",
-                "gains.log_mean[0]` = NaN is outside [-5, 5]",
-            ),
-            (
-                "log_mean = [0.0]\nlog_sd = [-1.0]\nmounting_log_sd = 0.1",
-                "gains.log_sd[0]` = -1 is outside [0, 2]",
-            ),
-            (
-                "log_mean = []\nlog_sd = []\nmounting_log_sd = 0.1",
-                "gains.log_mean.length` = 0",
-            ),
+            ("log_mean = [0.0]\nlog_sd = [0.0, 1.0]\nmounting_log_sd = 0.1", "gains.log_sd.length` = 2"),
+            ("log_mean = [nan]\nlog_sd = [0.0]\nmounting_log_sd = 0.1", "gains.log_mean[0]` = NaN is outside [-5, 5]"),
+            ("log_mean = [0.0]\nlog_sd = [-1.0]\nmounting_log_sd = 0.1", "gains.log_sd[0]` = -1 is outside [0, 2]"),
+            ("log_mean = []\nlog_sd = []\nmounting_log_sd = 0.1", "gains.log_mean.length` = 0"),
             ("log_mean = [0.0]\nlog_sd = [0.0]", "mounting_log_sd"),
-            (
-                "log_mean = [0.0]\nlog_sd = [0.0]\nmounting_log_sd = 0.1\nmean = 2",
-                "mean",
-            ),
+            ("log_mean = [0.0]\nlog_sd = [0.0]\nmounting_log_sd = 0.1\nmean = 2", "mean"),
         ] {
             let said = TaxelGains::from_toml(text).unwrap_err();
             assert!(said.contains(part), "{said}");

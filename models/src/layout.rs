@@ -31,12 +31,7 @@ struct SkinLayoutConfig {
 impl Default for SkinLayoutConfig {
     fn default() -> Self {
         let skin = SkinLayout::default();
-        Self {
-            rows: skin.rows,
-            cols: skin.cols,
-            pitch_m: skin.pitch_m,
-            electrode_m: None,
-        }
+        Self { rows: skin.rows, cols: skin.cols, pitch_m: skin.pitch_m, electrode_m: None }
     }
 }
 
@@ -57,12 +52,7 @@ impl Default for SkinLayout {
     /// The published skin: 10 × 10 taxels at 15 mm pitch. The side of the electrode is not published; 10 mm is an
     /// estimate from how little a neighbour of an edge responds.
     fn default() -> Self {
-        Self {
-            rows: 10,
-            cols: 10,
-            pitch_m: 15e-3,
-            electrode_m: 10e-3,
-        }
+        Self { rows: 10, cols: 10, pitch_m: 15e-3, electrode_m: 10e-3 }
     }
 }
 
@@ -80,18 +70,8 @@ impl SkinLayout {
         // below a micrometre a sheet of carbon-filled film is no continuum; beyond a metre the arm's reach ends in a
         // taxel
         in_interval("pitch_m", pitch_m, "[1e-6, 1] m")?;
-        in_range(
-            "electrode_m",
-            electrode_m,
-            electrode_m > 0.0 && electrode_m <= pitch_m,
-            "(0, pitch_m]",
-        )?;
-        Ok(Self {
-            rows,
-            cols,
-            pitch_m,
-            electrode_m,
-        })
+        in_range("electrode_m", electrode_m, electrode_m > 0.0 && electrode_m <= pitch_m, "(0, pitch_m]")?;
+        Ok(Self { rows, cols, pitch_m, electrode_m })
     }
 
     /// A skin of `rows × cols` taxels at the pitch `pitch_m`. Electrodes fill the same share of a taxel as on the
@@ -161,10 +141,7 @@ impl SkinLayout {
     /// Position (x, y), m, of the taxel coordinate `(row, col)`, which may be fractional.
     pub fn position_m(&self, row: f64, col: f64) -> [f64; 2] {
         let [width, height] = self.extent_m();
-        [
-            (col + 0.5) * self.pitch_m - 0.5 * width,
-            0.5 * height - (row + 0.5) * self.pitch_m,
-        ]
+        [(col + 0.5) * self.pitch_m - 0.5 * width, 0.5 * height - (row + 0.5) * self.pitch_m]
     }
 }
 
@@ -212,18 +189,8 @@ impl<U> Grid<U> {
     /// # Panics
     /// If `values.len() != rows * cols`.
     pub fn from_values(rows: usize, cols: usize, values: Vec<f64>) -> Self {
-        assert_eq!(
-            values.len(),
-            rows * cols,
-            "a {rows} × {cols} map needs {} values",
-            rows * cols
-        );
-        Self {
-            rows,
-            cols,
-            values,
-            unit: PhantomData,
-        }
+        assert_eq!(values.len(), rows * cols, "a {rows} × {cols} map needs {} values", rows * cols);
+        Self { rows, cols, values, unit: PhantomData }
     }
 
     /// Number of rows.
@@ -270,10 +237,7 @@ mod tests {
         // one rounding each of the product, the quotient and the number read
         let rounded = 3.0 * f64::EPSILON;
         assert!((electrode_m("pitch_m = 0.005") / (0.01 / 3.0) - 1.0).abs() < rounded);
-        assert_eq!(
-            electrode_m("pitch_m = 0.005\nelectrode_m = 0.004").to_bits(),
-            4e-3_f64.to_bits()
-        );
+        assert_eq!(electrode_m("pitch_m = 0.005\nelectrode_m = 0.004").to_bits(), 4e-3_f64.to_bits());
         assert_eq!(SkinLayout::default().relative_area().to_bits(), 1.0_f64.to_bits());
     }
 }

@@ -54,10 +54,7 @@ pub struct HysteresisConfig {
 
 impl Default for HysteresisConfig {
     fn default() -> Self {
-        Self {
-            operators: 6,
-            width: 1.8,
-        }
+        Self { operators: 6, width: 1.8 }
     }
 }
 
@@ -67,9 +64,7 @@ impl TryFrom<HysteresisConfig> for Hysteresis {
         let n = c.operators as f64;
         in_range("hysteresis.operators", n, c.operators <= MAX_OPERATORS, "[0, 32]")?;
         in_interval("hysteresis.width", c.width, "[1, 10]")?;
-        let factors = (1..=c.operators)
-            .map(|i| 1.0 + (c.width - 1.0) * i as f64 / n)
-            .collect();
+        let factors = (1..=c.operators).map(|i| 1.0 + (c.width - 1.0) * i as f64 / n).collect();
         Ok(Self { factors })
     }
 }
@@ -123,22 +118,14 @@ impl Prony {
         let count = shares.len() as f64;
         in_range(&name("shares (length)"), count, shares.len() <= MAX_BRANCHES, "[0, 32]")?;
         let same = shares.len() == taus_s.len();
-        in_range(
-            &name("tau_s (length)"),
-            taus_s.len() as f64,
-            same,
-            "the length of `shares`",
-        )?;
+        in_range(&name("tau_s (length)"), taus_s.len() as f64, same, "the length of `shares`")?;
         for share in shares {
             in_interval(&name("shares"), *share, "[0, 1]")?;
         }
         for tau_s in taus_s {
             in_interval(&name("tau_s"), *tau_s, "[1e-6, 1e7]")?;
         }
-        Ok(Self {
-            shares: shares.to_vec(),
-            taus_s: taus_s.to_vec(),
-        })
+        Ok(Self { shares: shares.to_vec(), taus_s: taus_s.to_vec() })
     }
 
     /// Branches of share 1 with time constants `spacing` decades apart from `start_s` to `end_s`, which are valid.
@@ -149,10 +136,7 @@ impl Prony {
             .take_while(|d| *d <= decades + 1e-9)
             .map(|d| start_s * 10_f64.powf(d))
             .collect();
-        Self {
-            shares: vec![1.0; taus_s.len()],
-            taus_s,
-        }
+        Self { shares: vec![1.0; taus_s.len()], taus_s }
     }
 
     /// Number of branches.
@@ -218,10 +202,7 @@ impl Decay {
     fn new(dt_s: f64, tau_s: f64) -> Self {
         // a branch without delay is never in the past
         if tau_s > 0.0 {
-            Self {
-                left: (-dt_s / tau_s).exp(),
-                gone: -(-dt_s / tau_s).exp_m1(),
-            }
+            Self { left: (-dt_s / tau_s).exp(), gone: -(-dt_s / tau_s).exp_m1() }
         } else {
             Self { left: 0.0, gone: 1.0 }
         }
@@ -229,11 +210,7 @@ impl Decay {
 
     #[inline]
     fn towards(self, target: f64, from: f64) -> f64 {
-        if self.gone < SHORT {
-            from + (target - from) * self.gone
-        } else {
-            target + (from - target) * self.left
-        }
+        if self.gone < SHORT { from + (target - from) * self.gone } else { target + (from - target) * self.left }
     }
 }
 
@@ -247,30 +224,19 @@ impl Lag {
         in_interval("creep.fast_s", rise_s, "[0, 1]")?;
         in_interval("creep.fast_fall_s", fall_s, "[0, 1]")?;
         in_interval("creep.instant", instant, "[0, 1]")?;
-        Ok(Self {
-            rise_s,
-            fall_s,
-            instant,
-        })
+        Ok(Self { rise_s, fall_s, instant })
     }
 
     /// Decays over a step of `dt_s`, the same for all taxels.
     pub(crate) fn decays(&self, dt_s: f64) -> LagDecays {
-        LagDecays {
-            rise: Decay::new(dt_s, self.rise_s),
-            fall: Decay::new(dt_s, self.fall_s),
-        }
+        LagDecays { rise: Decay::new(dt_s, self.rise_s), fall: Decay::new(dt_s, self.fall_s) }
     }
 
     /// Moves one taxel's `delayed` conductance, S, over a step under `elastic_s` and returns the conductance at its
     /// end, S.
     #[inline]
     pub(crate) fn respond(&self, elastic_s: f64, decays: LagDecays, delayed_s: &mut f64) -> f64 {
-        let decay = if *delayed_s < elastic_s {
-            decays.rise
-        } else {
-            decays.fall
-        };
+        let decay = if *delayed_s < elastic_s { decays.rise } else { decays.fall };
         *delayed_s = decay.towards(elastic_s, *delayed_s);
         self.instant * elastic_s + (1.0 - self.instant) * *delayed_s
     }
@@ -412,10 +378,7 @@ impl Creep {
 
     /// Storage for the decay factors of a step.
     pub fn decays(&self) -> CreepDecays {
-        CreepDecays {
-            slow: vec![0.0; self.slow.len()],
-            fast: LagDecays::default(),
-        }
+        CreepDecays { slow: vec![0.0; self.slow.len()], fast: LagDecays::default() }
     }
 
     /// Computes the decay factor of every branch for a step of `dt_s` seconds.
@@ -479,12 +442,7 @@ pub struct Conditioning {
 
 impl Default for Conditioning {
     fn default() -> Self {
-        Self {
-            first: 0.92,
-            per_ln_press: 0.055,
-            reference_press: 10,
-            touch_pa: 100.0,
-        }
+        Self { first: 0.92, per_ln_press: 0.055, reference_press: 10, touch_pa: 100.0 }
     }
 }
 
@@ -508,11 +466,7 @@ impl Conditioning {
 
     /// State of a taxel that has not been pressed in this session.
     pub fn fresh(&self) -> Presses {
-        Presses {
-            count: 0,
-            pressed: false,
-            gain: self.gain(1),
-        }
+        Presses { count: 0, pressed: false, gain: self.gain(1) }
     }
 
     /// Gain at press number `press` of a session, counted from 1.
@@ -560,10 +514,7 @@ mod tests {
         let up = (0..=steps).map(|i| p_max * f64::from(i) / f64::from(steps));
         let path = up.clone().chain(up.collect::<Vec<_>>().into_iter().rev());
         let trace = sweep(&h, &mut state, path);
-        let area: f64 = trace
-            .windows(2)
-            .map(|w| 0.5 * (w[0].0 + w[1].0) * (w[1].1 - w[0].1))
-            .sum();
+        let area: f64 = trace.windows(2).map(|w| 0.5 * (w[0].0 + w[1].0) * (w[1].1 - w[0].1)).sum();
         let mean: f64 = h.factors.iter().map(|k| 1.0 - 1.0 / k).sum::<f64>() / 6.0;
         // one kink a branch, each within one step of the sweep
         assert_relative_eq!(area, 0.5 * p_max * p_max * mean, max_relative = 2.0 / f64::from(steps));
@@ -612,12 +563,7 @@ mod tests {
         for t in [1e-9_f64, 1e-3, 0.1, 10.0, 3600.0] {
             let expected: f64 = g.iter().zip(tau_s).map(|(g, tau)| -g * (-t / tau).exp_m1()).sum();
             // 1 − exp(−t/τ) for short t keeps the digits that t/τ leaves above a rounding of 1
-            assert_relative_eq!(
-                relaxed(&series, 1.0, &[t]),
-                expected,
-                epsilon = 1e-15,
-                max_relative = 1e-14
-            );
+            assert_relative_eq!(relaxed(&series, 1.0, &[t]), expected, epsilon = 1e-15, max_relative = 1e-14);
         }
     }
 
@@ -685,10 +631,7 @@ mod tests {
     }
 
     fn creep(kind: CreepKind) -> Creep {
-        let config = CreepConfig {
-            kind,
-            ..CreepConfig::default()
-        };
+        let config = CreepConfig { kind, ..CreepConfig::default() };
         Creep::try_from(config).unwrap()
     }
 

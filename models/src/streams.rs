@@ -35,9 +35,9 @@ impl Streams {
     /// The generator of item `index` for the purpose `label`.
     pub fn rng(self, label: &str, index: u64) -> ChaCha8Rng {
         // FNV-1a: stable across releases, unlike the standard library's hasher
-        let key = label.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| {
-            (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
-        });
+        let key = label
+            .bytes()
+            .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
         let mut seed = [0; 32];
         seed[..8].copy_from_slice(&self.root.to_le_bytes());
         seed[8..16].copy_from_slice(&key.to_le_bytes());

@@ -70,10 +70,7 @@ impl OnElectrode {
         if relative_area.to_bits() == 1.0_f64.to_bits() {
             return calibrated;
         }
-        Box::new(Self {
-            calibrated,
-            relative_area,
-        })
+        Box::new(Self { calibrated, relative_area })
     }
 }
 
@@ -92,10 +89,7 @@ impl Transducer for OnElectrode {
     }
 
     fn boxed(&self) -> Box<dyn Transducer> {
-        Box::new(Self {
-            calibrated: self.calibrated.boxed(),
-            relative_area: self.relative_area,
-        })
+        Box::new(Self { calibrated: self.calibrated.boxed(), relative_area: self.relative_area })
     }
 }
 

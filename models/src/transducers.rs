@@ -19,13 +19,7 @@ pub type BuildTransducer = fn(toml::Table, &SkinLayout, Streams) -> Result<Box<d
 /// Every transducer, by name.
 pub const TRANSDUCERS: &[(&str, BuildTransducer)] = &[
     ("linear", |table, _, _| Ok(Box::new(parsed::<Linear>(table)?))),
-    ("velostat", |table, skin, streams| {
-        Ok(Box::new(Velostat::new(
-            parsed::<VelostatConfig>(table)?,
-            skin,
-            streams,
-        )?))
-    }),
+    ("velostat", |table, skin, streams| Ok(Box::new(Velostat::new(parsed::<VelostatConfig>(table)?, skin, streams)?))),
 ];
 
 /// Builds the transducer called `name` in [`TRANSDUCERS`], and scales its conductance with the area of the skin's
@@ -82,10 +76,7 @@ mod tests {
         for text in outside.split("; ") {
             let field = text.split(' ').next().unwrap();
             let message = build("velostat", text);
-            assert!(
-                message.contains(field) && message.contains("is outside"),
-                "{text}: {message}"
-            );
+            assert!(message.contains(field) && message.contains("is outside"), "{text}: {message}");
         }
     }
 }

@@ -38,9 +38,7 @@ impl PoseIn {
     pub(crate) fn of(value: &Bound<'_, PyAny>) -> PyResult<Self> {
         let pose = value.extract::<([f64; 3], [f64; 4])>();
         let (position, quaternion) = pose.map_err(|_| {
-            refuse(format!(
-                "`pose` = {value}; a pair is needed: position (3,) m, unit quaternion (4,) w x y z"
-            ))
+            refuse(format!("`pose` = {value}; a pair is needed: position (3,) m, unit quaternion (4,) w x y z"))
         })?;
         Ok(Self(position, quaternion))
     }
@@ -57,21 +55,9 @@ impl PoseIn {
         }
         let [w, x, y, z] = quaternion.map(|v| v / length);
         let rotation = [
-            [
-                1.0 - 2.0 * (y * y + z * z),
-                2.0 * (x * y - w * z),
-                2.0 * (x * z + w * y),
-            ],
-            [
-                2.0 * (x * y + w * z),
-                1.0 - 2.0 * (x * x + z * z),
-                2.0 * (y * z - w * x),
-            ],
-            [
-                2.0 * (x * z - w * y),
-                2.0 * (y * z + w * x),
-                1.0 - 2.0 * (x * x + y * y),
-            ],
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
         ];
         Ok((position, rotation))
     }
@@ -79,11 +65,9 @@ impl PoseIn {
 
 /// A twist: velocity of the body's origin, m/s, then angular velocity, rad/s, both in the skin's frame.
 pub(crate) fn checked_twist(value: &Bound<'_, PyAny>) -> PyResult<([f64; 3], [f64; 3])> {
-    let twist: [f64; 6] = value.extract().map_err(|_| {
-        refuse(format!(
-            "`twist` = {value}; six numbers are needed: linear m/s, then angular rad/s"
-        ))
-    })?;
+    let twist: [f64; 6] = value
+        .extract()
+        .map_err(|_| refuse(format!("`twist` = {value}; six numbers are needed: linear m/s, then angular rad/s")))?;
     if !twist.iter().all(|v| v.is_finite()) {
         bail!("`twist` = {twist:?}: finite numbers are needed, m/s and rad/s");
     }
@@ -104,8 +88,5 @@ pub(crate) fn triples(name: &str, array: &PyArrayLike2<'_, f64, AllowTypeChange>
 /// An array (n, 3) of `rows`.
 pub(crate) fn triples_out(py: Python<'_>, rows: impl ExactSizeIterator<Item = [f64; 3]>) -> PyResult<Array2<'_>> {
     let count = rows.len();
-    rows.flatten()
-        .collect::<Vec<f64>>()
-        .into_pyarray(py)
-        .reshape([count, 3])
+    rows.flatten().collect::<Vec<f64>>().into_pyarray(py).reshape([count, 3])
 }

@@ -51,10 +51,7 @@ impl Body {
         if !(1e4..=f64::INFINITY).contains(&stiffness_pa_per_m) {
             bail!("`stiffness` = {stiffness_pa_per_m} is outside [1e4, inf] Pa/m");
         }
-        Ok(Self {
-            body: PreparedMesh::from(mesh).into(),
-            stiffness_pa_per_m,
-        })
+        Ok(Self { body: PreparedMesh::from(mesh).into(), stiffness_pa_per_m })
     }
 }
 
@@ -151,11 +148,7 @@ impl Body {
         let half_m = 0.5 * length;
         let lower = cap(radius, half_m).rev().map(|[r, z]| [r, -z]);
         let tip = half_m + radius;
-        let profile = [[0.0, -tip]]
-            .into_iter()
-            .chain(lower)
-            .chain(cap(radius, half_m))
-            .chain([[0.0, tip]]);
+        let profile = [[0.0, -tip]].into_iter().chain(lower).chain(cap(radius, half_m)).chain([[0.0, tip]]);
         let volume = PI * radius * radius * (length + 4.0 / 3.0 * radius);
         Self::new(round(&profile.collect::<Vec<_>>(), volume), stiffness)
     }
@@ -172,10 +165,7 @@ impl Body {
 
     /// The same body once more: a key of its own for a second pose.
     fn copy(&self) -> Self {
-        Self {
-            body: self.body.clone(),
-            stiffness_pa_per_m: self.stiffness_pa_per_m,
-        }
+        Self { body: self.body.clone(), stiffness_pa_per_m: self.stiffness_pa_per_m }
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {

@@ -32,9 +32,7 @@ pub(crate) fn table(field: &str, dict: &Bound<'_, PyDict>) -> PyResult<toml::Tab
 
 fn table_at(field: &str, dict: &Bound<'_, PyDict>, depth: usize) -> PyResult<toml::Table> {
     let entry = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
-        let key: String = key
-            .extract()
-            .map_err(|_| refuse(format!("`{field}` has a key that is no text")))?;
+        let key: String = key.extract().map_err(|_| refuse(format!("`{field}` has a key that is no text")))?;
         let value = value_at(&format!("{field}[\"{key}\"]"), &value, depth + 1)?;
         Ok((key, value))
     };

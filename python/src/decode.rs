@@ -83,11 +83,7 @@ impl Decoder {
             }
         };
         let data = learned.map_err(refuse)?;
-        Ok(Self {
-            trained: py.detach(|| (spec.train)(&data)).map_err(refuse)?,
-            name: spec.name,
-            shape,
-        })
+        Ok(Self { trained: py.detach(|| (spec.train)(&data)).map_err(refuse)?, name: spec.name, shape })
     }
 
     /// Image of one window: `phi` (M, taxels), `y` (M,) V; (rows, cols).
@@ -97,23 +93,16 @@ impl Decoder {
         phi: PyReadonlyArray2<'_, f64>,
         y: PyReadonlyArray1<'_, f64>,
     ) -> PyResult<Array2<'py>> {
-        let rows = self.rows_of(
-            phi.as_array().rows().into_iter().flatten().copied(),
-            phi.as_array().dim(),
-        )?;
+        let rows = self.rows_of(phi.as_array().rows().into_iter().flatten().copied(), phi.as_array().dim())?;
         let y = measured(y.as_array().iter().copied(), rows.1)?;
         let image = py.detach(|| {
             let press = Press::on(Arc::new(PressRows::of_matrix(&rows.0)), y, 0.0);
-            let window = press
-                .window(0, rows.1)
-                .ok_or_else(|| refuse("`y` holds a value that is not finite"))?;
+            let window = press.window(0, rows.1).ok_or_else(|| refuse("`y` holds a value that is not finite"))?;
             let mut answer = Answer::default();
             self.trained.start().decode(&window, &mut answer).map_err(refuse)?;
             Ok::<_, PyErr>(answer.image)
         })?;
-        self.image_out(image)?
-            .into_pyarray(py)
-            .reshape([self.shape.0, self.shape.1])
+        self.image_out(image)?.into_pyarray(py).reshape([self.shape.0, self.shape.1])
     }
 
     /// Images and classes of n windows: `phi` (n, M, taxels), `y` (n, M); images (n, taxels), and classes (n,), -1 for
@@ -160,10 +149,7 @@ impl Decoder {
     }
 
     fn __repr__(&self) -> String {
-        format!(
-            "<spts decoder {} for {} x {} taxels>",
-            self.name, self.shape.0, self.shape.1
-        )
+        format!("<spts decoder {} for {} x {} taxels>", self.name, self.shape.0, self.shape.1)
     }
 }
 
@@ -281,8 +267,5 @@ pub(crate) fn decoder_table() -> Vec<(&'static str, &'static str, &'static str)>
         Needs::Classes => "classes",
         Needs::Shapes | Needs::Network => "shapes",
     };
-    DECODERS
-        .iter()
-        .map(|spec| (spec.name, spec.about, needs(spec.needs)))
-        .collect()
+    DECODERS.iter().map(|spec| (spec.name, spec.about, needs(spec.needs))).collect()
 }

@@ -57,38 +57,19 @@ impl Mount {
     ) -> PyResult<Self> {
         let arrays: Arrays = data.extract()?;
         let count = roots.len();
-        let body_arrays = [
-            &arrays.xpos,
-            &arrays.xmat,
-            &arrays.xipos,
-            &arrays.cvel,
-            &arrays.subtree_com,
-            &arrays.xfrc_applied,
-        ];
+        let body_arrays =
+            [&arrays.xpos, &arrays.xmat, &arrays.xipos, &arrays.cvel, &arrays.subtree_com, &arrays.xfrc_applied];
         let fits = body_arrays
             .iter()
             .zip([3, 9, 3, 6, 3, 6])
             .all(|(a, cols)| a.bind(py).shape() == [count, cols]);
         let sites = arrays.site_xpos.bind(py).shape()[0];
-        let numbers = bodies
-            .iter()
-            .map(|(body, _)| *body)
-            .chain([link])
-            .chain(roots.iter().copied());
+        let numbers = bodies.iter().map(|(body, _)| *body).chain([link]).chain(roots.iter().copied());
         if !fits || site >= sites || numbers.max().is_some_and(|most| most >= count) {
             bail!("`data` is not of this model");
         }
         let (bodies, shapes) = bodies.into_iter().unzip();
-        Ok(Self {
-            skin,
-            site,
-            link,
-            bodies,
-            shapes,
-            roots,
-            arrays,
-            before: Mutex::default(),
-        })
+        Ok(Self { skin, site, link, bodies, shapes, roots, arrays, before: Mutex::default() })
     }
 
     /// Lets the bodies touch the skin, `dt` s after the last time, and adds the wrenches to `xfrc_applied`: on every
@@ -111,9 +92,7 @@ impl Mount {
     /// its number, and force and torque about its centre of mass in the world's frame (6,).
     fn loads<'py>(&self, py: Python<'py>, dt: f64) -> PyResult<(Touch, Vec<(usize, Array1<'py>)>)> {
         let (touch, loads) = self.felt(py, dt)?;
-        let loads = loads
-            .into_iter()
-            .map(|(body, load)| (body, PyArray1::from_slice(py, &load)));
+        let loads = loads.into_iter().map(|(body, load)| (body, PyArray1::from_slice(py, &load)));
         Ok((touch, loads.collect()))
     }
 
@@ -228,11 +207,7 @@ fn minus(a: Vector, b: Vector) -> Vector {
 }
 
 fn cross(a: Vector, b: Vector) -> Vector {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn joined(a: Vector, b: Vector) -> [f64; 6] {

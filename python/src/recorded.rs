@@ -38,11 +38,7 @@ pub(crate) struct Recording {
 pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Session>> {
     let set = py.detach(|| SessionSet::open(&path)).map_err(refuse)?;
     let sessions = set.sessions.into_iter();
-    Ok(sessions
-        .map(|session| Session {
-            whole: Arc::new(session),
-        })
-        .collect())
+    Ok(sessions.map(|session| Session { whole: Arc::new(session) }).collect())
 }
 
 #[pymethods]
@@ -105,25 +101,14 @@ impl Session {
             let blocks = recorded.as_ref()?.recording.blocks().len();
             Some(format!("{name} {blocks} blocks"))
         });
-        format!(
-            "<spts.Session {:?}: {}>",
-            self.whole.name,
-            modes.collect::<Vec<_>>().join(", ")
-        )
+        format!("<spts.Session {:?}: {}>", self.whole.name, modes.collect::<Vec<_>>().join(", "))
     }
 }
 
 impl Session {
     fn recording(&self, raster: bool) -> Option<Recording> {
-        let there = if raster {
-            &self.whole.raster
-        } else {
-            &self.whole.compressive
-        };
-        there.as_ref().map(|_| Recording {
-            whole: Arc::clone(&self.whole),
-            raster,
-        })
+        let there = if raster { &self.whole.raster } else { &self.whole.compressive };
+        there.as_ref().map(|_| Recording { whole: Arc::clone(&self.whole), raster })
     }
 }
 
@@ -153,9 +138,7 @@ impl Recording {
     #[getter]
     fn idle<'py>(&self, py: Python<'py>) -> Array1<'py> {
         let samples = self.samples();
-        let idle: Vec<f64> = (0..samples.blocks().len())
-            .map(|block| idle_mean(samples, block))
-            .collect();
+        let idle: Vec<f64> = (0..samples.blocks().len()).map(|block| idle_mean(samples, block)).collect();
         idle.into_pyarray(py)
     }
 
@@ -217,15 +200,9 @@ impl Recording {
         }
         let samples = self.samples();
         let idle_v = idle_mean(samples, block);
-        let y: Vec<f64> = samples.blocks()[block].volts[first..first + total]
-            .iter()
-            .map(|v| v - idle_v)
-            .collect();
+        let y: Vec<f64> = samples.blocks()[block].volts[first..first + total].iter().map(|v| v - idle_v).collect();
         let rows = samples.rows(block, first..first + total);
-        let phi = rows
-            .to_vec()
-            .into_pyarray(py)
-            .reshape([count, measurements, rows.taxels()])?;
+        let phi = rows.to_vec().into_pyarray(py).reshape([count, measurements, rows.taxels()])?;
         Ok((phi, y.into_pyarray(py).reshape([count, measurements])?))
     }
 
@@ -260,20 +237,13 @@ impl Recording {
     fn __repr__(&self) -> String {
         let samples = self.samples();
         let (blocks, each) = (samples.blocks().len(), samples.blocks()[0].volts.len());
-        format!(
-            "<spts.Recording of {blocks} blocks of {each} measurements, {} taxels>",
-            samples.taxels()
-        )
+        format!("<spts.Recording of {blocks} blocks of {each} measurements, {} taxels>", samples.taxels())
     }
 }
 
 impl Recording {
     fn recorded(&self) -> &Recorded {
-        let there = if self.raster {
-            &self.whole.raster
-        } else {
-            &self.whole.compressive
-        };
+        let there = if self.raster { &self.whole.raster } else { &self.whole.compressive };
         let Some(recorded) = there else {
             unreachable!("a recording is only made of one that is there");
         };
@@ -302,9 +272,7 @@ impl Recording {
     fn each<'py>(&self, py: Python<'py>, of: impl Fn(&PressFacts) -> Option<f64>) -> Array1<'py> {
         let recorded = self.recorded();
         let blocks = 0..recorded.recording.blocks().len();
-        let values: Vec<f64> = blocks
-            .map(|k| recorded.facts(k).and_then(&of).unwrap_or(f64::NAN))
-            .collect();
+        let values: Vec<f64> = blocks.map(|k| recorded.facts(k).and_then(&of).unwrap_or(f64::NAN)).collect();
         values.into_pyarray(py)
     }
 
@@ -318,10 +286,6 @@ impl Recording {
                 None => return Ok(None),
             }
         }
-        Ok(Some(all.into_pyarray(py).reshape([
-            blocks,
-            layout.rows(),
-            layout.cols(),
-        ])?))
+        Ok(Some(all.into_pyarray(py).reshape([blocks, layout.rows(), layout.cols()])?))
     }
 }

@@ -33,19 +33,11 @@ impl Contender for Given {
         &self.name
     }
 
-    fn learn(
-        &self,
-        data: &TrainingData,
-        labels: &Labels,
-        left_out: Option<&str>,
-    ) -> Result<Arc<dyn Trained>, Refusal> {
+    fn learn(&self, data: &TrainingData, labels: &Labels, left_out: Option<&str>) -> Result<Arc<dyn Trained>, Refusal> {
         let (images, numbers) = (data.library.images(), data.library.labels());
         let taxels = images.nrows();
         let values: Vec<f64> = (0..images.ncols()).flat_map(|k| images.column(k)).collect();
-        let numbers: Vec<i64> = numbers
-            .iter()
-            .filter_map(|number| i64::try_from(*number).ok())
-            .collect();
+        let numbers: Vec<i64> = numbers.iter().filter_map(|number| i64::try_from(*number).ok()).collect();
         let answers = Python::attach(|py| {
             let images = values.into_pyarray(py).reshape([numbers.len(), taxels])?;
             let names = labels.names().to_vec();
@@ -157,29 +149,20 @@ pub(crate) fn score_sessions(
     let named = decoders.iter().map(|name| {
         find(name).ok_or_else(|| {
             let known: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
-            refuse(format!(
-                "`estimator` = \"{name}\"; valid: an estimator, or {}",
-                known.join(", ")
-            ))
+            refuse(format!("`estimator` = \"{name}\"; valid: an estimator, or {}", known.join(", ")))
         })
     });
     let decoders = named.collect::<PyResult<Vec<_>>>()?;
     if let Some(m) = measurements.iter().find(|m| !(1..=10_000).contains(*m)) {
         bail!("`measurements` = {m} is outside [1, 10000]");
     }
-    let sources = [
-        (PUBLISHED, TrainingSource::Published),
-        (RASTER, TrainingSource::Raster),
-        (SHAPES, TrainingSource::Shapes),
-    ];
+    let sources =
+        [(PUBLISHED, TrainingSource::Published), (RASTER, TrainingSource::Raster), (SHAPES, TrainingSource::Shapes)];
     let training = vec![one_of("learn_from", learn_from, &sources)?];
     let sensing = sensing.iter().map(|name| {
         let known = Sensing::ALL.into_iter().find(|sensing| sensing.name() == name);
         known.ok_or_else(|| {
-            refuse(format!(
-                "`sensing` = \"{name}\"; valid: {}",
-                Sensing::ALL.map(Sensing::name).join(", ")
-            ))
+            refuse(format!("`sensing` = \"{name}\"; valid: {}", Sensing::ALL.map(Sensing::name).join(", ")))
         })
     });
     let sensing = sensing.collect::<PyResult<Vec<_>>>()?;

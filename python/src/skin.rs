@@ -162,9 +162,7 @@ impl Skin {
             let (low, high) = mesh.body.mesh.bounds().unwrap_or_default();
             winding.span_m = [low[winding.axis], high[winding.axis]];
         }
-        let points = py
-            .detach(|| SurfacePoints::wrapped(&winding, &mesh.body.mesh))
-            .map_err(refuse)?;
+        let points = py.detach(|| SurfacePoints::wrapped(&winding, &mesh.body.mesh)).map_err(refuse)?;
         Self::curved(points, winding.shape, surface(stiffness, thickness, damping, friction))
     }
 
@@ -199,12 +197,7 @@ impl Skin {
             let twist = twists.map(|twists| twists.get_item(&body)).transpose()?.flatten();
             let (velocity_m_per_s, spin_rad_per_s) = twist.map_or(Ok(REST), |twist| checked_twist(&twist))?;
             keys.push(body.unbind());
-            placed.push(Placed {
-                position_m,
-                rotation,
-                velocity_m_per_s,
-                spin_rad_per_s,
-            });
+            placed.push(Placed { position_m, rotation, velocity_m_per_s, spin_rad_per_s });
         }
         if let Some(twists) = twists
             && let Some(stray) = twists.keys().iter().find(|body| !poses.contains(body).unwrap_or(false))
@@ -371,14 +364,7 @@ impl Skin {
     }
 
     fn of(skin: TouchSkin) -> Self {
-        Self {
-            id: NEXT.fetch_add(1, Ordering::Relaxed),
-            state: Mutex::new(State {
-                skin,
-                touches: 0,
-                time_s: 0.0,
-            }),
-        }
+        Self { id: NEXT.fetch_add(1, Ordering::Relaxed), state: Mutex::new(State { skin, touches: 0, time_s: 0.0 }) }
     }
 
     /// Stiffness and damping of the foam where it is touched, N/m and N s/m.

@@ -83,12 +83,8 @@ impl Wire {
         taxels: Option<Vec<i128>>,
     ) -> PyResult<Self> {
         let (seed, session) = (whole("seed", seed)?, whole("session", session)?);
-        let taxels = taxels.map(|taxels| {
-            taxels
-                .into_iter()
-                .map(|k| whole("taxels", k))
-                .collect::<PyResult<Vec<usize>>>()
-        });
+        let taxels =
+            taxels.map(|taxels| taxels.into_iter().map(|k| whole("taxels", k)).collect::<PyResult<Vec<usize>>>());
         let taxels = taxels.transpose()?;
         let whole = skin.layout();
         let layout = match &taxels {
@@ -104,10 +100,7 @@ impl Wire {
         });
         let config = ChainConfig {
             transducer: Some(transducer.to_owned()),
-            transducer_parameters: parameters
-                .map(|p| table("parameters", p))
-                .transpose()?
-                .unwrap_or_default(),
+            transducer_parameters: parameters.map(|p| table("parameters", p)).transpose()?.unwrap_or_default(),
             readout: Some(readout.to_owned()),
             rows: rows(seeds, levels)?,
             weights: None,
@@ -215,9 +208,7 @@ impl Wire {
         if !raw {
             volts.iter_mut().for_each(|v| *v -= idle_v);
         }
-        let phi = weights
-            .then(|| phi.into_pyarray(py).reshape([count, taxels]))
-            .transpose()?;
+        let phi = weights.then(|| phi.into_pyarray(py).reshape([count, taxels])).transpose()?;
         Ok((volts.into_pyarray(py), phi))
     }
 
@@ -310,10 +301,7 @@ fn rows(seeds: Option<Bound<'_, PyAny>>, levels: Option<&str>) -> PyResult<RowsC
             }
         },
     }
-    let known = [
-        ("binary", CompressiveWeights::Binary),
-        ("analog", CompressiveWeights::Analog),
-    ];
+    let known = [("binary", CompressiveWeights::Binary), ("analog", CompressiveWeights::Analog)];
     rows.levels = levels.map(|levels| one_of("levels", levels, &known)).transpose()?;
     Ok(rows)
 }

@@ -65,9 +65,7 @@ fn classify(c: &mut Criterion) {
         Workspace::default(),
     );
     let classifier = Src::new(library, Src::PUBLISHED_SPARSITY);
-    c.bench_function("classify", |b| {
-        b.iter(|| classifier.classify(black_box(&image), &mut work))
-    });
+    c.bench_function("classify", |b| b.iter(|| classifier.classify(black_box(&image), &mut work)));
 }
 
 /// Twenty ±1 measurements of discs and bars on 10 × 10 taxels: the estimates that are given Φ with every window, and
@@ -75,17 +73,9 @@ fn classify(c: &mut Criterion) {
 fn fixed(c: &mut Criterion) {
     let (m, cols) = (20, 10);
     let mut rng = ChaCha8Rng::seed_from_u64(4);
-    let images = Matrix::from(&DMatrix::from_columns(
-        &(0..200).map(|k| touch(k, cols)).collect::<Vec<_>>(),
-    ));
+    let images = Matrix::from(&DMatrix::from_columns(&(0..200).map(|k| touch(k, cols)).collect::<Vec<_>>()));
     let prior = Arc::new(ImagePrior::UNSEEN.learn(&images, cols).expect("images"));
-    let phi = Matrix::from(&DMatrix::from_fn(
-        m,
-        cols * cols,
-        |_, _| {
-            if rng.random() { 1.0 } else { -1.0 }
-        },
-    ));
+    let phi = Matrix::from(&DMatrix::from_fn(m, cols * cols, |_, _| if rng.random() { 1.0 } else { -1.0 }));
     let windows: Vec<Vec<f64>> = (0..64)
         .map(|k| {
             let image = touch(1000 + k, cols);
@@ -101,14 +91,8 @@ fn fixed(c: &mut Criterion) {
     };
     let noise = Noise::Relative(0.12);
     let methods: [(&str, Box<dyn Recover>); 2] = [
-        (
-            "linear",
-            Box::new(Lmmse::new(Arc::clone(&prior), noise).expect("in range")),
-        ),
-        (
-            "non-negative",
-            Box::new(NnLmmse::new(Arc::clone(&prior), noise).expect("in range")),
-        ),
+        ("linear", Box::new(Lmmse::new(Arc::clone(&prior), noise).expect("in range"))),
+        ("non-negative", Box::new(NnLmmse::new(Arc::clone(&prior), noise).expect("in range"))),
     ];
     for (name, method) in &methods {
         each(&mut group, &format!("{name}, any operator"), &mut |y| {
@@ -142,10 +126,7 @@ fn touch(seed: u64, cols: usize) -> DVector<f64> {
     let long = if rng.random() { 1.0 } else { 3.0 };
     DVector::from_fn(cols * cols, |k, _| {
         let (y, x) = ((k / cols) as f64 - r, (k % cols) as f64 - c);
-        let (along, across) = (
-            x * f64::cos(turn) + y * f64::sin(turn),
-            y * f64::cos(turn) - x * f64::sin(turn),
-        );
+        let (along, across) = (x * f64::cos(turn) + y * f64::sin(turn), y * f64::cos(turn) - x * f64::sin(turn));
         let inside = (along / size).powi(2) + (across / (size / long)).powi(2) <= 1.0;
         if inside { rng.random_range(0.6..1.4) } else { 0.0 }
     })

@@ -15,15 +15,11 @@ use std::hint::black_box;
 const SIDE: usize = 10;
 
 fn signs(rng: &mut ChaCha8Rng) -> Vec<f64> {
-    (0..SIDE * SIDE)
-        .map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 })
-        .collect()
+    (0..SIDE * SIDE).map(|_| if rng.random::<bool>() { 1.0 } else { -1.0 }).collect()
 }
 
 fn classifier(rng: &mut ChaCha8Rng) -> EvidenceClassifier {
-    let images = (0..SIDE * SIDE * 17)
-        .map(|_| rng.random_range(0.0_f64..1.0).powi(4))
-        .collect();
+    let images = (0..SIDE * SIDE * 17).map(|_| rng.random_range(0.0_f64..1.0).powi(4)).collect();
     let images = Matrix::from_rows(SIDE * SIDE, 17, images).expect("the sizes fit");
     let library = Library::new(&images, &(0..17).collect::<Vec<_>>()).expect("a label an image");
     let model = TemplateModel::open(SIDE);
@@ -76,12 +72,8 @@ fn localise(c: &mut Criterion) {
         b.iter(|| localiser.project(black_box(&weights), &mut projected));
     });
     for _ in 0..10 {
-        localiser
-            .project(&signs(&mut rng), &mut projected)
-            .expect("a row of the sheet");
-        evidence
-            .observe(&projected, rng.random_range(-1.0..1.0))
-            .expect("a finite sample");
+        localiser.project(&signs(&mut rng), &mut projected).expect("a row of the sheet");
+        evidence.observe(&projected, rng.random_range(-1.0..1.0)).expect("a finite sample");
     }
     c.bench_function("blob/estimate", |b| b.iter(|| localiser.estimate(&mut evidence)));
 }
@@ -103,13 +95,7 @@ fn rectangles(rng: &mut ChaCha8Rng, count: usize) -> Matrix {
 /// `mixture` of the board.
 fn mixture(c: &mut Criterion) {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    let model = ClusterModel {
-        clusters: 30,
-        gain: 0.3,
-        floor: 0.01,
-        noise: 0.12,
-        rank: 20,
-    };
+    let model = ClusterModel { clusters: 30, gain: 0.3, floor: 0.01, noise: 0.12, rank: 20 };
     let shapes = rectangles(&mut rng, 3000);
     let clusters = Clusters::with_wide(&model, &shapes, 0.99, &mut rng).expect("valid parameters");
     let amplitude = AmplitudeRange::new(0.05, 50.0).expect("a range");

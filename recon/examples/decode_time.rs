@@ -26,15 +26,8 @@ struct Windows {
 
 fn read(path: &str) -> Result<Windows, Box<dyn Error>> {
     let bytes = std::fs::read(path)?;
-    let words: Vec<u64> = bytes
-        .as_chunks::<8>()
-        .0
-        .iter()
-        .map(|b| u64::from_le_bytes(*b))
-        .collect();
-    let (head, body) = words
-        .split_first_chunk::<5>()
-        .ok_or("a head of five words is missing")?;
+    let words: Vec<u64> = bytes.as_chunks::<8>().0.iter().map(|b| u64::from_le_bytes(*b)).collect();
+    let (head, body) = words.split_first_chunk::<5>().ok_or("a head of five words is missing")?;
     let mut sizes = [0; 5];
     for (size, &word) in sizes.iter_mut().zip(head) {
         *size = usize::try_from(word)?;

@@ -34,10 +34,7 @@ impl AmplitudeRange {
         within("min", min, LIMITS[0], LIMITS[1])?;
         within("max", max, LIMITS[0], LIMITS[1])?;
         if min < max {
-            Ok(Self {
-                ln_min: min.ln(),
-                ln_max: max.ln(),
-            })
+            Ok(Self { ln_min: min.ln(), ln_max: max.ln() })
         } else {
             Err(out_of_range("max", max, min, LIMITS[1]))
         }
@@ -106,12 +103,7 @@ impl Marginals {
         let nodes = self.start.iter().zip(&self.step);
         let outputs = self.log_evidence.iter_mut().zip(&mut self.means);
         for (lane, (out, (&start, &step))) in outputs.zip(nodes).enumerate() {
-            let moments = Moments {
-                count,
-                yy: yy[lane],
-                yt: yt[lane],
-                tt: tt[lane],
-            };
+            let moments = Moments { count, yy: yy[lane], yt: yt[lane], tt: tt[lane] };
             let [sum, sum_s] = integrate(&moments, start, step, *out.0);
             // a density far narrower than a step, at the end of the range, leaves nothing but its own value at the mode
             let (sum, mean) = if sum > 0.0 { (sum, sum_s / sum) } else { (0.5, *out.1) };
@@ -198,11 +190,7 @@ mod tests {
                 cut = [cut[0] + w, cut[1] + w * s];
             }
         }
-        Quadrature {
-            log_integral: peak + (sum * step).ln(),
-            mean: first / sum,
-            cut: [cut[0] / sum, cut[1] / first],
-        }
+        Quadrature { log_integral: peak + (sum * step).ln(), mean: first / sum, cut: [cut[0] / sum, cut[1] / first] }
     }
 
     #[derive(Debug)]
@@ -216,22 +204,14 @@ mod tests {
         let mut out = Marginals::default();
         let lanes = |v: f64| [0.3 * v, v, 2.0 * v, 0.0];
         out.compute(range, m.count, &lanes(m.yy), &lanes(m.yt), &lanes(m.tt));
-        Marginal {
-            log_evidence: out.log_evidence[1],
-            mean: out.means[1],
-        }
+        Marginal { log_evidence: out.log_evidence[1], mean: out.means[1] }
     }
 
     fn cases() -> impl Iterator<Item = Moments> {
         [1.0, 2.0, 5.0, 20.0, 200.0].into_iter().flat_map(|count: f64| {
             [-0.5, 0.0, 0.7, 0.99].into_iter().map(move |correlation| {
                 let (yy, tt) = (count * 4.0, count * 3.0);
-                Moments {
-                    count,
-                    yy,
-                    tt,
-                    yt: correlation * f64::sqrt(yy * tt),
-                }
+                Moments { count, yy, tt, yt: correlation * f64::sqrt(yy * tt) }
             })
         })
     }
@@ -273,19 +253,8 @@ mod tests {
     #[test]
     fn no_signal_and_too_much_of_it_stay_finite() {
         let range = AmplitudeRange::new(0.2, 6.0).unwrap();
-        for (yy, yt) in [
-            (0.0, 0.0),
-            (1e-300, 1e-150),
-            (1e200, 1e100),
-            (1e200, -1e100),
-            (1e290, 1e140),
-        ] {
-            let m = Moments {
-                count: 20.0,
-                yy,
-                yt,
-                tt: 3.0,
-            };
+        for (yy, yt) in [(0.0, 0.0), (1e-300, 1e-150), (1e200, 1e100), (1e200, -1e100), (1e290, 1e140)] {
+            let m = Moments { count: 20.0, yy, yt, tt: 3.0 };
             let got = marginal(&m, range);
             assert!(got.log_evidence.is_finite(), "{yy}: {got:?}");
             assert!((0.19..6.1).contains(&got.mean), "{yy}: {got:?}");

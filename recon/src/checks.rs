@@ -4,11 +4,7 @@ use spts_input::Refusal;
 
 /// `value` when it lies in [`min`, `max`]; a NaN lies nowhere.
 pub(crate) fn within(field: &str, value: f64, min: f64, max: f64) -> Result<f64, Refusal> {
-    if value >= min && value <= max {
-        Ok(value)
-    } else {
-        Err(out_of_range(field, value, min, max))
-    }
+    if value >= min && value <= max { Ok(value) } else { Err(out_of_range(field, value, min, max)) }
 }
 
 /// A parameter outside its range.
@@ -42,9 +38,7 @@ pub(crate) fn empty(rows: usize, cols: usize) -> Refusal {
 
 /// An operator for another number of unknowns.
 pub(crate) fn other_columns(cols: usize, expected: usize) -> Refusal {
-    Refusal::new(format!(
-        "operator has {cols} columns; the method was built for {expected}"
-    ))
+    Refusal::new(format!("operator has {cols} columns; the method was built for {expected}"))
 }
 
 /// A measurement that is a NaN or an infinity.
@@ -54,23 +48,17 @@ pub(crate) fn not_finite(index: usize, value: f64) -> Refusal {
 
 /// A coefficient beyond the range of numbers, as with measurements of 1e300 and an operator of 1e-300.
 pub(crate) fn overflow(atom: usize) -> Refusal {
-    Refusal::new(format!(
-        "the coefficient of atom {atom} exceeds the range of 64-bit numbers"
-    ))
+    Refusal::new(format!("the coefficient of atom {atom} exceeds the range of 64-bit numbers"))
 }
 
 /// Normal equations that cannot be solved.
 pub(crate) fn not_positive_definite(pivot: usize) -> Refusal {
-    Refusal::new(format!(
-        "the matrix of the normal equations is not positive definite at pivot {pivot}"
-    ))
+    Refusal::new(format!("the matrix of the normal equations is not positive definite at pivot {pivot}"))
 }
 
 /// An iteration that ended before its tolerance, with the relative error that it reached.
 pub(crate) fn not_converged(iterations: usize, error: f64, tol: f64) -> Refusal {
-    Refusal::new(format!(
-        "no convergence in {iterations} iterations (relative error {error:.3e}, tolerance {tol:.3e})"
-    ))
+    Refusal::new(format!("no convergence in {iterations} iterations (relative error {error:.3e}, tolerance {tol:.3e})"))
 }
 
 /// An argument of the wrong length.

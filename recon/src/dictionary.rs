@@ -25,11 +25,7 @@ pub struct Selection {
 
 impl Default for Selection {
     fn default() -> Self {
-        Self {
-            min_peak: 0.25,
-            max_coherence: 0.95,
-            max_images: 1500,
-        }
+        Self { min_peak: 0.25, max_coherence: 0.95, max_images: 1500 }
     }
 }
 
@@ -101,11 +97,7 @@ pub struct Ksvd {
 
 impl Default for Ksvd {
     fn default() -> Self {
-        Self {
-            n_components: 100,
-            n_nonzero_coefs: 20,
-            n_iter: 15,
-        }
+        Self { n_components: 100, n_nonzero_coefs: 20, n_iter: 15 }
     }
 }
 
@@ -253,12 +245,7 @@ impl GramPursuit {
         let (mut squares, mut weights) = (vec![0.0; k], vec![0.0; k]);
         kernels::column_squares(a.view().values(), &vec![1.0; pixels], &mut squares);
         kernels::inverse_roots(&squares, &mut weights);
-        Self {
-            a,
-            gram,
-            weights,
-            limit: n_nonzero_coefs.min(pixels).min(k),
-        }
+        Self { a, gram, weights, limit: n_nonzero_coefs.min(pixels).min(k) }
     }
 
     /// Chooses the atoms of the image `y` and writes their coefficients.
@@ -342,17 +329,12 @@ impl Training {
     /// # Errors
     /// [`Refusal`], [`Refusal`], [`Refusal`].
     fn new(images: &[Vec<f64>]) -> Result<Self, Refusal> {
-        let expected = images
-            .first()
-            .ok_or(Refusal::new("no training image is left after preprocessing"))?
-            .len();
+        let expected = images.first().ok_or(Refusal::new("no training image is left after preprocessing"))?.len();
         let mut values = Vec::with_capacity(images.len() * expected);
         for (index, image) in images.iter().enumerate() {
             let len = image.len();
             if len != expected {
-                return Err(Refusal::new(format!(
-                    "training image {index} has {len} values, the first has {expected}"
-                )));
+                return Err(Refusal::new(format!("training image {index} has {len} values, the first has {expected}")));
             }
             values.extend_from_slice(image);
         }
@@ -494,9 +476,7 @@ fn useless(atoms: &Matrix, used: &[usize]) -> Vec<usize> {
 }
 
 fn degenerate(index: usize) -> Refusal {
-    Refusal::new(format!(
-        "training image {index} is zero, not finite, or less than 1e-150 of the strongest one"
-    ))
+    Refusal::new(format!("training image {index} is zero, not finite, or less than 1e-150 of the strongest one"))
 }
 
 #[cfg(test)]
@@ -518,10 +498,7 @@ mod tests {
             vec![f64::NAN, 1.0, 1.0], // not finite
             vec![0.0, 0.0, 1.0],      // kept, but beyond the limit
         ];
-        let selection = Selection {
-            max_images: 2,
-            ..Selection::default()
-        };
+        let selection = Selection { max_images: 2, ..Selection::default() };
         assert_eq!(select(&images, &selection), [1, 3]);
         assert_eq!(select(&images, &Selection::default()), [1, 3, 5]);
     }
@@ -533,11 +510,7 @@ mod tests {
         let images: Vec<Vec<f64>> = [(5.0 * 0.8, -2.0 * 0.6), (5.0 * 0.6, 2.0 * 0.8)]
             .map(|(a, b)| vec![c * a - s * b, s * a + c * b])
             .to_vec();
-        let ksvd = Ksvd {
-            n_components: 1,
-            n_nonzero_coefs: 1,
-            n_iter: 25,
-        };
+        let ksvd = Ksvd { n_components: 1, n_nonzero_coefs: 1, n_iter: 25 };
         let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
         // a power step shrinks the share of u₂ by (2/5)²: 25 of them by 1e-20
         assert!((d.row(0)[0].abs() - c).abs() < 1e-12, "{:?}", d.column(0));
@@ -563,11 +536,7 @@ mod tests {
                 image
             })
             .collect();
-        let ksvd = Ksvd {
-            n_components: 50,
-            n_nonzero_coefs: 3,
-            n_iter: 80,
-        };
+        let ksvd = Ksvd { n_components: 50, n_nonzero_coefs: 3, n_iter: 80 };
         let found = [1, 2, 3].map(|seed| {
             let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(seed)).unwrap();
             atoms.iter().filter(|atom| 1.0 - closest(&d, atom) < 0.01).count()
@@ -591,10 +560,7 @@ mod tests {
                 let expected = Omp::new(s).recover(&problem, &mut Workspace::default()).unwrap();
                 assert_eq!(code.support, expected.support, "{pixels} pixels, {count} atoms");
                 for (found, expected) in code.coefficients.iter().zip(&expected.coefficients) {
-                    assert!(
-                        (found - expected).abs() <= 1e-7 * expected.abs().max(1.0),
-                        "{found}, {expected}"
-                    );
+                    assert!((found - expected).abs() <= 1e-7 * expected.abs().max(1.0), "{found}, {expected}");
                 }
             }
         }
@@ -650,9 +616,7 @@ mod tests {
 
     #[test]
     fn learned_dictionaries_conform() {
-        let mut suite = Suite {
-            rng: ChaCha8Rng::seed_from_u64(1),
-        };
+        let mut suite = Suite { rng: ChaCha8Rng::seed_from_u64(1) };
         suite.seeds_and_threads();
         suite.scales();
         suite.few_and_equal_images();
@@ -677,17 +641,11 @@ mod tests {
                     let mut image = vec![0.0; atoms[0].len()];
                     for s in 0..sparsity {
                         // every atom is used equally often
-                        let k = if s == 0 {
-                            i % atoms.len()
-                        } else {
-                            self.rng.random_range(0..atoms.len())
-                        };
+                        let k = if s == 0 { i % atoms.len() } else { self.rng.random_range(0..atoms.len()) };
                         let weight = self.rng.random_range(0.9..1.1);
                         image.iter_mut().zip(&atoms[k]).for_each(|(v, a)| *v += weight * a);
                     }
-                    image
-                        .iter_mut()
-                        .for_each(|v| *v += self.rng.random_range(-0.017..0.017));
+                    image.iter_mut().for_each(|v| *v += self.rng.random_range(-0.017..0.017));
                     image
                 })
                 .collect()
@@ -695,11 +653,7 @@ mod tests {
 
         fn attempt(&self, settings: [usize; 3], images: &[Vec<f64>], seed: u64) -> Result<Matrix, Refusal> {
             let [n_components, n_nonzero_coefs, n_iter] = settings;
-            let ksvd = Ksvd {
-                n_components,
-                n_nonzero_coefs,
-                n_iter,
-            };
+            let ksvd = Ksvd { n_components, n_nonzero_coefs, n_iter };
             ksvd.learn(images, &mut ChaCha8Rng::seed_from_u64(seed))
         }
 
@@ -784,10 +738,7 @@ mod tests {
                 self.attempt([4, 1, 2], &images, 7)
             };
             for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-                assert!(says(
-                    &with(vec![1.0, 1.0, 1.0, 1.0, 1.0, bad]),
-                    "training image 3 is zero"
-                ));
+                assert!(says(&with(vec![1.0, 1.0, 1.0, 1.0, 1.0, bad]), "training image 3 is zero"));
             }
             let empty = [vec![], vec![]];
             for (refused, why) in [

@@ -184,14 +184,7 @@ fn best_of(c: &[f64], w: &[f64], score: impl Fn(f64, f64) -> f64) -> Option<(usi
     }
     let tail = c1.iter().zip(w1).map(|(&c, &w)| score(c, w));
     let best = most.into_iter().chain(tail).fold(0.0, |m, s| if s > m { s } else { m });
-    if best > 0.0 {
-        c.iter()
-            .zip(w)
-            .position(|(&c, &w)| score(c, w) >= best)
-            .map(|k| (k, best))
-    } else {
-        None
-    }
+    if best > 0.0 { c.iter().zip(w).position(|(&c, &w)| score(c, w) >= best).map(|k| (k, best)) } else { None }
 }
 
 /// 1/√`squares`, 0 where a square is 0.
@@ -342,16 +335,7 @@ pub(crate) fn ln(x: f64) -> f64 {
     /// Bits of 2⁵², whose lowest bits count ones.
     const WHOLE: u64 = 0x4330_0000_0000_0000;
     /// 1/(2n + 1) from n = 7 down to 0.
-    const SERIES: [f64; 8] = [
-        1.0 / 15.0,
-        1.0 / 13.0,
-        1.0 / 11.0,
-        1.0 / 9.0,
-        1.0 / 7.0,
-        1.0 / 5.0,
-        1.0 / 3.0,
-        1.0,
-    ];
+    const SERIES: [f64; 8] = [1.0 / 15.0, 1.0 / 13.0, 1.0 / 11.0, 1.0 / 9.0, 1.0 / 7.0, 1.0 / 5.0, 1.0 / 3.0, 1.0];
     // adding 1 − √½ in bits carries into the exponent exactly where the mantissa reaches √2
     let carried = x.to_bits().wrapping_add(ONE - HALF_ROOT);
     let k = f64::from_bits(WHOLE | (carried >> 52)) - (4_503_599_627_370_496.0 + 1023.0);
@@ -438,10 +422,7 @@ mod tests {
         for x in (-64_000..=64_000).map(x).chain(edges) {
             // the series' rest of 2e-14 and the rounding of k ln 2, up to 710
             let error = (ln(x) - x.ln()).abs();
-            assert!(
-                error < 1e-13_f64.max(4.0 * f64::EPSILON * x.ln().abs()),
-                "{x:e}: {error:e}"
-            );
+            assert!(error < 1e-13_f64.max(4.0 * f64::EPSILON * x.ln().abs()), "{x:e}: {error:e}");
         }
     }
 }

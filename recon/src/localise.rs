@@ -82,9 +82,7 @@ impl Axis {
         let profile = |c: f64| (0..taxels).map(move |i| value(c, i));
         Self {
             profiles: centres.iter().flat_map(|&c| profile(c)).collect(),
-            transposed: (0..taxels)
-                .flat_map(|i| centres.iter().map(move |&c| value(c, i)))
-                .collect(),
+            transposed: (0..taxels).flat_map(|i| centres.iter().map(move |&c| value(c, i))).collect(),
             squares: centres.iter().map(|&c| profile(c).map(|v| v * v).sum()).collect(),
             centres,
         }
@@ -152,10 +150,7 @@ impl Localiser {
         let mut variances = Vec::new();
         for width in WIDTHS_PX {
             let [rows, cols] = [rows, cols].map(|taxels| Axis::new(taxels, width));
-            let squares = rows
-                .squares
-                .iter()
-                .flat_map(|r| cols.squares.iter().map(move |c| r * c));
+            let squares = rows.squares.iter().flat_map(|r| cols.squares.iter().map(move |c| r * c));
             variances.extend(squares.map(|s| NOISE.powi(2) * s));
             widths.push(Width { width, rows, cols });
         }
@@ -201,13 +196,7 @@ impl Localiser {
     /// Evidence of no sample, to begin a window with.
     pub fn evidence(&self) -> BlobEvidence {
         let zeros = vec![0.0; self.templates()];
-        BlobEvidence {
-            count: 0.0,
-            yy: 0.0,
-            yt: zeros.clone(),
-            tt: zeros.clone(),
-            weights: zeros,
-        }
+        BlobEvidence { count: 0.0, yy: 0.0, yt: zeros.clone(), tt: zeros.clone(), weights: zeros }
     }
 
     /// Posterior of the centre. Every blob is weighted by its evidence, integrated over the amplitude ([Laplace], flat
@@ -232,11 +221,7 @@ impl Localiser {
                     let w = (weights[k] - peak).exp();
                     sum += w;
                     first = [first[0] + w * row, first[1] + w * col];
-                    second = [
-                        second[0] + w * row * row,
-                        second[1] + w * row * col,
-                        second[2] + w * col * col,
-                    ];
+                    second = [second[0] + w * row * row, second[1] + w * row * col, second[2] + w * col * col];
                     if k == best {
                         width = of_width.width;
                     }
@@ -253,11 +238,7 @@ impl Localiser {
                 [(rr - row * row).max(0.0) + self.cell, rc - row * col],
                 [rc - row * col, (cc - col * col).max(0.0) + self.cell],
             ],
-            amplitude: if evidence.tt[best] > 0.0 {
-                (evidence.yt[best] / evidence.tt[best]).max(0.0)
-            } else {
-                0.0
-            },
+            amplitude: if evidence.tt[best] > 0.0 { (evidence.yt[best] / evidence.tt[best]).max(0.0) } else { 0.0 },
             width_px: width,
         }
     }
@@ -268,11 +249,7 @@ impl Localiser {
         if evidence.yy > 0.0 {
             let moments = [evidence.count, evidence.yy];
             let (yt, tt) = (&evidence.yt, &evidence.tt);
-            weigh(
-                moments,
-                [yt, tt, &self.variances, &self.log_variances],
-                &mut evidence.weights,
-            );
+            weigh(moments, [yt, tt, &self.variances, &self.log_variances], &mut evidence.weights);
         }
     }
 }
@@ -295,12 +272,7 @@ fn project(rows: &[f64], cols: &[f64], taxels: usize, weights: &[f64], out: &mut
 fn weigh([count, yy]: [f64; 2], [yt, tt, variances, log_variances]: [&[f64]; 4], out: &mut [f64]) {
     let sums = yt.iter().zip(tt).zip(variances.iter().zip(log_variances));
     for (((yt, tt), (variance, log_variance)), out) in sums.zip(out) {
-        let moments = Moments {
-            count,
-            yy: yy / variance,
-            yt: yt / variance,
-            tt: tt / variance,
-        };
+        let moments = Moments { count, yy: yy / variance, yt: yt / variance, tt: tt / variance };
         *out += moments.laplace() - 0.5 * count * log_variance;
     }
 }
@@ -407,9 +379,7 @@ mod tests {
                 // twelve uniform numbers less 6: mean 0, variance 1
                 let normal: f64 = (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
                 localiser.project(&weights, &mut projected).unwrap();
-                evidence
-                    .observe(&projected, 1.7 * (dot(&weights, &image) + sd * normal))
-                    .unwrap();
+                evidence.observe(&projected, 1.7 * (dot(&weights, &image) + sd * normal)).unwrap();
             }
             let e = localiser.estimate(&mut evidence);
             assert!(distance(e.position_px, centre) < 0.5, "{e:?} for {centre:?}");

@@ -31,11 +31,7 @@ pub struct MatrixView<'a> {
 impl Matrix {
     /// Matrix of zeros.
     pub fn zeros(nrows: usize, ncols: usize) -> Self {
-        Self {
-            nrows,
-            ncols,
-            values: vec![0.0; nrows * ncols],
-        }
+        Self { nrows, ncols, values: vec![0.0; nrows * ncols] }
     }
 
     /// A matrix with row-major `values`.
@@ -76,11 +72,7 @@ impl Matrix {
         let ncols = columns.len();
         let mut out = Self::zeros(nrows, ncols);
         for (c, column) in columns.iter().map(AsRef::as_ref).enumerate() {
-            assert_eq!(
-                column.len(),
-                nrows,
-                "column {c} must have one value for each of the {nrows} rows"
-            );
+            assert_eq!(column.len(), nrows, "column {c} must have one value for each of the {nrows} rows");
             out.set_column(c, column);
         }
         out
@@ -88,11 +80,7 @@ impl Matrix {
 
     /// All rows.
     pub fn view(&self) -> MatrixView<'_> {
-        MatrixView {
-            nrows: self.nrows,
-            ncols: self.ncols,
-            values: &self.values,
-        }
+        MatrixView { nrows: self.nrows, ncols: self.ncols, values: &self.values }
     }
 
     /// Number of rows.
@@ -155,11 +143,7 @@ impl Matrix {
 
 impl From<&DMatrix<f64>> for Matrix {
     fn from(m: &DMatrix<f64>) -> Self {
-        Self {
-            nrows: m.nrows(),
-            ncols: m.ncols(),
-            values: m.transpose().as_slice().to_vec(),
-        }
+        Self { nrows: m.nrows(), ncols: m.ncols(), values: m.transpose().as_slice().to_vec() }
     }
 }
 
@@ -196,11 +180,7 @@ impl<'a> MatrixView<'a> {
     /// # Panics
     /// If the rows do not exist.
     pub fn rows(self, start: usize, nrows: usize) -> Self {
-        Self {
-            nrows,
-            ncols: self.ncols,
-            values: &self.values[start * self.ncols..(start + nrows) * self.ncols],
-        }
+        Self { nrows, ncols: self.ncols, values: &self.values[start * self.ncols..(start + nrows) * self.ncols] }
     }
 
     /// Copies column `c` into `out`.
@@ -259,10 +239,7 @@ pub fn shifted(dictionary: &Matrix, cols: usize, reach: usize) -> Matrix {
 
 /// Another number of values than the shape needs.
 pub(crate) fn matrix_shape(nrows: usize, ncols: usize, len: usize) -> Refusal {
-    Refusal::new(format!(
-        "a {nrows} × {ncols} matrix needs {} values, got {len}",
-        nrows * ncols
-    ))
+    Refusal::new(format!("a {nrows} × {ncols} matrix needs {} values, got {len}", nrows * ncols))
 }
 
 #[cfg(test)]
@@ -273,9 +250,8 @@ mod tests {
     fn a_corner_pixel_moves_to_every_place_in_reach() {
         let corner = Matrix::from_rows(9, 1, vec![1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).unwrap();
         let all = shifted(&corner, 3, 1);
-        let mut places: Vec<usize> = (0..all.ncols())
-            .map(|k| all.column(k).iter().position(|v| *v > 0.0).unwrap())
-            .collect();
+        let mut places: Vec<usize> =
+            (0..all.ncols()).map(|k| all.column(k).iter().position(|v| *v > 0.0).unwrap()).collect();
         places.sort_unstable();
         assert_eq!(places, [0, 1, 3, 4]);
     }

@@ -119,12 +119,9 @@ mod tests {
         let truth = [true, true, true, false, false, false, false, false, false, false];
         let found = [true, true, false, true, false, false, false, false, false, false];
         let s = SupportScore::new(&found, &truth);
-        for (got, expected) in [
-            (s.accuracy, 0.8),
-            (s.iou, 0.5),
-            (s.f1, 2.0 / 3.0),
-            (s.balanced_accuracy, 0.5 * (2.0 / 3.0 + 6.0 / 7.0)),
-        ] {
+        for (got, expected) in
+            [(s.accuracy, 0.8), (s.iou, 0.5), (s.f1, 2.0 / 3.0), (s.balanced_accuracy, 0.5 * (2.0 / 3.0 + 6.0 / 7.0))]
+        {
             assert!((got - expected).abs() < 1e-15, "{got} against {expected}");
         }
     }

@@ -101,16 +101,8 @@ impl Solution {
 
     /// Computes the image `D α` for a dictionary `D` (N × K, row-major) into `image` (length N).
     pub fn synthesise(&self, dictionary: MatrixView<'_>, image: &mut [f64]) {
-        for (out, row) in image
-            .iter_mut()
-            .zip(dictionary.values().chunks_exact(dictionary.ncols().max(1)))
-        {
-            *out = self
-                .support
-                .iter()
-                .zip(&self.coefficients)
-                .map(|(&k, &c)| c * row[k])
-                .sum();
+        for (out, row) in image.iter_mut().zip(dictionary.values().chunks_exact(dictionary.ncols().max(1))) {
+            *out = self.support.iter().zip(&self.coefficients).map(|(&k, &c)| c * row[k]).sum();
         }
     }
 }
@@ -268,11 +260,7 @@ impl Scaled<'_> {
         let ratio = y_scale / matrix_scale;
         for (coefficient, &atom) in solution.coefficients.iter_mut().zip(&solution.support) {
             // one product that is exact, or two where 2^±1074 lies between the scales
-            *coefficient = if ratio.is_normal() {
-                *coefficient * ratio
-            } else {
-                *coefficient * y_scale / matrix_scale
-            };
+            *coefficient = if ratio.is_normal() { *coefficient * ratio } else { *coefficient * y_scale / matrix_scale };
             if !coefficient.is_finite() {
                 return Err(overflow(atom));
             }
@@ -284,9 +272,7 @@ impl Scaled<'_> {
 /// Largest power of two that is at most the largest magnitude of `values`, or 1 when all of them are zero. Dividing by
 /// it is exact. Infinite or NaN when a value is.
 pub(crate) fn power_of_two(values: &[f64]) -> f64 {
-    let max = values
-        .iter()
-        .fold(0.0_f64, |m, v| if m.is_nan() || v.abs() <= m { m } else { v.abs() });
+    let max = values.iter().fold(0.0_f64, |m, v| if m.is_nan() || v.abs() <= m { m } else { v.abs() });
     if max == 0.0 {
         return 1.0;
     }
@@ -389,10 +375,7 @@ mod tests {
             let mut scaling = Scaling::default();
             let problem = Problem::new(MatrixView::new(2, 2, &a).unwrap(), &y).unwrap();
             let scaled = scaling.apply(&problem).unwrap();
-            assert!(
-                ORDINARY.contains(&scaled.squares[1]) && ORDINARY.contains(&scaled.y_norm),
-                "{scale:e}"
-            );
+            assert!(ORDINARY.contains(&scaled.squares[1]) && ORDINARY.contains(&scaled.y_norm), "{scale:e}");
             let mut solution = Solution {
                 support: vec![1],
                 coefficients: vec![scaled.y[1] / scaled.a.values()[3]],

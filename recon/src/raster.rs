@@ -44,10 +44,7 @@ impl Interpolation {
     fn new(rows: usize, cols: usize, measured: Vec<usize>) -> Self {
         let mut triangulation = DelaunayTriangulation::<Site>::new();
         for (slot, &pixel) in measured.iter().enumerate() {
-            let site = Site {
-                position: point(pixel, cols),
-                slot,
-            };
+            let site = Site { position: point(pixel, cols), slot };
             // the coordinates are small integers, so insertion cannot fail
             let _ = triangulation.insert(site);
         }
@@ -57,15 +54,9 @@ impl Interpolation {
             .map(|pixel| {
                 barycentric.get_weights(point(pixel, cols), &mut found);
                 if found.is_empty() {
-                    return nearest(&measured, pixel, cols)
-                        .map(|slot| (slot, 1.0))
-                        .into_iter()
-                        .collect();
+                    return nearest(&measured, pixel, cols).map(|slot| (slot, 1.0)).into_iter().collect();
                 }
-                found
-                    .iter()
-                    .map(|(vertex, w)| (triangulation.vertex(*vertex).data().slot, *w))
-                    .collect()
+                found.iter().map(|(vertex, w)| (triangulation.vertex(*vertex).data().slot, *w)).collect()
             })
             .collect();
         Self { measured, weights }
@@ -91,9 +82,7 @@ fn evenly_spaced(n: usize, m: usize) -> Vec<usize> {
     if m <= 1 {
         return (0..m).collect();
     }
-    (0..m)
-        .map(|i| (i as f64 * (n - 1) as f64 / (m - 1) as f64).round() as usize)
-        .collect()
+    (0..m).map(|i| (i as f64 * (n - 1) as f64 / (m - 1) as f64).round() as usize).collect()
 }
 
 fn point(pixel: usize, cols: usize) -> Point2<f64> {
@@ -102,10 +91,7 @@ fn point(pixel: usize, cols: usize) -> Point2<f64> {
 
 fn nearest(measured: &[usize], pixel: usize, cols: usize) -> Option<usize> {
     let square = |other: usize| {
-        let (dr, dc) = (
-            (other / cols).abs_diff(pixel / cols),
-            (other % cols).abs_diff(pixel % cols),
-        );
+        let (dr, dc) = ((other / cols).abs_diff(pixel / cols), (other % cols).abs_diff(pixel % cols));
         dr * dr + dc * dc
     };
     (0..measured.len()).min_by_key(|&slot| square(measured[slot]))
@@ -129,9 +115,7 @@ mod tests {
     #[test]
     fn linear_images_are_interpolated_exactly() {
         let (rows, cols) = (10, 10);
-        let plane: Vec<f64> = (0..100)
-            .map(|i| 0.3 * f64::from(i % 10) - 0.7 * f64::from(i / 10))
-            .collect();
+        let plane: Vec<f64> = (0..100).map(|i| 0.3 * f64::from(i % 10) - 0.7 * f64::from(i / 10)).collect();
         let corners = Interpolation::new(rows, cols, vec![0, 9, 44, 90, 99]);
         let mut out = vec![0.0; 100];
         corners.apply(&plane, &mut out);

@@ -43,11 +43,7 @@ pub fn two_sided(t: f64, freedom: u32) -> f64 {
         sum += term;
         term *= cos * cos * f64::from(power + 1) / f64::from(power + 2);
     }
-    if odd {
-        1.0 - std::f64::consts::FRAC_2_PI * (theta + sin * sum)
-    } else {
-        1.0 - sin * sum
-    }
+    if odd { 1.0 - std::f64::consts::FRAC_2_PI * (theta + sin * sum) } else { 1.0 - sin * sum }
 }
 
 /// The t with P(|T| > t) = `outside`, in (0, 1), for Student's T with `freedom` ≥ 1 degrees of freedom.
@@ -133,20 +129,12 @@ pub struct Band {
 impl Band {
     /// `mean` ± `half`.
     pub fn around(mean: f64, half: f64) -> Self {
-        Self {
-            mean,
-            low: mean - half,
-            high: mean + half,
-        }
+        Self { mean, low: mean - half, high: mean + half }
     }
 
     /// The same mean with the band cut off at `least` and `most`.
     pub fn within(self, [least, most]: [f64; 2]) -> Self {
-        Self {
-            low: self.low.max(least),
-            high: self.high.min(most),
-            ..self
-        }
+        Self { low: self.low.max(least), high: self.high.min(most), ..self }
     }
 
     /// Whether `found` lies in the band.

@@ -34,13 +34,7 @@ const fn level(
     coupled: Option<bool>,
     dynamic: bool,
 ) -> FidelityLevel {
-    FidelityLevel {
-        name,
-        label,
-        model,
-        coupled,
-        dynamic,
-    }
+    FidelityLevel { name, label, model, coupled, dynamic }
 }
 
 /// Name of the level with which the others are compared.
@@ -75,9 +69,7 @@ const OWN_CHOICE: [&str; 2] = ["coupled", "densification"];
 pub fn change_model(contact: &mut toml::Table, model: &str) {
     let before = contact.insert("model".to_owned(), model.into());
     let before = before.as_ref().and_then(toml::Value::as_str).unwrap_or("winkler");
-    let elastic = LEVELS
-        .iter()
-        .any(|level| level.model == model && level.coupled.is_some());
+    let elastic = LEVELS.iter().any(|level| level.model == model && level.coupled.is_some());
     let gone: &[&str] = match (elastic, before == model) {
         (true, true) => &[],
         (true, false) => &OWN_CHOICE,
@@ -242,11 +234,7 @@ mod tests {
         let choice = |tolerance| cheapest(&table, "press", tolerance).map(|c| (c.level.name, c.cells_per_taxel));
         assert_eq!(choice(0.5), Some(("winkler", 2)));
         assert_eq!(choice(0.05), Some(("winkler", 6)));
-        assert_eq!(
-            choice(0.01),
-            Some(("layer", 12)),
-            "the incomplete setting is not chosen"
-        );
+        assert_eq!(choice(0.01), Some(("layer", 12)), "the incomplete setting is not chosen");
         assert_eq!(choice(f64::NAN), None);
         assert_eq!(cheapest(&table, "drop", 0.5), None);
     }

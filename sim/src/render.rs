@@ -69,12 +69,7 @@ impl Renderer {
         let pads = (0..if taxels <= MAX_PADS { taxels } else { 0 })
             .filter_map(|i| model.name_to_id(MjtObjBase::mjOBJ_GEOM, &pad_name(i)))
             .collect();
-        Ok(Self {
-            model,
-            pads,
-            width,
-            height,
-        })
+        Ok(Self { model, pads, width, height })
     }
 
     /// Draws `world` in its present state. With `frame`, the skin's pads are coloured by its pressure relative to
@@ -107,24 +102,15 @@ impl Renderer {
         renderer.sync_data(&mut data).map_err(failed)?;
         renderer.render().map_err(failed)?;
         let rgb = renderer.rgb_flat().unwrap_or_default().to_vec();
-        Ok(Picture {
-            width: self.width,
-            height: self.height,
-            rgb,
-        })
+        Ok(Picture { width: self.width, height: self.height, rgb })
     }
 }
 
 /// Colour of a pad at `level` (0 idle, 1 full scale): grey through violet and orange to yellow.
 #[expect(clippy::cast_possible_truncation, reason = "colours need no more than f32")]
 fn heat(level: f64) -> [f32; 3] {
-    const STOPS: [[f32; 3]; 5] = [
-        PAD_RGB,
-        [0.36, 0.16, 0.52],
-        [0.75, 0.22, 0.40],
-        [0.97, 0.50, 0.22],
-        [0.99, 0.90, 0.35],
-    ];
+    const STOPS: [[f32; 3]; 5] =
+        [PAD_RGB, [0.36, 0.16, 0.52], [0.75, 0.22, 0.40], [0.97, 0.50, 0.22], [0.99, 0.90, 0.35]];
     let position = level.clamp(0.0, 1.0) as f32 * 4.0;
     let mut below = 0;
     while below < 3 && position > (below + 1) as f32 {

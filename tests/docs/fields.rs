@@ -13,9 +13,7 @@ const PRESS: &str = "[press]\nobject = \"T\"";
 
 /// The names that an error lists after "expected".
 fn expected(error: &str) -> Vec<&str> {
-    let (_, list) = error
-        .split_once("expected ")
-        .unwrap_or_else(|| panic!("no list of fields: {error}"));
+    let (_, list) = error.split_once("expected ").unwrap_or_else(|| panic!("no list of fields: {error}"));
     let list = list.split(" (").next().unwrap_or_default();
     list.split('`').skip(1).step_by(2).collect()
 }
@@ -89,11 +87,7 @@ fn keys(page: &str, heading: &str) -> Vec<String> {
         let first = line.strip_prefix("| ").and_then(|row| row.split(" | ").next());
         let mut section = String::new();
         for name in first.unwrap_or_default().split('`').skip(1).step_by(2) {
-            let key = if name.starts_with('.') {
-                format!("{section}{name}")
-            } else {
-                name.to_owned()
-            };
+            let key = if name.starts_with('.') { format!("{section}{name}") } else { name.to_owned() };
             if let Some((before, _)) = key.split_once('.') {
                 before.clone_into(&mut section);
             }
@@ -135,9 +129,7 @@ fn the_reference_has_every_field_of_a_profile() {
     let error = |text: String| {
         fs::write(folder.path().join("profile.toml"), text).expect("a file can be written");
         let scene = format!("readout = \"profile.toml\"\n{PRESS}");
-        Scene::from_toml(&scene, folder.path())
-            .expect_err("the field is not known")
-            .to_string()
+        Scene::from_toml(&scene, folder.path()).expect_err("the field is not known").to_string()
     };
     let mut gaps = missing(&page, "## The top of the file", &error(format!("{UNKNOWN}\n{ideal}")));
     for (name, _) in spts::circuit::EFFECTS {

@@ -44,10 +44,7 @@ fn every_command_that_takes_arguments_has_examples_that_the_program_takes() {
         let text = text_after(command);
         let examples = text.strip_prefix("Examples:\n").unwrap_or_default();
         let lines: Vec<&str> = examples.lines().take_while(|line| !line.is_empty()).collect();
-        assert!(
-            !lines.is_empty(),
-            "`{name}`: its help does not go on with examples: {text}"
-        );
+        assert!(!lines.is_empty(), "`{name}`: its help does not go on with examples: {text}");
         let mut own = false;
         for line in lines {
             // a remark stands further to the right

@@ -57,10 +57,7 @@ pub(super) fn blocks(page: &Path) -> Vec<Block> {
             before = line;
             continue;
         };
-        let body = lines
-            .by_ref()
-            .map(|(_, line)| line)
-            .take_while(|line| line.trim() != "```");
+        let body = lines.by_ref().map(|(_, line)| line).take_while(|line| line.trim() != "```");
         let text: String = body.flat_map(|line| [line, "\n"]).collect();
         let comment = before.strip_prefix("<!-- ").and_then(|rest| rest.strip_suffix(" -->"));
         found.push(Block {

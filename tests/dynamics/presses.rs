@@ -37,9 +37,6 @@ fn presses_settle_at_the_limit() {
         let press = scene.config().press.as_ref().unwrap();
         let area_m2 = scene.skin().cell_area_m2();
         let course = PressCourse::of(&frames, press.force_n, press.plateau_s(), area_m2).unwrap();
-        assert!(
-            course.plateau_error_n < 0.1 && course.overshoot < 0.05,
-            "{text}: {course:?}"
-        );
+        assert!(course.plateau_error_n < 0.1 && course.overshoot < 0.05, "{text}: {course:?}");
     }
 }

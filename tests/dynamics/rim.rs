@@ -38,9 +38,7 @@ fn no_energy_from_the_rim() {
 fn flight_energy_j(pair: &[Frame], mass_kg: f64, radius_m: f64) -> f64 {
     let dt_s = pair[1].time_s - pair[0].time_s;
     let [a, b] = [pair[0].pose, pair[1].pose];
-    let speed2: f64 = (0..3)
-        .map(|i| ((b.position_m[i] - a.position_m[i]) / dt_s).powi(2))
-        .sum();
+    let speed2: f64 = (0..3).map(|i| ((b.position_m[i] - a.position_m[i]) / dt_s).powi(2)).sum();
     let cosine: f64 = (0..4).map(|i| a.quaternion[i] * b.quaternion[i]).sum();
     let spin = 2.0 * cosine.abs().min(1.0).acos() / dt_s;
     let height_m = 0.5 * (a.position_m[2] + b.position_m[2]) - radius_m;

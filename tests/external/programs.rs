@@ -44,10 +44,7 @@ empty image ## ## say(json.dumps(dict(image=[], label=1))) ## ## an image of 0 v
 
 /// Name, program, and what the error says.
 pub(super) fn hostile() -> Vec<(&'static str, String, &'static str)> {
-    let table = OF_A_SHELL
-        .lines()
-        .chain(OF_LINES.lines())
-        .filter(|line| !line.is_empty());
+    let table = OF_A_SHELL.lines().chain(OF_LINES.lines()).filter(|line| !line.is_empty());
     let cells = table.map(|line| line.split("##").map(str::trim).collect::<Vec<_>>());
     let programs = cells.map(|cells| match cells[..] {
         [name, program, said] => (name, program.to_owned(), said),

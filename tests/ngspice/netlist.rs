@@ -31,16 +31,10 @@ pub(crate) enum Limits {
 /// x, out.
 pub(crate) fn netlist(amplifier: &Amplifier, drives: &[Drive], limits: Limits, options: &str, control: &str) -> String {
     let (op_amp, network) = (amplifier.op_amp(), amplifier.network());
-    let mut text = format!(
-        "* summing amplifier\n.options temp={} {options}\n",
-        network.temperature_k - 273.15
-    );
+    let mut text = format!("* summing amplifier\n.options temp={} {options}\n", network.temperature_k - 273.15);
     for (k, drive) in drives.iter().enumerate() {
         source(&mut text, k, drive);
-        line(
-            &mut text,
-            format_args!("Rt{k} d{k} sum {:e}", 1.0 / drive.conductance_s),
-        );
+        line(&mut text, format_args!("Rt{k} d{k} sum {:e}", 1.0 / drive.conductance_s));
     }
     if network.bus_f > 0.0 {
         line(&mut text, format_args!("Cb sum 0 {:e}", network.bus_f));
@@ -51,29 +45,17 @@ pub(crate) fn netlist(amplifier: &Amplifier, drives: &[Drive], limits: Limits, o
     line(&mut text, format_args!("Rf sum out {:e}", network.feedback_ohm));
     // en and in as thermal noise of resistors: en² = 4kT·R, in² = 4kT/R
     let thermal = 4.0 * BOLTZMANN_J_PER_K * network.temperature_k;
+    line(&mut text, format_args!("Rn nn 0 {:e}", op_amp.noise_v_per_rthz.powi(2) / thermal));
     line(
         &mut text,
-        format_args!("Rn nn 0 {:e}", op_amp.noise_v_per_rthz.powi(2) / thermal),
+        format_args!("Rni ni 0 {:e}\nVni ni 0 0\nFni sum 0 Vni 1", thermal / op_amp.noise_a_per_rthz.powi(2)),
     );
-    line(
-        &mut text,
-        format_args!(
-            "Rni ni 0 {:e}\nVni ni 0 0\nFni sum 0 Vni 1",
-            thermal / op_amp.noise_a_per_rthz.powi(2)
-        ),
-    );
-    line(
-        &mut text,
-        format_args!("Vofs pa 0 dc {:e}\nEofs p pa nn 0 1", network.offset_v),
-    );
+    line(&mut text, format_args!("Vofs pa 0 dc {:e}\nEofs p pa nn 0 1", network.offset_v));
     let unity = TAU * op_amp.gain_bandwidth_hz;
     let (stage_ohm, stage_f) = (op_amp.dc_gain / STAGE_S, STAGE_S / unity);
     line(&mut text, format_args!("Cp x 0 {stage_f:e}\nEout out 0 x 0 1"));
     match limits {
-        Limits::None => line(
-            &mut text,
-            format_args!("Gop 0 x p sum {STAGE_S:e}\nRp x 0 {stage_ohm:e} noisy=0"),
-        ),
+        Limits::None => line(&mut text, format_args!("Gop 0 x p sum {STAGE_S:e}\nRp x 0 {stage_ohm:e} noisy=0")),
         Limits::All => {
             let most_a = op_amp.slew_v_per_s * stage_f;
             let rail_v = op_amp.rail_v;
@@ -86,10 +68,7 @@ pub(crate) fn netlist(amplifier: &Amplifier, drives: &[Drive], limits: Limits, o
             );
         }
     }
-    line(
-        &mut text,
-        format_args!(".control\nset noaskquit\nset numdgt=14\n{control}\nquit\n.endc\n.end"),
-    );
+    line(&mut text, format_args!(".control\nset noaskquit\nset numdgt=14\n{control}\nquit\n.endc\n.end"));
     text
 }
 

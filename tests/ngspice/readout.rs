@@ -19,12 +19,7 @@ const ACCURATE: &str = "reltol=1e-5 abstol=1e-12 vntol=1e-8 gmin=1e-15";
 /// `as_designed` without its converters, 5 nF on its bus and hardly any noise.
 fn profile() -> Profile {
     let mut profile = Profile::named("as_designed").unwrap();
-    let amplifier = profile
-        .compressive
-        .get_mut("amplifier")
-        .unwrap()
-        .as_table_mut()
-        .unwrap();
+    let amplifier = profile.compressive.get_mut("amplifier").unwrap().as_table_mut().unwrap();
     amplifier.insert("bus_f".to_owned(), 5e-9.into());
     amplifier.insert("offset_v".to_owned(), 0.4e-3.into());
     amplifier.insert("temperature_k".to_owned(), 1.0.into());
@@ -39,23 +34,14 @@ fn profile() -> Profile {
 /// A quarter of the taxels pressed with 50 … 200 µS, the others idle at 1 µS.
 fn conductance_s() -> Vec<f64> {
     let pressed = |k: u32| 50e-6 + 1.5e-6 * f64::from(k);
-    (0..TAXELS)
-        .map(|k| if k % 4 == 1 { pressed(k) } else { 1e-6 })
-        .collect()
+    (0..TAXELS).map(|k| if k % 4 == 1 { pressed(k) } else { 1e-6 }).collect()
 }
 
 /// Volts of `measurements` measurements, and the time they took.
 fn twin(measurements: usize) -> (Vec<f64>, Duration) {
     let map = ConductanceMap::from_values(10, 10, conductance_s());
     let mut source = Constant::new(map).unwrap();
-    let mut readout = Readout::new(
-        &profile(),
-        Mode::Compressive,
-        &SkinLayout::default(),
-        Streams::new(1),
-        0,
-    )
-    .unwrap();
+    let mut readout = Readout::new(&profile(), Mode::Compressive, &SkinLayout::default(), Streams::new(1), 0).unwrap();
     let start = Instant::now();
     let block = readout.acquire(&mut source, measurements).unwrap();
     (block.volts, start.elapsed())
@@ -67,11 +53,7 @@ fn spice(measurements: u32, step: &str, options: &str) -> (Run, Vec<f64>) {
     let profile = profile();
     let weights = profile.weights(Mode::Compressive, TAXELS).unwrap();
     let period_s = 1.0 / profile.sample_rate_hz;
-    let op_amp = OpAmp {
-        noise_v_per_rthz: 1e-15,
-        noise_a_per_rthz: 1e-18,
-        ..OpAmp::default()
-    };
+    let op_amp = OpAmp { noise_v_per_rthz: 1e-15, noise_a_per_rthz: 1e-18, ..OpAmp::default() };
     let network = Network {
         feedback_ohm: profile.feedback_ohm,
         bus_f: 5e-9,
@@ -94,10 +76,7 @@ fn spice(measurements: u32, step: &str, options: &str) -> (Run, Vec<f64>) {
                 .collect(),
         })
         .collect();
-    let control = format!(
-        "tran 100n {:e} {step}\nwrdata tran.dat v(out)",
-        f64::from(measurements) * period_s
-    );
+    let control = format!("tran 100n {:e} {step}\nwrdata tran.dat v(out)", f64::from(measurements) * period_s);
     let done = run(&netlist(&amplifier, &drives, Limits::All, options, &control));
     let wave = done.data("tran.dat");
     let sampled = (0..measurements).map(|n| interpolate(&wave, f64::from(n) * period_s + SAMPLE_S));

@@ -17,10 +17,7 @@ pub(crate) fn ringing(wave: &[(f64, f64)], from_s: f64, settled_v: f64) -> (f64,
         }
     }
     let least_v = 1e-3 * extrema[0].1.abs();
-    let end = extrema
-        .iter()
-        .position(|(_, v)| v.abs() < least_v)
-        .unwrap_or(extrema.len());
+    let end = extrema.iter().position(|(_, v)| v.abs() < least_v).unwrap_or(extrema.len());
     let (first, last) = (extrema[0], extrema[end - 1]);
     let half_turns = (end - 1) as f64;
     assert!(half_turns >= 1.0, "fewer than two extrema");

@@ -29,12 +29,7 @@ pub(crate) fn run(netlist: &str) -> Run {
     let wall = start.elapsed();
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     let run = Run { dir, printed, wall };
-    assert!(
-        output.status.success(),
-        "{}\n{}",
-        run.printed,
-        String::from_utf8_lossy(&output.stderr)
-    );
+    assert!(output.status.success(), "{}\n{}", run.printed, String::from_utf8_lossy(&output.stderr));
     run
 }
 

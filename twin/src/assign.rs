@@ -44,17 +44,11 @@ impl FromStr for Assignment {
         let value = match toml::from_str::<Table>(&format!("value = {value}")) {
             Ok(mut table) if table.len() == 1 => table.remove("value").unwrap_or(Value::Boolean(false)),
             _ if value.starts_with(['[', '{', '"', '\'']) || value.contains('\n') || value.is_empty() => {
-                return Err(refused(
-                    "the value is not TOML; a text with spaces or brackets needs quotes",
-                ));
+                return Err(refused("the value is not TOML; a text with spaces or brackets needs quotes"));
             }
             _ => Value::String(value.to_owned()),
         };
-        Ok(Self {
-            keys: vec![key.to_owned()],
-            value,
-            said: text.to_owned(),
-        })
+        Ok(Self { keys: vec![key.to_owned()], value, said: text.to_owned() })
     }
 }
 
@@ -76,11 +70,7 @@ impl Assignment {
             Value::String(text) => text.clone(),
             other => other.to_string(),
         };
-        Self {
-            keys: keys.iter().map(|&key| key.to_owned()).collect(),
-            said: format!("{option} {shown}"),
-            value,
-        }
+        Self { keys: keys.iter().map(|&key| key.to_owned()).collect(), said: format!("{option} {shown}"), value }
     }
 
     /// Whether the assignment sets `key`.
@@ -117,11 +107,7 @@ fn set(table: &mut Table, key: &str, value: Value) -> Result<(), String> {
     };
     let entry = rest.split('.').next().unwrap_or(rest);
     let list = entry == "+" || entry.parse::<usize>().is_ok();
-    let empty = if list {
-        Value::Array(Vec::new())
-    } else {
-        Value::Table(Table::new())
-    };
+    let empty = if list { Value::Array(Vec::new()) } else { Value::Table(Table::new()) };
     match table.entry(first).or_insert(empty) {
         Value::Table(inner) => set(inner, rest, value),
         Value::Array(entries) => set_entry(entries, first, rest, value),

@@ -49,10 +49,7 @@ struct List {
     entries: BTreeMap<u64, Leftover>,
 }
 
-static LIST: Mutex<List> = Mutex::new(List {
-    next: 0,
-    entries: BTreeMap::new(),
-});
+static LIST: Mutex<List> = Mutex::new(List { next: 0, entries: BTreeMap::new() });
 
 fn list() -> MutexGuard<'static, List> {
     // a thread that panicked while it made something has listed nothing
@@ -166,10 +163,7 @@ mod tests {
         let parent = tempfile::tempdir().unwrap();
         let [kept, lost] = ["kept", "lost"].map(|name| parent.path().join(name));
         let make = |path: &PathBuf| {
-            listed(
-                || std::fs::create_dir(path).map(|()| path.clone()),
-                |path| Leftover::Folder(path.clone()),
-            )
+            listed(|| std::fs::create_dir(path).map(|()| path.clone()), |path| Leftover::Folder(path.clone()))
         };
         drop(make(&kept).unwrap());
         let (_, _entry) = make(&lost).unwrap();

@@ -47,10 +47,7 @@ impl Twin {
     /// # Errors
     /// [`Refusal`], as [`Scene::hash`].
     pub fn new(scene: &Scene) -> Result<Self, Refusal> {
-        Ok(Self {
-            scene_hash: scene.hash()?,
-            scene: scene.clone(),
-        })
+        Ok(Self { scene_hash: scene.hash()?, scene: scene.clone() })
     }
 
     /// The scene.
@@ -176,22 +173,13 @@ impl Twin {
 
     /// The session of these recordings, with the scene's name, object, event, hold and provenance.
     pub fn session(&self, raster: Option<Recorded>, compressive: Option<Recorded>) -> Session {
-        Session {
-            raster,
-            compressive,
-            ..header(&self.scene, &self.scene_hash)
-        }
+        Session { raster, compressive, ..header(&self.scene, &self.scene_hash) }
     }
 
     /// Checks that the frames of `presses` presses can be kept.
     fn check_frames(&self, presses: usize) -> Result<(), Refusal> {
         let rate_hz = 1.0 / self.scene.mechanics().frame_interval_s();
-        self.check_size(
-            presses,
-            rate_hz,
-            self.scene.skin().taxels(),
-            "presses × frames × taxels",
-        )
+        self.check_size(presses, rate_hz, self.scene.skin().taxels(), "presses × frames × taxels")
     }
 
     /// Checks that `presses` presses with `values` values at `rate_hz` instants a second can be kept.
@@ -241,10 +229,9 @@ impl TwinSession<'_> {
         let sources = presses.iter().map(|press| self.skin.conductance(&press.frames));
         let mut sources = sources.collect::<Result<Vec<_>, _>>()?;
         let recording = self.readout.as_mut().map(|readout| readout.record(&mut sources));
-        let recorded = recording.transpose()?.map(|recording| Recorded {
-            presses: self.twin.facts(presses, &sources),
-            ..Recorded::new(recording)
-        });
+        let recorded = recording
+            .transpose()?
+            .map(|recording| Recorded { presses: self.twin.facts(presses, &sources), ..Recorded::new(recording) });
         Ok((sources, recorded))
     }
 }
@@ -258,11 +245,7 @@ impl Twin {
     pub fn start_session(&self, acquisition: &Acquisition, read_out: bool) -> Result<TwinSession<'_>, Refusal> {
         let chain = self.scene().chain();
         let readout = read_out.then(|| chain.readout_session(self.scene().duration_s(), acquisition));
-        Ok(TwinSession {
-            twin: self,
-            skin: chain.skin_session(acquisition.session),
-            readout: readout.transpose()?,
-        })
+        Ok(TwinSession { twin: self, skin: chain.skin_session(acquisition.session), readout: readout.transpose()? })
     }
 
     /// What is known of `presses`, whose conductance is `sources`.
@@ -288,10 +271,7 @@ pub struct PressFrames {
 impl PressFrames {
     /// Largest relative difference |force − Σ p·A| / force over all frames; see [`Frame::imbalance`].
     pub fn imbalance(&self, cell_area_m2: f64) -> f64 {
-        self.frames
-            .iter()
-            .map(|f| f.imbalance(cell_area_m2))
-            .fold(0.0, f64::max)
+        self.frames.iter().map(|f| f.imbalance(cell_area_m2)).fold(0.0, f64::max)
     }
 }
 
@@ -306,11 +286,7 @@ pub fn press_frames(scene: &Scene, index: usize) -> Result<PressFrames, Refusal>
         Task::Press(press) => PressCourse::of(&frames, press.force_n, press.plateau_s(), scene.skin().cell_area_m2()),
         Task::Drop(_) => None,
     };
-    Ok(PressFrames {
-        course,
-        bounces: world.bounces().to_vec(),
-        frames,
-    })
+    Ok(PressFrames { course, bounces: world.bounces().to_vec(), frames })
 }
 
 /// Span of a recorded press in which the published evaluation takes the contact as steady, s: frames 500 to 700 of 100
@@ -324,20 +300,7 @@ pub fn hold_s(scene: &Scene) -> Option<[f64; 2]> {
     let Task::Press(press) = scene.task() else {
         return None;
     };
-    let course = |p: &PressConfig| {
-        [
-            p.duration_s,
-            p.onset_s,
-            p.onset_spread_s,
-            p.rise_s,
-            p.lift_s,
-            p.lift_spread_s,
-        ]
-    };
+    let course = |p: &PressConfig| [p.duration_s, p.onset_s, p.onset_spread_s, p.rise_s, p.lift_s, p.lift_spread_s];
     let default = course(&PressConfig::default()).map(f64::to_bits);
-    if course(press).map(f64::to_bits) == default {
-        Some(PUBLISHED_HOLD_S)
-    } else {
-        Some(press.plateau_s())
-    }
+    if course(press).map(f64::to_bits) == default { Some(PUBLISHED_HOLD_S) } else { Some(press.plateau_s()) }
 }

@@ -52,18 +52,10 @@ impl Wire {
         let mut line = |mode| {
             let mut readout = chain.readout(mode, session)?;
             let idle = readout.measure(&mut felt, IDLE).map_err(of_readout)?;
-            Ok::<_, Refusal>(Line {
-                idle_v: median(&idle).unwrap_or_default(),
-                readout,
-            })
+            Ok::<_, Refusal>(Line { idle_v: median(&idle).unwrap_or_default(), readout })
         };
         let lines = [line(Mode::Compressive)?, line(Mode::Raster)?];
-        Ok(Self {
-            skin,
-            felt,
-            shape,
-            lines,
-        })
+        Ok(Self { skin, felt, shape, lines })
     }
 
     /// Applies `electrode_pressure` for `dt_s` seconds. It then stays until the next call.
@@ -165,10 +157,7 @@ mod tests {
     /// Without an effect, a measurement is Σ w·R·G of the rows that it says.
     #[test]
     fn an_ideal_wire_is_the_sum_of_its_rows() {
-        let config = ChainConfig {
-            readout: Some("ideal".to_owned()),
-            ..ChainConfig::default()
-        };
+        let config = ChainConfig { readout: Some("ideal".to_owned()), ..ChainConfig::default() };
         let chain = Chain::new(&config, &SkinLayout::default(), 3, ".".as_ref()).unwrap();
         let mut wire = Wire::new(&chain, 0).unwrap();
         wire.feel(&pressed(), 0.1).unwrap();
@@ -200,10 +189,8 @@ mod tests {
         let mut wrenches = Vec::new();
         for k in 0..3 {
             let position_m = [0.01, -0.02, 0.014 - 1e-3 * f64::from(k)];
-            let posed = PosedMesh {
-                velocity_m_per_s: [0.0, 0.0, -0.01],
-                ..PosedMesh::at_rest(&block.mesh, position_m)
-            };
+            let posed =
+                PosedMesh { velocity_m_per_s: [0.0, 0.0, -0.01], ..PosedMesh::at_rest(&block.mesh, position_m) };
             skin.touch(&[(&block, posed)], &mut wrenches);
             wire.feel(skin.electrode_pressure(), 0.1)?;
         }

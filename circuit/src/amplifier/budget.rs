@@ -30,12 +30,7 @@ pub struct Skin {
 /// published ± 3.3 V.
 impl Default for Skin {
     fn default() -> Self {
-        Self {
-            pressed_share: 0.25,
-            pressed_s: 150e-6,
-            idle_s: 1e-6,
-            drive_v: 3.3,
-        }
+        Self { pressed_share: 0.25, pressed_s: 150e-6, idle_s: 1e-6, drive_v: 3.3 }
     }
 }
 
@@ -186,10 +181,7 @@ impl Budget {
             (Limit::Settling, (settle_s + slew_s) / available_s),
             (Limit::Rails, excursion_v / op_amp.rail_v),
             (Limit::ConverterRange, excursion_v / ends_v),
-            (
-                Limit::OutputCurrent,
-                excursion_v.min(op_amp.rail_v) / feedback_ohm / op_amp.output_a,
-            ),
+            (Limit::OutputCurrent, excursion_v.min(op_amp.rail_v) / feedback_ohm / op_amp.output_a),
             (Limit::ConverterStep, adc.lsb_v() / signal_v),
         ];
         Self {
@@ -334,10 +326,7 @@ pub fn remedied(
 }
 
 fn with_feedback(amplifier: &Amplifier, feedback_ohm: f64) -> Result<Amplifier, Refusal> {
-    let network = Network {
-        feedback_ohm,
-        ..*amplifier.network()
-    };
+    let network = Network { feedback_ohm, ..*amplifier.network() };
     Amplifier::new(*amplifier.op_amp(), network)
 }
 
@@ -382,19 +371,9 @@ pub fn fewest_wires(
         // all numbers of wires up to `last` leave as many on the emptiest; only `last` itself can leave no more on the
         // fullest
         let last = taxels / fewest;
-        wires = if last > wires && last * fewest == taxels {
-            last
-        } else {
-            last + 1
-        };
+        wires = if last > wires && last * fewest == taxels { last } else { last + 1 };
     }
-    Ok(wired(
-        &on_bus(taxels.div_ceil(wires))?,
-        taxels,
-        wires,
-        Remedy::Wires,
-        setting,
-    ))
+    Ok(wired(&on_bus(taxels.div_ceil(wires))?, taxels, wires, Remedy::Wires, setting))
 }
 
 /// A tree of amplifiers. Inputs of the upper levels are resistors of Rf/gain to a feedback of Rf.
@@ -422,13 +401,7 @@ fn sub_arrays(amplifier: &Amplifier, taxels: u32, sub_array: u32, setting: &Sett
     // noise of all amplifiers of the level, at the sum of their outputs: equal and independent
     tree.scale_noise(f64::from(count).sqrt());
     // no bus of taxels at the upper levels, and so none of its capacitance
-    let upper = Amplifier::new(
-        *amplifier.op_amp(),
-        Network {
-            bus_f: 0.0,
-            ..*amplifier.network()
-        },
-    )?;
+    let upper = Amplifier::new(*amplifier.op_amp(), Network { bus_f: 0.0, ..*amplifier.network() })?;
     while count > 1 {
         let inputs = count;
         count = inputs.div_ceil(sub_array);
@@ -461,11 +434,7 @@ impl Tree {
         // the sum with a gain of 1: independent signs add as squares, like ones as they are
         let (rms_v, worst_v) = (b.sum_rms_v * fan_in.sqrt(), b.sum_worst_v * fan_in);
         let excursion_v = (EXCURSION_SD * rms_v).min(worst_v);
-        let gain = if excursion_v > b.range_v {
-            b.range_v / excursion_v
-        } else {
-            1.0
-        };
+        let gain = if excursion_v > b.range_v { b.range_v / excursion_v } else { 1.0 };
         let feedback_ohm = amplifier.network().feedback_ohm;
         let conductance_s = fan_in * gain / feedback_ohm;
         let response = AmplifierResponse::new(amplifier, conductance_s);
@@ -501,11 +470,7 @@ impl Tree {
         let filled = b.excursion_v / (b.range_v * (1.0 + 1e-12));
         let [rails, current] = self.first;
         b.saturates = rails.1 > 1.0 || filled > 1.0;
-        let range = if op_amp.rail_v <= adc_ends_v(&setting.adc) {
-            Limit::Rails
-        } else {
-            Limit::ConverterRange
-        };
+        let range = if op_amp.rail_v <= adc_ends_v(&setting.adc) { Limit::Rails } else { Limit::ConverterRange };
         let last_a = b.excursion_v.min(op_amp.rail_v) / amplifier.network().feedback_ohm;
         b.limit = worst([
             (Limit::Settling, (b.settle_s + b.slew_s) / setting.available_s),

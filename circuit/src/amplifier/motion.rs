@@ -17,12 +17,7 @@ impl Decay {
     pub(super) fn new(sigma: f64, product: f64, delta: f64) -> Self {
         let root = delta.abs().sqrt();
         let slow = if delta >= 0.0 { product / (sigma - root) } else { sigma };
-        Self {
-            sigma,
-            delta,
-            root,
-            slow,
-        }
+        Self { sigma, delta, root, slow }
     }
 
     /// σ, 1/s.
@@ -47,20 +42,12 @@ impl Decay {
 
     /// Slow and fast mode, 1/s; both σ where they oscillate.
     fn modes(&self) -> (f64, f64) {
-        if self.delta >= 0.0 {
-            (self.slow, self.sigma - self.root)
-        } else {
-            (self.sigma, self.sigma)
-        }
+        if self.delta >= 0.0 { (self.slow, self.sigma - self.root) } else { (self.sigma, self.sigma) }
     }
 
     /// Time after which the faster of two real modes is below rounding; infinite where the modes oscillate.
     pub(super) fn fast_gone_s(&self) -> f64 {
-        if self.delta >= 0.0 {
-            40.0 / -self.modes().1
-        } else {
-            f64::INFINITY
-        }
+        if self.delta >= 0.0 { 40.0 / -self.modes().1 } else { f64::INFINITY }
     }
 
     /// e^(σt)·cosh(√δ t) and e^(σt)·sinh(√δ t)/√δ, both entire functions of δ: they pass smoothly through the critical
@@ -92,11 +79,7 @@ impl Decay {
             let half_turn = std::f64::consts::PI / self.root;
             let phase = (-x).atan2((slope - self.sigma * x) / self.root);
             let first = phase.rem_euclid(std::f64::consts::PI) / self.root;
-            return if first > 0.0 {
-                [first, first + half_turn]
-            } else {
-                [half_turn, 2.0 * half_turn]
-            };
+            return if first > 0.0 { [first, first + half_turn] } else { [half_turn, 2.0 * half_turn] };
         }
         // x = P e^(slow t) + R e^(fast t) is 0 when e^((slow − fast) t) = −R/P = 1 + ratio
         let (_, fast) = self.modes();
@@ -205,17 +188,9 @@ mod tests {
 
     #[test]
     fn zeros_are_found_to_rounding() {
-        assert_relative_eq!(
-            crossing(&|t: f64| t.cos(), 0.0, 3.0),
-            std::f64::consts::FRAC_PI_2,
-            max_relative = 1e-15
-        );
+        assert_relative_eq!(crossing(&|t: f64| t.cos(), 0.0, 3.0), std::f64::consts::FRAC_PI_2, max_relative = 1e-15);
         assert_relative_eq!(crossing(&|t: f64| 1e-9 - t, 0.0, 3600.0), 1e-9, max_relative = 1e-15);
-        assert_relative_eq!(
-            crossing(&|t: f64| 1.0 - (1e3 * t).powi(2), 0.0, 100.0),
-            1e-3,
-            max_relative = 1e-15
-        );
+        assert_relative_eq!(crossing(&|t: f64| 1.0 - (1e3 * t).powi(2), 0.0, 100.0), 1e-3, max_relative = 1e-15);
         assert_relative_eq!(
             crossing(&|t: f64| (-1e6 * t).exp() - 0.5, 0.0, 1.0),
             2_f64.ln() * 1e-6,

@@ -73,13 +73,7 @@ pub struct Network {
 
 impl Default for Network {
     fn default() -> Self {
-        Self {
-            feedback_ohm: 1e3,
-            feedback_f: 0.0,
-            bus_f: 0.0,
-            offset_v: 0.0,
-            temperature_k: 300.0,
-        }
+        Self { feedback_ohm: 1e3, feedback_f: 0.0, bus_f: 0.0, offset_v: 0.0, temperature_k: 300.0 }
     }
 }
 
@@ -164,10 +158,7 @@ pub struct BusLoad {
 impl BusLoad {
     /// Finite, and no negative conductance.
     pub(super) fn check(self) {
-        let Self {
-            conductance_s,
-            current_a,
-        } = self;
+        let Self { conductance_s, current_a } = self;
         debug_assert!(
             conductance_s.is_finite() && conductance_s >= 0.0 && current_a.is_finite(),
             "a load of {conductance_s} S and {current_a} A is not finite, or negative"

@@ -83,11 +83,7 @@ impl AmplifierResponse {
         // a₂² u² + p u = a₀² with u = ω²
         let p = a1 * a1 - 2.0 * a0 * a2;
         let root = p.hypot(2.0 * a0 * a2);
-        let u = if p >= 0.0 {
-            2.0 * a0 * a0 / (p + root)
-        } else {
-            (root - p) / (2.0 * a2 * a2)
-        };
+        let u = if p >= 0.0 { 2.0 * a0 * a0 / (p + root) } else { (root - p) / (2.0 * a2 * a2) };
         u.sqrt() / TAU
     }
 
@@ -115,11 +111,7 @@ impl AmplifierResponse {
         } else {
             // x − √Δ, without losing digits; p > 0 here
             let least = 2.0 * square * (u + 2.0 * a0 * a0 / (p + root));
-            if root > 0.0 {
-                (2.0 * root / least).ln_1p() / root
-            } else {
-                2.0 / least
-            }
+            if root > 0.0 { (2.0 * root / least).ln_1p() / root } else { 2.0 / least }
         };
         let d = square * u * u + p * u + a0 * a0;
         let low = 0.5 * (d.ln() - 2.0 * (a2 * u).ln()) - 0.5 * p * j;
@@ -147,11 +139,7 @@ pub(super) fn settle_s(decay: &Decay, fraction: f64) -> f64 {
         let half_turn_s = PI / turning;
         let last = (time_constants / (-decay.sigma() * half_turn_s)).floor();
         let sign = error(last * half_turn_s).signum();
-        return crossing(
-            &|t| sign * error(t) - fraction,
-            last * half_turn_s,
-            (last + 1.0) * half_turn_s,
-        );
+        return crossing(&|t| sign * error(t) - fraction, last * half_turn_s, (last + 1.0) * half_turn_s);
     }
     // e(t) ≤ (1 + |slow| t) e^(−|slow| t), which is below e^(−x) from |slow| t = 2x + 2 on
     let longest_s = (2.0 * time_constants + 2.0) / decay.slowest_per_s();
@@ -194,17 +182,8 @@ impl AmplifierNoise {
         let per_current = response.gain_ohm(frequency_hz);
         let per_voltage = per_current * response.bus_s.hypot(TAU * frequency_hz * response.a[2]);
         let corner_hz = amplifier.op_amp().noise_corner_hz;
-        let flicker = if frequency_hz >= FLICKER_FROM_HZ {
-            corner_hz / frequency_hz
-        } else {
-            0.0
-        };
-        Self::scaled(
-            amplifier,
-            conductance_s,
-            per_current,
-            per_voltage * (1.0 + flicker).sqrt(),
-        )
+        let flicker = if frequency_hz >= FLICKER_FROM_HZ { corner_hz / frequency_hz } else { 0.0 };
+        Self::scaled(amplifier, conductance_s, per_current, per_voltage * (1.0 + flicker).sqrt())
     }
 
     /// Root mean square of the noise at the output over all frequencies, V, with the conductance `conductance_s` = S =
@@ -223,22 +202,13 @@ impl AmplifierNoise {
         let per_current = response.unity / (4.0 * a0 * a1).sqrt();
         let per_voltage = per_current * response.bus_s.hypot((a2 * a0).sqrt());
         let corner_hz = amplifier.op_amp().noise_corner_hz;
-        let flicker = if corner_hz > 0.0 {
-            (corner_hz * response.flicker(FLICKER_FROM_HZ)).sqrt()
-        } else {
-            0.0
-        };
+        let flicker = if corner_hz > 0.0 { (corner_hz * response.flicker(FLICKER_FROM_HZ)).sqrt() } else { 0.0 };
         Self::scaled(amplifier, conductance_s, per_current, per_voltage.hypot(flicker))
     }
 
     /// Root sum of squares, because the sources are independent.
     pub fn total(&self) -> f64 {
-        let Self {
-            taxels,
-            feedback,
-            voltage,
-            current,
-        } = self;
+        let Self { taxels, feedback, voltage, current } = self;
         taxels.hypot(*feedback).hypot(*voltage).hypot(*current)
     }
 

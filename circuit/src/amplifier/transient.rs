@@ -42,14 +42,8 @@ pub struct Transient {
 impl Transient {
     /// An amplifier at rest with nothing on its bus.
     pub fn new(amplifier: Amplifier) -> Self {
-        let mut transient = Self {
-            amplifier,
-            state: State::default(),
-        };
-        transient.settle(BusLoad {
-            conductance_s: 0.0,
-            current_a: 0.0,
-        });
+        let mut transient = Self { amplifier, state: State::default() };
+        transient.settle(BusLoad { conductance_s: 0.0, current_a: 0.0 });
         transient
     }
 
@@ -75,10 +69,7 @@ impl Transient {
         if self.state.output_v.abs() > rail_v {
             let output_v = self.state.output_v.clamp(-rail_v, rail_v);
             let current_a = output_v / self.amplifier.network().feedback_ohm + load.current_a;
-            self.state = State {
-                sum_v: current_a / self.amplifier.bus_s(load.conductance_s),
-                output_v,
-            };
+            self.state = State { sum_v: current_a / self.amplifier.bus_s(load.conductance_s), output_v };
         }
     }
 
@@ -105,12 +96,7 @@ impl Transient {
             }
             phase = next;
         }
-        let (
-            OpAmp {
-                rail_v, slew_v_per_s, ..
-            },
-            before_v,
-        ) = (*self.amplifier.op_amp(), self.state.output_v);
+        let (OpAmp { rail_v, slew_v_per_s, .. }, before_v) = (*self.amplifier.op_amp(), self.state.output_v);
         let most_v = slew_v_per_s * left_s;
         self.state = linear.after(self.state, left_s);
         self.state.output_v = (self.state.output_v.clamp(before_v - most_v, before_v + most_v)).clamp(-rail_v, rail_v);
@@ -206,28 +192,17 @@ pub(super) struct Linear {
 impl Linear {
     pub(super) fn new(amplifier: &Amplifier, load: BusLoad) -> Self {
         let (unity, pole) = (amplifier.unity_rad_per_s(), amplifier.pole_rad_per_s());
-        let Network {
-            feedback_ohm,
-            feedback_f,
-            offset_v,
-            ..
-        } = *amplifier.network();
+        let Network { feedback_ohm, feedback_f, offset_v, .. } = *amplifier.network();
         let (bus_s, capacitance_f) = (amplifier.bus_s(load.conductance_s), amplifier.capacitance_f());
         let m = [
-            [
-                -(feedback_f * unity + bus_s) / capacitance_f,
-                (1.0 / feedback_ohm - feedback_f * pole) / capacitance_f,
-            ],
+            [-(feedback_f * unity + bus_s) / capacitance_f, (1.0 / feedback_ohm - feedback_f * pole) / capacitance_f],
             [-unity, -pole],
         ];
         let product = (pole * bus_s + unity / feedback_ohm) / capacitance_f;
         let delta = (0.5 * (m[0][0] - m[1][1])).powi(2) + m[0][1] * m[1][0];
         Self {
             decay: Decay::new(0.5 * (m[0][0] + m[1][1]), product, delta),
-            still: [
-                (feedback_f * unity * offset_v + load.current_a) / capacitance_f,
-                unity * offset_v,
-            ],
+            still: [(feedback_f * unity * offset_v + load.current_a) / capacitance_f, unity * offset_v],
             m,
             rest: rest(amplifier, load),
         }
@@ -293,10 +268,7 @@ impl Linear {
     /// Rates at `state`, which is `d` from rest, and what rounding may take from the output's. Where the rest is so far
     /// away that the slew rate is lost in it, the rates are those of the amplifier's equations themselves.
     fn rates(&self, state: State, d: [f64; 2], slew_v_per_s: f64) -> ([f64; 2], f64) {
-        let terms = |[v, o]: [f64; 2]| {
-            self.m
-                .map(|[from_v, from_o]| (from_v * v).abs().max((from_o * o).abs()))
-        };
+        let terms = |[v, o]: [f64; 2]| self.m.map(|[from_v, from_o]| (from_v * v).abs().max((from_o * o).abs()));
         let lost = ROUNDING * terms(d)[1];
         if lost <= MARGIN * slew_v_per_s {
             return (self.derivative(d), lost);
@@ -326,10 +298,7 @@ pub(super) fn rest(amplifier: &Amplifier, load: BusLoad) -> State {
     let noise_gain = network.feedback_ohm * amplifier.bus_s(load.conductance_s);
     let output_v =
         (noise_gain * network.offset_v - network.feedback_ohm * load.current_a) / (1.0 + noise_gain / dc_gain);
-    State {
-        sum_v: network.offset_v - output_v / dc_gain,
-        output_v,
-    }
+    State { sum_v: network.offset_v - output_v / dc_gain, output_v }
 }
 
 /// Output at the constant rate r; the bus follows v′ = −k v + b + c t, k = (S + 1/Rf)/C.

@@ -45,11 +45,7 @@ struct Cell {
 impl Cell {
     /// The same with this probability that a collision makes it late.
     fn late_at(self, late: f64) -> Self {
-        Self {
-            late,
-            ln_in_time: (-late).ln_1p(),
-            ..self
-        }
+        Self { late, ln_in_time: (-late).ln_1p(), ..self }
     }
 
     /// First collision that acts on `first_row` or a later row: φ + n·period > `first_row` − 1.
@@ -109,41 +105,22 @@ pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<d
     let period = config.period_measurements;
     in_range("period_measurements", period, (2.0..1e9).contains(&period), "[2, 1e9)")?;
     let sd = config.period_sd_measurements;
-    within(
-        "period_sd_measurements",
-        sd,
-        0.0,
-        0.1 * period,
-        "[0, period_measurements/10]",
-    )?;
-    let rate = config
-        .rate
-        .within("rate", 0.0, 0.5 / period, "[0, 0.5/period_measurements]")?;
+    within("period_sd_measurements", sd, 0.0, 0.1 * period, "[0, period_measurements/10]")?;
+    let rate = config.rate.within("rate", 0.0, 0.5 / period, "[0, 0.5/period_measurements]")?;
     let mut oscillators = session.device.rng("late-updates/oscillators", 0);
     let mut rng = session.streams.rng("late-updates/cells", 0);
     let cells = (0..session.weights.taxels())
         .map(|_| {
             let normal: f64 = StandardNormal.sample(&mut oscillators);
             let period = period + sd * normal.clamp(-4.0, 4.0);
-            Cell {
-                phase: period * rng.random::<f64>(),
-                period,
-                late: 0.0,
-                ln_in_time: 0.0,
-                collision: 0.0,
-            }
-            .late_at(rate.draw(&mut rng) * period)
+            Cell { phase: period * rng.random::<f64>(), period, late: 0.0, ln_in_time: 0.0, collision: 0.0 }
+                .late_at(rate.draw(&mut rng) * period)
         })
         .collect();
     if session.weights.mode() == WeightMode::Raster {
         return Ok(Box::new(LateRaster::new(session.streams, cells)));
     }
-    Ok(Box::new(LateUpdates {
-        streams: session.streams,
-        cells,
-        rng,
-        queue: BinaryHeap::new(),
-    }))
+    Ok(Box::new(LateUpdates { streams: session.streams, cells, rng, queue: BinaryHeap::new() }))
 }
 
 impl Effect for LateUpdates {
@@ -183,12 +160,7 @@ struct LateRaster {
 
 impl LateRaster {
     fn new(session: Streams, cells: Vec<Cell>) -> Self {
-        Self {
-            session,
-            block: session,
-            cells,
-            changing: Vec::new(),
-        }
+        Self { session, block: session, cells, changing: Vec::new() }
     }
 }
 
@@ -264,11 +236,7 @@ mod tests {
         let mut volts = vec![0.0; 10_000];
         for (block, volts) in (0..).zip(volts.chunks_mut(rows)) {
             let first_row = block * rows as u64;
-            effects[0].begin_block(&BlockStart {
-                block,
-                first_row,
-                continuous: true,
-            });
+            effects[0].begin_block(&BlockStart { block, first_row, continuous: true });
             let mut engine = Engine::new(weights.clone(), 1e3, 1e3);
             engine.run(&mut effects, first_row, &mut skin, volts).unwrap();
         }
@@ -282,11 +250,7 @@ mod tests {
         let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, 4);
         let (whole, mut nominal) = (run(&weights, Box::new(any_weights()), 10_000), vec![0.0; 10_000]);
         weights.weighted_sums(0, &[1.0, 2.0, 4.0, 8.0], &mut nominal);
-        let late = whole
-            .iter()
-            .zip(&nominal)
-            .filter(|(y, u)| (**y - **u).abs() > 0.5)
-            .count();
+        let late = whole.iter().zip(&nominal).filter(|(y, u)| (**y - **u).abs() > 0.5).count();
         assert!(late > 3000, "{late} late rows");
         assert!(whole == run(&weights, Box::new(any_weights()), 100));
     }

@@ -80,10 +80,7 @@ pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<d
     }
     let all = (config.all_probability > 0.0).then(|| {
         let streams = session.streams.child("missed-clocks/all", 0);
-        let session = EffectSession {
-            streams,
-            ..session.clone()
-        };
+        let session = EffectSession { streams, ..session.clone() };
         SkippingClocks::new(&session, 0, config.all_probability)
     });
     Ok(Box::new(MissedClocks {

@@ -54,11 +54,7 @@ pub fn build_chain(chain: &toml::Table, session: &EffectSession) -> Result<Vec<B
     let mode = session.weights.mode().readout();
     if let Some(name) = chain.keys().find(|k| EFFECTS.iter().all(|(name, _)| name != k)) {
         let known: Vec<&str> = EFFECTS.iter().map(|(name, _)| *name).collect();
-        return Err(Refusal::new(format!(
-            "`{}.{name}` is not an effect; known: {}",
-            mode.name(),
-            known.join(", ")
-        )));
+        return Err(Refusal::new(format!("`{}.{name}` is not an effect; known: {}", mode.name(), known.join(", "))));
     }
     let mut effects = Vec::new();
     for &(name, build) in EFFECTS {
@@ -116,10 +112,8 @@ pub(crate) fn rail_v(chain: &toml::Table, mode: Mode) -> Result<Option<f64>, Ref
 /// If the effect lacks a property; the message holds the numbers.
 pub fn check_effect(build: &dyn Fn(&EffectSession) -> Box<dyn Effect>) {
     for mode in [WeightMode::Binary, WeightMode::Analog, WeightMode::Raster] {
-        let session = EffectSession {
-            streams: Streams::new(3),
-            ..EffectSession::of(2, Weights::new(mode, Seeding::Address, 4))
-        };
+        let session =
+            EffectSession { streams: Streams::new(3), ..EffectSession::of(2, Weights::new(mode, Seeding::Address, 4)) };
         for scale_s in [0.0, 1e-9, 1e-4, 1e3] {
             let mut effect = [build(&session)];
             let first = block_of(&mut effect, &session, 0, scale_s, 128);
@@ -155,11 +149,7 @@ fn block_of(
     let times_s = vec![0.1, 0.35, 0.8];
     let mut source = Interpolated::new(times_s, vec![map(2.0), map(0.0), map(1.0)]).expect("a valid series");
     let first_row = 1000 * block;
-    effect[0].begin_block(&BlockStart {
-        block,
-        first_row,
-        continuous: false,
-    });
+    effect[0].begin_block(&BlockStart { block, first_row, continuous: false });
     let mut volts = vec![0.0; 1000];
     Engine::new(session.weights.clone(), 1e3, 1e3)
         .with_batch(batch)

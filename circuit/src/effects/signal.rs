@@ -69,10 +69,7 @@ pub(super) fn memory(table: toml::Table, session: &EffectSession) -> Result<Box<
     let c: MemoryConfig = parse(table)?;
     let rng = &mut session.streams.rng("memory", 0);
     let mut tap = |field, span: Span| span.drawn(field, [-0.4, 0.4], "[−0.4, 0.4]", rng);
-    Ok(Box::new(Memory {
-        taps: [tap("h1", c.h1)?, tap("h2", c.h2)?],
-        past_v: [0.0; 2],
-    }))
+    Ok(Box::new(Memory { taps: [tap("h1", c.h1)?, tap("h2", c.h2)?], past_v: [0.0; 2] }))
 }
 
 impl Effect for Memory {
@@ -157,9 +154,7 @@ pub(super) fn contact_noise(table: toml::Table, session: &EffectSession) -> Resu
 
 pub(super) fn idle_noise(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let rng = &mut session.streams.rng("idle-noise/session", 0);
-    let sd_v = parse::<IdleNoiseConfig>(table)?
-        .sd_v
-        .drawn("sd_v", [0.0, 10.0], "[0, 10]", rng)?;
+    let sd_v = parse::<IdleNoiseConfig>(table)?.sd_v.drawn("sd_v", [0.0, 10.0], "[0, 10]", rng)?;
     Ok(Box::new(Noise::new(session, "idle-noise", sd_v, false)))
 }
 
@@ -167,13 +162,7 @@ impl Noise {
     fn new(session: &EffectSession, label: &'static str, sd: f64, relative: bool) -> Self {
         let streams = session.streams;
         let rng = streams.rng(label, 0);
-        Self {
-            streams,
-            label,
-            sd,
-            relative,
-            rng,
-        }
+        Self { streams, label, sd, relative, rng }
     }
 }
 

@@ -144,12 +144,7 @@ impl SeedRule for Consecutive {
     fn states(multiplier: u64, increment: u64, seeds: [u64; 4]) -> [u64; 4] {
         let first = wide_state(multiplier, seeds[0], increment);
         let third = first.wrapping_add(multiplier << 1);
-        [
-            first,
-            first.wrapping_add(multiplier),
-            third,
-            third.wrapping_add(multiplier),
-        ]
+        [first, first.wrapping_add(multiplier), third, third.wrapping_add(multiplier)]
     }
 }
 
@@ -180,11 +175,7 @@ impl<'a, S> Generated<'a, S> {
         // equal lengths known once: no bounds to check within the loops
         let multipliers = &jumps.multipliers[..];
         let increments = &jumps.increments[..multipliers.len()];
-        Self {
-            multipliers,
-            increments,
-            rule,
-        }
+        Self { multipliers, increments, rule }
     }
 }
 
@@ -263,10 +254,7 @@ impl<'a> Levels for Given<'a> {
 }
 
 /// `sums[v]` += Σₖ ±`values[v][k]`, with the signs of the binary levels.
-#[expect(
-    clippy::needless_range_loop,
-    reason = "one counter for slices of equal length is what is made SIMD of"
-)]
+#[expect(clippy::needless_range_loop, reason = "one counter for slices of equal length is what is made SIMD of")]
 #[inline(always)]
 fn signed_sums_of<L: Levels, const V: usize>(levels: L, values: [&[f64]; V], sums: [&mut [f64]; V]) {
     let len = levels.len();
@@ -381,11 +369,7 @@ mod tests {
             assert_eq!(bits(&c), bits(&a1), "{n} taxels");
 
             let share: Vec<f64> = (0..37).map(|i| f64::from(i) / 37.0).collect();
-            let lines = Lines {
-                from: &from,
-                to: Some(&to),
-                share: &share,
-            };
+            let lines = Lines { from: &from, to: Some(&to), share: &share };
             let [mut a, mut b, mut a1, mut b1] = [zero(), zero(), zero(), zero()];
             analog_sums(drives, lines, &mut a, &mut b);
             analog_sums_of(levels, lines, &mut a1, &mut b1);

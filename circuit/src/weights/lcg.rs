@@ -28,15 +28,9 @@ pub struct Jump {
 
 impl Jump {
     /// No step.
-    pub(crate) const NONE: Self = Self {
-        multiplier: 1,
-        increment: 0,
-    };
+    pub(crate) const NONE: Self = Self { multiplier: 1, increment: 0 };
     /// One step.
-    pub const ONE: Self = Self {
-        multiplier: MULTIPLIER,
-        increment: INCREMENT,
-    };
+    pub const ONE: Self = Self { multiplier: MULTIPLIER, increment: INCREMENT };
 
     /// `steps` steps, by repeated squaring: O(log steps). The generator's period is 2³², so only `steps` mod 2³²
     /// matters.
@@ -58,10 +52,7 @@ impl Jump {
     pub const fn then(self, next: Self) -> Self {
         Self {
             multiplier: self.multiplier.wrapping_mul(next.multiplier),
-            increment: next
-                .multiplier
-                .wrapping_mul(self.increment)
-                .wrapping_add(next.increment),
+            increment: next.multiplier.wrapping_mul(self.increment).wrapping_add(next.increment),
         }
     }
 

@@ -140,16 +140,7 @@ impl CodeRows {
         for (code, level) in (0..=u8::MAX).zip(&mut levels) {
             *level = mode.code_level(code);
         }
-        Self {
-            mode,
-            taxels,
-            first_row: 0,
-            len: 0,
-            levels,
-            codes: Vec::new(),
-            kinds: Vec::new(),
-            drives: Vec::new(),
-        }
+        Self { mode, taxels, first_row: 0, len: 0, levels, codes: Vec::new(), kinds: Vec::new(), drives: Vec::new() }
     }
 
     /// Goes to the rows `first_row..first_row + len` of a source, whose `codes` writes as many rows as the slice holds,
@@ -272,14 +263,7 @@ pub(crate) struct Rows {
 impl Rows {
     /// No rows yet.
     pub(crate) fn new(weights: Weights) -> Self {
-        Self {
-            weights,
-            first_row: 0,
-            given: None,
-            summed: false,
-            before: None,
-            jumps: Jumps::default(),
-        }
+        Self { weights, first_row: 0, given: None, summed: false, before: None, jumps: Jumps::default() }
     }
 
     /// Goes to the rows `first_row..first_row + len` of `source`, in place of the generator's.
@@ -377,8 +361,7 @@ impl Rows {
             let scanned = before.and_then(|row| row.checked_rem(self.weights.taxels() as u64));
             return f64::from(scanned == Some(taxel as u64));
         }
-        self.before
-            .map_or(0.0, |jump| self.weights.mode().level(jump.apply(self.seed(taxel))))
+        self.before.map_or(0.0, |jump| self.weights.mode().level(jump.apply(self.seed(taxel))))
     }
 
     /// Sums over the taxels with values on `lines`, into `sums`, whose old content is dropped. In raster mode the
@@ -444,11 +427,7 @@ impl Weights {
         let (mut rows, mut sums) = (Rows::new(self.clone()), Sums::default());
         for (out, first_row) in out.chunks_mut(RUN).zip((first_row..).step_by(RUN)) {
             rows.go_to(first_row, out.len());
-            let lines = Lines {
-                from: values,
-                to: None,
-                share: &[0.0; RUN],
-            };
+            let lines = Lines { from: values, to: None, share: &[0.0; RUN] };
             rows.sum(lines, &mut sums);
             for (i, out) in out.iter_mut().enumerate() {
                 *out = rows.weighted(&lines, &sums, i);

@@ -103,11 +103,7 @@ impl WeightMode {
 /// Nearest code of a level, the neutral one of level 0.
 #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
 pub(crate) fn code_of(level: f64) -> u8 {
-    if level == 0.0 {
-        NEUTRAL
-    } else {
-        (ANALOG_SCALE * (1.0 + level)).round() as u8
-    }
+    if level == 0.0 { NEUTRAL } else { (ANALOG_SCALE * (1.0 + level)).round() as u8 }
 }
 
 /// A list `field` of `len` entries, where [1, `most`] are valid.
@@ -118,10 +114,7 @@ fn wrong_length(field: &str, len: usize, most: usize) -> Refusal {
 /// A key `field` that `mode` does not use.
 pub(crate) fn not_in_mode(field: &str, mode: WeightMode) -> Refusal {
     let valid = "valid modes: \"analog\" and \"binary\"";
-    Refusal::new(format!(
-        "`{field}` does not go with `mode` = {:?}; {valid}",
-        mode.name()
-    ))
+    Refusal::new(format!("`{field}` does not go with `mode` = {:?}; {valid}", mode.name()))
 }
 
 /// Most codes in a pattern.
@@ -163,10 +156,7 @@ impl TryFrom<PatternsConfig> for Patterns {
 
 impl From<Patterns> for PatternsConfig {
     fn from(patterns: Patterns) -> Self {
-        Self {
-            period: patterns.period(),
-            codes: patterns.codes,
-        }
+        Self { period: patterns.period(), codes: patterns.codes }
     }
 }
 
@@ -201,11 +191,7 @@ impl Patterns {
     ///
     /// # Errors
     /// As [`Patterns::new`].
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "float to integer casts saturate"
-    )]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "float to integer casts saturate")]
     pub fn of_levels(period: usize, levels: &[f64]) -> Result<Self, Refusal> {
         let code = |level: &f64| (127.5 * (1.0 + level)).round() as u8;
         Self::new(period, levels.iter().map(code).collect())
@@ -319,11 +305,7 @@ pub struct Weights {
 impl Weights {
     /// Weights of `taxels` taxels whose generators are seeded by a rule.
     pub fn new(mode: WeightMode, seeding: Seeding, taxels: u32) -> Self {
-        Self {
-            mode,
-            source: LevelSource::Seeding(seeding),
-            taxels,
-        }
+        Self { mode, source: LevelSource::Seeding(seeding), taxels }
     }
 
     /// Weights with one generator seed for each taxel.
@@ -336,11 +318,9 @@ impl Weights {
             return Err(not_in_mode(field, mode));
         }
         match u32::try_from(seeds.len()) {
-            Ok(taxels) if (1..=MAX_SEEDS).contains(&seeds.len()) => Ok(Self {
-                mode,
-                source: LevelSource::Seeds(seeds),
-                taxels,
-            }),
+            Ok(taxels) if (1..=MAX_SEEDS).contains(&seeds.len()) => {
+                Ok(Self { mode, source: LevelSource::Seeds(seeds), taxels })
+            }
             _ => Err(wrong_length(field, seeds.len(), MAX_SEEDS)),
         }
     }
@@ -352,11 +332,7 @@ impl Weights {
     pub fn with_patterns(mode: WeightMode, patterns: Patterns) -> Result<Self, Refusal> {
         patterns.check(mode)?;
         let taxels = u32::try_from(patterns.taxels()).unwrap_or(u32::MAX);
-        Ok(Self {
-            mode,
-            source: LevelSource::Patterns(Arc::new(patterns)),
-            taxels,
-        })
+        Ok(Self { mode, source: LevelSource::Patterns(Arc::new(patterns)), taxels })
     }
 
     /// Number of taxels: the length of a row, and the period of the raster.
@@ -447,9 +423,7 @@ impl Weights {
             match &self.source {
                 LevelSource::Patterns(patterns) => {
                     let codes = patterns.row(row).iter();
-                    out.iter_mut()
-                        .zip(codes)
-                        .for_each(|(out, code)| *out = self.mode.code_level(*code));
+                    out.iter_mut().zip(codes).for_each(|(out, code)| *out = self.mode.code_level(*code));
                 }
                 _ => {
                     out.fill(0.0);
@@ -469,9 +443,7 @@ impl Weights {
     pub fn fill_codes(&self, first_row: u64, out: &mut [u8]) {
         let mut levels = vec![0.0; out.len()];
         self.fill_rows(first_row, &mut levels);
-        out.iter_mut()
-            .zip(&levels)
-            .for_each(|(out, level)| *out = code_of(*level));
+        out.iter_mut().zip(&levels).for_each(|(out, level)| *out = code_of(*level));
     }
 }
 
@@ -513,11 +485,7 @@ pub struct WeightRows<'a> {
 impl<'a> WeightRows<'a> {
     /// The `len` rows of `weights` from row `first_row` on, counted from loading the seeds.
     pub fn new(weights: &'a Weights, first_row: u64, len: usize) -> Self {
-        Self {
-            weights,
-            first_row,
-            len,
-        }
+        Self { weights, first_row, len }
     }
 
     /// The weights to which the rows belong.
@@ -620,9 +588,7 @@ const STATES: u64 = 1 << 32;
 pub fn seeds_of_first_window(window: &Patterns) -> Result<Vec<u32>, Refusal> {
     let rows = window.period();
     if rows > MOST_ROWS {
-        return Err(Refusal::new(format!(
-            "a window of {rows} rows is outside [1, {MOST_ROWS}]"
-        )));
+        return Err(Refusal::new(format!("a window of {rows} rows is outside [1, {MOST_ROWS}]")));
     }
     let words = words(window)?;
     let mut seeds: BTreeMap<u32, u32> = words.iter().map(|word| (*word, 0)).collect();
@@ -737,10 +703,7 @@ mod tests {
     #[test]
     fn windows_that_cannot_be_are_refused() {
         let refused = |rows, codes: Vec<u8>| seeds_of_first_window(&Patterns::new(rows, codes).unwrap()).unwrap_err();
-        assert_eq!(
-            refused(25, vec![0; 25]).to_string(),
-            "a window of 25 rows is outside [1, 24]"
-        );
+        assert_eq!(refused(25, vec![0; 25]).to_string(), "a window of 25 rows is outside [1, 24]");
         let said = refused(2, vec![0, 0, 0, 1]).to_string();
         assert!(said.starts_with("row 1, taxel 1: code 1 is not 0 or 255"), "{said}");
     }

@@ -59,26 +59,13 @@ impl From<&Weights> for WeightsConfig {
 impl TryFrom<WeightsConfig> for Weights {
     type Error = Refusal;
     fn try_from(config: WeightsConfig) -> Result<Self, Refusal> {
-        let WeightsConfig {
-            mode,
-            taxels,
-            generator,
-            seeding,
-            seeds,
-            patterns,
-        } = config;
+        let WeightsConfig { mode, taxels, generator, seeding, seeds, patterns } = config;
         if generator.is_some() && patterns.is_some() {
             return Err(one_source("`generator`, `patterns`"));
         }
         let raster = mode == WeightMode::Raster && seeds.is_none() && patterns.is_none();
         let seeding = seeding.or(raster.then_some(Seeding::Address));
-        Self::from_one(
-            mode,
-            taxels,
-            (seeding, "`seeding`"),
-            seeds.as_deref(),
-            patterns.as_ref(),
-        )
+        Self::from_one(mode, taxels, (seeding, "`seeding`"), seeds.as_deref(), patterns.as_ref())
     }
 }
 
@@ -103,20 +90,16 @@ impl Weights {
             (None, Some(seeds), None) => (Self::with_seeds(mode, seeds)?, "seeds"),
             (None, None, Some(patterns)) => (Self::with_patterns(mode, patterns.clone())?, "patterns"),
             _ => {
-                let given = [
-                    seeding.map(|_| shown),
-                    seeds.map(|_| "`seeds`"),
-                    patterns.map(|_| "`patterns`"),
-                ];
+                let given = [seeding.map(|_| shown), seeds.map(|_| "`seeds`"), patterns.map(|_| "`patterns`")];
                 let found = given.into_iter().flatten().collect::<Vec<_>>().join(", ");
                 return Err(one_source(if found.is_empty() { "none" } else { &found }));
             }
         };
         let found = weights.taxels();
         match taxels {
-            Some(taxels) if taxels as usize != found => Err(Refusal::new(format!(
-                "`{field}` is for {found} taxels; expected {taxels}"
-            ))),
+            Some(taxels) if taxels as usize != found => {
+                Err(Refusal::new(format!("`{field}` is for {found} taxels; expected {taxels}")))
+            }
             _ => Ok(weights),
         }
     }
@@ -124,9 +107,7 @@ impl Weights {
 
 /// Weights with no source of the levels, or several: the keys `found`.
 fn one_source(found: &str) -> Refusal {
-    Refusal::new(format!(
-        "weights need exactly one of `seeding`, `seeds` and `patterns`; found: {found}"
-    ))
+    Refusal::new(format!("weights need exactly one of `seeding`, `seeds` and `patterns`; found: {found}"))
 }
 
 impl Serialize for Weights {
@@ -178,14 +159,8 @@ pub fn parse_seeds(text: &str) -> Result<Vec<u32>, Refusal> {
                 Some(digits) => u32::from_str_radix(digits, 16),
                 None => word.parse(),
             };
-            let seed = seed.map_err(|_| {
-                wrong(
-                    index,
-                    word,
-                    "seed = `",
-                    "` is not one of the whole numbers in [0, 4294967295]",
-                )
-            })?;
+            let seed = seed
+                .map_err(|_| wrong(index, word, "seed = `", "` is not one of the whole numbers in [0, 4294967295]"))?;
             seeds.push(seed);
         }
     }
@@ -222,12 +197,7 @@ pub fn parse_patterns(text: &str) -> Result<Patterns, Refusal> {
                 continue;
             }
             let code = word.parse().map_err(|_| {
-                wrong(
-                    index,
-                    word,
-                    "`",
-                    "` is neither a row of + and − signs nor one of the codes in [0, 255]",
-                )
+                wrong(index, word, "`", "` is neither a row of + and − signs nor one of the codes in [0, 255]")
             })?;
             codes.push(code);
         }
@@ -239,10 +209,7 @@ pub fn parse_patterns(text: &str) -> Result<Patterns, Refusal> {
         let first = *taxels.get_or_insert(found);
         if found != first {
             let expected = format!("the rows before it have {first}");
-            return Err(Refusal::new(format!(
-                "line {}: a row of {found} taxels; {expected}",
-                index + 1
-            )));
+            return Err(Refusal::new(format!("line {}: a row of {found} taxels; {expected}", index + 1)));
         }
     }
     Patterns::new(rows, codes)

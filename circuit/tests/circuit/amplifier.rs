@@ -19,10 +19,7 @@ fn amplifier(network: Network) -> Amplifier {
 /// An operational amplifier with this corner of the 1/f noise.
 fn corner(noise_corner_hz: f64) -> OpAmp {
     let op_amp = OpAmp::default();
-    OpAmp {
-        noise_corner_hz,
-        ..op_amp
-    }
+    OpAmp { noise_corner_hz, ..op_amp }
 }
 
 /// No 1/f noise.
@@ -33,36 +30,22 @@ fn white(network: Network) -> Amplifier {
 /// No slewing, no rails.
 fn small_signal(network: Network) -> Amplifier {
     let (slew_v_per_s, rail_v) = (1e15, 1e6);
-    let op_amp = OpAmp {
-        slew_v_per_s,
-        rail_v,
-        ..OpAmp::default()
-    };
+    let op_amp = OpAmp { slew_v_per_s, rail_v, ..OpAmp::default() };
     Amplifier::new(op_amp, network).unwrap()
 }
 
 fn network(bus_f: f64, feedback_f: f64) -> Network {
-    Network {
-        bus_f,
-        feedback_f,
-        ..Network::default()
-    }
+    Network { bus_f, feedback_f, ..Network::default() }
 }
 
 fn load(conductance_s: f64, current_a: f64) -> BusLoad {
-    BusLoad {
-        conductance_s,
-        current_a,
-    }
+    BusLoad { conductance_s, current_a }
 }
 
 /// (v, o) from the differential equations alone, by Runge and Kutta's method of fourth order in steps of `h`.
 fn runge_kutta(amplifier: &Amplifier, loads: &[(BusLoad, f64)], h: f64) -> Vec<f64> {
     let (op_amp, n) = (amplifier.op_amp(), amplifier.network());
-    let (unity, pole) = (
-        TAU * op_amp.gain_bandwidth_hz,
-        TAU * op_amp.gain_bandwidth_hz / op_amp.dc_gain,
-    );
+    let (unity, pole) = (TAU * op_amp.gain_bandwidth_hz, TAU * op_amp.gain_bandwidth_hz / op_amp.dc_gain);
     let capacitance_f = n.bus_f + n.feedback_f;
     let rates = |[v, o]: [f64; 2], load: BusLoad| {
         let demand = unity * (n.offset_v - v) - pole * o;
@@ -249,16 +232,10 @@ proptest! {
 /// below 1e-5.
 #[test]
 fn noise_is_the_integral_over_the_response() {
-    for (bus_f, feedback_f, feedback_ohm) in [
-        (0.0, 0.0, 1e3),
-        (10e-9, 0.0, 1e3),
-        (5e-9, 200e-12, 300.0),
-        (1e-12, 0.0, 1e4),
-    ] {
-        let amplifier = amplifier(Network {
-            feedback_ohm,
-            ..network(bus_f, feedback_f)
-        });
+    for (bus_f, feedback_f, feedback_ohm) in
+        [(0.0, 0.0, 1e3), (10e-9, 0.0, 1e3), (5e-9, 200e-12, 300.0), (1e-12, 0.0, 1e4)]
+    {
+        let amplifier = amplifier(Network { feedback_ohm, ..network(bus_f, feedback_f) });
         let (s, unity) = (4e-3 + 1.0 / feedback_ohm, TAU * 10.6e6);
         let c = (bus_f + feedback_f).max(1e-18);
         let (mut current, mut voltage, mut flicker, mut last) = (0.0, 0.0, 0.0, None::<[f64; 3]>);
@@ -281,17 +258,9 @@ fn noise_is_the_integral_over_the_response() {
         let noise = AmplifierNoise::rms(&amplifier, 4e-3);
         let kt4 = 4.0 * 1.380_649e-23 * 300.0;
         assert_relative_eq!(noise.taxels, (kt4 * 4e-3 * current).sqrt(), max_relative = 2e-4);
-        assert_relative_eq!(
-            noise.feedback,
-            (kt4 / feedback_ohm * current).sqrt(),
-            max_relative = 2e-4
-        );
+        assert_relative_eq!(noise.feedback, (kt4 / feedback_ohm * current).sqrt(), max_relative = 2e-4);
         assert_relative_eq!(noise.current, 1e-13 * current.sqrt(), max_relative = 2e-4);
-        assert_relative_eq!(
-            noise.voltage,
-            6e-9 * (voltage + 1e3 * flicker).sqrt(),
-            max_relative = 2e-4
-        );
+        assert_relative_eq!(noise.voltage, 6e-9 * (voltage + 1e3 * flicker).sqrt(), max_relative = 2e-4);
         // a corner at which the 1/f noise is nearly all there is
         let op_amp = corner(1e9);
         let pink = AmplifierNoise::rms(&Amplifier::new(op_amp, *amplifier.network()).unwrap(), 4e-3);
@@ -377,19 +346,9 @@ fn a_ringing_amplifier_keeps_to_its_slew_rate() {
 /// 300 A on a farad: the rest is at 6e8 V, where the slew rate of 1 V/s is lost in rounding.
 #[test]
 fn a_rest_far_away_does_not_hide_the_slew_rate() {
-    let op_amp = OpAmp {
-        gain_bandwidth_hz: 5.8e10,
-        dc_gain: 10.0,
-        slew_v_per_s: 1.0,
-        rail_v: 33e3,
-        ..OpAmp::default()
-    };
-    let network = Network {
-        feedback_ohm: 2.08e6,
-        bus_f: 1.0,
-        offset_v: 4e-4,
-        ..Network::default()
-    };
+    let op_amp =
+        OpAmp { gain_bandwidth_hz: 5.8e10, dc_gain: 10.0, slew_v_per_s: 1.0, rail_v: 33e3, ..OpAmp::default() };
+    let network = Network { feedback_ohm: 2.08e6, bus_f: 1.0, offset_v: 4e-4, ..Network::default() };
     let mut transient = Transient::new(Amplifier::new(op_amp, network).unwrap());
     let before_v = transient.output_v();
     transient.advance(load(4.3e-8, -300.0), 1.0);
@@ -461,11 +420,7 @@ fn amplifier_effect(rest: &str) -> String {
 #[test]
 fn a_fast_amplifier_adds_its_noise_only() {
     let quiet = "op_amp = { noise_v_per_rthz = 0.0, noise_a_per_rthz = 0.0 }\ntemperature_k = 1.0";
-    let (ideal, silent, noisy) = (
-        record(""),
-        record(&amplifier_effect(quiet)),
-        record(&amplifier_effect("")),
-    );
+    let (ideal, silent, noisy) = (record(""), record(&amplifier_effect(quiet)), record(&amplifier_effect("")));
     // Σx = Rf·Vd·ΣG is what the profile of these tests makes of the press
     let sum_v: f64 = press_v().iter().sum();
     let volts_per_siemens = profile("").volts_per_siemens();
@@ -499,12 +454,7 @@ fn bus_capacitance_leaves_a_memory() {
         let t = 5e-6 + k / 64.3e3;
         (-damping * t).exp() * ((turning * t).cos() + damping / turning * (turning * t).sin())
     };
-    let expected = [
-        1.0 - error(0.0),
-        error(0.0) - error(1.0),
-        error(1.0) - error(2.0),
-        error(2.0) - error(3.0),
-    ];
+    let expected = [1.0 - error(0.0), error(0.0) - error(1.0), error(1.0) - error(2.0), error(2.0) - error(3.0)];
     assert!(expected[1] > 0.1, "no memory to look at: {expected:?}");
     for (found, expected) in h.iter().zip(expected) {
         // what comes before is below e^(−10); the finite gain takes 1e-5
@@ -531,10 +481,7 @@ fn as_designed_is_close_to_its_weights() {
             let expected: f64 = (0_u32..100).zip(&x).map(|(k, x)| weights.level(k, row) * x).sum();
             // half a step, and of the offset and the noise some mV; the raster converter ends at ±4.3 V
             if expected.abs() < 4.2 {
-                assert!(
-                    (y - expected).abs() <= 0.5 * lsb_v + 4e-3,
-                    "{mode:?} row {row}: {y} for {expected}"
-                );
+                assert!((y - expected).abs() <= 0.5 * lsb_v + 4e-3, "{mode:?} row {row}: {y} for {expected}");
             }
         }
     }
@@ -543,11 +490,7 @@ fn as_designed_is_close_to_its_weights() {
 fn setting() -> Setting {
     let profile = Profile::named("as_designed").unwrap();
     let adc: Adc = profile.compressive["adc"].clone().try_into().unwrap();
-    Setting {
-        skin: Skin::default(),
-        adc,
-        available_s: 5e-6,
-    }
+    Setting { skin: Skin::default(), adc, available_s: 5e-6 }
 }
 
 fn of(taxels: u32, remedy: Remedy) -> Remedied {
@@ -603,11 +546,7 @@ fn the_fewest_wires_are_found_where_more_taxels_help() {
     for taxels in [100, 2, 1] {
         assert_eq!(alone(taxels).budget.limit, Some(Limit::Settling));
     }
-    let fewest = |taxels: u32| {
-        remedied(&amplifier, taxels, 100, Remedy::Wires, &setting())
-            .unwrap()
-            .wires
-    };
+    let fewest = |taxels: u32| remedied(&amplifier, taxels, 100, Remedy::Wires, &setting()).unwrap().wires;
     assert_eq!(fewest(200), 1);
     // every number of wires, one after the other
     let works = |taxels: u32, wires: u32| {
@@ -656,10 +595,7 @@ fn nothing_cannot_be_read() {
         let error = remedied(&amplifier, taxels, sub_array, Remedy::SubArrays, &setting()).unwrap_err();
         assert!(error.to_string().contains(field), "{error}");
     }
-    let skin = Skin {
-        pressed_share: 1.5,
-        ..Skin::default()
-    };
+    let skin = Skin { pressed_share: 1.5, ..Skin::default() };
     let setting = Setting { skin, ..setting() };
     let error = remedied(&amplifier, 100, 100, Remedy::AsBuilt, &setting).unwrap_err();
     assert!(error.to_string().contains("pressed_share"), "{error}");

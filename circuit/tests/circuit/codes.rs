@@ -49,10 +49,7 @@ fn sound_cells(profile: &Profile, mode: Mode, taxels: u32) -> Box<dyn CellCodes>
     let weights = profile.weights(mode, taxels).unwrap();
     let mode = weights.mode();
     let code = move |row, taxel| sound(mode, weights.seed(taxel as usize).unwrap(), taxels, row, taxel);
-    Box::new(Cells {
-        taxels: taxels as usize,
-        code,
-    })
+    Box::new(Cells { taxels: taxels as usize, code })
 }
 
 /// Any code anywhere.
@@ -136,11 +133,7 @@ fn any_codes_give_their_sums() {
     let mut analog = profile("");
     analog.weights = CompressiveWeights::Analog;
     let noise = "\n[compressive.contact_noise]\nfraction = 0.1\n[raster.contact_noise]\nfraction = 0.1";
-    for (quiet, mode) in [
-        (profile(""), Mode::Raster),
-        (profile(""), Mode::Compressive),
-        (analog, Mode::Compressive),
-    ] {
+    for (quiet, mode) in [(profile(""), Mode::Raster), (profile(""), Mode::Compressive), (analog, Mode::Compressive)] {
         let mut noisy = profile(noise);
         noisy.weights = quiet.weights;
         let weights = quiet.weights(mode, 100).unwrap();
@@ -150,11 +143,7 @@ fn any_codes_give_their_sums() {
             let mut readout = readout.with_codes(cells).unwrap();
             readout.acquire(&mut skin(&x), 2000).unwrap().volts
         };
-        for code in [
-            any_code as fn(u64, u32) -> u8,
-            |_, _| 126,
-            |_, taxel| if taxel == 50 { 255 } else { 0 },
-        ] {
+        for code in [any_code as fn(u64, u32) -> u8, |_, _| 126, |_, taxel| if taxel == 50 { 255 } else { 0 }] {
             let (quiet_v, noisy_v) = (y(&quiet, code), y(&noisy, code));
             let mut sound = start(&noisy, mode, 3);
             let sound_v = sound.acquire(&mut skin(&x), 2000).unwrap().volts;
@@ -171,11 +160,7 @@ fn any_codes_give_their_sums() {
                 let (sound_sum, sound_norm) = dot(&|k| weights.level(k, row as u64));
                 if sound_norm > 0.0 {
                     let normal = (sound_v[row] - sound_sum) / sound_norm;
-                    assert_close(
-                        *noisy_v,
-                        sum + norm * normal,
-                        tolerance * (1.0 + 10.0 * norm / sound_norm),
-                    );
+                    assert_close(*noisy_v, sum + norm * normal, tolerance * (1.0 + 10.0 * norm / sound_norm));
                 }
             }
         }
@@ -187,11 +172,9 @@ fn any_codes_give_their_sums() {
 #[test]
 fn cells_out_of_order_are_the_faults() {
     const TOLERANCE_V: f64 = 1e-12;
-    for (name, mode) in [
-        ("as_built", Mode::Compressive),
-        ("as_designed", Mode::Compressive),
-        ("as_designed", Mode::Raster),
-    ] {
+    for (name, mode) in
+        [("as_built", Mode::Compressive), ("as_designed", Mode::Compressive), ("as_designed", Mode::Raster)]
+    {
         let mut analog = Profile::named(name).unwrap();
         for effects in [&mut analog.compressive, &mut analog.raster] {
             effects.remove("adc");
@@ -200,9 +183,7 @@ fn cells_out_of_order_are_the_faults() {
         for fault in ["dead", "stuck", "mis_seeded"] {
             let mut faulty = analog.clone();
             let list = format!("[[faults]]\nname = \"{fault}\"\ntaxel = 41");
-            faulty.faults = Profile::from_toml(&format!("{}\n{list}", PROFILES[0].1))
-                .unwrap()
-                .faults;
+            faulty.faults = Profile::from_toml(&format!("{}\n{list}", PROFILES[0].1)).unwrap().faults;
             let readout = |profile| start(profile, mode, 2);
             let weights = analog.weights(mode, 100).unwrap().mode();
             let code = move |row, taxel| match fault {
@@ -212,11 +193,7 @@ fn cells_out_of_order_are_the_faults() {
                 _ => sound(weights, taxel + 8, 100, row, taxel),
             };
             let cells = Box::new(Cells { taxels: 100, code });
-            let by_cells = readout(&analog)
-                .with_codes(cells)
-                .unwrap()
-                .acquire(&mut skin(&press_v()), 5000)
-                .unwrap();
+            let by_cells = readout(&analog).with_codes(cells).unwrap().acquire(&mut skin(&press_v()), 5000).unwrap();
             let by_fault = readout(&faulty).acquire(&mut skin(&press_v()), 5000).unwrap();
             for (a, b) in by_cells.volts.iter().zip(&by_fault.volts) {
                 assert_close(*a, *b, TOLERANCE_V);

@@ -49,10 +49,7 @@ pub(crate) fn least_squares(rows: &[Vec<f64>], y: &[f64]) -> DVector<f64> {
 
 pub(crate) fn assert_close(found: f64, expected: f64, tolerance: f64) {
     let e = (found - expected).abs();
-    assert!(
-        e <= tolerance,
-        "found {found}, expected {expected}, error {e:e} > {tolerance:e}"
-    );
+    assert!(e <= tolerance, "found {found}, expected {expected}, error {e:e} > {tolerance:e}");
 }
 
 #[test]
@@ -73,10 +70,7 @@ fn noise_levels_are_recovered() {
     let tolerance = sd_tolerance(MEASUREMENTS);
     let idle = sd(&error("[compressive.idle_noise]\nsd_v = 0.1", Mode::Compressive));
     assert_close(idle, 0.1, 0.1 * tolerance);
-    let contact = sd(&error(
-        "[compressive.contact_noise]\nfraction = 0.06",
-        Mode::Compressive,
-    ));
+    let contact = sd(&error("[compressive.contact_noise]\nfraction = 0.06", Mode::Compressive));
     let expected = 0.06 * norm(&press_v());
     assert_close(contact, expected, expected * tolerance);
     // in raster mode only the scanned taxel is driven, and only it is noisy
@@ -178,10 +172,7 @@ fn edges_that_all_cells_miss_shift_the_rows() {
         for (found, expected) in found.iter().zip(volts(&sound)).filter(|(found, _)| !found.is_nan()) {
             assert_close(*found, expected, 1e-9);
         }
-        let same = volts(&slipped)
-            .iter()
-            .zip(volts(&sound))
-            .all(|(a, b)| (a - b).abs() < 1e-9);
+        let same = volts(&slipped).iter().zip(volts(&sound)).all(|(a, b)| (a - b).abs() < 1e-9);
         assert_eq!(same, block == 0, "block {block}");
     }
 }
@@ -223,24 +214,14 @@ fn nonsense_is_refused_with_its_name() {
         sample_rate_hz: 67e3,
         ..EffectSession::of(0, Weights::new(WeightMode::Binary, Seeding::Address, 100))
     };
-    let error = |text: &str| {
-        build_chain(&toml::from_str(text).unwrap(), &session)
-            .map(|_| ())
-            .unwrap_err()
-            .to_string()
-    };
+    let error = |text: &str| build_chain(&toml::from_str(text).unwrap(), &session).map(|_| ()).unwrap_err().to_string();
     assert!(error("[hum]").contains("known: missed_clocks, late_updates, "));
     assert!(error("adc = 10").contains("expected a table"));
     assert!(error("[rails]\nlimit = 3.0").contains("limit"));
     for line in NONSENSE.trim().lines() {
-        let [effect, parameters, field] = line.split(" | ").collect::<Vec<_>>()[..] else {
-            panic!("{line}")
-        };
+        let [effect, parameters, field] = line.split(" | ").collect::<Vec<_>>()[..] else { panic!("{line}") };
         let message = error(&format!("[{effect}]\n{}", parameters.replace("; ", "\n")));
-        assert!(
-            message.contains(field) && message.contains("is outside"),
-            "{line}: {message}"
-        );
+        assert!(message.contains(field) && message.contains("is outside"), "{line}: {message}");
     }
 }
 
@@ -278,10 +259,7 @@ late_updates | rate = 0.0; period_measurements = 50.0; period_sd_measurements = 
 
 /// Parameters with which each effect of `as_built` does nothing.
 const NEUTRAL: &[(&str, &str)] = &[
-    (
-        "late_updates",
-        "rate = 0.0\nperiod_measurements = 52.44\nperiod_sd_measurements = 0.2",
-    ),
+    ("late_updates", "rate = 0.0\nperiod_measurements = 52.44\nperiod_sd_measurements = 0.2"),
     ("drive_offset", "constant_v = 0.0\nasymmetry = 0.0"),
     ("memory", "h1 = 0.0\nh2 = 0.0"),
     ("clock_pattern", "amplitude_v = 0.0"),
@@ -319,10 +297,7 @@ fn leaving_out_is_switching_off() {
             chain(&mut neutral, mode).insert(name.clone(), parameters.into());
             assert!(pressed(&without, mode) == pressed(&neutral, mode), "{mode:?}: {name}");
             if name != "rails" {
-                assert!(
-                    pressed(&without, mode) != pressed(&full, mode),
-                    "{mode:?}: {name} does nothing"
-                );
+                assert!(pressed(&without, mode) != pressed(&full, mode), "{mode:?}: {name} does nothing");
             }
         }
     }
@@ -340,11 +315,7 @@ fn converter_and_clamp_are_functions_of_the_output() {
         for (y, u) in pressed(&full, mode).iter().zip(pressed(&analog, mode)) {
             let quantised = adc.volts(adc.code(u));
             let expected = subtract_v.map_or(quantised, |v| (quantised - v).max(0.0));
-            assert_eq!(
-                y.to_bits(),
-                expected.to_bits(),
-                "{mode:?}: {y} V, expected {expected} V"
-            );
+            assert_eq!(y.to_bits(), expected.to_bits(), "{mode:?}: {y} V, expected {expected} V");
         }
     }
 }
@@ -378,11 +349,7 @@ fn offset_gain_and_floor_are_exact() {
     let binary = profile(&dac("compressive", parameters));
     let analog = analog(&dac("compressive", parameters));
     let raster = profile(&dac("raster", parameters));
-    for (profile, mode) in [
-        (binary, Mode::Compressive),
-        (analog, Mode::Compressive),
-        (raster, Mode::Raster),
-    ] {
+    for (profile, mode) in [(binary, Mode::Compressive), (analog, Mode::Compressive), (raster, Mode::Raster)] {
         let weights = profile.weights(mode, 100).unwrap();
         for (y, row) in volts(&profile, mode, &x, 1000).iter().zip(0_u64..) {
             let level = |k: u32| {
@@ -436,16 +403,9 @@ fn faulty_cells_have_converters_too() {
     let parameters = "floor_v = 0.2\noffset_v = [-0.04, 0.0]\ngain_lsb = [-10.0, 10.0]\ninl_lsb = 0.3\ndnl_lsb = 0.25";
     let mut x = vec![0.0; 100];
     x[40] = 1.0;
-    let high = |profile: &Profile| {
-        volts(profile, Mode::Compressive, &x, 300)
-            .into_iter()
-            .fold(f64::MIN, f64::max)
-    };
+    let high = |profile: &Profile| volts(profile, Mode::Compressive, &x, 300).into_iter().fold(f64::MIN, f64::max);
     let sound = profile(&dac("compressive", parameters));
-    let faulty = profile(&format!(
-        "[[faults]]\nname = \"stuck\"\ntaxel = 40\n{}",
-        dac("compressive", parameters)
-    ));
+    let faulty = profile(&format!("[[faults]]\nname = \"stuck\"\ntaxel = 40\n{}", dac("compressive", parameters)));
     let expected = high(&sound);
     for y in volts(&faulty, Mode::Compressive, &x, 300) {
         assert_close(y, expected, 8.0 * f64::EPSILON);
@@ -458,11 +418,7 @@ fn faulty_cells_have_converters_too() {
 fn sessions_and_modes_share_the_converters() {
     let parameters =
         "floor_v = 0.0\noffset_v = [-0.04, 0.0]\ngain_lsb = [-10.0, 10.0]\ninl_lsb = [-0.3, 0.3]\ndnl_lsb = 0.25";
-    let profile = analog(&format!(
-        "{}\n{}",
-        dac("compressive", parameters),
-        dac("raster", parameters)
-    ));
+    let profile = analog(&format!("{}\n{}", dac("compressive", parameters), dac("raster", parameters)));
     let weights = profile.weights(Mode::Compressive, 100).unwrap();
     let mut x = vec![0.0; 100];
     x[23] = 1.0;

@@ -46,11 +46,7 @@ fn a_cell_that_never_leaves_a_level_drives_it() {
 #[test]
 fn a_mis_seeded_cell_runs_on_its_own_sequence() {
     assert_forward("name = \"mis_seeded\"\ntaxel = 56", |w, k, row| {
-        if k == 56 && w.mode() != WeightMode::Raster {
-            w.mode().level_from_seed(2, row)
-        } else {
-            w.level(k, row)
-        }
+        if k == 56 && w.mode() != WeightMode::Raster { w.mode().level_from_seed(2, row) } else { w.level(k, row) }
     });
 }
 
@@ -60,9 +56,7 @@ fn a_skipping_cell_answers_late_in_the_raster() {
     let faulty = profile("[[faults]]\nname = \"skipping_clocks\"\ntaxel = 50\nprobability = 0.001");
     let y = volts(&faulty, Mode::Raster, 1000);
     let (x, sound) = (press_v(), volts(&profile(""), Mode::Raster, 1000));
-    let late: Vec<usize> = (0..ROWS)
-        .filter(|n| (y[*n] - sound[*n] - x[50]).abs() < 1e-12)
-        .collect();
+    let late: Vec<usize> = (0..ROWS).filter(|n| (y[*n] - sound[*n] - x[50]).abs() < 1e-12).collect();
     // about 100 misses after 100 000 edges: modulo 100 any place, but one answer a frame
     assert!((18..=21).contains(&late.len()), "{} answers in 20 frames", late.len());
 }

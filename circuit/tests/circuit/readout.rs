@@ -12,15 +12,7 @@ use spts_models::{ConductanceMap, SkinLayout, Streams};
 /// A press on taxels 33…66, in volts at 4300 V/S.
 pub(crate) fn press_v() -> Vec<f64> {
     let pressed = |k| (33..67).contains(&k);
-    (0..100)
-        .map(|k| {
-            if pressed(k) {
-                0.1 + 0.01 * f64::from(k - 33)
-            } else {
-                0.0
-            }
-        })
-        .collect()
+    (0..100).map(|k| if pressed(k) { 0.1 + 0.01 * f64::from(k - 33) } else { 0.0 }).collect()
 }
 
 pub(crate) fn skin(x_v: &[f64]) -> Constant {
@@ -45,10 +37,7 @@ pub(crate) fn start(profile: &Profile, mode: Mode, seed: u64) -> Readout {
 
 /// Samples of a skin with these volts.
 pub(crate) fn samples(profile: &Profile, mode: Mode, seed: u64, x_v: &[f64], measurements: usize) -> Vec<f64> {
-    start(profile, mode, seed)
-        .acquire(&mut skin(x_v), measurements)
-        .unwrap()
-        .volts
+    start(profile, mode, seed).acquire(&mut skin(x_v), measurements).unwrap().volts
 }
 
 fn readout(name: &str, mode: Mode) -> Readout {
@@ -82,10 +71,7 @@ fn a_noiseless_recording_is_inverted() {
     let x = press_v();
     let mut readout = readout("ideal", Mode::Compressive);
     let block = readout.acquire(&mut skin(&x), 200).unwrap();
-    let weights = Profile::named("ideal")
-        .unwrap()
-        .weights(Mode::Compressive, 100)
-        .unwrap();
+    let weights = Profile::named("ideal").unwrap().weights(Mode::Compressive, 100).unwrap();
     let mut values = vec![0.0; 150 * 100];
     weights.fill_rows(0, &mut values);
     let rows: Vec<Vec<f64>> = values.chunks(100).map(<[f64]>::to_vec).collect();
@@ -108,10 +94,7 @@ fn blocks(readout: &mut Readout, n: usize) -> Vec<Block> {
 fn blocks_depend_on_seed_and_number_alone() {
     for mode in [Mode::Raster, Mode::Compressive] {
         let in_order = blocks(&mut readout("as_built", mode), 3);
-        assert_eq!(
-            in_order.iter().map(|b| b.frame_position).collect::<Vec<_>>(),
-            [50, 157, 264]
-        );
+        assert_eq!(in_order.iter().map(|b| b.frame_position).collect::<Vec<_>>(), [50, 157, 264]);
         // each block on a thread of its own, from a readout of its own
         let on_threads: Vec<Block> = std::thread::scope(|scope| {
             let handles: Vec<_> = (0..3)
@@ -128,10 +111,7 @@ fn blocks_depend_on_seed_and_number_alone() {
         assert!(in_order == on_threads, "{mode:?}");
         let profile = Profile::named("as_built").unwrap();
         let mut other = start(&profile, mode, 6);
-        assert!(
-            in_order != blocks(&mut other, 3),
-            "{mode:?}: another seed gives the same noise"
-        );
+        assert!(in_order != blocks(&mut other, 3), "{mode:?}: another seed gives the same noise");
     }
 }
 
@@ -156,10 +136,7 @@ fn wrong_shapes_are_refused() {
     let said = readout.acquire(&mut small, 100).unwrap_err().to_string();
     assert_eq!(said, "the source has 9 taxels; the readout 100");
     for measurements in [0, 150] {
-        let said = readout
-            .acquire(&mut skin(&press_v()), measurements)
-            .unwrap_err()
-            .to_string();
+        let said = readout.acquire(&mut skin(&press_v()), measurements).unwrap_err().to_string();
         assert!(said.contains("not a positive whole number of frames of 100"), "{said}");
     }
 }
@@ -199,14 +176,8 @@ fn a_short_skin_saturates() {
         for (mode, low, high) in [(Mode::Raster, 0.0, 4.4), (Mode::Compressive, -32.5, 32.0)] {
             let built = Profile::named("as_built").unwrap();
             let y = volts(&built, mode, 100, conductance_s);
-            assert!(
-                y.iter().all(|y| (low..=high).contains(y)),
-                "{mode:?}: {conductance_s} S"
-            );
-            assert!(
-                y.iter().any(|y| *y > high - 1e-9),
-                "{mode:?}: no sample at the end of the range"
-            );
+            assert!(y.iter().all(|y| (low..=high).contains(y)), "{mode:?}: {conductance_s} S");
+            assert!(y.iter().any(|y| *y > high - 1e-9), "{mode:?}: no sample at the end of the range");
             let ideal = volts(&profile(""), mode, 100, conductance_s);
             assert!(ideal.iter().all(|y| y.is_finite()), "{mode:?}: {conductance_s} S");
         }
@@ -226,10 +197,7 @@ fn a_skin_of_a_million_taxels() {
     let mut sums = [0.0; 300];
     weights.weighted_sums(1 << 33, &values, &mut sums);
     for (sum, row) in sums.iter().zip((1 << 33)..) {
-        let expected: f64 = pressed
-            .iter()
-            .map(|k| weights.level(*k, row) * values[*k as usize])
-            .sum();
+        let expected: f64 = pressed.iter().map(|k| weights.level(*k, row) * values[*k as usize]).sum();
         // fifty roundings of values up to 1e-3
         assert_close(*sum, expected, 50.0 * f64::EPSILON * 1e-3);
     }
@@ -287,22 +255,14 @@ impl ConductanceSource for Broken {
     }
 
     fn segment(&mut self, _time_s: f64) -> Segment<'_> {
-        Segment {
-            start_s: 0.0,
-            end_s: self.end_s,
-            conductance_s: &self.values,
-            end_conductance_s: None,
-        }
+        Segment { start_s: 0.0, end_s: self.end_s, conductance_s: &self.values, end_conductance_s: None }
     }
 }
 
 #[test]
 fn broken_sources_are_refused() {
     for (end_s, taxels) in [(1e-3, 100), (f64::NAN, 100), (f64::INFINITY, 99)] {
-        let mut source = Broken {
-            end_s,
-            values: vec![0.0; taxels],
-        };
+        let mut source = Broken { end_s, values: vec![0.0; taxels] };
         let mut readout = start(&profile(""), Mode::Compressive, 0);
         let error = readout.acquire(&mut source, 1000).unwrap_err();
         assert!(error.to_string().starts_with("at 0"), "{error}");

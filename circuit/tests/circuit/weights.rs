@@ -13,10 +13,7 @@ fn matrix(seeding: Seeding, rows: usize) -> Vec<Vec<f64>> {
     let mut values = vec![0.0; rows * 100];
     Weights::new(WeightMode::Binary, seeding, 100).fill_rows(0, &mut values);
     // {0, 1} as the published scripts decode
-    values
-        .chunks(100)
-        .map(|row| row.iter().map(|w| 0.5 * (w + 1.0)).collect())
-        .collect()
+    values.chunks(100).map(|row| row.iter().map(|w| 0.5 * (w + 1.0)).collect()).collect()
 }
 
 /// Singular values of matrices with entries 0 and 1 and a norm below 150 that are zero come out below 150·100·ε =
@@ -93,9 +90,7 @@ fn press(taxels: u32) -> Interpolated {
 
 fn record(profile: &Profile, taxels: u32, frames: usize) -> Recording {
     let mut readout = Readout::new(profile, Mode::Compressive, &strip(taxels), Streams::new(3), 0).unwrap();
-    readout
-        .record(&mut [press(taxels), press(taxels)], frames * taxels as usize, 5)
-        .unwrap()
+    readout.record(&mut [press(taxels), press(taxels)], frames * taxels as usize, 5).unwrap()
 }
 
 fn bits(recording: &Recording) -> Vec<u64> {
@@ -178,10 +173,7 @@ fn listed_seeds_and_patterns_record_as_the_rule() {
                     readout.record(&mut [press(taxels)], 4 * n, 0).unwrap()
                 };
                 let rule = bits(&readout(&generated));
-                assert!(
-                    rule == bits(&readout(&repeated)),
-                    "{name}, {taxels} taxels, {weights:?}"
-                );
+                assert!(rule == bits(&readout(&repeated)), "{name}, {taxels} taxels, {weights:?}");
                 let mut listed = generated.clone();
                 listed.seeds = Some(seeds(generated.seeding, taxels));
                 listed.seeding = Seeding::Address;
@@ -241,10 +233,10 @@ fn every_sample_has_a_code() {
             let converter = recording.converter().unwrap();
             assert!(converter.made(&recording.blocks()[0].volts), "{name}, {mode:?}");
             // samples that no converter made
-            let halved = recording.blocks().iter().map(|block| Block {
-                volts: block.volts.iter().map(|v| v * 0.37).collect(),
-                ..block.clone()
-            });
+            let halved = recording
+                .blocks()
+                .iter()
+                .map(|block| Block { volts: block.volts.iter().map(|v| v * 0.37).collect(), ..block.clone() });
             assert!(recording.with_blocks(halved.collect()).unwrap().converter().is_none());
             let again = recording.with_blocks(recording.blocks().to_vec()).unwrap();
             assert_eq!(again, recording);

@@ -87,10 +87,7 @@ impl Potential {
                 self.gradient = Vector3::new(self.gradient[0], 0.0, 0.0);
                 self.hessian = Matrix3::from_diagonal(&Vector3::new(self.hessian[(0, 0)], 1.0, 1.0));
             }
-            Holder::Elastic {
-                stiffness_nm_per_rad: k,
-                rest_rad,
-            } => {
+            Holder::Elastic { stiffness_nm_per_rad: k, rest_rad } => {
                 let off = [state[1] - rest_rad[0], state[2] - rest_rad[1]];
                 for (i, k) in (1..).zip(k) {
                     self.gradient[i] += k[0] * off[0] + k[1] * off[1];
@@ -142,16 +139,8 @@ impl Footprint {
     pub(crate) fn new(config: Foam, skin: &SkinLayout) -> Result<Self, Refusal> {
         // checked as they are, used without rates
         config.check_on(skin, MAX_CELLS)?;
-        let elastic = Foam {
-            damping_s: 0.0,
-            friction: 0.0,
-            ..config
-        };
-        Ok(Self {
-            config,
-            layer: WinklerLayer::new(elastic, skin)?,
-            row: Row::default(),
-        })
+        let elastic = Foam { damping_s: 0.0, friction: 0.0, ..config };
+        Ok(Self { config, layer: WinklerLayer::new(elastic, skin)?, row: Row::default() })
     }
 
     /// Potential at `state` = (z, θx, θy); also leaves the pressure in the layer when `keep`.
@@ -163,8 +152,7 @@ impl Footprint {
         let row = &mut self.row;
         row.resize(patch.width());
         row.arm_m.clear();
-        row.arm_m
-            .extend(self.layer.x_m[patch.cols[0]..patch.cols[1]].iter().map(|x| x - px));
+        row.arm_m.extend(self.layer.x_m[patch.cols[0]..patch.cols[1]].iter().map(|x| x - px));
         let (mut g, mut h) = ([0.0; 3], [0.0; 6]);
         for (i, drops) in (patch.rows[0]..).zip(map.drop_m().chunks_exact(patch.width().max(1))) {
             let ry = self.layer.envelope.centre_m(i, 0)[1] - py;
@@ -172,9 +160,7 @@ impl Footprint {
             let start = i * width + patch.cols[0];
             let seat = [height_m, state[2]];
             match &self.layer.preload {
-                None => row.press(task.base_m, seat, drops, |_, depth_m| {
-                    task.law.pressure_and_slope(depth_m)
-                }),
+                None => row.press(task.base_m, seat, drops, |_, depth_m| task.law.pressure_and_slope(depth_m)),
                 Some(preload) => {
                     let preload = preload.row(start..start + drops.len(), task.body_pa_per_m);
                     let law = |k, depth_m| preload.pressure_and_slope(k, &task.law, depth_m);
@@ -247,11 +233,7 @@ impl Footprint {
                 break;
             }
             let step = z - here.gradient[0] / here.hessian[(0, 0)];
-            z = if step > low_m && step < high_m {
-                step
-            } else {
-                0.5 * (low_m + high_m)
-            };
+            z = if step > low_m && step < high_m { step } else { 0.5 * (low_m + high_m) };
             here = self.potential(task, state(z), false);
             if here.gradient[0] > 0.0 {
                 high_m = z;
@@ -310,22 +292,13 @@ impl Footprint {
         }
         let deepest = Vector3::new(touch_m - limit_m, state[1], state[2]);
         let reached_n = force_n - self.potential(task, deepest, false).gradient[0];
-        Err(EquilibriumError::Force {
-            reached_n,
-            wanted_n: force_n,
-            depth_m: limit_m,
-        })
+        Err(EquilibriumError::Force { reached_n, wanted_n: force_n, depth_m: limit_m })
     }
 
     /// Farthest cell of the map from the load's axis, m: the lever that makes moments forces.
     fn reach_m(&self, load: &Load) -> f64 {
         let Patch { rows, cols } = self.layer.envelope.map().patch();
-        let corners = [
-            (rows[0], cols[0]),
-            (rows[1], cols[1]),
-            (rows[0], cols[1]),
-            (rows[1], cols[0]),
-        ];
+        let corners = [(rows[0], cols[0]), (rows[1], cols[1]), (rows[0], cols[1]), (rows[1], cols[0])];
         let far = corners.map(|(row, col)| {
             let [x, y] = self.layer.envelope.centre_m(row, col);
             (x - load.axis_m[0]).hypot(y - load.axis_m[1])
@@ -354,12 +327,7 @@ impl QuasiStatic for Footprint {
         if !base_m.is_finite() {
             return Err(EquilibriumError::beside(limit_m));
         }
-        let task = Task {
-            law,
-            load,
-            base_m,
-            body_pa_per_m: body.stiffness_pa_per_m,
-        };
+        let task = Task { law, load, base_m, body_pa_per_m: body.stiffness_pa_per_m };
         let started = load.from.map(|seat| {
             let tilt_rad = match load.holder {
                 Holder::Rigid => rest_rad,
@@ -375,17 +343,8 @@ impl QuasiStatic for Footprint {
             self.settle(&task, Vector3::new(z, rest_rad[0], rest_rad[1]))?
         };
         self.admit(&task, state, limit_m)?;
-        let seat = Seat {
-            height_m: base_m + state[0],
-            tilt_rad: [state[1], state[2]],
-        };
-        let free = Load {
-            holder: Holder::Elastic {
-                stiffness_nm_per_rad: [[0.0; 2]; 2],
-                rest_rad,
-            },
-            ..*load
-        };
+        let seat = Seat { height_m: base_m + state[0], tilt_rad: [state[1], state[2]] };
+        let free = Load { holder: Holder::Elastic { stiffness_nm_per_rad: [[0.0; 2]; 2], rest_rad }, ..*load };
         let rest = self.potential(&Task { load: &free, ..task }, state, true);
         self.layer.patch = self.layer.envelope.map().patch();
         let (rotation, position_m, centre_m) = seated(body, load, &seat);
@@ -397,10 +356,7 @@ impl QuasiStatic for Footprint {
             rotation,
             position_m,
             response: Response {
-                wrench: Wrench {
-                    force_n: [0.0, 0.0, up_n],
-                    torque_nm: [mx + arm[1] * up_n, my - arm[0] * up_n, 0.0],
-                },
+                wrench: Wrench { force_n: [0.0, 0.0, up_n], torque_nm: [mx + arm[1] * up_n, my - arm[0] * up_n, 0.0] },
                 pressure_pa: &self.layer.pressure_pa,
                 patch: Some(self.layer.patch),
             },

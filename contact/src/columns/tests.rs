@@ -16,11 +16,7 @@ const K: f64 = 1e7;
 
 /// So thick that densification vanishes (δ/δ_m < 1e-3).
 fn thick() -> Foam {
-    Foam {
-        stiffness_pa_per_m: K,
-        thickness_m: 10.0,
-        ..Foam::default()
-    }
+    Foam { stiffness_pa_per_m: K, thickness_m: 10.0, ..Foam::default() }
 }
 
 fn winkler(config: Foam) -> WinklerLayer {
@@ -29,10 +25,7 @@ fn winkler(config: Foam) -> WinklerLayer {
 
 /// A thick layer with `cells` fine cells a taxel side.
 fn layer(cells: usize) -> WinklerLayer {
-    winkler(Foam {
-        cells_per_taxel: cells,
-        ..thick()
-    })
+    winkler(Foam { cells_per_taxel: cells, ..thick() })
 }
 
 /// Block over [x0, x1] × [y0, y1] that stands on z = 0.
@@ -113,10 +106,7 @@ fn concave_and_stacked() {
 fn damping_and_depth_beyond_the_foam() {
     let mesh = plate([-0.015, 0.015], [-0.015, 0.015]);
     let mut skin = layer(6);
-    let body = PosedMesh {
-        velocity_m_per_s: [0.0, 0.0, -1.0],
-        ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3])
-    };
+    let body = PosedMesh { velocity_m_per_s: [0.0, 0.0, -1.0], ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3]) };
     let force_n = skin.respond(&body).wrench.force_n[2];
     let tau_s = Foam::default().damping_s;
     assert_relative_eq!(force_n, K * 9e-4 * (1e-3 + tau_s), max_relative = 1e-3);
@@ -237,9 +227,7 @@ fn round_bodies_converge_with_order_two() {
     assert_relative_eq!(moments(&lying, depth_m)[0] * share, expected, max_relative = 1.5e-2);
     // the errors of its two straight rims add or cancel with the width in cells, so the depth varies too, by ± a
     // quarter: the width by ± a cell of the coarsest grid
-    let spread = places(1.0)
-        .into_iter()
-        .map(|[x, y, _]| [y, 0.0, depth_m * (1.0 + 0.5 * x / 0.015)]);
+    let spread = places(1.0).into_iter().map(|[x, y, _]| [y, 0.0, depth_m * (1.0 + 0.5 * x / 0.015)]);
     let across: Vec<Case> = spread.collect();
     let slope = |r: f64| 0.2 * r;
     type Drop<'a> = &'a dyn Fn(f64) -> f64;
@@ -250,10 +238,7 @@ fn round_bodies_converge_with_order_two() {
     ];
     for (name, mesh, share, cases, drop_m) in all {
         let (order, finest) = order(mesh, share, cases, drop_m);
-        assert!(
-            order >= 2.0 - SCATTER && finest < 1e-3,
-            "{name}: order {order}, {finest:e}"
-        );
+        assert!(order >= 2.0 - SCATTER && finest < 1e-3, "{name}: order {order}, {finest:e}");
     }
 }
 
@@ -274,20 +259,13 @@ fn punch_converges_with_order_one() {
 fn compliant_punch_is_two_springs_in_series() {
     let block = cuboid([0.06, 0.03, 0.02]);
     for body_pa_per_m in [1e6, 1e7, 2e8] {
-        let body = PosedMesh {
-            stiffness_pa_per_m: body_pa_per_m,
-            ..PosedMesh::at_rest(&block, [0.0, 0.0, -1e-3])
-        };
+        let body = PosedMesh { stiffness_pa_per_m: body_pa_per_m, ..PosedMesh::at_rest(&block, [0.0, 0.0, -1e-3]) };
         let mut field = layer(4);
         let response = field.respond(&body);
         let expected_pa = 1e-3 / (1.0 / K + 1.0 / body_pa_per_m);
         let peak_pa = response.pressure_pa.iter().copied().fold(0.0, f64::max);
         assert_relative_eq!(peak_pa, expected_pa, max_relative = 2.4e-4);
-        assert_relative_eq!(
-            response.wrench.force_n[2],
-            expected_pa * 0.06 * 0.03,
-            max_relative = 2.4e-4
-        );
+        assert_relative_eq!(response.wrench.force_n[2], expected_pa * 0.06 * 0.03, max_relative = 2.4e-4);
     }
 }
 
@@ -353,10 +331,8 @@ fn a_soft_body_gives_way_to_what_is_added() {
     let (strain, depth_m, body_pa_per_m) = (0.1, 1e-3, 2e7);
     let mut layer = winkler(config);
     let rest_pa = layer.preload(&strains(|_| strain)).unwrap()[0];
-    let body = PosedMesh {
-        stiffness_pa_per_m: body_pa_per_m,
-        ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -low_m - depth_m])
-    };
+    let body =
+        PosedMesh { stiffness_pa_per_m: body_pa_per_m, ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -low_m - depth_m]) };
     let answer = layer.respond(&body);
     let added_pa = answer.pressure_pa.iter().copied().fold(0.0, f64::max);
     let foam_m = depth_m - added_pa / body_pa_per_m;
@@ -391,9 +367,7 @@ fn a_balance_on_uneven_preload_carries_the_force() {
     let skin = SkinLayout::default();
     let mesh = cuboid([FLAT_M, FLAT_M, 5e-3]);
     let mut field = footprint(Foam::default());
-    field
-        .preload(&strains(|k| if k % 3 == 0 { 0.08 } else { 0.0 }))
-        .unwrap();
+    field.preload(&strains(|k| if k % 3 == 0 { 0.08 } else { 0.0 })).unwrap();
     let load = load(12.0, [0.0, 0.0], Holder::Rigid);
     let body = PosedMesh::at_rest(&mesh, [0.0; 3]);
     let cell_m = skin.pitch_m() / field.cells_per_taxel() as f64;
@@ -410,19 +384,11 @@ fn footprint(config: Foam) -> Footprint {
 }
 
 fn load(force_n: f64, axis_m: [f64; 2], holder: Holder) -> Load {
-    Load {
-        force_n,
-        axis_m,
-        holder,
-        from: None,
-    }
+    Load { force_n, axis_m, holder, from: None }
 }
 
 fn elastic(k: f64) -> Holder {
-    Holder::Elastic {
-        stiffness_nm_per_rad: [[k, 0.0], [0.0, k]],
-        rest_rad: [0.0; 2],
-    }
+    Holder::Elastic { stiffness_nm_per_rad: [[k, 0.0], [0.0, k]], rest_rad: [0.0; 2] }
 }
 
 /// 60 × 30 mm block on whole cells (24 × 12), axis e beside its middle, wholly in contact: δ = F/(K A) and, the
@@ -456,22 +422,13 @@ fn tilted_block_in_closed_form() {
 #[test]
 fn same_pressure_as_winkler() {
     let mesh = sphere(0.0334, 24, 48);
-    let body = PosedMesh {
-        stiffness_pa_per_m: 2e7,
-        ..PosedMesh::at_rest(&mesh, [0.0031, -0.0017, 0.0])
-    };
+    let body = PosedMesh { stiffness_pa_per_m: 2e7, ..PosedMesh::at_rest(&mesh, [0.0031, -0.0017, 0.0]) };
     let config = Foam::default();
     let mut field = footprint(config);
-    let balance = field
-        .carry(&body, &load(20.0, [0.0031, -0.0017], Holder::Rigid))
-        .unwrap();
+    let balance = field.carry(&body, &load(20.0, [0.0031, -0.0017], Holder::Rigid)).unwrap();
     let mut layer = winkler(config);
     let com_m = balance.position_m;
-    let there = PosedMesh {
-        position_m: balance.position_m,
-        centre_of_mass_m: com_m,
-        ..body
-    };
+    let there = PosedMesh { position_m: balance.position_m, centre_of_mass_m: com_m, ..body };
     let expected = layer.respond(&there);
     for (a, b) in balance.response.pressure_pa.iter().zip(expected.pressure_pa) {
         assert_relative_eq!(*a, *b, max_relative = 1e-12);
@@ -505,16 +462,10 @@ fn start_does_not_matter() {
 fn origin_far_from_the_face() {
     let near = cuboid([0.085, 0.07, 0.01]);
     for k in [1e4, 1.5e7, 1e9] {
-        let config = Foam {
-            stiffness_pa_per_m: k,
-            ..Foam::default()
-        };
-        for (force_n, holder) in [
-            (0.2, Holder::Rigid),
-            (0.2, elastic(300.0)),
-            (2e-3, elastic(300.0)),
-            (50.0, elastic(1e3)),
-        ] {
+        let config = Foam { stiffness_pa_per_m: k, ..Foam::default() };
+        for (force_n, holder) in
+            [(0.2, Holder::Rigid), (0.2, elastic(300.0)), (2e-3, elastic(300.0)), (50.0, elastic(1e3))]
+        {
             let mut pressures = Vec::new();
             for lift_m in [0.0, 0.1, -0.1] {
                 let mesh = near.clone().translated([0.0, 0.0, lift_m]);
@@ -548,9 +499,7 @@ fn depth_limit_holds_for_any_start() {
         let near = field.carry(&body, &Load { force_n: 600.0, ..cold }).unwrap().seat;
         for from in [None, Some(near)] {
             let error = field.carry(&body, &Load { from, ..cold }).unwrap_err();
-            let EquilibriumError::Force { reached_n, depth_m, .. } = error else {
-                panic!("{error}")
-            };
+            let EquilibriumError::Force { reached_n, depth_m, .. } = error else { panic!("{error}") };
             assert_relative_eq!(depth_m, 0.07, max_relative = 1e-12);
             assert_relative_eq!(reached_n, 635.0, max_relative = 1e-3);
         }
@@ -562,24 +511,16 @@ fn what_cannot_be_carried() {
     let mesh = cuboid([0.03, 0.03, 0.02]);
     let mut field = footprint(thick());
     let body = |x| PosedMesh::at_rest(&mesh, [x, 0.0, 0.0]);
-    let error = field
-        .carry(&body(0.3), &load(5.0, [0.3, 0.0], Holder::Rigid))
-        .unwrap_err();
+    let error = field.carry(&body(0.3), &load(5.0, [0.3, 0.0], Holder::Rigid)).unwrap_err();
     assert!(error.to_string().contains("lies beside the skin"), "{error}");
     // 9e-4 m² at 7 cm: less than 640 N
-    let error = field
-        .carry(&body(0.0), &load(1e3, [0.0; 2], Holder::Rigid))
-        .unwrap_err();
+    let error = field.carry(&body(0.0), &load(1e3, [0.0; 2], Holder::Rigid)).unwrap_err();
     assert!(matches!(error, EquilibriumError::Force { .. }), "{error}");
     // 30 mm beside the middle of a block that ends at 15 mm, hardly held
-    let error = field
-        .carry(&body(0.0), &load(20.0, [0.03, 0.0], elastic(1e-3)))
-        .unwrap_err();
+    let error = field.carry(&body(0.0), &load(20.0, [0.03, 0.0], elastic(1e-3))).unwrap_err();
     assert!(error.to_string().contains("it tips over"), "{error}");
     for force_n in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-        let error = field
-            .carry(&body(0.0), &load(force_n, [0.0; 2], Holder::Rigid))
-            .unwrap_err();
+        let error = field.carry(&body(0.0), &load(force_n, [0.0; 2], Holder::Rigid)).unwrap_err();
         assert!(error.to_string().contains("is outside (0, ∞) N"), "{error}");
     }
 }

@@ -124,11 +124,7 @@ fn press(
     pressure_of: impl Fn(usize, f64) -> f64,
     pressure_pa: &mut [f64],
 ) {
-    let (v, w, c) = (
-        body.velocity_m_per_s,
-        body.angular_velocity_rad_per_s,
-        body.centre_of_mass_m,
-    );
+    let (v, w, c) = (body.velocity_m_per_s, body.angular_velocity_rad_per_s, body.centre_of_mass_m);
     let sink_m = -damping_s * (v[2] + w[0] * (y_m - c[1]) + w[1] * c[0]);
     let slope = damping_s * w[1];
     for (k, ((p, &depth), &x)) in pressure_pa.iter_mut().zip(depth_m).zip(x_m).enumerate() {
@@ -144,16 +140,8 @@ impl ContactField for WinklerLayer {
 
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
         self.clear();
-        let wrench = if body.is_finite() {
-            self.press(body)
-        } else {
-            Wrench::UNKNOWN
-        };
-        Response {
-            wrench,
-            pressure_pa: &self.pressure_pa,
-            patch: Some(self.patch),
-        }
+        let wrench = if body.is_finite() { self.press(body) } else { Wrench::UNKNOWN };
+        Response { wrench, pressure_pa: &self.pressure_pa, patch: Some(self.patch) }
     }
 
     fn preload(&mut self, strain: &[f64]) -> Option<Vec<f64>> {
@@ -221,10 +209,7 @@ impl Preload {
             let cell = |k: usize| values[k / cols / cells_per_taxel * taxel_cols + k % cols / cells_per_taxel];
             (0..rows * cols).map(cell).collect()
         };
-        let preload = Self {
-            depth_m: fine(taxel_depth_m),
-            rest_pa: fine(&rest_pa),
-        };
+        let preload = Self { depth_m: fine(taxel_depth_m), rest_pa: fine(&rest_pa) };
         (preload, rest_pa)
     }
 

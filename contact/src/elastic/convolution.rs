@@ -15,10 +15,7 @@ pub(crate) struct Planner<T: FftNum> {
 
 impl<T: FftNum> Planner<T> {
     pub(crate) fn new() -> Self {
-        Self {
-            rows: RealFftPlanner::new(),
-            cols: FftPlanner::new(),
-        }
+        Self { rows: RealFftPlanner::new(), cols: FftPlanner::new() }
     }
 }
 
@@ -107,8 +104,7 @@ where
             for i in 0..tall {
                 self.columns[i] = self.half[i.min(tall - i) * width + j];
             }
-            self.col_forward
-                .process_with_scratch(&mut self.columns[..tall], &mut self.scratch);
+            self.col_forward.process_with_scratch(&mut self.columns[..tall], &mut self.scratch);
             for i in 0..tall {
                 self.spectrum[j * tall + i] = (transfer(self.columns[i].re.as_()) * scale).as_();
             }
@@ -212,10 +208,7 @@ pub(crate) struct Planners {
 
 impl Planners {
     pub(crate) fn new() -> Self {
-        Self {
-            double: Planner::new(),
-            single: Planner::new(),
-        }
+        Self { double: Planner::new(), single: Planner::new() }
     }
 }
 

@@ -194,11 +194,7 @@ impl ElasticField {
         let (poisson, thickness_m) = (config.poisson, config.thickness_m);
         let modulus_pa = modulus_of_confined_pa(config.stiffness_pa_per_m, poisson, thickness_m);
         let kernel = if bonded {
-            ElasticKernel::Layer {
-                modulus_pa,
-                poisson,
-                thickness_m,
-            }
+            ElasticKernel::Layer { modulus_pa, poisson, thickness_m }
         } else {
             ElasticKernel::HalfSpace { modulus_pa, poisson }
         };
@@ -273,10 +269,7 @@ impl ElasticField {
         let c = self.config;
         let margin_m = self.margin_m(body, shift_m);
         let [x, y, z] = body.position_m;
-        let lowered = PosedMesh {
-            position_m: [x, y, z - shift_m - margin_m],
-            ..*body
-        };
+        let lowered = PosedMesh { position_m: [x, y, z - shift_m - margin_m], ..*body };
         self.clear();
         let seen = self.envelope.rasterise(&lowered);
         self.patch = self.contact_patch(seen);
@@ -290,9 +283,8 @@ impl ElasticField {
         self.solver.set_series(body_m_per_pa);
         if !self.solver.sink(self.patch, &self.target_m, c.tolerance).converged {
             let bound = c.tolerance;
-            return self.fail(format!(
-                "the elastic contact problem does not converge to `contact.tolerance` = {bound:e}"
-            ));
+            return self
+                .fail(format!("the elastic contact problem does not converge to `contact.tolerance` = {bound:e}"));
         }
         self.patch_pa.clear();
         self.patch_pa.extend_from_slice(self.solver.pressure_pa());
@@ -321,16 +313,8 @@ impl ElasticField {
         let (last, depth_m) = (self.patch, self.envelope.depth_m());
         let found = seen.shrunk(self.envelope.shape()[1], |cell| depth_m[cell] > 0.0);
         let area = |p: Patch| p.height() * p.width();
-        let patch = if found.is_empty() {
-            found
-        } else {
-            found.rounded(self.envelope.shape())
-        };
-        if last.holds(found) && 4 * area(last) <= 5 * area(patch) {
-            last
-        } else {
-            patch
-        }
+        let patch = if found.is_empty() { found } else { found.rounded(self.envelope.shape()) };
+        if last.holds(found) && 4 * area(last) <= 5 * area(patch) { last } else { patch }
     }
 
     /// Displacement wanted at each cell of the patch.
@@ -373,14 +357,9 @@ impl ElasticField {
     fn wrench(&self, body: &PosedMesh<'_>) -> Wrench {
         let width = self.envelope.shape()[1];
         let margin_m = self.margin_m(body, 0.0);
-        wrench(
-            &self.envelope,
-            self.patch,
-            &self.patch_pa,
-            body,
-            &self.config.foam(),
-            |row, col| self.envelope.depth_m()[row * width + col] - margin_m,
-        )
+        wrench(&self.envelope, self.patch, &self.patch_pa, body, &self.config.foam(), |row, col| {
+            self.envelope.depth_m()[row * width + col] - margin_m
+        })
     }
 
     /// Force carried, N, after moving the body along the normal until it is `force_n`: secant steps from the last
@@ -424,11 +403,7 @@ impl ElasticField {
                 break;
             }
             // the side that stays put twice in a row counts half
-            let (moved, other) = if over_n > 0.0 {
-                (&mut high, &mut low)
-            } else {
-                (&mut low, &mut high)
-            };
+            let (moved, other) = if over_n > 0.0 { (&mut high, &mut low) } else { (&mut low, &mut high) };
             *moved = Some((shift_m, over_n));
             if rose == Some(over_n > 0.0)
                 && let Some((_, value)) = other
@@ -467,11 +442,7 @@ impl ContactField for ElasticField {
             None => (self.elastic(body), Some(self.patch)),
         };
         let winkler_pa = self.winkler.as_ref().map(|winkler| &winkler.pressure_pa);
-        Response {
-            wrench,
-            pressure_pa: winkler_pa.unwrap_or(&self.pressure_pa),
-            patch,
-        }
+        Response { wrench, pressure_pa: winkler_pa.unwrap_or(&self.pressure_pa), patch }
     }
 
     fn failure(&self) -> Option<String> {
@@ -484,11 +455,7 @@ impl ContactField for ElasticField {
     }
 
     fn tolerance(&self) -> f64 {
-        if self.config.coupled {
-            ERROR_PER_TOLERANCE * self.config.tolerance
-        } else {
-            0.0
-        }
+        if self.config.coupled { ERROR_PER_TOLERANCE * self.config.tolerance } else { 0.0 }
     }
 
     fn cells_per_taxel(&self) -> usize {

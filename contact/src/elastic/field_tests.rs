@@ -22,10 +22,7 @@ fn plate(x: [f64; 2], y: [f64; 2]) -> TriMesh {
 /// damped and in series with the body: exp(−15) = 3e-7 of the rim's effect is left, and the iteration's 1e-6 × 10.
 #[test]
 fn middle_of_a_wide_plate_is_winkler() {
-    let config = ElasticConfig {
-        thickness_m: 2e-3,
-        ..ElasticConfig::default()
-    };
+    let config = ElasticConfig { thickness_m: 2e-3, ..ElasticConfig::default() };
     let mesh = plate([-0.045, 0.045], [-0.045, 0.045]);
     for (depth_m, speed, body) in [(2e-4, 0.0, f64::INFINITY), (1.5e-3, 0.0, 2e7), (1e-3, -0.4, 5e7)] {
         let posed = PosedMesh {
@@ -47,10 +44,7 @@ fn half_space_is_linear() {
     let mesh = plate([-0.03, 0.03], [-0.015, 0.015]);
     let mut half = field(ElasticConfig::default(), false);
     let mut force = |depth_m: f64, speed: f64| {
-        let body = PosedMesh {
-            velocity_m_per_s: [0.0, 0.0, speed],
-            ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -depth_m])
-        };
+        let body = PosedMesh { velocity_m_per_s: [0.0, 0.0, speed], ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -depth_m]) };
         half.respond(&body).wrench.force_n[2]
     };
     let unit_n = force(1e-3, 0.0);
@@ -65,10 +59,7 @@ fn half_space_is_linear() {
 /// columns lack.
 #[test]
 fn refined_for_frames_only() {
-    let config = ElasticConfig {
-        coupled: false,
-        ..ElasticConfig::default()
-    };
+    let config = ElasticConfig { coupled: false, ..ElasticConfig::default() };
     let mesh = plate([-0.03, 0.03], [-0.015, 0.015]);
     let ball = sphere(33.4e-3, 24, 48);
     for bonded in [true, false] {
@@ -82,10 +73,7 @@ fn refined_for_frames_only() {
             let refined = skin.refine(&body, force_n).unwrap();
             let sum: f64 = refined.iter().sum::<f64>() * (0.015_f64 / 6.0).powi(2);
             assert_relative_eq!(sum, force_n, max_relative = 1e-12);
-            let differ = refined
-                .iter()
-                .zip(&plain)
-                .any(|(a, b)| (a - b).abs() > 0.05 * b.max(1e3));
+            let differ = refined.iter().zip(&plain).any(|(a, b)| (a - b).abs() > 0.05 * b.max(1e3));
             assert!(differ && refined.iter().all(|p| *p >= 0.0));
         }
         assert!(
@@ -121,11 +109,7 @@ fn tolerance_is_kept_along_a_press() {
             let tolerance = fresh.tolerance();
             let expected = fresh.respond(&body).pressure_pa;
             let highest = expected.iter().copied().fold(0.0, f64::max);
-            let worst = answer
-                .iter()
-                .zip(expected)
-                .map(|(a, b)| (a - b).abs())
-                .fold(0.0, f64::max);
+            let worst = answer.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             assert!(worst <= tolerance * highest, "step {step}: {worst} of {highest}");
         }
     }
@@ -152,10 +136,7 @@ fn refuses_what_it_cannot_do() {
 /// Nothing lies under the body: no depth gives the force, and the field says so until it has an answer again.
 #[test]
 fn a_frame_that_cannot_be_refined_says_why() {
-    let config = ElasticConfig {
-        coupled: false,
-        ..ElasticConfig::default()
-    };
+    let config = ElasticConfig { coupled: false, ..ElasticConfig::default() };
     let mut layer = field(config, true);
     let mesh = sphere(20e-3, 24, 48);
     let body = PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3]);
@@ -171,16 +152,10 @@ fn a_frame_that_cannot_be_refined_says_why() {
 /// The search ends on either side of that jump, which is no failure; all larger forces are carried.
 #[test]
 fn a_jump_of_the_force_is_no_failure() {
-    let config = ElasticConfig {
-        coupled: false,
-        ..ElasticConfig::default()
-    };
+    let config = ElasticConfig { coupled: false, ..ElasticConfig::default() };
     let mut layer = field(config, true);
     let mesh = sphere(20e-3, 24, 48);
-    let body = PosedMesh {
-        velocity_m_per_s: [0.0, 0.0, -1.0],
-        ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3])
-    };
+    let body = PosedMesh { velocity_m_per_s: [0.0, 0.0, -1.0], ..PosedMesh::at_rest(&mesh, [0.0, 0.0, -1e-3]) };
     let (mut jumps, mut carried) = (0, 0);
     for exponent in -10..=4 {
         if layer.refine(&body, 10_f64.powf(0.5 * f64::from(exponent))).is_some() {
@@ -201,12 +176,7 @@ fn skin(rows: usize, cols: usize, pitch_m: f64) -> SkinLayout {
 
 /// One cell a taxel.
 fn coarse(thickness_m: f64, poisson: f64) -> ElasticConfig {
-    ElasticConfig {
-        cells_per_taxel: 1,
-        thickness_m,
-        poisson,
-        ..ElasticConfig::default()
-    }
+    ElasticConfig { cells_per_taxel: 1, thickness_m, poisson, ..ElasticConfig::default() }
 }
 
 /// The tightest tolerance is reached, at once and from memory, by a ball and by a flat shape's sharp edges, on 60 × 60
@@ -216,11 +186,7 @@ fn tightest_tolerance() {
     let layout = SkinLayout::default();
     let (ball, plate) = (sphere(33.4e-3, 24, 48), cuboid([0.06, 0.03, 0.01]));
     for (bonded, poisson) in [(true, 0.2), (true, 0.49), (false, 0.2)] {
-        let config = ElasticConfig {
-            tolerance: 1e-12,
-            poisson,
-            ..ElasticConfig::default()
-        };
+        let config = ElasticConfig { tolerance: 1e-12, poisson, ..ElasticConfig::default() };
         let mut field = ElasticField::new(config, bonded, &layout).unwrap();
         for mesh in [&ball, &plate] {
             for depth_m in [1e-3, 1.1e-3, 2e-3] {
@@ -237,11 +203,7 @@ fn tightest_tolerance() {
 #[test]
 fn cells_wider_than_the_layer_are_columns() {
     let layout = skin(4, 6, 0.1);
-    let config = ElasticConfig {
-        densification: Some(false),
-        tolerance: 1e-10,
-        ..coarse(1e-4, 0.45)
-    };
+    let config = ElasticConfig { densification: Some(false), tolerance: 1e-10, ..coarse(1e-4, 0.45) };
     let mut field = ElasticField::new(config, true, &layout).unwrap();
     let plate = cuboid([2.0, 2.0, 0.02]);
     let response = field.respond(&PosedMesh::at_rest(&plate, [0.0, 0.0, -1e-5]));
@@ -250,16 +212,10 @@ fn cells_wider_than_the_layer_are_columns() {
         assert!((p - expected_pa).abs() <= 1e-9 * expected_pa, "{p} {expected_pa}");
     }
     for cell_m in [3e-3, 20e-3, 49e-3, 51e-3] {
-        let kernel = ElasticKernel::Layer {
-            modulus_pa: 1.0,
-            poisson: 0.3,
-            thickness_m: 1e-3,
-        };
+        let kernel = ElasticKernel::Layer { modulus_pa: 1.0, poisson: 0.3, thickness_m: 1e-3 };
         let influence = Influence::new(&kernel, [12, 12], cell_m);
         let sides = |k: usize| if k == 0 { 1.0 } else { 2.0 };
-        let sum: f64 = (0..144)
-            .map(|k| sides(k / 12) * sides(k % 12) * influence.at(k / 12, k % 12))
-            .sum();
+        let sum: f64 = (0..144).map(|k| sides(k / 12) * sides(k % 12) * influence.at(k / 12, k % 12)).sum();
         let stiffness = super::confined_stiffness_pa_per_m(1.0, 0.3, 1e-3);
         assert!((sum * stiffness - 1.0).abs() < 1e-6, "{cell_m}: {}", sum * stiffness);
     }
@@ -276,10 +232,7 @@ fn large_skins() {
     let loaded = pressure_pa.iter().filter(|p| **p > 0.0).count();
     assert!((1..100).contains(&loaded));
     for bonded in [true, false] {
-        let config = ElasticConfig {
-            cells_per_taxel: 3,
-            ..coarse(1e-4, 0.2)
-        };
+        let config = ElasticConfig { cells_per_taxel: 3, ..coarse(1e-4, 0.2) };
         let error = ElasticField::new(config, bonded, &layout).err().unwrap().to_string();
         for part in ["rows × cols × contact.cells_per_taxel²", "2250000", "2^20"] {
             assert!(error.contains(part), "{error}");
@@ -293,15 +246,8 @@ fn no_answer_is_nan() {
     let layout = SkinLayout::default();
     let ball = sphere(33.4e-3, 12, 16);
     let good = PosedMesh::at_rest(&ball, [0.0, 0.0, -2e-3]);
-    let bad = PosedMesh {
-        velocity_m_per_s: [0.0, 0.0, f64::NAN],
-        ..good
-    };
-    let config = ElasticConfig {
-        cells_per_taxel: 2,
-        densification: Some(false),
-        ..ElasticConfig::default()
-    };
+    let bad = PosedMesh { velocity_m_per_s: [0.0, 0.0, f64::NAN], ..good };
+    let config = ElasticConfig { cells_per_taxel: 2, densification: Some(false), ..ElasticConfig::default() };
     let mut skin = ElasticField::new(config, true, &layout).unwrap();
     let expected_n = skin.respond(&good).wrench.force_n[2];
     assert!(expected_n > 0.0);
@@ -310,10 +256,7 @@ fn no_answer_is_nan() {
     let again_n = skin.respond(&good).wrench.force_n[2];
     assert_eq!(again_n.to_bits(), expected_n.to_bits());
     // no iteration reaches an error below 0
-    let hopeless = ElasticConfig {
-        tolerance: -1.0,
-        ..config
-    };
+    let hopeless = ElasticConfig { tolerance: -1.0, ..config };
     let mut skin = ElasticField::unchecked(hopeless, true, &layout).unwrap();
     assert!(skin.respond(&good).wrench.force_n[2].is_nan());
     assert!(skin.carry(&good, 1.0).is_none());
@@ -327,15 +270,9 @@ fn no_answer_is_nan() {
 /// Input that carries nothing: zeros that have not converged, and no panic.
 #[test]
 fn nothing_to_press() {
-    let kernel = ElasticKernel::HalfSpace {
-        modulus_pa: 1e5,
-        poisson: 0.2,
-    };
+    let kernel = ElasticKernel::HalfSpace { modulus_pa: 1e5, poisson: 0.2 };
     let mut solver = ElasticSolver::new(kernel, [3, 4], 1e-3);
-    let patch = |rows, cols| Patch {
-        rows: [0, rows],
-        cols: [0, cols],
-    };
+    let patch = |rows, cols| Patch { rows: [0, rows], cols: [0, cols] };
     for height_m in [f64::INFINITY, f64::NAN] {
         let outcome = solver.press(&[height_m; 12], 1.0, 1e-6);
         assert!(!outcome.converged && solver.pressure_pa() == [0.0; 12]);

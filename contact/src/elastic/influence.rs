@@ -44,10 +44,7 @@ impl ElasticKernel {
     /// E, Pa, and ν.
     pub(crate) fn constants(&self) -> (f64, f64) {
         match *self {
-            Self::HalfSpace { modulus_pa, poisson }
-            | Self::Layer {
-                modulus_pa, poisson, ..
-            } => (modulus_pa, poisson),
+            Self::HalfSpace { modulus_pa, poisson } | Self::Layer { modulus_pa, poisson, .. } => (modulus_pa, poisson),
         }
     }
 
@@ -67,11 +64,7 @@ impl ElasticKernel {
         let half_space = 2.0 * self.inverse_reduced_modulus_per_pa() / wave_per_m;
         match *self {
             Self::HalfSpace { .. } => half_space,
-            Self::Layer {
-                modulus_pa,
-                poisson,
-                thickness_m,
-            } => {
+            Self::Layer { modulus_pa, poisson, thickness_m } => {
                 let x = wave_per_m * thickness_m;
                 if x <= 0.0 {
                     return 1.0 / confined_stiffness_pa_per_m(modulus_pa, poisson, thickness_m);
@@ -128,11 +121,7 @@ pub(crate) fn gauss_legendre(order: usize) -> Vec<(f64, f64)> {
                     (last, p) = (p, ((2.0 * j - 1.0) * x * p - (j - 1.0) * last) / j);
                 }
                 // P'_n = n (x P_n − P_{n−1}) / (x² − 1)
-                slope = if order == 1 {
-                    1.0
-                } else {
-                    n * (x * p - last) / (x * x - 1.0)
-                };
+                slope = if order == 1 { 1.0 } else { n * (x * p - last) / (x * x - 1.0) };
                 x -= p / slope;
             }
             (x, 2.0 / ((1.0 - x * x) * slope * slope))
@@ -313,12 +302,7 @@ impl Influence {
         [rows, cols]: [usize; 2],
         cell_m: f64,
     ) -> Self {
-        let mut influence = Self {
-            rows,
-            cols,
-            values: love(rows, cols),
-            bulge: Bulge::default(),
-        };
+        let mut influence = Self { rows, cols, values: love(rows, cols), bulge: Bulge::default() };
         let scale = cell_m * kernel.inverse_reduced_modulus_per_pa() / PI;
         influence.values.iter_mut().for_each(|v| *v *= scale);
         if let (&ElasticKernel::Layer { thickness_m, .. }, Some(deficit)) = (kernel, deficit) {
@@ -390,14 +374,8 @@ impl Influence {
     /// Independent columns.
     fn set_columns(&mut self, kernel: &ElasticKernel) {
         self.values.fill(0.0);
-        if let (
-            Some(own),
-            &ElasticKernel::Layer {
-                modulus_pa,
-                poisson,
-                thickness_m,
-            },
-        ) = (self.values.first_mut(), kernel)
+        if let (Some(own), &ElasticKernel::Layer { modulus_pa, poisson, thickness_m }) =
+            (self.values.first_mut(), kernel)
         {
             *own = 1.0 / confined_stiffness_pa_per_m(modulus_pa, poisson, thickness_m);
         }
@@ -433,9 +411,7 @@ impl Influence {
 pub(crate) fn deficit(kernel: &ElasticKernel, [rows, cols]: [usize; 2], cell_m: f64) -> Option<Deficit> {
     match *kernel {
         ElasticKernel::HalfSpace { .. } => None,
-        ElasticKernel::Layer {
-            poisson, thickness_m, ..
-        } => {
+        ElasticKernel::Layer { poisson, thickness_m, .. } => {
             let farthest = (rows as f64).hypot(cols as f64) * cell_m / thickness_m;
             Some(Deficit::new(poisson, farthest))
         }
@@ -457,10 +433,7 @@ fn cell_points(cell: f64) -> Vec<(f64, f64)> {
     let width = cell / parts as f64;
     let part = |i: usize| (i as f64 + 0.5) * width - 0.5 * cell;
     (0..parts)
-        .flat_map(|i| {
-            rule.iter()
-                .map(move |&(x, w)| (part(i) + 0.5 * width * x, 0.5 * w / parts as f64))
-        })
+        .flat_map(|i| rule.iter().map(move |&(x, w)| (part(i) + 0.5 * width * x, 0.5 * w / parts as f64)))
         .collect()
 }
 

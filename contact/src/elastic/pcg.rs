@@ -100,11 +100,7 @@ pub(crate) fn solve(system: &mut System, f: &mut Fields, goal: Goal, stop: Stop)
             done.approach_m += f.balance();
         }
         let state = f.measure(done.approach_m, system.stiffness_pa_per_m);
-        let tolerance = if done.iterations == 1 {
-            stop.start_tolerance
-        } else {
-            stop.tolerance
-        };
+        let tolerance = if done.iterations == 1 { stop.start_tolerance } else { stop.tolerance };
         if state.worst <= tolerance * state.highest {
             done.converged = true;
             break;
@@ -119,11 +115,7 @@ pub(crate) fn solve(system: &mut System, f: &mut Fields, goal: Goal, stop: Stop)
             fresh = true;
             continue;
         }
-        let turn = if fresh {
-            0.0
-        } else {
-            (state.change / last_power).max(0.0)
-        };
+        let turn = if fresh { 0.0 } else { (state.change / last_power).max(0.0) };
         (fresh, last_power) = (false, state.power);
         for (t, z) in f.direction.iter_mut().zip(&f.image) {
             *t = z + turn * *t;
@@ -182,11 +174,7 @@ impl Fields {
         let cells = self.target.iter().zip(&self.displacement).zip(&self.contact);
         let old = self.residual.iter_mut().zip(&mut self.step);
         for (((target, displacement), inside), (residual, step)) in cells.zip(old) {
-            let r = if *inside > 0.0 {
-                target + approach_m - displacement
-            } else {
-                0.0
-            };
+            let r = if *inside > 0.0 { target + approach_m - displacement } else { 0.0 };
             *step = r - *residual;
             *residual = r;
         }
@@ -210,11 +198,7 @@ impl Fields {
             highest = if *p > highest { *p } else { highest };
             let depth_m = target + approach_m - displacement;
             let below = if *p < 0.0 { -p } else { 0.0 };
-            let above = if depth_m > 0.0 {
-                depth_m * stiffness_pa_per_m
-            } else {
-                0.0
-            };
+            let above = if depth_m > 0.0 { depth_m * stiffness_pa_per_m } else { 0.0 };
             let within = *inside > 0.0;
             let (below, above) = (if within { below } else { 0.0 }, if within { 0.0 } else { above });
             negative += below * below;

@@ -48,14 +48,9 @@ fn computed(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Tables {
         (size, side_m) = (coarser(size), 2.0 * side_m);
         sizes.push((size, side_m));
     }
-    let sizes = sizes
-        .into_iter()
-        .map(|(size, side_m)| (size.map(|n| n + EXTRA_OFFSETS), side_m));
+    let sizes = sizes.into_iter().map(|(size, side_m)| (size.map(|n| n + EXTRA_OFFSETS), side_m));
     // the coarsest offsets reach furthest
-    let table = sizes
-        .clone()
-        .next_back()
-        .and_then(|(offsets, side_m)| deficit(&kernel, offsets, side_m));
+    let table = sizes.clone().next_back().and_then(|(offsets, side_m)| deficit(&kernel, offsets, side_m));
     let level = |(offsets, side_m)| {
         let influence = Influence::with_deficit(&kernel, table.as_ref(), offsets, side_m);
         (Arc::new(influence), side_m)
@@ -76,19 +71,13 @@ impl Patch {
             // what does not fit at the end goes before the beginning
             [end.saturating_sub(side).min(first), end]
         };
-        Self {
-            rows: rounded(self.rows, rows),
-            cols: rounded(self.cols, cols),
-        }
+        Self { rows: rounded(self.rows, rows), cols: rounded(self.cols, cols) }
     }
 
     /// Window with `margin` more cells on every side, as far as the patch of `shape` goes.
     fn grown(&self, margin: usize, [rows, cols]: [usize; 2]) -> Self {
         let grown = |[first, end]: [usize; 2], most: usize| [first.saturating_sub(margin), (end + margin).min(most)];
-        Self {
-            rows: grown(self.rows, rows),
-            cols: grown(self.cols, cols),
-        }
+        Self { rows: grown(self.rows, rows), cols: grown(self.cols, cols) }
     }
 
     /// Copies the window out of a patch `cols` wide.
@@ -189,11 +178,7 @@ impl Level {
         window.cut(&self.pressure, cols, &mut f.pressure);
         let started = f.pressure.iter().any(|p| *p > 0.0);
         for ((inside, p), target) in f.contact.iter_mut().zip(&mut f.pressure).zip(&f.target) {
-            *inside = if target.is_finite() && (!started || *p > 0.0) {
-                1.0
-            } else {
-                0.0
-            };
+            *inside = if target.is_finite() && (!started || *p > 0.0) { 1.0 } else { 0.0 };
             *p *= *inside;
         }
         let outcome = pcg::solve(&mut self.systems[index], f, goal, stop);
@@ -299,11 +284,7 @@ pub(crate) fn prolong(coarse: &[f64], target: &[f64], [rows, cols]: [usize; 2], 
     let [coarse_rows, coarse_cols] = coarser([rows, cols]);
     let near = |i: usize, n: usize| {
         let own = i / 2;
-        let other = if i % 2 == 1 {
-            (own + 1).min(n - 1)
-        } else {
-            own.saturating_sub(1)
-        };
+        let other = if i % 2 == 1 { (own + 1).min(n - 1) } else { own.saturating_sub(1) };
         [(own, 0.75), (other, 0.25)]
     };
     fine.clear();
@@ -403,11 +384,8 @@ impl Memory {
 
     /// Keeps the answer on the patch of the last [`Memory::start`] and lets the oldest go.
     pub(crate) fn keep(&mut self, pressure: &[f64], displacement: &[f64]) {
-        let mut answer = if self.answers.len() < KEPT_ANSWERS {
-            Answer::default()
-        } else {
-            self.answers.pop().unwrap_or_default()
-        };
+        let mut answer =
+            if self.answers.len() < KEPT_ANSWERS { Answer::default() } else { self.answers.pop().unwrap_or_default() };
         answer.pressure.clear();
         answer.pressure.extend_from_slice(pressure);
         answer.displacement.clear();
@@ -450,9 +428,7 @@ fn shifted(field: &[f64], old: Patch, new: Patch, out: &mut Vec<f64>) {
 /// Σ p d over the cells in contact; the others may have an infinite target.
 fn finite_dot(pressure: &[f64], target: &[f64]) -> f64 {
     let cells = pressure.iter().zip(target);
-    cells
-        .map(|(p, d)| if *p > 0.0 && d.is_finite() { p * d } else { 0.0 })
-        .sum()
+    cells.map(|(p, d)| if *p > 0.0 && d.is_finite() { p * d } else { 0.0 }).sum()
 }
 
 /// Solver for the contact of height maps with a half-space or a bonded layer.
@@ -499,12 +475,7 @@ impl ElasticSolver {
             .iter()
             .map(|(influence, side_m)| Level::new(Arc::clone(influence), *side_m))
             .collect();
-        Self {
-            shape,
-            planners: Planners::new(),
-            levels,
-            memory: Memory::default(),
-        }
+        Self { shape, planners: Planners::new(), levels, memory: Memory::default() }
     }
 
     /// Rise of the surface beside a wide load relative to the depression under it; see [`Influence::bulge`].
@@ -548,11 +519,7 @@ impl ElasticSolver {
     /// If `target_m` does not have one value for each square of the patch.
     pub fn sink(&mut self, patch: Patch, target_m: &[f64], tolerance: f64) -> Outcome {
         let shape = patch.shape();
-        assert_eq!(
-            target_m.len(),
-            shape[0] * shape[1],
-            "one displacement a cell of the patch"
-        );
+        assert_eq!(target_m.len(), shape[0] * shape[1], "one displacement a cell of the patch");
         let fits = (0..2).all(|i| (1..=self.shape[i]).contains(&shape[i]));
         let any = target_m.iter().any(|t| t.is_finite());
         if !fits || !any {
@@ -590,10 +557,7 @@ impl ElasticSolver {
         let pressure = &mut self.levels[0].pressure;
         pressure.clear();
         pressure.resize(cells, 0.0);
-        Outcome {
-            converged,
-            ..Outcome::default()
-        }
+        Outcome { converged, ..Outcome::default() }
     }
 
     /// Presses a rigid shape of height `height_m` above its lowest point (row-major; infinite where there is nothing)
@@ -655,16 +619,10 @@ impl ElasticSolver {
         tolerance: f64,
     ) -> Outcome {
         let level = &mut self.levels[index];
-        let goal = force_n.map_or(Goal::Displacement, |f| {
-            Goal::PressureSum(f / (level.cell_m * level.cell_m))
-        });
+        let goal = force_n.map_or(Goal::Displacement, |f| Goal::PressureSum(f / (level.cell_m * level.cell_m)));
         // an iteration goes a little further than asked, so that the combination of answers is good enough next time
         let reserve = if force_n.is_none() && index == 0 { RESERVE } else { 1.0 };
-        let stop = Stop {
-            tolerance: reserve * tolerance,
-            start_tolerance: tolerance,
-            iterations: MAX_ITERATIONS,
-        };
+        let stop = Stop { tolerance: reserve * tolerance, start_tolerance: tolerance, iterations: MAX_ITERATIONS };
         let mut iterations = 0;
         loop {
             let mut outcome = level.solve(&mut self.planners, shape[1], window, goal, stop);

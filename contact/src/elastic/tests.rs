@@ -10,11 +10,7 @@ const H: f64 = 6e-3;
 const E: f64 = 150e3;
 
 fn layer(poisson: f64) -> ElasticKernel {
-    ElasticKernel::Layer {
-        modulus_pa: E,
-        poisson,
-        thickness_m: H,
-    }
+    ElasticKernel::Layer { modulus_pa: E, poisson, thickness_m: H }
 }
 
 /// C = (1/K)(1 + O((kh)²)) with a factor below 1/(1 − 2ν) · 10 = 500: at kh = 1e-8 the limit is met to 1e-13. C differs
@@ -58,10 +54,7 @@ fn table_of_the_layer() {
         for (x, expected) in WAVES.iter().zip(row) {
             let ratio = layer(poisson).compliance_m_per_pa(x / H) * stiffness;
             // 1 % of a unit for values that end in 5
-            assert!(
-                (ratio - expected).abs() <= 1.02 * half_unit,
-                "ν {poisson}, kh {x}: {ratio}"
-            );
+            assert!((ratio - expected).abs() <= 1.02 * half_unit, "ν {poisson}, kh {x}: {ratio}");
         }
     }
 }
@@ -92,19 +85,12 @@ fn bessel() {
 /// relative correction (a/r)²/24 of the square's second moment.
 #[test]
 fn love_near_and_far() {
-    let half = ElasticKernel::HalfSpace {
-        modulus_pa: E,
-        poisson: 0.2,
-    };
+    let half = ElasticKernel::HalfSpace { modulus_pa: E, poisson: 0.2 };
     let cell_m = 1e-3;
     let influence = Influence::new(&half, [4, 200], cell_m);
     let unit = cell_m * half.inverse_reduced_modulus_per_pa() / PI;
     assert_relative_eq!(influence.at(0, 0), 4.0 * 1.0_f64.asinh() * unit, max_relative = 1e-14);
-    assert_relative_eq!(
-        influence.at(0, 199) * 199.0 / unit,
-        1.0 + 1.0 / (24.0 * 199.0 * 199.0),
-        max_relative = 1e-9
-    );
+    assert_relative_eq!(influence.at(0, 199) * 199.0 / unit, 1.0 + 1.0 / (24.0 * 199.0 * 199.0), max_relative = 1e-9);
     assert!(influence.bulge_m_per_pa() <= 0.0 && influence.bulge() <= 0.0);
 }
 
@@ -133,11 +119,7 @@ fn coefficients_carry_waves() {
                 .map(|m| {
                     let k = wave + 2.0 * PI * f64::from(m) / cell_m;
                     let half_phase = 0.5 * k * cell_m;
-                    let sinc = if half_phase.abs() < 1e-12 {
-                        1.0
-                    } else {
-                        half_phase.sin() / half_phase
-                    };
+                    let sinc = if half_phase.abs() < 1e-12 { 1.0 } else { half_phase.sin() / half_phase };
                     kernel.compliance_m_per_pa(k.abs()) * sinc
                 })
                 .sum();
@@ -150,10 +132,7 @@ fn coefficients_carry_waves() {
 
 // The solver against closed forms, a recorded table and its own conditions.
 
-const HALF: ElasticKernel = ElasticKernel::HalfSpace {
-    modulus_pa: E,
-    poisson: 0.2,
-};
+const HALF: ElasticKernel = ElasticKernel::HalfSpace { modulus_pa: E, poisson: 0.2 };
 /// E* = E/(1 − ν²).
 const REDUCED: f64 = E / 0.96;
 
@@ -162,9 +141,7 @@ fn grid([rows, cols]: [usize; 2], cell_m: f64, height: impl Fn(f64, f64) -> f64)
     let at = |i: usize, n: usize| {
         (f64::from(u32::try_from(i).unwrap()) - 0.5 * (f64::from(u32::try_from(n).unwrap()) - 1.0)) * cell_m
     };
-    (0..rows * cols)
-        .map(|i| height(at(i % cols, cols), at(i / cols, rows)))
-        .collect()
+    (0..rows * cols).map(|i| height(at(i % cols, cols), at(i / cols, rows))).collect()
 }
 
 fn force_n(solver: &ElasticSolver, cell_m: f64) -> f64 {
@@ -207,27 +184,15 @@ fn round_punch() {
     for cells in [64_u32, 256] {
         let (n, cell_m) = (cells as usize, 0.045 / f64::from(cells));
         let mut solver = ElasticSolver::new(HALF, [n, n], cell_m);
-        let height_m = grid(
-            [n, n],
-            cell_m,
-            |x, y| if x.hypot(y) <= radius_m { 0.0 } else { f64::INFINITY },
-        );
+        let height_m = grid([n, n], cell_m, |x, y| if x.hypot(y) <= radius_m { 0.0 } else { f64::INFINITY });
         let outcome = solver.press(&height_m, 20.0, 1e-7);
         let h = cell_m / radius_m;
         let limit = (h.powf(1.5) + 0.15 * h).min(if cells == 256 { 3e-3 } else { 1.0 });
         assert!(outcome.converged);
-        assert_relative_eq!(
-            outcome.approach_m,
-            20.0 / (2.0 * radius_m * REDUCED),
-            max_relative = limit
-        );
+        assert_relative_eq!(outcome.approach_m, 20.0 / (2.0 * radius_m * REDUCED), max_relative = limit);
         // p = F / (2πa √(a² − r²)): 1/2 of the mean in the middle
         let middle = solver.pressure_pa()[n / 2 * n + n / 2];
-        assert_relative_eq!(
-            middle,
-            20.0 / (2.0 * PI * radius_m * radius_m),
-            max_relative = 2.0 * limit
-        );
+        assert_relative_eq!(middle, 20.0 / (2.0 * PI * radius_m * radius_m), max_relative = 2.0 * limit);
     }
 }
 
@@ -308,11 +273,7 @@ const CELLS: usize = 64;
 
 fn on_layer(ratio: f64, poisson: f64) -> (ElasticSolver, Vec<f64>, f64) {
     let cell_m = 3.0 * ratio / 64.0;
-    let kernel = ElasticKernel::Layer {
-        modulus_pa: 1.0,
-        poisson,
-        thickness_m: 1.0,
-    };
+    let kernel = ElasticKernel::Layer { modulus_pa: 1.0, poisson, thickness_m: 1.0 };
     let height_m = grid([CELLS, CELLS], cell_m, |x, y| (x * x + y * y) / (2.0 * R));
     (ElasticSolver::new(kernel, [CELLS, CELLS], cell_m), height_m, cell_m)
 }
@@ -328,11 +289,7 @@ fn force_for_radius(ratio: f64, poisson: f64) -> f64 {
     for _ in 0..14 {
         let middle = 0.5 * (low + high);
         solver.press(&height_m, middle, 1e-4);
-        if contact_radius(&solver, cell_m) > ratio {
-            high = middle
-        } else {
-            low = middle
-        }
+        if contact_radius(&solver, cell_m) > ratio { high = middle } else { low = middle }
     }
     high
 }
@@ -360,11 +317,7 @@ fn ratios_on_layer(ratio: f64, poisson: f64, force_n: f64) -> [f64; 4] {
 #[test]
 fn conditions_of_contact() {
     let shape = [30, 27];
-    let layer = |poisson| ElasticKernel::Layer {
-        modulus_pa: E,
-        poisson,
-        thickness_m: 6e-3,
-    };
+    let layer = |poisson| ElasticKernel::Layer { modulus_pa: E, poisson, thickness_m: 6e-3 };
     for kernel in [HALF, layer(0.2), layer(0.45)] {
         let cell_m = 2.5e-3;
         let influence = Influence::new(&kernel, shape, cell_m);
@@ -377,13 +330,7 @@ fn conditions_of_contact() {
         for round in 0..6 {
             let target_m: Vec<f64> = grid(shape, cell_m, |x, y| 1e-3 - x.hypot(y) * 0.04)
                 .into_iter()
-                .map(|t| {
-                    if noise() < 0.1 {
-                        f64::NEG_INFINITY
-                    } else {
-                        t + 4e-4 * noise() + 1e-4 * f64::from(round)
-                    }
-                })
+                .map(|t| if noise() < 0.1 { f64::NEG_INFINITY } else { t + 4e-4 * noise() + 1e-4 * f64::from(round) })
                 .collect();
             let outcome = solver.sink(Patch::whole(shape), &target_m, 1e-9);
             assert!(outcome.converged && outcome.iterations < 100, "{outcome:?}");
@@ -398,10 +345,7 @@ fn conditions_of_contact() {
                     .sum();
                 let (p, t) = (pressure[cell], target_m[cell]);
                 assert!(p >= 0.0 && u >= t - limit_m, "cell {cell}: {u} < {t}");
-                assert!(
-                    p <= 0.0 || (u - t).abs() <= limit_m,
-                    "cell {cell}: {u} ≠ {t} under {p} Pa"
-                );
+                assert!(p <= 0.0 || (u - t).abs() <= limit_m, "cell {cell}: {u} ≠ {t} under {p} Pa");
             }
         }
     }
@@ -431,28 +375,17 @@ fn memory_of_a_flat_shape() {
     let (shape, cell_m) = ([24, 32], 2.5e-3);
     let tilted = |depth_m: f64, a: f64, b: f64| grid(shape, cell_m, |x, y| depth_m + a * x + b * y);
     let mut solver = ElasticSolver::new(HALF, shape, cell_m);
-    let poses = [
-        (1e-3, 0.0, 0.0),
-        (1.1e-3, 1e-3, 0.0),
-        (1.2e-3, 0.0, 1e-3),
-        (1.3e-3, 2e-3, -1e-3),
-    ];
+    let poses = [(1e-3, 0.0, 0.0), (1.1e-3, 1e-3, 0.0), (1.2e-3, 0.0, 1e-3), (1.3e-3, 2e-3, -1e-3)];
     let mut iterations = 0;
     for (depth_m, a, b) in poses {
-        iterations = solver
-            .sink(Patch::whole(shape), &tilted(depth_m, a, b), 1e-8)
-            .iterations;
+        iterations = solver.sink(Patch::whole(shape), &tilted(depth_m, a, b), 1e-8).iterations;
     }
     // the fourth pose is a combination of the three before
     assert_eq!(iterations, 1);
     let warm = solver.pressure_pa().to_vec();
     solver.forget();
     solver.sink(Patch::whole(shape), &tilted(1.3e-3, 2e-3, -1e-3), 1e-8);
-    let worst = warm
-        .iter()
-        .zip(solver.pressure_pa())
-        .map(|(a, b)| (a - b).abs())
-        .fold(0.0, f64::max);
+    let worst = warm.iter().zip(solver.pressure_pa()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(worst <= 1e-7 * peak_pa(&solver), "{worst}");
 }
 
@@ -462,15 +395,9 @@ fn rounded_windows() {
     let shape = [10, 17];
     for [row, col] in [[0, 0], [3, 5], [9, 16], [7, 2]] {
         for [end_row, end_col] in [shape, [row + 1, col + 1]] {
-            let window = Patch {
-                rows: [row, end_row],
-                cols: [col, end_col],
-            };
+            let window = Patch { rows: [row, end_row], cols: [col, end_col] };
             let round = window.rounded(shape);
-            assert!(
-                round.holds(window) && Patch::whole(shape).holds(round),
-                "{window:?} {round:?}"
-            );
+            assert!(round.holds(window) && Patch::whole(shape).holds(round), "{window:?} {round:?}");
             for ((side, old), most) in round.shape().into_iter().zip(window.shape()).zip(shape) {
                 assert!(side.is_multiple_of(4) || side == most, "{window:?} {round:?}");
                 assert!(side < old + 4);

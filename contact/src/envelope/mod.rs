@@ -103,9 +103,7 @@ impl Envelope {
     pub(crate) fn make_map(&mut self, body: &PosedMesh<'_>) {
         self.take(body);
         if !self.known.map.serves(&stand(body), f64::INFINITY) {
-            self.known
-                .map
-                .make(&self.raster, &mut self.known.blocks, body, f64::INFINITY);
+            self.known.map.make(&self.raster, &mut self.known.blocks, body, f64::INFINITY);
         }
     }
 
@@ -136,12 +134,7 @@ impl Envelope {
 
     /// Adds every triangle that dips below `level_m` above the origin.
     fn add_below(&mut self, body: &PosedMesh<'_>, level_m: f64) {
-        let mut cells = Cells {
-            values: &mut self.depth_m,
-            origin: [0, 0],
-            stride: self.raster.cols,
-            level_m,
-        };
+        let mut cells = Cells { values: &mut self.depth_m, origin: [0, 0], stride: self.raster.cols, level_m };
         let (raster, touched) = (&self.raster, &mut self.touched);
         self.known.blocks.below(raster, body, level_m, |corners| {
             if let Some(patch) = raster.add(&mut cells, corners) {
@@ -164,10 +157,8 @@ impl Envelope {
                 let z = level_m + drop_m;
                 *depth_m = if z > 0.0 { z } else { 0.0 };
             }
-            self.touched.include(Patch {
-                rows: [row, row + 1],
-                cols: [patch.cols[0] + first, patch.cols[0] + last + 1],
-            });
+            self.touched
+                .include(Patch { rows: [row, row + 1], cols: [patch.cols[0] + first, patch.cols[0] + last + 1] });
         }
     }
 }
@@ -187,10 +178,7 @@ struct Blocks {
 
 impl Blocks {
     fn new(mesh: PreparedMesh) -> Self {
-        Self {
-            mesh,
-            corners: vec![[0.0; 3]; 3 * BLOCK],
-        }
+        Self { mesh, corners: vec![[0.0; 3]; 3 * BLOCK] }
     }
 
     /// Whether this is `mesh`, bit for bit. The same address tells, since what is there is shared and cannot change;
@@ -312,8 +300,7 @@ impl HeightMap {
             }
         });
         self.drop_m.clear();
-        self.drop_m
-            .resize(self.patch.height() * self.patch.width(), f64::NEG_INFINITY);
+        self.drop_m.resize(self.patch.height() * self.patch.width(), f64::NEG_INFINITY);
         let mut cells = Cells {
             values: &mut self.drop_m,
             origin: [self.patch.rows[0], self.patch.cols[0]],

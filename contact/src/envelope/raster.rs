@@ -57,18 +57,12 @@ impl Raster {
 
     /// Centre (x, y) of a cell, m.
     pub(super) fn centre_m(&self, row: usize, col: usize) -> [f64; 2] {
-        [
-            self.first_m[0] + col as f64 * self.cell_m,
-            self.first_m[1] - row as f64 * self.cell_m,
-        ]
+        [self.first_m[0] + col as f64 * self.cell_m, self.first_m[1] - row as f64 * self.cell_m]
     }
 
     /// World (x, y), m, in cells.
     pub(super) fn cells(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [
-            (x - self.first_m[0]) * self.cells_per_m,
-            (self.first_m[1] - y) * self.cells_per_m,
-        ]
+        [(x - self.first_m[0]) * self.cells_per_m, (self.first_m[1] - y) * self.cells_per_m]
     }
 
     /// Cells whose centres lie in the box around the corners (u, v, z); often none, with small triangles.
@@ -99,11 +93,7 @@ impl Raster {
         if area.abs() <= self.slack {
             return false;
         }
-        let [a, b, c] = if area > 0.0 {
-            corners
-        } else {
-            [corners[0], corners[2], corners[1]]
-        };
+        let [a, b, c] = if area > 0.0 { corners } else { [corners[0], corners[2], corners[1]] };
         let plane = Plane {
             scale: 1.0 / area.abs(),
             rise: [b[2] - a[2], c[2] - a[2]],
@@ -210,10 +200,7 @@ impl Plane {
 
 /// Whole numbers of `0..cells` in `[low, high]`, widened by [`COLUMN_SLACK`], as a half-open range; none when its ends
 /// are not in order.
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "both ends are inside the grid where they are cast"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "both ends are inside the grid where they are cast")]
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "as for `span`")]
 fn whole(low: f64, high: f64, cells: usize) -> [usize; 2] {

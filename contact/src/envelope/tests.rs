@@ -84,12 +84,9 @@ fn lowest_near_m(world: &TriMesh, [x, y]: Point, slack_m: f64) -> Option<f64> {
     let mut lowest: Option<f64> = None;
     for t in 0..world.triangles.len() {
         let mut polygon = world.corners(t).to_vec();
-        for (axis, sign, bound) in [
-            (0, 1.0, x + slack_m),
-            (0, -1.0, slack_m - x),
-            (1, 1.0, y + slack_m),
-            (1, -1.0, slack_m - y),
-        ] {
+        for (axis, sign, bound) in
+            [(0, 1.0, x + slack_m), (0, -1.0, slack_m - x), (1, 1.0, y + slack_m), (1, -1.0, slack_m - y)]
+        {
             polygon = clipped(&polygon, axis, sign, bound);
         }
         for p in polygon {
@@ -124,10 +121,7 @@ const NEAR_M: f64 = 1e-9;
 /// At every centre the depth is that of the surface: where the brute force is the same all around the centre, to
 /// round-off; on edges and walls between the deepest point of the neighbourhood and the point itself.
 fn check(mesh: &TriMesh, rotation: [[f64; 3]; 3], position_m: [f64; 3], cells: usize) -> Result<(), TestCaseError> {
-    let body = PosedMesh {
-        rotation,
-        ..PosedMesh::at_rest(mesh, position_m)
-    };
+    let body = PosedMesh { rotation, ..PosedMesh::at_rest(mesh, position_m) };
     let mut envelope = Envelope::new(&SkinLayout::default(), cells);
     let patch = envelope.rasterise(&body);
     let moving = envelope.depth_m().to_vec();
@@ -150,10 +144,7 @@ fn check(mesh: &TriMesh, rotation: [[f64; 3]; 3], position_m: [f64; 3], cells: u
     }
     // the same pose again comes out of the height map, at the same height and at others
     for lower_m in [0.0, 0.0, 3e-4, -2e-4, 0.02, -0.5] {
-        let again = PosedMesh {
-            position_m: [position_m[0], position_m[1], position_m[2] - lower_m],
-            ..body
-        };
+        let again = PosedMesh { position_m: [position_m[0], position_m[1], position_m[2] - lower_m], ..body };
         let patch = envelope.rasterise(&again);
         let mut fresh = Envelope::new(&SkinLayout::default(), cells);
         fresh.rasterise(&again);
@@ -175,16 +166,8 @@ fn any_mesh(kind: usize, a: f64, b: f64) -> TriMesh {
         2 => low(cylinder(0.5 * b, 0.02, 17)),
         // a hole right through, and a recess from below
         3 => low(extrude(&rectangle(a, a), &[circle(0.3 * a, 11)], 0.02)),
-        4 => low(extrude_recessed(
-            &rectangle(a, b),
-            &rectangle(0.5 * a, 0.5 * b),
-            0.02,
-            0.004,
-        )),
-        5 => revolve_ring(
-            &[[0.3 * a, 0.0], [0.5 * a, -0.01], [0.5 * a, 0.01], [0.4 * a, 0.002]],
-            12,
-        ),
+        4 => low(extrude_recessed(&rectangle(a, b), &rectangle(0.5 * a, 0.5 * b), 0.02, 0.004)),
+        5 => revolve_ring(&[[0.3 * a, 0.0], [0.5 * a, -0.01], [0.5 * a, 0.01], [0.4 * a, 0.002]], 12),
         // a needle, and two bodies one above the other
         6 => cuboid([a, 1e-5, 0.02]),
         _ => cuboid([a, b, 0.004]).merged(&sphere(0.4 * b, 6, 8).translated([0.2 * a, 0.0, 0.003])),
@@ -219,10 +202,7 @@ proptest! {
 /// The seventeen objects as they are pressed.
 #[test]
 fn objects_equal_brute_force() {
-    for object in OBJECTS
-        .iter()
-        .filter(|o| ["T", "comb", "tape", "center"].contains(&o.name))
-    {
+    for object in OBJECTS.iter().filter(|o| ["T", "comb", "tape", "center"].contains(&o.name)) {
         let mesh = (object.build)();
         check(&mesh, object.placement.matrix(), [0.001, 0.002, -1e-3], 2).unwrap();
     }

@@ -54,18 +54,12 @@ pub(super) fn malformed(file: &str, why: impl Display) -> MeshError {
 
 /// The error of a coordinate that is NaN or infinite.
 pub(super) fn not_finite(file: &str, vertex: usize, axis: char, value: f64) -> MeshError {
-    refused(
-        file,
-        format_args!("vertex {vertex}, coordinate {axis} = {value} is not a finite number"),
-    )
+    refused(file, format_args!("vertex {vertex}, coordinate {axis} = {value} is not a finite number"))
 }
 
 /// The error of the triangle `triangle` that uses a vertex that is not there.
 pub(super) fn out_of_range(file: &str, triangle: usize, index: u32, vertices: usize) -> MeshError {
-    refused(
-        file,
-        format_args!("triangle {triangle} uses vertex {index}, outside [0, {vertices})"),
-    )
+    refused(file, format_args!("triangle {triangle} uses vertex {index}, outside [0, {vertices})"))
 }
 
 /// The error of a file with more of something than is read.
@@ -75,18 +69,13 @@ pub(super) fn too_large(file: &str, what: &str, found: usize, most: usize) -> Me
 
 /// `value` without a row of zeros.
 fn short(value: f64) -> String {
-    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
-        format!("{value:e}")
-    } else {
-        value.to_string()
-    }
+    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) { format!("{value:e}") } else { value.to_string() }
 }
 
 /// What to do about a wrong unit.
 fn advice(suggestion: Option<(&'static str, f64)>) -> String {
-    suggestion.map_or_else(String::new, |(unit, scale)| {
-        format!("; if its unit is {unit}, use scale = {}", short(scale))
-    })
+    suggestion
+        .map_or_else(String::new, |(unit, scale)| format!("; if its unit is {unit}, use scale = {}", short(scale)))
 }
 
 /// What was repaired in a mesh when it was loaded, and the size of the mesh afterwards.
@@ -263,11 +252,7 @@ impl TriMesh {
         }
         let mut votes: BTreeMap<u32, i64> = BTreeMap::new();
         for edge in sides.edges() {
-            let of_sheets: Vec<u32> = edge
-                .iter()
-                .map(|s| s.triangle)
-                .filter(|&t| sheets[t as usize])
-                .collect();
+            let of_sheets: Vec<u32> = edge.iter().map(|s| s.triangle).filter(|&t| sheets[t as usize]).collect();
             if let [t] = of_sheets[..] {
                 let others = edge.len() - 1;
                 *votes.entry(regions.find(t).0).or_insert(0) += if others % 2 == 0 { 1 } else { -1 };
@@ -378,10 +363,7 @@ fn turn_outward(mesh: &mut TriMesh, parts: &[u32]) -> usize {
     if bodies.iter().all(|b| b.volume_m3 >= 0.0) {
         return 0;
     }
-    let turned: Vec<bool> = outermost(mesh, &bodies)
-        .into_iter()
-        .map(|outer| bodies[outer].volume_m3 < 0.0)
-        .collect();
+    let turned: Vec<bool> = outermost(mesh, &bodies).into_iter().map(|outer| bodies[outer].volume_m3 < 0.0).collect();
     for (t, &part) in mesh.triangles.iter_mut().zip(parts) {
         if turned[part as usize] {
             t.swap(1, 2);
@@ -402,18 +384,10 @@ fn bodies(mesh: &TriMesh, parts: &[u32]) -> Vec<Body> {
     for (t, &part) in parts.iter().enumerate() {
         let corners = mesh.corners(t);
         if part as usize == bodies.len() {
-            bodies.push(Body {
-                triangles: Vec::new(),
-                volume_m3: 0.0,
-                low: corners[0],
-                high: corners[0],
-            });
+            bodies.push(Body { triangles: Vec::new(), volume_m3: 0.0, low: corners[0], high: corners[0] });
         }
         let body = &mut bodies[part as usize];
-        let first = body
-            .triangles
-            .first()
-            .map_or(corners[0], |&f| mesh.corners(f as usize)[0]);
+        let first = body.triangles.first().map_or(corners[0], |&f| mesh.corners(f as usize)[0]);
         let [a, b, c] = corners.map(|v| sub(v, first));
         body.volume_m3 += dot(a, cross(b, c)) / 6.0;
         body.triangles.push(index(t));
@@ -672,11 +646,7 @@ fn fill(mesh: &mut TriMesh, ring: &[u32], outline: &Outline) {
     if n[up] < 0.0 {
         (u, v) = (v, u);
     }
-    let points: Vec<Point> = ring
-        .iter()
-        .map(|&i| mesh.vertices[i as usize])
-        .map(|p| [p[u], p[v]])
-        .collect();
+    let points: Vec<Point> = ring.iter().map(|&i| mesh.vertices[i as usize]).map(|p| [p[u], p[v]]).collect();
     append(mesh, ring, &points);
 }
 
@@ -752,12 +722,7 @@ pub fn checked(raw: &TriMesh, scale: f64, file: &str) -> Result<(TriMesh, MeshRe
         let why = format!("encloses {volume_m3} m³; a solid of its extent encloses at least {least_m3} m³");
         return Err(refused(file, why));
     }
-    let mut report = MeshReport {
-        joined_vertices,
-        dropped_triangles,
-        duplicate_triangles,
-        ..mended
-    };
+    let mut report = MeshReport { joined_vertices, dropped_triangles, duplicate_triangles, ..mended };
     if mesh.triangles.len() > SOFT_MAX_TRIANGLES
         && let Some((fewer, error_m)) = mesh.decimated()
     {
@@ -849,10 +814,7 @@ fn check_numbers(raw: &TriMesh, scale: f64, file: &str) -> Result<(), MeshError>
 /// Refuses a mesh of more `vertices` or `triangles` than can be repaired in the memory of a small machine. Readers ask
 /// before they make room for them.
 pub(super) fn within_budget(vertices: usize, triangles: usize, file: &str) -> Result<(), MeshError> {
-    let counts = [
-        ("number of triangles", triangles, MAX_TRIANGLES),
-        ("number of vertices", vertices, MAX_VERTICES),
-    ];
+    let counts = [("number of triangles", triangles, MAX_TRIANGLES), ("number of vertices", vertices, MAX_VERTICES)];
     match counts.into_iter().find(|(_, found, most)| found > most) {
         None => Ok(()),
         Some((what, found, most)) => Err(too_large(file, what, found, most)),
@@ -862,12 +824,7 @@ pub(super) fn within_budget(vertices: usize, triangles: usize, file: &str) -> Re
 /// Extent of the vertices that triangles use, so that a stray vertex does not set the weld distance.
 fn used_extent(raw: &TriMesh) -> f64 {
     let used = TriMesh {
-        vertices: raw
-            .triangles
-            .iter()
-            .flatten()
-            .map(|&i| raw.vertices[i as usize])
-            .collect(),
+        vertices: raw.triangles.iter().flatten().map(|&i| raw.vertices[i as usize]).collect(),
         triangles: Vec::new(),
     };
     used.extent_m()
@@ -880,13 +837,8 @@ fn fits(extent_m: f64) -> bool {
 
 /// The error for a mesh of the wrong size, `raw_extent` in the unit of the file, with the first usual unit that fits.
 fn far_from_metres(extent_m: f64, raw_extent: f64, scale: f64, file: &str) -> MeshError {
-    let units = [
-        ("metres", 1.0),
-        ("millimetres", 1e-3),
-        ("centimetres", 1e-2),
-        ("inches", 25.4e-3),
-        ("micrometres", 1e-6),
-    ];
+    let units =
+        [("metres", 1.0), ("millimetres", 1e-3), ("centimetres", 1e-2), ("inches", 25.4e-3), ("micrometres", 1e-6)];
     MeshError::FarFromMetres {
         file: file.to_owned(),
         extent_m,

@@ -108,10 +108,7 @@ impl<'m> Nearest<'m> {
             Aabb::new(a.min(b).min(c), a.max(b).max(c))
         };
         let boxes: Vec<Aabb> = (0..mesh.triangles.len()).map(boxed).collect();
-        Self {
-            mesh,
-            boxes: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
-        }
+        Self { mesh, boxes: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes) }
     }
 
     /// Largest distance of any of `points` to the surface, m; 0 without points.
@@ -137,10 +134,7 @@ impl<'m> Nearest<'m> {
 /// Square of the distance from `p` to the box of `node`, m².
 fn box_distance(p: [f64; 3], node: &BvhNode) -> f64 {
     let p = Vector::from(p);
-    (node.mins() - p)
-        .max(p - node.maxs())
-        .max(Vector::ZERO)
-        .length_squared()
+    (node.mins() - p).max(p - node.maxs()).max(Vector::ZERO).length_squared()
 }
 
 /// Square of the distance from `p` to the triangle, m².
@@ -214,10 +208,6 @@ mod tests {
         // facets lie within 1 − cos(π/40) of the sphere along meridians, the same along the equator's 80
         let sagitta = 2.0 * (1.0 - (std::f64::consts::PI / 80.0).cos());
         assert_relative_eq!(tree.farthest_m([[0.0, 0.0, 1.0]]), 1.0, epsilon = sagitta);
-        assert_relative_eq!(
-            tree.farthest_m([[3.0, 0.0, 1.0], [0.0, 0.0, 1.0]]),
-            2.0,
-            epsilon = sagitta
-        );
+        assert_relative_eq!(tree.farthest_m([[3.0, 0.0, 1.0], [0.0, 0.0, 1.0]]), 2.0, epsilon = sagitta);
     }
 }

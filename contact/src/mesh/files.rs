@@ -37,11 +37,7 @@ type Reader = fn(&[u8], f64, &str) -> Result<(TriMesh, MeshReport), MeshError>;
 /// [`MeshError`] if the file cannot be read, is not OBJ, GLB or STL, or fails a check.
 pub fn load(path: &Path, scale: f64) -> Result<(TriMesh, MeshReport), MeshError> {
     let file = path.display().to_string();
-    let extension = path
-        .extension()
-        .and_then(|e| e.to_str())
-        .unwrap_or("")
-        .to_ascii_lowercase();
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let read: Reader = match extension.as_str() {
         "obj" => read_obj,
         "glb" => read_glb,
@@ -55,10 +51,7 @@ pub fn load(path: &Path, scale: f64) -> Result<(TriMesh, MeshReport), MeshError>
 
 /// The error of a mesh file of no known kind.
 pub fn unknown_extension(file: &str, extension: &str) -> MeshError {
-    refused(
-        file,
-        format_args!("extension `{extension}` is not one of obj, glb, stl"),
-    )
+    refused(file, format_args!("extension `{extension}` is not one of obj, glb, stl"))
 }
 
 /// As [`load`], from the bytes of an OBJ file. `file` is the name in errors.
@@ -81,10 +74,8 @@ pub fn read_obj(bytes: &[u8], scale: f64, file: &str) -> Result<(TriMesh, MeshRe
     for tobj::Model { mesh, .. } in models {
         let base = index(raw.vertices.len());
         let (positions, corners) = (mesh.positions.as_chunks().0, mesh.indices.as_chunks().0);
-        raw.vertices
-            .extend(positions.iter().map(|p: &[f32; 3]| p.map(f64::from)));
-        raw.triangles
-            .extend(corners.iter().map(|t: &[u32; 3]| t.map(|i| i.saturating_add(base))));
+        raw.vertices.extend(positions.iter().map(|p: &[f32; 3]| p.map(f64::from)));
+        raw.triangles.extend(corners.iter().map(|t: &[u32; 3]| t.map(|i| i.saturating_add(base))));
     }
     checked(&raw, scale, file)
 }
@@ -130,12 +121,9 @@ fn obj_geometry(text: &str, file: &str) -> Result<String, MeshError> {
 /// `seen` of `all` vertices precede the face.
 fn obj_index(word: &str, seen: usize, all: usize, triangle: usize, file: &str) -> Result<u32, MeshError> {
     let number = word.split('/').next().unwrap_or(word);
-    let given: i64 = number.parse().map_err(|_| {
-        malformed(
-            file,
-            format_args!("triangle {triangle}: `{number}` is not a whole number"),
-        )
-    })?;
+    let given: i64 = number
+        .parse()
+        .map_err(|_| malformed(file, format_args!("triangle {triangle}: `{number}` is not a whole number")))?;
     let limit = |n: usize| i64::try_from(n).unwrap_or(i64::MAX);
     let from_0 = if given < 0 { limit(seen) + given } else { given - 1 };
     let vertex = usize::try_from(from_0).ok().filter(|vertex| *vertex < all);
@@ -203,10 +191,7 @@ struct Glb<'a> {
 impl<'a> Glb<'a> {
     fn new(bytes: &'a [u8], file: &'a str) -> Result<Self, MeshError> {
         let Some(declared) = bytes.get(8..12).map(|b| le_u32(b) as usize) else {
-            return Err(malformed(
-                file,
-                format_args!("{} bytes, a GLB header has 12", bytes.len()),
-            ));
+            return Err(malformed(file, format_args!("{} bytes, a GLB header has 12", bytes.len())));
         };
         if declared < 12 || declared > bytes.len() {
             let why = format!("header declares {declared} bytes, the file has {}", bytes.len());
@@ -215,11 +200,7 @@ impl<'a> Glb<'a> {
         if &bytes[..4] != b"glTF" {
             return Err(malformed(file, "does not start with the bytes `glTF`"));
         }
-        if let Some(found) = bytes
-            .get(12..16)
-            .map(|b| le_u32(b) as usize)
-            .filter(|n| *n > MAX_JSON_BYTES)
-        {
+        if let Some(found) = bytes.get(12..16).map(|b| le_u32(b) as usize).filter(|n| *n > MAX_JSON_BYTES) {
             return Err(too_large(file, "bytes of the JSON chunk", found, MAX_JSON_BYTES));
         }
         let glb = gltf::Glb::from_slice(bytes).map_err(|e| malformed(file, e))?;
@@ -359,12 +340,7 @@ impl<'g> Elements<'g> {
     fn new(glb: &'g Glb<'g>, at: Index<Accessor>) -> Result<Self, MeshError> {
         let accessor = glb.get("accessor", at)?;
         let count = usize::try_from(accessor.count.0).unwrap_or(usize::MAX);
-        Ok(Self {
-            glb,
-            at,
-            accessor,
-            count,
-        })
+        Ok(Self { glb, at, accessor, count })
     }
 
     /// The elements as `number` makes them of their bytes, when they are `kind` of one of the component types in
@@ -379,16 +355,11 @@ impl<'g> Elements<'g> {
         let (Checked::Valid(found), Checked::Valid(shape)) = (&accessor.component_type, &accessor.type_) else {
             return Err(glb.malformed(format_args!("accessor {at} has an unknown type")));
         };
-        let fits = types
-            .iter()
-            .find(|(component, _)| *component == found.0 && *shape == kind);
+        let fits = types.iter().find(|(component, _)| *component == found.0 && *shape == kind);
         let Some(&(_, size)) = fits else {
             let expected: Vec<String> = types.iter().map(|(component, _)| format!("{component:?}")).collect();
             let expected = expected.join(" or ");
-            let why = format!(
-                "accessor {at} holds {shape:?} {:?}, {kind:?} {expected} expected",
-                found.0
-            );
+            let why = format!("accessor {at} holds {shape:?} {:?}, {kind:?} {expected} expected", found.0);
             return Err(glb.malformed(why));
         };
         if accessor.sparse.is_some() {
@@ -403,16 +374,11 @@ impl<'g> Elements<'g> {
         }
         let bytes = |offset: Option<USize64>| offset.map_or(Some(0), |n| usize::try_from(n.0).ok());
         let stride = view.byte_stride.map_or(size, |stride| stride.0);
-        let data = bytes(view.byte_offset)
-            .zip(bytes(Some(view.byte_length)))
-            .and_then(|(start, length)| {
-                let data = glb
-                    .blob
-                    .get(start..start.checked_add(length)?)?
-                    .get(bytes(accessor.byte_offset)?..)?;
-                let end = self.count.saturating_sub(1).checked_mul(stride)?.checked_add(size)?;
-                (stride >= size && (self.count == 0 || end <= data.len())).then_some(data)
-            });
+        let data = bytes(view.byte_offset).zip(bytes(Some(view.byte_length))).and_then(|(start, length)| {
+            let data = glb.blob.get(start..start.checked_add(length)?)?.get(bytes(accessor.byte_offset)?..)?;
+            let end = self.count.saturating_sub(1).checked_mul(stride)?.checked_add(size)?;
+            (stride >= size && (self.count == 0 || end <= data.len())).then_some(data)
+        });
         let Some(data) = data else {
             let (count, length) = (self.count, glb.blob.len());
             let why = format!(
@@ -468,17 +434,12 @@ fn is_text(bytes: &[u8]) -> bool {
 /// A mesh of triangles that share no corners: three of `vertices` each.
 fn soup(vertices: Vec<[f64; 3]>) -> TriMesh {
     let corners = (0..vertices.len() / 3).map(|t| [3 * t, 3 * t + 1, 3 * t + 2].map(index));
-    TriMesh {
-        triangles: corners.collect(),
-        vertices,
-    }
+    TriMesh { triangles: corners.collect(), vertices }
 }
 
 fn binary_stl(records: &[u8], file: &str) -> Result<TriMesh, MeshError> {
     within_budget(0, records.len() / TRIANGLE, file)?;
-    let corners = records
-        .chunks_exact(TRIANGLE)
-        .flat_map(|record| record[12..48].chunks_exact(12));
+    let corners = records.chunks_exact(TRIANGLE).flat_map(|record| record[12..48].chunks_exact(12));
     Ok(soup(corners.map(|b| le_point(b).map(f64::from)).collect()))
 }
 
@@ -518,10 +479,7 @@ fn text_stl(text: &str, file: &str) -> Result<TriMesh, MeshError> {
 
 /// The number in four bytes, the least significant first.
 fn le_u32(bytes: &[u8]) -> u32 {
-    bytes
-        .iter()
-        .rev()
-        .fold(0, |number, byte| number << 8 | u32::from(*byte))
+    bytes.iter().rev().fold(0, |number, byte| number << 8 | u32::from(*byte))
 }
 
 /// Three f32 in twelve bytes.
@@ -572,10 +530,7 @@ impl TriMesh {
         let position_bytes = bin.len();
         bin.extend(self.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()));
         let index_bytes = bin.len() - position_bytes;
-        let name: String = name
-            .chars()
-            .filter(|c| c.is_ascii_alphanumeric() || "-_. ".contains(*c))
-            .collect();
+        let name: String = name.chars().filter(|c| c.is_ascii_alphanumeric() || "-_. ".contains(*c)).collect();
         let mut json = format!(
             concat!(
                 r#"{{"asset":{{"version":"2.0","generator":"spts-sim"}},"scene":0,"scenes":[{{"nodes":[0]}}],"#,
@@ -626,18 +581,12 @@ mod tests {
         assert_eq!(reader.read_positions().unwrap().count(), 8);
         assert_eq!(reader.read_indices().unwrap().into_u32().max(), Some(7));
         let high = primitive.bounding_box().max;
-        assert!(
-            (high[0] - 0.01).abs() < 1e-9 && (high[2] - 0.04).abs() < 1e-8,
-            "{high:?}"
-        );
+        assert!((high[0] - 0.01).abs() < 1e-9 && (high[2] - 0.04).abs() < 1e-8, "{high:?}");
     }
 
     #[test]
     fn obj_has_no_negative_zero() {
-        let mesh = TriMesh {
-            vertices: vec![[-1e-12, 0.0, 0.0]],
-            triangles: vec![],
-        };
+        let mesh = TriMesh { vertices: vec![[-1e-12, 0.0, 0.0]], triangles: vec![] };
         assert!(!mesh.to_obj("x").contains("-0.0"));
     }
 }

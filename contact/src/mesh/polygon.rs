@@ -71,10 +71,7 @@ pub fn rounded(outline: &[Point], radius_m: f64, steps: usize) -> Vec<Point> {
         let sweep = std::f64::consts::PI - 2.0 * half;
         for k in 0..=steps {
             let (s, c) = (sweep * ratio(k, steps)).sin_cos();
-            out.push([
-                centre[0] + c * start[0] - s * start[1],
-                centre[1] + s * start[0] + c * start[1],
-            ]);
+            out.push([centre[0] + c * start[0] - s * start[1], centre[1] + s * start[0] + c * start[1]]);
         }
     }
     out
@@ -125,11 +122,7 @@ pub(super) fn turn(a: Point, b: Point, c: Point) -> f64 {
 fn unit(a: Point, b: Point) -> (Point, f64) {
     let d = [b[0] - a[0], b[1] - a[1]];
     let length = d[0].hypot(d[1]);
-    if length > 0.0 {
-        ([d[0] / length, d[1] / length], length)
-    } else {
-        ([0.0; 2], 0.0)
-    }
+    if length > 0.0 { ([d[0] / length, d[1] / length], length) } else { ([0.0; 2], 0.0) }
 }
 
 // Triangulation of a polygon with holes by bridging and ear clipping.
@@ -247,29 +240,18 @@ mod tests {
         assert_relative_eq!(signed_area_m2(&rectangle(2.0, 3.0)), 6.0);
         assert_relative_eq!(signed_area_m2(&triangle(2.0)), 3.0_f64.sqrt(), max_relative = 1e-12);
         // a regular n-gon has n/2 sin(2π/n) of the circle's r²
-        assert_relative_eq!(
-            signed_area_m2(&circle(1.0, 64)),
-            32.0 * (TAU / 64.0).sin(),
-            max_relative = 1e-12
-        );
+        assert_relative_eq!(signed_area_m2(&circle(1.0, 64)), 32.0 * (TAU / 64.0).sin(), max_relative = 1e-12);
         // a rounded corner of 90° loses (1 − π/4) r²; an arc of k chords a little more
         let round = signed_area_m2(&rounded(&rectangle(4.0, 4.0), 1.0, 200));
         assert_relative_eq!(round, 12.0 + std::f64::consts::PI, max_relative = 1e-4);
         let band = between([0.0, 2.0], 5, |x| x - 0.25, |x| x + 0.25);
         assert_relative_eq!(signed_area_m2(&band), 1.0, max_relative = 1e-12);
         assert_eq!(between([0.0, 2.0], 2, |_| 0.0, |x| x * (2.0 - x)).len(), 4);
-        assert_relative_eq!(
-            signed_area_m2(&placed(&band, 1.0, [3.0, 4.0])),
-            1.0,
-            max_relative = 1e-12
-        );
+        assert_relative_eq!(signed_area_m2(&placed(&band, 1.0, [3.0, 4.0])), 1.0, max_relative = 1e-12);
     }
 
     fn area(points: &[Point], triangles: &[[usize; 3]]) -> f64 {
-        triangles
-            .iter()
-            .map(|t| 0.5 * turn(points[t[0]], points[t[1]], points[t[2]]))
-            .sum()
+        triangles.iter().map(|t| 0.5 * turn(points[t[0]], points[t[1]], points[t[2]])).sum()
     }
 
     /// n points and h holes give n + 2h − 2 triangles, none turned over, that cover the area.
@@ -283,27 +265,15 @@ mod tests {
         let points: Vec<Point> = outer.iter().chain(holes.iter().flatten()).copied().collect();
         let triangles = triangulate(&outer, &holes);
         assert_eq!(triangles.len(), points.len() + 2 * holes.len() - 2);
-        assert!(
-            triangles
-                .iter()
-                .all(|t| turn(points[t[0]], points[t[1]], points[t[2]]) > 0.0)
-        );
+        assert!(triangles.iter().all(|t| turn(points[t[0]], points[t[1]], points[t[2]]) > 0.0));
         let expected = 60.0 - holes.iter().map(|h| signed_area_m2(h)).sum::<f64>();
         assert_relative_eq!(area(&points, &triangles), expected, max_relative = 1e-12);
     }
 
     #[test]
     fn concave_and_clockwise() {
-        let mut outline = vec![
-            [0.0, 0.0],
-            [4.0, 0.0],
-            [4.0, 4.0],
-            [3.0, 4.0],
-            [3.0, 1.0],
-            [1.0, 1.0],
-            [1.0, 4.0],
-            [0.0, 4.0],
-        ];
+        let mut outline =
+            vec![[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [3.0, 4.0], [3.0, 1.0], [1.0, 1.0], [1.0, 4.0], [0.0, 4.0]];
         assert_relative_eq!(area(&outline, &triangulate(&outline, &[])), 10.0, max_relative = 1e-12);
         outline.reverse();
         assert_relative_eq!(area(&outline, &triangulate(&outline, &[])), 10.0, max_relative = 1e-12);
@@ -331,10 +301,6 @@ mod tests {
         assert_eq!(triangles.len(), outline.len() - 2);
         let turns = |t: &[usize; 3]| turn(outline[t[0]], outline[t[1]], outline[t[2]]);
         assert!(triangles.iter().all(|t| turns(t) > 0.0));
-        assert_relative_eq!(
-            area(&outline, &triangles),
-            signed_area_m2(&outline).abs(),
-            max_relative = 1e-12
-        );
+        assert_relative_eq!(area(&outline, &triangles), signed_area_m2(&outline).abs(), max_relative = 1e-12);
     }
 }

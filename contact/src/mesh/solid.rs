@@ -149,10 +149,7 @@ mod tests {
         let block = cuboid([2.0, 3.0, 4.0]);
         assert_relative_eq!(block.volume_m3(), 24.0, max_relative = 1e-12);
         assert_relative_eq!(block.area_m2(), 52.0, max_relative = 1e-12);
-        assert_eq!(
-            (block.vertices.len(), block.triangles.len(), block.open_edges()),
-            (8, 12, 0)
-        );
+        assert_eq!((block.vertices.len(), block.triangles.len(), block.open_edges()), (8, 12, 0));
     }
 
     #[test]

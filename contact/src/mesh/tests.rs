@@ -58,20 +58,11 @@ fn files_that_are_not_meshes() {
     refuses(missing, &["none.obj`: cannot be read"]);
     let step = load(&save(&directory, "a.step", b"x"), 1.0);
     refuses(step, &["extension `step` is not one of obj, glb, stl"]);
-    refuses(
-        load(&save(&directory, "plain", b"x"), 1.0),
-        &["extension `` is not one of"],
-    );
+    refuses(load(&save(&directory, "plain", b"x"), 1.0), &["extension `` is not one of"]);
     let glb: &[u8] = b"glTF\x02\0\0\0\0\0\0\0";
     for (read, part) in [
-        (
-            read_obj(b"v 1 2\nf 1 1 1\n", 1.0, "a"),
-            "malformed: vertex 0, coordinate z = `` is not a number",
-        ),
-        (
-            read_obj(b"v 1 2 3\nf 1 1 x/1\n", 1.0, "a"),
-            "malformed: triangle 0: `x` is not a whole number",
-        ),
+        (read_obj(b"v 1 2\nf 1 1 1\n", 1.0, "a"), "malformed: vertex 0, coordinate z = `` is not a number"),
+        (read_obj(b"v 1 2 3\nf 1 1 x/1\n", 1.0, "a"), "malformed: triangle 0: `x` is not a whole number"),
         (read_obj(&[0xff, 0xfe, 0], 1.0, "a"), "malformed"),
         (read_obj(b"", 1.0, "a"), "0 triangles of non-zero size"),
         (read_glb(b"glTF", 1.0, "a"), "malformed"),
@@ -88,10 +79,7 @@ fn obj_dialects() {
                 v .02 .02 .02\nv 0 .02 .02\nvn 0 0 1\nvt 0 0\ng one\nusemtl m\nf 1//1 4//1 3//1 2//1\nf 5/1 6/1 7/1 8/1\n\
                 g two\nl 1 2\nf 1 2 6 5\nf 2 3 7 6\nf -6 -5 -1 -2\nf 4 1 5 8\n";
     let (mesh, report) = read_obj(text.as_bytes(), 1.0, "cube.obj").unwrap();
-    assert_eq!(
-        (mesh.vertices.len(), mesh.triangles.len(), report.flipped),
-        (8, 12, false)
-    );
+    assert_eq!((mesh.vertices.len(), mesh.triangles.len(), report.flipped), (8, 12, false));
     assert_relative_eq!(mesh.volume_m3(), 8e-6, max_relative = 1e-6);
 }
 
@@ -128,10 +116,7 @@ fn far_from_metres_suggests_the_scale() {
     let small = checked(&block(), 1e-3, "a");
     assert!(matches!(small, Err(MeshError::FarFromMetres { .. })));
     // 0.04e-300 m: the size is what is wrong, though no two vertices are apart any more
-    let words = [
-        "e-302 m after scale = 1e-300 is",
-        "if its unit is metres, use scale = 1",
-    ];
+    let words = ["e-302 m after scale = 1e-300 is", "if its unit is metres, use scale = 1"];
     refuses(checked(&block(), 1e-300, "a"), &words);
     let words = ["= 400000 m", "if its unit is micrometres, use scale = 1e-6"];
     refuses(gate(&block().scaled([1e7; 3])), &words);
@@ -151,14 +136,8 @@ fn meshes_without_an_inside() {
     // top and bottom coincide: either everything collapses or nothing is enclosed
     let said = gate(&sheet).unwrap_err().to_string();
     assert!(said.contains("encloses") || said.contains("0 triangles"), "{said}");
-    let dust = TriMesh {
-        vertices: vec![[0.0; 3]; 3],
-        triangles: vec![[0, 1, 2]],
-    };
-    refuses(
-        gate(&dust),
-        &["0 triangles of non-zero size (1 degenerate ones dropped)"],
-    );
+    let dust = TriMesh { vertices: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]] };
+    refuses(gate(&dust), &["0 triangles of non-zero size (1 degenerate ones dropped)"]);
 }
 
 #[test]
@@ -184,10 +163,7 @@ fn transforms_keep_the_solid() {
     let pair = block().merged(&block().translated([0.1, 0.0, 0.0]));
     assert_relative_eq!(pair.volume_m3(), 48e-6, max_relative = 1e-9);
     assert_eq!((pair.open_edges(), pair.vertices.len()), (0, 16));
-    assert_relative_eq!(
-        block().translated([0.0, 0.0, -7.0]).grounded().bounds().unwrap().0[2],
-        0.0
-    );
+    assert_relative_eq!(block().translated([0.0, 0.0, -7.0]).grounded().bounds().unwrap().0[2], 0.0);
 }
 
 /// A GLB whose one mesh hangs below two nodes: a child that is moved and mirrored, under a parent that scales.
@@ -202,10 +178,7 @@ fn glb_node_transforms_are_applied() {
     assert!(!report.flipped, "mirroring is undone by turning the triangles");
     assert_relative_eq!(mesh.volume_m3(), 8.0 * 24e-6, max_relative = 1e-6);
     assert_relative_eq!(mesh.bounds().unwrap().0[0], 2.0 - 0.02, max_relative = 1e-6);
-    refuses(
-        read(r#""nodes":[{"mesh":0,"children":[0]}]"#),
-        &["the node tree is cyclic"],
-    );
+    refuses(read(r#""nodes":[{"mesh":0,"children":[0]}]"#), &["the node tree is cyclic"]);
     refuses(read(r#""nodes":[{"mesh":3}]"#), &["mesh 3 is outside [0, 1)"]);
 }
 
@@ -368,15 +341,9 @@ fn damaged_files_say_what_is_wrong() {
     let plain = String::from_utf8(text(&block())).unwrap();
     says(&plain.as_bytes()[..plain.len() / 2], "endsolid");
     let broken = |old: &str, new: &str| plain.replacen(old, new, 1).into_bytes();
-    says(
-        &broken("e-2", "e-2x"),
-        "malformed: vertex 0, coordinate x = `-1e-2x` is not a number",
-    );
+    says(&broken("e-2", "e-2x"), "malformed: vertex 0, coordinate x = `-1e-2x` is not a number");
     says(&broken("vertex -1e-2", "vertex -inf"), "coordinate x = -inf");
-    says(
-        &broken("    endloop\n", ""),
-        "triangle 0: `endloop` expected, found `endfacet`",
-    );
+    says(&broken("    endloop\n", ""), "triangle 0: `endloop` expected, found `endfacet`");
     says(b"solid empty\nendsolid empty\n", "0 triangles");
     // the unit of a file is never guessed
     let micrometres = self::binary(&block().scaled([1e6; 3]));
@@ -463,12 +430,7 @@ fn a_cavity_is_not_inside_out() {
     assert!(report.flipped);
     assert_relative_eq!(mesh.volume_m3(), 23e-6, max_relative = 1e-12);
     // inside the box around a bent part, but not inside the part: no cavity
-    let arch = extrude_recessed(
-        &polygon::rectangle(0.04, 0.04),
-        &polygon::rectangle(0.03, 0.03),
-        0.03,
-        0.025,
-    );
+    let arch = extrude_recessed(&polygon::rectangle(0.04, 0.04), &polygon::rectangle(0.03, 0.03), 0.03, 0.025);
     let below = cuboid([0.01, 0.01, 0.01]).flipped();
     let (mesh, report) = pass(&arch.clone().merged(&below));
     assert!(report.flipped);
@@ -516,9 +478,7 @@ fn sheets_that_enclose_nothing_go() {
 fn small_holes_are_filled_flat() {
     let whole = cuboid([0.02, 0.02, 0.01]).refined(0.9e-3, |p, q| p[2].max(q[2]) <= 0.0);
     // one triangle of the underside, which is flat, so that volume and area come back
-    let below = (0..whole.triangles.len())
-        .find(|&t| centre(&whole, t)[2] <= 0.0)
-        .unwrap();
+    let below = (0..whole.triangles.len()).find(|&t| centre(&whole, t)[2] <= 0.0).unwrap();
     let mut keep = vec![true; whole.triangles.len()];
     keep[below] = false;
     let (mended, report) = pass(&whole.only(&keep));
@@ -569,10 +529,8 @@ fn an_open_top_gets_a_lid_above_everything() {
                 continue;
             }
             let base = index(scan.vertices.len());
-            scan.vertices
-                .extend([at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)]);
-            scan.triangles
-                .extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
+            scan.vertices.extend([at(i, j), at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)]);
+            scan.triangles.extend([[base, base + 1, base + 2], [base, base + 2, base + 3]]);
         }
     }
     let (mesh, report) = pass(&scan);
@@ -589,10 +547,7 @@ fn an_open_top_gets_a_lid_above_everything() {
 
 /// A cone on its tip, 40 mm wide and 20 mm high, open above with a rim of `n` edges.
 fn bowl(n: u32) -> TriMesh {
-    let mut bowl = TriMesh {
-        vertices: vec![[0.0; 3]],
-        triangles: Vec::new(),
-    };
+    let mut bowl = TriMesh { vertices: vec![[0.0; 3]], triangles: Vec::new() };
     for k in 0..n {
         let (y, x) = (std::f64::consts::TAU * f64::from(k) / f64::from(n)).sin_cos();
         bowl.vertices.push([0.02 * x, 0.02 * y, 0.02]);
@@ -641,9 +596,7 @@ fn surfaces_without_outside_are_refused() {
         corner([0.01, 0.015, 0.04]),
         corner([-0.01, -0.015, 0.04]),
     ];
-    walled
-        .triangles
-        .extend([[ends[0], ends[1], ends[2]], [ends[0], ends[2], ends[3]]]);
+    walled.triangles.extend([[ends[0], ends[1], ends[2]], [ends[0], ends[2], ends[3]]]);
     let said = gate(&walled).unwrap_err().to_string();
     let parts = ["3 triangles meet in an edge at", "not closed"];
     assert!(parts.iter().any(|part| said.contains(part)), "{said}");
@@ -654,8 +607,7 @@ fn surfaces_without_outside_are_refused() {
         let angle = std::f64::consts::TAU * f64::from(k) / f64::from(turns);
         for side in [-0.005, 0.005] {
             let r = 0.02 + side * (0.5 * angle).cos();
-            band.vertices
-                .push([r * angle.cos(), r * angle.sin(), side * (0.5 * angle).sin()]);
+            band.vertices.push([r * angle.cos(), r * angle.sin(), side * (0.5 * angle).sin()]);
         }
     }
     for k in 0..turns {
@@ -686,11 +638,7 @@ fn deepest_m(mesh: &TriMesh, radius_m: f64) -> f64 {
         let [s, m, l] = sides;
         let n = mesh.area_vector_m2(t);
         let double = n.iter().map(|x| x * x).sum::<f64>();
-        let circle = if l >= s + m {
-            0.25 * l
-        } else {
-            s * m * l / (4.0 * double)
-        };
+        let circle = if l >= s + m { 0.25 * l } else { s * m * l / (4.0 * double) };
         radius_m - (radius_m * radius_m - circle).sqrt()
     };
     (0..mesh.triangles.len()).map(depth).fold(0.0, f64::max)
@@ -704,10 +652,7 @@ fn a_fine_sphere_is_decimated_within_its_bound() {
     assert!(ball.triangles.len() > 100_000);
     let (mesh, report) = pass(&ball);
     assert_eq!(report.decimated_from, Some(ball.triangles.len()));
-    assert_eq!(
-        (mesh.triangles.len() <= SOFT_MAX_TRIANGLES, report.heavy),
-        (true, false)
-    );
+    assert_eq!((mesh.triangles.len() <= SOFT_MAX_TRIANGLES, report.heavy), (true, false));
     let said_m = report.decimation_error_m.unwrap();
     assert!(said_m > 0.0 && said_m <= MAX_DECIMATION_ERROR_M, "{said_m}");
     // the original lies below the sphere itself, by at most its own deepest facet; and the deepest point is missed by
@@ -749,22 +694,12 @@ fn a_million_triangles_from_a_file() {
     assert_eq!(report.decimated_from, Some(ball.triangles.len()));
     assert_eq!(mesh.open_edges(), 0);
     // smooth on the scale of a millimetre: a few thousand facets follow it to 0.1 mm
-    assert!(
-        mesh.triangles.len() < 2 * SOFT_MAX_TRIANGLES,
-        "{}",
-        mesh.triangles.len()
-    );
+    assert!(mesh.triangles.len() < 2 * SOFT_MAX_TRIANGLES, "{}", mesh.triangles.len());
     let error_m = report.decimation_error_m.unwrap();
     assert!(error_m <= MAX_DECIMATION_ERROR_M, "{error_m}");
     // up to 10 mm from the lowest point the surface rises by at most tan(asin(1/3)) + 0.06 = 0.41, so that a distance e
     // between the surfaces is at most 1.1 e upright; the rest is for where the error was not sampled
-    for [x, y] in [
-        [0.0, 0.0],
-        [0.004, 0.001],
-        [-0.003, 0.005],
-        [0.006, -0.007],
-        [-0.0091, -0.002],
-    ] {
+    for [x, y] in [[0.0, 0.0], [0.004, 0.001], [-0.003, 0.005], [0.006, -0.007], [-0.0091, -0.002]] {
         let [before, after] = [&ball, &mesh].map(|mesh| mesh.underside_m([x, y]).unwrap());
         assert!((before - after).abs() <= 1.2 * error_m, "({x}, {y}): {before} {after}");
     }

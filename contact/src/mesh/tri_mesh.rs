@@ -99,10 +99,7 @@ pub(super) struct Unions {
 
 impl Unions {
     pub(super) fn new(n: usize) -> Self {
-        Self {
-            parent: (0..n).map(index).collect(),
-            turned: vec![false; n],
-        }
+        Self { parent: (0..n).map(index).collect(), turned: vec![false; n] }
     }
 
     /// First member of the set of `i`, and whether `i` is turned against it.
@@ -156,11 +153,7 @@ pub(super) fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 pub(super) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -184,9 +177,8 @@ impl TriMesh {
 
     /// Longest side of the box around the vertices, m; 0 for a mesh without vertices.
     pub fn extent_m(&self) -> f64 {
-        self.bounds().map_or(0.0, |(low, high)| {
-            (0..3).fold(0.0, |most: f64, k| most.max(high[k] - low[k]))
-        })
+        self.bounds()
+            .map_or(0.0, |(low, high)| (0..3).fold(0.0, |most: f64, k| most.max(high[k] - low[k])))
     }
 
     /// Normal of triangle `t` times twice its area, m².
@@ -272,11 +264,7 @@ impl TriMesh {
     /// then turned to face outwards again.
     pub fn scaled(self, factor: [f64; 3]) -> Self {
         let scaled = self.mapped(|v| [v[0] * factor[0], v[1] * factor[1], v[2] * factor[2]]);
-        if factor.iter().product::<f64>() < 0.0 {
-            scaled.flipped()
-        } else {
-            scaled
-        }
+        if factor.iter().product::<f64>() < 0.0 { scaled.flipped() } else { scaled }
     }
 
     /// Multiplies every vertex by a row-major rotation matrix.
@@ -309,8 +297,7 @@ impl TriMesh {
     pub(crate) fn merged(mut self, other: &TriMesh) -> Self {
         let base = index(self.vertices.len());
         self.vertices.extend_from_slice(&other.vertices);
-        self.triangles
-            .extend(other.triangles.iter().map(|t| t.map(|i| i.saturating_add(base))));
+        self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i.saturating_add(base))));
         self
     }
 }
@@ -365,9 +352,7 @@ impl TriMesh {
     /// Pieces of triangle `t` whose edges `k → k+1` have the middles `mids[k]`, where split.
     fn split(&self, t: [u32; 3], mids: [Option<u32>; 3], out: &mut Vec<[u32; 3]>) {
         // turned so that the split edges come first
-        let first = (0..3)
-            .find(|&k| mids[k].is_some() && mids[(k + 2) % 3].is_none())
-            .unwrap_or(0);
+        let first = (0..3).find(|&k| mids[k].is_some() && mids[(k + 2) % 3].is_none()).unwrap_or(0);
         let [a, b, c] = [0, 1, 2].map(|k| t[(first + k) % 3]);
         match [0, 1, 2].map(|k| mids[(first + k) % 3]) {
             [Some(ab), Some(bc), Some(ca)] => out.extend([[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]),
@@ -436,10 +421,7 @@ impl TriMesh {
 
     /// `triangles` on the vertices of this mesh, without those that nothing uses.
     pub(super) fn with_triangles(&self, triangles: &[[u32; 3]]) -> Self {
-        let mut out = Self {
-            vertices: Vec::new(),
-            triangles: Vec::with_capacity(triangles.len()),
-        };
+        let mut out = Self { vertices: Vec::new(), triangles: Vec::with_capacity(triangles.len()) };
         let mut renumbered: Vec<Option<u32>> = vec![None; self.vertices.len()];
         for t in triangles {
             out.triangles.push(t.map(|i| {
@@ -462,10 +444,7 @@ impl TriMesh {
     /// If an index is out of range; [`super::checked`] tests the indices first.
     pub(crate) fn welded(&self, tolerance_m: f64) -> (Self, usize, usize) {
         let side_m = (CELL_TOLERANCES * tolerance_m).max(f64::MIN_POSITIVE.sqrt());
-        let mut grid = Grid {
-            side_m,
-            cells: HashMap::new(),
-        };
+        let mut grid = Grid { side_m, cells: HashMap::new() };
         let mut kept: Vec<[f64; 3]> = Vec::new();
         let mut target: Vec<u32> = Vec::with_capacity(self.vertices.len());
         for &v in &self.vertices {
@@ -480,10 +459,7 @@ impl TriMesh {
         let corners = self.triangles.iter().map(|t| t.map(|i| target[i as usize]));
         let triangles: Vec<[u32; 3]> = corners.filter(|&[a, b, c]| a != b && b != c && c != a).collect();
         let dropped = self.triangles.len() - triangles.len();
-        let whole = Self {
-            vertices: kept,
-            triangles: Vec::new(),
-        };
+        let whole = Self { vertices: kept, triangles: Vec::new() };
         (whole.with_triangles(&triangles), joined, dropped)
     }
 }

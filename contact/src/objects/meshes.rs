@@ -31,51 +31,23 @@ const THICKNESS_M: f64 = 10e-3;
 /// middle of the box around it.
 fn tee(bar: f64, bar_width: f64, height: f64, stem_width: f64) -> Vec<Point> {
     let (x, s, top, neck) = (0.5 * bar, 0.5 * stem_width, 0.5 * height, 0.5 * height - bar_width);
-    vec![
-        [-s, -top],
-        [s, -top],
-        [s, neck],
-        [x, neck],
-        [x, top],
-        [-x, top],
-        [-x, neck],
-        [-s, neck],
-    ]
+    vec![[-s, -top], [s, -top], [s, neck], [x, neck], [x, top], [-x, top], [-x, neck], [-s, neck]]
 }
 
 /// Two bars of `width` that cross in their middles: one of length `long` along x, one of length `short` along y.
 fn cross(long: f64, short: f64, width: f64) -> Vec<Point> {
     let (a, b, w) = (0.5 * long, 0.5 * short, 0.5 * width);
-    vec![
-        [-a, -w],
-        [-w, -w],
-        [-w, -b],
-        [w, -b],
-        [w, -w],
-        [a, -w],
-        [a, w],
-        [w, w],
-        [w, b],
-        [-w, b],
-        [-w, w],
-        [-a, w],
-    ]
+    vec![[-a, -w], [-w, -w], [-w, -b], [w, -b], [w, -w], [a, -w], [a, w], [w, w], [w, b], [-w, b], [-w, w], [-a, w]]
 }
 
 /// Wide letter T.
 pub(super) fn letter_t() -> TriMesh {
-    bowed(
-        extrude(&tee(60e-3, 29.5e-3, 97e-3, 16e-3), &[], THICKNESS_M),
-        [-0.3e-3, -0.1e-3],
-    )
+    bowed(extrude(&tee(60e-3, 29.5e-3, 97e-3, 16e-3), &[], THICKNESS_M), [-0.3e-3, -0.1e-3])
 }
 
 /// Narrow letter T.
 pub(super) fn small_t() -> TriMesh {
-    bowed(
-        extrude(&tee(55e-3, 10e-3, 105.5e-3, 7.5e-3), &[], THICKNESS_M),
-        [0.0, -0.25e-3],
-    )
+    bowed(extrude(&tee(55e-3, 10e-3, 105.5e-3, 7.5e-3), &[], THICKNESS_M), [0.0, -0.25e-3])
 }
 
 /// Letter X.
@@ -85,10 +57,7 @@ pub(super) fn letter_x() -> TriMesh {
 
 /// Straight bar along x.
 pub(super) fn line() -> TriMesh {
-    bowed(
-        extrude(&polygon::rectangle(96e-3, 8e-3), &[], THICKNESS_M),
-        [-0.5e-3, 0.0],
-    )
+    bowed(extrude(&polygon::rectangle(96e-3, 8e-3), &[], THICKNESS_M), [-0.5e-3, 0.0])
 }
 
 /// An L: legs along −x and +y from the outer corner at the lower right; origin in the middle of the box around it.
@@ -100,18 +69,12 @@ pub(super) fn corner() -> TriMesh {
 
 /// Rectangular plate, its long edges touching first.
 pub(super) fn rec() -> TriMesh {
-    bowed(
-        extrude(&polygon::rectangle(82e-3, 62e-3), &[], THICKNESS_M),
-        [0.0, -0.4e-3],
-    )
+    bowed(extrude(&polygon::rectangle(82e-3, 62e-3), &[], THICKNESS_M), [0.0, -0.4e-3])
 }
 
 /// Round plate.
 pub(super) fn circle() -> TriMesh {
-    bowed(
-        extrude(&polygon::circle(44e-3, 64), &[], THICKNESS_M),
-        [0.05e-3, -0.15e-3],
-    )
+    bowed(extrude(&polygon::circle(44e-3, 64), &[], THICKNESS_M), [0.05e-3, -0.15e-3])
 }
 
 /// Equilateral triangle with rounded corners, apex along +y.
@@ -175,10 +138,7 @@ pub(super) fn comb() -> TriMesh {
 
 /// Block eraser, its felt pad slightly bowed.
 pub(super) fn eraser() -> TriMesh {
-    bowed(
-        extrude(&polygon::rectangle(53e-3, 87e-3), &[], 25e-3),
-        [0.2e-3, -0.15e-3],
-    )
+    bowed(extrude(&polygon::rectangle(53e-3, 87e-3), &[], 25e-3), [0.2e-3, -0.15e-3])
 }
 
 /// Toy fish swimming in an S: body thickest in the middle, tail fin flared.
@@ -186,21 +146,14 @@ pub(super) fn fish() -> TriMesh {
     let (length, sway, width) = (80e-3, -3.5e-3, 15.5e-3);
     let spine = |x: f64| sway * (TAU * x / length).sin();
     let half_width = |x: f64| 0.5 * width * fish_width(x / length + 0.5);
-    let outline = polygon::between(
-        [-0.5 * length, 0.5 * length],
-        24,
-        |x| spine(x) - half_width(x),
-        |x| spine(x) + half_width(x),
-    );
+    let outline =
+        polygon::between([-0.5 * length, 0.5 * length], 24, |x| spine(x) - half_width(x), |x| spine(x) + half_width(x));
     bowed(extrude(&outline, &[], 15e-3), [-0.25e-3, -0.05e-3])
 }
 
 /// Width of the fish, as a part of the widest, at `s` from tail (0) to nose (1).
 fn fish_width(s: f64) -> f64 {
-    let body = (std::f64::consts::PI * ((s - 0.1) / 0.9).clamp(0.0, 1.0))
-        .sin()
-        .max(0.0)
-        .sqrt();
+    let body = (std::f64::consts::PI * ((s - 0.1) / 0.9).clamp(0.0, 1.0)).sin().max(0.0).sqrt();
     let fin = 0.8 * (1.0 - s / 0.2).max(0.0);
     body.max(fin).max(0.15)
 }

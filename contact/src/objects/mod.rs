@@ -123,13 +123,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         meshes::center,
         [4.78, 5.36, 0.118, 0.006, -0.0097],
     ),
-    object(
-        3,
-        "circle",
-        "Round plate, like a coaster",
-        meshes::circle,
-        [4.53, 4.25, 0.0, -0.004, -0.0012],
-    ),
+    object(3, "circle", "Round plate, like a coaster", meshes::circle, [4.53, 4.25, 0.0, -0.004, -0.0012]),
     object(
         4,
         "comb",
@@ -137,13 +131,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         meshes::comb,
         [6.53, 4.82, -1.03, -0.002, 0.005],
     ),
-    object(
-        5,
-        "corner",
-        "L-shaped corner piece",
-        meshes::corner,
-        [5.17, 5.29, 0.086, -0.0105, -0.0061],
-    ),
+    object(5, "corner", "L-shaped corner piece", meshes::corner, [5.17, 5.29, 0.086, -0.0105, -0.0061]),
     soft(
         ERASER_PAD_PA_PER_M,
         object(
@@ -154,13 +142,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
             [4.92, 4.59, 0.122, 0.0012, -0.0056],
         ),
     ),
-    object(
-        7,
-        "fish",
-        "Toy fish in an S curve",
-        meshes::fish,
-        [5.01, 3.17, 0.949, -0.004, 0.0204],
-    ),
+    object(7, "fish", "Toy fish in an S curve", meshes::fish, [5.01, 3.17, 0.949, -0.004, 0.0204]),
     object(
         8,
         "gel",
@@ -168,13 +150,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         meshes::gel,
         [5.8, 4.48, 0.0, -0.0007, 0.0002],
     ),
-    object(
-        9,
-        "line",
-        "Straight bar, pressed along the diagonal",
-        meshes::line,
-        [4.58, 4.58, -0.786, 0.001, 0.0028],
-    ),
+    object(9, "line", "Straight bar, pressed along the diagonal", meshes::line, [4.58, 4.58, -0.786, 0.001, 0.0028]),
     object(
         10,
         "perfume",
@@ -182,13 +158,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         meshes::perfume,
         [5.02, 4.28, 0.028, 0.0061, -0.0097],
     ),
-    object(
-        11,
-        "rec",
-        "Rectangular plate",
-        meshes::rec,
-        [5.07, 4.24, -0.101, -0.0033, -0.0009],
-    ),
+    object(11, "rec", "Rectangular plate", meshes::rec, [5.07, 4.24, -0.101, -0.0033, -0.0009]),
     object(
         12,
         "smallT",
@@ -196,13 +166,7 @@ pub const OBJECTS: &[ObjectSpec] = &[
         meshes::small_t,
         [4.73, 4.31, 2.378, 0.0246, 0.0339],
     ),
-    object(
-        13,
-        "T",
-        "Wide letter T",
-        meshes::letter_t,
-        [4.6, 4.68, 0.012, 0.0022, -0.0036],
-    ),
+    object(13, "T", "Wide letter T", meshes::letter_t, [4.6, 4.68, 0.012, 0.0022, -0.0036]),
     object(
         14,
         "tape",
@@ -210,24 +174,9 @@ pub const OBJECTS: &[ObjectSpec] = &[
         meshes::tape,
         [4.11, 4.2, 0.0, 0.0206, -0.0119],
     ),
-    soft(
-        BALL_STIFFNESS_PA_PER_M,
-        object(15, "tennis", "Tennis ball", meshes::tennis, [5.05, 5.03, 0.0, 0.0, 0.0]),
-    ),
-    object(
-        16,
-        "trig",
-        "Triangular block with rounded corners",
-        meshes::trig,
-        [4.83, 3.92, 0.103, -0.0285, -0.0047],
-    ),
-    object(
-        17,
-        "X",
-        "Letter X: two crossed bars",
-        meshes::letter_x,
-        [6.01, 3.91, 0.799, 0.0091, -0.0275],
-    ),
+    soft(BALL_STIFFNESS_PA_PER_M, object(15, "tennis", "Tennis ball", meshes::tennis, [5.05, 5.03, 0.0, 0.0, 0.0])),
+    object(16, "trig", "Triangular block with rounded corners", meshes::trig, [4.83, 3.92, 0.103, -0.0285, -0.0047]),
+    object(17, "X", "Letter X: two crossed bars", meshes::letter_x, [6.01, 3.91, 0.799, 0.0091, -0.0275]),
 ];
 
 const fn object(
@@ -243,22 +192,13 @@ const fn object(
         description,
         build,
         stiffness_pa_per_m: None,
-        placement: Placement {
-            row,
-            col,
-            rotation_rad,
-            tilt_x_rad,
-            tilt_y_rad,
-        },
+        placement: Placement { row, col, rotation_rad, tilt_x_rad, tilt_y_rad },
     }
 }
 
 /// `object` with a surface of this stiffness, Pa/m.
 const fn soft(stiffness_pa_per_m: f64, object: ObjectSpec) -> ObjectSpec {
-    ObjectSpec {
-        stiffness_pa_per_m: Some(stiffness_pa_per_m),
-        ..object
-    }
+    ObjectSpec { stiffness_pa_per_m: Some(stiffness_pa_per_m), ..object }
 }
 
 /// Stiffness of a finger's pulp, Pa/m: about 80 kPa over 5 mm (estimate).
@@ -266,13 +206,5 @@ const PULP_PA_PER_M: f64 = 1.6e7;
 
 /// A fingertip: a ball of 8 mm radius with a soft surface. It has no label. Scenes select it with `press.object =
 /// "finger"`.
-pub const FINGER: ObjectSpec = soft(
-    PULP_PA_PER_M,
-    object(
-        0,
-        "finger",
-        "Tip of a finger",
-        meshes::fingertip,
-        [4.5, 4.5, 0.0, 0.0, 0.0],
-    ),
-);
+pub const FINGER: ObjectSpec =
+    soft(PULP_PA_PER_M, object(0, "finger", "Tip of a finger", meshes::fingertip, [4.5, 4.5, 0.0, 0.0, 0.0]));

@@ -27,32 +27,13 @@ fn every_object_is_a_solid() {
     for o in OBJECTS {
         let mesh = (o.build)();
         let (repaired, report) = checked(&mesh, 1.0, o.name).unwrap();
-        assert_eq!(
-            (report.joined_vertices, report.dropped_triangles, report.flipped),
-            (0, 0, false),
-            "{}",
-            o.name
-        );
+        assert_eq!((report.joined_vertices, report.dropped_triangles, report.flipped), (0, 0, false), "{}", o.name);
         assert_eq!(repaired.triangles.len(), mesh.triangles.len(), "{}", o.name);
-        assert!(
-            report.triangles <= SOFT_MAX_TRIANGLES,
-            "{}: {} triangles",
-            o.name,
-            report.triangles
-        );
+        assert!(report.triangles <= SOFT_MAX_TRIANGLES, "{}: {} triangles", o.name, report.triangles);
         let (low, high) = mesh.bounds().unwrap();
         assert_abs_diff_eq!(low[2], 0.0, epsilon = 1e-9);
-        assert!(
-            low[0] < 0.0 && high[0] > 0.0 && low[1] < 0.0 && high[1] > 0.0,
-            "{}: origin outside",
-            o.name
-        );
-        assert!(
-            report.extent_m.iter().all(|&e| (3e-3..=0.16).contains(&e)),
-            "{}: {:?}",
-            o.name,
-            report.extent_m
-        );
+        assert!(low[0] < 0.0 && high[0] > 0.0 && low[1] < 0.0 && high[1] > 0.0, "{}: origin outside", o.name);
+        assert!(report.extent_m.iter().all(|&e| (3e-3..=0.16).contains(&e)), "{}: {:?}", o.name, report.extent_m);
     }
 }
 
@@ -75,10 +56,7 @@ fn committed_files_are_current() {
             }
         }
     }
-    assert_eq!(
-        std::fs::read_to_string(assets().join("placements.csv")).unwrap(),
-        placements_csv()
-    );
+    assert_eq!(std::fs::read_to_string(assets().join("placements.csv")).unwrap(), placements_csv());
 }
 
 /// Holes and hollows are real: straight up from the skin, where do these points meet the solid?
@@ -97,13 +75,7 @@ fn holes_and_hollows_are_real() {
 /// The matrix is a rotation, and tilts act in skin axes after the rotation.
 #[test]
 fn placement_matrix() {
-    let p = Placement {
-        row: 0.0,
-        col: 0.0,
-        rotation_rad: 0.7,
-        tilt_x_rad: 0.02,
-        tilt_y_rad: -0.03,
-    };
+    let p = Placement { row: 0.0, col: 0.0, rotation_rad: 0.7, tilt_x_rad: 0.02, tilt_y_rad: -0.03 };
     let m = p.matrix();
     for i in 0..3 {
         for j in 0..3 {

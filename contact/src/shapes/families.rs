@@ -23,55 +23,32 @@ pub(super) fn strokes(letter: char) -> Vec<Vec<Point>> {
     let after = |start: &[Point], path: Vec<Point>, end: &[Point]| [start, &path, end].concat();
     let (foot, head) = ([0.0, 0.0], [0.0, 1.0]);
     match letter {
-        'A' => vec![
-            line(&[[0.0, 0.0], [0.38, 1.0], [0.76, 0.0]]),
-            line(&[[0.14, 0.33], [0.62, 0.33]]),
-        ],
-        'B' => vec![
-            after(&[foot], bulge(0.5, 1.0, 0.52), &[]),
-            after(&[], bulge(0.0, 0.5, 0.6), &[head]),
-        ],
+        'A' => vec![line(&[[0.0, 0.0], [0.38, 1.0], [0.76, 0.0]]), line(&[[0.14, 0.33], [0.62, 0.33]])],
+        'B' => vec![after(&[foot], bulge(0.5, 1.0, 0.52), &[]), after(&[], bulge(0.0, 0.5, 0.6), &[head])],
         'C' => vec![arc([0.42, 0.5], [0.42, 0.5], [45.0, 315.0], 12)],
         'D' => vec![after(&[foot], bulge(0.0, 1.0, 0.66), &[head])],
-        'E' => vec![
-            line(&[[0.58, 1.0], [0.0, 1.0], [0.0, 0.0], [0.58, 0.0]]),
-            line(&[[0.0, 0.5], [0.5, 0.5]]),
-        ],
-        'F' => vec![
-            line(&[[0.58, 1.0], [0.0, 1.0], [0.0, 0.0]]),
-            line(&[[0.0, 0.52], [0.5, 0.52]]),
-        ],
+        'E' => vec![line(&[[0.58, 1.0], [0.0, 1.0], [0.0, 0.0], [0.58, 0.0]]), line(&[[0.0, 0.5], [0.5, 0.5]])],
+        'F' => vec![line(&[[0.58, 1.0], [0.0, 1.0], [0.0, 0.0]]), line(&[[0.0, 0.52], [0.5, 0.52]])],
         'G' => {
             let mut path = arc([0.42, 0.5], [0.42, 0.5], [45.0, 345.0], 13);
             path.extend([[0.84, 0.46], [0.48, 0.46]]);
             vec![path]
         }
-        'H' => vec![
-            stem(),
-            line(&[[0.66, 0.0], [0.66, 1.0]]),
-            line(&[[0.0, 0.5], [0.66, 0.5]]),
-        ],
+        'H' => vec![stem(), line(&[[0.66, 0.0], [0.66, 1.0]]), line(&[[0.0, 0.5], [0.66, 0.5]])],
         'I' => vec![stem()],
         'J' => {
             let mut path = vec![[0.5, 1.0]];
             path.extend(arc([0.25, 0.27], [0.25, 0.27], [0.0, -180.0], HALF));
             vec![path]
         }
-        'K' => vec![
-            stem(),
-            line(&[[0.62, 1.0], [0.02, 0.42]]),
-            line(&[[0.2, 0.56], [0.64, 0.0]]),
-        ],
+        'K' => vec![stem(), line(&[[0.62, 1.0], [0.02, 0.42]]), line(&[[0.2, 0.56], [0.64, 0.0]])],
         'L' => vec![line(&[[0.0, 1.0], [0.0, 0.0], [0.56, 0.0]])],
         'M' => vec![line(&[[0.0, 0.0], [0.0, 1.0], [0.42, 0.3], [0.84, 1.0], [0.84, 0.0]])],
         'N' => vec![line(&[[0.0, 0.0], [0.0, 1.0], [0.68, 0.0], [0.68, 1.0]])],
         'O' => vec![round()],
         'P' => vec![after(&[foot], bulge(0.46, 1.0, 0.6), &[])],
         'Q' => vec![round(), line(&[[0.5, 0.3], [0.86, -0.08]])],
-        'R' => vec![
-            after(&[foot], bulge(0.46, 1.0, 0.6), &[]),
-            line(&[[0.26, 0.46], [0.62, 0.0]]),
-        ],
+        'R' => vec![after(&[foot], bulge(0.46, 1.0, 0.6), &[]), line(&[[0.26, 0.46], [0.62, 0.0]])],
         'S' => {
             let mut path = arc([0.3, 0.75], [0.3, 0.25], [30.0, 270.0], 9);
             path.extend(arc([0.3, 0.25], [0.3, 0.25], [90.0, -150.0], 9).split_off(1));
@@ -87,10 +64,7 @@ pub(super) fn strokes(letter: char) -> Vec<Vec<Point>> {
         'V' => vec![line(&[[0.0, 1.0], [0.38, 0.0], [0.76, 1.0]])],
         'W' => vec![line(&[[0.0, 1.0], [0.26, 0.0], [0.52, 0.8], [0.78, 0.0], [1.04, 1.0]])],
         'X' => vec![line(&[[0.0, 0.0], [0.7, 1.0]]), line(&[[0.0, 1.0], [0.7, 0.0]])],
-        'Y' => vec![
-            line(&[[0.0, 1.0], [0.36, 0.46], [0.72, 1.0]]),
-            line(&[[0.36, 0.5], [0.36, 0.0]]),
-        ],
+        'Y' => vec![line(&[[0.0, 1.0], [0.36, 0.46], [0.72, 1.0]]), line(&[[0.36, 0.5], [0.36, 0.0]])],
         'Z' => vec![line(&[[0.0, 1.0], [0.66, 1.0], [0.0, 0.0], [0.66, 0.0]])],
         _ => Vec::new(),
     }
@@ -144,11 +118,7 @@ pub(crate) fn junction(dice: &mut Dice) -> Plan {
         2 => vec![vec![[-a, 0.0], [b, 0.0]], vec![[0.0, d], [0.0, -c]]],
         3 => vec![vec![[-a, far], [0.0, far], [0.0, 0.0], [b, 0.0]]],
         4 => vec![vec![[0.0, a], [0.0, 0.0], [far, 0.0], [far, b]]],
-        5 => vec![
-            vec![[0.0, a], [0.0, -b]],
-            vec![[far, c], [far, -d]],
-            vec![[0.0, 0.0], [far, 0.0]],
-        ],
+        5 => vec![vec![[0.0, a], [0.0, -b]], vec![[far, c], [far, -d]], vec![[0.0, 0.0], [far, 0.0]]],
         arms => {
             let arms = if arms == 6 { 3 } else { dice.whole(4, 6) };
             let start = dice.angle_rad();
@@ -186,10 +156,7 @@ pub(crate) fn dome(dice: &mut Dice) -> Plan {
     let rise = 0.5 * (0.5 * cap_rad).tan() * dice.between(0.6, 1.0);
     let flat = if dice.chance(0.3) { dice.between(0.1, 0.6) } else { 0.0 };
     let dome = Some(Dome { cap_rad, rise, flat });
-    Plan {
-        dome,
-        ..Plan::simple(outline, 1.0)
-    }
+    Plan { dome, ..Plan::simple(outline, 1.0) }
 }
 
 // Teeth in a row and around a circle.
@@ -225,11 +192,7 @@ pub(crate) fn comb(dice: &mut Dice) -> Plan {
 /// Star or gear with five to twelve tips; some gears have a bore.
 pub(crate) fn gear(dice: &mut Dice) -> Plan {
     let (teeth, pointed) = (dice.whole(5, 12), dice.chance(0.5));
-    let root = if pointed {
-        dice.between(0.4, 0.75)
-    } else {
-        dice.between(0.6, 0.82)
-    };
+    let root = if pointed { dice.between(0.4, 0.75) } else { dice.between(0.6, 0.82) };
     let outline = plan::gear(teeth, root, pointed);
     let width = 2.0 / teeth as f64;
     if dice.chance(0.35) {
@@ -418,11 +381,7 @@ pub(crate) fn union(dice: &mut Dice) -> Plan {
         let (s, c) = dice.angle_rad().sin_cos();
         // within the first one, so that most are one piece
         let reach = if i == 0 { 0.0 } else { dice.between(0.3, 0.9) };
-        add.push(polygon::placed(
-            &shrunk(&outline, scale),
-            dice.angle_rad(),
-            [reach * c, reach * s],
-        ));
+        add.push(polygon::placed(&shrunk(&outline, scale), dice.angle_rad(), [reach * c, reach * s]));
     }
     let cuts = if dice.chance(0.6) { dice.whole(1, 2) } else { 0 };
     let cut = (0..cuts).map(|_| {

@@ -86,32 +86,17 @@ pub struct Dome {
 impl Plan {
     /// A simple outline without holes.
     pub fn simple(outline: Vec<Point>, least_width: f64) -> Self {
-        Self {
-            add: vec![outline],
-            least_width,
-            ..Self::default()
-        }
+        Self { add: vec![outline], least_width, ..Self::default() }
     }
 
     /// A simple outline with holes, or several separate outlines.
     pub fn apart(add: Vec<Vec<Point>>, cut: Vec<Vec<Point>>, least_width: f64) -> Self {
-        Self {
-            add,
-            cut,
-            least_width,
-            ..Self::default()
-        }
+        Self { add, cut, least_width, ..Self::default() }
     }
 
     /// The union of overlapping outlines.
     pub fn union(add: Vec<Vec<Point>>, cut: Vec<Vec<Point>>, least_width: f64) -> Self {
-        Self {
-            add,
-            cut,
-            overlapping: true,
-            least_width,
-            dome: None,
-        }
+        Self { add, cut, overlapping: true, least_width, dome: None }
     }
 }
 
@@ -206,11 +191,8 @@ pub(super) fn blob(dice: &mut Dice, waviness: f64) -> (Vec<Point>, f64) {
 /// Star or gear of `teeth`, radius 1 at the tips and `root` between them. `pointed` or with flat tips.
 pub(super) fn gear(teeth: usize, root: f64, pointed: bool) -> Vec<Point> {
     let pitch = TAU / teeth as f64;
-    let corners: &[(f64, bool)] = if pointed {
-        &[(0.0, true), (0.5, false)]
-    } else {
-        &[(-0.22, true), (0.22, true), (0.3, false), (0.7, false)]
-    };
+    let corners: &[(f64, bool)] =
+        if pointed { &[(0.0, true), (0.5, false)] } else { &[(-0.22, true), (0.22, true), (0.3, false), (0.7, false)] };
     (0..teeth)
         .flat_map(|i| corners.iter().map(move |&(at, tip)| (i as f64 + at, tip)))
         .map(|(at, tip)| {
@@ -243,12 +225,7 @@ pub(super) fn convex(dice: &mut Dice) -> (Vec<Point>, f64) {
         }
         2 => {
             let (top, shear) = (dice.between(0.35, 0.9), dice.between(-0.4, 0.4));
-            let corners = [
-                [-1.0, -stretch],
-                [1.0, -stretch],
-                [shear + top, stretch],
-                [shear - top, stretch],
-            ];
+            let corners = [[-1.0, -stretch], [1.0, -stretch], [shear + top, stretch], [shear - top, stretch]];
             (corners.to_vec(), 1.2 * stretch)
         }
         _ => (polygon::ellipse(1.0, stretch, ROUND), 2.0 * stretch),

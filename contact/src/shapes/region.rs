@@ -23,12 +23,7 @@ impl Side {
     fn new(a: Point, b: Point) -> Self {
         let d = [b[0] - a[0], b[1] - a[1]];
         let square = (d[0] * d[0] + d[1] * d[1]).max(f64::MIN_POSITIVE);
-        Self {
-            from_m: a,
-            along_m: d,
-            end_y_m: b[1],
-            inverse: 1.0 / square,
-        }
+        Self { from_m: a, along_m: d, end_y_m: b[1], inverse: 1.0 / square }
     }
 
     /// Lower and upper end along y, m.
@@ -155,10 +150,7 @@ pub(super) fn rounded(outline: &[Point], radius_m: f64) -> Vec<Point> {
         let cut_m = (radius_m / tan).min(MOST_OF_SIDE * before_m.min(after_m));
         let reach_m = cut_m / (0.5 * between).cos();
         let length = ((ux + vx).powi(2) + (uy + vy).powi(2)).sqrt();
-        let centre = [
-            at[0] + (ux + vx) / length * reach_m,
-            at[1] + (uy + vy) / length * reach_m,
-        ];
+        let centre = [at[0] + (ux + vx) / length * reach_m, at[1] + (uy + vy) / length * reach_m];
         let start = [at[0] + ux * cut_m - centre[0], at[1] + uy * cut_m - centre[1]];
         // left turns of a loop are counter-clockwise arcs
         let sign = if uy * vx - ux * vy > 0.0 { 1.0 } else { -1.0 };
@@ -166,10 +158,7 @@ pub(super) fn rounded(outline: &[Point], radius_m: f64) -> Vec<Point> {
         let mut k = 0.0;
         while k <= steps {
             let (s, c) = (sign * turn * k / steps).sin_cos();
-            out.push([
-                centre[0] + c * start[0] - s * start[1],
-                centre[1] + s * start[0] + c * start[1],
-            ]);
+            out.push([centre[0] + c * start[0] - s * start[1], centre[1] + s * start[0] + c * start[1]]);
             k += 1.0;
         }
     }
@@ -209,15 +198,9 @@ impl Region {
             united(plan)
         } else {
             let outer = plan.add.iter().map(|l| directed(l.clone(), true));
-            outer
-                .chain(plan.cut.iter().map(|l| directed(l.clone(), false)))
-                .collect()
+            outer.chain(plan.cut.iter().map(|l| directed(l.clone(), false))).collect()
         };
-        let mut region = Self {
-            loops,
-            unit_m: 1.0,
-            centre: [0.0; 2],
-        };
+        let mut region = Self { loops, unit_m: 1.0, centre: [0.0; 2] };
         region.fit(size_m)?;
         Some(region)
     }

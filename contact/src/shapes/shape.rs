@@ -36,11 +36,7 @@ impl Default for ShapeRanges {
     /// Objects of the size of a hand's grip: from just over a taxel's pitch to well within the skin. The published
     /// objects are bowed by up to 0.6 mm.
     fn default() -> Self {
-        Self {
-            size_m: [20e-3, 90e-3],
-            relief_m: [0.0, 0.6e-3],
-            edge_m: [0.0, 3e-3],
-        }
+        Self { size_m: [20e-3, 90e-3], relief_m: [0.0, 0.6e-3], edge_m: [0.0, 3e-3] }
     }
 }
 
@@ -148,9 +144,7 @@ impl ShapeFamily {
         });
         tries.ok_or_else(|| {
             let name = self.name;
-            Refusal::new(format!(
-                "shape family \"{name}\" has no closed solid for seed {seed} in {TRIES} tries"
-            ))
+            Refusal::new(format!("shape family \"{name}\" has no closed solid for seed {seed} in {TRIES} tries"))
         })
     }
 
@@ -165,11 +159,7 @@ impl ShapeFamily {
             return None;
         }
         let edge_m = edge_m.min(MOST_OF_WIDTH * plan.least_width * sharp.unit_m);
-        let edge_m = if edge_m < LEAST_EDGE_M || plan.dome.is_some() {
-            0.0
-        } else {
-            edge_m
-        };
+        let edge_m = if edge_m < LEAST_EDGE_M || plan.dome.is_some() { 0.0 } else { edge_m };
         let round = || {
             let mut round = sharp.clone();
             for outline in &mut round.loops {
@@ -216,75 +206,23 @@ impl ShapeFamily {
 
 /// Every family of this crate.
 pub const SHAPE_FAMILIES: &[ShapeFamily] = &[
-    family(
-        "plate",
-        "Rectangle, polygon of three to eight sides, trapezoid or ellipse",
-        families::plate,
-    ),
-    family(
-        "perforated",
-        "Plate with one to six round, square or slot-like holes",
-        families::perforated,
-    ),
-    family(
-        "ring",
-        "Round or angular ring, two rings one in the other, or a ring with a gap",
-        families::ring,
-    ),
-    family(
-        "bar",
-        "Straight or tapered bar, or two to four bars side by side",
-        families::bar,
-    ),
-    family(
-        "junction",
-        "Bars that meet: L, T, X, Y, Z, U, H or a star of arms",
-        families::junction,
-    ),
-    family(
-        "letter",
-        "Capital letter A to Z of random width, slant and weight",
-        families::letter,
-    ),
-    family(
-        "polyline",
-        "Thick line of two to six straight pieces, or a smoothly winding one",
-        families::polyline,
-    ),
-    family(
-        "blob",
-        "Smooth random outline, like a pebble or a puddle",
-        families::blob,
-    ),
-    family(
-        "dome",
-        "Part of a sphere or an ellipsoid, or a pebble, round side down",
-        families::dome,
-    ),
-    family(
-        "comb",
-        "Back with three to ten teeth on one side or on both",
-        families::comb,
-    ),
-    family(
-        "gear",
-        "Star or gear with five to twelve tips, with or without a bore",
-        families::gear,
-    ),
+    family("plate", "Rectangle, polygon of three to eight sides, trapezoid or ellipse", families::plate),
+    family("perforated", "Plate with one to six round, square or slot-like holes", families::perforated),
+    family("ring", "Round or angular ring, two rings one in the other, or a ring with a gap", families::ring),
+    family("bar", "Straight or tapered bar, or two to four bars side by side", families::bar),
+    family("junction", "Bars that meet: L, T, X, Y, Z, U, H or a star of arms", families::junction),
+    family("letter", "Capital letter A to Z of random width, slant and weight", families::letter),
+    family("polyline", "Thick line of two to six straight pieces, or a smoothly winding one", families::polyline),
+    family("blob", "Smooth random outline, like a pebble or a puddle", families::blob),
+    family("dome", "Part of a sphere or an ellipsoid, or a pebble, round side down", families::dome),
+    family("comb", "Back with three to ten teeth on one side or on both", families::comb),
+    family("gear", "Star or gear with five to twelve tips, with or without a bore", families::gear),
     family("studs", "Two to nine feet of one body, apart", families::studs),
-    family(
-        "union",
-        "Two to four plates, bars and blobs over one another, some with holes and bites",
-        families::union,
-    ),
+    family("union", "Two to four plates, bars and blobs over one another, some with holes and bites", families::union),
 ];
 
 const fn family(name: &'static str, description: &'static str, plan: fn(&mut Dice) -> Plan) -> ShapeFamily {
-    ShapeFamily {
-        name,
-        description,
-        plan,
-    }
+    ShapeFamily { name, description, plan }
 }
 
 /// Builds the shape of `seed` in the family called `family`. The result depends only on the arguments, and has the same
@@ -294,10 +232,7 @@ const fn family(name: &'static str, description: &'static str, plan: fn(&mut Dic
 /// [`Refusal`] if the name is unknown, a range is not valid, or the family has no solid for this seed.
 pub fn build_shape(family: &str, ranges: &ShapeRanges, seed: u64) -> Result<Shape, Refusal> {
     let Some(known) = SHAPE_FAMILIES.iter().find(|known| known.name == family) else {
-        let known: Vec<_> = SHAPE_FAMILIES
-            .iter()
-            .map(|known| format!("\"{}\"", known.name))
-            .collect();
+        let known: Vec<_> = SHAPE_FAMILIES.iter().map(|known| format!("\"{}\"", known.name)).collect();
         let known = known.join(", ");
         return Err(Refusal::new(format!("shape family \"{family}\" is not one of {known}")));
     };

@@ -31,24 +31,14 @@ impl Relief {
             let k = 0.5 * TAU / dice.between(0.7, 2.0);
             (dice.between(0.0, 0.45), dice.angle_rad(), [k * c, k * s])
         });
-        Self {
-            half_m: 0.5 * size_m,
-            bow,
-            waves,
-        }
+        Self { half_m: 0.5 * size_m, bow, waves }
     }
 
     /// Heights over `points`, m, whose lowest and highest differ by `relief_m`.
     pub(super) fn heights_m(&self, points: &[Point], relief_m: f64) -> Vec<f64> {
         let mut heights: Vec<f64> = points.iter().map(|&p| self.at(p)).collect();
-        let (low, high) = heights
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &z| (l.min(z), h.max(z)));
-        let scale = if high - low > 1e-9 {
-            relief_m / (high - low)
-        } else {
-            0.0
-        };
+        let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &z| (l.min(z), h.max(z)));
+        let scale = if high - low > 1e-9 { relief_m / (high - low) } else { 0.0 };
         for z in &mut heights {
             *z = (*z - low) * scale;
         }
@@ -57,10 +47,7 @@ impl Relief {
 
     fn at(&self, [x, y]: Point) -> f64 {
         let (x, y) = (x / self.half_m, y / self.half_m);
-        let waves = self
-            .waves
-            .iter()
-            .map(|&(a, phase, k)| a * (phase + k[0] * x + k[1] * y).cos());
+        let waves = self.waves.iter().map(|&(a, phase, k)| a * (phase + k[0] * x + k[1] * y).cos());
         self.bow[0] * x * x + self.bow[1] * y * y + waves.sum::<f64>()
     }
 }
@@ -267,10 +254,7 @@ impl Underside {
         let cap = dome.cap_rad.sin();
         let full = 1.0 - dome.cap_rad.cos();
         let rim_m = dome.rise * width_m;
-        let mut below = Self {
-            heights_m: vec![rim_m; plane.points.len()],
-            plane,
-        };
+        let mut below = Self { heights_m: vec![rim_m; plane.points.len()], plane };
         let rings = (dome.cap_rad / DOME_STEP_RAD).ceil().max(3.0);
         let mut k = rings - 1.0;
         while k >= 0.0 {
@@ -354,8 +338,7 @@ pub(super) fn solid(
     let index = |i: usize| u32::try_from(i).ok();
     let mut mesh = TriMesh::default();
     mesh.vertices.reserve(base + lid.points.len());
-    mesh.vertices
-        .extend(points.iter().zip(&heights_m).map(|(p, z)| [p[0], p[1], z - low]));
+    mesh.vertices.extend(points.iter().zip(&heights_m).map(|(p, z)| [p[0], p[1], z - low]));
     mesh.vertices.extend(lid.points.iter().map(|p| [p[0], p[1], top_m]));
     mesh.triangles.reserve(under.len() + over.len() + 2 * lid.points.len());
     for [a, b, c] in under {

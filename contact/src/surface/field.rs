@@ -47,11 +47,7 @@ impl SurfaceField {
     /// [`Refusal`] if a parameter is outside its range.
     pub fn new(config: Foam, points: SurfacePoints) -> Result<Self, Refusal> {
         config.check()?;
-        Ok(Self {
-            pressure_pa: vec![0.0; points.len()],
-            config,
-            points,
-        })
+        Ok(Self { pressure_pa: vec![0.0; points.len()], config, points })
     }
 
     /// The sample points.
@@ -110,9 +106,6 @@ impl SurfaceField {
             torque += arm.cross(load);
             *pressure_pa += p;
         }
-        Wrench {
-            force_n: force.into(),
-            torque_nm: torque.into(),
-        }
+        Wrench { force_n: force.into(), torque_nm: torque.into() }
     }
 }

@@ -55,11 +55,7 @@ impl Solid {
         let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);
         let triangle = |t: &[u32; 3]| {
             let [a, b, c] = t.map(corner);
-            Triangle {
-                corner_m: a,
-                edges_m: [b - a, c - a],
-                size_m2: (b - a).length() * (c - a).length(),
-            }
+            Triangle { corner_m: a, edges_m: [b - a, c - a], size_m2: (b - a).length() * (c - a).length() }
         };
         let boxed = |t: &[u32; 3]| {
             let [a, b, c] = t.map(corner);
@@ -69,9 +65,7 @@ impl Solid {
         };
         let boxes: Vec<Aabb> = mesh.triangles.iter().map(boxed).collect();
         let empty = (Vector::splat(f64::INFINITY), Vector::splat(f64::NEG_INFINITY));
-        let (low_m, high_m) = boxes
-            .iter()
-            .fold(empty, |(low, high), b| (low.min(b.mins), high.max(b.maxs)));
+        let (low_m, high_m) = boxes.iter().fold(empty, |(low, high), b| (low.min(b.mins), high.max(b.maxs)));
         Self {
             low_m,
             high_m,
@@ -148,10 +142,7 @@ impl Triangle {
             return None;
         }
         let distance_m = f.dot(q) * inverse;
-        (distance_m >= 0.0).then_some(Hit {
-            distance_m,
-            enters: determinant > 0.0,
-        })
+        (distance_m >= 0.0).then_some(Hit { distance_m, enters: determinant > 0.0 })
     }
 }
 
@@ -213,11 +204,7 @@ impl SurfacePoints {
     ) -> Result<Self, Refusal> {
         let count = positions_m.len();
         in_range("points", count as f64, (1..=MOST_POINTS).contains(&count), "[1, 2^24]")?;
-        for (field, found) in [
-            ("normals", normals.len()),
-            ("areas_m2", areas_m2.len()),
-            ("taxels", taxels.len()),
-        ] {
+        for (field, found) in [("normals", normals.len()), ("areas_m2", areas_m2.len()), ("taxels", taxels.len())] {
             in_range(field, found as f64, found == count, "as many as there are points")?;
         }
         for (i, p) in positions_m.iter().enumerate() {
@@ -243,19 +230,9 @@ impl SurfacePoints {
             taxel_areas_m2[*taxel as usize] += area;
         }
         if let Some(k) = taxel_areas_m2.iter().position(|area| *area <= 0.0) {
-            return Err(Refusal::range(
-                "taxels",
-                k,
-                "a point for every taxel up to the last one",
-            ));
+            return Err(Refusal::range("taxels", k, "a point for every taxel up to the last one"));
         }
-        Ok(Self {
-            positions_m,
-            normals: units,
-            areas_m2,
-            taxels,
-            taxel_areas_m2,
-        })
+        Ok(Self { positions_m, normals: units, areas_m2, taxels, taxel_areas_m2 })
     }
 
     /// A flat skin with `cells_per_taxel` × `cells_per_taxel` points a taxel, in the plane z = 0 and centred on the
@@ -278,12 +255,7 @@ impl SurfacePoints {
                 taxels.push(u32::try_from(taxel).unwrap_or(u32::MAX));
             }
         }
-        Self::new(
-            positions_m,
-            vec![[0.0, 0.0, 1.0]; count],
-            vec![cell_m * cell_m; count],
-            taxels,
-        )
+        Self::new(positions_m, vec![[0.0, 0.0, 1.0]; count], vec![cell_m * cell_m; count], taxels)
     }
 
     /// Number of points.
@@ -494,11 +466,7 @@ mod tests {
     #[test]
     fn a_cylinder_has_the_area_of_one() {
         for (axis, low) in [(0, 0.02), (1, -0.03), (2, 0.4)] {
-            let winding = Winding {
-                axis,
-                span_m: [low, low + 0.08],
-                ..HALF
-            };
+            let winding = Winding { axis, span_m: [low, low + 0.08], ..HALF };
             let points = SurfacePoints::on_cylinder(&winding, 0.05).unwrap();
             assert_eq!((points.len(), points.taxels()), (96, 24));
             let area: f64 = points.taxel_areas_m2().iter().sum();
@@ -526,10 +494,7 @@ mod tests {
             }
             assert_relative_eq!(found.areas_m2[i], wanted.areas_m2[i], max_relative = 1e-3);
         }
-        let above = Winding {
-            span_m: [0.0, 0.3],
-            ..HALF
-        };
+        let above = Winding { span_m: [0.0, 0.3], ..HALF };
         let error = SurfacePoints::wrapped(&above, &mesh).unwrap_err().to_string();
         assert!(error.contains("mesh under taxel 0"), "{error}");
     }

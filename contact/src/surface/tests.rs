@@ -46,11 +46,7 @@ fn a_flat_skin_is_winkler() {
         let most_pa = wanted.pressure_pa.iter().copied().fold(0.0, f64::max);
         assert!(most_pa > 1e3, "{}", object.name);
         for (found, wanted) in curved.pressure_pa().iter().zip(wanted.pressure_pa) {
-            assert!(
-                (found - wanted).abs() < 1e-9 * most_pa,
-                "{}: {found} {wanted}",
-                object.name
-            );
+            assert!((found - wanted).abs() < 1e-9 * most_pa, "{}: {found} {wanted}", object.name);
         }
         let size_n = wanted.wrench.force_n[2];
         for i in 0..3 {
@@ -80,11 +76,7 @@ fn a_sphere_on_a_cylinder() {
     }
     let count = positions.len();
     let points = SurfacePoints::new(positions, normals, vec![side_m * side_m; count], vec![0; count]).unwrap();
-    let config = Foam {
-        thickness_m: 18e-3 / 2.0,
-        max_strain: 1.0,
-        ..Foam::default()
-    };
+    let config = Foam { thickness_m: 18e-3 / 2.0, max_strain: 1.0, ..Foam::default() };
     let mut field = SurfaceField::new(config, points).unwrap();
     let mesh = sphere(ball_m, 300, 600);
     // the lowest point of the mesh is its origin
@@ -168,11 +160,7 @@ fn extremes() {
         field.clear();
         let height_m = 0.05 - 1e-3 * f64::from(k);
         let wrench = field.press(&solid, &PosedMesh::at_rest(&mesh, [0.001, 0.002, height_m]));
-        assert!(
-            wrench.force_n[2] >= last_n * (1.0 - 1e-12),
-            "{k}: {} {last_n}",
-            wrench.force_n[2]
-        );
+        assert!(wrench.force_n[2] >= last_n * (1.0 - 1e-12), "{k}: {} {last_n}", wrench.force_n[2]);
         last_n = wrench.force_n[2];
     }
     assert!(last_n > 1e3);
@@ -197,10 +185,7 @@ fn points_that_cannot_be_are_refused() {
     assert!(SurfacePoints::new(p.clone(), n.clone(), vec![1e-6; 2], vec![1, 0]).is_ok());
     for (error, field) in [
         (refused(&vec![], &vec![], vec![], vec![]), "points"),
-        (
-            refused(&vec![[f64::NAN; 3]; 2], &n, vec![1e-6; 2], vec![0; 2]),
-            "positions_m[0]",
-        ),
+        (refused(&vec![[f64::NAN; 3]; 2], &n, vec![1e-6; 2], vec![0; 2]), "positions_m[0]"),
         (refused(&p, &vec![[0.0; 3]; 2], vec![1e-6; 2], vec![0; 2]), "normals[0]"),
         (refused(&p, &n, vec![1e-6, 0.0], vec![0; 2]), "areas_m2[1]"),
         (refused(&p, &n, vec![1e-6], vec![0; 2]), "areas_m2"),

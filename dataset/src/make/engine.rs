@@ -48,12 +48,7 @@ fn scene(spec: &Spec) -> MechanicsConfig {
     let (model, parameters) = spec.contact();
     let mut contact = parameters.clone();
     contact.insert("model".to_owned(), model.into());
-    MechanicsConfig {
-        timestep_s: Some(Timestep::Auto),
-        skin: *spec.skin(),
-        contact,
-        ..MechanicsConfig::default()
-    }
+    MechanicsConfig { timestep_s: Some(Timestep::Auto), skin: *spec.skin(), contact, ..MechanicsConfig::default() }
 }
 
 fn pressed(spec: &Spec, choice: &Choice, touch: Touch, streams: Streams, press: u64) -> Result<Moving, Refusal> {
@@ -93,11 +88,7 @@ fn pressed(spec: &Spec, choice: &Choice, touch: Touch, streams: Streams, press: 
     };
     let mechanics = Mechanics::of_mesh(mechanics, choice.mesh.clone())?;
     let mut world = World::new(&mechanics)?;
-    Ok(Moving {
-        frames: frames_until(&mut world, end_s)?,
-        touch,
-        touch_s: onset_s,
-    })
+    Ok(Moving { frames: frames_until(&mut world, end_s)?, touch, touch_s: onset_s })
 }
 
 fn fall(spec: &Spec, mut touch: Touch, ball: Ball) -> Result<Moving, Refusal> {
@@ -126,15 +117,8 @@ fn fall(spec: &Spec, mut touch: Touch, ball: Ball) -> Result<Moving, Refusal> {
     let Some(bounce) = world.first_bounce() else {
         return Err(no_touch(end_s));
     };
-    touch.ball = Some(Ball {
-        speed_m_per_s: bounce.speed_in_m_per_s,
-        ..ball
-    });
-    Ok(Moving {
-        touch,
-        touch_s: bounce.start_s,
-        frames,
-    })
+    touch.ball = Some(Ball { speed_m_per_s: bounce.speed_in_m_per_s, ..ball });
+    Ok(Moving { touch, touch_s: bounce.start_s, frames })
 }
 
 /// The frames of `world` up to the first one at or after `end_s`.

@@ -51,10 +51,7 @@ impl Touch {
                 height_m * draw(&pose.y_share, "pose.y_share") + draw(&pose.y_m, "pose.y_m"),
             ],
             rotation_deg: draw(&pose.rotation_deg, "pose.rotation_deg"),
-            tilt_deg: [
-                draw(&pose.tilt_x_deg, "pose.tilt_x_deg"),
-                draw(&pose.tilt_y_deg, "pose.tilt_y_deg"),
-            ],
+            tilt_deg: [draw(&pose.tilt_x_deg, "pose.tilt_x_deg"), draw(&pose.tilt_y_deg, "pose.tilt_y_deg")],
             force_n: draw(&config.press.force_n, "press.force_n"),
             stiffness_pa_per_m: f64::INFINITY,
             refused: 0,
@@ -68,10 +65,7 @@ impl Touch {
             touch.position_m = [0, 1].map(|k| touch.position_m[k] + fitted_m[k]);
             touch.rotation_deg += place.rotation_rad.to_degrees();
             let [tilt_x_deg, tilt_y_deg] = touch.tilt_deg;
-            touch.tilt_deg = [
-                tilt_x_deg + place.tilt_x_rad.to_degrees(),
-                tilt_y_deg + place.tilt_y_rad.to_degrees(),
-            ];
+            touch.tilt_deg = [tilt_x_deg + place.tilt_x_rad.to_degrees(), tilt_y_deg + place.tilt_y_rad.to_degrees()];
         }
         if spec.drops() {
             let drop = config.drop.clone().unwrap_or_default();
@@ -115,11 +109,7 @@ impl Touch {
 
 /// The streams of attempt number `attempt` at a pose.
 pub(super) fn of_attempt(streams: Streams, attempt: u64) -> Streams {
-    if attempt == 0 {
-        streams
-    } else {
-        streams.child("attempt", attempt)
-    }
+    if attempt == 0 { streams } else { streams.child("attempt", attempt) }
 }
 
 /// Whether a part of `body` lies beside the sheet.
@@ -154,10 +144,7 @@ impl Field {
         let (model, parameters) = spec.contact();
         let mut field = build_contact(model, parameters.clone(), spec.skin())?;
         field.expect(&choice.mesh);
-        Ok(Self {
-            bins: TaxelBins::new(spec.skin(), field.cells_per_taxel()),
-            field,
-        })
+        Ok(Self { bins: TaxelBins::new(spec.skin(), field.cells_per_taxel()), field })
     }
 
     /// Presses `choice` in press number `press`, beside the `others`: poses are drawn until one is a balance and keeps
@@ -181,9 +168,7 @@ impl Field {
             }
         }
         match failure {
-            Some(last) => Err(Refusal::new(format!(
-                "none of {ATTEMPTS} poses has an equilibrium; the last: {last}"
-            ))),
+            Some(last) => Err(Refusal::new(format!("none of {ATTEMPTS} poses has an equilibrium; the last: {last}"))),
             None => Ok(None),
         }
     }
@@ -193,10 +178,7 @@ impl Field {
         let load = Load {
             force_n: touch.force_n,
             axis_m: touch.position_m,
-            holder: Holder::Elastic {
-                stiffness_nm_per_rad: [[stiffness, 0.0], [0.0, stiffness]],
-                rest_rad: [0.0; 2],
-            },
+            holder: Holder::Elastic { stiffness_nm_per_rad: [[stiffness, 0.0], [0.0, stiffness]], rest_rad: [0.0; 2] },
             from: None,
         };
         let Some(field) = self.field.quasi_static() else {
@@ -206,13 +188,7 @@ impl Field {
         let patch = balance.response.patch.unwrap_or_default();
         let height_m = balance.seat.height_m;
         let [pressure, electrode_pressure] = self.bins.means(balance.response.pressure_pa, balance.response.patch);
-        Ok(Held {
-            touch,
-            height_m,
-            pressure,
-            electrode_pressure,
-            patch,
-        })
+        Ok(Held { touch, height_m, pressure, electrode_pressure, patch })
     }
 }
 
@@ -250,11 +226,7 @@ impl Moving {
         let first = &self.frames[after.saturating_sub(1)];
         let second = &self.frames[after.min(self.frames.len() - 1)];
         let apart_s = second.time_s - first.time_s;
-        let share = if apart_s > 0.0 {
-            ((time_s - first.time_s) / apart_s).clamp(0.0, 1.0)
-        } else {
-            0.0
-        };
+        let share = if apart_s > 0.0 { ((time_s - first.time_s) / apart_s).clamp(0.0, 1.0) } else { 0.0 };
         let mut pressure = first.pressure.clone();
         for (from, to) in pressure.values_mut().iter_mut().zip(second.pressure.values()) {
             *from += share * (to - *from);

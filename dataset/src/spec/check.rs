@@ -65,9 +65,7 @@ impl Timing {
         let before_s = record.before_s.or(before_s).unwrap_or(0.0);
         let is_valid = (0.0..=10.0).contains(&before_s);
         in_range("record.before_s", before_s, is_valid, "[0, 10] s")?;
-        let windows = record
-            .windows
-            .unwrap_or_else(|| default_windows(config, interval_s, before_s));
+        let windows = record.windows.unwrap_or_else(|| default_windows(config, interval_s, before_s));
         let is_valid = (1..=MOST_WINDOWS).contains(&windows);
         in_range("record.windows", windows as f64, is_valid, "[1, 10000]")?;
         Ok(Self {
@@ -149,13 +147,8 @@ fn within(limits: &[Limits<'_>]) -> Result<(), Refusal> {
 
 pub(super) fn check_draws(c: &SpecConfig, skin: &SkinLayout, timing: &Timing, moving: bool) -> Result<(), Refusal> {
     let (pose, press, split, taxels) = (&c.pose, &c.press, &c.split, skin.taxels());
-    let [tilt, validation, test, both] = [
-        press.tilt_stiffness_nm_per_rad,
-        split.validation,
-        split.test,
-        split.validation + split.test,
-    ]
-    .map(Draw::Fixed);
+    let [tilt, validation, test, both] =
+        [press.tilt_stiffness_nm_per_rad, split.validation, split.test, split.validation + split.test].map(Draw::Fixed);
     within(&[
         ("pose.x_share", &pose.x_share, -1.0, 1.0, "[-1, 1]"),
         ("pose.y_share", &pose.y_share, -1.0, 1.0, "[-1, 1]"),
@@ -228,11 +221,9 @@ fn check_ball(c: &SpecConfig) -> Result<(), Refusal> {
     if c.press != PressConfig::default() {
         return Err(Refusal::new("`[press]` is not for drops; `[drop]` is"));
     }
-    for (field, draw) in [
-        ("rotation_deg", &c.pose.rotation_deg),
-        ("tilt_x_deg", &c.pose.tilt_x_deg),
-        ("tilt_y_deg", &c.pose.tilt_y_deg),
-    ] {
+    for (field, draw) in
+        [("rotation_deg", &c.pose.rotation_deg), ("tilt_x_deg", &c.pose.tilt_x_deg), ("tilt_y_deg", &c.pose.tilt_y_deg)]
+    {
         if *draw != Draw::Fixed(0.0) {
             let problem = format!("`pose.{field}` is not for drops: a ball has no side");
             return Err(Refusal::new(problem));

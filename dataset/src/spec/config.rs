@@ -100,11 +100,7 @@ impl Default for SpecConfig {
 
 impl Default for SplitConfig {
     fn default() -> Self {
-        Self {
-            by: None,
-            validation: 0.1,
-            test: 0.1,
-        }
+        Self { by: None, validation: 0.1, test: 0.1 }
     }
 }
 
@@ -323,10 +319,7 @@ impl Default for SkinConfig {
 
 impl Default for FaultsConfig {
     fn default() -> Self {
-        Self {
-            count: Draw::Fixed(0.0),
-            names: None,
-        }
+        Self { count: Draw::Fixed(0.0), names: None }
     }
 }
 

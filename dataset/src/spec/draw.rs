@@ -164,9 +164,7 @@ fn number(value: &Value) -> Option<Result<f64, String>> {
 fn list(value: &Value) -> Result<Vec<f64>, String> {
     let values = value.as_array().filter(|values| !values.is_empty());
     let values = values.ok_or("a list of numbers is needed")?;
-    let numbers = values
-        .iter()
-        .map(|v| number(v).unwrap_or_else(|| Err(format!("{v} is not a number"))));
+    let numbers = values.iter().map(|v| number(v).unwrap_or_else(|| Err(format!("{v} is not a number"))));
     numbers.collect()
 }
 
@@ -176,11 +174,7 @@ fn pair(value: &Value) -> Result<[f64; 2], String> {
 }
 
 fn rising([low, high]: [f64; 2]) -> Result<[f64; 2], String> {
-    if low <= high {
-        Ok([low, high])
-    } else {
-        Err(format!("{low} is above {high}"))
-    }
+    if low <= high { Ok([low, high]) } else { Err(format!("{low} is above {high}")) }
 }
 
 fn grid(value: &Value) -> Result<Vec<f64>, String> {
@@ -287,10 +281,7 @@ mod tests {
             let draw = draw(text).unwrap();
             let values: Vec<f64> = (0..n).map(|k| draw.value(Streams::new(1), "x", k.into())).collect();
             let found = values.iter().sum::<f64>() / f64::from(n);
-            assert!(
-                (found - mean).abs() <= 5.0 * sd / f64::from(n).sqrt(),
-                "{text}: {found}"
-            );
+            assert!((found - mean).abs() <= 5.0 * sd / f64::from(n).sqrt(), "{text}: {found}");
             let [low, high] = draw.range();
             assert!(values.iter().all(|v| (low..=high).contains(v)), "{text}");
         }
@@ -298,30 +289,16 @@ mod tests {
 
     #[test]
     fn grids_take_all_combinations() {
-        let mut grids = [
-            draw("{ grid = [1, 2, 3] }").unwrap(),
-            draw("{ grid = { from = 0, to = 1, steps = 2 } }").unwrap(),
-        ];
+        let mut grids =
+            [draw("{ grid = [1, 2, 3] }").unwrap(), draw("{ grid = { from = 0, to = 1, steps = 2 } }").unwrap()];
         let mut turn = 1;
         for grid in &mut grids {
             grid.take_turn(&mut turn);
         }
         assert_eq!(turn, 6);
-        let all: Vec<[f64; 2]> = (0..7)
-            .map(|k| [0, 1].map(|g: usize| grids[g].value(Streams::new(0), "", k)))
-            .collect();
-        assert_eq!(
-            all,
-            [
-                [1.0, 0.0],
-                [2.0, 0.0],
-                [3.0, 0.0],
-                [1.0, 1.0],
-                [2.0, 1.0],
-                [3.0, 1.0],
-                [1.0, 0.0]
-            ]
-        );
+        let all: Vec<[f64; 2]> =
+            (0..7).map(|k| [0, 1].map(|g: usize| grids[g].value(Streams::new(0), "", k))).collect();
+        assert_eq!(all, [[1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [1.0, 1.0], [2.0, 1.0], [3.0, 1.0], [1.0, 0.0]]);
     }
 
     #[test]

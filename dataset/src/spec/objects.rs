@@ -96,9 +96,7 @@ impl Choices {
             relief_m: config.relief_m.unwrap_or(default.relief_m),
             edge_m: config.edge_m.unwrap_or(default.edge_m),
         };
-        ranges
-            .check()
-            .map_err(|e| Refusal::new(in_section("object", &e.to_string())))?;
+        ranges.check().map_err(|e| Refusal::new(in_section("object", &e.to_string())))?;
         let entry = |name: &str, mesh: PreparedMesh| Choice {
             name: Arc::from(name),
             label: 0,
@@ -140,11 +138,7 @@ impl Choices {
         for (place, entry) in (0..).zip(&mut entries) {
             entry.label = entry.object.map_or(place, |object| object.label.into());
         }
-        Ok(Self {
-            entries,
-            ranges,
-            source,
-        })
+        Ok(Self { entries, ranges, source })
     }
 
     /// Number of different objects or files, or of families.
@@ -226,9 +220,7 @@ fn mesh_files(config: &ObjectConfig, folder: &Path) -> Result<Vec<(String, PathB
         }
     }
     if files.is_empty() {
-        return Err(Refusal::new("no file that ends in `.obj`, `.glb` or `.stl`")
-            .at(at)
-            .into());
+        return Err(Refusal::new("no file that ends in `.obj`, `.glb` or `.stl`").at(at).into());
     }
     files.sort();
     let name = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();

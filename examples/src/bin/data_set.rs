@@ -38,12 +38,7 @@ fn main() -> Result<()> {
     let names = ["contact_force_n", "conductance_s", "split"];
     let columns = dataset.columns(&names, 0..400, || Ok(()))?;
     let values: Vec<&ColumnValues> = columns.iter().map(|(_, values)| values).collect();
-    let [
-        ColumnValues::Floats(forces),
-        ColumnValues::Floats(images),
-        ColumnValues::Texts(splits),
-    ] = values[..]
-    else {
+    let [ColumnValues::Floats(forces), ColumnValues::Floats(images), ColumnValues::Texts(splits)] = values[..] else {
         return Err("a column has another type".into());
     };
     let rows_of = |name: &str| splits.iter().filter(|split| *split == name).count();

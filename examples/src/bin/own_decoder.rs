@@ -75,11 +75,7 @@ fn main() -> Result<()> {
 
     // presses of the twin; `Source::open` takes recordings of a skin in their place
     let scenes = ["press/T", "press/rec", "press/tape"].map(str::to_owned).to_vec();
-    let twin = TwinSessions {
-        scenes,
-        seed: 1,
-        quick: true,
-    };
+    let twin = TwinSessions { scenes, seed: 1, quick: true };
     let source = Source::new(twin.simulate(&|| ())?)?;
     let settings = BoardSettings {
         decoders: ["nn_lasso", "nn_lmmse"].into_iter().filter_map(find).collect(),

@@ -44,10 +44,6 @@ fn main() -> Result<()> {
 
     let (recording, start_s) = held(&session)?;
     println!("{file}, 15 N, turned by 20 degrees, from 50 measurements:");
-    show(
-        &decode(&window(recording, start_s, 50)?)?,
-        truth(&session)?,
-        recording.layout().cols(),
-    );
+    show(&decode(&window(recording, start_s, 50)?)?, truth(&session)?, recording.layout().cols());
     Ok(())
 }

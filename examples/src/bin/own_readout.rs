@@ -45,10 +45,7 @@ fn main() -> Result<()> {
         let volts = &recording.blocks()[0].volts[..10_000];
         let mean = volts.iter().sum::<f64>() / volts.len() as f64;
         let variance = volts.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / volts.len() as f64;
-        println!(
-            "{name}: noise of the untouched skin {:.1} mV; from 40 measurements:",
-            1e3 * variance.sqrt()
-        );
+        println!("{name}: noise of the untouched skin {:.1} mV; from 40 measurements:", 1e3 * variance.sqrt());
         let image = decode(&window(&recording, press.frames[middle].time_s, 40)?)?;
         let truth = &chain.conductance_maps(&[&press.frames], 0)[0][middle];
         show(&image, truth.values(), scene.skin().cols());

@@ -34,10 +34,7 @@ impl Transducer for Foil {
 }
 
 fn main() -> Result<()> {
-    let foil = Foil {
-        most_s: 3e-4,
-        half_pa: 2e4,
-    };
+    let foil = Foil { most_s: 3e-4, half_pa: 2e4 };
     // the promises that every transducer keeps; panics with the numbers when this one does not
     check_transducer(&|_| Box::new(foil));
     println!("the foil keeps the promises of a transducer");

@@ -97,13 +97,7 @@ impl BudgetCommand {
         };
         let report = study.run(&Bars::default())?;
         spts_report::budget::write(&report, out)?;
-        let text = || {
-            format!(
-                "{}\ntables and pictures: {}",
-                spts_report::budget::text(&report),
-                self.out.display()
-            )
-        };
+        let text = || format!("{}\ntables and pictures: {}", spts_report::budget::text(&report), self.out.display());
         self.common.print(&spts_report::budget::json(&report), text)
     }
 }

@@ -75,9 +75,7 @@ fn parse_out(text: &str) -> Result<PathBuf, String> {
 
 /// FIRST-LAST, both from 1 on.
 fn parse_presses(text: &str) -> Result<(usize, usize), String> {
-    let ends = text
-        .split_once('-')
-        .and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    let ends = text.split_once('-').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
     ends.filter(|(a, b)| 1 <= *a && a <= b)
         .ok_or_else(|| "valid: A-B with whole numbers 1 ≤ A ≤ B".to_owned())
 }
@@ -92,10 +90,7 @@ impl CalibrateCommand {
         if let Some(path) = &self.out {
             check_ours(path, |text| !text.contains('#') && Profile::from_toml(text).is_ok())?;
         }
-        let study = CalibrationStudy {
-            session: self.session,
-            presses: self.presses,
-        };
+        let study = CalibrationStudy { session: self.session, presses: self.presses };
         let report = study.run(&self.recordings, &Bars::default())?;
         if let Some(slips) = slips_text(&report.slips) {
             note(&format!("note: {slips}"));
@@ -126,8 +121,7 @@ impl CalibrateCommand {
         if let Some(text) = report.scored_text() {
             note(&format!("note: {text}"));
         }
-        self.common
-            .print(&report, || spts_report::calibrate::skin_text(&report))?;
+        self.common.print(&report, || spts_report::calibrate::skin_text(&report))?;
         if let Some(path) = &self.out {
             write_bytes(path, report.toml()?.as_bytes())?;
             let picture = path.with_extension("png");

@@ -95,15 +95,9 @@ impl CircuitCommand {
         let one_wire = study.one_wire_text(one_wire_taxels);
         if let Some(taxels) = self.taxels {
             let ways = study.of(taxels)?;
-            let (as_built, remedies) = ways
-                .split_first()
-                .ok_or_else(|| CliError::usage("no way to read a skin".to_owned()))?;
-            let one = OneSize {
-                available_s,
-                one_wire_taxels,
-                as_built,
-                remedies,
-            };
+            let (as_built, remedies) =
+                ways.split_first().ok_or_else(|| CliError::usage("no way to read a skin".to_owned()))?;
+            let one = OneSize { available_s, one_wire_taxels, as_built, remedies };
             let text = || format!("{}\n{one_wire}", text(&ways, available_s));
             return self.common.print(&one, text);
         }
@@ -114,11 +108,7 @@ impl CircuitCommand {
         self.common.print(&report, || {
             let shown = report.rows.iter().filter(|r| TABLE_TAXELS.contains(&r.taxels));
             let shown: Vec<Remedied> = shown.cloned().collect();
-            format!(
-                "{}\n{one_wire}\npicture: {}",
-                text(&shown, available_s),
-                picture.display()
-            )
+            format!("{}\n{one_wire}\npicture: {}", text(&shown, available_s), picture.display())
         })
     }
 

@@ -110,11 +110,8 @@ impl CompareCommand {
         self.common.start()?;
         let out = open_folder(&self.out)?;
         if self.arm {
-            let study = ArmStudy {
-                recordings: &self.recordings,
-                skins: self.skins.unwrap_or(ARM_SKINS),
-                seed: self.seed,
-            };
+            let study =
+                ArmStudy { recordings: &self.recordings, skins: self.skins.unwrap_or(ARM_SKINS), seed: self.seed };
             let report = study.run(&Bars::default())?;
             write_arm(&report, out)?;
             return self.common.print(&arm_json(&report), || arm_text(&report));
@@ -124,11 +121,7 @@ impl CompareCommand {
         if let Some(slips) = slips_text(&slips) {
             note(&format!("note: {slips}"));
         }
-        let real = if self.no_curves || self.profile.is_some() {
-            None
-        } else {
-            self.scored()?
-        };
+        let real = if self.no_curves || self.profile.is_some() { None } else { self.scored()? };
         let simulated = self.images == "simulated";
         if self.gains.is_some() && !simulated {
             let message = "`--gains` is of a simulated skin; it needs `--images simulated`";
@@ -150,20 +143,12 @@ impl CompareCommand {
         let report = study.run(&Bars::default())?;
         let objects = self.per_object()?;
         write(&report, objects.as_ref(), out)?;
-        let folder = if self.profile.is_some() {
-            "predicted.csv"
-        } else {
-            "figures"
-        };
+        let folder = if self.profile.is_some() { "predicted.csv" } else { "figures" };
         self.common.print(&json(&report, objects.as_ref()), || {
-            let objects = objects.as_ref().map_or_else(String::new, |found| {
-                format!("\n{}\n", spts_report::per_object::text(found))
-            });
-            format!(
-                "{}{objects}\nresults: {}",
-                text(&report),
-                self.out.join(folder).display()
-            )
+            let objects = objects
+                .as_ref()
+                .map_or_else(String::new, |found| format!("\n{}\n", spts_report::per_object::text(found)));
+            format!("{}{objects}\nresults: {}", text(&report), self.out.join(folder).display())
         })
     }
 
@@ -190,12 +175,7 @@ impl CompareCommand {
     /// Twin and skin object by object, if that is asked for.
     fn per_object(&self) -> Result<Option<PerObjectReport>, CliError> {
         let Some(skins) = self.skins else { return Ok(None) };
-        let study = PerObjectStudy {
-            recordings: &self.recordings,
-            skins,
-            seed: self.seed,
-            causes: self.causes,
-        };
+        let study = PerObjectStudy { recordings: &self.recordings, skins, seed: self.seed, causes: self.causes };
         Ok(Some(study.run(&Bars::default())?))
     }
 

@@ -70,11 +70,7 @@ pub(super) fn note_earlier(path: &Path) {
 
 /// Standard error, or nowhere when that is not a terminal.
 fn target() -> ProgressDrawTarget {
-    if std::io::stderr().is_terminal() {
-        ProgressDrawTarget::stderr()
-    } else {
-        ProgressDrawTarget::hidden()
-    }
+    if std::io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
 }
 
 /// Spinner for a stage of unknown length, on standard error; silent when that is not a terminal. Gone when dropped.
@@ -175,10 +171,7 @@ enum Shown {
 impl Bars {
     /// Bars that leave a line of every stage, with the time that it took: for runs of minutes.
     pub fn with_lines() -> Self {
-        Self {
-            lines: true,
-            ..Self::default()
-        }
+        Self { lines: true, ..Self::default() }
     }
 
     fn set(&self, next: Shown, running: Option<(&'static str, Instant)>) {

@@ -101,9 +101,7 @@ impl DecodeCommand {
         }
         let shown = |slip: &SessionSlip| sessions.iter().any(|session| session.name == slip.session);
         let slips: Vec<SessionSlip> = slips.into_iter().filter(shown).collect();
-        slips_text(&slips)
-            .iter()
-            .for_each(|text| note(&format!("note: {text}")));
+        slips_text(&slips).iter().for_each(|text| note(&format!("note: {text}")));
         let bars = Bars::default();
         bars.stage("learning", None);
         let training = Training::new(&set, self.skin.as_deref(), self.seed);
@@ -137,9 +135,7 @@ impl DecodeCommand {
             let lost = all - found.measured.len();
             if lost > 0 {
                 let name = &session.name;
-                note(&format!(
-                    "note: {name}: {lost} of {all} windows have lost samples and are left out"
-                ));
+                note(&format!("note: {name}: {lost} of {all} windows have lost samples and are left out"));
             }
             decoded.push((session, found));
             bars.step();
@@ -160,12 +156,7 @@ impl DecodeCommand {
 
     /// The sessions to decode: those that are named, or all with a compressive recording.
     fn chosen<'a>(&self, set: &'a SessionSet) -> Result<Vec<&'a Session>, CliError> {
-        let names = || {
-            set.sessions
-                .iter()
-                .filter(|s| s.compressive.is_some())
-                .map(|s| s.name.as_str())
-        };
+        let names = || set.sessions.iter().filter(|s| s.compressive.is_some()).map(|s| s.name.as_str());
         if let Some(name) = self.only.iter().find(|name| set.named(name).is_none()) {
             let valid: Vec<&str> = names().collect();
             return Err(CliError::usage(format!(
@@ -208,13 +199,7 @@ impl<'a> Training<'a> {
         if let (Err(error), None) = (&source, skin) {
             note(&format!("note: nothing is learned from these recordings: {error}"));
         }
-        Self {
-            source: source.ok(),
-            skin,
-            labels: Labels::default(),
-            seed,
-            streams: Streams::new(seed),
-        }
+        Self { source: source.ok(), skin, labels: Labels::default(), seed, streams: Streams::new(seed) }
     }
 
     fn of(&self, layout: &SkinLayout) -> Result<(TrainingData, Option<&Labels>), CliError> {
@@ -256,10 +241,7 @@ fn table(decoded: &[(&Session, DecodedSession)]) -> String {
         .shown("correlation", |(_, rows)| mean(rows, |r| r.correlation))
         .digits(3)
         .shown("classified", |(known, rows)| {
-            let right = rows
-                .iter()
-                .filter(|r| r.label.as_deref() == Some(&*r.label_true))
-                .count();
+            let right = rows.iter().filter(|r| r.label.as_deref() == Some(&*r.label_true)).count();
             (*known && rows.iter().any(|r| r.label.is_some())).then(|| format!("{right} of {}", rows.len()))
         });
     table.text().trim_end().to_owned()

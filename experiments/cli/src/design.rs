@@ -129,10 +129,7 @@ fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
 
 /// A length, m.
 fn length(text: &str) -> Result<f64, String> {
-    let found = with_unit(
-        text,
-        &[("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("µm", 1e-6), ("m", 1.0)],
-    );
+    let found = with_unit(text, &[("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("µm", 1e-6), ("m", 1.0)]);
     let range = found.filter(|m| (1e-4..=1.0).contains(m));
     range.ok_or_else(|| "is not a length in [0.1mm, 1m], as 5mm or 0.005".to_owned())
 }
@@ -158,18 +155,14 @@ impl NewDesign {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let (Some(area_m), Some(pitch_m), Some(latency_s)) = (self.area, self.resolution, self.latency) else {
-            return Err(CliError::usage(
-                "--area, --resolution and --latency are needed".to_owned(),
-            ));
+            return Err(CliError::usage("--area, --resolution and --latency are needed".to_owned()));
         };
         let study = DesignStudy {
             area_m,
             pitch_m,
             latency_s,
             iou: self.iou,
-            wires: self
-                .wires
-                .map_or(WireChoice::UpTo(self.most_wires), WireChoice::Exactly),
+            wires: self.wires.map_or(WireChoice::UpTo(self.most_wires), WireChoice::Exactly),
             objects: DesignObjects::named(&self.objects)?,
             seed: self.seed,
         };
@@ -193,8 +186,7 @@ impl CheckCommand {
         self.common.start()?;
         let check = read_design(&self.design, self.seed)?;
         let report = check.run(&Bars::default())?;
-        self.common
-            .print(&report, || spts_report::design::check_text(&report))?;
+        self.common.print(&report, || spts_report::design::check_text(&report))?;
         if report.agrees {
             return Ok(());
         }
@@ -218,10 +210,7 @@ mod tests {
         assert!(near(length("0.5cm"), 5e-3) && near(time("5ms"), 5e-3) && near(time("500us"), 5e-4));
         assert!(near(time("0.005"), 5e-3) && near(time("5e-3s"), 5e-3));
         for wrong in ["", "mm", "nan", "-5mm", "0", "inf", "2m", "5 apples"] {
-            assert!(
-                length(wrong).is_err() && time(&wrong.replace("2m", "20s")).is_err(),
-                "{wrong}"
-            );
+            assert!(length(wrong).is_err() && time(&wrong.replace("2m", "20s")).is_err(), "{wrong}");
         }
         assert!(area("0.3x0.2").is_ok_and(|a| (a[0] - 0.3).abs() + (a[1] - 0.2).abs() < 1e-15));
         for wrong in ["0.3", "0x0.2", "nanx1", "0.3x", "11x1", "0.3x0.2x0.1"] {

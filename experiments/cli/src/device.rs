@@ -155,10 +155,7 @@ impl DeviceCommand {
         let refuse = |reason: String| CliError::usage(format!("{}: {reason}", path.display()));
         let [session] = set.sessions.as_slice() else {
             let names: Vec<&str> = set.sessions.iter().map(|s| s.name.as_str()).collect();
-            return Err(refuse(format!(
-                "holds several sessions: {}; name the folder of one",
-                names.join(", ")
-            )));
+            return Err(refuse(format!("holds several sessions: {}; name the folder of one", names.join(", "))));
         };
         let found = match self.mode.readout() {
             Mode::Raster => Session::raster(session),
@@ -169,12 +166,7 @@ impl DeviceCommand {
 
     fn serve(&self, source: &mut dyn BlockSource, taxels: usize, blocks: Option<u64>) -> Result<(), CliError> {
         let terminal = Terminal::open().map_err(|e| CliError::usage(format!("`--pty`: {e}")))?;
-        let opened = Opened {
-            port: &terminal.name,
-            mode: self.mode.name(),
-            taxels,
-            blocks,
-        };
+        let opened = Opened { port: &terminal.name, mode: self.mode.name(), taxels, blocks };
         if self.json {
             let line = serde_json::to_string(&opened)?;
             print(&line)?;
@@ -210,10 +202,6 @@ impl Terminal {
         let mut settings = tcgetattr(&host)?;
         settings.make_raw();
         tcsetattr(&host, OptionalActions::Now, &settings)?;
-        Ok(Self {
-            device: File::from(device),
-            host,
-            name: name.to_string_lossy().into_owned(),
-        })
+        Ok(Self { device: File::from(device), host, name: name.to_string_lossy().into_owned() })
     }
 }

@@ -88,11 +88,7 @@ fn option_name(argument: &str) -> &str {
 
 /// The reason as it follows a value: " is outside [1, 9]", or ": two numbers are needed".
 fn joined(reason: &str) -> String {
-    if reason.starts_with("is ") {
-        format!(" {reason}")
-    } else {
-        format!(": {reason}")
-    }
+    if reason.starts_with("is ") { format!(" {reason}") } else { format!(": {reason}") }
 }
 
 /// `text` on one line, whatever a library or a file put into it.

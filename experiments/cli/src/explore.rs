@@ -74,12 +74,7 @@ impl ExploreCommand {
         self.common.start()?;
         let out = open_folder(&self.out)?;
         let study = ExploreStudy {
-            sides: sorted(
-                self.taxels
-                    .iter()
-                    .filter_map(|side| u32::try_from(side.0).ok())
-                    .collect(),
-            ),
+            sides: sorted(self.taxels.iter().filter_map(|side| u32::try_from(side.0).ok()).collect()),
             scenes: self.scenes.unwrap_or(if self.quick { 1 } else { 4 }),
             seeding: match self.seeding {
                 SeedsArg::Mixed => Seeding::Mixed,
@@ -90,13 +85,7 @@ impl ExploreCommand {
         };
         let report = study.run(&Bars::default())?;
         explore::write(&study, &report, out)?;
-        let text = || {
-            format!(
-                "{}\ntables and pictures: {}",
-                explore::text(&report),
-                self.out.display()
-            )
-        };
+        let text = || format!("{}\ntables and pictures: {}", explore::text(&report), self.out.display());
         self.common.print(&report, text)
     }
 }

@@ -59,38 +59,21 @@ impl FidelityCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let mut grid = if self.quick {
-            SettingGrid::quick()
-        } else {
-            SettingGrid::full()
-        };
+        let mut grid = if self.quick { SettingGrid::quick() } else { SettingGrid::full() };
         if !self.cells.is_empty() {
             let cells: Vec<usize> = sorted(self.cells.iter().copied().map(usize::from).collect());
             grid.reference_cells = grid.reference_cells.max(cells[cells.len() - 1]);
             grid.cells_per_taxel = cells;
         }
-        let study = FidelityStudy {
-            scenes: self.scene,
-            grid,
-            seed: self.seed,
-        };
+        let study = FidelityStudy { scenes: self.scene, grid, seed: self.seed };
         let out = open_folder(&self.out)?;
         let report = study.run(&out.folder("scenes")?, &Bars::default())?;
         spts_report::fidelity::write(&report, out)?;
         let folder = self.out.join("figures");
-        let text = || {
-            format!(
-                "{}\npictures: {}",
-                spts_report::fidelity::text(&report),
-                folder.display()
-            )
-        };
+        let text = || format!("{}\npictures: {}", spts_report::fidelity::text(&report), folder.display());
         self.common.print(&report, text)?;
         for refusal in report.refusals.iter().take(3) {
-            note(&format!(
-                "refused: {} on {}: {}",
-                refusal.scene, refusal.level, refusal.reason
-            ));
+            note(&format!("refused: {} on {}: {}", refusal.scene, refusal.level, refusal.reason));
         }
         Ok(())
     }

@@ -26,14 +26,7 @@ pub(crate) fn simulated_sessions(scenes: &[String], seed: u64, quick: bool) -> R
 /// Simulated presses of every object on as many skins as the default says, made once for all sources that need them.
 /// The skins have the `layout` of the scored one, and usual gains; with `median`, gain 1 everywhere.
 pub(crate) fn simulated_presses(layout: SkinLayout, median: bool, seed: u64) -> Result<Vec<ScoredSession>, CliError> {
-    let skins = if median {
-        Skins::median(layout)
-    } else {
-        Skins {
-            layout,
-            ..Skins::default()
-        }
-    };
+    let skins = if median { Skins::median(layout) } else { Skins { layout, ..Skins::default() } };
     let bar = progress(skins.skins * OBJECTS.len(), "simulated presses");
     let sessions = skins.press(seed, &|| bar.inc(1));
     bar.finish_and_clear();

@@ -25,10 +25,7 @@ mod firmware;
 mod full;
 #[cfg(feature = "full")]
 mod live;
-#[cfg_attr(
-    not(feature = "full"),
-    expect(dead_code, reason = "some belong to commands that are left out")
-)]
+#[cfg_attr(not(feature = "full"), expect(dead_code, reason = "some belong to commands that are left out"))]
 mod options;
 #[cfg(feature = "full")]
 mod readouts;
@@ -178,7 +175,5 @@ impl Cli {
 /// The command, and all below it, with `-1` as the value of an option, to be refused with the range, and not as an
 /// option that does not exist.
 fn with_negative_numbers(command: clap::Command) -> clap::Command {
-    command
-        .allow_negative_numbers(true)
-        .mut_subcommands(with_negative_numbers)
+    command.allow_negative_numbers(true).mut_subcommands(with_negative_numbers)
 }

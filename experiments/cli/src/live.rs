@@ -43,11 +43,8 @@ impl LiveCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let server = Server::bind(&LiveConfig {
-            port: self.port,
-            seed: self.seed,
-            object: self.object.name.to_owned(),
-        })?;
+        let server =
+            Server::bind(&LiveConfig { port: self.port, seed: self.seed, object: self.object.name.to_owned() })?;
         let url = format!("http://{}/", server.address());
         if self.common.json {
             // one line, for a script that reads a line and goes on while the page is served

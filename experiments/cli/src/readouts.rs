@@ -92,11 +92,7 @@ impl ReadoutsCommand {
         let report = study.run(&Bars::default())?;
         write(&study, &report, out)?;
         let text = || {
-            format!(
-                "{}\ntables and pictures: {}",
-                spts_report::readouts::text(&report).trim_end(),
-                self.out.display()
-            )
+            format!("{}\ntables and pictures: {}", spts_report::readouts::text(&report).trim_end(), self.out.display())
         };
         self.common.print(&report, text)
     }

@@ -85,9 +85,7 @@ impl RecordCommand {
             return Err(CliError::usage(format!("`--hold` = {:?}; valid: FIRST,END", self.hold)));
         };
         if first >= end {
-            return Err(CliError::usage(format!(
-                "`--hold` = {first},{end}: the end is not behind the first frame"
-            )));
+            return Err(CliError::usage(format!("`--hold` = {first},{end}: the end is not behind the first frame")));
         }
         let chain = self.mode.chain(&self.readout, 0)?;
         let readout = chain.readout(self.mode.readout(), 0)?;
@@ -105,10 +103,7 @@ impl RecordCommand {
             let found = host.block(FRAMES * frame)?;
             if let Some(code) = found.codes.iter().find(|code| **code > converter.max_code()) {
                 let most = converter.max_code();
-                return Err(CliError::usage(format!(
-                    "block {}: code {code} is outside [0, {most}]",
-                    blocks.len()
-                )));
+                return Err(CliError::usage(format!("block {}: code {code} is outside [0, {most}]", blocks.len())));
             }
             let volts = found.codes.iter().map(|code| converter.volts(*code));
             // the last one of a block is never sent
@@ -121,10 +116,8 @@ impl RecordCommand {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        let signal_v: Vec<f64> = blocks
-            .iter()
-            .map(|block| self.signal_v(&block.volts, frame, first as usize))
-            .collect();
+        let signal_v: Vec<f64> =
+            blocks.iter().map(|block| self.signal_v(&block.volts, frame, first as usize)).collect();
         let count = blocks.len();
         let recording = Recording::new(info, blocks).map_err(|e| CliError::usage(format!("what was read: {e}")))?;
         let recorded = Recorded {
@@ -146,17 +139,13 @@ impl RecordCommand {
     fn open(&self) -> Result<SerialPort, CliError> {
         let failed = |e: io::Error| CliError::usage(format!("`--port` = {}: {e}", self.port.display()));
         let mut port = SerialPort::open(&self.port, self.baud).map_err(failed)?;
-        port.set_read_timeout(Duration::from_secs_f64(self.timeout))
-            .map_err(failed)?;
+        port.set_read_timeout(Duration::from_secs_f64(self.timeout)).map_err(failed)?;
         Ok(port)
     }
 
     /// The session that is there, without the mode that is recorded now, or a new one.
     fn session(&self, hold_s: [f64; 2]) -> Result<Session, CliError> {
-        let new = Session {
-            hold_s: Some(hold_s),
-            ..Session::new(&self.object, Event::Press)
-        };
+        let new = Session { hold_s: Some(hold_s), ..Session::new(&self.object, Event::Press) };
         if !self.out.join(SESSION_FILE).exists() {
             return Ok(new);
         }
@@ -170,15 +159,9 @@ impl RecordCommand {
             )));
         }
         if self.slot(&mut there).is_some() {
-            note(&format!(
-                "note: the recording of this mode in {} is replaced",
-                self.out.display()
-            ));
+            note(&format!("note: the recording of this mode in {} is replaced", self.out.display()));
         }
-        Ok(Session {
-            hold_s: Some(hold_s),
-            ..there
-        })
+        Ok(Session { hold_s: Some(hold_s), ..there })
     }
 
     /// The recording of `session` in this mode.

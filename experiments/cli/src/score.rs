@@ -251,15 +251,9 @@ impl ScoreCommand {
             board.localisation = ready.localise()?;
             Ok(board)
         })?;
-        let found = before
-            .as_ref()
-            .map(|before| regressions(before, &board, self.tolerance));
+        let found = before.as_ref().map(|before| regressions(before, &board, self.tolerance));
         let apart = before.as_ref().map(|before| differences(before, &board));
-        let shown = BoardOutput {
-            board: &board,
-            regressions: found.as_deref(),
-            differences: apart.as_deref(),
-        };
+        let shown = BoardOutput { board: &board, regressions: found.as_deref(), differences: apart.as_deref() };
         self.finish(&shown, table(&board), || {
             write_board(&board, out)?;
             self.save.as_deref().map_or(Ok(()), |path| write_json(path, &board))
@@ -307,10 +301,7 @@ impl ScoreCommand {
             return Err(CliError::usage(reason));
         }
         let source = self.source()?;
-        let settings = BoardSettings {
-            training: self.training(&source)?,
-            ..self.fitting(settings, &source)
-        };
+        let settings = BoardSettings { training: self.training(&source)?, ..self.fitting(settings, &source) };
         let bars = Bars::default();
         bars.stage("learning", None);
         let scored = settings.learn(&source).and_then(|ready| {
@@ -339,18 +330,13 @@ impl ScoreCommand {
     /// The wanted confidences.
     fn wanted(&self) -> Result<StopSettings, CliError> {
         if let Some(outside) = self.confidence.iter().find(|p| !(**p > 0.5 && **p < 1.0)) {
-            return Err(CliError::usage(format!(
-                "`--confidence` = {outside} is outside (0.5, 1)"
-            )));
+            return Err(CliError::usage(format!("`--confidence` = {outside} is outside (0.5, 1)")));
         }
         if self.confidence.is_empty() {
             return Ok(StopSettings::default());
         }
         let wanted = sorted_numbers(self.confidence.clone());
-        Ok(StopSettings {
-            class: wanted.clone(),
-            image: wanted,
-        })
+        Ok(StopSettings { class: wanted.clone(), image: wanted })
     }
 
     /// The sessions that are scored; a note says which of them slip.
@@ -374,9 +360,7 @@ impl ScoreCommand {
             );
         }
         let training = self.learn_from.iter();
-        training
-            .map(|name| training_source(name, scored, self.seed, &mut skins))
-            .collect()
+        training.map(|name| training_source(name, scored, self.seed, &mut skins)).collect()
     }
 
     /// The same without decoders that nobody named and that have no weights for the skin.
@@ -425,22 +409,15 @@ impl ScoreCommand {
         }
         let mut measurements: Vec<usize> = self.measurements.iter().map(|m| *m as usize).collect();
         if measurements.is_empty() {
-            measurements = if self.in_time {
-                IN_TIME_MEASUREMENTS.to_vec()
-            } else {
-                BoardSettings::MEASUREMENTS.to_vec()
-            };
+            measurements =
+                if self.in_time { IN_TIME_MEASUREMENTS.to_vec() } else { BoardSettings::MEASUREMENTS.to_vec() };
         }
         Ok(BoardSettings {
             decoders,
             external,
             measurements: sorted(measurements),
             objects: self.object.clone(),
-            localisation: if self.no_ball || self.anytime {
-                Vec::new()
-            } else {
-                BoardSettings::LOCALISATION.to_vec()
-            },
+            localisation: if self.no_ball || self.anytime { Vec::new() } else { BoardSettings::LOCALISATION.to_vec() },
             left_out: self.left_out,
             sensing: sorted(self.sensing.clone()),
             training: Vec::new(),
@@ -473,25 +450,11 @@ fn list() -> String {
 /// Says what this board and the earlier one, which is in `file`, do not have in common.
 fn note_differences(file: &Path, found: &[Difference]) {
     let file = file.display();
-    for Difference {
-        what,
-        only_before,
-        only_now,
-    } in found
-    {
-        let sides = [
-            (format!("only in {file}"), only_before),
-            ("only in this run".to_owned(), only_now),
-        ];
+    for Difference { what, only_before, only_now } in found {
+        let sides = [(format!("only in {file}"), only_before), ("only in this run".to_owned(), only_now)];
         let sides = sides.iter().filter(|(_, names)| !names.is_empty());
-        let sides: Vec<String> = sides
-            .map(|(side, names)| format!("{side}: {}", names.join(", ")))
-            .collect();
-        let means = if *what == "objects" {
-            "; the means are over different objects"
-        } else {
-            ""
-        };
+        let sides: Vec<String> = sides.map(|(side, names)| format!("{side}: {}", names.join(", "))).collect();
+        let means = if *what == "objects" { "; the means are over different objects" } else { "" };
         note(&format!("note: {what} {}{means}", sides.join("; ")));
     }
 }
@@ -512,17 +475,10 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
     let gone: Vec<&Regression> = found.iter().filter(|r| r.now.is_none()).collect();
     for row in gone.chunk_by(|a, b| a.what == b.what) {
         let scores: Vec<&str> = row.iter().map(|r| r.score).collect();
-        note(&format!(
-            "{}: not scored in this run: {}",
-            row[0].what,
-            scores.join(", ")
-        ));
+        note(&format!("{}: not scored in this run: {}", row[0].what, scores.join(", ")));
     }
     let fell = found.len() - gone.len();
-    Err(CliError::Differs(format!(
-        "{fell} scores fell, {} are gone",
-        gone.len()
-    )))
+    Err(CliError::Differs(format!("{fell} scores fell, {} are gone", gone.len())))
 }
 
 /// Refuses to save a board where one cannot be written, and in place of a file that is no board.
@@ -580,21 +536,18 @@ fn training_source(
         PUBLISHED => TrainingSource::Published,
         RASTER => TrainingSource::Raster,
         SHAPES => TrainingSource::Shapes,
-        SIMULATION => TrainingSource::Poses {
-            name: SIMULATION.to_owned(),
-            objects: posed_objects(&scored.layout, seed)?,
-        },
+        SIMULATION => {
+            TrainingSource::Poses { name: SIMULATION.to_owned(), objects: posed_objects(&scored.layout, seed)? }
+        }
         SIMULATION_FITTED => TrainingSource::Other {
             name: SIMULATION_FITTED.to_owned(),
             sessions: presses(false)?,
             all: true,
             gain_sd: simulated_gain_sd(),
         },
-        CALIBRATED => TrainingSource::Calibrated {
-            name: CALIBRATED.to_owned(),
-            simulated: presses(true)?,
-            gains: None,
-        },
+        CALIBRATED => {
+            TrainingSource::Calibrated { name: CALIBRATED.to_owned(), simulated: presses(true)?, gains: None }
+        }
         file if Path::new(file).extension().is_some_and(|e| e == "toml") => TrainingSource::Calibrated {
             name: file.to_owned(),
             gains: Some(skin_gains(Path::new(file), &scored.layout)?),

@@ -45,9 +45,7 @@ const MOST: usize = 1024;
 /// Rows and columns of a skin.
 fn skin(text: &str) -> Result<[usize; 2], String> {
     let side = |word: &str| word.parse().ok().filter(|n| (1..=MOST).contains(n));
-    let found = text
-        .split_once(['x', '×'])
-        .and_then(|(r, c)| Some([side(r)?, side(c)?]));
+    let found = text.split_once(['x', '×']).and_then(|(r, c)| Some([side(r)?, side(c)?]));
     found.ok_or_else(|| "is not ROWSxCOLS with both in [1, 1024]".to_owned())
 }
 
@@ -150,10 +148,7 @@ impl DesignCommand {
             },
             noise: self.noise,
             largest_sum: self.largest_sum,
-            tolerances: Tolerances {
-                gain_log_sd: self.gains,
-                shift: self.shift,
-            },
+            tolerances: Tolerances { gain_log_sd: self.gains, shift: self.shift },
             fewest_flips: self.fewest_flips,
             seed: self.seed,
         };

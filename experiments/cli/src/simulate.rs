@@ -158,21 +158,13 @@ pub(super) struct SimulateCommand {
 /// Help of `SCENE`, with the objects that there are.
 fn scene_help() -> String {
     let names: Vec<&str> = OBJECTS.iter().map(|object| object.name).collect();
-    format!(
-        "press/NAME, press (with --mesh), bounce, arm, or FILE.toml; NAME is finger or one of {}",
-        names.join(", ")
-    )
+    format!("press/NAME, press (with --mesh), bounce, arm, or FILE.toml; NAME is finger or one of {}", names.join(", "))
 }
 
 /// A path as a value of a scene.
 fn path(path: &Path) -> Result<Value, CliError> {
     let text = path.to_str().map(Value::from);
-    text.ok_or_else(|| {
-        CliError::usage(format!(
-            "--mesh {}: the name of the file is not valid UTF-8",
-            path.display()
-        ))
-    })
+    text.ok_or_else(|| CliError::usage(format!("--mesh {}: the name of the file is not valid UTF-8", path.display())))
 }
 
 fn parse_pair(text: &str) -> Result<[f64; 2], String> {
@@ -202,27 +194,15 @@ impl SimulateCommand {
             ("--row", &PLACE[0], number(self.row)),
             ("--col", &PLACE[1], number(self.col)),
             ("--rotation-deg", &["press.rotation_deg"], number(self.rotation_deg)),
-            (
-                "--tilt-deg",
-                &["press.tilt_deg"],
-                self.tilt_deg.map(|tilt| tilt.to_vec().into()),
-            ),
+            ("--tilt-deg", &["press.tilt_deg"], self.tilt_deg.map(|tilt| tilt.to_vec().into())),
             ("--force", &["press.force_n"], number(self.force)),
             ("--height", &["drop.height_m"], number(self.height)),
-            (
-                "--presses",
-                &["press.presses", "drop.drops"],
-                self.presses.map(Value::from),
-            ),
+            ("--presses", &["press.presses", "drop.drops"], self.presses.map(Value::from)),
             ("--tolerance", &["tolerance"], number(self.tolerance)),
             ("--timestep", &["timestep_s"], self.timestep.map(|step| step.to_toml())),
             ("--contact", &["contact.model"], text(&self.contact)),
             ("--cells", &["contact.cells_per_taxel"], self.cells.map(Value::from)),
-            (
-                "--seed",
-                &["seed"],
-                self.seed.map(|seed| Value::Integer(seed.cast_signed())),
-            ),
+            ("--seed", &["seed"], self.seed.map(|seed| Value::Integer(seed.cast_signed()))),
             ("--transducer", &["transducer"], text(&self.transducer)),
             ("--readout", &["readout"], text(&self.readout)),
             ("--weights", &["weights"], text(&self.weights)),
@@ -247,10 +227,7 @@ impl SimulateCommand {
             return self.common.print(&list, || list.text());
         }
         self.common.start()?;
-        let request = Request {
-            scene: self.scene.clone().unwrap_or_default(),
-            assignments: self.assignments()?,
-        };
+        let request = Request { scene: self.scene.clone().unwrap_or_default(), assignments: self.assignments()? };
         let prepared = request.prepare()?;
         let out = self.out.clone();
         let out = out.unwrap_or_else(|| default_folder(&prepared));
@@ -323,11 +300,7 @@ impl Learned {
             network: None,
             seed: 1,
         };
-        Ok(Self {
-            decoders: request.learn(layout, &training, None)?,
-            training,
-            request,
-        })
+        Ok(Self { decoders: request.learn(layout, &training, None)?, training, request })
     }
 
     /// The decoded session; `None` without a compressive recording.
@@ -342,20 +315,11 @@ const MOST_DECODED: usize = 1100;
 
 /// Everything that `SCENE` may be, as it stands on the command line, and what it is.
 const SCENES: [(&str, &str); 5] = [
-    (
-        "press/NAME",
-        "A robot arm presses the object NAME, one of those below, on the skin",
-    ),
-    (
-        "press --mesh FILE",
-        "The arm presses a mesh of your own: .obj, .glb or .stl",
-    ),
+    ("press/NAME", "A robot arm presses the object NAME, one of those below, on the skin"),
+    ("press --mesh FILE", "The arm presses a mesh of your own: .obj, .glb or .stl"),
     ("bounce", "A tennis ball falls on the skin and bounces"),
     ("arm", "A finger touches a skin that is wrapped round a robot's arm"),
-    (
-        "FILE.toml",
-        "A scene file. Every run writes one, scene.toml, to start from",
-    ),
+    ("FILE.toml", "A scene file. Every run writes one, scene.toml, to start from"),
 ];
 
 /// What `--list` prints.
@@ -378,11 +342,7 @@ impl SceneList {
     }
 
     fn text(&self) -> String {
-        format!(
-            "{}\n{}\nTry: spts simulate press/T",
-            self.scenes.text(),
-            self.objects.text()
-        )
+        format!("{}\n{}\nTry: spts simulate press/T", self.scenes.text(), self.objects.text())
     }
 }
 
@@ -421,10 +381,7 @@ mod tests {
         let plain = plain.filter(|scene| !scene.contains(|c: char| c.is_uppercase()));
         let objects = pressable().map(|object| format!("press/{}", object.name));
         for scene in plain.chain(objects) {
-            let request = Request {
-                scene,
-                ..Request::default()
-            };
+            let request = Request { scene, ..Request::default() };
             request.prepare().unwrap();
         }
     }

@@ -67,10 +67,7 @@ fn score(real: &PublishedSkin, measurements: &[usize]) -> Result<ValidationOutpu
     let bar = progress(real.skin.steps(), "scoring presses");
     let scores = real.skin.score(measurements, measurements, &[], &|| bar.inc(1));
     bar.finish_and_clear();
-    Ok(ValidationOutput {
-        scores: scores?,
-        missing: real.missing.clone(),
-    })
+    Ok(ValidationOutput { scores: scores?, missing: real.missing.clone() })
 }
 
 fn table(report: &ValidationOutput) -> String {
@@ -107,10 +104,7 @@ fn table(report: &ValidationOutput) -> String {
             .digits(2)
             .shown("share under 1", |l| l.share_under_1px)
             .digits(2);
-        out.push_str(&format!(
-            "\nlocalisation of the bouncing ball, taxels\n{}",
-            places.text()
-        ));
+        out.push_str(&format!("\nlocalisation of the bouncing ball, taxels\n{}", places.text()));
     }
     out.trim_end().to_owned()
 }
@@ -127,9 +121,6 @@ mod tests {
         let command = Cli::command();
         let validate = command.find_subcommand("validate").unwrap();
         let option = validate.get_arguments().find(|a| a.get_id() == "measurements").unwrap();
-        assert_eq!(
-            option.get_default_values()[0].to_str().unwrap(),
-            MEASUREMENTS.map(|m| m.to_string()).join(",")
-        );
+        assert_eq!(option.get_default_values()[0].to_str().unwrap(), MEASUREMENTS.map(|m| m.to_string()).join(","));
     }
 }

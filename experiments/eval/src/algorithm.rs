@@ -92,11 +92,8 @@ pub trait Algorithm {
             match self.decode(window, answer) {
                 Err(error @ DecodeError::External(_)) => return Err(error),
                 Err(_) => {
-                    *answer = Answer {
-                        image: vec![0.0; window.phi.ncols()],
-                        class: Some(Class::Unknown),
-                        failed: true,
-                    };
+                    *answer =
+                        Answer { image: vec![0.0; window.phi.ncols()], class: Some(Class::Unknown), failed: true };
                 }
                 Ok(()) => {}
             }

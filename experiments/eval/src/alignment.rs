@@ -70,10 +70,7 @@ pub fn follow_slips(set: &mut SessionSet) -> Vec<SessionSlip> {
         if !slips.is_empty() {
             recorded.recording = recorded.recording.realigned(&slips);
         }
-        let named = slips.into_iter().map(|slip| SessionSlip {
-            session: session.name.clone(),
-            slip,
-        });
+        let named = slips.into_iter().map(|slip| SessionSlip { session: session.name.clone(), slip });
         named.collect()
     };
     let found: Vec<Vec<SessionSlip>> = set.sessions.par_iter_mut().map(follow).collect();
@@ -101,20 +98,12 @@ pub fn slips_text(slips: &[SessionSlip]) -> Option<String> {
             format!("{rows} rows from measurement {from} of block {block} on")
         });
         let more = of_session.len().saturating_sub(NAMED);
-        let more = if more > 0 {
-            format!(" and {more} more")
-        } else {
-            String::new()
-        };
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
         format!("{name} ({}{more})", places.collect::<Vec<_>>().join(", "))
     });
     let each: Vec<String> = each.collect();
-    (!each.is_empty()).then(|| {
-        format!(
-            "clock edges were missed; samples are put back on their rows: {}",
-            each.join("; ")
-        )
-    })
+    (!each.is_empty())
+        .then(|| format!("clock edges were missed; samples are put back on their rows: {}", each.join("; ")))
 }
 
 /// Candidates that are fitted.
@@ -158,28 +147,16 @@ fn correlation_energies(phi: &[f64], taxels: usize, y: &[f64]) -> Vec<f64> {
     let lengths = "buffers of the plan's own lengths";
     let mut output = forward.make_output_vec();
     values[..y.len()].copy_from_slice(y);
-    forward
-        .process_with_scratch(&mut values, &mut output, &mut scratch)
-        .expect(lengths);
+    forward.process_with_scratch(&mut values, &mut output, &mut scratch).expect(lengths);
     let mut energies = vec![0.0; rows + 1 - y.len()];
     for taxel in 0..taxels {
         let weights = phi.iter().skip(taxel).step_by(taxels);
-        values
-            .iter_mut()
-            .zip(weights)
-            .for_each(|(value, weight)| *value = *weight);
+        values.iter_mut().zip(weights).for_each(|(value, weight)| *value = *weight);
         values[rows..].fill(0.0);
-        forward
-            .process_with_scratch(&mut values, &mut spectrum, &mut scratch)
-            .expect(lengths);
+        forward.process_with_scratch(&mut values, &mut spectrum, &mut scratch).expect(lengths);
         spectrum.iter_mut().zip(&output).for_each(|(w, y)| *w *= y.conj());
-        inverse
-            .process_with_scratch(&mut spectrum, &mut values, &mut scratch)
-            .expect(lengths);
-        energies
-            .iter_mut()
-            .zip(&values)
-            .for_each(|(energy, part)| *energy += part * part);
+        inverse.process_with_scratch(&mut spectrum, &mut values, &mut scratch).expect(lengths);
+        energies.iter_mut().zip(&values).for_each(|(energy, part)| *energy += part * part);
     }
     energies
 }
@@ -218,12 +195,7 @@ struct Tracker<'a> {
 
 impl<'a> Tracker<'a> {
     fn new(recording: &'a Recording) -> Self {
-        Self {
-            recording,
-            len: chunk_len(recording),
-            lag: 0,
-            slips: Vec::new(),
-        }
+        Self { recording, len: chunk_len(recording), lag: 0, slips: Vec::new() }
     }
 
     /// Finds the slips of block `block`.
@@ -306,10 +278,7 @@ impl<'a> Tracker<'a> {
         let (mut before, mut after) = (before.clone(), after.clone());
         let mut place = found;
         for _ in 0..ROUNDS {
-            let sums = (
-                all.expected(before.rows, &before.image),
-                all.expected(after.rows, &after.image),
-            );
+            let sums = (all.expected(before.rows, &before.image), all.expected(after.rows, &after.image));
             let (Some(old), Some(new)) = sums else { return place };
             let (mut gain, mut best, mut at) = (0.0, 0.0, 0);
             for (i, y) in all.y.iter().enumerate() {
@@ -355,9 +324,7 @@ mod tests {
     fn record(blocks: usize, faults: &str) -> Recording {
         let mut profile = Profile::named("as_built").unwrap();
         let faults: toml::Table = toml::from_str(faults).unwrap();
-        profile
-            .compressive
-            .insert("missed_clocks".to_owned(), toml::Value::Table(faults));
+        profile.compressive.insert("missed_clocks".to_owned(), toml::Value::Table(faults));
         let mut readout =
             Readout::new(&profile, Mode::Compressive, &SkinLayout::default(), Streams::new(3), 0).unwrap();
         let mut sources: Vec<Interpolated> = (0..blocks).map(press).collect();
@@ -391,10 +358,7 @@ mod tests {
         assert!(slips.is_sorted_by_key(|slip| slip.rows), "{slips:?}");
         let last = slips.last().map_or(0, |slip| slip.rows) as f64;
         let expected = 1e-4 * recording.first_row(BLOCKS - 1, FRAMES) as f64;
-        assert!(
-            (last - expected).abs() < 5.0 * expected.sqrt(),
-            "{last}, expected {expected}"
-        );
+        assert!((last - expected).abs() < 5.0 * expected.sqrt(), "{last}, expected {expected}");
         assert_eq!(find_slips(&recording.realigned(&slips)), []);
     }
 

@@ -31,10 +31,7 @@ pub struct StopSettings {
 
 impl Default for StopSettings {
     fn default() -> Self {
-        Self {
-            class: vec![0.8, 0.9, 0.95, 0.99],
-            image: vec![0.6, 0.7, 0.8],
-        }
+        Self { class: vec![0.8, 0.9, 0.95, 0.99], image: vec![0.6, 0.7, 0.8] }
     }
 }
 
@@ -115,12 +112,8 @@ impl TrainedBoard<'_> {
     pub fn stops(&self, settings: &StopSettings, done: &(dyn Fn() + Sync)) -> Result<AnytimeBoard, Refusal> {
         let stopped = self.stopped(settings)?;
         let slots = stopped.iter().map(|stopped| stopped.ends.len()).sum();
-        let stops = self
-            .run
-            .each_press(slots, done, |session, block| self.press(&stopped, session, block))?;
-        let each = stopped
-            .iter()
-            .flat_map(|stopped| stopped.ends.iter().map(move |end| (stopped, end)));
+        let stops = self.run.each_press(slots, done, |session, block| self.press(&stopped, session, block))?;
+        let each = stopped.iter().flat_map(|stopped| stopped.ends.iter().map(move |end| (stopped, end)));
         let mut board = AnytimeBoard::default();
         for ((Stopped { entry, subject, .. }, end), presses) in each.zip(stops) {
             let key = AnytimeKey {
@@ -147,14 +140,12 @@ impl TrainedBoard<'_> {
                 failed: presses.iter().flatten().map(|press| press.failed).sum(),
             });
             let each = self.run.sessions.iter().zip(&presses).zip(scores);
-            board
-                .objects
-                .extend(each.map(|((session, presses), scores)| AnytimeObject {
-                    key: key.clone(),
-                    object: session.title().to_owned(),
-                    scores,
-                    windows: windows(presses),
-                }));
+            board.objects.extend(each.map(|((session, presses), scores)| AnytimeObject {
+                key: key.clone(),
+                object: session.title().to_owned(),
+                scores,
+                windows: windows(presses),
+            }));
         }
         Ok(board)
     }
@@ -227,10 +218,7 @@ enum Right<'a> {
 }
 
 /// What a decoder says about a sample that it cannot use, and from then on.
-const LOST: Belief = Belief {
-    confidence: 0.0,
-    class: Some(Class::Unknown),
-};
+const LOST: Belief = Belief { confidence: 0.0, class: Some(Class::Unknown) };
 
 /// How the windows of a press of up to `most` samples end, for each of `ends`. `label` is the class, where it is known.
 fn stops(
@@ -286,12 +274,9 @@ fn stop(
         }
         let attained = attained(scorer, &window.first(samples), belief, right)?;
         for &(end, reached) in &ended {
-            stops[end].windows.push(WindowStop {
-                samples,
-                reached,
-                stated: belief.confidence,
-                attained,
-            });
+            stops[end]
+                .windows
+                .push(WindowStop { samples, reached, stated: belief.confidence, attained });
         }
         open.retain(|end| ended.iter().all(|(done, _)| done != end));
         if open.is_empty() {
@@ -412,10 +397,7 @@ fn intervals(objects: &[Vec<PressStops>]) -> [Option<[f64; 2]>; 2] {
             [samples + w.samples as f64, attained + w.attained, count + 1.0]
         })
     };
-    let objects: Vec<Vec<[f64; 3]>> = objects
-        .iter()
-        .map(|presses| presses.iter().map(sums).collect())
-        .collect();
+    let objects: Vec<Vec<[f64; 3]>> = objects.iter().map(|presses| presses.iter().map(sums).collect()).collect();
     bootstrap(&objects, |drawn| {
         let mut means = [(!drawn.is_empty()).then_some(0.0); 2];
         for presses in drawn {
@@ -477,24 +459,9 @@ fn keyed<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> &'a AnytimeKey
 pub fn table(board: &AnytimeBoard) -> String {
     let mut out = String::new();
     for (subject, left_out, attained, title) in [
-        (
-            Subject::Class,
-            false,
-            "right",
-            "class: stop when the most probable class has the wanted probability",
-        ),
-        (
-            Subject::Image,
-            false,
-            "IoU",
-            "image, objects that were learned from: stop at the wanted expected IoU",
-        ),
-        (
-            Subject::Image,
-            true,
-            "IoU",
-            "image, the object was not learned from: stop at the wanted expected IoU",
-        ),
+        (Subject::Class, false, "right", "class: stop when the most probable class has the wanted probability"),
+        (Subject::Image, false, "IoU", "image, objects that were learned from: stop at the wanted expected IoU"),
+        (Subject::Image, true, "IoU", "image, the object was not learned from: stop at the wanted expected IoU"),
     ] {
         let here = |r: &&AnytimeRow| r.key.subject == subject && r.key.left_out == left_out;
         let rows: Vec<&AnytimeRow> = board.rows.iter().filter(here).collect();
@@ -549,12 +516,7 @@ fn objects(board: &AnytimeBoard) -> String {
     let line = |AnytimeRow { key, .. }: &AnytimeRow| {
         let learned = if key.left_out { "left out" } else { &key.learned_from };
         // whatever the two are confident of
-        let same = |o: &&AnytimeObject| {
-            AnytimeKey {
-                subject: key.subject,
-                ..o.key.clone()
-            } == *key
-        };
+        let same = |o: &&AnytimeObject| AnytimeKey { subject: key.subject, ..o.key.clone() } == *key;
         let cells = board.objects.iter().filter(same);
         let cells = cells.map(|o| format!("{}/{}", fixed(o.scores.samples, 1), fixed(o.scores.attained, 3)));
         let head = [short_label(&key.decoder), learned, key.sensing.name()].map(str::to_owned);
@@ -605,10 +567,7 @@ mod tests {
             if sample.y[0] < 0.0 {
                 return Err(Refusal::new("lost").into());
             }
-            Ok(Belief {
-                confidence: sample.y[0],
-                class: Some(Class::Known(self.0)),
-            })
+            Ok(Belief { confidence: sample.y[0], class: Some(Class::Known(self.0)) })
         }
     }
 
@@ -638,10 +597,7 @@ mod tests {
         assert_eq!(seen(&stops[1]), [(4, false); 2]);
         assert_eq!(seen(&stops[2]), [(3, true); 2]);
         let attained: Vec<f64> = stops.iter().map(|s| s.windows[0].attained).collect();
-        assert!(
-            attained[0] > 0.5 && attained[1] < 0.5 && attained[2] < 0.5,
-            "{attained:?}"
-        );
+        assert!(attained[0] > 0.5 && attained[1] < 0.5 && attained[2] < 0.5, "{attained:?}");
 
         let stops = stopped(&[0.6, -1.0, 0.99, 0.99], 3);
         for stops in &stops {
@@ -652,16 +608,9 @@ mod tests {
     }
 
     fn press(windows: &[(usize, bool, f64)]) -> PressStops {
-        let window = |&(samples, reached, attained): &(usize, bool, f64)| WindowStop {
-            samples,
-            reached,
-            stated: 0.9,
-            attained,
-        };
-        PressStops {
-            windows: windows.iter().map(window).collect(),
-            failed: 0,
-        }
+        let window =
+            |&(samples, reached, attained): &(usize, bool, f64)| WindowStop { samples, reached, stated: 0.9, attained };
+        PressStops { windows: windows.iter().map(window).collect(), failed: 0 }
     }
 
     #[test]

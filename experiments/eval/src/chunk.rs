@@ -55,10 +55,7 @@ impl<'a> Chunk<'a> {
         let lost: Vec<bool> = volts.iter().map(|v| !v.is_finite()).collect();
         let finite = || volts.iter().filter(|v| v.is_finite());
         let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
-        let y: Vec<f64> = volts
-            .iter()
-            .map(|v| if v.is_finite() { v - mean } else { 0.0 })
-            .collect();
+        let y: Vec<f64> = volts.iter().map(|v| if v.is_finite() { v - mean } else { 0.0 }).collect();
         Self {
             recording,
             first_row: recording.first_row(block, 0) + start as u64,
@@ -94,13 +91,7 @@ impl<'a> Chunk<'a> {
         let Some(expected) = self.expected(rows, image) else {
             return 0.0;
         };
-        let kept = || {
-            expected
-                .iter()
-                .zip(&self.lost)
-                .filter(|(_, lost)| !**lost)
-                .map(|(e, _)| *e)
-        };
+        let kept = || expected.iter().zip(&self.lost).filter(|(_, lost)| !**lost).map(|(e, _)| *e);
         let mean = kept().sum::<f64>() / kept().count().max(1) as f64;
         let (mut both, mut square) = (0.0, 0.0);
         for ((e, y), lost) in expected.iter().zip(&self.y).zip(&self.lost) {
@@ -110,11 +101,7 @@ impl<'a> Chunk<'a> {
             }
         }
         let scale = square * self.energy;
-        if scale > 0.0 {
-            both.max(0.0).powi(2) / scale
-        } else {
-            0.0
-        }
+        if scale > 0.0 { both.max(0.0).powi(2) / scale } else { 0.0 }
     }
 
     /// Least squares for an image and a constant, by conjugate gradients, if the chunk lags by `rows`; `None` before
@@ -161,21 +148,13 @@ impl<'a> Chunk<'a> {
             adjoint(&left, &mut gradient);
             let next = dot(&gradient, &gradient);
             let keep = next / square;
-            direction
-                .iter_mut()
-                .zip(&gradient)
-                .for_each(|(d, g)| *d = g + keep * *d);
+            direction.iter_mut().zip(&gradient).for_each(|(d, g)| *d = g + keep * *d);
             square = next;
         }
         let offset_v = self.mean_v + image[taxels];
         image.truncate(taxels);
         let residual = (dot(&left, &left) / self.energy).sqrt();
-        residual.is_finite().then_some(Fit {
-            rows,
-            image,
-            offset_v,
-            residual,
-        })
+        residual.is_finite().then_some(Fit { rows, image, offset_v, residual })
     }
 }
 
@@ -183,12 +162,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     // eight sums, so that the compiler may use vectors
     let mut sums = [0.0; 8];
     let (a_chunks, b_chunks) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a_chunks
-        .remainder()
-        .iter()
-        .zip(b_chunks.remainder())
-        .map(|(a, b)| a * b)
-        .sum();
+    let rest: f64 = a_chunks.remainder().iter().zip(b_chunks.remainder()).map(|(a, b)| a * b).sum();
     for (a, b) in a_chunks.zip(b_chunks) {
         for k in 0..8 {
             sums[k] += a[k] * b[k];

@@ -117,10 +117,7 @@ pub struct MeasuredWindow {
 
 /// Why a session without a compressive recording is not decoded.
 pub fn no_recording(session: &Session) -> Refusal {
-    Refusal::new(format!(
-        "session {:?} has no compressive recording to decode",
-        session.name
-    ))
+    Refusal::new(format!("session {:?} has no compressive recording to decode", session.name))
 }
 
 /// Why `windows` windows of `m` measurements a block are not decoded, of a block of `session` with `most` measurements
@@ -198,17 +195,13 @@ impl DecodeRequest {
             let press = untouched.press(recording, block, start..start + longest);
             let truth = scored.truth(block);
             let all = |m: usize| press.windows(0..m * self.windows, m, m);
-            let measured = self
-                .measurements
-                .iter()
-                .flat_map(|&m| all(m))
-                .map(|(at, window)| MeasuredWindow {
-                    block,
-                    window: at / window.y.len(),
-                    m: window.y.len(),
-                    phi: window.phi.values().to_vec(),
-                    y: window.y.to_vec(),
-                });
+            let measured = self.measurements.iter().flat_map(|&m| all(m)).map(|(at, window)| MeasuredWindow {
+                block,
+                window: at / window.y.len(),
+                m: window.y.len(),
+                phi: window.phi.values().to_vec(),
+                y: window.y.to_vec(),
+            });
             let measured: Vec<MeasuredWindow> = measured.collect();
             let mut rows = Vec::new();
             for (spec, trained) in self.decoders.iter().zip(&learned.trained) {
@@ -232,10 +225,7 @@ impl DecodeRequest {
         let mut decoded = DecodedSession {
             session: session.name.clone(),
             shape: [layout.rows(), layout.cols()],
-            knows_class: learned
-                .classes
-                .as_ref()
-                .is_some_and(|all| all.number(&session.object).is_some()),
+            knows_class: learned.classes.as_ref().is_some_and(|all| all.number(&session.object).is_some()),
             rows: Vec::new(),
             truth: Vec::new(),
             measured: Vec::new(),
@@ -256,10 +246,7 @@ impl LearnedDecoders {
         let classifier = self.classifier.as_ref();
         let class = classifier.and_then(|classifier| match answer.class {
             Some(class) => class.label(),
-            None => classifier
-                .classify(&answer.image, &mut Workspace::default())
-                .ok()
-                .flatten(),
+            None => classifier.classify(&answer.image, &mut Workspace::default()).ok().flatten(),
         });
         let truth = truth.filter(|truth| truth.image.len() == answer.image.len());
         let score = truth.map(|truth| SupportScore::new(&mask(&answer.image), &truth.support));
@@ -274,11 +261,7 @@ impl LearnedDecoders {
             support: score.map(|s| s.accuracy),
             iou: score.map(|s| s.iou),
             correlation: truth.and_then(|truth| pearson(&answer.image, &truth.image)),
-            label: self
-                .classes
-                .as_ref()
-                .and_then(|labels| labels.name(class?))
-                .map(str::to_owned),
+            label: self.classes.as_ref().and_then(|labels| labels.name(class?)).map(str::to_owned),
             label_true: session.object.clone(),
             place: centre_of_mass(&answer.image, cols, SUPPORT_THRESHOLD),
             image: answer.image,
@@ -369,12 +352,7 @@ fn write_arrays(path: &Path, session: &DecodedSession) -> Result<(), Refusal> {
         }
     }
     let unknown = vec![f64::NAN; taxels];
-    let truth = session
-        .truth
-        .iter()
-        .flat_map(|t| t.as_ref().unwrap_or(&unknown))
-        .copied()
-        .collect();
+    let truth = session.truth.iter().flat_map(|t| t.as_ref().unwrap_or(&unknown)).copied().collect();
     arrays.push(("truth".to_owned(), vec![session.truth.len(), rows, cols], truth));
     write_npz(path, &arrays).map_err(unwritable(path))
 }
@@ -388,11 +366,7 @@ fn write_npz(path: &Path, arrays: &[(String, Vec<usize>, Vec<f64>)]) -> io::Resu
     for (name, shape, values) in arrays {
         zip.start_file(format!("{name}.npy"), stored)?;
         let shape: Vec<u64> = shape.iter().map(|n| *n as u64).collect();
-        let mut writer = npyz::WriteOptions::new()
-            .default_dtype()
-            .shape(&shape)
-            .writer(&mut zip)
-            .begin_nd()?;
+        let mut writer = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(&mut zip).begin_nd()?;
         writer.extend(values.iter().copied())?;
         writer.finish()?;
     }

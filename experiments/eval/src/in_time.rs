@@ -134,10 +134,9 @@ impl TrainedBoard<'_> {
             for (session, contacts) in self.run.sessions.iter().zip(objects) {
                 let own = lines(entry, ContactKind::Press, m, std::slice::from_ref(contacts));
                 let object = session.title();
-                board.objects.extend(own.into_iter().map(|row| InTimeObject {
-                    object: object.to_owned(),
-                    row,
-                }));
+                board
+                    .objects
+                    .extend(own.into_iter().map(|row| InTimeObject { object: object.to_owned(), row }));
             }
             if !entry.left_out || entry.learned_from == SHAPES {
                 let drops: Vec<Followed> = dropped.iter().map(|all| all[at].clone()).collect();
@@ -202,10 +201,7 @@ type Followed = Vec<(Moment, [Option<Judged>; 3])>;
 /// # Errors
 /// [`DecodeError`] when a window cannot be followed.
 fn follow(contact: &FollowedContact, decoder: &TrainedDecoder, m: usize, cols: usize) -> Result<Followed, DecodeError> {
-    let prior = decoder
-        .trained
-        .prior()
-        .ok_or_else(|| Refusal::new("no Gaussian prior"))?;
+    let prior = decoder.trained.prior().ok_or_else(|| Refusal::new("no Gaussian prior"))?;
     let taxels = prior.mean().len();
     let mut image = TrackedImage::new(prior, motion(contact.rate_hz, contact.idle_noise_v))?;
     let mut scorer = Scorer::new(decoder);
@@ -323,12 +319,7 @@ fn press(session: &ScoredSession, block: usize) -> Option<FollowedContact> {
         if let Some(idle) = &untouched.image {
             image.iter_mut().zip(idle).for_each(|(x, idle)| *x -= idle);
         }
-        Some(ScoredMoment {
-            at: Some(time_s),
-            end: end - first,
-            support: mask(&image),
-            centre: None,
-        })
+        Some(ScoredMoment { at: Some(time_s), end: end - first, support: mask(&image), centre: None })
     });
     let mut moments: Vec<ScoredMoment> = rises.collect();
     let held = hold.clone().step_by(protocol.support_stride.max(1)).skip(1);
@@ -351,10 +342,7 @@ fn press(session: &ScoredSession, block: usize) -> Option<FollowedContact> {
 /// Drops of a ball on a sheet of `cols` columns, from before the touch to the end of the contact.
 fn drops(recording: &Recording, cols: usize) -> Vec<FollowedContact> {
     let bounces = find_bounces(recording);
-    bounces
-        .iter()
-        .filter_map(|bounce| drop(recording, bounce, cols))
-        .collect()
+    bounces.iter().filter_map(|bounce| drop(recording, bounce, cols)).collect()
 }
 
 fn drop(recording: &Recording, bounce: &RecordedBounce, cols: usize) -> Option<FollowedContact> {
@@ -371,10 +359,7 @@ fn drop(recording: &Recording, bounce: &RecordedBounce, cols: usize) -> Option<F
             centre: Some(centre),
         })
     });
-    let untouched = Untouched {
-        offset_v: bounce.idle,
-        image: None,
-    };
+    let untouched = Untouched { offset_v: bounce.idle, image: None };
     Some(FollowedContact {
         moments: moments.collect(),
         press: untouched.press(recording, bounce.block, first..bounce.end),
@@ -548,10 +533,7 @@ pub fn followed_images(
                 (taken, window) = (stop, start..stop);
             }
         }
-        images.push(FollowedImage {
-            window: window.clone(),
-            image: image.image().to_vec(),
-        });
+        images.push(FollowedImage { window: window.clone(), image: image.image().to_vec() });
     }
     Ok(images)
 }
@@ -621,10 +603,7 @@ pub fn table(board: &InTimeBoard) -> String {
     let mut out = String::new();
     for (kind, title) in [
         (ContactKind::Press, "presses: IoU of windows alone and in time"),
-        (
-            ContactKind::Drop,
-            "drops of the ball: IoU, and distance of its place in taxels",
-        ),
+        (ContactKind::Drop, "drops of the ball: IoU, and distance of its place in taxels"),
     ] {
         let rows: Vec<&InTimeRow> = board.rows.iter().filter(|row| row.contact == kind).collect();
         if !rows.is_empty() {
@@ -694,18 +673,11 @@ fn objects(board: &InTimeBoard) -> String {
             });
             text.collect::<String>()
         };
-        let head = [
-            short_label(&row.decoder).to_owned(),
-            learned(row),
-            row.m.to_string(),
-            moment(row.since_touch_s),
-        ];
+        let head = [short_label(&row.decoder).to_owned(), learned(row), row.m.to_string(), moment(row.since_touch_s)];
         head.into_iter().chain(names.iter().map(cell)).collect()
     };
     let presses = board.rows.iter().filter(|row| row.contact == ContactKind::Press);
-    let head = ["decoder", "learned", "M", "time"]
-        .into_iter()
-        .chain(names.iter().copied());
+    let head = ["decoder", "learned", "M", "time"].into_iter().chain(names.iter().copied());
     let table = TextTable::new(head, presses.map(line));
     format!("\nobject by object: alone / in time (95 %)\n{table}")
 }
@@ -728,11 +700,7 @@ mod tests {
         let (found, contacts) = scores(&[vec![few.clone()], vec![many]], None);
         let near = |found: Option<f64>, value: f64| found.is_some_and(|found| (found - value).abs() < 1e-12);
         assert!(near(found.iou_alone, 0.4) && near(found.iou_in_time, 0.7) && near(found.iou_gain, 0.3));
-        assert!(
-            found
-                .iou_gain_ci
-                .is_some_and(|ci| ci.iter().all(|v| near(Some(*v), 0.3)))
-        );
+        assert!(found.iou_gain_ci.is_some_and(|ci| ci.iter().all(|v| near(Some(*v), 0.3))));
         assert_eq!((contacts, found.iou_longer, found.error_gain_px), (2, None, None));
         let (nothing, contacts) = scores(&[vec![few]], Some(0.001));
         assert_eq!((nothing.iou_alone, contacts), (None, 0));

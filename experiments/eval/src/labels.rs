@@ -21,9 +21,7 @@ pub struct Labels {
 impl Default for Labels {
     fn default() -> Self {
         let published = OBJECTS.iter().map(|object| object.name.to_owned());
-        Self {
-            names: std::iter::once("empty".to_owned()).chain(published).collect(),
-        }
+        Self { names: std::iter::once("empty".to_owned()).chain(published).collect() }
     }
 }
 

@@ -142,10 +142,7 @@ impl Truth {
 
     /// The truth that is `image`.
     pub(crate) fn of(image: Vec<f64>) -> Self {
-        Self {
-            support: mask(&image),
-            image,
-        }
+        Self { support: mask(&image), image }
     }
 }
 

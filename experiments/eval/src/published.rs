@@ -152,18 +152,10 @@ pub fn score_sessions(
     measurements: &[usize],
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<ScoreRow>, Refusal> {
-    let run = Run {
-        sessions: sessions.to_vec(),
-        measurements: measurements.to_vec(),
-        times: false,
-    };
-    let entries = decoders
-        .iter()
-        .map(|(name, decoder)| Entry::published(name, decoder, sessions.len()));
+    let run = Run { sessions: sessions.to_vec(), measurements: measurements.to_vec(), times: false };
+    let entries = decoders.iter().map(|(name, decoder)| Entry::published(name, decoder, sessions.len()));
     let tallies = run.tallies(&entries.collect::<Vec<_>>(), done)?;
-    let slots = decoders
-        .iter()
-        .flat_map(|(decode, _)| measurements.iter().map(move |&m| (*decode, m)));
+    let slots = decoders.iter().flat_map(|(decode, _)| measurements.iter().map(move |&m| (*decode, m)));
     let slots: Vec<_> = slots.zip(tallies).collect();
     let of_session = |(at, session): (usize, &&ScoredSession)| {
         let rows = slots

@@ -54,11 +54,7 @@ impl<'a> ScoredPress<'a> {
             Measured::Recorded(press) => Measured::Chosen(chooser.windows(press, most, classes)?),
             Measured::Chosen(windows) => Measured::Chosen(windows.clone()),
         };
-        Ok(Self {
-            measured,
-            truth: self.truth.clone(),
-            ..*self
-        })
+        Ok(Self { measured, truth: self.truth.clone(), ..*self })
     }
 
     /// The true contact.
@@ -110,11 +106,7 @@ pub struct Scorer<'a> {
 impl<'a> Scorer<'a> {
     /// Starts `decoder`.
     pub fn new(decoder: &'a TrainedDecoder) -> Self {
-        Self {
-            algorithm: decoder.trained.start(),
-            classifier: &decoder.classifier,
-            work: Workspace::default(),
-        }
+        Self { algorithm: decoder.trained.start(), classifier: &decoder.classifier, work: Workspace::default() }
     }
 
     /// Answers of the decoder to `windows`, all of the same M, in order.
@@ -171,9 +163,8 @@ impl<'a> Scorer<'a> {
         let decisions: Vec<Option<usize>> = answers.iter().map(|a| self.class(a)).collect();
         tally.decisions(&decisions, label, vote);
         let groups = windows.chunks_exact(vote.max(1));
-        let summed: Option<Vec<Option<usize>>> = groups
-            .map(|group| self.algorithm.sum(group).map(Class::label))
-            .collect();
+        let summed: Option<Vec<Option<usize>>> =
+            groups.map(|group| self.algorithm.sum(group).map(Class::label)).collect();
         tally.summed(&summed.unwrap_or_default(), label);
         Ok(())
     }

@@ -90,13 +90,9 @@ impl RowChooser {
         let [share, of] = CANDIDATES;
         let pool = (press.len() * share / of).max(1).min(press.len());
         let task = task(&self.images, &self.classes);
-        let images = chosen(press, pool, most, |rows, m| {
-            choose_for_images(&RowTask { rows: m, ..task }, rows)
-        })?;
+        let images = chosen(press, pool, most, |rows, m| choose_for_images(&RowTask { rows: m, ..task }, rows))?;
         let classes = if classes && !self.classes.is_empty() {
-            chosen(press, pool, most, |rows, m| {
-                choose_for_classes(&RowTask { rows: m, ..task }, rows)
-            })?
+            chosen(press, pool, most, |rows, m| choose_for_classes(&RowTask { rows: m, ..task }, rows))?
         } else {
             images.clone()
         };
@@ -105,11 +101,7 @@ impl RowChooser {
 }
 
 fn task<'a>(expected: &'a Expected, classes: &'a [Component]) -> RowTask<'a> {
-    RowTask {
-        classes,
-        noise: NOISE,
-        ..RowTask::new(1, expected)
-    }
+    RowTask { classes, noise: NOISE, ..RowTask::new(1, expected) }
 }
 
 /// Windows of `press` whose rows tell places of blobs, of up to `most` measurements each.
@@ -118,18 +110,11 @@ fn task<'a>(expected: &'a Expected, classes: &'a [Component]) -> RowTask<'a> {
 /// [`Refusal`] when the rows do not fill the sheet.
 pub(crate) fn chosen_places(press: &Press, shape: [usize; 2], most: usize) -> Result<Vec<Press>, Refusal> {
     let blobs = blobs(shape);
-    let how = ImagePrior {
-        reach: 0,
-        stay: 1.0,
-        threshold: 0.0,
-        ..ImagePrior::UNSEEN
-    };
+    let how = ImagePrior { reach: 0, stay: 1.0, threshold: 0.0, ..ImagePrior::UNSEEN };
     let prior = how.learn(&blobs, shape[1])?;
     let expected = Expected::like(&prior, shape, Tolerances::default())?;
     let task = task(&expected, &[]);
-    chosen(press, press.len(), most, |rows, m| {
-        choose_for_images(&RowTask { rows: m, ..task }, rows)
-    })
+    chosen(press, press.len(), most, |rows, m| choose_for_images(&RowTask { rows: m, ..task }, rows))
 }
 
 /// One round blob at every taxel, of every width that the locator knows.
@@ -142,9 +127,7 @@ fn blobs(shape: [usize; 2]) -> Matrix {
         };
         (0..rows * cols).map(at).collect::<Vec<f64>>()
     };
-    let all = WIDTHS_PX
-        .iter()
-        .flat_map(|&width| (0..rows * cols).map(move |centre| (width, centre)));
+    let all = WIDTHS_PX.iter().flat_map(|&width| (0..rows * cols).map(move |centre| (width, centre)));
     let images: Vec<Vec<f64>> = all.map(|(width, centre)| blob(width, centre)).collect();
     Matrix::from_column_slices(rows * cols, &images)
 }
@@ -159,9 +142,7 @@ fn chosen(
 ) -> Result<Vec<Press>, Refusal> {
     let mut windows = Vec::with_capacity(OFFSETS);
     for offset in 0..OFFSETS {
-        let candidates = (offset..pool)
-            .step_by(OFFSETS)
-            .filter(|k| press.window(*k, 1).is_some());
+        let candidates = (offset..pool).step_by(OFFSETS).filter(|k| press.window(*k, 1).is_some());
         let candidates: Vec<usize> = candidates.collect();
         if candidates.is_empty() {
             continue;
@@ -199,9 +180,7 @@ mod tests {
 
     /// The measurement whose sample is its number.
     fn number(sample: f64) -> usize {
-        (0..90)
-            .position(|k| f64::from(k).to_bits() == sample.to_bits())
-            .unwrap()
+        (0..90).position(|k| f64::from(k).to_bits() == sample.to_bits()).unwrap()
     }
 
     /// Other samples at the same rows are no reason for another choice, and each sample stays with its row.

@@ -62,21 +62,13 @@ impl SkinRun<'_> {
         } else {
             None
         };
-        Ok(SkinRunPresses {
-            session: twin.session(Some(raster), compressive),
-            presses,
-        })
+        Ok(SkinRunPresses { session: twin.session(Some(raster), compressive), presses })
     }
 }
 
 /// The sessions of a simulated skin as a set.
 pub fn twin_set(sessions: Vec<Session>) -> SessionSet {
-    SessionSet {
-        root: PathBuf::from("the twin"),
-        sessions,
-        published: None,
-        missing: Vec::new(),
-    }
+    SessionSet { root: PathBuf::from("the twin"), sessions, published: None, missing: Vec::new() }
 }
 
 /// `presses` presses of the object called `object`, at its place in the published recordings, on the skin that follows
@@ -86,11 +78,7 @@ pub fn footprint_scene(object: &str, presses: usize, seed: u64) -> SceneConfig {
     SceneConfig {
         seed,
         contact: [("model".to_owned(), "footprint".into())].into_iter().collect(),
-        press: Some(PressConfig {
-            object: Some(object.to_owned()),
-            presses,
-            ..PressConfig::default()
-        }),
+        press: Some(PressConfig { object: Some(object.to_owned()), presses, ..PressConfig::default() }),
         ..SceneConfig::default()
     }
 }
@@ -141,13 +129,7 @@ impl TwinSessions {
         let scenes = scenes.collect::<Result<Vec<(Scene, String)>, Refusal>>()?;
         let sessions = scenes.par_iter().enumerate().map(|(number, (scene, name))| {
             let [scanned, summed] = self.presses(name);
-            let run = SkinRun {
-                scene,
-                number: number as u64,
-                scanned,
-                summed,
-                conditioning: scanned,
-            };
+            let run = SkinRun { scene, number: number as u64, scanned, summed, conditioning: scanned };
             let recorded = run.record(done).map_err(|e| refused(name, e))?;
             Ok(recorded.session)
         });
@@ -156,14 +138,8 @@ impl TwinSessions {
 
     fn scene(&self, name: &str) -> Result<Scene, Refusal> {
         let presses: usize = self.presses(name).iter().sum();
-        let mut request = Request {
-            scene: name.to_owned(),
-            assignments: Vec::new(),
-        };
-        let drop = matches!(
-            request.prepare().map_err(|e| refused(name, e))?.scene.task(),
-            Task::Drop(_)
-        );
+        let mut request = Request { scene: name.to_owned(), assignments: Vec::new() };
+        let drop = matches!(request.prepare().map_err(|e| refused(name, e))?.scene.task(), Task::Drop(_));
         if drop {
             let message = "a drop has no hold to score; valid: scenes with [press]";
             return Err(Refusal::new(message).at(format_args!("--twin {name}")));
@@ -185,9 +161,7 @@ fn refused(name: &str, error: Refusal) -> Refusal {
 fn own_presses(name: &str) -> Option<usize> {
     let is_file = Path::new(name).extension().is_some_and(|e| e == "toml");
     // a file that cannot be read or is no scene is refused where it is prepared
-    let text = is_file
-        .then(|| spts_input::read_text(Path::new(name), MAX_TOML_BYTES).ok())
-        .flatten()?;
+    let text = is_file.then(|| spts_input::read_text(Path::new(name), MAX_TOML_BYTES).ok()).flatten()?;
     let table: toml::Table = toml::from_str(&text).ok()?;
     let presses = table.get("press")?.get("presses")?.as_integer()?;
     usize::try_from(presses).ok().filter(|presses| *presses > 0)
@@ -213,11 +187,7 @@ mod tests {
             (false, &silent, [8, 6]),
             (true, "press/T", [4, 2]),
         ] {
-            let twin = TwinSessions {
-                scenes: vec![name.to_owned()],
-                seed: 1,
-                quick,
-            };
+            let twin = TwinSessions { scenes: vec![name.to_owned()], seed: 1, quick };
             assert_eq!(twin.presses(name), presses, "{name}");
             assert_eq!(twin.steps(), presses.iter().sum::<usize>());
         }

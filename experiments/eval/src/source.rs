@@ -85,12 +85,7 @@ impl Source {
     pub fn new(mut set: SessionSet) -> Result<Self, Refusal> {
         let slips = follow_slips(&mut set);
         let bounces = set.drops().cloned();
-        let SessionSet {
-            root,
-            sessions,
-            published,
-            mut missing,
-        } = set;
+        let SessionSet { root, sessions, published, mut missing } = set;
         let simulated = sessions.iter().all(|s| s.provenance.is_some());
         let (presses, others): (Vec<Session>, Vec<Session>) =
             sessions.into_iter().partition(|s| s.event == Event::Press);
@@ -110,33 +105,16 @@ impl Source {
         });
         let touches = others.iter().filter(|s| s.event == Event::Touch);
         let touches = touches.filter_map(|s| Some((s.name.clone(), s.compressive()?.clone())));
-        let touches = touches
-            .filter(|(_, touches)| shape(touches.layout()) == shape(&layout))
-            .collect();
+        let touches = touches.filter(|(_, touches)| shape(touches.layout()) == shape(&layout)).collect();
         let mut scored: Vec<ScoredSession> = Vec::with_capacity(presses.len());
         for session in presses {
             let label = labels.number(&session.object).unwrap_or_default();
             let session = ScoredSession::new(session, label);
             let same = || scored.iter().filter(|s| s.object == session.object);
             let (again, shared_raster) = (same().next().is_some(), same().any(|s| s.raster == session.raster));
-            scored.push(ScoredSession {
-                again,
-                shared_raster,
-                ..session
-            });
+            scored.push(ScoredSession { again, shared_raster, ..session });
         }
-        Ok(Self {
-            sessions: scored,
-            root,
-            bounces,
-            touches,
-            published,
-            missing,
-            simulated,
-            layout,
-            labels,
-            slips,
-        })
+        Ok(Self { sessions: scored, root, bounces, touches, published, missing, simulated, layout, labels, slips })
     }
 
     /// Training data for this skin: raster presses that are not scored, with the published dictionary and library if
@@ -186,20 +164,12 @@ impl Source {
             missing_file(&self.root.join("{dictionary,SRC_lib}.mat"), needed_by)
         })?;
         if published.shifted.is_none() {
-            self.missing
-                .push("permuted_dictionary.mat: shifted dictionary".to_owned());
+            self.missing.push("permuted_dictionary.mat: shifted dictionary".to_owned());
         }
         let cols = self.layout.cols();
         let learned = Learned::new(published.dictionary, published.shifted, published.library, cols);
-        let skin = ScoredSkin {
-            sessions: self.sessions,
-            bounces: self.bounces,
-            learned,
-        };
-        Ok(PublishedSkin {
-            skin,
-            missing: self.missing,
-        })
+        let skin = ScoredSkin { sessions: self.sessions, bounces: self.bounces, learned };
+        Ok(PublishedSkin { skin, missing: self.missing })
     }
 }
 

@@ -89,20 +89,14 @@ impl Cell {
 
     /// The two ends of an interval for readers, with `digits` decimals.
     pub fn span(interval: Option<[f64; 2]>, digits: usize) -> Self {
-        interval
-            .map(|[low, high]| format!("{low:.digits$}–{high:.digits$}"))
-            .into()
+        interval.map(|[low, high]| format!("{low:.digits$}–{high:.digits$}")).into()
     }
 }
 
 impl<'a, R: Copy> Table<'a, R> {
     /// A table without columns; its CSV file is called `name`. The rows are references, or small values.
     pub fn new(name: impl Into<String>, rows: impl IntoIterator<Item = R>) -> Self {
-        Self {
-            name: name.into(),
-            rows: rows.into_iter().collect(),
-            columns: Vec::new(),
-        }
+        Self { name: name.into(), rows: rows.into_iter().collect(), columns: Vec::new() }
     }
 
     /// Adds a column for files and readers.
@@ -280,10 +274,7 @@ pub(crate) fn fixed(value: Option<f64>, digits: usize) -> String {
 
 impl TextTable {
     pub(crate) fn new<'a>(head: impl IntoIterator<Item = &'a str>, rows: impl Iterator<Item = Vec<String>>) -> Self {
-        Self {
-            head: head.into_iter().map(str::to_owned).collect(),
-            rows: rows.collect(),
-        }
+        Self { head: head.into_iter().map(str::to_owned).collect(), rows: rows.collect() }
     }
 
     /// The table as an HTML element; cells of numbers have the class `number`.
@@ -299,10 +290,7 @@ impl TextTable {
             format!("<tr>{}</tr>\n", flush.iter().enumerate().map(cell).collect::<String>())
         };
         let body: String = self.rows.iter().map(|cells| row(cells, "td")).collect();
-        format!(
-            "<table>\n<thead>{}</thead>\n<tbody>\n{body}</tbody>\n</table>",
-            row(&self.head, "th")
-        )
+        format!("<table>\n<thead>{}</thead>\n<tbody>\n{body}</tbody>\n</table>", row(&self.head, "th"))
     }
 
     /// Which columns are set flush right.
@@ -322,11 +310,7 @@ impl Display for TextTable {
         let cell = |row: &[String], column: usize| row.get(column).cloned().unwrap_or_default();
         let width = |column: usize| {
             let cells = self.rows.iter().chain([&self.head]);
-            cells
-                .map(|row| cell(row, column).chars().count())
-                .max()
-                .unwrap_or(0)
-                .max(2)
+            cells.map(|row| cell(row, column).chars().count()).max().unwrap_or(0).max(2)
         };
         let flush = self.flush_right();
         let widths: Vec<usize> = (0..flush.len()).map(width).collect();
@@ -432,16 +416,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         table.write_csv(&dir.path().join("t.csv")).unwrap();
         let csv = std::fs::read_to_string(dir.path().join("t.csv")).unwrap();
-        assert_eq!(
-            csv,
-            "id,share,good,words\n1,0.30000000000000004,true,\"a,b\"\n2,NaN,false,\n"
-        );
+        assert_eq!(csv, "id,share,good,words\n1,0.30000000000000004,true,\"a,b\"\n2,NaN,false,\n");
         let json = serde_json::to_string(&table).unwrap();
         let first = r#"{"id":1,"share":0.30000000000000004,"good":true,"words":"a,b"}"#;
-        assert_eq!(
-            json,
-            format!(r#"[{first},{{"id":2,"share":null,"good":false,"words":""}}]"#)
-        );
+        assert_eq!(json, format!(r#"[{first},{{"id":2,"share":null,"good":false,"words":""}}]"#));
         assert_eq!(table.text().lines().nth(2), Some("|   1 |   0.3 | yes  |"));
         assert_eq!(table.text().lines().nth(3), Some("|   2 |     – | no   |"));
     }
@@ -449,17 +427,12 @@ mod tests {
     #[test]
     fn ragged_rows_and_markup_are_shown() {
         let words = |row: &[&str]| row.iter().map(|s| (*s).to_owned()).collect::<Vec<_>>();
-        let table = TextTable {
-            head: words(&["a<b", "≥ 1"]),
-            rows: vec![words(&["x"]), words(&["y", "±0.5", "more"])],
-        };
+        let table =
+            TextTable { head: words(&["a<b", "≥ 1"]), rows: vec![words(&["x"]), words(&["y", "±0.5", "more"])] };
         assert_eq!(table.to_string().lines().count(), 4);
         let html = table.html();
         assert!(html.contains("a&lt;b") && html.contains("<td class=\"number\">±0.5</td>"));
         assert_eq!(TextTable::default().to_string(), "|\n|\n");
-        assert_eq!(
-            escape("a<b & \"c\" 'd'\u{0}>"),
-            "a&lt;b &amp; &quot;c&quot; &#39;d&#39;&gt;"
-        );
+        assert_eq!(escape("a<b & \"c\" 'd'\u{0}>"), "a&lt;b &amp; &quot;c&quot; &#39;d&#39;&gt;");
     }
 }

@@ -79,39 +79,25 @@ impl<'a> Window<'a> {
 impl PressRows {
     /// The weights of `rows`.
     pub fn new(rows: WeightRows<'_>) -> Self {
-        Self {
-            taxels: rows.taxels(),
-            phi: rows.to_vec(),
-            signs: rows.sign_bits(),
-        }
+        Self { taxels: rows.taxels(), phi: rows.to_vec(), signs: rows.sign_bits() }
     }
 
     /// The weights in `phi`, measurements × taxels.
     pub fn of_matrix(phi: &Matrix) -> Self {
         let (taxels, values) = (phi.ncols(), phi.view().values());
         let binary = values.iter().all(|w| w.abs().to_bits() == 1.0_f64.to_bits());
-        Self {
-            taxels,
-            phi: values.to_vec(),
-            signs: binary.then(|| sign_bits(values, taxels)),
-        }
+        Self { taxels, phi: values.to_vec(), signs: binary.then(|| sign_bits(values, taxels)) }
     }
 
     /// The rows with the numbers `indices`, in this order.
     fn picked(&self, indices: &[usize]) -> Self {
         let words = self.taxels.div_ceil(64);
-        let rows = indices
-            .iter()
-            .flat_map(|&k| &self.phi[k * self.taxels..(k + 1) * self.taxels]);
+        let rows = indices.iter().flat_map(|&k| &self.phi[k * self.taxels..(k + 1) * self.taxels]);
         let signs = self.signs.as_ref().map(|signs| {
             let rows = indices.iter().flat_map(|&k| &signs[k * words..(k + 1) * words]);
             rows.copied().collect()
         });
-        Self {
-            taxels: self.taxels,
-            phi: rows.copied().collect(),
-            signs,
-        }
+        Self { taxels: self.taxels, phi: rows.copied().collect(), signs }
     }
 
     /// The weights with taxel k renumbered as `to(k)`.
@@ -121,11 +107,7 @@ impl PressRows {
         for (new, old) in phi.chunks_exact_mut(taxels).zip(self.phi.chunks_exact(taxels)) {
             old.iter().enumerate().for_each(|(k, w)| new[to(k)] = *w);
         }
-        Self {
-            taxels: self.taxels,
-            signs: self.signs.is_some().then(|| sign_bits(&phi, self.taxels)),
-            phi,
-        }
+        Self { taxels: self.taxels, signs: self.signs.is_some().then(|| sign_bits(&phi, self.taxels)), phi }
     }
 }
 
@@ -153,20 +135,13 @@ impl Press {
 
     /// Measurements `range` of block `block` of `recording`. The output of the untouched skin is `idle_v`, V.
     pub fn within(recording: &Recording, block: usize, range: Range<usize>, idle_v: f64) -> Self {
-        let untouched = Untouched {
-            offset_v: idle_v,
-            image: None,
-        };
+        let untouched = Untouched { offset_v: idle_v, image: None };
         untouched.press(recording, block, range)
     }
 
     /// The measurements `volts`, V, with the rows `rows`. The output of the untouched skin is `idle_v`, V.
     pub fn on(rows: Arc<PressRows>, volts: Vec<f64>, idle_v: f64) -> Self {
-        Self {
-            y: volts.iter().map(|v| v - idle_v).collect(),
-            rows,
-            volts,
-        }
+        Self { y: volts.iter().map(|v| v - idle_v).collect(), rows, volts }
     }
 
     /// The measurements with the numbers `indices`, in this order, with their rows.
@@ -183,10 +158,7 @@ impl Press {
 
     /// The same measurements with taxel k renumbered as `to(k)`.
     pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
-        Self {
-            rows: Arc::new(self.rows.renamed(to)),
-            ..self.clone()
-        }
+        Self { rows: Arc::new(self.rows.renamed(to)), ..self.clone() }
     }
 
     /// Number of measurements.
@@ -218,9 +190,7 @@ impl Press {
     /// Windows with a lost measurement are left out.
     pub fn windows(&self, range: Range<usize>, m: usize, step: usize) -> impl Iterator<Item = (usize, Window<'_>)> {
         let starts = range.start..(range.end.min(self.len()) + 1).saturating_sub(m);
-        starts
-            .step_by(step.max(1))
-            .filter_map(move |start| Some((start, self.window(start, m)?)))
+        starts.step_by(step.max(1)).filter_map(move |start| Some((start, self.window(start, m)?)))
     }
 }
 
@@ -272,10 +242,7 @@ impl Untouched {
 
     /// The untouched skin, from the first `frames` frames of the block.
     pub(crate) fn in_frames(recording: &Recording, block: usize, frames: usize) -> Self {
-        let flat = || Self {
-            offset_v: idle_mean(recording, block),
-            image: None,
-        };
+        let flat = || Self { offset_v: idle_mean(recording, block), image: None };
         let taxels = recording.taxels();
         let idle = (frames * recording.measurements_per_frame()).min(MEASUREMENTS_PER_TAXEL * taxels);
         if recording.mode() != Mode::Compressive || idle < LEAST_PER_TAXEL * taxels {
@@ -290,10 +257,7 @@ impl Untouched {
             return flat();
         }
         let fit = chunk.fit(0).filter(|fit| fit.residual.powi(2) < 1.0 - EXPLAINED);
-        fit.map_or_else(flat, |fit| Self {
-            offset_v: fit.offset_v,
-            image: Some(fit.image),
-        })
+        fit.map_or_else(flat, |fit| Self { offset_v: fit.offset_v, image: Some(fit.image) })
     }
 
     /// Measurements `range` of block `block` minus the output of the untouched skin, V.
@@ -333,17 +297,11 @@ mod tests {
         let press = Press::on(Arc::new(PressRows::of_matrix(&phi)), vec![3.0, 1.0, -1.0], 0.5);
         let window = press.window(0, 3).unwrap();
         let two = window.first(2);
-        assert_eq!(
-            (two.y, two.volts, two.signs),
-            (&[2.5, 0.5][..], &[3.0, 1.0][..], Some(&[3, 2][..]))
-        );
+        assert_eq!((two.y, two.volts, two.signs), (&[2.5, 0.5][..], &[3.0, 1.0][..], Some(&[3, 2][..])));
         assert_eq!((two.phi.nrows(), two.phi.values()), (2, &phi.view().values()[..4]));
         assert_eq!(window.first(9).y.len(), 3);
         let third = window.samples().nth(2).unwrap();
-        assert_eq!(
-            (third.y, third.signs, third.phi.values()),
-            (&[-1.5][..], Some(&[1][..]), phi.row(2))
-        );
+        assert_eq!((third.y, third.signs, third.phi.values()), (&[-1.5][..], Some(&[1][..]), phi.row(2)));
         assert_eq!(window.samples().count(), 3);
     }
 
@@ -360,18 +318,10 @@ mod tests {
             (None, [f64::NAN; 6], 0.0),
         ];
         for (idle_frames, volts, expected) in cases {
-            let block = Block {
-                frame_position: 3,
-                idle_frames,
-                volts: volts.to_vec(),
-            };
+            let block = Block { frame_position: 3, idle_frames, volts: volts.to_vec() };
             let recording = Recording::new(info.clone(), vec![block]).unwrap();
             let found = idle_mean(&recording, 0);
-            assert_eq!(
-                found.to_bits(),
-                f64::to_bits(expected),
-                "{idle_frames:?} {volts:?}: {found}"
-            );
+            assert_eq!(found.to_bits(), f64::to_bits(expected), "{idle_frames:?} {volts:?}: {found}");
         }
     }
 
@@ -393,10 +343,7 @@ mod tests {
         let profile = Profile::named("as_built").unwrap();
         let streams = Streams::new(1);
         let mut readout = Readout::new(&profile, Mode::Compressive, &SkinLayout::default(), streams, 0).unwrap();
-        readout
-            .record(&mut [press], 400 * 100, 0)
-            .unwrap()
-            .with_idle_frames(Some(100))
+        readout.record(&mut [press], 400 * 100, 0).unwrap().with_idle_frames(Some(100))
     }
 
     /// The image of the preload, 0.43 V on 15 taxels, is found to a tenth of a taxel's. Before the touch noise is left:
@@ -408,16 +355,9 @@ mod tests {
         let image = untouched.image.as_ref().unwrap();
         let volts_per_siemens = 4.3 * 1e3;
         for (k, found) in image.iter().enumerate() {
-            let expected = if k.is_multiple_of(7) {
-                volts_per_siemens * PRELOAD_S
-            } else {
-                0.0
-            };
+            let expected = if k.is_multiple_of(7) { volts_per_siemens * PRELOAD_S } else { 0.0 };
             let tolerance = 0.1 * volts_per_siemens * PRELOAD_S;
-            assert!(
-                (found - expected).abs() < tolerance,
-                "taxel {k}: {found} V, expected {expected} V"
-            );
+            assert!((found - expected).abs() < tolerance, "taxel {k}: {found} V, expected {expected} V");
         }
         let idle = untouched.without(&recording, 0, 0..10_000);
         let rms = (idle.iter().map(|v| v * v).sum::<f64>() / 1e4).sqrt();
@@ -438,9 +378,7 @@ mod tests {
         assert_eq!(untouched.image, None);
         assert_eq!(untouched.offset_v.to_bits(), idle_mean(&recording, 0).to_bits());
         let y = untouched.without(&recording, 0, 500..510);
-        let expected = recording.blocks()[0].volts[500..510]
-            .iter()
-            .map(|v| v - idle_mean(&recording, 0));
+        let expected = recording.blocks()[0].volts[500..510].iter().map(|v| v - idle_mean(&recording, 0));
         assert!(y.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()));
     }
 }

@@ -14,13 +14,8 @@ use spts_studies::budget::{
 };
 
 /// Headings of [`CHANGES`], in the order in which readers see them: place of the change, and what it is called.
-const SHOWN: [(usize, &str); CHANGES.len()] = [
-    (0, "support"),
-    (IOU, "IoU"),
-    (IOU_CONTACT, "IoU, contact"),
-    (2, "class"),
-    (3, "vote of 20"),
-];
+const SHOWN: [(usize, &str); CHANGES.len()] =
+    [(0, "support"), (IOU, "IoU"), (IOU_CONTACT, "IoU, contact"), (2, "class"), (3, "vote of 20")];
 /// Place of the intersection over union in [`CHANGES`], and of that with the truth of the contact alone.
 const IOU: usize = 1;
 const IOU_CONTACT: usize = 4;
@@ -33,11 +28,7 @@ pub fn json(report: &BudgetReport) -> impl Serialize + '_ {
         end_points: Table<'a, &'a EndPoint>,
         provenance: &'a Provenance,
     }
-    Printed {
-        rows: costs(&report.rows),
-        end_points: end_points(report),
-        provenance: &report.provenance,
-    }
+    Printed { rows: costs(&report.rows), end_points: end_points(report), provenance: &report.provenance }
 }
 
 /// Writes the tables, their summary, the figures and the provenance of `report` into the folder `out`.
@@ -55,11 +46,7 @@ pub fn write(report: &BudgetReport, out: OutputFolder) -> Result<(), Refusal> {
                 ("budget", "truth from the raster scan", IOU),
                 ("contact", "truth from the contact alone", IOU_CONTACT),
             ] {
-                save_bars(
-                    &bars(report, decode, truth, change),
-                    &folder,
-                    &format!("{name}_{decode}"),
-                )?;
+                save_bars(&bars(report, decode, truth, change), &folder, &format!("{name}_{decode}"))?;
             }
         }
         write_json(&out.path("provenance.json"), &report.provenance)?;
@@ -92,22 +79,13 @@ fn end_points(report: &BudgetReport) -> Table<'_, &EndPoint> {
         .column("m", "M", |p| p.m)
         .file("taxels", |p| p.taxels)
         .column("truth", "truth", |p| p.truth);
-    let scores = [
-        ("support", "support"),
-        ("iou", "IoU"),
-        ("class_single", "class"),
-        ("class_vote20", "vote of 20"),
-    ];
+    let scores = [("support", "support"), ("iou", "IoU"), ("class_single", "class"), ("class_vote20", "vote of 20")];
     for (place, (key, head)) in scores.into_iter().enumerate() {
         table = table
             // the scan is one press, and nothing votes
-            .column(key, head, move |p| {
-                (place < 3 || !p.is_scan()).then_some(p.scores[place].mean)
-            })
+            .column(key, head, move |p| (place < 3 || !p.is_scan()).then_some(p.scores[place].mean))
             .digits(3)
-            .file(format!("{key}_se"), move |p| {
-                (!p.is_scan()).then_some(p.scores[place].standard_error())
-            });
+            .file(format!("{key}_se"), move |p| (!p.is_scan()).then_some(p.scores[place].standard_error()));
     }
     table
 }
@@ -184,10 +162,7 @@ fn by_effect(report: &BudgetReport, decode: &str, columns: &[(String, Direction,
     });
     let mut table = Table::new("", rows)
         .shown("stage", |(stage, _)| stage)
-        .shown(
-            "effect",
-            |(_, effect)| if effect == WHOLE_STAGE { "all of it" } else { effect },
-        );
+        .shown("effect", |(_, effect)| if effect == WHOLE_STAGE { "all of it" } else { effect });
     for (head, direction, m, change) in columns {
         table = table.shown(head, move |effect| {
             let cell = find(report, effect, *direction, (decode, *m), *change)?;
@@ -200,13 +175,8 @@ fn by_effect(report: &BudgetReport, decode: &str, columns: &[(String, Direction,
 
 /// What the signs mean, and how many stars are nothing but chance among the changes `shown` of every row.
 fn footnote(report: &BudgetReport, shown: &[usize]) -> String {
-    let numbers = report
-        .rows
-        .iter()
-        .flat_map(|row| shown.iter().map(|change| row.changes[*change]));
-    let moved: Vec<Sample> = numbers
-        .filter(|number| number.mean.abs() > 0.0 || number.variance > 0.0)
-        .collect();
+    let numbers = report.rows.iter().flat_map(|row| shown.iter().map(|change| row.changes[*change]));
+    let moved: Vec<Sample> = numbers.filter(|number| number.mean.abs() > 0.0 || number.variance > 0.0).collect();
     let (all, stars) = (moved.len(), moved.iter().filter(|number| stands_out(number)).count());
     let sessions = report.rows.first().map_or(0, |row| row.changes[0].count);
     format!(
@@ -251,11 +221,7 @@ fn bars(report: &BudgetReport, decode: &str, truth: &str, change: usize) -> BarC
         };
         let heading = name == WHOLE_STAGE;
         BarRow {
-            label: if heading {
-                stage.to_owned()
-            } else {
-                readable(stage, name)
-            },
+            label: if heading { stage.to_owned() } else { readable(stage, name) },
             heading,
             values: all.iter().map(|&m| lost(m)).collect(),
         }
@@ -268,10 +234,7 @@ fn bars(report: &BudgetReport, decode: &str, truth: &str, change: usize) -> BarC
             ("regained when taken from the whole chain", Style::Twin),
             ("lost when added to the ideal chain", Style::Raster),
         ]
-        .map(|(name, style)| BarGroup {
-            name: name.to_owned(),
-            style,
-        })
+        .map(|(name, style)| BarGroup { name: name.to_owned(), style })
         .to_vec(),
         rows: rows.collect(),
     }

@@ -23,14 +23,9 @@ pub fn text(report: &CalibrationReport) -> String {
         "" => name.to_owned(),
         unit => format!("{name} [{unit}]"),
     };
-    let numbers = report
-        .sessions
-        .iter()
-        .fold(Table::new("numbers", NUMBERS).shown("", label), |table, s| {
-            table.shown(&s.session, |(name, _)| {
-                s.numbers.get(name).map_or_else(String::new, estimated)
-            })
-        });
+    let numbers = report.sessions.iter().fold(Table::new("numbers", NUMBERS).shown("", label), |table, s| {
+        table.shown(&s.session, |(name, _)| s.numbers.get(name).map_or_else(String::new, estimated))
+    });
     let table = numbers.text();
     format!(
         "{table}{}\n{}not identifiable from these recordings:\n- {}\nin the recordings, not modelled:\n- {}",
@@ -56,18 +51,12 @@ fn remarks(s: &SessionEstimates) -> Vec<String> {
         [] => "none seen".to_owned(),
         beats => beats.iter().map(beat).collect::<Vec<_>>().join(", "),
     };
-    let grid = s.steps.map_or_else(
-        || "values on no grid".to_owned(),
-        |steps| format!("step {:.4} mV", 1e3 * steps.step_v),
-    );
+    let grid = s
+        .steps
+        .map_or_else(|| "values on no grid".to_owned(), |steps| format!("step {:.4} mV", 1e3 * steps.step_v));
     let presses = s.presses.len();
     let mut found = vec![format!("{presses} presses, {grid}, beats [measurements]: {beats}")];
-    if let Some(SessionGains {
-        taxels,
-        log_sd,
-        standard_error,
-    }) = &s.gains
-    {
+    if let Some(SessionGains { taxels, log_sd, standard_error }) = &s.gains {
         let taxels = taxels.len();
         found.push(format!(
             "gains of {taxels} taxels against the raster session: log-sd {log_sd:.3} ± {standard_error:.3}"
@@ -109,10 +98,7 @@ pub fn skin_text(report: &SkinReport) -> String {
         "(not measured: no session has both recordings)".to_owned()
     } else {
         let each = |m: &Mounting| format!("{} {:.3}", m.session, m.log_sd);
-        format!(
-            "(median of {})",
-            report.mountings.iter().map(each).collect::<Vec<_>>().join(", ")
-        )
+        format!("(median of {})", report.mountings.iter().map(each).collect::<Vec<_>>().join(", "))
     };
     let mut out = format!(
         "gains of {rows} × {cols} taxels, {} of them touched; objects: {}\n\
@@ -164,17 +150,8 @@ pub fn skin_text(report: &SkinReport) -> String {
 pub fn write_gains(report: &SkinReport, path: &Path) -> Result<(), Refusal> {
     let [rows, cols] = report.shape;
     let tile = |values: Vec<f64>, what: &str| {
-        let (least, most) = values
-            .iter()
-            .fold((f64::INFINITY, 0.0_f64), |(low, high), &v| (low.min(v), high.max(v)));
-        Tile::Heat {
-            values,
-            rows,
-            cols,
-            max: None,
-            caption: format!("{what}: {least:.2} to {most:.2}"),
-            outline: None,
-        }
+        let (least, most) = values.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), &v| (low.min(v), high.max(v)));
+        Tile::Heat { values, rows, cols, max: None, caption: format!("{what}: {least:.2} to {most:.2}"), outline: None }
     };
     let gains = report.skin.gains.log_mean.iter().map(|log| log.exp()).collect();
     let known = report.bands().map(|factor| factor - 1.0).collect();

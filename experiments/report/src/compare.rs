@@ -103,11 +103,7 @@ pub fn json<'a>(report: &'a CompareReport, objects: Option<&'a PerObjectReport>)
 pub fn text(report: &CompareReport) -> String {
     if !report.predicted.is_empty() {
         let inside = report.predicted.iter().filter(|row| row.of.inside()).count();
-        return format!(
-            "{}inside: {inside} of {}",
-            predicted(report).text(),
-            report.predicted.len()
-        );
+        return format!("{}inside: {inside} of {}", predicted(report).text(), report.predicted.len());
     }
     let mut out = statistics(report.all_statistics()).text();
     if !report.distances().is_empty() {
@@ -136,12 +132,7 @@ pub fn arm_json(report: &ArmReport) -> impl Serialize + '_ {
         skins: u64,
         statistics: Table<'a, &'a ArmBand>,
     }
-    Printed {
-        session: &report.session,
-        touches: report.touches,
-        skins: report.skins,
-        statistics: arm(report),
-    }
+    Printed { session: &report.session, touches: report.touches, skins: report.skins, statistics: arm(report) }
 }
 
 /// Writes the tables of the bent skin into the folder `out`.
@@ -209,11 +200,7 @@ fn histogram(compared: &ComparedSession) -> Chart {
             counts[bin.min(BINS - 1)] += 1.0 / values.len() as f64;
         }
         let middle_v = |bin: usize| (bin as f64 + 0.5) * width_v - REACH;
-        counts
-            .into_iter()
-            .enumerate()
-            .map(|(bin, share)| (middle_v(bin), share))
-            .collect()
+        counts.into_iter().enumerate().map(|(bin, share)| (middle_v(bin), share)).collect()
     };
     Chart {
         title: object_label(&compared.real.session).to_owned(),
@@ -233,11 +220,7 @@ fn quantile_plot(compared: &ComparedSession) -> Chart {
     let (real, twin) = (&compared.real, &compared.twin);
     let pair = |r: &[f64], t: &[f64]| -> Vec<(f64, f64)> { r.iter().copied().zip(t.iter().copied()).collect() };
     let output = pair(&real.output_quantiles_v, &twin.output_quantiles_v);
-    let ends = [output.first(), output.last()]
-        .into_iter()
-        .flatten()
-        .map(|p| (p.0, p.0))
-        .collect();
+    let ends = [output.first(), output.last()].into_iter().flatten().map(|p| (p.0, p.0)).collect();
     let ten = |values: &[f64]| -> Vec<f64> { quantiles(values, POINTS).iter().map(|v| 10.0 * v).collect() };
     Chart {
         title: object_label(&compared.real.session).to_owned(),
@@ -246,12 +229,7 @@ fn quantile_plot(compared: &ComparedSession) -> Chart {
         series: vec![
             Series::new("equal", Style::Baseline, 0, ends),
             Series::new("output", Style::Twin, 0, output),
-            Series::new(
-                "residual × 10",
-                Style::Raster,
-                0,
-                pair(&ten(&real.clean_v), &ten(&twin.clean_v)),
-            ),
+            Series::new("residual × 10", Style::Raster, 0, pair(&ten(&real.clean_v), &ten(&twin.clean_v))),
         ],
         ..Chart::default()
     }
@@ -259,15 +237,8 @@ fn quantile_plot(compared: &ComparedSession) -> Chart {
 
 fn scores(curves: &ScoreCurves, decode: &str) -> Chart {
     type Score = (u8, &'static str, fn(&ScoreRow) -> f64);
-    let all: [Score; 3] = [
-        (0, "support", |r| r.support),
-        (1, "IoU", |r| r.iou),
-        (2, "vote of 20", |r| r.class_vote20),
-    ];
-    let skins = [
-        (Style::Twin, "twin", &curves.twin),
-        (Style::Real, "real skin", &curves.real),
-    ];
+    let all: [Score; 3] = [(0, "support", |r| r.support), (1, "IoU", |r| r.iou), (2, "vote of 20", |r| r.class_vote20)];
+    let skins = [(Style::Twin, "twin", &curves.twin), (Style::Real, "real skin", &curves.real)];
     let mut rows = Vec::new();
     for score in &all {
         for (style, whose, of_skin) in skins {

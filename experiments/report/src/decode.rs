@@ -40,38 +40,24 @@ pub(crate) fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path
     let mut rows = Vec::new();
     let mut columns = vec!["pressed".to_owned(), "the wire".to_owned()];
     // sessions of other skins are decoded from other numbers of measurements
-    let same_m = decoded
-        .iter()
-        .all(|(_, found)| measurements(found) == measurements(&decoded[0].1));
+    let same_m = decoded.iter().all(|(_, found)| measurements(found) == measurements(&decoded[0].1));
     let most_blocks = MOST_ROWS.div_ceil(decoded.len().max(1)).max(1);
     for (session, found) in decoded {
         for block in 0..found.truth.len().min(most_blocks) {
             if rows.len() == MOST_ROWS {
                 break;
             }
-            let first: Vec<&DecodedWindow> = found
-                .rows
-                .iter()
-                .filter(|r| r.block == block && r.window == 0)
-                .collect();
+            let first: Vec<&DecodedWindow> = found.rows.iter().filter(|r| r.block == block && r.window == 0).collect();
             if columns.len() == 2 {
                 columns.extend(first.iter().map(|r| {
                     let name = short_label(r.decoder);
-                    if same_m {
-                        format!("{name}, M = {}", r.m)
-                    } else {
-                        name.to_owned()
-                    }
+                    if same_m { format!("{name}, M = {}", r.m) } else { name.to_owned() }
                 }));
             }
             let mut tiles = vec![pressed(session, found, block), wire(found, block)];
             tiles.extend(first.iter().map(|row| image(found, row, !same_m)));
             rows.push(TileRow {
-                label: if decoded.len() > 1 {
-                    session.name.clone()
-                } else {
-                    format!("block {block}")
-                },
+                label: if decoded.len() > 1 { session.name.clone() } else { format!("block {block}") },
                 tiles,
             });
         }
@@ -84,10 +70,7 @@ pub(crate) fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path
         title,
         column_titles: columns,
         rows,
-        tile_px: if decoded
-            .iter()
-            .any(|(_, found)| found.shape.iter().any(|side| *side > FINE))
-        {
+        tile_px: if decoded.iter().any(|(_, found)| found.shape.iter().any(|side| *side > FINE)) {
             FINE_TILE_PX
         } else {
             TILE_PX
@@ -100,14 +83,7 @@ pub(crate) fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path
 fn pressed(session: &Session, found: &DecodedSession, block: usize) -> Tile {
     let facts = session.compressive.as_ref().and_then(|r| r.facts(block));
     let [rows, cols] = found.shape;
-    let heat = |values: Vec<f64>, caption: String| Tile::Heat {
-        values,
-        rows,
-        cols,
-        max: None,
-        caption,
-        outline: None,
-    };
+    let heat = |values: Vec<f64>, caption: String| Tile::Heat { values, rows, cols, max: None, caption, outline: None };
     if let Some(map) = facts.and_then(|f| f.pressure.as_ref()) {
         return heat(map.values().to_vec(), format!("peak {:.0} kPa", 1e-3 * map.max()));
     }

@@ -37,10 +37,7 @@ pub fn write(report: &DesignReport, out: OutputFolder) -> Result<(), Refusal> {
 
 fn curves_table(report: &DesignReport) -> Table<'_, (&DesignCurve, &DesignPoint)> {
     let period_s = report.design.wire.period_s;
-    let points = report
-        .curves
-        .iter()
-        .flat_map(|curve| curve.points.iter().map(move |p| (curve, p)));
+    let points = report.curves.iter().flat_map(|curve| curve.points.iter().map(move |p| (curve, p)));
     Table::new("curves", points)
         .file("wires", |(c, _)| c.wires)
         .file("rows", |(c, _)| c.rows.name())
@@ -72,22 +69,12 @@ pub fn read_design(path: &Path, seed: u64) -> Result<DesignCheck, Refusal> {
         RowSource::Generator => None,
         RowSource::Designer(_) => Some(read("rows.txt", MAX_PATTERNS_BYTES)?),
     };
-    Ok(DesignCheck {
-        design,
-        profile,
-        pattern,
-        seed,
-    })
+    Ok(DesignCheck { design, profile, pattern, seed })
 }
 
 /// The design as text.
 pub fn text(report: &DesignReport) -> String {
-    let (d, w, e, c) = (
-        &report.design,
-        &report.design.wire,
-        &report.design.expected,
-        &report.cost,
-    );
+    let (d, w, e, c) = (&report.design, &report.design.wire, &report.design.expected, &report.cost);
     let wanted = format!("an IoU of {}", report.iou_wanted);
     let limit = ms(report.latency.limit_s);
     let heading = if report.reached {
@@ -96,11 +83,7 @@ pub fn text(report: &DesignReport) -> String {
         format!("NOT REACHABLE: {wanted} within {limit} ms; this is the best there is")
     };
     let [least, most] = [d.sub_arrays.iter().min(), d.sub_arrays.iter().max()].map(|n| n.copied().unwrap_or_default());
-    let each = if least == most {
-        most.to_string()
-    } else {
-        format!("{least} or {most}")
-    };
+    let each = if least == most { most.to_string() } else { format!("{least} or {most}") };
     let decides = match w.feedback_limit {
         FeedbackLimit::Range => "range decides",
         FeedbackLimit::Settling => "time to settle decides",
@@ -110,11 +93,8 @@ pub fn text(report: &DesignReport) -> String {
         RowSource::Generator => "random: the cells' generators, seeded with a mix of their addresses".to_owned(),
         RowSource::Designer(name) => format!("designed: {name}, a pattern of {} bits a cell", d.m_per_wire),
     };
-    let each_wire = if d.wires == 1 {
-        String::new()
-    } else {
-        format!(": {} on each of {} wires", d.m_per_wire, d.wires)
-    };
+    let each_wire =
+        if d.wires == 1 { String::new() } else { format!(": {} on each of {} wires", d.m_per_wire, d.wires) };
     let class = match (&e.class, &e.no_class) {
         (Some(class), _) => promise(class, 3),
         (None, why) => format!("not said: {}", why.as_deref().unwrap_or_default()),
@@ -125,18 +105,12 @@ pub fn text(report: &DesignReport) -> String {
     let (pitch_mm, electrode_mm) = (mm(d.pitch_m), mm(d.electrode_m));
     line(
         "skin",
-        format!(
-            "{} × {} = {} taxels, pitch {pitch_mm} mm, electrodes {electrode_mm} mm",
-            d.rows, d.cols, d.taxels
-        ),
+        format!("{} × {} = {} taxels, pitch {pitch_mm} mm, electrodes {electrode_mm} mm", d.rows, d.cols, d.taxels),
     );
     let wires = counted(d.wires, "wire");
     line("wires", format!("{wires}, {each} taxels each, read at the same time"));
     let (rate_khz, settle_us, available_us) = (1e-3 * w.rate_hz, 1e6 * w.settle_s, 1e6 * w.available_s);
-    line(
-        "clock",
-        format!("{rate_khz:.1} kHz; the output settles in {settle_us:.2} of {available_us:.2} µs"),
-    );
+    line("clock", format!("{rate_khz:.1} kHz; the output settles in {settle_us:.2} of {available_us:.2} µs"));
     line(
         "amplifier",
         format!(
@@ -145,20 +119,14 @@ pub fn text(report: &DesignReport) -> String {
         ),
     );
     let (bits, step_mv, steps) = (w.adc_bits, 1e3 * w.adc_step_v, w.steps_per_taxel);
-    line(
-        "converter",
-        format!("{bits} bits, steps of {step_mv:.1} mV; a pressed taxel is worth {steps:.1} of them"),
-    );
+    line("converter", format!("{bits} bits, steps of {step_mv:.1} mV; a pressed taxel is worth {steps:.1} of them"));
     if let Some(limit) = &w.limit {
         line("", format!("beyond its closed form: {limit}"));
     }
     line("rows", rows);
     line("measurements", format!("M = {}{each_wire}", d.m));
     let (decoder, places, memory) = (&d.decoder.name, d.decoder.places, bytes(d.decoder.bytes));
-    line(
-        "decoder",
-        format!("{decoder}: separable Gaussian prior, non-negative on {places} taxels at most; {memory}"),
-    );
+    line("decoder", format!("{decoder}: separable Gaussian prior, non-negative on {places} taxels at most; {memory}"));
     line("expected IoU", promise(&e.iou, 3));
     line("expected place", format!("{} taxels", promise(&e.place_px, 2)));
     line("", format!("{} mm", promise(&e.place_mm, 2)));
@@ -190,15 +158,9 @@ pub fn text(report: &DesignReport) -> String {
             ms(c.load_s)
         ),
     );
-    line(
-        "binding",
-        format!("{}: {}", report.binding.name(), report.binding_reason),
-    );
+    line("binding", format!("{}: {}", report.binding.name(), report.binding_reason));
     if let Ok(designed) = ElectronicsStudy::as_designed() {
-        line(
-            "",
-            format!("as designed, {}", designed.one_wire_text(report.one_wire_taxels)),
-        );
+        line("", format!("as designed, {}", designed.one_wire_text(report.one_wire_taxels)));
     }
     let alternatives = Table::new("alternatives", &report.alternatives)
         .shown("alternative", |a| &a.what)
@@ -221,12 +183,7 @@ pub fn text(report: &DesignReport) -> String {
 pub fn check_text(report: &CheckReport) -> String {
     let quantities = report.quantities.iter().map(|q| {
         let verdict = if q.agrees { "agrees" } else { "DOES NOT AGREE" };
-        format!(
-            "\n{:<20} {:.3}, promised {}: {verdict}",
-            q.quantity,
-            q.found,
-            promise(&q.promised, 3)
-        )
+        format!("\n{:<20} {:.3}, promised {}: {verdict}", q.quantity, q.found, promise(&q.promised, 3))
     });
     format!(
         "{} repetitions of {} touches with seed {}, none of which the design has seen{}",
@@ -262,11 +219,7 @@ fn ms(seconds: f64) -> String {
 /// Bytes with a prefix.
 fn bytes(count: usize) -> String {
     let count = count as f64;
-    if count >= 1e6 {
-        format!("{:.1} MB", count * 1e-6)
-    } else {
-        format!("{:.0} kB", count * 1e-3)
-    }
+    if count >= 1e6 { format!("{:.1} MB", count * 1e-6) } else { format!("{:.0} kB", count * 1e-3) }
 }
 
 /// IoU and place error against the time of acquisition, with the target, the latency and the design itself: everything
@@ -275,11 +228,7 @@ fn charts(report: &DesignReport) -> Vec<Chart> {
     let (d, e) = (&report.design, &report.design.expected);
     let (limit_ms, at) = (1e3 * report.latency.limit_s, 1e3 * report.latency.acquisition_s);
     let period_ms = 1e3 * d.wire.period_s;
-    let shown: Vec<&DesignCurve> = report
-        .curves
-        .iter()
-        .filter(|c| c.wires == d.wires || c.wires == 1)
-        .collect();
+    let shown: Vec<&DesignCurve> = report.curves.iter().filter(|c| c.wires == d.wires || c.wires == 1).collect();
     let points = || shown.iter().flat_map(|c| c.points.iter().map(move |p| (*c, p)));
     let curve = |(c, _): (&DesignCurve, &DesignPoint)| {
         let random = |c: &DesignCurve| c.rows == RowSource::Generator;
@@ -316,9 +265,7 @@ fn charts(report: &DesignReport) -> Vec<Chart> {
     let ends = |chart: &Chart, of: fn(&(f64, f64)) -> f64| -> Vec<f64> {
         chart.series.iter().flat_map(|s| s.points.iter().map(of)).collect()
     };
-    let first = ends(&image, |(time_ms, _)| *time_ms)
-        .into_iter()
-        .fold(limit_ms, f64::min);
+    let first = ends(&image, |(time_ms, _)| *time_ms).into_iter().fold(limit_ms, f64::min);
     let farthest = ends(&place, |(_, mm)| *mm).into_iter().fold(0.0, f64::max);
     let asked = report.iou_wanted;
     let level = vec![(first, asked), (limit_ms, asked)];

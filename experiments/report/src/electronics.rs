@@ -79,15 +79,7 @@ fn table(rows: &[Remedied]) -> Table<'_, &Remedied> {
 
 /// A number with a prefix of the SI, to three digits.
 fn scaled(value: f64, unit: &str) -> String {
-    let prefixes = [
-        (1e9, "G"),
-        (1e6, "M"),
-        (1e3, "k"),
-        (1.0, ""),
-        (1e-3, "m"),
-        (1e-6, "µ"),
-        (1e-9, "n"),
-    ];
+    let prefixes = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n")];
     let found = prefixes.into_iter().find(|(scale, _)| value >= *scale);
     let (scale, prefix) = found.unwrap_or((1e-9, "n"));
     let lead = value / scale;
@@ -117,9 +109,9 @@ fn charts(report: &ElectronicsReport) -> Vec<Chart> {
         chart.series.push(Series::new(name, BOUND, 0, points));
         chart
     };
-    let settling = by_remedy().log_y().y("settling and slewing, µs", |r| {
-        (r.budget.settle_s + r.budget.slew_s) * 1e6
-    });
+    let settling = by_remedy()
+        .log_y()
+        .y("settling and slewing, µs", |r| (r.budget.settle_s + r.budget.slew_s) * 1e6);
     let sum = by_remedy().log_y().y("4σ of the sum, V", |r| r.budget.excursion_v);
     let ratio = by_remedy().y("SNR with the converter's step, dB", |r| r.budget.snr_adc_db);
     type Source = (Curve, fn(&Budget) -> f64);
@@ -131,9 +123,7 @@ fn charts(report: &ElectronicsReport) -> Vec<Chart> {
         (Curve::new("converter's step", BOUND, 0), |b| b.adc_noise_v),
     ];
     let as_built: Vec<&Remedied> = rows.iter().filter(|r| r.remedy == Remedy::AsBuilt).collect();
-    let noise = sources
-        .iter()
-        .flat_map(|source| as_built.iter().map(move |r| (source, *r)));
+    let noise = sources.iter().flat_map(|source| as_built.iter().map(move |r| (source, *r)));
     let noise = Plot::new(noise)
         .x("taxels", |(_, r)| f64::from(r.taxels))
         .log_x()
@@ -141,16 +131,8 @@ fn charts(report: &ElectronicsReport) -> Vec<Chart> {
         .log_y()
         .by(|((curve, _), _)| curve.clone());
     vec![
-        with(
-            settling.chart("Settling to half a step of the converter"),
-            "time there is",
-            report.available_s * 1e6,
-        ),
-        with(
-            sum.chart("Sum of all taxels at the converter"),
-            "range of amplifier and converter",
-            of(|b| b.range_v),
-        ),
+        with(settling.chart("Settling to half a step of the converter"), "time there is", report.available_s * 1e6),
+        with(sum.chart("Sum of all taxels at the converter"), "range of amplifier and converter", of(|b| b.range_v)),
         with(
             ratio.chart("One pressed taxel over all noise"),
             "one step of the converter",

@@ -46,10 +46,7 @@ pub fn write(study: &ExploreStudy, report: &ExploreReport, out: OutputFolder) ->
             .write_csv(&out.timed_path("timings.csv"))?;
         let (timed, others): (Vec<_>, Vec<_>) = report.fits.iter().partition(|fit| fit.is_of_this_machine());
         fits("fits", others).write(out)?;
-        write_json(
-            &out.timed_path("timing.json"),
-            &(Machine::here(), fits("timing", timed)),
-        )?;
+        write_json(&out.timed_path("timing.json"), &(Machine::here(), fits("timing", timed)))?;
         let figures = out.folder("figures")?;
         save_charts(&charts(report), &figures, "explore")?;
         save_charts(&[timing(report)], &figures, "timing")?;
@@ -141,25 +138,15 @@ fn panel(report: &ExploreReport, title: &str, y_label: &str, value: fn(&SizeRow)
 fn charts(report: &ExploreReport) -> Vec<Chart> {
     let near = "Measurements for 95 % of the contacts within 1 px";
     vec![
-        panel(report, "Measurements for an IoU of 0.8", "measurements", |r| {
-            r.m_iou.map(|m| m as f64)
-        }),
+        panel(report, "Measurements for an IoU of 0.8", "measurements", |r| r.m_iou.map(|m| m as f64)),
         panel(report, near, "measurements", |r| r.m_located.map(|m| m as f64)),
-        panel(report, "Acquisition for an IoU of 0.8", "time, ms", |r| {
-            r.acquire_s.map(|s| s * 1e3)
-        }),
-        panel(report, "Scan of every taxel, for comparison", "time, ms", |r| {
-            Some(r.raster_s * 1e3)
-        }),
-        panel(report, "Memory of the decoder", "MB", |r| {
-            r.m_iou.and(r.deciding()).map(|t| t.bytes as f64 / 1e6)
-        }),
+        panel(report, "Acquisition for an IoU of 0.8", "time, ms", |r| r.acquire_s.map(|s| s * 1e3)),
+        panel(report, "Scan of every taxel, for comparison", "time, ms", |r| Some(r.raster_s * 1e3)),
+        panel(report, "Memory of the decoder", "MB", |r| r.m_iou.and(r.deciding()).map(|t| t.bytes as f64 / 1e6)),
     ]
 }
 
 /// Time of decoding, on this machine.
 fn timing(report: &ExploreReport) -> Chart {
-    panel(report, "Decoding for an IoU of 0.8", "time, s", |r| {
-        r.m_iou.and(r.deciding()).map(|t| t.decode_s)
-    })
+    panel(report, "Decoding for an IoU of 0.8", "time, s", |r| r.m_iou.and(r.deciding()).map(|t| t.decode_s))
 }

@@ -74,10 +74,7 @@ pub fn text(report: &FidelityReport) -> String {
         ));
     }
     if !report.refusals.is_empty() {
-        out.push_str(&format!(
-            "{} settings were refused (refused.csv)\n",
-            report.refusals.len()
-        ));
+        out.push_str(&format!("{} settings were refused (refused.csv)\n", report.refusals.len()));
     }
     out
 }
@@ -93,11 +90,7 @@ fn mean(setting: &Setting<'_>, get: fn(&MeasuredSetting) -> f64) -> f64 {
 /// Every setting of the scenes of `task`, the cheapest level first.
 fn settings<'a>(rows: &'a [MeasuredSetting], task: &str) -> Vec<Setting<'a>> {
     let key = |r: &&MeasuredSetting| {
-        (
-            LEVELS.iter().position(|level| level.name == r.level),
-            r.cells_per_taxel,
-            r.timestep_s.to_bits(),
-        )
+        (LEVELS.iter().position(|level| level.name == r.level), r.cells_per_taxel, r.timestep_s.to_bits())
     };
     let mut rows: Setting<'_> = rows.iter().filter(|r| r.task == task).collect();
     rows.sort_by_key(key);
@@ -151,13 +144,8 @@ fn pareto(rows: &[MeasuredSetting]) -> Vec<Chart> {
 }
 
 /// Ink of every level, in the order of [`LEVELS`].
-const STYLES: [(Style, u8); 5] = [
-    (Style::Baseline, 0),
-    (Style::Raster, 0),
-    (Style::Twin, 1),
-    (Style::Twin, 0),
-    (Style::Paper, 0),
-];
+const STYLES: [(Style, u8); 5] =
+    [(Style::Baseline, 0), (Style::Raster, 0), (Style::Twin, 1), (Style::Twin, 0), (Style::Paper, 0)];
 
 /// Side of the part of the skin that is shown, as a share of it.
 const SHOWN: f64 = 0.9;
@@ -167,10 +155,7 @@ const SHOWN: f64 = 0.9;
 fn pressures(rows: &[MeasuredSetting], fine: &[FinePressure]) -> Sheet {
     let scenes = unique(rows.iter().map(|row| row.scene.as_str()));
     let tile = |scene: &str, level: &FidelityLevel| {
-        let of = rows
-            .iter()
-            .zip(fine)
-            .filter(|(row, _)| row.scene == scene && row.level == level.name);
+        let of = rows.iter().zip(fine).filter(|(row, _)| row.scene == scene && row.level == level.name);
         let best = of.min_by(|(a, _), (b, _)| {
             let coarse = |row: &MeasuredSetting| row.cells_per_taxel.abs_diff(6);
             coarse(a).cmp(&coarse(b)).then(a.timestep_s.total_cmp(&b.timestep_s))
@@ -208,10 +193,6 @@ fn picture(row: &MeasuredSetting, fine: &FinePressure) -> Tile {
         width,
         height,
         rgb,
-        caption: format!(
-            "peak {:.0} kPa, error {:.1} %",
-            peak_pa * 1e-3,
-            100.0 * row.pressure_rms_rel
-        ),
+        caption: format!("peak {:.0} kPa, error {:.1} %", peak_pa * 1e-3, 100.0 * row.pressure_rms_rel),
     }
 }

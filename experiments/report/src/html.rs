@@ -71,12 +71,7 @@ pub struct PageFigure {
 impl PageFigure {
     /// The figure in `file`, with what is to be seen and what it means.
     pub fn new(file: impl Into<String>, alt: impl Into<String>, caption: impl Into<String>) -> Self {
-        Self {
-            file: file.into(),
-            still: None,
-            alt: alt.into(),
-            caption: caption.into(),
-        }
+        Self { file: file.into(), still: None, alt: alt.into(), caption: caption.into() }
     }
 
     fn html(&self) -> String {
@@ -88,12 +83,7 @@ impl PageFigure {
             let source = format!("figures/{stem}.png\"");
             ("picture", format!("{stem}.png"), source, String::new())
         } else {
-            (
-                "chart",
-                format!("{stem}.svg"),
-                format!("figures/{stem}.svg\""),
-                String::new(),
-            )
+            ("chart", format!("{stem}.svg"), format!("figures/{stem}.svg\""), String::new())
         };
         let image = format!("<picture>{before}<img src=\"{source} alt=\"{alt}\"></picture>");
         let files = if self.file.ends_with(".gif") {
@@ -111,10 +101,7 @@ impl PageFigure {
     fn standing(&self) -> String {
         let still = self.still.as_deref();
         still.map_or_else(String::new, |file| {
-            format!(
-                "<source media=\"print, (prefers-reduced-motion: reduce)\" srcset=\"figures/{}\">",
-                link(file)
-            )
+            format!("<source media=\"print, (prefers-reduced-motion: reduce)\" srcset=\"figures/{}\">", link(file))
         })
     }
 }
@@ -133,11 +120,7 @@ pub struct PageTable {
 impl PageTable {
     /// The columns for readers of `table`, whose rows are in the file `file`.
     pub fn new<R: Copy>(caption: &str, table: &Table<'_, R>, file: &str) -> Self {
-        Self {
-            caption: caption.to_owned(),
-            table: table.for_readers(),
-            files: vec![file.to_owned()],
-        }
+        Self { caption: caption.to_owned(), table: table.for_readers(), files: vec![file.to_owned()] }
     }
 }
 
@@ -146,10 +129,7 @@ pub fn html(page: &Page) -> String {
     let title = escape(&page.title);
     let entry = |id: &str, title: &str| format!("<li><a href=\"#{}\">{}</a></li>\n", anchor(id), escape(title));
     let mut contents: String = page.sections.iter().map(|s| entry(&s.id, &s.title)).collect();
-    let last = [
-        (&page.glossary, "glossary", "Glossary"),
-        (&page.provenance, "provenance", "Provenance"),
-    ];
+    let last = [(&page.glossary, "glossary", "Glossary"), (&page.provenance, "provenance", "Provenance")];
     let mut terms = String::new();
     for (list, id, title) in last.iter().filter(|(list, ..)| !list.is_empty()) {
         contents.push_str(&entry(id, title));
@@ -186,11 +166,7 @@ fn definitions(id: &str, title: &str, list: &[(String, String)]) -> String {
 
 /// `content` between two tags, or nothing.
 fn wrapped(content: &str, before: &str, after: &str) -> String {
-    if content.is_empty() {
-        String::new()
-    } else {
-        format!("{before}{content}{after}")
-    }
+    if content.is_empty() { String::new() } else { format!("{before}{content}{after}") }
 }
 
 /// Text as paragraphs; what stands between back quotes is code.
@@ -207,21 +183,16 @@ fn with_code(text: &str) -> String {
     if pieces.len().is_multiple_of(2) {
         return text.to_owned();
     }
-    let each = pieces.iter().enumerate().map(|(index, piece)| {
-        if index % 2 == 1 {
-            format!("<code>{piece}</code>")
-        } else {
-            (*piece).to_owned()
-        }
-    });
+    let each = pieces
+        .iter()
+        .enumerate()
+        .map(|(index, piece)| if index % 2 == 1 { format!("<code>{piece}</code>") } else { (*piece).to_owned() });
     each.collect()
 }
 
 /// Letters, digits, `-` and `_`; anything else becomes `-`.
 fn anchor(id: &str) -> String {
-    id.chars()
-        .map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' })
-        .collect()
+    id.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' }).collect()
 }
 
 fn card(card: &Card) -> String {
@@ -266,15 +237,9 @@ fn table(table: &PageTable) -> String {
     // one file needs no name, several do
     let files = table.files.iter().map(|file| {
         let stem = file.strip_suffix(".csv").unwrap_or(file);
-        let words = if table.files.len() > 1 {
-            escape(&format!("CSV: {}", stem.replace('_', " ")))
-        } else {
-            "CSV".to_owned()
-        };
-        format!(
-            " <span class=\"files\"><a href=\"tables/{}.csv\">{words}</a></span>",
-            link(stem)
-        )
+        let words =
+            if table.files.len() > 1 { escape(&format!("CSV: {}", stem.replace('_', " "))) } else { "CSV".to_owned() };
+        format!(" <span class=\"files\"><a href=\"tables/{}.csv\">{words}</a></span>", link(stem))
     });
     let files: String = files.collect();
     let whole = format!("<div class=\"scroll\" tabindex=\"0\">{}</div>\n", table.table.html());

@@ -39,11 +39,7 @@ pub(crate) fn statistic_label(name: &str) -> String {
 
 /// Names of objects in a text, separated by spaces, in plain words.
 pub(crate) fn object_list(names: &str) -> String {
-    names
-        .split_whitespace()
-        .map(object_label)
-        .collect::<Vec<_>>()
-        .join(", ")
+    names.split_whitespace().map(object_label).collect::<Vec<_>>().join(", ")
 }
 
 /// What a score is called.

@@ -17,9 +17,6 @@ pub struct Origin {
 impl Origin {
     /// Results of `provenance`, made on this machine.
     pub fn here(provenance: Provenance) -> Self {
-        Self {
-            provenance,
-            machine: Machine::here(),
-        }
+        Self { provenance, machine: Machine::here() }
     }
 }

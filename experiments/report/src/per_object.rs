@@ -30,19 +30,12 @@ pub(crate) fn banded<'a, R: Copy + 'a>(
         .digits(digits)
         .file("low", move |row| of(row).low)
         .file("high", move |row| of(row).high)
-        .shown("90 % band", move |row| {
-            format!("{:.digits$} – {:.digits$}", of(row).low, of(row).high)
-        })
+        .shown("90 % band", move |row| format!("{:.digits$} – {:.digits$}", of(row).low, of(row).high))
 }
 
 /// Adds whether the real value lies in the band.
 pub(crate) fn marked<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> Banded + Copy + 'a) -> Table<'a, R> {
-    table.named(
-        "inside",
-        "",
-        move |row| of(row).inside(),
-        |inside| if inside { "" } else { "outside" },
-    )
+    table.named("inside", "", move |row| of(row).inside(), |inside| if inside { "" } else { "outside" })
 }
 
 /// What is written as JSON.
@@ -55,11 +48,7 @@ pub(crate) struct Printed<'a> {
 
 /// What is written as JSON.
 pub(crate) fn json(report: &PerObjectReport) -> Printed<'_> {
-    Printed {
-        skins: report.skins,
-        distances: distances(report),
-        objects: objects(report),
-    }
+    Printed { skins: report.skins, distances: distances(report), objects: objects(report) }
 }
 
 /// Writes [`TABLES`], each to the path that `path` gives its name.
@@ -155,11 +144,7 @@ pub(crate) fn section(report: &PerObjectReport) -> Section {
 }
 
 fn chart(report: &PerObjectReport) -> IntervalChart {
-    let twin: Vec<&ObjectBand> = report
-        .objects
-        .iter()
-        .filter(|b| b.images == ReadoutImages::Twin)
-        .collect();
+    let twin: Vec<&ObjectBand> = report.objects.iter().filter(|b| b.images == ReadoutImages::Twin).collect();
     let rows = unique(twin.iter().map(|b| b.score.object.as_str()));
     let mut lines = unique(twin.iter().map(|b| (b.score.score, b.score.decoder.as_str())));
     lines.sort_by_key(|(score, _)| SCORES.iter().position(|(name, _)| name == score));
@@ -174,10 +159,7 @@ fn chart(report: &PerObjectReport) -> IntervalChart {
                 mark: b.of.real,
             })
         };
-        IntervalPanel {
-            title: format!("M = {m}"),
-            intervals: rows.iter().map(interval).collect(),
-        }
+        IntervalPanel { title: format!("M = {m}"), intervals: rows.iter().map(interval).collect() }
     };
     let line = |(score, decoder): (&str, &str)| IntervalLine {
         title: format!("{}, {}", label(decoder), score_label(score)),
@@ -185,10 +167,7 @@ fn chart(report: &PerObjectReport) -> IntervalChart {
     };
     IntervalChart {
         title: format!("Twin and real skin, object by object; {} simulated skins", report.skins),
-        legend: [
-            "twin: mean, and where one more simulated skin lies (90 %)".to_owned(),
-            "real skin".to_owned(),
-        ],
+        legend: ["twin: mean, and where one more simulated skin lies (90 %)".to_owned(), "real skin".to_owned()],
         rows: rows.iter().map(|name| object_label(name).to_owned()).collect(),
         lines: lines.into_iter().map(line).collect(),
     }

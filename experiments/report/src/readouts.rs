@@ -143,12 +143,7 @@ fn charts(report: &ReadoutsReport) -> Vec<Chart> {
     charts.extend(over_measurements("17 objects", "share named rightly", |t| t.accuracy));
     charts.push(Chart {
         published: published.collect(),
-        ..over_taxels(
-            &format!("Rate of images with IoU ≥ {GOOD_IOU}"),
-            "images a second",
-            rate,
-            1.0,
-        )
+        ..over_taxels(&format!("Rate of images with IoU ≥ {GOOD_IOU}"), "images a second", rate, 1.0)
     });
     let placed = |row: &ReadoutRow| row.deciding()?.placed_s;
     charts.push(over_taxels("From a touch to its place", "time, ms", placed, 1e3));

@@ -116,9 +116,7 @@ fn scores(board: &ScoreBoard, title: &str, y_label: &str, over: Over, left_out: 
         let k = sources.iter().position(|source| *source == own).unwrap_or(0);
         Curve::of_decoder(words, &r.key.decoder, Stroke::of(k))
     };
-    let by_name = names
-        .iter()
-        .flat_map(|name| rows.iter().copied().filter(move |r| r.key.decoder == *name));
+    let by_name = names.iter().flat_map(|name| rows.iter().copied().filter(move |r| r.key.decoder == *name));
     let plot = Plot::new(by_name).y(y_label, get).by(curve).log_x().within(0.0, 1.02);
     let plot = match over {
         Over::M => plot.x("measurements M", |r| r.key.m as f64),
@@ -141,9 +139,7 @@ fn localisation(ball: &[&PlaceRow]) -> [Chart; 2] {
     };
     [
         plot("mean, taxels", |r| r.mean_px).chart("Distance from the true centre"),
-        plot("share", |r| r.share_under_1px)
-            .within(0.0, 1.02)
-            .chart("Windows within one taxel"),
+        plot("share", |r| r.share_under_1px).within(0.0, 1.02).chart("Windows within one taxel"),
     ]
 }
 
@@ -153,16 +149,8 @@ fn localisation(ball: &[&PlaceRow]) -> [Chart; 2] {
 fn stops(board: &AnytimeBoard) -> Vec<Chart> {
     let left_out = board.rows.iter().any(|r| r.key.left_out);
     let panel = |title: &str, y_label: &str, subject: Subject, left_out: bool| {
-        let here = board
-            .rows
-            .iter()
-            .filter(|r| r.key.subject == subject && r.key.left_out == left_out);
-        let several = unique(
-            here.clone()
-                .map(|r| (r.key.decoder.as_str(), r.key.learned_from.as_str())),
-        )
-        .len()
-            > 1;
+        let here = board.rows.iter().filter(|r| r.key.subject == subject && r.key.left_out == left_out);
+        let several = unique(here.clone().map(|r| (r.key.decoder.as_str(), r.key.learned_from.as_str()))).len() > 1;
         let curve = move |r: &AnytimeRow| {
             let style = match r.key.sensing {
                 Sensing::Random => Style::Twin,
@@ -179,9 +167,7 @@ fn stops(board: &AnytimeBoard) -> Vec<Chart> {
             Curve::new(name, style, shade)
         };
         Plot::new(here)
-            .x("samples, mean", |r| {
-                r.scores.samples.filter(|_| r.scores.attained.is_some())
-            })
+            .x("samples, mean", |r| r.scores.samples.filter(|_| r.scores.attained.is_some()))
             .log_x()
             .y(y_label, |r| Some(1.0 - r.scores.attained?))
             .by(curve)
@@ -201,10 +187,7 @@ fn since_touch(board: &InTimeBoard) -> Vec<Chart> {
     type Both = fn(&InTimeRow) -> [Option<f64>; 2];
     let left_out = board.rows.iter().any(|r| r.left_out);
     let panel = |title: &str, y_label: &str, kind: ContactKind, left_out: bool, both: Both| {
-        let here = board
-            .rows
-            .iter()
-            .filter(|r| r.contact == kind && r.left_out == left_out);
+        let here = board.rows.iter().filter(|r| r.contact == kind && r.left_out == left_out);
         let here: Vec<&InTimeRow> = here.collect();
         let sources = unique(here.iter().map(|r| r.learned_from.as_str()));
         let measurements = unique(here.iter().map(|r| r.m));
@@ -220,11 +203,7 @@ fn since_touch(board: &InTimeBoard) -> Vec<Chart> {
         }
         let curve = move |(r, shade, k): (&InTimeRow, u8, usize)| {
             let (how, style) = [("alone", Style::Raster), ("in time", Style::Twin)][k];
-            let whose = if several {
-                format!(", {}", r.learned_from)
-            } else {
-                String::new()
-            };
+            let whose = if several { format!(", {}", r.learned_from) } else { String::new() };
             Curve::new(format!("M = {} {how}{whose}", r.m), style, shade)
         };
         Plot::new(rows)
@@ -234,21 +213,11 @@ fn since_touch(board: &InTimeBoard) -> Vec<Chart> {
             .by(curve)
             .chart(title)
     };
-    let presses = if left_out {
-        "Presses, object left out"
-    } else {
-        "Presses"
-    };
+    let presses = if left_out { "Presses, object left out" } else { "Presses" };
     drawn([
-        panel(presses, "IoU", ContactKind::Press, left_out, |r| {
-            [r.scores.iou_alone, r.scores.iou_in_time]
+        panel(presses, "IoU", ContactKind::Press, left_out, |r| [r.scores.iou_alone, r.scores.iou_in_time]),
+        panel("Drops of the ball", "distance of the place, taxels", ContactKind::Drop, false, |r| {
+            [r.scores.error_alone_px, r.scores.error_in_time_px]
         }),
-        panel(
-            "Drops of the ball",
-            "distance of the place, taxels",
-            ContactKind::Drop,
-            false,
-            |r| [r.scores.error_alone_px, r.scores.error_in_time_px],
-        ),
     ])
 }

@@ -65,12 +65,7 @@ fn writes(report: &RowDesignReport) -> Option<Vec<(usize, u8, String)>> {
 fn rows(report: &RowDesignReport) -> Sheet {
     let [rows, cols] = report.skin;
     let tile = |r: usize| Tile::Heat {
-        values: report
-            .patterns
-            .row(r as u64)
-            .iter()
-            .map(|code| f64::from(*code))
-            .collect(),
+        values: report.patterns.row(r as u64).iter().map(|code| f64::from(*code)).collect(),
         rows,
         cols,
         max: Some(255.0),
@@ -78,15 +73,10 @@ fn rows(report: &RowDesignReport) -> Sheet {
         outline: None,
     };
     let shown: Vec<usize> = (0..report.m.min(SHOWN)).collect();
-    let lines = shown.chunks(A_LINE).map(|line| TileRow {
-        label: String::new(),
-        tiles: line.iter().map(|r| tile(*r)).collect(),
-    });
-    let first = if report.m > SHOWN {
-        format!("first {SHOWN} of ")
-    } else {
-        String::new()
-    };
+    let lines = shown
+        .chunks(A_LINE)
+        .map(|line| TileRow { label: String::new(), tiles: line.iter().map(|r| tile(*r)).collect() });
+    let first = if report.m > SHOWN { format!("first {SHOWN} of ") } else { String::new() };
     Sheet {
         title: format!("{}: {first}{} rows, bright +1, dark −1", report.label, report.m),
         column_titles: Vec::new(),

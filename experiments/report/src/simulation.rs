@@ -39,19 +39,10 @@ impl<'a> SimulationFiles<'a> {
                 write_bytes(&out.path(name), content)?;
             }
             let session = record.then(|| SessionWriter::create(&out.path(""), &prepared.session()));
-            Ok((
-                CsvFile::create(&out.path("frames.csv"), FRAME_COLUMNS)?,
-                session.transpose()?,
-            ))
+            Ok((CsvFile::create(&out.path("frames.csv"), FRAME_COLUMNS)?, session.transpose()?))
         };
         let (frames, session) = begin().map_err(|error| out.unstaged(error))?;
-        Ok(Self {
-            maps: MapFiles::new(prepared),
-            frames,
-            session,
-            out,
-            prepared,
-        })
+        Ok(Self { maps: MapFiles::new(prepared), frames, session, out, prepared })
     }
 
     /// Writes the next presses.
@@ -110,13 +101,7 @@ impl<'a> SimulationFiles<'a> {
             mechanics_s: f64,
             recording_s: f64,
         }
-        let Self {
-            mut out,
-            prepared,
-            frames,
-            maps,
-            session,
-        } = self;
+        let Self { mut out, prepared, frames, maps, session } = self;
         let numbers = || {
             frames.finish()?;
             maps.finish()?;
@@ -220,8 +205,7 @@ impl MapFiles {
                     Some(maps) => maps,
                     None => {
                         write_npy(&out.path("time_s.npy"), &[frames.len()], &times_s())?;
-                        self.maps
-                            .insert(create_maps(out, "", &[piece.of, frames.len(), rows, cols])?)
+                        self.maps.insert(create_maps(out, "", &[piece.of, frames.len(), rows, cols])?)
                     }
                 };
                 push_maps(maps, frames, conductance)?;
@@ -243,11 +227,7 @@ impl MapFiles {
 
 fn create_maps(out: &OutputFolder, suffix: &str, shape: &[usize]) -> Result<Maps, Refusal> {
     let file = |name: &str| NpyFile::create(&out.path(&format!("{name}{suffix}.npy")), shape);
-    Ok([
-        file("pressure_pa")?,
-        file("electrode_pressure_pa")?,
-        file("conductance_s")?,
-    ])
+    Ok([file("pressure_pa")?, file("electrode_pressure_pa")?, file("conductance_s")?])
 }
 
 fn push_maps(maps: &mut Maps, frames: &[Frame], conductance: &[ConductanceMap]) -> Result<(), Refusal> {
@@ -257,8 +237,7 @@ fn push_maps(maps: &mut Maps, frames: &[Frame], conductance: &[ConductanceMap]) 
         electrode.push(frame.electrode_pressure.values().iter().copied())?;
     }
     let maps = conductance.iter();
-    maps.into_iter()
-        .try_for_each(|map| conductances.push(map.values().iter().copied()))
+    maps.into_iter().try_for_each(|map| conductances.push(map.values().iter().copied()))
 }
 
 /// Size of the pictures of the scene, pixels.
@@ -271,12 +250,7 @@ fn pressure_picture(out: &OutputFolder, prepared: &Prepared, simulation: &Simula
         return Ok(());
     };
     let map = &frame.pressure;
-    let title = format!(
-        "{}: pressure at {:.1} N, {:.3} s",
-        prepared.body(),
-        frame.wrench.force_n[2],
-        frame.time_s
-    );
+    let title = format!("{}: pressure at {:.1} N, {:.3} s", prepared.body(), frame.wrench.force_n[2], frame.time_s);
     let path = out.path("pressure.png");
     pressure_png(map.values(), map.rows(), map.cols(), "kPa", KPA_PER_PA, &title, &path)
 }

@@ -76,11 +76,7 @@ fn page_is_well_formed_and_self_contained() {
 fn navigation_leads_to_every_section() {
     let page = page();
     let text = markup(&page);
-    let ids = page
-        .sections
-        .iter()
-        .map(|s| s.id.as_str())
-        .chain(["glossary", "provenance"]);
+    let ids = page.sections.iter().map(|s| s.id.as_str()).chain(["glossary", "provenance"]);
     for id in ids {
         let (link, place) = (format!("<a href=\"#{id}\">"), format!("<section id=\"{id}\""));
         assert!(text.contains(&link) && text.contains(&place), "{id}");
@@ -91,15 +87,9 @@ fn navigation_leads_to_every_section() {
 /// An animation is one file, and a picture stands for it where nothing is to move.
 #[test]
 fn animations_are_shown_as_they_are() {
-    let figure = PageFigure {
-        still: Some("still.png".to_owned()),
-        ..PageFigure::new("press.gif", "a press", "A press.")
-    };
-    assert!(
-        figure
-            .html()
-            .contains("prefers-reduced-motion: reduce)\" srcset=\"figures/still.png\"")
-    );
+    let figure =
+        PageFigure { still: Some("still.png".to_owned()), ..PageFigure::new("press.gif", "a press", "A press.") };
+    assert!(figure.html().contains("prefers-reduced-motion: reduce)\" srcset=\"figures/still.png\""));
     assert!(figure.html().contains("src=\"figures/press.gif\" alt=\"a press\""));
     assert!(!figure.html().contains("svg"));
 }
@@ -109,10 +99,7 @@ fn text_cannot_become_markup() {
     let nasty = "\"><script>alert('&')</script>".to_owned();
     let table = PageTable {
         caption: nasty.clone(),
-        table: TextTable {
-            head: vec![nasty.clone()],
-            rows: vec![vec![nasty.clone(), nasty.clone()]],
-        },
+        table: TextTable { head: vec![nasty.clone()], rows: vec![vec![nasty.clone(), nasty.clone()]] },
         files: vec![nasty.clone(), nasty.clone()],
     };
     let section = Section {
@@ -161,9 +148,6 @@ fn long_tables_are_folded() {
     let table = &mut page.sections[0].tables[0].table;
     table.rows.push(table.head.clone());
     let text = markup(&page);
-    assert!(
-        text.contains(&format!("<summary>All {} rows</summary>", MOST_UNFOLDED + 1)),
-        "{text}"
-    );
+    assert!(text.contains(&format!("<summary>All {} rows</summary>", MOST_UNFOLDED + 1)), "{text}");
     check_markup(&text, &VOID).unwrap();
 }

@@ -101,12 +101,7 @@ impl ArmStudy<'_> {
             let of = Banded::of(real[k], &twins, UNLIMITED)?;
             Some(ArmBand { statistic, unit, of })
         });
-        Ok(ArmReport {
-            session,
-            touches,
-            skins: self.skins,
-            statistics: bands.collect(),
-        })
+        Ok(ArmReport { session, touches, skins: self.skins, statistics: bands.collect() })
     }
 }
 
@@ -129,10 +124,7 @@ fn touched(layout: &SkinLayout, seed: u64) -> Result<Recording, Refusal> {
         format!("skin.electrode_m={:?}", layout.electrode_m()),
     ];
     let assignments = assignments.iter().map(|text| text.parse());
-    let request = Request {
-        scene: SCENE.to_owned(),
-        assignments: assignments.collect::<Result<_, _>>()?,
-    };
+    let request = Request { scene: SCENE.to_owned(), assignments: assignments.collect::<Result<_, _>>()? };
     let twin = Twin::new(&request.prepare()?.scene)?;
     let presses = twin.presses(0..TOUCHES, &|| ())?;
     Ok(twin.recorded(&presses, &twin.acquisition(Mode::Compressive))?.recording)

@@ -56,11 +56,7 @@ impl BudgetStudy {
     /// # Errors
     /// [`Refusal`] if an object, a number of measurements or the readout is not valid, or the simulation fails.
     pub fn run(&self, progress: &dyn Progress) -> Result<BudgetReport, Refusal> {
-        let size = if self.quick {
-            BudgetSize::quick()
-        } else {
-            BudgetSize::full()
-        };
+        let size = if self.quick { BudgetSize::quick() } else { BudgetSize::full() };
         let taxels = self.side * self.side;
         let measurements = self.fitting(&size)?;
         let objects = self.objects()?;
@@ -79,20 +75,14 @@ impl BudgetStudy {
         };
         let pressed = [press(columns)?, press(layers)?];
         progress.end();
-        let hashes = pressed[0]
-            .iter()
-            .map(|p| p.scene.hash())
-            .collect::<Result<Vec<_>, _>>()?;
+        let hashes = pressed[0].iter().map(|p| p.scene.hash()).collect::<Result<Vec<_>, _>>()?;
         let whole = pressed[0][0].scene.chain().profile();
         let items = items(whole);
         let comparisons = comparisons(&items);
         let [everything, ideal] = [items, Vec::new()].map(|acts| Variant { layer: false, acts });
         let compared = comparisons.iter().map(|line| &line.variant);
         let variants = unique([&everything, &ideal].into_iter().chain(compared));
-        progress.stage(
-            "recording and scoring",
-            Some(variants.len() * objects.len() * size.sessions),
-        );
+        progress.stage("recording and scoring", Some(variants.len() * objects.len() * size.sessions));
         let mut scores = vec![ScoreTable::new(); variants.len()];
         let mut scan = ScoreTable::new();
         // skin by skin: what a skin has learned is used by all its readouts and then dropped
@@ -101,10 +91,7 @@ impl BudgetStudy {
             if skin == everything.skin() {
                 scan = learned.scan();
             }
-            let of_skin = scores
-                .par_iter_mut()
-                .zip(&variants)
-                .filter(|(_, variant)| variant.skin() == skin);
+            let of_skin = scores.par_iter_mut().zip(&variants).filter(|(_, variant)| variant.skin() == skin);
             of_skin.try_for_each(|(scores, variant)| {
                 *scores = learned.score(&variant.readout(whole), &measurements, progress)?;
                 Ok::<_, Refusal>(())
@@ -140,11 +127,7 @@ impl BudgetStudy {
             }
         }
         ends.extend(end_points(SCAN, (RASTER, taxels), taxels, &scan, 0));
-        Ok(BudgetReport {
-            rows,
-            end_points: ends,
-            provenance: Provenance::new(self.seed, combined_hash(&hashes)),
-        })
+        Ok(BudgetReport { rows, end_points: ends, provenance: Provenance::new(self.seed, combined_hash(&hashes)) })
     }
 
     fn objects(&self) -> Result<Vec<&'static ObjectSpec>, Refusal> {
@@ -152,11 +135,7 @@ impl BudgetStudy {
             return Ok(OBJECTS.iter().collect());
         }
         let default = DEFAULT_OBJECTS.map(str::to_owned);
-        let names: &[String] = if self.objects.is_empty() {
-            &default
-        } else {
-            &self.objects
-        };
+        let names: &[String] = if self.objects.is_empty() { &default } else { &self.objects };
         let mut objects: Vec<&'static ObjectSpec> = Vec::new();
         for name in names {
             let Some(object) = by_name(name) else {
@@ -345,19 +324,12 @@ struct BudgetItem {
 fn items(profile: &Profile) -> Vec<BudgetItem> {
     let item = |stage, name| BudgetItem { stage, name };
     let parts = PARTS.iter().map(|(name, _)| item(TRANSDUCER, name));
-    let present = FAULTS
-        .iter()
-        .filter(|(name, _)| profile.faults.iter().any(|f| f.name == *name));
-    let listed = EFFECTS
-        .iter()
-        .filter(|(name, _)| profile.compressive.contains_key(*name));
+    let present = FAULTS.iter().filter(|(name, _)| profile.faults.iter().any(|f| f.name == *name));
+    let listed = EFFECTS.iter().filter(|(name, _)| profile.compressive.contains_key(*name));
     let mut effects: Vec<BudgetItem> = listed.map(|(name, _)| item(stage_of(name), name)).collect();
     // stable: signal order within a stage
     effects.sort_by_key(|item| READOUT_STAGES.iter().position(|(stage, _)| *stage == item.stage));
-    parts
-        .chain(present.map(|(name, _)| item(CELLS, name)))
-        .chain(effects)
-        .collect()
+    parts.chain(present.map(|(name, _)| item(CELLS, name))).chain(effects).collect()
 }
 
 fn stage_of(effect: &str) -> &'static str {
@@ -440,19 +412,12 @@ fn comparisons(items: &[BudgetItem]) -> Vec<ChainComparison> {
     let mut all = Vec::new();
     let mut compare = |stage, effect, mode, layer, acts: &dyn Fn(&BudgetItem) -> bool| {
         let acts = items.iter().copied().filter(acts).collect();
-        all.push(ChainComparison {
-            stage,
-            effect,
-            mode,
-            variant: Variant { layer, acts },
-        });
+        all.push(ChainComparison { stage, effect, mode, variant: Variant { layer, acts } });
     };
     compare(CONTACT, LAYER, Direction::Ablation, true, &|_| true);
     for stage in unique(items.iter().map(|item| item.stage)) {
         let of_stage = items.iter().map(|item| (item.stage, item.name));
-        let effects = [(stage, WHOLE_STAGE)]
-            .into_iter()
-            .chain(of_stage.filter(|of| of.0 == stage));
+        let effects = [(stage, WHOLE_STAGE)].into_iter().chain(of_stage.filter(|of| of.0 == stage));
         for (_, effect) in effects {
             let own = |item: &BudgetItem| item.stage == stage && (effect == WHOLE_STAGE || item.name == effect);
             compare(stage, effect, Direction::Ablation, false, &|item| !own(item));
@@ -480,11 +445,7 @@ impl BudgetSize {
     fn full() -> Self {
         Self {
             raster_presses: 5,
-            learning: Learning {
-                presses: 0..4,
-                training_images: 1500,
-                sweeps: 15,
-            },
+            learning: Learning { presses: 0..4, training_images: 1500, sweeps: 15 },
             sessions: 10,
             votes: 6,
         }
@@ -494,11 +455,7 @@ impl BudgetSize {
     fn quick() -> Self {
         Self {
             raster_presses: 3,
-            learning: Learning {
-                presses: 0..2,
-                training_images: 300,
-                sweeps: 4,
-            },
+            learning: Learning { presses: 0..2, training_images: 300, sweeps: 4 },
             sessions: 3,
             votes: 3,
         }
@@ -544,10 +501,7 @@ fn raster_acquisition(label: usize) -> Acquisition {
 /// taxels.
 fn compressive_acquisition(label: usize, session: usize) -> Acquisition {
     let base = Acquisition::presses(Mode::Compressive, 2 * (label as u64 * SESSIONS + session as u64) + 1);
-    Acquisition {
-        lead_frames: base.lead_frames + 1000 * session as u64,
-        ..base
-    }
+    Acquisition { lead_frames: base.lead_frames + 1000 * session as u64, ..base }
 }
 
 /// An object and all its presses.
@@ -624,13 +578,7 @@ impl<'a> LearnedSkin<'a> {
             Ok((decoders.collect::<Result<Vec<_>, _>>()?, learned))
         });
         let learned = learned.map(|found| found.map(|(decoders, learned)| (learned, decoders)));
-        Ok(Self {
-            size,
-            learned: learned.collect::<Result<_, Refusal>>()?,
-            chain,
-            objects,
-            protocol,
-        })
+        Ok(Self { size, learned: learned.collect::<Result<_, Refusal>>()?, chain, objects, protocol })
     }
 
     /// Scores of the scan that the truth is taken from: its frames are windows of a session of their own. The library
@@ -643,10 +591,7 @@ impl<'a> LearnedSkin<'a> {
             for frame in self.protocol.first_frame..last {
                 let image = object.raster.volts(self.protocol.truth.0, frame);
                 object.tally(&mut tallies, image);
-                let decision = self
-                    .learned
-                    .first()
-                    .map(|(l, _)| l.classifier.classify(image, &mut work));
+                let decision = self.learned.first().map(|(l, _)| l.classifier.classify(image, &mut work));
                 decisions.push(decision.and_then(Result::unwrap_or_default));
             }
             tallies[0].decisions(&decisions, object.label, self.protocol.vote);
@@ -678,12 +623,7 @@ impl<'a> LearnedSkin<'a> {
         session: usize,
         measurements: &[usize],
     ) -> Result<Vec<PressScores>, Refusal> {
-        let Protocol {
-            first_frame,
-            frames,
-            vote,
-            ..
-        } = self.protocol;
+        let Protocol { first_frame, frames, vote, .. } = self.protocol;
         let mut source = [object.sources[session].clone()];
         let duration_s = ((first_frame + frames) * object.raster.taxels()) as f64 / chain.sample_rate_hz();
         let acquisition = compressive_acquisition(object.label, session);
@@ -702,9 +642,7 @@ impl<'a> LearnedSkin<'a> {
                     let press = Press::within(&recording, 0, start..start + vote * m, idle_v);
                     let windows: Vec<Window<'_>> = press.windows(0..press.len(), m, m).map(|(_, w)| w).collect();
                     let answers = scorer.answers(&windows)?;
-                    answers
-                        .iter()
-                        .for_each(|answer| object.tally(&mut tallies, &answer.image));
+                    answers.iter().for_each(|answer| object.tally(&mut tallies, &answer.image));
                     let decisions: Vec<Option<usize>> = answers.iter().map(|a| scorer.class(a)).collect();
                     tallies[0].decisions(&decisions, object.label, vote);
                 }
@@ -723,10 +661,7 @@ fn starts(most: usize, len: usize, vote_len: usize) -> impl Iterator<Item = usiz
 
 /// Chain of `scene` with the transducer's parts `acting` alone.
 fn chain(scene: &Scene, acting: &[&str]) -> Result<Chain, Refusal> {
-    let config = ChainConfig {
-        transducer_parameters: with_parts(acting)?,
-        ..scene.config().chain()
-    };
+    let config = ChainConfig { transducer_parameters: with_parts(acting)?, ..scene.config().chain() };
     Chain::new(&config, scene.skin(), scene.seed(), Path::new(""))
 }
 
@@ -747,10 +682,8 @@ impl LearnedObject {
         let time_s = raster.time_s(protocol.truth.1.min(raster.frames() - 1));
         let sources = read.par_iter().enumerate().map(|(session, &press)| {
             // every session has gains of its own, on a sheet that was pressed as often as the scanned one
-            let sums = Acquisition {
-                conditioning_presses: size.raster_presses,
-                ..compressive_acquisition(label, session)
-            };
+            let sums =
+                Acquisition { conditioning_presses: size.raster_presses, ..compressive_acquisition(label, session) };
             chain.conductance(&[press], &sums)
         });
         Ok(Self {
@@ -777,9 +710,7 @@ impl LearnedObject {
 fn touched(chain: &Chain, presses: &[&[Frame]], session: u64, time_s: f64) -> Vec<bool> {
     let mut mask = Vec::new();
     let maps = chain.conductance_maps(presses, session).pop().unwrap_or_default();
-    let after = presses
-        .last()
-        .map_or(0, |frames| frames.partition_point(|f| f.time_s < time_s));
+    let after = presses.last().map_or(0, |frames| frames.partition_point(|f| f.time_s < time_s));
     if let (Some(idle), Some(map)) = (maps.first(), maps.get(after).or(maps.last())) {
         let pairs = map.values().iter().zip(idle.values());
         let image: Vec<f64> = pairs.map(|(g, g0)| g - g0).collect();
@@ -804,16 +735,7 @@ type ScoreTable = Vec<Vec<Vec<PressScores>>>;
 /// counted.
 fn press_scores(tallies: &[Tally; 3]) -> PressScores {
     let [a, b, c] = tallies.each_ref().map(Tally::scores);
-    let scores = [
-        a.support,
-        b.support,
-        c.support,
-        a.iou,
-        b.iou,
-        c.iou,
-        a.class_single,
-        a.class_vote20,
-    ];
+    let scores = [a.support, b.support, c.support, a.iou, b.iou, c.iou, a.class_single, a.class_vote20];
     scores.map(|score| score.unwrap_or(0.0))
 }
 
@@ -852,11 +774,7 @@ fn mean_score(scores: &ScoreTable, reference: Option<&ScoreTable>, key: usize, s
         mean(objects.map(|(object, sessions)| sessions[session][key][score] - before(object))).unwrap_or_default()
     };
     let means: Vec<f64> = (0..sessions).map(of_session).collect();
-    let none = Sample {
-        count: 0,
-        mean: 0.0,
-        variance: 0.0,
-    };
+    let none = Sample { count: 0, mean: 0.0, variance: 0.0 };
     Sample::of(&means).unwrap_or(none)
 }
 
@@ -877,11 +795,7 @@ mod tests {
     #[test]
     fn the_transducer_knows_every_part() {
         for (name, _) in PARTS {
-            let others: Vec<&str> = PARTS
-                .iter()
-                .map(|(other, _)| *other)
-                .filter(|other| other != name)
-                .collect();
+            let others: Vec<&str> = PARTS.iter().map(|(other, _)| *other).filter(|other| other != name).collect();
             let parameters = with_parts(&others).unwrap();
             build_transducer("velostat", parameters, &SkinLayout::default(), Streams::new(0)).unwrap();
         }
@@ -918,10 +832,7 @@ mod tests {
             let line = lines.iter().find(|c| c.effect == effect && c.mode == mode).unwrap();
             line.variant.acts.iter().map(|item| item.name).collect::<String>()
         };
-        assert_eq!(
-            (acts("y", Direction::Ablation), acts("y", Direction::Addition)),
-            ("xz".to_owned(), "y".to_owned())
-        );
+        assert_eq!((acts("y", Direction::Ablation), acts("y", Direction::Addition)), ("xz".to_owned(), "y".to_owned()));
     }
 
     /// Sessions of the scan and of all compressive recordings are numbered apart, so that each has noise and gains of

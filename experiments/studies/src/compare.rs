@@ -121,14 +121,7 @@ fn twin_of(
         Images::Simulated { gains } => {
             let seed = streams.rng("compare/skin", draw).random::<u64>() >> 1;
             let presses = simulated_presses(pair, seed, gains.as_ref())?;
-            replay(
-                real,
-                &blocks,
-                &|block| Ok(presses[block].clone()),
-                profile,
-                readout,
-                draw,
-            )
+            replay(real, &blocks, &|block| Ok(presses[block].clone()), profile, readout, draw)
         }
     }
 }
@@ -217,10 +210,7 @@ impl CompareStudy<'_> {
             progress.stage("predicting sessions", Some(self.pairs.len() * draws));
             let predicted = predicted_statistics(self.pairs, prediction, &self.images, streams, &done)?;
             progress.end();
-            return Ok(CompareReport {
-                predicted,
-                ..CompareReport::default()
-            });
+            return Ok(CompareReport { predicted, ..CompareReport::default() });
         }
         progress.stage("replaying sessions", Some(self.pairs.len()));
         let compared = self.pairs.par_iter().map(|pair| {
@@ -357,11 +347,7 @@ impl ComparedSession {
             Some(self.statistic(name, numbers, words, Some(ok)))
         });
         let mut rows: Vec<Statistic> = compared.collect();
-        let exact = |value| Estimated {
-            value,
-            standard_error: None,
-            n: 1,
-        };
+        let exact = |value| Estimated { value, standard_error: None, n: 1 };
         let (real, twin) = (&self.real, &self.twin);
         let [real_v, twin_v] = [real, twin].map(|s| s.steps.map_or(f64::NAN, |s| s.step_v));
         let same = (real_v - twin_v).abs() <= STEP_ROUNDING * real_v.abs();
@@ -392,11 +378,8 @@ pub const MEASUREMENTS: [usize; 11] = [7, 10, 13, 15, 20, 25, 30, 40, 50, 75, 10
 type Metric = (&'static str, f64, fn(&ScoreRow) -> f64);
 
 /// Scores that are compared.
-const METRICS: [Metric; 3] = [
-    ("support", 0.02, |r| r.support),
-    ("iou", 0.06, |r| r.iou),
-    ("class_vote20", 0.05, |r| r.class_vote20),
-];
+const METRICS: [Metric; 3] =
+    [("support", 0.02, |r| r.support), ("iou", 0.06, |r| r.iou), ("class_vote20", 0.05, |r| r.class_vote20)];
 
 /// How far the twin's curve of a score over M is from the real skin's.
 #[derive(Debug, Clone, PartialEq)]
@@ -436,11 +419,7 @@ fn compared_only(recording: &Recording, protocol: &Protocol) -> Option<(Recordin
         .filter(|block| scored.contains(block))
         .map(|block| recording.blocks()[block].clone())
         .collect();
-    let protocol = Protocol {
-        first_press: 0,
-        presses: blocks.len(),
-        ..*protocol
-    };
+    let protocol = Protocol { first_press: 0, presses: blocks.len(), ..*protocol };
     Some((recording.with_blocks(blocks).ok()?, protocol))
 }
 
@@ -453,11 +432,7 @@ fn scored_sessions(compared: &[ComparedSession], real: &PublishedSkin) -> [Vec<S
             let own = session.compressive.as_ref();
             let recording = if is_twin { Some(&c.recording) } else { own };
             let (compressive, protocol) = compared_only(recording?, &session.protocol)?;
-            Some(ScoredSession {
-                compressive: Some(compressive),
-                protocol,
-                ..session.clone()
-            })
+            Some(ScoredSession { compressive: Some(compressive), protocol, ..session.clone() })
         });
         scored.collect()
     })
@@ -477,11 +452,7 @@ fn curves(
         Ok::<_, Refusal>(mean_rows(&rows))
     });
     let (real, twin) = (skin?, twin?);
-    Ok(ScoreCurves {
-        distances: curve_distances(&real, &twin),
-        real,
-        twin,
-    })
+    Ok(ScoreCurves { distances: curve_distances(&real, &twin), real, twin })
 }
 
 fn curve_distances(real: &[ScoreRow], twin: &[ScoreRow]) -> Vec<CurveDistance> {
@@ -590,9 +561,7 @@ pub(crate) fn replay(
     streams: Streams,
     session: u64,
 ) -> Result<Recording, Refusal> {
-    let profile = profile
-        .on(real.layout())
-        .and_then(|profile| profile.with_weights(real.weights()));
+    let profile = profile.on(real.layout()).and_then(|profile| profile.with_weights(real.weights()));
     let profile = profile.map_err(readout_refused)?;
     let again = |&block: &usize| {
         let mut press = source(block)?;
@@ -698,10 +667,7 @@ mod tests {
     fn tolerances_mean_what_they_say() {
         assert!(Allowed::Share(0.15).holds(0.2, 0.229) && !Allowed::Share(0.15).holds(0.2, 0.231));
         assert!(Allowed::Factor(1.5).holds(0.01, 0.0149) && !Allowed::Factor(1.5).holds(0.01, 0.0066));
-        assert!(
-            !Allowed::Factor(2.0).holds(0.0, 0.0),
-            "nothing is not a factor of nothing"
-        );
+        assert!(!Allowed::Factor(2.0).holds(0.0, 0.0), "nothing is not a factor of nothing");
         assert!(Allowed::Difference(0.01).holds(-0.02, -0.012) && !Allowed::Difference(0.01).holds(0.0, f64::NAN));
         // quantiles 1 V apart at most, over a range of 10 V
         assert!((quantile_gap(&[-5.0, 0.0, 5.0], &[-4.0, 0.5, 5.0]) - 0.1).abs() < 1e-15);

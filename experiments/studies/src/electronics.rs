@@ -8,9 +8,8 @@ use spts_circuit::{Adc, Profile};
 use spts_input::Refusal;
 
 /// Sizes of a report.
-const SWEEP_TAXELS: [u32; 13] = [
-    100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000,
-];
+const SWEEP_TAXELS: [u32; 13] =
+    [100, 200, 500, 1000, 2000, 5000, 10_000, 20_000, 50_000, 100_000, 200_000, 500_000, 1_000_000];
 
 /// Largest capacitance of a bus, F, as [`Network`] says.
 const LARGEST_BUS_F: f64 = 1.0;
@@ -96,11 +95,7 @@ impl ElectronicsStudy {
 
     /// How a skin is pressed and sampled.
     fn setting(&self) -> Result<Setting, Refusal> {
-        Ok(Setting {
-            skin: self.skin,
-            adc: self.adc,
-            available_s: self.available_s()?,
-        })
+        Ok(Setting { skin: self.skin, adc: self.adc, available_s: self.available_s()? })
     }
 
     /// Capacitance of a bus with `taxels` taxels, F.
@@ -110,10 +105,7 @@ impl ElectronicsStudy {
 
     /// Amplifier of a bus with `taxels` taxels.
     fn amplifier(&self, taxels: u32) -> Result<Amplifier, Refusal> {
-        let network = Network {
-            bus_f: self.bus_f(taxels),
-            ..self.network
-        };
+        let network = Network { bus_f: self.bus_f(taxels), ..self.network };
         Amplifier::new(self.op_amp, network)
     }
 
@@ -180,10 +172,7 @@ impl ElectronicsStudy {
                 ..Network::default()
             },
             taxel_f: 0.0,
-            skin: Skin {
-                drive_v: profile.drive_v,
-                ..Skin::default()
-            },
+            skin: Skin { drive_v: profile.drive_v, ..Skin::default() },
             rate_hz: profile.sample_rate_hz,
             busy_s: parts.update_s + 1.0 / profile.sample_rate_hz - parts.sample_s,
             sub_array: SUB_ARRAY,
@@ -249,12 +238,8 @@ impl ElectronicsStudy {
             None => "with no number of taxels".to_owned(),
         };
         let short = |number: f64| (number * 1e4).round() / 1e4;
-        let [pressed, pressed_us, idle_us] = [
-            100.0 * self.skin.pressed_share,
-            self.skin.pressed_s * 1e6,
-            self.skin.idle_s * 1e6,
-        ]
-        .map(short);
+        let [pressed, pressed_us, idle_us] =
+            [100.0 * self.skin.pressed_share, self.skin.pressed_s * 1e6, self.skin.idle_s * 1e6].map(short);
         format!("one wire works {works}, {pressed} % of them pressed to {pressed_us} µS, the others at {idle_us} µS")
     }
 }
@@ -269,19 +254,12 @@ mod tests {
     fn no_smaller_number_of_wires_works() {
         let profile = Profile::named("as_designed").unwrap();
         let adc: Adc = profile.compressive["adc"].clone().try_into().unwrap();
-        for (taxel_pf, bus_nf, taxels) in [
-            (0.0, 0.0, 3000_u32),
-            (20.0, 0.0, 3000),
-            (20.0, 2.0, 1000),
-            (1000.0, 0.0, 500),
-            (3.0, 20.0, 400),
-        ] {
+        for (taxel_pf, bus_nf, taxels) in
+            [(0.0, 0.0, 3000_u32), (20.0, 0.0, 3000), (20.0, 2.0, 1000), (1000.0, 0.0, 500), (3.0, 20.0, 400)]
+        {
             let study = ElectronicsStudy {
                 op_amp: OpAmp::default(),
-                network: Network {
-                    bus_f: bus_nf * 1e-9,
-                    ..Network::default()
-                },
+                network: Network { bus_f: bus_nf * 1e-9, ..Network::default() },
                 taxel_f: taxel_pf * 1e-12,
                 skin: Skin::default(),
                 rate_hz: 67e3,
@@ -289,11 +267,7 @@ mod tests {
                 sub_array: 100,
                 adc,
             };
-            let setting = Setting {
-                skin: study.skin,
-                adc: study.adc,
-                available_s: study.available_s().unwrap(),
-            };
+            let setting = Setting { skin: study.skin, adc: study.adc, available_s: study.available_s().unwrap() };
             let fits = |on_bus: u32| {
                 let amplifier = study.amplifier(on_bus).unwrap();
                 Budget::new(&amplifier, f64::from(on_bus), &setting).limit.is_none()
@@ -324,10 +298,7 @@ mod tests {
     #[test]
     fn there_may_be_none() {
         let study = ElectronicsStudy {
-            skin: Skin {
-                pressed_s: 1e-9,
-                ..Skin::default()
-            },
+            skin: Skin { pressed_s: 1e-9, ..Skin::default() },
             ..ElectronicsStudy::as_designed().unwrap()
         };
         // a taxel is far below a step of the converter, whatever the size

@@ -80,12 +80,7 @@ impl FidelityStudy {
                 let run = |index, runs| run_contact(&at_reference, index, runs);
                 let (learned, scored) = (run(0, ONCE), run(1, TIMED));
                 progress.step();
-                Ok(Reference {
-                    learned: learned?,
-                    scored: scored?,
-                    at_reference,
-                    scene,
-                })
+                Ok(Reference { learned: learned?, scored: scored?, at_reference, scene })
             })
             .collect::<Result<Vec<_>, Refusal>>()?;
         let others = others(&references, self.seed, meshes)?.into_par_iter();
@@ -114,10 +109,7 @@ impl FidelityStudy {
         measured.extend(references.iter().enumerate().map(|(i, reference)| {
             let setting = self.grid.reference(reference.scene.is_drop());
             let scored = &reference.scored;
-            (
-                i,
-                row(reference, scored, setting, taxel_error(scored, scored), [0.0; 3]),
-            )
+            (i, row(reference, scored, setting, taxel_error(scored, scored), [0.0; 3]))
         }));
         // scene by scene, levels from cheap to dear, then resolution and step
         measured.sort_by_key(|(i, (row, _))| {
@@ -128,12 +120,7 @@ impl FidelityStudy {
         // what every other setting follows from
         let hashes = references.iter().map(|r| r.at_reference.hash());
         let hash = combined_hash(&hashes.collect::<Result<Vec<_>, Refusal>>()?);
-        Ok(FidelityReport {
-            rows,
-            refusals,
-            fine,
-            provenance: Provenance::new(self.seed, hash),
-        })
+        Ok(FidelityReport { rows, refusals, fine, provenance: Provenance::new(self.seed, hash) })
     }
 }
 
@@ -245,12 +232,7 @@ impl SettingGrid {
 
     /// Settings that take less than a minute.
     pub fn quick() -> Self {
-        Self {
-            cells_per_taxel: vec![2, 6],
-            press_steps_s: vec![5e-4],
-            drop_steps_s: vec![1e-4],
-            reference_cells: 6,
-        }
+        Self { cells_per_taxel: vec![2, 6], press_steps_s: vec![5e-4], drop_steps_s: vec![1e-4], reference_cells: 6 }
     }
 
     fn steps_s(&self, drop: bool) -> &[f64] {
@@ -351,24 +333,16 @@ fn others(references: &[Reference], seed: u64, folder: &Path) -> Result<Vec<Scen
             first.scene.name, other.scene.name
         )));
     }
-    let left = SCENES
-        .iter()
-        .filter(|name| references.iter().all(|r| r.scene.name != **name));
+    let left = SCENES.iter().filter(|name| references.iter().all(|r| r.scene.name != **name));
     let scenes = left.map(|name| {
-        let config = SceneConfig {
-            skin,
-            ..built_in(name, seed, folder)?.config
-        };
+        let config = SceneConfig { skin, ..built_in(name, seed, folder)?.config };
         Ok(Scene::new(config, folder).ok())
     });
     scenes.filter_map(Result::transpose).collect()
 }
 
 fn built_in(name: &str, seed: u64, folder: &Path) -> Result<FidelityScene, Refusal> {
-    let mut press = PressConfig {
-        presses: REPEATS,
-        ..PressConfig::default()
-    };
+    let mut press = PressConfig { presses: REPEATS, ..PressConfig::default() };
     let mut ball = None;
     match name {
         "T" | "tape" | "comb" => press.object = Some(name.to_owned()),
@@ -396,12 +370,7 @@ fn built_in(name: &str, seed: u64, folder: &Path) -> Result<FidelityScene, Refus
     }
     Ok(FidelityScene {
         name: name.to_owned(),
-        config: SceneConfig {
-            seed,
-            press: ball.is_none().then_some(press),
-            drop: ball,
-            ..SceneConfig::default()
-        },
+        config: SceneConfig { seed, press: ball.is_none().then_some(press), drop: ball, ..SceneConfig::default() },
         folder: folder.to_owned(),
     })
 }
@@ -432,16 +401,10 @@ fn from_file(path: &Path) -> Result<FidelityScene, Refusal> {
     let mut config = scene.config().clone();
     match scene.task() {
         Task::Press(press) => {
-            config.press = Some(PressConfig {
-                presses: REPEATS,
-                ..press.clone()
-            });
+            config.press = Some(PressConfig { presses: REPEATS, ..press.clone() });
         }
         Task::Drop(ball) => {
-            config.drop = Some(DropConfig {
-                drops: REPEATS,
-                ..ball.clone()
-            });
+            config.drop = Some(DropConfig { drops: REPEATS, ..ball.clone() });
         }
     }
     // the levels bring their own
@@ -524,11 +487,7 @@ fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<F
     let (rows, cols) = (scene.skin().rows() * cells, scene.skin().cols() * cells);
     let middle_s = 0.5 * (start_s + end_s);
     let Some(frame) = nearest(frames, middle_s).map(|i| &frames[i]) else {
-        return Ok(FinePressure {
-            rows,
-            cols,
-            pressure_pa: vec![0.0; rows * cols],
-        });
+        return Ok(FinePressure { rows, cols, pressure_pa: vec![0.0; rows * cols] });
     };
     let body = scene.mechanics().posed(&frame.pose);
     let mut pressure_pa = field.respond(&body).pressure_pa.to_vec();
@@ -538,11 +497,7 @@ fn fine(scene: &Scene, frames: &[Frame], [start_s, end_s]: [f64; 2]) -> Result<F
     } else if let Some(reason) = field.failure() {
         return Err(no_pressure(force_n, frame.time_s, &reason));
     }
-    Ok(FinePressure {
-        rows,
-        cols,
-        pressure_pa,
-    })
+    Ok(FinePressure { rows, cols, pressure_pa })
 }
 
 /// Index of the frame nearest to `time_s`; `None` without a frame.
@@ -566,11 +521,7 @@ fn relative_rms(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
         error += (value - expected).powi(2);
         reference += expected * expected;
     }
-    if error > 0.0 || error.is_nan() {
-        (error / reference).sqrt()
-    } else {
-        0.0
-    }
+    if error > 0.0 || error.is_nan() { (error / reference).sqrt() } else { 0.0 }
 }
 
 /// Error of a fine field on the grid of the reference: every cell of it takes the value of the cell its centre falls
@@ -592,11 +543,7 @@ const DROP_SAMPLE_S: f64 = 5e-5;
 fn taxel_error(found: &ContactRun, reference: &ContactRun) -> f64 {
     // times in the reference and in the run
     let times_s: Vec<(f64, f64)> = match reference.bounces.first() {
-        None => reference
-            .frames
-            .iter()
-            .map(|frame| (frame.time_s, frame.time_s))
-            .collect(),
+        None => reference.frames.iter().map(|frame| (frame.time_s, frame.time_s)).collect(),
         Some(contact) => {
             let (Some(middle_s), Some(found_s)) = (half_rise_s(reference), half_rise_s(found)) else {
                 return f64::INFINITY;
@@ -691,34 +638,18 @@ impl ReferenceScores {
         }
         let streams = Streams::new(seed);
         // relative to the peak, published thresholds of 0.25 V on images of a few volts become a tenth
-        let selection = Selection {
-            min_peak: 0.1,
-            ..Selection::default()
-        };
-        let chosen: Images = select(&training, &selection)
-            .into_iter()
-            .map(|i| training[i].clone())
-            .collect();
-        let ksvd = Ksvd {
-            n_iter: SWEEPS,
-            ..Ksvd::default()
-        };
+        let selection = Selection { min_peak: 0.1, ..Selection::default() };
+        let chosen: Images = select(&training, &selection).into_iter().map(|i| training[i].clone()).collect();
+        let ksvd = Ksvd { n_iter: SWEEPS, ..Ksvd::default() };
         let nothing = |of: &'static str| move |e: Refusal| Refusal::new(format!("no training data for the {of}: {e}"));
-        let dictionary = ksvd
-            .learn(&chosen, &mut streams.rng("ksvd", 0))
-            .map_err(nothing("dictionary"))?;
+        let dictionary = ksvd.learn(&chosen, &mut streams.rng("ksvd", 0)).map_err(nothing("dictionary"))?;
         let library = Library::new(&Matrix::from_column_slices(dictionary.nrows(), &library), &labels)
             .map_err(nothing("library"))?;
         let cols = references.first().map_or(1, |r| r.at_reference.skin().cols());
         let learned = Learned::new(dictionary, None, library, cols);
-        let truths = references
-            .iter()
-            .map(|reference| Truth::new(&reference.at_reference, &reference.scored));
-        let mut learned = Self {
-            decoder: published("matched", &learned)?,
-            truths: truths.collect(),
-            references: Vec::new(),
-        };
+        let truths = references.iter().map(|reference| Truth::new(&reference.at_reference, &reference.scored));
+        let mut learned =
+            Self { decoder: published("matched", &learned)?, truths: truths.collect(), references: Vec::new() };
         let scores = references.iter().enumerate();
         let scores = scores.map(|(label, r)| learned.score(&r.at_reference, &r.scored, label));
         learned.references = scores.collect::<Result<_, Refusal>>()?;
@@ -732,10 +663,8 @@ impl ReferenceScores {
             Task::Press(_) => Acquisition::presses,
             Task::Drop(_) => Acquisition::drops,
         };
-        let acquisition = Acquisition {
-            conditioning_presses: PRESSES_BEFORE,
-            ..of_task(Mode::Compressive, label as u64)
-        };
+        let acquisition =
+            Acquisition { conditioning_presses: PRESSES_BEFORE, ..of_task(Mode::Compressive, label as u64) };
         let recording = scene.chain().record(&[&run.frames], scene.duration_s(), &acquisition)?;
         let volts = &recording.blocks()[0].volts;
         let rate_hz = recording.sample_rate_hz();
@@ -771,10 +700,7 @@ impl Truth {
             support(&image, SUPPORT_THRESHOLD, &mut mask);
             mask
         });
-        Self {
-            masks: masks.collect(),
-            run: run.clone(),
-        }
+        Self { masks: masks.collect(), run: run.clone() }
     }
 
     fn mask(&self, time_s: f64) -> Option<&[bool]> {
@@ -836,21 +762,9 @@ mod tests {
     /// Two cells against four of half the size: the values 1 and 3 against 1, 2, 3, 4 leave errors 0, −1, 0, −1.
     #[test]
     fn coarse_fields_are_compared_on_the_fine_grid() {
-        let coarse = FinePressure {
-            rows: 1,
-            cols: 2,
-            pressure_pa: vec![1.0, 3.0],
-        };
-        let fine = FinePressure {
-            rows: 1,
-            cols: 4,
-            pressure_pa: vec![1.0, 2.0, 3.0, 4.0],
-        };
-        assert_relative_eq!(
-            fine_error(&coarse, &fine),
-            (2.0_f64 / 30.0).sqrt(),
-            max_relative = 1e-15
-        );
+        let coarse = FinePressure { rows: 1, cols: 2, pressure_pa: vec![1.0, 3.0] };
+        let fine = FinePressure { rows: 1, cols: 4, pressure_pa: vec![1.0, 2.0, 3.0, 4.0] };
+        assert_relative_eq!(fine_error(&coarse, &fine), (2.0_f64 / 30.0).sqrt(), max_relative = 1e-15);
         assert!(fine_error(&fine, &fine) <= 0.0);
     }
 
@@ -881,10 +795,7 @@ mod tests {
         };
         for scene in ["T", "drop"] {
             let reference = row(scene, "layer", 4);
-            assert!(
-                reference.taxel_rms_rel <= 0.0 && reference.pressure_rms_rel <= 0.0,
-                "{reference:?}"
-            );
+            assert!(reference.taxel_rms_rel <= 0.0 && reference.pressure_rms_rel <= 0.0, "{reference:?}");
             let (layer, half_space) = (row(scene, "layer", 2), row(scene, "half_space", 2));
             assert!(
                 layer.taxel_rms_rel > 0.0 && layer.taxel_rms_rel < half_space.taxel_rms_rel,

@@ -45,8 +45,7 @@ impl CellTask {
 
     /// Name of the mode, with the number of bits for a pattern.
     pub fn name(self) -> String {
-        self.period
-            .map_or_else(|| self.mode().to_owned(), |period| format!("pattern {period}"))
+        self.period.map_or_else(|| self.mode().to_owned(), |period| format!("pattern {period}"))
     }
 
     /// The twin's weights of `cells` cells that are started with this.
@@ -69,11 +68,7 @@ impl Serialize for CellTask {
             #[serde(skip_serializing_if = "Option::is_none")]
             period: Option<usize>,
         }
-        Text {
-            mode: self.mode(),
-            period: self.period,
-        }
-        .serialize(serializer)
+        Text { mode: self.mode(), period: self.period }.serialize(serializer)
     }
 }
 
@@ -167,11 +162,7 @@ pub struct Verification {
 impl EmulatedCells {
     /// The twin's weights of these cells. The firmware's raster counts to a hundred, however many cells there are.
     fn expected_weights(&self, task: CellTask) -> Result<Weights, Refusal> {
-        let taxels = if task.mode == WeightMode::Raster {
-            RASTER_PERIOD
-        } else {
-            self.cells
-        };
+        let taxels = if task.mode == WeightMode::Raster { RASTER_PERIOD } else { self.cells };
         task.weights(self.seeding, taxels).map_err(|e| self.unusable(e))
     }
 
@@ -190,10 +181,7 @@ impl EmulatedCells {
 
     /// A taxel that these cells do not have, as an error.
     fn no_such(&self, taxel: usize) -> Refusal {
-        Refusal::new(format!(
-            "taxel {taxel} is outside [0, {}]",
-            self.cells.saturating_sub(1)
-        ))
+        Refusal::new(format!("taxel {taxel} is outside [0, {}]", self.cells.saturating_sub(1)))
     }
 
     /// Runs the cells in every mode and compares.
@@ -201,10 +189,7 @@ impl EmulatedCells {
     /// # Errors
     /// [`Refusal`] if the array cannot be built, or a cell does not answer.
     pub fn verify(&self, progress: &dyn Progress) -> Result<Verification, Refusal> {
-        progress.stage(
-            "clocking the cells",
-            Some(self.blocks().saturating_mul(self.tasks.len())),
-        );
+        progress.stage("clocking the cells", Some(self.blocks().saturating_mul(self.tasks.len())));
         let started = Instant::now();
         let (mut modes, mut first_mismatch, mut instructions) = (Vec::new(), None, 0);
         for &task in &self.tasks {
@@ -212,11 +197,7 @@ impl EmulatedCells {
             let mismatches = self.compare(task, &mut array, &mut first_mismatch, progress)?;
             let read_back_mismatches = self.read_back(task, &mut array)?;
             instructions += array.instructions();
-            modes.push(ModeVerification {
-                task,
-                mismatches,
-                read_back_mismatches,
-            });
+            modes.push(ModeVerification { task, mismatches, read_back_mismatches });
         }
         progress.end();
         let seconds = started.elapsed().as_secs_f64();
@@ -257,14 +238,7 @@ impl EmulatedCells {
                     let level = mode.code_level(code);
                     if level.to_bits() != expected.to_bits() {
                         mismatches += 1;
-                        first.get_or_insert(Mismatch {
-                            task,
-                            edge,
-                            taxel,
-                            code,
-                            level,
-                            expected_level: expected,
-                        });
+                        first.get_or_insert(Mismatch { task, edge, taxel, code, level, expected_level: expected });
                     }
                 }
             }
@@ -302,10 +276,7 @@ impl EmulatedCells {
     /// and code.
     fn read_back(&self, task: CellTask, array: &mut Array) -> Result<usize, Refusal> {
         let weights = self.expected_weights(task)?;
-        let expected: Vec<_> = (0..self.cells)
-            .into_par_iter()
-            .map(|taxel| self.reply(&weights, taxel))
-            .collect();
+        let expected: Vec<_> = (0..self.cells).into_par_iter().map(|taxel| self.reply(&weights, taxel)).collect();
         let mut wrong = 0;
         for (address, expected) in (FIRST_ADDRESS..).zip(expected) {
             let mut reply = [0; REPLY_BYTES];
@@ -374,12 +345,8 @@ impl EmulatedCells {
         ticks: u64,
         line: &mut dyn FnMut(&TraceRecord),
     ) -> Result<(), Refusal> {
-        let address = u8::try_from(taxel)
-            .ok()
-            .and_then(|taxel| FIRST_ADDRESS.checked_add(taxel));
-        let address = address
-            .filter(|_| taxel < self.cells)
-            .ok_or_else(|| self.no_such(taxel))?;
+        let address = u8::try_from(taxel).ok().and_then(|taxel| FIRST_ADDRESS.checked_add(taxel));
+        let address = address.filter(|_| taxel < self.cells).ok_or_else(|| self.no_such(taxel))?;
         let program = Device::program(self.image.flash()).map_err(|e| self.unusable(e))?;
         Device::new(program, &[address]).trace_until(ticks, line);
         Ok(())
@@ -388,13 +355,8 @@ impl EmulatedCells {
 
 /// What `spts firmware verify` prints: codes that differ, one line for each mode.
 pub fn verification_text(v: &Verification) -> String {
-    let mut out = format!(
-        "image {}: {} cells, {} edges a mode at {:.1} kHz\n",
-        v.image,
-        v.cells,
-        v.edges,
-        v.edge_hz / 1e3
-    );
+    let mut out =
+        format!("image {}: {} cells, {} edges a mode at {:.1} kHz\n", v.image, v.cells, v.edges, v.edge_hz / 1e3);
     for m in &v.modes {
         out.push_str(&format!(
             "{:<10} {} mismatches, {} of {} cells read back wrong\n",
@@ -420,9 +382,6 @@ pub fn verification_text(v: &Verification) -> String {
         }
     }
     let millions = v.instructions as f64 / 1e6;
-    out.push_str(&format!(
-        "{millions:.0} million instructions, {:.0} million a second",
-        v.instructions_per_s / 1e6
-    ));
+    out.push_str(&format!("{millions:.0} million instructions, {:.0} million a second", v.instructions_per_s / 1e6));
     out
 }

@@ -91,28 +91,17 @@ impl PerObjectStudy<'_> {
             Ok(Source::new(twin(seed, &objects, true, &done)?)?)
         })?;
         if self.causes {
-            of(
-                ReadoutImages::TwinWithSkinGains,
-                "with the skin's gains",
-                presses,
-                &|seed| with_skin_gains(&twin(seed, &objects, false, &done)?, &real, seed),
-            )?;
+            of(ReadoutImages::TwinWithSkinGains, "with the skin's gains", presses, &|seed| {
+                with_skin_gains(&twin(seed, &objects, false, &done)?, &real, seed)
+            })?;
             let raster = raster_images(&real, &objects)?;
             let compressive = compressive_images(self.recordings, &objects)?;
-            for (images, volts) in [
-                (ReadoutImages::SkinRaster, raster),
-                (ReadoutImages::SkinCompressive, compressive),
-            ] {
-                of(images, images.label(), real.sessions.len(), &|seed| {
-                    with_images(&real, &volts, seed, &done)
-                })?;
+            for (images, volts) in [(ReadoutImages::SkinRaster, raster), (ReadoutImages::SkinCompressive, compressive)]
+            {
+                of(images, images.label(), real.sessions.len(), &|seed| with_images(&real, &volts, seed, &done))?;
             }
         }
-        Ok(PerObjectReport {
-            skins: self.skins,
-            distances: distances(&all),
-            objects: all,
-        })
+        Ok(PerObjectReport { skins: self.skins, distances: distances(&all), objects: all })
     }
 }
 
@@ -144,12 +133,7 @@ fn scores(source: &Source, objects: &[String], seed: u64) -> Result<Vec<(ObjectS
     let board = settings.learn(source)?.score(&|| ())?;
     let of_row = |row: &ObjectRow| {
         let value = |&(score, get): &ScoreOf| {
-            let key = ObjectScore {
-                decoder: row.key.decoder.clone(),
-                m: row.key.m,
-                score,
-                object: row.object.clone(),
-            };
+            let key = ObjectScore { decoder: row.key.decoder.clone(), m: row.key.m, score, object: row.object.clone() };
             Some((key, get(&row.scores)?))
         };
         SCORES.iter().filter_map(value).collect::<Vec<_>>()
@@ -161,12 +145,10 @@ fn scores(source: &Source, objects: &[String], seed: u64) -> Result<Vec<(ObjectS
 fn raster_images(real: &Source, objects: &[String]) -> Result<Vec<(String, Vec<f64>)>, Refusal> {
     let sessions = real.sessions.iter().filter(|s| objects.contains(&s.object));
     let trained = sessions.filter_map(|session| Some((session, TrainingPresses::unscored(session)?)));
-    let images = trained
-        .filter(|(_, training)| !training.is_empty())
-        .map(|(session, training)| {
-            let library = templates(&[training]).map_err(|e| e.at("raster images"))?;
-            Ok((session.object.clone(), library.images().column(0)))
-        });
+    let images = trained.filter(|(_, training)| !training.is_empty()).map(|(session, training)| {
+        let library = templates(&[training]).map_err(|e| e.at("raster images"))?;
+        Ok((session.object.clone(), library.images().column(0)))
+    });
     images.collect()
 }
 
@@ -248,12 +230,7 @@ fn bands(images: ReadoutImages, real: &[(ObjectScore, f64)], skins: &[Vec<(Objec
     let band = |(score, real): &(ObjectScore, f64)| {
         let same = |skin: &Vec<(ObjectScore, f64)>| skin.iter().find(|(of, _)| of == score).map(|(_, value)| *value);
         let skins: Vec<f64> = skins.iter().map(same).collect::<Option<_>>()?;
-        Some(ObjectBand {
-            images,
-            score: score.clone(),
-            of: Banded::of(*real, &skins, [0.0, 1.0])?,
-            skins,
-        })
+        Some(ObjectBand { images, score: score.clone(), of: Banded::of(*real, &skins, [0.0, 1.0])?, skins })
     };
     real.iter().filter_map(band).collect()
 }
@@ -266,11 +243,7 @@ fn distances(bands: &[ObjectBand]) -> Vec<ScoreDistance> {
     let distance = |(images, decoder, m, score)| {
         let of: Vec<&ObjectBand> = bands.iter().filter(|b| key(b) == (images, decoder, m, score)).collect();
         let mean = |get: &dyn Fn(&ObjectBand) -> f64| of.iter().map(|b| get(b)).sum::<f64>() / of.len() as f64;
-        let outside: Vec<&str> = of
-            .iter()
-            .filter(|b| !b.of.inside())
-            .map(|b| b.score.object.as_str())
-            .collect();
+        let outside: Vec<&str> = of.iter().filter(|b| !b.of.inside()).map(|b| b.score.object.as_str()).collect();
         ScoreDistance {
             images,
             decoder: decoder.to_owned(),
@@ -370,9 +343,7 @@ fn with_skin_gains(set: &SessionSet, real: &Source, seed: u64) -> Result<Source,
             let Some(recorded) = recorded else { return Ok(None) };
             let images = recorded.presses.iter().filter_map(|press| press.conductance.as_ref());
             let with_gains = |image: &ConductanceMap| image.values().iter().zip(&gains).map(|(c, g)| c * g).collect();
-            Ok(Some(
-                readout.record(mode, &images.map(with_gains).collect::<Vec<Vec<f64>>>())?,
-            ))
+            Ok(Some(readout.record(mode, &images.map(with_gains).collect::<Vec<Vec<f64>>>())?))
         };
         scored.raster = again(session.raster.as_ref(), Mode::Raster)?;
         scored.compressive = again(session.compressive.as_ref(), Mode::Compressive)?;
@@ -407,11 +378,7 @@ fn with_images(
             }
             None => None,
         };
-        session.protocol = Protocol {
-            first_press: 0,
-            presses: SCORED,
-            ..session.protocol
-        };
+        session.protocol = Protocol { first_press: 0, presses: SCORED, ..session.protocol };
         done();
     }
     Ok(source)
@@ -493,20 +460,11 @@ mod tests {
         assert_ne!(one, other);
         // every decoder, M and score of the one object; `nn_lmmse` says no classes
         let with_classes = DECODERS.len() - 1;
-        assert!(
-            one.len() >= (DECODERS.len() + with_classes) * MEASUREMENTS.len(),
-            "{}",
-            one.len()
-        );
+        assert!(one.len() >= (DECODERS.len() + with_classes) * MEASUREMENTS.len(), "{}", one.len());
     }
 
     fn score(object: &str, value: f64) -> (ObjectScore, f64) {
-        let score = ObjectScore {
-            decoder: "matched".to_owned(),
-            m: 20,
-            score: "iou",
-            object: object.to_owned(),
-        };
+        let score = ObjectScore { decoder: "matched".to_owned(), m: 20, score: "iou", object: object.to_owned() };
         (score, value)
     }
 
@@ -528,11 +486,7 @@ mod tests {
     #[test]
     fn a_real_skin_like_the_twin_s_lies_within_the_band() {
         let skins = [0.4, 0.6, 0.4, 0.6].map(|v| vec![score("brain", v)]);
-        let within = |real: f64| {
-            bands(ReadoutImages::Twin, &[score("brain", real)], &skins)[0]
-                .of
-                .inside()
-        };
+        let within = |real: f64| bands(ReadoutImages::Twin, &[score("brain", real)], &skins)[0].of.inside();
         assert!(within(0.5) && within(0.79) && !within(0.81) && !within(0.19));
     }
 

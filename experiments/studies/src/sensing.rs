@@ -113,31 +113,20 @@ impl RowDesign {
         };
         let rows = (self.designer.build)().design(&task)?;
         let taxels = rows.ncols();
-        let order = if self.fewest_flips {
-            fewest_flips(rows.view(), &vec![1.0; taxels])
-        } else {
-            (0..rows.nrows()).collect()
-        };
+        let order =
+            if self.fewest_flips { fewest_flips(rows.view(), &vec![1.0; taxels]) } else { (0..rows.nrows()).collect() };
         let mode = WeightMode::Binary;
         let levels: Vec<f64> = order.iter().flat_map(|&r| rows.row(r)).copied().collect();
         let patterns = Patterns::of_levels(order.len(), &levels)?;
         let weights = Weights::with_patterns(mode, patterns.clone())?;
         let seeds = seeds_of_first_window(&patterns).ok();
         let random = |seed: u64| {
-            let task = RowTask {
-                seed: self.seed.wrapping_add(seed),
-                largest_sum: None,
-                ..task
-            };
+            let task = RowTask { seed: self.seed.wrapping_add(seed), largest_sum: None, ..task };
             Random.design(&task).and_then(|rows| posterior_trace(&task, &rows))
         };
         let random = (0..RANDOM).map(random).collect::<Result<Vec<f64>, _>>()?;
         let message = (rows.nrows() <= PATTERN_BITS)
-            .then(|| {
-                Pattern::new(rows.nrows(), 0)
-                    .ok()
-                    .map(|pattern| pattern.message().len())
-            })
+            .then(|| Pattern::new(rows.nrows(), 0).ok().map(|pattern| pattern.message().len()))
             .flatten();
         Ok(RowDesignReport {
             designer: self.designer.name,
@@ -223,17 +212,11 @@ impl RowDesignReport {
             100.0 * self.flips,
         );
         if self.constant_rows > 0 {
-            out.push_str(&format!(
-                "{} of the rows are constant: all taxels have the same level\n",
-                self.constant_rows
-            ));
+            out.push_str(&format!("{} of the rows are constant: all taxels have the same level\n", self.constant_rows));
         }
         out.push_str(&match (self.bytes_a_cell, self.load_s) {
             (Some(bytes), Some(load_s)) => {
-                format!(
-                    "pattern: {bytes} bytes a cell, {:.1} ms for all at 400 kHz\n",
-                    1e3 * load_s
-                )
+                format!("pattern: {bytes} bytes a cell, {:.1} ms for all at 400 kHz\n", 1e3 * load_s)
             }
             _ => "pattern: no cell holds it (at most 64 rows of ±1)\n".to_owned(),
         });
@@ -273,10 +256,7 @@ mod tests {
             let plain = design("greedy", images.clone());
             let report = plain.run().unwrap();
             assert!(report.variance_left < 0.8 * report.variance_left_random, "{report:?}");
-            let ordered = RowDesign {
-                fewest_flips: true,
-                ..plain
-            };
+            let ordered = RowDesign { fewest_flips: true, ..plain };
             let ordered = ordered.run().unwrap();
             assert!(ordered.flips < report.flips, "{} {}", ordered.flips, report.flips);
             assert!((ordered.variance_left - report.variance_left).abs() < 1e-9);
@@ -293,19 +273,10 @@ mod tests {
 
     #[test]
     fn what_cannot_be_designed_is_refused() {
-        let few = RowDesign {
-            rows: 0,
-            ..design("greedy", DesignImages::Shapes)
-        };
+        let few = RowDesign { rows: 0, ..design("greedy", DesignImages::Shapes) };
         assert!(few.run().is_err());
         assert!(design("classes", DesignImages::Shapes).run().is_err());
         let nowhere = DesignImages::Recordings("nowhere".into());
-        assert!(
-            design("greedy", nowhere)
-                .run()
-                .unwrap_err()
-                .to_string()
-                .contains("nowhere")
-        );
+        assert!(design("greedy", nowhere).run().unwrap_err().to_string().contains("nowhere"));
     }
 }

@@ -91,15 +91,7 @@ pub struct Touch {
 impl TouchScene {
     /// A scene with `touches` touches of `objects` on a skin.
     pub(crate) fn new(layout: SkinLayout, objects: TouchObjects, touches: usize, seed: u64) -> Self {
-        Self {
-            layout,
-            objects,
-            size_m: None,
-            placed: false,
-            touches,
-            seed,
-            specimen: None,
-        }
+        Self { layout, objects, size_m: None, placed: false, touches, seed, specimen: None }
     }
 
     /// Presses all touches. The result depends only on the scene.
@@ -150,11 +142,7 @@ impl TouchScene {
                 -x, -y
             )
         };
-        let (touches, seed, specimen) = (
-            self.touches,
-            self.seed >> 1,
-            self.specimen.unwrap_or(self.seed) % (1 << 53),
-        );
+        let (touches, seed, specimen) = (self.touches, self.seed >> 1, self.specimen.unwrap_or(self.seed) % (1 << 53));
         format!(
             "rows = {touches}\nseed = {seed}\nreadout = \"ideal\"\n\
              [object]\nfrom = \"{from}\"\nrows_per_shape = 1\n{size}\
@@ -213,10 +201,7 @@ impl TouchWire {
         let mut untouched = Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols()))?;
         readout.seek_row(IDLE_BLOCK, 0);
         let idle = readout.measure(&mut untouched, IDLE_MEASUREMENTS)?;
-        Ok(Self {
-            readout,
-            idle_v: idle.iter().sum::<f64>() / IDLE_MEASUREMENTS as f64,
-        })
+        Ok(Self { readout, idle_v: idle.iter().sum::<f64>() / IDLE_MEASUREMENTS as f64 })
     }
 
     /// A wire with the given readout. Nothing is subtracted from its samples.
@@ -301,11 +286,7 @@ mod tests {
             for objects in [TouchObjects::Shapes, TouchObjects::Objects] {
                 let scene = TouchScene::new(layout, objects, 12, 7);
                 let touches = scene.draw().unwrap();
-                assert!(
-                    touches
-                        .iter()
-                        .all(|t| t.centre_px.is_some() && t.support.iter().any(|on| *on))
-                );
+                assert!(touches.iter().all(|t| t.centre_px.is_some() && t.support.iter().any(|on| *on)));
                 assert_eq!(touches, scene.draw().unwrap());
                 // more touches begin with the same ones
                 let more = TouchScene { touches: 15, ..scene };
@@ -317,10 +298,7 @@ mod tests {
     #[test]
     fn another_specimen_has_other_gains_under_the_same_touches() {
         let scene = TouchScene::new(SkinLayout::default(), TouchObjects::Shapes, 2, 3);
-        let other = TouchScene {
-            specimen: Some(4),
-            ..scene.clone()
-        };
+        let other = TouchScene { specimen: Some(4), ..scene.clone() };
         let (a, b) = (scene.draw().unwrap(), other.draw().unwrap());
         assert_ne!(a[0].conductance_s, b[0].conductance_s);
         let pressed = |t: &Touch| t.conductance_s.values().iter().map(|g| *g > 0.0).collect::<Vec<_>>();

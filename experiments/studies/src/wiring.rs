@@ -67,9 +67,7 @@ pub struct Wiring {
 
 /// ΣG and ΣG² of taxels, S and S².
 pub(crate) fn sums(conductance_s: &[f64]) -> (f64, f64) {
-    conductance_s
-        .iter()
-        .fold((0.0, 0.0), |(sum, squares), g| (sum + g, squares + g * g))
+    conductance_s.iter().fold((0.0, 0.0), |(sum, squares), g| (sum + g, squares + g * g))
 }
 
 /// The pressed skin of the closed forms whose `taxels` taxels have this ΣG and ΣG².
@@ -83,10 +81,7 @@ pub(crate) fn pressed_skin((sum_s, squares): (f64, f64), taxels: usize, electron
 
 /// The amplifier as designed with another feedback.
 pub(crate) fn amplifier(electronics: &ElectronicsStudy, feedback_ohm: f64) -> Result<Amplifier, Refusal> {
-    let network = Network {
-        feedback_ohm,
-        ..electronics.network
-    };
+    let network = Network { feedback_ohm, ..electronics.network };
     Amplifier::new(electronics.op_amp, network)
 }
 
@@ -149,20 +144,13 @@ pub(crate) fn wirings(
         let profile = if way == Way::Ideal {
             Profile::named("ideal")?
         } else {
-            let table = profile(
-                feedback_ohm,
-                1.0 / period_s,
-                available_s,
-                &["late_updates", "contact_noise"],
-            )?;
+            let table = profile(feedback_ohm, 1.0 / period_s, available_s, &["late_updates", "contact_noise"])?;
             table.try_into().map_err(Refusal::from_error)?
         };
         ways.push(Wiring {
             way,
             wires: wires as usize,
-            limit: budget(&Setting { available_s, ..setting })
-                .limit
-                .filter(|_| way != Way::Ideal),
+            limit: budget(&Setting { available_s, ..setting }).limit.filter(|_| way != Way::Ideal),
             feedback_ohm,
             noise_gain: own.noise_gain,
             settle_s,
@@ -202,9 +190,6 @@ pub(crate) fn profile(feedback_ohm: f64, rate_hz: f64, available_s: f64, effects
 
 /// A shipped profile as a table.
 pub(crate) fn shipped(name: &str) -> Result<Table, Refusal> {
-    let text = PROFILES
-        .iter()
-        .find(|(known, _)| *known == name)
-        .map_or("", |(_, text)| text);
+    let text = PROFILES.iter().find(|(known, _)| *known == name).map_or("", |(_, text)| text);
     toml::from_str(text).map_err(|error| Refusal::from_error(error).at(name))
 }

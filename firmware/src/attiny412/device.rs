@@ -42,15 +42,7 @@ impl Device {
     /// erased).
     pub fn new(program: Arc<Program>, eeprom: &[u8]) -> Self {
         let space = Space::new(eeprom);
-        Self {
-            core: Core::new(RAM_END),
-            program,
-            space,
-            now: 0,
-            asleep: false,
-            pending: None,
-            next_event: u64::MAX,
-        }
+        Self { core: Core::new(RAM_END), program, space, now: 0, asleep: false, pending: None, next_event: u64::MAX }
     }
 
     /// The flash of an ATtiny412, starting with `flash`.
@@ -234,12 +226,7 @@ impl Device {
         if !self.core.interrupts_enabled() {
             return false;
         }
-        self.hear(
-            observer,
-            TraceStep::Interrupt {
-                vector: accepted.vector,
-            },
-        );
+        self.hear(observer, TraceStep::Interrupt { vector: accepted.vector });
         self.space.cpuint.enter(accepted);
         let cycles = self.core.interrupt(accepted.vector, &mut self.space);
         self.now += u64::from(cycles) * ticks_per_cycle;
@@ -391,12 +378,5 @@ fn instruction(tick: u64, program: &Program, before: &Core, after: &Core) -> Tra
     if before.sreg != after.sreg {
         changes.push(("SREG".into(), u16::from(after.sreg)));
     }
-    TraceRecord {
-        tick,
-        step: TraceStep::Instruction {
-            pc: before.pc,
-            text: disassemble(program, before.pc),
-            changes,
-        },
-    }
+    TraceRecord { tick, step: TraceStep::Instruction { pc: before.pc, text: disassemble(program, before.pc), changes } }
 }

@@ -24,10 +24,7 @@ pub(super) struct ClockPin {
 impl ClockPin {
     /// The pin after a reset: its level is that of the world outside.
     pub(super) fn after_reset(&self) -> Self {
-        Self {
-            high: self.high,
-            ..Self::default()
-        }
+        Self { high: self.high, ..Self::default() }
     }
 
     /// Writes PIN3CTRL. `false` for what is not emulated.
@@ -96,12 +93,7 @@ impl Dac {
     }
 
     pub(super) fn after_reset(&self) -> Self {
-        Self {
-            before: self.output(),
-            fresh: true,
-            written_at: self.written_at,
-            ..Self::default()
-        }
+        Self { before: self.output(), fresh: true, written_at: self.written_at, ..Self::default() }
     }
 
     pub(super) fn output(&self) -> Output {
@@ -110,11 +102,7 @@ impl Dac {
 
     /// Output at `tick`, which is not before the write before the last.
     pub(super) fn output_at(&self, tick: u64) -> Output {
-        if self.written_at > tick {
-            self.before
-        } else {
-            self.output()
-        }
+        if self.written_at > tick { self.before } else { self.output() }
     }
 }
 

@@ -173,11 +173,7 @@ impl Space {
 impl DataSpace for Space {
     #[inline]
     fn read(&mut self, address: u16) -> u8 {
-        if address >> 8 == SRAM_PAGE {
-            self.sram[usize::from(address & 0xff)]
-        } else {
-            self.read_io(address)
-        }
+        if address >> 8 == SRAM_PAGE { self.sram[usize::from(address & 0xff)] } else { self.read_io(address) }
     }
 
     #[inline]
@@ -197,11 +193,7 @@ impl DataSpace for Space {
     #[inline]
     fn write_bit(&mut self, address: u16, mask: u8, set: bool) {
         // flags: a one clears its own, a zero does nothing
-        let old = if address == VPORT_INTFLAGS {
-            0
-        } else {
-            self.read(address)
-        };
+        let old = if address == VPORT_INTFLAGS { 0 } else { self.read(address) };
         self.write(address, if set { old | mask } else { old & !mask });
     }
 }

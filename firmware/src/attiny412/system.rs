@@ -150,10 +150,7 @@ mod tests {
     #[test]
     fn level_one_preempts_level_zero_and_nothing_preempts_level_one() {
         let [port, timer, twi] = [3, 8, 19].map(|vector| 1_u32 << vector);
-        let mut cpuint = Cpuint {
-            level1_vector: 3,
-            ..Cpuint::default()
-        };
+        let mut cpuint = Cpuint { level1_vector: 3, ..Cpuint::default() };
         let source = |cpuint: &Cpuint, requests| cpuint.next(requests).map(|accepted| accepted.vector);
         cpuint.enter(cpuint.next(twi).unwrap());
         assert_eq!(source(&cpuint, timer | twi), None);

@@ -33,14 +33,7 @@ pub(super) struct Tca {
 
 impl Default for Tca {
     fn default() -> Self {
-        Self {
-            ctrla: 0,
-            enabled: false,
-            overflowed: false,
-            temp: 0,
-            per: u16::MAX,
-            since: 0,
-        }
+        Self { ctrla: 0, enabled: false, overflowed: false, temp: 0, per: u16::MAX, since: 0 }
     }
 }
 

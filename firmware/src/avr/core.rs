@@ -78,14 +78,7 @@ pub struct Core {
 impl Core {
     /// State after reset, with the stack at `sp` (the last byte of SRAM on AVRxt).
     pub const fn new(sp: u16) -> Self {
-        Self {
-            registers: [0; 32],
-            pc: 0,
-            sp,
-            sreg: 0,
-            instructions: 0,
-            hold_until: 0,
-        }
+        Self { registers: [0; 32], pc: 0, sp, sreg: 0, instructions: 0, hold_until: 0 }
     }
 
     /// Whether an interrupt may be executed before the next instruction: the I flag is set, one instruction has been
@@ -109,10 +102,7 @@ impl Core {
     /// Pair of registers `low`, `low + 1`.
     #[inline]
     const fn pair(&self, low: u8) -> u16 {
-        u16::from_le_bytes([
-            self.registers[(low & 31) as usize],
-            self.registers[((low + 1) & 31) as usize],
-        ])
+        u16::from_le_bytes([self.registers[(low & 31) as usize], self.registers[((low + 1) & 31) as usize]])
     }
 
     #[inline]
@@ -261,11 +251,7 @@ impl Core {
                 1
             }
             Op::Bst { d, mask } => {
-                self.sreg = if self.get(d) & mask == 0 {
-                    self.sreg & !T
-                } else {
-                    self.sreg | T
-                };
+                self.sreg = if self.get(d) & mask == 0 { self.sreg & !T } else { self.sreg | T };
                 1
             }
             Op::Bld { d, mask } => {

@@ -193,14 +193,8 @@ fn pairs_and_products(word: u16) -> Op {
     let (d, r) = (16 + bits(word, 4, 7), 16 + bits(word, 0, 7));
     match (word >> 8, word & 0x88) {
         (0, _) if word == 0 => Op::Nop,
-        (1, _) => Op::Movw {
-            d: 2 * bits(word, 4, 15),
-            r: 2 * bits(word, 0, 15),
-        },
-        (2, _) => Op::Muls {
-            d: high_d(word),
-            r: 16 + bits(word, 0, 15),
-        },
+        (1, _) => Op::Movw { d: 2 * bits(word, 4, 15), r: 2 * bits(word, 0, 15) },
+        (2, _) => Op::Muls { d: high_d(word), r: 16 + bits(word, 0, 15) },
         (3, 0x00) => Op::Mulsu { d, r },
         (3, 0x08) => Op::Fmul { d, r },
         (3, 0x80) => Op::Fmuls { d, r },
@@ -213,11 +207,7 @@ fn pairs_and_products(word: u16) -> Op {
 fn displaced(word: u16) -> Op {
     let q = bits(word, 0, 7) | bits(word, 7, 0x18) | bits(word, 8, 0x20);
     let p = if word & 0x0008 == 0 { Z } else { Y };
-    if word & 0x0200 == 0 {
-        Op::Ldd { d: d5(word), p, q }
-    } else {
-        Op::Std { r: d5(word), p, q }
-    }
+    if word & 0x0200 == 0 { Op::Ldd { d: d5(word), p, q } } else { Op::Std { r: d5(word), p, q } }
 }
 
 fn group_9(word: u16, second: u16) -> Op {
@@ -233,10 +223,7 @@ fn group_9(word: u16, second: u16) -> Op {
         0x9 => Op::Sbic { a, mask },
         0xA => Op::Sbi { a, mask },
         0xB => Op::Sbis { a, mask },
-        _ => Op::Mul {
-            d: d5(word),
-            r: r5(word),
-        },
+        _ => Op::Mul { d: d5(word), r: r5(word) },
     }
 }
 
@@ -316,11 +303,7 @@ fn without_register(word: u16) -> Op {
 /// `1011 saad dddd aaaa`.
 fn in_out(word: u16) -> Op {
     let a = bits(word, 0, 15) | bits(word, 5, 0x30);
-    if word & 0x0800 == 0 {
-        Op::In { d: d5(word), a }
-    } else {
-        Op::Out { a, r: d5(word) }
-    }
+    if word & 0x0800 == 0 { Op::In { d: d5(word), a } } else { Op::Out { a, r: d5(word) } }
 }
 
 fn branches(word: u16) -> Op {

@@ -28,9 +28,7 @@ impl Program {
         };
         if image.len() > flash_bytes {
             let program = image.len();
-            return Err(Refusal::new(format!(
-                "program has {program} bytes, but flash has {flash_bytes}"
-            )));
+            return Err(Refusal::new(format!("program has {program} bytes, but flash has {flash_bytes}")));
         }
         let mut bytes = vec![0xFF; flash_bytes].into_boxed_slice();
         bytes[..image.len()].copy_from_slice(image);
@@ -95,11 +93,7 @@ impl Program {
 /// ```
 pub fn disassemble(program: &Program, pc: u16) -> String {
     let op = program.op(pc);
-    let text = if program.word(pc) == LPM_IMPLIED {
-        "lpm".to_owned()
-    } else {
-        instruction(op)
-    };
+    let text = if program.word(pc) == LPM_IMPLIED { "lpm".to_owned() } else { instruction(op) };
     match offset(op) {
         None => text,
         Some(offset) => {

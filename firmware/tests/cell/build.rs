@@ -33,10 +33,7 @@ pub(crate) fn compiler() -> Option<String> {
     match output {
         Ok(output) if output.status.success() => Some(String::from_utf8(output.stdout).unwrap().trim().to_owned()),
         _ => {
-            assert!(
-                std::env::var("CI").as_deref() != Ok("true"),
-                "avr-gcc is not installed: run scripts/setup.sh"
-            );
+            assert!(std::env::var("CI").as_deref() != Ok("true"), "avr-gcc is not installed: run scripts/setup.sh");
             eprintln!("NOT CHECKED: avr-gcc is not installed (scripts/setup.sh does)");
             None
         }
@@ -117,9 +114,6 @@ fn the_committed_images_are_built_from_the_sources_byte_for_byte() {
     for file in FILES {
         let built = std::fs::read(dir.path().join(file)).unwrap();
         let committed = std::fs::read(sources().join(file)).unwrap();
-        assert!(
-            built == committed,
-            "{file} is not what the sources give: run `make firmware`"
-        );
+        assert!(built == committed, "{file} is not what the sources give: run `make firmware`");
     }
 }

@@ -26,9 +26,7 @@ fn clocked(array: &mut Array, edges: usize) -> Vec<u8> {
 }
 
 fn expected(cells: &mut [Cell], edges: usize) -> Vec<u8> {
-    (0..edges)
-        .flat_map(|_| cells.iter_mut().map(Cell::edge).collect::<Vec<_>>())
-        .collect()
+    (0..edges).flat_map(|_| cells.iter_mut().map(Cell::edge).collect::<Vec<_>>()).collect()
 }
 
 fn state(array: &mut Array, address: u8) -> [u8; REPLY_BYTES] {
@@ -47,12 +45,7 @@ fn spec_state(cell: &Cell) -> [u8; REPLY_BYTES] {
 fn assert_agrees(array: &mut Array, cells: &mut [Cell]) {
     assert_eq!(clocked(array, 30), expected(cells, 30));
     for cell in &*cells {
-        assert_eq!(
-            state(array, cell.address()),
-            spec_state(cell),
-            "read-back of {}",
-            cell.address()
-        );
+        assert_eq!(state(array, cell.address()), spec_state(cell), "read-back of {}", cell.address());
     }
     for cell in array.cells() {
         assert_eq!(cell.faults().first(), None);
@@ -73,20 +66,11 @@ fn sizes_out_of_range_are_refused() {
     let (mut array, _) = seeded(3, CellMode::Raster);
     let needed = "`codes` has 4 entries, which is no multiple of the 3 cells";
     assert_eq!(said(array.clock(FAST, &mut [0; 4])), needed);
-    assert_eq!(
-        said(array.start_with_seeds(CellMode::Binary, &[1, 2])),
-        "2 seeds for 3 cells"
-    );
+    assert_eq!(said(array.start_with_seeds(CellMode::Binary, &[1, 2])), "2 seeds for 3 cells");
     for time_s in [-1e-9, 86_401.0, f64::INFINITY, f64::NAN] {
-        assert_eq!(
-            said(array.idle(time_s)),
-            format!("`time_s` = {time_s} is outside [0, 86400] s")
-        );
+        assert_eq!(said(array.idle(time_s)), format!("`time_s` = {time_s} is outside [0, 86400] s"));
     }
-    let late = Clock {
-        sample_delay_s: 14e-6,
-        ..FAST
-    };
+    let late = Clock { sample_delay_s: 14e-6, ..FAST };
     let needed = "`sample_delay_s` = 0.000014 is outside [0, 1/edge_hz) in whole ticks of 50 ns";
     assert_eq!(said(array.clock(late, &mut [0; 3])), needed);
 }
@@ -115,9 +99,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
 fn snapshots_go_on_identically() {
     let (mut array, _) = seeded(9, CellMode::Analog);
     array.run_clock(FAST).unwrap();
-    array
-        .transact(&[BusEvent::Start, BusEvent::Write(9 << 1), BusEvent::Write(2)])
-        .unwrap();
+    array.transact(&[BusEvent::Start, BusEvent::Write(9 << 1), BusEvent::Write(2)]).unwrap();
     let mut snapshot = array.clone();
     let go_on = |array: &mut Array| {
         let rest = [BusEvent::Write(80), BusEvent::Stop];
@@ -135,10 +117,7 @@ fn blocks_continue_without_a_gap() {
     let mut blocks = whole.clone();
     let all = clocked(&mut whole, 1000);
     assert_eq!(all, expected(&mut cells, 1000));
-    let pieces: Vec<u8> = [1, 2, 0, 97, 900]
-        .into_iter()
-        .flat_map(|n| clocked(&mut blocks, n))
-        .collect();
+    let pieces: Vec<u8> = [1, 2, 0, 97, 900].into_iter().flat_map(|n| clocked(&mut blocks, n)).collect();
     assert_eq!(pieces, all);
     assert_eq!(whole.instructions(), blocks.instructions());
 }
@@ -220,10 +199,7 @@ fn two_cells_with_one_address_collide_without_hanging() {
     twin.run_until(now);
     let (seeded, unseeded) = (spec_state(&cells[1]), spec_state(&Cell::new(9).unwrap()));
     let mode = seeded[0] & unseeded[0];
-    assert_eq!(
-        mode, seeded[0],
-        "the unseeded cell sends ones and is overruled at the first byte"
-    );
+    assert_eq!(mode, seeded[0], "the unseeded cell sends ones and is overruled at the first byte");
     assert_eq!(state(&mut array, 9), seeded);
     array.write(9, &CellMode::Analog.pair(9)).unwrap();
     let codes = clocked(&mut array, 40);

@@ -5,16 +5,10 @@ use proptest::prelude::*;
 use spts_firmware::{Array, BusEvent, BusReply, Cell, CellMode, Clock, FIRST_ADDRESS, Image, Pattern, REPLY_BYTES};
 
 /// Real timing of the skin at its fastest: 72 kHz, sampled 11 µs behind the edge.
-pub(crate) const FAST: Clock = Clock {
-    edge_hz: 72e3,
-    sample_delay_s: 11e-6,
-};
+pub(crate) const FAST: Clock = Clock { edge_hz: 72e3, sample_delay_s: 11e-6 };
 
 /// Slow enough for the plain image: 400 cycles, sampled behind its handlers of edge (147) and timer (about 110).
-pub(crate) const SLOW: Clock = Clock {
-    edge_hz: 50e3,
-    sample_delay_s: 19e-6,
-};
+pub(crate) const SLOW: Clock = Clock { edge_hz: 50e3, sample_delay_s: 19e-6 };
 
 const MODES: [CellMode; 3] = [CellMode::Raster, CellMode::Analog, CellMode::Binary];
 
@@ -69,10 +63,7 @@ impl Twins {
     pub(crate) fn new(image: &Image, cells: u8, clock: Clock) -> Self {
         Self {
             array: Array::new(usize::from(cells), image).unwrap(),
-            cells: (FIRST_ADDRESS..)
-                .take(usize::from(cells))
-                .map(|a| Cell::new(a).unwrap())
-                .collect(),
+            cells: (FIRST_ADDRESS..).take(usize::from(cells)).map(|a| Cell::new(a).unwrap()).collect(),
             clock,
         }
     }
@@ -152,15 +143,9 @@ pub(crate) fn conforms(image: &Image, clock: Clock) -> Result<(), Difference> {
         twins.edges(3)?;
         twins.read_back()?;
     }
-    for bytes in [
-        &[][..],
-        &[1],
-        &[3],
-        &[3, 64, 1, 2, 3, 4, 5, 6, 7],
-        &[0x82, 1, 2, 3],
-        &[7, 1],
-        &[0x83, 1, 2, 3, 1, 77, 0],
-    ] {
+    for bytes in
+        [&[][..], &[1], &[3], &[3, 64, 1, 2, 3, 4, 5, 6, 7], &[0x82, 1, 2, 3], &[7, 1], &[0x83, 1, 2, 3, 1, 77, 0]]
+    {
         twins.write_all(|_| bytes.to_vec())?;
         twins.edges(3)?;
         twins.read_back()?;
@@ -275,11 +260,7 @@ fn transact(twins: &mut Twins, parts: &[Part], bits: u8) -> Result<(), Differenc
     events.extend((bits > 0).then_some(BusEvent::Bits(bits)));
     events.push(BusEvent::Stop);
     let replies = twins.array.transact(&events).map_err(|e| e.to_string())?;
-    if replies == expected {
-        Ok(())
-    } else {
-        Err(format!("{events:?}: {replies:?}, not {expected:?}"))
-    }
+    if replies == expected { Ok(()) } else { Err(format!("{events:?}: {replies:?}, not {expected:?}")) }
 }
 
 proptest! {

@@ -55,9 +55,7 @@ an edge tears the reply ¦ race ¦ generator.S ¦ cli⏎        mov     r18, mod
 fn mutations() -> impl Iterator<Item = (&'static str, &'static str, Substitution)> {
     MUTATIONS.trim().lines().map(|line| {
         let fields = line.split(" ¦").map(|field| field.strip_prefix(' ').unwrap_or(field));
-        let [what, images, file, from, to] = fields.collect::<Vec<_>>()[..] else {
-            panic!("{line}")
-        };
+        let [what, images, file, from, to] = fields.collect::<Vec<_>>()[..] else { panic!("{line}") };
         (what, images, Substitution::new(file, from, to))
     })
 }
@@ -69,10 +67,7 @@ fn every_mutation_is_caught() {
     }
     let images = [("shipped", "cell", FAST), ("plain", "cell_plain", SLOW)];
     for (what, place, substitution) in mutations() {
-        for (image, name, clock) in images
-            .into_iter()
-            .filter(|(image, ..)| place == "both" || place == *image)
-        {
+        for (image, name, clock) in images.into_iter().filter(|(image, ..)| place == "both" || place == *image) {
             let caught = conforms(&changed(name, &substitution), clock);
             assert!(caught.is_err(), "{what}: not seen in the {image} image");
         }

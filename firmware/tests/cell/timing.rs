@@ -81,10 +81,7 @@ fn no_edge_is_lost_at_the_least_period() {
     let image = Image::shipped();
     for (mode, period) in LEAST_PERIOD_CYCLES {
         let at = |period, edges| {
-            let clock = Clock {
-                edge_hz: 1.0 / cycles_s(period),
-                sample_delay_s: cycles_s(period - 1),
-            };
+            let clock = Clock { edge_hz: 1.0 / cycles_s(period), sample_delay_s: cycles_s(period - 1) };
             tally(&image, mode, clock, edges)
         };
         let (sound, short) = (at(period, EDGES), at(period - 1, EDGES));
@@ -97,12 +94,7 @@ fn no_edge_is_lost_at_the_least_period() {
 /// to its recordings, are 0.18 % of the changes of its binary weights in the mean over sessions, and at most 0.5 %.
 #[test]
 fn late_updates_come_from_the_plain_firmware() {
-    let shipped = tally(
-        &Image::shipped(),
-        Start::Seeded(CellMode::Binary),
-        Clock::default(),
-        5000,
-    );
+    let shipped = tally(&Image::shipped(), Start::Seeded(CellMode::Binary), Clock::default(), 5000);
     assert_eq!((shipped.late, shipped.wrong), (0, 0));
     let plain = tally(&Image::plain(), Start::Seeded(CellMode::Binary), Clock::default(), 5000);
     let rate = plain.late as f64 / plain.changes as f64;
@@ -133,18 +125,12 @@ const EXCHANGES: [Exchange; 5] = [
 /// at most one falls into what matters.
 pub(crate) fn exchanges_while_clocked(image: &Image, sample_delay_cycles: u32) -> Result<(), Difference> {
     for period in [278, 2400] {
-        let clock = Clock {
-            edge_hz: 1.0 / cycles_s(period),
-            sample_delay_s: cycles_s(sample_delay_cycles),
-        };
+        let clock = Clock { edge_hz: 1.0 / cycles_s(period), sample_delay_s: cycles_s(sample_delay_cycles) };
         for before in STARTS {
             let mut start = Array::new(1, image).map_err(|e| e.to_string())?;
             let message = before.message(FIRST_ADDRESS);
             start.write(FIRST_ADDRESS, &message).map_err(|e| e.to_string())?;
-            for (exchange, offset) in EXCHANGES
-                .into_iter()
-                .flat_map(|e| (0..period).map(move |offset| (e, offset)))
-            {
+            for (exchange, offset) in EXCHANGES.into_iter().flat_map(|e| (0..period).map(move |offset| (e, offset))) {
                 exchange_at(start.clone(), clock, before, exchange, offset)
                     .map_err(|e| format!("{before:?}, {exchange:?} at cycle {offset} of {period}: {e}"))?;
             }
@@ -182,10 +168,7 @@ fn exchange_at(
         due.extend((edges..codes.len()).map(|_| cell.edge()));
         (due, read)
     };
-    if (0..codes.len())
-        .map(expected)
-        .any(|(due, read)| due == codes && read == reply)
-    {
+    if (0..codes.len()).map(expected).any(|(due, read)| due == codes && read == reply) {
         Ok(())
     } else {
         Err(format!("codes {codes:?}, reply {reply:?}"))

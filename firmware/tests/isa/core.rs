@@ -74,21 +74,11 @@ fn skips() {
         (io_bit(asm::SBIS, 3, 5), 0, 0xDF, false),
     ];
     let (lds, sts) = ([one(asm::LDS, 20), 0x3F00], [one(asm::STS, 20), 0x3F00]);
-    let skipped: [&[u16]; 6] = [
-        &[asm::NOP],
-        &[asm::RET],
-        &[asm::JMP, 0x300],
-        &[asm::CALL, 0x300],
-        &lds,
-        &sts,
-    ];
+    let skipped: [&[u16]; 6] = [&[asm::NOP], &[asm::RET], &[asm::JMP, 0x300], &[asm::CALL, 0x300], &lds, &sts];
     for (opcode, a, b, skips) in cases {
         for next in skipped {
             let words = [&[opcode], next].concat();
-            let mut machine = in_flash(&words)
-                .with(&[(16, a), (17, b)])
-                .with_memory(3, &[b])
-                .with_sreg(0x5A);
+            let mut machine = in_flash(&words).with(&[(16, a), (17, b)]).with_memory(3, &[b]).with_sreg(0x5A);
             let cycles = machine.run(1);
             let length = if skips { next.len() } else { 0 };
             assert_eq!(usize::from(machine.core.pc), 0x101 + length, "{opcode:#06x}");
@@ -128,10 +118,7 @@ fn interrupts_are_held_back_behind_sei_and_spl() {
         };
         (0..words.len()).map(&mut step).collect::<Vec<_>>()
     };
-    assert_eq!(
-        enabled(0, &[asm::SEI, asm::SLEEP, asm::SEI, asm::CLI]),
-        [false, true, true, false]
-    );
+    assert_eq!(enabled(0, &[asm::SEI, asm::SLEEP, asm::SEI, asm::CLI]), [false, true, true, false]);
     let (spl, sph) = (io(asm::OUT, 1, 0x3D), io(asm::OUT, 1, 0x3E));
     let waiting = enabled(I, &[spl, asm::NOP, asm::NOP, asm::NOP, asm::NOP]);
     assert_eq!(waiting, [false, false, false, false, true]);
@@ -143,11 +130,7 @@ fn interrupts_are_held_back_behind_sei_and_spl() {
 #[test]
 fn events() {
     let illegal = [0x95E8, 0x95D8, 0x9419, 0x9204, 0x0001, 0xFFFF].map(|word| (word, Event::Illegal));
-    let own = [
-        (asm::NOP, Event::None),
-        (asm::SLEEP, Event::Sleep),
-        (asm::BREAK, Event::Break),
-    ];
+    let own = [(asm::NOP, Event::None), (asm::SLEEP, Event::Sleep), (asm::BREAK, Event::Break)];
     let own = own.into_iter().chain([(asm::WDR, Event::WatchdogReset)]);
     for (word, event) in own.chain(illegal) {
         let mut machine = in_flash(&[word]);
@@ -156,10 +139,7 @@ fn events() {
         assert_eq!((step.cycles, step.event), (1, event), "{word:#06x}");
         let core = &machine.core;
         assert_eq!((core.pc, core.instructions), (0x101, before.instructions + 1));
-        assert_eq!(
-            (core.registers, core.sreg, core.sp),
-            (before.registers, before.sreg, before.sp)
-        );
+        assert_eq!((core.registers, core.sreg, core.sp), (before.registers, before.sreg, before.sp));
     }
 }
 
@@ -174,68 +154,20 @@ fn cycles() {
             assert_eq!(machine.step().cycles, cycles, "{opcode:#06x}");
         }
     };
-    all(
-        1,
-        &asm::TWO_REGISTERS.map(|base| if base == asm::MUL { asm::NOP } else { rr(base, 3, 4) }),
-    );
+    all(1, &asm::TWO_REGISTERS.map(|base| if base == asm::MUL { asm::NOP } else { rr(base, 3, 4) }));
     all(1, &asm::IMMEDIATES.map(|base| rk(base, 20, 4)));
     all(1, &asm::ONE_REGISTER.map(|base| one(base, 3)));
     all(2, &asm::FRACTIONAL.map(|base| fractional(base, 17, 18)));
-    all(
-        2,
-        &[
-            rr(asm::MUL, 3, 4),
-            word(asm::ADIW, 24, 1),
-            word(asm::SBIW, 24, 1),
-            muls(17, 18),
-        ],
-    );
-    all(
-        1,
-        &[
-            movw(2, 4),
-            bit(asm::BST, 3, 4),
-            bit(asm::BLD, 3, 4),
-            flag(asm::BSET, 3),
-            flag(asm::BCLR, 3),
-        ],
-    );
+    all(2, &[rr(asm::MUL, 3, 4), word(asm::ADIW, 24, 1), word(asm::SBIW, 24, 1), muls(17, 18)]);
+    all(1, &[movw(2, 4), bit(asm::BST, 3, 4), bit(asm::BLD, 3, 4), flag(asm::BSET, 3), flag(asm::BCLR, 3)]);
     all(2, &INDIRECT.map(|(load, ..)| one(load, 3)));
     all(1, &INDIRECT.map(|(_, store, ..)| one(store, 3)));
-    all(
-        2,
-        &[
-            one(asm::POP, 3),
-            displaced(asm::LDD_Y, 3, 5),
-            displaced(asm::LDD_Z, 3, 5),
-        ],
-    );
-    all(
-        1,
-        &[
-            one(asm::PUSH, 3),
-            displaced(asm::STD_Y, 3, 5),
-            displaced(asm::STD_Z, 3, 5),
-        ],
-    );
-    all(
-        3,
-        &[one(asm::LDS, 3), asm::LPM, one(asm::LPM_Z, 3), one(asm::LPM_Z_INC, 3)],
-    );
+    all(2, &[one(asm::POP, 3), displaced(asm::LDD_Y, 3, 5), displaced(asm::LDD_Z, 3, 5)]);
+    all(1, &[one(asm::PUSH, 3), displaced(asm::STD_Y, 3, 5), displaced(asm::STD_Z, 3, 5)]);
+    all(3, &[one(asm::LDS, 3), asm::LPM, one(asm::LPM_Z, 3), one(asm::LPM_Z_INC, 3)]);
     all(2, &[one(asm::STS, 3)]);
-    all(
-        1,
-        &[
-            io(asm::IN, 3, 4),
-            io(asm::OUT, 3, 4),
-            io_bit(asm::SBI, 3, 4),
-            io_bit(asm::CBI, 3, 4),
-        ],
-    );
-    all(
-        2,
-        &[relative(asm::RJMP, 1), asm::IJMP, relative(asm::RCALL, 1), asm::ICALL],
-    );
+    all(1, &[io(asm::IN, 3, 4), io(asm::OUT, 3, 4), io_bit(asm::SBI, 3, 4), io_bit(asm::CBI, 3, 4)]);
+    all(2, &[relative(asm::RJMP, 1), asm::IJMP, relative(asm::RCALL, 1), asm::ICALL]);
     all(3, &[asm::JMP, asm::CALL]);
     all(4, &[asm::RET, asm::RETI]);
     // a branch that is not taken, and one that is

@@ -41,11 +41,7 @@ pub(crate) struct Machine {
 
 impl Machine {
     pub(crate) fn new(words: &[u16]) -> Self {
-        Self {
-            core: Core::new(RAM_END),
-            program: Program::from_words(words),
-            memory: Memory(Box::new([0; 0x1_0000])),
-        }
+        Self { core: Core::new(RAM_END), program: Program::from_words(words), memory: Memory(Box::new([0; 0x1_0000])) }
     }
 
     /// Sets registers.

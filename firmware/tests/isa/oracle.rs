@@ -23,9 +23,9 @@ const INSTRUCTIONS: u64 = 1_000_000;
 
 /// 64-bit FNV-1a.
 fn fnv1a(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
-        (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3)
-    })
+    bytes
+        .iter()
+        .fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3))
 }
 
 /// r0…r31, SREG, SP (low byte first), I/O 0x1C…0x1F and SRAM 0x3F00…0x3FFF at the end of `words`; the instructions
@@ -158,21 +158,9 @@ const SREG: u16 = 0x3F;
 
 /// (low register, plain or displaced, displaced, stepping) accesses.
 const POINTERS: [(u16, [u16; 2], [u16; 4]); 3] = [
-    (
-        26,
-        [asm::LD_X, asm::ST_X],
-        [asm::LD_X_INC, asm::LD_X_DEC, asm::ST_X_INC, asm::ST_X_DEC],
-    ),
-    (
-        28,
-        [asm::LDD_Y, asm::STD_Y],
-        [asm::LD_Y_INC, asm::LD_Y_DEC, asm::ST_Y_INC, asm::ST_Y_DEC],
-    ),
-    (
-        30,
-        [asm::LDD_Z, asm::STD_Z],
-        [asm::LD_Z_INC, asm::LD_Z_DEC, asm::ST_Z_INC, asm::ST_Z_DEC],
-    ),
+    (26, [asm::LD_X, asm::ST_X], [asm::LD_X_INC, asm::LD_X_DEC, asm::ST_X_INC, asm::ST_X_DEC]),
+    (28, [asm::LDD_Y, asm::STD_Y], [asm::LD_Y_INC, asm::LD_Y_DEC, asm::ST_Y_INC, asm::ST_Y_DEC]),
+    (30, [asm::LDD_Z, asm::STD_Z], [asm::LD_Z_INC, asm::LD_Z_DEC, asm::ST_Z_INC, asm::ST_Z_DEC]),
 ];
 
 fn count(words: &[u16]) -> u16 {
@@ -193,11 +181,7 @@ struct Generator {
 
 /// Program number `index`, 1951 words or a few more.
 fn program(index: u64) -> Vec<u16> {
-    let mut generator = Generator {
-        random: Random(index),
-        words: vec![asm::NOP],
-        subroutines: Vec::new(),
-    };
+    let mut generator = Generator { random: Random(index), words: vec![asm::NOP], subroutines: Vec::new() };
     for _ in 0..SUBROUTINES {
         generator.subroutine();
     }
@@ -480,19 +464,14 @@ fn avr_objdump(path: &Path) -> Option<Output> {
     if let Ok(output) = output {
         return Some(output);
     }
-    assert!(
-        std::env::var("CI").as_deref() != Ok("true"),
-        "avr-objdump is not installed: run scripts/setup.sh"
-    );
+    assert!(std::env::var("CI").as_deref() != Ok("true"), "avr-objdump is not installed: run scripts/setup.sh");
     eprintln!("NOT CHECKED: avr-objdump is not installed (scripts/setup.sh does)");
     None
 }
 
 #[test]
 fn agrees_with_avr_objdump() {
-    let image: Vec<u8> = (0..=u16::MAX)
-        .flat_map(|w| [w.to_le_bytes(), [0, 0]].concat())
-        .collect();
+    let image: Vec<u8> = (0..=u16::MAX).flat_map(|w| [w.to_le_bytes(), [0, 0]].concat()).collect();
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(file.path(), image).unwrap();
     let Some(output) = avr_objdump(file.path()) else {

@@ -11,11 +11,7 @@ use tungstenite::{Message, WebSocket};
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn server() -> SocketAddr {
-    let server = Server::bind(&LiveConfig {
-        port: 0,
-        seed: 1,
-        object: "T".to_owned(),
-    });
+    let server = Server::bind(&LiveConfig { port: 0, seed: 1, object: "T".to_owned() });
     let server = server.unwrap();
     let address = server.address();
     std::thread::spawn(move || server.run());
@@ -103,32 +99,18 @@ fn foreign_hosts_and_origins_are_refused() {
     for host in ["Host: evil.example", "Host: 127.0.0.1:1", "X-Host: none"] {
         assert_eq!(status(&answer(address, "/", &[host])), 403, "{host}");
     }
-    assert_eq!(
-        status(&answer(address, "/", &[&format!("Host: evil.example:{port}")])),
-        403
-    );
+    assert_eq!(status(&answer(address, "/", &[&format!("Host: evil.example:{port}")])), 403);
     for origin in ["http://evil.example", "null", "https://127.0.0.1"] {
-        assert_eq!(
-            status(&answer(address, "/live.js", &[&own_host, &format!("Origin: {origin}")])),
-            403,
-            "{origin}"
-        );
+        assert_eq!(status(&answer(address, "/live.js", &[&own_host, &format!("Origin: {origin}")])), 403, "{origin}");
     }
     for (host, origin) in [
         (format!("127.0.0.1:{port}"), Some("http://evil.example".to_owned())),
         (format!("127.0.0.1:{port}"), None),
         (format!("127.0.0.1:{port}"), Some("null".to_owned())),
         (format!("127.0.0.1:{port}"), Some(format!("http://evil.example:{port}"))),
-        (
-            format!("evil.example:{port}"),
-            Some(format!("http://evil.example:{port}")),
-        ),
+        (format!("evil.example:{port}"), Some(format!("http://evil.example:{port}"))),
     ] {
-        assert_eq!(
-            open(address, &host, origin.as_deref()).map(drop),
-            Err(403),
-            "{host} {origin:?}"
-        );
+        assert_eq!(open(address, &host, origin.as_deref()).map(drop), Err(403), "{host} {origin:?}");
     }
     for name in ["127.0.0.1", "localhost", "[::1]"] {
         let host = format!("{name}:{port}");
@@ -145,32 +127,14 @@ fn bad_messages_are_answered_and_the_skin_goes_on() {
         ("{", "message: "),
         ("[]", "message: "),
         ("{\"type\":\"shout\"}", "unknown variant"),
-        (
-            "{\"type\":\"press\",\"x_mm\":NaN,\"y_mm\":0,\"force_n\":1}",
-            "message: ",
-        ),
-        (
-            "{\"type\":\"press\",\"x_mm\":1e999,\"y_mm\":0,\"force_n\":1}",
-            "message: ",
-        ),
-        (
-            "{\"type\":\"press\",\"x_mm\":0,\"y_mm\":0,\"force_n\":1e9}",
-            "`force_n` = 1000000000",
-        ),
+        ("{\"type\":\"press\",\"x_mm\":NaN,\"y_mm\":0,\"force_n\":1}", "message: "),
+        ("{\"type\":\"press\",\"x_mm\":1e999,\"y_mm\":0,\"force_n\":1}", "message: "),
+        ("{\"type\":\"press\",\"x_mm\":0,\"y_mm\":0,\"force_n\":1e9}", "`force_n` = 1000000000"),
         ("{\"type\":\"press\",\"x_mm\":0,\"y_mm\":0}", "missing field"),
-        (
-            "{\"type\":\"measurements\",\"count\":0}",
-            "`count` = 0 is outside [5, 100]",
-        ),
+        ("{\"type\":\"measurements\",\"count\":0}", "`count` = 0 is outside [5, 100]"),
         ("{\"type\":\"measurements\",\"count\":-3}", "message: "),
-        (
-            "{\"type\":\"panel\",\"panel\":0,\"decoder\":\"x\",\"rows\":\"random\",\"more\":1}",
-            "more",
-        ),
-        (
-            &format!("{{\"type\":\"object\",\"name\":\"{}\"}}", "x".repeat(5000)),
-            "bytes is outside [0, 4096]",
-        ),
+        ("{\"type\":\"panel\",\"panel\":0,\"decoder\":\"x\",\"rows\":\"random\",\"more\":1}", "more"),
+        (&format!("{{\"type\":\"object\",\"name\":\"{}\"}}", "x".repeat(5000)), "bytes is outside [0, 4096]"),
     ] {
         say(&mut socket, text);
         let error = next(&mut socket, "error");
@@ -187,15 +151,9 @@ fn a_flood_of_messages_does_not_stop_the_updates() {
     let mut socket = own(server());
     next(&mut socket, "hello");
     for k in 0..1000 {
-        say(
-            &mut socket,
-            &format!("{{\"type\":\"press\",\"x_mm\":{},\"y_mm\":0,\"force_n\":20}}", k % 50),
-        );
+        say(&mut socket, &format!("{{\"type\":\"press\",\"x_mm\":{},\"y_mm\":0,\"force_n\":20}}", k % 50));
         say(&mut socket, "{\"type\":\"object\",\"name\":\"tennis\"}");
-        say(
-            &mut socket,
-            &format!("{{\"type\":\"readout\",\"profile\":\"as_built\",\"noise\":{}}}", k % 10),
-        );
+        say(&mut socket, &format!("{{\"type\":\"readout\",\"profile\":\"as_built\",\"noise\":{}}}", k % 10));
     }
     say(&mut socket, "{\"type\":\"object\",\"name\":\"tape\"}");
     while !next(&mut socket, "shape").contains("\"name\":\"tape\"") {}
@@ -243,10 +201,7 @@ fn no_more_pages_than_eight_are_served() {
 fn a_mesh_presses_and_a_broken_one_is_refused() {
     let mut socket = own(server());
     let mut drop_file = |name: &str, bytes: &[u8], kind: &str| {
-        say(
-            &mut socket,
-            &format!("{{\"type\":\"mesh\",\"name\":\"{name}\",\"unit\":\"guess\"}}"),
-        );
+        say(&mut socket, &format!("{{\"type\":\"mesh\",\"name\":\"{name}\",\"unit\":\"guess\"}}"));
         socket.send(Message::binary(bytes.to_vec())).unwrap();
         next(&mut socket, kind)
     };

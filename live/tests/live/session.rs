@@ -19,25 +19,15 @@ fn press(x_mm: f64, y_mm: f64, force_n: f64) -> Request {
 }
 
 fn panel(panel: usize, decoder: &str, rows: &str) -> Request {
-    Request::Panel {
-        panel,
-        decoder: decoder.to_owned(),
-        rows: rows.to_owned(),
-    }
+    Request::Panel { panel, decoder: decoder.to_owned(), rows: rows.to_owned() }
 }
 
 fn readout(profile: &str, noise: f64) -> Request {
-    Request::Readout {
-        profile: profile.to_owned(),
-        noise,
-    }
+    Request::Readout { profile: profile.to_owned(), noise }
 }
 
 fn fault(taxel: u32, name: &str) -> Request {
-    Request::Fault {
-        taxel,
-        name: Some(name.to_owned()),
-    }
+    Request::Fault { taxel, name: Some(name.to_owned()) }
 }
 
 /// Asks, waits for decoders and rows, and gives the frame after `steps` updates, without its times.
@@ -87,11 +77,7 @@ fn a_quiet_wire_with_all_rows_shows_the_touch() {
 #[test]
 fn designed_rows_see_more_than_random_ones() {
     let mean = |rows: &str| {
-        let requests = vec![
-            press(0.0, 0.0, 20.0),
-            panel(0, "nn_lmmse", rows),
-            panel(1, "nn_lmmse", rows),
-        ];
+        let requests = vec![press(0.0, 0.0, 20.0), panel(0, "nn_lmmse", rows), panel(1, "nn_lmmse", rows)];
         let mut session = session(2);
         shown(&mut session, requests, 20);
         let ious = (0..40).filter_map(|_| session.step().unwrap().panels[0].iou);
@@ -105,11 +91,7 @@ fn designed_rows_see_more_than_random_ones() {
 #[test]
 fn a_lifted_object_has_no_score() {
     let mut session = session(0);
-    assert!(
-        shown(&mut session, vec![press(0.0, 0.0, 20.0)], 20).panels[0]
-            .iou
-            .is_some()
-    );
+    assert!(shown(&mut session, vec![press(0.0, 0.0, 20.0)], 20).panels[0].iou.is_some());
     let lifted = shown(&mut session, vec![press(0.0, 0.0, 0.0)], 40);
     assert!(lifted.touched.is_empty() && lifted.panels.iter().all(|panel| panel.iou.is_none()));
 }
@@ -123,43 +105,22 @@ fn a_broken_cell_is_heard_on_the_wire() {
         line.volts.iter().map(|v| (v - line.idle_v).abs()).fold(0.0, f64::max)
     };
     let mut session = session(0);
-    let finger = Request::Object {
-        name: "finger".to_owned(),
-    };
+    let finger = Request::Object { name: "finger".to_owned() };
     // row 4, column 5: just above and to the right of the middle
     let whole = loud(&mut session, vec![finger, readout("ideal", 1.0), press(7.5, 7.5, 8.0)]);
     let broken = loud(&mut session, vec![fault(45, "detached")]);
     let mended = loud(&mut session, vec![Request::MendAll]);
-    assert!(
-        broken < 0.1 * whole && mended > 0.9 * whole,
-        "{whole} V, {broken} V, {mended} V"
-    );
+    assert!(broken < 0.1 * whole && mended > 0.9 * whole, "{whole} V, {broken} V, {mended} V");
 }
 
 #[test]
 fn every_fault_goes_with_every_readout_and_all_rows() {
     let mut session = session(0);
     for profile in ["ideal", "as_built", "as_published", "as_designed"] {
-        for name in [
-            "dead",
-            "stuck",
-            "mis_seeded",
-            "overdriven",
-            "skipping_clocks",
-            "drifting",
-            "detached",
-        ] {
-            let requests = vec![
-                readout(profile, 10.0),
-                fault(44, name),
-                fault(0, name),
-                press(0.0, 0.0, 20.0),
-            ];
+        for name in ["dead", "stuck", "mis_seeded", "overdriven", "skipping_clocks", "drifting", "detached"] {
+            let requests = vec![readout(profile, 10.0), fault(44, name), fault(0, name), press(0.0, 0.0, 20.0)];
             let frame = shown(&mut session, requests, 2);
-            assert!(
-                frame.lines.iter().flat_map(|line| &line.volts).all(|v| v.is_finite()),
-                "{profile}, {name}"
-            );
+            assert!(frame.lines.iter().flat_map(|line| &line.volts).all(|v| v.is_finite()), "{profile}, {name}");
         }
     }
 }
@@ -199,24 +160,11 @@ fn nonsense_is_refused_with_field_and_range_and_changes_nothing() {
 /// Every decoder that is offered has an image; the mixture of shapes learns for longer than all others.
 #[test]
 fn every_decoder_that_is_offered_has_an_image() {
-    let said = session(0)
-        .apply(panel(0, "?", "random"))
-        .map(drop)
-        .unwrap_err()
-        .to_string();
+    let said = session(0).apply(panel(0, "?", "random")).map(drop).unwrap_err().to_string();
     let (_, known) = said.split_once("; valid: ").unwrap();
     for name in known.split(", ").filter(|name| *name != "mixture") {
-        let frame = shown(
-            &mut session(0),
-            vec![press(0.0, 0.0, 20.0), panel(0, name, "random")],
-            10,
-        );
-        assert_eq!(
-            frame.panels[0].image.len(),
-            100,
-            "{name}: {:?}",
-            frame.panels[0].waits_for
-        );
+        let frame = shown(&mut session(0), vec![press(0.0, 0.0, 20.0), panel(0, name, "random")], 10);
+        assert_eq!(frame.panels[0].image.len(), 100, "{name}: {:?}", frame.panels[0].waits_for);
     }
 }
 

@@ -179,9 +179,7 @@ impl Velostat {
             return self.warmth * self.unloaded_s;
         }
         let (operators, branches) = (self.hysteresis.operators(), self.creep.branches());
-        let effective_pa = self
-            .hysteresis
-            .respond(pressure_pa, &mut self.plays[k * operators..(k + 1) * operators]);
+        let effective_pa = self.hysteresis.respond(pressure_pa, &mut self.plays[k * operators..(k + 1) * operators]);
         let elastic_s = self.law.conductance_s(effective_pa);
         let slow = &mut self.slow[k * branches..(k + 1) * branches];
         let crept_s = self.creep.respond(pressure_pa, elastic_s, &self.decays, slow);
@@ -193,13 +191,7 @@ impl Velostat {
 impl Transducer for Velostat {
     fn step(&mut self, pressure: &PressureMap, dt_s: f64, out: &mut ConductanceMap) {
         self.creep.set_step(elapsed_s(dt_s), &mut self.decays);
-        for (k, (out, &p)) in out
-            .values_mut()
-            .iter_mut()
-            .zip(pressure.values())
-            .enumerate()
-            .take(self.taxels.len())
-        {
+        for (k, (out, &p)) in out.values_mut().iter_mut().zip(pressure.values()).enumerate().take(self.taxels.len()) {
             *out = self.respond(k, loaded_pa(p));
         }
     }
@@ -216,15 +208,9 @@ impl Transducer for Velostat {
     }
 
     fn start_session(&mut self, session: u64) {
-        let gains = self
-            .session
-            .gains(self.fixed.len(), self.streams, "velostat/session", session);
+        let gains = self.session.gains(self.fixed.len(), self.streams, "velostat/session", session);
         let presses = self.conditioning.fresh();
-        let taxel = |(fixed, session)| Taxel {
-            gain: fixed * session,
-            presses,
-            loaded: false,
-        };
+        let taxel = |(fixed, session)| Taxel { gain: fixed * session, presses, loaded: false };
         self.taxels = self.fixed.iter().zip(gains).map(taxel).collect();
         self.plays.fill(0.0);
         self.slow.fill(0.0);
@@ -259,11 +245,7 @@ impl PressureLaw {
         in_interval("reference_s", reference_s, "(0, 1]")?;
         in_interval("exponent", exponent, "[0.05, 2]")?;
         in_interval("saturation_pa", saturation_pa, "[1, 1e12]")?;
-        Ok(Self {
-            reference_s,
-            exponent,
-            saturation_pa,
-        })
+        Ok(Self { reference_s, exponent, saturation_pa })
     }
 
     /// Conductance under `pressure_pa` ≥ 0, S.
@@ -342,10 +324,7 @@ mod tests {
     fn the_spread_is_fixed_and_a_session_adds_to_it() {
         let skin = SkinLayout::new(100, 100, 15e-3, 10e-3).unwrap();
         let sheet = |seed, session_log_sd, session| {
-            let config = VelostatConfig {
-                session_log_sd,
-                ..VelostatConfig::default()
-            };
+            let config = VelostatConfig { session_log_sd, ..VelostatConfig::default() };
             let mut sheet = Velostat::new(config, &skin, Streams::new(seed)).unwrap();
             sheet.start_session(session);
             sheet.gains().collect::<Vec<_>>()
@@ -359,11 +338,7 @@ mod tests {
         // sessions only theirs are left. Standard error of the log-sd of n taxels: σ/√(2n); five of them.
         let log_sd = |pairs: &mut dyn Iterator<Item = f64>| (pairs.map(|g| g.ln().powi(2)).sum::<f64>() / 1e4).sqrt();
         let (total, between) = (0.30_f64.hypot(0.15), 0.15 * 2.0_f64.sqrt());
-        assert_relative_eq!(
-            log_sd(&mut a.iter().copied()),
-            total,
-            epsilon = 5.0 * total / (2e4_f64).sqrt()
-        );
+        assert_relative_eq!(log_sd(&mut a.iter().copied()), total, epsilon = 5.0 * total / (2e4_f64).sqrt());
         let ratios = &mut a.iter().zip(&b).map(|(a, b)| a / b);
         assert_relative_eq!(log_sd(ratios), between, epsilon = 5.0 * between / (2e4_f64).sqrt());
     }
@@ -373,23 +348,10 @@ mod tests {
     fn a_warm_sheet_conducts_less() {
         let skin = SkinLayout::default();
         let sum_v = |temperature_c| {
-            let config = VelostatConfig {
-                temperature_c,
-                unloaded_s: 1e-6,
-                ..VelostatConfig::default()
-            };
-            volts(
-                &mut Velostat::new(config, &skin, Streams::new(1)).unwrap(),
-                &skin,
-                20e3,
-                1.0,
-            )
+            let config = VelostatConfig { temperature_c, unloaded_s: 1e-6, ..VelostatConfig::default() };
+            volts(&mut Velostat::new(config, &skin, Streams::new(1)).unwrap(), &skin, 20e3, 1.0)
         };
-        assert_relative_eq!(
-            sum_v(45.0) / sum_v(25.0),
-            (-0.004 * 20.0_f64).exp(),
-            max_relative = 1e-14
-        );
+        assert_relative_eq!(sum_v(45.0) / sum_v(25.0), (-0.004 * 20.0_f64).exp(), max_relative = 1e-14);
     }
 
     /// Memory persists: the first press is the weakest, and each later one gains a little.
@@ -413,11 +375,7 @@ mod tests {
     fn the_law_has_its_limits() {
         let law = PressureLaw::new(1e-4, 0.5, 1e12).unwrap();
         assert_relative_eq!(law.conductance_s(REFERENCE_PA), 1e-4, max_relative = 1e-8);
-        assert_relative_eq!(
-            law.conductance_s(4e4) / law.conductance_s(1e4),
-            2.0,
-            max_relative = 1e-7
-        );
+        assert_relative_eq!(law.conductance_s(4e4) / law.conductance_s(1e4), 2.0, max_relative = 1e-7);
         let law = PressureLaw::new(1e-4, 0.5, 4e4).unwrap();
         assert_relative_eq!(law.conductance_s(1e9), 2e-4, max_relative = 0.5 * 4e4 / 1e9);
         assert!(law.conductance_s(0.0) <= 0.0);

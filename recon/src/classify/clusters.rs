@@ -129,10 +129,7 @@ pub(super) fn wide(model: &ClusterModel, images: &Matrix, label: usize) -> Resul
     component.mean = vec![0.0; n];
     component.factors = factors;
     component.noise_variance = model.noise.powi(2) + rest;
-    Ok(Clusters {
-        components: vec![component],
-        priors: vec![prior],
-    })
+    Ok(Clusters { components: vec![component], priors: vec![prior] })
 }
 
 impl Clusters {
@@ -208,10 +205,9 @@ fn members(units: &[Vec<f64>], mut centres: Vec<Vec<f64>>) -> Vec<Vec<usize>> {
         let squares: Vec<f64> = centres.iter().map(|c| dot(c, c)).collect();
         let nearest = |unit: &Vec<f64>| {
             let each = centres.iter().zip(&squares).map(|(c, s)| distance(unit, c, 1.0 + s));
-            let best = each.enumerate().fold(
-                (0, f64::INFINITY),
-                |best, (k, d)| if d < best.1 { (k, d) } else { best },
-            );
+            let best = each
+                .enumerate()
+                .fold((0, f64::INFINITY), |best, (k, d)| if d < best.1 { (k, d) } else { best });
             best.0
         };
         let of: Vec<usize> = units.par_iter().map(nearest).collect();
@@ -231,8 +227,7 @@ fn members(units: &[Vec<f64>], mut centres: Vec<Vec<f64>>) -> Vec<Vec<usize>> {
 
 fn mean(units: &[Vec<f64>], own: &[usize]) -> Vec<f64> {
     let mut mean = vec![0.0; units[0].len()];
-    own.iter()
-        .for_each(|&k| axpy(1.0 / own.len() as f64, &units[k], &mut mean));
+    own.iter().for_each(|&k| axpy(1.0 / own.len() as f64, &units[k], &mut mean));
     mean
 }
 
@@ -242,24 +237,13 @@ mod tests {
     use crate::checks::says;
     use rand::SeedableRng as _;
 
-    const MODEL: ClusterModel = ClusterModel {
-        clusters: 2,
-        gain: 0.5,
-        floor: 0.1,
-        noise: 0.2,
-        rank: 1,
-    };
+    const MODEL: ClusterModel = ClusterModel { clusters: 2, gain: 0.5, floor: 0.1, noise: 0.2, rank: 1 };
 
     /// Two kinds of images, of any length: two components, each with the mean of its kind, the gains and the floor.
     #[test]
     fn kinds_of_images_are_components() {
-        let columns: Vec<&[f64]> = vec![
-            &[2.0, 0.0, 0.0],
-            &[0.0, 0.3, 0.4],
-            &[0.0, 6.0, 8.0],
-            &[0.0; 3],
-            &[5.0, 0.0, 0.0],
-        ];
+        let columns: Vec<&[f64]> =
+            vec![&[2.0, 0.0, 0.0], &[0.0, 0.3, 0.4], &[0.0, 6.0, 8.0], &[0.0; 3], &[5.0, 0.0, 0.0]];
         let images = Matrix::from_column_slices(3, &columns);
         let found = MODEL.learn(&images, 7, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
         assert_eq!(found.components.len(), 2);
@@ -297,11 +281,8 @@ mod tests {
     fn images_without_a_contact_are_refused() {
         let refused = MODEL.learn(&Matrix::zeros(3, 2), 0, &mut ChaCha8Rng::seed_from_u64(1));
         assert!(refused.unwrap_err().to_string().contains("image 0 has no value"));
-        let refused = ClusterModel {
-            gain: f64::NAN,
-            ..MODEL
-        }
-        .learn(&Matrix::zeros(3, 2), 0, &mut ChaCha8Rng::seed_from_u64(1));
+        let refused =
+            ClusterModel { gain: f64::NAN, ..MODEL }.learn(&Matrix::zeros(3, 2), 0, &mut ChaCha8Rng::seed_from_u64(1));
         assert!(says(&refused, "is outside"));
     }
 }

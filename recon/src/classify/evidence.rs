@@ -200,10 +200,7 @@ impl EvidenceClassifier {
                 best = k;
             }
         }
-        Decision {
-            label: self.outcomes[best],
-            probability: posterior.probabilities[best],
-        }
+        Decision { label: self.outcomes[best], probability: posterior.probabilities[best] }
     }
 
     /// Log evidence of every outcome, and the share of every component in its outcome's.
@@ -328,10 +325,7 @@ impl ImageEstimator {
     /// [`Refusal`] if `noise` is outside (0, ∞).
     pub fn new(priors: Vec<Gaussian>, noise: f64) -> Result<Self, Refusal> {
         let lmmse = |prior| Lmmse::new(Arc::new(prior), Noise::Absolute(noise));
-        Ok(Self {
-            components: priors.into_iter().map(lmmse).collect::<Result<_, _>>()?,
-            non_negative: None,
-        })
+        Ok(Self { components: priors.into_iter().map(lmmse).collect::<Result<_, _>>()?, non_negative: None })
     }
 
     /// An estimator of non-negative images: the mean of the most probable non-negative images of the `most` (at least
@@ -384,11 +378,7 @@ impl ImageEstimator {
         phi: MatrixView<'_>,
         y: &[f64],
         workspace: &mut Workspace,
-        ImageScratch {
-            scaled,
-            solution,
-            order,
-        }: &mut ImageScratch,
+        ImageScratch { scaled, solution, order }: &mut ImageScratch,
         image: &mut [f64],
     ) -> Result<(), Refusal> {
         image.fill(0.0);

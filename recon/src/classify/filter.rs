@@ -174,8 +174,7 @@ impl Preparation {
     /// 0.
     pub(super) fn log_determinants(&self, rows: usize) -> &[f64] {
         let lanes = self.shape.lanes();
-        rows.checked_sub(1)
-            .map_or(&[], |last| &self.log_determinants[last * lanes..][..lanes])
+        rows.checked_sub(1).map_or(&[], |last| &self.log_determinants[last * lanes..][..lanes])
     }
 }
 

@@ -110,11 +110,7 @@ impl Src {
         let mut classes = library.labels.clone();
         classes.sort_unstable();
         classes.dedup();
-        Self {
-            library,
-            pursuit: ReferenceOmp::new(n_nonzero_coefs),
-            classes,
-        }
+        Self { library, pursuit: ReferenceOmp::new(n_nonzero_coefs), classes }
     }
 
     /// The labelled images.
@@ -140,11 +136,7 @@ impl Src {
         let mut best = None;
         for &class in &self.classes {
             members.clear();
-            let pairs = solution
-                .support
-                .iter()
-                .copied()
-                .zip(solution.coefficients.iter().copied());
+            let pairs = solution.support.iter().copied().zip(solution.coefficients.iter().copied());
             members.extend(pairs.filter(|(k, _)| self.library.labels[*k] == class));
             if members.is_empty() {
                 continue;

@@ -58,13 +58,7 @@ const FLOOR: f64 = 0.025;
 impl TemplateModel {
     /// Values for presses that are repeated accurately. `noise` also covers the differences between sessions.
     pub fn new(cols: usize) -> Self {
-        Self {
-            cols,
-            gains: Vec::new(),
-            noise: 0.4,
-            rank: 8,
-            reach: 0,
-        }
+        Self { cols, gains: Vec::new(), noise: 0.4, rank: 8, reach: 0 }
     }
 
     /// Values for a classifier with the outcome "unknown". Its classes are so wide that an unusual press of an object
@@ -100,10 +94,7 @@ impl TemplateModel {
     /// zero.
     pub fn classes(&self, library: &Library) -> Result<Vec<Component>, Refusal> {
         let places = self.places(library, self.reach)?;
-        Ok(places
-            .into_iter()
-            .map(|(label, mean)| self.component(label, mean))
-            .collect())
+        Ok(places.into_iter().map(|(label, mean)| self.component(label, mean)).collect())
     }
 
     /// The components of [`Self::classes`] as full Gaussians, in the same order, for [`super::ImageEstimator`].
@@ -169,9 +160,7 @@ impl TemplateModel {
     fn moments(&self, library: &Library) -> Result<(Vec<f64>, DMatrix<f64>), Refusal> {
         let all = self.places(library, 1)?;
         let (n, count) = (library.images().nrows(), all.len() as f64);
-        let mean: Vec<f64> = (0..n)
-            .map(|i| all.iter().map(|(_, image)| image[i]).sum::<f64>() / count)
-            .collect();
+        let mean: Vec<f64> = (0..n).map(|i| all.iter().map(|(_, image)| image[i]).sum::<f64>() / count).collect();
         let centred = DMatrix::from_fn(n, all.len(), |i, k| all[k].1[i] - mean[i]);
         Ok((mean, &centred * centred.transpose() / count))
     }
@@ -232,14 +221,9 @@ pub(super) fn principal(covariance: DMatrix<f64>, rank: usize) -> (Vec<Vec<f64>>
     // rounding may leave a zero eigenvalue a little below zero
     let value = |k: usize| eigen.eigenvalues[k].max(0.0);
     let (kept, left) = order.split_at(rank.min(order.len()));
-    let factors = kept.iter().map(|&k| {
-        eigen
-            .eigenvectors
-            .column(k)
-            .iter()
-            .map(|v| v * value(k).sqrt())
-            .collect()
-    });
+    let factors = kept
+        .iter()
+        .map(|&k| eigen.eigenvectors.column(k).iter().map(|v| v * value(k).sqrt()).collect());
     (factors.collect(), left.iter().map(|&k| value(k)).sum())
 }
 
@@ -250,10 +234,7 @@ mod tests {
     /// The priors are the stated Σ, independent part included, in the order of the classes.
     #[test]
     fn image_priors_are_the_stated_covariance() {
-        let model = TemplateModel {
-            reach: 1,
-            ..TemplateModel::new(4)
-        };
+        let model = TemplateModel { reach: 1, ..TemplateModel::new(4) };
         let library = library();
         let (classes, priors) = (model.classes(&library).unwrap(), model.image_priors(&library).unwrap());
         // nine shifts
@@ -274,10 +255,7 @@ mod tests {
     /// With every eigenvector kept, F Fᵀ is the smooth part and the rest is white: together the stated Σ's trace.
     #[test]
     fn covariance_is_the_stated_one() {
-        let model = TemplateModel {
-            rank: 12,
-            ..TemplateModel::new(4)
-        };
+        let model = TemplateModel { rank: 12, ..TemplateModel::new(4) };
         let c = &model.classes(&library()).unwrap()[0];
         let (t, a) = (&c.mean, model.blur(&c.mean));
         assert!((t.iter().copied().fold(0.0, f64::max) - 1.0).abs() < 1e-15);
@@ -291,17 +269,8 @@ mod tests {
         }
         let square: f64 = a.iter().map(|v| v * v).sum();
         let white = 0.16 + 0.2 * 0.22_f64.powi(2) * square + 12.0 * 0.025_f64.powi(2);
-        assert!(
-            (c.noise_variance - white).abs() < 1e-14,
-            "{} for {white}",
-            c.noise_variance
-        );
-        let fewer = TemplateModel {
-            rank: 2,
-            ..model.clone()
-        }
-        .classes(&library())
-        .unwrap();
+        assert!((c.noise_variance - white).abs() < 1e-14, "{} for {white}", c.noise_variance);
+        let fewer = TemplateModel { rank: 2, ..model.clone() }.classes(&library()).unwrap();
         let trace = |c: &Component| c.factors.iter().flatten().map(|v| v * v).sum::<f64>() + c.noise_variance;
         assert!((trace(&fewer[0]) - trace(c)).abs() < 1e-14);
     }
@@ -309,15 +278,9 @@ mod tests {
     /// Gains of a skin that was not seen add γᵢ² tᵢ² to the variance of taxel i, and nothing between taxels.
     #[test]
     fn gains_of_another_skin_are_independent() {
-        let same = TemplateModel {
-            rank: 12,
-            ..TemplateModel::new(4)
-        };
+        let same = TemplateModel { rank: 12, ..TemplateModel::new(4) };
         let gains: Vec<f64> = (0..12).map(|i| 0.1 * f64::from(i)).collect();
-        let other = TemplateModel {
-            gains: gains.clone(),
-            ..same.clone()
-        };
+        let other = TemplateModel { gains: gains.clone(), ..same.clone() };
         let [a, b] = [same, other].map(|model| model.classes(&library()).unwrap().remove(0));
         for i in 0..12 {
             for j in 0..12 {

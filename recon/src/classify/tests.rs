@@ -72,10 +72,7 @@ fn direct(c: &Component, phi: &Matrix, y: &[f64]) -> (f64, Vec<f64>) {
     let peak = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let weights: Vec<f64> = values.iter().map(|v| (v - peak).exp()).collect();
     let sum: f64 = weights.iter().sum();
-    let image = weights
-        .iter()
-        .zip(&images)
-        .fold(DVector::zeros(n), |a, (w, x)| a + x * (w / sum));
+    let image = weights.iter().zip(&images).fold(DVector::zeros(n), |a, (w, x)| a + x * (w / sum));
     (peak + (sum / f64::from(steps)).ln(), image.as_slice().to_vec())
 }
 
@@ -98,10 +95,7 @@ fn one_component_equals_its_definition() {
         // the amplitude's nodes cut a tail of few measurements (see `amplitude`): 2e-4 at M = 5, 2e-6 at 30
         let tolerance = 2e-3 * (-f64::from(u32::try_from(m).unwrap()) / 5.0).exp();
         let got = posterior.log_evidence[0];
-        assert!(
-            (got - expected).abs() < tolerance,
-            "M = {m}, rank {rank}: {got}, expected {expected}"
-        );
+        assert!((got - expected).abs() < tolerance, "M = {m}, rank {rank}: {got}, expected {expected}");
         assert_eq!((decision.label, decision.probability), (Some(4), 1.0));
         let covariance = DMatrix::from_fn(9, 9, |i, j| {
             let smooth: f64 = c.factors.iter().map(|f| f[i] * f[j]).sum();
@@ -115,10 +109,7 @@ fn one_component_equals_its_definition() {
             .estimate(&posterior, phi.view(), &y, &mut Workspace::default(), &mut image)
             .unwrap();
         for (g, e) in image.iter().zip(&expected_image) {
-            assert!(
-                (g - e).abs() < 1e-6 + 10.0 * tolerance,
-                "M = {m}, rank {rank}: image {g}, expected {e}"
-            );
+            assert!((g - e).abs() < 1e-6 + 10.0 * tolerance, "M = {m}, rank {rank}: image {g}, expected {e}");
         }
     }
 }
@@ -141,11 +132,7 @@ fn mixtures_follow_bayes() {
     };
     let e: Vec<f64> = components.iter().map(alone).collect();
     let by_outcome = [e[1], (e[0] + 2.5 * e[3] + e[4]) / 4.5, e[2]];
-    let weighted: Vec<f64> = by_outcome
-        .iter()
-        .zip([0.475, 0.475, 0.05])
-        .map(|(e, p)| p * e)
-        .collect();
+    let weighted: Vec<f64> = by_outcome.iter().zip([0.475, 0.475, 0.05]).map(|(e, p)| p * e).collect();
     let sum: f64 = weighted.iter().sum();
     for k in 0..3 {
         assert!((posterior.log_evidence[k] - by_outcome[k].ln()).abs() < 1e-10);
@@ -166,10 +153,7 @@ fn windows_add_their_evidence() {
     assert_eq!(evidence.count(), 0);
     classifier.decide(&preparation, &evidence, &mut posterior);
     for (empty, once) in posterior.log_evidence.iter().zip(&once) {
-        assert!(
-            (empty - once).abs() < 1e-12 * once.abs(),
-            "an empty window says nothing"
-        );
+        assert!((empty - once).abs() < 1e-12 * once.abs(), "an empty window says nothing");
     }
     for y in &y {
         evidence.observe(&preparation, *y).unwrap();
@@ -214,10 +198,7 @@ fn refuses_what_it_cannot_use() {
     let (classifier, _) = planted();
     let (mut preparation, mut evidence) = (classifier.preparation(), classifier.evidence());
     let before = evidence.clone();
-    assert!(says(
-        &evidence.observe(&preparation, 1.0),
-        "measurement 0 arrived, but only 0 rows"
-    ));
+    assert!(says(&evidence.observe(&preparation, 1.0), "measurement 0 arrived, but only 0 rows"));
     let width = classifier.bank().ncols();
     assert!(preparation.push(&vec![1.0; width - 1]).is_err());
     assert!(preparation.push(&vec![f64::NAN; width]).is_err());
@@ -229,16 +210,10 @@ fn refuses_what_it_cannot_use() {
     let mut rng = ChaCha8Rng::seed_from_u64(7);
     let good = component(&mut rng, Some(1), 4, 1);
     let other = EvidenceClassifier::new(std::slice::from_ref(&good), range(), 0.1).unwrap();
-    assert!(
-        other.evidence().observe(&preparation, 1.0).is_err(),
-        "another classifier's preparation"
-    );
+    assert!(other.evidence().observe(&preparation, 1.0).is_err(), "another classifier's preparation");
     let new = |c: &[Component]| EvidenceClassifier::new(c, range(), 0.1);
     assert!(new(&[]).unwrap_err().to_string().contains("there is no component"));
-    let bad = Component {
-        factors: vec![vec![1.0; 3]],
-        ..good.clone()
-    };
+    let bad = Component { factors: vec![vec![1.0; 3]], ..good.clone() };
     assert!(new(&[good, bad]).is_err());
 }
 
@@ -257,24 +232,14 @@ impl PlantedWindow {
             .flat_map(|s| (0..image.len()).map(move |i| if s >> i & 1 == 1 { 1.0 } else { -1.0 }));
         let phi = Matrix::from_rows(m, image.len(), weights.collect()).unwrap();
         let signal = |row: &[f64]| -> f64 { row.iter().zip(image).map(|(a, b)| a * b).sum() };
-        let y = (0..m)
-            .map(|r| amplitude * (signal(phi.row(r)) + noise * normal(&mut rng)))
-            .collect();
+        let y = (0..m).map(|r| amplitude * (signal(phi.row(r)) + noise * normal(&mut rng))).collect();
         Self { phi, y }
     }
 }
 
 pub(super) fn planted() -> (EvidenceClassifier, Vec<Vec<f64>>) {
-    let shape = |taxels: &[usize]| {
-        (0..36)
-            .map(|i| if taxels.contains(&i) { 1.0 } else { 0.0 })
-            .collect::<Vec<f64>>()
-    };
-    let images = vec![
-        shape(&[7, 8, 13, 14]),
-        shape(&[21, 22, 23, 24, 27, 28]),
-        shape(&[10, 16, 22, 28]),
-    ];
+    let shape = |taxels: &[usize]| (0..36).map(|i| if taxels.contains(&i) { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
+    let images = vec![shape(&[7, 8, 13, 14]), shape(&[21, 22, 23, 24, 27, 28]), shape(&[10, 16, 22, 28])];
     let library = Library::new(&Matrix::from_column_slices(36, &images), &[3, 1, 2]).unwrap();
     let model = TemplateModel::new(6);
     let mut components = model.classes(&library).unwrap();
@@ -321,31 +286,13 @@ fn noise_is_unknown() {
 fn degenerate_measurements_stay_finite() {
     let (classifier, _) = planted();
     let ones = Matrix::from_rows(4, 36, vec![1.0; 144]).unwrap();
-    for y in [
-        &[][..],
-        &[1.0],
-        &[0.0],
-        &[0.0; 4],
-        &[1e-300; 4],
-        &[1e79, -1e79, 1e79, 1e79],
-        &[-1e-79; 4],
-    ] {
+    for y in [&[][..], &[1.0], &[0.0], &[0.0; 4], &[1e-300; 4], &[1e79, -1e79, 1e79, 1e79], &[-1e-79; 4]] {
         let (_, _, posterior, decision) = run(&classifier, &ones, y);
-        assert!(
-            decision.probability.is_finite() && decision.probability > 0.0,
-            "{y:?}: {decision:?}"
-        );
-        assert!(
-            (posterior.probabilities.iter().sum::<f64>() - 1.0).abs() < 1e-12,
-            "{y:?}"
-        );
+        assert!(decision.probability.is_finite() && decision.probability > 0.0, "{y:?}: {decision:?}");
+        assert!((posterior.probabilities.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{y:?}");
     }
     let (_, _, prior, _) = run(&classifier, &ones, &[]);
-    for (p, expected) in prior
-        .probabilities
-        .iter()
-        .zip([0.95 / 3.0, 0.95 / 3.0, 0.95 / 3.0, 0.05])
-    {
+    for (p, expected) in prior.probabilities.iter().zip([0.95 / 3.0, 0.95 / 3.0, 0.95 / 3.0, 0.05]) {
         assert!((p - expected).abs() < 1e-12, "{prior:?}");
     }
 }
@@ -354,12 +301,7 @@ fn degenerate_measurements_stay_finite() {
 fn takes_the_class_whose_images_explain_it() {
     let images = Matrix::from_column_slices(
         4,
-        &[
-            &[1.0, 0.0, 0.0, 0.0],
-            &[1.0, 0.2, 0.0, 0.0],
-            &[0.0; 4],
-            &[0.0, 0.0, 1.0, 1.0],
-        ],
+        &[&[1.0, 0.0, 0.0, 0.0], &[1.0, 0.2, 0.0, 0.0], &[0.0; 4], &[0.0, 0.0, 1.0, 1.0]],
     );
     let classifier = Src::new(Library::new(&images, &[3, 3, 0, 8]).unwrap(), 3);
     let mut work = Workspace::default();

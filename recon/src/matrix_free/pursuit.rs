@@ -78,11 +78,7 @@ impl RegionPursuit {
 
     /// A pursuit of contacts with radii of 1 to 4 taxels in images of `rows` × `cols`.
     pub fn new(rows: usize, cols: usize) -> Self {
-        Self {
-            rows,
-            cols,
-            max_rounds: Self::MAX_ROUNDS,
-        }
+        Self { rows, cols, max_rounds: Self::MAX_ROUNDS }
     }
 
     /// Reconstructs the image of `y`. `start` may be a similar image, such as the previous one of a series.
@@ -162,11 +158,7 @@ impl<'a, A: SelectColumns> Search<'a, A> {
                 residual_norm: norm(&residual),
                 rounds: 0,
                 candidates: 0,
-                descent: Descent {
-                    iterations: 0,
-                    gap: 0.0,
-                    converged: true,
-                },
+                descent: Descent { iterations: 0, gap: 0.0, converged: true },
                 bytes: 0,
             },
             weights,
@@ -202,9 +194,7 @@ impl<'a, A: SelectColumns> Search<'a, A> {
         let shape = (self.pursuit.rows, self.pursuit.cols);
         let before = std::mem::replace(&mut self.candidates, vec![false; self.weights.len()]);
         let largest = self.weights.iter().copied().fold(0.0, f64::max);
-        let support: Vec<usize> = (0..self.weights.len())
-            .filter(|&k| self.weights[k] > 1e-3 * largest)
-            .collect();
+        let support: Vec<usize> = (0..self.weights.len()).filter(|&k| self.weights[k] > 1e-3 * largest).collect();
         for marked in [&support[..], new] {
             dilate(shape, marked, REACH_TAXELS, &mut self.candidates);
         }
@@ -229,11 +219,7 @@ impl<'a, A: SelectColumns> Search<'a, A> {
         let mut part = vec![0.0; grains.taxels().len()];
         grains.apply(&x, &mut part);
         self.found.image.fill(0.0);
-        grains
-            .taxels()
-            .iter()
-            .zip(&part)
-            .for_each(|(&k, v)| self.found.image[k] = *v);
+        grains.taxels().iter().zip(&part).for_each(|(&k, v)| self.found.image[k] = *v);
         self.residual.copy_from_slice(self.y);
         subtract(&columns, &part, &mut self.residual);
         self.found.residual_norm = norm(&self.residual);
@@ -292,9 +278,7 @@ impl Detector {
     /// Score that chance reaches `false_alarms` times in all places and blobs together: the z of a normal tail,
     /// P(Z > z) ≤ e^(−z²/2)/2.
     fn threshold(&self, false_alarms: f64) -> f64 {
-        (2.0 * (0.5 * self.filters() as f64 / false_alarms).ln())
-            .max(0.0)
-            .sqrt()
+        (2.0 * (0.5 * self.filters() as f64 / false_alarms).ln()).max(0.0).sqrt()
     }
 
     /// Places whose best blob scores more than `threshold`, in increasing order. `correlation` is Φᵀ r of a residual,
@@ -419,22 +403,12 @@ impl Grains {
             bump.iter().filter_map(inside)
         };
         let mut touched = vec![false; rows * cols];
-        places
-            .iter()
-            .flat_map(|p| around(*p))
-            .for_each(|(taxel, _)| touched[taxel] = true);
+        places.iter().flat_map(|p| around(*p)).for_each(|(taxel, _)| touched[taxel] = true);
         let taxels: Vec<usize> = (0..rows * cols).filter(|k| touched[*k]).collect();
         let mut row_of = vec![0; rows * cols];
         taxels.iter().enumerate().for_each(|(row, taxel)| row_of[*taxel] = row);
-        let entries = places
-            .iter()
-            .map(|p| around(*p).map(|(taxel, v)| (row_of[taxel], v)).collect())
-            .collect();
-        Self {
-            places,
-            taxels,
-            entries,
-        }
+        let entries = places.iter().map(|p| around(*p).map(|(taxel, v)| (row_of[taxel], v)).collect()).collect();
+        Self { places, taxels, entries }
     }
 
     /// Places of the columns.
@@ -468,9 +442,7 @@ fn bump(sd_taxels: f64) -> Vec<(isize, isize, f64)> {
         _ => (-0.5 * (d as f64 / sd_taxels).powi(2)).exp(),
     };
     let line = || -reach..=reach;
-    let mut bump: Vec<_> = line()
-        .flat_map(|r| line().map(move |c| (r, c, height(r) * height(c))))
-        .collect();
+    let mut bump: Vec<_> = line().flat_map(|r| line().map(move |c| (r, c, height(r) * height(c)))).collect();
     let sum: f64 = bump.iter().map(|(_, _, v)| v).sum();
     bump.iter_mut().for_each(|(_, _, v)| *v /= sum);
     bump
@@ -550,10 +522,7 @@ impl State {
     fn beyond(&self, before: &Self, momentum: f64) -> Self {
         let beyond =
             |now: &[f64], before: &[f64]| now.iter().zip(before).map(|(n, b)| n + momentum * (n - b)).collect();
-        Self {
-            x: beyond(&self.x, &before.x),
-            ax: beyond(&self.ax, &before.ax),
-        }
+        Self { x: beyond(&self.x, &before.x), ax: beyond(&self.ax, &before.ax) }
     }
 
     /// Aᵀ (y − A x).
@@ -579,16 +548,9 @@ impl NnFista {
         check(a, y)?;
         assert_eq!(x.len(), a.ncols(), "a start for every column");
         let mut now = State::at(a, x.iter().map(|v| v.max(0.0)).collect());
-        let mut ahead = State {
-            x: now.x.clone(),
-            ax: now.ax.clone(),
-        };
+        let mut ahead = State { x: now.x.clone(), ax: now.ax.clone() };
         let (mut curvature, mut pace) = (first_curvature(a, y), 1.0_f64);
-        let mut descent = Descent {
-            iterations: 0,
-            gap: f64::INFINITY,
-            converged: false,
-        };
+        let mut descent = Descent { iterations: 0, gap: f64::INFINITY, converged: false };
         while descent.iterations <= self.max_iter {
             if descent.iterations.is_multiple_of(BETWEEN_LOOKS) || descent.iterations == self.max_iter {
                 descent.gap = self.gap(&now, &now.slope(a, y), y);
@@ -603,11 +565,7 @@ impl NnFista {
             let uphill: f64 = (ahead.x.iter().zip(&next.x).zip(&now.x))
                 .map(|((ahead, next), now)| (ahead - next) * (next - now))
                 .sum();
-            let faster = if uphill > 0.0 {
-                1.0
-            } else {
-                0.5 * (1.0 + (1.0 + 4.0 * pace * pace).sqrt())
-            };
+            let faster = if uphill > 0.0 { 1.0 } else { 0.5 * (1.0 + (1.0 + 4.0 * pace * pace).sqrt()) };
             let momentum = if uphill > 0.0 { 0.0 } else { (pace - 1.0) / faster };
             pace = faster;
             ahead = next.beyond(&now, momentum);
@@ -641,11 +599,7 @@ impl NnFista {
             return 0.0;
         }
         let steepest = slope.iter().copied().fold(0.0, f64::max);
-        let shrink = if steepest > self.penalty {
-            self.penalty / steepest
-        } else {
-            1.0
-        };
+        let shrink = if steepest > self.penalty { self.penalty / steepest } else { 1.0 };
         let residual: Vec<f64> = y.iter().zip(&now.ax).map(|(y, v)| y - v).collect();
         let rest: f64 = y.iter().zip(&residual).map(|(y, r)| (y - shrink * r).powi(2)).sum();
         let primal = 0.5 * dot(&residual, &residual) + self.penalty * now.x.iter().sum::<f64>();
@@ -698,9 +652,7 @@ mod tests {
     /// Caps at places that do not touch.
     fn scene(places: &[(usize, usize, f64)]) -> Vec<f64> {
         let mut image = vec![0.0; SIDE * SIDE];
-        places
-            .iter()
-            .for_each(|&(r, c, peak)| place(&mut image, SIDE, 2.0, (r, c), peak));
+        places.iter().for_each(|&(r, c, peak)| place(&mut image, SIDE, 2.0, (r, c), peak));
         image
     }
 
@@ -709,10 +661,7 @@ mod tests {
         let blob = cap(radius);
         let side = blob.len().isqrt();
         for (k, v) in image.iter_mut().enumerate() {
-            let [i, j] = [
-                (k / cols + side / 2).wrapping_sub(r),
-                (k % cols + side / 2).wrapping_sub(c),
-            ];
+            let [i, j] = [(k / cols + side / 2).wrapping_sub(r), (k % cols + side / 2).wrapping_sub(c)];
             if i < side && j < side {
                 *v += peak * blob[i * side + j];
             }
@@ -749,8 +698,7 @@ mod tests {
             phi.apply(&truth, &mut y);
             let sd = 0.05 * norm(&truth);
             // uniform noise of that deviation
-            y.iter_mut()
-                .for_each(|v| *v += sd * 3_f64.sqrt() * rng.random_range(-1.0..1.0));
+            y.iter_mut().for_each(|v| *v += sd * 3_f64.sqrt() * rng.random_range(-1.0..1.0));
             y
         };
         let (y, y_parts) = (noisy(&whole), noisy(&parts));
@@ -768,10 +716,7 @@ mod tests {
     fn extremes_are_images_or_errors() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let phi = signs(SIDE * SIDE, 200, &mut rng);
-        let pursuit = RegionPursuit {
-            max_rounds: 3,
-            ..RegionPursuit::new(SIDE, SIDE)
-        };
+        let pursuit = RegionPursuit { max_rounds: 3, ..RegionPursuit::new(SIDE, SIDE) };
         let nothing = pursuit.recover(&phi, &[0.0; 200], None).unwrap();
         assert!(nothing.image.iter().all(|v| *v == 0.0) && nothing.rounds == 0);
         let truth = scene(&PLACES);
@@ -786,24 +731,11 @@ mod tests {
         let mut y = vec![1.0; 200];
         y[7] = f64::INFINITY;
         assert!(says(&pursuit.recover(&phi, &y, None), "`y[7]`"));
-        assert!(says(
-            &pursuit.recover(&phi, &[1.0; 3], None),
-            "rows but `y` has 3 entries"
-        ));
+        assert!(says(&pursuit.recover(&phi, &[1.0; 3], None), "rows but `y` has 3 entries"));
         let other = RegionPursuit::new(SIDE, 2);
-        assert!(says(
-            &other.recover(&phi, &[1.0; 200], None),
-            "the method was built for 120"
-        ));
+        assert!(says(&other.recover(&phi, &[1.0; 200], None), "the method was built for 120"));
         let single = signs(SIDE * SIDE, 1, &mut rng);
-        assert!(
-            pursuit
-                .recover(&single, &[1.0], None)
-                .unwrap()
-                .image
-                .iter()
-                .all(|v| v.is_finite())
-        );
+        assert!(pursuit.recover(&single, &[1.0], None).unwrap().image.iter().all(|v| v.is_finite()));
     }
 
     #[test]
@@ -817,12 +749,7 @@ mod tests {
             let best = found.iter().max_by(|a, b| a.score.total_cmp(&b.score)).unwrap();
             // the score of the blob itself is its length, times 2
             assert_eq!(best.place, r * 9 + c);
-            assert!(
-                (best.score - norm(&image)).abs() < 1e-9,
-                "{} against {}",
-                best.score,
-                norm(&image)
-            );
+            assert!((best.score - norm(&image)).abs() < 1e-9, "{} against {}", best.score, norm(&image));
         }
     }
 

@@ -89,11 +89,7 @@ impl SheetPrior {
             let mut c = Matrix::zeros(n, n);
             for i in 0..n {
                 for (j, v) in c.row_mut(i).iter_mut().enumerate() {
-                    *v = if i == j {
-                        1.0
-                    } else {
-                        (1.0 - FLOOR) * lags[i.abs_diff(j)] / lags[0]
-                    };
+                    *v = if i == j { 1.0 } else { (1.0 - FLOOR) * lags[i.abs_diff(j)] / lags[0] };
                 }
             }
             c
@@ -408,9 +404,7 @@ impl SheetDecoder {
         let mut covariance = Matrix::zeros(n, n);
         for (r, i) in places.iter().enumerate() {
             let row = covariance.row_mut(r);
-            row.iter_mut()
-                .zip(places)
-                .for_each(|(v, j)| *v = self.prior.covariance(*i, *j));
+            row.iter_mut().zip(places).for_each(|(v, j)| *v = self.prior.covariance(*i, *j));
         }
         let noise = Noise::Absolute(self.noise.own * (n as f64 / self.count as f64).sqrt());
         let prior = Gaussian::new(vec![0.0; n], covariance)?;
@@ -485,11 +479,7 @@ mod tests {
 
     fn signs(rows: usize, taxels: usize) -> Vec<f64> {
         let sign = |k: u64| {
-            if (k * k).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 63 == 1 {
-                1.0
-            } else {
-                -1.0
-            }
+            if (k * k).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 63 == 1 { 1.0 } else { -1.0 }
         };
         (1..=(rows * taxels) as u64).map(sign).collect()
     }
@@ -540,10 +530,7 @@ mod tests {
         assert!((13..16).contains(&strongest) && image.iter().all(|v| *v >= 0.0));
         let shifted: Vec<f64> = y.iter().map(|v| v + 3.0).collect();
         let other = decoder.non_negative(&shifted, 30).unwrap();
-        let far = image
-            .iter()
-            .zip(&other)
-            .fold(0.0_f64, |far, (a, b)| far.max((a - b).abs()));
+        let far = image.iter().zip(&other).fold(0.0_f64, |far, (a, b)| far.max((a - b).abs()));
         assert!(far < 0.3, "{far}");
         // fewer places than taxels
         let few = decoder.non_negative(&y, 5).unwrap();
@@ -554,10 +541,7 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_refused() {
         let prior = SheetPrior::smooth([2, 2], 1.0).unwrap();
-        let noise = SheetNoise {
-            own: f64::NAN,
-            common: 0.0,
-        };
+        let noise = SheetNoise { own: f64::NAN, common: 0.0 };
         assert!(SheetDecoder::new(prior.clone(), noise, 1).is_err());
         let mut decoder = SheetDecoder::new(prior, SheetNoise::default(), 1).unwrap();
         assert!(decoder.extend(&[1.0; 5], &[0]).is_err() && decoder.extend(&[f64::NAN; 4], &[0]).is_err());
@@ -566,11 +550,7 @@ mod tests {
         assert!(decoder.linear(&[f64::INFINITY]).is_err());
         // the second of these rows has a square beyond the range of numbers: none of them stays
         let before = decoder.linear(&[1.0]).unwrap();
-        assert!(
-            decoder
-                .extend(&[1.0, -1.0, 1.0, -1.0, 1e200, 1e200, 1e200, 1e200], &[0, 0])
-                .is_err()
-        );
+        assert!(decoder.extend(&[1.0, -1.0, 1.0, -1.0, 1e200, 1e200, 1e200, 1e200], &[0, 0]).is_err());
         assert_eq!((decoder.measurements(), decoder.linear(&[1.0]).unwrap()), (1, before));
         assert!(decoder.linear(&[1.0, 2.0]).is_err());
         decoder.extend(&[1.0, -1.0, 1.0, -1.0], &[0]).unwrap();

@@ -273,11 +273,7 @@ impl<A: LinearOperator, B: LinearOperator> Composition<A, B> {
     /// # Panics
     /// When `outer` has not as many columns as `inner` has rows.
     pub(crate) fn new(outer: A, inner: B) -> Self {
-        assert_eq!(
-            outer.ncols(),
-            inner.nrows(),
-            "columns of the outer operator against rows of the inner one"
-        );
+        assert_eq!(outer.ncols(), inner.nrows(), "columns of the outer operator against rows of the inner one");
         Self { outer, inner }
     }
 }
@@ -381,10 +377,7 @@ where
     type Selected = SubArrays<A::Selected>;
 
     fn select_columns(&self, columns: &[usize]) -> Self::Selected {
-        assert!(
-            columns.is_sorted(),
-            "columns of sub-arrays are taken in increasing order"
-        );
+        assert!(columns.is_sorted(), "columns of sub-arrays are taken in increasing order");
         let (mut first, mut parts) = (0, Vec::with_capacity(self.parts.len()));
         let mut left = columns;
         for part in &self.parts {
@@ -434,27 +427,12 @@ pub fn check_operator(a: &impl LinearOperator) {
     let (lhs, rhs) = (dot(&ax, &y), dot(&aty, &x));
     let whole = norm(&ax) * norm(&y) + norm(&aty) * norm(&x);
     let allowed = rounding(m, n, whole);
-    assert!(
-        (lhs - rhs).abs() <= allowed,
-        "⟨Ax, y⟩ = {lhs}, ⟨x, Aᵀy⟩ = {rhs}, allowed {allowed:e}"
-    );
+    assert!((lhs - rhs).abs() <= allowed, "⟨Ax, y⟩ = {lhs}, ⟨x, Aᵀy⟩ = {rhs}, allowed {allowed:e}");
 
     let sum: Vec<f64> = x.iter().zip(&z).map(|(x, z)| 2.0 * x - z).collect();
-    let off: Vec<f64> = apply(&sum)
-        .iter()
-        .zip(ax.iter().zip(&az))
-        .map(|(s, (x, z))| s - (2.0 * x - z))
-        .collect();
-    let allowed = rounding(
-        m,
-        n,
-        norm(&ax) + norm(&az) + norm(&x) * norm(&aty) / norm(&y).max(f64::MIN_POSITIVE),
-    );
-    assert!(
-        norm(&off) <= allowed,
-        "not linear by {:e}, allowed {allowed:e}",
-        norm(&off)
-    );
+    let off: Vec<f64> = apply(&sum).iter().zip(ax.iter().zip(&az)).map(|(s, (x, z))| s - (2.0 * x - z)).collect();
+    let allowed = rounding(m, n, norm(&ax) + norm(&az) + norm(&x) * norm(&aty) / norm(&y).max(f64::MIN_POSITIVE));
+    assert!(norm(&off) <= allowed, "not linear by {:e}, allowed {allowed:e}", norm(&off));
 }
 
 #[cfg(test)]

@@ -30,11 +30,7 @@ impl SignGenerator {
     /// [`Refusal`] for a `bit` beyond 31.
     pub fn new(multiplier: u32, increment: u32, bit: u32) -> Result<Self, Refusal> {
         within("bit", f64::from(bit), 0.0, 31.0)?;
-        Ok(Self {
-            multiplier,
-            increment,
-            shift: 63 - bit,
-        })
+        Ok(Self { multiplier, increment, shift: 63 - bit })
     }
 
     /// (a, c) of `steps` steps in one, by repeated squaring: O(log steps). The period divides 2³².
@@ -69,12 +65,7 @@ pub struct SignOperator {
 impl SignOperator {
     /// Rows `first_row..first_row + nrows` of generators with `seeds`, one for each column.
     pub fn new(generator: SignGenerator, seeds: Vec<u32>, first_row: u64, nrows: usize) -> Self {
-        Self {
-            generator,
-            seeds,
-            first_row,
-            nrows,
-        }
+        Self { generator, seeds, first_row, nrows }
     }
 
     /// Memory of the operator, bytes: a constant, and 4 for each column, whatever the number of rows.
@@ -118,9 +109,7 @@ impl LinearOperator for SignOperator {
         minus_x.as_flattened_mut().iter_mut().zip(x).for_each(|(m, x)| *m = -x);
         let tasks = 4 * rayon::current_num_threads();
         let rows = y.len().div_ceil(tasks).max(FEWEST_ROWS).next_multiple_of(4);
-        y.par_chunks_mut(rows)
-            .enumerate()
-            .for_each(|(i, y)| self.rows(&minus_x, i * rows, y));
+        y.par_chunks_mut(rows).enumerate().for_each(|(i, y)| self.rows(&minus_x, i * rows, y));
     }
 
     fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
@@ -139,10 +128,7 @@ impl SelectColumns for SignOperator {
     type Selected = Self;
 
     fn select_columns(&self, columns: &[usize]) -> Self {
-        Self {
-            seeds: columns.iter().map(|&k| self.seeds[k]).collect(),
-            ..*self
-        }
+        Self { seeds: columns.iter().map(|&k| self.seeds[k]).collect(), ..*self }
     }
 
     fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
@@ -260,15 +246,8 @@ mod tests {
     const STEP: (u32, u32) = (1_664_525, 1_013_904_223);
 
     fn operator(n: usize, first_row: u64, nrows: usize, bit: u32) -> SignOperator {
-        let seeds = (0..n)
-            .map(|k| u32::try_from(k).unwrap().wrapping_mul(0x85eb_ca6b))
-            .collect();
-        SignOperator::new(
-            SignGenerator::new(STEP.0, STEP.1, bit).unwrap(),
-            seeds,
-            first_row,
-            nrows,
-        )
+        let seeds = (0..n).map(|k| u32::try_from(k).unwrap().wrapping_mul(0x85eb_ca6b)).collect();
+        SignOperator::new(SignGenerator::new(STEP.0, STEP.1, bit).unwrap(), seeds, first_row, nrows)
     }
 
     /// Weight by weight, one step after the other.
@@ -324,19 +303,13 @@ mod tests {
 
     fn states() -> Vec<[u32; LANES]> {
         let state = |k: usize| u32::try_from(k).unwrap().wrapping_mul(0x9e37_79b9);
-        (0..7)
-            .map(|group| std::array::from_fn(|l| state(group * LANES + l)))
-            .collect()
+        (0..7).map(|group| std::array::from_fn(|l| state(group * LANES + l))).collect()
     }
 
     /// The chosen instructions against the ones that every machine has.
     #[test]
     fn every_instruction_set_gives_the_same_bits() {
-        let generator = SignGenerator {
-            multiplier: 1_664_525,
-            increment: 1_013_904_223,
-            shift: 32,
-        };
+        let generator = SignGenerator { multiplier: 1_664_525, increment: 1_013_904_223, shift: 32 };
         let value = |k: usize| (0.37 * k as f64).sin() * 10_f64.powf((k % 7) as f64);
         let minus_x: Vec<[f64; LANES]> = (0..7).map(|g| std::array::from_fn(|l| value(g * LANES + l))).collect();
         let y: Vec<f64> = (0..43).map(value).collect();

@@ -22,11 +22,7 @@ struct Suite<'a> {
 
 impl<'a> Suite<'a> {
     fn new(name: &'a str) -> Self {
-        Self {
-            name,
-            rng: ChaCha8Rng::seed_from_u64(1),
-            used: Workspace::default(),
-        }
+        Self { name, rng: ChaCha8Rng::seed_from_u64(1), used: Workspace::default() }
     }
 
     fn vector(&mut self, len: usize) -> Vec<f64> {
@@ -57,11 +53,8 @@ impl<'a> Suite<'a> {
         let name = self.name;
         let problem = Problem::new(a.view(), y)?;
         let fresh = method.recover(&problem, &mut Workspace::default());
-        let mut used = Solution {
-            support: vec![usize::MAX; 3],
-            coefficients: vec![f64::NAN; 2],
-            residual_norm: f64::NAN,
-        };
+        let mut used =
+            Solution { support: vec![usize::MAX; 3], coefficients: vec![f64::NAN; 2], residual_norm: f64::NAN };
         match method.recover_into(&problem, &mut self.used, &mut used) {
             Ok(()) => assert_eq!(fresh.as_ref(), Ok(&used), "{name}: the workspace leaks into the result"),
             Err(e) => assert!(fresh.is_err(), "{name}: {e} in a used workspace only"),
@@ -89,10 +82,7 @@ impl<'a> Suite<'a> {
         sorted.sort_unstable();
         sorted.dedup();
         assert!(sorted.len() == support.len(), "{name}: an atom twice");
-        assert!(
-            sorted.iter().all(|&k| k < a.ncols()),
-            "{name}: an atom that does not exist"
-        );
+        assert!(sorted.iter().all(|&k| k < a.ncols()), "{name}: an atom that does not exist");
     }
 
     /// Finite numbers for every problem at an ordinary scale, and finite numbers or an error at any other.
@@ -138,9 +128,7 @@ impl<'a> Suite<'a> {
 }
 
 fn product(a: &Matrix, x: &[f64]) -> Vec<f64> {
-    (0..a.nrows())
-        .map(|r| a.row(r).iter().zip(x).map(|(a, x)| a * x).sum())
-        .collect()
+    (0..a.nrows()).map(|r| a.row(r).iter().zip(x).map(|(a, x)| a * x).sum()).collect()
 }
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
@@ -154,10 +142,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
 /// # Panics
 /// If a property fails; the message names it.
 pub fn conformance(name: &str, build: Build) {
-    let mut suite = Pursuits {
-        suite: Suite::new(name),
-        build,
-    };
+    let mut suite = Pursuits { suite: Suite::new(name), build };
     suite.planted_signals();
     suite.order_of_columns();
     suite.twins();
@@ -179,11 +164,7 @@ impl Pursuits<'_> {
         let atoms = solution.support.len();
         assert!(atoms <= sparsity, "{}: {atoms} atoms, not {sparsity}", self.suite.name);
         let (residual, length) = (solution.residual_norm, norm(y));
-        assert!(
-            residual <= length * (1.0 + 1e-12),
-            "{}: residual {residual} above ‖y‖ = {length}",
-            self.suite.name
-        );
+        assert!(residual <= length * (1.0 + 1e-12), "{}: residual {residual} above ‖y‖ = {length}", self.suite.name);
         solution
     }
 
@@ -247,10 +228,7 @@ const K: usize = 24;
 /// If a property fails; the message names it.
 pub fn conformance_regularised(name: &str, build: BuildRegularised) {
     let make = |k: usize| build(k).unwrap_or_else(|e| panic!("{name}: {e}"));
-    let mut suite = Regularised {
-        suite: Suite::new(name),
-        method: make(K),
-    };
+    let mut suite = Regularised { suite: Suite::new(name), method: make(K) };
     suite.planted();
     suite.symmetries();
     suite.suite.extremes(&make);
@@ -301,10 +279,7 @@ impl Regularised<'_> {
 fn assert_near(name: &str, what: &str, got: &[f64], expected: &[f64], tolerance: f64) {
     let largest = expected.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     for (k, (g, e)) in got.iter().zip(expected).enumerate() {
-        assert!(
-            (g - e).abs() <= tolerance * largest,
-            "{name}: {what}: entry {k} is {g}, expected {e}"
-        );
+        assert!((g - e).abs() <= tolerance * largest, "{name}: {what}: entry {k} is {g}, expected {e}");
     }
 }
 

@@ -209,11 +209,9 @@ impl FixedWindow<'_> {
         };
         let variance = variance(deviation, fixed.smallest_variance);
         self.shares.clear();
-        self.shares
-            .extend(fixed.spectrum.iter().map(|lambda| 1.0 / (lambda + variance)));
+        self.shares.extend(fixed.spectrum.iter().map(|lambda| 1.0 / (lambda + variance)));
         self.forces.clear();
-        self.forces
-            .extend(self.sums.iter().zip(&self.shares).map(|(t, share)| t * share));
+        self.forces.extend(self.sums.iter().zip(&self.shares).map(|(t, share)| t * share));
         adjoint(&fixed.images, &self.forces, &mut self.image);
         axpy(1.0, fixed.prior.mean(), &mut self.image);
         if self.image.iter().all(|x| x.is_finite()) {
@@ -251,20 +249,13 @@ impl FixedWindow<'_> {
         for (linear, x) in self.linear_part.iter_mut().zip(&self.image) {
             *linear = -x / scale;
         }
-        let posterior = Lowered {
-            matrix: fixed.prior.covariance().view().values(),
-            rows: &fixed.images,
-            shares: &self.shares,
-        };
+        let posterior =
+            Lowered { matrix: fixed.prior.covariance().view().values(), rows: &fixed.images, shares: &self.shares };
         if nnqp::minimise(&posterior, &self.linear_part, &mut self.forces, &mut self.work).is_err() {
             return false;
         }
         for ((x, force), lift) in self.image.iter_mut().zip(&self.forces).zip(self.work.product()) {
-            *x = if *force > 0.0 {
-                0.0
-            } else {
-                (*x + lift * scale).max(0.0)
-            };
+            *x = if *force > 0.0 { 0.0 } else { (*x + lift * scale).max(0.0) };
         }
         true
     }
@@ -277,11 +268,7 @@ impl FixedWindow<'_> {
         axpy(variance, fixed.prior.natural(), &mut self.linear_part);
         let scale = power_of_two(&self.linear_part);
         self.linear_part.iter_mut().for_each(|h| *h /= scale);
-        let hessian = Hessian {
-            rows: &fixed.rows,
-            variance,
-            precision: fixed.prior.precision().view().values(),
-        };
+        let hessian = Hessian { rows: &fixed.rows, variance, precision: fixed.prior.precision().view().values() };
         nnqp::minimise(&hessian, &self.linear_part, &mut self.image, &mut self.work)?;
         self.image.iter_mut().for_each(|x| *x *= scale);
         Ok(())

@@ -78,14 +78,7 @@ impl<'p, 'w> Model<'p, 'w> {
         }
         let smallest = smallest_variance(&work.operator, m, prior);
         let variance = variance(noise.deviation(y) / scale, smallest);
-        Ok(Self {
-            m,
-            n,
-            prior,
-            variance,
-            scale,
-            work,
-        })
+        Ok(Self { m, n, prior, variance, scale, work })
     }
 
     /// A C → `cross` and A C Aᵀ + σ² I → upper triangle of `system`.
@@ -129,8 +122,7 @@ impl<'p, 'w> Model<'p, 'w> {
         let work = &mut *self.work;
         work.residual.clear();
         let rows = work.operator.chunks_exact(self.n);
-        work.residual
-            .extend(work.y.iter().zip(rows).map(|(y, row)| y - dot(row, &work.x)));
+        work.residual.extend(work.y.iter().zip(rows).map(|(y, row)| y - dot(row, &work.x)));
         norm(&work.residual) * self.scale
     }
 }
@@ -181,10 +173,7 @@ impl Lmmse {
     /// # Errors
     /// [`Refusal`] if `noise` is outside its range.
     pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, Refusal> {
-        Ok(Self {
-            prior,
-            noise: noise.checked()?,
-        })
+        Ok(Self { prior, noise: noise.checked()? })
     }
 }
 
@@ -267,10 +256,7 @@ impl NnLmmse {
     /// # Errors
     /// [`Refusal`] if `noise` is outside its range.
     pub fn new(prior: Arc<Gaussian>, noise: Noise) -> Result<Self, Refusal> {
-        Ok(Self {
-            prior,
-            noise: noise.checked()?,
-        })
+        Ok(Self { prior, noise: noise.checked()? })
     }
 }
 
@@ -317,11 +303,7 @@ impl Recover for NnLmmse {
             return Err(overflow(atom));
         }
         work.weights.iter_mut().for_each(|h| *h /= scale);
-        let hessian = Hessian {
-            rows: &work.operator,
-            variance,
-            precision: self.prior.precision().view().values(),
-        };
+        let hessian = Hessian { rows: &work.operator, variance, precision: self.prior.precision().view().values() };
         nnqp::minimise(&hessian, &work.weights, &mut work.x, &mut work.pivoting)?;
         work.x.iter_mut().for_each(|x| *x *= scale);
         let residual_norm = model.residual_norm();

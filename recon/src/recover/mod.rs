@@ -39,9 +39,7 @@ pub type Build = fn(usize) -> Box<dyn Recover>;
 
 /// Every algorithm with a given number of atoms, by name.
 pub const RECOVER: &[(&str, Build)] = &[
-    ("reference", |n_nonzero_coefs| {
-        Box::new(ReferenceOmp::new(n_nonzero_coefs))
-    }),
+    ("reference", |n_nonzero_coefs| Box::new(ReferenceOmp::new(n_nonzero_coefs))),
     ("omp", |n_nonzero_coefs| Box::new(Omp::new(n_nonzero_coefs))),
     ("nn_omp", |n_nonzero_coefs| Box::new(NnOmp::new(n_nonzero_coefs))),
 ];
@@ -59,20 +57,8 @@ const WEAK: f64 = 1e-3;
 /// Every algorithm with a prior, by name, here with weak and neutral settings: unit deviation, a grid of one row.
 pub const REGULARISED: &[(&str, BuildRegularised)] = &[
     ("nn_lasso", |_| Ok(Box::new(NnLasso::new(Penalty::Relative(WEAK))?))),
-    ("lmmse", |k| {
-        Ok(Box::new(Lmmse::new(
-            Arc::new(Gaussian::white(k, 1.0)?),
-            Noise::Absolute(WEAK),
-        )?))
-    }),
-    ("nn_lmmse", |k| {
-        Ok(Box::new(NnLmmse::new(
-            Arc::new(Gaussian::white(k, 1.0)?),
-            Noise::Absolute(WEAK),
-        )?))
-    }),
-    ("unrolled", |k| {
-        Ok(Box::new(Unrolled::new(UnrolledWeights::plain(k, 0.1 * WEAK)?)))
-    }),
+    ("lmmse", |k| Ok(Box::new(Lmmse::new(Arc::new(Gaussian::white(k, 1.0)?), Noise::Absolute(WEAK))?))),
+    ("nn_lmmse", |k| Ok(Box::new(NnLmmse::new(Arc::new(Gaussian::white(k, 1.0)?), Noise::Absolute(WEAK))?))),
+    ("unrolled", |k| Ok(Box::new(Unrolled::new(UnrolledWeights::plain(k, 0.1 * WEAK)?)))),
     ("tv", |k| Ok(Box::new(Tv::new(1, k, Penalty::Relative(WEAK))?))),
 ];

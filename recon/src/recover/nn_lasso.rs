@@ -41,29 +41,19 @@ pub struct NnLasso {
 
 impl NnLasso {
     /// Default of `stopping`.
-    pub(crate) const STOPPING: Stopping = Stopping {
-        tol: 1e-8,
-        max_iter: 10_000,
-    };
+    pub(crate) const STOPPING: Stopping = Stopping { tol: 1e-8, max_iter: 10_000 };
 
     /// A lasso with the penalty `alpha`.
     ///
     /// # Errors
     /// [`Refusal`] if `alpha` is outside its range.
     pub fn new(alpha: Penalty) -> Result<Self, Refusal> {
-        Ok(Self {
-            alpha: alpha.checked()?,
-            normalise: false,
-            stopping: Self::STOPPING,
-        })
+        Ok(Self { alpha: alpha.checked()?, normalise: false, stopping: Self::STOPPING })
     }
 
     /// The same with columns scaled to unit length first. Coefficients belong to the columns as given.
     pub fn with_normalised_columns(self) -> Self {
-        Self {
-            normalise: true,
-            ..self
-        }
+        Self { normalise: true, ..self }
     }
 
     /// The problem near 1, and what its coefficients must be multiplied by.
@@ -98,11 +88,7 @@ impl NnLasso {
             Penalty::Absolute(alpha) => {
                 // the objective was divided by a_scale² x_scale²; unit columns leave the scale of A to their
                 // coefficients
-                let (of_a, of_x) = if self.normalise {
-                    (1.0, x_scale * a_scale)
-                } else {
-                    (a_scale, x_scale)
-                };
+                let (of_a, of_x) = if self.normalise { (1.0, x_scale * a_scale) } else { (a_scale, x_scale) };
                 alpha * m as f64 / of_x / of_a / of_a
             }
             Penalty::Relative(share) => share * largest,
@@ -170,12 +156,7 @@ impl<'w> Descent<'w> {
         work.correlation.resize(work.lengths.len(), 0.0);
         let columns = work.columns.chunks_exact(m);
         let largest = columns.map(|c| dot(c, &work.y)).fold(0.0, f64::max);
-        Self {
-            m,
-            penalty: 0.0,
-            largest,
-            work,
-        }
+        Self { m, penalty: 0.0, largest, work }
     }
 
     /// Largest correlation of a column with y, at least 0.
@@ -238,24 +219,11 @@ impl<'w> Descent<'w> {
         }
         let whole = 0.5 * dot(&work.y, &work.y);
         if whole == 0.0 {
-            return if work.x.iter().all(|x| *x == 0.0) {
-                0.0
-            } else {
-                f64::INFINITY
-            };
+            return if work.x.iter().all(|x| *x == 0.0) { 0.0 } else { f64::INFINITY };
         }
-        let shrink = if steepest > self.penalty {
-            self.penalty / steepest
-        } else {
-            1.0
-        };
+        let shrink = if steepest > self.penalty { self.penalty / steepest } else { 1.0 };
         let primal = 0.5 * dot(&work.residual, &work.residual) + self.penalty * work.x.iter().sum::<f64>();
-        let rest: f64 = work
-            .y
-            .iter()
-            .zip(&work.residual)
-            .map(|(y, r)| (y - shrink * r).powi(2))
-            .sum();
+        let rest: f64 = work.y.iter().zip(&work.residual).map(|(y, r)| (y - shrink * r).powi(2)).sum();
         let dual = whole - 0.5 * rest;
         ((primal - dual) / whole).max(0.0)
     }
@@ -389,11 +357,7 @@ impl<'w> Descent<'w> {
         let step = moves().fold(limit, |step, (&k, &way)| step.min(reach(work.x[k], way)));
         for (&k, &way) in work.free.iter().zip(&work.point) {
             let x = work.x[k];
-            work.x[k] = if reach(x, way) <= step {
-                0.0
-            } else {
-                (x + step * way).max(0.0)
-            };
+            work.x[k] = if reach(x, way) <= step { 0.0 } else { (x + step * way).max(0.0) };
         }
         step
     }

@@ -59,8 +59,7 @@ impl Quadratic for Lowered<'_> {
         }
         work.image.clear();
         let rows = work.rows.chunks_exact(size).zip(self.shares);
-        work.image
-            .extend(rows.map(|(row, share)| -share * kernels::dot(row, point)));
+        work.image.extend(rows.map(|(row, share)| -share * kernels::dot(row, point)));
         kernels::adjoint(self.rows, &work.image, product);
         kernels::add_rows(self.matrix, free, point, product);
     }
@@ -219,22 +218,13 @@ fn active_set(hessian: &impl Quadratic, linear: &[f64], x: &mut [f64], work: &mu
         work.feasible.copy_from_slice(x);
         multiply(hessian, x, work);
         violations(linear, largest, x, work);
-        let most = work
-            .violation
-            .iter()
-            .copied()
-            .enumerate()
-            .max_by(|a, b| a.1.total_cmp(&b.1));
+        let most = work.violation.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
         match most.filter(|(_, violation)| *violation > 0.0) {
             Some((i, _)) => work.free[i] = true,
             None => return Ok(()),
         }
     }
-    Err(not_converged(
-        limit,
-        work.violation.iter().copied().fold(0.0, f64::max),
-        TOL,
-    ))
+    Err(not_converged(limit, work.violation.iter().copied().fold(0.0, f64::max), TOL))
 }
 
 /// x = H_FF⁻¹ h_F on the free unknowns, zero elsewhere.
@@ -267,11 +257,7 @@ fn multiply(hessian: &impl Quadratic, x: &[f64], work: &mut Buffers) {
 fn violations(linear: &[f64], largest: f64, x: &[f64], work: &mut Buffers) -> usize {
     let x_largest = x.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     for (i, violation) in work.violation.iter_mut().enumerate() {
-        let (short, whole) = if work.free[i] {
-            (-x[i], x_largest)
-        } else {
-            (linear[i] - work.product[i], largest)
-        };
+        let (short, whole) = if work.free[i] { (-x[i], x_largest) } else { (linear[i] - work.product[i], largest) };
         *violation = if short > TOL * whole { short / whole } else { 0.0 };
     }
     work.violation.iter().filter(|v| **v > 0.0).count()
@@ -304,11 +290,7 @@ mod tests {
                 let mut draw = |count: usize| -> Vec<f64> { (0..count).map(|_| rng.random_range(-1.0..1.0)).collect() };
                 let (rows, linear) = (draw(m * n), draw(n));
                 let precision: Vec<f64> = (0..n * n).map(|k| if k % (n + 1) == 0 { 1.0 } else { 0.0 }).collect();
-                let hessian = Hessian {
-                    rows: &rows,
-                    variance: 0.1,
-                    precision: &precision,
-                };
+                let hessian = Hessian { rows: &rows, variance: 0.1, precision: &precision };
                 let (mut by_exchange, mut by_set) = (vec![0.0; n], vec![0.0; n]);
                 let mut work = Buffers::default();
                 minimise(&hessian, &linear, &mut by_exchange, &mut work).unwrap();

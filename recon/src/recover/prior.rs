@@ -54,23 +54,14 @@ impl Gaussian {
         let dense = DMatrix::from_row_slice(n, n, values);
         let inverse = dense
             .cholesky()
-            .ok_or(Refusal::new(
-                "covariance is not positive definite; a positive `floor` or noise makes it so",
-            ))?
+            .ok_or(Refusal::new("covariance is not positive definite; a positive `floor` or noise makes it so"))?
             .inverse();
         if !inverse.iter().all(|v| v.is_finite()) {
-            return Err(Refusal::new(
-                "covariance is not positive definite; a positive `floor` or noise makes it so",
-            ));
+            return Err(Refusal::new("covariance is not positive definite; a positive `floor` or noise makes it so"));
         }
         let precision = Matrix::from(&inverse);
         let natural = (0..n).map(|i| dot(precision.row(i), &mean)).collect();
-        Ok(Self {
-            mean,
-            covariance,
-            precision,
-            natural,
-        })
+        Ok(Self { mean, covariance, precision, natural })
     }
 
     /// A prior of `n` independent unknowns with mean 0 and standard deviation `deviation`.
@@ -161,24 +152,12 @@ impl ImagePrior {
     /// For objects unlike the example images. The middle of the flat top of a search over 972 settings on raster images
     /// of 17 real objects, each left out of its own prior (`tests/priors.rs`). To be used with a noise of 0.12 of the
     /// root mean square of `y`.
-    pub const UNSEEN: Self = Self {
-        reach: 2,
-        stay: 0.3,
-        threshold: 0.5,
-        equal_length: true,
-        centred: false,
-        floor: 0.01,
-    };
+    pub const UNSEEN: Self =
+        Self { reach: 2, stay: 0.3, threshold: 0.5, equal_length: true, centred: false, floor: 0.01 };
 
     /// For the same objects at the same places as in the example images: their mean and covariance.
-    pub const SEEN: Self = Self {
-        reach: 0,
-        stay: 1.0,
-        threshold: 0.0,
-        equal_length: false,
-        centred: true,
-        floor: 0.025,
-    };
+    pub const SEEN: Self =
+        Self { reach: 0, stay: 1.0, threshold: 0.0, equal_length: false, centred: true, floor: 0.025 };
 
     /// Prior of images that resemble `images` (N × number of images, each with `cols` columns, row-major). Images that
     /// are zero everywhere are ignored.
@@ -192,10 +171,7 @@ impl ImagePrior {
         self.check()?;
         let pixels = images.nrows();
         if !images.view().values().iter().all(|v| v.is_finite()) {
-            return Err(Refusal::new(format!(
-                "`{field}` holds a value that is not finite",
-                field = "images"
-            )));
+            return Err(Refusal::new(format!("`{field}` holds a value that is not finite", field = "images")));
         }
         let clean = self.clean(images);
         if clean.ncols() == 0 || cols == 0 || !pixels.is_multiple_of(cols) {
@@ -287,11 +263,7 @@ pub(super) fn below_one(field: &'static str, value: f64) -> Result<f64, Refusal>
 }
 
 fn within(field: &'static str, value: f64, ok: bool, range: &'static str) -> Result<f64, Refusal> {
-    if ok {
-        Ok(value)
-    } else {
-        Err(Refusal::range(field, value, range))
-    }
+    if ok { Ok(value) } else { Err(Refusal::range(field, value, range)) }
 }
 
 /// How strongly a recovery penalises its unknowns, in place of fitting the samples.
@@ -360,9 +332,7 @@ pub struct Stopping {
 
 /// No image, or images that do not fit the grid.
 pub(crate) fn no_images(images: usize, pixels: usize, cols: usize) -> Refusal {
-    Refusal::new(format!(
-        "{images} images of {pixels} pixels do not make a prior on a grid of {cols} columns"
-    ))
+    Refusal::new(format!("{images} images of {pixels} pixels do not make a prior on a grid of {cols} columns"))
 }
 
 #[cfg(test)]
@@ -378,10 +348,7 @@ mod tests {
         assert!(says(&new(&[0.0], unit), "`mean` has 1 entries"));
         assert!(says(&new(&[f64::NAN, 0.0], unit), "`mean` holds"));
         assert!(says(&new(&[0.0; 2], [1.0, 0.5, 0.4, 1.0]), "covariance[1, 0]"));
-        assert!(says(
-            &new(&[0.0; 2], [1.0, 2.0, 2.0, 1.0]),
-            "covariance is not positive definite"
-        ));
+        assert!(says(&new(&[0.0; 2], [1.0, 2.0, 2.0, 1.0]), "covariance is not positive definite"));
         assert!(says(&Gaussian::white(2, 0.0), "covariance is not positive definite"));
     }
 
@@ -392,14 +359,8 @@ mod tests {
     /// One pixel in the middle of 3 × 3, moved by up to one pixel: nine images of one pixel each.
     #[test]
     fn moments_of_a_moving_pixel() {
-        let settings = ImagePrior {
-            reach: 1,
-            stay: 0.0,
-            threshold: 0.0,
-            equal_length: false,
-            centred: true,
-            floor: 0.5,
-        };
+        let settings =
+            ImagePrior { reach: 1, stay: 0.0, threshold: 0.0, equal_length: false, centred: true, floor: 0.5 };
         let prior = settings.learn(&pixel(3.0), 3).unwrap();
         for (i, mean) in prior.mean().iter().enumerate() {
             assert!((mean - 1.0 / 3.0).abs() < 1e-15);
@@ -409,11 +370,7 @@ mod tests {
                 assert!((prior.covariance().row(i)[j] - expected).abs() < 1e-14);
             }
         }
-        let about_zero = ImagePrior {
-            centred: false,
-            stay: 0.5,
-            ..settings
-        };
+        let about_zero = ImagePrior { centred: false, stay: 0.5, ..settings };
         let prior = about_zero.learn(&pixel(3.0), 3).unwrap();
         assert_eq!(prior.mean(), [0.0; 9]);
         // half of the weight stays in the middle, the other half is spread over nine places
@@ -426,10 +383,7 @@ mod tests {
     #[test]
     fn backgrounds_go_and_lengths_become_equal() {
         let images = Matrix::from_rows(2, 2, vec![1.0, 0.7, 0.1, 7.0]).unwrap();
-        let prior = ImagePrior {
-            reach: 0,
-            ..ImagePrior::UNSEEN
-        };
+        let prior = ImagePrior { reach: 0, ..ImagePrior::UNSEEN };
         let learned = prior.learn(&images, 2).unwrap();
         // √((1² + 7²)/2) = 5 is the common length, and each image has half of the weight
         let expected = 0.5 * 25.0 + 0.01 * 0.01;
@@ -442,12 +396,7 @@ mod tests {
     #[test]
     fn what_makes_no_prior_is_refused() {
         let image = Matrix::from_rows(4, 1, vec![1.0; 4]).unwrap();
-        for (images, cols) in [
-            (&image, 3),
-            (&image, 0),
-            (&Matrix::zeros(4, 2), 2),
-            (&Matrix::zeros(4, 0), 2),
-        ] {
+        for (images, cols) in [(&image, 3), (&image, 0), (&Matrix::zeros(4, 2), 2), (&Matrix::zeros(4, 0), 2)] {
             let refused = ImagePrior::UNSEEN.learn(images, cols);
             assert!(says(&refused, "do not make a prior"), "{refused:?}");
         }
@@ -457,13 +406,7 @@ mod tests {
         let unseen = ImagePrior::UNSEEN;
         for (prior, field) in [
             (ImagePrior { stay: 1.1, ..unseen }, "stay"),
-            (
-                ImagePrior {
-                    threshold: 1.0,
-                    ..unseen
-                },
-                "threshold",
-            ),
+            (ImagePrior { threshold: 1.0, ..unseen }, "threshold"),
             (ImagePrior { floor: 0.0, ..unseen }, "floor"),
         ] {
             let refused = prior.learn(&image, 2);

@@ -127,9 +127,7 @@ fn solve_non_negative(state: &mut State, problem: &Scaled<'_>) {
             // in another order an atom can turn out to depend on the others: its coefficient goes with it
             let mut atoms = state.atoms.iter();
             let kept = state.factor.atoms();
-            state
-                .previous
-                .retain(|_| atoms.next().is_some_and(|atom| kept.contains(atom)));
+            state.previous.retain(|_| atoms.next().is_some_and(|atom| kept.contains(atom)));
         }
     }
 }

@@ -209,9 +209,7 @@ mod tests {
                 let y = DVector::from_fn(m, |_, _| rng.random_range(-1.0..1.0));
                 let dense = Matrix::from(&a);
                 let problem = Problem::new(dense.view(), y.as_slice()).unwrap();
-                let got = ReferenceOmp::new(s)
-                    .recover(&problem, &mut Workspace::default())
-                    .unwrap();
+                let got = ReferenceOmp::new(s).recover(&problem, &mut Workspace::default()).unwrap();
                 let (support, alpha) = textbook(&a, &y, s);
                 assert_eq!(got.support, support, "{m} × {k}, S = {s}");
                 for (g, e) in got.coefficients.iter().zip(alpha.iter()) {

@@ -147,18 +147,14 @@ impl SequentialGains {
             *gain = u * precision;
         }
         let variances = self.variances[(at + 1) * n..][..n].iter_mut();
-        variances
-            .zip(self.posterior.variances())
-            .for_each(|(to, variance)| *to = variance);
+        variances.zip(self.posterior.variances()).for_each(|(to, variance)| *to = variance);
         self.count += 1;
     }
 
     /// Removes all rows and keeps the memory.
     pub fn clear(&mut self) {
         self.count = 0;
-        self.posterior
-            .covariance
-            .copy_from_slice(self.prior.covariance().view().values());
+        self.posterior.covariance.copy_from_slice(self.prior.covariance().view().values());
     }
 
     /// Number of rows.
@@ -236,11 +232,7 @@ impl SequentialEstimate {
     /// Scale ŝ of image and noise: the standard deviation of pixel i is ŝ √Pᵢᵢ. 1 if the scale is known, and before the
     /// first sample.
     pub fn scale(&self) -> f64 {
-        if self.unknown_scale && self.count > 0 {
-            (self.squares / self.count as f64).sqrt()
-        } else {
-            1.0
-        }
+        if self.unknown_scale && self.count > 0 { (self.squares / self.count as f64).sqrt() } else { 1.0 }
     }
 
     /// Expected intersection over union, in [0, 1], of the support of x̂ with the true one. The support is the set of
@@ -370,9 +362,7 @@ impl TrackedImage {
     /// Removes all samples and keeps the memory.
     pub fn clear(&mut self) {
         self.shape.fill(0.0);
-        self.posterior
-            .covariance
-            .copy_from_slice(self.prior.covariance().view().values());
+        self.posterior.covariance.copy_from_slice(self.prior.covariance().view().values());
         self.image.fill(0.0);
         self.strength = 0.0;
         self.sums = Sums::default();
@@ -512,9 +502,7 @@ fn probability_above(level: f64, mean: f64, deviation: f64) -> f64 {
 }
 
 fn with_mean(index: usize, value: f64) -> Refusal {
-    Refusal::new(format!(
-        "a prior of unknown scale has mean 0, but `mean[{index}]` = {value}"
-    ))
+    Refusal::new(format!("a prior of unknown scale has mean 0, but `mean[{index}]` = {value}"))
 }
 
 fn other_weights(cols: usize, expected: usize) -> Refusal {

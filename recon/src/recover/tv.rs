@@ -57,21 +57,14 @@ const GRADIENT_SQUARE: f64 = 8.0;
 
 impl Tv {
     /// Default of `stopping`.
-    pub(crate) const STOPPING: Stopping = Stopping {
-        tol: 1e-6,
-        max_iter: 200_000,
-    };
+    pub(crate) const STOPPING: Stopping = Stopping { tol: 1e-6, max_iter: 200_000 };
 
     /// Images of `rows` × `cols` pixels (row-major) with the penalty `alpha`.
     ///
     /// # Errors
     /// [`Refusal`] if `alpha` is outside its range.
     pub fn new(rows: usize, cols: usize, alpha: Penalty) -> Result<Self, Refusal> {
-        Ok(Self {
-            grid: Grid { rows, cols },
-            alpha: alpha.checked()?,
-            stopping: Self::STOPPING,
-        })
+        Ok(Self { grid: Grid { rows, cols }, alpha: alpha.checked()?, stopping: Self::STOPPING })
     }
 }
 
@@ -135,11 +128,7 @@ impl Point {
 
     /// Running mean: self + (other − self)·weight.
     fn approach(&mut self, other: &Self, weight: f64) {
-        for (mine, theirs) in [
-            (&mut self.x, &other.x),
-            (&mut self.q, &other.q),
-            (&mut self.p, &other.p),
-        ] {
+        for (mine, theirs) in [(&mut self.x, &other.x), (&mut self.q, &other.q), (&mut self.p, &other.p)] {
             for (m, t) in mine.iter_mut().zip(theirs) {
                 *m += weight * (t - *m);
             }
@@ -183,13 +172,7 @@ impl<'w> Hybrid<'w> {
         work.slope.resize(grid.pixels(), 0.0);
         work.image.resize(m, 0.0);
         work.differences.resize(grid.edges(), 0.0);
-        Self {
-            m,
-            grid,
-            penalty: 0.0,
-            balance: 1.0,
-            work,
-        }
+        Self { m, grid, penalty: 0.0, balance: 1.0, work }
     }
 
     /// Divides the operator by its largest singular value, which is returned (1 for a zero operator).
@@ -197,10 +180,7 @@ impl<'w> Hybrid<'w> {
         let (m, n) = (self.m, self.grid.pixels());
         let work = &mut *self.work;
         // a direction that no symmetry of the operator is likely to be orthogonal to
-        work.slope
-            .iter_mut()
-            .zip(1_u32..)
-            .for_each(|(v, i)| *v = 1.0 + f64::from(i).sin());
+        work.slope.iter_mut().zip(1_u32..).for_each(|(v, i)| *v = 1.0 + f64::from(i).sin());
         let mut largest = 0.0;
         for _ in 0..POWER_ROUNDS {
             let length = norm(&work.slope);

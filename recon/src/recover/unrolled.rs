@@ -104,9 +104,7 @@ impl Unrolled {
     /// A network with the numbers that its training has found.
     pub fn new(weights: UnrolledWeights) -> Self {
         let tables = SignTables::new(weights.prior.view());
-        Self {
-            model: Arc::new(Model { weights, tables }),
-        }
+        Self { model: Arc::new(Model { weights, tables }) }
     }
 
     /// N, taxels.
@@ -151,10 +149,7 @@ impl Unrolled {
         work.touched.clear();
         work.touched.resize(n, 0.0);
         if zero {
-            return Ok(Touched {
-                taxels: 0,
-                expected_iou: 0.0,
-            });
+            return Ok(Touched { taxels: 0, expected_iou: 0.0 });
         }
         let s = self.linear(work);
         self.unroll(work);
@@ -187,12 +182,7 @@ impl Unrolled {
         if let Ok(rows) = MatrixView::new(m, n, &work.rows) {
             rows.copy_columns(&mut work.columns);
         }
-        for (i, (row, gains)) in work
-            .lower
-            .chunks_exact_mut(m)
-            .zip(work.gains.chunks_exact(n))
-            .enumerate()
-        {
+        for (i, (row, gains)) in work.lower.chunks_exact_mut(m).zip(work.gains.chunks_exact(n)).enumerate() {
             adjoint(&work.columns, gains, row);
             row[i] += weights.noise_variance;
         }
@@ -227,8 +217,7 @@ impl Unrolled {
         for step in &weights.steps {
             work.white.clear();
             let rows = work.rows.chunks_exact(n);
-            work.white
-                .extend(work.y.iter().zip(rows).map(|(y, row)| y - dot(row, &work.x)));
+            work.white.extend(work.y.iter().zip(rows).map(|(y, row)| y - dot(row, &work.x)));
             solve_lower(&work.lower, m, &mut work.white);
             adjoint(&work.gains, &work.white, &mut work.step);
             let error = single(norm(&work.white) / (m as f64).sqrt());
@@ -243,14 +232,8 @@ impl Unrolled {
             push(inputs, work.hidden.iter().map(|v| v.max(0.0)));
             apply(&step.change, inputs, &mut work.change);
             let (image, memory) = work.change.split_at(n);
-            work.x
-                .iter_mut()
-                .zip(image)
-                .for_each(|(x, z)| *x = (*x + f64::from(*z)).max(0.0));
-            work.memory
-                .iter_mut()
-                .zip(memory)
-                .for_each(|(h, z)| *h = libm::tanhf(*z));
+            work.x.iter_mut().zip(image).for_each(|(x, z)| *x = (*x + f64::from(*z)).max(0.0));
+            work.memory.iter_mut().zip(memory).for_each(|(h, z)| *h = libm::tanhf(*z));
         }
         work.inputs.clear();
         let x = work.x.iter().map(|v| single(*v));
@@ -340,8 +323,7 @@ impl Recover for Unrolled {
         let n = self.taxels();
         let rows = problem.matrix().values().chunks_exact(n);
         work.white.clear();
-        work.white
-            .extend(problem.y().iter().zip(rows).map(|(y, row)| y - dot(row, &work.x)));
+        work.white.extend(problem.y().iter().zip(rows).map(|(y, row)| y - dot(row, &work.x)));
         let left = norm(&work.white);
         solution.set_dense(&work.x, 1.0, if left.is_finite() { left } else { f64::MAX })
     }
@@ -374,10 +356,9 @@ impl Layer {
     }
 
     fn check(&self, name: &str, inputs: usize, outputs: usize) -> Result<(), Refusal> {
-        for (what, len, expected) in [
-            ("weights", self.weights.len(), inputs * outputs),
-            ("biases", self.bias.len(), outputs),
-        ] {
+        for (what, len, expected) in
+            [("weights", self.weights.len(), inputs * outputs), ("biases", self.bias.len(), outputs)]
+        {
             if len != expected {
                 return Err(other_count(&format!("{what} of {name}"), len, expected));
             }
@@ -385,10 +366,7 @@ impl Layer {
         if self.weights.iter().chain(&self.bias).all(|w| w.is_finite()) {
             Ok(())
         } else {
-            Err(Refusal::new(format!(
-                "{what} have a number that is not finite",
-                what = name.to_owned()
-            )))
+            Err(Refusal::new(format!("{what} have a number that is not finite", what = name.to_owned())))
         }
     }
 }
@@ -436,18 +414,9 @@ impl UnrolledWeights {
     pub fn new(prior: Matrix, noise_variance: f64, steps: Vec<UnrolledStep>, output: Layer) -> Result<Self, Refusal> {
         let n = prior.nrows();
         let range = |field, value, valid, range| {
-            if valid {
-                Ok(())
-            } else {
-                Err(Refusal::range(field, value, range))
-            }
+            if valid { Ok(()) } else { Err(Refusal::range(field, value, range)) }
         };
-        range(
-            "taxels",
-            n as f64,
-            (1..=MOST_TAXELS).contains(&n) && prior.ncols() == n,
-            "[1, 4096]",
-        )?;
+        range("taxels", n as f64, (1..=MOST_TAXELS).contains(&n) && prior.ncols() == n, "[1, 4096]")?;
         range("steps", steps.len() as f64, steps.len() <= 100, "[0, 100]")?;
         if !prior.view().values().iter().all(|v| v.is_finite()) {
             return Err(Refusal::new(format!(
@@ -457,35 +426,18 @@ impl UnrolledWeights {
         }
         let trace: f64 = (0..n).map(|i| prior.row(i)[i]).sum();
         let [least, most] = MOMENTS;
-        range(
-            "trace of the prior",
-            trace,
-            (least..=most).contains(&trace),
-            "[1e-3, 1e3]",
-        )?;
-        range(
-            "noise_variance",
-            noise_variance,
-            (1e-5..=most).contains(&noise_variance),
-            "[1e-5, 1e3]",
-        )?;
+        range("trace of the prior", trace, (least..=most).contains(&trace), "[1e-3, 1e3]")?;
+        range("noise_variance", noise_variance, (1e-5..=most).contains(&noise_variance), "[1e-5, 1e3]")?;
         let memory = (output.weights.len() / n)
             .checked_sub(n)
             .ok_or_else(|| other_count("weights of the output", output.weights.len(), n * n))?;
         for (t, step) in steps.iter().enumerate() {
             let hidden = step.hidden.bias.len();
-            step.hidden
-                .check(&format!("step {t}, hidden"), 4 * n + memory + 2, hidden)?;
+            step.hidden.check(&format!("step {t}, hidden"), 4 * n + memory + 2, hidden)?;
             step.change.check(&format!("step {t}, change"), hidden, n + memory)?;
         }
         output.check("the output", memory + n, n)?;
-        Ok(Self {
-            prior,
-            noise_variance,
-            steps,
-            output,
-            memory,
-        })
+        Ok(Self { prior, noise_variance, steps, output, memory })
     }
 
     /// An untrained network for `taxels` that are independent and alike. Every step adds the linear estimate from the
@@ -507,10 +459,8 @@ impl UnrolledWeights {
             change[i * n + i] = 1.0;
             change[(n + i) * n + i] = -1.0;
         }
-        let step = UnrolledStep {
-            hidden: Layer::new(hidden, vec![0.0; 2 * n]),
-            change: Layer::new(change, vec![0.0; n]),
-        };
+        let step =
+            UnrolledStep { hidden: Layer::new(hidden, vec![0.0; 2 * n]), change: Layer::new(change, vec![0.0; n]) };
         let output = Layer::new(weights, vec![-STEEP / 4.0; n]);
         Self::new(prior, noise_variance, vec![step; PLAIN_STEPS], output)
     }
@@ -655,11 +605,7 @@ mod tests {
     /// Against all subsets of six taxels.
     #[test]
     fn no_other_support_is_expected_to_be_better() {
-        for touched in [
-            [0.9, 0.8, 0.3, 0.2, 0.05, 0.6],
-            [0.1, 0.1, 0.05, 0.2, 0.02, 0.1],
-            [1.0; 6],
-        ] {
+        for touched in [[0.9, 0.8, 0.3, 0.2, 0.05, 0.6], [0.1, 0.1, 0.05, 0.2, 0.02, 0.1], [1.0; 6]] {
             let mut order = Vec::new();
             let (count, expected) = best_support(&touched, &mut order);
             let total: f64 = touched.iter().sum();
@@ -743,10 +689,7 @@ mod tests {
                 .flat_map(|part| part.iter().copied().collect::<Vec<_>>())
                 .chain([(m as f64 / 20.0).ln(), e.norm() / (m as f64).sqrt()])
                 .collect();
-            let z = dense(
-                &step.change,
-                &dense(&step.hidden, &DVector::from_vec(inputs)).map(|v| v.max(0.0)),
-            );
+            let z = dense(&step.change, &dense(&step.hidden, &DVector::from_vec(inputs)).map(|v| v.max(0.0)));
             x = DVector::from_fn(N, |i, _| (x[i] + z[i]).max(0.0));
             h = DVector::from_fn(MEMORY, |i, _| z[N + i].tanh());
         }
@@ -782,10 +725,7 @@ mod tests {
             agree(&mut expected, &order, count);
             let largest = expected.iter().fold(0.0_f64, |most, v| most.max(*v));
             for (x, expected) in image.iter().zip(&expected) {
-                assert!(
-                    (x - expected).abs() < 1e-5 * largest,
-                    "M = {m}: {x}, expected {expected}"
-                );
+                assert!((x - expected).abs() < 1e-5 * largest, "M = {m}: {x}, expected {expected}");
             }
         }
     }

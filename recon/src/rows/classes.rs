@@ -196,13 +196,7 @@ struct Separation<'a> {
 impl<'a> Separation<'a> {
     fn new(apart: &'a Apart) -> Self {
         let count = apart.labels.len();
-        Self {
-            apart,
-            sums: vec![0.0; count],
-            changed: vec![0.0; count],
-            u: vec![0.0; apart.n],
-            apa: 0.0,
-        }
+        Self { apart, sums: vec![0.0; count], changed: vec![0.0; count], u: vec![0.0; apart.n], apa: 0.0 }
     }
 
     fn apa_after(&self, i: usize, delta: f64) -> f64 {
@@ -215,26 +209,16 @@ impl Worth for Separation<'_> {
         adjoint(&self.apart.posterior.covariance, row, &mut self.u);
         self.apa = dot(row, &self.u);
         let templates = self.apart.residual.chunks_exact(self.apart.n);
-        self.sums
-            .iter_mut()
-            .zip(templates)
-            .for_each(|(sum, t)| *sum = dot(t, row));
+        self.sums.iter_mut().zip(templates).for_each(|(sum, t)| *sum = dot(t, row));
     }
 
     fn worth(&self) -> f64 {
-        -self
-            .apart
-            .bound(&self.sums, self.apa.max(0.0) + self.apart.variance, f64::INFINITY)
+        -self.apart.bound(&self.sums, self.apa.max(0.0) + self.apart.variance, f64::INFINITY)
     }
 
     fn after(&mut self, i: usize, delta: f64) -> f64 {
         let n = self.apart.n;
-        for ((changed, sum), t) in self
-            .changed
-            .iter_mut()
-            .zip(&self.sums)
-            .zip(self.apart.residual.chunks_exact(n))
-        {
+        for ((changed, sum), t) in self.changed.iter_mut().zip(&self.sums).zip(self.apart.residual.chunks_exact(n)) {
             *changed = sum + delta * t[i];
         }
         let s = self.apa_after(i, delta).max(0.0) + self.apart.variance;
@@ -284,11 +268,7 @@ pub fn choose_for_images(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Resu
     for (product, row) in products.chunks_exact_mut(n).zip(&rows) {
         crate::kernels::adjoint(covariance.view().values(), row, product);
     }
-    let mut falls: Vec<(f64, f64)> = products
-        .chunks_exact(n)
-        .zip(&rows)
-        .map(|(u, a)| (dot(u, u), dot(u, a)))
-        .collect();
+    let mut falls: Vec<(f64, f64)> = products.chunks_exact(n).zip(&rows).map(|(u, a)| (dot(u, u), dot(u, a))).collect();
     let mut chosen = Vec::with_capacity(task.rows);
     let mut left = vec![true; rows.len()];
     let mut u = vec![0.0; n];
@@ -379,10 +359,7 @@ mod tests {
     fn the_row_that_tells_two_classes_apart_is_found() {
         let classes = [component(1, [1.0, 1.0, 0.0, 0.0]), component(2, [0.0, 0.0, 1.0, 1.0])];
         let expected = Expected::smooth([2, 2], 0.5).unwrap();
-        let task = RowTask {
-            classes: &classes,
-            ..RowTask::new(1, &expected)
-        };
+        let task = RowTask { classes: &classes, ..RowTask::new(1, &expected) };
         let rows = Classes.design(&task).unwrap();
         let row = rows.row(0);
         let alike = |i: usize, j: usize| row[i] * row[j] > 0.0;
@@ -438,11 +415,7 @@ mod tests {
             for k in (0..60).filter(|k| !chosen[..m - 1].contains(k)) {
                 let mut other = chosen[..m - 1].to_vec();
                 other.push(k);
-                assert!(
-                    trace(&other) >= best - 1e-12,
-                    "row {m}: {k} is better than {}",
-                    chosen[m - 1]
-                );
+                assert!(trace(&other) >= best - 1e-12, "row {m}: {k} is better than {}", chosen[m - 1]);
             }
         }
         let refused = choose_for_images(&RowTask::new(61, &expected), candidates.view());
@@ -462,19 +435,13 @@ mod tests {
                 noise_variance: 3.0,
             })
             .collect();
-        let task = RowTask {
-            classes: &classes,
-            ..RowTask::new(5, &expected)
-        };
+        let task = RowTask { classes: &classes, ..RowTask::new(5, &expected) };
         let chosen = choose_for_classes(&task, candidates.view()).unwrap();
         let mut apart = Apart::new(&classes, [4, 4]).unwrap();
         for (m, &best) in chosen.iter().enumerate() {
             let bound = |k: usize| apart.bound_with(&apart.seen(candidates.row(k)), f64::INFINITY);
             for k in (0..60).filter(|k| !chosen[..m].contains(k)) {
-                assert!(
-                    bound(k) >= bound(best) * (1.0 - 1e-9),
-                    "row {m}: {k} is better than {best}"
-                );
+                assert!(bound(k) >= bound(best) * (1.0 - 1e-9), "row {m}: {k} is better than {best}");
             }
             apart.observe(candidates.row(best));
         }

@@ -27,10 +27,7 @@ pub fn conformance(designer: &Designer) {
         let classes = classes(n);
         for expected in expectations(shape) {
             for rows in [1, n.min(4), n / 2, n] {
-                let task = RowTask {
-                    classes: &classes,
-                    ..RowTask::new(rows.max(1), &expected)
-                };
+                let task = RowTask { classes: &classes, ..RowTask::new(rows.max(1), &expected) };
                 let found = method.design(&task);
                 match &found {
                     Ok(found) => sound(designer, &task, found),
@@ -60,10 +57,7 @@ fn expectations(shape: [usize; 2]) -> Vec<Expected> {
     let n = shape[0] * shape[1];
     let smooth = Expected::smooth(shape, 1.5).unwrap_or_else(|e| panic!("{e}"));
     let prior = Gaussian::new(vec![0.3; n], smooth.covariance()).ok();
-    let tolerances = Tolerances {
-        gain_log_sd: 0.3,
-        shift: 1,
-    };
+    let tolerances = Tolerances { gain_log_sd: 0.3, shift: 1 };
     let like = prior.and_then(|prior| Expected::like(&prior, shape, tolerances).ok());
     std::iter::once(smooth).chain(like).collect()
 }
@@ -84,45 +78,23 @@ fn classes(n: usize) -> Vec<Component> {
 
 fn sound(designer: &Designer, task: &RowTask<'_>, rows: &Matrix) {
     let name = designer.name;
-    assert_eq!(
-        (rows.nrows(), rows.ncols()),
-        (task.rows, task.expected.taxels()),
-        "{name}: shape"
-    );
+    assert_eq!((rows.nrows(), rows.ncols()), (task.rows, task.expected.taxels()), "{name}: shape");
     for (i, &level) in rows.view().values().iter().enumerate() {
-        assert!(
-            level.abs().to_bits() == 1.0_f64.to_bits(),
-            "{name}: level {level} at {i}"
-        );
+        assert!(level.abs().to_bits() == 1.0_f64.to_bits(), "{name}: level {level} at {i}");
     }
 }
 
 fn refuses(name: &str, method: &dyn DesignRows) {
     let expected = Expected::smooth([4, 4], 1.5).unwrap_or_else(|e| panic!("{e}"));
     let classes = classes(16);
-    let task = RowTask {
-        classes: &classes,
-        ..RowTask::new(3, &expected)
-    };
+    let task = RowTask { classes: &classes, ..RowTask::new(3, &expected) };
     let bad = [
         RowTask { rows: 0, ..task },
-        RowTask {
-            rows: usize::MAX,
-            ..task
-        },
+        RowTask { rows: usize::MAX, ..task },
         RowTask { noise: 0.0, ..task },
-        RowTask {
-            noise: f64::NAN,
-            ..task
-        },
-        RowTask {
-            largest_sum: Some(f64::NAN),
-            ..task
-        },
-        RowTask {
-            largest_sum: Some(0.0),
-            ..task
-        },
+        RowTask { noise: f64::NAN, ..task },
+        RowTask { largest_sum: Some(f64::NAN), ..task },
+        RowTask { largest_sum: Some(0.0), ..task },
     ];
     for task in bad {
         assert!(method.design(&task).is_err(), "{name}: {task:?} was not refused");
@@ -140,14 +112,8 @@ fn extremes(designer: &Designer, method: &dyn DesignRows) {
         let prior = Gaussian::new(vec![0.0; 16], covariance).unwrap_or_else(|e| panic!("{e}"));
         let expected = Expected::like(&prior, [4, 4], Tolerances::default()).unwrap_or_else(|e| panic!("{e}"));
         for noise in [1e-6, 1e3] {
-            let task = RowTask {
-                classes: &classes,
-                noise,
-                ..RowTask::new(5, &expected)
-            };
-            let rows = method
-                .design(&task)
-                .unwrap_or_else(|e| panic!("{}: {e}", designer.name));
+            let task = RowTask { classes: &classes, noise, ..RowTask::new(5, &expected) };
+            let rows = method.design(&task).unwrap_or_else(|e| panic!("{}: {e}", designer.name));
             sound(designer, &task, &rows);
         }
     }
@@ -157,22 +123,14 @@ fn keeps_to_the_headroom(designer: &Designer, method: &dyn DesignRows) {
     let expected = Expected::smooth([6, 6], 1.5).unwrap_or_else(|e| panic!("{e}"));
     let classes = classes(36);
     for limit in [0.05, 0.6, 1.0, 2.0, 1e3] {
-        let task = RowTask {
-            classes: &classes,
-            largest_sum: Some(limit),
-            ..RowTask::new(4, &expected)
-        };
+        let task = RowTask { classes: &classes, largest_sum: Some(limit), ..RowTask::new(4, &expected) };
         match method.design(&task) {
             Ok(rows) => {
                 let largest = limit * expected.random_square().sqrt();
                 for r in 0..4 {
                     let rms = expected.square_of_sum(rows.row(r)).sqrt();
                     // sums are kept up to date level by level
-                    assert!(
-                        rms <= largest * (1.0 + 1e-9),
-                        "{}: {rms} above {largest}",
-                        designer.name
-                    );
+                    assert!(rms <= largest * (1.0 + 1e-9), "{}: {rms} above {largest}", designer.name);
                 }
             }
             Err(e) if limit < 2.0 && (is_too_many(&e) || e.to_string().starts_with("no row of levels ±1")) => {}
@@ -184,10 +142,7 @@ fn keeps_to_the_headroom(designer: &Designer, method: &dyn DesignRows) {
 fn does_not_see_threads(name: &str, method: &dyn DesignRows) {
     let expected = Expected::smooth([6, 6], 1.5).unwrap_or_else(|e| panic!("{e}"));
     let classes = classes(36);
-    let task = RowTask {
-        classes: &classes,
-        ..RowTask::new(6, &expected)
-    };
+    let task = RowTask { classes: &classes, ..RowTask::new(6, &expected) };
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.unwrap_or_else(|e| panic!("{e}")).install(|| method.design(&task))
@@ -199,10 +154,7 @@ fn does_not_see_threads(name: &str, method: &dyn DesignRows) {
 fn sees_more_than_chance(designer: &Designer, method: &dyn DesignRows) {
     let expected = Expected::smooth([10, 10], 1.5).unwrap_or_else(|e| panic!("{e}"));
     let left = |method: &dyn DesignRows, seed| {
-        let task = RowTask {
-            seed,
-            ..RowTask::new(20, &expected)
-        };
+        let task = RowTask { seed, ..RowTask::new(20, &expected) };
         let trace = method.design(&task).and_then(|rows| posterior_trace(&task, &rows));
         trace.unwrap_or_else(|e| panic!("{}: {e}", designer.name))
     };
@@ -210,9 +162,5 @@ fn sees_more_than_chance(designer: &Designer, method: &dyn DesignRows) {
     let worst = random.iter().copied().fold(0.0, f64::max);
     let own = left(method, 1);
     // rows of chance scatter by a few per cent about their mean
-    assert!(
-        own <= worst * 1.05,
-        "{}: {own} is left, by chance {worst}",
-        designer.name
-    );
+    assert!(own <= worst * 1.05, "{}: {own} is left, by chance {worst}", designer.name);
 }

@@ -72,13 +72,7 @@ impl Expected {
             }
             c
         };
-        Ok(Self {
-            shape,
-            moments: Moments::Separable {
-                rows: axis(shape[0]),
-                cols: axis(shape[1]),
-            },
-        })
+        Ok(Self { shape, moments: Moments::Separable { rows: axis(shape[0]), cols: axis(shape[1]) } })
     }
 
     /// Images of `prior` on a grid of `shape` = [rows, columns], with `tolerances`. Gains g with mean 1 and variance v
@@ -95,17 +89,10 @@ impl Expected {
         let mean = prior.mean().to_vec();
         let mut second = prior.covariance().clone();
         for i in 0..n {
-            second
-                .row_mut(i)
-                .iter_mut()
-                .zip(&mean)
-                .for_each(|(s, m)| *s += mean[i] * m);
+            second.row_mut(i).iter_mut().zip(&mean).for_each(|(s, m)| *s += mean[i] * m);
         }
-        let (mean, mut second) = if tolerances.shift > 0 {
-            moved(shape, tolerances.shift, &mean, &second)
-        } else {
-            (mean, second)
-        };
+        let (mean, mut second) =
+            if tolerances.shift > 0 { moved(shape, tolerances.shift, &mean, &second) } else { (mean, second) };
         let spread = tolerances.gain_log_sd.powi(2).exp_m1();
         let floor = FLOOR * (0..n).map(|i| second.row(i)[i]).sum::<f64>() / n as f64;
         for i in 0..n {
@@ -117,10 +104,7 @@ impl Expected {
             let row = covariance.row_mut(i);
             row.iter_mut().zip(&mean).for_each(|(c, m)| *c -= mean[i] * m);
         }
-        Ok(Self {
-            shape,
-            moments: Moments::Dense { covariance, second },
-        })
+        Ok(Self { shape, moments: Moments::Dense { covariance, second } })
     }
 
     /// Rows and columns of the grid.
@@ -151,9 +135,7 @@ impl Expected {
                 let width = cols.nrows();
                 let along = along_rows(rows, a, width);
                 for (out, part) in out.chunks_exact_mut(width).zip(along.chunks_exact(width)) {
-                    out.iter_mut()
-                        .enumerate()
-                        .for_each(|(c, out)| *out = dot(cols.row(c), part));
+                    out.iter_mut().enumerate().for_each(|(c, out)| *out = dot(cols.row(c), part));
                 }
             }
         }
@@ -194,8 +176,7 @@ impl Expected {
                 let width = cols.nrows();
                 let ax = along_rows(rows, a, width);
                 let each = a.chunks_exact(width).zip(ax.chunks_exact(width));
-                each.map(|(x, ax)| (0..width).map(|c| x[c] * dot(cols.row(c), ax)).sum::<f64>())
-                    .sum()
+                each.map(|(x, ax)| (0..width).map(|c| x[c] * dot(cols.row(c), ax)).sum::<f64>()).sum()
             }
         }
     }
@@ -261,17 +242,8 @@ fn shifts(side: usize, reach: usize) -> std::ops::RangeInclusive<usize> {
 /// Largest shift of images of `shape` whose average takes [`MOST_PRODUCTS`] at most.
 fn most_shift(shape: [usize; 2]) -> usize {
     let square = ((shape[0] * shape[1]) as f64).powi(2);
-    let products = |reach: usize| {
-        shape
-            .map(|side| shifts(side, reach).count() as f64)
-            .iter()
-            .product::<f64>()
-            * square
-    };
-    (0..=MOST.1)
-        .rev()
-        .find(|reach| products(*reach) <= MOST_PRODUCTS)
-        .unwrap_or(0)
+    let products = |reach: usize| shape.map(|side| shifts(side, reach).count() as f64).iter().product::<f64>() * square;
+    (0..=MOST.1).rev().find(|reach| products(*reach) <= MOST_PRODUCTS).unwrap_or(0)
 }
 
 /// Mean and second moments of images at all shifts up to `reach`, averaged; zeros move in.
@@ -291,11 +263,7 @@ fn moved(shape: [usize; 2], reach: usize, mean: &[f64], second: &Matrix) -> (Vec
             out_mean[to] += weight * mean[from(r, c)];
             for r in down.clone() {
                 let (first, source) = (r * cols + across.start, &source[from(r, across.start)..]);
-                axpy(
-                    weight,
-                    &source[..across.len()],
-                    &mut out.row_mut(to)[first..first + across.len()],
-                );
+                axpy(weight, &source[..across.len()], &mut out.row_mut(to)[first..first + across.len()]);
             }
         }
     }
@@ -415,10 +383,7 @@ mod tests {
         let mut tiny = Matrix::zeros(9, 9);
         (0..9).for_each(|i| tiny.row_mut(i)[i] = 1e-12);
         let prior = Gaussian::new(mean, tiny).unwrap();
-        let tolerances = Tolerances {
-            gain_log_sd: 0.3,
-            shift: 1,
-        };
+        let tolerances = Tolerances { gain_log_sd: 0.3, shift: 1 };
         let expected = Expected::like(&prior, [3, 3], tolerances).unwrap();
         let second = expected.second();
         let v = 0.09_f64.exp();
@@ -443,10 +408,7 @@ mod tests {
             let (mut expected_mean, mut expected) = (vec![0.0; n], vec![0.0; n * n]);
             for (dr, dc) in (0..=2 * reach).flat_map(|dr| (0..=2 * reach).map(move |dc| (dr, dc))) {
                 let source = |i: usize| {
-                    let (r, c) = (
-                        (i / shape[1] + reach).wrapping_sub(dr),
-                        (i % shape[1] + reach).wrapping_sub(dc),
-                    );
+                    let (r, c) = ((i / shape[1] + reach).wrapping_sub(dr), (i % shape[1] + reach).wrapping_sub(dc));
                     (r < shape[0] && c < shape[1]).then(|| r * shape[1] + c)
                 };
                 for (i, from) in (0..n).filter_map(|i| Some((i, source(i)?))) {
@@ -474,13 +436,7 @@ mod tests {
             }
         }
         assert!((expected.random_square() - 12.0).abs() < 1e-12);
-        let dense = Expected {
-            shape: [3, 4],
-            moments: Moments::Dense {
-                covariance: c.clone(),
-                second: c,
-            },
-        };
+        let dense = Expected { shape: [3, 4], moments: Moments::Dense { covariance: c.clone(), second: c } };
         for (a, b) in dense.axes().iter().zip(&expected.axes()) {
             for (a, b) in a.view().values().iter().zip(b.view().values()) {
                 assert!((a - b).abs() < 1e-14);

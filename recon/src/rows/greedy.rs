@@ -96,9 +96,7 @@ pub(super) fn best_row<W: Worth>(
 
 /// The smallest sum that can be had, for an error.
 fn unreachable_limit(task: &RowTask<'_>, headroom: Option<Headroom>) -> Refusal {
-    let mut row: Vec<f64> = (0..task.expected.taxels())
-        .map(|i| if i % 2 == 0 { 1.0 } else { -1.0 })
-        .collect();
+    let mut row: Vec<f64> = (0..task.expected.taxels()).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
     let square = headroom.map_or(0.0, |mut headroom| {
         headroom.start(&row);
         loop {
@@ -112,10 +110,7 @@ fn unreachable_limit(task: &RowTask<'_>, headroom: Option<Headroom>) -> Refusal 
             row[next.1] *= -1.0;
         }
     });
-    headroom_unreachable(
-        task.largest_sum.unwrap_or_default(),
-        (square.max(0.0) / task.expected.random_square()).sqrt(),
-    )
+    headroom_unreachable(task.largest_sum.unwrap_or_default(), (square.max(0.0) / task.expected.random_square()).sqrt())
 }
 
 /// |P a|² / (aᵀP a + σ²).
@@ -132,13 +127,7 @@ struct Fall<'a> {
 impl<'a> Fall<'a> {
     fn new(covariances: &'a Covariances) -> Self {
         let n = covariances.n;
-        Self {
-            covariances,
-            u: vec![0.0; n],
-            w: vec![0.0; n],
-            uu: 0.0,
-            apa: 0.0,
-        }
+        Self { covariances, u: vec![0.0; n], w: vec![0.0; n], uu: 0.0, apa: 0.0 }
     }
 
     fn parts(&self, i: usize, delta: f64) -> (f64, f64) {
@@ -172,11 +161,7 @@ impl Worth for Fall<'_> {
     fn change(&mut self, i: usize, delta: f64) {
         let n = self.covariances.n;
         (self.uu, self.apa) = self.parts(i, delta);
-        axpy(
-            delta,
-            &self.covariances.posterior.covariance[i * n..(i + 1) * n],
-            &mut self.u,
-        );
+        axpy(delta, &self.covariances.posterior.covariance[i * n..(i + 1) * n], &mut self.u);
         axpy(delta, &self.covariances.square[i * n..(i + 1) * n], &mut self.w);
     }
 }
@@ -192,20 +177,13 @@ struct Leading {
 impl Leading {
     fn new(n: usize, rng: &mut ChaCha8Rng) -> Self {
         let count = LEADING.min(n);
-        Self {
-            n,
-            vectors: (0..count * n).map(|_| rng.random::<f64>() - 0.5).collect(),
-            products: vec![0.0; count * n],
-        }
+        Self { n, vectors: (0..count * n).map(|_| rng.random::<f64>() - 0.5).collect(), products: vec![0.0; count * n] }
     }
 
     fn iterate(&mut self, p: &[f64], iterations: usize) {
         let n = self.n;
         for _ in 0..iterations {
-            let pairs = self
-                .vectors
-                .par_chunks_exact(n)
-                .zip(self.products.par_chunks_exact_mut(n));
+            let pairs = self.vectors.par_chunks_exact(n).zip(self.products.par_chunks_exact_mut(n));
             pairs.for_each(|(v, out)| adjoint(p, v, out));
             std::mem::swap(&mut self.vectors, &mut self.products);
             for k in 0..self.vectors.len() / n {
@@ -321,17 +299,9 @@ impl Covariances {
         // P is symmetric: (P²)ᵢⱼ is the product of two rows
         square.par_chunks_exact_mut(n).enumerate().for_each(|(i, out)| {
             let row = &p[i * n..(i + 1) * n];
-            out.iter_mut()
-                .zip(p.chunks_exact(n))
-                .for_each(|(out, other)| *out = dot(row, other));
+            out.iter_mut().zip(p.chunks_exact(n)).for_each(|(out, other)| *out = dot(row, other));
         });
-        Self {
-            n,
-            posterior: GaussianPosterior::new(p, n),
-            square,
-            variance,
-            w: vec![0.0; n],
-        }
+        Self { n, posterior: GaussianPosterior::new(p, n), square, variance, w: vec![0.0; n] }
     }
 
     /// Measures the row `a`.
@@ -413,11 +383,7 @@ mod tests {
 
     fn hadamard(n: usize, r: usize, c: usize) -> f64 {
         debug_assert!(n.is_power_of_two());
-        if (r & c).count_ones().is_multiple_of(2) {
-            1.0
-        } else {
-            -1.0
-        }
+        if (r & c).count_ones().is_multiple_of(2) { 1.0 } else { -1.0 }
     }
 
     /// Where the eigenvectors are rows of a Hadamard matrix, they are the best rows of all, strongest first.
@@ -428,26 +394,18 @@ mod tests {
         let mut c = Matrix::zeros(n, n);
         for i in 0..n {
             for j in 0..n {
-                c.row_mut(i)[j] = (0..n)
-                    .map(|k| variances[k] * hadamard(n, k, i) * hadamard(n, k, j) / n as f64)
-                    .sum();
+                c.row_mut(i)[j] = (0..n).map(|k| variances[k] * hadamard(n, k, i) * hadamard(n, k, j) / n as f64).sum();
             }
         }
         let prior = Gaussian::new(vec![0.0; n], c).unwrap();
         let expected = Expected::like(&prior, [4, 4], Tolerances::default()).unwrap();
-        let task = RowTask {
-            noise: 0.01,
-            ..RowTask::new(8, &expected)
-        };
+        let task = RowTask { noise: 0.01, ..RowTask::new(8, &expected) };
         let rows = Greedy.design(&task).unwrap();
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| variances[*b].total_cmp(&variances[*a]));
         for (r, &k) in order[..8].iter().enumerate() {
             let overlap: f64 = (0..n).map(|i| rows.row(r)[i] * hadamard(n, k, i)).sum();
-            assert!(
-                (overlap.abs() - n as f64).abs() < 1e-9,
-                "row {r} is not eigenvector {k}: {overlap}"
-            );
+            assert!((overlap.abs() - n as f64).abs() < 1e-9, "row {r} is not eigenvector {k}: {overlap}");
         }
         // every row then removes its own variance but for the noise: λ → λ σ²/(N λ + σ²)
         let (variance, all) = (task.variance(), variances.iter().sum::<f64>());
@@ -456,11 +414,7 @@ mod tests {
             .enumerate()
             .map(|(r, &k)| {
                 let v = variances[k];
-                if r < 8 {
-                    v * variance / (n as f64 * v + variance)
-                } else {
-                    v
-                }
+                if r < 8 { v * variance / (n as f64 * v + variance) } else { v }
             })
             .sum();
         // `like` raises the diagonal by 1e-9 of its mean
@@ -473,16 +427,9 @@ mod tests {
         let (mut low, mut high) = (0.0, 1e9);
         for _ in 0..200 {
             let middle = 0.5 * (low + high);
-            if spent(middle) < energy {
-                low = middle
-            } else {
-                high = middle
-            }
+            if spent(middle) < energy { low = middle } else { high = middle }
         }
-        eigen
-            .iter()
-            .map(|l| l / (1.0 + l * (low - 1.0 / l.max(1e-300)).max(0.0)))
-            .sum()
+        eigen.iter().map(|l| l / (1.0 + l * (low - 1.0 / l.max(1e-300)).max(0.0))).sum()
     }
 
     /// No rows of energy N each leave less than water-filling over the eigenvectors does, and greedy signs come within

@@ -83,14 +83,7 @@ impl<'a> RowTask<'a> {
 
     /// A task for `rows` rows and the images `expected`, without a limit of the sums.
     pub fn new(rows: usize, expected: &'a Expected) -> Self {
-        Self {
-            rows,
-            expected,
-            classes: &[],
-            noise: Self::NOISE,
-            largest_sum: None,
-            seed: 1,
-        }
+        Self { rows, expected, classes: &[], noise: Self::NOISE, largest_sum: None, seed: 1 }
     }
 
     /// Checks all numbers; at most `most` rows, because of `reason`.
@@ -112,8 +105,7 @@ impl<'a> RowTask<'a> {
 
     /// The largest mean square of a row's sum, in the unit of the images.
     pub(super) fn largest_square(&self) -> Option<f64> {
-        self.largest_sum
-            .map(|limit| limit * limit * self.expected.random_square())
+        self.largest_sum.map(|limit| limit * limit * self.expected.random_square())
     }
 }
 
@@ -150,34 +142,18 @@ const fn line(
     about: &'static str,
     build: fn() -> Box<dyn DesignRows>,
 ) -> Designer {
-    Designer {
-        name,
-        label,
-        needs,
-        about,
-        build,
-    }
+    Designer { name, label, needs, about, build }
 }
 
 /// Every designer: name, label, needs, description, builder.
 pub const DESIGNERS: &[Designer] = &[
-    line("random", "random", Nothing, "independent random signs", || {
-        Box::new(Random)
+    line("random", "random", Nothing, "independent random signs", || Box::new(Random)),
+    line("cosine_signs", "cosine signs", Nothing, "signs of two-dimensional cosines, low frequencies first", || {
+        Box::new(CosineSigns)
     }),
-    line(
-        "cosine_signs",
-        "cosine signs",
-        Nothing,
-        "signs of two-dimensional cosines, low frequencies first",
-        || Box::new(CosineSigns),
-    ),
-    line(
-        "greedy",
-        "greedy",
-        Moments,
-        "row by row, the one that lowers the posterior variance most",
-        || Box::new(Greedy),
-    ),
+    line("greedy", "greedy", Moments, "row by row, the one that lowers the posterior variance most", || {
+        Box::new(Greedy)
+    }),
     line(
         "separable",
         "separable",
@@ -306,9 +282,6 @@ mod tests {
             })
             .sum();
         assert!((flips - 4.0).abs() < 1e-12, "{order:?}: {flips}");
-        assert_eq!(
-            fewest_flips(Matrix::from_rows(1, 3, vec![1.0; 3]).unwrap().view(), &[1.0; 3]),
-            [0]
-        );
+        assert_eq!(fewest_flips(Matrix::from_rows(1, 3, vec![1.0; 3]).unwrap().view(), &[1.0; 3]), [0]);
     }
 }

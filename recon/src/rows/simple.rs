@@ -96,10 +96,7 @@ impl DesignRows for Separable {
             let n = covariance.nrows();
             let along = Expected {
                 shape: [1, n],
-                moments: Moments::Dense {
-                    second: covariance.clone(),
-                    covariance: covariance.clone(),
-                },
+                moments: Moments::Dense { second: covariance.clone(), covariance: covariance.clone() },
             };
             let designed = Greedy.design(&RowTask {
                 rows: n.min(task.rows),
@@ -113,9 +110,8 @@ impl DesignRows for Separable {
                 rows[axis].push(designed.row(r).to_vec());
             }
         }
-        let mut pairs: Vec<(usize, usize)> = (0..rows[0].len())
-            .flat_map(|i| (0..rows[1].len()).map(move |j| (i, j)))
-            .collect();
+        let mut pairs: Vec<(usize, usize)> =
+            (0..rows[0].len()).flat_map(|i| (0..rows[1].len()).map(move |j| (i, j))).collect();
         // aᵀA a · bᵀB b is the variance of the sum; the first of equals
         pairs.sort_by(|x, y| (worth[0][y.0] * worth[1][y.1]).total_cmp(&(worth[0][x.0] * worth[1][x.1])));
         take(task, products(shape, &rows, pairs), reason)

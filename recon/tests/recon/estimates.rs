@@ -66,10 +66,7 @@ fn lasso_equals_scikit_learn() {
         let objective = |w: &[f64]| lasso(&a, &y, w, alpha);
         // the gap bounds how far ours is above the smallest objective; the other program's can only be above it as well
         let allowed = 1e-12 * objective(&vec![0.0; k]);
-        assert!(
-            objective(&w) <= objective(&expected) + allowed,
-            "case {seed}: objective"
-        );
+        assert!(objective(&w) <= objective(&expected) + allowed, "case {seed}: objective");
         // a gap of 1e-13 leaves 3e-7 in a coefficient of unit curvature; the curvature on the support is near M/3 > 1,
         // its smallest value some hundredth of that
         assert_near(&w, &expected, 1e-5, &format!("case {seed}"));
@@ -141,22 +138,13 @@ fn total_variation_of_two_plateaus() {
         let mean = 0.4 * low + 0.6 * high;
         // the lower plateau may not rise above the mean of all
         let lower = (low + penalty / 4.0_f64).min(mean).max(0.0);
-        let upper = if lower > 0.0 && lower >= mean {
-            mean
-        } else {
-            high - penalty / 6.0
-        };
+        let upper = if lower > 0.0 && lower >= mean { mean } else { high - penalty / 6.0 };
         let expected: Vec<f64> = (0..10).map(|i| if i < n1 { lower } else { upper }).collect();
         for (rows, cols) in [(1, 10), (10, 1)] {
             let mut method = Tv::new(rows, cols, Penalty::Absolute(alpha)).unwrap();
             method.stopping.tol = 1e-11;
             // a gap of 1e-11 ‖y‖² / 2 in an objective of unit curvature is below 1e-4 in a pixel
-            assert_near(
-                &solve(&method, &Matrix::from(&a), &y),
-                &expected,
-                1e-4,
-                &format!("{low} and {high}"),
-            );
+            assert_near(&solve(&method, &Matrix::from(&a), &y), &expected, 1e-4, &format!("{low} and {high}"));
         }
         assert_eq!(n1 + n2, 10);
     }
@@ -232,10 +220,7 @@ fn what_is_no_window_is_refused() {
     let (prior, a, y) = drawn(5, 4, 6, 0.0);
     let other = Arc::new(Gaussian::white(5, 1.0).unwrap());
     let noise = Noise::Relative(0.1);
-    assert!(says(
-        &Fixed::new(a.view(), other, noise),
-        "operator has 6 columns; the method was built for 5"
-    ));
+    assert!(says(&Fixed::new(a.view(), other, noise), "operator has 6 columns; the method was built for 5"));
     for bad in [Noise::Relative(0.0), Noise::Absolute(f64::NAN)] {
         assert!(Fixed::new(a.view(), Arc::clone(&prior), bad).is_err(), "{bad:?}");
     }

@@ -20,10 +20,7 @@ pub(crate) fn assert_near(found: &[f64], expected: &[f64], tolerance: f64, what:
     let largest = expected.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
     for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
         let error = (found - expected).abs();
-        assert!(
-            error <= tolerance * largest,
-            "{what}: entry {k} is {found}, expected {expected}"
-        );
+        assert!(error <= tolerance * largest, "{what}: entry {k} is {found}, expected {expected}");
     }
 }
 
@@ -31,10 +28,7 @@ pub(crate) fn assert_near(found: &[f64], expected: &[f64], tolerance: f64, what:
 pub(crate) fn solve(method: &dyn Recover, a: &Matrix, y: &[f64]) -> Vec<f64> {
     let problem = Problem::new(a.view(), y).unwrap();
     let mut x = vec![0.0; a.ncols()];
-    method
-        .recover(&problem, &mut Workspace::default())
-        .unwrap()
-        .scatter(&mut x);
+    method.recover(&problem, &mut Workspace::default()).unwrap().scatter(&mut x);
     x
 }
 
@@ -55,9 +49,7 @@ pub(crate) fn prior(rng: &mut ChaCha8Rng, n: usize, mean: f64) -> Arc<Gaussian> 
 pub(crate) fn drawn(seed: u64, m: usize, n: usize, mean: f64) -> (Arc<Gaussian>, Matrix, Vec<f64>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (prior, rows) = (prior(&mut rng, n, mean), signs(&mut rng, m, n));
-    let image: Vec<f64> = (0..n)
-        .map(|k| if k % 3 == 0 { rng.random_range(0.5..2.0) } else { 0.0 })
-        .collect();
+    let image: Vec<f64> = (0..n).map(|k| if k % 3 == 0 { rng.random_range(0.5..2.0) } else { 0.0 }).collect();
     let sum = |r: usize| rows.row(r).iter().zip(&image).map(|(w, x)| w * x).sum::<f64>();
     let y = (0..m).map(|r| sum(r) + rng.random_range(-0.1..0.1)).collect();
     (prior, rows, y)

@@ -9,15 +9,8 @@ use spts_recon::recover::{Build, NnLasso, NnOmp, Omp, Penalty, ReferenceOmp};
 use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
 
 /// (M, K, S), and the share of noise, as in `scripts/oracles/problems.py`.
-const SHAPES: [(usize, usize, usize); 7] = [
-    (10, 40, 3),
-    (25, 100, 6),
-    (50, 100, 20),
-    (7, 100, 2),
-    (20, 100, 5),
-    (13, 60, 4),
-    (40, 24, 8),
-];
+const SHAPES: [(usize, usize, usize); 7] =
+    [(10, 40, 3), (25, 100, 6), (50, 100, 20), (7, 100, 2), (20, 100, 5), (13, 60, 4), (40, 24, 8)];
 const NOISE: f64 = 0.1;
 
 /// SplitMix64: numbers in [-1, 1) from the top 53 bits.
@@ -116,10 +109,7 @@ fn fit(a: &DMatrix<f64>, y: &DVector<f64>, support: &[usize]) -> (DVector<f64>, 
 fn non_negative(a: &DMatrix<f64>, y: &DVector<f64>, support: &[usize]) -> (f64, Vec<usize>) {
     let mut best = (y.norm(), Vec::new());
     for mask in 1_usize..1 << support.len() {
-        let subset: Vec<usize> = (0..support.len())
-            .filter(|i| mask >> i & 1 == 1)
-            .map(|i| support[i])
-            .collect();
+        let subset: Vec<usize> = (0..support.len()).filter(|i| mask >> i & 1 == 1).map(|i| support[i]).collect();
         let (alpha, residual) = fit(a, y, &subset);
         if alpha.iter().all(|c| *c > 0.0) && residual.norm() < best.0 {
             best = (residual.norm(), subset);
@@ -169,10 +159,7 @@ fn nn_omp_solves_the_non_negative_least_squares_of_each_choice() {
         assert!(got.coefficients.iter().all(|c| *c > 0.0), "{:?}", got.coefficients);
         assert_fit("nn_omp", &a, &y, &got);
     }
-    assert!(
-        dropped > 0,
-        "no problem made an atom leave: the test does not test that"
-    );
+    assert!(dropped > 0, "no problem made an atom leave: the test does not test that");
 }
 
 /// Share of 40 problems whose planted signal is found to 1e-2 of its length: ±1 weights, S magnitudes in [0.5, 1.5],
@@ -191,16 +178,10 @@ fn rate(build: Build, sparsity: usize, positive: bool) -> f64 {
         let mut x = vec![0.0; K];
         for place in rand::seq::index::sample(&mut rng, K, sparsity) {
             let magnitude = rng.random_range(0.5..1.5);
-            x[place] = if positive || rng.random() {
-                magnitude
-            } else {
-                -magnitude
-            };
+            x[place] = if positive || rng.random() { magnitude } else { -magnitude };
         }
         let square = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>();
-        let y: Vec<f64> = (0..M)
-            .map(|r| a.row(r).iter().zip(&x).map(|(a, x)| a * x).sum())
-            .collect();
+        let y: Vec<f64> = (0..M).map(|r| a.row(r).iter().zip(&x).map(|(a, x)| a * x).sum()).collect();
         let mut error = x.clone();
         if let Ok(solution) = build(sparsity).recover(&Problem::new(a.view(), &y).unwrap(), &mut work) {
             for (&k, c) in solution.support.iter().zip(&solution.coefficients) {

@@ -85,15 +85,9 @@ fn operators_and_measurements_of_any_scale_are_the_same_problem() {
             build(s).recover(&Problem::new(a.view(), &y).unwrap(), &mut Workspace::default())
         };
         let unit = solve(0, 0).unwrap();
-        for (a_exponent, y_exponent) in [
-            (-900, 0),
-            (900, 0),
-            (-900, -900),
-            (900, 900),
-            (0, 1000),
-            (0, -900),
-            (500, -400),
-        ] {
+        for (a_exponent, y_exponent) in
+            [(-900, 0), (900, 0), (-900, -900), (900, 900), (0, 1000), (0, -900), (500, -400)]
+        {
             let got = solve(a_exponent, y_exponent).unwrap();
             assert_eq!(got.support, unit.support, "{name}: A·2^{a_exponent}, y·2^{y_exponent}");
             for (g, e) in got.coefficients.iter().zip(&unit.coefficients) {
@@ -155,11 +149,8 @@ fn no_classification_allocates() {
 fn no_image_of_a_decision_allocates() {
     let mut rng = ChaCha8Rng::seed_from_u64(33);
     let mut draw = |len: usize| -> Vec<f64> { (0..len).map(|_| rng.random_range(0.1..1.0)).collect() };
-    let (images, phi, y) = (
-        Matrix::from_rows(36, 3, draw(36 * 3)).unwrap(),
-        Matrix::from_rows(20, 36, draw(20 * 36)).unwrap(),
-        draw(20),
-    );
+    let (images, phi, y) =
+        (Matrix::from_rows(36, 3, draw(36 * 3)).unwrap(), Matrix::from_rows(20, 36, draw(20 * 36)).unwrap(), draw(20));
     let (library, model) = (Library::new(&images, &[1, 2, 3]).unwrap(), TemplateModel::new(6));
     let range = AmplitudeRange::new(0.1, 10.0).unwrap();
     let classifier = EvidenceClassifier::new(&model.classes(&library).unwrap(), range, 0.05).unwrap();
@@ -169,9 +160,7 @@ fn no_image_of_a_decision_allocates() {
     classifier.decide(&classifier.preparation(), &classifier.evidence(), &mut posterior);
     let (mut work, mut image) = (Workspace::default(), vec![0.0; 36]);
     let mut decode = || {
-        estimator
-            .estimate(&posterior, phi.view(), &y, &mut work, &mut image)
-            .unwrap();
+        estimator.estimate(&posterior, phi.view(), &y, &mut work, &mut image).unwrap();
     };
     decode();
     assert_eq!(measure(decode).count_total, 0);

@@ -29,12 +29,7 @@ fn run(prior: &Arc<Gaussian>, noise: Noise, rows: &Matrix, y: &[f64]) -> (Sequen
 /// and without.
 #[test]
 fn rank_one_updates_are_the_batch_estimate() {
-    for (m, n, mean, noise) in [
-        (1, 1, 0.5, 0.2),
-        (1, 9, 0.0, 0.3),
-        (20, 36, 0.7, 0.5),
-        (80, 36, -0.2, 0.3),
-    ] {
+    for (m, n, mean, noise) in [(1, 1, 0.5, 0.2), (1, 9, 0.0, 0.3), (20, 36, 0.7, 0.5), (80, 36, -0.2, 0.3)] {
         let (prior, rows, y) = drawn(7, m, n, mean);
         let (gains, estimate) = run(&prior, Noise::Absolute(noise), &rows, &y);
         // the condition of the systems is below 1e5
@@ -92,10 +87,7 @@ fn prepared_gains_are_those_of_a_window() {
             assert_eq!(a.to_bits(), b.to_bits());
         }
     }
-    assert!(says(
-        &window.observe(&gains, 1.0),
-        "sample 12 arrived, but only 12 rows"
-    ));
+    assert!(says(&window.observe(&gains, 1.0), "sample 12 arrived, but only 12 rows"));
 }
 
 /// The expected IoU depends on neither the unit of the samples nor that of the weights; numbers that are too large or
@@ -106,22 +98,13 @@ fn extremes_are_exact_or_refused() {
     let noise = Noise::Relative(0.1);
     let (gains, estimate) = run(&prior, noise, &rows, &y);
     let expected = estimate.expected_iou(&gains, 0.23);
-    for (weight, unit) in [
-        (1.0, 1e-90),
-        (1.0, 1e90),
-        (1e-100, 1e-100),
-        (1e99, 1e-50),
-        (1e-50, 1e50),
-    ] {
+    for (weight, unit) in [(1.0, 1e-90), (1.0, 1e90), (1e-100, 1e-100), (1e99, 1e-50), (1e-50, 1e50)] {
         let scaled = rows.view().values().iter().map(|w| w * weight).collect();
         let scaled = Matrix::from_rows(10, 9, scaled).unwrap();
         let samples: Vec<f64> = y.iter().map(|y| y * unit).collect();
         let (gains, estimate) = run(&prior, noise, &scaled, &samples);
         let found = estimate.expected_iou(&gains, 0.23);
-        assert!(
-            (found - expected).abs() < 1e-9,
-            "{weight:e}, {unit:e}: {found}, expected {expected}"
-        );
+        assert!((found - expected).abs() < 1e-9, "{weight:e}, {unit:e}: {found}, expected {expected}");
     }
     let (mut gains, mut estimate) = (gains, estimate);
     let before = (estimate.mean().to_vec(), gains.covariance().to_vec());
@@ -210,12 +193,7 @@ fn no_sample_allocates() {
     assert_eq!(measure(window).count_total, 0);
 }
 
-const MOTION: Motion = Motion {
-    memory: 30.0,
-    strength_memory: 12.0,
-    noise: 0.2,
-    idle_noise: 0.1,
-};
+const MOTION: Motion = Motion { memory: 30.0, strength_memory: 12.0, noise: 0.2, idle_noise: 0.1 };
 
 /// A window: time since the one before it, rows and samples.
 type Window = (f64, Matrix, Vec<f64>);
@@ -257,9 +235,7 @@ fn the_filter_is_the_posterior_of_all_windows() {
     let strength = |k: usize| {
         let age = |i: usize| (-(times[k] - times[i]) / MOTION.strength_memory).exp();
         let count: f64 = (0..=k).map(|i| age(i) * windows[i].2.len() as f64).sum();
-        let squares: f64 = (0..=k)
-            .map(|i| age(i) * windows[i].2.iter().map(|y| y * y).sum::<f64>())
-            .sum();
+        let squares: f64 = (0..=k).map(|i| age(i) * windows[i].2.iter().map(|y| y * y).sum::<f64>()).sum();
         let (mean, idle) = (squares / count, MOTION.idle_noise.powi(2));
         (((mean - idle) / unit).sqrt(), MOTION.noise.powi(2) * mean + idle)
     };
@@ -267,9 +243,7 @@ fn the_filter_is_the_posterior_of_all_windows() {
     let last = windows.len() - 1;
     let (mut gram, mut cross) = (DMatrix::zeros(total, total), DMatrix::zeros(n, total));
     let mut y = DVector::zeros(total);
-    let (mut top, correlation) = (0, |i: usize, j: usize| {
-        (-(times[i] - times[j]).abs() / MOTION.memory).exp()
-    });
+    let (mut top, correlation) = (0, |i: usize, j: usize| (-(times[i] - times[j]).abs() / MOTION.memory).exp());
     for i in 0..=last {
         let (a, (s, noise)) = (&windows[i].1, strength(i));
         let a = DMatrix::from_row_slice(a.nrows(), n, a.view().values()) * s;
@@ -294,16 +268,10 @@ fn the_filter_is_the_posterior_of_all_windows() {
     let covariance = &c - &cross * inverse * cross.transpose();
     let image = track(&prior, MOTION, &windows);
     for (found, expected) in image.image().iter().zip(mean.iter()) {
-        assert!(
-            (found - expected).abs() < 1e-10 * mean.amax(),
-            "{found}, expected {expected}"
-        );
+        assert!((found - expected).abs() < 1e-10 * mean.amax(), "{found}, expected {expected}");
     }
     for (found, expected) in image.covariance().iter().zip(covariance.iter()) {
-        assert!(
-            (found - expected).abs() < 1e-10 * c.amax(),
-            "{found}, expected {expected}"
-        );
+        assert!((found - expected).abs() < 1e-10 * c.amax(), "{found}, expected {expected}");
     }
 }
 
@@ -316,28 +284,16 @@ fn the_unit_does_not_matter() {
     let one = track(&prior, MOTION, &drawn);
     for exponent in [-300, -20, 20, 300] {
         let unit = 2.0_f64.powi(exponent);
-        let motion = Motion {
-            idle_noise: MOTION.idle_noise * unit,
-            ..MOTION
-        };
+        let motion = Motion { idle_noise: MOTION.idle_noise * unit, ..MOTION };
         let scaled = drawn.iter().cloned();
-        let scaled: Vec<Window> = scaled
-            .map(|(t, phi, y)| (t, phi, y.iter().map(|y| y * unit).collect()))
-            .collect();
+        let scaled: Vec<Window> = scaled.map(|(t, phi, y)| (t, phi, y.iter().map(|y| y * unit).collect())).collect();
         let other = track(&prior, motion, &scaled);
         for (a, b) in one.image().iter().zip(other.image()) {
             assert_eq!((a * unit).to_bits(), b.to_bits(), "2^{exponent}");
         }
     }
     // squares that are lost count as no output
-    let silent = track(
-        &prior,
-        Motion {
-            idle_noise: 0.0,
-            ..MOTION
-        },
-        &[(1.0, signs(&mut rng, 2, 9), vec![1e-300; 2])],
-    );
+    let silent = track(&prior, Motion { idle_noise: 0.0, ..MOTION }, &[(1.0, signs(&mut rng, 2, 9), vec![1e-300; 2])]);
     assert!(silent.image().iter().all(|x| x.to_bits() == 0));
 }
 
@@ -359,19 +315,10 @@ fn what_cannot_be_used_is_refused() {
     for elapsed in [f64::NAN, f64::INFINITY, -1.0] {
         assert!(image.observe(elapsed, phi.view(), &[1.0; 2]).is_err(), "{elapsed}");
     }
-    assert!(says(
-        &image.observe(1.0, phi.view(), &[1.0]),
-        "sample 1 arrived, but only 2 rows"
-    ));
+    assert!(says(&image.observe(1.0, phi.view(), &[1.0]), "sample 1 arrived, but only 2 rows"));
     let wide = signs(&mut rng, 2, 5);
-    assert!(says(
-        &image.observe(1.0, wide.view(), &[1.0; 2]),
-        "the row has 5 weights, expected 4"
-    ));
-    assert_eq!(
-        (image.image(), image.covariance()),
-        (before.image(), before.covariance())
-    );
+    assert!(says(&image.observe(1.0, wide.view(), &[1.0; 2]), "the row has 5 weights, expected 4"));
+    assert_eq!((image.image(), image.covariance()), (before.image(), before.covariance()));
     // the longest time there is, and the largest samples
     image.observe(f64::MAX, phi.view(), &[1e100, -1e100]).unwrap();
     assert!(image.image().iter().chain(image.covariance()).all(|v| v.is_finite()));

@@ -86,11 +86,7 @@ impl BendConfig {
             let slack = taxels.random::<f64>() >= self.taut_share;
             let (fixed, moved): (f64, f64) = (StandardNormal.sample(&mut taxels), StandardNormal.sample(&mut press));
             let log = self.strain_log_sd * fixed + self.press_log_sd * moved;
-            if slack {
-                0.0
-            } else {
-                (self.strain * log.exp()).min(MOST_STRAIN)
-            }
+            if slack { 0.0 } else { (self.strain * log.exp()).min(MOST_STRAIN) }
         };
         (0..skin.taxels()).map(|_| strain()).collect()
     }
@@ -143,11 +139,7 @@ mod tests {
         let share_error = (bend.taut_share * (1.0 - bend.taut_share) / n).sqrt();
         assert_relative_eq!(m / n, bend.taut_share, epsilon = 5.0 * share_error);
         let sd = bend.strain_log_sd.hypot(bend.press_log_sd);
-        assert_relative_eq!(
-            logs[logs.len() / 2],
-            bend.strain.ln(),
-            epsilon = 5.0 * 1.25 * sd / m.sqrt()
-        );
+        assert_relative_eq!(logs[logs.len() / 2], bend.strain.ln(), epsilon = 5.0 * 1.25 * sd / m.sqrt());
         let mean = logs.iter().sum::<f64>() / m;
         let found = (logs.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / m).sqrt();
         assert_relative_eq!(found, sd, epsilon = 5.0 * sd / (2.0 * m).sqrt());
@@ -166,12 +158,7 @@ mod tests {
         let half_m = 10e-3;
         let mesh = cuboid([2.0 * half_m, 30e-3, 4e-3]);
         let met = bend.unroll(&mesh, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-        let edge = met
-            .vertices
-            .iter()
-            .filter(|v| v[2] < 2e-3)
-            .max_by(|a, b| a[0].total_cmp(&b[0]))
-            .unwrap();
+        let edge = met.vertices.iter().filter(|v| v[2] < 2e-3).max_by(|a, b| a[0].total_cmp(&b[0])).unwrap();
         assert_relative_eq!(edge[2], half_m.powi(2) / (2.0 * bend.radius_m), max_relative = 0.02);
         let lowest = met.vertices.iter().map(|v| v[2]).fold(f64::INFINITY, f64::min);
         assert_relative_eq!(lowest, 0.0, epsilon = 1e-12);
@@ -192,14 +179,8 @@ mod tests {
     #[test]
     fn a_sphere_has_the_relative_curvature() {
         let (r_m, bend) = (8e-3, BendConfig::default());
-        let met = bend.unroll(
-            &sphere(r_m, 64, 96),
-            [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
-        );
-        let near = met
-            .vertices
-            .iter()
-            .filter(|v| v[1].abs() < 1e-9 && v[2] < 1e-4 && v[0] > 1e-6);
+        let met = bend.unroll(&sphere(r_m, 64, 96), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        let near = met.vertices.iter().filter(|v| v[1].abs() < 1e-9 && v[2] < 1e-4 && v[0] > 1e-6);
         let curvature: Vec<f64> = near.map(|v| 2.0 * v[2] / v[0].powi(2)).collect();
         assert!(!curvature.is_empty());
         for found in curvature {

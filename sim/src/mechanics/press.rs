@@ -101,12 +101,7 @@ fn check_place(before: &str, place: [Option<f64>; 2], skin: &SkinLayout) -> Resu
     let reach = reach(skin);
     for (((name, range), at), last) in names.into_iter().zip(place).zip(last(skin)) {
         let Some(at) = at else { continue };
-        in_range(
-            &format!("{before}{name}"),
-            at,
-            (-reach..=last + reach).contains(&at),
-            range,
-        )?;
+        in_range(&format!("{before}{name}"), at, (-reach..=last + reach).contains(&at), range)?;
     }
     Ok(())
 }
@@ -122,10 +117,7 @@ fn of_published([row, col]: [f64; 2], skin: &SkinLayout) -> [f64; 2] {
     }
     let scale = published.pitch_m() / skin.pitch_m();
     let ([last_row, last_col], [row_0, col_0]) = (last(skin), last(&published));
-    [
-        0.5 * last_row + (row - 0.5 * row_0) * scale,
-        0.5 * last_col + (col - 0.5 * col_0) * scale,
-    ]
+    [0.5 * last_row + (row - 0.5 * row_0) * scale, 0.5 * last_col + (col - 0.5 * col_0) * scale]
 }
 
 /// Section `[press]`. Times count from the start of one recorded block of 1000 frames × 100 measurements at 64.3 kHz =
@@ -322,17 +314,11 @@ impl PressConfig {
                 let Some(object) = pressable().find(|object| object.name == name) else {
                     let known: Vec<_> = pressable().map(|object| object.name).collect();
                     let known = known.join(", ");
-                    return Err(Refusal::new(format!(
-                        "`press.object` = \"{name}\" is not one of {known}"
-                    )));
+                    return Err(Refusal::new(format!("`press.object` = \"{name}\" is not one of {known}")));
                 };
                 self.stiffness_pa_per_m = self.stiffness_pa_per_m.or(object.stiffness_pa_per_m);
                 let [row, col] = of_published([object.placement.row, object.placement.col], skin);
-                let placement = Placement {
-                    row,
-                    col,
-                    ..object.placement
-                };
+                let placement = Placement { row, col, ..object.placement };
                 ((object.build)().into(), None, placement)
             }
             (None, Some(file), None) => {
@@ -345,9 +331,7 @@ impl PressConfig {
                 let found = [object.is_some(), mesh.is_some(), given.is_some()];
                 let found = found.into_iter().filter(|named| *named).count();
                 let choices = "`press.object` and `press.mesh`";
-                return Err(Refusal::new(format!(
-                    "exactly one of {choices} is needed, found {found}"
-                )));
+                return Err(Refusal::new(format!("exactly one of {choices} is needed, found {found}")));
             }
         };
         for [row, col] in self.places.iter().flatten() {
@@ -385,9 +369,7 @@ impl PressConfig {
     fn resolve_places(&mut self) -> Result<(), Refusal> {
         let Some(places) = &self.places else { return Ok(()) };
         let Some(&[row, col]) = places.first() else {
-            return Err(Refusal::new(
-                "`press.places` = [] is empty; valid: one [row, col] or more",
-            ));
+            return Err(Refusal::new("`press.places` = [] is empty; valid: one [row, col] or more"));
         };
         let same = |written: Option<f64>, first: f64| written.is_none_or(|at| at.to_bits() == first.to_bits());
         let elsewhere = self.position_m.is_some() || self.position_share.is_some();
@@ -556,10 +538,7 @@ mod tests {
     fn a_mesh_that_opens_upward_may_hardly_lean() {
         let dir = std::env::temp_dir().join(format!("spts-lids-{}", std::process::id()));
         std::fs::create_dir_all(&dir).unwrap();
-        let mut bowl = TriMesh {
-            vertices: vec![[0.0; 3]],
-            triangles: Vec::new(),
-        };
+        let mut bowl = TriMesh { vertices: vec![[0.0; 3]], triangles: Vec::new() };
         for k in 0..24 {
             let (y, x) = (std::f64::consts::TAU * f64::from(k) / 24.0).sin_cos();
             bowl.vertices.push([0.02 * x, 0.02 * y, 0.02]);
@@ -580,12 +559,9 @@ mod tests {
             assert_eq!(press("bowl", tilt_deg, sd).unwrap().mesh_report().unwrap().lids, 1);
         }
         // cos 60° cos 60° = cos 75.5°
-        for (tilt_deg, sd, lean_deg) in [
-            ([60.0, 0.0], 0.0, 60.0),
-            ([60.0, 60.0], 0.0, 75.522),
-            ([4.0, -4.0], 0.0, 5.6546),
-            ([0.0, 0.0], 2.0, 6.0),
-        ] {
+        for (tilt_deg, sd, lean_deg) in
+            [([60.0, 0.0], 0.0, 60.0), ([60.0, 60.0], 0.0, 75.522), ([4.0, -4.0], 0.0, 5.6546), ([0.0, 0.0], 2.0, 6.0)]
+        {
             let said = press("bowl", tilt_deg, sd).unwrap_err().to_string();
             assert!(said.contains(&format!("tilt it by {lean_deg:.1}°")), "{said}");
             for fact in ["bowl.obj", "tilt_deg", "[0, 5]°"] {

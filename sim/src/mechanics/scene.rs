@@ -46,21 +46,12 @@ pub struct MechanicsConfig {
 impl MechanicsConfig {
     /// Ten presses of the object called `name` by the arm, at the object's place.
     pub fn press(name: &str) -> Self {
-        Self {
-            press: Some(PressConfig {
-                object: Some(name.to_owned()),
-                ..PressConfig::default()
-            }),
-            ..Self::default()
-        }
+        Self { press: Some(PressConfig { object: Some(name.to_owned()), ..PressConfig::default() }), ..Self::default() }
     }
 
     /// Ten drops of a tennis ball from half a metre onto the middle of the skin.
     pub fn bounce() -> Self {
-        Self {
-            drop: Some(DropConfig::default()),
-            ..Self::default()
-        }
+        Self { drop: Some(DropConfig::default()), ..Self::default() }
     }
 }
 
@@ -108,9 +99,7 @@ impl MechanicsConfig {
 
 /// The error of a tolerance together with one of the values that it determines.
 fn chosen_twice(key: &str) -> Refusal {
-    Refusal::new(format!(
-        "`tolerance` chooses contact model, cells and time step; leave out `{key}`, or the tolerance"
-    ))
+    Refusal::new(format!("`tolerance` chooses contact model, cells and time step; leave out `{key}`, or the tolerance"))
 }
 
 /// Most cells along one side of a taxel.
@@ -221,15 +210,10 @@ impl Mechanics {
                 }
                 (press, ball) => {
                     let found = usize::from(press.is_some()) + usize::from(ball.is_some());
-                    return Err(Refusal::new(format!(
-                        "exactly one of [press] and [drop] is needed, found {found}"
-                    )));
+                    return Err(Refusal::new(format!("exactly one of [press] and [drop] is needed, found {found}")));
                 }
             };
-        let asked = config
-            .timestep_s
-            .unwrap_or(Timestep::Seconds(default_step_s))
-            .checked()?;
+        let asked = config.timestep_s.unwrap_or(Timestep::Seconds(default_step_s)).checked()?;
         // a step that was chosen, not written, gives way to a stiffer scene
         let asked = if choice.is_some() { Timestep::Auto } else { asked };
         if let Some(interval_s) = config.frame_interval_s {
@@ -442,13 +426,7 @@ impl Mechanics {
             Task::Drop(ball) => {
                 let speed_m_per_s = (2.0 * GRAVITY_M_PER_S2 * ball.height_m).sqrt();
                 let touch_m = ball.radius_m;
-                at_rest.max(impact_damping(
-                    field,
-                    &body,
-                    mass_kg,
-                    stiffness_n_per_m,
-                    [touch_m, speed_m_per_s],
-                ))
+                at_rest.max(impact_damping(field, &body, mass_kg, stiffness_n_per_m, [touch_m, speed_m_per_s]))
             }
         };
         StepLimit::new(mass_kg, stiffness_n_per_m, damping_n_s_per_m)
@@ -475,9 +453,7 @@ impl Mechanics {
                 let curve = DepthCurve::up_to_energy(field, &body, energy_j);
                 curve.map_err(|error| {
                     let (mass_kg, height_m) = (ball.mass_kg, ball.height_m);
-                    Refusal::new(format!(
-                        "`drop.mass_kg` = {mass_kg} from `drop.height_m` = {height_m}: {error}"
-                    ))
+                    Refusal::new(format!("`drop.mass_kg` = {mass_kg} from `drop.height_m` = {height_m}: {error}"))
                 })?
             }
         })
@@ -507,21 +483,9 @@ impl Mechanics {
 /// Rotation matrix, row-major, of a unit quaternion (w, x, y, z).
 fn matrix([w, x, y, z]: [f64; 4]) -> [[f64; 3]; 3] {
     [
-        [
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y - w * z),
-            2.0 * (x * z + w * y),
-        ],
-        [
-            2.0 * (x * y + w * z),
-            1.0 - 2.0 * (x * x + z * z),
-            2.0 * (y * z - w * x),
-        ],
-        [
-            2.0 * (x * z - w * y),
-            2.0 * (y * z + w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ],
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
     ]
 }
 
@@ -638,10 +602,7 @@ mod tests {
                 let scene = scene(&format!("tolerance = {tolerance}\n{text}")).unwrap();
                 let config = scene.config();
                 assert_eq!(config.contact["model"].as_str(), Some(choice.level.model));
-                assert_eq!(
-                    config.contact["cells_per_taxel"].as_integer(),
-                    i64::try_from(choice.cells_per_taxel).ok()
-                );
+                assert_eq!(config.contact["cells_per_taxel"].as_integer(), i64::try_from(choice.cells_per_taxel).ok());
                 assert_eq!(config.tolerance, None);
                 let again = Mechanics::from_toml(&scene.to_toml().unwrap(), Path::new("")).unwrap();
                 assert_eq!(again.config(), config);

@@ -13,10 +13,7 @@ fn read(text: &str) -> Result<Mechanics, Refusal> {
 fn round_trip() {
     let mut texts = vec!["[drop]\nheight_m = 0.3".to_owned()];
     for object in spts_contact::objects::OBJECTS {
-        texts.push(format!(
-            "seed = 3\n[press]\nobject = \"{}\"\nforce_n = 12.5",
-            object.name
-        ));
+        texts.push(format!("seed = 3\n[press]\nobject = \"{}\"\nforce_n = 12.5", object.name));
     }
     texts.push("[contact]\nfriction = 0.2\n[drop]".to_owned());
     for text in texts {
@@ -36,10 +33,7 @@ fn defaults_are_those_of_an_empty_section() {
 #[test]
 fn plateau_of_the_default_course() {
     let [start_s, end_s] = super::PressConfig::default().plateau_s();
-    assert!(
-        0.78 < start_s && start_s + 0.15 < end_s && end_s < 1.02,
-        "{start_s} {end_s}"
-    );
+    assert!(0.78 < start_s && start_s + 0.15 < end_s && end_s < 1.02, "{start_s} {end_s}");
 }
 
 /// A bad scene a line, its own lines apart by ` ; `, and behind the arrow the words that its error has to have: the
@@ -162,10 +156,7 @@ fn auto_is_the_longest_stable_step_that_divides_the_time_between_frames() {
         assert_eq!(scene.config().timestep_s, Some(Timestep::Seconds(scene.timestep_s())));
         assert_eq!(read(&scene.to_toml().unwrap()).unwrap(), scene);
     }
-    assert_eq!(
-        read("timestep_s = \"auto\"\n[drop]").unwrap(),
-        Mechanics::bounce().unwrap()
-    );
+    assert_eq!(read("timestep_s = \"auto\"\n[drop]").unwrap(), Mechanics::bounce().unwrap());
 }
 
 #[test]
@@ -206,11 +197,8 @@ fn places_are_kept_in_metres() {
         assert_eq!((press.position_m, press.position_share), (None, None));
         scene.skin().position_m(press.row.unwrap(), press.col.unwrap())
     };
-    let skins = [
-        "",
-        "[skin]\nrows = 12\ncols = 20\npitch_m = 0.012\n",
-        "[skin]\nrows = 32\ncols = 30\npitch_m = 0.005\n",
-    ];
+    let skins =
+        ["", "[skin]\nrows = 12\ncols = 20\npitch_m = 0.012\n", "[skin]\nrows = 32\ncols = 30\npitch_m = 0.005\n"];
     let published = spts_contact::objects::by_name("comb").unwrap().placement;
     let expected_m = SkinLayout::default().position_m(published.row, published.col);
     let press = "[press]\nobject = \"comb\"\n";
@@ -221,10 +209,7 @@ fn places_are_kept_in_metres() {
     let same = |a: [f64; 2], b: [f64; 2]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-15);
     for skin in skins {
         let found_m = place_m(&format!("{skin}{press}"));
-        assert!(
-            same(found_m, expected_m),
-            "{skin}: {found_m:?}, expected {expected_m:?}"
-        );
+        assert!(same(found_m, expected_m), "{skin}: {found_m:?}, expected {expected_m:?}");
         let found_m = place_m(&format!("{skin}{press}position_m = [0.02, -0.01]"));
         assert!(same(found_m, [0.02, -0.01]), "{skin}: {found_m:?}");
         let [width_m, height_m] = read(&format!("{skin}{press}")).unwrap().skin().extent_m();

@@ -143,11 +143,7 @@ impl StepLimit {
     pub(super) fn new(mass_kg: f64, stiffness_n_per_m: f64, damping_n_s_per_m: f64) -> Self {
         let root = damping_n_s_per_m.hypot((4.0 * mass_kg * stiffness_n_per_m).sqrt());
         let stable_s = 4.0 * mass_kg / (damping_n_s_per_m + root);
-        Self {
-            limit_s: (SHARE * stable_s).min(LONGEST_STEP_S),
-            stiffness_n_per_m,
-            mass_kg,
-        }
+        Self { limit_s: (SHARE * stable_s).min(LONGEST_STEP_S), stiffness_n_per_m, mass_kg }
     }
 
     /// The largest stable step, s.
@@ -167,10 +163,7 @@ impl StepLimit {
         if timestep_s <= limit_s && timestep_s >= SHORTEST_STEP_S {
             return Ok(timestep_s);
         }
-        let contact = format!(
-            "the contact reaches {:.3e} N/m on {mass_kg:.3} kg",
-            self.stiffness_n_per_m
-        );
+        let contact = format!("the contact reaches {:.3e} N/m on {mass_kg:.3} kg", self.stiffness_n_per_m);
         Err(Refusal::new(if limit_s >= SHORTEST_STEP_S && asked != Timestep::Auto {
             format!(
                 "`timestep_s` = {timestep_s} is outside [1e-6, {limit_s:.2e}]: {contact}; \"auto\" takes a step that fits"

@@ -49,9 +49,7 @@ impl Start {
         let mut rng = Streams::new(scene.seed()).rng("drop", index);
         let release_s = config.release_s + config.release_spread_s * (2.0 * rng.random::<f64>() - 1.0);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let [x, y] = scene
-            .skin()
-            .position_m(config.row.unwrap_or_default(), config.col.unwrap_or_default());
+        let [x, y] = scene.skin().position_m(config.row.unwrap_or_default(), config.col.unwrap_or_default());
         let centre_m = [
             x + config.position_sd_m * normal(),
             y + config.position_sd_m * normal(),
@@ -60,11 +58,7 @@ impl Start {
         // four normal numbers, normalised, are a uniform orientation
         let q: [f64; 4] = std::array::from_fn(|_| normal());
         let norm = q.iter().map(|v| v * v).sum::<f64>().sqrt();
-        Self {
-            release_s,
-            centre_m,
-            quaternion: q.map(|v| v / norm),
-        }
+        Self { release_s, centre_m, quaternion: q.map(|v| v / norm) }
     }
 }
 
@@ -89,13 +83,7 @@ pub(crate) struct Sample {
 
 impl BounceLog {
     pub(crate) fn new(mass_kg: f64) -> Self {
-        Self {
-            mass_kg,
-            last: None,
-            open: None,
-            energy_in_j: 0.0,
-            done: Vec::with_capacity(64),
-        }
+        Self { mass_kg, last: None, open: None, energy_in_j: 0.0, done: Vec::with_capacity(64) }
     }
 
     /// The first bounce; while it lasts, as far as it is known.
@@ -237,10 +225,7 @@ impl Ball {
     }
 
     /// Sums over the cells under the ball.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "indices are cut to the grid before they are cast"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "indices are cut to the grid before they are cast")]
     fn sums(&self, pressure_pa: &[f64], centre_m: [f64; 3]) -> PressureSums {
         let span = |middle_m: f64, cells: usize| {
             let low = ((middle_m - self.radius_m) / self.cell_m).ceil().max(0.0);
@@ -276,11 +261,7 @@ impl Ball {
 fn implicit_share(step: f64, f: [f64; 2], v: [f64; 2]) -> f64 {
     let speed2 = v[0] * v[0] + v[1] * v[1];
     let power = -(f[0] * v[0] + f[1] * v[1]);
-    if power > 0.0 && speed2 > 0.0 {
-        1.0 / (1.0 + step * power / speed2)
-    } else {
-        1.0
-    }
+    if power > 0.0 && speed2 > 0.0 { 1.0 / (1.0 + step * power / speed2) } else { 1.0 }
 }
 
 #[cfg(test)]
@@ -296,11 +277,7 @@ mod tests {
     const CENTRE_M: [f64; 3] = [1.25e-3, 1.25e-3, 29e-3];
 
     fn motion(velocity_m_per_s: [f64; 3], angular_velocity_rad_per_s: [f64; 3]) -> BallMotion {
-        BallMotion {
-            centre_m: CENTRE_M,
-            velocity_m_per_s,
-            angular_velocity_rad_per_s,
-        }
+        BallMotion { centre_m: CENTRE_M, velocity_m_per_s, angular_velocity_rad_per_s }
     }
 
     /// Field's answer: 10 N of pressure on one cell, `dx` cells to the right of the centre and `dy` above, and the
@@ -312,11 +289,7 @@ mod tests {
         let h = (0.03_f64.powi(2) - x * x - y * y).sqrt();
         let wrench = Wrench {
             force_n: [drag[0], drag[1], 10.0],
-            torque_nm: [
-                y * 10.0 + h * drag[1],
-                -x * 10.0 - h * drag[0],
-                x * drag[1] - y * drag[0],
-            ],
+            torque_nm: [y * 10.0 + h * drag[1], -x * 10.0 - h * drag[0], x * drag[1] - y * drag[0]],
         };
         (wrench, pressure_pa)
     }
@@ -358,12 +331,7 @@ mod tests {
     #[test]
     fn cells_are_cut_to_the_skin() {
         let pressure = vec![1e4; 3600];
-        for (x, y, over) in [
-            (0.075, 0.0, true),
-            (-0.08, 0.08, true),
-            (0.2, 0.0, false),
-            (0.0, -1e9, false),
-        ] {
+        for (x, y, over) in [(0.075, 0.0, true), (-0.08, 0.08, true), (0.2, 0.0, false), (0.0, -1e9, false)] {
             let sums = ball().sums(&pressure, [x, y, 0.02]);
             assert_eq!(sums.force_n > 0.0, over, "{x} {y}");
         }
@@ -376,13 +344,7 @@ mod tests {
 
     #[test]
     fn nothing_without_contact() {
-        let none = Wrench {
-            force_n: [0.0; 3],
-            torque_nm: [0.0; 3],
-        };
-        assert_eq!(
-            ball().wrench(&none, &[0.0; 3600], &motion([1.0; 3], [1.0; 3]), 1e-3),
-            none
-        );
+        let none = Wrench { force_n: [0.0; 3], torque_nm: [0.0; 3] };
+        assert_eq!(ball().wrench(&none, &[0.0; 3600], &motion([1.0; 3], [1.0; 3]), 1e-3), none);
     }
 }

@@ -58,10 +58,7 @@ impl Dynamics {
     ///
     /// # Errors
     /// [`Refusal`] when the arm cannot reach the place or MuJoCo does not take the model.
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "a scene's duration is at most 60 s in steps of at least 1 µs"
-    )]
+    #[expect(clippy::cast_possible_truncation, reason = "a scene's duration is at most 60 s in steps of at least 1 µs")]
     pub(super) fn new(scene: &Mechanics, index: u64, field: Box<dyn ContactField>) -> Result<Self, Refusal> {
         let (contact_body, _) = scene.contact_body();
         let stiffness_pa_per_m = contact_body.stiffness_pa_per_m;
@@ -166,17 +163,14 @@ impl Dynamics {
                     velocity_m_per_s: posed.velocity_m_per_s,
                     angular_velocity_rad_per_s: posed.angular_velocity_rad_per_s,
                 };
-                free.ball
-                    .wrench(&response.wrench, response.pressure_pa, &motion, self.scene.timestep_s())
+                free.ball.wrench(&response.wrench, response.pressure_pa, &motion, self.scene.timestep_s())
             }
         };
         let ([fx, fy, fz], [tx, ty, tz]) = (wrench.force_n, wrench.torque_nm);
         if ![fx, fy, fz, tx, ty, tz].iter().all(|v| v.is_finite()) {
             let unknown = || "pose or velocity of the body are not finite, or the contact field gave up".to_owned();
             let (force_n, reason) = (wrench.force_n, self.field.failure().unwrap_or_else(unknown));
-            return Err(Refusal::new(format!(
-                "contact force {force_n:?} N at {time_s:.4} s is not finite: {reason}"
-            )));
+            return Err(Refusal::new(format!("contact force {force_n:?} N at {time_s:.4} s is not finite: {reason}")));
         }
         let near = match &self.driver {
             Driver::Press(_) => true,
@@ -203,10 +197,7 @@ impl Dynamics {
             pressure,
             electrode_pressure,
             wrench,
-            pose: Pose {
-                position_m,
-                quaternion: self.data.xquat()[b],
-            },
+            pose: Pose { position_m, quaternion: self.data.xquat()[b] },
         });
         if frame.is_some() {
             self.next_frame = self.step + stride(self.scene.frame_interval_s(), self.scene.timestep_s());
@@ -233,18 +224,15 @@ impl Dynamics {
         self.data.xfrc_applied_mut()[b] = [fx, fy, fz, tx, ty, tz];
         self.data.step2();
         match self.data.warning().iter().position(|w| w.number > 0) {
-            Some(warning) => Err(Refusal::new(format!(
-                "MuJoCo warning {warning} at {time_s:.4} s: the dynamics are not stable"
-            ))),
+            Some(warning) => {
+                Err(Refusal::new(format!("MuJoCo warning {warning} at {time_s:.4} s: the dynamics are not stable")))
+            }
             None => Ok(frame),
         }
     }
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "a scene's intervals are at most 0.1 s in steps of at least 1 µs"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "a scene's intervals are at most 0.1 s in steps of at least 1 µs")]
 fn stride(interval_s: f64, timestep_s: f64) -> u64 {
     ((interval_s / timestep_s).round() as u64).max(1)
 }

@@ -39,9 +39,7 @@ enum Engine {
 
 impl std::fmt::Debug for World {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("World")
-            .field("time_s", &self.time_s())
-            .finish_non_exhaustive()
+        f.debug_struct("World").field("time_s", &self.time_s()).finish_non_exhaustive()
     }
 }
 
@@ -61,10 +59,7 @@ impl World {
     /// [`Refusal`] if there is no such repeat, the arm cannot reach the place, or MuJoCo rejects the model.
     pub fn repeat(scene: &Mechanics, index: usize) -> Result<Self, Refusal> {
         if index >= scene.repeats() {
-            return Err(Refusal::new(format!(
-                "press {index} is outside [0, {})",
-                scene.repeats()
-            )));
+            return Err(Refusal::new(format!("press {index} is outside [0, {})", scene.repeats())));
         }
         let mut field = scene.build_contact()?;
         let index = index as u64;
@@ -76,12 +71,7 @@ impl World {
             }
             _ => Engine::Dynamics(Box::new(Dynamics::new(scene, index, field)?)),
         };
-        Ok(Self {
-            scene: scene.clone(),
-            engine,
-            cover,
-            failed: false,
-        })
+        Ok(Self { scene: scene.clone(), engine, cover, failed: false })
     }
 
     /// The scene.
@@ -174,11 +164,7 @@ impl Cover {
         let touched = frame.pressure.values().iter().map(|p| *p > 0.0);
         let covered = self.rest_pa.iter().zip(&self.slack).zip(touched);
         for (p, ((rest_pa, slack), touched)) in frame.electrode_pressure.values_mut().iter_mut().zip(covered) {
-            *p += if touched {
-                *rest_pa
-            } else {
-                rest_pa * (-slack * share).exp()
-            };
+            *p += if touched { *rest_pa } else { rest_pa * (-slack * share).exp() };
         }
         frame
     }

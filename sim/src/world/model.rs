@@ -64,13 +64,7 @@ fn adapter(mesh: &TriMesh) -> String {
     format!(
         "{}{}",
         geom("cylinder", [0.0, 0.0, top], [0.0, 0.0, top + 0.04], 0.016, "steel"),
-        geom(
-            "cylinder",
-            [0.0, 0.0, top + 0.032],
-            [0.0, 0.0, top + 0.04],
-            0.0315,
-            "steel"
-        )
+        geom("cylinder", [0.0, 0.0, top + 0.032], [0.0, 0.0, top + 0.04], 0.0315, "steel")
     )
 }
 
@@ -84,9 +78,7 @@ fn assets(mesh: &TriMesh, width: usize, height: usize) -> String {
         let _ = write!(faces, "{a} {b} {c} ");
     }
     let look = include_str!("../../assets/look.xml");
-    let look = look
-        .replace("{width}", &width.to_string())
-        .replace("{height}", &height.to_string());
+    let look = look.replace("{width}", &width.to_string()).replace("{height}", &height.to_string());
     look.replace("{vertices}", &vertices).replace("{faces}", &faces)
 }
 
@@ -98,15 +90,9 @@ fn world(scene: &Mechanics, thickness_m: f64, press: bool) -> String {
     let floor = table - 0.72;
     let target = [0.0, 0.0, 0.012];
     let (wide, close) = if press {
-        (
-            camera("wide", [0.52, -0.94, 0.52], [-0.215, 0.0, 0.215], 34.0),
-            [0.21, -0.235, 0.165],
-        )
+        (camera("wide", [0.52, -0.94, 0.52], [-0.215, 0.0, 0.215], 34.0), [0.21, -0.235, 0.165])
     } else {
-        (
-            camera("wide", [0.42, -0.62, 0.40], [0.0, 0.0, 0.13], 38.0),
-            [0.21, -0.26, 0.17],
-        )
+        (camera("wide", [0.42, -0.62, 0.40], [0.0, 0.0, 0.13], 38.0), [0.21, -0.26, 0.17])
     };
     let scale = (hx.max(hy) / 0.075).max(1.0);
     let close = camera("close", close.map(|c| c * scale), target, 38.0);
@@ -117,28 +103,14 @@ fn world(scene: &Mechanics, thickness_m: f64, press: bool) -> String {
 <geom type="plane" size="4 4 0.1" pos="0 0 {floor}" material="floor" contype="0" conaffinity="0"/>
 {}{}{}
 "#,
-        slab(
-            [if press { -0.24 } else { 0.0 }, 0.0, table - 0.02],
-            [reach_x + 0.22, reach_y, 0.02],
-            "table"
-        ),
+        slab([if press { -0.24 } else { 0.0 }, 0.0, table - 0.02], [reach_x + 0.22, reach_y, 0.02], "table"),
         slab([0.0, 0.0, table + 1e-3], [hx + 0.012, hy + 0.012, 1e-3], "carrier"),
-        slab(
-            [0.0, 0.0, -0.5 * thickness_m - 2e-4],
-            [hx, hy, 0.5 * thickness_m - 2e-4],
-            "foam"
-        ),
+        slab([0.0, 0.0, -0.5 * thickness_m - 2e-4], [hx, hy, 0.5 * thickness_m - 2e-4], "foam"),
     );
     if press {
         let foot = [BASE_M[0], BASE_M[1], table];
         xml += &geom("cylinder", foot, [foot[0], foot[1], table + 0.012], 0.085, "dark");
-        xml += &geom(
-            "cylinder",
-            [foot[0], foot[1], table + 0.012],
-            [foot[0], foot[1], 0.035],
-            0.075,
-            "grey",
-        );
+        xml += &geom("cylinder", [foot[0], foot[1], table + 0.012], [foot[0], foot[1], 0.035], 0.075, "grey");
     }
     if scene.skin().taxels() <= MAX_PADS {
         let half = 0.5 * scene.skin().pitch_m() * 0.88;
@@ -193,9 +165,7 @@ fn geom(kind: &str, from: [f64; 3], to: [f64; 3], radius: f64, material: &str) -
 /// with blue caps, offset sideways as on the real arm.
 fn links() -> impl Iterator<Item = &'static str> {
     let links = include_str!("../../assets/arm.xml").split("<!-- link ");
-    links
-        .skip(1)
-        .map(|link| link.split_once("-->").map_or("", |(_, shapes)| shapes.trim()))
+    links.skip(1).map(|link| link.split_once("-->").map_or("", |(_, shapes)| shapes.trim()))
 }
 
 /// MuJoCo version for which this crate is made.
@@ -216,9 +186,7 @@ pub(crate) fn tool_length_m(mesh: &TriMesh) -> f64 {
 pub(crate) fn compile(scene: &Mechanics, visuals: Option<&Visuals>) -> Result<MjModel, Refusal> {
     let found = mujoco_rs::mujoco_version();
     if found != MUJOCO_VERSION {
-        return Err(Refusal::new(format!(
-            "MuJoCo {found} is linked, {MUJOCO_VERSION} is needed"
-        )));
+        return Err(Refusal::new(format!("MuJoCo {found} is linked, {MUJOCO_VERSION} is needed")));
     }
     MjModel::from_xml_string(&mjcf(scene, visuals)).map_err(|error| rejected(&error.to_string()))
 }
@@ -289,11 +257,8 @@ fn arm(tool: &str, visual: bool) -> String {
         frame = tail;
     }
     let [x, y, z] = frame.translation.vector.into();
-    let _ = write!(
-        xml,
-        "<body name=\"flange\" pos=\"{x} {y} {z}\" quat=\"{}\">{tool}</body>",
-        quaternion(&frame.rotation)
-    );
+    let _ =
+        write!(xml, "<body name=\"flange\" pos=\"{x} {y} {z}\" quat=\"{}\">{tool}</body>", quaternion(&frame.rotation));
     xml.push_str(&"</body>".repeat(arm::LINKS.len()));
     xml.push('\n');
     xml

@@ -184,9 +184,7 @@ impl PressDriver {
                 let speed = compliance * (rate_n_per_s + LOOP_PER_S * (input_n - self.force_n));
                 self.height_m -= dt_s * speed.clamp(-MAX_M_PER_S, MAX_M_PER_S);
                 if time_s > self.plan.lift_s && reference_n <= TOUCH * self.plan.config.force_n {
-                    self.phase = Phase::Retract {
-                        speed_m_per_s: -speed.min(0.0),
-                    };
+                    self.phase = Phase::Retract { speed_m_per_s: -speed.min(0.0) };
                 }
             }
             Phase::Retract { speed_m_per_s } => {

@@ -104,10 +104,7 @@ impl QuasiStaticPress {
         self.touch_height_m = self.seat.map_or(0.0, |seat| seat.height_m);
         self.seat = None;
         // the highest pose has to be within reach too
-        self.arm.joints_rad = arm::solve(
-            &self.plan.flange(self.touch_height_m + CLEARANCE_M),
-            &self.arm.joints_rad,
-        )?;
+        self.arm.joints_rad = arm::solve(&self.plan.flange(self.touch_height_m + CLEARANCE_M), &self.arm.joints_rad)?;
         self.hang(self.touch_height_m + CLEARANCE_M);
         Ok(())
     }
@@ -156,10 +153,7 @@ impl QuasiStaticPress {
         };
         self.hang(height_m);
         let [rows, cols] = self.shape;
-        let nothing = Wrench {
-            force_n: [0.0; 3],
-            torque_nm: [0.0; 3],
-        };
+        let nothing = Wrench { force_n: [0.0; 3], torque_nm: [0.0; 3] };
         let maps = [(); 2].map(|()| PressureMap::zeros(rows, cols));
         Ok(Some(self.frame_of(maps, nothing)))
     }
@@ -211,10 +205,7 @@ impl QuasiStaticPress {
             pressure,
             electrode_pressure,
             wrench,
-            pose: Pose {
-                position_m: self.position_m,
-                quaternion: [q.w, q.i, q.j, q.k],
-            },
+            pose: Pose { position_m: self.position_m, quaternion: [q.w, q.i, q.j, q.k] },
         }
     }
 }
@@ -228,14 +219,10 @@ impl Arm {
         let jacobian = arm::jacobian(&joints_rad, &pivot.coords);
         let compliance = |i: usize, j: usize| -> f64 {
             let parts = arm::LINKS.iter().enumerate();
-            parts
-                .map(|(k, link)| jacobian[(i, k)] * jacobian[(j, k)] / link.servo_nm_per_rad)
-                .sum()
+            parts.map(|(k, link)| jacobian[(i, k)] * jacobian[(j, k)] / link.servo_nm_per_rad).sum()
         };
         let tilts = Matrix2::from_fn(|i, j| compliance(3 + i, 3 + j));
-        let stiffness = tilts
-            .try_inverse()
-            .ok_or_else(|| rejected("the arm cannot tilt the object"))?;
+        let stiffness = tilts.try_inverse().ok_or_else(|| rejected("the arm cannot tilt the object"))?;
         Ok(Self {
             joints_rad,
             stiffness_nm_per_rad: [0, 1].map(|i| [0, 1].map(|j| stiffness[(i, j)])),
@@ -260,11 +247,7 @@ mod tests {
     }
 
     fn run(scene: &Mechanics, index: usize) -> Vec<Frame> {
-        World::repeat(scene, index)
-            .unwrap()
-            .frames()
-            .map(Result::unwrap)
-            .collect()
+        World::repeat(scene, index).unwrap().frames().map(Result::unwrap).collect()
     }
 
     /// The same index is the same press: on the plateau the object stands where the stepped arm puts it (within a tenth
@@ -302,11 +285,7 @@ mod tests {
             let tool_m = model::tool_length_m(scene.mesh());
             let tip = arm::flange(&joints) * nalgebra::Point3::new(0.0, 0.0, tool_m);
             for i in 0..3 {
-                assert!(
-                    (tip[i] - frame.pose.position_m[i]).abs() < 1e-9,
-                    "{tip} {:?}",
-                    frame.pose
-                );
+                assert!((tip[i] - frame.pose.position_m[i]).abs() < 1e-9, "{tip} {:?}", frame.pose);
             }
         }
     }

@@ -205,12 +205,7 @@ fn bad_worlds() {
     assert_eq!(error, "press 10 is outside [0, 10)");
     let far = "[skin]\nrows = 400\ncols = 400\n[contact]\ncells_per_taxel = 1\n[press]\nobject = \"rec\"\nrow = 0.0\ncol = 390.0";
     let far = Mechanics::from_toml(far, Path::new("")).unwrap();
-    assert!(
-        World::new(&far)
-            .unwrap_err()
-            .to_string()
-            .contains("the arm cannot reach")
-    );
+    assert!(World::new(&far).unwrap_err().to_string().contains("the arm cannot reach"));
 }
 
 /// The rotors at the tool weigh at least what the time step's limit counts on, wherever the skin is pressed.
@@ -225,23 +220,14 @@ fn arm_is_heavier_than_assumed() {
         let joints = arm::solve(&goal, &arm::HOME_RAD).unwrap();
         let jacobian = arm::jacobian(&joints, &tool.translation.vector);
         let row = jacobian.row(2);
-        let mobility: f64 = row
-            .iter()
-            .zip(&arm::LINKS)
-            .map(|(j, link)| j * j / link.rotor_kg_m2)
-            .sum();
+        let mobility: f64 = row.iter().zip(&arm::LINKS).map(|(j, link)| j * j / link.rotor_kg_m2).sum();
         assert!(1.0 / mobility > crate::mechanics::ARM_MASS_KG, "{}", 1.0 / mobility);
     }
 }
 
 /// Whether this machine has what draws without a graphics card: the EGL dispatcher and Mesa behind it.
 fn mesa_is_installed() -> bool {
-    let folders = [
-        "/usr/lib",
-        "/usr/lib64",
-        "/usr/lib/x86_64-linux-gnu",
-        "/usr/lib/aarch64-linux-gnu",
-    ];
+    let folders = ["/usr/lib", "/usr/lib64", "/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu"];
     let has = |file: &str| folders.iter().any(|folder| Path::new(folder).join(file).exists());
     has("libEGL.so.1") && has("libEGL_mesa.so.0")
 }
@@ -253,11 +239,7 @@ fn picture_or_clear_error() {
     use crate::render::{Camera, Renderer};
     let scene = Mechanics::press("X").unwrap();
     let mut world = World::new(&scene).unwrap();
-    let frame = world
-        .frames()
-        .find(|f| f.as_ref().unwrap().time_s > 0.8)
-        .unwrap()
-        .unwrap();
+    let frame = world.frames().find(|f| f.as_ref().unwrap().time_s > 0.8).unwrap().unwrap();
     let too_small = Renderer::new(&world, 0, 10).unwrap_err().to_string();
     assert_eq!(too_small, "picture of 0 × 10 is outside [1, 8192] pixels a side");
     let full_pa = frame.pressure.max();
@@ -270,10 +252,7 @@ fn picture_or_clear_error() {
             assert_ne!(picture.rgb, idle.rgb);
         }
         Err(error) => {
-            assert!(
-                error.to_string().starts_with("off-screen rendering failed: "),
-                "{error}"
-            );
+            assert!(error.to_string().starts_with("off-screen rendering failed: "), "{error}");
             assert!(!mesa_is_installed(), "EGL is there, and yet: {error}");
         }
     }

@@ -250,11 +250,7 @@ mod tests {
         for (i, (code, level)) in codes.iter().zip(&levels).enumerate() {
             let found = mode.code_level(*code);
             let (row, taxel) = (5 + i / n, i % n);
-            assert_eq!(
-                found.to_bits(),
-                level.to_bits(),
-                "{weights:?}, row {row}, taxel {taxel}: {found} ≠ {level}"
-            );
+            assert_eq!(found.to_bits(), level.to_bits(), "{weights:?}, row {row}, taxel {taxel}: {found} ≠ {level}");
         }
     }
 
@@ -299,10 +295,7 @@ mod tests {
         let binary = Weights::new(WeightMode::Binary, Seeding::Address, 2);
         for rate_hz in [0.0, 2e6, f64::NAN, f64::INFINITY] {
             let error = FirmwareCells::new(&binary, rate_hz).unwrap_err().to_string();
-            assert!(
-                error.contains("sample_rate_hz") && error.contains("[1, 1e6]"),
-                "{error}"
-            );
+            assert!(error.contains("sample_rate_hz") && error.contains("[1, 1e6]"), "{error}");
         }
     }
 }

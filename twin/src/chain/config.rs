@@ -61,9 +61,7 @@ impl WeightSource {
         found.map(|(_, source)| *source).ok_or_else(|| {
             let known: Vec<&str> = WEIGHT_SOURCES.iter().map(|(known, _)| *known).collect();
             let known = known.join(", ");
-            Refusal::new(format!(
-                "`weights` = \"{name}\" is not a source of weights; known: {known}"
-            ))
+            Refusal::new(format!("`weights` = \"{name}\" is not a source of weights; known: {known}"))
         })
     }
 }
@@ -248,14 +246,8 @@ impl RowsConfig {
         }
         match (given.first(), self.kind) {
             (Some((field, kind)), Some(asked)) if *kind != asked => {
-                let kind = if asked == RowsKind::Pattern {
-                    "pattern"
-                } else {
-                    "generator"
-                };
-                Err(Refusal::new(format!(
-                    "`rows.{field}` does not go with `rows.kind` = \"{kind}\""
-                )))
+                let kind = if asked == RowsKind::Pattern { "pattern" } else { "generator" };
+                Err(Refusal::new(format!("`rows.{field}` does not go with `rows.kind` = \"{kind}\"")))
             }
             (source, _) => Ok(source.copied()),
         }

@@ -165,12 +165,7 @@ impl Chain {
         let valid = profile.validate(taxels(&self.skin));
         let valid = valid.and_then(|()| profile.on(&self.skin).map(drop));
         valid.map_err(|error| refused_profile(None, &error))?;
-        Ok(Self {
-            profile,
-            profile_file: None,
-            rows_file: None,
-            ..self.clone()
-        })
+        Ok(Self { profile, profile_file: None, rows_file: None, ..self.clone() })
     }
 
     /// The same skin with `transducer`, a transducer of your own. The transducer starts as on a fresh skin, and its
@@ -186,10 +181,7 @@ impl Chain {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn with_transducer(&self, transducer: Box<dyn Transducer>) -> Self {
-        Self {
-            transducer: transducer.into(),
-            ..self.clone()
-        }
+        Self { transducer: transducer.into(), ..self.clone() }
     }
 
     /// Records `presses` of `duration_s` seconds each, in order. Foam and Velostat remember earlier presses.
@@ -326,14 +318,7 @@ impl Acquisition {
     /// The way in which the published device records presses: 57 frames are not recorded after each block, while the
     /// arm returns, and a block begins with an untouched skin.
     pub fn presses(mode: Mode, session: u64) -> Self {
-        Self {
-            mode,
-            session,
-            lead_frames: 243,
-            gap_frames: 57,
-            starts_idle: true,
-            conditioning_presses: 0,
-        }
+        Self { mode, session, lead_frames: 243, gap_frames: 57, starts_idle: true, conditioning_presses: 0 }
     }
 
     /// The way in which the published device records touches by a finger: block follows block without a gap, as for
@@ -345,12 +330,7 @@ impl Acquisition {
     /// The way in which the published device records drops of a ball: block follows block without a gap, and nothing
     /// says when in a block the ball lands.
     pub fn drops(mode: Mode, session: u64) -> Self {
-        Self {
-            lead_frames: 0,
-            gap_frames: 0,
-            starts_idle: false,
-            ..Self::presses(mode, session)
-        }
+        Self { lead_frames: 0, gap_frames: 0, starts_idle: false, ..Self::presses(mode, session) }
     }
 }
 
@@ -397,10 +377,7 @@ pub struct SkinSession {
 
 impl Clone for SkinSession {
     fn clone(&self) -> Self {
-        Self {
-            transducer: self.transducer.boxed(),
-            ..*self
-        }
+        Self { transducer: self.transducer.boxed(), ..*self }
     }
 }
 
@@ -429,8 +406,7 @@ impl SkinSession {
         let mut last_s = 0.0;
         let maps = frames.iter().map(|frame| {
             let mut map = ConductanceMap::zeros(self.rows, self.cols);
-            self.transducer
-                .step(&frame.electrode_pressure, frame.time_s - last_s, &mut map);
+            self.transducer.step(&frame.electrode_pressure, frame.time_s - last_s, &mut map);
             last_s = frame.time_s;
             map
         });
@@ -485,12 +461,7 @@ impl Chain {
     pub fn skin_session(&self, session: u64) -> SkinSession {
         let mut transducer = self.transducer.boxed();
         transducer.start_session(session);
-        SkinSession {
-            transducer,
-            rows: self.skin().rows(),
-            cols: self.skin().cols(),
-            pressed: false,
-        }
+        SkinSession { transducer, rows: self.skin().rows(), cols: self.skin().cols(), pressed: false }
     }
 
     /// The readout, ready to record presses of `duration_s` seconds each as `acquisition` says.
@@ -541,10 +512,7 @@ pub fn press_facts(frames: &[Frame], maps: &[ConductanceMap], hold_s: Option<[f6
     };
     PressFacts {
         time_s: Some(frame.time_s),
-        pose: Some(PressPose {
-            position_m: frame.pose.position_m,
-            quaternion: frame.pose.quaternion,
-        }),
+        pose: Some(PressPose { position_m: frame.pose.position_m, quaternion: frame.pose.quaternion }),
         force_n: Some(frame.wrench.force_n[2]),
         pressure: Some(frame.pressure.clone()),
         conductance: at.and_then(|at| maps.get(at)).cloned(),
@@ -603,12 +571,7 @@ impl Chain {
         let (_, median_s, _) = values.select_nth_unstable_by(skin.taxels() / 2, f64::total_cmp);
         let conductance = ConductanceMap::from_values(1, 1, vec![*median_s]);
         let one = SkinLayout::new(1, 1, skin.pitch_m(), skin.electrode_m()).unwrap_or_default();
-        let profile = Profile {
-            seeds: None,
-            patterns: None,
-            faults: Vec::new(),
-            ..self.profile().clone()
-        };
+        let profile = Profile { seeds: None, patterns: None, faults: Vec::new(), ..self.profile().clone() };
         let mut readout = Readout::new(&profile, Mode::Compressive, &one, self.streams, 0).map_err(of_readout)?;
         let mut pressed = Constant::new(conductance).map_err(of_conductance)?;
         let volts = readout.measure(&mut pressed, MEASUREMENTS).map_err(of_readout)?;
@@ -649,14 +612,8 @@ mod tests {
             time_s,
             pressure: map.clone(),
             electrode_pressure: map,
-            wrench: Wrench {
-                force_n: [0.0, 0.0, 225.0],
-                torque_nm: [0.0; 3],
-            },
-            pose: Pose {
-                position_m: [0.0; 3],
-                quaternion: [1.0, 0.0, 0.0, 0.0],
-            },
+            wrench: Wrench { force_n: [0.0, 0.0, 225.0], torque_nm: [0.0; 3] },
+            pose: Pose { position_m: [0.0; 3], quaternion: [1.0, 0.0, 0.0, 0.0] },
         }
     }
 

@@ -49,24 +49,17 @@ pub fn parse_mat(bytes: Vec<u8>, names: &[&'static str], path: &Path) -> Result<
     };
     let Some((kind, data)) = element.numbers else {
         let class = element.class;
-        return Err(refused(format!(
-            "variable `{name}` is a {class}; expected an array of numbers"
-        )));
+        return Err(refused(format!("variable `{name}` is a {class}; expected an array of numbers")));
     };
     let count = data.len() / width(kind);
     if count > MAX_VALUES {
-        return Err(not_mat(format!(
-            "`{name}` holds {count} values, outside [0, {MAX_VALUES}]"
-        )));
+        return Err(not_mat(format!("`{name}` holds {count} values, outside [0, {MAX_VALUES}]")));
     }
     let values = values(kind, data).ok_or_else(|| not_mat(format!("`{name}` is damaged")))?;
     let shape = element.shape.clone();
     let expected = shape.iter().try_fold(1_usize, |n, &d| n.checked_mul(d));
     if expected != Some(values.len()) {
-        return Err(not_mat(format!(
-            "`{name}` holds {} values for shape {shape:?}",
-            values.len()
-        )));
+        return Err(not_mat(format!("`{name}` holds {} values for shape {shape:?}", values.len())));
     }
     Ok(MatVariable { name, shape, values })
 }
@@ -85,11 +78,7 @@ fn listed(found: &[MatElement<'_>]) -> String {
     let names = found.iter().take(MOST).map(|e| format!("{} ({})", e.name, e.class));
     let names: Vec<String> = names.collect();
     let more = found.len().saturating_sub(MOST);
-    let more = if more > 0 {
-        format!(" and {more} more")
-    } else {
-        String::new()
-    };
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
     names.join(", ") + &more
 }
 
@@ -108,12 +97,9 @@ const MAX_BYTES: usize = 1 << 28;
 /// # Errors
 /// What is wrong, in words: a foreign header, a file that ends early, a damaged element.
 fn inflate(file: &[u8]) -> Result<Vec<u8>, String> {
-    let header = file.get(..HEADER).ok_or_else(|| {
-        format!(
-            "the file ends after {} bytes; its header alone has {HEADER}",
-            file.len()
-        )
-    })?;
+    let header = file
+        .get(..HEADER)
+        .ok_or_else(|| format!("the file ends after {} bytes; its header alone has {HEADER}", file.len()))?;
     if header[126..] != *b"IM" {
         return Err("it does not begin with a little-endian v5 header".to_owned());
     }
@@ -137,9 +123,7 @@ fn inflate(file: &[u8]) -> Result<Vec<u8>, String> {
             let read = ZlibDecoder::new(element).take(limit).read_to_end(&mut plain);
             read.map_err(|e| format!("the compressed element at byte {at} is damaged: {e}"))?;
             if (plain.len() - before) as u64 == limit {
-                return Err(format!(
-                    "the element at byte {at} unfolds to more than {MAX_BYTES} bytes"
-                ));
+                return Err(format!("the element at byte {at} unfolds to more than {MAX_BYTES} bytes"));
             }
         } else {
             if plain.len() + head.len() + element.len() > MAX_BYTES {
@@ -243,8 +227,7 @@ fn width(kind: u32) -> usize {
 fn values(kind: u32, data: &[u8]) -> Option<Vec<f64>> {
     fn all<const N: usize>(data: &[u8], value: impl Fn([u8; N]) -> f64) -> Option<Vec<f64>> {
         let (chunks, rest) = data.as_chunks::<N>();
-        rest.is_empty()
-            .then(|| chunks.iter().map(|chunk| value(*chunk)).collect())
+        rest.is_empty().then(|| chunks.iter().map(|chunk| value(*chunk)).collect())
     }
     match kind {
         1 => all(data, |b| i8::from_le_bytes(b).into()),
@@ -300,14 +283,7 @@ mod tests {
         encoder.write_all(&element).unwrap();
         let packed = encoder.finish().unwrap();
         let length = u32::try_from(packed.len()).unwrap();
-        let compressed = [
-            &header[..],
-            &element,
-            &COMPRESSED.to_le_bytes(),
-            &length.to_le_bytes(),
-            &packed,
-        ]
-        .concat();
+        let compressed = [&header[..], &element, &COMPRESSED.to_le_bytes(), &length.to_le_bytes(), &packed].concat();
         (compressed, [header, element.clone(), element].concat())
     }
 

@@ -58,12 +58,7 @@ impl SessionSet {
         find(root, DEPTH, &mut folders)?;
         if folders.is_empty() {
             let (sessions, published, missing) = PublishedFiles::open(root)?.read()?;
-            return Ok(Self {
-                root: root.to_owned(),
-                sessions,
-                published,
-                missing,
-            });
+            return Ok(Self { root: root.to_owned(), sessions, published, missing });
         }
         let sessions = folders.iter().map(|folder| Session::read(folder));
         let mut sessions = sessions.collect::<Result<Vec<_>, _>>()?;
@@ -76,12 +71,7 @@ impl SessionSet {
             true => PublishedFiles::beside(root)?,
             false => None,
         };
-        Ok(Self {
-            root: root.to_owned(),
-            sessions,
-            published,
-            missing: Vec::new(),
-        })
+        Ok(Self { root: root.to_owned(), sessions, published, missing: Vec::new() })
     }
 
     /// The session called `name`.
@@ -169,11 +159,7 @@ mod tests {
             write(folder, name).unwrap();
         }
         let set = SessionSet::open(dir.path()).unwrap();
-        let found: Vec<_> = set
-            .sessions
-            .iter()
-            .map(|s| (s.name.as_str(), s.object.as_str()))
-            .collect();
+        let found: Vec<_> = set.sessions.iter().map(|s| (s.name.as_str(), s.object.as_str())).collect();
         let mut sorted = set.sessions.clone();
         sort(&mut sorted);
         assert_eq!(set.sessions, sorted);

@@ -83,10 +83,7 @@ impl PublishedFiles {
         let holds = |base: &PathBuf| known.iter().any(|folder| base.join(folder).is_dir());
         let base = [root.to_owned(), root.join("Data_Analysis")].into_iter().find(holds);
         match base {
-            Some(base) => Ok(Self {
-                root: root.to_owned(),
-                base,
-            }),
+            Some(base) => Ok(Self { root: root.to_owned(), base }),
             None => Err(nothing_found(root)),
         }
     }
@@ -175,11 +172,7 @@ impl PublishedFiles {
             sessions.push(Session {
                 object,
                 raster: files.raster.as_ref().map(|path| read(path, Mode::Raster)).transpose()?,
-                compressive: files
-                    .compressive
-                    .as_ref()
-                    .map(|path| read(path, Mode::Compressive))
-                    .transpose()?,
+                compressive: files.compressive.as_ref().map(|path| read(path, Mode::Compressive)).transpose()?,
                 ..Session::new(&name, event)
             });
         }
@@ -200,9 +193,7 @@ impl PublishedFiles {
         let labels: Vec<usize> = (0..images.ncols()).map(|k| k / LIBRARY_COLUMNS_PER_CLASS).collect();
         Ok(Some(Published {
             dictionary: matrix(&dictionary, "Dksvd")?,
-            shifted: file("permuted_dictionary")
-                .map(|path| matrix(&path, "Dksvd_new"))
-                .transpose()?,
+            shifted: file("permuted_dictionary").map(|path| matrix(&path, "Dksvd_new")).transpose()?,
             library: Library::new(&images, &labels).map_err(|e| not_mat(&library, &e.to_string()))?,
         }))
     }
@@ -242,10 +233,7 @@ fn press(object: &str, files: &RecordingFiles, raster: Option<&PathBuf>) -> Resu
 
 /// A recording whose first presses only condition the skin.
 fn conditioned(recording: Recording) -> Recorded {
-    Recorded {
-        conditioning: CONDITIONING,
-        ..Recorded::new(recording)
-    }
+    Recorded { conditioning: CONDITIONING, ..Recorded::new(recording) }
 }
 
 /// The compressive recording at `path`, with the positions of its blocks.
@@ -276,11 +264,7 @@ fn blocks(path: &Path, mode: Mode) -> Result<Vec<Vec<f64>>, Refusal> {
         [TAXELS, frames] | [TAXELS, frames, _] if frames > 0 && !array.values.is_empty() => frames,
         _ => return Err(wrong_shape(path, &array, "100 × frames × presses")),
     };
-    Ok(array
-        .values
-        .chunks_exact(TAXELS * frames)
-        .map(<[f64]>::to_vec)
-        .collect())
+    Ok(array.values.chunks_exact(TAXELS * frames).map(<[f64]>::to_vec).collect())
 }
 
 /// The error of a variable of the wrong shape.
@@ -321,13 +305,7 @@ fn frame_position(path: &Path, index: usize, value: f64) -> Result<u64, Refusal>
     if value.fract() == 0.0 && (0.0..=MAX).contains(&value) {
         return Ok(value as u64);
     }
-    Err(wrong_value(
-        path,
-        "framePosition",
-        index,
-        value,
-        "the whole numbers in [0, 4e10]",
-    ))
+    Err(wrong_value(path, "framePosition", index, value, "the whole numbers in [0, 4e10]"))
 }
 
 /// A matrix with one row a taxel.
@@ -337,13 +315,7 @@ fn matrix(path: &Path, name: &'static str) -> Result<Matrix, Refusal> {
         return Err(wrong_shape(path, &array, "100 × columns"));
     };
     if let Some(index) = array.values.iter().position(|v| !v.is_finite()) {
-        return Err(wrong_value(
-            path,
-            name,
-            index,
-            array.values[index],
-            "the finite numbers",
-        ));
+        return Err(wrong_value(path, name, index, array.values[index], "the finite numbers"));
     }
     Matrix::from_columns(TAXELS, columns, &array.values).map_err(|e| not_mat(path, &e.to_string()))
 }
@@ -394,10 +366,7 @@ fn recording_files(folder: &Path, prefix: &str) -> Result<Vec<RecordingFiles>, R
     for entry in std::fs::read_dir(folder).map_err(&io)? {
         let path = entry.map_err(&io)?.path();
         let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let Some(name) = stem
-            .strip_prefix(prefix)
-            .filter(|_| path.extension().is_some_and(|e| e == "mat"))
-        else {
+        let Some(name) = stem.strip_prefix(prefix).filter(|_| path.extension().is_some_and(|e| e == "mat")) else {
             continue;
         };
         // 0: scans, 1: sums, 2: positions
@@ -418,9 +387,7 @@ fn recording_files(folder: &Path, prefix: &str) -> Result<Vec<RecordingFiles>, R
         *[&mut files.raster, &mut files.compressive, &mut files.positions][kind] = Some(path);
     }
     let found = found.into_values();
-    Ok(found
-        .filter(|files| files.raster.is_some() || files.compressive.is_some())
-        .collect())
+    Ok(found.filter(|files| files.raster.is_some() || files.compressive.is_some()).collect())
 }
 
 /// Largest constant that the publication subtracted from a raster scan before it set negative volts to 0, hundredths of
@@ -434,30 +401,16 @@ pub(super) fn published_converter(mode: Mode, blocks: &[Block]) -> Option<Conver
         Mode::Raster => (4.3, 508.0, 165.0),
         Mode::Compressive => (32.0, 11_140.0, 570.0),
     };
-    let constants = (0..=MOST_SUBTRACTED)
-        .flat_map(|k| [k, -k])
-        .map(|k| Some(f64::from(k) / 100.0));
+    let constants = (0..=MOST_SUBTRACTED).flat_map(|k| [k, -k]).map(|k| Some(f64::from(k) / 100.0));
     let constants: Vec<Option<f64>> = match mode {
         Mode::Raster => std::iter::once(None).chain(constants).collect(),
         Mode::Compressive => vec![None],
     };
     let converters = constants.into_iter().filter_map(|subtract_v| {
-        let scale = CodeScale::Divider {
-            reference_v: 3.3,
-            numerator,
-            denominator,
-        };
-        Converter::new(ConverterConfig {
-            offset_v,
-            scale,
-            max_code: 1023,
-            subtract_v,
-        })
-        .ok()
+        let scale = CodeScale::Divider { reference_v: 3.3, numerator, denominator };
+        Converter::new(ConverterConfig { offset_v, scale, max_code: 1023, subtract_v }).ok()
     });
-    converters
-        .into_iter()
-        .find(|c| blocks.iter().all(|block| c.made(&block.volts)))
+    converters.into_iter().find(|c| blocks.iter().all(|block| c.made(&block.volts)))
 }
 
 #[cfg(test)]
@@ -468,14 +421,7 @@ mod tests {
     #[test]
     fn repetitions_of_the_ball_have_names_of_their_own() {
         let dir = tempfile::tempdir().unwrap();
-        for name in [
-            "random2_",
-            "random2_re",
-            "random2_tennis",
-            "random2_tennis_re",
-            "raster_ball",
-            "raster_tennis",
-        ] {
+        for name in ["random2_", "random2_re", "random2_tennis", "random2_tennis_re", "raster_ball", "raster_tennis"] {
             std::fs::write(dir.path().join(format!("{name}.mat")), "").unwrap();
         }
         std::fs::write(dir.path().join("random2_tennis.fig"), "").unwrap();
@@ -493,34 +439,21 @@ mod tests {
             ("tennis_bounces", "tennis", true),
             ("tennis_bounces_re", "tennis", false),
         ];
-        assert_eq!(
-            names,
-            expected.map(|(name, object, raster)| (name.to_owned(), object.to_owned(), raster))
-        );
+        assert_eq!(names, expected.map(|(name, object, raster)| (name.to_owned(), object.to_owned(), raster)));
     }
 
     #[test]
     fn repetitions_of_a_press_have_files_of_their_own() {
         let dir = tempfile::tempdir().unwrap();
-        for name in [
-            "T_raster",
-            "T_random2",
-            "T_random2_time",
-            "T_random2_re",
-            "T_random2_re_time",
-            "T_random1",
-            "U_raster",
-        ] {
+        for name in
+            ["T_raster", "T_random2", "T_random2_time", "T_random2_re", "T_random2_re_time", "T_random1", "U_raster"]
+        {
             std::fs::write(dir.path().join(format!("{name}.mat")), "").unwrap();
         }
         let found = recording_files(dir.path(), "T_").unwrap();
         let suffixes: Vec<&str> = found.iter().map(|files| files.suffix.as_str()).collect();
         assert_eq!(suffixes, ["", "_re"]);
         assert!(found[0].raster.is_some() && found[1].raster.is_none());
-        assert!(
-            found
-                .iter()
-                .all(|files| files.positions.is_some() && files.compressive.is_some())
-        );
+        assert!(found.iter().all(|files| files.positions.is_some() && files.compressive.is_some()));
     }
 }

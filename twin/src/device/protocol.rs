@@ -159,17 +159,10 @@ impl<P: Read + Write> Host<P> {
     /// [`Refusal`] if the device does not answer, or answers with unexpected text.
     pub fn greet(mut port: P) -> Result<Self, Refusal> {
         port.write_all(&[START]).and_then(|()| port.flush()).map_err(of_port)?;
-        let mut host = Self {
-            port: BufReader::new(port),
-            read: 0,
-        };
+        let mut host = Self { port: BufReader::new(port), read: 0 };
         for needed in [SENDING, SENT] {
             let mut line = Vec::new();
-            host.port
-                .by_ref()
-                .take(GREETING)
-                .read_until(b'\n', &mut line)
-                .map_err(of_port)?;
+            host.port.by_ref().take(GREETING).read_until(b'\n', &mut line).map_err(of_port)?;
             let found = String::from_utf8_lossy(&line);
             if found.trim_end() != needed {
                 return Err(said(&found, &format!("{needed:?}")));
@@ -187,11 +180,7 @@ impl<P: Read + Write> Host<P> {
         let needed = measurements + 1;
         let mut line = Vec::with_capacity(4 * needed);
         let most = needed.saturating_mul(FIELD) as u64;
-        self.port
-            .by_ref()
-            .take(most)
-            .read_until(b'\n', &mut line)
-            .map_err(of_port)?;
+        self.port.by_ref().take(most).read_until(b'\n', &mut line).map_err(of_port)?;
         let text = String::from_utf8_lossy(&line);
         let Some(text) = text.strip_suffix('\n') else {
             let (block, fields) = (self.read, text.matches(',').count());
@@ -204,10 +193,7 @@ impl<P: Read + Write> Host<P> {
         };
         if !END.contains(end) || fields.len() != needed {
             let found = format!("{} fields that end in {end:?}", fields.len());
-            return Err(said(
-                &found,
-                &format!("a block of {needed} fields, the last one a space"),
-            ));
+            return Err(said(&found, &format!("a block of {needed} fields, the last one a space")));
         }
         let number = |field: &&str| field.parse().map_err(|_| said(field, "a code of the converter"));
         let block = DeviceBlock {
@@ -273,10 +259,7 @@ mod tests {
             let mut host = greeted(&format!("Sending.\nSent!.\n{text}")).unwrap();
             match host.block(3) {
                 Ok(block) => assert_eq!((block.frame_position, block.codes, reason), (7, vec![1, 2], "")),
-                Err(error) => assert!(
-                    !reason.is_empty() && error.to_string().contains(reason),
-                    "{text:?}: {error}"
-                ),
+                Err(error) => assert!(!reason.is_empty() && error.to_string().contains(reason), "{text:?}: {error}"),
             }
         }
     }

@@ -40,11 +40,7 @@ impl<'a> Played<'a> {
         let converter = recording.converter().copied().ok_or_else(|| {
             Refusal::new("the recording has no codes: its readout has no converter, or one of unknown scale")
         })?;
-        Ok(Self {
-            recording,
-            converter,
-            next: 0,
-        })
+        Ok(Self { recording, converter, next: 0 })
     }
 }
 
@@ -64,10 +60,7 @@ impl BlockSource for Played<'_> {
         self.next += 1;
         // a sample that was lost is sent as 0
         let codes = block.volts.iter().map(|v| self.converter.code(*v).unwrap_or(0));
-        Ok(Some(DeviceBlock {
-            frame_position: block.frame_position,
-            codes: codes.collect(),
-        }))
+        Ok(Some(DeviceBlock { frame_position: block.frame_position, codes: codes.collect() }))
     }
 }
 
@@ -129,10 +122,7 @@ impl Pressed {
         let body = TouchBody::from(PreparedMesh::from((spec.build)()));
         let [x_m, y_m] = layout.position_m(place.row, place.col);
         let posed = place.matrix();
-        let lowest = PosedMesh {
-            rotation: posed,
-            ..PosedMesh::at_rest(&body.mesh, [0.0; 3])
-        };
+        let lowest = PosedMesh { rotation: posed, ..PosedMesh::at_rest(&body.mesh, [0.0; 3]) };
         let [low_m, _] = lowest.heights_m();
         let mut pressed = Self {
             skin: TouchSkin::flat(layout, Foam::default())?,
@@ -169,9 +159,7 @@ impl Pressed {
         let (mut low_m, mut high_m) = (0.0, DEEPEST_M);
         if self.touch(high_m, 0.0) < force_n {
             let name = self.config.object.name;
-            return Err(Refusal::new(format!(
-                "{name:?} cannot press with {force_n} N on this skin"
-            )));
+            return Err(Refusal::new(format!("{name:?} cannot press with {force_n} N on this skin")));
         }
         for _ in 0..HALVINGS {
             let middle_m = 0.5 * (low_m + high_m);
@@ -189,11 +177,7 @@ impl Pressed {
         let [down, hold, up, gone] = COURSE.map(f64::from);
         let frame = f64::from(frame);
         let ramp = |share: f64| (FRAC_PI_2 * share.clamp(0.0, 1.0)).sin().powi(2);
-        if frame < hold {
-            ramp((frame - down) / (hold - down))
-        } else {
-            1.0 - ramp((frame - up) / (gone - up))
-        }
+        if frame < hold { ramp((frame - down) / (hold - down)) } else { 1.0 - ramp((frame - up) / (gone - up)) }
     }
 }
 
@@ -231,10 +215,7 @@ impl BlockSource for Pressed {
             codes.extend(volts.iter().map(|v| self.converter.code(*v).unwrap_or(0)));
         }
         self.made += 1;
-        Ok(Some(DeviceBlock {
-            frame_position: self.wire.rows(mode, 0).first_row() / taxels as u64,
-            codes,
-        }))
+        Ok(Some(DeviceBlock { frame_position: self.wire.rows(mode, 0).first_row() / taxels as u64, codes }))
     }
 }
 
@@ -248,18 +229,10 @@ mod tests {
     use std::os::unix::net::UnixStream;
 
     fn pressed(mode: Mode, blocks: u64) -> Pressed {
-        let config = ChainConfig {
-            readout: Some("as_built".to_owned()),
-            ..ChainConfig::default()
-        };
+        let config = ChainConfig { readout: Some("as_built".to_owned()), ..ChainConfig::default() };
         let chain = Chain::new(&config, &SkinLayout::default(), 3, "".as_ref()).unwrap();
-        let config = PressedConfig {
-            object: by_name("T").unwrap(),
-            force_n: 20.0,
-            mode,
-            blocks: Some(blocks),
-            session: 0,
-        };
+        let config =
+            PressedConfig { object: by_name("T").unwrap(), force_n: 20.0, mode, blocks: Some(blocks), session: 0 };
         Pressed::new(&chain, config).unwrap()
     }
 

@@ -24,9 +24,7 @@ pub fn unwritable<E: Error + Send + Sync + 'static>(path: &Path) -> impl Fn(E) -
 
 /// The refusal of a folder at `path` that cannot be made.
 pub fn no_folder(path: &Path, source: io::Error) -> Refusal {
-    Refusal::from_error(source)
-        .at("the output folder cannot be made")
-        .at(path.display())
+    Refusal::from_error(source).at("the output folder cannot be made").at(path.display())
 }
 
 /// The refusal of a file at `path` that has the name of a result, and that no run has written.
@@ -87,10 +85,7 @@ impl NewFile {
     pub(super) fn create(path: &Path) -> io::Result<Self> {
         let file = watched(DiskOperation::Other, path, || File::create_new(path))?;
         let _ = file.try_lock();
-        Ok(Self {
-            file,
-            path: path.to_owned(),
-        })
+        Ok(Self { file, path: path.to_owned() })
     }
 
     pub(super) fn sync(&self) -> io::Result<()> {
@@ -140,11 +135,7 @@ pub(super) fn below(root: &Path) -> io::Result<(Vec<PathBuf>, Vec<PathBuf>)> {
     while let Some(folder) = folders.get(read).cloned() {
         for entry in std::fs::read_dir(root.join(&folder))? {
             let entry = entry?;
-            let kind = if entry.file_type()?.is_dir() {
-                &mut folders
-            } else {
-                &mut files
-            };
+            let kind = if entry.file_type()?.is_dir() { &mut folders } else { &mut files };
             kind.push(folder.join(entry.file_name()));
         }
         read += 1;
@@ -155,11 +146,9 @@ pub(super) fn below(root: &Path) -> io::Result<(Vec<PathBuf>, Vec<PathBuf>)> {
 
 /// Removes the file or the empty folder `path`.
 pub(super) fn remove(path: &Path) -> io::Result<()> {
-    watched(DiskOperation::Remove, path, || {
-        match path.symlink_metadata()?.is_dir() {
-            true => std::fs::remove_dir(path),
-            false => std::fs::remove_file(path),
-        }
+    watched(DiskOperation::Remove, path, || match path.symlink_metadata()?.is_dir() {
+        true => std::fs::remove_dir(path),
+        false => std::fs::remove_file(path),
     })
 }
 

@@ -52,11 +52,7 @@ impl AtomicFile {
             .rand_bytes(RANDOM)
             .make_in(disk::parent(path), NewFile::create);
         let (file, temporary) = made.map_err(failed)?.into_parts();
-        Ok(Self {
-            buffer: BufWriter::with_capacity(PIECE, file),
-            temporary,
-            path: path.to_owned(),
-        })
+        Ok(Self { buffer: BufWriter::with_capacity(PIECE, file), temporary, path: path.to_owned() })
     }
 
     /// Waits until the bytes are on the disk, then gives the file its name.
@@ -197,21 +193,10 @@ impl<T: NpyValue> NpyFile<T> {
         let mut file = AtomicFile::create(path)?;
         let mut header = Vec::new();
         let kind = T::KIND.parse().map_err(unwritable(path))?;
-        let options = npyz::WriteOptions::new_header_only()
-            .dtype(npyz::DType::Plain(kind))
-            .shape(&sides);
-        options
-            .writer(&mut header)
-            .write_header_only()
-            .map_err(unwritable(path))?;
+        let options = npyz::WriteOptions::new_header_only().dtype(npyz::DType::Plain(kind)).shape(&sides);
+        options.writer(&mut header).write_header_only().map_err(unwritable(path))?;
         file.write_all(&header).map_err(unwritable(path))?;
-        Ok(Self {
-            file,
-            shape: shape.to_vec(),
-            written: 0,
-            header_bytes: header.len() as u64,
-            kind: PhantomData,
-        })
+        Ok(Self { file, shape: shape.to_vec(), written: 0, header_bytes: header.len() as u64, kind: PhantomData })
     }
 
     /// Writes the next values.

@@ -40,12 +40,7 @@ impl OutputFolder {
     pub fn open(path: &Path) -> Result<Self, Refusal> {
         let failed = unwritable(path);
         let missing = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
-        let made: Vec<PathBuf> = path
-            .ancestors()
-            .skip(1)
-            .take_while(missing)
-            .map(Path::to_owned)
-            .collect();
+        let made: Vec<PathBuf> = path.ancestors().skip(1).take_while(missing).map(Path::to_owned).collect();
         make_folders(if path.exists() { path } else { parent(path) })?;
         let folder = match path.file_name() {
             // a link to nowhere is no place for a folder
@@ -68,14 +63,7 @@ impl OutputFolder {
         let stage = beside(&folder, "new");
         let make = || watched(DiskOperation::Other, &stage, || std::fs::create_dir(&stage));
         let ((), entry) = listed(make, |()| Leftover::Folder(stage.clone())).map_err(failed)?;
-        Ok(Self {
-            folder,
-            shown: path.to_owned(),
-            stage,
-            timed: BTreeSet::new(),
-            entry: Some(entry),
-            _lock: lock,
-        })
+        Ok(Self { folder, shown: path.to_owned(), stage, timed: BTreeSet::new(), entry: Some(entry), _lock: lock })
     }
 
     /// Where to write the result `name`. It may lie in a folder (`tables/scores.csv`) that [`OutputFolder::folder`] has
@@ -113,9 +101,7 @@ impl OutputFolder {
         let names: Vec<String> = files.iter().map(|name| name.to_string_lossy().into_owned()).collect();
         let manifest = Manifest::write_of(&self.stage, &names, &self.timed);
         manifest.map_err(|error| self.unstaged(error))?;
-        let synced = folders
-            .iter()
-            .try_for_each(|folder| disk::sync_folder(&self.stage.join(folder)));
+        let synced = folders.iter().try_for_each(|folder| disk::sync_folder(&self.stage.join(folder)));
         synced.map_err(&failed)?;
         check_ours(&self.folder, &self.shown)?;
         // from here on the stage may be the earlier results, which no signal may remove unseen
@@ -291,11 +277,7 @@ impl Lock {
             if identity(file.metadata()) == identity(path.metadata()) {
                 let left = [vec![path], made].concat();
                 let entry = listed(|| Ok(()), |()| Leftover::Each(left.clone())).map_err(failed)?;
-                return Ok(Self {
-                    _file: file,
-                    left,
-                    _entry: entry.1,
-                });
+                return Ok(Self { _file: file, left, _entry: entry.1 });
             }
         }
     }
@@ -363,10 +345,7 @@ mod tests {
     fn results_of_a_run_appear_together_or_not_at_all() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("deep/er");
-        assert_eq!(
-            run(&out, &[("a", "old"), ("tables/b", "old")]).unwrap(),
-            ["a", "tables/b"]
-        );
+        assert_eq!(run(&out, &[("a", "old"), ("tables/b", "old")]).unwrap(), ["a", "tables/b"]);
         let first = OutputFolder::open(&out).unwrap();
         refused(&out, &["deep/er: another run is writing to this folder"]);
         // whatever fails while results wait, the message names where they would have been
@@ -453,10 +432,7 @@ mod tests {
         refused(&nowhere, &["nowhere: cannot be written"]);
         assert!(names(dir.path()) == ["file", "nowhere"] && fs::read(&file).unwrap() == b"mine");
         for mounted in ["/", "/proc"] {
-            refused(
-                Path::new(mounted),
-                &[mounted, ": is a mount point", "choose a folder in it"],
-            );
+            refused(Path::new(mounted), &[mounted, ": is a mount point", "choose a folder in it"]);
         }
     }
 
@@ -492,9 +468,7 @@ mod tests {
 
     fn copy(from: &Path, to: &Path) {
         let (files, folders) = disk::below(from).unwrap();
-        folders
-            .iter()
-            .for_each(|name| fs::create_dir_all(to.join(name)).unwrap());
+        folders.iter().for_each(|name| fs::create_dir_all(to.join(name)).unwrap());
         for name in files {
             fs::copy(from.join(&name), to.join(name)).unwrap();
         }
@@ -570,10 +544,7 @@ mod tests {
             // between two renames there is no folder, never half of one
             let is_aside = (away || !exchanges) && !out.exists() && there(&aside) == before;
             let states = [there(&out) == before, there(&out) == after, is_aside];
-            let state = states
-                .iter()
-                .position(|is| *is)
-                .unwrap_or_else(|| panic!("{what}: a mixture"));
+            let state = states.iter().position(|is| *is).unwrap_or_else(|| panic!("{what}: a mixture"));
             seen[state] += 1;
             match (at.1, result.is_ok()) {
                 (Fault::Once, false) => assert!(state == 0 || away && state == 2, "{what}"),
@@ -584,11 +555,7 @@ mod tests {
             drop(OutputFolder::open(&out).unwrap());
             assert!([&before, &after].contains(&&there(&out)), "{what}: not put back");
             run(&out, new).unwrap();
-            assert!(
-                there(&out) == after && names(&left) == ["out"],
-                "{what}: {:?}",
-                names(&left)
-            );
+            assert!(there(&out) == after && names(&left) == ["out"], "{what}: {:?}", names(&left));
         }
         eprintln!("{steps} steps, each with three faults: {seen:?} times earlier, new, put aside and put back results");
     }
@@ -596,12 +563,7 @@ mod tests {
     #[test]
     fn a_run_fails_or_is_killed_at_every_step() {
         let old: Results<'_> = &[("a", "old"), ("same", "same"), ("arrays/b", "old")];
-        for (old, away, exchanges) in [
-            (old, false, true),
-            (old, false, false),
-            (old, true, true),
-            (&[], false, true),
-        ] {
+        for (old, away, exchanges) in [(old, false, true), (old, false, false), (old, true, true), (&[], false, true)] {
             check_every_step(old, away, exchanges);
         }
     }

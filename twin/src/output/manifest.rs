@@ -62,10 +62,7 @@ impl FileEntry {
         while let read @ 1.. = file.read(&mut piece)? {
             hash.update(&piece[..read]);
         }
-        Ok(Self {
-            bytes: Some(bytes),
-            sha256: Some(in_digits(hash)),
-        })
+        Ok(Self { bytes: Some(bytes), sha256: Some(in_digits(hash)) })
     }
 }
 
@@ -84,11 +81,7 @@ impl Manifest {
             };
             files.insert(name.clone(), entry);
         }
-        let manifest = Self {
-            format: FORMAT.to_owned(),
-            schema: SCHEMA,
-            files,
-        };
+        let manifest = Self { format: FORMAT.to_owned(), schema: SCHEMA, files };
         write_json(&folder.join(MANIFEST_FILE), &manifest)?;
         Ok(manifest)
     }
@@ -96,10 +89,7 @@ impl Manifest {
     /// SHA-256 of the names and digests of the listed files below the folder `within`, in order of name. Equal files
     /// give equal digests wherever they lie.
     pub fn digest_of(&self, within: &str) -> String {
-        let listed = self
-            .files
-            .iter()
-            .filter(|(name, _)| Path::new(name).starts_with(within));
+        let listed = self.files.iter().filter(|(name, _)| Path::new(name).starts_with(within));
         let lines = listed.map(|(name, entry)| format!("{}  {name}\n", entry.sha256.as_deref().unwrap_or_default()));
         in_digits(Sha256::new().chain_update(lines.collect::<String>()))
     }
@@ -145,10 +135,7 @@ pub fn check_whole(folder: &Path, names: &[&str]) -> Result<(), Refusal> {
     let Ok(whole) = folder.canonicalize() else {
         return Ok(());
     };
-    let listing = whole
-        .ancestors()
-        .take(3)
-        .find_map(|above| Some((above, Manifest::read(above)?)));
+    let listing = whole.ancestors().take(3).find_map(|above| Some((above, Manifest::read(above)?)));
     let Some((above, manifest)) = listing else {
         return Ok(());
     };
@@ -173,10 +160,7 @@ pub(super) fn changed(path: &Path, folder: &Path, advice: &str) -> Refusal {
 
 /// Whether `name` stays below the folder that it is joined to.
 fn is_below(name: &str) -> bool {
-    !name.is_empty()
-        && Path::new(name)
-            .components()
-            .all(|part| matches!(part, Component::Normal(_)))
+    !name.is_empty() && Path::new(name).components().all(|part| matches!(part, Component::Normal(_)))
 }
 
 /// `hash` in hexadecimal digits.

@@ -20,9 +20,7 @@ impl Assignment {
             let of = |a: &Self| a.key(scene).to_owned();
             let earlier = assignments[..number].iter().find(|a| conflict(&of(a), &of(later)));
             if let Some(earlier) = earlier {
-                return Err(later.refused(format!(
-                    "`{earlier}` says the same in another way; leave out one of them"
-                )));
+                return Err(later.refused(format!("`{earlier}` says the same in another way; leave out one of them")));
             }
         }
         assignments.iter().try_for_each(|assignment| assignment.apply(scene))
@@ -72,28 +70,14 @@ type OneOf = (&'static [&'static str], &'static [&'static [&'static str]]);
 
 /// Where a thing is put, and where the seeds come from.
 const ONE_OF: [OneOf; 2] = [
-    (
-        &["press", "drop"],
-        &[&["row", "col"], &["position_m"], &["position_share"], &["places"]],
-    ),
-    (
-        &["rows"],
-        &[
-            &["seeding"],
-            &["seeds"],
-            &["seeds_file"],
-            &["patterns"],
-            &["patterns_file"],
-        ],
-    ),
+    (&["press", "drop"], &[&["row", "col"], &["position_m"], &["position_share"], &["places"]]),
+    (&["rows"], &[&["seeding"], &["seeds"], &["seeds_file"], &["patterns"], &["patterns_file"]]),
 ];
 
 /// Whether two fields, both set by the user, say one thing in two ways.
 fn conflict(a: &str, b: &str) -> bool {
     let tolerance = |a: &str, b: &str| {
-        let chosen = b
-            .strip_prefix("contact.")
-            .is_some_and(|field| OF_TOLERANCE.contains(&field));
+        let chosen = b.strip_prefix("contact.").is_some_and(|field| OF_TOLERANCE.contains(&field));
         a == "tolerance" && (chosen || b == "timestep_s")
     };
     let object = |a: &str, b: &str| a == "press.mesh" && b == "press.object";
@@ -144,10 +128,7 @@ fn make_room(scene: &mut Table, key: &str, value: &Value) {
         _ => {}
     }
     for group in ONE_OF {
-        if let Some((section, field)) = key
-            .split_once('.')
-            .filter(|(s, f)| group.0.contains(s) && in_group(group, f))
-        {
+        if let Some((section, field)) = key.split_once('.').filter(|(s, f)| group.0.contains(s) && in_group(group, f)) {
             let others = group.1.iter().copied().filter(|ways| !ways.contains(&field));
             others.for_each(|ways| remove(section, ways));
         }
@@ -179,12 +160,10 @@ fn forget_object(scene: &mut Table) {
     let Some(object) = scene.get("press").and_then(|press| press.get("object")).cloned() else {
         return;
     };
-    let mut alone: Table = [(
-        "press".to_owned(),
-        Value::Table([("object".to_owned(), object.clone())].into_iter().collect()),
-    )]
-    .into_iter()
-    .collect();
+    let mut alone: Table =
+        [("press".to_owned(), Value::Table([("object".to_owned(), object.clone())].into_iter().collect()))]
+            .into_iter()
+            .collect();
     alone.extend(scene.get("skin").map(|skin| ("skin".to_owned(), skin.clone())));
     // of an object that does not exist nothing is known
     let Ok(config) = alone.try_into::<SceneConfig>() else {
@@ -234,29 +213,17 @@ mod tests {
         )
         .unwrap();
         let press = config.press.unwrap();
-        assert_eq!(
-            (press.force_n.to_bits(), press.tilt_deg),
-            (12.0_f64.to_bits(), Some([1.0, 2.0]))
-        );
-        assert_eq!(
-            (config.readout.as_deref(), config.seed, config.skin.rows()),
-            (Some("my/own.toml"), 7, 12)
-        );
+        assert_eq!((press.force_n.to_bits(), press.tilt_deg), (12.0_f64.to_bits(), Some([1.0, 2.0])));
+        assert_eq!((config.readout.as_deref(), config.seed, config.skin.rows()), (Some("my/own.toml"), 7, 12));
         assert_eq!(config.transducer_parameters["creep"]["kind"].as_str(), Some("prony"));
     }
 
     #[test]
     fn lists_by_number_and_by_plus() {
         let scene = "[[faults]]\nname = \"dead\"\ntaxel = 1\n[drop]";
-        let config = changed(
-            scene,
-            &[
-                "faults.0.taxel=5",
-                "faults.+={ name = \"stuck\", taxel = 7 }",
-                "faults.1.level=0.5",
-            ],
-        )
-        .unwrap();
+        let config =
+            changed(scene, &["faults.0.taxel=5", "faults.+={ name = \"stuck\", taxel = 7 }", "faults.1.level=0.5"])
+                .unwrap();
         assert_eq!(config.faults[0]["taxel"].as_integer(), Some(5));
         assert_eq!(config.faults[1]["level"].as_float(), Some(0.5));
         assert!(
@@ -272,10 +239,7 @@ mod tests {
         let config = changed(layer, &["contact.model=winkler"]).unwrap();
         assert!(!config.contact.contains_key("coupled"));
         let config = changed(layer, &["tolerance=0.1"]).unwrap();
-        assert_eq!(
-            (config.contact.len(), config.timestep_s, config.frame_interval_s),
-            (0, None, None)
-        );
+        assert_eq!((config.contact.len(), config.timestep_s, config.frame_interval_s), (0, None, None));
         let config = changed("[press]\nobject = \"T\"", &["press.mesh=cup.obj"]).unwrap();
         assert_eq!(config.press.unwrap().object, None);
     }
@@ -286,18 +250,12 @@ mod tests {
     fn room_is_made_for_another_way_to_say_it() {
         let place = "[press]\nobject = \"T\"\nrow = 4.5\ncol = 4.25";
         let config = changed(place, &["press.position_m=[0.01, 0]"]).unwrap().press.unwrap();
-        assert_eq!(
-            (config.row, config.col, config.position_m),
-            (None, None, Some([0.01, 0.0]))
-        );
+        assert_eq!((config.row, config.col, config.position_m), (None, None, Some([0.01, 0.0])));
         let config = changed(place, &["press.row=3.0"]).unwrap().press.unwrap();
         assert_eq!((config.row, config.col), (Some(3.0), Some(4.25)));
         let rows = "[rows]\nseeds = [1]\n[drop]";
         let config = changed(rows, &["rows.seeding=mixed"]).unwrap().rows;
-        assert_eq!(
-            (config.seeding, config.seeds),
-            (Some(spts_circuit::Seeding::Mixed), None)
-        );
+        assert_eq!((config.seeding, config.seeds), (Some(spts_circuit::Seeding::Mixed), None));
         // the usual electrode follows the pitch, one that was chosen stays
         for (electrode_m, expected_m) in [("0.01", 0.02), ("0.009", 0.009)] {
             let skin = format!("[skin]\npitch_m = 0.015\nelectrode_m = {electrode_m}\n[drop]");
@@ -326,11 +284,7 @@ drop.height_m=1 | drop.height_m=1 | only a ball drops
                 assert!(error.contains(fact), "{text}: {error}");
             }
         }
-        assert!(
-            changed("[drop]", &["press.force_n=1"])
-                .unwrap_err()
-                .contains("nothing is pressed")
-        );
+        assert!(changed("[drop]", &["press.force_n=1"]).unwrap_err().contains("nothing is pressed"));
     }
 
     #[test]

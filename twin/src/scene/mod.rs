@@ -77,12 +77,7 @@ impl Scene {
         if !is_plain(name) {
             return Err(Refusal::range("name", format!("{name:?}"), NAMES));
         }
-        Ok(Self {
-            config,
-            mechanics,
-            chain,
-            hash: OnceLock::new(),
-        })
+        Ok(Self { config, mechanics, chain, hash: OnceLock::new() })
     }
 
     /// The scene in the TOML text `text`. Files that it names are looked up in `folder`.
@@ -208,10 +203,7 @@ impl Scene {
         for index in mesh.triangles.iter().flatten() {
             bytes.extend(index.to_le_bytes());
         }
-        let texts = [
-            self.chain.profile_file().map(|file| &file.text),
-            self.chain.rows_file().map(|file| &file.text),
-        ];
+        let texts = [self.chain.profile_file().map(|file| &file.text), self.chain.rows_file().map(|file| &file.text)];
         bytes.extend(texts.into_iter().flatten().flat_map(|text| text.bytes()));
         Ok(self.hash.get_or_init(|| hash_text(&bytes)).clone())
     }

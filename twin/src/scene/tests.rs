@@ -80,20 +80,13 @@ weights = "magic" ; [drop] | `weights` = "magic" | model, firmware
 fn errors_name_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mine.toml");
-    let load = || {
-        Scene::load(&path)
-            .map(|s| s.name().to_owned())
-            .map_err(|e| e.to_string())
-    };
+    let load = || Scene::load(&path).map(|s| s.name().to_owned()).map_err(|e| e.to_string());
     assert!(load().unwrap_err().contains("mine.toml: cannot be read"));
     for (text, facts) in [
         ("[drop]\nheight_m = 9.0", ["mine.toml", "drop.height_m"]),
         ("[drop]\nheigt_m = 0.5", ["mine.toml: line 2", "heigt_m"]),
         ("readout = \"gone.toml\"\n[drop]", ["mine.toml", "gone.toml"]),
-        (
-            "readout = \"own.toml\"\n[drop]",
-            ["own.toml", "`readout.compressive.adc.bits` = 40"],
-        ),
+        ("readout = \"own.toml\"\n[drop]", ["own.toml", "`readout.compressive.adc.bits` = 40"]),
     ] {
         let ideal = spts_circuit::PROFILES[0].1;
         let adc = "[compressive.adc]\nbits = 40\nreference_v = 3.3\ndivider = 1.0\noffset_v = 0.0";
@@ -115,10 +108,7 @@ fn the_hash_does_not_know_the_names_of_files() {
     let folder = tempfile::tempdir().unwrap();
     let hash = |name: &str, text: &str| {
         std::fs::write(folder.path().join(name), text).unwrap();
-        let config = SceneConfig {
-            readout: Some(name.to_owned()),
-            ..Scene::press("T").unwrap().config().clone()
-        };
+        let config = SceneConfig { readout: Some(name.to_owned()), ..Scene::press("T").unwrap().config().clone() };
         Scene::new(config, folder.path()).unwrap().hash().unwrap()
     };
     let text = spts_circuit::PROFILES[0].1;
@@ -153,41 +143,23 @@ fn rows_of_a_scene_take_the_place_of_the_profile_s() {
     let repeated = Weights::with_patterns(WeightMode::Binary, patterns).unwrap();
     let cases = [
         ("", Weights::with_seeds(WeightMode::Binary, vec![5; 16]).unwrap()),
-        (
-            "seeding = \"mixed\"",
-            Weights::new(WeightMode::Binary, Seeding::Mixed, 16),
-        ),
-        (
-            "seeding = \"address\"",
-            Weights::new(WeightMode::Binary, Seeding::Address, 16),
-        ),
+        ("seeding = \"mixed\"", Weights::new(WeightMode::Binary, Seeding::Mixed, 16)),
+        ("seeding = \"address\"", Weights::new(WeightMode::Binary, Seeding::Address, 16)),
         ("seeds_file = \"own.txt\"", listed.clone()),
         ("seeds_file = \"own.json\"", listed.clone()),
         (&format!("seeds = {seeds:?}"), listed),
-        (
-            "levels = \"analog\"",
-            Weights::with_seeds(WeightMode::Analog, vec![5; 16]).unwrap(),
-        ),
-        (
-            "kind = \"generator\"",
-            Weights::with_seeds(WeightMode::Binary, vec![5; 16]).unwrap(),
-        ),
+        ("levels = \"analog\"", Weights::with_seeds(WeightMode::Analog, vec![5; 16]).unwrap()),
+        ("kind = \"generator\"", Weights::with_seeds(WeightMode::Binary, vec![5; 16]).unwrap()),
         ("patterns_file = \"rows.txt\"", repeated.clone()),
         ("kind = \"pattern\"\npatterns_file = \"rows.txt\"", repeated.clone()),
-        (
-            &format!("kind = \"pattern\"\npatterns = {{ period = 3, codes = {codes:?} }}"),
-            repeated,
-        ),
+        (&format!("kind = \"pattern\"\npatterns = {{ period = 3, codes = {codes:?} }}"), repeated),
     ];
     let mut hashes = Vec::new();
     for (rows, expected) in cases {
         let scene = scene(rows);
         assert_eq!(weights(&scene), expected, "{rows}");
         let again = Scene::from_toml(&scene.to_toml().unwrap(), folder.path()).unwrap();
-        assert_eq!(
-            (weights(&again), again.hash().unwrap()),
-            (expected, scene.hash().unwrap())
-        );
+        assert_eq!((weights(&again), again.hash().unwrap()), (expected, scene.hash().unwrap()));
         hashes.push(scene.hash().unwrap());
     }
     // all of them differ

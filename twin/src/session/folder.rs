@@ -120,11 +120,7 @@ fn code(volts: f64, converter: &Converter, missing: u32) -> Option<u32> {
 
 /// Mark of a missing sample: larger than every code, in the smallest unsigned type that holds both.
 fn missing_mark(converter: &Converter) -> u32 {
-    if is_narrow(converter) {
-        u32::from(u16::MAX)
-    } else {
-        u32::MAX
-    }
+    if is_narrow(converter) { u32::from(u16::MAX) } else { u32::MAX }
 }
 
 /// Whether codes and the mark of a missing sample have 16 bits.
@@ -201,11 +197,7 @@ impl SampleFile {
         let mut volts = NpyFile::create(&self.dir.join(name(self.mode, false)), &self.shape)?;
         let mark = missing_mark(converter);
         let of_code = |code| if code == mark { f64::NAN } else { converter.volts(code) };
-        let width = if is_narrow(converter) {
-            size_of::<u16>()
-        } else {
-            size_of::<u32>()
-        };
+        let width = if is_narrow(converter) { size_of::<u16>() } else { size_of::<u32>() };
         let code = |bytes: &[u8]| bytes.iter().rev().fold(0, |code, byte| code << 8 | u32::from(*byte));
         let mut push = |bytes: &[u8]| volts.push(bytes.chunks_exact(width).map(|bytes| of_code(code(bytes))));
         match &mut self.array {
@@ -356,10 +348,7 @@ impl SessionWriter {
 
 /// The error of what could not be read again.
 fn refused(dir: &Path, invalid: &Refusal) -> Refusal {
-    invalid
-        .clone()
-        .at("cannot be written")
-        .at(dir.join(SESSION_FILE).display())
+    invalid.clone().at("cannot be written").at(dir.join(SESSION_FILE).display())
 }
 
 /// Refuses a file that would be too large to be read again.
@@ -456,13 +445,7 @@ struct MapFile {
 
 impl MapFile {
     fn new(dir: &Path, name: String, shape: [usize; 3]) -> Self {
-        Self {
-            dir: dir.to_owned(),
-            name,
-            shape,
-            unknown: 0,
-            file: None,
-        }
+        Self { dir: dir.to_owned(), name, shape, unknown: 0, file: None }
     }
 
     fn push(&mut self, map: Option<&[f64]>) -> Result<(), Refusal> {
@@ -476,9 +459,7 @@ impl MapFile {
             (None, Some(file)) => file.push(unknown(1)),
             (Some(map), Some(file)) => file.push(map.iter().copied()),
             (Some(map), None) => {
-                let file = self
-                    .file
-                    .insert(NpyFile::create(&self.dir.join(&self.name), &self.shape)?);
+                let file = self.file.insert(NpyFile::create(&self.dir.join(&self.name), &self.shape)?);
                 file.push(unknown(self.unknown))?;
                 file.push(map.iter().copied())
             }
@@ -535,18 +516,13 @@ impl Session {
             return Err(outside(&path, "format", found, format!("{{{FORMAT:?}}}")));
         }
         if version.schema != SCHEMA {
-            let problem = format!(
-                "`schema` = {} is not known; this program reads {SCHEMA}",
-                version.schema
-            );
+            let problem = format!("`schema` = {} is not known; this program reads {SCHEMA}", version.schema);
             return Err(Refusal::new(problem).at(path.display()));
         }
         let contents: Contents = parse(&path, &text)?;
         let files: Vec<String> = contents.files().into_iter().map(str::to_owned).collect();
         let read = |contents: Option<RecordedContents>, mode| {
-            contents
-                .map(|contents| read_recorded(dir, &path, mode, contents))
-                .transpose()
+            contents.map(|contents| read_recorded(dir, &path, mode, contents)).transpose()
         };
         let session = Self {
             raster: read(contents.raster, "raster")?,
@@ -569,10 +545,7 @@ impl Session {
 fn read_recorded(dir: &Path, path: &Path, mode: &'static str, contents: RecordedContents) -> Result<Recorded, Refusal> {
     let RecordedContents { info, frames, .. } = &contents;
     let shape = [contents.blocks.len(), *frames, info.measurements_per_frame];
-    let expected = Expected {
-        shape: &shape,
-        dimensions: "blocks × frames × measurements a frame",
-    };
+    let expected = Expected { shape: &shape, dimensions: "blocks × frames × measurements a frame" };
     let file = plain(path, &format!("{mode}.samples.file"), &contents.samples.file)?;
     let file = dir.join(file);
     let volts = match contents.samples.kind {
@@ -591,10 +564,7 @@ fn read_recorded(dir: &Path, path: &Path, mode: &'static str, contents: Recorded
             return Ok::<_, Refusal>(Vec::new());
         };
         let file = dir.join(plain(path, &format!("{mode}.{field}"), file)?);
-        let expected = Expected {
-            shape: &map_shape,
-            dimensions: "blocks × rows × cols",
-        };
+        let expected = Expected { shape: &map_shape, dimensions: "blocks × rows × cols" };
         let values = read_doubles(&file, Some(expected))?.values;
         check_truth(&file, &values, info.layout.taxels())?;
         Ok(values)
@@ -624,11 +594,7 @@ fn read_recorded(dir: &Path, path: &Path, mode: &'static str, contents: Recorded
     }
     let recording =
         Recording::new(contents.info, blocks).map_err(|error| error.at(format!("{}: `{mode}`", path.display())))?;
-    Ok(Recorded {
-        recording,
-        conditioning: contents.conditioning,
-        presses,
-    })
+    Ok(Recorded { recording, conditioning: contents.conditioning, presses })
 }
 
 /// Map of block `block`; `None` where it is not known.

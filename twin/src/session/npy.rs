@@ -45,9 +45,7 @@ impl Header {
             other => return Err(invalid(format!("version = {other} is outside [1, 3]"))),
         };
         if length > MAX_HEADER {
-            return Err(invalid(format!(
-                "header length = {length} bytes is outside [0, {MAX_HEADER}]"
-            )));
+            return Err(invalid(format!("header length = {length} bytes is outside [0, {MAX_HEADER}]")));
         }
         let mut text = vec![0; length];
         reader.read_exact(&mut text)?;
@@ -62,11 +60,7 @@ impl Header {
         let (order, rest) = rest.split_once(",'shape':(")?;
         let sides = rest.strip_suffix('}')?.trim_end_matches(',').strip_suffix(')')?;
         let sides = sides.split(',').filter(|side| !side.is_empty()).map(str::parse);
-        Some(Self {
-            kind: kind.to_owned(),
-            c_order: order == "False",
-            shape: sides.collect::<Result<_, _>>().ok()?,
-        })
+        Some(Self { kind: kind.to_owned(), c_order: order == "False", shape: sides.collect::<Result<_, _>>().ok()? })
     }
 }
 
@@ -101,9 +95,7 @@ const HEADER_BYTES: u64 = 256;
 /// Bytes of the file of an array of this shape with values of `width` bytes, or a little more.
 pub(super) fn npy_bytes(shape: &[usize], width: usize) -> u64 {
     let sides = shape.iter().map(|side| *side as u64);
-    sides
-        .fold(width as u64, u64::saturating_mul)
-        .saturating_add(HEADER_BYTES)
+    sides.fold(width as u64, u64::saturating_mul).saturating_add(HEADER_BYTES)
 }
 
 /// An array in C order, as NumPy stores it.
@@ -128,10 +120,7 @@ pub fn read_npy(path: &Path) -> Result<NpyArray, Refusal> {
 pub(super) fn read_doubles(path: &Path, expected: Option<Expected<'_>>) -> Result<NpyArray, Refusal> {
     let mut open = Open::new(path, &[("'<f8'", size_of::<f64>())], expected)?;
     let values = open.values::<8, f64>(f64::from_le_bytes)?;
-    Ok(NpyArray {
-        shape: open.shape,
-        values,
-    })
+    Ok(NpyArray { shape: open.shape, values })
 }
 
 /// Reads the array at `path`: little-endian unsigned integers of 16 or 32 bits in C order, as
@@ -147,10 +136,7 @@ pub(super) fn read_codes(path: &Path, expected: Option<Expected<'_>>) -> Result<
     } else {
         open.values::<4, u32>(u32::from_le_bytes)?
     };
-    Ok(NpyArray {
-        shape: open.shape,
-        values,
-    })
+    Ok(NpyArray { shape: open.shape, values })
 }
 
 /// The shape that an array has to have.
@@ -191,32 +177,18 @@ impl<'a> Open<'a> {
             return Err(not_npy(path, problem));
         };
         if let Some(expected) = expected.filter(|expected| expected.shape != shape) {
-            let Expected {
-                shape: needed,
-                dimensions,
-            } = expected;
+            let Expected { shape: needed, dimensions } = expected;
             let path = path.display();
-            return Err(Refusal::new(format!(
-                "{path}: shape {shape:?}; expected {needed:?} ({dimensions})"
-            )));
+            return Err(Refusal::new(format!("{path}: shape {shape:?}; expected {needed:?} ({dimensions})")));
         }
         let count = count_of(&shape).map_err(wrong)?;
         let there = length - reader.stream_position().map_err(wrong)?.min(length);
         let needed = (count as u64).checked_mul(width as u64);
         if needed != Some(there) {
             let needed = needed.map_or_else(|| "too many".to_owned(), |bytes| bytes.to_string());
-            return Err(not_npy(
-                path,
-                format!("shape {shape:?} needs {needed} bytes of values; there are {there}"),
-            ));
+            return Err(not_npy(path, format!("shape {shape:?} needs {needed} bytes of values; there are {there}")));
         }
-        Ok(Self {
-            path,
-            reader,
-            shape,
-            width,
-            count,
-        })
+        Ok(Self { path, reader, shape, width, count })
     }
 
     /// The values, of `N` bytes each.
@@ -254,21 +226,16 @@ mod tests {
     #[test]
     fn a_header_is_measured_before_room_is_made_for_it() {
         for (bytes, fact) in [
-            (
-                &b"\x93NUMPY\x02\0\xff\xff\xff\xff"[..],
-                "header length = 4294967295 bytes",
-            ),
+            (&b"\x93NUMPY\x02\0\xff\xff\xff\xff"[..], "header length = 4294967295 bytes"),
             (b"\x93NUMPY\x01\0\xff\xff", "outside [0, 1024]"),
             (b"\x93NUMPY\x07\0\xff\xff", "version = 7"),
             (b"PK", "ends before"),
         ] {
             assert!(said_of(bytes).contains(fact), "{fact}");
         }
-        for text in [
-            "",
-            "{'descr':",
-            "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999, 2), }\n",
-        ] {
+        for text in
+            ["", "{'descr':", "{'descr': '<f8', 'fortran_order': False, 'shape': (99999999999999999999, 2), }\n"]
+        {
             assert!(said(text).contains("its header is not"), "{text}");
         }
         assert!(count_of(&[usize::MAX, 2]).is_err());
@@ -280,10 +247,7 @@ mod tests {
         for (sides, shape) in [("2, 3", &[2, 3][..]), ("2, 3, ", &[2, 3]), ("3,", &[3]), ("", &[])] {
             let text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({sides}), }}  \n");
             let header = Header::parse(&text).unwrap();
-            assert_eq!(
-                (header.kind.as_str(), header.c_order, &*header.shape),
-                ("'<f8'", true, shape)
-            );
+            assert_eq!((header.kind.as_str(), header.c_order, &*header.shape), ("'<f8'", true, shape));
         }
     }
 
@@ -301,13 +265,7 @@ mod tests {
         write_npy(&path, &[3, 1, 2], &values).unwrap();
         let array = read_npy(&path).unwrap();
         assert_eq!(array.shape, [3, 1, 2]);
-        assert!(
-            array
-                .values
-                .iter()
-                .zip(&values)
-                .all(|(a, b)| a.to_bits() == b.to_bits())
-        );
+        assert!(array.values.iter().zip(&values).all(|(a, b)| a.to_bits() == b.to_bits()));
         let whole = std::fs::read(&path).unwrap();
         for length in 0..whole.len() {
             std::fs::write(&path, &whole[..length]).unwrap();

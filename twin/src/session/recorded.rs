@@ -59,11 +59,7 @@ pub struct Recorded {
 impl Recorded {
     /// A recording without facts about its blocks.
     pub fn new(recording: Recording) -> Self {
-        Self {
-            recording,
-            conditioning: 0,
-            presses: Vec::new(),
-        }
+        Self { recording, conditioning: 0, presses: Vec::new() }
     }
 
     /// The facts about block `block`.
@@ -137,10 +133,7 @@ fn invalid<T>(field: &str, value: impl Display, range: impl Display) -> Result<T
 /// The first thing that is wrong with `session`.
 pub(super) fn check(session: &Session) -> Result<(), Refusal> {
     check_header(session)?;
-    for (mode, recorded) in [
-        (Mode::Raster, &session.raster),
-        (Mode::Compressive, &session.compressive),
-    ] {
+    for (mode, recorded) in [(Mode::Raster, &session.raster), (Mode::Compressive, &session.compressive)] {
         if let Some(recorded) = recorded {
             check_recorded(mode, recorded, recorded.recording.blocks().len())?;
         }

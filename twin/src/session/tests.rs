@@ -142,11 +142,7 @@ fn written(dir: &Path) -> Session {
         ..RecordingInfo::new(layout, Weights::new(WeightMode::Binary, Seeding::Mixed, 8), 64_300.0)
     };
     let volts = (0..80).map(|k| converter(1023, false).volts(k)).collect();
-    let block = Block {
-        frame_position: 10,
-        idle_frames: Some(2),
-        volts,
-    };
+    let block = Block { frame_position: 10, idle_frames: Some(2), volts };
     let session = Session {
         compressive: Some(Recorded::new(Recording::new(info, vec![block]).unwrap())),
         ..Session::new("cup", Event::Press)
@@ -169,20 +165,10 @@ fn codes_are_stored_where_there_is_a_converter() {
 fn of_mode(mode: WeightMode, cols: usize, per_frame: usize, conditioning: usize) -> Recorded {
     let layout = SkinLayout::new(1, cols, 5e-3, 3e-3).unwrap();
     let weights = Weights::new(mode, Seeding::Mixed, u32::try_from(cols).unwrap());
-    let info = RecordingInfo {
-        measurements_per_frame: per_frame,
-        ..RecordingInfo::new(layout, weights, 64_300.0)
-    };
-    let block = Block {
-        frame_position: 2,
-        idle_frames: None,
-        volts: vec![0.5; 2 * per_frame],
-    };
+    let info = RecordingInfo { measurements_per_frame: per_frame, ..RecordingInfo::new(layout, weights, 64_300.0) };
+    let block = Block { frame_position: 2, idle_frames: None, volts: vec![0.5; 2 * per_frame] };
     let recording = Recording::new(info, vec![block]).unwrap();
-    Recorded {
-        conditioning,
-        ..Recorded::new(recording)
-    }
+    Recorded { conditioning, ..Recorded::new(recording) }
 }
 
 /// The cases of a table: a line each, of what is replaced, by what, and what the error says.
@@ -223,18 +209,9 @@ fn contradictions_are_refused_by_writer_and_reader() {
             compressive(of_mode(WeightMode::Raster, 4, 4, 0)),
             "`compressive.info.weights.mode` = \"raster\" is outside {\"binary\", \"analog\"}",
         ),
-        (
-            raster(of_mode(WeightMode::Raster, 4, 3, 0)),
-            "`raster.info.measurements_per_frame` = 3 is outside {4}",
-        ),
-        (
-            compressive(of_mode(WeightMode::Binary, 5, 3, 0)),
-            "`compressive.info.layout` = 1 × 5 taxels",
-        ),
-        (
-            compressive(of_mode(WeightMode::Analog, 4, 3, 2)),
-            "`compressive.conditioning` = 2 is outside [0, 1]",
-        ),
+        (raster(of_mode(WeightMode::Raster, 4, 3, 0)), "`raster.info.measurements_per_frame` = 3 is outside {4}"),
+        (compressive(of_mode(WeightMode::Binary, 5, 3, 0)), "`compressive.info.layout` = 1 × 5 taxels"),
+        (compressive(of_mode(WeightMode::Analog, 4, 3, 2)), "`compressive.conditioning` = 2 is outside [0, 1]"),
         (hold([0.5, 0.5]), "`hold_s` = [0.5, 0.5]"),
         (hold([-1.0, 0.5]), "`hold_s` = [-1, 0.5]"),
         (hold([0.0, f64::INFINITY]), "`hold_s` = [0, inf]"),
@@ -292,10 +269,7 @@ compressive_codes.npy | gone.npy | gone.npy
         assert!(text.contains(from), "{from} in {text}");
         std::fs::write(&path, text.replace(from, to)).unwrap();
         let said = Session::read(dir.path()).unwrap_err().to_string();
-        assert!(
-            said.contains(expected) && said.contains(&dir.path().display().to_string()),
-            "{to}: {said}"
-        );
+        assert!(said.contains(expected) && said.contains(&dir.path().display().to_string()), "{to}: {said}");
     }
     std::fs::write(&path, &text).unwrap();
     let codes = dir.path().join("compressive_codes.npy");
@@ -304,8 +278,5 @@ compressive_codes.npy | gone.npy | gone.npy
     bytes[last..].copy_from_slice(&2000_u16.to_le_bytes());
     std::fs::write(&codes, bytes).unwrap();
     let said = Session::read(dir.path()).unwrap_err().to_string();
-    assert!(
-        said.contains("entry 79 is 2000; the converter has the codes 0 to 1023"),
-        "{said}"
-    );
+    assert!(said.contains("entry 79 is 2000; the converter has the codes 0 to 1023"), "{said}");
 }

@@ -90,11 +90,7 @@ impl Request {
         if let (Some(file), Some(name)) = (scene.chain().profile_file(), &portable.readout) {
             copies.push((name.clone(), file.text.clone().into_bytes()));
         }
-        let rows = portable
-            .rows
-            .seeds_file
-            .as_ref()
-            .or(portable.rows.patterns_file.as_ref());
+        let rows = portable.rows.seeds_file.as_ref().or(portable.rows.patterns_file.as_ref());
         if let (Some(file), Some(name)) = (scene.chain().rows_file(), rows) {
             copies.push((name.clone(), file.text.clone().into_bytes()));
         }
@@ -118,10 +114,8 @@ impl Request {
     fn start(&self) -> Result<Table, Refusal> {
         let mesh = self.assignments.iter().find(|assignment| assignment.sets("press.mesh"));
         let once = |section: &str, entries: &[(&str, Value)]| {
-            let section = (
-                section.to_owned(),
-                Value::Table(entries.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect()),
-            );
+            let section =
+                (section.to_owned(), Value::Table(entries.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect()));
             Ok([section].into_iter().collect())
         };
         if is_toml(&self.scene) {
@@ -133,10 +127,8 @@ impl Request {
         }
         match (self.scene.split_once('/'), mesh) {
             (Some(("press", _)), Some(mesh)) => {
-                let reason = format!(
-                    "a mesh takes the place of the object: write `press` in place of `{}`",
-                    self.scene
-                );
+                let reason =
+                    format!("a mesh takes the place of the object: write `press` in place of `{}`", self.scene);
                 Err(mesh.refused(reason))
             }
             (Some(("press", object)), None) => once("press", &[("object", object.into()), ("presses", 1.into())]),
@@ -162,10 +154,7 @@ impl Request {
         {
             *value = utf8(folder.join(readout))?;
         }
-        let named = [
-            ("seeds_file", &parsed.rows.seeds_file),
-            ("patterns_file", &parsed.rows.patterns_file),
-        ];
+        let named = [("seeds_file", &parsed.rows.seeds_file), ("patterns_file", &parsed.rows.patterns_file)];
         for (key, name) in named {
             if let (Some(name), Some(Value::Table(rows))) = (name, table.get_mut("rows")) {
                 rows.insert(key.to_owned(), utf8(folder.join(name))?.into());
@@ -207,12 +196,7 @@ fn notes_on(scene: &Scene) -> Result<Vec<String>, Refusal> {
     let cols = scene.skin().cols();
     notes.extend(scene.chain().profile().faults.iter().map(|fault| {
         let taxel = fault.taxel as usize;
-        format!(
-            "injected fault: `{}`, taxel {taxel} (row {}, column {})",
-            fault.name,
-            taxel / cols,
-            taxel % cols
-        )
+        format!("injected fault: `{}`, taxel {taxel} (row {}, column {})", fault.name, taxel / cols, taxel % cols)
     }));
     notes.extend(below_noise(scene)?);
     Ok(notes)
@@ -221,17 +205,12 @@ fn notes_on(scene: &Scene) -> Result<Vec<String>, Refusal> {
 fn overhang(mechanics: &Mechanics) -> Option<String> {
     let edges = mechanics.overhang()?.edges();
     let over = edges.iter().filter(|(_, m)| *m > 0.0);
-    let over: Vec<String> = over
-        .map(|(edge, m)| format!("{:.1} mm over the edge at {edge}", 1e3 * m))
-        .collect();
+    let over: Vec<String> = over.map(|(edge, m)| format!("{:.1} mm over the edge at {edge}", 1e3 * m)).collect();
     let what = match mechanics.task() {
         Task::Press(_) => "object",
         Task::Drop(_) => "ball",
     };
-    Some(format!(
-        "the {what} hangs {}: beside the sheet there is nothing to press on",
-        over.join(", ")
-    ))
+    Some(format!("the {what} hangs {}: beside the sheet there is nothing to press on", over.join(", ")))
 }
 
 fn chosen(mechanics: &Mechanics) -> Option<String> {

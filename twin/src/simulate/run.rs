@@ -137,9 +137,7 @@ impl<'a> Run<'a> {
         of: usize,
         presses: &'p [PressFrames],
     ) -> Result<SimulatedPiece<'p>, Refusal> {
-        let Self {
-            raster, compressive, ..
-        } = self;
+        let Self { raster, compressive, .. } = self;
         let (raster, compressive) = rayon::join(
             || raster.record(presses),
             || compressive.as_mut().map(|session| session.record(presses)).transpose(),
@@ -167,11 +165,7 @@ impl<'a> Run<'a> {
             for (frame, at) in frames.frames.iter().enumerate() {
                 let before = simulation.peak.as_ref().map(|peak| peak.at.wrench.force_n[2]);
                 if before.is_none_or(|before| at.wrench.force_n[2] > before) {
-                    simulation.peak = Some(Peak {
-                        press,
-                        frame,
-                        at: at.clone(),
-                    });
+                    simulation.peak = Some(Peak { press, frame, at: at.clone() });
                 }
             }
         }
@@ -207,11 +201,7 @@ fn keep_first(kept: &mut Option<Recorded>, piece: Option<&Recorded>) -> Result<(
     blocks.extend_from_slice(&piece.recording.blocks()[..more]);
     presses.extend_from_slice(&piece.presses[..more]);
     let recording = Recording::new(piece.recording.info().clone(), blocks);
-    *kept = Some(Recorded {
-        recording: recording.map_err(of_readout)?,
-        conditioning: 0,
-        presses,
-    });
+    *kept = Some(Recorded { recording: recording.map_err(of_readout)?, conditioning: 0, presses });
     Ok(())
 }
 

@@ -55,10 +55,7 @@ impl Summary {
         let mut notes = prepared.notes.clone();
         let missed = presses.iter().filter(|p| force_n.is_some() && p.course.is_none());
         notes.extend(missed.map(|p| {
-            format!(
-                "press {}: the force did not reach and hold its target (peak {:.3} N)",
-                p.press, p.peak_force_n
-            )
+            format!("press {}: the force did not reach and hold its target (peak {:.3} N)", p.press, p.peak_force_n)
         }));
         if simulation.first.is_some() {
             notes.extend(notes_on_recordings(scene, &simulation.saturated));
@@ -111,11 +108,7 @@ impl Summary {
             press.line(&mut out);
         }
         if self.presses.len() > SHOWN_PRESSES {
-            let _ = writeln!(
-                out,
-                "    … {} more, in summary.json",
-                self.presses.len() - SHOWN_PRESSES
-            );
+            let _ = writeln!(out, "    … {} more, in summary.json", self.presses.len() - SHOWN_PRESSES);
         }
         out.pop();
         out
@@ -139,11 +132,7 @@ impl PressSummary {
                 self.force_imbalance
             );
         } else if self.bounces.is_empty() {
-            let _ = writeln!(
-                out,
-                "{:>5} {:>6.2} (no plateau, no bounce)",
-                self.press, self.peak_force_n
-            );
+            let _ = writeln!(out, "{:>5} {:>6.2} (no plateau, no bounce)", self.press, self.peak_force_n);
         }
         for (number, b) in self.bounces.iter().take(SHOWN_BOUNCES).enumerate() {
             let _ = writeln!(

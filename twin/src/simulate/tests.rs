@@ -13,10 +13,7 @@ use std::path::Path;
 fn prepared(scene: &str, assignments: &[&str]) -> Prepared {
     let request = Request {
         scene: scene.to_owned(),
-        assignments: assignments
-            .iter()
-            .map(|text| text.parse::<Assignment>().unwrap())
-            .collect(),
+        assignments: assignments.iter().map(|text| text.parse::<Assignment>().unwrap()).collect(),
     };
     request.prepare().unwrap()
 }
@@ -40,17 +37,10 @@ fn whole(prepared: &Prepared) -> (Simulation, Session) {
         let info = pieces.first()?.recording.info().clone();
         let blocks = pieces.iter().flat_map(|p| p.recording.blocks().to_vec()).collect();
         let presses = pieces.iter().flat_map(|p| p.presses.clone()).collect();
-        Some(Recorded {
-            presses,
-            ..Recorded::new(Recording::new(info, blocks).unwrap())
-        })
+        Some(Recorded { presses, ..Recorded::new(Recording::new(info, blocks).unwrap()) })
     });
     let simulation = simulation.unwrap();
-    let session = Session {
-        raster,
-        compressive,
-        ..simulation.first.clone().unwrap()
-    };
+    let session = Session { raster, compressive, ..simulation.first.clone().unwrap() };
     (simulation, session)
 }
 
@@ -76,13 +66,7 @@ fn profile(name: &str, more: &str) -> String {
 #[test]
 fn there_is_nothing_to_say_of_a_sound_scene() {
     // seeds that are addresses make rows of equal signs, which would saturate where so many taxels are pressed
-    let fine = [
-        "skin.pitch_m=0.005",
-        "skin.rows=32",
-        "skin.cols=32",
-        "rows.seeding=mixed",
-        "press.force_n=8",
-    ];
+    let fine = ["skin.pitch_m=0.005", "skin.rows=32", "skin.cols=32", "rows.seeding=mixed", "press.force_n=8"];
     for more in [&[][..], &fine, &["skin.rows=12", "skin.cols=20"]] {
         let scene = prepared("press/rec", &[&["contact.model=footprint"], more].concat());
         assert!(notes(&scene).is_empty(), "{more:?}: {:?}", notes(&scene));
@@ -95,19 +79,10 @@ fn there_is_nothing_to_say_of_a_sound_scene() {
 fn an_object_over_the_edge_is_measured() {
     let folder = tempfile::tempdir().unwrap();
     let block = cuboid([40e-3, 20e-3, 10e-3]);
-    let mesh = format!(
-        "press.mesh={}",
-        write(folder.path(), "block.obj", &block.to_obj("block"))
-    );
+    let mesh = format!("press.mesh={}", write(folder.path(), "block.obj", &block.to_obj("block")));
     let at = |place: &str| prepared("press", &[&mesh, "contact.model=footprint", place]).notes;
-    assert_said(
-        &at("press.position_m=[0.07, 0]"),
-        &["hangs 15.0 mm over the edge at the last column:"],
-    );
-    assert_said(
-        &at("press.position_m=[0, -0.07]"),
-        &["hangs 5.0 mm over the edge at the last row:"],
-    );
+    assert_said(&at("press.position_m=[0.07, 0]"), &["hangs 15.0 mm over the edge at the last column:"]);
+    assert_said(&at("press.position_m=[0, -0.07]"), &["hangs 5.0 mm over the edge at the last row:"]);
     assert_said(
         &at("press.position_share=[-0.5, 0.5]"),
         &["10.0 mm over the edge at row 0, 20.0 mm over the edge at column 0"],
@@ -148,27 +123,14 @@ fn the_choice_of_a_tolerance_is_said() {
 #[test]
 fn a_taxel_below_the_noise_is_said() {
     let folder = tempfile::tempdir().unwrap();
-    let fixed = write(
-        folder.path(),
-        "fixed.toml",
-        &profile("as_built", "feedback_scales = false"),
-    );
+    let fixed = write(folder.path(), "fixed.toml", &profile("as_built", "feedback_scales = false"));
     let readout = format!("readout={fixed}");
-    let small = prepared(
-        "press/rec",
-        &["skin.pitch_m=0.005", "skin.rows=30", "skin.cols=30", &readout],
-    );
-    assert_said(
-        &small.notes,
-        &["a taxel under 10 kPa", "is below the noise", "electrode of 3.3 mm"],
-    );
+    let small = prepared("press/rec", &["skin.pitch_m=0.005", "skin.rows=30", "skin.cols=30", &readout]);
+    assert_said(&small.notes, &["a taxel under 10 kPa", "is below the noise", "electrode of 3.3 mm"]);
     assert!(prepared("press/rec", &[&readout]).notes.is_empty());
     for name in ["ideal", "as_published", "as_designed"] {
         let scaled = format!("readout={name}");
-        let scene = prepared(
-            "press/rec",
-            &["skin.pitch_m=0.005", "skin.rows=30", "skin.cols=30", &scaled],
-        );
+        let scene = prepared("press/rec", &["skin.pitch_m=0.005", "skin.rows=30", "skin.cols=30", &scaled]);
         assert!(scene.notes.is_empty(), "{name}: {:?}", scene.notes);
     }
 }
@@ -187,29 +149,14 @@ fn saturated_samples_are_counted_in_each_mode() {
     let notes = Summary::new(&scene, &simulation).notes;
     for recording in [session.raster().unwrap(), session.compressive().unwrap()] {
         let converter = recording.converter().unwrap();
-        let ends = [
-            converter.volts(0),
-            converter.volts(1),
-            converter.volts(converter.max_code()),
-        ]
-        .map(f64::to_bits);
+        let ends = [converter.volts(0), converter.volts(1), converter.volts(converter.max_code())].map(f64::to_bits);
         let volts = &recording.blocks()[0].volts;
         // a rail of 32 V lies within a code of the last volts of the compressive converter
-        let ends = if recording.mode() == Mode::Raster {
-            &ends[..1]
-        } else {
-            &ends[..]
-        };
-        let count = volts
-            .iter()
-            .filter(|v| ends.contains(&v.to_bits()) || v.abs() >= 32.0 - 0.0631)
-            .count();
+        let ends = if recording.mode() == Mode::Raster { &ends[..1] } else { &ends[..] };
+        let count = volts.iter().filter(|v| ends.contains(&v.to_bits()) || v.abs() >= 32.0 - 0.0631).count();
         assert!(count > 100, "{count}");
         let fact = format!("{}: {count} of {} samples", recording.mode().name(), volts.len());
-        assert_said(
-            &notes,
-            &[&fact, "at the end of the converter's or the amplifier's range"],
-        );
+        assert_said(&notes, &[&fact, "at the end of the converter's or the amplifier's range"]);
     }
 }
 
@@ -252,9 +199,7 @@ const SCENES: [(&str, &[&str]); 2] = [
 /// All bits of the samples.
 fn bits(recorded: &Recorded) -> Vec<u64> {
     let blocks = recorded.recording.blocks().iter();
-    blocks
-        .flat_map(|block| block.volts.iter().map(|v| v.to_bits()))
-        .collect()
+    blocks.flat_map(|block| block.volts.iter().map(|v| v.to_bits())).collect()
 }
 
 /// Every recording that a scene can have, made alone and at once on all threads, is that of the whole run, piece by
@@ -269,20 +214,14 @@ fn one_mode_alone_is_the_same_as_in_a_run() {
         let raster = twin.record(Mode::Raster).unwrap();
         let compressive = twin.record(Mode::Compressive).unwrap();
         assert!(raster.compressive.is_none() && compressive.raster.is_none());
-        for (alone, together) in [
-            (&raster.raster, &whole.raster),
-            (&compressive.compressive, &whole.compressive),
-        ] {
+        for (alone, together) in [(&raster.raster, &whole.raster), (&compressive.compressive, &whole.compressive)] {
             let (alone, together) = (alone.as_ref().unwrap(), together.as_ref().unwrap());
             assert_eq!(alone, together, "{scene}");
             assert!(bits(alone) == bits(together), "{scene}");
             assert_eq!(alone.presses.len(), prepared.scene.repeats());
         }
         // and all that is said of them
-        let both = Session {
-            raster: raster.raster,
-            ..compressive
-        };
+        let both = Session { raster: raster.raster, ..compressive };
         assert_eq!(both, whole);
     }
 }

@@ -119,13 +119,9 @@ pub(super) struct SpecsCommand {
 impl VerifyCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let verified = self
-            .files
-            .open(&self.folder)?
-            .verify(self.rows, self.seed, &Bars::default())?;
-        self.common.print(&verified, || {
-            format!("{} rows of {} files compared", verified.rows, verified.shards)
-        })?;
+        let verified = self.files.open(&self.folder)?.verify(self.rows, self.seed, &Bars::default())?;
+        self.common
+            .print(&verified, || format!("{} rows of {} files compared", verified.rows, verified.shards))?;
         match verified.differ.first() {
             None => Ok(()),
             Some((row, column)) => {
@@ -142,10 +138,7 @@ impl CompareCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let reference = self.files.open(&self.reference)?;
-        let compared = self
-            .files
-            .open(&self.folder)?
-            .compare_with(&reference, &Bars::default())?;
+        let compared = self.files.open(&self.folder)?.compare_with(&reference, &Bars::default())?;
         self.common.print(&compared, || comparison(&compared))
     }
 }
@@ -242,10 +235,7 @@ impl SpecsCommand {
             Some((_, text)) => print(text.trim_end()),
             None => {
                 let known: Vec<&str> = NAMED_SPECS.iter().map(|(known, _)| *known).collect();
-                Err(CliError::usage(format!(
-                    "`--show` = {name}: valid: {}",
-                    known.join(", ")
-                )))
+                Err(CliError::usage(format!("`--show` = {name}: valid: {}", known.join(", "))))
             }
         }
     }

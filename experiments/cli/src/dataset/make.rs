@@ -116,27 +116,19 @@ impl MakeCommand {
         let overrides = overrides.filter_map(|(key, value)| value.map(|value| (key.to_owned(), whole(value))));
         let mut overrides: toml::Table = overrides.collect();
         for assignment in &self.set {
-            assignment
-                .put_into(&mut overrides)
-                .map_err(|e| CliError::usage(format!("`--set` {e}")))?;
+            assignment.put_into(&mut overrides).map_err(|e| CliError::usage(format!("`--set` {e}")))?;
         }
         let spec = Spec::load(&self.spec, &overrides)?;
         let part = match &self.shard {
             Some(text) => Some(Part::parse(text)?),
             None => Part::from_environment(|name| std::env::var(name).ok(), self.shards)?,
         };
-        let out = self
-            .out
-            .unwrap_or_else(|| Path::new("out/dataset").join(&spec.config().name));
+        let out = self.out.unwrap_or_else(|| Path::new("out/dataset").join(&spec.config().name));
         let dataset = Dataset::begin(&out, spec)?;
         let (bars, begin, cpu) = (Bars::default(), Instant::now(), cpu_s());
         let made = dataset.make(part.unwrap_or(Part::WHOLE), &bars)?;
         let (wall_s, cpu_s) = (begin.elapsed().as_secs_f64(), cpu_s() - cpu);
-        let finished = if part.is_none() {
-            Some(dataset.finish(&bars)?)
-        } else {
-            None
-        };
+        let finished = if part.is_none() { Some(dataset.finish(&bars)?) } else { None };
         let report = Report {
             rows: made.rows,
             cpu_s,

@@ -111,19 +111,11 @@ impl PreviewCommand {
             Source::Files(dataset) => dataset.rows(&wanted, PREVIEW_COLUMNS, each)?,
             Source::Spec(spec) => spec.rows(&wanted, PREVIEW_COLUMNS, each)?,
         }
-        let preview = Preview {
-            name: name.clone(),
-            of: spec.config().rows,
-            rows,
-        };
+        let preview = Preview { name: name.clone(), of: spec.config().rows, rows };
         save_preview(&preview, &file)?;
-        let report = Report {
-            file,
-            rows: wanted.into_iter().collect(),
-        };
-        self.common.print(&report, || {
-            format!("{} rows drawn: {}", report.rows.len(), report.file.display())
-        })
+        let report = Report { file, rows: wanted.into_iter().collect() };
+        self.common
+            .print(&report, || format!("{} rows drawn: {}", report.rows.len(), report.file.display()))
     }
 }
 
@@ -196,13 +188,9 @@ impl ShapesCommand {
         check_writable(&self.out)?;
         let shapes = drawn_shapes(&families, self.seed, self.count)?;
         save_shapes(&shapes, &self.out)?;
-        let report = ShapesReport {
-            file: self.out,
-            shapes: shapes.iter().map(ShapeLine::of).collect(),
-        };
-        self.common.print(&report, || {
-            format!("{} shapes drawn: {}", report.shapes.len(), report.file.display())
-        })
+        let report = ShapesReport { file: self.out, shapes: shapes.iter().map(ShapeLine::of).collect() };
+        self.common
+            .print(&report, || format!("{} shapes drawn: {}", report.shapes.len(), report.file.display()))
     }
 
     /// The named families in the order of their table, each once; all without a name.
@@ -210,10 +198,7 @@ impl ShapesCommand {
         let known = |name: &String| SHAPE_FAMILIES.iter().any(|family| family.name == name);
         if let Some(unknown) = self.families.iter().find(|name| !known(name)) {
             let names: Vec<&str> = SHAPE_FAMILIES.iter().map(|family| family.name).collect();
-            return Err(CliError::usage(format!(
-                "`--families` = {unknown}: valid: {}",
-                names.join(", ")
-            )));
+            return Err(CliError::usage(format!("`--families` = {unknown}: valid: {}", names.join(", "))));
         }
         let wanted =
             |family: &&ShapeFamily| self.families.is_empty() || self.families.iter().any(|name| name == family.name);

@@ -24,35 +24,17 @@ type Names = fn(&ScoreBoard) -> Vec<String>;
 const KINDS: &[(&str, Names)] = &[
     ("objects", |b| b.objects.iter().map(|o| o.object.clone()).collect()),
     ("decoders", |b| b.rows.iter().map(|r| r.key.decoder.clone()).collect()),
-    ("numbers of measurements", |b| {
-        b.rows.iter().map(|r| r.key.m.to_string()).collect()
-    }),
-    ("training data", |b| {
-        b.rows.iter().map(|r| r.key.learned_from.clone()).collect()
-    }),
-    ("scores", |b| {
-        b.rows.iter().map(|r| left_out(&r.key).to_owned()).collect()
-    }),
-    ("rows of a window", |b| {
-        b.rows.iter().map(|r| r.key.sensing.name().to_owned()).collect()
-    }),
-    ("places of", |b| {
-        b.localisation.iter().map(|r| r.contact.clone()).collect()
-    }),
-    ("locators", |b| {
-        b.localisation.iter().map(|r| r.decoder.clone()).collect()
-    }),
-    ("numbers of measurements of places", |b| {
-        b.localisation.iter().map(|r| r.m.to_string()).collect()
-    }),
+    ("numbers of measurements", |b| b.rows.iter().map(|r| r.key.m.to_string()).collect()),
+    ("training data", |b| b.rows.iter().map(|r| r.key.learned_from.clone()).collect()),
+    ("scores", |b| b.rows.iter().map(|r| left_out(&r.key).to_owned()).collect()),
+    ("rows of a window", |b| b.rows.iter().map(|r| r.key.sensing.name().to_owned()).collect()),
+    ("places of", |b| b.localisation.iter().map(|r| r.contact.clone()).collect()),
+    ("locators", |b| b.localisation.iter().map(|r| r.decoder.clone()).collect()),
+    ("numbers of measurements of places", |b| b.localisation.iter().map(|r| r.m.to_string()).collect()),
 ];
 
 fn left_out(key: &RowKey) -> &'static str {
-    if key.left_out {
-        "of objects left out of the training data"
-    } else {
-        "of objects in the training data"
-    }
+    if key.left_out { "of objects left out of the training data" } else { "of objects in the training data" }
 }
 
 /// The kinds of names that differ between the score tables `before` and `now`; empty for two tables of the same
@@ -67,15 +49,9 @@ fn left_out(key: &RowKey) -> &'static str {
 pub fn differences(before: &ScoreBoard, now: &ScoreBoard) -> Vec<Difference> {
     let kinds = KINDS.iter().map(|(what, names)| {
         let (before, now) = (names(before), names(now));
-        Difference {
-            what,
-            only_before: without(&before, &now),
-            only_now: without(&now, &before),
-        }
+        Difference { what, only_before: without(&before, &now), only_now: without(&now, &before) }
     });
-    kinds
-        .filter(|kind| !kind.only_before.is_empty() || !kind.only_now.is_empty())
-        .collect()
+    kinds.filter(|kind| !kind.only_before.is_empty() || !kind.only_now.is_empty()).collect()
 }
 
 /// The names in `these` that `those` lack, each once.
@@ -107,17 +83,9 @@ const PLACES: &[ScoreColumn<PlaceRow>] = &[
 pub fn regressions(before: &ScoreBoard, now: &ScoreBoard, tolerance: f64) -> Vec<Regression> {
     let mut found = Vec::new();
     for old in &before.rows {
-        let RowKey {
-            decoder,
-            m,
-            learned_from,
-            ..
-        } = &old.key;
+        let RowKey { decoder, m, learned_from, .. } = &old.key;
         let kind = if old.key.left_out { ", left out" } else { "" };
-        let what = format!(
-            "{decoder} at M = {m} from {learned_from}{kind}{}",
-            chosen(old.key.sensing)
-        );
+        let what = format!("{decoder} at M = {m} from {learned_from}{kind}{}", chosen(old.key.sensing));
         let new = now.row_like(&old.key).map(|row| &row.scores);
         compare(&Scores::COLUMNS, &what, &old.scores, new, tolerance, &mut found);
     }
@@ -127,10 +95,7 @@ pub fn regressions(before: &ScoreBoard, now: &ScoreBoard, tolerance: f64) -> Vec
         let new = now.localisation.iter().find(|r| named(r) && key(r) == key(old));
         let kind = if old.relabelled { ", relabelled" } else { "" };
         let rows = chosen(old.sensing);
-        let what = format!(
-            "place of {} by {} at M = {}{kind}{rows}",
-            old.contact, old.decoder, old.m
-        );
+        let what = format!("place of {} by {} at M = {}{kind}{rows}", old.contact, old.decoder, old.m);
         compare(PLACES, &what, old, new, tolerance, &mut found);
     }
     found
@@ -157,12 +122,7 @@ fn compare<T>(
         let now = new.and_then(get);
         // not `<`: a NaN is a regression, too
         if !now.is_some_and(|now| now >= before - tolerance) {
-            found.push(Regression {
-                what: what.to_owned(),
-                score,
-                before: before.abs(),
-                now: now.map(f64::abs),
-            });
+            found.push(Regression { what: what.to_owned(), score, before: before.abs(), now: now.map(f64::abs) });
         }
     }
 }
@@ -207,33 +167,18 @@ mod tests {
                 class_single_ci: None,
             });
             let rows = cells.iter().map(|(_, decoder, m)| row(decoder, *m, Scores::default()));
-            ScoreBoard {
-                objects: objects.collect(),
-                rows: rows.collect(),
-                ..ScoreBoard::default()
-            }
+            ScoreBoard { objects: objects.collect(), rows: rows.collect(), ..ScoreBoard::default() }
         };
         let before = board(&[("T", "omp", 7), ("T", "omp", 20), ("rec", "omp", 20)]);
         let found = differences(&before, &board(&[("T", "omp", 20), ("T", "evidence", 20)]));
-        let found = found
-            .iter()
-            .map(|d| (d.what, d.only_before.join(","), d.only_now.join(",")));
-        let expected = [
-            ("objects", "rec", ""),
-            ("decoders", "", "evidence"),
-            ("numbers of measurements", "7", ""),
-        ];
+        let found = found.iter().map(|d| (d.what, d.only_before.join(","), d.only_now.join(",")));
+        let expected = [("objects", "rec", ""), ("decoders", "", "evidence"), ("numbers of measurements", "7", "")];
         let expected = expected.map(|(what, a, b)| (what, a.to_owned(), b.to_owned()));
         assert_eq!(found.collect::<Vec<_>>(), expected);
     }
 
     fn board(iou: f64, mean_px: f64) -> ScoreBoard {
-        let scores = Scores {
-            support: Some(0.9),
-            iou: Some(iou),
-            f1: Some(0.8),
-            ..Scores::default()
-        };
+        let scores = Scores { support: Some(0.9), iou: Some(iou), f1: Some(0.8), ..Scores::default() };
         ScoreBoard {
             rows: vec![row("omp", 20, scores)],
             localisation: vec![PlaceRow {

@@ -110,11 +110,7 @@ impl<'a> Trainer<'a> {
                         Algorithm::Own(spec) => (spec.name.to_owned(), spec.needs),
                         Algorithm::External(given) => (given.name().to_owned(), Needs::Dictionary),
                     };
-                    let source = if needs.shapes() {
-                        &TrainingSource::Shapes
-                    } else {
-                        source
-                    };
+                    let source = if needs.shapes() { &TrainingSource::Shapes } else { source };
                     let shapes = matches!(source, TrainingSource::Shapes);
                     // no object is in the shapes, so that all of them are left out
                     if shapes && left_out != asked.left_out {
@@ -146,9 +142,7 @@ impl<'a> Trainer<'a> {
                         let scored = of_object.then_some((session.object.as_str(), left_out));
                         places.push((self.place(source, published, scored)?, scored));
                     }
-                    let decoders = places
-                        .iter()
-                        .map(|&(place, scored)| self.decoder(algorithm, place, scored));
+                    let decoders = places.iter().map(|&(place, scored)| self.decoder(algorithm, place, scored));
                     let decoders = if of_object {
                         decoders.collect::<Result<Vec<_>, Refusal>>()?
                     } else {
@@ -208,19 +202,16 @@ impl<'a> Trainer<'a> {
             TrainingSource::Poses { objects, .. } => {
                 objects.iter().map(|o| (o.name.to_owned(), o.images.nrows())).collect()
             }
-            TrainingSource::Other { sessions, .. }
-            | TrainingSource::Calibrated {
-                simulated: sessions, ..
-            } => sessions.iter().map(of_session).collect(),
+            TrainingSource::Other { sessions, .. } | TrainingSource::Calibrated { simulated: sessions, .. } => {
+                sessions.iter().map(of_session).collect()
+            }
         };
-        all.iter()
-            .find(|(_, taxels)| *taxels != needed)
-            .map_or(Ok(()), |(object, taxels)| {
-                Err(Refusal::new(format!(
-                    "{}: the raster session of {object} has {taxels} taxels; the scored skin has {needed}",
-                    source.name()
-                )))
-            })
+        all.iter().find(|(_, taxels)| *taxels != needed).map_or(Ok(()), |(object, taxels)| {
+            Err(Refusal::new(format!(
+                "{}: the raster session of {object} has {taxels} taxels; the scored skin has {needed}",
+                source.name()
+            )))
+        })
     }
 
     fn decoder(&self, algorithm: Algorithm<'_>, place: usize, scored: Scored<'_>) -> Result<TrainedDecoder, Refusal> {
@@ -248,10 +239,7 @@ impl<'a> Trainer<'a> {
             TrainingSource::Published if published => PUBLISHED,
             source => source.name(),
         };
-        let key = (
-            name.to_owned(),
-            scored.map(|(object, left_out)| (object.to_owned(), left_out)),
-        );
+        let key = (name.to_owned(), scored.map(|(object, left_out)| (object.to_owned(), left_out)));
         if let Some(at) = self.prepared.iter().position(|prepared| prepared.key == key) {
             return Ok(at);
         }
@@ -259,11 +247,7 @@ impl<'a> Trainer<'a> {
         if let (true, Some(given)) = (published, &self.source.published) {
             data = data.with_published(&given.dictionary, &given.library);
         }
-        self.prepared.push(Prepared {
-            key,
-            data,
-            chooser: None,
-        });
+        self.prepared.push(Prepared { key, data, chooser: None });
         Ok(self.prepared.len() - 1)
     }
 
@@ -285,14 +269,8 @@ impl<'a> Trainer<'a> {
             TrainingSource::Published | TrainingSource::Raster => {
                 self.learn(&own.sessions, TrainingPresses::unscored, Vec::new(), scored)
             }
-            TrainingSource::Other {
-                sessions, gain_sd, all, ..
-            } => {
-                let of = if *all {
-                    TrainingPresses::all
-                } else {
-                    TrainingPresses::unscored
-                };
+            TrainingSource::Other { sessions, gain_sd, all, .. } => {
+                let of = if *all { TrainingPresses::all } else { TrainingPresses::unscored };
                 let taxels = if *gain_sd > 0.0 { own.layout.taxels() } else { 0 };
                 self.learn(sessions, of, vec![*gain_sd; taxels], scored)
             }

@@ -79,12 +79,7 @@ impl TrainedBoard<'_> {
     /// [`Refusal`].
     pub fn score(&self, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, Refusal> {
         let (rows, objects) = self.run.score(&self.entries, done)?;
-        Ok(ScoreBoard {
-            rows,
-            objects,
-            slips: self.source.slips.clone(),
-            ..ScoreBoard::default()
-        })
+        Ok(ScoreBoard { rows, objects, slips: self.source.slips.clone(), ..ScoreBoard::default() })
     }
 
     /// Results for the bouncing ball and for touches. Without a ball, there are none of locators with a dictionary;
@@ -137,10 +132,7 @@ impl BoardSettings {
         let known = |name: &&String| sessions.iter().any(|s| s.object == **name || s.name == **name);
         if let Some(name) = self.objects.iter().find(|name| !known(name)) {
             let valid: Vec<&str> = scorable().map(ScoredSession::title).collect();
-            let problem = format!(
-                "object {name:?} has no compressive session; valid: {}",
-                valid.join(", ")
-            );
+            let problem = format!("object {name:?} has no compressive session; valid: {}", valid.join(", "));
             return Err(Refusal::new(problem).at(source.root.display()));
         }
         let places = !self.localisation.is_empty();
@@ -160,11 +152,7 @@ impl BoardSettings {
         Ok(TrainedBoard {
             settings: self,
             source,
-            run: Run {
-                sessions,
-                measurements: self.measurements.clone(),
-                times: self.times,
-            },
+            run: Run { sessions, measurements: self.measurements.clone(), times: self.times },
             entries,
             dictionary,
         })
@@ -239,9 +227,7 @@ impl Run<'_> {
 
     /// Every entry at every M, in the order of [`Run::tallies`].
     pub(crate) fn slots<'e>(&self, entries: &'e [Entry]) -> impl Iterator<Item = (&'e Entry, usize)> {
-        entries
-            .iter()
-            .flat_map(|entry| self.measurements.iter().map(move |&m| (entry, m)))
+        entries.iter().flat_map(|entry| self.measurements.iter().map(move |&m| (entry, m)))
     }
 
     /// Scores every press by every entry at every M: the one loop over windows of the board and of the published
@@ -261,8 +247,7 @@ impl Run<'_> {
                 let mut scorer = Scorer::new(&entry.decoders[session]);
                 let label = entry.knows_classes.then_some(scored.label);
                 let each = self.measurements.iter();
-                each.map(|&m| Ok(scorer.score(press, m, label)?))
-                    .collect::<Result<Vec<Tally>, Refusal>>()
+                each.map(|&m| Ok(scorer.score(press, m, label)?)).collect::<Result<Vec<Tally>, Refusal>>()
             })?;
             Ok(tallies.concat())
         })
@@ -274,11 +259,7 @@ impl Run<'_> {
         for decoder in entries.iter().flat_map(|entry| &entry.decoders) {
             decoder.trained.finish()?;
         }
-        let rate_hz = self
-            .sessions
-            .first()
-            .and_then(|s| s.compressive.as_ref())
-            .map(Recording::sample_rate_hz);
+        let rate_hz = self.sessions.first().and_then(|s| s.compressive.as_ref()).map(Recording::sample_rate_hz);
         let times = times.into_iter().chain(std::iter::repeat(None));
         let (mut rows, mut objects) = (Vec::new(), Vec::new());
         for (((entry, m), presses), decode_us) in self.slots(entries).zip(&tallies).zip(times) {
@@ -303,22 +284,10 @@ impl Run<'_> {
                 too_slow: decode_us.map(|us| us >= acquire_us),
                 failed: presses.iter().flatten().map(|t| t.failed).sum(),
             });
-            objects.extend(
-                self.sessions
-                    .iter()
-                    .zip(presses)
-                    .zip(scores)
-                    .map(|((session, presses), scores)| {
-                        let [_, iou_ci, class_single_ci] = intervals(std::slice::from_ref(presses));
-                        ObjectRow {
-                            key: key.clone(),
-                            object: session.title().to_owned(),
-                            scores,
-                            iou_ci,
-                            class_single_ci,
-                        }
-                    }),
-            );
+            objects.extend(self.sessions.iter().zip(presses).zip(scores).map(|((session, presses), scores)| {
+                let [_, iou_ci, class_single_ci] = intervals(std::slice::from_ref(presses));
+                ObjectRow { key: key.clone(), object: session.title().to_owned(), scores, iou_ci, class_single_ci }
+            }));
         }
         Ok((rows, objects))
     }

@@ -99,10 +99,9 @@ fn places(rows: &[PlaceRow]) -> Table<'_, &PlaceRow> {
 /// to 20.
 pub fn table(board: &ScoreBoard) -> String {
     let mut out = String::new();
-    for (left_out, title) in [
-        (false, "objects that were learned from"),
-        (true, "\nleft out: the object was not learned from"),
-    ] {
+    for (left_out, title) in
+        [(false, "objects that were learned from"), (true, "\nleft out: the object was not learned from")]
+    {
         let own: Vec<&BoardRow> = board.rows.iter().filter(|r| r.key.left_out == left_out).collect();
         if !own.is_empty() {
             out.push_str(&format!("{title}\n{}", rows(own).text()));
@@ -147,18 +146,11 @@ fn gaps(board: &ScoreBoard) -> String {
     let elsewhere =
         |r: &&ObjectRow| r.key.m == m && ![RASTER, PUBLISHED, "nothing"].contains(&r.key.learned_from.as_str());
     let own = |row: &ObjectRow| {
-        let key = RowKey {
-            learned_from: RASTER.to_owned(),
-            ..row.key.clone()
-        };
+        let key = RowKey { learned_from: RASTER.to_owned(), ..row.key.clone() };
         board.objects.iter().find(|o| o.key == key && o.object == row.object)
     };
-    let pairs: Vec<(&ObjectRow, &ObjectRow)> = board
-        .objects
-        .iter()
-        .filter(elsewhere)
-        .filter_map(|row| Some((row, own(row)?)))
-        .collect();
+    let pairs: Vec<(&ObjectRow, &ObjectRow)> =
+        board.objects.iter().filter(elsewhere).filter_map(|row| Some((row, own(row)?))).collect();
     if pairs.is_empty() {
         return String::new();
     }
@@ -168,9 +160,7 @@ fn gaps(board: &ScoreBoard) -> String {
         .shown("learned from", |(row, _)| &row.key.learned_from)
         .shown("object", |(row, _)| &row.object)
         .shown("IoU", |(row, own)| gap(own.scores.iou, row.scores.iou))
-        .shown("single", |(row, own)| {
-            gap(own.scores.class_single, row.scores.class_single)
-        });
+        .shown("single", |(row, own)| gap(own.scores.class_single, row.scores.class_single));
     format!("\ngap to learning from {RASTER} at M = {m}\n{}", table.text())
 }
 

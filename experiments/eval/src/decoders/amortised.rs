@@ -51,8 +51,7 @@ impl Algorithm for AtWork<'_> {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
         let problem = Problem::new(window.phi, window.y)?;
         answer.class = None;
-        self.network
-            .estimate(&problem, &mut self.work, &mut answer.image, &mut self.touched)?;
+        self.network.estimate(&problem, &mut self.work, &mut answer.image, &mut self.touched)?;
         Ok(())
     }
 }
@@ -70,12 +69,7 @@ impl Confidence for AtWork<'_> {
         // as many numbers as rows times taxels
         let phi = MatrixView::new(self.y.len(), taxels, &self.phi).unwrap_or(sample.phi);
         let problem = Problem::new(phi, &self.y)?;
-        let found = self
-            .network
-            .estimate(&problem, &mut self.work, &mut self.image, &mut self.touched)?;
-        Ok(Belief {
-            confidence: found.expected_iou,
-            class: None,
-        })
+        let found = self.network.estimate(&problem, &mut self.work, &mut self.image, &mut self.touched)?;
+        Ok(Belief { confidence: found.expected_iou, class: None })
     }
 }

@@ -52,11 +52,7 @@ pub(super) fn correlate(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal
 
 impl Trained for Correlate {
     fn start(&self) -> Box<dyn Algorithm + '_> {
-        Box::new(AtWork {
-            correlate: self,
-            seen: Vec::new(),
-            sums: vec![[0.0; 2]; self.labels.len()],
-        })
+        Box::new(AtWork { correlate: self, seen: Vec::new(), sums: vec![[0.0; 2]; self.labels.len()] })
     }
 }
 

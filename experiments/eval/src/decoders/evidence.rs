@@ -38,26 +38,14 @@ struct Classes {
 
 /// Objects whose poses are not known: a dozen clusters of poses each score as thirty do. Noise as of images, and what a
 /// press differs by.
-const POSES: ClusterModel = ClusterModel {
-    clusters: 12,
-    gain: 0.0,
-    floor: 0.01,
-    noise: 0.15,
-    rank: OTHER_SKIN_RANK,
-};
+const POSES: ClusterModel = ClusterModel { clusters: 12, gain: 0.0, floor: 0.01, noise: 0.15, rank: OTHER_SKIN_RANK };
 /// Lengths of an image that count as possible, V.
 const LENGTHS_V: [f64; 2] = [0.05, 50.0];
 /// Root of the random numbers of the clusters.
 const SEED: u64 = 1;
 
 /// Thirty clusters; a hundred score no better. Gains scatter as those of the skins in the published recordings.
-const SHAPES: ClusterModel = ClusterModel {
-    clusters: 30,
-    gain: 0.3,
-    floor: 0.01,
-    noise: 0.12,
-    rank: 20,
-};
+const SHAPES: ClusterModel = ClusterModel { clusters: 30, gain: 0.3, floor: 0.01, noise: 0.12, rank: 20 };
 /// Weight of the wide component, so that a cluster takes over only where the evidence is clear.
 const APART: f64 = 0.99;
 /// Components that are solved with non-negative taxels.
@@ -116,12 +104,7 @@ impl Classes {
     ) -> Result<Box<dyn Trained>, Refusal> {
         let amplitude = AmplitudeRange::new(least_v, most_v).map_err(|e| e.at("range"))?;
         let classifier = EvidenceClassifier::new(components, amplitude, unknown).map_err(|e| e.at("templates"))?;
-        Ok(Box::new(Self {
-            bank: Bank::new(classifier.bank()),
-            classifier,
-            images,
-            named,
-        }))
+        Ok(Box::new(Self { bank: Bank::new(classifier.bank()), classifier, images, named }))
     }
 
     fn at_work(&self) -> AtWork<'_> {
@@ -142,8 +125,7 @@ impl Trained for Classes {
     }
 
     fn confidence(&self) -> Option<(Subject, Box<dyn Confidence + '_>)> {
-        self.named
-            .then(|| (Subject::Class, Box::new(self.at_work()) as Box<dyn Confidence + '_>))
+        self.named.then(|| (Subject::Class, Box::new(self.at_work()) as Box<dyn Confidence + '_>))
     }
 }
 
@@ -192,10 +174,7 @@ impl Confidence for AtWork<'_> {
     fn observe(&mut self, sample: &Window<'_>) -> Result<Belief, DecodeError> {
         self.extend(sample)?;
         let (class, confidence) = self.decide();
-        Ok(Belief {
-            confidence,
-            class: Some(class),
-        })
+        Ok(Belief { confidence, class: Some(class) })
     }
 }
 
@@ -239,9 +218,7 @@ struct Bank {
 impl Bank {
     fn new(bank: &Matrix) -> Self {
         let few = bank.ncols() <= FEW_COLUMNS;
-        Self {
-            tables: few.then(|| SignTables::new(bank.view())),
-        }
+        Self { tables: few.then(|| SignTables::new(bank.view())) }
     }
 
     /// Overwrites `rows` with one row of Φ times `bank` (taxels × columns) for every measurement of `window`.

@@ -105,9 +105,7 @@ pub(super) fn nn_omp(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
 }
 
 pub(super) fn nn_lasso(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
-    let lasso = NnLasso::new(LASSO)
-        .map_err(|e| e.at("parameter"))?
-        .with_normalised_columns();
+    let lasso = NnLasso::new(LASSO).map_err(|e| e.at("parameter"))?.with_normalised_columns();
     on_atoms(data, Weights::Signs, move |_| Box::new(lasso))
 }
 
@@ -239,9 +237,6 @@ impl Confidence for ImageConfidence {
         for y in sample.y {
             self.estimate.observe(&self.gains, *y)?;
         }
-        Ok(Belief {
-            confidence: self.estimate.expected_iou(&self.gains, SUPPORT_THRESHOLD),
-            class: None,
-        })
+        Ok(Belief { confidence: self.estimate.expected_iou(&self.gains, SUPPORT_THRESHOLD), class: None })
     }
 }

@@ -72,17 +72,7 @@ pub struct DecoderSpec {
 type Train = fn(&TrainingData) -> Result<Box<dyn Trained>, Refusal>;
 
 const fn spec(name: &'static str, label: &'static str, needs: Needs, shown: bool, train: Train) -> DecoderSpec {
-    DecoderSpec {
-        name,
-        label,
-        short: label,
-        about: "",
-        needs,
-        shown,
-        anytime: false,
-        look: None,
-        train,
-    }
+    DecoderSpec { name, label, short: label, about: "", needs, shown, anytime: false, look: None, train }
 }
 
 impl DecoderSpec {
@@ -128,26 +118,14 @@ pub const DECODERS: &[DecoderSpec] = &[
         .short("script, 20 atoms")
         .about("the published script: weights {0, 1}, no offset, 20 atoms")
         .drawn(0x56_b4_e9, 2),
-    spec(
-        "script_m4",
-        "published script, M/4 atoms",
-        Dictionary,
-        false,
-        image::script_m4,
-    )
-    .short("script, M/4 atoms")
-    .about("the published text: weights {0, 1}, no offset, M/4 atoms")
-    .drawn(0x2c_3f_8f, 5),
-    spec(
-        "matched",
-        "published pursuit, matched to ±1",
-        Dictionary,
-        true,
-        image::matched,
-    )
-    .short("matched")
-    .about("the published pursuit with weights ±1 and the idle output removed")
-    .drawn(0x00_72_b2, 0),
+    spec("script_m4", "published script, M/4 atoms", Dictionary, false, image::script_m4)
+        .short("script, M/4 atoms")
+        .about("the published text: weights {0, 1}, no offset, M/4 atoms")
+        .drawn(0x2c_3f_8f, 5),
+    spec("matched", "published pursuit, matched to ±1", Dictionary, true, image::matched)
+        .short("matched")
+        .about("the published pursuit with weights ±1 and the idle output removed")
+        .drawn(0x00_72_b2, 0),
     spec("omp", "OMP", Dictionary, true, image::omp)
         .about("orthogonal matching pursuit, columns normalised")
         .drawn(0x6a_3d_9a, 0),
@@ -164,16 +142,10 @@ pub const DECODERS: &[DecoderSpec] = &[
         .about("linear minimum mean square error with non-negative taxels, prior for unseen objects")
         .anytime()
         .drawn(0x00_9e_73, 3),
-    spec(
-        "nn_lmmse_seen",
-        "non-negative LMMSE, objects seen",
-        Images,
-        false,
-        image::nn_lmmse_seen,
-    )
-    .short("NN LMMSE, objects seen")
-    .about("as nn_lmmse, prior for the objects that were seen")
-    .drawn(0x00_5f_45, 1),
+    spec("nn_lmmse_seen", "non-negative LMMSE, objects seen", Images, false, image::nn_lmmse_seen)
+        .short("NN LMMSE, objects seen")
+        .about("as nn_lmmse, prior for the objects that were seen")
+        .drawn(0x00_5f_45, 1),
     spec("mixture", "mixture of shapes", Shapes, false, evidence::mixture)
         .about("thirty clusters of simulated shapes weighed by the evidence of y, non-negative taxels")
         .drawn(0x1b_9a_aa, 5),
@@ -215,10 +187,7 @@ impl TrainedDecoder {
     /// `trained`, which has learned from `data`.
     pub(crate) fn of(trained: Arc<dyn Trained>, data: &TrainingData) -> Self {
         let classifier = Src::new(data.library.clone(), Src::PUBLISHED_SPARSITY);
-        Self {
-            trained,
-            classifier: Arc::new(classifier),
-        }
+        Self { trained, classifier: Arc::new(classifier) }
     }
 }
 
@@ -295,9 +264,7 @@ pub fn no_confidence(decoder: &str) -> Refusal {
 
 /// Why `decoder` cannot track a contact in time.
 pub fn not_in_time(decoder: &str) -> Refusal {
-    Refusal::new(format!(
-        "`--decoder` = {decoder}: has no Gaussian prior to track a contact with; valid: nn_lmmse"
-    ))
+    Refusal::new(format!("`--decoder` = {decoder}: has no Gaussian prior to track a contact with; valid: nn_lmmse"))
 }
 
 #[cfg(test)]
@@ -322,10 +289,7 @@ mod tests {
         for (k, name) in names.iter().enumerate() {
             let (long, short) = (label(name), short_label(name));
             assert!(!long.trim().is_empty() && !short.trim().is_empty(), "{name}");
-            assert!(
-                short.chars().count() <= long.chars().count().min(WIDTH),
-                "{name}: {short}"
-            );
+            assert!(short.chars().count() <= long.chars().count().min(WIDTH), "{name}: {short}");
             for before in &names[..k] {
                 assert_ne!(label(before), long, "{before} and {name}");
                 assert_ne!(short_label(before), short, "{before} and {name}");

@@ -48,15 +48,8 @@ impl ExternalCommand {
     /// Parses `NAME=COMMAND`, or a command that is its own name. A name has only letters, digits, `-` and `_`.
     pub fn parse(text: &str) -> Self {
         let is_name = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
-        let (name, command) = text
-            .split_once('=')
-            .filter(|(name, _)| is_name(name))
-            .unwrap_or((text, text));
-        Self {
-            name: name.to_owned(),
-            command: command.to_owned(),
-            limit: Self::DEFAULT_LIMIT,
-        }
+        let (name, command) = text.split_once('=').filter(|(name, _)| is_name(name)).unwrap_or((text, text));
+        Self { name: name.to_owned(), command: command.to_owned(), limit: Self::DEFAULT_LIMIT }
     }
 }
 
@@ -124,11 +117,7 @@ impl Stream {
         header: &serde_json::Value,
     ) -> Result<Self, Refusal> {
         let mut shell = Command::new("sh");
-        shell
-            .arg("-c")
-            .arg(command)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped());
+        shell.arg("-c").arg(command).stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut process = Process::start(&mut shell).map_err(|e| broken(command, e))?;
         let child = process.child();
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
@@ -187,9 +176,7 @@ impl Stream {
             Ok(event) => return Err(self.unexpected(&event, deadline)),
             Err(_) => return Err(self.late()),
         };
-        self.valid
-            .line(&line)
-            .map_err(|problem| self.refused(&self.window(), &problem))
+        self.valid.line(&line).map_err(|problem| self.refused(&self.window(), &problem))
     }
 
     /// The window that was asked last, in words.
@@ -383,9 +370,7 @@ impl Valid {
             let start: String = text.trim_end().chars().take(QUOTED).collect();
             format!("`{}` ({e})", start.escape_debug())
         })?;
-        let label = parsed
-            .label
-            .map(|label| label.map(|value| self.label(value)).transpose());
+        let label = parsed.label.map(|label| label.map(|value| self.label(value)).transpose());
         self.answer(parsed.image, label.transpose()?)
     }
 
@@ -419,11 +404,8 @@ impl Valid {
 /// # Errors
 /// A message that says what is wrong.
 pub fn check_line(line: &[u8], taxels: usize, classes: usize) -> Result<Answer, String> {
-    let valid = Valid {
-        taxels,
-        classes: (1..=classes).map(|number| (number, number.to_string())).collect(),
-        left_out: None,
-    };
+    let valid =
+        Valid { taxels, classes: (1..=classes).map(|number| (number, number.to_string())).collect(), left_out: None };
     valid.line(line)
 }
 
@@ -445,11 +427,8 @@ mod tests {
 
     #[test]
     fn answers_are_checked() {
-        let valid = Valid {
-            taxels: 2,
-            classes: [(1, "brain".to_owned()), (4, "rec".to_owned())].into(),
-            left_out: Some(7),
-        };
+        let valid =
+            Valid { taxels: 2, classes: [(1, "brain".to_owned()), (4, "rec".to_owned())].into(), left_out: Some(7) };
         for bad in [-2.0, -1.0, 0.0, 1.5, 2.0, 99.0, 1e300, f64::NAN, f64::INFINITY] {
             let said = valid.label(bad).unwrap_err();
             assert!(said.contains("valid: 1, 4"), "{said}");
@@ -457,12 +436,7 @@ mod tests {
         assert_eq!((valid.label(4.0), valid.label(7.0)), (Ok(4), Ok(7)));
         assert!(valid.answer(Some(vec![1.0]), None).is_err());
         assert!(valid.answer(Some(vec![]), Some(Some(1))).is_err());
-        assert!(
-            valid
-                .answer(Some(vec![1.0, f64::NAN]), None)
-                .unwrap_err()
-                .contains("NaN at taxel 1")
-        );
+        assert!(valid.answer(Some(vec![1.0, f64::NAN]), None).unwrap_err().contains("NaN at taxel 1"));
         assert!(valid.answer(None, None).is_err());
         assert_eq!(valid.answer(None, Some(None)).unwrap().class, Some(Class::Unknown));
         assert_eq!(valid.answer(Some(vec![1.0, 2.0]), None).unwrap().class, None);

@@ -43,12 +43,7 @@ impl Process {
         };
         let ((child, leader), entry) = listed(start, |(_, leader)| Leftover::Group(*leader))?;
         // from here on an error ends the group
-        let mut process = Self {
-            child,
-            leader,
-            keeper: None,
-            entry: Some(entry),
-        };
+        let mut process = Self { child, leader, keeper: None, entry: Some(entry) };
         let mut keeper = Command::new("sh");
         keeper.args(["-c", KEEPER]).process_group(leader.as_raw_nonzero().get());
         keeper.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
@@ -167,12 +162,7 @@ impl Pipes {
         thread::spawn(move || write_lines(&input, &to_write, &shared, &told));
         let shared = Arc::clone(&counts);
         thread::spawn(move || read_lines(output, most_bytes, &shared, &unread, &events));
-        Self {
-            input: Some(lines),
-            events: received,
-            counts,
-            most_bytes,
-        }
+        Self { input: Some(lines), events: received, counts, most_bytes }
     }
 
     /// Most bytes of a line of the output.
@@ -206,18 +196,13 @@ impl Pipes {
 
     /// What comes next, until `deadline`.
     pub(super) fn next_by(&self, deadline: Instant) -> Result<Event, RecvTimeoutError> {
-        self.events
-            .recv_timeout(deadline.saturating_duration_since(Instant::now()))
+        self.events.recv_timeout(deadline.saturating_duration_since(Instant::now()))
     }
 
     /// What the program has to do next.
     pub(super) fn waits_for(&self) -> Asked {
         let written = self.counts.written.load(Ordering::SeqCst);
-        if written <= self.counts.asked.load(Ordering::SeqCst) {
-            Asked::Write(written)
-        } else {
-            Asked::Answer
-        }
+        if written <= self.counts.asked.load(Ordering::SeqCst) { Asked::Write(written) } else { Asked::Answer }
     }
 }
 
@@ -225,11 +210,8 @@ fn write_lines(mut input: &ChildStdin, lines: &Receiver<String>, counts: &Counts
     for mut line in lines {
         line.push('\n');
         if let Err(error) = input.write_all(line.as_bytes()) {
-            let event = if error.kind() == io::ErrorKind::BrokenPipe {
-                Event::InputClosed
-            } else {
-                Event::Failed(error)
-            };
+            let event =
+                if error.kind() == io::ErrorKind::BrokenPipe { Event::InputClosed } else { Event::Failed(error) };
             // nobody may listen any more
             let _ = events.send(event);
             return;
@@ -265,8 +247,6 @@ fn read_lines(
 
 /// Whether there is more in the program's input than the end of a line, which a reader may leave for the next one.
 fn is_unread(input: &Weak<ChildStdin>) -> bool {
-    let bytes = input
-        .upgrade()
-        .and_then(|input| rustix::io::ioctl_fionread(&*input).ok());
+    let bytes = input.upgrade().and_then(|input| rustix::io::ioctl_fionread(&*input).ok());
     bytes.is_some_and(|bytes| bytes > 1)
 }

@@ -54,12 +54,7 @@ pub(crate) fn touch_of(recording: &Recording, block: usize) -> Option<RecordedTo
         let touched = |frame: &[f64]| frame.iter().all(|level| *level > limit);
         let first = levels[QUIET_FRAMES..].windows(SHORTEST_FRAMES).position(touched)? + QUIET_FRAMES;
         let last = levels.iter().rposition(|level| *level > limit)?;
-        found = Some(RecordedTouch {
-            block,
-            start: first * per_frame,
-            end: (last + 1) * per_frame,
-            untouched,
-        });
+        found = Some(RecordedTouch { block, start: first * per_frame, end: (last + 1) * per_frame, untouched });
         quiet = first.saturating_sub(MARGIN_FRAMES).max(QUIET_FRAMES);
     }
     found
@@ -79,9 +74,7 @@ fn levels(recording: &Recording, block: usize, untouched: &Untouched) -> Vec<f64
 impl RecordedTouch {
     /// The least-squares image of the whole touch minus the untouched skin, V.
     pub fn image(&self, recording: &Recording) -> Option<Vec<f64>> {
-        let mut image = Chunk::new(recording, self.block, self.start, self.end - self.start)
-            .fit(0)?
-            .image;
+        let mut image = Chunk::new(recording, self.block, self.start, self.end - self.start).fit(0)?.image;
         for (volts, idle) in image.iter_mut().zip(self.untouched.image.iter().flatten()) {
             *volts -= idle;
         }
@@ -150,10 +143,7 @@ fn contacts(block: usize, volts: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
     let Some(idle) = median(&finite) else {
         return Vec::new();
     };
-    let square: Vec<f64> = volts
-        .iter()
-        .map(|v| if v.is_finite() { (v - idle).powi(2) } else { 0.0 })
-        .collect();
+    let square: Vec<f64> = volts.iter().map(|v| if v.is_finite() { (v - idle).powi(2) } else { 0.0 }).collect();
     let half = width / 2;
     let mut envelope = vec![0.0; square.len()];
     let mut sum = 0.0;
@@ -170,19 +160,10 @@ fn contacts(block: usize, volts: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
         return Vec::new();
     };
     let mut found: Vec<RecordedBounce> = Vec::new();
-    for (i, _) in envelope
-        .iter()
-        .enumerate()
-        .filter(|(_, e)| **e > BOUNCE_THRESHOLD * quiet)
-    {
+    for (i, _) in envelope.iter().enumerate().filter(|(_, e)| **e > BOUNCE_THRESHOLD * quiet) {
         match found.last_mut() {
             Some(last) if i - last.end < gap => last.end = i + 1,
-            _ => found.push(RecordedBounce {
-                block,
-                start: i,
-                end: i + 1,
-                idle,
-            }),
+            _ => found.push(RecordedBounce { block, start: i, end: i + 1, idle }),
         }
     }
     found.retain(|b| b.end - b.start >= shortest);

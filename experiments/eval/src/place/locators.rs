@@ -45,21 +45,9 @@ pub(super) const LOCATORS: &[LocatorSpec] = &[
         label: "middle of the sheet",
         start: |tools, _| Box::new(|_, _| Some(middle(tools.shape))),
     },
-    LocatorSpec {
-        name: "script_s5",
-        label: "script, 5 atoms",
-        start: |tools, press| pursuit(tools, press, true),
-    },
-    LocatorSpec {
-        name: "matched",
-        label: "matched",
-        start: |tools, press| pursuit(tools, press, false),
-    },
-    LocatorSpec {
-        name: "blob",
-        label: "blob evidence",
-        start: blob,
-    },
+    LocatorSpec { name: "script_s5", label: "script, 5 atoms", start: |tools, press| pursuit(tools, press, true) },
+    LocatorSpec { name: "matched", label: "matched", start: |tools, press| pursuit(tools, press, false) },
+    LocatorSpec { name: "blob", label: "blob evidence", start: blob },
     LocatorSpec {
         name: TAXEL,
         label: "touched taxel",
@@ -88,11 +76,8 @@ fn pursuit<'a>(tools: &'a Tools, press: &'a Press, script: bool) -> Locate<'a> {
     let mut image = vec![0.0; dictionary.atoms.nrows()];
     Box::new(move |start, window| {
         let m = window.y.len();
-        let (sparsity, threshold, y) = if script {
-            (5, 0.0, window.volts)
-        } else {
-            (quarter(m), SUPPORT_THRESHOLD, window.y)
-        };
+        let (sparsity, threshold, y) =
+            if script { (5, 0.0, window.volts) } else { (quarter(m), SUPPORT_THRESHOLD, window.y) };
         let a = MatrixView::new(m, atoms, &operator[start * atoms..(start + m) * atoms]).ok()?;
         let problem = Problem::new(a, y).ok()?;
         let pursuit = ReferenceOmp::new(sparsity);
@@ -113,10 +98,7 @@ fn blob<'a>(tools: &'a Tools, press: &'a Press) -> Locate<'a> {
     };
     let all = press.window(0, press.len());
     let rows = all.map_or(&[][..], |all| all.phi.values());
-    let projected: Vec<Vec<f64>> = rows
-        .chunks_exact(tools.shape[0] * tools.shape[1])
-        .map(project)
-        .collect();
+    let projected: Vec<Vec<f64>> = rows.chunks_exact(tools.shape[0] * tools.shape[1]).map(project).collect();
     let mut evidence = tools.localiser.evidence();
     Box::new(move |start, window| {
         evidence.clear();

@@ -58,11 +58,7 @@ pub(crate) fn places(
     measurements: &[usize],
     sensing: &[Sensing],
 ) -> Result<Vec<PlaceRow>, Refusal> {
-    let asked = PlacesRequest {
-        relabelled: true,
-        sensing,
-        ..PlacesRequest::new(measurements, |name| name != TAXEL)
-    };
+    let asked = PlacesRequest { relabelled: true, sensing, ..PlacesRequest::new(measurements, |name| name != TAXEL) };
     let tools = Tools::new(recording, shifted, cols)?;
     let found = asked.locate(BALL, &tools, &bounces(recording, tools.shape))?;
     Ok(found.into_iter().map(|(row, _)| row).collect())
@@ -111,28 +107,18 @@ pub fn touch_errors_px(recording: &Recording, touches: &[RecordedTouch], measure
 /// Contacts of the ball.
 fn bounces(recording: &Recording, shape: [usize; 2]) -> Vec<Contact> {
     let bounces = find_bounces(recording);
-    bounces
-        .iter()
-        .filter_map(|bounce| Contact::new(recording, bounce, shape))
-        .collect()
+    bounces.iter().filter_map(|bounce| Contact::new(recording, bounce, shape)).collect()
 }
 
 fn touches(recording: &Recording, touches: &[RecordedTouch], shape: [usize; 2]) -> Vec<Contact> {
-    touches
-        .iter()
-        .filter_map(|touch| Contact::of_touch(recording, touch, shape))
-        .collect()
+    touches.iter().filter_map(|touch| Contact::of_touch(recording, touch, shape)).collect()
 }
 
 impl Tools {
     /// Tools for the skin of `recording`, with `cols` columns.
     fn new(recording: &Recording, shifted: Matrix, cols: usize) -> Result<Self, Refusal> {
         let shape = [recording.taxels() / cols.max(1), cols];
-        Ok(Self {
-            shape,
-            dictionary: Dictionary::new(shifted),
-            localiser: Localiser::new(shape)?,
-        })
+        Ok(Self { shape, dictionary: Dictionary::new(shifted), localiser: Localiser::new(shape)? })
     }
 }
 
@@ -168,10 +154,7 @@ impl<'a> PlacesRequest<'a> {
             .map(|&(_, contact, shift)| self.errors(tools, contact, shift))
             .collect::<Result<_, Refusal>>()
             .map_err(|e| e.at("rows"))?;
-        let kinds = self
-            .sensing
-            .iter()
-            .flat_map(|&sensing| [(false, sensing), (true, sensing)]);
+        let kinds = self.sensing.iter().flat_map(|&sensing| [(false, sensing), (true, sensing)]);
         let mut found = Vec::new();
         for (k, (relabelled, sensing)) in kinds.enumerate() {
             for (l, spec) in self.locators.iter().enumerate() {
@@ -285,8 +268,7 @@ impl Contact {
     /// The contact with taxel (r, c) called (r + shift₀, c + shift₁), cyclically.
     fn relabelled(&self, shift: [usize; 2]) -> Press {
         let [rows, cols] = self.shape;
-        self.press
-            .renamed(|k| (k / cols + shift[0]) % rows * cols + (k % cols + shift[1]) % cols)
+        self.press.renamed(|k| (k / cols + shift[0]) % rows * cols + (k % cols + shift[1]) % cols)
     }
 }
 

@@ -133,11 +133,7 @@ impl TrainingData {
         classes.dedup();
         let means = classes.iter().map(|class| {
             let mut mean = vec![0.0; images.nrows()];
-            let own: Vec<_> = columns
-                .iter()
-                .zip(labels)
-                .filter(|(_, label)| *label == class)
-                .collect();
+            let own: Vec<_> = columns.iter().zip(labels).filter(|(_, label)| *label == class).collect();
             for (column, _) in &own {
                 let each = mean.iter_mut().zip(*column);
                 each.for_each(|(mean, v)| *mean += v.max(0.0) / own.len() as f64);
@@ -149,12 +145,7 @@ impl TrainingData {
             templates: Library::new(&Matrix::from_column_slices(images.nrows(), &means), &classes)
                 .map_err(|e| e.at("library"))?,
             candidates: Arc::new(columns),
-            ..Self::of_library(
-                Library::new(&images, labels).map_err(|e| e.at("library"))?,
-                images,
-                cols,
-                streams,
-            )
+            ..Self::of_library(Library::new(&images, labels).map_err(|e| e.at("library"))?, images, cols, streams)
         })
     }
 
@@ -189,11 +180,7 @@ impl TrainingData {
     pub fn for_shapes(skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
         let data = Self::for_layout(skin, streams)?;
         let alike = shape_images(skin, streams.rng("shapes", 0).random()).map_err(|e| e.at("shapes"))?;
-        Ok(Self {
-            images: with_gains(&alike, streams),
-            alike: Some(Arc::new(alike)),
-            ..data
-        })
+        Ok(Self { images: with_gains(&alike, streams), alike: Some(Arc::new(alike)), ..data })
     }
 
     /// Training data from `objects`, each with its label, in all their poses, for a sheet with `cols` columns and
@@ -215,12 +202,7 @@ impl TrainingData {
         let of_library: Vec<Vec<f64>> = few.iter().map(|&k| images.column(k)).collect();
         let few_labels: Vec<usize> = few.iter().map(|&k| labels[k]).collect();
         let data = Self::of_images(matrix(&of_library), &few_labels, cols, streams)?;
-        Ok(Self {
-            images,
-            alike: Some(Arc::new(alike)),
-            posed: Some(Arc::new(labels)),
-            ..data
-        })
+        Ok(Self { images, alike: Some(Arc::new(alike)), posed: Some(Arc::new(labels)), ..data })
     }
 
     /// Images of objects in many poses with equal gains of all taxels, and their labels; `None` if the poses are known.
@@ -286,18 +268,11 @@ impl TrainingData {
     /// [`Refusal`].
     pub fn prior(&self, how: ImagePrior) -> Result<Arc<Gaussian>, Refusal> {
         let how = if self.random_shapes {
-            ImagePrior {
-                reach: 0,
-                stay: 1.0,
-                threshold: 0.0,
-                ..ImagePrior::UNSEEN
-            }
+            ImagePrior { reach: 0, stay: 1.0, threshold: 0.0, ..ImagePrior::UNSEEN }
         } else {
             how
         };
-        Ok(Arc::new(
-            how.learn(&self.images, self.shape[1]).map_err(|e| e.at("prior"))?,
-        ))
+        Ok(Arc::new(how.learn(&self.images, self.shape[1]).map_err(|e| e.at("prior"))?))
     }
 }
 
@@ -340,26 +315,16 @@ impl Learned {
         cols: usize,
         streams: Streams,
     ) -> Result<Self, Refusal> {
-        let training: Vec<TrainingPresses<'_>> = sessions
-            .iter()
-            .filter_map(|s| TrainingPresses::within(s, &learning.presses))
-            .collect();
+        let training: Vec<TrainingPresses<'_>> =
+            sessions.iter().filter_map(|s| TrainingPresses::within(s, &learning.presses)).collect();
         let dictionary = learn_dictionary(training_images(&training), &learning.dictionary(), streams)
             .map_err(|e| e.at("dictionary"))?;
-        Ok(Self::new(
-            dictionary,
-            None,
-            library(&training).map_err(|e| e.at("library"))?,
-            cols,
-        ))
+        Ok(Self::new(dictionary, None, library(&training).map_err(|e| e.at("library"))?, cols))
     }
 
     /// The same with the shifted dictionary in place of the dictionary.
     pub fn at_all_places(&self) -> Self {
-        Self {
-            dictionary: Arc::new(Dictionary::new(self.shifted.clone())),
-            ..self.clone()
-        }
+        Self { dictionary: Arc::new(Dictionary::new(self.shifted.clone())), ..self.clone() }
     }
 }
 
@@ -390,11 +355,7 @@ pub struct Dictionary {
 impl Dictionary {
     /// The dictionary of `atoms`, taxels × K.
     pub fn new(atoms: Matrix) -> Self {
-        Self {
-            tables: SignTables::new(atoms.view()),
-            sums: atoms.column_sums(),
-            atoms,
-        }
+        Self { tables: SignTables::new(atoms.view()), sums: atoms.column_sums(), atoms }
     }
 
     /// Computes rows of Φ·D for the rows `phi` of Φ, by look-up if `signs` holds the weights as bits.
@@ -431,14 +392,8 @@ pub struct Learning {
 impl Learning {
     /// Which images a dictionary is learned from, and how.
     pub(super) fn dictionary(&self) -> (Selection, Ksvd) {
-        let selection = Selection {
-            max_images: self.training_images,
-            ..Selection::default()
-        };
-        let ksvd = Ksvd {
-            n_iter: self.sweeps,
-            ..Ksvd::default()
-        };
+        let selection = Selection { max_images: self.training_images, ..Selection::default() };
+        let ksvd = Ksvd { n_iter: self.sweeps, ..Ksvd::default() };
         (selection, ksvd)
     }
 }
@@ -451,9 +406,6 @@ pub(super) fn learn_dictionary(
 ) -> Result<Matrix, Refusal> {
     // the limit on their number then treats all objects, presses and frames alike
     candidates.shuffle(&mut streams.rng("training", 0));
-    let chosen: Vec<Vec<f64>> = select(&candidates, selection)
-        .into_iter()
-        .map(|i| candidates[i].clone())
-        .collect();
+    let chosen: Vec<Vec<f64>> = select(&candidates, selection).into_iter().map(|i| candidates[i].clone()).collect();
     ksvd.learn(&chosen, &mut streams.rng("ksvd", 0))
 }

@@ -50,9 +50,7 @@ impl SkinGains {
         let taxels = skin.images().nrows();
         if taxels != simulated.images().nrows() {
             let found = simulated.images().nrows();
-            return Err(Refusal::new(format!(
-                "images of the skin have {taxels} taxels, simulated ones {found}"
-            )));
+            return Err(Refusal::new(format!("images of the skin have {taxels} taxels, simulated ones {found}")));
         }
         let (mut ratios, mut count, mut sessions) = (Vec::new(), vec![0; taxels], 0);
         for (k, &object) in skin.labels().iter().enumerate() {
@@ -62,19 +60,12 @@ impl SkinGains {
             let logs = logs(&skin.images().column(k), &simulated.images().column(l));
             for &(taxel, log) in &logs {
                 count[taxel] += 1;
-                ratios.push(Ratio {
-                    session: sessions,
-                    object,
-                    taxel,
-                    log,
-                });
+                ratios.push(Ratio { session: sessions, object, taxel, log });
             }
             sessions += usize::from(!logs.is_empty());
         }
         if sessions == 0 {
-            return Err(Refusal::new(
-                "no object has both an image of the skin and a simulated one",
-            ));
+            return Err(Refusal::new("no object has both an image of the skin and a simulated one"));
         }
         let mut fitted: Vec<usize> = ratios.iter().map(|r| r.object).collect();
         fitted.sort_unstable();
@@ -87,12 +78,7 @@ impl SkinGains {
         });
         let solution = model.solve(effects);
         Ok(Self {
-            gains: TaxelGains {
-                shape: None,
-                log_mean: solution.mean,
-                log_sd: solution.sd,
-                mounting_log_sd,
-            },
+            gains: TaxelGains { shape: None, log_mean: solution.mean, log_sd: solution.sd, mounting_log_sd },
             spread_log_sd: effects.gain,
             contact_log_sd: effects.contact,
             sessions: count,
@@ -128,9 +114,7 @@ impl SkinGains {
         let logs = logs(skin, simulated);
         // what is left of a ratio without the gain, and its variance
         let left = logs.iter().map(|&(i, log)| {
-            let sd = self.gains.log_sd[i]
-                .hypot(self.contact_log_sd)
-                .hypot(self.gains.mounting_log_sd);
+            let sd = self.gains.log_sd[i].hypot(self.contact_log_sd).hypot(self.gains.mounting_log_sd);
             (log - self.gains.log_mean[i], sd * sd)
         });
         let left: Vec<(f64, f64)> = left.collect();
@@ -163,10 +147,7 @@ pub fn on_skins_with(
     sessions: &[ScoredSession],
     streams: Streams,
 ) -> Result<Vec<ScoredSession>, Refusal> {
-    let session_gains = TaxelGains {
-        log_sd: gains.session_log_sd().collect(),
-        ..gains.clone()
-    };
+    let session_gains = TaxelGains { log_sd: gains.session_log_sd().collect(), ..gains.clone() };
     let with_gains = |session: &ScoredSession| {
         let Some(raster) = &session.raster else {
             return Ok(session.clone());
@@ -180,19 +161,10 @@ pub fn on_skins_with(
             Block {
                 frame_position: block.frame_position,
                 idle_frames: block.idle_frames,
-                volts: block
-                    .volts
-                    .iter()
-                    .zip(of_taxels.iter().cycle())
-                    .map(|(v, g)| v * g)
-                    .collect(),
+                volts: block.volts.iter().zip(of_taxels.iter().cycle()).map(|(v, g)| v * g).collect(),
             }
         });
-        Ok(ScoredSession {
-            raster: Some(raster.with_blocks(blocks.collect())?),
-            compressive: None,
-            ..session.clone()
-        })
+        Ok(ScoredSession { raster: Some(raster.with_blocks(blocks.collect())?), compressive: None, ..session.clone() })
     };
     sessions.iter().map(with_gains).collect()
 }
@@ -208,11 +180,7 @@ fn logs(skin: &[f64], simulated: &[f64]) -> Vec<(usize, f64)> {
         let ratio = skin[i].max(0.0) / (scale * simulated[i]);
         (i, ratio.clamp(1.0 / LARGEST_FACTOR, LARGEST_FACTOR).ln())
     };
-    if scale > 0.0 && scale.is_finite() {
-        touched.iter().map(log).collect()
-    } else {
-        Vec::new()
-    }
+    if scale > 0.0 && scale.is_finite() { touched.iter().map(log).collect() } else { Vec::new() }
 }
 
 /// γ of every taxel of a skin with these `gains` in one session: the relative standard deviation √(exp(σ²) − 1) of its
@@ -290,11 +258,7 @@ impl MixedModel {
     /// The model of `ratios` on `taxels` taxels; every session from 0 to `sessions` has one at least.
     fn new(mut ratios: Vec<Ratio>, taxels: usize, sessions: usize) -> Self {
         ratios.sort_by_key(|r| (r.taxel, r.object, r.session));
-        Self {
-            ratios,
-            taxels,
-            sessions,
-        }
+        Self { ratios, taxels, sessions }
     }
 
     /// Posterior of the gains, and the likelihood of the effects.
@@ -351,11 +315,7 @@ impl MixedModel {
             (mean, variance.sqrt())
         });
         let (mean, sd) = gains.unzip();
-        Solution {
-            mean,
-            sd,
-            log_likelihood: -0.5 * (log_determinant + squares),
-        }
+        Solution { mean, sd, log_likelihood: -0.5 * (log_determinant + squares) }
     }
 
     /// The spread of the gains and the error of a contact that make the restricted likelihood times a weak prior
@@ -461,11 +421,7 @@ mod tests {
         };
         let layout = SkinLayout::new(1, 3, 5e-3, 3e-3).unwrap();
         let info = RecordingInfo::new(layout, Weights::new(WeightMode::Raster, Seeding::Mixed, 3), 64_300.0);
-        let block = |k: u64| Block {
-            frame_position: 100 * k,
-            idle_frames: Some(0),
-            volts: vec![1.0; 3 * 20],
-        };
+        let block = |k: u64| Block { frame_position: 100 * k, idle_frames: Some(0), volts: vec![1.0; 3 * 20] };
         let raster = Recording::new(info, (1..=2).map(block).collect()).unwrap();
         let session = Session {
             hold_s: Some([0.0, 1e-3]),
@@ -500,12 +456,7 @@ mod tests {
                 let contact = effects.contact * normal();
                 for session in sessions.clone() {
                     let log = amplitudes[session - object] + gain + contact + effects.mounting * normal();
-                    ratios.push(Ratio {
-                        session,
-                        object,
-                        taxel,
-                        log,
-                    });
+                    ratios.push(Ratio { session, object, taxel, log });
                 }
             }
         }
@@ -516,11 +467,7 @@ mod tests {
     /// likelihood −½(log|V| + log|Xᵀ V⁻¹ X| + rᵀ P r).
     #[test]
     fn the_solution_is_that_of_dense_matrices() {
-        let effects = Effects {
-            gain: 0.3,
-            contact: 0.35,
-            mounting: 0.1,
-        };
+        let effects = Effects { gain: 0.3, contact: 0.35, mounting: 0.1 };
         let (taxels, sessions) = (7, 5);
         let (ratios, _) = planted(effects, taxels, sessions - 1, 5);
         let model = MixedModel::new(ratios, taxels, sessions);
@@ -556,11 +503,7 @@ mod tests {
     /// 400 ± 5 √800.
     #[test]
     fn planted_effects_are_found() {
-        let effects = |gain, contact| Effects {
-            gain,
-            contact,
-            mounting: 0.1,
-        };
+        let effects = |gain, contact| Effects { gain, contact, mounting: 0.1 };
         let expected = effects(0.25, 0.45);
         let (ratios, gains) = planted(expected, 400, 12, 8);
         let model = MixedModel::new(ratios, 400, 13);

@@ -59,11 +59,7 @@ impl TrainedNetwork {
             Refusal::new(format!("{path}: not a trained network in safetensors format: {reason}"))
         };
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| failed(e.to_string()))?;
-        let told = metadata
-            .metadata()
-            .as_ref()
-            .and_then(|all| all.get("spts"))
-            .map_or("{}", String::as_str);
+        let told = metadata.metadata().as_ref().and_then(|all| all.get("spts")).map_or("{}", String::as_str);
         let told: serde_json::Value = serde_json::from_str(told).map_err(|e| failed(e.to_string()))?;
         let tensors = SafeTensors::deserialize(bytes).map_err(|e| failed(e.to_string()))?;
         let file = File { told: &told, tensors };
@@ -85,17 +81,11 @@ impl TrainedNetwork {
             };
             let steps: Vec<UnrolledStep> = (0..steps).map(step).collect::<Result<_, _>>()?;
             let output = file.layer("out.w", "out.b")?;
-            Ok((
-                shape,
-                UnrolledWeights::new(prior, file.number("noise_variance")?, steps, output),
-            ))
+            Ok((shape, UnrolledWeights::new(prior, file.number("noise_variance")?, steps, output)))
         };
         let (shape, weights) = read().map_err(failed)?;
         let weights = weights.map_err(|e| e.at(path.display()))?;
-        Ok(Self {
-            shape,
-            network: Arc::new(Unrolled::new(weights)),
-        })
+        Ok(Self { shape, network: Arc::new(Unrolled::new(weights)) })
     }
 
     /// The network, for a sheet with `skin` rows and columns.
@@ -123,31 +113,20 @@ struct File<'a> {
 impl File<'_> {
     fn number(&self, field: &str) -> Result<f64, String> {
         let found = &self.told[field];
-        found
-            .as_f64()
-            .ok_or_else(|| format!("`{field}` is {found}, expected a number"))
+        found.as_f64().ok_or_else(|| format!("`{field}` is {found}, expected a number"))
     }
 
     /// A whole number in [0, 10000].
     fn count(&self, field: &str) -> Result<usize, String> {
         let found = self.told[field].as_u64().filter(|count| *count <= 10_000);
         let found = found.and_then(|count| usize::try_from(count).ok());
-        found.ok_or_else(|| {
-            format!(
-                "`{field}` is {}, expected a whole number in [0, 10000]",
-                self.told[field]
-            )
-        })
+        found.ok_or_else(|| format!("`{field}` is {}, expected a whole number in [0, 10000]", self.told[field]))
     }
 
     fn values(&self, name: &str) -> Result<Vec<f32>, String> {
         let tensor = self.tensors.tensor(name).map_err(|e| format!("`{name}`: {e}"))?;
-        numbers(&tensor).ok_or_else(|| {
-            format!(
-                "`{name}` has numbers of the type {:?}, expected F16 or F32",
-                tensor.dtype()
-            )
-        })
+        numbers(&tensor)
+            .ok_or_else(|| format!("`{name}` has numbers of the type {:?}, expected F16 or F32", tensor.dtype()))
     }
 
     fn layer(&self, weights: &str, bias: &str) -> Result<Layer, String> {
@@ -159,14 +138,7 @@ impl File<'_> {
 fn numbers(tensor: &TensorView<'_>) -> Option<Vec<f32>> {
     let bytes = tensor.data();
     match tensor.dtype() {
-        Dtype::F16 => Some(
-            bytes
-                .as_chunks()
-                .0
-                .iter()
-                .map(|b| half::f16::from_le_bytes(*b).to_f32())
-                .collect(),
-        ),
+        Dtype::F16 => Some(bytes.as_chunks().0.iter().map(|b| half::f16::from_le_bytes(*b).to_f32()).collect()),
         Dtype::F32 => Some(bytes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect()),
         _ => None,
     }
@@ -186,10 +158,7 @@ mod tests {
     #[test]
     fn damaged_weights_are_refused() {
         for end in [0, 7, 200, SHIPPED.len() - 1] {
-            assert!(
-                TrainedNetwork::parse(&SHIPPED[..end], Path::new("w")).is_err(),
-                "{end} bytes"
-            );
+            assert!(TrainedNetwork::parse(&SHIPPED[..end], Path::new("w")).is_err(), "{end} bytes");
         }
         let mut other = SHIPPED.to_vec();
         let at = other.windows(KIND.len()).position(|w| w == KIND.as_bytes()).unwrap();

@@ -50,10 +50,7 @@ impl<'a> TrainingPresses<'a> {
         let scored = protocol.presses_of(all.raster);
         let truth = protocol.truth.0.min(all.raster.blocks().len().saturating_sub(1));
         let presses = all.presses.iter().copied();
-        Some(Self {
-            presses: presses.filter(|p| !scored.contains(p) && *p != truth).collect(),
-            ..all
-        })
+        Some(Self { presses: presses.filter(|p| !scored.contains(p) && *p != truth).collect(), ..all })
     }
 
     /// All presses of `session`; `None` without a raster recording.
@@ -84,11 +81,7 @@ impl<'a> TrainingPresses<'a> {
         #[expect(clippy::cast_possible_truncation, reason = "no press has so many frames")]
         let scaled = |frames: usize| ((frames * PUBLISHED_TAXELS) as f64 * relative_rate / per_frame) as usize;
         let own = (self.hold.start + scaled(frame)).saturating_sub(scaled(PLATEAU.start));
-        if PLATEAU.contains(&frame) {
-            own.min(self.hold.end - 1)
-        } else {
-            own
-        }
+        if PLATEAU.contains(&frame) { own.min(self.hold.end - 1) } else { own }
     }
 
     /// Ten plateau images, spread evenly over presses and plateau.

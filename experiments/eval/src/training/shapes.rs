@@ -80,13 +80,7 @@ pub struct PoseKnowledge {
 
 impl Default for PoseKnowledge {
     fn default() -> Self {
-        Self {
-            place_step_m: 7.5e-3,
-            place_sd_m: 4e-3,
-            rotation_step_deg: 15.0,
-            rotation_sd_deg: 5.0,
-            tilt_sd_deg: 0.7,
-        }
+        Self { place_step_m: 7.5e-3, place_sd_m: 4e-3, rotation_step_deg: 15.0, rotation_sd_deg: 5.0, tilt_sd_deg: 0.7 }
     }
 }
 
@@ -116,10 +110,7 @@ impl PoseKnowledge {
             let streams = Streams::new(seed).rng("poses", u64::from(object.label));
             let images = self.press_one(object, layout, streams)?;
             done();
-            Ok(PosedObject {
-                name: object.name,
-                images,
-            })
+            Ok(PosedObject { name: object.name, images })
         });
         objects.collect()
     }
@@ -252,11 +243,7 @@ fn normal(mut uniform: impl FnMut() -> f64) -> f64 {
 /// Dictionary of blobs at every taxel, taxels × atoms, every atom of length 1.
 pub(super) fn blobs(layout: &SkinLayout) -> Matrix {
     let (rows, cols) = (layout.rows(), layout.cols());
-    let widths = if layout.taxels() > FEW_TAXELS {
-        &WIDTHS[..1]
-    } else {
-        &WIDTHS
-    };
+    let widths = if layout.taxels() > FEW_TAXELS { &WIDTHS[..1] } else { &WIDTHS };
     let mut atoms: Vec<Vec<f64>> = Vec::new();
     for width in widths {
         for centre in 0..rows * cols {
@@ -287,11 +274,7 @@ mod tests {
             assert_eq!(images.nrows(), rows * cols);
             let middle = images.row(rows / 2 * cols + cols / 2);
             let touched = middle.iter().filter(|g| **g > 0.0).count();
-            assert!(
-                touched > images.ncols() / 4,
-                "{rows} × {cols}: {touched} of {}",
-                images.ncols()
-            );
+            assert!(touched > images.ncols() / 4, "{rows} × {cols}: {touched} of {}", images.ncols());
         }
     }
 
@@ -304,10 +287,7 @@ mod tests {
             assert_eq!((images.nrows(), images.ncols()), (rows * cols, SHAPES));
             for taxel in 0..rows * cols {
                 let touched = images.row(taxel).iter().filter(|v| **v > 0.1).count();
-                assert!(
-                    touched > SHAPES / 100,
-                    "{rows} × {cols}: taxel {taxel} is in {touched} shapes"
-                );
+                assert!(touched > SHAPES / 100, "{rows} × {cols}: taxel {taxel} is in {touched} shapes");
             }
             let atoms = blobs(&layout);
             for k in 0..atoms.ncols() {

@@ -67,13 +67,7 @@ impl Skins {
     /// Presses on the same number of median skins, which differ only by the arm's repeatability. They are scanned
     /// without readout faults, because y = Φx refers to the true images.
     pub fn median(layout: SkinLayout) -> Self {
-        Self {
-            layout,
-            spread_log_sd: 0.0,
-            session_log_sd: 0.0,
-            readout: "ideal",
-            ..Self::default()
-        }
+        Self { layout, spread_log_sd: 0.0, session_log_sd: 0.0, readout: "ideal", ..Self::default() }
     }
 }
 
@@ -98,10 +92,7 @@ impl Skins {
                 raster: Some(Recorded::new(raster)),
                 ..Session::new(object.name, Event::Press)
             };
-            Ok(ScoredSession::new(
-                session,
-                labels.number(object.name).unwrap_or_default(),
-            ))
+            Ok(ScoredSession::new(session, labels.number(object.name).unwrap_or_default()))
         });
         sessions.collect()
     }
@@ -128,9 +119,7 @@ impl Skins {
             press.rotation_sd_deg = self.rotation_sd_deg;
         }
         config.skin = self.layout;
-        config
-            .transducer_parameters
-            .insert("spread_log_sd".to_owned(), self.spread_log_sd.into());
+        config.transducer_parameters.insert("spread_log_sd".to_owned(), self.spread_log_sd.into());
         config
             .transducer_parameters
             .insert("session_log_sd".to_owned(), self.session_log_sd.into());
@@ -139,9 +128,7 @@ impl Skins {
         let index = usize::from(object.label);
         let twin = Twin::new(&scene)?;
         let presses = twin.presses(index..index + 1, done)?;
-        Ok(twin
-            .recorded(&presses, &Acquisition::presses(Mode::Raster, label))?
-            .recording)
+        Ok(twin.recorded(&presses, &Acquisition::presses(Mode::Raster, label))?.recording)
     }
 }
 
@@ -198,14 +185,8 @@ mod tests {
 
     #[test]
     fn what_is_out_of_range_is_refused() {
-        let few = Skins {
-            skins: 1,
-            ..Skins::default()
-        };
-        let far = Skins {
-            position_sd_m: -1.0,
-            ..few
-        };
+        let few = Skins { skins: 1, ..Skins::default() };
+        let far = Skins { position_sd_m: -1.0, ..few };
         for (bad, field) in [(Skins { skins: 0, ..few }, "skins"), (far, "position_sd_m")] {
             let said = bad.press(1, &|| ()).unwrap_err().to_string();
             assert!(said.contains(field), "{said}");

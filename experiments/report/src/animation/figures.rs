@@ -54,10 +54,7 @@ pub const MOTION_FIGURES: [MotionFigure; 2] = [
 pub fn simulate_motion(seed: u64, folder: &Path) -> Result<(), Refusal> {
     for figure in MOTION_FIGURES {
         let assignment: Assignment = format!("seed={seed}").parse()?;
-        let request = Request {
-            scene: figure.scene.to_owned(),
-            assignments: vec![assignment],
-        };
+        let request = Request { scene: figure.scene.to_owned(), assignments: vec![assignment] };
         let prepared = request.prepare()?;
         let mut frames = Vec::new();
         let simulation = run(&prepared, true, &|| (), |piece| {

@@ -21,11 +21,7 @@ pub(super) fn gif(
     let mut encoder = Encoder::new(&mut bytes, width, height, &palette.bytes())?;
     encoder.set_repeat(Repeat::Infinite)?;
     for (k, picture) in pictures.iter().enumerate() {
-        let delay = if k + 1 == pictures.len() {
-            LAST_DELAY_CS
-        } else {
-            DELAY_CS
-        };
+        let delay = if k + 1 == pictures.len() { LAST_DELAY_CS } else { DELAY_CS };
         let before = k.checked_sub(1).map(|before| pictures[before].as_slice());
         encoder.write_frame(&Frame {
             delay,
@@ -91,14 +87,7 @@ impl Palette {
     pub(super) fn new() -> Self {
         let mut colours = vec![WHITE, WHITE];
         colours.extend((0..HEAT_STEPS).map(|step| heat(f64::from(step) / f64::from(HEAT_STEPS - 1))));
-        for (ink, shades) in [
-            (INK, 32),
-            (MUTED, 20),
-            (TRACE, 20),
-            (WINDOW, 20),
-            (FRAME, 8),
-            (AHEAD, 8),
-        ] {
+        for (ink, shades) in [(INK, 32), (MUTED, 20), (TRACE, 20), (WINDOW, 20), (FRAME, 8), (AHEAD, 8)] {
             colours.extend((1..=shades).map(|shade| WHITE.mix(ink, f64::from(shade) / f64::from(shades))));
         }
         colours.push(MISSING);

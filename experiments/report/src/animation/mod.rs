@@ -96,19 +96,11 @@ impl Animation {
         // a fifth of the taxels, and no more samples than come between two pictures
         let shares = DecodeRequest::default_measurements(layout.taxels());
         let between = ends.windows(2).map(|pair| pair[1] - pair[0]).min();
-        let m = shares
-            .get(1)
-            .copied()
-            .unwrap_or(1)
-            .min(between.unwrap_or(usize::MAX))
-            .max(1);
+        let m = shares.get(1).copied().unwrap_or(1).min(between.unwrap_or(usize::MAX)).max(1);
         let images = match training {
             Some(training) => followed_images(session, 0, training, m, &ends)?,
             None => {
-                let undecoded = |&end: &usize| FollowedImage {
-                    window: end.saturating_sub(m)..end,
-                    image: Vec::new(),
-                };
+                let undecoded = |&end: &usize| FollowedImage { window: end.saturating_sub(m)..end, image: Vec::new() };
                 ends.iter().map(undecoded).collect()
             }
         };

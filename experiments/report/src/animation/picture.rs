@@ -34,10 +34,7 @@ impl Animation {
         let time_s = self.timeline.instants_s[k];
         let mut canvas = Canvas::new(WIDTH, HEIGHT, &self.title);
         let fit = (WIDTH - 2.0 * MARGIN) / text_width(&self.title, TITLE.size, true);
-        let title = TextStyle {
-            size: TITLE.size * fit.min(1.0),
-            ..TITLE
-        };
+        let title = TextStyle { size: TITLE.size * fit.min(1.0), ..TITLE };
         canvas.text((MARGIN, 20.0), &self.title, title);
         let line = TextStyle::new(12.0, MUTED);
         canvas.text((MARGIN, 42.0), &self.timeline.speed(), line);
@@ -47,13 +44,7 @@ impl Animation {
         let right = WIDTH - MARGIN - TILE;
         let scale = |peak: f64| if peak > 0.0 { peak } else { 1.0 };
         let (pressure_pa, image) = (&self.pressures[k], &self.images[k].image);
-        self.tile(
-            &mut canvas,
-            MARGIN,
-            "pressure on the skin",
-            pressure_pa,
-            scale(self.peak_pa),
-        );
+        self.tile(&mut canvas, MARGIN, "pressure on the skin", pressure_pa, scale(self.peak_pa));
         scale_bar(&mut canvas, MARGIN, &pressure_label(self.peak_pa));
         match &self.peak_v {
             Ok(peak_v) => {
@@ -81,10 +72,7 @@ impl Animation {
     /// The samples of the window as bars about zero.
     fn bars(&self, canvas: &mut Canvas, samples: &[f64]) {
         let (left, width) = BARS;
-        let coloured = TextStyle {
-            colour: WINDOW,
-            ..HEADING
-        };
+        let coloured = TextStyle { colour: WINDOW, ..HEADING };
         let heading = format!("{} samples", self.m);
         let at = (left + width / 2.0, TILES_TOP - 10.0);
         canvas.text(at, &heading, coloured.anchored(Anchor::Middle));
@@ -119,10 +107,7 @@ impl Animation {
         let window_ms = 1e3 * self.m as f64 / self.rate_hz;
         let marked = format!("marked: the last {} samples, {window_ms:.2} ms", self.m);
         let style = SMALL.anchored(Anchor::End);
-        let coloured = TextStyle {
-            colour: WINDOW,
-            ..style
-        };
+        let coloured = TextStyle { colour: WINDOW, ..style };
         canvas.text((left + width, top - 12.0), &marked, coloured);
 
         let now = at(self.timeline.instants_s[k]);

@@ -103,11 +103,7 @@ fn the_animations_of_the_report() {
         assert!((42..=100).contains(&pictures.len()), "{}", pictures.len());
         assert!(pictures.windows(2).all(|pair| pair[0] != pair[1]));
 
-        let strongest = |values: &[f64]| {
-            (0..values.len())
-                .max_by(|a, b| values[*a].total_cmp(&values[*b]))
-                .unwrap()
-        };
+        let strongest = |values: &[f64]| (0..values.len()).max_by(|a, b| values[*a].total_cmp(&values[*b])).unwrap();
         let sums: Vec<f64> = animation.pressures.iter().map(|p| p.iter().sum()).collect();
         let at = strongest(&sums);
         let taxel = strongest(&animation.images[at].image);
@@ -126,20 +122,13 @@ fn any_skin_and_no_contact_are_drawn() {
     let footprint = "contact.model=footprint";
     let skins: [(&str, &[&str]); 3] = [
         ("press/rec", &["skin.rows=1", "skin.cols=12", footprint]),
-        (
-            "press/rec",
-            &["skin.rows=7", "skin.cols=16", "rows.seeding=mixed", footprint],
-        ),
+        ("press/rec", &["skin.rows=7", "skin.cols=16", "rows.seeding=mixed", footprint]),
         ("arm", &[]),
     ];
     for (scene, assignments) in skins {
         let simulated = simulated(scene, assignments);
         let bytes = simulated.animation().gif(Path::new("skin.gif")).unwrap();
-        assert!(
-            !decoded(&bytes).0.is_empty() && bytes.len() < 600_000,
-            "{scene}: {}",
-            bytes.len()
-        );
+        assert!(!decoded(&bytes).0.is_empty() && bytes.len() < 600_000, "{scene}: {}", bytes.len());
     }
     let mut nothing = simulated("press/rec", &[footprint]);
     for frame in &mut nothing.frames {
@@ -155,10 +144,7 @@ fn any_skin_and_no_contact_are_drawn() {
     let undecoded = Animation::new(&nothing.prepared, &nothing.frames, &nothing.session, None).unwrap();
     let bytes = undecoded.gif(Path::new("undecoded.gif")).unwrap();
     assert_eq!(decoded(&bytes).0.len(), animation.len());
-    let none = Session {
-        compressive: None,
-        ..nothing.session
-    };
+    let none = Session { compressive: None, ..nothing.session };
     assert!(Animation::new(&nothing.prepared, &nothing.frames, &none, None).is_err());
 }
 
@@ -170,22 +156,11 @@ fn times_are_those_of_the_contact() {
     let (touch_s, instants_s) = (timeline.touch_s.unwrap(), &timeline.instants_s);
     // a ball is on the skin for 8 to 9 ms, of which a frame on each side is counted too
     let shown_s = timeline.to_s - timeline.from_s;
-    assert!(
-        (0.0105..0.0145).contains(&shown_s) && touch_s > timeline.from_s,
-        "{timeline:?}"
-    );
-    assert!(
-        [300.0, 500.0]
-            .iter()
-            .any(|speed| (timeline.slower - speed).abs() < 1e-9)
-    );
+    assert!((0.0105..0.0145).contains(&shown_s) && touch_s > timeline.from_s, "{timeline:?}");
+    assert!([300.0, 500.0].iter().any(|speed| (timeline.slower - speed).abs() < 1e-9));
     let step_s = 0.07 / timeline.slower;
     // times of up to 0.6 s, to a few parts in 10^16
-    assert!(
-        instants_s
-            .windows(2)
-            .all(|pair| (pair[1] - pair[0] - step_s).abs() < 1e-15)
-    );
+    assert!(instants_s.windows(2).all(|pair| (pair[1] - pair[0] - step_s).abs() < 1e-15));
     assert!(instants_s.iter().all(|t| (timeline.from_s..=timeline.to_s).contains(t)));
     assert_eq!(timeline.clock(touch_s + 1.23e-3), "1.2 ms after the touch");
     assert_eq!(timeline.clock(touch_s - 0.5e-3), "0.5 ms before the touch");

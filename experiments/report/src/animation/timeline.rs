@@ -84,8 +84,7 @@ impl Timeline {
 
     /// The zero of the time axis, s since the start of the block, and its name.
     pub(super) fn zero(&self) -> (f64, &'static str) {
-        self.touch_s
-            .map_or((0.0, "time, ms"), |touch| (touch, "time after the touch, ms"))
+        self.touch_s.map_or((0.0, "time, ms"), |touch| (touch, "time after the touch, ms"))
     }
 }
 
@@ -164,10 +163,7 @@ impl Trace {
             range
         });
         let columns = columns.collect();
-        Self {
-            columns,
-            range: all.unwrap_or([0.0, 1.0]),
-        }
+        Self { columns, range: all.unwrap_or([0.0, 1.0]) }
     }
 }
 

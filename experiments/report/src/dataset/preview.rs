@@ -82,11 +82,7 @@ pub(super) fn layout(preview: &Preview) -> Canvas {
     let heights: Vec<f64> = captions.iter().map(|lines| card.height(*lines)).collect();
     let tall = heights.iter().sum::<f64>() + GAP.1 * heights.len() as f64;
     let mut canvas = Canvas::new(width, top + tall - GAP.1 + BORDER, &title);
-    canvas.lines(
-        (BORDER, BORDER + 0.6 * TITLE),
-        &title_lines,
-        TextStyle::new(TITLE, INK).bold(),
-    );
+    canvas.lines((BORDER, BORDER + 0.6 * TITLE), &title_lines, TextStyle::new(TITLE, INK).bold());
     canvas.lines((BORDER, words_top + 0.6 * WORDS), &lines, TextStyle::new(WORDS, MUTED));
     let mut y = top;
     for ((rows, lines), height) in preview.rows.chunks(card.columns).zip(captions).zip(heights) {
@@ -112,22 +108,12 @@ impl Card {
             (false, true) => (5, 160.0),
             (false, false) => (4, 204.0),
         };
-        Self {
-            columns,
-            map,
-            width: if raster { 2.0 * map + MAP_GAP } else { map },
-            raster,
-            outlined: small,
-        }
+        Self { columns, map, width: if raster { 2.0 * map + MAP_GAP } else { map }, raster, outlined: small }
     }
 
     /// What the picture shows.
     fn words(&self) -> String {
-        let outlined = if self.outlined {
-            ", outlined where the conductance has its support"
-        } else {
-            ""
-        };
+        let outlined = if self.outlined { ", outlined where the conductance has its support" } else { "" };
         let maps = if self.raster {
             format!("Left: true pressure{outlined}. Right: the image as the raster scan has it.")
         } else {
@@ -163,11 +149,7 @@ impl Card {
     /// Draws `row` with its upper left corner at `left`, `top` and room for a caption of `lines` lines.
     fn draw(&self, canvas: &mut Canvas, row: &PreviewRow, lines: usize, (left, top): Point) {
         let line = WORDS * LINE_HEIGHT;
-        canvas.text(
-            (left, top + 0.5 * line),
-            &row.heading,
-            TextStyle::new(WORDS, INK).bold(),
-        );
+        canvas.text((left, top + 0.5 * line), &row.heading, TextStyle::new(WORDS, INK).bold());
         canvas.lines((left, top + 1.5 * line), &self.caption(row), TextStyle::new(WORDS, INK));
         let y = top + (1 + lines) as f64 * line + 4.0;
         let ends = TextStyle::new(ENDS, MUTED).anchored(Anchor::Middle);
@@ -183,12 +165,7 @@ impl Card {
         if let Some(image_v) = &row.image_v {
             let ends = range(image_v).unwrap_or_default();
             let shares: Vec<f64> = image_v.iter().map(|v| share(*v, ends)).collect();
-            map(
-                &shares,
-                &format!("{} V", between(ends)),
-                None,
-                left + self.map + MAP_GAP,
-            );
+            map(&shares, &format!("{} V", between(ends)), None, left + self.map + MAP_GAP);
         }
         let (samples, unit) = &row.samples;
         let strip = y + self.map + ENDS * LINE_HEIGHT + 4.0;
@@ -224,11 +201,7 @@ fn range(values: &[f64]) -> Option<[f64; 2]> {
 
 /// Place of a value between the two of a range, 0 to 1.
 fn share(value: f64, [low, high]: [f64; 2]) -> f64 {
-    if high > low {
-        ((value - low) / (high - low)).clamp(0.0, 1.0)
-    } else {
-        0.0 * value
-    }
+    if high > low { ((value - low) / (high - low)).clamp(0.0, 1.0) } else { 0.0 * value }
 }
 
 /// Draws `values` as steps between the least and the most.
@@ -322,20 +295,11 @@ impl PreviewRow {
             if found == needed {
                 return Ok(values);
             }
-            Err(Refusal::new(format!(
-                "row {index}: `{column}` has {found} values; {needed} are needed"
-            )))
+            Err(Refusal::new(format!("row {index}: `{column}` has {found} values; {needed} are needed")))
         };
-        let image_v = if row["image_v"].is_array() {
-            Some(map("image_v")?)
-        } else {
-            None
-        };
-        let samples = if row["y_code"].is_array() {
-            (numbers(&row["y_code"]), "")
-        } else {
-            (numbers(&row["y_v"]), "V")
-        };
+        let image_v = if row["image_v"].is_array() { Some(map("image_v")?) } else { None };
+        let samples =
+            if row["y_code"].is_array() { (numbers(&row["y_code"]), "") } else { (numbers(&row["y_v"]), "V") };
         let step = rows.max(cols).div_ceil(MOST_SIDE);
         let small = |values: &[f64]| blocks(values, (rows, cols), step);
         let pressure_kpa: Vec<f64> = map("pressure_pa")?.iter().map(|p| p * KPA_PER_PA).collect();
@@ -381,9 +345,8 @@ fn blocks(values: &[f64], (rows, cols): (usize, usize), step: usize) -> Vec<f64>
     let block = |top: usize, left: usize| {
         let within =
             (top..rows.min(top + step)).flat_map(|row| (left..cols.min(left + step)).map(move |col| (row, col)));
-        let (sum, count) = within.fold((0.0, 0.0), |(sum, count), (row, col)| {
-            (sum + values[row * cols + col], count + 1.0)
-        });
+        let (sum, count) =
+            within.fold((0.0, 0.0), |(sum, count), (row, col)| (sum + values[row * cols + col], count + 1.0));
         sum / count
     };
     let tops = (0..rows).step_by(step);

@@ -43,10 +43,7 @@ pub fn drawn_shapes(families: &[&ShapeFamily], seed: u64, count: usize) -> Resul
     });
     let wanted: Vec<_> = wanted.collect();
     let ranges = ShapeRanges::default();
-    wanted
-        .into_par_iter()
-        .map(|(family, number)| family.build(&ranges, number))
-        .collect()
+    wanted.into_par_iter().map(|(family, number)| family.build(&ranges, number)).collect()
 }
 
 /// Draws the undersides of `shapes`, those of a family together, all to one scale.
@@ -73,11 +70,7 @@ pub(super) fn layout(shapes: &[Shape]) -> Canvas {
     let keys_top = words_top + words.len() as f64 * WORDS * LINE_HEIGHT + 10.0;
     let top = keys_top + 46.0;
     let mut canvas = Canvas::new(width, top + lines.len() as f64 * line - GAP.1 + BORDER, &title);
-    canvas.text(
-        (BORDER, BORDER + 0.6 * TITLE),
-        &title,
-        TextStyle::new(TITLE, INK).bold(),
-    );
+    canvas.text((BORDER, BORDER + 0.6 * TITLE), &title, TextStyle::new(TITLE, INK).bold());
     canvas.lines((BORDER, words_top + 0.6 * WORDS), &words, TextStyle::new(WORDS, MUTED));
     draw_keys(&mut canvas, keys_top);
     let mut above = "";
@@ -118,11 +111,7 @@ fn draw_keys(canvas: &mut Canvas, top: f64) {
         canvas.line(&[(x, level - 5.0), (x, level + 5.0)], INK, 2.0);
     }
     let words = format!("{:.0} mm", BAR_M * 1e3);
-    canvas.text(
-        (left + length / 2.0, level + 16.0),
-        &words,
-        style.anchored(Anchor::Middle),
-    );
+    canvas.text((left + length / 2.0, level + 16.0), &words, style.anchored(Anchor::Middle));
     // on a whole pixel, so that steps meet without seams
     let left = (left + length + 60.0).round();
     let steps = 110_u32;
@@ -134,17 +123,9 @@ fn draw_keys(canvas: &mut Canvas, top: f64) {
     canvas.frame((left, level - 6.0), (HEIGHT_BAR, 12.0), FRAME, 1.0);
     for height_mm in HEIGHTS_MM {
         let x = left + share(height_mm * 1e-3) * HEIGHT_BAR;
-        canvas.text(
-            (x, level + 16.0),
-            &height_mm.to_string(),
-            style.anchored(Anchor::Middle),
-        );
+        canvas.text((x, level + 16.0), &height_mm.to_string(), style.anchored(Anchor::Middle));
     }
-    canvas.text(
-        (left + HEIGHT_BAR + 14.0, level),
-        "height above the lowest point, mm",
-        style,
-    );
+    canvas.text((left + HEIGHT_BAR + 14.0, level), "height above the lowest point, mm", style);
 }
 
 /// Colour of the lowest points, which touch first, and of what is [`HIGHEST_M`] above them or more.
@@ -230,11 +211,7 @@ fn heights(mesh: &TriMesh, side: usize, pixel_m: f64) -> Vec<f64> {
                 let weight = |p: [f64; 3], q: [f64; 3]| ((p[0] - x) * (q[1] - y) - (p[1] - y) * (q[0] - x)) / area;
                 let weights = [weight(b, c), weight(c, a), weight(a, b)];
                 if weights.iter().all(|weight| *weight >= 0.0) {
-                    let z = weights
-                        .iter()
-                        .zip(&corners)
-                        .map(|(weight, p)| weight * p[2])
-                        .sum::<f64>();
+                    let z = weights.iter().zip(&corners).map(|(weight, p)| weight * p[2]).sum::<f64>();
                     let held = &mut heights_m[row * side + col];
                     // the lower one; NaN gives way
                     *held = held.min(z);

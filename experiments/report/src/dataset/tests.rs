@@ -11,12 +11,7 @@ use spts_contact::shapes::SHAPE_FAMILIES;
 /// Elements `tag` of a picture.
 fn elements(canvas: &Canvas, tag: &str) -> Vec<String> {
     let start = format!("<{tag} ");
-    canvas
-        .svg()
-        .lines()
-        .filter(|line| line.starts_with(&start))
-        .map(str::to_owned)
-        .collect()
+    canvas.svg().lines().filter(|line| line.starts_with(&start)).map(str::to_owned).collect()
 }
 
 /// A number among the attributes of an element.
@@ -48,11 +43,8 @@ fn row(rows: usize, cols: usize) -> Value {
 #[test]
 fn a_card_says_what_its_row_holds() {
     let card = |row: &Value, size| {
-        let preview = Preview {
-            name: "made-up".to_owned(),
-            of: 2_000_000,
-            rows: vec![PreviewRow::of(row, size).unwrap()],
-        };
+        let preview =
+            Preview { name: "made-up".to_owned(), of: 2_000_000, rows: vec![PreviewRow::of(row, size).unwrap()] };
         layout(&preview)
     };
     let volts = card(&row(10, 10), (10, 10));
@@ -92,10 +84,7 @@ fn large_skins_are_drawn_in_blocks() {
 #[test]
 fn a_row_that_does_not_fill_its_skin_is_refused() {
     let error = PreviewRow::of(&row(10, 10), (10, 11)).unwrap_err();
-    assert_eq!(
-        error.to_string(),
-        "row 1234567: `image_v` has 100 values; 110 are needed"
-    );
+    assert_eq!(error.to_string(), "row 1234567: `image_v` has 100 values; 110 are needed");
     let none = PreviewRow::of(&json!({}), (2, 2)).unwrap_err();
     assert!(none.to_string().contains("`pressure_pa` has 0 values"), "{none}");
 }
@@ -108,20 +97,13 @@ fn odd_values_stay_on_the_card() {
     odd["y_v"] = json!([1.0, null, 1.0]);
     odd["pressure_pa"] = json!(vec![0.0; 16]);
     odd["object"] = json!("a name of a mesh file that is wider than its card by far, and then some");
-    let preview = Preview {
-        name: "odd".repeat(30),
-        of: 1,
-        rows: vec![PreviewRow::of(&odd, (4, 4)).unwrap()],
-    };
+    let preview = Preview { name: "odd".repeat(30), of: 1, rows: vec![PreviewRow::of(&odd, (4, 4)).unwrap()] };
     let canvas = layout(&preview);
     // the first rectangle is the paper
     for rect in elements(&canvas, "rect").iter().skip(1) {
         let far = |place, size| attribute(rect, place) + attribute(rect, size);
         assert!(attribute(rect, "x") >= 0.0 && attribute(rect, "y") >= 0.0, "{rect}");
-        assert!(
-            far("x", "width") <= canvas.width && far("y", "height") <= canvas.height,
-            "{rect}"
-        );
+        assert!(far("x", "width") <= canvas.width && far("y", "height") <= canvas.height, "{rect}");
     }
     for text in elements(&canvas, "text") {
         // a card of two maps is 208 wide; only the heading is beyond it
@@ -129,11 +111,7 @@ fn odd_values_stay_on_the_card() {
         let words = text.split_once('>').unwrap().1.split_once('<').unwrap().0;
         let width = text_width(words, size, text.contains("bold"));
         let least = if text.contains("middle") { at - width / 2.0 } else { at };
-        let card = if attribute(&text, "y") < 95.0 {
-            canvas.width
-        } else {
-            16.0 + 208.0
-        };
+        let card = if attribute(&text, "y") < 95.0 { canvas.width } else { 16.0 + 208.0 };
         assert!(least >= 0.0 && least + width <= card, "{text}");
     }
 }

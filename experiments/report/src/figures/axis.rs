@@ -33,22 +33,14 @@ impl Axis {
             && shown(high)
             && low < high
         {
-            return Self {
-                low: place(low),
-                high: place(high),
-                log,
-            };
+            return Self { low: place(low), high: place(high), log };
         }
         let (low, high) = values
             .filter(|&v| shown(v))
             .map(place)
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
         if low > high {
-            return Self {
-                low: 0.0,
-                high: 1.0,
-                log,
-            };
+            return Self { low: 0.0, high: 1.0, log };
         }
         // A single value, to rounding: 1e-9 is far above the rounding of a sum and below any tick.
         if high - low <= 1e-9 * low.abs().max(high.abs()) {
@@ -57,21 +49,13 @@ impl Axis {
                 size if size < f64::MIN_POSITIVE => 1.0,
                 size => (0.1 * size).max(f64::MIN_POSITIVE.sqrt()),
             };
-            return Self {
-                low: low - half,
-                high: high + half,
-                log,
-            };
+            return Self { low: low - half, high: high + half, log };
         }
         let free = PADDING * (high - low);
         let near = |end: f64, other: f64| !log && end.abs() <= 0.5 * other.abs();
         Self {
             low: if low >= 0.0 && near(low, high) { 0.0 } else { low - free },
-            high: if high <= 0.0 && near(high, low) {
-                0.0
-            } else {
-                high + free
-            },
+            high: if high <= 0.0 && near(high, low) { 0.0 } else { high + free },
             log,
         }
     }
@@ -90,11 +74,7 @@ impl Axis {
                 return ticks;
             }
             // Less than a decade between two ticks of the usual leads: ticks as on a linear axis.
-            let linear = Self {
-                low: 10_f64.powf(self.low),
-                high: 10_f64.powf(self.high),
-                log: false,
-            };
+            let linear = Self { low: 10_f64.powf(self.low), high: 10_f64.powf(self.high), log: false };
             let finer = linear.linear_ticks(count);
             if finer.len() > ticks.len() { finer } else { ticks }
         } else {
@@ -183,10 +163,7 @@ fn log_label(lead: f64, decade: f64) -> String {
 /// A whole number in raised digits.
 fn superscript(exponent: f64) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    let raise = |c: char| {
-        c.to_digit(10)
-            .map_or('⁻', |digit| DIGITS[usize::try_from(digit).unwrap_or(0)])
-    };
+    let raise = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[usize::try_from(digit).unwrap_or(0)]);
     format!("{exponent:.0}").chars().map(raise).collect()
 }
 
@@ -238,12 +215,7 @@ mod tests {
         let cases: [(f64, f64, bool, &[&str]); 6] = [
             (2.0, 100.0, true, &["2", "5", "10", "20", "50", "100"]),
             // it begins above a decade
-            (
-                1.6e-4,
-                0.07,
-                true,
-                &["2·10⁻⁴", "5·10⁻⁴", "0.001", "0.002", "0.005", "0.01", "0.02", "0.05"],
-            ),
+            (1.6e-4, 0.07, true, &["2·10⁻⁴", "5·10⁻⁴", "0.001", "0.002", "0.005", "0.01", "0.02", "0.05"]),
             (1e-7, 1e-5, true, &["10⁻⁷", "2·10⁻⁷"]),
             (12.0, 98.0, false, &["0", "25", "50", "75", "100"]),
             (0.0, 4e7, false, &["0", "1·10⁷"]),

@@ -90,11 +90,7 @@ fn layout(chart: &BarChart) -> Canvas {
         let left = margin + panel * index as f64;
         let middle = left + 0.5 * (panel - 2.0 * BORDER);
         canvas.text((middle, top - 0.8 * HEADING), name, heading.anchored(Anchor::Middle));
-        let frame = BarFrame {
-            at: (left, top),
-            size: (panel - 2.0 * BORDER, height),
-            axis,
-        };
+        let frame = BarFrame { at: (left, top), size: (panel - 2.0 * BORDER, height), axis };
         frame.draw(&mut canvas, chart, index, row);
     }
     for (index, entry) in chart.rows.iter().enumerate() {
@@ -126,11 +122,7 @@ impl BarFrame {
             let Some(x) = self.column(value) else { continue };
             canvas.line(&[(x, top), (x, bottom)], GRID, 1.0);
             canvas.line(&[(x, bottom), (x, bottom + 5.0)], CLAIM, 1.0);
-            canvas.text(
-                (x, bottom + 15.0),
-                &label,
-                TextStyle::new(SIZE, MUTED).anchored(Anchor::Middle),
-            );
+            canvas.text((x, bottom + 15.0), &label, TextStyle::new(SIZE, MUTED).anchored(Anchor::Middle));
         }
     }
 
@@ -271,12 +263,7 @@ fn interval_layout(chart: &IntervalChart) -> Canvas {
         let y = top + line * l as f64 + HEAD;
         canvas.text((BORDER, y - 0.75 * HEAD), &of_line.title, heading);
         for (column, panel) in of_line.panels.iter().enumerate() {
-            draw_panel(
-                &mut canvas,
-                panel,
-                (margin + column as f64 * (PANEL + PANEL_GAP), y),
-                inner,
-            );
+            draw_panel(&mut canvas, panel, (margin + column as f64 * (PANEL + PANEL_GAP), y), inner);
         }
         for (k, label) in chart.rows.iter().enumerate() {
             canvas.text((margin - BORDER, y + ROW * (k as f64 + 0.5)), label, beside);
@@ -344,27 +331,16 @@ mod tests {
             title: "made up".to_owned(),
             x_label: "loss".to_owned(),
             panels: vec![String::new(); values.len()],
-            groups: vec![BarGroup {
-                name: "one".to_owned(),
-                style: Style::Twin,
-            }],
-            rows: vec![BarRow {
-                label: "row".to_owned(),
-                heading: false,
-                values,
-            }],
+            groups: vec![BarGroup { name: "one".to_owned(), style: Style::Twin }],
+            rows: vec![BarRow { label: "row".to_owned(), heading: false, values }],
         };
         let svg = layout(&chart).svg();
         let number = |line: &str, name: &str| -> f64 {
             let (_, rest) = line.split_once(&format!(" {name}=\"")).unwrap();
             rest.split_once('"').unwrap().0.parse().unwrap()
         };
-        let rects = svg
-            .lines()
-            .filter(|line| line.starts_with("<rect") && line.contains(&colour.hex()));
-        rects
-            .map(|line| (number(line, "x"), number(line, "x") + number(line, "width")))
-            .collect()
+        let rects = svg.lines().filter(|line| line.starts_with("<rect") && line.contains(&colour.hex()));
+        rects.map(|line| (number(line, "x"), number(line, "x") + number(line, "width"))).collect()
     }
 
     /// The sample of the legend is a bar, too; what has no length is left out.
@@ -376,12 +352,9 @@ mod tests {
         assert_relative_eq!(found[0].1 - found[0].0, 2.0 * (found[1].1 - found[1].0), epsilon = 0.03);
         // the two panels have one scale, so that noughts lie one panel apart
         assert_relative_eq!(found[1].1 - found[0].0, 340.0, epsilon = 0.03);
-        for (bar, count) in [
-            (None, 1),
-            (Some((f64::NAN, 1.0)), 1),
-            (Some((f64::INFINITY, 0.0)), 1),
-            (Some((0.0, f64::NAN)), 2),
-        ] {
+        for (bar, count) in
+            [(None, 1), (Some((f64::NAN, 1.0)), 1), (Some((f64::INFINITY, 0.0)), 1), (Some((0.0, f64::NAN)), 2)]
+        {
             assert_eq!(ends(vec![vec![bar], vec![]], twin).len(), count, "{bar:?}");
         }
         assert_eq!(ends(vec![], twin).len(), 1);
@@ -400,15 +373,7 @@ mod tests {
                     title: "IoU".to_owned(),
                     panels: vec![IntervalPanel {
                         title: "M = 20".to_owned(),
-                        intervals: vec![
-                            Some(Interval {
-                                low,
-                                middle,
-                                high,
-                                mark,
-                            }),
-                            None,
-                        ],
+                        intervals: vec![Some(Interval { low, middle, high, mark }), None],
                     }],
                 }],
             };

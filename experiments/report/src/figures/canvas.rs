@@ -57,13 +57,7 @@ pub struct TextStyle {
 impl TextStyle {
     /// Regular, level text that starts at its position.
     pub const fn new(size: f64, colour: Rgb) -> Self {
-        Self {
-            size,
-            bold: false,
-            colour,
-            anchor: Anchor::Start,
-            upwards: false,
-        }
+        Self { size, bold: false, colour, anchor: Anchor::Start, upwards: false }
     }
 
     /// The same in bold.
@@ -136,9 +130,7 @@ impl Canvas {
     /// Adds a filled polygon.
     pub fn polygon(&mut self, points: &[Point], fill: Rgb, opacity: f64) {
         let (d, fill, clear) = (path_data(points), fill.hex(), clear(opacity));
-        self.add(&format!(
-            "<path d=\"{d}Z\" fill=\"{fill}\" fill-rule=\"evenodd\"{clear}/>"
-        ));
+        self.add(&format!("<path d=\"{d}Z\" fill=\"{fill}\" fill-rule=\"evenodd\"{clear}/>"));
     }
 
     /// Adds a filled disc.
@@ -191,11 +183,7 @@ impl Canvas {
         }
         let shift = HALF_CAPITAL_EM * style.size;
         let place = if style.upwards {
-            format!(
-                "transform=\"translate({} {}) rotate(-90)\"",
-                number(x + shift),
-                number(y)
-            )
+            format!("transform=\"translate({} {}) rotate(-90)\"", number(x + shift), number(y))
         } else {
             format!("x=\"{}\" y=\"{}\"", number(x), number(y + shift))
         };
@@ -206,9 +194,7 @@ impl Canvas {
         };
         let weight = if style.bold { " font-weight=\"bold\"" } else { "" };
         let (size, fill, text) = (number(style.size), style.colour.hex(), escape(text));
-        self.add(&format!(
-            "<text {place} font-size=\"{size}\"{anchor}{weight} fill=\"{fill}\">{text}</text>"
-        ));
+        self.add(&format!("<text {place} font-size=\"{size}\"{anchor}{weight} fill=\"{fill}\">{text}</text>"));
     }
 
     /// Adds lines of text, one below the other, the first at `at`.
@@ -222,11 +208,7 @@ impl Canvas {
 }
 
 fn clear(opacity: f64) -> String {
-    if opacity < 1.0 {
-        format!(" fill-opacity=\"{opacity}\"")
-    } else {
-        String::new()
-    }
+    if opacity < 1.0 { format!(" fill-opacity=\"{opacity}\"") } else { String::new() }
 }
 
 /// Corners as path commands.
@@ -271,10 +253,7 @@ pub(crate) fn text_width(text: &str, size: f64, bold: bool) -> f64 {
 
 /// Width of the widest of several texts.
 pub fn widest<'a>(texts: impl IntoIterator<Item = &'a str>, size: f64, bold: bool) -> f64 {
-    texts
-        .into_iter()
-        .map(|text| text_width(text, size, bold))
-        .fold(0.0, f64::max)
+    texts.into_iter().map(|text| text_width(text, size, bold)).fold(0.0, f64::max)
 }
 
 /// Breaks a text between words into lines no wider than `width`; a longer word keeps a line of its own. A number
@@ -331,11 +310,7 @@ static PAINTING: LazyLock<Options<'static>> = LazyLock::new(|| {
     let mut fonts = Database::new();
     fonts.load_font_data(include_bytes!("../../assets/Inter-Regular.otf").to_vec());
     fonts.load_font_data(include_bytes!("../../assets/Inter-Bold.otf").to_vec());
-    Options {
-        font_family: "Inter".to_owned(),
-        fontdb: Arc::new(fonts),
-        ..Options::default()
-    }
+    Options { font_family: "Inter".to_owned(), fontdb: Arc::new(fonts), ..Options::default() }
 });
 
 /// Writes a figure to `dir/name.svg` and `dir/name.png`. The folder is made if it is missing.
@@ -379,10 +354,7 @@ pub(crate) fn paint(canvas: &Canvas) -> io::Result<(usize, usize, Vec<u8>)> {
     let scale = PIXELS_PER_UNIT as f32;
     resvg::render(&tree, Transform::from_scale(scale, scale), &mut pixmap.as_mut());
     // every pixel is opaque: the figure stands on white
-    let rgb = pixmap
-        .data()
-        .chunks_exact(4)
-        .flat_map(|rgba| [rgba[0], rgba[1], rgba[2]]);
+    let rgb = pixmap.data().chunks_exact(4).flat_map(|rgba| [rgba[0], rgba[1], rgba[2]]);
     Ok((width, height, rgb.collect()))
 }
 
@@ -393,10 +365,7 @@ pub(crate) fn paint(canvas: &Canvas) -> io::Result<(usize, usize, Vec<u8>)> {
 pub fn encode_png(rgb: &[u8], width: usize, height: usize) -> io::Result<Vec<u8>> {
     if rgb.len() != width * height * 3 || rgb.is_empty() {
         let len = rgb.len();
-        return Err(io::Error::other(format!(
-            "{len} values do not fill {height} × {} cells",
-            width * 3
-        )));
+        return Err(io::Error::other(format!("{len} values do not fill {height} × {} cells", width * 3)));
     }
     let side = |value: usize| u32::try_from(value).map_err(io::Error::other);
     let mut bytes = Vec::new();
@@ -464,10 +433,7 @@ mod tests {
     fn shrinking_averages_and_growing_repeats() {
         let two = [10, 20, 30, 30, 40, 50];
         assert_eq!(resample(&two, (2, 1), (1, 1)), [20, 30, 40]);
-        assert_eq!(
-            resample(&two, (2, 1), (4, 1)),
-            [10, 20, 30, 10, 20, 30, 30, 40, 50, 30, 40, 50]
-        );
+        assert_eq!(resample(&two, (2, 1), (4, 1)), [10, 20, 30, 10, 20, 30, 30, 40, 50, 30, 40, 50]);
         assert_eq!(resample(&[], (0, 0), (1, 1)), [255; 3]);
     }
 
@@ -481,9 +447,9 @@ mod tests {
         let (width, height, rgb) = paint(&canvas).unwrap();
         assert_eq!((width, height), (400, 80));
         // FNV-1a
-        let hash = rgb.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| {
-            (h ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3)
-        });
+        let hash = rgb
+            .iter()
+            .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3));
         assert_eq!(hash, 0x949b_63ad_3925_b1b5, "{hash:#x}");
     }
 }

@@ -24,14 +24,7 @@ pub struct Series {
 impl Series {
     /// The curve `name` through `points`.
     pub fn new(name: impl Into<String>, style: Style, variant: u8, points: Vec<(f64, f64)>) -> Self {
-        Self {
-            name: name.into(),
-            style,
-            variant,
-            points,
-            spans: Vec::new(),
-            scatter: Vec::new(),
-        }
+        Self { name: name.into(), style, variant, points, spans: Vec::new(), scatter: Vec::new() }
     }
 
     /// The curve `name` of the decoder, locator or control `decoder`, in that one's own colour.
@@ -100,28 +93,14 @@ pub struct Chart {
 impl Chart {
     /// The chart with points that the paper states: label, x and y of each.
     pub(crate) fn with_claims(self, claims: &[(&str, f64, f64)]) -> Self {
-        let claim = |&(label, x, y): &(&str, f64, f64)| Claim {
-            label: label.to_owned(),
-            x: Some(x),
-            y: Some(y),
-        };
-        Self {
-            claims: claims.iter().map(claim).collect(),
-            ..self
-        }
+        let claim = |&(label, x, y): &(&str, f64, f64)| Claim { label: label.to_owned(), x: Some(x), y: Some(y) };
+        Self { claims: claims.iter().map(claim).collect(), ..self }
     }
 
     /// The chart with ranges of x that the paper states: label and ends of each.
     pub(crate) fn with_ranges(self, ranges: &[(&str, f64, f64)]) -> Self {
-        let range = |&(label, from, to): &(&str, f64, f64)| StatedRange {
-            label: label.to_owned(),
-            from,
-            to,
-        };
-        Self {
-            ranges: ranges.iter().map(range).collect(),
-            ..self
-        }
+        let range = |&(label, from, to): &(&str, f64, f64)| StatedRange { label: label.to_owned(), from, to };
+        Self { ranges: ranges.iter().map(range).collect(), ..self }
     }
 }
 
@@ -183,11 +162,7 @@ pub struct Curve {
 impl Curve {
     /// The curve `name` of a style and variant.
     pub fn new(name: impl Into<String>, style: Style, variant: u8) -> Self {
-        Self {
-            name: name.into(),
-            style,
-            variant,
-        }
+        Self { name: name.into(), style, variant }
     }
 
     /// The curve `name` of the decoder, locator or control `decoder`, in that one's own colour.
@@ -292,10 +267,6 @@ impl<'a, R: Copy> Plot<'a, R> {
                 .with_scatter(ends(&self.scatter, &own))
         };
         let curves = unique(rows.iter().map(|&row| (self.curve)(row)));
-        Chart {
-            title,
-            series: curves.into_iter().map(series).collect(),
-            ..self.axes.clone()
-        }
+        Chart { title, series: curves.into_iter().map(series).collect(), ..self.axes.clone() }
     }
 }

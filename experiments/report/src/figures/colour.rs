@@ -71,11 +71,7 @@ fn linear_srgb(lightness: f64, a: f64, b: f64) -> [f64; 3] {
 
 /// Transfer function of sRGB (IEC 61966-2-1).
 fn gamma(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 {
-        12.92 * linear
-    } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
-    }
+    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }
 
 /// A share of full scale as a byte.

@@ -49,10 +49,7 @@ pub(super) fn entries(chart: &Chart) -> Vec<(LegendKey, String)> {
             out.push(entry);
         }
     };
-    for Series {
-        style, variant, name, ..
-    } in &chart.series
-    {
+    for Series { style, variant, name, .. } in &chart.series {
         add(LegendKey::Curve(*style, variant % style.variants()), name);
     }
     for claim in &chart.claims {
@@ -87,11 +84,7 @@ impl Legend {
                 line.push((key, name, wide));
             }
         }
-        let height = if lines.is_empty() {
-            0.0
-        } else {
-            LINE * lines.len() as f64 + 6.0
-        };
+        let height = if lines.is_empty() { 0.0 } else { LINE * lines.len() as f64 + 6.0 };
         Self { lines, height }
     }
 
@@ -161,10 +154,7 @@ pub(super) fn draw_marks(
     let mut marks = Vec::new();
     for claim in claims {
         let place = match (claim.x, claim.y) {
-            (Some(x), Some(y)) => frame
-                .place((x, y))
-                .filter(|&place| frame.holds(place))
-                .map(Place::Point),
+            (Some(x), Some(y)) => frame.place((x, y)).filter(|&place| frame.holds(place)).map(Place::Point),
             (None, Some(y)) => frame.level(y).map(Place::Level),
             (Some(x), None) => frame.column(x).map(Place::Column),
             (None, None) => None,
@@ -178,11 +168,7 @@ pub(super) fn draw_marks(
         if !points.is_empty() {
             canvas.dashed(&points, CLAIM, 1.6, dash(Style::Paper, 0));
         }
-        marks.push(Mark {
-            label: claim.label.clone(),
-            place,
-            draw,
-        });
+        marks.push(Mark { label: claim.label.clone(), place, draw });
     }
     marks
 }

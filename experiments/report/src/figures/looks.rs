@@ -65,9 +65,7 @@ pub(super) fn ink(style: Style, variant: u8) -> Rgb {
     match variant % 4 {
         0 => base,
         1 => base.mix(WHITE, 0.45),
-        2 => base
-            .mix(Rgb(0, 0, 0), 0.5)
-            .mix(WHITE, if style == Style::Real { 0.35 } else { 0.0 }),
+        2 => base.mix(Rgb(0, 0, 0), 0.5).mix(WHITE, if style == Style::Real { 0.35 } else { 0.0 }),
         _ => base.mix(WHITE, 0.65),
     }
 }
@@ -139,15 +137,13 @@ impl Stroke {
 
 /// Variant of [`Style::Decoder`] for the decoder, locator or control called `name`.
 pub fn decoder_variant(name: &str, stroke: Stroke) -> u8 {
-    let own = DECODERS
-        .iter()
-        .position(|spec| spec.name == name && spec.look.is_some());
+    let own = DECODERS.iter().position(|spec| spec.name == name && spec.look.is_some());
     let named = || Some(DECODERS.len() + NAMED.iter().position(|(known, _)| *known == name)?);
     let place = own.or_else(named).unwrap_or_else(|| {
         // FNV-1a: the same program has the same look in every run
-        let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| {
-            (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3)
-        });
+        let hash = name
+            .bytes()
+            .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
         DECODERS.len() + NAMED.len() + usize::try_from(hash % OTHERS.len() as u64).unwrap_or(0)
     });
     u8::try_from(place).unwrap_or(0) * STROKES + stroke as u8

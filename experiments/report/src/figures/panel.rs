@@ -41,11 +41,7 @@ pub(super) fn layout(charts: &[Chart]) -> Canvas {
         2 | 4 => (2, 530.0, 320.0),
         _ => (3, 365.0, 270.0),
     };
-    let description = charts
-        .iter()
-        .map(|chart| chart.title.as_str())
-        .collect::<Vec<_>>()
-        .join("; ");
+    let description = charts.iter().map(|chart| chart.title.as_str()).collect::<Vec<_>>().join("; ");
     let width = BORDER * 2.0 + panel * across as f64;
     let inner = panel - 2.0 * BORDER;
     // what others have published may be in one panel alone; the common legend has it, too
@@ -64,10 +60,7 @@ pub(super) fn layout(charts: &[Chart]) -> Canvas {
     for row in charts.chunks(across) {
         let heading = |chart: &Chart| wrap(&chart.title, HEADING, true, inner);
         let lines = row.iter().map(|chart| heading(chart).len()).max().unwrap_or(0) as f64;
-        let legends: Vec<_> = row
-            .iter()
-            .map(|chart| (!shared).then(|| Legend::new(chart, inner)))
-            .collect();
+        let legends: Vec<_> = row.iter().map(|chart| (!shared).then(|| Legend::new(chart, inner))).collect();
         let below = legends.iter().flatten().map(|legend| legend.height).fold(0.0, f64::max);
         let plot_top = top + 1.3 * HEADING * lines + 10.0;
         for (column, (chart, legend)) in row.iter().zip(legends).enumerate() {
@@ -76,21 +69,13 @@ pub(super) fn layout(charts: &[Chart]) -> Canvas {
         }
         top = plot_top + height + 52.0 + below + BORDER;
     }
-    let mut canvas = Canvas::new(
-        width,
-        top.max(80.0) + common.as_ref().map_or(0.0, |c| c.height),
-        &description,
-    );
+    let mut canvas = Canvas::new(width, top.max(80.0) + common.as_ref().map_or(0.0, |c| c.height), &description);
     if charts.is_empty() {
         let style = TextStyle::new(LABEL, MUTED).anchored(Anchor::Middle);
         canvas.text((width / 2.0, 40.0), "no data", style);
     }
     for (chart, legend, heading, (left, top, plot_top)) in blocks {
-        canvas.lines(
-            (left + BORDER, top + HEADING * 0.65),
-            &heading,
-            TextStyle::new(HEADING, INK).bold(),
-        );
+        canvas.lines((left + BORDER, top + HEADING * 0.65), &heading, TextStyle::new(HEADING, INK).bold());
         let frame = draw_panel(&mut canvas, chart, (left + BORDER, plot_top), (inner, height));
         if let Some(legend) = legend {
             legend.draw(&mut canvas, (left + BORDER, frame.top + frame.height + 52.0), inner);
@@ -113,32 +98,12 @@ fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, he
         .collect();
     let claimed = |pick: fn(&Claim) -> Option<f64>| chart.claims.iter().chain(&chart.published).filter_map(pick);
     let stated = chart.ranges.iter().flat_map(|range| [range.from, range.to]);
-    let x = Axis::new(
-        curves
-            .iter()
-            .flatten()
-            .map(|p| p.0)
-            .chain(claimed(|c| c.x))
-            .chain(stated),
-        chart.x_log,
-        None,
-    );
-    let y = Axis::new(
-        curves.iter().flatten().map(|p| p.1).chain(claimed(|c| c.y)),
-        chart.y_log,
-        chart.y_range,
-    );
+    let x = Axis::new(curves.iter().flatten().map(|p| p.0).chain(claimed(|c| c.x)).chain(stated), chart.x_log, None);
+    let y = Axis::new(curves.iter().flatten().map(|p| p.1).chain(claimed(|c| c.y)), chart.y_log, chart.y_range);
     let y_ticks = y.ticks(if height > 300.0 { 6 } else { 5 });
     let widest = widest(y_ticks.iter().map(|(_, label)| label.as_str()), TICK, false);
     let margin = (widest + 34.0).ceil();
-    let frame = PanelFrame {
-        left: left + margin,
-        top,
-        width: width - margin - 8.0,
-        height,
-        x,
-        y,
-    };
+    let frame = PanelFrame { left: left + margin, top, width: width - margin - 8.0, height, x, y };
     draw_axes(canvas, chart, &frame, left, &y_ticks);
 
     draw_ranges(canvas, chart, &frame);
@@ -222,18 +187,10 @@ fn draw_axes(canvas: &mut Canvas, chart: &Chart, frame: &PanelFrame, edge: f64, 
         canvas.line(&[(frame.left - 5.0, y), (frame.left, y)], CLAIM, 1.0);
         canvas.text((frame.left - 8.0, y), label, tick.anchored(Anchor::End));
     }
-    canvas.line(
-        &[(frame.left, frame.top), (frame.left, bottom), (right, bottom)],
-        CLAIM,
-        1.2,
-    );
+    canvas.line(&[(frame.left, frame.top), (frame.left, bottom), (right, bottom)], CLAIM, 1.2);
     let label = TextStyle::new(LABEL, INK).anchored(Anchor::Middle);
     canvas.text((frame.left + frame.width / 2.0, bottom + 36.0), &chart.x_label, label);
-    canvas.text(
-        (edge + 8.0, frame.top + frame.height / 2.0),
-        &chart.y_label,
-        label.upwards(),
-    );
+    canvas.text((edge + 8.0, frame.top + frame.height / 2.0), &chart.y_label, label.upwards());
 }
 
 /// The parts of a line inside the frame.
@@ -274,11 +231,7 @@ fn clip_edge(a: Point, b: Point, frame: &PanelFrame) -> Option<(Point, Point)> {
     }
     // An end that is not cut is kept bit by bit, so that the next edge joins it.
     let at = |t: f64, end: Point| {
-        if t <= 0.0 || t >= 1.0 {
-            end
-        } else {
-            (a.0 + t * dx, a.1 + t * dy)
-        }
+        if t <= 0.0 || t >= 1.0 { end } else { (a.0 + t * dx, a.1 + t * dy) }
     };
     (enter < leave).then(|| (at(enter, a), at(leave, b)))
 }
@@ -329,10 +282,7 @@ fn draw_ranges(canvas: &mut Canvas, chart: &Chart, frame: &PanelFrame) {
             (left - 5.0, Anchor::End)
         } else {
             // no further than the frame
-            (
-                (right + 5.0).min(frame.left + frame.width - widest - 4.0),
-                Anchor::Start,
-            )
+            ((right + 5.0).min(frame.left + frame.width - widest - 4.0), Anchor::Start)
         };
         let first = foot - RANGE_LINE * (lines.len() as f64 - 0.5);
         canvas.lines((at, first), &lines, TextStyle::new(RANGE_SIZE, MUTED).anchored(anchor));

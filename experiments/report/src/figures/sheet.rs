@@ -119,13 +119,9 @@ pub fn save_sheet(sheet: &Sheet, dir: &Path, name: &str) -> Result<(), Refusal> 
     let path = dir.join(format!("{name}.svg"));
     for tile in sheet.rows.iter().flat_map(|row| &row.tiles) {
         let (len, rows, cols, marks) = match tile {
-            Tile::Heat {
-                values,
-                rows,
-                cols,
-                outline,
-                ..
-            } => (values.len(), *rows, *cols, outline.as_ref().map(Vec::len)),
+            Tile::Heat { values, rows, cols, outline, .. } => {
+                (values.len(), *rows, *cols, outline.as_ref().map(Vec::len))
+            }
             Tile::Picture { width, height, rgb, .. } => (rgb.len(), *height, width * 3, None),
             _ => continue,
         };
@@ -144,31 +140,15 @@ pub(super) fn layout(sheet: &Sheet) -> Canvas {
     let longest = sheet.rows.iter().map(|row| row.tiles.len()).max().unwrap_or(0);
     let widest = widest(sheet.rows.iter().map(|row| row.label.as_str()), WORDS, true);
     let split = sheet.rows.len() > ROWS_OF_ONE_HALF;
-    let heads: Vec<_> = sheet
-        .column_titles
-        .iter()
-        .map(|head| wrap(head, WORDS, true, tile + GAP - 4.0))
-        .collect();
+    let heads: Vec<_> = sheet.column_titles.iter().map(|head| wrap(head, WORDS, true, tile + GAP - 4.0)).collect();
     let head_lines = heads.iter().map(Vec::len).max().unwrap_or(0) as f64;
     let grid = SheetGrid {
         tile,
-        label: if widest > 0.0 && !split {
-            widest.min(LABEL) + 12.0
-        } else {
-            0.0
-        },
-        above: if widest > 0.0 && split {
-            WORDS * LINE_HEIGHT + 4.0
-        } else {
-            0.0
-        },
+        label: if widest > 0.0 && !split { widest.min(LABEL) + 12.0 } else { 0.0 },
+        above: if widest > 0.0 && split { WORDS * LINE_HEIGHT + 4.0 } else { 0.0 },
         columns: longest.max(heads.len()).max(1),
         heads,
-        head_height: if head_lines > 0.0 {
-            head_lines * WORDS * LINE_HEIGHT + 6.0
-        } else {
-            0.0
-        },
+        head_height: if head_lines > 0.0 { head_lines * WORDS * LINE_HEIGHT + 6.0 } else { 0.0 },
     };
     let halves: Vec<&[TileRow]> = if split {
         let (left, right) = sheet.rows.split_at(sheet.rows.len().div_ceil(2));
@@ -180,27 +160,11 @@ pub(super) fn layout(sheet: &Sheet) -> Canvas {
     let body = half * halves.len() as f64 + GUTTER * (halves.len() - 1) as f64;
     let width = (body + 2.0 * BORDER).max(320.0);
     let title = wrap(&sheet.title, TITLE, true, width - 2.0 * BORDER);
-    let top = BORDER
-        + if title.is_empty() {
-            0.0
-        } else {
-            title.len() as f64 * TITLE * LINE_HEIGHT + 10.0
-        };
-    let heights: Vec<f64> = halves
-        .iter()
-        .map(|rows| rows.iter().map(|row| row_height(row, &grid)).sum())
-        .collect();
+    let top = BORDER + if title.is_empty() { 0.0 } else { title.len() as f64 * TITLE * LINE_HEIGHT + 10.0 };
+    let heights: Vec<f64> = halves.iter().map(|rows| rows.iter().map(|row| row_height(row, &grid)).sum()).collect();
     let tallest = heights.iter().copied().fold(40.0, f64::max);
-    let mut canvas = Canvas::new(
-        width,
-        top + grid.head_height + tallest + BORDER - GAP / 2.0,
-        &sheet.title,
-    );
-    canvas.lines(
-        (BORDER, BORDER + TITLE * 0.6),
-        &title,
-        TextStyle::new(TITLE, INK).bold(),
-    );
+    let mut canvas = Canvas::new(width, top + grid.head_height + tallest + BORDER - GAP / 2.0, &sheet.title);
+    canvas.lines((BORDER, BORDER + TITLE * 0.6), &title, TextStyle::new(TITLE, INK).bold());
     for (index, rows) in halves.iter().enumerate() {
         draw_half(&mut canvas, rows, &grid, (BORDER + index as f64 * (half + GUTTER), top));
     }
@@ -219,11 +183,7 @@ fn row_height(row: &TileRow, grid: &SheetGrid) -> f64 {
         .map(|t| wrap(t.caption(), CAPTION, false, grid.tile + GAP).len())
         .max()
         .unwrap_or(0);
-    let captions = if lines > 0 {
-        lines as f64 * CAPTION * LINE_HEIGHT + 6.0
-    } else {
-        0.0
-    };
+    let captions = if lines > 0 { lines as f64 * CAPTION * LINE_HEIGHT + 6.0 } else { 0.0 };
     grid.above + grid.tile + captions + GAP
 }
 
@@ -264,14 +224,7 @@ fn draw_label(canvas: &mut Canvas, label: &str, grid: &SheetGrid, (left, top): P
 
 fn draw_tile(canvas: &mut Canvas, tile: &Tile, corner: Point, side: f64) {
     match tile {
-        Tile::Heat {
-            values,
-            rows,
-            cols,
-            max,
-            outline,
-            ..
-        } => {
+        Tile::Heat { values, rows, cols, max, outline, .. } => {
             let peak = max.unwrap_or_else(|| values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max));
             draw_heat(canvas, values, (*rows, *cols), peak, outline.as_deref(), corner, side);
         }
@@ -297,14 +250,8 @@ fn draw_picture(canvas: &mut Canvas, (width, height): (usize, usize), rgb: &[u8]
         return;
     }
     let scale = side / width.max(height) as f64;
-    let size = (
-        (width as f64 * scale).round().max(1.0),
-        (height as f64 * scale).round().max(1.0),
-    );
-    let at = (
-        corner.0 + ((side - size.0) / 2.0).floor(),
-        corner.1 + ((side - size.1) / 2.0).floor(),
-    );
+    let size = ((width as f64 * scale).round().max(1.0), (height as f64 * scale).round().max(1.0));
+    let at = (corner.0 + ((side - size.0) / 2.0).floor(), corner.1 + ((side - size.1) / 2.0).floor());
     canvas.picture(at, size, (width, height), rgb, false);
     canvas.frame(at, size, FRAME, 1.0);
 }
@@ -320,19 +267,10 @@ fn draw_bars(canvas: &mut Canvas, values: &[f64], highlight: usize, (x, y): Poin
     let nought = y + 6.0 + high * scale + if scale > 0.0 { 0.0 } else { inner };
     let pitch = inner / values.len().max(1) as f64;
     for (index, &value) in values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
-        let fill = if index < highlight {
-            COLOUR
-        } else {
-            GRID.mix(FRAME, 0.6)
-        };
+        let fill = if index < highlight { COLOUR } else { GRID.mix(FRAME, 0.6) };
         let tall = value.abs() * scale;
         let top = if value > 0.0 { nought - tall } else { nought };
-        canvas.rect(
-            (x + 6.0 + pitch * (index as f64 + 0.1), top),
-            (pitch * 0.8, tall),
-            fill,
-            1.0,
-        );
+        canvas.rect((x + 6.0 + pitch * (index as f64 + 0.1), top), (pitch * 0.8, tall), fill, 1.0);
     }
     canvas.line(&[(x + 4.0, nought), (x + side - 4.0, nought)], MUTED, 1.0);
 }
@@ -366,11 +304,7 @@ pub(crate) fn draw_heat(
     let (left, top) = (corner.0 + (side - w) / 2.0, corner.1 + (side - h) / 2.0);
     let nought = heat(0.0);
     let colour = |value: &f64| {
-        if value.is_finite() && peak <= 0.0 {
-            nought
-        } else {
-            heat(value / peak)
-        }
+        if value.is_finite() && peak <= 0.0 { nought } else { heat(value / peak) }
     };
     let colours: Vec<Rgb> = values.iter().take(rows * cols).map(colour).collect();
     if colours.len() > MOST_RECTS {
@@ -460,11 +394,7 @@ pub fn pressure_png(
 /// The picture as shapes.
 fn pressure_layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, title: &str) -> Canvas {
     let longest = rows.max(cols);
-    let side = if longest > STRIP * rows.min(cols) {
-        LONG_MAP
-    } else {
-        MAP
-    };
+    let side = if longest > STRIP * rows.min(cols) { LONG_MAP } else { MAP };
     let cell = (side / longest as f64).floor().max(1.0);
     let (w, h) = (cell * cols as f64, cell * rows as f64);
     let (left, width) = (56.0, 56.0 + w + 130.0);
@@ -482,12 +412,7 @@ fn pressure_layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, titl
         let rgb: Vec<u8> = fills.iter().flat_map(|Rgb(r, g, b)| [*r, *g, *b]).collect();
         canvas.picture((left, top), (w, h), (cols, rows), &rgb, true);
     }
-    for (taxel, (&value, &fill)) in shown
-        .iter()
-        .zip(&fills)
-        .enumerate()
-        .filter(|_| fills.len() <= MOST_RECTS)
-    {
+    for (taxel, (&value, &fill)) in shown.iter().zip(&fills).enumerate().filter(|_| fills.len() <= MOST_RECTS) {
         let corner = (left + (taxel % cols) as f64 * cell, top + (taxel / cols) as f64 * cell);
         canvas.rect(corner, (cell, cell), fill, 1.0);
         if cell >= 40.0 && value.is_finite() {
@@ -498,9 +423,7 @@ fn pressure_layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, titl
     }
     canvas.frame((left, top), (w, h), FRAME, 1.0);
     // labels do not touch
-    let every = ((text_width(&longest.to_string(), 12.0, false) + 8.0) / cell)
-        .ceil()
-        .max(1.0);
+    let every = ((text_width(&longest.to_string(), 12.0, false) + 8.0) / cell).ceil().max(1.0);
     let index = TextStyle::new(12.0, MUTED).anchored(Anchor::Middle);
     for col in (0..cols).filter(|&col| (col as f64 % every) < 0.5) {
         canvas.text((left + (col as f64 + 0.5) * cell, top - 12.0), &col.to_string(), index);
@@ -514,24 +437,13 @@ fn pressure_layout(shown: &[f64], (rows, cols): (usize, usize), unit: &str, titl
 
     let bar = left + w + 28.0;
     for step in 0..BAR_STEPS {
-        let (from, to) = (
-            f64::from(step) / f64::from(BAR_STEPS),
-            f64::from(step + 1) / f64::from(BAR_STEPS),
-        );
+        let (from, to) = (f64::from(step) / f64::from(BAR_STEPS), f64::from(step + 1) / f64::from(BAR_STEPS));
         let (y0, y1) = ((top + bar_h * (1.0 - to)).round(), (top + bar_h * (1.0 - from)).round());
         canvas.rect((bar, y0), (20.0, y1 - y0), heat((from + to) / 2.0), 1.0);
     }
     canvas.frame((bar, top), (20.0, bar_h), FRAME, 1.0);
-    for (tick, label) in if peak > 0.0 {
-        axis.ticks(6)
-    } else {
-        vec![(0.0, "0".to_owned())]
-    } {
-        let place = if peak > 0.0 {
-            axis.place(tick).unwrap_or(0.0)
-        } else {
-            0.0
-        };
+    for (tick, label) in if peak > 0.0 { axis.ticks(6) } else { vec![(0.0, "0".to_owned())] } {
+        let place = if peak > 0.0 { axis.place(tick).unwrap_or(0.0) } else { 0.0 };
         let y = top + bar_h * (1.0 - place);
         canvas.line(&[(bar + 20.0, y), (bar + 25.0, y)], MUTED, 1.0);
         canvas.text((bar + 30.0, y), &label, TextStyle::new(13.0, INK));
@@ -547,11 +459,7 @@ fn reading(value: f64, peak: f64) -> String {
         p if p >= 10.0 => 1,
         p if p >= 0.1 => 2,
         _ => {
-            return if value > 0.0 {
-                format!("{value:.0e}")
-            } else {
-                "0".to_owned()
-            };
+            return if value > 0.0 { format!("{value:.0e}") } else { "0".to_owned() };
         }
     };
     format!("{value:.decimals$}")

@@ -25,12 +25,7 @@ pub(crate) fn check_markup(text: &str, void: &[&str]) -> Result<usize, String> {
         if body.matches('"').count() % 2 != 0 || body.contains('<') {
             return Err(format!("bad tag `{body}`"));
         }
-        let name = body
-            .trim_start_matches('/')
-            .split_whitespace()
-            .next()
-            .unwrap_or_default()
-            .to_owned();
+        let name = body.trim_start_matches('/').split_whitespace().next().unwrap_or_default().to_owned();
         count += 1;
         if body.starts_with('/') {
             let last = open.pop();
@@ -41,11 +36,7 @@ pub(crate) fn check_markup(text: &str, void: &[&str]) -> Result<usize, String> {
             open.push(name);
         }
     }
-    if open.is_empty() {
-        Ok(count)
-    } else {
-        Err(format!("left open: {open:?}"))
-    }
+    if open.is_empty() { Ok(count) } else { Err(format!("left open: {open:?}")) }
 }
 
 /// Writes `charts` and a sheet, and checks that their files are well formed and of one size.
@@ -77,16 +68,9 @@ fn charts_are_well_formed() {
         points("empty <&> list", vec![]),
         points("one point", vec![(7.0, 3.0)]),
         points("constant", vec![(1.0, 0.0), (10.0, 0.0), (100.0, 0.0)]),
-        points(
-            "no number",
-            vec![(f64::NAN, 1.0), (2.0, f64::INFINITY), (-3.0, 1.0), (0.0, 2.0)],
-        ),
+        points("no number", vec![(f64::NAN, 1.0), (2.0, f64::INFINITY), (-3.0, 1.0), (0.0, 2.0)]),
         Chart::default(),
-        Chart {
-            y_range: Some((f64::NAN, 1.0)),
-            claims: vec![claim("", None, None)],
-            ..accuracy("claims")
-        },
+        Chart { y_range: Some((f64::NAN, 1.0)), claims: vec![claim("", None, None)], ..accuracy("claims") },
     ];
     for charts in [&awkward[..], &[], &[accuracy("one"), accuracy("other")]] {
         check("charts", |folder| save_charts(charts, folder, "figure"));
@@ -94,11 +78,7 @@ fn charts_are_well_formed() {
 }
 
 fn claim(label: &str, x: Option<f64>, y: Option<f64>) -> Claim {
-    Claim {
-        label: label.to_owned(),
-        x,
-        y,
-    }
+    Claim { label: label.to_owned(), x, y }
 }
 
 /// A chart of everything: made-up curves, spans, scatter, claims, a range and a published system.
@@ -107,13 +87,7 @@ fn accuracy(title: &str) -> Chart {
         let counts = [2.0, 5.0, 10.0, 20.0, 50.0, 100.0_f64];
         counts.map(|m| (m, level * (1.0 - (-m / rate).exp()))).to_vec()
     };
-    let styles = [
-        Style::Twin,
-        Style::Real,
-        Style::Raster,
-        Style::RasterReal,
-        Style::Baseline,
-    ];
+    let styles = [Style::Twin, Style::Real, Style::Raster, Style::RasterReal, Style::Baseline];
     let styles = styles.into_iter().zip(0_u8..);
     let mut series: Vec<Series> = styles
         .map(|(style, k)| Series::new(format!("made up {k}"), style, k, curve(97.0 - f64::from(k), 7.0)))
@@ -136,11 +110,7 @@ fn accuracy(title: &str) -> Chart {
             claim("made-up level", None, Some(30.0)),
             claim("made-up column", Some(8.0), None),
         ],
-        ranges: vec![StatedRange {
-            label: "made-up range".to_owned(),
-            from: 15.0,
-            to: 20.0,
-        }],
+        ranges: vec![StatedRange { label: "made-up range".to_owned(), from: 15.0, to: 20.0 }],
         published: vec![claim("made-up system", Some(50.0), Some(50.0))],
         ..Chart::default()
     }
@@ -158,10 +128,7 @@ fn heat_tile(values: Vec<f64>, (rows, cols): (usize, usize), max: Option<f64>, c
 }
 
 fn sheet(label: &str, rows: usize, tiles: Vec<Tile>) -> Sheet {
-    let row = |k: usize| TileRow {
-        label: format!("{label} {k}"),
-        tiles: tiles.clone(),
-    };
+    let row = |k: usize| TileRow { label: format!("{label} {k}"), tiles: tiles.clone() };
     Sheet {
         title: "made up".to_owned(),
         column_titles: ["object", "wire", "raster scan"].map(str::to_owned).to_vec(),
@@ -174,26 +141,13 @@ fn sheet(label: &str, rows: usize, tiles: Vec<Tile>) -> Sheet {
 fn sheets_are_well_formed() {
     let values: Vec<f64> = (0..100).map(|k| 31.0 * (f64::from(k) * 0.3).sin()).collect();
     let tiles = vec![
-        Tile::Picture {
-            width: 64,
-            height: 48,
-            rgb: vec![160; 64 * 48 * 3],
-            caption: String::new(),
-        },
-        Tile::Bars {
-            values: vec![0.4, -0.1, f64::NAN],
-            highlight: 1,
-            caption: "first 1 of 3".to_owned(),
-        },
+        Tile::Picture { width: 64, height: 48, rgb: vec![160; 64 * 48 * 3], caption: String::new() },
+        Tile::Bars { values: vec![0.4, -0.1, f64::NAN], highlight: 1, caption: "first 1 of 3".to_owned() },
         Tile::Text("words in a tile".to_owned()),
         Tile::Empty,
         heat_tile(values, (10, 10), None, "M = 10"),
     ];
-    for sheet in [
-        sheet("made-up object", 10, tiles.clone()),
-        sheet("few", 2, tiles),
-        Sheet::default(),
-    ] {
+    for sheet in [sheet("made-up object", 10, tiles.clone()), sheet("few", 2, tiles), Sheet::default()] {
         check("sheet", |folder| save_sheet(&sheet, folder, "figure"));
     }
 }
@@ -211,12 +165,7 @@ fn tiles_with_the_wrong_number_of_values_are_refused() {
 #[test]
 fn images_without_values_are_drawn() {
     let dir = tempfile::tempdir().unwrap();
-    for values in [
-        vec![f64::NAN; 6],
-        vec![0.0; 6],
-        vec![-1.0; 6],
-        vec![1e-12, 0.0, 2e-12, f64::INFINITY, 1.0, 5.0],
-    ] {
+    for values in [vec![f64::NAN; 6], vec![0.0; 6], vec![-1.0; 6], vec![1e-12, 0.0, 2e-12, f64::INFINITY, 1.0, 5.0]] {
         pressure_png(&values, 2, 3, "kPa", 1e-3, "made up", &dir.path().join("map.png")).unwrap();
         let heat = |max| heat_tile(values.clone(), (2, 3), max, "");
         let sheet = sheet("", 1, vec![heat(None), heat(Some(0.0)), heat(Some(f64::NAN))]);
@@ -243,12 +192,7 @@ fn heat_rises_in_luminance() {
         0.2126 * linear(c.0) + 0.7152 * linear(c.1) + 0.0722 * linear(c.2)
     };
     for i in 0..32 {
-        assert!(
-            luminance(i) < luminance(i + 1),
-            "step {i}: {} {}",
-            luminance(i),
-            luminance(i + 1)
-        );
+        assert!(luminance(i) < luminance(i + 1), "step {i}: {} {}", luminance(i), luminance(i + 1));
     }
 }
 

@@ -59,16 +59,8 @@ pub(super) struct SimulatedData {
 }
 
 /// Landing points (row, col) of the drops, spread over the sheet as the recorded ones are.
-const LANDINGS: [[f64; 2]; 8] = [
-    [4.2, 4.5],
-    [4.2, 5.8],
-    [4.5, 5.0],
-    [4.6, 5.7],
-    [3.6, 3.6],
-    [5.7, 3.3],
-    [6.4, 4.8],
-    [2.9, 5.1],
-];
+const LANDINGS: [[f64; 2]; 8] =
+    [[4.2, 4.5], [4.2, 5.8], [4.5, 5.0], [4.6, 5.7], [3.6, 3.6], [5.7, 3.3], [6.4, 4.8], [2.9, 5.1]];
 
 /// Instant on the plateau, as a share of the press.
 const PLATEAU: f64 = 0.58;
@@ -121,9 +113,7 @@ pub(super) fn simulate(seed: u64, size: &ReproductionSize, done: &(dyn Fn() + Sy
         .collect::<Result<Vec<_>, _>>()?;
     let area_m2 = scenes[0].skin().cell_area_m2();
     let twins = scenes.iter().map(Twin::new).collect::<Result<Vec<_>, _>>()?;
-    let drops = twins
-        .par_iter()
-        .map(|twin| twin.presses(0..twin.scene().repeats(), &|| ()));
+    let drops = twins.par_iter().map(|twin| twin.presses(0..twin.scene().repeats(), &|| ()));
     let drops: Vec<_> = drops.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
     // one session of one skin: blocks follow each other as in the published session
     let bounces = twins[0].recorded(&drops, &Acquisition::drops(Mode::Compressive, 0))?;
@@ -141,10 +131,7 @@ pub(super) fn simulate(seed: u64, size: &ReproductionSize, done: &(dyn Fn() + Sy
         },
         drops: drops
             .into_iter()
-            .map(|drop| SimulatedDrop {
-                imbalance: drop.imbalance(area_m2),
-                bounces: drop.bounces,
-            })
+            .map(|drop| SimulatedDrop { imbalance: drop.imbalance(area_m2), bounces: drop.bounces })
             .collect(),
         cols: scenes[0].skin().cols(),
         scene_hash: combined_hash(&hashes),
@@ -171,11 +158,7 @@ fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, Refus
         release_s: 0.95 + 0.013 * index as f64,
         ..DropConfig::default()
     };
-    let config = SceneConfig {
-        seed,
-        drop: Some(ball),
-        ..SceneConfig::default()
-    };
+    let config = SceneConfig { seed, drop: Some(ball), ..SceneConfig::default() };
     Scene::new(config, Path::new(""))
 }
 
@@ -183,10 +166,7 @@ fn drop_scene(landing: [f64; 2], seed: u64, index: usize) -> Result<Scene, Refus
 fn picture(scene: &Scene, time_s: f64) -> Result<Picture, Refusal> {
     debug_assert!(matches!(scene.task(), Task::Press(_)), "drops are not drawn here");
     let mut world = World::new(scene.mechanics())?;
-    let reached = world
-        .frames()
-        .find(|f| f.as_ref().map_or(true, |f| f.time_s >= time_s))
-        .transpose()?;
+    let reached = world.frames().find(|f| f.as_ref().map_or(true, |f| f.time_s >= time_s)).transpose()?;
     debug_assert!(reached.is_some(), "the plateau is within the press");
     let mut renderer = Renderer::new(&world, PICTURE[0], PICTURE[1])?;
     renderer.draw(&world, Camera::Close, None)

@@ -34,18 +34,14 @@ type Draw = fn(&Shown<'_>) -> Drawing;
 
 /// Every figure of the paper: its file, and how it is drawn. `page.toml` has its words.
 pub(super) const FIGURES: &[(&str, Draw)] = &[
-    ("s5_objects.png", |s| {
-        Images(sheets::objects(s.dataset, s.skins, s.correlations))
-    }),
+    ("s5_objects.png", |s| Images(sheets::objects(s.dataset, s.skins, s.correlations))),
     ("3b_classification", |s| Charts(s.skins.fig_3b())),
     ("3c_support", |s| Charts(s.skins.fig_3c())),
     ("3d_frequency", |s| Charts(s.skins.fig_3d(s.timings))),
     ("3e_latency", |s| Charts(s.skins.fig_3e())),
     ("4_adaptive.png", |s| Images(sheets::adaptive(s.skins, s.dataset.cols))),
     ("s4_examples.png", |s| Images(sheets::examples(s.skins, s.dataset.cols))),
-    ("s6_dictionary.png", |s| {
-        Images(sheets::dictionaries(s.skins, s.dataset.cols))
-    }),
+    ("s6_dictionary.png", |s| Images(sheets::dictionaries(s.skins, s.dataset.cols))),
     ("5b_change", |s| Charts(s.skins.fig_5b())),
     ("5c_peak", |s| Charts(s.skins.fig_5c())),
     ("6_localisation", |s| Charts(s.skins.fig_6())),
@@ -67,10 +63,8 @@ pub(super) fn draw(dir: &Path, shown: &Shown<'_>) -> Result<(), Refusal> {
 }
 
 /// Numbers of measurements with which the paper finds small objects reconstructed well enough, and large ones.
-const STATED: [(&str, f64, f64); 2] = [
-    ("paper: 15–20 for small objects", 15.0, 20.0),
-    ("paper: 25–30 for large objects", 25.0, 30.0),
-];
+const STATED: [(&str, f64, f64); 2] =
+    [("paper: 15–20 for small objects", 15.0, 20.0), ("paper: 25–30 for large objects", 25.0, 30.0)];
 /// Numbers of measurements a frame in Fig. 5C, and the hue of each.
 const FRAMES: [(usize, u8); 3] = [(25, 1), (50, 0), (100, 3)];
 /// Locators in Fig. 6: the published ones, the best, and the middle of the sheet, which needs no measurement.
@@ -94,11 +88,7 @@ fn over_m(title: &str, y_label: &str, series: Vec<Series>) -> Chart {
 
 /// Whether curves with this name are of the real skin, and their looks where a chart has one curve for each skin.
 fn skin_curve(whose: &str, points: impl Iterator<Item = (f64, f64)>) -> Series {
-    let (name, style) = if whose.contains("real") {
-        ("real skin", Style::Real)
-    } else {
-        ("twin", Style::Twin)
-    };
+    let (name, style) = if whose.contains("real") { ("real skin", Style::Real) } else { ("twin", Style::Twin) };
     Series::new(name, style, 0, points.collect())
 }
 
@@ -158,19 +148,14 @@ impl BothSkins<'_> {
                 ("paper: at least 0.98 at M = 20", 20.0, 0.98),
             ])
         });
-        votes
-            .chain(self.panels("Single windows", right, |r| r.class_single, &chance))
-            .collect()
+        votes.chain(self.panels("Single windows", right, |r| r.class_single, &chance)).collect()
     }
 
     /// Fig. 3C: support of the reconstruction.
     fn fig_3c(&self) -> Vec<Chart> {
         let empty = self.empty_image(|b| b.support);
         let support = self.panels("Support accuracy", "taxels on the right side", |r| r.support, &empty);
-        let support = support.into_iter().map(|chart| Chart {
-            y_range: Some((0.5, 1.01)),
-            ..chart
-        });
+        let support = support.into_iter().map(|chart| Chart { y_range: Some((0.5, 1.01)), ..chart });
         let nothing = self.empty_image(|b| b.iou);
         let iou = self.panels("Intersection over union", "IoU of the support", |r| r.iou, &nothing);
         support.chain(iou).map(|chart| chart.with_ranges(&STATED)).collect()
@@ -186,26 +171,11 @@ impl BothSkins<'_> {
             let name = format!("acquired, {:.1} kHz as recorded", rate_hz * 1e-3);
             all.push(Series::new(name, Style::Twin, 0, acquired(rate_hz)));
         }
-        let (decoded, paper) = (
-            "decoded, one thread of this machine",
-            "acquired, 70 kHz as in the paper",
-        );
-        all.push(Series::new(
-            decoded,
-            Style::Baseline,
-            0,
-            over(&|t| 1e3 / t.decode_us_median),
-        ));
+        let (decoded, paper) = ("decoded, one thread of this machine", "acquired, 70 kHz as in the paper");
+        all.push(Series::new(decoded, Style::Baseline, 0, over(&|t| 1e3 / t.decode_us_median)));
         all.push(Series::new(paper, Style::Paper, 0, acquired(70e3)));
-        let chart = Chart {
-            y_log: true,
-            y_range: None,
-            ..over_m("Frame rate", "frames a second, thousands", all)
-        };
-        vec![chart.with_claims(&[
-            ("paper: 3500 at M = 20", 20.0, 3.5),
-            ("paper: 5400 at M = 13", 13.0, 5.4),
-        ])]
+        let chart = Chart { y_log: true, y_range: None, ..over_m("Frame rate", "frames a second, thousands", all) };
+        vec![chart.with_claims(&[("paper: 3500 at M = 20", 20.0, 3.5), ("paper: 5400 at M = 13", 13.0, 5.4)])]
     }
 
     /// Fig. 3E: classification over time.
@@ -217,35 +187,22 @@ impl BothSkins<'_> {
         };
         let published = "From 100 frames after contact, as published";
         let published = panel(published, "ms of data", "published", &[25, 50, 100]);
-        let contact = panel(
-            "From first contact, one window",
-            "ms since first contact",
-            "contact",
-            &[25, 100],
-        );
+        let contact = panel("From first contact, one window", "ms since first contact", "contact", &[25, 100]);
         vec![published.with_claims(&[("paper: 80 % in 0.4 ms", 0.4, 0.8)]), contact]
     }
 
     fn latencies(&self, rule: &'static str, measurements: &[usize]) -> Vec<Series> {
         let mut all = Vec::new();
         for (results, whose, _) in self.named() {
-            let (kind, raster) = if whose.contains("real") {
-                (Style::Real, Style::RasterReal)
-            } else {
-                (Style::Twin, Style::Raster)
-            };
+            let (kind, raster) =
+                if whose.contains("real") { (Style::Real, Style::RasterReal) } else { (Style::Twin, Style::Raster) };
             let curve = |decode: &str, m: usize| -> Vec<(f64, f64)> {
                 let rows = results.latency.iter();
                 let of = rows.filter(|r| r.rule == rule && r.decode == decode && r.m == m);
                 of.map(|r| (r.time_ms, r.accuracy)).collect()
             };
             for (variant, &m) in (0_u8..).zip(measurements) {
-                all.push(Series::new(
-                    format!("M = {m}{whose}"),
-                    kind,
-                    variant,
-                    curve("matched", m),
-                ));
+                all.push(Series::new(format!("M = {m}{whose}"), kind, variant, curve("matched", m)));
             }
             let points = curve(RASTER, 100);
             if !points.is_empty() {
@@ -262,16 +219,10 @@ impl BothSkins<'_> {
                 .named()
                 .into_iter()
                 .map(|(results, whose, _)| skin_curve(whose, results.tracking.iter().map(|t| (as_f64(t.m), get(t)))));
-            Chart {
-                x_log: false,
-                y_range: None,
-                ..over_m(title, y_label, curves.collect())
-            }
+            Chart { x_log: false, y_range: None, ..over_m(title, y_label, curves.collect()) }
         };
         let change = "mean change of the largest taxel, V";
-        let frames = panel("Frames in one contact", "mean number of frames", |t| {
-            t.frames_in_contact
-        });
+        let frames = panel("Frames in one contact", "mean number of frames", |t| t.frames_in_contact);
         vec![
             panel("Change from frame to frame", change, |t| t.mean_change_v),
             frames.with_claims(&[("paper: 23 at M = 25", 25.0, 23.0)]),
@@ -292,11 +243,7 @@ impl BothSkins<'_> {
             let chart = Chart {
                 x_label: "ms since first contact".to_owned(),
                 x_log: false,
-                ..over_m(
-                    &title,
-                    "largest taxel, V",
-                    FRAMES.map(|frame| curve(results, frame)).to_vec(),
-                )
+                ..over_m(&title, "largest taxel, V", FRAMES.map(|frame| curve(results, frame)).to_vec())
             };
             chart.with_ranges(&[("paper: contact of about 8 ms", 0.0, 8.0)])
         });
@@ -305,9 +252,7 @@ impl BothSkins<'_> {
         let highest_v = all
             .flat_map(|s| s.points.iter().map(|p| p.1).chain(s.scatter.iter().map(|r| r.2)))
             .fold(0.0, f64::max);
-        panels
-            .iter_mut()
-            .for_each(|chart| chart.y_range = Some((0.0, 1.05 * highest_v)));
+        panels.iter_mut().for_each(|chart| chart.y_range = Some((0.0, 1.05 * highest_v)));
         panels
     }
 
@@ -331,15 +276,8 @@ impl BothSkins<'_> {
         }
         let chart = Chart {
             y_range: None,
-            ..over_m(
-                "Distance of the estimated centre of contact",
-                "mean distance, taxels",
-                all,
-            )
+            ..over_m("Distance of the estimated centre of contact", "mean distance, taxels", all)
         };
-        vec![chart.with_claims(&[
-            ("paper: within 2 at M = 7", 7.0, 2.0),
-            ("paper: 1 at M = 25", 25.0, 1.0),
-        ])]
+        vec![chart.with_claims(&[("paper: within 2 at M = 7", 7.0, 2.0), ("paper: 1 at M = 25", 25.0, 1.0)])]
     }
 }

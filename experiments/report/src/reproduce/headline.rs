@@ -44,8 +44,7 @@ impl Facts<'_> {
     }
 
     fn located(skin: Option<&SkinResults>) -> Option<f64> {
-        skin.and_then(|skin| skin.scores.located(MATCHED, M_FAST))
-            .map(|l| l.mean_px)
+        skin.and_then(|skin| skin.scores.located(MATCHED, M_FAST)).map(|l| l.mean_px)
     }
 
     /// First bounce of every drop, from the mechanics.

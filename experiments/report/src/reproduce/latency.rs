@@ -61,10 +61,7 @@ pub(super) fn latency(skin: &ScoredSkin, decoder: &TrainedDecoder) -> Result<Vec
     let mut rows: Vec<LatencyRow> = keys
         .iter()
         .enumerate()
-        .map(|(i, key)| LatencyRow {
-            accuracy: share(i),
-            ..key.clone()
-        })
+        .map(|(i, key)| LatencyRow { accuracy: share(i), ..key.clone() })
         .collect();
     rows.extend(raster(skin));
     Ok(rows)
@@ -75,13 +72,8 @@ fn keys(rate_hz: f64) -> Vec<LatencyRow> {
     let mut keys = Vec::new();
     for m in LATENCY_MEASUREMENTS {
         let window_s = m as f64 / rate_hz;
-        let row = |rule, time_s: f64| LatencyRow {
-            rule,
-            decode: "matched",
-            m,
-            time_ms: time_s * 1e3,
-            accuracy: f64::NAN,
-        };
+        let row =
+            |rule, time_s: f64| LatencyRow { rule, decode: "matched", m, time_ms: time_s * 1e3, accuracy: f64::NAN };
         let mut end_s = window_s;
         while end_s <= PUBLISHED_SPAN_S {
             keys.push(row("published", end_s));
@@ -92,10 +84,7 @@ fn keys(rate_hz: f64) -> Vec<LatencyRow> {
     keys
 }
 
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "sample indices of one press, far below 2^52 and never negative"
-)]
+#[expect(clippy::cast_possible_truncation, reason = "sample indices of one press, far below 2^52 and never negative")]
 fn press_hits(
     decoder: &TrainedDecoder,
     label: usize,
@@ -145,23 +134,14 @@ fn raster(skin: &ScoredSkin) -> Vec<LatencyRow> {
     let right = |session: &ScoredSession, recording: &Recording, block: usize, frames: usize| {
         let start = onset_frame(recording, block)? + PUBLISHED_DELAY;
         let mut work = Workspace::default();
-        let classify = |frame| {
-            skin.learned
-                .classifier
-                .classify(recording.volts(block, frame), &mut work)
-        };
+        let classify = |frame| skin.learned.classifier.classify(recording.volts(block, frame), &mut work);
         let frames = (start..start + frames).filter(|frame| *frame < recording.frames());
         let votes: Vec<Option<usize>> = frames.map(classify).map(Result::unwrap_or_default).collect();
         Some(majority(&votes) == Some(session.label))
     };
-    let ends = (1..=8)
-        .map(|k| (k, k as f64 * frame_s))
-        .take_while(|(_, t)| *t <= PUBLISHED_SPAN_S);
+    let ends = (1..=8).map(|k| (k, k as f64 * frame_s)).take_while(|(_, t)| *t <= PUBLISHED_SPAN_S);
     let row = |(frames, end_s): (usize, f64)| {
-        let with = skin
-            .sessions
-            .par_iter()
-            .filter_map(|session| Some((session, session.raster.as_ref()?)));
+        let with = skin.sessions.par_iter().filter_map(|session| Some((session, session.raster.as_ref()?)));
         let hits = with.flat_map_iter(|(session, recording)| {
             let presses = session.raster_protocol.presses_of(recording);
             presses.filter_map(move |block| right(session, recording, block, frames))
@@ -204,11 +184,7 @@ pub(super) fn onset_frame(recording: &Recording, block: usize) -> Option<usize> 
     let quiet = median(&(0..idle_frames).map(distance).collect::<Vec<_>>())?;
     let mut run = 0;
     for frame in idle_frames..recording.frames() {
-        run = if distance(frame) > THRESHOLD * quiet {
-            run + 1
-        } else {
-            0
-        };
+        run = if distance(frame) > THRESHOLD * quiet { run + 1 } else { 0 };
         if run == RUN {
             return Some(frame + 1 - RUN);
         }
@@ -231,11 +207,7 @@ mod tests {
                 idle + if i / 4 == 12 || i / 4 >= 20 { 1.0 } else { 0.0 }
             })
             .collect();
-        let block = Block {
-            frame_position: 40,
-            idle_frames: Some(10),
-            volts,
-        };
+        let block = Block { frame_position: 40, idle_frames: Some(10), volts };
         let layout = SkinLayout::new(2, 2, 15e-3, 10e-3).unwrap();
         let weights = Weights::new(WeightMode::Binary, Seeding::Address, 4);
         let recording = Recording::new(RecordingInfo::new(layout, weights, 1e3), vec![block]).unwrap();

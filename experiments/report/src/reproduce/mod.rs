@@ -79,11 +79,7 @@ impl Reproduction {
     /// [`Refusal`] when the recordings cannot be used, the simulation fails, or a file cannot be written.
     pub fn run(&self, progress: &dyn Progress) -> Result<ReproductionSummary, Refusal> {
         let begin = Instant::now();
-        let size = if self.quick {
-            ReproductionSize::quick()
-        } else {
-            ReproductionSize::full()
-        };
+        let size = if self.quick { ReproductionSize::quick() } else { ReproductionSize::full() };
         let mut out = OutputFolder::open(&self.out)?;
         progress.stage("reading recordings", None);
         let real = self.recordings.as_deref().map(PublishedSkin::open).transpose()?;
@@ -97,12 +93,7 @@ impl Reproduction {
         let missing = real.as_ref().map_or_else(Vec::new, |r| r.missing.clone());
         let (comparison, per_object) = match (&self.recordings, &real) {
             (Some(recordings), Some(real)) if !self.quick => {
-                let study = PerObjectStudy {
-                    recordings,
-                    skins: SKINS,
-                    seed: self.seed,
-                    causes: false,
-                };
+                let study = PerObjectStudy { recordings, skins: SKINS, seed: self.seed, causes: false };
                 let comparison = ReadoutSection::run(recordings, real, self.seed, progress)?;
                 (Some(comparison), Some(study.run(progress)?))
             }
@@ -131,10 +122,7 @@ impl Reproduction {
         if let Some(real) = &mut real {
             real.add_common_mean(&common);
         }
-        let skins = BothSkins {
-            twin: &twin,
-            real: real.as_ref(),
-        };
+        let skins = BothSkins { twin: &twin, real: real.as_ref() };
         progress.stage("timing and drawing", None);
         let results = Scored {
             timings: &timings(&twin, &size.measurements, size.timed_decodes)?,
@@ -143,9 +131,7 @@ impl Reproduction {
             per_object: per_object.as_ref(),
             missing: &missing,
         };
-        let summary = self
-            .write(&dataset, &results, begin, &mut out)
-            .map_err(|error| out.unstaged(error))?;
+        let summary = self.write(&dataset, &results, begin, &mut out).map_err(|error| out.unstaged(error))?;
         out.commit()?;
         progress.end();
         Ok(summary)
@@ -160,11 +146,7 @@ impl Reproduction {
         };
         let sessions: Vec<ScoredSession> = dataset.objects.iter().map(scored).collect();
         let learned = Learned::learn(&sessions, &size.learning, dataset.cols, Streams::new(self.seed))?;
-        Ok(ScoredSkin {
-            sessions,
-            bounces: dataset.bounces.compressive().cloned(),
-            learned,
-        })
+        Ok(ScoredSkin { sessions, bounces: dataset.bounces.compressive().cloned(), learned })
     }
 
     fn write(
@@ -174,16 +156,8 @@ impl Reproduction {
         begin: Instant,
         out: &mut OutputFolder,
     ) -> Result<ReproductionSummary, Refusal> {
-        let Scored {
-            skins,
-            comparison,
-            per_object,
-            timings,
-            missing,
-        } = *results;
-        let correlations = skins
-            .real
-            .map_or_else(Vec::new, |real| tables::correlations(skins.twin, real));
+        let Scored { skins, comparison, per_object, timings, missing } = *results;
+        let correlations = skins.real.map_or_else(Vec::new, |real| tables::correlations(skins.twin, real));
 
         let folder = out.folder("tables")?;
         tables::write_skin(&folder, tables::TWIN, skins.twin)?;
@@ -199,12 +173,7 @@ impl Reproduction {
             tables::write_sessions(out, dataset)?;
         }
         let figures = out.folder("figures")?;
-        let shown = Shown {
-            dataset,
-            skins,
-            correlations: &correlations,
-            timings,
-        };
+        let shown = Shown { dataset, skins, correlations: &correlations, timings };
         figures::draw(&figures, &shown)?;
         if let Some(comparison) = comparison {
             comparison.write(&folder, &figures)?;
@@ -214,14 +183,8 @@ impl Reproduction {
             per_object::draw(objects, &figures)?;
         }
         let wall_s = begin.elapsed().as_secs_f64();
-        let headline = Headline::new(&Facts {
-            dataset,
-            skins,
-            per_object,
-            correlations: &correlations,
-            timings,
-            wall_s,
-        });
+        let headline =
+            Headline::new(&Facts { dataset, skins, per_object, correlations: &correlations, timings, wall_s });
         let summary = ReproductionSummary {
             headline,
             provenance: Origin::here(Provenance::new(self.seed, dataset.scene_hash.clone())),
@@ -246,10 +209,8 @@ impl Reproduction {
 /// The moving pictures that are in the folder `figures`.
 fn motion(figures: &Path) -> Vec<PageFigure> {
     let there = MOTION_FIGURES.iter().filter(|m| figures.join(m.file).is_file());
-    let each = there.map(|m| PageFigure {
-        still: Some(m.still.to_owned()),
-        ..PageFigure::new(m.file, m.alt, m.caption)
-    });
+    let each =
+        there.map(|m| PageFigure { still: Some(m.still.to_owned()), ..PageFigure::new(m.file, m.alt, m.caption) });
     each.collect()
 }
 

@@ -120,10 +120,7 @@ pub(super) struct PageContent<'a> {
 pub(super) fn page(content: &PageContent<'_>) -> Page {
     let compared = content.skins.real.is_some();
     let section = |id| section(id, compared);
-    let motion = Section {
-        figures: content.animations.clone(),
-        ..section("motion")
-    };
+    let motion = Section { figures: content.animations.clone(), ..section("motion") };
     let mut objects = section("objects");
     if !content.correlations.is_empty() {
         objects.tables.push(correlations_table(content.correlations));
@@ -141,10 +138,7 @@ pub(super) fn page(content: &PageContent<'_>) -> Page {
         (content.quick, &words.quick),
         (!content.missing.is_empty(), &words.missing),
     ];
-    let summary = summary
-        .into_iter()
-        .filter(|(said, _)| *said)
-        .map(|(_, words)| words.as_str());
+    let summary = summary.into_iter().filter(|(said, _)| *said).map(|(_, words)| words.as_str());
     Page {
         title: WORDS.title.clone(),
         summary: summary.collect(),
@@ -157,32 +151,19 @@ pub(super) fn page(content: &PageContent<'_>) -> Page {
 
 /// The section `id` with its figures.
 pub(super) fn section(id: &str, compared: bool) -> Section {
-    let figures = WORDS
-        .figures
-        .iter()
-        .filter(|figure| figure.section == id)
-        .map(|figure| {
-            let more = figure.compared.as_ref().filter(|_| compared);
-            let caption = more.map_or_else(|| figure.caption.clone(), |more| format!("{} {more}", figure.caption));
-            PageFigure::new(&figure.file, &figure.alt, caption)
-        });
+    let figures = WORDS.figures.iter().filter(|figure| figure.section == id).map(|figure| {
+        let more = figure.compared.as_ref().filter(|_| compared);
+        let caption = more.map_or_else(|| figure.caption.clone(), |more| format!("{} {more}", figure.caption));
+        PageFigure::new(&figure.file, &figure.alt, caption)
+    });
     let found = WORDS.sections.iter().find(|section| section.id == id);
     debug_assert!(found.is_some(), "no section is called {id}");
     let (title, lead) = found.map_or_else(Default::default, |words| {
         let more = if compared { &words.compared } else { &words.alone };
         let best = BEST.map(|name| format!("“{}”", label(name))).join(" and ");
-        (
-            words.title.clone(),
-            words.lead.replace("{best}", &best).replace("{compared}", more),
-        )
+        (words.title.clone(), words.lead.replace("{best}", &best).replace("{compared}", more))
     });
-    Section {
-        id: id.to_owned(),
-        title,
-        lead,
-        figures: figures.collect(),
-        tables: vec![],
-    }
+    Section { id: id.to_owned(), title, lead, figures: figures.collect(), tables: vec![] }
 }
 
 /// A card for every number that the headline has.
@@ -213,9 +194,7 @@ pub(super) fn cards(h: &Headline) -> Vec<Card> {
         ("{least}", say("raster_corr_min", &|r| format!(" The least is {r:.2}."))),
         (
             "{off}",
-            say("press_plateau_error_max_n", &|n| {
-                format!(" No press deviates by more than {n:.3} N while it holds.")
-            }),
+            say("press_plateau_error_max_n", &|n| format!(" No press deviates by more than {n:.3} N while it holds.")),
         ),
     ];
     let card = |words: &CardWords| {
@@ -227,9 +206,7 @@ pub(super) fn cards(h: &Headline) -> Vec<Card> {
             let value = other.text.clone().or_else(|| text(&other.keys))?;
             Some((label(&other.of).to_owned(), value))
         };
-        let note = phrases
-            .iter()
-            .fold(words.note.clone(), |note, (name, phrase)| note.replace(name, phrase));
+        let note = phrases.iter().fold(words.note.clone(), |note, (name, phrase)| note.replace(name, phrase));
         Some(Card {
             label: words.label.clone(),
             of: words.of.clone(),
@@ -252,8 +229,7 @@ fn not_recorded(missing: &[String]) -> Vec<(String, String)> {
         }
     }
     let rows = groups.iter();
-    rows.map(|(what, objects)| (format!("no {what} of"), objects.join(", ")))
-        .collect()
+    rows.map(|(what, objects)| (format!("no {what} of"), objects.join(", "))).collect()
 }
 
 fn origin(summary: &ReproductionSummary) -> Vec<(String, String)> {
@@ -267,10 +243,7 @@ fn origin(summary: &ReproductionSummary) -> Vec<(String, String)> {
         ("processor", m.cpu.clone()),
         ("platform", m.platform.clone()),
         ("threads", m.threads.to_string()),
-        (
-            "wall time",
-            format!("{:.0} s", summary.headline.number("wall_s").unwrap_or_default()),
-        ),
+        ("wall time", format!("{:.0} s", summary.headline.number("wall_s").unwrap_or_default())),
     ]
     .map(|(name, value)| (name.to_owned(), value))
     .to_vec()
@@ -284,38 +257,20 @@ type MeanRow = (&'static str, &'static str, usize, [Option<f64>; 6]);
 
 /// Scores of decoders and baselines, mean over the objects.
 fn means_table(skins: &BothSkins<'_>) -> PageTable {
-    const HEADS: [&str; 6] = [
-        "mean support accuracy",
-        "mean IoU",
-        "mean F1",
-        "mean balanced accuracy",
-        "single windows",
-        "votes of 20",
-    ];
+    const HEADS: [&str; 6] =
+        ["mean support accuracy", "mean IoU", "mean F1", "mean balanced accuracy", "single windows", "votes of 20"];
     let compared = skins.real.is_some();
     let mut shown = vec![("twin", skins.twin, skins.common())];
     if let Some(real) = skins.real {
-        shown.extend([
-            ("real skin", real, skins.common()),
-            ("twin, all 17 objects", skins.twin, "mean"),
-        ]);
+        shown.extend([("real skin", real, skins.common()), ("twin, all 17 objects", skins.twin, "mean")]);
     }
     let mut rows: Vec<MeanRow> = Vec::new();
     for (whose, results, object) in shown {
-        let scored = results
-            .scores
-            .rows
-            .iter()
-            .filter(|r| r.object == object && SHOWN.contains(&r.m));
+        let scored = results.scores.rows.iter().filter(|r| r.object == object && SHOWN.contains(&r.m));
         rows.extend(scored.map(|r| {
             let images = [r.support, r.iou, r.f1, r.balanced_accuracy];
             let [a, b, c, d] = images.map(Some);
-            (
-                whose,
-                r.decode,
-                r.m,
-                [a, b, c, d, Some(r.class_single), Some(r.class_vote20)],
-            )
+            (whose, r.decode, r.m, [a, b, c, d, Some(r.class_single), Some(r.class_vote20)])
         }));
         let level = results.scores.baselines.iter().filter(|b| b.object == object);
         rows.extend(level.map(|b| {
@@ -338,10 +293,7 @@ fn means_table(skins: &BothSkins<'_>) -> PageTable {
     };
     let whose = std::iter::once(TWIN).chain(compared.then_some(REAL));
     let files = whose.flat_map(|whose| [skin_file("scores", whose), skin_file("baselines", whose)]);
-    PageTable {
-        files: files.collect(),
-        ..PageTable::new(caption, &table, "")
-    }
+    PageTable { files: files.collect(), ..PageTable::new(caption, &table, "") }
 }
 
 /// How alike the raster images are.
@@ -384,10 +336,8 @@ mod tests {
         }
         assert!(cards(&Headline::of(f64::NAN)).is_empty());
         let drawn = FIGURES.iter().map(|(file, _)| *file).chain(ELSEWHERE);
-        let (mut drawn, mut told): (Vec<&str>, Vec<&str>) = (
-            drawn.collect(),
-            WORDS.figures.iter().map(|figure| figure.file.as_str()).collect(),
-        );
+        let (mut drawn, mut told): (Vec<&str>, Vec<&str>) =
+            (drawn.collect(), WORDS.figures.iter().map(|figure| figure.file.as_str()).collect());
         drawn.sort_unstable();
         told.sort_unstable();
         assert_eq!(drawn, told);

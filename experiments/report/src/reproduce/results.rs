@@ -75,17 +75,7 @@ impl SkinResults {
             traces = self::traces(recording, &bounces, &matched)?;
         }
         let tracking = tracking(&bounces, &traces);
-        Ok(Self {
-            skin,
-            scores,
-            matched,
-            best,
-            latency,
-            places,
-            bounces,
-            traces,
-            tracking,
-        })
+        Ok(Self { skin, scores, matched, best, latency, places, bounces, traces, tracking })
     }
 
     /// Objects with a compressive session.
@@ -104,13 +94,7 @@ impl SkinResults {
             let of: Vec<BaselineRow> = found.filter(|b| objects.contains(&b.object)).cloned().collect();
             self.scores.baselines.extend(mean_baseline(&of, baseline));
         }
-        let rows: Vec<_> = self
-            .scores
-            .rows
-            .iter()
-            .filter(|r| objects.contains(&r.object))
-            .cloned()
-            .collect();
+        let rows: Vec<_> = self.scores.rows.iter().filter(|r| objects.contains(&r.object)).cloned().collect();
         self.scores.rows.extend(mean_rows(&rows).into_iter().map(|mut row| {
             MEAN_COMMON.clone_into(&mut row.object);
             row
@@ -159,9 +143,7 @@ pub(super) fn best<'a>(
     }
     let data = TrainingData::new(&presses, cols, Vec::new(), streams)?;
     let specs = BEST.iter().filter_map(|name| find(name));
-    specs
-        .map(|spec| Ok((spec.name, TrainedDecoder::new(spec, &data)?)))
-        .collect()
+    specs.map(|spec| Ok((spec.name, TrainedDecoder::new(spec, &data)?))).collect()
 }
 
 /// Size of a reproduction.
@@ -193,19 +175,12 @@ impl ReproductionSize {
         let protocol = Protocol::default();
         Self {
             raster_presses: 10,
-            learning: Learning {
-                presses: 0..5,
-                training_images: 1500,
-                sweeps: 15,
-            },
+            learning: Learning { presses: 0..5, training_images: 1500, sweeps: 15 },
             compressive_presses: 10,
             measurements: MEASUREMENTS.to_vec(),
             localisation: MEASUREMENTS.to_vec(),
             timed_decodes: 2000,
-            protocol: Protocol {
-                first_press: 0,
-                ..protocol
-            },
+            protocol: Protocol { first_press: 0, ..protocol },
             raster_protocol: protocol,
             real_protocol: protocol,
         }
@@ -213,19 +188,10 @@ impl ReproductionSize {
 
     /// A look at everything in a minute: fewer presses, windows and numbers of measurements.
     pub(super) fn quick() -> Self {
-        let few = Protocol {
-            presses: 2,
-            max_windows: 60,
-            support_stride: 20,
-            ..Protocol::default()
-        };
+        let few = Protocol { presses: 2, max_windows: 60, support_stride: 20, ..Protocol::default() };
         Self {
             raster_presses: 3,
-            learning: Learning {
-                presses: 0..2,
-                training_images: 500,
-                sweeps: 5,
-            },
+            learning: Learning { presses: 0..2, training_images: 500, sweeps: 5 },
             compressive_presses: 2,
             measurements: vec![5, 10, 20, 25, 50, 100],
             localisation: vec![5, 7, 10, 15, 20, 25, 50, 100],
@@ -263,11 +229,7 @@ pub(super) fn timings(twin: &SkinResults, measurements: &[usize], decodes: usize
     let mut rows = Vec::new();
     for &m in measurements {
         if let Some(decode_us_median) = decode_us(&twin.matched, &press, m, decodes)? {
-            rows.push(TimingRow {
-                m,
-                decode_us_median,
-                acquire_us: m as f64 / recording.sample_rate_hz() * 1e6,
-            });
+            rows.push(TimingRow { m, decode_us_median, acquire_us: m as f64 / recording.sample_rate_hz() * 1e6 });
         }
     }
     Ok(rows)
@@ -292,10 +254,7 @@ impl BothSkins<'_> {
     pub(super) fn named(&self) -> Vec<(&SkinResults, &'static str, Stroke)> {
         match self.real {
             None => vec![(self.twin, "", Stroke::Solid)],
-            Some(real) => vec![
-                (self.twin, ", twin", Stroke::Solid),
-                (real, ", real skin", Stroke::Dashed),
-            ],
+            Some(real) => vec![(self.twin, ", twin", Stroke::Solid), (real, ", real skin", Stroke::Dashed)],
         }
     }
 }

@@ -22,14 +22,7 @@ const FRAME: usize = 560;
 const ATOMS: usize = 40;
 
 fn heat(values: &[f64], cols: usize, caption: String, outline: Option<Vec<bool>>) -> Tile {
-    Tile::Heat {
-        values: values.to_vec(),
-        rows: values.len() / cols.max(1),
-        cols,
-        max: None,
-        caption,
-        outline,
-    }
+    Tile::Heat { values: values.to_vec(), rows: values.len() / cols.max(1), cols, max: None, caption, outline }
 }
 
 fn find<'a>(results: &'a SkinResults, object: &str) -> Option<&'a ScoredSession> {
@@ -62,11 +55,7 @@ impl ShownWindow {
             let answer = scorer.answers(&[press.window(0, m)?]).ok()?.pop()?;
             images.push((m, answer.image));
         }
-        Some(Self {
-            images,
-            y: press.window(0, longest)?.y.to_vec(),
-            truth: session.truth(block)?,
-        })
+        Some(Self { images, y: press.window(0, longest)?.y.to_vec(), truth: session.truth(block)? })
     }
 
     fn images(&self, cols: usize) -> impl Iterator<Item = Tile> + '_ {
@@ -87,12 +76,7 @@ pub(super) fn objects(dataset: &SimulatedData, skins: &BothSkins<'_>, correlatio
     let rows = dataset.objects.iter().map(|object| {
         let name = &object.session.object;
         let scene = match &object.picture {
-            Ok(p) => Tile::Picture {
-                width: p.width,
-                height: p.height,
-                rgb: p.rgb.clone(),
-                caption: String::new(),
-            },
+            Ok(p) => Tile::Picture { width: p.width, height: p.height, rgb: p.rgb.clone(), caption: String::new() },
             Err(reason) => Tile::Text(format!("not rendered: {reason}")),
         };
         let peak_kpa = object.pressure_pa.iter().copied().fold(0.0, f64::max) * 1e-3;
@@ -112,10 +96,7 @@ pub(super) fn objects(dataset: &SimulatedData, skins: &BothSkins<'_>, correlatio
                 heat(&image, cols, caption, None)
             }));
         }
-        TileRow {
-            label: object_label(name).to_owned(),
-            tiles,
-        }
+        TileRow { label: object_label(name).to_owned(), tiles }
     });
     let mut titles = vec!["object", "pressure", "raster image"];
     if skins.real.is_some() {
@@ -147,10 +128,7 @@ pub(super) fn adaptive(skins: &BothSkins<'_>, cols: usize) -> Sheet {
                     highlight: *m,
                     caption: String::new(),
                 });
-                rows.push(TileRow {
-                    label: format!("{title}: the wire"),
-                    tiles: bars.chain([Tile::Empty]).collect(),
-                });
+                rows.push(TileRow { label: format!("{title}: the wire"), tiles: bars.chain([Tile::Empty]).collect() });
             }
             rows.push(TileRow {
                 label: format!("{title}: {name}"),
@@ -166,10 +144,7 @@ pub(super) fn adaptive(skins: &BothSkins<'_>, cols: usize) -> Sheet {
             add(", real skin", "rec", real);
         }
     }
-    let titles = PROGRESS
-        .iter()
-        .map(|m| format!("M = {m}"))
-        .chain(["raster image".to_owned()]);
+    let titles = PROGRESS.iter().map(|m| format!("M = {m}")).chain(["raster image".to_owned()]);
     Sheet {
         title: "Images from the first M of 15 measurements".to_owned(),
         column_titles: titles.collect(),
@@ -195,15 +170,8 @@ pub(super) fn examples(skins: &BothSkins<'_>, cols: usize) -> Sheet {
             }
         }
     }
-    let titles = ["raster image".to_owned()]
-        .into_iter()
-        .chain(EXAMPLES.iter().map(|m| format!("M = {m}")));
-    Sheet {
-        title: "Images at several M".to_owned(),
-        column_titles: titles.collect(),
-        rows,
-        tile_px: 80,
-    }
+    let titles = ["raster image".to_owned()].into_iter().chain(EXAMPLES.iter().map(|m| format!("M = {m}")));
+    Sheet { title: "Images at several M".to_owned(), column_titles: titles.collect(), rows, tile_px: 80 }
 }
 
 /// Fig. S6: dictionaries.
@@ -229,19 +197,11 @@ pub(super) fn dictionaries(skins: &BothSkins<'_>, cols: usize) -> Sheet {
             add("published, ", &real.skin.learned.dictionary.atoms);
         }
     }
-    Sheet {
-        title: "First atoms of the learned dictionary".to_owned(),
-        column_titles: vec![],
-        rows,
-        tile_px: 72,
-    }
+    Sheet { title: "First atoms of the learned dictionary".to_owned(), column_titles: vec![], rows, tile_px: 72 }
 }
 
 /// An atom with the sign that makes its largest entry positive.
 fn signed(atom: &[f64]) -> Vec<f64> {
-    let largest = atom
-        .iter()
-        .copied()
-        .fold(0.0_f64, |a, v| if v.abs() > a.abs() { v } else { a });
+    let largest = atom.iter().copied().fold(0.0_f64, |a, v| if v.abs() > a.abs() { v } else { a });
     atom.iter().map(|v| v * largest.signum()).collect()
 }

@@ -73,10 +73,8 @@ pub(super) fn write_skin(dir: &Path, whose: &str, results: &SkinResults) -> Resu
     write_table(&path("latency"), &results.latency)?;
     write_table(&path("places"), &results.places)?;
     write_table(&path("bounce_traces"), &results.traces)?;
-    let courses: Vec<CourseRow> = TRACKING_MEASUREMENTS
-        .iter()
-        .flat_map(|&m| over_bounces(&results.traces, m))
-        .collect();
+    let courses: Vec<CourseRow> =
+        TRACKING_MEASUREMENTS.iter().flat_map(|&m| over_bounces(&results.traces, m)).collect();
     write_table(&path("bounce_courses"), &courses)?;
     write_table(&path("bounce_tracking"), &results.tracking)
 }
@@ -128,23 +126,13 @@ pub(super) fn write_arrays(dir: &Path, dataset: &SimulatedData, twin: &SkinResul
         let taxels = maps.first().map_or(0, Vec::len);
         write_npy(&dir.join(name), &[maps.len(), taxels / cols, cols], &maps.concat())
     };
-    stack(
-        "pressure_pa.npy",
-        dataset.objects.iter().map(|o| o.pressure_pa.clone()).collect(),
-    )?;
-    let rasters = dataset
-        .objects
-        .iter()
-        .filter_map(|o| o.session.raster().map(median_image));
+    stack("pressure_pa.npy", dataset.objects.iter().map(|o| o.pressure_pa.clone()).collect())?;
+    let rasters = dataset.objects.iter().filter_map(|o| o.session.raster().map(median_image));
     stack("median_raster_v.npy", rasters.collect())?;
     let dictionary = &twin.skin.learned.dictionary.atoms;
     let images = twin.skin.learned.classifier.library().images();
     for (name, matrix) in [("dictionary.npy", dictionary), ("library.npy", images)] {
-        write_npy(
-            &dir.join(name),
-            &[matrix.nrows(), matrix.ncols()],
-            matrix.view().values(),
-        )?;
+        write_npy(&dir.join(name), &[matrix.nrows(), matrix.ncols()], matrix.view().values())?;
     }
     let labels = twin.skin.learned.classifier.library().labels();
     let labels: Vec<f64> = labels.iter().map(|&label| label as f64).collect();

@@ -60,12 +60,7 @@ pub(super) fn traces(
             for (begin, answer) in begins.iter().zip(scorer.answers(&windows)?) {
                 let peak_v = WEIGHT_SCALE * answer.image.iter().copied().fold(0.0, f64::max);
                 let time_s = ((start + begin + m) as f64 - bounce.start as f64) / recording.sample_rate_hz();
-                rows.push(TraceRow {
-                    bounce: index,
-                    m,
-                    time_ms: time_s * 1e3,
-                    peak_v,
-                });
+                rows.push(TraceRow { bounce: index, m, time_ms: time_s * 1e3, peak_v });
             }
         }
         Ok(rows)
@@ -83,11 +78,8 @@ pub(super) fn tracking(bounces: &[RecordedBounce], traces: &[TraceRow]) -> Vec<T
         .map(|&m| {
             let (mut change, mut count) = (0.0, 0.0);
             for index in 0..bounces.len() {
-                let peaks: Vec<f64> = traces
-                    .iter()
-                    .filter(|r| r.bounce == index && r.m == m)
-                    .map(|r| r.peak_v)
-                    .collect();
+                let peaks: Vec<f64> =
+                    traces.iter().filter(|r| r.bounce == index && r.m == m).map(|r| r.peak_v).collect();
                 for pair in peaks.windows(2) {
                     change += (pair[1] - pair[0]).abs();
                     count += 1.0;
@@ -132,14 +124,7 @@ pub(super) fn over_bounces(traces: &[TraceRow], m: usize) -> Vec<CourseRow> {
     kept.map(|group| {
         let peaks: Vec<f64> = group.iter().map(|t| t.peak_v).collect();
         let [low_v, median_v, high_v] = [0.25, 0.5, 0.75].map(|share| quantile(&peaks, share).unwrap_or_default());
-        CourseRow {
-            m,
-            time_ms: group[0].time_ms,
-            bounces: group.len(),
-            low_v,
-            median_v,
-            high_v,
-        }
+        CourseRow { m, time_ms: group[0].time_ms, bounces: group.len(), low_v, median_v, high_v }
     })
     .collect()
 }
@@ -152,12 +137,7 @@ mod tests {
     /// Four bounces with peaks 1 to 4 V; one frame that a single bounce has is left out.
     #[test]
     fn courses_are_quartiles_over_the_bounces() {
-        let trace = |bounce: usize, time_ms: f64, peak_v: f64| TraceRow {
-            bounce,
-            m: 25,
-            time_ms,
-            peak_v,
-        };
+        let trace = |bounce: usize, time_ms: f64, peak_v: f64| TraceRow { bounce, m: 25, time_ms, peak_v };
         let mut traces: Vec<TraceRow> = (0..4).map(|b| trace(b, 0.4, [3.0, 1.0, 4.0, 2.0][b])).collect();
         traces.push(trace(0, 9.0, 7.0));
         let courses = over_bounces(&traces, 25);

@@ -46,25 +46,16 @@ pub enum CellFault {
 impl std::fmt::Display for CellFault {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {
-            Self::MisSeeded {
-                taxel,
-                seed,
-                amplitude_v,
-            } => {
+            Self::MisSeeded { taxel, seed, amplitude_v } => {
                 let (cell, hint) = match taxel {
                     Some(taxel) => (format!("taxel {taxel}"), ""),
                     None => ("some taxel".to_owned(), "; a raster session would say which"),
                 };
                 write!(f, "{cell} runs on seed {seed}, amplitude {amplitude_v:.3} V{hint}")
             }
-            Self::Lagging {
-                taxel,
-                lag,
-                amplitude_v,
-            } => write!(
-                f,
-                "taxel {taxel} is {lag} measurements behind its sequence, amplitude {amplitude_v:.3} V"
-            ),
+            Self::Lagging { taxel, lag, amplitude_v } => {
+                write!(f, "taxel {taxel} is {lag} measurements behind its sequence, amplitude {amplitude_v:.3} V")
+            }
         }
     }
 }
@@ -87,11 +78,7 @@ pub(super) fn find(
     let first_row = recording.first_row(block, hold.start);
     let limit = OUTLIER_SD * robust_sd(&window.residual_v).unwrap_or(0.0);
     // NaN is not within the limit
-    let core: Vec<f64> = window
-        .residual_v
-        .iter()
-        .map(|r| if r.abs() <= limit { *r } else { 0.0 })
-        .collect();
+    let core: Vec<f64> = window.residual_v.iter().map(|r| if r.abs() <= limit { *r } else { 0.0 }).collect();
     let power: f64 = core.iter().map(|r| r * r).sum();
     let norm_v = window.image.iter().map(|x| x * x).sum::<f64>().sqrt();
     let weights = recording.weights();
@@ -107,20 +94,14 @@ pub(super) fn find(
         sum
     };
     let taxels = u32::try_from(recording.taxels()).unwrap_or(u32::MAX);
-    let own: Vec<u32> = (0..recording.taxels())
-        .filter_map(|taxel| weights.seed(taxel))
-        .collect();
+    let own: Vec<u32> = (0..recording.taxels()).filter_map(|taxel| weights.seed(taxel)).collect();
     let (mut faults, mut taken) = (Vec::new(), Vec::new());
     for seed in (0..SEEDS).filter(|seed| !own.contains(seed)) {
         let sum = correlate(seed, first_row);
         if believed(sum) {
             let taxel = raster.and_then(|r| missing(&window.image, r, &taken));
             taken.extend(taxel);
-            faults.push(CellFault::MisSeeded {
-                taxel,
-                seed,
-                amplitude_v: sum / n,
-            });
+            faults.push(CellFault::MisSeeded { taxel, seed, amplitude_v: sum / n });
         }
     }
     for taxel in 0..taxels {
@@ -131,11 +112,7 @@ pub(super) fn find(
         for lag in (TAPS as u64 + 1..=LAGS).filter(|lag| *lag <= first_row) {
             let sum = correlate(seed, first_row - lag);
             if believed(sum) {
-                faults.push(CellFault::Lagging {
-                    taxel,
-                    lag,
-                    amplitude_v: sum / n,
-                });
+                faults.push(CellFault::Lagging { taxel, lag, amplitude_v: sum / n });
             }
         }
     }
@@ -159,11 +136,7 @@ impl CellFault {
     /// The cell, if it runs with another seed and its taxel is known.
     pub(super) fn reseeded(&self) -> Option<Reseeded> {
         match *self {
-            Self::MisSeeded {
-                taxel: Some(taxel),
-                seed,
-                ..
-            } => Some(Reseeded { taxel, seed }),
+            Self::MisSeeded { taxel: Some(taxel), seed, .. } => Some(Reseeded { taxel, seed }),
             _ => None,
         }
     }
@@ -285,12 +258,7 @@ fn samples(recording: &Recording, hold: &Range<usize>, blocks: &[usize], cell: R
             for (i, &residual_v) in window.residual_v.iter().enumerate() {
                 let level = analog.level_from_seed(cell.seed, first_row + i as u64);
                 let binary_v = if level > 0.0 { x } else { -x };
-                out.push(Sample {
-                    residual_v,
-                    binary_v,
-                    level,
-                    before,
-                });
+                out.push(Sample { residual_v, binary_v, level, before });
                 before = level;
             }
         }
@@ -354,10 +322,7 @@ pub(super) fn gains(compressive_v: &[f64], raster_v: &[f64], faulty: &[usize]) -
     let logs: Vec<f64> = loaded.iter().map(|(_, log)| *log).collect();
     let (centre, freedom) = (mean(&logs), logs.len() as f64 - 1.0);
     let log_sd = sd(&logs) * (logs.len() as f64 / freedom).sqrt();
-    let relative = |(taxel, log): (usize, f64)| TaxelGain {
-        taxel,
-        gain: (log - centre).exp(),
-    };
+    let relative = |(taxel, log): (usize, f64)| TaxelGain { taxel, gain: (log - centre).exp() };
     Some(SessionGains {
         taxels: loaded.into_iter().map(relative).collect(),
         log_sd,

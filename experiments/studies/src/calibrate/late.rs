@@ -128,10 +128,7 @@ impl Late {
     pub(super) fn cells(&self) -> Vec<Counts> {
         let other = self.unexplained().clamp(0.0, 1.0);
         let other = if other.is_nan() { 0.0 } else { other };
-        let cell = |c: &Counts| Counts {
-            chance: other * c.chance,
-            ..*c
-        };
+        let cell = |c: &Counts| Counts { chance: other * c.chance, ..*c };
         self.counts.iter().map(cell).collect()
     }
 
@@ -186,10 +183,7 @@ impl Late {
 /// Error of taxel `k` at measurement `TAPS + i` of the window if it does not flip in time, V; `None` when it does not
 /// flip.
 fn full(window: &FitWindow, k: usize, i: usize) -> Option<f64> {
-    let (before, now) = (
-        window.design.is_plus(k, TAPS + i - 1),
-        window.design.is_plus(k, TAPS + i),
-    );
+    let (before, now) = (window.design.is_plus(k, TAPS + i - 1), window.design.is_plus(k, TAPS + i));
     let full_v = 2.0 * window.image[k];
     (before != now).then_some(if before { full_v } else { -full_v })
 }
@@ -246,12 +240,7 @@ pub(super) fn beat(taxel: usize, presses: &[Vec<u64>]) -> Option<Beat> {
     }
     let prominence = best.1 / (total / tried);
     let least = chance_prominence(presses.len(), FALSE_ALARM / tried).max(PROMINENCE);
-    (prominence > least).then_some(Beat {
-        taxel,
-        events,
-        period_measurements: best.0,
-        prominence,
-    })
+    (prominence > least).then_some(Beat { taxel, events, period_measurements: best.0, prominence })
 }
 
 /// Prominence that one period reaches with the given chance when the rows are random: the power of a press is then

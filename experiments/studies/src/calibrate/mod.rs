@@ -96,11 +96,7 @@ pub fn read(root: &Path) -> Result<Vec<SessionPair>, Refusal> {
             object: session.object.clone(),
             compressive: compressive.clone(),
             hold: held,
-            slips: slips
-                .iter()
-                .filter(|slip| slip.session == session.name)
-                .cloned()
-                .collect(),
+            slips: slips.iter().filter(|slip| slip.session == session.name).cloned().collect(),
             raster: raster.and_then(|r| Some((r.recording.clone(), held_frames(r, session.hold_s)?))),
         });
     }
@@ -124,11 +120,7 @@ fn held_frames(recorded: &Recorded, hold_s: Option<[f64; 2]>) -> Option<Range<us
     let held = scored.first_frame..scored.first_frame + scored.frames;
     let published = Protocol::default();
     let published = published.first_frame..(published.first_frame + published.frames).min(recording.frames());
-    Some(if held == published && held.end >= PLATEAU.end {
-        PLATEAU
-    } else {
-        held
-    })
+    Some(if held == published && held.end >= PLATEAU.end { PLATEAU } else { held })
 }
 
 /// Settings of `spts calibrate`: which sessions and presses the readout is fitted to.
@@ -327,10 +319,8 @@ impl SessionEstimates {
         let contact = raster.and_then(|(raster, hold)| mean_contact(raster, hold));
         let faults = cells::find(recording, hold, contact.as_deref(), blocks);
         let cells = reseeded(&faults);
-        let overdriven: Vec<Overdriven> = cells
-            .iter()
-            .filter_map(|cell| cells::fit(recording, hold, blocks, *cell))
-            .collect();
+        let overdriven: Vec<Overdriven> =
+            cells.iter().filter_map(|cell| cells::fit(recording, hold, blocks, *cell)).collect();
         let analysed: Vec<(usize, PressAnalysis)> = blocks
             .par_iter()
             .filter_map(|&block| Some((block, analyse(recording, hold, block, &cells, &overdriven)?)))
@@ -402,9 +392,7 @@ fn late_cells(analysed: &[(usize, PressAnalysis)]) -> Vec<LateCell> {
     let taxels = analysed.first().map_or(0, |(_, press)| press.late.len());
     (0..taxels)
         .filter_map(|k| {
-            let sum = analysed
-                .iter()
-                .fold(Counts::default(), |sum, (_, press)| sum.plus(press.late[k]));
+            let sum = analysed.iter().fold(Counts::default(), |sum, (_, press)| sum.plus(press.late[k]));
             sum.cell(k)
         })
         .collect()
@@ -418,12 +406,7 @@ fn beats(analysed: &[(usize, PressAnalysis)]) -> Vec<Beat> {
     let mut taxels: Vec<usize> = (0..image.len()).collect();
     taxels.sort_by(|a, b| image[*b].total_cmp(&image[*a]));
     let rows = |taxel: usize, press: &PressAnalysis| -> Vec<u64> {
-        press
-            .events
-            .iter()
-            .filter(|(k, _)| *k == taxel)
-            .map(|(_, row)| *row)
-            .collect()
+        press.events.iter().filter(|(k, _)| *k == taxel).map(|(_, row)| *row).collect()
     };
     taxels
         .into_par_iter()

@@ -85,10 +85,7 @@ pub(super) fn analyse(
         // what the fit took out of the noise is put back: every window then has the noise's own standard deviation
         move |v: f64| v / left_over
     };
-    let residual_v: Vec<f64> = windows
-        .iter()
-        .flat_map(|w| w.residual_v.iter().copied().map(whole(w)))
-        .collect();
+    let residual_v: Vec<f64> = windows.iter().flat_map(|w| w.residual_v.iter().copied().map(whole(w))).collect();
     let windows: Vec<FitWindow> = windows.into_iter().map(|w| without_overdriven(w, overdriven)).collect();
     let taps = taps(&windows);
     let mut clean_v = Vec::new();
@@ -108,10 +105,7 @@ pub(super) fn analyse(
     }
     let idle_volts = &recording.blocks()[block].volts[..idle_frames * recording.measurements_per_frame()];
     let (idle_noise_v, idle_sum_v) = (sd(&idle.residual_v) / idle.left_over, idle.image.iter().sum::<f64>());
-    let (sum_v, norm_v) = (
-        image.iter().sum::<f64>(),
-        image.iter().map(|x| x * x).sum::<f64>().sqrt(),
-    );
+    let (sum_v, norm_v) = (image.iter().sum::<f64>(), image.iter().map(|x| x * x).sum::<f64>().sqrt());
     let (offset_v, parity_v) = (over_windows(&|w| w.offset_v), over_windows(&|w| w.parity_v));
     let [h1, h2, h3] = taps;
     // the press must raise Σx, and reach an ‖x‖₂, by more than the noise of one measurement
@@ -150,13 +144,7 @@ pub(super) fn analyse(
         ("unexplained_outliers", late.unexplained()),
         ("contact_fraction", contact_fraction),
     ]);
-    Some(PressAnalysis {
-        numbers,
-        image,
-        late: late.cells(),
-        events: late.events,
-        clean_v,
-    })
+    Some(PressAnalysis { numbers, image, late: late.cells(), events: late.events, clean_v })
 }
 
 /// The window less what `cells` add beyond ±1.
@@ -171,11 +159,7 @@ fn without_overdriven(mut window: FitWindow, cells: &[Overdriven]) -> FitWindow 
 
 /// Share of the finite `values` whose absolute value is beyond `limit`.
 fn share_beyond(values: &[f64], limit: f64) -> f64 {
-    let beyond: Vec<f64> = values
-        .iter()
-        .filter(|v| v.is_finite())
-        .map(|v| f64::from(v.abs() > limit))
-        .collect();
+    let beyond: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|v| f64::from(v.abs() > limit)).collect();
     mean(&beyond)
 }
 

@@ -89,11 +89,7 @@ impl FittedReadout {
     /// The profile as TOML. Parameters that the recordings do not determine are taken from the TOML table `base`.
     fn to_toml(&self, base: &toml::Table) -> Result<String, toml::ser::Error> {
         let mut out = self.header();
-        let kept = |key: &str| {
-            base.get(key)
-                .map(|v| format!("{key} = {v}  # kept\n"))
-                .unwrap_or_default()
-        };
+        let kept = |key: &str| base.get(key).map(|v| format!("{key} = {v}  # kept\n")).unwrap_or_default();
         let weights = self.weights_lines(base)?;
         out.push_str(&weights.unwrap_or_else(|| kept("weights")));
         out.push_str(&self.rate_line(base));
@@ -111,19 +107,14 @@ impl FittedReadout {
             if let Some(span) = value.span {
                 line(format!("{key} = {}  # {}", span_text(span), words(&value.estimate)));
             } else if let Some(kept) = kept(effect, key) {
-                line(format!(
-                    "{key} = {kept}  # kept: not identified, no press says anything about it"
-                ));
+                line(format!("{key} = {kept}  # kept: not identified, no press says anything about it"));
             }
             match self.beat {
                 _ if key != "rate" => {}
                 Some(beat) => {
                     let (period, error) = (beat.value, error_text(beat, 1.0, 2));
                     let sd = self.beat_sd.min(0.1 * period);
-                    line(format!(
-                        "period_measurements = {period:.2}  # mean{error}, {} beats of cells",
-                        beat.n
-                    ));
+                    line(format!("period_measurements = {period:.2}  # mean{error}, {} beats of cells", beat.n));
                     line(format!("period_sd_measurements = {sd:.2}"));
                 }
                 None => {
@@ -410,12 +401,7 @@ fn fitted(&(name, number, limits): &Parameter, sessions: &[SessionEstimates]) ->
     if name == LATE_RATE && sessions.len() > 1 {
         span = late_span(estimate.value, sessions).or(span);
     }
-    FittedParameter {
-        name,
-        span,
-        sessions: values,
-        estimate,
-    }
+    FittedParameter { name, span, sessions: values, estimate }
 }
 
 /// Whether every session lies in the spans that the others predict; of the late rate, its mean over the taxels. `None`

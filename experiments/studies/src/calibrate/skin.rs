@@ -76,19 +76,9 @@ impl SkinStudy {
         }
         let mountings = mountings(root, progress)?;
         let logs: Vec<f64> = mountings.iter().map(|m| m.log_sd).collect();
-        let mounting_log_sd = if logs.is_empty() {
-            VelostatConfig::default().session_log_sd
-        } else {
-            middle(&logs)
-        };
-        let skins = Skins {
-            skins: PRESSES,
-            ..Skins::median(source.layout)
-        };
-        progress.stage(
-            "simulating presses",
-            Some(PRESSES * spts_contact::objects::OBJECTS.len()),
-        );
+        let mounting_log_sd = if logs.is_empty() { VelostatConfig::default().session_log_sd } else { middle(&logs) };
+        let skins = Skins { skins: PRESSES, ..Skins::median(source.layout) };
+        progress.stage("simulating presses", Some(PRESSES * spts_contact::objects::OBJECTS.len()));
         let simulated = skins.press(self.seed, &|| progress.step());
         progress.end();
         let simulated = images(&simulated.map_err(unknown_gains)?, &|_| true)?;
@@ -107,22 +97,14 @@ impl SkinStudy {
                 continue;
             };
             if let Some(check) = others.check(&own.images().column(0), &simulated.images().column(k)) {
-                objects.push(ObjectCheck {
-                    object: session.object.clone(),
-                    check,
-                });
+                objects.push(ObjectCheck { object: session.object.clone(), check });
             }
         }
         Ok(SkinReport {
             shape: [source.layout.rows(), source.layout.cols()],
             skin: estimate(&|_| true)?,
             mountings,
-            scored: source
-                .sessions
-                .iter()
-                .filter(|s| falls_back(s))
-                .map(|s| s.name.clone())
-                .collect(),
+            scored: source.sessions.iter().filter(|s| falls_back(s)).map(|s| s.name.clone()).collect(),
             objects,
         })
     }
@@ -152,10 +134,7 @@ fn presses(session: &ScoredSession) -> Option<TrainingPresses<'_>> {
 
 /// What a mounting changes, from every session with both recordings of one object.
 fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Mounting>, Refusal> {
-    let study = CalibrationStudy {
-        session: None,
-        presses: Some(MOUNTED_PRESSES),
-    };
+    let study = CalibrationStudy { session: None, presses: Some(MOUNTED_PRESSES) };
     // the recordings in `root` have been read before: those that are refused now are none to fit a readout to
     let Ok(pairs) = read(root) else { return Ok(Vec::new()) };
     let sessions = study.fit_all(pairs, progress)?.sessions;
@@ -177,10 +156,7 @@ impl SkinReport {
     /// [`Refusal`], which no gains should cause.
     pub fn toml(&self) -> Result<String, Refusal> {
         let [rows, cols] = self.shape;
-        let gains = TaxelGains {
-            shape: Some(self.shape),
-            ..self.skin.gains.clone()
-        };
+        let gains = TaxelGains { shape: Some(self.shape), ..self.skin.gains.clone() };
         let gains = toml::to_string(&gains).map_err(unknown_gains)?;
         Ok(format!(
             "# Gains of the taxels of a skin of {rows} x {cols} taxels, row by row: mean and standard deviation of their logarithms,\n\
@@ -189,19 +165,14 @@ impl SkinReport {
             self.skin.fitted_objects,
             self.skin.spread_log_sd,
             self.skin.contact_log_sd,
-            self.scored_text()
-                .map_or_else(String::new, |text| format!("# {text}\n")),
+            self.scored_text().map_or_else(String::new, |text| format!("# {text}\n")),
         ))
     }
 
     /// Text about sessions whose scored presses were used; `None` if there are none.
     pub fn scored_text(&self) -> Option<String> {
-        (!self.scored.is_empty()).then(|| {
-            format!(
-                "fitted to presses that are scored, as there are no others: {}",
-                self.scored.join(", ")
-            )
-        })
+        (!self.scored.is_empty())
+            .then(|| format!("fitted to presses that are scored, as there are no others: {}", self.scored.join(", ")))
     }
 
     /// Uncertainty of the gains, one factor a taxel, row by row: with a probability of 90 %, the true gain lies between

@@ -32,11 +32,7 @@ pub(super) fn sd(values: &[f64]) -> f64 {
 pub(super) fn kurtosis(values: &[f64]) -> f64 {
     let (centre, spread) = (mean(values), sd(values));
     let fourth: Vec<f64> = values.iter().map(|v| (v - centre).powi(4)).collect();
-    if spread > 0.0 {
-        mean(&fourth) / spread.powi(4)
-    } else {
-        0.0
-    }
+    if spread > 0.0 { mean(&fourth) / spread.powi(4) } else { 0.0 }
 }
 
 /// Quantiles of the finite values at (k + ½)/`count`, by linear interpolation between order statistics. Empty without
@@ -44,9 +40,7 @@ pub(super) fn kurtosis(values: &[f64]) -> f64 {
 pub fn quantiles(values: &[f64], count: usize) -> Vec<f64> {
     let mut sorted = finite(values);
     sorted.sort_unstable_by(f64::total_cmp);
-    (0..count)
-        .filter_map(|k| quantile(&sorted, (k as f64 + 0.5) / count as f64))
-        .collect()
+    (0..count).filter_map(|k| quantile(&sorted, (k as f64 + 0.5) / count as f64)).collect()
 }
 
 /// A number with its uncertainty.
@@ -89,11 +83,7 @@ impl Estimated {
         let middle = median(&values).unwrap_or(f64::NAN);
         let distances: Vec<f64> = values.iter().map(|v| v - middle).collect();
         let error = |s: f64| std::f64::consts::FRAC_PI_2.sqrt() * s / (n as f64).sqrt();
-        Self {
-            value: middle,
-            standard_error: robust_sd(&distances).filter(|_| n > 1).map(error),
-            n,
-        }
+        Self { value: middle, standard_error: robust_sd(&distances).filter(|_| n > 1).map(error), n }
     }
 }
 
@@ -148,10 +138,8 @@ pub(super) fn steps(recording: &Recording, blocks: &[usize]) -> Option<Converter
     }
     let codes = (range / divisor).round();
     // the whole range over its number of steps: the rounding of one difference does not matter
-    (divisor > 0.0 && (1.0..=MOST_CODES).contains(&codes)).then(|| ConverterSteps {
-        step_v: range / codes,
-        origin_v: first,
-    })
+    (divisor > 0.0 && (1.0..=MOST_CODES).contains(&codes))
+        .then(|| ConverterSteps { step_v: range / codes, origin_v: first })
 }
 
 #[cfg(test)]
@@ -167,10 +155,7 @@ mod tests {
         assert_relative_eq!(sd(&values), 1.0);
         assert_relative_eq!(kurtosis(&values), 1.0);
         assert_relative_eq!(robust_sd(&values).unwrap(), MAD_TO_SD);
-        for (found, expected) in quantiles(&[3.0, 1.0, 2.0], 3)
-            .into_iter()
-            .zip([4.0 / 3.0, 2.0, 8.0 / 3.0])
-        {
+        for (found, expected) in quantiles(&[3.0, 1.0, 2.0], 3).into_iter().zip([4.0 / 3.0, 2.0, 8.0 / 3.0]) {
             assert_relative_eq!(found, expected);
         }
         assert!(quantiles(&[f64::NAN], 3).is_empty());
@@ -181,16 +166,8 @@ mod tests {
         // s² = ((−1)² + 0 + 1²)/2 = 1
         let estimate = Estimated::mean_of(&[1.0, 2.0, 3.0, f64::NAN]);
         assert_relative_eq!(estimate.value, 2.0);
-        assert_relative_eq!(
-            estimate.standard_error.unwrap(),
-            1.0 / 3_f64.sqrt(),
-            max_relative = 1e-15
-        );
-        assert_eq!(
-            Estimated::mean_of(&[2.0]).standard_error,
-            None,
-            "one value has no uncertainty"
-        );
+        assert_relative_eq!(estimate.standard_error.unwrap(), 1.0 / 3_f64.sqrt(), max_relative = 1e-15);
+        assert_eq!(Estimated::mean_of(&[2.0]).standard_error, None, "one value has no uncertainty");
         assert!(Estimated::mean_of(&[]).value.is_nan());
     }
     #[test]
@@ -208,15 +185,8 @@ mod tests {
     #[test]
     fn the_step_is_found_where_no_two_values_are_neighbours() {
         let lsb = 3.3 / 1023.0 * 11140.0 / 570.0;
-        let volts: Vec<f64> = [10, 16, 25, 31, 100, 40]
-            .iter()
-            .map(|k| 32.0 - f64::from(*k) * lsb)
-            .collect();
-        let block = |frame_position, volts| Block {
-            frame_position,
-            idle_frames: None,
-            volts,
-        };
+        let volts: Vec<f64> = [10, 16, 25, 31, 100, 40].iter().map(|k| 32.0 - f64::from(*k) * lsb).collect();
+        let block = |frame_position, volts| Block { frame_position, idle_frames: None, volts };
         // a press that is not asked for does not matter
         let other = (0..6).map(|k| 0.1 * lsb * f64::from(k)).collect();
         let blocks = vec![block(1, other), block(2, volts)];

@@ -47,10 +47,7 @@ fn presses(profile: &Profile, factors: &[f64]) -> Recording {
             let volts = if k % 4 == 0 { 0.3 + 0.005 * f64::from(k) } else { 0.0 };
             factor * volts / profile.volts_per_siemens()
         });
-        let (idle, pressed) = (
-            ConductanceMap::zeros(10, 10),
-            ConductanceMap::from_values(10, 10, pressed.collect()),
-        );
+        let (idle, pressed) = (ConductanceMap::zeros(10, 10), ConductanceMap::from_values(10, 10, pressed.collect()));
         Interpolated::new(vec![0.0, 0.3, 0.5], vec![idle.clone(), idle, pressed]).unwrap()
     };
     let mut readout = Readout::new(profile, Mode::Compressive, &SkinLayout::default(), Streams::new(5), 0).unwrap();
@@ -80,14 +77,8 @@ fn the_profile_and_the_replay_have_the_weights_and_the_rate_of_the_recording() {
     let (fitted, text) = fitted_profile(&FittedReadout::of(std::slice::from_ref(&found)), 100).unwrap();
     let lines = "weights = \"binary\"  # of the recordings\nseeding = \"mixed\"  # of the recordings\n";
     assert!(text.contains(lines), "{text}");
-    assert_eq!(
-        &fitted.weights(Mode::Compressive, 100).unwrap(),
-        pair.compressive.weights()
-    );
-    assert!(
-        text.contains("\nsample_rate_hz = 50000.0  # kept: no beat seen\n"),
-        "{text}"
-    );
+    assert_eq!(&fitted.weights(Mode::Compressive, 100).unwrap(), pair.compressive.weights());
+    assert!(text.contains("\nsample_rate_hz = 50000.0  # kept: no beat seen\n"), "{text}");
     // a base profile seeds with the addresses: the replay's weights are those of the recording all the same
     let mut addressed = fitted;
     addressed.seeding = Seeding::Address;
@@ -124,11 +115,7 @@ fn calibration_finds_what_was_put_in() {
     close("late_per_flip", 0.001, 0.0002);
     let step_v = found.steps.unwrap().step_v;
     assert_abs_diff_eq!(step_v, STEP_V, epsilon = 1e-9);
-    assert!(
-        found.faults.is_empty() && found.overdriven.is_empty(),
-        "{:?}",
-        found.faults
-    );
+    assert!(found.faults.is_empty() && found.overdriven.is_empty(), "{:?}", found.faults);
 }
 
 /// The third of five presses hardly touches, the first has two thirds of the others: the one is left out and named, the
@@ -136,10 +123,7 @@ fn calibration_finds_what_was_put_in() {
 #[test]
 fn a_press_that_missed_is_left_out() {
     let profile = Profile::from_toml(READOUT).unwrap();
-    let of = |factors: &[f64]| SessionPair {
-        compressive: presses(&profile, factors),
-        ..pair(&profile)
-    };
+    let of = |factors: &[f64]| SessionPair { compressive: presses(&profile, factors), ..pair(&profile) };
     let with_miss = of(&[0.65, 1.0, 0.05, 1.0, 1.0]);
     let found = SessionEstimates::of(&with_miss, &with_miss.compressive, &[0, 1, 2, 3, 4]).unwrap();
     assert_eq!(found.presses, [1, 2, 4, 5]);
@@ -148,10 +132,7 @@ fn a_press_that_missed_is_left_out() {
     assert!(said.starts_with("press 3 missed and is left out: Σx 0.6"), "{said}");
     let others = SessionEstimates::of(&with_miss, &with_miss.compressive, &[0, 1, 3, 4]).unwrap();
     assert!(others.missed.is_empty());
-    assert_eq!(
-        (found.numbers["h1"], &found.image_v),
-        (others.numbers["h1"], &others.image_v)
-    );
+    assert_eq!((found.numbers["h1"], &found.image_v), (others.numbers["h1"], &others.image_v));
 
     // a skin that is never touched has no press that missed
     let untouched = of(&[0.0; 3]);

@@ -47,10 +47,7 @@ pub(crate) fn fit_windows(
 ) -> Vec<FitWindow> {
     let per_frame = recording.measurements_per_frame();
     let volts = &recording.blocks()[block].volts;
-    let starts = frames
-        .clone()
-        .step_by(window.max(1))
-        .filter(|start| start + window <= frames.end);
+    let starts = frames.clone().step_by(window.max(1)).filter(|start| start + window <= frames.end);
     starts
         .filter_map(|start| {
             let measurements = start * per_frame..(start + window) * per_frame;
@@ -121,12 +118,7 @@ impl Design {
                 columns[k * words + i / 64] |= (row[k / 64] >> (k % 64) & 1) << (i % 64);
             }
         }
-        let mut design = Self {
-            len,
-            words,
-            columns,
-            count,
-        };
+        let mut design = Self { len, words, columns, count };
         for cell in reseeded {
             design.fill(cell.taxel as usize, |i| {
                 WeightMode::Binary.level_from_seed(cell.seed, first_row + i as u64) > 0.0
@@ -258,12 +250,8 @@ mod tests {
     #[test]
     fn an_exact_run_is_solved_exactly() {
         let weights = Weights::new(WeightMode::Binary, Seeding::Address, 100);
-        let design = Design::new(
-            WeightRows::new(&weights, 12_345, 1000),
-            &[Reseeded { taxel: 7, seed: 2 }],
-            true,
-        )
-        .unwrap();
+        let design =
+            Design::new(WeightRows::new(&weights, 12_345, 1000), &[Reseeded { taxel: 7, seed: 2 }], true).unwrap();
         let image: Vec<f64> = (0..102).map(|k| f64::from(k % 7) * 0.1 - 0.2).collect();
         let y = design.apply(&image);
         let kept: Vec<bool> = (0..1000).map(|i| i % 5 != 3).collect();
@@ -275,15 +263,9 @@ mod tests {
         }
         // the packed columns are the weights themselves
         for (k, i) in [(0, 0), (99, 999), (50, 64)] {
-            assert_eq!(
-                design.is_plus(k, i),
-                weights.level(u32::try_from(k).unwrap(), 12_345 + i as u64) > 0.0
-            );
+            assert_eq!(design.is_plus(k, i), weights.level(u32::try_from(k).unwrap(), 12_345 + i as u64) > 0.0);
         }
-        assert_eq!(
-            design.is_plus(7, 5),
-            WeightMode::Binary.level_from_seed(2, 12_350) > 0.0
-        );
+        assert_eq!(design.is_plus(7, 5), WeightMode::Binary.level_from_seed(2, 12_350) > 0.0);
     }
 
     #[test]

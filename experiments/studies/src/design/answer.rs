@@ -41,15 +41,7 @@ impl DesignStudy {
         // a scan of every taxel of every wire at the same clock
         let most = design.sub_arrays.iter().copied().max().unwrap_or_default();
         let what = "a scan of every taxel, without a decoder";
-        alternatives.push(alternative(
-            ground,
-            what,
-            design.wires,
-            "raster",
-            most,
-            &design.wire,
-            None,
-        ));
+        alternatives.push(alternative(ground, what, design.wires, "raster", most, &design.wire, None));
         let (_, profile) = design.wire.profile(design.row_source == RowSource::Generator)?;
         let pattern = chosen.bench.rows.text();
         let scene = scene(&design);
@@ -129,10 +121,7 @@ impl DesignStudy {
             return (Binding::Latency, reason);
         }
         let which = format!("which are {percent:.0} % of the {latency_ms} ms");
-        (
-            Binding::Iou,
-            format!("an IoU of {iou} takes {m} measurements a wire, {which}"),
-        )
+        (Binding::Iou, format!("an IoU of {iou} takes {m} measurements a wire, {which}"))
     }
 
     /// Twice the wires, half the measurements.
@@ -142,21 +131,12 @@ impl DesignStudy {
             return Ok(None);
         }
         let m = design.m_per_wire.div_ceil(2);
-        self.simulated(
-            ground,
-            "twice the wires, half the measurements each",
-            wires,
-            &design.row_source,
-            m,
-        )
+        self.simulated(ground, "twice the wires, half the measurements each", wires, &design.row_source, m)
     }
 
     /// A coarser pitch, the same measurements.
     fn coarser(&self, design: &Design) -> Result<Option<Alternative>, Refusal> {
-        let coarse = Self {
-            pitch_m: COARSER * self.pitch_m,
-            ..self.clone()
-        };
+        let coarse = Self { pitch_m: COARSER * self.pitch_m, ..self.clone() };
         let Ok(layout) = coarse.layout() else { return Ok(None) };
         if design.wires > layout.rows() || design.m_per_wire * design.wires > layout.taxels() {
             return Ok(None);
@@ -185,15 +165,7 @@ impl DesignStudy {
         let scores = bench.score(&bench.measure(drawn, m)?, m, None)?;
         let found = (mean(&scores, |s| s.iou), mean(&scores, |s| s.place_px));
         let rows = source.name();
-        Ok(Some(alternative(
-            ground,
-            what,
-            wires,
-            rows,
-            m,
-            &wired.wire,
-            Some(found),
-        )))
+        Ok(Some(alternative(ground, what, wires, rows, m, &wired.wire, Some(found))))
     }
 }
 
@@ -207,15 +179,7 @@ fn searched(ground: &Ground, chosen: &Tried<'_>, other: &Tried<'_>) -> Option<Al
         format!("{rows} rows")
     };
     let found = (point.iou.mean, point.place_px);
-    Some(alternative(
-        ground,
-        &what,
-        wires,
-        rows,
-        at,
-        &other.wired.wire,
-        Some(found),
-    ))
+    Some(alternative(ground, &what, wires, rows, at, &other.wired.wire, Some(found)))
 }
 
 /// `what` differs from the design: `m` measurements of every wire, where IoU and place error, taxels, were `found`.
@@ -265,10 +229,7 @@ fn cost(design: &Design) -> CostDrivers {
 fn scene(design: &Design) -> String {
     let rows = design.sub_arrays.first().copied().unwrap_or_default() / design.cols.max(1);
     let of = if design.wires > 1 {
-        format!(
-            "The sub-array of the first of {} wires: a session is of one wire.",
-            design.wires
-        )
+        format!("The sub-array of the first of {} wires: a session is of one wire.", design.wires)
     } else {
         "The whole skin, on its one wire.".to_owned()
     };

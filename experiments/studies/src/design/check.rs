@@ -64,10 +64,7 @@ impl DesignCheck {
         let refused = |what: &str, reason: String| Refusal::new(format!("{what}: {reason}"));
         let expected = &design.expected;
         if design.wires == 0 || design.wires > design.rows || design.m_per_wire == 0 || expected.repetitions < 2 {
-            return Err(refused(
-                "design.json",
-                "wires, measurements or repetitions are out of range".to_owned(),
-            ));
+            return Err(refused("design.json", "wires, measurements or repetitions are out of range".to_owned()));
         }
         progress.stage("preparing", None);
         let study = DesignStudy {
@@ -81,23 +78,17 @@ impl DesignCheck {
         };
         let ground = study.ground(layout)?;
         let rows = match (&design.row_source, &self.pattern) {
-            (RowSource::Generator, _) => BandRows::new(
-                &design.row_source,
-                &ground.prior,
-                design.wires,
-                design.m_per_wire,
-                design.seed,
-            )?,
+            (RowSource::Generator, _) => {
+                BandRows::new(&design.row_source, &ground.prior, design.wires, design.m_per_wire, design.seed)?
+            }
             (RowSource::Designer(_), Some(text)) => {
                 let bands = bands(design.rows, design.wires);
                 let taxels = bands.first().map_or(0, std::ops::Range::len) * design.cols;
                 let pattern = parse_patterns(text).map_err(|e| refused("rows.txt", e.to_string()))?;
                 let (found, wanted) = ((pattern.period(), pattern.taxels()), (design.m_per_wire, taxels));
                 if found != wanted {
-                    let reason = format!(
-                        "{} rows of {} taxels; the design has {} of {}",
-                        found.0, found.1, wanted.0, wanted.1
-                    );
+                    let reason =
+                        format!("{} rows of {} taxels; the design has {} of {}", found.0, found.1, wanted.0, wanted.1);
                     return Err(refused("rows.txt", reason));
                 }
                 BandRows::pattern(&pattern, bands, design.cols)?

@@ -52,12 +52,7 @@ impl DesignObjects {
     /// [`Refusal`] for a specification that cannot be read, or has meshes, balls or several simultaneous
     /// objects.
     pub fn named(name: &str) -> Result<Self, Refusal> {
-        let shapes = |size_m| Self {
-            name: name.to_owned(),
-            seventeen: false,
-            placed: false,
-            size_m,
-        };
+        let shapes = |size_m| Self { name: name.to_owned(), seventeen: false, placed: false, size_m };
         if let Some((_, size_m)) = SIZES_M.iter().find(|(known, _)| *known == name) {
             return Ok(shapes(*size_m));
         }
@@ -67,11 +62,7 @@ impl DesignObjects {
             ))
         };
         let path = Path::new(name);
-        let file = if path.is_dir() {
-            path.join("spec.toml").to_string_lossy().into_owned()
-        } else {
-            name.to_owned()
-        };
+        let file = if path.is_dir() { path.join("spec.toml").to_string_lossy().into_owned() } else { name.to_owned() };
         let spec = Spec::load(&file, &toml::Table::new()).map_err(|e| refused(e.to_string()))?;
         let (object, pose) = (&spec.config().object, &spec.config().pose);
         if spec.drops() || spec.most_objects() > 1 {
@@ -91,11 +82,7 @@ impl DesignObjects {
 
     /// `touches` of them on a skin of their own.
     pub(super) fn scene(&self, layout: &SkinLayout, touches: usize, seed: u64) -> TouchScene {
-        let objects = if self.seventeen {
-            TouchObjects::Objects
-        } else {
-            TouchObjects::Shapes
-        };
+        let objects = if self.seventeen { TouchObjects::Objects } else { TouchObjects::Shapes };
         TouchScene {
             size_m: (!self.seventeen).then_some(self.size_m),
             placed: self.placed,
@@ -143,9 +130,7 @@ impl Classes {
             for touch in &own {
                 let values = touch.conductance_s.values();
                 let largest = values.iter().fold(f64::MIN_POSITIVE, |most, v| most.max(*v));
-                mean.iter_mut()
-                    .zip(values)
-                    .for_each(|(m, v)| *m += v / largest / own.len() as f64);
+                mean.iter_mut().zip(values).for_each(|(m, v)| *m += v / largest / own.len() as f64);
             }
             mean
         };
@@ -153,11 +138,7 @@ impl Classes {
         let taxels = means.first().map_or(0, Vec::len);
         let labels: Vec<usize> = (0..names.len()).collect();
         let templates = Library::new(&Matrix::from_column_slices(taxels, &means), &labels)?;
-        let model = TemplateModel {
-            gains: vec![GAIN_SD; taxels],
-            rank: RANK,
-            ..TemplateModel::new(cols)
-        };
+        let model = TemplateModel { gains: vec![GAIN_SD; taxels], rank: RANK, ..TemplateModel::new(cols) };
         let amplitude = AmplitudeRange::new(AMPLITUDES_V[0], AMPLITUDES_V[1])?;
         let classifier = EvidenceClassifier::new(&model.classes(&templates)?, amplitude, UNKNOWN_PRIOR)?;
         Ok(Self { classifier, names })
@@ -182,9 +163,7 @@ impl Classes {
             preparation.push(row)?;
             evidence.observe(&preparation, *v)?;
         }
-        let decision = self
-            .classifier
-            .decide(&preparation, &evidence, &mut Posterior::default());
+        let decision = self.classifier.decide(&preparation, &evidence, &mut Posterior::default());
         Ok(decision.label.is_some_and(|label| &*self.names[label] == name))
     }
 }
@@ -210,10 +189,7 @@ mod tests {
         assert_eq!(sized.size_m.map(f64::to_bits), [0.01, 0.03].map(f64::to_bits));
         for refused in ["large-skin", "drops", "nothing", "missing.toml"] {
             let error = DesignObjects::named(refused).unwrap_err().to_string();
-            assert!(
-                error.contains("`objects`") && error.contains("valid: small, large"),
-                "{error}"
-            );
+            assert!(error.contains("`objects`") && error.contains("valid: small, large"), "{error}");
         }
     }
 }

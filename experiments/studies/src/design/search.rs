@@ -90,11 +90,7 @@ impl DesignStudy {
         let taxels = bands.first().map_or(0, std::ops::Range::len) * layout.cols();
         // ΣG and ΣG² of the fullest touch on one of the bands
         let mut pressing = (f64::MIN_POSITIVE, f64::MIN_POSITIVE);
-        for (touch, band) in ground
-            .learned
-            .iter()
-            .flat_map(|touch| bands.iter().map(move |band| (touch, band)))
-        {
+        for (touch, band) in ground.learned.iter().flat_map(|touch| bands.iter().map(move |band| (touch, band))) {
             let (sum_s, squares) =
                 sums(&touch.conductance_s.values()[band.start * layout.cols()..band.end * layout.cols()]);
             pressing = (pressing.0.max(sum_s), pressing.1.max(squares));
@@ -114,12 +110,7 @@ impl DesignStudy {
         }
         let held = MOST.0.min(MOST.1 / (2 * layout.taxels())) / wires;
         let most = in_time.min(source.most_rows(taxels)).min(taxels).min(held).max(1);
-        Ok(Wired {
-            wire,
-            profile,
-            most,
-            by_latency: most == in_time,
-        })
+        Ok(Wired { wire, profile, most, by_latency: most == in_time })
     }
 
     /// The design with the first `measurements` rows of every wire.
@@ -166,16 +157,7 @@ impl DesignStudy {
             let next = (least as f64 * STEP).round() as usize;
             least = next.max(least + 1).min(wired.most);
         };
-        let mut tried = Tried {
-            bench,
-            wired,
-            curve: DesignCurve {
-                wires,
-                rows: source,
-                points,
-            },
-            reached,
-        };
+        let mut tried = Tried { bench, wired, curve: DesignCurve { wires, rows: source, points }, reached };
         self.refine(&mut tried, &measured)?;
         Ok(tried)
     }
@@ -207,11 +189,7 @@ fn point(bench: &mut Bench<'_>, measured: &[Repetition], m: usize) -> Result<Opt
     bench.prepare(m)?;
     let scores = bench.score(measured, m, None)?;
     let iou: Vec<f64> = scores.iter().map(|s| s.iou).collect();
-    Ok(band(&iou).map(|iou| DesignPoint {
-        m_per_wire: m,
-        iou,
-        place_px: mean(&scores, |s| s.place_px),
-    }))
+    Ok(band(&iou).map(|iou| DesignPoint { m_per_wire: m, iou, place_px: mean(&scores, |s| s.place_px) }))
 }
 
 /// The one to build: of those that reach the IoU the one with the fewest wires and then the fewest measurements, else
@@ -351,12 +329,7 @@ impl<'a> Bench<'a> {
         let touches: Vec<(usize, &Touch, &[f64])> = repetitions
             .iter()
             .enumerate()
-            .flat_map(|(r, rep)| {
-                rep.touches
-                    .iter()
-                    .zip(&rep.volts)
-                    .map(move |(t, v)| (r, t, &v[..count]))
-            })
+            .flat_map(|(r, rep)| rep.touches.iter().zip(&rep.volts).map(move |(t, v)| (r, t, &v[..count])))
             .collect();
         let one = |(r, touch, volts): (usize, &Touch, &[f64])| -> Result<_, Refusal> {
             let image = self.decoder.non_negative(volts, places)?;
@@ -395,13 +368,8 @@ const RAISE: (f64, usize) = (1.2, 4);
 /// Most taxels with classes: their templates are dense.
 const MOST_CLASS_TAXELS: usize = 2048;
 /// Labels of the promises' touches: every attempt has its own.
-const PROMISES: [&str; 5] = [
-    "design/promised",
-    "design/promised/1",
-    "design/promised/2",
-    "design/promised/3",
-    "design/promised/4",
-];
+const PROMISES: [&str; 5] =
+    ["design/promised", "design/promised/1", "design/promised/2", "design/promised/3", "design/promised/4"];
 
 impl DesignStudy {
     /// What the chosen design promises, from touches and specimens that the search has not seen. Where that is short of
@@ -458,9 +426,7 @@ impl DesignStudy {
         } else if !self.objects.placed {
             Some("the classifier knows the seventeen objects at their published places only".to_owned())
         } else if taxels > MOST_CLASS_TAXELS {
-            Some(format!(
-                "{taxels} taxels: templates are for {MOST_CLASS_TAXELS} at most"
-            ))
+            Some(format!("{taxels} taxels: templates are for {MOST_CLASS_TAXELS} at most"))
         } else {
             None
         }

@@ -226,10 +226,7 @@ impl BandRows {
         };
         let height = bands.first().map_or(0, Range::len);
         let expected = Expected::smooth([height, cols], length(prior))?;
-        let task = RowTask {
-            seed,
-            ..RowTask::new(measurements, &expected)
-        };
+        let task = RowTask { seed, ..RowTask::new(measurements, &expected) };
         let found = designer(name).ok_or_else(|| Refusal::new(format!("rows: no designer {name:?}")))?;
         let matrix = (found.build)().design(&task)?;
         let codes = matrix.view().values().iter();
@@ -257,10 +254,7 @@ impl BandRows {
     ) -> Result<Self, Refusal> {
         Ok(Self {
             cols,
-            weights: bands
-                .iter()
-                .map(|band| weights(band.len() * cols))
-                .collect::<Result<_, _>>()?,
+            weights: bands.iter().map(|band| weights(band.len() * cols)).collect::<Result<_, _>>()?,
             bands,
         })
     }
@@ -280,10 +274,7 @@ impl BandRows {
         for measurement in range {
             for (wire, (band, weights)) in self.bands.iter().zip(&self.weights).enumerate() {
                 if let Some(row) = out.next() {
-                    weights.fill_rows(
-                        measurement as u64,
-                        &mut row[band.start * self.cols..band.end * self.cols],
-                    );
+                    weights.fill_rows(measurement as u64, &mut row[band.start * self.cols..band.end * self.cols]);
                 }
                 wires.push(wire);
             }
@@ -321,11 +312,7 @@ mod tests {
         let pressing = (20.0 * 100e-6, 20.0 * 1e-8);
         let wire = WireDesign::new(&electronics, 100, pressing, false).unwrap();
         let by_hand = 0.7 * 14.9 / (4.0 * 3.3 * (20.0 * 1e-8_f64).sqrt());
-        assert!(
-            (wire.feedback_ohm / by_hand - 1.0).abs() < 1e-3,
-            "{} {by_hand}",
-            wire.feedback_ohm
-        );
+        assert!((wire.feedback_ohm / by_hand - 1.0).abs() < 1e-3, "{} {by_hand}", wire.feedback_ohm);
         assert_eq!((wire.feedback_limit, wire.adc_bits), (FeedbackLimit::Range, 10));
         assert!(wire.settle_s <= wire.available_s && wire.limit.is_none());
         // all signs alike: ΣG

@@ -134,15 +134,8 @@ fn trial(
     measured: &mut [MeasuredWires],
     rows: usize,
 ) -> Result<ExploreTrial, Refusal> {
-    let pursuit = RegionPursuit {
-        max_rounds: MAX_ROUNDS,
-        ..RegionPursuit::new(side, side)
-    };
-    let mut sum = ExploreTrial {
-        rows_per_wire: rows,
-        measurements: rows * wiring.wires,
-        ..ExploreTrial::default()
-    };
+    let pursuit = RegionPursuit { max_rounds: MAX_ROUNDS, ..RegionPursuit::new(side, side) };
+    let mut sum = ExploreTrial { rows_per_wire: rows, measurements: rows * wiring.wires, ..ExploreTrial::default() };
     let share = 1.0 / scenes.len() as f64;
     let (mut truth, mut mask) = (Vec::new(), Vec::new());
     for (scene, measured) in scenes.iter().zip(measured) {
@@ -283,11 +276,7 @@ impl ExploreReport {
                 fits.extend(power_law(&points).map(|law| CostFit { way, cost, law }));
             }
         }
-        Self {
-            rows,
-            fits,
-            one_wire_taxels,
-        }
+        Self { rows, fits, one_wire_taxels }
     }
 }
 
@@ -309,9 +298,7 @@ fn power_law(points: &[(f64, f64)]) -> Option<PowerLaw> {
     let logs = points.iter().filter(|(x, y)| *x > 0.0 && *y > 0.0 && y.is_finite());
     let logs: Vec<(f64, f64)> = logs.map(|(x, y)| (x.ln(), y.ln())).collect();
     let n = logs.len() as f64;
-    let (mx, my) = logs
-        .iter()
-        .fold((0.0, 0.0), |(sx, sy), (x, y)| (sx + x / n, sy + y / n));
+    let (mx, my) = logs.iter().fold((0.0, 0.0), |(sx, sy), (x, y)| (sx + x / n, sy + y / n));
     let sxx: f64 = logs.iter().map(|(x, _)| (x - mx).powi(2)).sum();
     let sxy: f64 = logs.iter().map(|(x, y)| (x - mx) * (y - my)).sum();
     if logs.len() < 3 || sxx <= 0.0 {
@@ -335,32 +322,20 @@ mod tests {
     #[test]
     fn any_number_of_threads_gives_the_same_numbers() {
         let electronics = ElectronicsStudy::as_designed().unwrap();
-        let explore = ExploreStudy {
-            sides: vec![20],
-            scenes: 2,
-            seeding: Seeding::Mixed,
-            quick: false,
-            seed: 5,
-        };
+        let explore = ExploreStudy { sides: vec![20], scenes: 2, seeding: Seeding::Mixed, quick: false, seed: 5 };
         let rows = |threads: usize| -> Vec<SizeRow> {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let scenes: Vec<ExploreScene> = (0..2).map(|i| scene(20, 150e-6, Streams::new(5), i)).collect();
             let wirings = wirings(&scenes[0].image_s, Seeding::Mixed, &electronics).unwrap();
             let search = |wiring: Wiring| explore.search(20, wiring, &scenes, &electronics).unwrap();
             let mut rows: Vec<SizeRow> = pool.install(|| wirings.into_iter().map(search).collect());
-            rows.iter_mut()
-                .flat_map(|r| &mut r.trials)
-                .for_each(|t| t.decode_s = 0.0);
+            rows.iter_mut().flat_map(|r| &mut r.trials).for_each(|t| t.decode_s = 0.0);
             rows
         };
         let (one, three) = (rows(1), rows(3));
         assert_eq!(one, three);
         // an ideal wire needs far fewer measurements than there are taxels
-        assert!(
-            one[0].m_iou.is_some_and(|m| m < 200) && one[0].m_located.is_some(),
-            "{:?}",
-            one[0]
-        );
+        assert!(one[0].m_iou.is_some_and(|m| m < 200) && one[0].m_located.is_some(), "{:?}", one[0]);
     }
 
     #[test]

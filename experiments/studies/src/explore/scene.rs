@@ -144,11 +144,7 @@ impl MeasuredWires {
         self.wires.par_iter_mut().try_for_each(|wire| wire.extend(rows))?;
         let operator = |wire: &Wire| Centred::new(SignOperator::new(self.generator, wire.seeds.clone(), 0, rows));
         let phi = SubArrays::new(self.wires.iter().map(operator).collect());
-        let mut volts: Vec<f64> = self
-            .wires
-            .iter()
-            .flat_map(|w| w.volts[..rows].iter().copied())
-            .collect();
+        let mut volts: Vec<f64> = self.wires.iter().flat_map(|w| w.volts[..rows].iter().copied()).collect();
         volts.chunks_exact_mut(rows.max(1)).for_each(centre);
         Ok((phi, volts))
     }
@@ -203,11 +199,9 @@ mod tests {
     /// Any row of the circuit's weights, however far from the seeds, is a row of the recovery's operator.
     #[test]
     fn far_rows_are_the_circuits() {
-        for (seeding, first_row) in [
-            (Seeding::Address, 0),
-            (Seeding::Mixed, 1_000_003),
-            (Seeding::Mixed, (1 << 40) + 5),
-        ] {
+        for (seeding, first_row) in
+            [(Seeding::Address, 0), (Seeding::Mixed, 1_000_003), (Seeding::Mixed, (1 << 40) + 5)]
+        {
             let weights = Weights::new(WeightMode::Binary, seeding, 77);
             let generator = SignGenerator::new(MULTIPLIER, INCREMENT, SIGN_BIT).unwrap();
             let phi = SignOperator::new(generator, (0..77).map(|k| seeding.seed(k)).collect(), first_row, 9);

@@ -26,9 +26,7 @@ fn coarse_to_fine(rows: usize, cols: usize) -> Vec<usize> {
     loop {
         let start = stride / 2;
         let along = |n: usize| (start.min(n - 1)..n).step_by(stride);
-        let grid: Vec<usize> = along(rows)
-            .flat_map(|r| along(cols).map(move |c| r * cols + c))
-            .collect();
+        let grid: Vec<usize> = along(rows).flat_map(|r| along(cols).map(move |c| r * cols + c)).collect();
         let mut fresh: Vec<usize> = grid.into_iter().filter(|k| !taken[*k]).collect();
         // multiples of the golden ratio, modulo 1, are spread evenly: Weyl
         fresh.sort_by_key(|k| (*k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
@@ -47,12 +45,7 @@ fn coarse_to_fine(rows: usize, cols: usize) -> Vec<usize> {
 impl Adaptive {
     pub(super) fn new(skin: &ReadoutSkin) -> Self {
         let (rows, cols) = (skin.layout.rows(), skin.layout.cols());
-        Self {
-            rows,
-            cols,
-            order: coarse_to_fine(rows, cols),
-            counts: skin.measurements(),
-        }
+        Self { rows, cols, order: coarse_to_fine(rows, cols), counts: skin.measurements() }
     }
 
     /// The taxels within one row and column of `taxel`, itself among them.
@@ -70,9 +63,7 @@ impl Adaptive {
         let mut read = vec![false; self.order.len()];
         let (mut near, mut grids) = (VecDeque::new(), self.order.iter().copied());
         for _ in 0..count {
-            let next = std::iter::from_fn(|| near.pop_front())
-                .chain(grids.by_ref())
-                .find(|k: &usize| !read[*k]);
+            let next = std::iter::from_fn(|| near.pop_front()).chain(grids.by_ref()).find(|k: &usize| !read[*k]);
             let Some(taxel) = next else { break };
             read[taxel] = true;
             if frame.volts[taxel] > frame.alarm_v {
@@ -91,9 +82,7 @@ impl Adaptive {
         let reach = (1.5 * pitch).ceil() as usize;
         // of the taxels that were read alone: the alarm of another one is not known
         let known = WireFrame {
-            volts: (0..read.len())
-                .map(|k| if read[k] { frame.volts[k] } else { 0.0 })
-                .collect(),
+            volts: (0..read.len()).map(|k| if read[k] { frame.volts[k] } else { 0.0 }).collect(),
             alarm_v: frame.alarm_v,
         };
         let samples = known.contacts(self.cols);
@@ -115,11 +104,7 @@ impl Adaptive {
             }
         }
         let filled = |k: usize| {
-            if read[k] {
-                samples[k]
-            } else {
-                nearest[k].1 / f64::from(nearest[k].2.max(1))
-            }
+            if read[k] { samples[k] } else { nearest[k].1 / f64::from(nearest[k].2.max(1)) }
         };
         (0..read.len()).map(filled).collect()
     }
@@ -138,12 +123,7 @@ impl WireReadout for Adaptive {
             let read = self.read_taxels(&frame, count);
             // an idle skin is scanned at the first taxels of the order, over and over
             let noticed = until_noticed(&beyond[..count.min(beyond.len())]);
-            Reading {
-                measurements: count,
-                image: self.fill(&frame, &read, count),
-                noticed,
-                placed: noticed,
-            }
+            Reading { measurements: count, image: self.fill(&frame, &read, count), noticed, placed: noticed }
         };
         Ok(self.counts.iter().map(reading).collect())
     }
@@ -171,16 +151,8 @@ mod tests {
     /// A patch of 3 × 3 whose middle is on a grid is read as a whole, with a rim, once the grid has found it.
     #[test]
     fn a_contact_is_read_densely() {
-        let grids = Adaptive {
-            rows: 32,
-            cols: 32,
-            order: coarse_to_fine(32, 32),
-            counts: Vec::new(),
-        };
-        let mut frame = WireFrame {
-            volts: vec![0.0; 1024],
-            alarm_v: 0.5,
-        };
+        let grids = Adaptive { rows: 32, cols: 32, order: coarse_to_fine(32, 32), counts: Vec::new() };
+        let mut frame = WireFrame { volts: vec![0.0; 1024], alarm_v: 0.5 };
         for taxel in grids.around(8 * 32 + 8, 1) {
             frame.volts[taxel] = 1.0;
         }
@@ -191,10 +163,7 @@ mod tests {
         for (k, v) in image.iter().enumerate() {
             let touched = grids.around(8 * 32 + 8, 1).any(|t| t == k);
             // what is filled in beside it does not count as touched
-            assert!(
-                if touched { *v > 0.99 } else { *v < SUPPORT_THRESHOLD },
-                "taxel {k}: {v}"
-            );
+            assert!(if touched { *v > 0.99 } else { *v < SUPPORT_THRESHOLD }, "taxel {k}: {v}");
         }
     }
 }

@@ -67,23 +67,14 @@ impl FewRows {
                 Decoder::Sheet(Box::new(sheet))
             }
         };
-        Ok(Self {
-            codes: Patterns::of_levels(rows.nrows(), rows.view().values())?,
-            rows,
-            shape,
-            counts,
-            decoder,
-        })
+        Ok(Self { codes: Patterns::of_levels(rows.nrows(), rows.view().values())?, rows, shape, counts, decoder })
     }
 
     /// Patches that the first samples show. Where there are measurements enough to tell their taxels apart, these are
     /// solved for: a pursuit's bumps are wider than a taxel.
     fn patches(&self, phi: MatrixView<'_>, samples: &[f64]) -> Result<Vec<f64>, Refusal> {
         let [rows, cols] = self.shape;
-        let pursuit = RegionPursuit {
-            max_rounds: MAX_ROUNDS,
-            ..RegionPursuit::new(rows, cols)
-        };
+        let pursuit = RegionPursuit { max_rounds: MAX_ROUNDS, ..RegionPursuit::new(rows, cols) };
         let mut centred = samples.to_vec();
         centre(&mut centred);
         let mut image = pursuit.recover(&Centred::new(phi), &centred, None)?.image;
@@ -127,12 +118,7 @@ impl WireReadout for FewRows {
                     window(fixed, *expected, &lesser).non_negative()?.to_vec()
                 }
             };
-            Ok(Reading {
-                measurements: count,
-                image,
-                noticed: frame.noticed(count),
-                placed: Some(count as f64 - 0.5),
-            })
+            Ok(Reading { measurements: count, image, noticed: frame.noticed(count), placed: Some(count as f64 - 0.5) })
         };
         self.counts.iter().enumerate().map(read).collect()
     }
@@ -189,9 +175,7 @@ fn non_negative(columns: &Matrix, y: &[f64], start: &[f64]) -> Vec<f64> {
     let gram: Vec<f64> = (0..n * n).map(|e| dot(&columns[e / n], &columns[e % n])).collect();
     let mut x: Vec<f64> = start.iter().map(|v| v.max(0.0)).collect();
     // gradient of half the square
-    let mut gradient: Vec<f64> = (0..n)
-        .map(|k| dot(&gram[k * n..(k + 1) * n], &x) - dot(&columns[k], y))
-        .collect();
+    let mut gradient: Vec<f64> = (0..n).map(|k| dot(&gram[k * n..(k + 1) * n], &x) - dot(&columns[k], y)).collect();
     for _ in 0..SWEEPS {
         for k in 0..n {
             let diagonal = gram[k * n + k];
@@ -201,10 +185,7 @@ fn non_negative(columns: &Matrix, y: &[f64], start: &[f64]) -> Vec<f64> {
             let step = (x[k] - gradient[k] / diagonal).max(0.0) - x[k];
             if step != 0.0 {
                 x[k] += step;
-                gradient
-                    .iter_mut()
-                    .zip(&gram[k * n..(k + 1) * n])
-                    .for_each(|(g, a)| *g += step * a);
+                gradient.iter_mut().zip(&gram[k * n..(k + 1) * n]).for_each(|(g, a)| *g += step * a);
             }
         }
     }

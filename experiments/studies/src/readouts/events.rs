@@ -32,10 +32,7 @@ impl Events {
     pub(super) fn new(skin: &ReadoutSkin) -> Self {
         let taxels = skin.layout.taxels();
         let message = |slots| Message::new(taxels, slots, skin.streams);
-        Self {
-            taxels,
-            messages: SLOTS.map(message).into(),
-        }
+        Self { taxels, messages: SLOTS.map(message).into() }
     }
 }
 
@@ -43,9 +40,7 @@ impl Events {
 fn value(conductance_s: f64, largest_s: f64) -> u8 {
     let levels = f64::from(Message::LEVELS - 1);
     #[expect(clippy::cast_possible_truncation, reason = "clamped to 0..=15")]
-    let value = ((conductance_s / largest_s).max(0.0).sqrt() * levels)
-        .round()
-        .min(levels) as u8;
+    let value = ((conductance_s / largest_s).max(0.0).sqrt() * levels).round().min(levels) as u8;
     value
 }
 
@@ -140,19 +135,14 @@ impl Message {
     /// Signatures of `taxels` taxels: in every sixteen of the `slots` slots one pulse of either sign, at random.
     fn new(taxels: usize, slots: usize, streams: Streams) -> Self {
         let signature = |taxel: usize| {
-            let mut rng = streams
-                .child("readouts/signatures", slots as u64)
-                .rng("taxel", taxel as u64);
+            let mut rng = streams.child("readouts/signatures", slots as u64).rng("taxel", taxel as u64);
             let pulse = |start: usize| {
                 let slot = start + usize::from(rng.random_range(0..16_u16));
                 (slot, if rng.random() { 1.0 } else { -1.0 })
             };
             (0..slots).step_by(16).map(pulse).collect()
         };
-        Self {
-            slots,
-            signatures: (0..taxels).map(signature).collect(),
-        }
+        Self { slots, signatures: (0..taxels).map(signature).collect() }
     }
 
     /// Slots of a message: the signature alone, then once a bit.
@@ -219,11 +209,7 @@ fn receive(message: &Message, samples: &[f64]) -> Vec<Sender> {
         .iter()
         .zip(amplitudes.chunks_exact(PIECES))
         .filter(|(_, pieces)| pieces[0] > PRESENT)
-        .map(|((taxel, start), pieces)| Sender {
-            taxel: *taxel,
-            start: *start,
-            value: value(pieces),
-        })
+        .map(|((taxel, start), pieces)| Sender { taxel: *taxel, start: *start, value: value(pieces) })
         .collect();
     senders.sort_by_key(|sender| sender.taxel);
     senders
@@ -246,10 +232,7 @@ fn strongest(message: &Message, residual: &[f64], kept: &[(usize, usize)], count
         best.push((sums[start], taxel, start));
     }
     best.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-    best.iter()
-        .take(count)
-        .map(|(_, taxel, start)| (*taxel, *start))
-        .collect()
+    best.iter().take(count).map(|(_, taxel, start)| (*taxel, *start)).collect()
 }
 
 /// Adds `factor` times the pieces with these amplitudes to `samples`.
@@ -268,15 +251,8 @@ fn add(message: &Message, senders: &[(usize, usize)], amplitudes: &[f64], factor
 /// What the samples correlate with every piece.
 fn correlate(message: &Message, senders: &[(usize, usize)], samples: &[f64]) -> Vec<f64> {
     let sample = |slot: usize| samples.get(slot).copied().unwrap_or(0.0);
-    let sum = |(taxel, start), piece| {
-        message
-            .pulses(taxel, start, piece)
-            .map(|(slot, sign)| sign * sample(slot))
-            .sum()
-    };
-    let each = senders
-        .iter()
-        .flat_map(|sender| (0..PIECES).map(move |piece| (*sender, piece)));
+    let sum = |(taxel, start), piece| message.pulses(taxel, start, piece).map(|(slot, sign)| sign * sample(slot)).sum();
+    let each = senders.iter().flat_map(|sender| (0..PIECES).map(move |piece| (*sender, piece)));
     each.map(|(sender, piece)| sum(sender, piece)).collect()
 }
 
@@ -300,10 +276,7 @@ fn solve(message: &Message, senders: &[(usize, usize)], samples: &[f64]) -> Vec<
         amplitudes.iter_mut().zip(&direction).for_each(|(a, d)| *a += step * d);
         rest.iter_mut().zip(&product).for_each(|(r, p)| *r -= step * p);
         let now = square(&rest);
-        direction
-            .iter_mut()
-            .zip(&rest)
-            .for_each(|(d, r)| *d = r + now / before * *d);
+        direction.iter_mut().zip(&rest).for_each(|(d, r)| *d = r + now / before * *d);
         before = now;
     }
     amplitudes
@@ -317,14 +290,9 @@ mod tests {
     fn values_are_coded_to_half_a_step() {
         let largest_s = 600e-6;
         for g in [10e-6_f64, 50e-6, 150e-6, 400e-6, 600e-6] {
-            let (root, back) = (
-                (g / largest_s).sqrt(),
-                (conductance_s(value(g, largest_s), largest_s) / largest_s).sqrt(),
-            );
-            assert!(
-                (root - back).abs() <= 0.5 / 15.0 + 1e-12,
-                "{g} S: {root} against {back}"
-            );
+            let (root, back) =
+                ((g / largest_s).sqrt(), (conductance_s(value(g, largest_s), largest_s) / largest_s).sqrt());
+            assert!((root - back).abs() <= 0.5 / 15.0 + 1e-12, "{g} S: {root} against {back}");
         }
         assert_eq!((value(0.0, largest_s), value(1.0, largest_s)), (0, 15));
     }
@@ -347,11 +315,7 @@ mod tests {
     fn overlapping_messages_are_told_apart() {
         let message = Message::new(1000, 512, Streams::new(3));
         let senders: Vec<Sender> = (0..20_u8)
-            .map(|k| Sender {
-                taxel: 47 * usize::from(k) + 3,
-                start: usize::from(k) * 29 % 64,
-                value: k % 16,
-            })
+            .map(|k| Sender { taxel: 47 * usize::from(k) + 3, start: usize::from(k) * 29 % 64, value: k % 16 })
             .collect();
         let mut heard = samples(&message, &senders, 64 + message.len());
         assert_eq!(receive(&message, &heard), senders);
@@ -366,9 +330,7 @@ mod tests {
         let message = Message::new(100, 128, Streams::new(3));
         assert_eq!(receive(&message, &vec![0.0; 64 + message.len()]), []);
         let mut rng = Streams::new(4).rng("noise", 0);
-        let noise: Vec<f64> = (0..64 + message.len())
-            .map(|_| 0.2 * rng.random_range(-1.0..1.0))
-            .collect();
+        let noise: Vec<f64> = (0..64 + message.len()).map(|_| 0.2 * rng.random_range(-1.0..1.0)).collect();
         assert_eq!(receive(&message, &noise), []);
     }
 }

@@ -91,11 +91,7 @@ pub struct ReadoutSkin {
 impl ReadoutSkin {
     /// A skin of this layout. `seed` determines the random numbers that readouts need for preparation.
     pub fn new(layout: SkinLayout, seed: u64) -> Self {
-        Self {
-            layout,
-            streams: Streams::new(seed),
-            prior: OnceLock::new(),
-        }
+        Self { layout, streams: Streams::new(seed), prior: OnceLock::new() }
     }
 
     /// Prior of the images on this skin without any recording: random shapes anywhere.
@@ -246,9 +242,7 @@ mod tests {
     fn plate(layout: &SkinLayout, pressed_s: f64) -> Touch {
         let (rows, cols) = (layout.rows(), layout.cols());
         let inside = |k: usize| (5..9).contains(&(k / cols)) && (2..5).contains(&(k % cols));
-        let values = (0..rows * cols)
-            .map(|k| if inside(k) { pressed_s } else { 0.0 })
-            .collect();
+        let values = (0..rows * cols).map(|k| if inside(k) { pressed_s } else { 0.0 }).collect();
         Touch {
             name: Arc::from("plate"),
             conductance_s: ConductanceMap::from_values(rows, cols, values),
@@ -273,10 +267,7 @@ mod tests {
         let wire = SkinWire::new(layout, touch.conductance_s.values()).expect(name);
         let largest_sum_s = wire.largest_sum_s(&*readout, &touch);
         let all_s: f64 = 12.0 * 150e-6 + layout.taxels() as f64 * wire.electronics.skin.idle_s;
-        assert!(
-            largest_sum_s > 0.0 && largest_sum_s <= all_s + 1e-12,
-            "{name}: {largest_sum_s} S of {all_s} S"
-        );
+        assert!(largest_sum_s > 0.0 && largest_sum_s <= all_s + 1e-12, "{name}: {largest_sum_s} S of {all_s} S");
         let session = || wire.session(largest_sum_s, Streams::new(11)).expect(name);
 
         let mut first = session();
@@ -286,46 +277,26 @@ mod tests {
             assert!(pair[0].measurements < pair[1].measurements, "{name}: measurements rise");
         }
         for reading in &readings {
-            assert!(
-                reading.measurements > 0 && reading.image.len() == layout.taxels(),
-                "{name}"
-            );
-            assert!(
-                reading.image.iter().all(|v| v.is_finite() && *v >= 0.0),
-                "{name}: {:?}",
-                reading.image
-            );
+            assert!(reading.measurements > 0 && reading.image.len() == layout.taxels(), "{name}");
+            assert!(reading.image.iter().all(|v| v.is_finite() && *v >= 0.0), "{name}: {:?}", reading.image);
             if let (Some(noticed), Some(placed)) = (reading.noticed, reading.placed) {
-                assert!(
-                    0.5 <= noticed && noticed <= placed,
-                    "{name}: noticed {noticed}, placed {placed}"
-                );
+                assert!(0.5 <= noticed && noticed <= placed, "{name}: noticed {noticed}, placed {placed}");
             }
         }
         let best = readings.last().expect("one reading");
         let score = TouchScore::of(&best.image, &touch, &layout);
         assert!(score.iou >= LEAST_IOU, "{name}: IoU {}", score.iou);
-        assert!(
-            score.place_px.is_some_and(|place| place < 1.0),
-            "{name}: place {:?}",
-            score.place_px
-        );
+        assert!(score.place_px.is_some_and(|place| place < 1.0), "{name}: place {:?}", score.place_px);
         assert!(best.noticed.is_some(), "{name}: a contact is not noticed");
 
         let idle = readout.read(first.hold(&nothing, 1)).expect(name);
         assert_eq!(idle.len(), readings.len(), "{name}: as many readings of nothing");
-        assert!(
-            idle.iter().all(|reading| reading.noticed.is_none()),
-            "{name}: noticed nothing"
-        );
+        assert!(idle.iter().all(|reading| reading.noticed.is_none()), "{name}: noticed nothing");
 
         let mut second = session();
         let before = readout.read(second.hold(&nothing, 1)).expect(name);
         let again = readout.read(second.hold(&touch, 0)).expect(name);
-        assert!(
-            before == idle && again == readings,
-            "{name}: the order of touches shows"
-        );
+        assert!(before == idle && again == readings, "{name}: the order of touches shows");
         let other = readout.read(second.hold(&touch, 2)).expect(name);
         assert!(other != readings, "{name}: no noise");
     }

@@ -158,11 +158,7 @@ mod tests {
         let mut codes = vec![0; 16 * 11];
         walsh.codes(0, &mut codes).unwrap();
         for (codes, sum) in codes.chunks(11).zip(&sums) {
-            let expected: f64 = codes
-                .iter()
-                .zip(&values)
-                .map(|(c, v)| if *c == 255 { *v } else { -*v })
-                .sum();
+            let expected: f64 = codes.iter().zip(&values).map(|(c, v)| if *c == 255 { *v } else { -*v }).sum();
             // whole numbers below 100
             assert!((sum - expected).abs() < 1e-12, "{sum} against {expected}");
         }

@@ -90,11 +90,7 @@ impl ReadoutsStudy {
     pub fn run(&self, progress: &dyn Progress) -> Result<ReadoutsReport, Refusal> {
         let a_size = self.readouts.len() * (1 + self.repetitions);
         progress.stage("comparing readouts", Some(self.sides.len() * a_size));
-        let mut report = ReadoutsReport {
-            wires: Vec::new(),
-            rows: Vec::new(),
-            published: PUBLISHED,
-        };
+        let mut report = ReadoutsReport { wires: Vec::new(), rows: Vec::new(), published: PUBLISHED };
         for &side in &self.sides {
             self.size(side, &mut report, progress)?;
         }
@@ -137,10 +133,7 @@ impl ReadoutsStudy {
                 means
             })
             .collect::<Result<_, _>>()?;
-        report.wires.push(SizeWire {
-            taxels: layout.taxels(),
-            period_s: wire.period_s,
-        });
+        report.wires.push(SizeWire { taxels: layout.taxels(), period_s: wire.period_s });
         for ((line, ..), means) in prepared.iter().zip(means.chunks(self.repetitions.max(1))) {
             let feedback_ohm = means.first().map_or(0.0, |(feedback_ohm, _)| *feedback_ohm);
             let repetitions: Vec<&[Means]> = means.iter().map(|(_, means)| &means[..]).collect();
@@ -160,10 +153,7 @@ impl ReadoutsStudy {
     fn calibration(&self, layout: SkinLayout) -> Result<Vec<Touch>, Refusal> {
         let seed = Streams::new(self.seed).rng("readouts/calibration", 0).random();
         let shapes = TouchScene::new(layout, TouchObjects::Shapes, CALIBRATION_SHAPES, seed);
-        let objects = TouchScene {
-            placed: true,
-            ..TouchScene::new(layout, TouchObjects::Objects, OBJECTS, seed)
-        };
+        let objects = TouchScene { placed: true, ..TouchScene::new(layout, TouchObjects::Objects, OBJECTS, seed) };
         let mut touches = shapes.draw()?;
         touches.extend(objects.draw()?);
         Ok(touches)
@@ -178,10 +168,8 @@ impl ReadoutsStudy {
             specimen,
             ..TouchScene::new(layout, TouchObjects::Objects, presses * OBJECTS, seed(label))
         };
-        let shapes = TouchScene {
-            specimen,
-            ..TouchScene::new(layout, TouchObjects::Shapes, self.shapes, seed("shapes"))
-        };
+        let shapes =
+            TouchScene { specimen, ..TouchScene::new(layout, TouchObjects::Shapes, self.shapes, seed("shapes")) };
         let learned = objects("templates", TEMPLATE_PRESSES).draw()?;
         Ok(Repetition {
             device,
@@ -362,10 +350,7 @@ impl Templates {
         let known = sums.into_iter().map(|(name, sum)| {
             let own = length(&sum);
             let mean: Vec<f64> = sum.iter().map(|v| v / own).collect();
-            (
-                name,
-                shifted(&Matrix::from_column_slices(mean.len(), &[&mean]), cols, REACH),
-            )
+            (name, shifted(&Matrix::from_column_slices(mean.len(), &[&mean]), cols, REACH))
         });
         Self(known.collect())
     }
@@ -407,65 +392,24 @@ const fn system(
     frames_hz: f64,
     [wires, stated, source]: [&'static str; 3],
 ) -> PublishedSystem {
-    PublishedSystem {
-        name,
-        taxels,
-        frames_hz,
-        wires,
-        stated,
-        source,
-    }
+    PublishedSystem { name, taxels, frames_hz, wires, stated, source }
 }
 
 /// Published systems, from few taxels to many.
 const PUBLISHED: &[PublishedSystem] = &[
     system("CDMA skin", 16, 78.0, ["1", "measured", "arXiv 2509.10888"]),
-    system(
-        "SPTS",
-        100,
-        3500.0,
-        ["1, and a bus", "measured, M = 20", "arXiv 2511.16898"],
-    ),
-    system(
-        "ACES",
-        240,
-        1000.0,
-        ["1", "measured, 1 ms an event", "Science Robotics 4 (2019) eaax2198"],
-    ),
-    system(
-        "ACTS, adaptive",
-        1024,
-        1000.0,
-        ["rows and columns", "measured, the most", "arXiv 2410.13847"],
-    ),
-    system(
-        "ACTS, raster",
-        1024,
-        56.0,
-        ["rows and columns", "measured", "arXiv 2410.13847"],
-    ),
-    system(
-        "Hollis",
-        4096,
-        100.0,
-        ["not stated", "simulated, M = 1024, at least", "arXiv 1705.05247"],
-    ),
+    system("SPTS", 100, 3500.0, ["1, and a bus", "measured, M = 20", "arXiv 2511.16898"]),
+    system("ACES", 240, 1000.0, ["1", "measured, 1 ms an event", "Science Robotics 4 (2019) eaax2198"]),
+    system("ACTS, adaptive", 1024, 1000.0, ["rows and columns", "measured, the most", "arXiv 2410.13847"]),
+    system("ACTS, raster", 1024, 56.0, ["rows and columns", "measured", "arXiv 2410.13847"]),
+    system("Hollis", 4096, 100.0, ["not stated", "simulated, M = 1024, at least", "arXiv 1705.05247"]),
     system(
         "TUM H1",
         7560,
         250.0,
-        [
-            "47 patches",
-            "measured, sensors of several kinds",
-            "G. Cheng et al., Proc. IEEE 107 (2019) 2034",
-        ],
+        ["47 patches", "measured, sensors of several kinds", "G. Cheng et al., Proc. IEEE 107 (2019) 2034"],
     ),
-    system(
-        "BYU fabric",
-        8000,
-        50.0,
-        ["SPI, daisy-chained", "measured, at least, on 1 m²", "arXiv 2508.20959"],
-    ),
+    system("BYU fabric", 8000, 50.0, ["SPI, daisy-chained", "measured, at least, on 1 m²", "arXiv 2508.20959"]),
 ];
 
 #[cfg(test)]
@@ -481,13 +425,7 @@ mod tests {
             ..TouchScene::new(SkinLayout::default(), TouchObjects::Objects, 34, 1)
         };
         let templates = Templates::new(&scene.draw().unwrap(), 10);
-        let others = TouchScene {
-            seed: 2,
-            touches: 17,
-            ..scene
-        }
-        .draw()
-        .unwrap();
+        let others = TouchScene { seed: 2, touches: 17, ..scene }.draw().unwrap();
         let right = |shift: usize| {
             let named = others.iter().filter(|touch| {
                 let mut image = touch.conductance_s.values().to_vec();

@@ -40,10 +40,7 @@ impl WireFrame {
                 for near in r.saturating_sub(1)..(r + 2).min(rows) {
                     let beside = near * cols + c.saturating_sub(1)..near * cols + (c + 2).min(cols);
                     let samples = self.volts[beside.clone()].iter();
-                    image[beside]
-                        .iter_mut()
-                        .zip(samples)
-                        .for_each(|(out, v)| *out = v.max(0.0));
+                    image[beside].iter_mut().zip(samples).for_each(|(out, v)| *out = v.max(0.0));
                 }
             }
         }
@@ -140,10 +137,7 @@ impl WireSession<'_> {
         volts.iter_mut().for_each(|v| *v /= count);
         let means: f64 = volts.iter().map(|v| count * v * v).sum();
         let variance = (squares - means).max(0.0) / ((count - 1.0) * measurements as f64);
-        Ok(Idle {
-            volts,
-            sd_v: (variance * (1.0 + 1.0 / count)).sqrt(),
-        })
+        Ok(Idle { volts, sd_v: (variance * (1.0 + 1.0 / count)).sqrt() })
     }
 
     /// A raster frame: sample k has taxel k at level 1, and all others at 0.
@@ -166,10 +160,7 @@ impl WireSession<'_> {
         measurements: usize,
     ) -> Result<WireFrame, Refusal> {
         self.frame(measurements, |session| {
-            let profile = Profile {
-                weights: CompressiveWeights::Binary,
-                ..session.profile.clone()
-            };
+            let profile = Profile { weights: CompressiveWeights::Binary, ..session.profile.clone() };
             let readout = Readout::new(&profile, Mode::Compressive, &session.skin.layout, session.device, 0)?;
             readout.with_codes(Box::new(rows.clone()))
         })
@@ -218,10 +209,7 @@ impl WireSession<'_> {
         let map = ConductanceMap::from_values(1, chips.taxels(), vec![each_s; chips.taxels()]);
         let mut volts = line(chips)?.volts(map, self.held.1, measurements)?;
         volts.iter_mut().for_each(|v| *v -= idle_v);
-        Ok(WireFrame {
-            volts,
-            alarm_v: self.alarm_v(variance.sqrt()),
-        })
+        Ok(WireFrame { volts, alarm_v: self.alarm_v(variance.sqrt()) })
     }
 }
 
@@ -293,10 +281,7 @@ impl SkinWire {
     pub fn session(&self, largest_sum_s: f64, device: Streams) -> Result<WireSession<'_>, Refusal> {
         let session = device.child("session", 0);
         let built = Profile::named("as_built")?;
-        let mut profile = Profile {
-            feedback_ohm: self.feedback_ohm(largest_sum_s)?,
-            ..self.base.clone()
-        };
+        let mut profile = Profile { feedback_ohm: self.feedback_ohm(largest_sum_s)?, ..self.base.clone() };
         let mut contact_noise = 0.0;
         for (effect, number) in SESSION {
             let drawn = span(&built, effect, number)?.draw(&mut session.rng(effect, 0));
@@ -361,9 +346,7 @@ fn span(profile: &Profile, effect: &str, number: &str) -> Result<Span, Refusal> 
 
 /// An effect that a profile lacks, or a value of it, as an error.
 fn no_number(effect: &str, number: &str) -> Refusal {
-    Refusal::new(format!(
-        "profile as_built or as_designed: no `compressive.{effect}.{number}`"
-    ))
+    Refusal::new(format!("profile as_built or as_designed: no `compressive.{effect}.{number}`"))
 }
 
 #[cfg(test)]
@@ -374,10 +357,8 @@ mod tests {
     /// does not.
     #[test]
     fn contacts_are_what_is_beyond_the_alarm_and_beside_it() {
-        let frame = WireFrame {
-            volts: vec![2.0, -0.3, 0.0, 0.4, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9],
-            alarm_v: 1.0,
-        };
+        let frame =
+            WireFrame { volts: vec![2.0, -0.3, 0.0, 0.4, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.9], alarm_v: 1.0 };
         let expected = [2.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
         assert_eq!(frame.contacts(4), expected);
     }
