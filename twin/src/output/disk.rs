@@ -129,8 +129,11 @@ pub(super) fn sync_folder(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Names of the files below the folder `root`, sorted, and of `root` and the folders below it, parents first.
-pub(super) fn below(root: &Path) -> io::Result<(Vec<PathBuf>, Vec<PathBuf>)> {
+/// Names of the files below a folder, sorted, and of the folder and those below it, parents first.
+pub(super) type Below = (Vec<PathBuf>, Vec<PathBuf>);
+
+/// What is in the folder `root`.
+pub(super) fn below(root: &Path) -> io::Result<Below> {
     let (mut files, mut folders, mut read) = (Vec::new(), vec![PathBuf::new()], 0);
     while let Some(folder) = folders.get(read).cloned() {
         for entry in std::fs::read_dir(root.join(&folder))? {
@@ -152,11 +155,10 @@ pub(super) fn remove(path: &Path) -> io::Result<()> {
     })
 }
 
-/// Removes the folder `path` and all in it: only for folders whose every file is this program's own.
-pub(super) fn remove_all(path: &Path) -> io::Result<()> {
-    let (files, folders) = below(path)?;
+/// Removes the folder `root` and what was found in it.
+pub(super) fn remove_all(root: &Path, (files, folders): &Below) -> io::Result<()> {
     let mut all = files.iter().chain(folders.iter().rev());
-    all.try_for_each(|name| remove(&path.join(name)))
+    all.try_for_each(|name| remove(&root.join(name)))
 }
 
 /// Whether something has the name `path`, a link to nowhere as well.
@@ -166,8 +168,6 @@ pub(super) fn exists(path: &Path) -> bool {
 
 /// Folder of the file `path`.
 pub(super) fn parent(path: &Path) -> &Path {
-    match path.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    }
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    parent.unwrap_or(Path::new("."))
 }

@@ -5,7 +5,7 @@
 //! removed. A file system without such a step first gives the earlier results the name `.NAME.spts-old`. A run that is
 //! ended leaves what the next run with this folder clears up. A run holds `.NAME.spts-lock` locked.
 
-use super::disk::{self, DiskOperation, no_folder, not_ours, parent, unwritable, watched};
+use super::disk::{self, Below, DiskOperation, no_folder, not_ours, parent, unwritable, watched};
 use super::manifest::{MANIFEST_FILE, Manifest, changed};
 use crate::cleanup::{Entry, Leftover, listed};
 use spts_input::Refusal;
@@ -40,7 +40,8 @@ impl OutputFolder {
     pub fn open(path: &Path) -> Result<Self, Refusal> {
         let failed = unwritable(path);
         let missing = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
-        let made: Vec<PathBuf> = path.ancestors().skip(1).take_while(missing).map(Path::to_owned).collect();
+        let made = path.ancestors().skip(1).take_while(missing);
+        let made: Vec<PathBuf> = made.map(Path::to_owned).collect();
         make_folders(if path.exists() { path } else { parent(path) })?;
         let folder = match path.file_name() {
             // a link to nowhere is no place for a folder
@@ -85,8 +86,7 @@ impl OutputFolder {
     /// [`Refusal`] if the folder cannot be created.
     pub fn folder(&self, name: &str) -> Result<PathBuf, Refusal> {
         let path = self.path(name);
-        make_folders(&path)?;
-        Ok(path)
+        make_folders(&path).map(|()| path)
     }
 
     /// Replaces the results of the earlier run by the new ones, writes a manifest, and returns the names of the
@@ -98,7 +98,7 @@ impl OutputFolder {
     pub fn commit(mut self) -> Result<Vec<String>, Refusal> {
         let failed = unwritable(&self.shown);
         let (files, folders) = disk::below(&self.stage).map_err(&failed)?;
-        let names: Vec<String> = files.iter().map(|name| name.to_string_lossy().into_owned()).collect();
+        let names: Vec<String> = files.iter().map(|name| name.display().to_string()).collect();
         let manifest = Manifest::write_of(&self.stage, &names, &self.timed);
         manifest.map_err(|error| self.unstaged(error))?;
         let synced = folders.iter().try_for_each(|folder| disk::sync_folder(&self.stage.join(folder)));
@@ -128,15 +128,19 @@ impl Drop for OutputFolder {
     fn drop(&mut self) {
         if !self.stage.as_os_str().is_empty() {
             // nothing more can be done about what does not go away; the next run in this folder removes it
-            let _ = disk::remove_all(&self.stage);
+            let _ = disk::below(&self.stage).and_then(|found| disk::remove_all(&self.stage, &found));
         }
     }
 }
 
 /// Whether `folder` is in use: something is mounted on it, or the program works in it.
 fn is_unmovable(folder: &Path) -> bool {
+    use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
     let device = |path: &Path| path.metadata().ok().map(|found| found.dev());
-    let mounted = device(folder).is_some_and(|of| folder.parent().and_then(device) != Some(of));
+    let found = statx(CWD, folder, AtFlags::empty(), StatxFlags::empty());
+    // not every system tells of a mount; another device does
+    let mounted = found.is_ok_and(|found| found.stx_attributes.contains(StatxAttributes::MOUNT_ROOT))
+        || device(folder).is_some_and(|of| folder.parent().and_then(device) != Some(of));
     let here = std::env::current_dir().and_then(|here| here.canonicalize());
     mounted || here.is_ok_and(|here| here.starts_with(folder))
 }
@@ -149,14 +153,14 @@ fn beside(folder: &Path, what: &str) -> PathBuf {
 }
 
 /// Refuses `folder`, which the user calls `shown`, if it holds a file that is not an unchanged result of an earlier
-/// run.
-fn check_ours(folder: &Path, shown: &Path) -> Result<(), Refusal> {
+/// run. Returns what is in it.
+fn check_ours(folder: &Path, shown: &Path) -> Result<Below, Refusal> {
     if !disk::exists(folder) {
-        return Ok(());
+        return Ok(Below::default());
     }
-    let manifest = Manifest::read(folder);
-    for file in disk::below(folder).map_err(unwritable(shown))?.0 {
-        let (path, name) = (shown.join(&file), file.to_string_lossy());
+    let (manifest, found) = (Manifest::read(folder), disk::below(folder).map_err(unwritable(shown))?);
+    for file in &found.0 {
+        let (path, name) = (shown.join(file), file.to_string_lossy());
         match &manifest {
             Some(_) if name == MANIFEST_FILE => {}
             Some(all) if all.is_unchanged(folder, &name).map_err(unwritable(&path))? => {}
@@ -167,7 +171,12 @@ fn check_ours(folder: &Path, shown: &Path) -> Result<(), Refusal> {
             _ => return Err(not_ours(&path)),
         }
     }
-    Ok(())
+    Ok(found)
+}
+
+/// Removes `folder`, which holds nothing but an earlier run's results.
+fn discard(folder: &Path) -> Result<(), Refusal> {
+    disk::remove_all(folder, &check_ours(folder, folder)?).map_err(unwritable(folder))
 }
 
 /// Gives the results in `stage` the name `folder`, which holds nothing but an earlier run's results, and removes those.
@@ -184,7 +193,7 @@ fn put_in_place(stage: &Path, folder: &Path) -> io::Result<()> {
     }
     // what does not reach the disk or does not go away does no harm: the next run sees to it
     let _ = disk::sync_folder(parent(folder));
-    let _ = check_ours(stage, stage).map(|()| disk::remove_all(stage));
+    let _ = discard(stage);
     Ok(())
 }
 
@@ -211,20 +220,21 @@ fn recover(folder: &Path, shown: &Path) -> Result<(), Refusal> {
     let [new, old] = ["new", "old"].map(|what| beside(folder, what));
     let is_folder = |path: &Path| path.symlink_metadata().is_ok_and(|found| found.is_dir());
     if is_folder(&old) {
-        let back = !disk::exists(folder);
-        if !back {
+        let to = if disk::exists(folder) { &new } else { folder };
+        if to == new {
             check_ours(&old, &old)?;
         }
-        disk::rename(&old, if back { folder } else { &new }).map_err(unwritable(shown))?;
+        disk::rename(&old, to).map_err(unwritable(shown))?;
     }
-    if is_folder(&new) {
-        // without a manifest, results are not complete, or some of them have been removed
-        if Manifest::read(&new).is_some() {
-            check_ours(&new, &new)?;
+    match Manifest::read(&new) {
+        _ if !is_folder(&new) => Ok(()),
+        Some(_) => discard(&new),
+        // results that are not complete, or of which some have been removed
+        None => {
+            let removed = disk::below(&new).and_then(|found| disk::remove_all(&new, &found));
+            removed.map_err(unwritable(shown))
         }
-        disk::remove_all(&new).map_err(unwritable(shown))?;
     }
-    Ok(())
 }
 
 /// Makes the folder `path` and its parents where they are missing.
@@ -254,13 +264,11 @@ impl Lock {
         let failed = unwritable(shown);
         let open = || File::options().create(true).truncate(false).write(true).open(&path);
         loop {
-            let file = watched(DiskOperation::Other, &path, open).map_err(|error| match error.kind() {
-                ErrorKind::PermissionDenied if folder.exists() => {
-                    let above = parent(folder).display();
-                    let problem = format!("cannot be replaced as a whole: {above}: {error}; choose a folder in it");
-                    Refusal::new(problem).at(shown.display())
-                }
-                _ => failed(error),
+            let file = watched(DiskOperation::Other, &path, open).map_err(|error| {
+                let above = parent(folder).display();
+                let problem = format!("cannot be replaced as a whole: {above}: {error}; choose a folder in it");
+                let denied = error.kind() == ErrorKind::PermissionDenied && folder.exists();
+                if denied { Refusal::new(problem).at(shown.display()) } else { failed(error) }
             })?;
             match file.try_lock() {
                 Err(TryLockError::WouldBlock) => {
@@ -381,14 +389,8 @@ mod tests {
     fn only_unchanged_results_are_replaced() {
         // a manifest of somebody's own is nobody's leave to replace what it lists
         let mine = r#"{"format": "mine", "files": {"a": {}}}"#;
-        for (put_there, named) in [
-            ("notes.txt", "notes.txt"),
-            ("tables/mine.csv", "tables/mine.csv"),
-            (".hidden/mine", ".hidden/mine"),
-            ("a", "a"),
-            ("link", "a"),
-            (MANIFEST_FILE, "a"),
-        ] {
+        for put_there in ["notes.txt", "tables/mine.csv", ".hidden/mine", "a", "link", MANIFEST_FILE] {
+            let of_a = ["link", MANIFEST_FILE].contains(&put_there);
             let dir = tempfile::tempdir().unwrap();
             let out = dir.path().join("out");
             run(&out, &[("a", "old"), ("tables/b", "old")]).unwrap();
@@ -399,7 +401,7 @@ mod tests {
             } else {
                 put(&out.join(put_there), mine);
             }
-            let shown = out.join(named).display().to_string();
+            let shown = out.join(if of_a { "a" } else { put_there }).display().to_string();
             let late = early.commit().unwrap_err().to_string();
             assert!(late.starts_with(&format!("{shown}: is not ")), "{late}");
             refused(&out, &[&shown, "replaced", "move it away or choose another folder"]);
@@ -424,16 +426,11 @@ mod tests {
     #[test]
     fn what_cannot_be_replaced_as_a_whole_is_refused() {
         let dir = tempfile::tempdir().unwrap();
-        let [file, nowhere] = ["file", "nowhere"].map(|name| dir.path().join(name));
-        put(&file, "mine");
-        refused(&file, &["file: is a file; the output has to be a folder"]);
-        refused(&file.join("below"), &["file: is a file"]);
+        let nowhere = dir.path().join("nowhere");
         std::os::unix::fs::symlink("gone", &nowhere).unwrap();
         refused(&nowhere, &["nowhere: cannot be written"]);
-        assert!(names(dir.path()) == ["file", "nowhere"] && fs::read(&file).unwrap() == b"mine");
-        for mounted in ["/", "/proc"] {
-            refused(Path::new(mounted), &[mounted, ": is a mount point", "choose a folder in it"]);
-        }
+        assert_eq!(names(dir.path()), ["nowhere"]);
+        refused(Path::new("/proc"), &["/proc: is a mount point", "choose a folder in it"]);
     }
 
     /// What lies beside a folder under the hidden names may be anybody's work: only listed results are removed.
@@ -474,52 +471,15 @@ mod tests {
         }
     }
 
-    /// When an operation on the disk is made to fail.
-    #[derive(Debug, Clone, Copy, PartialEq)]
-    enum Fault {
-        /// This one alone, as when a network folder is away for a moment.
-        Once,
-        /// This one and all that follow, as on a full disk.
-        FromThen,
-        /// None, but what the disk holds before this one is what a killed run leaves.
-        Killed,
-    }
-
-    /// Puts `new` into `run/out` of the folder `work`. The fault comes at the operation `step`; `work/killed` gets what
-    /// a run leaves that is killed there. Returns the number of operations as well.
-    fn run_with(
-        new: Results<'_>,
-        exchanges: bool,
-        work: &Path,
-        (step, fault): (usize, Fault),
-    ) -> (Result<Vec<String>, Refusal>, usize) {
-        const INVALID: i32 = 22;
-        let [from, to] = ["run", "killed"].map(|name| work.join(name));
-        let (out, count) = (from.join("out"), Rc::new(Cell::new(0)));
-        let at = Rc::clone(&count);
-        let watcher = move |operation, _: &Path| {
-            let now = at.replace(at.get() + 1);
-            match fault {
-                Fault::Killed if now == step => copy(&from, &to),
-                Fault::Once if now == step => return Err(ErrorKind::StorageFull.into()),
-                Fault::FromThen if now >= step => return Err(ErrorKind::StorageFull.into()),
-                _ => {}
-            }
-            match operation {
-                DiskOperation::Exchange if !exchanges => Err(io::Error::from_raw_os_error(INVALID)),
-                _ => Ok(()),
-            }
-        };
-        (watching_disk(watcher, || run(&out, new)), count.get())
-    }
-
-    /// Every operation on the disk of a run that puts its results in place of `old` is made to fail once and for good,
-    /// and is the last one. `old` is empty for a new folder, and `away` when a run was ended between two renames.
+    /// Puts `new` in place of `old`, of which nothing is there where it is empty, and which lies `away` where a run was
+    /// ended between two renames. Every operation on the disk fails once, as when a network folder is away for a
+    /// moment; fails like all that follow, as on a full disk; and is the one before which the run is killed.
     fn check_every_step(old: Results<'_>, away: bool, exchanges: bool) {
+        const INVALID: i32 = 22;
         let new: Results<'_> = &[("a", "new"), ("same", "same"), ("tables/csv/c", "new")];
         // where the disk does not slow the operations down, if there is such a place
         let dir = tempfile::tempdir_in("/dev/shm").unwrap_or_else(|_| tempfile::tempdir().unwrap());
-        let [base, whole] = ["base", "whole"].map(|name| dir.path().join(name));
+        let base = dir.path().join("base");
         fs::create_dir(&base).unwrap();
         if !old.is_empty() {
             run(&base.join("out"), old).unwrap();
@@ -528,27 +488,44 @@ mod tests {
         if away {
             fs::rename(base.join("out"), base.join(".out.spts-old")).unwrap();
         }
-        copy(&base, &whole.join("run"));
-        let (result, steps) = run_with(new, exchanges, &whole, (usize::MAX, Fault::Once));
+        // the result, what is left, and the number of operations
+        let attempt = |name: &str, step: usize, fault: &'static str| {
+            let [left, killed] = ["run", "killed"].map(|of| dir.path().join(format!("{of} {name}")));
+            copy(&base, &left);
+            let (out, from, to) = (left.join("out"), left.clone(), killed.clone());
+            let count = Rc::new(Cell::new(0));
+            let at = Rc::clone(&count);
+            let watcher = move |operation, _: &Path| {
+                let now = at.replace(at.get() + 1);
+                match fault {
+                    "killed" if now == step => copy(&from, &to),
+                    "once" if now == step => return Err(ErrorKind::StorageFull.into()),
+                    "from then" if now >= step => return Err(ErrorKind::StorageFull.into()),
+                    _ => {}
+                }
+                // a file system that cannot exchange says so
+                let unknown = operation == DiskOperation::Exchange && !exchanges;
+                if unknown { Err(io::Error::from_raw_os_error(INVALID)) } else { Ok(()) }
+            };
+            let result = watching_disk(watcher, || run(&out, new));
+            (result, if fault == "killed" { killed } else { left }, count.get())
+        };
+        let (result, left, steps) = attempt("whole", usize::MAX, "once");
         result.unwrap();
-        let after = there(&whole.join("run/out"));
-        assert!(before != after && steps > 30, "{steps} steps");
+        let after = there(&left.join("out"));
+        assert!(before != after && steps > 20, "{steps} steps");
         let mut seen = [0; 3];
-        for at in (0..steps).flat_map(|step| [Fault::Once, Fault::FromThen, Fault::Killed].map(|fault| (step, fault))) {
-            let work = tempfile::tempdir_in(dir.path()).unwrap();
-            copy(&base, &work.path().join("run"));
-            let (result, _) = run_with(new, exchanges, work.path(), at);
-            let what = format!("{at:?}, {result:?}");
-            let left = work.path().join(if at.1 == Fault::Killed { "killed" } else { "run" });
-            let (out, aside) = (left.join("out"), left.join(".out.spts-old"));
+        for (step, fault) in (0..steps).flat_map(|step| ["once", "from then", "killed"].map(|fault| (step, fault))) {
+            let (result, left, _) = attempt(&format!("{step} {fault}"), step, fault);
+            let (what, out) = (format!("{step}, {fault}: {result:?}"), left.join("out"));
             // between two renames there is no folder, never half of one
-            let is_aside = (away || !exchanges) && !out.exists() && there(&aside) == before;
+            let is_aside = (away || !exchanges) && !out.exists() && there(&left.join(".out.spts-old")) == before;
             let states = [there(&out) == before, there(&out) == after, is_aside];
             let state = states.iter().position(|is| *is).unwrap_or_else(|| panic!("{what}: a mixture"));
             seen[state] += 1;
-            match (at.1, result.is_ok()) {
-                (Fault::Once, false) => assert!(state == 0 || away && state == 2, "{what}"),
-                (Fault::Once | Fault::FromThen, true) => assert_eq!(state, 1, "{what}"),
+            match (fault, result.is_ok()) {
+                ("once", false) => assert!(state == 0 || away && state == 2, "{what}"),
+                ("once" | "from then", true) => assert_eq!(state, 1, "{what}"),
                 _ => {}
             }
             // a run that writes nothing puts back what was away, and the next one leaves nothing of this one
@@ -557,14 +534,15 @@ mod tests {
             run(&out, new).unwrap();
             assert!(there(&out) == after && names(&left) == ["out"], "{what}: {:?}", names(&left));
         }
-        eprintln!("{steps} steps, each with three faults: {seen:?} times earlier, new, put aside and put back results");
+        eprintln!("{steps} steps, each with three faults: {seen:?} times earlier, new, and aside and put back");
     }
 
     #[test]
     fn a_run_fails_or_is_killed_at_every_step() {
         let old: Results<'_> = &[("a", "old"), ("same", "same"), ("arrays/b", "old")];
-        for (old, away, exchanges) in [(old, false, true), (old, false, false), (old, true, true), (&[], false, true)] {
-            check_every_step(old, away, exchanges);
-        }
+        check_every_step(old, false, true);
+        check_every_step(old, false, false);
+        check_every_step(old, true, true);
+        check_every_step(&[], false, true);
     }
 }
