@@ -103,7 +103,7 @@ pub fn placed(outline: &[Point], angle_rad: f64, offset_m: Point) -> Vec<Point> 
 }
 
 /// Enclosed area, m²; negative for a clockwise loop.
-pub(crate) fn signed_area_m2(outline: &[Point]) -> f64 {
+pub fn signed_area_m2(outline: &[Point]) -> f64 {
     let n = outline.len();
     (0..n)
         .map(|i| {

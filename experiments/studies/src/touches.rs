@@ -2,24 +2,6 @@
 //!
 //! A [`TouchScene`] defines objects and skin, and [`TouchScene::draw`] presses the objects. A [`TouchWire`] measures
 //! the touches through a readout profile with any weights, and a [`TouchScore`] compares an image with the touch.
-//!
-//! ```
-//! use spts_circuit::{Profile, Seeding, WeightMode, Weights};
-//! use spts_models::{SkinLayout, Streams};
-//! use spts_studies::touches::{TouchObjects, TouchScene, TouchScore, TouchWire};
-//!
-//! let scene = TouchScene::new(SkinLayout::default(), TouchObjects::Shapes, 3, 1);
-//! let touches = scene.draw()?;
-//! // one weight for every taxel and measurement, ±1
-//! let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, 100);
-//! let mut wire = TouchWire::new(&Profile::named("ideal")?, &weights, &scene.layout, Streams::new(1))?;
-//! let volts = wire.measure(touches[0].conductance_s.clone(), 0, 20)?;
-//! assert_eq!(volts.len(), 20);
-//! // the image itself shows the touch as it is
-//! let score = TouchScore::of(touches[0].conductance_s.values(), &touches[0], &scene.layout);
-//! assert_eq!((score.iou, score.place_px), (1.0, Some(0.0)));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 use spts_circuit::{Constant, Mode, Profile, Readout, Weights};
 use spts_dataset::{Maker, Spec};
@@ -46,16 +28,6 @@ const LEAST_SHARE: f64 = 0.3;
 
 /// Objects and skin of simulated touches: single objects at random places, rotations and forces (5 to 40 N), held
 /// still. All touches are on one specimen of the skin.
-///
-/// ```
-/// use spts_models::SkinLayout;
-/// use spts_studies::touches::{TouchObjects, TouchScene};
-///
-/// let touches = TouchScene::new(SkinLayout::default(), TouchObjects::Objects, 3, 1).draw()?;
-/// assert_eq!(touches.len(), 3);
-/// assert!(touches.iter().all(|touch| touch.conductance_s.max() > 0.0));
-/// # Ok::<(), spts_input::Refusal>(())
-/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TouchScene {
     /// Rows, columns, pitch and electrode.
@@ -165,20 +137,6 @@ const IDLE_MEASUREMENTS: usize = 1000;
 const IDLE_BLOCK: u64 = 1 << 40;
 
 /// The wire of a skin: a readout with its device's parts, and the noise of one session.
-///
-/// ```
-/// use spts_circuit::{Mode, Profile};
-/// use spts_models::{SkinLayout, Streams};
-/// use spts_studies::touches::{TouchObjects, TouchScene, TouchWire};
-///
-/// let layout = SkinLayout::default();
-/// let profile = Profile::named("ideal").expect("it ships");
-/// let weights = profile.weights(Mode::Compressive, 100).expect("100 taxels");
-/// let mut wire = TouchWire::new(&profile, &weights, &layout, Streams::new(1))?;
-/// let touch = TouchScene::new(layout, TouchObjects::Objects, 1, 1).draw()?.remove(0);
-/// assert_eq!(wire.measure(touch.conductance_s, 0, 20)?.len(), 20);
-/// # Ok::<(), spts_input::Refusal>(())
-/// ```
 pub(crate) struct TouchWire {
     readout: Readout,
     idle_v: f64,

@@ -61,7 +61,7 @@ pub(crate) const JOINT_DAMPING: f64 = 2.0;
 pub(crate) const BASE_M: [f64; 3] = [-0.5, 0.0, 0.0];
 
 /// A posture with the tool above the middle of the skin, pointing down, elbow up.
-pub(crate) const HOME_RAD: [f64; 6] = [std::f64::consts::PI, -1.4, 1.9, -2.07, -1.57, 0.0];
+pub const HOME_RAD: [f64; 6] = [std::f64::consts::PI, -1.4, 1.9, -2.07, -1.57, 0.0];
 
 impl Link {
     /// Transformation from the joint's moving side to the link's own frame: `T_z(d)` `T_x(a)` `R_x(α)`.
