@@ -133,7 +133,7 @@ const ERROR_PER_TOLERANCE: f64 = 10.0;
 /// wider than h).
 ///
 /// The surface beside a load rises if ν exceeds about 0.2. Contact outside the geometric overlap is then searched down
-/// to [`Influence::bulge`] × the depth, the rise beside a half-plane under uniform pressure.
+/// to `Influence::bulge` × the depth, the rise beside a half-plane under uniform pressure.
 ///
 /// If a pose or velocity is not finite, or the iteration does not converge, there is no answer: the pressure is 0 and
 /// the wrench NaN, which stops the simulation. Without `coupled`, the same holds for a frame whose iteration fails. At
@@ -142,8 +142,6 @@ const ERROR_PER_TOLERANCE: f64 = 10.0;
 ///
 /// Validity: small slopes; for the half-space, contact that is narrow compared with the thickness; the normal problem
 /// neglects friction.
-///
-/// [`Influence::bulge`]: super::Influence::bulge
 ///
 /// ```
 /// use spts_contact::{PosedMesh, build_contact, mesh::cuboid};

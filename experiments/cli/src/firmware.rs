@@ -254,7 +254,7 @@ impl WeightsCommand {
         check_array(&self.out)?;
         let cells = self.cells.emulated(self.edges as u64, vec![task])?;
         let mut file = NpyFile::create(&self.out, &[self.edges, cells.cells])?;
-        cells.weights(task, &Bars::default(), &mut |levels| Ok(file.push(levels.iter().copied())?))?;
+        cells.weights(task, &Bars::default(), &mut |levels| file.push(levels.iter().copied()))?;
         file.finish()?;
         let written = serde_json::json!({
             "file": self.out, "shape": [cells.edges, cells.cells], "mode": task.mode(), "period": task.period,

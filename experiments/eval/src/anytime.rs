@@ -156,7 +156,7 @@ impl TrainedBoard<'_> {
         for entry in &self.entries {
             let confidence = entry.decoders.first().and_then(|decoder| decoder.trained.confidence());
             let Some((subject, _)) = confidence else {
-                return Err(no_confidence(&entry.name).into());
+                return Err(no_confidence(&entry.name));
             };
             let wanted = match subject {
                 Subject::Class if !entry.knows_classes => continue,

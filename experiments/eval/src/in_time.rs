@@ -110,7 +110,7 @@ impl TrainedBoard<'_> {
         }
         for entry in &self.entries {
             if entry.decoders.iter().any(|decoder| decoder.trained.prior().is_none()) {
-                return Err(not_in_time(&entry.name).into());
+                return Err(not_in_time(&entry.name));
             }
         }
         let (measurements, cols) = (&self.run.measurements, self.source.layout.cols());

@@ -1,7 +1,7 @@
 //! Touches on a skin, sent through its circuit: common parts of the studies of sensing matrices and of readouts.
 //!
-//! A [`TouchScene`] defines objects and skin, and [`TouchScene::draw`] presses the objects. A [`TouchWire`] measures
-//! the touches through a readout profile with any weights, and a [`TouchScore`] compares an image with the touch.
+//! A `TouchScene` defines objects and skin, and its `draw` presses the objects. A `TouchWire` measures the touches
+//! through a readout profile with any weights, and a `TouchScore` compares an image with the touch.
 
 use spts_circuit::{Constant, Mode, Profile, Readout, Weights};
 use spts_dataset::{Maker, Spec};

@@ -35,7 +35,7 @@ use spts_input::Refusal;
 pub struct NnLasso {
     alpha: Penalty,
     normalise: bool,
-    /// Largest duality gap relative to ‖y‖² / (2M), and largest number of sweeps; default [`Self::STOPPING`].
+    /// Largest duality gap relative to ‖y‖² / (2M), and largest number of sweeps; default `STOPPING`.
     pub stopping: Stopping,
 }
 

@@ -38,7 +38,7 @@ use spts_input::Refusal;
 pub struct Tv {
     grid: Grid,
     alpha: Penalty,
-    /// Largest duality gap relative to ‖y‖² / (2M), and largest number of iterations; default [`Self::STOPPING`].
+    /// Largest duality gap relative to ‖y‖² / (2M), and largest number of iterations; default `STOPPING`.
     pub stopping: Stopping,
 }
 

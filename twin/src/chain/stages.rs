@@ -153,7 +153,7 @@ impl Chain {
 
     /// Number of codes in all recordings by this chain and its copies in which the emulated cells differ from the
     /// model. Such codes show edges that cells have lost because the clock is too fast.
-    pub(crate) fn unlike_codes(&self) -> u64 {
+    pub fn unlike_codes(&self) -> u64 {
         self.unlike_codes.load(Ordering::Relaxed)
     }
 

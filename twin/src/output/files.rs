@@ -119,7 +119,7 @@ const RANDOM: usize = 12;
 /// Checks that a file `path` can be written, and leaves nothing there. A long run calls this before it computes.
 ///
 /// # Errors
-/// As [`write_with`].
+/// [`Refusal`] if the file cannot be written, or `path` is something other than a regular file.
 pub fn check_writable(path: &Path) -> Result<(), Refusal> {
     AtomicFile::create(path).map(drop)
 }
@@ -127,7 +127,7 @@ pub fn check_writable(path: &Path) -> Result<(), Refusal> {
 /// Writes `bytes` as `path`.
 ///
 /// # Errors
-/// As [`write_with`].
+/// [`Refusal`] if the file cannot be written, or `path` is something other than a regular file.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Refusal> {
     write_with(path, |out| out.write_all(bytes))
 }

@@ -56,7 +56,7 @@ pub struct Simulation {
     pub presses: Vec<PressSummary>,
     /// The instant of the largest force; the first of several equal ones.
     pub peak: Option<Peak>,
-    /// The session with only its first blocks, at most [`Simulation::FIRST_BLOCKS`]; `None` if nothing was recorded.
+    /// The session with only its first blocks, at most `FIRST_BLOCKS`; `None` if nothing was recorded.
     pub first: Option<Session>,
     /// Samples at an end of the converter's or amplifier's range: of the raster recording, then of the compressive one.
     pub saturated: [Option<Saturated>; 2],

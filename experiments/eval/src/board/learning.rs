@@ -175,8 +175,7 @@ impl<'a> Trainer<'a> {
                 "`--decoder` = {}: learns classes from raster presses that are not scored, but the sessions have none; \
                  record more raster presses, or use `--learn-from simulation`",
                 without_classes.join(", ")
-            ))
-            .into());
+            )));
         }
         Ok(entries)
     }

@@ -38,7 +38,7 @@ impl Rgb {
 ///
 /// The path is drawn in Oklch (B. Ottosson, "A perceptual color space for image processing", 2020): lightness rises
 /// linearly, so equal steps of value look like equal steps, in colour and in grey. Values outside the range are
-/// clipped; a non-finite one is [`MISSING`].
+/// clipped; a non-finite one is `MISSING`.
 pub fn heat(value: f64) -> Rgb {
     if !value.is_finite() {
         return MISSING;

@@ -1,7 +1,7 @@
 //! Figures: charts, bars and sheets of tactile images, each written as SVG (to look at) and PNG (to share).
 //!
 //! A figure is drawn once, on a [`canvas::Canvas`], in CSS pixels. That is the SVG file, and the PNG file is painted
-//! from its text, with [`canvas::PIXELS_PER_UNIT`] pixels to the CSS pixel: the two never disagree. Results become
+//! from its text, with `PIXELS_PER_UNIT` pixels to the CSS pixel: the two never disagree. Results become
 //! charts through [`Plot`]. Files are written to a temporary name and renamed: a reader never sees half a figure.
 
 pub mod axis;

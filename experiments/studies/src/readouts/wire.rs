@@ -47,7 +47,7 @@ impl WireFrame {
         image
     }
 
-    /// [`until_noticed`](super::until_noticed) of the first `count` measurements, whose samples may have either sign.
+    /// `until_noticed` of the first `count` measurements, whose samples may have either sign.
     pub fn noticed(&self, count: usize) -> Option<f64> {
         let beyond: Vec<bool> = self.volts[..count].iter().map(|v| v.abs() > self.alarm_v).collect();
         super::until_noticed(&beyond)
