@@ -87,6 +87,9 @@ pub struct Wrench {
 }
 
 impl Wrench {
+    /// Nothing touches.
+    pub const NONE: Self = Self { force_n: [0.0; 3], torque_nm: [0.0; 3] };
+
     /// The answer of a contact field that has none: NaN everywhere.
     pub const UNKNOWN: Self = Self { force_n: [f64::NAN; 3], torque_nm: [f64::NAN; 3] };
 }

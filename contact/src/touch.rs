@@ -26,7 +26,9 @@ impl From<PreparedMesh> for TouchBody {
 
 /// A skin that any number of bodies can touch at once. Input: poses and velocities. Output: pressures and wrenches.
 ///
-/// A flat skin is a [`WinklerLayer`], any other a [`SurfaceField`]. Pressures of several bodies at one place add up.
+/// A flat skin is a [`WinklerLayer`], any other a [`SurfaceField`]. Foam acts in the columns between the link's surface
+/// and the skin's: what is behind them, or comes through them from behind, touches nothing. Pressures of several bodies
+/// at one place add up.
 ///
 /// ```
 /// use spts_contact::{PosedMesh, PreparedMesh, TouchBody, TouchSkin, Foam, mesh::cylinder};
@@ -50,6 +52,7 @@ pub struct TouchSkin {
     pressure: PressureMap,
     electrode_pressure: PressureMap,
     touched_m2: f64,
+    bottomed: bool,
 }
 
 #[derive(Debug, Clone)]
@@ -63,6 +66,8 @@ enum Surface {
 struct FlatSkin {
     layer: WinklerLayer,
     bins: TaxelBins,
+    /// Lowest and highest corner of the foam, m.
+    bounds_m: [[f64; 3]; 2],
     cell_area_m2: f64,
     /// Squares along a row of the grid.
     width: usize,
@@ -82,7 +87,9 @@ impl TouchSkin {
     pub fn flat(layout: SkinLayout, foam: Foam) -> Result<Self, Refusal> {
         let cells = foam.cells_per_taxel;
         let cell_m = layout.pitch_m() / cells as f64;
+        let [half_x, half_y] = [layout.cols(), layout.rows()].map(|n| 0.5 * n as f64 * layout.pitch_m());
         let flat = FlatSkin {
+            bounds_m: [[-half_x, -half_y, -foam.thickness_m], [half_x, half_y, 0.0]],
             layer: WinklerLayer::new(foam, &layout)?,
             bins: TaxelBins::new(&layout, cells),
             cell_area_m2: cell_m * cell_m,
@@ -112,7 +119,7 @@ impl TouchSkin {
 
     fn with(layout: SkinLayout, foam: Foam, surface: Surface) -> Self {
         let zeros = || PressureMap::zeros(layout.rows(), layout.cols());
-        Self { pressure: zeros(), electrode_pressure: zeros(), touched_m2: 0.0, layout, foam, surface }
+        Self { pressure: zeros(), electrode_pressure: zeros(), touched_m2: 0.0, bottomed: false, layout, foam, surface }
     }
 
     /// Rows, columns, pitch and electrodes of the taxels.
@@ -127,6 +134,24 @@ impl TouchSkin {
             Surface::Flat(_) => {
                 let flat = SurfacePoints::flat(&self.layout, 1);
                 flat.map(|points| points.taxel_centres()).unwrap_or_default()
+            }
+        }
+    }
+
+    /// Thickness of the foam, m.
+    pub fn thickness_m(&self) -> f64 {
+        self.foam.thickness_m
+    }
+
+    /// Whether a place, m, lies in the foam, or beside it within half a thickness along the normal.
+    pub fn covers(&self, place_m: [f64; 3]) -> bool {
+        match &self.surface {
+            Surface::Curved(field) => field.covers(place_m),
+            Surface::Flat(_) => {
+                let [x, y, z] = place_m;
+                let half = |n: usize| 0.5 * n as f64 * self.layout.pitch_m();
+                let along = (-1.5 * self.foam.thickness_m..=0.5 * self.foam.thickness_m).contains(&z);
+                x.abs() <= half(self.layout.cols()) && y.abs() <= half(self.layout.rows()) && along
             }
         }
     }
@@ -155,6 +180,12 @@ impl TouchSkin {
         self.touched_m2
     }
 
+    /// Whether a body has gone through the foam, down to the link. Its force then is that of solid polymer, which stands
+    /// for the link, and the pressure is no measured one.
+    pub fn bottomed(&self) -> bool {
+        self.bottomed
+    }
+
     /// Upper bound of the foam's stiffness in the contact, N/m: the value under the taxel with the largest pressure is
     /// used everywhere. The slope of p = K δ/(1 − δ/δ_m) at the pressure p is K (1 + p/(K δ_m))².
     pub fn stiffness_n_per_m(&self) -> f64 {
@@ -177,7 +208,8 @@ impl TouchSkin {
             Surface::Flat(flat) => {
                 self.pressure.values_mut().fill(0.0);
                 self.electrode_pressure.values_mut().fill(0.0);
-                self.touched_m2 = flat.touch(bodies, wrenches, [&mut self.pressure, &mut self.electrode_pressure]);
+                let maps = [&mut self.pressure, &mut self.electrode_pressure];
+                (self.touched_m2, self.bottomed) = flat.touch(bodies, wrenches, maps);
             }
             Surface::Curved(field) => {
                 field.clear();
@@ -185,26 +217,31 @@ impl TouchSkin {
                 field.points().means(field.pressure_pa(), self.pressure.values_mut());
                 self.electrode_pressure.values_mut().copy_from_slice(self.pressure.values());
                 self.touched_m2 = field.touched_m2();
+                self.bottomed = field.bottomed();
             }
         }
     }
 }
 
 impl FlatSkin {
-    /// Adds the pressures under `bodies` to `maps`. The area under pressure, m².
+    /// Adds the pressures under `bodies` to `maps`. The area under pressure, m², and whether a body has gone through.
     fn touch(
         &mut self,
         bodies: &[(&TouchBody, PosedMesh<'_>)],
         wrenches: &mut Vec<Wrench>,
         mut maps: [&mut PressureMap; 2],
-    ) -> f64 {
+    ) -> (f64, bool) {
         self.touches += 1;
         self.known.resize_with(bodies.len().max(self.known.len()), KnownBody::default);
-        let mut cells = 0_usize;
+        let (mut cells, mut bottomed) = (0_usize, false);
         for ((body, posed), known) in bodies.iter().zip(&mut self.known) {
+            if posed.is_finite() && body.solid.is_apart(posed, self.bounds_m) {
+                wrenches.push(Wrench::NONE);
+                continue;
+            }
             self.layer.swap_known(known);
             self.layer.expect(&body.mesh);
-            let answer = self.layer.respond(posed);
+            let answer = self.layer.respond_to(posed, Some(&body.solid));
             wrenches.push(answer.wrench);
             for (sum, map) in maps.iter_mut().zip(self.bins.means(answer.pressure_pa, answer.patch)) {
                 for (sum, p) in sum.values_mut().iter_mut().zip(map.values()) {
@@ -218,9 +255,10 @@ impl FlatSkin {
                     *last = if is_new { self.touches } else { *last };
                 }
             }
+            bottomed |= self.layer.bottomed;
             self.layer.swap_known(known);
         }
-        cells as f64 * self.cell_area_m2
+        (cells as f64 * self.cell_area_m2, bottomed)
     }
 }
 

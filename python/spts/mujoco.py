@@ -2,18 +2,20 @@
 
 ::
 
-    touch = spts.mujoco.attach(model, data, skin, site="palm", bodies=["cup"])
+    touch = spts.mujoco.attach(model, data, skin, site="palm")
     for _ in range(1000):
         felt = touch.step()                  # in place of mujoco.mj_step(model, data)
         y, phi = wire.record(felt, 20)
     touch.detach()
 
-The skin's frame is the site's: z outward, the free surface of a flat skin in the plane z = 0. The foam carries the bodies
-in place of MuJoCo's own contact between them and the skin's link, which is taken out; every other contact stays.
+The skin's frame is the site's, or a place on a body: z outward, the free surface of a flat skin in the plane z = 0. Where
+there is foam it carries the bodies in place of MuJoCo's own contact with the skin's link. Everywhere else, for other
+data and for copies, MuJoCo's contact stays, and the model is not changed.
 """
 
 from __future__ import annotations
 
+import ctypes
 import math
 import warnings
 
@@ -27,21 +29,28 @@ from ._spts import Body, Mount
 _LONG = 1.0
 
 
-def attach(model, data, skin, *, site, bodies, link_geoms=None):
-    """Puts `skin` on a site of a model.
+def attach(
+    model, data, skin, *, site=None, body=None, pos=(0, 0, 0), quat=(1, 0, 0, 0), bodies="all", link_geoms=None
+):
+    """Puts `skin` on a link of a model.
 
     Parameters
     ----------
     model : mujoco.MjModel
     data : mujoco.MjData
     skin : spts.Skin
-    site : str or int
+    site : str or int, optional
         Where the skin is: its frame is the site's.
-    bodies : sequence of str or int, or dict of them to spts.Body
-        Bodies that may touch the skin. Their shapes are their geoms that collide, unless a `spts.Body` is given.
+    body : str or int, optional
+        In place of a site, the body that the skin is on, with the skin's frame in that body's: `pos` (3,), m, and `quat`
+        (4,), w x y z.
+    bodies : "all", sequence of str or int, or dict of them to spts.Body
+        Bodies that may touch the skin. Their shapes are their geoms that collide, unless a `spts.Body` is given. "all"
+        are those with such geoms but the skin's own link, what is welded to it, and what a joint connects with it.
     link_geoms : sequence of str or int, optional
-        Geoms that the skin covers: MuJoCo's contact between them and `bodies` is taken out. Default: all geoms of the
-        site's body and, unless that stands still, of what is welded to it. A site of the world needs them said.
+        Geoms that the skin covers: MuJoCo's contact between them and `bodies` is taken out where there is foam. Default:
+        all geoms of the skin's body and, unless that stands still, of what is welded to it. A skin on the world covers
+        those that are not of `bodies`.
 
     Returns
     -------
@@ -52,16 +61,34 @@ def attach(model, data, skin, *, site, bodies, link_geoms=None):
     ValueError
         For a name that the model does not have, a body without a shape, and what this cannot do (said in the text).
     """
-    return Attachment(model, data, skin, site=site, bodies=bodies, link_geoms=link_geoms)
+    if (site is None) == (body is None):
+        raise ValueError("where is the skin? Either `site` or `body` is needed")
+    if site is not None:
+        site = _number(model, mujoco.mjtObj.mjOBJ_SITE, "site", site)
+        place = int(model.site_bodyid[site]), model.site_pos[site], model.site_quat[site]
+    else:
+        place = _number(model, mujoco.mjtObj.mjOBJ_BODY, "body", body), pos, quat
+    return Attachment(model, data, skin, *place, bodies=bodies, link_geoms=link_geoms)
 
 
 class Attachment:
-    """A skin on a site of a model: what `attach` returns."""
+    """A skin on a link of a model: what `attach` returns."""
 
-    def __init__(self, model, data, skin, *, site, bodies, link_geoms=None):
+    def __init__(self, model, data, skin, link, pos, quat, *, bodies="all", link_geoms=None):
+        if model.opt.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0):
+            raise ValueError(
+                "`model.opt.enableflags` has `sleep`: foam does not wake what sleeps; clear it, or let the bodies stay awake"
+            )
+        pos, quat = (np.asarray(v, np.float64) for v in (pos, quat))
+        if pos.shape != (3,) or quat.shape != (4,) or not (np.isfinite(pos).all() and np.linalg.norm(quat) > 1e-9):
+            raise ValueError(f"`pos` = {pos}, `quat` = {quat}: three finite numbers, and four that are not all 0, are needed")
+        rotation = np.empty(9)
+        mujoco.mju_quat2Mat(rotation, quat / np.linalg.norm(quat))
         self.model, self.data, self.skin = model, data, skin
-        site = _number(model, mujoco.mjtObj.mjOBJ_SITE, "site", site)
-        link = int(model.site_bodyid[site])
+        if isinstance(bodies, str):
+            if bodies != "all":
+                raise ValueError(f'`bodies` = "{bodies}"; valid: "all", a list of bodies, or a dict of bodies to `spts.Body`')
+            bodies = _all(model, link)
         given = bodies if isinstance(bodies, dict) else {body: None for body in bodies}
         if not given:
             raise ValueError("`bodies` is empty: which bodies may touch the skin?")
@@ -72,30 +99,38 @@ class Attachment:
             if number == link or model.body_weldid[number] == model.body_weldid[link] != 0:
                 raise ValueError(f'`bodies`: "{name}" is a part of the skin\'s own link')
             self.bodies[number] = body_of(model, number) if shape is None else shape
+        others = np.isin(model.geom_bodyid, list(self.bodies))
         if link_geoms is None:
-            own = _covered(model, link)
+            own = _covered(model, link) & ~others
         else:
-            own = [_number(model, mujoco.mjtObj.mjOBJ_GEOM, "link_geoms", geom) for geom in link_geoms]
-        others = [int(g) for g in np.flatnonzero(np.isin(model.geom_bodyid, list(self.bodies)))]
-        self._mount = Mount(skin, site, link, list(self.bodies.items()), model.body_rootid.tolist(), _Arrays(data))
-        self._contact = _Contact(model, own, others)
+            own = np.zeros(model.ngeom, bool)
+            own[[_number(model, mujoco.mjtObj.mjOBJ_GEOM, "link_geoms", geom) for geom in link_geoms]] = True
+        if (own & others).any():
+            raise ValueError(f"geoms {np.flatnonzero(own & others).tolist()} are of the skin's link and of a body at once")
+        self._own, self._others = own, others
+        frame = (*pos.tolist(), *rotation.tolist())
+        self._mount = Mount(skin, link, frame, list(self.bodies.items()), model.body_rootid.tolist(), _Arrays(data))
         # what a load moves at the least: inverse masses of the body and of the link add up
         inverse = model.body_invweight0[:, 0]
         self._mass = min(1.0 / max(inverse[b] + inverse[link], 1e-12) for b in self.bodies)
-        self._last = None
+        self._link, self._place = link, (pos, rotation.reshape(3, 3))
+        self._last = self._failed = None
         self._warned = False
         self._felt_at = None
         self._each = None
 
     @property
     def last(self):
-        """The last touch; None before the first step."""
+        """The last touch; None before the first step. An error in a step of others is raised here."""
+        if self._failed is not None:
+            failed, self._failed = self._failed, None
+            raise failed
         return self._last
 
     @property
     def pressure(self):
         """Mean pressure over every taxel, Pa, (rows, cols)."""
-        return np.zeros(self.skin.shape) if self._last is None else self._last.pressure
+        return np.zeros(self.skin.shape) if self.last is None else self._last.pressure
 
     def step(self, steps=1):
         """Steps the model, in place of `mujoco.mj_step`; the last `spts.Touch`."""
@@ -117,22 +152,29 @@ class Attachment:
         each : callable, optional
             Called with every touch.
 
-        The forces go into `qfrc_passive` by MuJoCo's callback `mjcb_passive`; one that is set already is called too.
+        The forces go into `qfrc_passive` by MuJoCo's callback `mjcb_passive`, for this data alone; one that is set already
+        is called first.
         """
-        if self not in _HOOKED:
-            if not _HOOKED:
-                _OTHERS.append(mujoco.get_mjcb_passive())
-                mujoco.set_mjcb_passive(_passive)
-            _HOOKED.append(self)
+        off = self.model.opt.disableflags
+        if all(off & flag for flag in _PASSIVE_OFF):
+            raise ValueError("`model.opt.disableflags` turns passive forces off, and with them the skin; use `step`")
+        if not _HOOKED:
+            _BEFORE.append(mujoco.get_mjcb_passive())
+            mujoco.set_mjcb_passive(_passive)
+        hooked = _HOOKED.setdefault(self.data._address, [])
+        if self not in hooked:
+            hooked.append(self)
         self._each = each
 
     def detach(self):
-        """Gives MuJoCo its contact back, and ends `hook`. Everything else stays as it is."""
-        self._contact.restore()
-        if self in _HOOKED:
-            _HOOKED.remove(self)
+        """Ends the skin: MuJoCo's contact acts everywhere again, and `hook` has ended."""
+        hooked = _HOOKED.get(self.data._address, [])
+        if self in hooked:
+            hooked.remove(self)
+            if not hooked:
+                del _HOOKED[self.data._address]
             if not _HOOKED:
-                mujoco.set_mjcb_passive(_OTHERS.pop())
+                mujoco.set_mjcb_passive(_BEFORE.pop())
 
     def __enter__(self):
         return self
@@ -143,6 +185,19 @@ class Attachment:
     def _apply(self, dt):
         self._last = self._mount.apply(dt)
         self._warn(dt)
+
+    def _foamed(self, contact):
+        """Which contacts are between the link and the bodies, where there is foam: (contacts,) of bool."""
+        geoms = contact.geom
+        own, others = self._own[geoms], self._others[geoms]
+        # a flex has no geom
+        found = (geoms >= 0).all(axis=1) & (own[:, 0] & others[:, 1] | others[:, 0] & own[:, 1])
+        for k in np.flatnonzero(found):
+            pos, rotation = self._place
+            turn = self.data.xmat[self._link].reshape(3, 3)
+            at = rotation.T @ (turn.T @ (contact.pos[k] - self.data.xpos[self._link]) - pos)
+            found[k] = self.skin.covers(at)
+        return found
 
     def _passive(self):
         """Adds the forces to `qfrc_passive`. Time runs only when the data's does: `mj_forward` repeats a moment."""
@@ -175,16 +230,51 @@ class Attachment:
                 )
 
 
-# Skins that every step feels, and the callback that was set before them.
-_HOOKED, _OTHERS = [], []
+# Skins that every step feels, by the address of their data, and the callback that was set before them.
+_HOOKED, _BEFORE = {}, []
+_PASSIVE_OFF = [
+    getattr(mujoco.mjtDisableBit, name)
+    for name in ("mjDSBL_PASSIVE", "mjDSBL_SPRING", "mjDSBL_DAMPER")
+    if hasattr(mujoco.mjtDisableBit, name)
+]
 
 
+# By addresses: MuJoCo also calls it for models that it is compiling, which have no object in Python.
+@ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
 def _passive(model, data):
-    if _OTHERS and _OTHERS[-1] is not None:
-        _OTHERS[-1](model, data)
-    for attachment in _HOOKED:
-        if attachment.data is data:
+    hooked = _HOOKED.get(data, ())
+    before = _BEFORE[-1] if _BEFORE else None
+    if isinstance(before, ctypes._CFuncPtr):
+        before(model, data)
+    elif before is not None and hooked:
+        before(hooked[0].model, hooked[0].data)
+    if hooked:
+        try:
+            _take_out(hooked)
+        except Exception as error:
+            hooked[0]._failed = error
+    for attachment in hooked:
+        try:
             attachment._passive()
+        except Exception as error:
+            # a step of others cannot raise it
+            attachment._failed = error
+
+
+def _take_out(attachments):
+    """Takes MuJoCo's contacts out of this step where there is foam. Computes the constraints again without them."""
+    model, data = attachments[0].model, attachments[0].data
+    if data.ncon == 0:
+        return
+    contact = data.contact
+    found = np.logical_or.reduce([attachment._foamed(contact) for attachment in attachments])
+    found &= contact.exclude == 0
+    if found.any():
+        contact.exclude[found] = 1
+        mujoco.mj_makeConstraint(model, data)
+        if hasattr(mujoco, "mj_island"):
+            mujoco.mj_island(model, data)
+        mujoco.mj_projectConstraint(model, data)
 
 
 def step(*attachments):
@@ -203,6 +293,8 @@ def step(*attachments):
             "`model.opt.integrator` = RK4; valid: Euler, implicit, implicitfast; with RK4 use `hook()` and `mj_step`"
         )
     mujoco.mj_step1(model, data)
+    _take_out(attachments)
+    mujoco.mj_referenceConstraint(model, data)
     done = []
     try:
         for attachment in attachments:
@@ -225,12 +317,11 @@ def body_of(model, body):
     Raises
     ------
     ValueError
-        For a body without a geom, and for planes, height fields and SDFs, which have no mesh.
+        For a body without a geom, and for SDFs, which have no mesh.
     """
     body = _number(model, mujoco.mjtObj.mjOBJ_BODY, "body", body)
     geoms = np.flatnonzero(model.geom_bodyid == body)
-    collide = [g for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
-    parts = [_mesh(model, int(g)) for g in (collide or geoms)]
+    parts = [_mesh(model, int(g)) for g in (_colliding(model, geoms) or geoms)]
     if not parts:
         raise ValueError(f'body "{model.body(body).name}" has no geom; give its shape: bodies={{name: spts.Body}}')
     vertices, faces, first = [], [], 0
@@ -239,6 +330,50 @@ def body_of(model, body):
         faces.append(triangles + first)
         first += len(points)
     return Body.from_vertices(np.concatenate(vertices), np.concatenate(faces))
+
+
+def _colliding(model, geoms):
+    return [int(g) for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
+
+
+def _all(model, link):
+    """Bodies with geoms that collide, but the kinematic neighbours of `link`."""
+    weld = model.body_weldid
+    near = {weld[link], weld[model.body_parentid[weld[link]]]}
+    below = {b for b in range(1, model.nbody) if weld[model.body_parentid[weld[b]]] == weld[link]} if weld[link] else set()
+    excluded = set(model.exclude_signature.tolist())
+    bodies = []
+    for body in range(model.nbody):
+        # what stands still is one: a link of the world is touched by all that moves, and one that moves by the world
+        if weld[body] in near - {0} or body in below or weld[body] == weld[link]:
+            continue
+        if (min(body, link) << 16) + max(body, link) in excluded:
+            continue
+        if _colliding(model, np.flatnonzero(model.geom_bodyid == body)):
+            bodies.append(body)
+    return bodies
+
+
+# Side of the block that stands for a plane, m.
+_WIDE = 200.0
+
+
+def _field(model, field):
+    """Vertices and faces of a height field, as the block under its surface."""
+    rows, cols = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
+    half_x, half_y, high, base = model.hfield_size[field]
+    first = model.hfield_adr[field]
+    heights = model.hfield_data[first : first + rows * cols].reshape(rows, cols)
+    x, y = np.meshgrid(np.linspace(-half_x, half_x, cols), np.linspace(-half_y, half_y, rows))
+    top = np.stack([x, y, heights * high], axis=-1).reshape(-1, 3)
+    bottom = top * (1.0, 1.0, 0.0) - (0.0, 0.0, base)
+    at = np.arange(rows * cols).reshape(rows, cols)
+    a, b, c, d = at[:-1, :-1].ravel(), at[:-1, 1:].ravel(), at[1:, 1:].ravel(), at[1:, :-1].ravel()
+    lid = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    rim = np.concatenate([at[0, :], at[1:, -1], at[-1, -2::-1], at[-2:0:-1, 0]])
+    after, n = np.roll(rim, -1), rows * cols
+    walls = np.concatenate([np.stack([rim, rim + n, after + n], 1), np.stack([rim, after + n, after], 1)])
+    return np.concatenate([top, bottom]), np.concatenate([lid, lid[:, ::-1] + n, walls])
 
 
 def _mesh(model, geom):
@@ -251,6 +386,16 @@ def _mesh(model, geom):
         vertices = model.mesh_vert[first : first + count].astype(np.float64)
         first, count = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
         faces = model.mesh_face[first : first + count].astype(np.int64)
+        a, b, c = (vertices[faces[:, k]] for k in range(3))
+        if np.einsum("ij,ij->", a, np.cross(b, c)) < 0.0:
+            # inside out: MuJoCo keeps such meshes as they are
+            faces = faces[:, ::-1]
+    elif kind == types.mjGEOM_PLANE:
+        # MuJoCo's planes press without end, whatever is drawn of them
+        vertices, faces = Body.box((_WIDE, _WIDE, _WIDE)).mesh
+        vertices = vertices - (0.0, 0.0, 0.5 * _WIDE)
+    elif kind == types.mjGEOM_HFIELD:
+        vertices, faces = _field(model, model.geom_dataid[geom])
     else:
         if kind == types.mjGEOM_SPHERE:
             shape = Body.sphere(size[0])
@@ -275,80 +420,17 @@ def _mesh(model, geom):
 
 
 def _covered(model, link):
-    """Geoms of a link."""
-    if link == 0:
-        raise ValueError("`link_geoms` is missing: the site is in the world; which of its geoms does the skin cover?")
+    """Geoms of a link, (geoms,) of bool."""
     weld = model.body_weldid[link]
-    owners = model.geom_bodyid if weld == 0 else model.body_weldid[model.geom_bodyid]
-    return [int(g) for g in np.flatnonzero(owners == (link if weld == 0 else weld))]
+    return (model.geom_bodyid if weld == 0 else model.body_weldid[model.geom_bodyid]) == (link if weld == 0 else weld)
 
 
 class _Arrays:
     """The arrays of an mjData that a mount reads and writes."""
 
     def __init__(self, data):
-        for name in ("xpos", "xmat", "xipos", "cvel", "subtree_com", "site_xpos", "site_xmat", "xfrc_applied"):
+        for name in ("xpos", "xmat", "xipos", "cvel", "subtree_com", "xfrc_applied"):
             setattr(self, name, getattr(data, name))
-
-
-class _Contact:
-    """Takes the contact between two sets of geoms out, and nothing else, with one free collision bit.
-
-    Geoms a and b collide when contype(a) & conaffinity(b) or contype(b) & conaffinity(a). The link's geoms get contype 0
-    and a bit of their own as conaffinity; what collided with them, and is not one of the bodies, gets that bit as contype.
-    """
-
-    def __init__(self, model, link, bodies):
-        joined = set(link) & set(bodies)
-        if joined:
-            raise ValueError(f"geoms {sorted(joined)} are of the skin's link and of a body at once")
-        pairs = zip(model.pair_geom1.tolist(), model.pair_geom2.tolist())
-        for a, b in pairs:
-            if {a, b} & set(link) and {a, b} & set(bodies):
-                raise ValueError(
-                    f"geoms {a} and {b} are a <pair> of the model, which collides whatever its bits; take it out"
-                )
-        self.model = model
-        contype, conaffinity = model.geom_contype, model.geom_conaffinity
-        self.before = [(g, int(contype[g]), int(conaffinity[g])) for g in link]
-        self.bits = 0
-        self.given = []
-        kinds = {(c, a) for _, c, a in self.before if c or a}
-        for c, a in sorted(kinds):
-            used = int(np.bitwise_or.reduce(contype) | np.bitwise_or.reduce(conaffinity)) & 0xFFFFFFFF
-            free = next((1 << k for k in range(31) if not used >> k & 1), None)
-            if free is None:
-                self.restore()
-                raise ValueError("the geoms of the model use all collision bits; one has to be free")
-            own = [g for g, c_own, a_own in self.before if (c_own, a_own) == (c, a)]
-            out = set(bodies) | set(link)
-            for g in range(model.ngeom):
-                if g not in out and (int(contype[g]) & a or c & int(conaffinity[g])):
-                    contype[g] |= free
-                    self.given.append((g, free))
-            for g in own:
-                contype[g], conaffinity[g] = 0, free
-        self._bodies()
-
-    def restore(self):
-        contype, conaffinity = self.model.geom_contype, self.model.geom_conaffinity
-        for g, bit in self.given:
-            contype[g] &= ~bit
-        for g, c, a in self.before:
-            contype[g], conaffinity[g] = c, a
-        self.given, self.before = [], []
-        self._bodies()
-
-    def _bodies(self):
-        """The bits of bodies, which MuJoCo looks at first, are those of their geoms together."""
-        model = self.model
-        if hasattr(model, "body_contype"):
-            for bits, own in (
-                (model.body_contype, model.geom_contype),
-                (model.body_conaffinity, model.geom_conaffinity),
-            ):
-                bits[:] = 0
-                np.bitwise_or.at(bits, model.geom_bodyid, own)
 
 
 def _number(model, kind, field, name):

@@ -13,13 +13,14 @@ type Rotation = [Vector; 3];
 /// Force and torque on bodies, by their numbers.
 type Loads = Vec<(usize, [f64; 6])>;
 
-/// A skin on a site, and the bodies that may touch it. It reads and writes the arrays of an `mjData`, whatever MuJoCo
+/// A skin on a link, and the bodies that may touch it. It reads and writes the arrays of an `mjData`, whatever MuJoCo
 /// they come from.
 #[pyclass(frozen, module = "spts")]
 pub(crate) struct Mount {
     skin: Py<Skin>,
-    site: usize,
     link: usize,
+    /// Origin of the skin's frame in the link's, m, and how it is turned there.
+    place: (Vector, Rotation),
     bodies: Vec<usize>,
     shapes: Vec<Py<Body>>,
     /// Root of the tree of every body.
@@ -37,20 +38,18 @@ struct Arrays {
     xipos: Py<PyArray2<f64>>,
     cvel: Py<PyArray2<f64>>,
     subtree_com: Py<PyArray2<f64>>,
-    site_xpos: Py<PyArray2<f64>>,
-    site_xmat: Py<PyArray2<f64>>,
     xfrc_applied: Py<PyArray2<f64>>,
 }
 
 #[pymethods]
 impl Mount {
-    /// `bodies` are numbers of bodies of the model and their shapes; `roots` the root of every body's tree.
+    /// `frame` is the skin's in the link's: origin, m, then the rotation matrix by rows. `bodies` are numbers of bodies of the model and their shapes; `roots` the root of every body's tree.
     #[new]
     fn new(
         py: Python<'_>,
         skin: Py<Skin>,
-        site: usize,
         link: usize,
+        frame: [f64; 12],
         bodies: Vec<(usize, Py<Body>)>,
         roots: Vec<usize>,
         data: &Bound<'_, PyAny>,
@@ -63,13 +62,14 @@ impl Mount {
             .iter()
             .zip([3, 9, 3, 6, 3, 6])
             .all(|(a, cols)| a.bind(py).shape() == [count, cols]);
-        let sites = arrays.site_xpos.bind(py).shape()[0];
         let numbers = bodies.iter().map(|(body, _)| *body).chain([link]).chain(roots.iter().copied());
-        if !fits || site >= sites || numbers.max().is_some_and(|most| most >= count) {
+        if !fits || numbers.max().is_some_and(|most| most >= count) {
             bail!("`data` is not of this model");
         }
         let (bodies, shapes) = bodies.into_iter().unzip();
-        Ok(Self { skin, site, link, bodies, shapes, roots, arrays, before: Mutex::default() })
+        let [x, y, z, turn @ ..] = frame;
+        let place = ([x, y, z], std::array::from_fn(|i| std::array::from_fn(|j| turn[3 * i + j])));
+        Ok(Self { skin, link, place, bodies, shapes, roots, arrays, before: Mutex::default() })
     }
 
     /// Lets the bodies touch the skin, `dt` s after the last time, and adds the wrenches to `xfrc_applied`: on every
@@ -147,8 +147,10 @@ impl Mount {
         let a = &self.arrays;
         let (xpos, xmat, cvel) = (read(py, &a.xpos)?, read(py, &a.xmat)?, read(py, &a.cvel)?);
         let centres = read(py, &a.subtree_com)?;
-        let origin = row(&read(py, &a.site_xpos)?, self.site);
-        let frame = rotation(&read(py, &a.site_xmat)?, self.site);
+        let (carrier, (at, turn)) = (rotation(&xmat, self.link), self.place);
+        let origin = plus(row(&xpos, self.link), turned(&carrier, at));
+        let columns: [Vector; 3] = std::array::from_fn(|j| turned(&carrier, turn.map(|row| row[j])));
+        let frame: Rotation = std::array::from_fn(|i| columns.map(|column| column[i]));
         // velocity of what moves with `body` at `at`: `cvel` is about the centre of mass of its tree, spin first
         let velocity = |body: usize, at: Vector| {
             let v: [f64; 6] = row(&cvel, body);

@@ -240,6 +240,17 @@ impl Skin {
         self.locked().time_s
     }
 
+    /// Thickness of the foam, m.
+    #[getter]
+    fn thickness(&self) -> f64 {
+        self.locked().skin.thickness_m()
+    }
+
+    /// Whether `place` (3,), m, in the skin's frame, lies in the foam or within half a thickness of it.
+    fn covers(&self, place: [f64; 3]) -> bool {
+        self.locked().skin.covers(place)
+    }
+
     /// Takes every body off and begins the time anew. A wire that has felt this skin stays behind: make a new one.
     fn reset(&self, py: Python<'_>) {
         py.detach(|| {
@@ -324,7 +335,7 @@ impl Skin {
             bail!("`dt` = {dt} is outside [0, 1e9] s");
         }
         let pairs: Vec<_> = bodies.iter().map(Py::get).zip(placed).collect();
-        let (wrenches, values, felt, [area, time], number) = py.detach(|| {
+        let (wrenches, values, felt, [area, time], (number, bottomed)) = py.detach(|| {
             let posed = pairs.iter().map(|(body, placed)| {
                 let posed = PosedMesh {
                     rotation: placed.rotation,
@@ -344,7 +355,7 @@ impl Skin {
             let values = state.skin.pressure().values().to_vec();
             let felt = state.skin.electrode_pressure().clone();
             let scalars = [state.skin.touched_m2(), state.time_s];
-            (wrenches, values, felt, scalars, state.touches)
+            (wrenches, values, felt, scalars, (state.touches, state.skin.bottomed()))
         });
         let found = PyDict::new(py);
         for (key, wrench) in bodies.iter().zip(&wrenches) {
@@ -357,6 +368,7 @@ impl Skin {
             area,
             time,
             number,
+            bottomed,
             felt,
             skin: self.id,
         };
@@ -412,6 +424,9 @@ pub(crate) struct Touch {
     /// Number of the touch, from 1.
     #[pyo3(get)]
     pub(crate) number: u64,
+    /// Whether a body has gone through the foam, down to the link: the pressure there is no measured one.
+    #[pyo3(get)]
+    bottomed: bool,
     /// What the transducer feels.
     pub(crate) felt: PressureMap,
     /// Which skin.

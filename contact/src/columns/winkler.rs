@@ -4,7 +4,9 @@ use crate::envelope::{Envelope, KnownBody};
 use crate::field::{ContactField, Patch, PosedMesh, Response, Wrench};
 use crate::foam::{Foam, FoamLaw, Most};
 use crate::prepared::PreparedMesh;
+use crate::surface::Solid;
 use crate::traction::Tractions;
+use parry3d_f64::math::Vector;
 use spts_input::Refusal;
 use spts_models::SkinLayout;
 
@@ -37,6 +39,8 @@ pub struct WinklerLayer {
     pub(super) envelope: Envelope,
     pub(crate) pressure_pa: Vec<f64>,
     pub(super) patch: Patch,
+    /// Whether the last body has gone through the foam; only [`WinklerLayer::respond_to`] a solid finds out.
+    pub(crate) bottomed: bool,
     /// Initial compression of the columns, if there is any.
     pub(super) preload: Option<Preload>,
     /// x of the centres of a row's cells, m.
@@ -58,6 +62,7 @@ impl WinklerLayer {
             config,
             pressure_pa: vec![0.0; rows * cols],
             patch: Patch::default(),
+            bottomed: false,
             preload: None,
             x_m: (0..cols).map(|col| envelope.centre_m(0, col)[0]).collect(),
             friction_pa: [vec![0.0; cols], vec![0.0; cols]],
@@ -77,13 +82,29 @@ impl WinklerLayer {
             self.pressure_pa[line].fill(0.0);
         }
         self.patch = Patch::default();
+        self.bottomed = false;
+    }
+
+    /// As [`ContactField::respond`] for a body that may also be below the skin or come through it: `solid`, made from
+    /// its mesh, presses only the columns that it enters from above.
+    pub(crate) fn respond_to(&mut self, body: &PosedMesh<'_>, solid: Option<&Solid>) -> Response<'_> {
+        self.clear();
+        let wrench = if body.is_finite() { self.press(body, solid) } else { Wrench::UNKNOWN };
+        Response { wrench, pressure_pa: &self.pressure_pa, patch: Some(self.patch) }
     }
 
     /// Presses `body` into the cleared layer.
-    fn press(&mut self, body: &PosedMesh<'_>) -> Wrench {
+    fn press(&mut self, body: &PosedMesh<'_>, solid: Option<&Solid>) -> Wrench {
         let [_, width] = self.envelope.shape();
         self.patch = self.envelope.rasterise(body);
         let c = &self.config;
+        if let Some(solid) = solid {
+            let [x, y, z] = body.rotation.map(Vector::from);
+            let (origin, h) = (Vector::from(body.position_m), c.thickness_m);
+            let into_body = |v: Vector| x * v.x + y * v.y + z * v.z;
+            let at = |[x_m, y_m]: [f64; 2]| solid.depth_m(into_body(Vector::new(x_m, y_m, -h) - origin), z, h);
+            self.bottomed = self.envelope.deeper_than(h, at);
+        }
         let law = c.law(body.stiffness_pa_per_m);
         let mut tractions = Tractions::new(body, c);
         // a patch may be wider than the contact: sums that start at fours of the grid's columns do not feel it
@@ -139,9 +160,7 @@ impl ContactField for WinklerLayer {
     }
 
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
-        self.clear();
-        let wrench = if body.is_finite() { self.press(body) } else { Wrench::UNKNOWN };
-        Response { wrench, pressure_pa: &self.pressure_pa, patch: Some(self.patch) }
+        self.respond_to(body, None)
     }
 
     fn preload(&mut self, strain: &[f64]) -> Option<Vec<f64>> {

@@ -99,6 +99,20 @@ impl Envelope {
         self.touched
     }
 
+    /// Replaces every depth beyond `thickness_m` by `depth_m` of the cell's centre (x, y), m; whether one is left.
+    pub(crate) fn deeper_than(&mut self, thickness_m: f64, depth_m: impl Fn([f64; 2]) -> f64) -> bool {
+        let mut deeper = false;
+        for (row, line) in (self.touched.rows[0]..).zip(self.touched.lines(self.raster.cols)) {
+            for (col, depth) in (self.touched.cols[0]..).zip(&mut self.depth_m[line]) {
+                if *depth > thickness_m {
+                    *depth = depth_m(self.raster.centre_m(row, col));
+                    deeper |= *depth > thickness_m;
+                }
+            }
+        }
+        deeper
+    }
+
     /// Makes [`Envelope::map`] the map of the whole underside of `body`, whatever its height, unless it is already.
     pub(crate) fn make_map(&mut self, body: &PosedMesh<'_>) {
         self.take(body);

@@ -7,18 +7,17 @@ use crate::traction::velocity_at;
 use parry3d_f64::math::Vector;
 use spts_input::Refusal;
 
-/// Depth to which bodies are looked for, in thicknesses of the foam.
-const REACH: f64 = 2.0;
-
 /// Independent columns of foam along the normals of a surface, under any number of bodies.
 ///
-/// A column starts at a sample point and points inwards along the normal n. At depth δ, where the body's surface moves
+/// A column goes from its base on the link, one thickness below a sample point, outwards along the normal n to that
+/// point on the free surface. A body touches it with what is inside it; what comes from behind the base, or lies
+/// there, touches nothing. At depth δ, where the body's surface moves
 /// with velocity v, its pressure is p = f(max(0, δ − τ v·n)), as in [`WinklerLayer`](crate::WinklerLayer), and friction
 /// along the surface is t = −μ p v_t/√(|v_t|² + v_reg²). The force p·A·n + t·A acts at the end of the column, δ below
 /// the point. A is the point's area on the free surface (valid to first order in δ over the radius of curvature).
 /// Pressures of several bodies at one point add up.
 ///
-/// A body deeper than two thicknesses is treated as if at two thicknesses.
+/// The depth of a body that has gone through the foam grows on behind the base, up to two thicknesses.
 ///
 /// ```
 /// use spts_contact::{PosedMesh, Solid, Foam, SurfaceField, SurfacePoints, Winding, mesh::sphere};
@@ -38,6 +37,9 @@ pub struct SurfaceField {
     config: Foam,
     points: SurfacePoints,
     pressure_pa: Vec<f64>,
+    bottomed: bool,
+    /// Lowest and highest corner of the foam, m.
+    bounds_m: [[f64; 3]; 2],
 }
 
 impl SurfaceField {
@@ -47,7 +49,15 @@ impl SurfaceField {
     /// [`Refusal`] if a parameter is outside its range.
     pub fn new(config: Foam, points: SurfacePoints) -> Result<Self, Refusal> {
         config.check()?;
-        Ok(Self { pressure_pa: vec![0.0; points.len()], config, points })
+        let mut bounds_m = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        for (point, normal) in points.positions_m.iter().zip(&points.normals) {
+            for k in 0..3 {
+                let base_m = point[k] - normal[k] * config.thickness_m;
+                bounds_m[0][k] = bounds_m[0][k].min(point[k]).min(base_m);
+                bounds_m[1][k] = bounds_m[1][k].max(point[k]).max(base_m);
+            }
+        }
+        Ok(Self { pressure_pa: vec![0.0; points.len()], bottomed: false, bounds_m, config, points })
     }
 
     /// The sample points.
@@ -66,9 +76,27 @@ impl SurfaceField {
         pressed.filter(|(p, _)| **p > 0.0).map(|(_, area)| area).sum()
     }
 
+    /// Whether a body has gone through the foam since [`SurfaceField::clear`].
+    pub fn bottomed(&self) -> bool {
+        self.bottomed
+    }
+
+    /// Whether a place, m, lies in a column of foam, or beside it within half a thickness along the normal.
+    pub(crate) fn covers(&self, place_m: [f64; 3]) -> bool {
+        let (place, h) = (Vector::from(place_m), self.config.thickness_m);
+        let points = self.points.positions_m.iter().zip(&self.points.normals).zip(&self.points.areas_m2);
+        points.into_iter().any(|((point, normal), area_m2)| {
+            let (away, normal) = (place - Vector::from(*point), Vector::from(*normal));
+            let along = away.dot(normal);
+            // as wide as a square of the point's area
+            (-1.5 * h..=0.5 * h).contains(&along) && (away - normal * along).length_squared() <= 0.5 * area_m2
+        })
+    }
+
     /// Removes all bodies.
     pub fn clear(&mut self) {
         self.pressure_pa.fill(0.0);
+        self.bottomed = false;
     }
 
     /// Presses `body` on the skin, in addition to the bodies pressed since [`SurfaceField::clear`]. `solid` is made
@@ -78,9 +106,11 @@ impl SurfaceField {
         if !body.is_finite() {
             return Wrench::UNKNOWN;
         }
+        if solid.is_apart(body, self.bounds_m) {
+            return Wrench::NONE;
+        }
         let c = &self.config;
         let law = c.law(body.stiffness_pa_per_m);
-        let reach_m = REACH * c.thickness_m;
         let regular = c.friction_speed_m_per_s * c.friction_speed_m_per_s;
         let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
         let [x, y, z] = body.rotation.map(Vector::from);
@@ -90,11 +120,12 @@ impl SurfaceField {
         let loads = self.points.areas_m2.iter().zip(&mut self.pressure_pa);
         for ((point, normal), (area, pressure_pa)) in points.zip(loads) {
             let (point, normal) = (Vector::from(*point), Vector::from(*normal));
-            let start = point - normal * reach_m;
-            let depth_m = solid.depth_m(into_body(start - origin), into_body(normal), reach_m);
+            let base = point - normal * c.thickness_m;
+            let depth_m = solid.depth_m(into_body(base - origin), into_body(normal), c.thickness_m);
             if depth_m <= 0.0 {
                 continue;
             }
+            self.bottomed |= depth_m > c.thickness_m;
             let arm = point - normal * depth_m - centre;
             let velocity = Vector::from(velocity_at(body, arm.into()));
             let away = velocity.dot(normal);

@@ -1,5 +1,6 @@
 //! Sample points of a skin, flat, around an axis or on a mesh; and the rays that find them and the bodies over them.
 
+use crate::field::PosedMesh;
 use crate::mesh::TriMesh;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
@@ -75,30 +76,60 @@ impl Solid {
         }
     }
 
-    /// How deep the solid reaches below the end of a ray that starts at `start_m` and goes `reach_m` along `direction`
-    /// (length 1); 0 where it does not. A start inside the solid counts as the deepest point of a ray.
-    pub(super) fn depth_m(&self, start_m: Vector, direction: Vector, reach_m: f64) -> f64 {
-        let hit = self.first(start_m, direction, reach_m);
-        if let Some(hit) = hit
-            && (hit.enters || !self.closed)
-        {
-            return reach_m - hit.distance_m;
+    /// How deep the solid reaches into a column of foam, from its free surface, m; 0 where it does not touch it.
+    ///
+    /// The column starts at `base_m`, on the link, and goes `thickness_m` along `outward` (length 1) to the free
+    /// surface. A solid with the base inside has come through the whole column if more of it lies outward of the base
+    /// than inward, along the column's line: its depth is then the thickness, and how far it goes on behind the base,
+    /// at most another thickness. Otherwise it has come from behind, and does not touch the foam.
+    pub(crate) fn depth_m(&self, base_m: Vector, outward: Vector, thickness_m: f64) -> f64 {
+        let mut from_m = 0.0;
+        while let Some(hit) = self.first(base_m + outward * from_m, outward, thickness_m - from_m) {
+            let at_m = from_m + hit.distance_m;
+            if hit.enters || !self.closed {
+                return thickness_m - at_m;
+            }
+            if from_m <= 0.0 && self.is_through(base_m, outward, at_m) {
+                return thickness_m + self.behind_m(base_m, outward, thickness_m);
+            }
+            // past what comes from behind, to what may enter from outside
+            from_m = at_m + SLACK * thickness_m;
         }
-        // it comes out first, or not at all: it may have started inside
-        if self.closed && self.holds(start_m, direction) {
-            return reach_m;
+        let beside = base_m.cmplt(self.low_m).any() || base_m.cmpgt(self.high_m).any();
+        if from_m > 0.0 || beside {
+            return 0.0;
         }
-        hit.map_or(0.0, |hit| reach_m - hit.distance_m)
+        let out_m = self.first(base_m, outward, f64::INFINITY);
+        match out_m {
+            Some(hit) if hit.enters && self.closed => 0.0,
+            None if self.closed => 0.0,
+            // without a far side, an open mesh goes on for ever
+            hit if self.is_through(base_m, outward, hit.map_or(f64::INFINITY, |hit| hit.distance_m)) => {
+                thickness_m + self.behind_m(base_m, outward, thickness_m)
+            }
+            _ => 0.0,
+        }
     }
 
-    /// Whether a point is inside: what is met first, both ways along `direction`, is the way out.
-    fn holds(&self, point_m: Vector, direction: Vector) -> bool {
-        let out = |direction| {
-            let first = self.first(point_m, direction, f64::INFINITY);
-            first.is_some_and(|hit| !hit.enters)
-        };
-        let beside = point_m.cmplt(self.low_m).any() || point_m.cmpgt(self.high_m).any();
-        !beside && out(direction) && out(-direction)
+    /// Whether a solid that has `base_m` inside, and ends `out_m` outward of it, reaches less far the other way.
+    fn is_through(&self, base_m: Vector, outward: Vector, out_m: f64) -> bool {
+        let inward = self.first(base_m, -outward, f64::INFINITY);
+        inward.is_some_and(|hit| (!hit.enters || !self.closed) && hit.distance_m < out_m)
+    }
+
+    /// How far the solid goes on behind `base_m`, m, at most `most_m`.
+    fn behind_m(&self, base_m: Vector, outward: Vector, most_m: f64) -> f64 {
+        self.first(base_m, -outward, most_m).map_or(most_m, |hit| hit.distance_m)
+    }
+
+    /// Whether the box around the solid, placed as `body`, and the box between two corners have nothing in common.
+    pub(crate) fn is_apart(&self, body: &PosedMesh<'_>, [low_m, high_m]: [[f64; 3]; 2]) -> bool {
+        let (middle, half) = ((self.low_m + self.high_m) * 0.5, (self.high_m - self.low_m) * 0.5);
+        (0..3).any(|k| {
+            let axis = Vector::from(body.rotation[k]);
+            let (at, reach) = (axis.dot(middle) + body.position_m[k], axis.abs().dot(half));
+            at + reach < low_m[k] || at - reach > high_m[k]
+        })
     }
 
     /// How far a ray of `reach_m` goes until it meets the mesh, and the normal there, which faces the ray.

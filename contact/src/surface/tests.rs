@@ -1,11 +1,13 @@
 //! The curved field against the flat one, a closed form, and boxes cut by hand.
 
-use super::{Solid, SurfaceField, SurfacePoints};
+use super::{Solid, SurfaceField, SurfacePoints, Winding};
 use crate::columns::WinklerLayer;
 use crate::field::{ContactField as _, PosedMesh};
 use crate::foam::Foam;
 use crate::mesh::{TriMesh, cuboid, sphere};
 use crate::objects::OBJECTS;
+use crate::prepared::PreparedMesh;
+use crate::touch::{TouchBody, TouchSkin};
 use approx::assert_relative_eq;
 use nalgebra::{Rotation3, Vector3};
 use proptest::prelude::*;
@@ -117,8 +119,9 @@ fn inside(half: [f64; 3], start: Vector3<f64>, direction: Vector3<f64>) -> Optio
 
 proptest! {
     #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(11), ..ProptestConfig::with_cases(400) })]
-    /// The depth of a box under points that look in all directions is that of its slabs, to 1e-12 m; rays that pass an
-    /// edge within 1e-7 m may see it or not. A box that goes deeper than the reach counts as that deep.
+    /// The depth of a box in columns that look in all directions is that of its slabs, to 1e-12 m; rays that pass an
+    /// edge within 1e-7 m may see it or not. A box with the base of the column inside has come through it if more of it
+    /// lies outward; then its depth grows on behind the base.
     #[test]
     fn depths_of_boxes(
         half in prop::array::uniform3(0.001..0.02_f64),
@@ -140,7 +143,13 @@ proptest! {
                 let array = |v: Vector3<f64>| parry3d_f64::math::Vector::new(v.x, v.y, v.z);
                 solid.depth_m(array(from), array(along), reach_m)
             };
-            let wanted = |half| inside(half, from, along * reach_m).map_or(0.0, |[enter, _]| reach_m * (1.0 - enter.max(0.0)));
+            let wanted = |half| match inside(half, from, along * reach_m) {
+                None => 0.0,
+                Some([enter, leave]) if enter < 0.0 && -enter >= leave => 0.0,
+                Some([enter, _]) => reach_m * (1.0 - enter.max(-1.0)),
+            };
+            // half of it on either side
+            prop_assume!(inside(half, from, along * reach_m).is_none_or(|[a, b]| (a + b).abs() > 1e-6));
             let found = depth(from, along);
             let near = |grow: f64| (found - wanted(half.map(|h| h + grow))).abs() < 1e-6;
             prop_assert!((found - wanted(half)).abs() < 1e-12 || near(1e-7) || near(-1e-7), "{found} {}", wanted(half));
@@ -148,7 +157,7 @@ proptest! {
     }
 }
 
-/// Deeper is never softer, through the whole foam and out of its reach; a body that is nowhere presses nothing.
+/// Deeper is never softer, through the whole foam and behind it; a body that is nowhere presses nothing.
 #[test]
 fn extremes() {
     let points = SurfacePoints::flat(&SkinLayout::default(), 4).unwrap();
@@ -156,7 +165,7 @@ fn extremes() {
     let mesh = centred([0.02, 0.02, 0.05]);
     let solid = Solid::new(&mesh);
     let mut last_n = 0.0;
-    for k in 0..60 {
+    for k in 0..50 {
         field.clear();
         let height_m = 0.05 - 1e-3 * f64::from(k);
         let wrench = field.press(&solid, &PosedMesh::at_rest(&mesh, [0.001, 0.002, height_m]));
@@ -194,4 +203,112 @@ fn points_that_cannot_be_are_refused() {
     ] {
         assert!(error.contains(field), "{error}");
     }
+}
+
+/// A floor under a thin finger, ever deeper: the force never turns and never falls, on skins thicker than the finger
+/// too, and the columns that look away from the floor feel nothing.
+#[test]
+fn a_thin_finger_goes_through_the_floor() {
+    let floor = cuboid([1.0, 1.0, 0.2]).translated([0.0, 0.0, -0.2]);
+    let solid = Solid::new(&floor);
+    for (radius_m, thickness_m) in [(8e-3, 6e-3), (8e-3, 3e-3), (5e-3, 6e-3), (20e-3, 6e-3)] {
+        let whole = [0.0, TAU];
+        let shape = [8, 16];
+        let winding =
+            Winding { shape, points_per_side: 2, axis: 0, centre_m: [0.0; 3], arc_rad: whole, span_m: [-0.04, 0.04] };
+        let points = SurfacePoints::on_cylinder(&winding, radius_m).unwrap();
+        let mut field = SurfaceField::new(Foam { thickness_m, ..Foam::default() }, points).unwrap();
+        let mut last_n = 0.0;
+        for k in -1..60 {
+            field.clear();
+            let depth_m = 0.2e-3 * f64::from(k);
+            let wrench = field.press(&solid, &PosedMesh::at_rest(&floor, [0.0, 0.0, depth_m - radius_m]));
+            let force_n = -wrench.force_n[2];
+            assert!(force_n >= last_n * (1.0 - 1e-12), "{radius_m} {thickness_m} {depth_m}: {force_n} after {last_n}");
+            assert!(if k < 0 { force_n <= 0.0 } else { force_n < 1e6 });
+            let points = field.points();
+            for (pressure, normal) in field.pressure_pa().iter().zip(&points.normals) {
+                assert!(normal[2] < 0.0 || *pressure <= 0.0, "{radius_m} {depth_m}: felt from behind");
+            }
+            last_n = force_n;
+        }
+        assert!(last_n > 100.0);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { rng_seed: RngSeed::Fixed(35), ..ProptestConfig::with_cases(10_000) })]
+    /// A body behind a link is never felt, bit for bit: behind a flat skin, and inside the link under a round one.
+    #[test]
+    fn what_is_behind_a_link_is_not_felt(
+        half in prop::array::uniform3(1e-4..0.5_f64),
+        angles in prop::array::uniform3(-3.1..3.1_f64),
+        place in prop::array::uniform2(-0.1..0.1_f64),
+        away in 1e-9..3.0_f64,
+        velocity in prop::array::uniform3(-2.0..2.0_f64),
+        round in any::<bool>(),
+    ) {
+        let foam = Foam::default();
+        let layout = SkinLayout::with_pitch(6, 6, 15e-3).unwrap();
+        let rotation = Rotation3::from_euler_angles(angles[0], angles[1], angles[2]);
+        fn at<'a>(turn: &Rotation3<f64>, velocity: [f64; 3], mesh: &'a TriMesh, position_m: [f64; 3]) -> PosedMesh<'a> {
+            let posed = PosedMesh::at_rest(mesh, position_m);
+            PosedMesh { rotation: turn.matrix().transpose().into(), velocity_m_per_s: velocity, ..posed }
+        }
+        let corner = Vector3::from(half).norm();
+        let (mut skins, mesh, position_m) = if round {
+            // a link of 80 mm radius; the body anywhere inside it
+            let arc_rad = [0.0, TAU];
+            let winding =
+                Winding { shape: [6, 6], points_per_side: 2, axis: 2, centre_m: [0.0; 3], arc_rad, span_m: [-0.1, 0.1] };
+            let points = SurfacePoints::on_cylinder(&winding, 0.08 + foam.thickness_m).unwrap();
+            let small = 0.05 / corner;
+            let mesh = centred(half.map(|h| h * small));
+            (vec![TouchSkin::curved(layout, points, foam).unwrap()], mesh, [0.2 * place[0], 0.2 * place[1], 0.05])
+        } else {
+            let points = SurfacePoints::flat(&layout, 2).unwrap();
+            let skins = vec![
+                TouchSkin::flat(layout, Foam { cells_per_taxel: 2, ..foam }).unwrap(),
+                TouchSkin::curved(layout, points, foam).unwrap(),
+            ];
+            let mesh = centred(half);
+            let [_, high_m] = at(&rotation, velocity, &mesh, [0.0; 3]).heights_m();
+            (skins, mesh, [place[0], place[1], -foam.thickness_m - high_m - away])
+        };
+        let body = TouchBody::from(PreparedMesh::from(mesh));
+        for skin in &mut skins {
+            let mut wrenches = Vec::new();
+            skin.touch(&[(&body, at(&rotation, velocity, &body.mesh, position_m))], &mut wrenches);
+            prop_assert!(wrenches[0].force_n.iter().chain(&wrenches[0].torque_nm).all(|v| v.abs().to_bits() == 0));
+            prop_assert!(skin.pressure().values().iter().all(|p| p.to_bits() == 0) && !skin.bottomed());
+        }
+    }
+}
+
+/// Flat and curved skins are one rule at every depth: a ball that sinks in, bottoms out, goes through and comes out
+/// behind; what bottoms out says so.
+#[test]
+fn flat_and_curved_are_one_rule() {
+    let layout = SkinLayout::default();
+    let foam = Foam::default();
+    let ball = TouchBody::from(PreparedMesh::from(sphere(0.03, 48, 96).translated([0.0, 0.0, -0.03])));
+    let mut flat = TouchSkin::flat(layout, foam).unwrap();
+    let points = SurfacePoints::flat(&layout, foam.cells_per_taxel).unwrap();
+    let mut curved = TouchSkin::curved(layout, points, foam).unwrap();
+    let mut bottomed = Vec::new();
+    for k in 0..75 {
+        let height_m = 0.0313 - 1e-3 * f64::from(k);
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        let posed = |body| (body, PosedMesh::at_rest(&ball.mesh, [1.3e-3, 0.7e-3, height_m]));
+        flat.touch(&[posed(&ball)], &mut a);
+        curved.touch(&[posed(&ball)], &mut b);
+        let (a, b) = (a[0].force_n[2], b[0].force_n[2]);
+        assert!((a - b).abs() <= 1e-9 * b.max(1.0), "{height_m}: {a} {b}");
+        assert_eq!(flat.bottomed(), curved.bottomed(), "{height_m}");
+        assert_eq!(a > 0.0, (-0.006..0.03).contains(&height_m), "{height_m}: {a}");
+        bottomed.push(flat.bottomed());
+    }
+    // touched at 30 mm, at the link at 24 mm, half of it behind the link at −6 mm
+    assert_eq!(bottomed.iter().position(|b| *b), Some(8));
+    assert_eq!(bottomed.iter().rposition(|b| *b), Some(37));
 }
