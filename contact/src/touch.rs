@@ -149,7 +149,8 @@ impl TouchSkin {
             Surface::Curved(field) => field.covers(place_m),
             Surface::Flat(_) => {
                 let [x, y, z] = place_m;
-                let half = |n: usize| 0.5 * n as f64 * self.layout.pitch_m();
+                // what touches right on the rim is on the foam
+                let half = |n: usize| (0.5 * n as f64 + 0.05) * self.layout.pitch_m();
                 let along = (-1.5 * self.foam.thickness_m..=0.5 * self.foam.thickness_m).contains(&z);
                 x.abs() <= half(self.layout.cols()) && y.abs() <= half(self.layout.rows()) && along
             }

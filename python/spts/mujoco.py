@@ -29,9 +29,7 @@ from ._spts import Body, Mount
 _LONG = 1.0
 
 
-def attach(
-    model, data, skin, *, site=None, body=None, pos=(0, 0, 0), quat=(1, 0, 0, 0), bodies="all", link_geoms=None
-):
+def attach(model, data, skin, *, site=None, body=None, pos=(0, 0, 0), quat=(1, 0, 0, 0), bodies="all", link_geoms=None):
     """Puts `skin` on a link of a model.
 
     Parameters
@@ -45,7 +43,8 @@ def attach(
         In place of a site, the body that the skin is on, with the skin's frame in that body's: `pos` (3,), m, and `quat`
         (4,), w x y z.
     bodies : "all", sequence of str or int, or dict of them to spts.Body
-        Bodies that may touch the skin. Their shapes are their geoms that collide, unless a `spts.Body` is given. "all"
+        Bodies that may touch the skin, by their names or that of a geom of theirs. Their shapes are their geoms that
+        collide, unless a `spts.Body` is given. "all"
         are those with such geoms but the skin's own link, what is welded to it, and what a joint connects with it.
     link_geoms : sequence of str or int, optional
         Geoms that the skin covers: MuJoCo's contact between them and `bodies` is taken out where there is foam. Default:
@@ -81,13 +80,17 @@ class Attachment:
             )
         pos, quat = (np.asarray(v, np.float64) for v in (pos, quat))
         if pos.shape != (3,) or quat.shape != (4,) or not (np.isfinite(pos).all() and np.linalg.norm(quat) > 1e-9):
-            raise ValueError(f"`pos` = {pos}, `quat` = {quat}: three finite numbers, and four that are not all 0, are needed")
+            raise ValueError(
+                f"`pos` = {pos}, `quat` = {quat}: three finite numbers, and four that are not all 0, are needed"
+            )
         rotation = np.empty(9)
         mujoco.mju_quat2Mat(rotation, quat / np.linalg.norm(quat))
         self.model, self.data, self.skin = model, data, skin
         if isinstance(bodies, str):
             if bodies != "all":
-                raise ValueError(f'`bodies` = "{bodies}"; valid: "all", a list of bodies, or a dict of bodies to `spts.Body`')
+                raise ValueError(
+                    f'`bodies` = "{bodies}"; valid: "all", a list of bodies, or a dict of bodies to `spts.Body`'
+                )
             bodies = _all(model, link)
         given = bodies if isinstance(bodies, dict) else {body: None for body in bodies}
         if not given:
@@ -95,7 +98,9 @@ class Attachment:
         #: The `spts.Body` of every body of the model that may touch the skin, by its number: the keys of `wrenches`.
         self.bodies = {}
         for name, shape in given.items():
-            number = _number(model, mujoco.mjtObj.mjOBJ_BODY, "bodies", name)
+            number = _of_geom(model, name)
+            if number is None:
+                number = _number(model, mujoco.mjtObj.mjOBJ_BODY, "bodies", name)
             if number == link or model.body_weldid[number] == model.body_weldid[link] != 0:
                 raise ValueError(f'`bodies`: "{name}" is a part of the skin\'s own link')
             self.bodies[number] = body_of(model, number) if shape is None else shape
@@ -106,7 +111,9 @@ class Attachment:
             own = np.zeros(model.ngeom, bool)
             own[[_number(model, mujoco.mjtObj.mjOBJ_GEOM, "link_geoms", geom) for geom in link_geoms]] = True
         if (own & others).any():
-            raise ValueError(f"geoms {np.flatnonzero(own & others).tolist()} are of the skin's link and of a body at once")
+            raise ValueError(
+                f"geoms {np.flatnonzero(own & others).tolist()} are of the skin's link and of a body at once"
+            )
         self._own, self._others = own, others
         frame = (*pos.tolist(), *rotation.tolist())
         self._mount = Mount(skin, link, frame, list(self.bodies.items()), model.body_rootid.tolist(), _Arrays(data))
@@ -332,6 +339,14 @@ def body_of(model, body):
     return Body.from_vertices(np.concatenate(vertices), np.concatenate(faces))
 
 
+def _of_geom(model, name):
+    """The body with the geom called `name`, if no body is called so: a floor often is a geom of the world."""
+    if not isinstance(name, str) or mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name) >= 0:
+        return None
+    geom = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, name)
+    return int(model.geom_bodyid[geom]) if geom >= 0 else None
+
+
 def _colliding(model, geoms):
     return [int(g) for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
 
@@ -340,7 +355,9 @@ def _all(model, link):
     """Bodies with geoms that collide, but the kinematic neighbours of `link`."""
     weld = model.body_weldid
     near = {weld[link], weld[model.body_parentid[weld[link]]]}
-    below = {b for b in range(1, model.nbody) if weld[model.body_parentid[weld[b]]] == weld[link]} if weld[link] else set()
+    below = (
+        {b for b in range(1, model.nbody) if weld[model.body_parentid[weld[b]]] == weld[link]} if weld[link] else set()
+    )
     excluded = set(model.exclude_signature.tolist())
     bodies = []
     for body in range(model.nbody):
@@ -392,8 +409,8 @@ def _mesh(model, geom):
             faces = faces[:, ::-1]
     elif kind == types.mjGEOM_PLANE:
         # MuJoCo's planes press without end, whatever is drawn of them
-        vertices, faces = Body.box((_WIDE, _WIDE, _WIDE)).mesh
-        vertices = vertices - (0.0, 0.0, 0.5 * _WIDE)
+        vertices, faces = Body.box((1.0, 1.0, 1.0)).mesh
+        vertices = (vertices - (0.0, 0.0, 0.5)) * _WIDE
     elif kind == types.mjGEOM_HFIELD:
         vertices, faces = _field(model, model.geom_dataid[geom])
     else:

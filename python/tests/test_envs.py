@@ -119,8 +119,25 @@ def test_any_environment_gets_a_skin(integrator):
     for _ in range(150):
         seen, *_ = env.step(np.zeros(1))
     assert seen["tactile"].sum() * 0.015**2 == pytest.approx(0.2 * 9.81, rel=1e-3)
+    # a second episode, felt by a wire whose time begins anew
+    env.reset(seed=1)
+    env.step(np.zeros(1))
     env.close()
     assert mujoco.get_mjcb_passive() is None
+
+
+@pytest.mark.parametrize("kind", [gym.vector.SyncVectorEnv, gym.vector.AsyncVectorEnv])
+def test_vectors_of_environments_with_a_skin(kind):
+    def make():
+        return spts.envs.TactileWrapper(Lift(), spts.Skin(8, 8, 0.01), site="skin")
+
+    envs = kind([make, make])
+    for seed in range(2):
+        envs.reset(seed=seed)
+        for _ in range(3):
+            seen, *_ = envs.step(np.zeros((2, 1)))
+    assert seen["tactile"].shape == (2, 13)
+    envs.close()
 
 
 def test_a_hook_is_the_step():

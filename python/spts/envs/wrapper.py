@@ -7,7 +7,7 @@ import gymnasium as gym
 from .tactile import Tactile, fresh_seed
 
 
-class TactileWrapper(gym.ObservationWrapper):
+class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
     """Adds a skin to an environment with a MuJoCo model: what it feels becomes a part of the observation.
 
     The environment steps as it always does; the skin's forces act in every step of it. Needs `mujoco`.
@@ -17,7 +17,7 @@ class TactileWrapper(gym.ObservationWrapper):
     env : gymnasium.Env
         With `model` and `data` of MuJoCo, as all of gymnasium's and gymnasium-robotics's have.
     skin : spts.Skin
-    site, bodies, link_geoms
+    site, body, pos, quat, bodies, link_geoms
         As of `spts.mujoco.attach`.
     key : str
         Name of the new part of the observation. Observations that are no dictionaries become `observation`.
@@ -30,8 +30,11 @@ class TactileWrapper(gym.ObservationWrapper):
         env,
         skin,
         *,
-        site,
-        bodies,
+        site=None,
+        body=None,
+        pos=(0, 0, 0),
+        quat=(1, 0, 0, 0),
+        bodies="all",
         link_geoms=None,
         key="tactile",
         observe="samples",
@@ -41,13 +44,17 @@ class TactileWrapper(gym.ObservationWrapper):
     ):
         from .. import mujoco as ours
 
-        super().__init__(env)
+        options = {"site": site, "body": body, "pos": pos, "quat": quat, "bodies": bodies, "link_geoms": link_geoms}
+        tactile = {"observe": observe, "measurements": measurements, "decoder": decoder, "wire": wire}
+        gym.utils.RecordConstructorArgs.__init__(self, _disable_deepcopy=True, skin=skin, key=key, **options, **tactile)
+        gym.ObservationWrapper.__init__(self, env)
         inner = env.unwrapped
         if not (hasattr(inner, "model") and hasattr(inner, "data")):
             raise ValueError(f"`env` = {inner}: it has no `model` and `data` of MuJoCo")
-        self.touch = ours.attach(inner.model, inner.data, skin, site=site, bodies=bodies, link_geoms=link_geoms)
+        self.touch = ours.attach(inner.model, inner.data, skin, **options)
+        self._resets = False
         self.touch.hook(self._feel)
-        self._tactile, self._key = Tactile(skin, observe, measurements, decoder, wire), key
+        self._tactile, self._key = Tactile(skin, **tactile), key
         spaces = env.observation_space
         own = dict(spaces.spaces) if isinstance(spaces, gym.spaces.Dict) else {"observation": spaces}
         if key in own:
@@ -56,13 +63,18 @@ class TactileWrapper(gym.ObservationWrapper):
 
     def reset(self, *, seed=None, options=None):
         # what the environment computes while it resets is no touch
-        found, info = self.env.reset(seed=seed, options=options)
+        self._resets = True
+        try:
+            found, info = self.env.reset(seed=seed, options=options)
+        finally:
+            self._resets = False
         self._tactile.reset(fresh_seed(self.unwrapped.np_random))
         self.touch.reset()
         return self.observation(found), info
 
     def _feel(self, touch):
-        self._tactile.feel(touch)
+        if not self._resets:
+            self._tactile.feel(touch)
 
     def observation(self, observation):
         touch = self.touch.last
