@@ -141,7 +141,7 @@ def steps():
         cost_us(lambda: mujoco.mj_step(model, data)),
     )
     model, data = table(BARE)
-    with spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["can"]) as touch:
+    with spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["can"], mode="foam") as touch:
         touch.step(4000)
         yield (
             f"attached step, 10 x 10 taxels of 6 x 6 points, {next(iter(touch.bodies.values())).triangles} triangles",
@@ -156,7 +156,9 @@ def sums():
         mujoco.mj_step(model, data, nstep=8000)
         theirs = float(np.abs(data.sensordata[: model.nsensordata // 3]).sum())
         model, data = table(BARE, mass)
-        with spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["can"]) as touch:
+        with spts.mujoco.attach(
+            model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["can"], mode="foam"
+        ) as touch:
             ours = float((touch.step(8000).pressure * 0.015**2).sum())
         yield mass * GRAVITY, ours, theirs
 

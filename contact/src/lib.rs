@@ -21,6 +21,7 @@
 //! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
+mod balance;
 mod columns;
 mod depth_curve;
 mod elastic;
@@ -52,4 +53,4 @@ pub use prepared::PreparedMesh;
 pub use surface::{Solid, SurfaceField, SurfacePoints, Winding};
 pub use table::{CONTACT_FIELDS, ContactBuild, ContactTable, build_contact, build_contact_from};
 pub use taxels::TaxelBins;
-pub use touch::{TouchBody, TouchSkin};
+pub use touch::{Carried, TouchBody, TouchSkin};

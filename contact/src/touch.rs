@@ -1,5 +1,6 @@
 //! Several bodies on one skin, flat or curved.
 
+use crate::balance::{Column, settle};
 use crate::columns::WinklerLayer;
 use crate::envelope::KnownBody;
 use crate::field::{ContactField as _, PosedMesh, Wrench};
@@ -22,6 +23,19 @@ impl From<PreparedMesh> for TouchBody {
     fn from(mesh: PreparedMesh) -> Self {
         Self { solid: Solid::new(&mesh), mesh }
     }
+}
+
+/// A body that something else carries, such as the contact of a physics engine, and its load on a skin.
+#[derive(Debug, Clone, Copy)]
+pub struct Carried<'a> {
+    /// The body.
+    pub body: &'a TouchBody,
+    /// Where it is, in the skin's axes.
+    pub posed: PosedMesh<'a>,
+    /// Normal force between it and the skin, N.
+    pub normal_n: f64,
+    /// Where the force acts, m.
+    pub centre_m: [f64; 3],
 }
 
 /// A skin that any number of bodies can touch at once. Input: poses and velocities. Output: pressures and wrenches.
@@ -49,6 +63,8 @@ pub struct TouchSkin {
     layout: SkinLayout,
     foam: Foam,
     surface: Surface,
+    /// Columns under a body that is carried.
+    columns: Vec<Column>,
     pressure: PressureMap,
     electrode_pressure: PressureMap,
     touched_m2: f64,
@@ -119,7 +135,16 @@ impl TouchSkin {
 
     fn with(layout: SkinLayout, foam: Foam, surface: Surface) -> Self {
         let zeros = || PressureMap::zeros(layout.rows(), layout.cols());
-        Self { pressure: zeros(), electrode_pressure: zeros(), touched_m2: 0.0, bottomed: false, layout, foam, surface }
+        Self {
+            pressure: zeros(),
+            electrode_pressure: zeros(),
+            touched_m2: 0.0,
+            bottomed: false,
+            columns: Vec::new(),
+            layout,
+            foam,
+            surface,
+        }
     }
 
     /// Rows, columns, pitch and electrodes of the taxels.
@@ -224,7 +249,79 @@ impl TouchSkin {
     }
 }
 
+impl TouchSkin {
+    /// Removes everything from the skin and reads `loads`: what it feels of bodies that something else carries. The
+    /// force of each spreads over the foam as it would at balance, under the body's own shape, so that the sum of
+    /// pressure × area is the sum of the forces to 1e-9 of it. Loads that are not positive, or not finite, are passed
+    /// over.
+    pub fn read(&mut self, loads: &[Carried<'_>]) {
+        self.pressure.values_mut().fill(0.0);
+        self.electrode_pressure.values_mut().fill(0.0);
+        (self.touched_m2, self.bottomed) = (0.0, false);
+        if let Surface::Curved(field) = &mut self.surface {
+            field.clear();
+        }
+        for load in loads {
+            let finite = load.posed.is_finite() && load.centre_m.iter().all(|v| v.is_finite());
+            if !(finite && load.normal_n > 0.0 && load.normal_n < f64::INFINITY) {
+                continue;
+            }
+            match &mut self.surface {
+                Surface::Flat(flat) => {
+                    let maps = [&mut self.pressure, &mut self.electrode_pressure];
+                    let (touched_m2, bottomed) = flat.carry(load, &self.foam, &mut self.columns, maps);
+                    // two bodies in one place count twice
+                    self.touched_m2 += touched_m2;
+                    self.bottomed |= bottomed;
+                }
+                Surface::Curved(field) => field.carry(&load.body.solid, load, &mut self.columns),
+            }
+        }
+        if let Surface::Curved(field) = &self.surface {
+            field.points().means(field.pressure_pa(), self.pressure.values_mut());
+            self.electrode_pressure.values_mut().copy_from_slice(self.pressure.values());
+            (self.touched_m2, self.bottomed) = (field.touched_m2(), field.bottomed());
+        }
+    }
+}
+
 impl FlatSkin {
+    /// Adds the pressures under a body that is carried to `maps`. The area under pressure, m², and whether a body has
+    /// gone through.
+    fn carry(
+        &mut self,
+        load: &Carried<'_>,
+        foam: &Foam,
+        columns: &mut Vec<Column>,
+        maps: [&mut PressureMap; 2],
+    ) -> (f64, bool) {
+        let [x_m, y_m, _] = load.centre_m;
+        let mut known = KnownBody::default();
+        self.layer.swap_known(&mut known);
+        self.layer.expect(&load.body.mesh);
+        self.layer.columns_under(&load.posed, &load.body.solid, [x_m, y_m], columns);
+        if columns.is_empty() {
+            // it touches the rim
+            columns.push(self.layer.column_at([x_m, y_m]));
+        }
+        let law = foam.law(load.posed.stiffness_pa_per_m);
+        settle(&law, columns, load.normal_n);
+        let (mut touched, mut bottomed) = (0_usize, false);
+        for c in columns.iter() {
+            let p = law.pressure_pa(c.depth_m);
+            self.layer.pressure_pa[c.index] = p;
+            touched += usize::from(p > 0.0);
+            bottomed |= c.depth_m > foam.thickness_m;
+        }
+        for (sum, map) in maps.into_iter().zip(self.bins.means(&self.layer.pressure_pa, Some(self.layer.patch))) {
+            for (sum, p) in sum.values_mut().iter_mut().zip(map.values()) {
+                *sum += p;
+            }
+        }
+        self.layer.swap_known(&mut known);
+        (touched as f64 * self.cell_area_m2, bottomed)
+    }
+
     /// Adds the pressures under `bodies` to `maps`. The area under pressure, m², and whether a body has gone through.
     fn touch(
         &mut self,

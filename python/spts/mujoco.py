@@ -8,9 +8,12 @@
         y, phi = wire.record(felt, 20)
     touch.detach()
 
-The skin's frame is the site's, or a place on a body: z outward, the free surface of a flat skin in the plane z = 0. Where
-there is foam it carries the bodies in place of MuJoCo's own contact with the skin's link. Everywhere else, for other
-data and for copies, MuJoCo's contact stays, and the model is not changed.
+The skin's frame is the site's, or a place on a body: z outward, the free surface of a flat skin in the plane z = 0.
+
+Two modes. In mode "sense" MuJoCo's own contact moves everything, as without a skin, and the skin spreads the normal force
+of that contact over the foam: the sum of pressure × area is that force, at any step. In mode "foam" the foam itself
+carries the bodies, where there is foam, in place of MuJoCo's contact: it gives way and bounces as foam does, and needs a
+short step. Everywhere else, for other data and for copies, MuJoCo's contact stays; the model is not changed.
 """
 
 from __future__ import annotations
@@ -29,7 +32,19 @@ from ._spts import Body, Mount
 _LONG = 1.0
 
 
-def attach(model, data, skin, *, site=None, body=None, pos=(0, 0, 0), quat=(1, 0, 0, 0), bodies="all", link_geoms=None):
+def attach(
+    model,
+    data,
+    skin,
+    *,
+    site=None,
+    body=None,
+    pos=(0, 0, 0),
+    quat=(1, 0, 0, 0),
+    bodies="all",
+    link_geoms=None,
+    mode="sense",
+):
     """Puts `skin` on a link of a model.
 
     Parameters
@@ -47,9 +62,11 @@ def attach(model, data, skin, *, site=None, body=None, pos=(0, 0, 0), quat=(1, 0
         collide, unless a `spts.Body` is given. "all"
         are those with such geoms but the skin's own link, what is welded to it, and what a joint connects with it.
     link_geoms : sequence of str or int, optional
-        Geoms that the skin covers: MuJoCo's contact between them and `bodies` is taken out where there is foam. Default:
-        all geoms of the skin's body and, unless that stands still, of what is welded to it. A skin on the world covers
-        those that are not of `bodies`.
+        Geoms that the skin covers: MuJoCo's contact between them and `bodies` is felt where there is foam, or taken out in
+        mode "foam". Default: all geoms of the skin's body and, unless that stands still, of what is welded to it. A skin
+        on the world covers those that are not of `bodies`.
+    mode : str
+        "sense": MuJoCo's contact moves the bodies, and the skin reads its forces. "foam": the foam moves them.
 
     Returns
     -------
@@ -67,14 +84,17 @@ def attach(model, data, skin, *, site=None, body=None, pos=(0, 0, 0), quat=(1, 0
         place = int(model.site_bodyid[site]), model.site_pos[site], model.site_quat[site]
     else:
         place = _number(model, mujoco.mjtObj.mjOBJ_BODY, "body", body), pos, quat
-    return Attachment(model, data, skin, *place, bodies=bodies, link_geoms=link_geoms)
+    return Attachment(model, data, skin, *place, bodies=bodies, link_geoms=link_geoms, mode=mode)
 
 
 class Attachment:
     """A skin on a link of a model: what `attach` returns."""
 
-    def __init__(self, model, data, skin, link, pos, quat, *, bodies="all", link_geoms=None):
-        if model.opt.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0):
+    def __init__(self, model, data, skin, link, pos, quat, *, bodies="all", link_geoms=None, mode="sense"):
+        if mode not in ("sense", "foam"):
+            raise ValueError(f'`mode` = "{mode}"; valid: "sense", "foam"')
+        self.mode = mode
+        if mode == "foam" and model.opt.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0):
             raise ValueError(
                 "`model.opt.enableflags` has `sleep`: foam does not wake what sleeps; clear it, or let the bodies stay awake"
             )
@@ -125,6 +145,8 @@ class Attachment:
         self._warned = False
         self._felt_at = None
         self._each = None
+        # whether every look is at the present moment of the data
+        self._follows = False
 
     @property
     def last(self):
@@ -132,6 +154,8 @@ class Attachment:
         if self._failed is not None:
             failed, self._failed = self._failed, None
             raise failed
+        if self._follows and self.data.time != self._felt_at:
+            self._read(self._elapsed())
         return self._last
 
     @property
@@ -157,11 +181,18 @@ class Attachment:
         Parameters
         ----------
         each : callable, optional
-            Called with every touch.
+            Called with every touch, in mode "foam".
 
-        The forces go into `qfrc_passive` by MuJoCo's callback `mjcb_passive`, for this data alone; one that is set already
+        In mode "sense", `last` then is what the skin feels at the present moment of the data. In mode "foam" the forces go into `qfrc_passive` by MuJoCo's callback `mjcb_passive`, for this data alone; one that is set already
         is called first.
         """
+        if self.mode == "sense":
+            if each is not None:
+                raise ValueError(
+                    '`each` needs mode "foam": in mode "sense" nothing is called in a step; look at `last` after it'
+                )
+            self._follows = True
+            return
         off = self.model.opt.disableflags
         if all(off & flag for flag in _PASSIVE_OFF):
             raise ValueError("`model.opt.disableflags` turns passive forces off, and with them the skin; use `step`")
@@ -175,6 +206,7 @@ class Attachment:
 
     def detach(self):
         """Ends the skin: MuJoCo's contact acts everywhere again, and `hook` has ended."""
+        self._follows = False
         hooked = _HOOKED.get(self.data._address, [])
         if self in hooked:
             hooked.remove(self)
@@ -193,6 +225,31 @@ class Attachment:
         self._last = self._mount.apply(dt)
         self._warn(dt)
 
+    def _read(self, dt):
+        """Feels the forces of MuJoCo's contact that the data has."""
+        model, data, contact = self.model, self.data, self.data.contact
+        loads, force = {}, np.empty(6)
+        for k in np.flatnonzero(self._foamed(contact)) if data.ncon else ():
+            if contact.efc_address[k] < 0:
+                continue
+            mujoco.mj_contactForce(model, data, k, force)
+            geoms, pos = contact.geom[k], contact.pos[k]
+            first = self._others[geoms[0]]
+            body = int(model.geom_bodyid[geoms[0 if first else 1]])
+            # the contact's normal points from its first geom to its second, and the force is on the second
+            frame = contact.frame[k].reshape(3, 3)
+            sign = -1.0 if first else 1.0
+            push = sign * (force[:3] @ frame)
+            twist = sign * (force[3:] @ frame) + np.cross(pos - data.xpos[body], push)
+            normal, at, pushed, twisted = loads.get(body, (0.0, 0.0, 0.0, 0.0))
+            loads[body] = normal + force[0], at + force[0] * pos, pushed + push, twisted + twist
+        found = [
+            (body, float(normal), (at / normal).tolist(), push.tolist(), twist.tolist())
+            for body, (normal, at, push, twist) in loads.items()
+            if normal > 0.0
+        ]
+        self._last = self._mount.read(dt, found)
+
     def _foamed(self, contact):
         """Which contacts are between the link and the bodies, where there is foam: (contacts,) of bool."""
         geoms = contact.geom
@@ -206,16 +263,20 @@ class Attachment:
             found[k] = self.skin.covers(at)
         return found
 
-    def _passive(self):
-        """Adds the forces to `qfrc_passive`. Time runs only when the data's does: `mj_forward` repeats a moment."""
-        data = self.data
-        elapsed = 0.0 if self._felt_at is None else data.time - self._felt_at
-        if elapsed < 0.0:
+    def _elapsed(self):
+        """Time since the last touch, s. It runs only when the data's does: `mj_forward` repeats a moment."""
+        time, before = self.data.time, self._felt_at
+        if before is not None and time < before:
             # the data was reset
             self.reset()
-            elapsed = 0.0
-        self._felt_at = data.time
-        self._last, loads = self._mount.loads(elapsed)
+            before = None
+        self._felt_at = time
+        return 0.0 if before is None else time - before
+
+    def _passive(self):
+        """Adds the forces to `qfrc_passive`."""
+        data = self.data
+        self._last, loads = self._mount.loads(self._elapsed())
         for body, load in loads:
             mujoco.mj_applyFT(self.model, data, load[:3], load[3:], data.xipos[body], body, data.qfrc_passive)
         if self._each is not None:
@@ -291,26 +352,39 @@ def step(*attachments):
     ----------
     attachments : Attachment
         Of one model and data.
+
+    Returns
+    -------
+    list of spts.Touch
+        What each feels, in the order of `attachments`.
     """
     model, data = attachments[0].model, attachments[0].data
     if any(a.model is not model or a.data is not data for a in attachments):
         raise ValueError("`attachments` are of several models or data; one step moves one of them")
-    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+    foams = [attachment for attachment in attachments if attachment.mode == "foam"]
+    if not foams:
+        mujoco.mj_step(model, data)
+    elif model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         raise ValueError(
             "`model.opt.integrator` = RK4; valid: Euler, implicit, implicitfast; with RK4 use `hook()` and `mj_step`"
         )
-    mujoco.mj_step1(model, data)
-    _take_out(attachments)
-    mujoco.mj_referenceConstraint(model, data)
-    done = []
-    try:
-        for attachment in attachments:
-            attachment._apply(model.opt.timestep)
-            done.append(attachment)
-        mujoco.mj_step2(model, data)
-    finally:
-        for attachment in reversed(done):
-            attachment._mount.restore()
+    else:
+        mujoco.mj_step1(model, data)
+        _take_out(foams)
+        mujoco.mj_referenceConstraint(model, data)
+        done = []
+        try:
+            for attachment in foams:
+                attachment._apply(model.opt.timestep)
+                done.append(attachment)
+            mujoco.mj_step2(model, data)
+        finally:
+            for attachment in reversed(done):
+                attachment._mount.restore()
+    for attachment in attachments:
+        if attachment.mode == "sense":
+            attachment._read(model.opt.timestep)
+    return [attachment._last for attachment in attachments]
 
 
 def body_of(model, body):

@@ -6,6 +6,7 @@ use crate::common::refuse;
 use crate::skin::{Placed, Skin, Touch};
 use numpy::{PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
+use spts::contact::Wrench;
 use std::sync::{Mutex, PoisonError};
 
 type Vector = [f64; 3];
@@ -96,6 +97,22 @@ impl Mount {
         Ok((touch, loads.collect()))
     }
 
+    /// What the skin feels, `dt` s after the last time, of bodies that the engine's contact carries. A load has the number
+    /// of its body in the model; its normal force, N; where that acts; and force and torque on the body about its
+    /// origin, all in the world's frame.
+    fn read(&self, py: Python<'_>, dt: f64, loads: Vec<(usize, f64, Vector, Vector, Vector)>) -> PyResult<Touch> {
+        let (placed, frame, origin) = self.placed(py)?;
+        let mut known = Vec::with_capacity(loads.len());
+        for (body, normal_n, centre, force, torque) in loads {
+            let Some(at) = self.bodies.iter().position(|known| *known == body) else {
+                bail!("body {body} is none of those that may touch the skin");
+            };
+            let wrench = Wrench { force_n: into(&frame, force), torque_nm: into(&frame, torque) };
+            known.push((at, normal_n, into(&frame, minus(centre, origin)), wrench));
+        }
+        self.skin.get().carried(py, &self.shapes, &placed, dt, &known)
+    }
+
     /// Puts the rows of `xfrc_applied` back to what they were before `apply`.
     fn restore(&self, py: Python<'_>) -> PyResult<()> {
         let mut before = self.before.lock().unwrap_or_else(PoisonError::into_inner);
@@ -118,7 +135,7 @@ impl Mount {
 impl Mount {
     /// The touch, and the load on every body and on the link about its centre of mass, world's frame.
     fn felt(&self, py: Python<'_>, dt: f64) -> PyResult<(Touch, Loads)> {
-        let (placed, frame) = self.placed(py)?;
+        let (placed, frame, _) = self.placed(py)?;
         let (touch, wrenches) = self.skin.get().touched(py, &self.shapes, &placed, dt)?;
         let xipos = read(py, &self.arrays.xipos)?;
         let xpos = read(py, &self.arrays.xpos)?;
@@ -142,8 +159,8 @@ impl Mount {
         Ok((touch, loads))
     }
 
-    /// The bodies in the skin's frame, and how that frame is turned in the world's.
-    fn placed(&self, py: Python<'_>) -> PyResult<(Vec<Placed>, Rotation)> {
+    /// The bodies in the skin's frame, and how that frame is turned and where it is in the world's.
+    fn placed(&self, py: Python<'_>) -> PyResult<(Vec<Placed>, Rotation, Vector)> {
         let a = &self.arrays;
         let (xpos, xmat, cvel) = (read(py, &a.xpos)?, read(py, &a.xmat)?, read(py, &a.cvel)?);
         let centres = read(py, &a.subtree_com)?;
@@ -172,7 +189,7 @@ impl Mount {
                 spin_rad_per_s: into(&frame, minus(spin, turning)),
             }
         });
-        Ok((placed.collect(), frame))
+        Ok((placed.collect(), frame, origin))
     }
 }
 

@@ -6,7 +6,7 @@ use crate::common::refuse;
 use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use spts::contact::{Foam, PosedMesh, SurfacePoints, TouchSkin, Winding, Wrench};
+use spts::contact::{Carried, Foam, PosedMesh, SurfacePoints, TouchBody, TouchSkin, Winding, Wrench};
 use spts::{PressureMap, SkinLayout};
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -331,6 +331,47 @@ impl Skin {
         placed: &[Placed],
         dt: f64,
     ) -> PyResult<(Touch, Vec<Wrench>)> {
+        self.felt(py, bodies, placed, dt, |skin, posed| {
+            let mut wrenches: Vec<Wrench> = Vec::with_capacity(posed.len());
+            skin.touch(posed, &mut wrenches);
+            wrenches
+        })
+    }
+
+    /// What the skin feels of `bodies` that something else carries: each load has the number of its body, its normal
+    /// force, N, where it acts, m, and the wrench on the body about its origin, in the skin's frame.
+    pub(crate) fn carried(
+        &self,
+        py: Python<'_>,
+        bodies: &[Py<Body>],
+        placed: &[Placed],
+        dt: f64,
+        loads: &[(usize, f64, [f64; 3], Wrench)],
+    ) -> PyResult<Touch> {
+        let felt = self.felt(py, bodies, placed, dt, |skin, posed| {
+            let carried = loads.iter().map(|(body, normal_n, centre_m, _)| {
+                let (body, posed) = posed[*body];
+                Carried { body, posed, normal_n: *normal_n, centre_m: *centre_m }
+            });
+            skin.read(&carried.collect::<Vec<_>>());
+            let mut wrenches = vec![Wrench::NONE; posed.len()];
+            for (body, _, _, wrench) in loads {
+                wrenches[*body] = *wrench;
+            }
+            wrenches
+        });
+        Ok(felt?.0)
+    }
+
+    /// What the skin feels, and the wrenches, as `act` makes and returns them.
+    fn felt(
+        &self,
+        py: Python<'_>,
+        bodies: &[Py<Body>],
+        placed: &[Placed],
+        dt: f64,
+        act: impl FnOnce(&mut TouchSkin, &[(&TouchBody, PosedMesh<'_>)]) -> Vec<Wrench> + Send,
+    ) -> PyResult<(Touch, Vec<Wrench>)> {
         if !(0.0..=1e9).contains(&dt) {
             bail!("`dt` = {dt} is outside [0, 1e9] s");
         }
@@ -347,9 +388,8 @@ impl Skin {
                 (&body.body, posed)
             });
             let posed: Vec<_> = posed.collect();
-            let mut wrenches: Vec<Wrench> = Vec::with_capacity(posed.len());
             let mut state = self.locked();
-            state.skin.touch(&posed, &mut wrenches);
+            let wrenches = act(&mut state.skin, &posed);
             state.touches += 1;
             state.time_s += dt;
             let values = state.skin.pressure().values().to_vec();

@@ -109,10 +109,11 @@ class Lift(gym.Env):
         return self.data.qpos.copy(), 0.0, False, False, {}
 
 
+@pytest.mark.parametrize("mode", ["sense", "foam"])
 @pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
-def test_any_environment_gets_a_skin(integrator):
+def test_any_environment_gets_a_skin(integrator, mode):
     env = spts.envs.TactileWrapper(
-        Lift(integrator), spts.Skin(10, 10, 0.015), site="skin", bodies=["cup"], observe="pressure"
+        Lift(integrator), spts.Skin(10, 10, 0.015), site="skin", bodies=["cup"], observe="pressure", mode=mode
     )
     check_env(env)
     env.reset(seed=0)
@@ -145,7 +146,8 @@ def test_a_hook_is_the_step():
     places = []
     for hook in (False, True):
         env = Lift()
-        with spts.mujoco.attach(env.model, env.data, spts.Skin(10, 10, 0.015), site="skin", bodies=["cup"]) as touch:
+        skin = spts.Skin(10, 10, 0.015)
+        with spts.mujoco.attach(env.model, env.data, skin, site="skin", bodies=["cup"], mode="foam") as touch:
             env.data.qvel[1] = 0.1
             if hook:
                 touch.hook()

@@ -65,7 +65,7 @@ def test_a_body_that_rests_is_carried(kind, size, lying, integrator):
     """Σ p·A = m g within 0.1 %, and MuJoCo's own contact is out."""
     model, data = table(kind, size, lying=lying, integrator=integrator)
     skin = spts.Skin(10, 10, 0.015)
-    with spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"]) as touch:
+    with spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"], mode="foam") as touch:
         for _ in range(8000):
             felt = touch.step()
             # round bodies would roll away
@@ -88,7 +88,7 @@ def test_a_body_rests_on_a_cylinder(points, tolerance):
     </worldbody></mujoco>""")
     data = mujoco.MjData(model)
     skin = spts.Skin.cylinder(0.05, 48 // points, 96 // points, axis="y", span=(-0.1, 0.1), points=points)
-    touch = spts.mujoco.attach(model, data, skin, site="skin", bodies=["slab"])
+    touch = spts.mujoco.attach(model, data, skin, site="skin", bodies=["slab"], mode="foam")
     felt = touch.step(6000)
     force, _ = felt.wrenches[touch.bodies[model.body("slab").id]]
     assert force[2] == pytest.approx(9.81, rel=1e-3)
@@ -101,7 +101,7 @@ def test_a_drop_gains_no_energy(joint):
     model, data = table("sphere", ".03 0 0", mass=0.06, height=0.33, joint=joint)
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     skin = spts.Skin(10, 10, 0.015)
-    touch = spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"])
+    touch = spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"], mode="foam")
     if joint:
         # the table sinks under its own weight first
         model.opt.gravity[:] = 0
@@ -133,7 +133,7 @@ def test_tilted_and_moving_links_feel_the_same():
         number = model.body("thing").id
         data.qpos[:3] = data.site("skin").xpos + frame @ (0.013, 0.021, 0.0195)
         mujoco.mju_mat2Quat(data.qpos[3:7], frame.ravel())
-        touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=[number])
+        touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=[number], mode="foam")
         felts.append(touch.step(500).pressure)
     for felt in felts[1:]:
         assert np.abs(felt - felts[0]).max() < 1e-6 * felts[0].max()
@@ -147,7 +147,7 @@ def test_the_link_feels_the_opposite():
         model.opt.gravity[:], model.opt.timestep = 0, dt
         first = model.body_dofadr[model.body("thing").id]
         data.qvel[first + 2], data.qvel[first + 3] = -0.5, 2.0
-        touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+        touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"], mode="foam")
         before = momentum(model, data)
         touch.step(round(0.2 / dt))
         assert abs(data.qvel[first + 2] + 0.5) > 0.1
@@ -166,7 +166,7 @@ def momentum(model, data):
 def test_other_contact_stays_and_comes_back():
     model, data = table(other=OTHER)
     skin = spts.Skin(10, 10, 0.015)
-    touch = spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"])
+    touch = spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"], mode="foam")
     touch.step(50)
     # the small box still stands on the table, by MuJoCo
     assert touching(model, data) == {frozenset(("top", "otherbox"))}
@@ -179,7 +179,7 @@ def test_other_contact_stays_and_comes_back():
 def test_forces_of_the_user_stay():
     model, data = table()
     number = model.body("thing").id
-    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"], mode="foam")
     data.xfrc_applied[number, 2] = -3.0
     felt = touch.step(3000)
     assert data.xfrc_applied[number].tolist() == [0, 0, -3.0, 0, 0, 0]
@@ -192,8 +192,8 @@ def test_two_skins_step_together():
     model, data = table(
         size=".06 .02 .02", sites='<site name="left" pos="-.0375 0 0"/><site name="right" pos=".0375 0 0"/>'
     )
-    a = spts.mujoco.attach(model, data, left, site="left", bodies=["thing"])
-    b = spts.mujoco.attach(model, data, right, site="right", bodies=["thing"])
+    a = spts.mujoco.attach(model, data, left, site="left", bodies=["thing"], mode="foam")
+    b = spts.mujoco.attach(model, data, right, site="right", bodies=["thing"], mode="foam")
     for _ in range(3000):
         spts.mujoco.step(a, b)
     carried = [(t.pressure * 0.015**2).sum() for t in (a, b)]
@@ -204,11 +204,11 @@ def test_two_skins_step_together():
 def test_a_step_that_is_too_long_is_said():
     model, data = table(mass=0.02)
     model.opt.timestep = 0.01
-    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"], mode="foam")
     with pytest.warns(RuntimeWarning, match="timestep"):
         touch.step(20)
     model, data = table()
-    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"], mode="foam")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         touch.step(200)
@@ -229,15 +229,15 @@ def test_what_cannot_be_attached():
         with pytest.raises(ValueError, match=text):
             spts.mujoco.attach(model, data, skin, **arguments)
     with pytest.raises(ValueError, match="where is the skin"):
-        spts.mujoco.attach(model, data, skin, bodies=["thing"])
+        spts.mujoco.attach(model, data, skin, bodies=["thing"], mode="foam")
     with pytest.raises(ValueError, match="quat"):
         spts.mujoco.attach(model, data, skin, body="table", quat=(0, 0, 0, 0))
     other = mujoco.MjData(mujoco.MjModel.from_xml_string("<mujoco/>"))
     with pytest.raises(ValueError, match="data"):
-        spts.mujoco.attach(model, other, skin, site="skin", bodies=["thing"])
+        spts.mujoco.attach(model, other, skin, site="skin", bodies=["thing"], mode="foam")
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     with pytest.raises(ValueError, match="RK4"):
-        spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"]).step()
+        spts.mujoco.attach(model, data, skin, site="skin", bodies=["thing"], mode="foam").step()
 
 
 def test_shapes_of_geoms():
@@ -273,10 +273,11 @@ FLAT = '<asset><hfield name="h" nrow="3" ncol="4" size="1 1 .1 .1" elevation="0 
         (FLAT, '<geom name="floor" type="hfield" hfield="h"/>', "all"),
     ],
 )
-def test_a_foot_stands_on_any_floor(asset, floor, bodies):
+@pytest.mark.parametrize("mode", ["sense", "foam"])
+def test_a_foot_stands_on_any_floor(asset, floor, bodies, mode):
     model = mujoco.MjModel.from_xml_string(SOLE.format(asset=asset, floor=floor, height=0.0205))
     data = mujoco.MjData(model)
-    touch = spts.mujoco.attach(model, data, spts.Skin(8, 16, 0.0125), site="sole", bodies=bodies)
+    touch = spts.mujoco.attach(model, data, spts.Skin(8, 16, 0.0125), site="sole", bodies=bodies, mode=mode)
     felt = touch.step(3000)
     assert felt.pressure.ravel() @ touch.skin.areas == pytest.approx(5 * 9.81, rel=1e-3)
     assert not felt.bottomed
@@ -311,7 +312,7 @@ def test_a_place_on_a_body_is_as_good_as_a_site():
     felts = []
     for place in ({"site": "skin"}, {"body": "table", "pos": (0.01, 0.02, 0), "quat": (0, 0, 0, 2)}):
         model, data = table(sites='<site name="skin" pos=".01 .02 0" euler="0 0 180"/>', tilt="0 0 30")
-        touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), bodies=["thing"], **place)
+        touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), bodies=["thing"], mode="foam", **place)
         felts.append(touch.step(300).pressure)
     assert felts[0].max() > 0.0 and np.abs(felts[0] - felts[1]).max() < 1e-6 * felts[0].max()
 
@@ -319,7 +320,7 @@ def test_a_place_on_a_body_is_as_good_as_a_site():
 def test_beside_the_skin_mujoco_carries():
     """A small skin in the middle of a table: what lies beside it lies on the table."""
     model, data = table("sphere", ".03 0 0", height=0.2301, other=OTHER.replace("0.26 0.05", "0.22 0.02"))
-    touch = spts.mujoco.attach(model, data, spts.Skin(4, 4, 0.01), site="skin", bodies=["thing", "other"])
+    touch = spts.mujoco.attach(model, data, spts.Skin(4, 4, 0.01), site="skin", bodies=["thing", "other"], mode="foam")
     touch.step(2000)
     assert touching(model, data) == {frozenset(("top", "otherbox"))}
     assert data.body("other").xpos[2] == pytest.approx(0.21, abs=1e-3)
@@ -328,7 +329,7 @@ def test_beside_the_skin_mujoco_carries():
 def test_other_data_keep_their_contact():
     """The model is as it was: a copy of the data, and a second skin on it, know nothing of the first."""
     model, data = table()
-    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"], mode="foam")
     touch.step(200)
     other = mujoco.MjData(model)
     touch.hook()
@@ -346,7 +347,10 @@ def test_any_number_of_skins_in_any_order():
         f'<mujoco><worldbody>{links}<body name="cup" pos="0 0 3"><freejoint/><geom size=".03"/></body></worldbody></mujoco>'
     )
     data = mujoco.MjData(model)
-    touches = [spts.mujoco.attach(model, data, spts.Skin(4, 4, 0.01), body=f"l{k}", bodies=["cup"]) for k in range(40)]
+    touches = [
+        spts.mujoco.attach(model, data, spts.Skin(4, 4, 0.01), body=f"l{k}", bodies=["cup"], mode="foam")
+        for k in range(40)
+    ]
     spts.mujoco.step(*touches)
     for touch in touches:
         touch.hook()
@@ -355,13 +359,13 @@ def test_any_number_of_skins_in_any_order():
     assert mujoco.get_mjcb_passive() is None
     for _ in range(100):
         # an episode each
-        spts.mujoco.attach(model, data, spts.Skin(4, 4, 0.01), body="l0", bodies=["cup"]).step()
+        spts.mujoco.attach(model, data, spts.Skin(4, 4, 0.01), body="l0", bodies=["cup"], mode="foam").step()
 
 
 def test_a_hook_leaves_other_models_alone():
     """Models are compiled, stepped and rolled out while a skin is hooked."""
     model, data = table()
-    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"], mode="foam")
     touch.hook()
     mujoco.mj_step(model, data, nstep=100)
     other, own = table()
@@ -382,7 +386,7 @@ def test_sleeping_bodies_are_refused():
     model, data = table()
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     with pytest.raises(ValueError, match="sleep"):
-        spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"])
+        spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["thing"], mode="foam")
 
 
 def test_cloth_lies_on_the_link():
@@ -398,8 +402,76 @@ def test_cloth_lies_on_the_link():
     for skinned in (False, True):
         model = mujoco.MjModel.from_xml_string(text)
         data = mujoco.MjData(model)
-        touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["cup"])
+        touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", bodies=["cup"], mode="foam")
         for _ in range(300):
             touch.step() if skinned else mujoco.mj_step(model, data)
         heights.append(data.flexvert_xpos[:, 2].min())
     assert heights[0] > 0.2 and heights[1] == pytest.approx(heights[0], abs=1e-6)
+
+
+TUBE = """
+<mujoco><option timestep="0.002" cone="{cone}"/><worldbody>
+  <geom name="floor" type="plane" size="2 2 .1"/>
+  <body name="arm" pos="0 0 .4" euler="0 20 0"><geom name="tube" type="capsule" size=".05 .1"/>
+    <site name="{round}" euler="0 90 0"/></body>
+  <body name="table" pos=".5 0 .2"><geom name="top" type="box" size=".1 .1 .02" pos="0 0 -.02"/><site name="{flat}"/></body>
+  <body name="slab" pos=".01 .01 .5" euler="0 20 10"><freejoint/><geom type="box" size=".1 .1 .01" mass="1"/></body>
+  <body name="cup" pos=".52 .01 .2199" euler="0 3 0"><freejoint/><geom type="cylinder" size=".03 .02" mass=".5"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
+def test_sensing_changes_nothing_and_adds_up(cone):
+    """Mode "sense" at a step of 2 ms: everything moves as without a skin, bit for bit. At every step Σ p·A is the normal
+    force of MuJoCo's contact, flat or round, and the wrenches are those of that contact."""
+    text = TUBE.format(cone=cone, round="round", flat="flat")
+    model = mujoco.MjModel.from_xml_string(text)
+    bare, data = mujoco.MjData(model), mujoco.MjData(model)
+    around = spts.Skin.cylinder(0.05, 12, 24, axis="x", span=(-0.1, 0.1), points=3)
+    touches = [
+        spts.mujoco.attach(model, data, around, site="round"),
+        spts.mujoco.attach(model, data, spts.Skin(12, 12, 0.015), site="flat"),
+    ]
+    force, seen = np.empty(6), [0, 0]
+    for _ in range(400):
+        mujoco.mj_step(model, bare)
+        felts = spts.mujoco.step(*touches)
+        assert np.array_equal(bare.qpos, data.qpos) and np.array_equal(bare.qvel, data.qvel)
+        for k, (touch, link, thing) in enumerate(zip(touches, ("tube", "top"), ("slab", "cup"))):
+            normal, push = 0.0, np.zeros(3)
+            for i, c in enumerate(data.contact):
+                if model.geom(link).id in (c.geom1, c.geom2):
+                    mujoco.mj_contactForce(model, data, i, force)
+                    normal += force[0]
+                    push += c.frame.reshape(3, 3).T @ force[:3] * (1 if model.geom(link).id == c.geom1 else -1)
+            felt = felts[k]
+            assert felt.pressure.ravel() @ touch.skin.areas == pytest.approx(normal, rel=1e-6, abs=1e-12)
+            frame = data.site_xmat[k].reshape(3, 3)
+            found = frame @ felt.wrenches[touch.bodies[model.body(thing).id]][0]
+            assert np.abs(found - push).max() <= 1e-9 * max(np.abs(push).max(), 1.0)
+            seen[k] += normal > 0.1
+    assert min(seen) > 50
+    # at rest the middle of the pressure is the middle of the force: the cup's own
+    felt, touch = felts[1], touches[1]
+    share = felt.pressure.ravel() * touch.skin.areas
+    middle = share @ touch.skin.positions / share.sum()
+    assert np.abs(middle[:2] - (data.body("cup").xpos - data.site("flat").xpos)[:2]).max() < 2e-3
+
+
+def test_a_look_in_mode_sense_is_at_the_present():
+    model, data = table()
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin")
+    touch.hook()
+    mujoco.mj_step(model, data, nstep=2000)
+    felt = touch.last
+    assert felt is touch.last and felt.time == 0.0
+    assert (felt.pressure * 0.015**2).sum() == pytest.approx(0.5 * 9.81, rel=1e-3)
+    mujoco.mj_step(model, data, nstep=100)
+    assert touch.last.time == pytest.approx(0.05)
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_forward(model, data)
+    assert touch.last.time == 0.0
+    with pytest.raises(ValueError, match="each"):
+        touch.hook(print)
+    with pytest.raises(ValueError, match="mode"):
+        spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", mode="both")

@@ -1,5 +1,6 @@
 //! Independent columns of foam with damping, densification and friction.
 
+use crate::balance::Column;
 use crate::envelope::{Envelope, KnownBody};
 use crate::field::{ContactField, Patch, PosedMesh, Response, Wrench};
 use crate::foam::{Foam, FoamLaw, Most};
@@ -38,7 +39,7 @@ pub struct WinklerLayer {
     config: Foam,
     pub(super) envelope: Envelope,
     pub(crate) pressure_pa: Vec<f64>,
-    pub(super) patch: Patch,
+    pub(crate) patch: Patch,
     /// Whether the last body has gone through the foam; only [`WinklerLayer::respond_to`] a solid finds out.
     pub(crate) bottomed: bool,
     /// Initial compression of the columns, if there is any.
@@ -91,6 +92,53 @@ impl WinklerLayer {
         self.clear();
         let wrench = if body.is_finite() { self.press(body, solid) } else { Wrench::UNKNOWN };
         Response { wrench, pressure_pa: &self.pressure_pa, patch: Some(self.patch) }
+    }
+
+    /// The columns under a body and up to a thickness below it, places from `axis_m`. Clears the last pressure.
+    pub(crate) fn columns_under(
+        &mut self,
+        body: &PosedMesh<'_>,
+        solid: &Solid,
+        axis_m: [f64; 2],
+        out: &mut Vec<Column>,
+    ) {
+        self.clear();
+        out.clear();
+        let h = self.config.thickness_m;
+        // lower by the gap, so that the map of what is below the surface has it
+        let mut lower = *body;
+        lower.position_m[2] -= h;
+        self.patch = self.envelope.rasterise(&lower);
+        let [x, y, z] = body.rotation.map(Vector::from);
+        let origin = Vector::from(body.position_m);
+        let into_body = |v: Vector| x * v.x + y * v.y + z * v.z;
+        let front = |[x_m, y_m]: [f64; 2]| solid.front_m(into_body(Vector::new(x_m, y_m, -h) - origin), z, h, h);
+        self.envelope
+            .deeper_than(2.0 * h, |place| front(place).map_or(0.0, |depth_m| depth_m + h));
+        let [_, width] = self.envelope.shape();
+        let area_m2 = self.envelope.cell_m().powi(2);
+        for (row, line) in (self.patch.rows[0]..).zip(self.patch.lines(width)) {
+            let [_, y_m] = self.envelope.centre_m(row, 0);
+            for index in line {
+                let depth_m = self.envelope.depth_m()[index];
+                if depth_m > 0.0 {
+                    let across_m = [self.x_m[index % width] - axis_m[0], y_m - axis_m[1]];
+                    out.push(Column { index, across_m, area_m2, depth_m: depth_m - h });
+                }
+            }
+        }
+    }
+
+    /// The column nearest to a place, which becomes the only one of the cleared layer.
+    pub(crate) fn column_at(&mut self, [x_m, y_m]: [f64; 2]) -> Column {
+        let [rows, cols] = self.envelope.shape();
+        let [first_x_m, first_y_m] = self.envelope.centre_m(0, 0);
+        let cell_m = self.envelope.cell_m();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of a row or column")]
+        let number = |at_m: f64, count: usize| (at_m / cell_m).round().clamp(0.0, count as f64 - 1.0) as usize;
+        let (row, col) = (number(first_y_m - y_m, rows), number(x_m - first_x_m, cols));
+        self.patch = Patch { rows: [row, row + 1], cols: [col, col + 1] };
+        Column { index: row * cols + col, across_m: [0.0; 2], area_m2: cell_m * cell_m, depth_m: 0.0 }
     }
 
     /// Presses `body` into the cleared layer.

@@ -1,8 +1,10 @@
 //! Foam on a surface of any shape.
 
 use super::points::{Solid, SurfacePoints};
+use crate::balance::{Column, settle};
 use crate::field::{PosedMesh, Wrench};
 use crate::foam::Foam;
+use crate::touch::Carried;
 use crate::traction::velocity_at;
 use parry3d_f64::math::Vector;
 use spts_input::Refusal;
@@ -97,6 +99,41 @@ impl SurfaceField {
     pub fn clear(&mut self) {
         self.pressure_pa.fill(0.0);
         self.bottomed = false;
+    }
+
+    /// Spreads `load` of a carried body over the columns under it, in addition to all pressures since
+    /// [`SurfaceField::clear`].
+    pub(crate) fn carry(&mut self, solid: &Solid, load: &Carried<'_>, columns: &mut Vec<Column>) {
+        let (body, h) = (&load.posed, self.config.thickness_m);
+        let law = self.config.law(body.stiffness_pa_per_m);
+        let [x, y, z] = body.rotation.map(Vector::from);
+        let into_body = |v: Vector| x * v.x + y * v.y + z * v.z;
+        let (origin, centre) = (Vector::from(body.position_m), Vector::from(load.centre_m));
+        let points = || self.points.positions_m.iter().zip(&self.points.normals);
+        let away = |point: &[f64; 3]| (Vector::from(*point) - centre).length_squared();
+        let nearest = points().enumerate().min_by(|(_, a), (_, b)| away(a.0).total_cmp(&away(b.0)));
+        let Some((nearest, (_, up))) = nearest else { return };
+        let up = Vector::from(*up);
+        let [u, v] = [up.any_orthonormal_vector(), up.cross(up.any_orthonormal_vector())];
+        columns.clear();
+        for (index, (point, normal)) in points().enumerate() {
+            let (point, normal) = (Vector::from(*point), Vector::from(*normal));
+            let base = point - normal * h;
+            if let Some(depth_m) = solid.front_m(into_body(base - origin), into_body(normal), h, h) {
+                let across_m = [(point - centre).dot(u), (point - centre).dot(v)];
+                columns.push(Column { index, across_m, area_m2: self.points.areas_m2[index], depth_m });
+            }
+        }
+        if columns.is_empty() {
+            // it touches the rim
+            let area_m2 = self.points.areas_m2[nearest];
+            columns.push(Column { index: nearest, across_m: [0.0; 2], area_m2, depth_m: 0.0 });
+        }
+        settle(&law, columns, load.normal_n);
+        for c in columns {
+            self.bottomed |= c.depth_m > h;
+            self.pressure_pa[c.index] += law.pressure_pa(c.depth_m);
+        }
     }
 
     /// Presses `body` on the skin, in addition to the bodies pressed since [`SurfaceField::clear`]. `solid` is made

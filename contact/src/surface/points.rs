@@ -83,32 +83,36 @@ impl Solid {
     /// than inward, along the column's line: its depth is then the thickness, and how far it goes on behind the base,
     /// at most another thickness. Otherwise it has come from behind, and does not touch the foam.
     pub(crate) fn depth_m(&self, base_m: Vector, outward: Vector, thickness_m: f64) -> f64 {
-        let mut from_m = 0.0;
-        while let Some(hit) = self.first(base_m + outward * from_m, outward, thickness_m - from_m) {
+        self.front_m(base_m, outward, thickness_m, 0.0).unwrap_or(0.0)
+    }
+
+    /// As [`Solid::depth_m`] with, as a negative depth, the gap to a solid up to `gap_m` above the free surface; `None`
+    /// where there is nothing.
+    pub(crate) fn front_m(&self, base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64) -> Option<f64> {
+        let (mut from_m, reach_m) = (0.0, thickness_m + gap_m);
+        while let Some(hit) = self.first(base_m + outward * from_m, outward, reach_m - from_m) {
             let at_m = from_m + hit.distance_m;
             if hit.enters || !self.closed {
-                return thickness_m - at_m;
+                return Some(thickness_m - at_m);
             }
             if from_m <= 0.0 && self.is_through(base_m, outward, at_m) {
-                return thickness_m + self.behind_m(base_m, outward, thickness_m);
+                return Some(thickness_m + self.behind_m(base_m, outward, thickness_m));
             }
             // past what comes from behind, to what may enter from outside
             from_m = at_m + SLACK * thickness_m;
         }
         let beside = base_m.cmplt(self.low_m).any() || base_m.cmpgt(self.high_m).any();
         if from_m > 0.0 || beside {
-            return 0.0;
+            return None;
         }
-        let out_m = self.first(base_m, outward, f64::INFINITY);
-        match out_m {
-            Some(hit) if hit.enters && self.closed => 0.0,
-            None if self.closed => 0.0,
-            // without a far side, an open mesh goes on for ever
-            hit if self.is_through(base_m, outward, hit.map_or(f64::INFINITY, |hit| hit.distance_m)) => {
-                thickness_m + self.behind_m(base_m, outward, thickness_m)
-            }
-            _ => 0.0,
-        }
+        // without a far side, an open mesh goes on for ever
+        let out_m = match self.first(base_m, outward, f64::INFINITY) {
+            Some(hit) if !hit.enters || !self.closed => hit.distance_m,
+            None if !self.closed => f64::INFINITY,
+            _ => return None,
+        };
+        let through = self.is_through(base_m, outward, out_m);
+        through.then(|| thickness_m + self.behind_m(base_m, outward, thickness_m))
     }
 
     /// Whether a solid that has `base_m` inside, and ends `out_m` outward of it, reaches less far the other way.

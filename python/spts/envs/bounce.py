@@ -88,6 +88,7 @@ class BounceEnv(gym.Env):
             self.skin,
             site="skin",
             bodies={"ball": Body.sphere(_BALL_M, stiffness=_BALL_PA_PER_M)},
+            mode="foam",
         )
         self._ball = self.model.body("ball").id
         self._tactile = Tactile(self.skin, observe, measurements, decoder, wire)

@@ -10,14 +10,15 @@ from .tactile import Tactile, fresh_seed
 class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
     """Adds a skin to an environment with a MuJoCo model: what it feels becomes a part of the observation.
 
-    The environment steps as it always does; the skin's forces act in every step of it. Needs `mujoco`.
+    The environment steps as it always does. In mode "sense" nothing of it changes; in mode "foam" the skin's forces act in
+    every step of it. Needs `mujoco`.
 
     Parameters
     ----------
     env : gymnasium.Env
         With `model` and `data` of MuJoCo, as all of gymnasium's and gymnasium-robotics's have.
     skin : spts.Skin
-    site, body, pos, quat, bodies, link_geoms
+    site, body, pos, quat, bodies, link_geoms, mode
         As of `spts.mujoco.attach`.
     key : str
         Name of the new part of the observation. Observations that are no dictionaries become `observation`.
@@ -36,6 +37,7 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         quat=(1, 0, 0, 0),
         bodies="all",
         link_geoms=None,
+        mode="sense",
         key="tactile",
         observe="samples",
         measurements=None,
@@ -44,7 +46,15 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
     ):
         from .. import mujoco as ours
 
-        options = {"site": site, "body": body, "pos": pos, "quat": quat, "bodies": bodies, "link_geoms": link_geoms}
+        options = {
+            "site": site,
+            "body": body,
+            "pos": pos,
+            "quat": quat,
+            "bodies": bodies,
+            "link_geoms": link_geoms,
+            "mode": mode,
+        }
         tactile = {"observe": observe, "measurements": measurements, "decoder": decoder, "wire": wire}
         gym.utils.RecordConstructorArgs.__init__(self, _disable_deepcopy=True, skin=skin, key=key, **options, **tactile)
         gym.ObservationWrapper.__init__(self, env)
@@ -53,7 +63,7 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
             raise ValueError(f"`env` = {inner}: it has no `model` and `data` of MuJoCo")
         self.touch = ours.attach(inner.model, inner.data, skin, **options)
         self._resets = False
-        self.touch.hook(self._feel)
+        self.touch.hook(self._feel if mode == "foam" else None)
         self._tactile, self._key = Tactile(skin, **tactile), key
         spaces = env.observation_space
         own = dict(spaces.spaces) if isinstance(spaces, gym.spaces.Dict) else {"observation": spaces}

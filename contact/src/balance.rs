@@ -1,0 +1,182 @@
+//! The balance of foam under a body that something else carries: how its force spreads over the columns.
+
+use crate::foam::FoamLaw;
+use nalgebra::{Matrix3, Vector3};
+
+/// A column of foam under a body.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Column {
+    /// Number of the column on its skin.
+    pub(crate) index: usize,
+    /// Place across the load, m, from the load's axis.
+    pub(crate) across_m: [f64; 2],
+    pub(crate) area_m2: f64,
+    /// How deep the body reaches into the column where it is, m; negative for a gap.
+    pub(crate) depth_m: f64,
+}
+
+/// Largest tilt, rad, of the body in the foam against where something else holds it.
+const MAX_TILT_RAD: f64 = 0.2;
+/// What may be left of the force, relative to it.
+const TOLERANCE: f64 = 1e-12;
+const MAX_ITERATIONS: usize = 60;
+
+/// Depths of `columns`, m, at which they carry `force_n`, with the resultant on the load's axis where that can be.
+///
+/// The body keeps its shape: it sinks by s and tilts by (a, b), so that a column at (u, v) has the depth
+/// d + s + a u + b v. With the pressure p of the foam's law, Σ A p = F, Σ A p u = 0 and Σ A p v = 0: the minimum of the
+/// convex potential Σ A ∫p dd − F s, by Newton's method. A load whose axis is beside all columns has none; then the body
+/// sinks without a tilt. The force is met to 1e-12 of it in either case.
+pub(crate) fn settle(law: &FoamLaw, columns: &mut [Column], force_n: f64) {
+    let sunk_m = sink(law, columns, [0.0; 2], force_n);
+    let tilts = tilt(law, columns, sunk_m, force_n).unwrap_or_default();
+    let sunk_m = sink(law, columns, tilts, force_n);
+    for c in columns {
+        c.depth_m += sunk_m + tilts[0] * c.across_m[0] + tilts[1] * c.across_m[1];
+    }
+}
+
+/// How far the tilted body sinks until the columns carry the force, m: the force grows with it, so that Newton's steps
+/// between two bounds find it.
+fn sink(law: &FoamLaw, columns: &[Column], [a, b]: [f64; 2], force_n: f64) -> f64 {
+    let depth = |c: &Column| c.depth_m + a * c.across_m[0] + b * c.across_m[1];
+    let carried = |s: f64| {
+        columns.iter().fold((0.0, 0.0), |(force, slope), c| {
+            let (p, k) = law.pressure_and_slope(depth(c) + s);
+            (force + c.area_m2 * p, slope + c.area_m2 * k)
+        })
+    };
+    let mut low = -columns.iter().map(depth).fold(f64::NEG_INFINITY, f64::max);
+    let mut step = 1e-4;
+    let mut high = low + step;
+    while carried(high).0 < force_n && step < 1e3 {
+        low = high;
+        step *= 2.0;
+        high += step;
+    }
+    let mut s = high;
+    for _ in 0..200 {
+        let (force, slope) = carried(s);
+        let off = force - force_n;
+        if off.abs() <= TOLERANCE * force_n || high - low <= f64::EPSILON * high.abs() {
+            break;
+        }
+        if off > 0.0 {
+            high = s;
+        } else {
+            low = s;
+        }
+        let next = s - off / slope;
+        s = if next > low && next < high { next } else { 0.5 * (low + high) };
+    }
+    s
+}
+
+/// The tilts at which the moments vanish; `None` if they are not small.
+fn tilt(law: &FoamLaw, columns: &[Column], sunk_m: f64, force_n: f64) -> Option<[f64; 2]> {
+    let reach_m = columns.iter().map(|c| c.across_m[0].hypot(c.across_m[1])).fold(0.0, f64::max);
+    // across in units of the reach: the three unknowns are lengths
+    let across = |c: &Column| Vector3::new(1.0, c.across_m[0] / reach_m, c.across_m[1] / reach_m);
+    let at = |state: &Vector3<f64>| {
+        let (mut gradient, mut hessian) = (Vector3::new(-force_n, 0.0, 0.0), Matrix3::zeros());
+        for c in columns {
+            let r = across(c);
+            let (p, k) = law.pressure_and_slope(c.depth_m + r.dot(state));
+            gradient += r * (c.area_m2 * p);
+            hessian += r * r.transpose() * (c.area_m2 * k);
+        }
+        (gradient, hessian)
+    };
+    let mut state = Vector3::new(sunk_m, 0.0, 0.0);
+    let (mut gradient, mut hessian) = at(&state);
+    for _ in 0..MAX_ITERATIONS {
+        if gradient.amax() <= 1e-9 * force_n {
+            break;
+        }
+        // one row of columns does not resist a tilt about itself
+        let damped = hessian + Matrix3::from_diagonal_element(1e-9 * hessian.trace());
+        let step = -damped.cholesky()?.solve(&gradient);
+        let slope = gradient.dot(&step).abs();
+        let mut share = 1.0;
+        loop {
+            let next = at(&(state + share * step));
+            if next.0.dot(&step) <= 0.9 * slope || share < 1e-6 {
+                state += share * step;
+                (gradient, hessian) = next;
+                break;
+            }
+            share *= 0.5;
+        }
+        if state.yz().amax() > MAX_TILT_RAD * reach_m {
+            return None;
+        }
+    }
+    (gradient.amax() <= 1e-6 * force_n).then(|| [state[1] / reach_m, state[2] / reach_m])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::foam::Foam;
+
+    fn grid(side: i32, depth: impl Fn(f64, f64) -> f64) -> Vec<Column> {
+        let cell_m = 1e-3;
+        let places =
+            (-side..=side).flat_map(|i| (-side..=side).map(move |j| (f64::from(i) * cell_m, f64::from(j) * cell_m)));
+        let column = |(index, (u, v))| Column { index, across_m: [u, v], area_m2: 1e-6, depth_m: depth(u, v) };
+        places.enumerate().map(column).collect()
+    }
+
+    fn sums(law: &FoamLaw, columns: &[Column]) -> [f64; 3] {
+        let mut out = [0.0; 3];
+        for c in columns {
+            let f = c.area_m2 * law.pressure_pa(c.depth_m);
+            out[0] += f;
+            out[1] += f * c.across_m[0];
+            out[2] += f * c.across_m[1];
+        }
+        out
+    }
+
+    /// A flat plate, far above or far below the skin, straight or tilted, carries the load on its axis: the pressure is
+    /// the same everywhere, F/A. A load off the middle tilts it, and its resultant is on the axis.
+    #[test]
+    fn plates_and_balls() {
+        let law = Foam::default().law(f64::INFINITY);
+        for away in [-3e-3, -1e-6, 0.0, 5e-3] {
+            for turn in [0.0, 0.05] {
+                let mut columns = grid(10, |u, _| away + turn * u);
+                settle(&law, &mut columns, 7.0);
+                let mean_pa = 7.0 / (columns.len() as f64 * 1e-6);
+                for c in &columns {
+                    let p = law.pressure_pa(c.depth_m);
+                    assert!((p / mean_pa - 1.0).abs() < 1e-5, "{away} {turn}: {p} {mean_pa}");
+                }
+            }
+        }
+        for force_n in [1e-6, 0.1, 20.0, 5e3] {
+            let mut plate = grid(10, |_, _| 0.0);
+            plate.iter_mut().for_each(|c| c.across_m[0] -= 1e-3);
+            let mut ball = grid(15, |u, v| -(u * u + v * v) / 0.04);
+            for columns in [&mut plate, &mut ball] {
+                settle(&law, columns, force_n);
+                let [force, x, y] = sums(&law, columns);
+                assert!((force / force_n - 1.0).abs() < 1e-11, "{force}");
+                assert!(x.abs().max(y.abs()) < 1e-6 * force_n * 1e-2, "{force_n}: {x} {y}");
+            }
+        }
+    }
+
+    /// An axis beside the plate, and a single column: the force is met all the same.
+    #[test]
+    fn loads_that_cannot_be_balanced() {
+        let law = Foam::default().law(f64::INFINITY);
+        let mut beside = grid(10, |_, _| 0.0);
+        beside.iter_mut().for_each(|c| c.across_m[0] -= 0.1);
+        let mut single = vec![Column { index: 0, across_m: [0.0; 2], area_m2: 1e-4, depth_m: -1e-3 }];
+        for columns in [&mut beside, &mut single] {
+            settle(&law, columns, 3.0);
+            assert!((sums(&law, columns)[0] / 3.0 - 1.0).abs() < 1e-11);
+        }
+    }
+}
