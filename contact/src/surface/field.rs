@@ -90,8 +90,8 @@ impl SurfaceField {
         points.into_iter().any(|((point, normal), area_m2)| {
             let (away, normal) = (place - Vector::from(*point), Vector::from(*normal));
             let along = away.dot(normal);
-            // as wide as a square of the point's area
-            (-1.5 * h..=0.5 * h).contains(&along) && (away - normal * along).length_squared() <= 0.5 * area_m2
+            // within the side of a square of the point's area: what touches right on the rim is on the foam
+            (-1.5 * h..=0.5 * h).contains(&along) && (away - normal * along).length_squared() <= *area_m2
         })
     }
 
