@@ -156,10 +156,15 @@ impl Pressed {
     }
 
     fn depth_for(&mut self, force_n: f64) -> Result<f64, Refusal> {
-        let (mut low_m, mut high_m) = (0.0, DEEPEST_M);
-        if self.touch(high_m, 0.0) < force_n {
-            let name = self.config.object.name;
-            return Err(Refusal::new(format!("{name:?} cannot press with {force_n} N on this skin")));
+        // from above: an object that has gone half through the skin touches nothing
+        let (mut low_m, mut high_m) = (0.0, DEEPEST_M / 16.0);
+        while self.touch(high_m, 0.0) < force_n {
+            if high_m >= DEEPEST_M {
+                let name = self.config.object.name;
+                return Err(Refusal::new(format!("{name:?} cannot press with {force_n} N on this skin")));
+            }
+            low_m = high_m;
+            high_m *= 2.0;
         }
         for _ in 0..HALVINGS {
             let middle_m = 0.5 * (low_m + high_m);
