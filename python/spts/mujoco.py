@@ -25,7 +25,7 @@ import warnings
 import mujoco
 import numpy as np
 
-from ._spts import Body, Mount
+from ._spts import Body, Mount, Skin, Wire
 
 # Courant-like number of a foam and the mass on it above which the step is called too long. With semi-implicit steps the
 # two are stable as long as k dt²/m + 2 c dt/m < 4.
@@ -59,8 +59,8 @@ def attach(
         (4,), w x y z.
     bodies : "all", sequence of str or int, or dict of them to spts.Body
         Bodies that may touch the skin, by their names or that of a geom of theirs. Their shapes are their geoms that
-        collide, unless a `spts.Body` is given. "all"
-        are those with such geoms but the skin's own link, what is welded to it, and what a joint connects with it.
+        collide, unless a `spts.Body` is given. "all" are those with such geoms but the skin's own link, what is welded to
+        it, and what a joint connects with it.
     link_geoms : sequence of str or int, optional
         Geoms that the skin covers: MuJoCo's contact between them and `bodies` is felt where there is foam, or taken out in
         mode "foam". Default: all geoms of the skin's body and, unless that stands still, of what is welded to it. A skin
@@ -145,6 +145,8 @@ class Attachment:
         self._warned = False
         self._felt_at = None
         self._each = None
+        # time since the last touch in mode "sense", when nothing touches any more
+        self._idle = 0.0
         # whether every look is at the present moment of the data
         self._follows = False
 
@@ -155,7 +157,11 @@ class Attachment:
             failed, self._failed = self._failed, None
             raise failed
         if self._follows and self.data.time != self._felt_at:
-            self._read(self._elapsed())
+            _read([self], self._elapsed())
+        if self._idle > 0.0:
+            # nothing has touched it for that long
+            self._last = self._mount.read(self._idle, [])
+            self._idle = 0.0
         return self._last
 
     @property
@@ -167,12 +173,13 @@ class Attachment:
         """Steps the model, in place of `mujoco.mj_step`; the last `spts.Touch`."""
         for _ in range(steps):
             step(self)
-        return self._last
+        return self.last
 
     def reset(self):
         """Takes every body off the skin and begins its time anew, as after `mujoco.mj_resetData`."""
         self.skin.reset()
         self._last = self._felt_at = None
+        self._idle = 0.0
 
     def hook(self, each=None):
         """Lets every `mujoco.mj_step` of the data feel the skin, whoever calls it: environments and viewers that step
@@ -183,8 +190,9 @@ class Attachment:
         each : callable, optional
             Called with every touch, in mode "foam".
 
-        In mode "sense", `last` then is what the skin feels at the present moment of the data. In mode "foam" the forces go into `qfrc_passive` by MuJoCo's callback `mjcb_passive`, for this data alone; one that is set already
-        is called first.
+        In mode "sense", `last` then is what the skin feels at the present moment of the data. In mode "foam" the forces go
+        into `qfrc_passive` by MuJoCo's callback `mjcb_passive`, for this data alone; one that is set already is called
+        first.
         """
         if self.mode == "sense":
             if each is not None:
@@ -215,6 +223,40 @@ class Attachment:
             if not _HOOKED:
                 mujoco.set_mjcb_passive(_BEFORE.pop())
 
+    def draw(self, scene, most=2e4):
+        """Draws the taxels into a scene of MuJoCo's viewer or renderer (`viewer.user_scn`, `renderer.scene`), those under
+        pressure in colour.
+
+        Parameters
+        ----------
+        scene : mujoco.MjvScene
+        most : float
+            Pressure of the brightest colour, Pa.
+        """
+        pos, turn = self._place
+        link = self.data.xmat[self._link].reshape(3, 3)
+        frame = link @ turn
+        places = self.skin.positions @ frame.T + (link @ pos + self.data.xpos[self._link])
+        normals = self.skin.normals @ frame.T
+        sides = 0.45 * np.sqrt(self.skin.areas)
+        shares = np.clip(self.pressure.ravel() / most, 0.0, 1.0)
+        for place, normal, side, share in zip(places, normals, sides, shares):
+            if scene.ngeom >= scene.maxgeom:
+                warnings.warn(f"the scene has room for {scene.maxgeom} geoms: not all taxels are drawn", stacklevel=2)
+                return
+            across = np.eye(3)[np.argmin(np.abs(normal))]
+            x = np.cross(across, normal)
+            x /= np.linalg.norm(x)
+            mujoco.mjv_initGeom(
+                scene.geoms[scene.ngeom],
+                mujoco.mjtGeom.mjGEOM_BOX,
+                np.array([side, side, 0.1 * side]),
+                place,
+                np.stack([x, np.cross(normal, x), normal], axis=1).ravel(),
+                np.array([0.15 + 0.85 * share, 0.2 + 0.4 * share, 0.35 * (1.0 - share), 1.0], np.float32),
+            )
+            scene.ngeom += 1
+
     def __enter__(self):
         return self
 
@@ -224,31 +266,6 @@ class Attachment:
     def _apply(self, dt):
         self._last = self._mount.apply(dt)
         self._warn(dt)
-
-    def _read(self, dt):
-        """Feels the forces of MuJoCo's contact that the data has."""
-        model, data, contact = self.model, self.data, self.data.contact
-        loads, force = {}, np.empty(6)
-        for k in np.flatnonzero(self._foamed(contact)) if data.ncon else ():
-            if contact.efc_address[k] < 0:
-                continue
-            mujoco.mj_contactForce(model, data, k, force)
-            geoms, pos = contact.geom[k], contact.pos[k]
-            first = self._others[geoms[0]]
-            body = int(model.geom_bodyid[geoms[0 if first else 1]])
-            # the contact's normal points from its first geom to its second, and the force is on the second
-            frame = contact.frame[k].reshape(3, 3)
-            sign = -1.0 if first else 1.0
-            push = sign * (force[:3] @ frame)
-            twist = sign * (force[3:] @ frame) + np.cross(pos - data.xpos[body], push)
-            normal, at, pushed, twisted = loads.get(body, (0.0, 0.0, 0.0, 0.0))
-            loads[body] = normal + force[0], at + force[0] * pos, pushed + push, twisted + twist
-        found = [
-            (body, float(normal), (at / normal).tolist(), push.tolist(), twist.tolist())
-            for body, (normal, at, push, twist) in loads.items()
-            if normal > 0.0
-        ]
-        self._last = self._mount.read(dt, found)
 
     def _foamed(self, contact):
         """Which contacts are between the link and the bodies, where there is foam: (contacts,) of bool."""
@@ -296,6 +313,260 @@ class Attachment:
                     RuntimeWarning,
                     stacklevel=5,
                 )
+
+
+def dress(
+    model,
+    data,
+    links="all",
+    pitch=0.01,
+    thickness=0.003,
+    wires="link",
+    *,
+    mode="sense",
+    readout="as_built",
+    seed=0,
+    **foam,
+):
+    """Puts skins on links of a robot: their whole surface, from their geoms, with a taxel about every `pitch`.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+    data : mujoco.MjData
+        Taxels inside the geoms of other links, as they stand in this data, are left out.
+    links : "all" or sequence of str or int
+        Bodies; "all" are those with a geom that collides, but the world and what is welded to it.
+    pitch : float
+        Distance between taxels, m, [1e-4, 1].
+    thickness : float
+        Thickness of the foam, m. It lies on the surface of the geoms.
+    wires : "link" or None
+        "link": a wire a link. None: no wires.
+    mode : str
+        As of `attach`.
+    readout, seed
+        As of `spts.Wire`; the wire of link k has the seed `seed` + k.
+    foam
+        `stiffness`, `damping` and `friction`, as of `spts.Skin`.
+
+    Returns
+    -------
+    Dress
+
+    Raises
+    ------
+    ValueError
+        For a name that the model does not have, a link without a surface, and numbers outside their ranges.
+
+    ::
+
+        robot = spts.mujoco.dress(model, data)
+        for _ in range(1000):
+            touches = robot.step()           # in place of mujoco.mj_step(model, data)
+        print(robot.taxels, sum(t.pressure.ravel() @ s.areas for t, s in zip(touches, robot.skins)))
+    """
+    if not 1e-4 <= pitch <= 1.0:
+        raise ValueError(f"`pitch` = {pitch} is outside [1e-4, 1] m")
+    if wires not in ("link", None):
+        raise ValueError(f'`wires` = {wires!r}; valid: "link", None')
+    if isinstance(links, str):
+        if links != "all":
+            raise ValueError(f'`links` = "{links}"; valid: "all" or a list of bodies')
+        moving = (b for b in range(1, model.nbody) if model.body_weldid[b] != 0)
+        links = [b for b in moving if _colliding(model, np.flatnonzero(model.geom_bodyid == b))]
+    links = [_number(model, mujoco.mjtObj.mjOBJ_BODY, "links", link) for link in links]
+    if not links:
+        raise ValueError("`links` is empty: the model has no moving body with a geom that collides")
+    if data.time == 0.0 and not data.xmat.any():
+        mujoco.mj_kinematics(model, data)
+    shapes, skins, meshes = {}, [], {}
+    for link in links:
+        positions, normals, areas = _surface(model, data, link, pitch, meshes)
+        skins.append(Skin.from_points(positions + thickness * normals, normals, areas, thickness=thickness, **foam))
+        for body in _all(model, link):
+            if body not in shapes:
+                shapes[body] = _body(model, body, meshes)
+    attachments = [
+        Attachment(
+            model,
+            data,
+            skin,
+            link,
+            (0, 0, 0),
+            (1, 0, 0, 0),
+            bodies={body: shapes[body] for body in _all(model, link)},
+            link_geoms=np.flatnonzero(model.geom_bodyid == link),
+            mode=mode,
+        )
+        for link, skin in zip(links, skins)
+    ]
+    made = [Wire(skin, readout, seed=seed + k) for k, skin in enumerate(skins)] if wires else []
+    return Dress(attachments, made, [model.body(link).name for link in links])
+
+
+class Dress:
+    """Skins on the links of a robot: what `dress` returns."""
+
+    def __init__(self, attachments, wires, names):
+        #: A skin a link: what `attach` returns, in the order of the links.
+        self.attachments = attachments
+        #: A wire a link, in the same order; empty without wires.
+        self.wires = wires
+        #: Names of the links.
+        self.names = names
+        self.model, self.data = attachments[0].model, attachments[0].data
+
+    @property
+    def skins(self):
+        """A `spts.Skin` a link."""
+        return [attachment.skin for attachment in self.attachments]
+
+    @property
+    def taxels(self):
+        """Number of taxels of all links."""
+        return sum(skin.shape[0] * skin.shape[1] for skin in self.skins)
+
+    @property
+    def touches(self):
+        """The last touch of every link; None before the first step."""
+        return [attachment.last for attachment in self.attachments]
+
+    def step(self, steps=1):
+        """Steps the model, in place of `mujoco.mj_step`; what every link feels."""
+        for _ in range(steps):
+            touches = step(*self.attachments)
+        return touches
+
+    def draw(self, scene, most=2e4):
+        """Draws all taxels; as `Attachment.draw`."""
+        for attachment in self.attachments:
+            attachment.draw(scene, most)
+
+    def reset(self):
+        """Takes every body off all skins, as after `mujoco.mj_resetData`."""
+        for attachment in self.attachments:
+            attachment.reset()
+
+    def detach(self):
+        """Ends all skins."""
+        for attachment in self.attachments:
+            attachment.detach()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.detach()
+
+
+# Samples along a pitch, from which taxels are made, and most taxels of a geom.
+_SAMPLES, _MOST = 5, 100_000
+
+
+def _surface(model, data, link, pitch, meshes):
+    """Taxels on the surface of a link, in its axes: positions (n, 3), m, outward normals (n, 3) and areas (n,), m². Keeps the
+    meshes of its geoms in `meshes`.
+
+    Samples a fifth of the pitch apart on every geom, without those inside other geoms, are gathered by the cells of a grid
+    of the pitch and by the side that they look to.
+    """
+    geoms = _colliding(model, np.flatnonzero(model.geom_bodyid == link))
+    no_surface = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+    geoms = [g for g in geoms if model.geom_type[g] not in no_surface]
+    name = model.body(link).name
+    if not geoms:
+        raise ValueError(f'`links`: "{name}" has no geom with a surface that collides')
+    others = [g for b in range(model.nbody) for g in _colliding(model, np.flatnonzero(model.geom_bodyid == b))]
+    turn, origin = data.xmat[link].reshape(3, 3), data.xpos[link]
+    places, normals, areas = [], [], []
+    for geom in geoms:
+        vertices, faces = meshes[geom] = _mesh(model, geom)
+        place, normal, area = _samples(vertices[faces], pitch / _SAMPLES)
+        at = place @ turn.T + origin
+        # a sample on the surface of its own geom is not inside it
+        inside = np.zeros(len(at), bool)
+        for other in others:
+            if other != geom and (model.geom_bodyid[other] == link or model.body_weldid[model.geom_bodyid[other]] != 0):
+                inside |= _inside(model, data, other, at)
+        places.append(place[~inside]), normals.append(normal[~inside]), areas.append(area[~inside])
+    place, normal, area = (np.concatenate(part) for part in (places, normals, areas))
+    if len(place) == 0:
+        raise ValueError(f'`links`: the surface of "{name}" lies inside other geoms')
+    side = np.abs(normal).argmax(axis=1)
+    side = 2 * side + (np.take_along_axis(normal, side[:, None], 1)[:, 0] > 0.0)
+    key = np.concatenate([np.floor(place / pitch + 0.5).astype(np.int64), side[:, None]], axis=1)
+    _, cell = np.unique(key, axis=0, return_inverse=True)
+    cell = cell.ravel()
+    sums = [np.bincount(cell, area)]
+    sums += [np.bincount(cell, area * v) for v in (*place.T, *normal.T)]
+    whole = sums[0]
+    middle, mean = np.stack(sums[1:4], 1) / whole[:, None], np.stack(sums[4:7], 1)
+    # rims of cells go to their neighbour that looks the same way
+    small = whole < 0.3 * pitch**2
+    if small.any() and not small.all():
+        kept = np.flatnonzero(~small)
+        mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+        for k in np.flatnonzero(small):
+            away = np.linalg.norm(middle[kept] - middle[k], axis=1) + pitch * (1.0 - mean[kept] @ mean[k])
+            cell[cell == k] = kept[away.argmin()]
+        kept, cell = np.unique(cell, return_inverse=True)
+        sums = [np.bincount(cell, area)] + [np.bincount(cell, area * v) for v in (*place.T, *normal.T)]
+        whole = sums[0]
+        middle, mean = np.stack(sums[1:4], 1) / whole[:, None], np.stack(sums[4:7], 1)
+    # the sample nearest to the middle lies on the surface
+    order = np.lexsort((np.linalg.norm(place - middle[cell], axis=1), cell))
+    first = order[np.searchsorted(cell[order], np.arange(len(whole)))]
+    return place[first], mean / np.linalg.norm(mean, axis=1, keepdims=True), whole
+
+
+def _samples(corners, spacing):
+    """Places, normals and areas of samples about `spacing` apart on triangles (n, 3, 3)."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    cross = np.cross(b - a, c - a)
+    double = np.linalg.norm(cross, axis=1)
+    corners, cross, double = corners[double > 0.0], cross[double > 0.0], double[double > 0.0]
+    # as many as the area asks for, evenly along the sum of the areas, in an order that has no rows of triangles
+    order = np.argsort(np.arange(len(double)) * 0.6180339887498949 % 1.0)
+    corners, cross, double = corners[order], cross[order], double[order]
+    ends = np.cumsum(0.5 * double)
+    if ends[-1] > _MOST * (_SAMPLES * spacing) ** 2:
+        raise ValueError(
+            f"`pitch` = {_SAMPLES * spacing:g} m makes {ends[-1] / (_SAMPLES * spacing) ** 2:.3g} taxels of one geom; at most {_MOST}"
+        )
+    count = max(12, math.ceil(ends[-1] / spacing**2))
+    number = np.arange(count)
+    of = np.minimum(np.searchsorted(ends, (number + 0.5) * (ends[-1] / count)), len(ends) - 1)
+    # the R2 sequence of M. Roberts (2018), folded into the triangle
+    u, v = (0.5 + 0.7548776662466927 * (number + 1)) % 1.0, (0.5 + 0.5698402909980532 * (number + 1)) % 1.0
+    over = u + v > 1.0
+    u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
+    a, b, c = corners[of, 0], corners[of, 1], corners[of, 2]
+    place = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    return place, (cross / double[:, None])[of], np.full(count, ends[-1] / count)
+
+
+def _inside(model, data, geom, places):
+    """Which places, in the world, are inside a geom; of meshes, inside their box of half the size."""
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    at = (places - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
+    types = mujoco.mjtGeom
+    along = np.abs(at[:, 2])
+    across = np.hypot(at[:, 0], at[:, 1])
+    if kind == types.mjGEOM_SPHERE:
+        return np.linalg.norm(at, axis=1) < size[0]
+    if kind == types.mjGEOM_CAPSULE:
+        return np.hypot(across, np.maximum(along - size[1], 0.0)) < size[0]
+    if kind == types.mjGEOM_CYLINDER:
+        return (across < size[0]) & (along < size[1])
+    if kind == types.mjGEOM_ELLIPSOID:
+        return np.linalg.norm(at / size, axis=1) < 1.0
+    if kind == types.mjGEOM_BOX:
+        return (np.abs(at) < size).all(axis=1)
+    if kind == types.mjGEOM_MESH:
+        half = model.geom_aabb[geom, 3:]
+        return (np.abs(at - model.geom_aabb[geom, :3]) < 0.5 * half).all(axis=1)
+    return np.zeros(len(places), bool)
 
 
 # Skins that every step feels, by the address of their data, and the callback that was set before them.
@@ -381,10 +652,39 @@ def step(*attachments):
         finally:
             for attachment in reversed(done):
                 attachment._mount.restore()
+    _read([attachment for attachment in attachments if attachment.mode == "sense"], model.opt.timestep)
+    return [attachment.last for attachment in attachments]
+
+
+def _read(attachments, dt):
+    """Lets skins in mode "sense" feel the forces of MuJoCo's contact that the data has, `dt` s after the last time."""
+    if not attachments:
+        return
+    model, data = attachments[0].model, attachments[0].data
+    contact, ncon = data.contact, data.ncon
+    geoms, force = contact.geom if ncon else np.empty((0, 2), int), np.empty(6)
+    places, frames, acts = (contact.pos, contact.frame, contact.efc_address >= 0) if ncon else ((), (), ())
     for attachment in attachments:
-        if attachment.mode == "sense":
-            attachment._read(model.opt.timestep)
-    return [attachment._last for attachment in attachments]
+        loads = {}
+        for k in np.flatnonzero(attachment._foamed(contact) & acts) if ncon else ():
+            mujoco.mj_contactForce(model, data, k, force)
+            # the contact's normal points from its first geom to its second, and the force is on the second
+            first = attachment._others[geoms[k, 0]]
+            body, sign = int(model.geom_bodyid[geoms[k, 0 if first else 1]]), -1.0 if first else 1.0
+            frame, pos = frames[k].reshape(3, 3), places[k]
+            push = sign * (force[:3] @ frame)
+            twist = sign * (force[3:] @ frame) + np.cross(pos - data.xpos[body], push)
+            normal, at, pushed, twisted = loads.get(body, (0.0, 0.0, 0.0, 0.0))
+            loads[body] = normal + force[0], at + force[0] * pos, pushed + push, twisted + twist
+        found = [
+            (body, float(normal), (at / normal).tolist(), push.tolist(), twist.tolist())
+            for body, (normal, at, push, twist) in loads.items()
+            if normal > 0.0
+        ]
+        attachment._idle += dt
+        if found or attachment._last is None or attachment._last.area > 0.0:
+            attachment._last = attachment._mount.read(attachment._idle, found)
+            attachment._idle = 0.0
 
 
 def body_of(model, body):
@@ -400,9 +700,13 @@ def body_of(model, body):
     ValueError
         For a body without a geom, and for SDFs, which have no mesh.
     """
-    body = _number(model, mujoco.mjtObj.mjOBJ_BODY, "body", body)
+    return _body(model, _number(model, mujoco.mjtObj.mjOBJ_BODY, "body", body), {})
+
+
+def _body(model, body, meshes):
+    """As `body_of`; `meshes` holds those of geoms that are known."""
     geoms = np.flatnonzero(model.geom_bodyid == body)
-    parts = [_mesh(model, int(g)) for g in (_colliding(model, geoms) or geoms)]
+    parts = [meshes[g] if g in meshes else _mesh(model, g) for g in (_colliding(model, geoms) or geoms)]
     if not parts:
         raise ValueError(f'body "{model.body(body).name}" has no geom; give its shape: bodies={{name: spts.Body}}')
     vertices, faces, first = [], [], 0

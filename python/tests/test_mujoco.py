@@ -476,3 +476,111 @@ def test_a_look_in_mode_sense_is_at_the_present():
         touch.hook(print)
     with pytest.raises(ValueError, match="mode"):
         spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.015), site="skin", mode="both")
+
+
+def leg(name, x, y):
+    return f"""<body name="{name}" pos="{x} {y} 0"><joint axis="0 1 0" stiffness="200" damping="2"/>
+      <geom type="capsule" fromto="0 0 -.02 0 0 -.2" size=".02" mass=".3"/>
+      <body name="{name}_foot" pos="0 0 -.24"><joint axis="0 1 0" stiffness="100" damping="1"/>
+        <geom size=".025" mass=".1"/></body></body>"""
+
+
+DOG = f"""
+<mujoco><option timestep="0.002"/><worldbody><geom name="floor" type="plane" size="2 2 .1"/>
+  <body name="trunk" pos="0 0 .266"><freejoint/><geom type="box" size=".2 .1 .04" mass="8"/>
+    {leg("fl", 0.17, 0.13)}{leg("fr", 0.17, -0.13)}{leg("bl", -0.17, 0.13)}{leg("br", -0.17, -0.13)}
+  </body>
+</worldbody></mujoco>"""
+
+
+@pytest.fixture(scope="module")
+def dog():
+    model = mujoco.MjModel.from_xml_string(DOG)
+    data = mujoco.MjData(model)
+    return model, data, spts.mujoco.dress(model, data, pitch=0.02)
+
+
+def test_a_dog_is_dressed_and_stands(dog):
+    """At the model's own step of 2 ms it moves as a bare one, bit for bit, and its feet feel its weight within 0.5 %."""
+    model, data, robot = dog
+    bare = mujoco.MjData(model)
+    assert len(robot.names) == len(robot.skins) == len(robot.wires) == 9 and robot.touches == [None] * 9
+    sums = []
+    for _ in range(1500):
+        mujoco.mj_step(model, bare)
+        touches = robot.step()
+        sums.append(sum(t.pressure.ravel() @ s.areas for t, s in zip(touches, robot.skins)))
+    assert np.array_equal(bare.qpos, data.qpos) and bare.qpos[2] > 0.24
+    weight = 9.81 * model.body_subtreemass[0]
+    assert np.mean(sums[-200:]) == pytest.approx(weight, rel=5e-3)
+    # the wrenches are on the floor, in the frames of the feet
+    down = 0.0
+    for attachment, touch in zip(robot.attachments, touches):
+        frame = data.body(attachment._link).xmat.reshape(3, 3)
+        down -= sum((frame @ force)[2] for force, _ in touch.wrenches.values())
+    assert down == pytest.approx(weight, rel=5e-3)
+    assert [t.area > 0.0 for t in touches] == [n.endswith("foot") for n in robot.names]
+    assert len({round(t.time, 9) for t in touches}) == 1
+    y, phi = robot.wires[robot.names.index("fl_foot")].record(touches[robot.names.index("fl_foot")], 5)
+    assert y.shape == (5,) and phi.shape[0] == 5
+
+
+def test_taxels_cover_links_once(dog):
+    """The areas add up to the surfaces: a trunk is a box without what the legs cover, a foot a ball."""
+    _, _, robot = dog
+    areas = {name: skin.areas.sum() for name, skin in zip(robot.names, robot.skins)}
+    box = 2 * (0.4 * 0.2 + 0.4 * 0.08 + 0.2 * 0.08)
+    assert areas["trunk"] == pytest.approx(box, rel=0.02)
+    # the leg's end is in it
+    assert 0.9 < areas["fl_foot"] / (4 * np.pi * 0.025**2) < 1.0
+    tube = 2 * np.pi * 0.02 * 0.18 + 4 * np.pi * 0.02**2
+    assert 0.9 * tube < areas["fl"] < tube
+    for skin in robot.skins:
+        assert np.allclose(np.linalg.norm(skin.normals, axis=1), 1.0) and skin.areas.max() < 3 * 0.02**2
+    # the skin of a ball is where the foam's surface is, and looks away from its middle
+    foot = robot.skins[robot.names.index("fl_foot")]
+    assert np.allclose(np.linalg.norm(foot.positions, axis=1), 0.028, atol=1e-3)
+    assert (np.einsum("ij,ij->i", foot.positions, foot.normals) > 0.9 * 0.028).all()
+
+
+def test_taxels_are_drawn(dog):
+    model, _, robot = dog
+    scene = mujoco.MjvScene(model, maxgeom=10_000)
+    robot.draw(scene)
+    assert scene.ngeom == robot.taxels == sum(len(skin.areas) for skin in robot.skins)
+    with pytest.warns(UserWarning, match="room for 10"):
+        robot.draw(mujoco.MjvScene(model, maxgeom=10))
+
+
+def test_skins_of_two_links_feel_one_force():
+    """A hand of two dressed fingers closes on itself: each feels the other, with the same force."""
+    model = mujoco.MjModel.from_xml_string("""
+    <mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody>
+      <body name="l" pos="-.031 0 0"><joint type="slide" axis="1 0 0" damping="5"/><geom size=".03" mass=".1"/></body>
+      <body name="r" pos=".031 0 0"><joint type="slide" axis="-1 0 0" damping="5"/><geom size=".03" mass=".1"/></body>
+    </worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    robot = spts.mujoco.dress(model, data, pitch=0.01, wires=None)
+    for _ in range(500):
+        data.qfrc_applied[:] = 5.0
+        touches = robot.step()
+    sums = [t.pressure.ravel() @ s.areas for t, s in zip(touches, robot.skins)]
+    assert robot.wires == [] and sums == pytest.approx([5.0, 5.0], rel=1e-2)
+    assert sums[0] == pytest.approx(sums[1], rel=1e-9)
+    robot.detach()
+
+
+def test_what_cannot_be_dressed(dog):
+    model, data, _ = dog
+    for text, arguments in [
+        ("pitch", {"pitch": 0.0}),
+        ("at most 100000", {"pitch": 2e-4}),
+        ("links", {"links": ["tail"]}),
+        ("links", {"links": []}),
+        ("links", {"links": "some"}),
+        ("wires", {"wires": "limb"}),
+        ("thickness", {"thickness": -1.0}),
+        ("has no geom with a surface", {"links": ["world"]}),
+    ]:
+        with pytest.raises(ValueError, match=text):
+            spts.mujoco.dress(model, data, **arguments)
