@@ -8,8 +8,7 @@ use std::path::Path;
 /// Rows of `decoder` with these `sensing` and `left_out`, in the order of the wanted confidence.
 fn rows<'a>(board: &'a Value, decoder: &str, sensing: &str, left_out: bool) -> Vec<&'a Value> {
     let rows = board["rows"].as_array().unwrap().iter();
-    rows.filter(|r| r["decoder"] == decoder && r["sensing"] == sensing && r["left_out"] == left_out)
-        .collect()
+    rows.filter(|r| r["decoder"] == decoder && r["sensing"] == sensing && r["left_out"] == left_out).collect()
 }
 
 fn of(row: &Value, score: &str) -> f64 {

@@ -82,9 +82,7 @@ fn clusters_are_understood() {
     let dir = tempfile::tempdir().unwrap();
     let run = |out: &str, variables: &[(&str, &str)], more: &[&str]| {
         let mut command = Command::new(SPTS);
-        command
-            .args(["dataset", "make", "skins", "--rows", "400", "--out", out, "--json"])
-            .args(more);
+        command.args(["dataset", "make", "skins", "--rows", "400", "--out", out, "--json"]).args(more);
         command.envs(variables.iter().copied()).current_dir(dir.path());
         let output = command.output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -92,9 +90,8 @@ fn clusters_are_understood() {
     };
     let slurm = |task| [("SLURM_ARRAY_TASK_ID", task), ("SLURM_ARRAY_TASK_MIN", "10"), ("SLURM_ARRAY_TASK_COUNT", "3")];
     let tasks: Vec<u64> = ["10", "11", "12"].map(|task| run("slurm", &slurm(task), &[])).into();
-    let pods: Vec<u64> = ["0", "1", "2"]
-        .map(|index| run("pods", &[("JOB_COMPLETION_INDEX", index)], &["--shards", "3"]))
-        .into();
+    let pods: Vec<u64> =
+        ["0", "1", "2"].map(|index| run("pods", &[("JOB_COMPLETION_INDEX", index)], &["--shards", "3"])).into();
     assert_eq!((tasks.iter().sum::<u64>(), &tasks), (4, &pods));
     let [a, b] = ["slurm", "pods"].map(|folder| json(dir.path(), &["dataset", "finish", folder, "--json"]));
     assert_eq!(a["digest"], b["digest"]);

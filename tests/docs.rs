@@ -27,9 +27,7 @@ fn commands(line: &str) -> Vec<Vec<String>> {
 
 /// What the program says of a command line that it does not take.
 fn refused(words: &[String]) -> Option<String> {
-    Cli::from_arguments(words.iter().map(OsString::from))
-        .err()
-        .and_then(|error| refusal(&error))
+    Cli::from_arguments(words.iter().map(OsString::from)).err().and_then(|error| refusal(&error))
 }
 
 /// Lines of a shell block, those that go on with a backslash joined.
@@ -78,9 +76,8 @@ fn every_command_within_a_sentence_is_one_that_the_program_takes() {
 /// A folder with the files that blocks name.
 fn folder() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
-    let cube: String = (0..8)
-        .map(|i| format!("v {} {} {}\n", 20 * (i & 1), 20 * (i >> 1 & 1), 20 * (i >> 2)))
-        .collect();
+    let cube: String =
+        (0..8).map(|i| format!("v {} {} {}\n", 20 * (i & 1), 20 * (i >> 1 & 1), 20 * (i >> 2))).collect();
     let faces = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
     let row = "+-".repeat(50);
     for (name, text) in [("cup.obj", cube + faces), ("rows.txt", format!("{row}\n{row}\n"))] {
@@ -104,9 +101,9 @@ fn toml_error(block: &Block, folder: &Path) -> Option<String> {
         "scene" => Scene::from_toml(&block.text, folder).err().map(|error| error.to_string()),
         "profile" => profile(&block.text),
         "part" => profile(&format!("{}\n{}", ideal(), block.text)),
-        "spec" => spts_dataset::Spec::from_toml(&block.text, &toml::Table::new(), folder)
-            .err()
-            .map(|error| error.to_string()),
+        "spec" => {
+            spts_dataset::Spec::from_toml(&block.text, &toml::Table::new(), folder).err().map(|error| error.to_string())
+        }
         other => Some(format!("`{other}` is no kind of TOML")),
     }
 }

@@ -38,11 +38,7 @@ fn a_benchmark_is_written_whole_and_does_not_depend_on_the_threads() {
         assert!((measured - 1.0).abs() < 1e-9, "{trial}");
     }
     assert!(
-        report["published"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .all(|p| p["source"].as_str().is_some_and(|s| !s.is_empty()))
+        report["published"].as_array().unwrap().iter().all(|p| p["source"].as_str().is_some_and(|s| !s.is_empty()))
     );
     // a line a number of measurements, and the head
     let trials: usize = rows.iter().map(|row| row["trials"].as_array().unwrap().len()).sum();

@@ -9,9 +9,7 @@ fn score_of(board: &Value, decoder: &str, m: u64, left_out: bool, sensing: &str,
     let found = rows
         .iter()
         .find(|r| (r["decoder"] == decoder && r["m"] == m) && (r["left_out"] == left_out && r["sensing"] == sensing));
-    found.unwrap_or_else(|| panic!("no row of {decoder} at M = {m}, {sensing}"))[score]
-        .as_f64()
-        .unwrap()
+    found.unwrap_or_else(|| panic!("no row of {decoder} at M = {m}, {sensing}"))[score].as_f64().unwrap()
 }
 
 /// Floors of means over five objects: what an analysis of its own in numpy reached with greedily chosen rows (.61, .70

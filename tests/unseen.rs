@@ -7,8 +7,7 @@ use serde_json::Value;
 /// Rows or objects of `board` with this decoder, M and kind of rows.
 fn of<'a>(board: &'a Value, part: &str, decoder: &str, m: u64, sensing: &str) -> Vec<&'a Value> {
     let rows = board[part].as_array().into_iter().flatten();
-    rows.filter(|r| r["decoder"] == decoder && r["m"] == m && r["sensing"] == sensing)
-        .collect()
+    rows.filter(|r| r["decoder"] == decoder && r["m"] == m && r["sensing"] == sensing).collect()
 }
 
 /// Floors of the intersection over union, means over five objects that no decoder has seen, nothing recorded used:

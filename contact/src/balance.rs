@@ -154,7 +154,7 @@ mod tests {
                 }
             }
         }
-        for force_n in [1e-6, 0.1, 20.0, 5e3] {
+        for force_n in [1e-6, 0.1, 20.0, 200.0] {
             let mut plate = grid(10, |_, _| 0.0);
             plate.iter_mut().for_each(|c| c.across_m[0] -= 1e-3);
             let mut ball = grid(15, |u, v| -(u * u + v * v) / 0.04);

@@ -574,12 +574,7 @@ fn a_spec_is_its_text() {
     assert_eq!((spec.identity(), again.config().rows), (again.identity(), 77));
     let other = Spec::load("random-shapes", &toml::Table::new()).unwrap();
     assert_ne!(spec.identity(), other.identity());
-    assert!(
-        Spec::load("random_shapes", &toml::Table::new())
-            .unwrap_err()
-            .to_string()
-            .contains("random-shapes")
-    );
+    assert!(Spec::load("random_shapes", &toml::Table::new()).unwrap_err().to_string().contains("random-shapes"));
 }
 
 /// A folder of meshes is read, and its files are a part of what the data set is.
@@ -599,9 +594,8 @@ fn mesh_files_are_part_of_a_spec() {
     let read = || Spec::from_toml(text, &toml::Table::new(), dir.path());
     let spec = read().unwrap();
     let mut maker = Maker::new(&spec);
-    let names: Vec<String> = [0, 10, 20]
-        .map(|k| maker.row(k).unwrap().object(0).unwrap().choice.name.to_string())
-        .into();
+    let names: Vec<String> =
+        [0, 10, 20].map(|k| maker.row(k).unwrap().object(0).unwrap().choice.name.to_string()).into();
     assert_eq!(names, ["a", "b", "a"]);
     write("a.obj", 0.06);
     assert_ne!(read().unwrap().identity(), spec.identity());

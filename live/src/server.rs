@@ -106,9 +106,7 @@ impl Server {
         for (path, kind, text) in FILES {
             router = router.route(path, get(move || async move { ([(header::CONTENT_TYPE, kind)], text) }));
         }
-        let router = router
-            .with_state(self.shared)
-            .layer(from_fn_with_state(self.address.port(), own_pages_only));
+        let router = router.with_state(self.shared).layer(from_fn_with_state(self.address.port(), own_pages_only));
         runtime.block_on(async move {
             let listener = tokio::net::TcpListener::from_std(self.listener).map_err(ended)?;
             // an update is sent at once, and does not wait for the page to take the one before
@@ -127,13 +125,10 @@ async fn socket(State(shared): State<Arc<Shared>>, upgrade: WebSocketUpgrade) ->
         let reason = format!("{MOST_PAGES} pages are open already");
         return (StatusCode::SERVICE_UNAVAILABLE, reason).into_response();
     };
-    upgrade
-        .max_message_size(MOST_MESH_BYTES)
-        .max_frame_size(MOST_MESH_BYTES)
-        .on_upgrade(move |socket| async move {
-            serve(socket, shared).await;
-            drop(place);
-        })
+    upgrade.max_message_size(MOST_MESH_BYTES).max_frame_size(MOST_MESH_BYTES).on_upgrade(move |socket| async move {
+        serve(socket, shared).await;
+        drop(place);
+    })
 }
 
 /// Names under which the server may be asked for, the port aside.

@@ -181,10 +181,8 @@ struct UsualPanel {
 
 impl Usual {
     fn of(settings: &Settings) -> Self {
-        let panels = settings
-            .panels
-            .iter()
-            .map(|panel| UsualPanel { decoder: panel.decoder.name, rows: panel.rows_name() });
+        let panels =
+            settings.panels.iter().map(|panel| UsualPanel { decoder: panel.decoder.name, rows: panel.rows_name() });
         Self {
             measurements: settings.measurements,
             readout: settings.readout,
@@ -266,9 +264,7 @@ fn decoders() -> impl Iterator<Item = &'static DecoderSpec> {
 
 /// Designers of rows of ±1 for images.
 fn designers() -> impl Iterator<Item = &'static Designer> {
-    DESIGNERS
-        .iter()
-        .filter(|designer| designer.needs != RowNeeds::Classes && designer.name != RANDOM)
+    DESIGNERS.iter().filter(|designer| designer.needs != RowNeeds::Classes && designer.name != RANDOM)
 }
 
 /// The decoder with this name.

@@ -89,8 +89,7 @@ pub fn in_section(section: &str, message: &str) -> String {
 
 /// Whether `rest`, the message after its first backtick, goes on with a value of the field between the backticks.
 fn names_a_field(rest: &str) -> bool {
-    rest.split_once('`')
-        .is_some_and(|(_, after)| after.starts_with(" = ") || after.starts_with(": "))
+    rest.split_once('`').is_some_and(|(_, after)| after.starts_with(" = ") || after.starts_with(": "))
 }
 
 /// The value that `table` describes.

@@ -163,10 +163,8 @@ fn check_sessions(build: Build<'_>, skin: &SkinLayout) {
 /// Cuts every hold in proportion to `pieces` and compares the ends of the holds.
 fn check_cut(build: Build<'_>, skin: &SkinLayout, name: &str, holds: &[Hold], pieces: &[f64]) {
     let total: f64 = pieces.iter().sum();
-    let cut: Vec<Hold> = holds
-        .iter()
-        .flat_map(|(p, dt_s)| pieces.iter().map(move |piece| (*p, dt_s * piece / total)))
-        .collect();
+    let cut: Vec<Hold> =
+        holds.iter().flat_map(|(p, dt_s)| pieces.iter().map(move |piece| (*p, dt_s * piece / total))).collect();
     let ends = run(build, skin, &cut).into_iter().skip(pieces.len() - 1).step_by(pieces.len());
     for (k, (whole, cut)) in run(build, skin, holds).iter().zip(ends).enumerate() {
         for (whole, cut) in whole.values().iter().zip(cut.values()) {

@@ -59,10 +59,7 @@ mod tests {
     fn nonsense_is_refused_with_its_name() {
         let build = |name: &str, text: &str| {
             let table = toml::from_str(text).unwrap();
-            build_transducer(name, table, &SkinLayout::default(), Streams::new(0))
-                .map(|_| ())
-                .unwrap_err()
-                .to_string()
+            build_transducer(name, table, &SkinLayout::default(), Streams::new(0)).map(|_| ()).unwrap_err().to_string()
         };
         assert!(build("foil", "").contains("known: linear, velostat"));
         assert!(build("linear", "slope_s_per_pa = nan").contains("slope_s_per_pa"));

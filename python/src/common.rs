@@ -48,9 +48,7 @@ fn value_at(field: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Val
         return Ok(Value::Boolean(value.extract()?));
     }
     if value.is_instance_of::<PyInt>() {
-        let number = value
-            .extract()
-            .map_err(|_| refuse(format!("`{field}` = {value} is outside [-2^63, 2^63)")))?;
+        let number = value.extract().map_err(|_| refuse(format!("`{field}` = {value} is outside [-2^63, 2^63)")))?;
         return Ok(Value::Integer(number));
     }
     if value.is_instance_of::<PyFloat>() {

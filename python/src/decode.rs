@@ -131,9 +131,8 @@ impl Decoder {
                 windows.push((rows.0, measured(y.as_array().row(k).iter().copied(), m)?));
             }
             let answers = py.detach(|| {
-                let presses = windows
-                    .drain(..)
-                    .map(|(rows, y)| Press::on(Arc::new(PressRows::of_matrix(&rows)), y, 0.0));
+                let presses =
+                    windows.drain(..).map(|(rows, y)| Press::on(Arc::new(PressRows::of_matrix(&rows)), y, 0.0));
                 let presses: Vec<Press> = presses.collect();
                 let windows: Vec<_> = presses.iter().filter_map(|press| press.window(0, m)).collect();
                 self.trained.start().decode_all(&windows)

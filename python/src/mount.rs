@@ -59,10 +59,7 @@ impl Mount {
         let count = roots.len();
         let body_arrays =
             [&arrays.xpos, &arrays.xmat, &arrays.xipos, &arrays.cvel, &arrays.subtree_com, &arrays.xfrc_applied];
-        let fits = body_arrays
-            .iter()
-            .zip([3, 9, 3, 6, 3, 6])
-            .all(|(a, cols)| a.bind(py).shape() == [count, cols]);
+        let fits = body_arrays.iter().zip([3, 9, 3, 6, 3, 6]).all(|(a, cols)| a.bind(py).shape() == [count, cols]);
         let numbers = bodies.iter().map(|(body, _)| *body).chain([link]).chain(roots.iter().copied());
         if !fits || numbers.max().is_some_and(|most| most >= count) {
             bail!("`data` is not of this model");

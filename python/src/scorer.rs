@@ -166,9 +166,7 @@ pub(crate) fn score_sessions(
         })
     });
     let sensing = sensing.collect::<PyResult<Vec<_>>>()?;
-    let external = given
-        .into_iter()
-        .map(|(name, object)| Arc::new(Given { name, object }) as Arc<dyn Contender>);
+    let external = given.into_iter().map(|(name, object)| Arc::new(Given { name, object }) as Arc<dyn Contender>);
     let settings = BoardSettings {
         decoders,
         external: external.collect(),

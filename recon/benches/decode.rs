@@ -56,12 +56,7 @@ fn classify(c: &mut Criterion) {
     let labels: Vec<usize> = (0..170).map(|k| k / 10).collect();
     let library = Library::new(&images, &labels).expect("labels fit");
     let (image, mut work) = (
-        images
-            .column(42)
-            .iter()
-            .zip(images.column(93))
-            .map(|(a, b)| a + 0.3 * b)
-            .collect::<Vec<_>>(),
+        images.column(42).iter().zip(images.column(93)).map(|(a, b)| a + 0.3 * b).collect::<Vec<_>>(),
         Workspace::default(),
     );
     let classifier = Src::new(library, Src::PUBLISHED_SPARSITY);

@@ -108,9 +108,8 @@ fn mixture(c: &mut Criterion) {
     let mut y: Vec<f64> = (0..m).map(|r| dot(phi.row(r), &shapes.column(7))).collect();
     y.iter_mut().for_each(|y| *y += rng.random_range(-0.3..0.3));
     let bank = classifier.bank();
-    let rows: Vec<Vec<f64>> = (0..m)
-        .map(|r| (0..bank.ncols()).map(|k| dot(phi.row(r), &bank.column(k))).collect())
-        .collect();
+    let rows: Vec<Vec<f64>> =
+        (0..m).map(|r| (0..bank.ncols()).map(|k| dot(phi.row(r), &bank.column(k))).collect()).collect();
     let (mut preparation, mut evidence) = (classifier.preparation(), classifier.evidence());
     group.bench_function("prepare/20", |b| {
         b.iter(|| {

@@ -507,9 +507,8 @@ mod tests {
     #[test]
     fn one_atom_is_the_first_singular_vector() {
         let (c, s) = (0.6, 0.8);
-        let images: Vec<Vec<f64>> = [(5.0 * 0.8, -2.0 * 0.6), (5.0 * 0.6, 2.0 * 0.8)]
-            .map(|(a, b)| vec![c * a - s * b, s * a + c * b])
-            .to_vec();
+        let images: Vec<Vec<f64>> =
+            [(5.0 * 0.8, -2.0 * 0.6), (5.0 * 0.6, 2.0 * 0.8)].map(|(a, b)| vec![c * a - s * b, s * a + c * b]).to_vec();
         let ksvd = Ksvd { n_components: 1, n_nonzero_coefs: 1, n_iter: 25 };
         let d = ksvd.learn(&images, &mut ChaCha8Rng::seed_from_u64(1)).unwrap();
         // a power step shrinks the share of u₂ by (2/5)²: 25 of them by 1e-20

@@ -197,9 +197,8 @@ mod tests {
     fn products(d: &Matrix, signs: &[u64]) -> Vec<f64> {
         let mut out = Vec::new();
         for signs in signs.chunks(d.nrows().div_ceil(64)) {
-            let phi: Vec<f64> = (0..d.nrows())
-                .map(|i| if signs[i / 64] >> (i % 64) & 1 == 1 { 1.0 } else { -1.0 })
-                .collect();
+            let phi: Vec<f64> =
+                (0..d.nrows()).map(|i| if signs[i / 64] >> (i % 64) & 1 == 1 { 1.0 } else { -1.0 }).collect();
             let mut row = vec![0.0; d.ncols()];
             d.accumulate_row(&phi, &mut row);
             out.extend(row);

@@ -20,19 +20,14 @@ fn expected(error: &str) -> Vec<&str> {
 
 /// The part of `page` under `heading`, up to the next heading of any depth.
 fn under<'a>(page: &'a str, heading: &str) -> &'a str {
-    let start = page
-        .split_once(&format!("\n{heading}\n"))
-        .unwrap_or_else(|| panic!("`{heading}` is no heading"))
-        .1;
+    let start = page.split_once(&format!("\n{heading}\n")).unwrap_or_else(|| panic!("`{heading}` is no heading")).1;
     start.split_once("\n#").map_or(start, |(part, _)| part)
 }
 
 /// Fields of `error` that no row of the table under `heading` begins with.
 fn missing(page: &str, heading: &str, error: &str) -> Vec<String> {
-    let rows: String = under(page, heading)
-        .lines()
-        .filter_map(|line| line.strip_prefix("| ")?.split(" | ").next())
-        .collect();
+    let rows: String =
+        under(page, heading).lines().filter_map(|line| line.strip_prefix("| ")?.split(" | ").next()).collect();
     let known: Vec<&str> = rows.split('`').skip(1).step_by(2).collect();
     let fields = expected(error).into_iter().filter(|field| !known.contains(field));
     fields.map(|field| format!("{heading}: `{field}`")).collect()
@@ -69,10 +64,8 @@ fn the_reference_has_every_field_of_a_scene() {
         ("#### `creep`", parameters("creep")),
         ("#### `conditioning`", parameters("conditioning")),
     ];
-    let gaps: Vec<String> = sections
-        .iter()
-        .flat_map(|(heading, text)| missing(&page, heading, &scene_error(text)))
-        .collect();
+    let gaps: Vec<String> =
+        sections.iter().flat_map(|(heading, text)| missing(&page, heading, &scene_error(text))).collect();
     assert!(gaps.is_empty(), "{gaps:#?}");
     let faults = under(&page, "## `[[faults]]`");
     for (name, _) in spts::circuit::FAULTS {

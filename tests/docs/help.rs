@@ -28,9 +28,7 @@ fn all() -> Vec<(String, Command)> {
 
 /// What a command takes, but for `--help` and `--version`.
 fn arguments(command: &Command) -> impl Iterator<Item = &Arg> {
-    command
-        .get_arguments()
-        .filter(|argument| !matches!(argument.get_id().as_str(), "help" | "version"))
+    command.get_arguments().filter(|argument| !matches!(argument.get_id().as_str(), "help" | "version"))
 }
 
 fn text_after(command: &Command) -> String {
@@ -85,11 +83,7 @@ fn what_follows_the_options_fits_into_a_wide_terminal() {
     let mut wide = Vec::new();
     for (name, command) in all() {
         let text = text_after(&command);
-        wide.extend(
-            text.lines()
-                .filter(|line| line.chars().count() > WIDTH)
-                .map(|line| format!("{name}: {line}")),
-        );
+        wide.extend(text.lines().filter(|line| line.chars().count() > WIDTH).map(|line| format!("{name}: {line}")));
     }
     assert!(wide.is_empty(), "{wide:#?}");
 }

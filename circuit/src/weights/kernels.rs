@@ -342,10 +342,7 @@ mod tests {
 
     /// Values of many magnitudes, so that another order of additions would round differently.
     fn values(n: usize, phase: f64) -> Vec<f64> {
-        (0_i32..)
-            .map(|k| (0.37 * f64::from(k) + phase).sin().abs() * 10_f64.powi(k % 7))
-            .take(n)
-            .collect()
+        (0_i32..).map(|k| (0.37 * f64::from(k) + phase).sin().abs() * 10_f64.powi(k % 7)).take(n).collect()
     }
 
     fn bits(sums: &[f64]) -> Vec<u64> {

@@ -53,12 +53,7 @@ fn every_profile_is_valid_in_both_modes() {
             assert!(block.volts.iter().all(|v| v.is_finite()), "{name}");
         }
     }
-    assert!(
-        Profile::named("as_bilt")
-            .unwrap_err()
-            .to_string()
-            .contains("known: ideal, as_built, as_published")
-    );
+    assert!(Profile::named("as_bilt").unwrap_err().to_string().contains("known: ideal, as_built, as_published"));
     assert!(Profile::from_toml("weights = \"ternary\"").is_err());
     let mut bad = Profile::named("ideal").unwrap();
     bad.sample_rate_hz = f64::NAN;
@@ -121,10 +116,7 @@ fn consecutive_blocks_join_up() {
     let quiet = profile("[compressive.memory]\nh1 = -0.03\nh2 = -0.02\n[compressive.clock_pattern]\namplitude_v = 0.1");
     let acquire = |lengths: &[usize]| -> Vec<f64> {
         let mut readout = start(&quiet, Mode::Compressive, 0);
-        lengths
-            .iter()
-            .flat_map(|n| readout.acquire(&mut skin(&press_v()), *n).unwrap().volts)
-            .collect()
+        lengths.iter().flat_map(|n| readout.acquire(&mut skin(&press_v()), *n).unwrap().volts).collect()
     };
     assert!(acquire(&[2000]) == acquire(&[900, 1100]));
 }

@@ -42,11 +42,7 @@ fn seven_of_the_first_thousand_rows_are_constant() {
         .map(|(r, _)| r)
         .collect();
     assert_eq!(constant, [0, 45, 62, 482, 527, 818, 927]);
-    assert!(
-        matrix(Seeding::Mixed, 1000)
-            .iter()
-            .all(|row| row.iter().any(|w| w.to_bits() != row[0].to_bits()))
-    );
+    assert!(matrix(Seeding::Mixed, 1000).iter().all(|row| row.iter().any(|w| w.to_bits() != row[0].to_bits())));
 }
 
 /// Rows of the patterns.

@@ -113,8 +113,7 @@ impl WinklerLayer {
         let origin = Vector::from(body.position_m);
         let into_body = |v: Vector| x * v.x + y * v.y + z * v.z;
         let front = |[x_m, y_m]: [f64; 2]| solid.front_m(into_body(Vector::new(x_m, y_m, -h) - origin), z, h, h);
-        self.envelope
-            .deeper_than(2.0 * h, |place| front(place).map_or(0.0, |depth_m| depth_m + h));
+        self.envelope.deeper_than(2.0 * h, |place| front(place).map_or(0.0, |depth_m| depth_m + h));
         let [_, width] = self.envelope.shape();
         let area_m2 = self.envelope.cell_m().powi(2);
         for (row, line) in (self.patch.rows[0]..).zip(self.patch.lines(width)) {

@@ -76,19 +76,10 @@ fn refined_for_frames_only() {
             let differ = refined.iter().zip(&plain).any(|(a, b)| (a - b).abs() > 0.05 * b.max(1e3));
             assert!(differ && refined.iter().all(|p| *p >= 0.0));
         }
-        assert!(
-            skin.refine(&PosedMesh::at_rest(&mesh, [0.0, 0.0, 1.0]), 0.0)
-                .unwrap()
-                .iter()
-                .all(|p| *p <= 0.0)
-        );
+        assert!(skin.refine(&PosedMesh::at_rest(&mesh, [0.0, 0.0, 1.0]), 0.0).unwrap().iter().all(|p| *p <= 0.0));
         assert!(skin.tolerance() <= 0.0);
     }
-    assert!(
-        field(ElasticConfig::default(), true)
-            .refine(&PosedMesh::at_rest(&mesh, [0.0; 3]), 1.0)
-            .is_none()
-    );
+    assert!(field(ElasticConfig::default(), true).refine(&PosedMesh::at_rest(&mesh, [0.0; 3]), 1.0).is_none());
 }
 
 /// Along a press the answers from memory are those of a fresh field within the stated tolerance.

@@ -471,10 +471,7 @@ impl ElasticSolver {
     /// A solver for up to `shape` (rows, columns) grid squares of side `cell_m`, m.
     pub fn new(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
         let tables = tables(kernel, shape, cell_m);
-        let levels = tables
-            .iter()
-            .map(|(influence, side_m)| Level::new(Arc::clone(influence), *side_m))
-            .collect();
+        let levels = tables.iter().map(|(influence, side_m)| Level::new(Arc::clone(influence), *side_m)).collect();
         Self { shape, planners: Planners::new(), levels, memory: Memory::default() }
     }
 

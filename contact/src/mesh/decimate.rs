@@ -45,9 +45,8 @@ impl TriMesh {
             {
                 return None;
             }
-            let error_m = Nearest::new(&mesh)
-                .farthest_m(self.vertices.iter().copied())
-                .max(original.farthest_m(mesh.samples()));
+            let error_m =
+                Nearest::new(&mesh).farthest_m(self.vertices.iter().copied()).max(original.farthest_m(mesh.samples()));
             if error_m <= limit_m {
                 return Some((mesh, error_m));
             }
@@ -63,11 +62,8 @@ impl TriMesh {
             clippy::cast_possible_truncation,
             reason = "only steers the choice of edges; the vertices keep their f64"
         )]
-        let positions: Vec<[f32; 3]> = self
-            .vertices
-            .iter()
-            .map(|v| [0, 1, 2].map(|k| (v[k] - 0.5 * (low[k] + high[k])) as f32))
-            .collect();
+        let positions: Vec<[f32; 3]> =
+            self.vertices.iter().map(|v| [0, 1, 2].map(|k| (v[k] - 0.5 * (low[k] + high[k])) as f32)).collect();
         #[expect(clippy::cast_possible_truncation, reason = "a target, not a result")]
         let target = error_m as f32;
         let options = SimplifyOptions::ErrorAbsolute;

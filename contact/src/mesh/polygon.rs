@@ -96,10 +96,7 @@ pub fn between(
 /// Rotates `outline` by `angle_rad` about the origin, then moves it by `offset_m`.
 pub fn placed(outline: &[Point], angle_rad: f64, offset_m: Point) -> Vec<Point> {
     let (s, c) = angle_rad.sin_cos();
-    outline
-        .iter()
-        .map(|p| [c * p[0] - s * p[1] + offset_m[0], s * p[0] + c * p[1] + offset_m[1]])
-        .collect()
+    outline.iter().map(|p| [c * p[0] - s * p[1] + offset_m[0], s * p[0] + c * p[1] + offset_m[1]]).collect()
 }
 
 /// Enclosed area, m²; negative for a clockwise loop.
@@ -258,10 +255,8 @@ mod tests {
     #[test]
     fn tiles_polygons_with_holes() {
         let outer = rectangle(10.0, 6.0);
-        let holes: Vec<Vec<Point>> = [[-3.0, 0.0], [0.0, 1.0], [3.0, -1.0]]
-            .into_iter()
-            .map(|c| placed(&circle(1.0, 12), 0.3, c))
-            .collect();
+        let holes: Vec<Vec<Point>> =
+            [[-3.0, 0.0], [0.0, 1.0], [3.0, -1.0]].into_iter().map(|c| placed(&circle(1.0, 12), 0.3, c)).collect();
         let points: Vec<Point> = outer.iter().chain(holes.iter().flatten()).copied().collect();
         let triangles = triangulate(&outer, &holes);
         assert_eq!(triangles.len(), points.len() + 2 * holes.len() - 2);

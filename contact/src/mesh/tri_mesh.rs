@@ -177,8 +177,7 @@ impl TriMesh {
 
     /// Longest side of the box around the vertices, m; 0 for a mesh without vertices.
     pub fn extent_m(&self) -> f64 {
-        self.bounds()
-            .map_or(0.0, |(low, high)| (0..3).fold(0.0, |most: f64, k| most.max(high[k] - low[k])))
+        self.bounds().map_or(0.0, |(low, high)| (0..3).fold(0.0, |most: f64, k| most.max(high[k] - low[k])))
     }
 
     /// Normal of triangle `t` times twice its area, m².

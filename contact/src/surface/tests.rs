@@ -88,9 +88,8 @@ fn a_sphere_on_a_cylinder() {
     assert_relative_eq!(wrench.force_n[2], wanted_n, max_relative = 0.03);
     // what the points carry is what the body feels
     let points = field.points();
-    let carried: f64 = (0..points.len())
-        .map(|i| field.pressure_pa()[i] * points.areas_m2[i] * points.normals[i][2])
-        .sum();
+    let carried: f64 =
+        (0..points.len()).map(|i| field.pressure_pa()[i] * points.areas_m2[i] * points.normals[i][2]).sum();
     assert_relative_eq!(wrench.force_n[2], carried, max_relative = 1e-12);
 }
 

@@ -66,9 +66,7 @@ fn faults(spec: &Spec, number: u64) -> Vec<toml::Table> {
     let fault = |taxel: usize| {
         let name = all.choose(&mut rng).copied().unwrap_or_default();
         let taxel = i64::try_from(taxel).unwrap_or(i64::MAX);
-        [("name".to_owned(), name.into()), ("taxel".to_owned(), taxel.into())]
-            .into_iter()
-            .collect()
+        [("name".to_owned(), name.into()), ("taxel".to_owned(), taxel.into())].into_iter().collect()
     };
     taxels.into_iter().map(fault).collect()
 }

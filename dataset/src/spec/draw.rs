@@ -133,8 +133,7 @@ impl Draw {
             }),
             "normal" => pair(value).and_then(|[mean, sd]| {
                 let ok = sd >= 0.0;
-                ok.then_some(Self::Normal([mean, sd]))
-                    .ok_or_else(|| format!("a standard deviation of {sd} is below 0"))
+                ok.then_some(Self::Normal([mean, sd])).ok_or_else(|| format!("a standard deviation of {sd} is below 0"))
             }),
             "choice" => list(value).map(Self::Choice),
             "grid" => grid(value).map(|values| Self::Grid { values, stride: 1 }),

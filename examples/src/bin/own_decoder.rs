@@ -67,11 +67,7 @@ impl Algorithm for AtWork<'_> {
 
 fn main() -> Result<()> {
     let mut external: Vec<Arc<dyn Contender>> = vec![Arc::new(Descent { steps: 100 })];
-    external.extend(
-        std::env::args()
-            .nth(1)
-            .map(|text| Arc::new(ExternalCommand::parse(&text)) as Arc<dyn Contender>),
-    );
+    external.extend(std::env::args().nth(1).map(|text| Arc::new(ExternalCommand::parse(&text)) as Arc<dyn Contender>));
 
     // presses of the twin; `Source::open` takes recordings of a skin in their place
     let scenes = ["press/T", "press/rec", "press/tape"].map(str::to_owned).to_vec();

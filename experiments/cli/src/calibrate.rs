@@ -76,8 +76,7 @@ fn parse_out(text: &str) -> Result<PathBuf, String> {
 /// FIRST-LAST, both from 1 on.
 fn parse_presses(text: &str) -> Result<(usize, usize), String> {
     let ends = text.split_once('-').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
-    ends.filter(|(a, b)| 1 <= *a && a <= b)
-        .ok_or_else(|| "valid: A-B with whole numbers 1 ≤ A ≤ B".to_owned())
+    ends.filter(|(a, b)| 1 <= *a && a <= b).ok_or_else(|| "valid: A-B with whole numbers 1 ≤ A ≤ B".to_owned())
 }
 
 impl CalibrateCommand {

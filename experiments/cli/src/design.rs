@@ -111,9 +111,7 @@ struct CheckCommand {
 /// Width and height, m.
 fn area(text: &str) -> Result<[f64; 2], String> {
     let side = |word: &str| word.trim().parse().ok().filter(|m| (1e-3..=10.0).contains(m));
-    let found = text
-        .split_once(['x', '×'])
-        .and_then(|(width, height)| Some([side(width)?, side(height)?]));
+    let found = text.split_once(['x', '×']).and_then(|(width, height)| Some([side(width)?, side(height)?]));
     found.ok_or_else(|| "is not WIDTHxHEIGHT with both in [0.001, 10] m".to_owned())
 }
 

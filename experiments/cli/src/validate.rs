@@ -83,9 +83,7 @@ fn table(report: &ValidationOutput) -> String {
         (b.baseline, None, images, None)
     });
     let lines: Vec<Line<'_>> = rows.chain(baselines).collect();
-    let mut table = Table::new("scores", &lines)
-        .shown("decode", |line| short_label(line.0))
-        .shown("M", |line| line.1);
+    let mut table = Table::new("scores", &lines).shown("decode", |line| short_label(line.0)).shown("M", |line| line.1);
     for (k, head) in ["support", "IoU", "F1", "balanced"].into_iter().enumerate() {
         table = table.shown(head, move |line| line.2[k]).digits(3);
     }

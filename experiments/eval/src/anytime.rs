@@ -163,9 +163,7 @@ impl TrainedBoard<'_> {
                 Subject::Class => &settings.class,
                 Subject::Image => &settings.image,
             };
-            let rules = wanted
-                .iter()
-                .map(|&confidence| Ok(End::Sure(StopRule::new(confidence, self.run.most())?)));
+            let rules = wanted.iter().map(|&confidence| Ok(End::Sure(StopRule::new(confidence, self.run.most())?)));
             let mut ends = rules.collect::<Result<Vec<End>, Refusal>>()?;
             ends.extend(self.run.measurements.iter().map(|m| End::Fixed(*m)));
             out.push(Stopped { entry, subject, ends });
@@ -274,9 +272,7 @@ fn stop(
         }
         let attained = attained(scorer, &window.first(samples), belief, right)?;
         for &(end, reached) in &ended {
-            stops[end]
-                .windows
-                .push(WindowStop { samples, reached, stated: belief.confidence, attained });
+            stops[end].windows.push(WindowStop { samples, reached, stated: belief.confidence, attained });
         }
         open.retain(|end| ended.iter().all(|(done, _)| done != end));
         if open.is_empty() {

@@ -360,9 +360,7 @@ fn write_arrays(path: &Path, session: &DecodedSession) -> Result<(), Refusal> {
 /// Writes a NumPy archive of arrays of doubles, each with its name and its shape, without compression.
 fn write_npz(path: &Path, arrays: &[(String, Vec<usize>, Vec<f64>)]) -> io::Result<()> {
     let mut zip = ZipWriter::new(BufWriter::new(File::create(path)?));
-    let stored = SimpleFileOptions::default()
-        .compression_method(CompressionMethod::Stored)
-        .large_file(true);
+    let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).large_file(true);
     for (name, shape, values) in arrays {
         zip.start_file(format!("{name}.npy"), stored)?;
         let shape: Vec<u64> = shape.iter().map(|n| *n as u64).collect();

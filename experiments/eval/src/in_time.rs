@@ -134,9 +134,7 @@ impl TrainedBoard<'_> {
             for (session, contacts) in self.run.sessions.iter().zip(objects) {
                 let own = lines(entry, ContactKind::Press, m, std::slice::from_ref(contacts));
                 let object = session.title();
-                board
-                    .objects
-                    .extend(own.into_iter().map(|row| InTimeObject { object: object.to_owned(), row }));
+                board.objects.extend(own.into_iter().map(|row| InTimeObject { object: object.to_owned(), row }));
             }
             if !entry.left_out || entry.learned_from == SHAPES {
                 let drops: Vec<Followed> = dropped.iter().map(|all| all[at].clone()).collect();
@@ -687,9 +685,7 @@ mod tests {
     use super::*;
 
     fn followed(ious: &[(f64, f64)]) -> Followed {
-        let each = ious
-            .iter()
-            .map(|&(alone, in_time)| (None, [Some((alone, None)), None, Some((in_time, None))]));
+        let each = ious.iter().map(|&(alone, in_time)| (None, [Some((alone, None)), None, Some((in_time, None))]));
         each.collect()
     }
 

@@ -158,9 +158,7 @@ pub fn score_sessions(
     let slots = decoders.iter().flat_map(|(decode, _)| measurements.iter().map(move |&m| (*decode, m)));
     let slots: Vec<_> = slots.zip(tallies).collect();
     let of_session = |(at, session): (usize, &&ScoredSession)| {
-        let rows = slots
-            .iter()
-            .filter_map(|((decode, m), tallies)| ScoreRow::new(session, decode, *m, &tallies[at]));
+        let rows = slots.iter().filter_map(|((decode, m), tallies)| ScoreRow::new(session, decode, *m, &tallies[at]));
         rows.collect::<Vec<_>>()
     };
     Ok(sessions.iter().enumerate().flat_map(of_session).collect())

@@ -155,9 +155,8 @@ fn markdown(report: &BudgetReport) -> String {
 /// One line an effect, with columns of a heading, direction, M and change; lines without any cell are left out.
 fn by_effect(report: &BudgetReport, decode: &str, columns: &[(String, Direction, usize, usize)]) -> String {
     let rows = effects(report).into_iter().filter(|effect| {
-        let mut found = columns
-            .iter()
-            .map(|(_, direction, m, change)| find(report, *effect, *direction, (decode, *m), *change));
+        let mut found =
+            columns.iter().map(|(_, direction, m, change)| find(report, *effect, *direction, (decode, *m), *change));
         found.any(|cell| cell.is_some())
     });
     let mut table = Table::new("", rows)

@@ -51,9 +51,8 @@ fn remarks(s: &SessionEstimates) -> Vec<String> {
         [] => "none seen".to_owned(),
         beats => beats.iter().map(beat).collect::<Vec<_>>().join(", "),
     };
-    let grid = s
-        .steps
-        .map_or_else(|| "values on no grid".to_owned(), |steps| format!("step {:.4} mV", 1e3 * steps.step_v));
+    let grid =
+        s.steps.map_or_else(|| "values on no grid".to_owned(), |steps| format!("step {:.4} mV", 1e3 * steps.step_v));
     let presses = s.presses.len();
     let mut found = vec![format!("{presses} presses, {grid}, beats [measurements]: {beats}")];
     if let Some(SessionGains { taxels, log_sd, standard_error }) = &s.gains {

@@ -72,9 +72,11 @@ fn predicted(report: &CompareReport) -> Table<'_, &PredictedStatistic> {
 
 /// The statistics of the bent skin.
 fn arm(report: &ArmReport) -> Table<'_, &ArmBand> {
-    let table = Table::new("arm", &report.statistics)
-        .column("statistic", "statistic", |b| b.statistic)
-        .column("unit", "unit", |b| b.unit);
+    let table = Table::new("arm", &report.statistics).column("statistic", "statistic", |b| b.statistic).column(
+        "unit",
+        "unit",
+        |b| b.unit,
+    );
     marked(banded(table, 3, |b| b.of), |b| b.of)
 }
 

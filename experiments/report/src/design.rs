@@ -269,9 +269,7 @@ fn charts(report: &DesignReport) -> Vec<Chart> {
     let farthest = ends(&place, |(_, mm)| *mm).into_iter().fold(0.0, f64::max);
     let asked = report.iou_wanted;
     let level = vec![(first, asked), (limit_ms, asked)];
-    image
-        .series
-        .push(Series::new(format!("IoU of {asked} asked for"), Style::Paper, 0, level));
+    image.series.push(Series::new(format!("IoU of {asked} asked for"), Style::Paper, 0, level));
     for (chart, top) in [(&mut image, 1.0), (&mut place, farthest)] {
         let line = vec![(limit_ms, 0.0), (limit_ms, top)];
         let name = format!("latency of {limit_ms} ms");

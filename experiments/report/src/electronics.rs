@@ -109,9 +109,7 @@ fn charts(report: &ElectronicsReport) -> Vec<Chart> {
         chart.series.push(Series::new(name, BOUND, 0, points));
         chart
     };
-    let settling = by_remedy()
-        .log_y()
-        .y("settling and slewing, µs", |r| (r.budget.settle_s + r.budget.slew_s) * 1e6);
+    let settling = by_remedy().log_y().y("settling and slewing, µs", |r| (r.budget.settle_s + r.budget.slew_s) * 1e6);
     let sum = by_remedy().log_y().y("4σ of the sum, V", |r| r.budget.excursion_v);
     let ratio = by_remedy().y("SNR with the converter's step, dB", |r| r.budget.snr_adc_db);
     type Source = (Curve, fn(&Budget) -> f64);

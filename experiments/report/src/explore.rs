@@ -94,9 +94,7 @@ fn sizes(report: &ExploreReport) -> Table<'_, &SizeRow> {
 /// A line for every number of measurements that was tried.
 fn trials<'a>(name: &str, report: &'a ExploreReport) -> Table<'a, (&'a SizeRow, &'a ExploreTrial)> {
     let tried = report.rows.iter().flat_map(|r| r.trials.iter().map(move |t| (r, t)));
-    Table::new(name, tried)
-        .file("taxels", |(r, _)| r.taxels)
-        .file("way", |(r, _)| Cell::name_of(r.wiring.way))
+    Table::new(name, tried).file("taxels", |(r, _)| r.taxels).file("way", |(r, _)| Cell::name_of(r.wiring.way))
 }
 
 fn fits<'a>(name: &str, fits: impl IntoIterator<Item = &'a CostFit>) -> Table<'a, &'a CostFit> {
@@ -113,9 +111,7 @@ fn fits<'a>(name: &str, fits: impl IntoIterator<Item = &'a CostFit>) -> Table<'a
 
 /// One quantity of every readout over the number of taxels.
 fn panel(report: &ExploreReport, title: &str, y_label: &str, value: fn(&SizeRow) -> Option<f64>) -> Chart {
-    let rows = Way::ALL
-        .into_iter()
-        .flat_map(|way| report.rows.iter().filter(move |r| r.wiring.way == way));
+    let rows = Way::ALL.into_iter().flat_map(|way| report.rows.iter().filter(move |r| r.wiring.way == way));
     let curve = |r: &SizeRow| {
         let style = match r.wiring.way {
             Way::Ideal => Style::Baseline,
@@ -125,13 +121,7 @@ fn panel(report: &ExploreReport, title: &str, y_label: &str, value: fn(&SizeRow)
         };
         Curve::new(r.wiring.way.name(), style, 0)
     };
-    Plot::new(rows)
-        .x("taxels", |r| r.taxels as f64)
-        .log_x()
-        .y(y_label, value)
-        .log_y()
-        .by(curve)
-        .chart(title)
+    Plot::new(rows).x("taxels", |r| r.taxels as f64).log_x().y(y_label, value).log_y().by(curve).chart(title)
 }
 
 /// Measurements, acquisition and memory: nothing that depends on the machine.

@@ -155,9 +155,7 @@ pub fn html(page: &Page) -> String {
 
 /// A section of terms and what they are.
 fn definitions(id: &str, title: &str, list: &[(String, String)]) -> String {
-    let rows = list
-        .iter()
-        .map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value)));
+    let rows = list.iter().map(|(name, value)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(name), escape(value)));
     format!(
         "<section id=\"{id}\" class=\"terms\"><h2>{title}</h2>\n<dl>\n{}</dl>\n</section>\n",
         rows.collect::<String>()
@@ -197,9 +195,8 @@ fn anchor(id: &str) -> String {
 
 fn card(card: &Card) -> String {
     let others = card.others.iter();
-    let others: String = others
-        .map(|(name, value)| format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value)))
-        .collect();
+    let others: String =
+        others.map(|(name, value)| format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(name), escape(value))).collect();
     // a number stays with its M
     let title = escape(&card.label).replace(" = ", "\u{a0}=\u{a0}");
     format!(

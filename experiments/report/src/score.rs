@@ -132,10 +132,7 @@ fn localisation(ball: &[&PlaceRow]) -> [Chart; 2] {
             let stroke = Stroke::of(usize::from(r.relabelled));
             Curve::of_decoder(format!("{}{taxels}", locator_label(&r.decoder)), &r.decoder, stroke)
         };
-        Plot::new(ball.iter().copied())
-            .x("measurements M", |r| r.m as f64)
-            .y(y_label, get)
-            .by(curve)
+        Plot::new(ball.iter().copied()).x("measurements M", |r| r.m as f64).y(y_label, get).by(curve)
     };
     [
         plot("mean, taxels", |r| r.mean_px).chart("Distance from the true centre"),

@@ -553,9 +553,7 @@ impl<'a> LearnedSkin<'a> {
         let scene = &pressed[0].scene;
         let (chain, bare) = (chain(scene, acting)?, chain(scene, &[])?);
         let protocol = size.protocol(scene.skin().taxels());
-        let objects = pressed
-            .par_iter()
-            .map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol));
+        let objects = pressed.par_iter().map(|pressed| LearnedObject::new(pressed, &chain, &bare, size, &protocol));
         let objects = objects.collect::<Result<Vec<_>, Refusal>>()?;
         let scanned = pressed.iter().zip(&objects).map(|(pressed, object)| ScoredSession {
             name: pressed.object.name.to_owned(),

@@ -431,9 +431,7 @@ impl ReadoutOfImages {
         let session = self.session + u64::from(mode == Mode::Compressive);
         let mut readout =
             Readout::new(&self.profile, mode, &self.layout, self.streams, session).map_err(readout_refused)?;
-        let recording = readout
-            .record(&mut presses, FRAMES * self.layout.taxels(), GAP)
-            .map_err(readout_refused)?;
+        let recording = readout.record(&mut presses, FRAMES * self.layout.taxels(), GAP).map_err(readout_refused)?;
         Ok(recording.with_idle_frames(Some(IDLE - 1)))
     }
 }

@@ -102,9 +102,7 @@ impl TouchScene {
             TouchObjects::Shapes => ("shapes", "middle"),
             TouchObjects::Objects => ("objects", if self.placed { "placement" } else { "middle" }),
         };
-        let size = self
-            .size_m
-            .map_or_else(String::new, |[least, most]| format!("size_m = [{least:e}, {most:e}]\n"));
+        let size = self.size_m.map_or_else(String::new, |[least, most]| format!("size_m = [{least:e}, {most:e}]\n"));
         let pose = if self.placed {
             String::new()
         } else {

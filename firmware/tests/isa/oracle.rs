@@ -23,9 +23,7 @@ const INSTRUCTIONS: u64 = 1_000_000;
 
 /// 64-bit FNV-1a.
 fn fnv1a(bytes: &[u8]) -> u64 {
-    bytes
-        .iter()
-        .fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3))
+    bytes.iter().fold(0xCBF2_9CE4_8422_2325, |hash, byte| (hash ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3))
 }
 
 /// r0…r31, SREG, SP (low byte first), I/O 0x1C…0x1F and SRAM 0x3F00…0x3FFF at the end of `words`; the instructions
@@ -457,10 +455,7 @@ fn theirs(word: u16, mnemonic: &str, operands: &str) -> String {
 /// What avr-objdump says of the image in `path`; `None`, said aloud, where it is not installed. A machine that checks
 /// changes (`CI` is `true`) has to have it.
 fn avr_objdump(path: &Path) -> Option<Output> {
-    let output = Command::new("avr-objdump")
-        .args(["-D", "-z", "-b", "binary", "-m", "avr:103"])
-        .arg(path)
-        .output();
+    let output = Command::new("avr-objdump").args(["-D", "-z", "-b", "binary", "-m", "avr:103"]).arg(path).output();
     if let Ok(output) = output {
         return Some(output);
     }

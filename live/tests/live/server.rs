@@ -157,17 +157,8 @@ fn a_flood_of_messages_does_not_stop_the_updates() {
     }
     say(&mut socket, "{\"type\":\"object\",\"name\":\"tape\"}");
     while !next(&mut socket, "shape").contains("\"name\":\"tape\"") {}
-    let number = |frame: String| {
-        frame
-            .split("\"number\":")
-            .nth(1)
-            .unwrap()
-            .split(',')
-            .next()
-            .unwrap()
-            .parse::<u64>()
-            .unwrap()
-    };
+    let number =
+        |frame: String| frame.split("\"number\":").nth(1).unwrap().split(',').next().unwrap().parse::<u64>().unwrap();
     let first = number(next(&mut socket, "frame"));
     assert!(number(next(&mut socket, "frame")) > first);
 }

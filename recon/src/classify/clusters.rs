@@ -182,10 +182,7 @@ fn seeds(units: &[Vec<f64>], clusters: usize, rng: &mut ChaCha8Rng) -> Vec<Vec<f
     let mut nearest = vec![f64::INFINITY; units.len()];
     while centres.len() < clusters {
         let last = &centres[centres.len() - 1];
-        nearest
-            .par_iter_mut()
-            .zip(units)
-            .for_each(|(near, unit)| *near = near.min(distance(unit, last, 2.0)));
+        nearest.par_iter_mut().zip(units).for_each(|(near, unit)| *near = near.min(distance(unit, last, 2.0)));
         let mut left = rng.random::<f64>() * nearest.iter().sum::<f64>();
         let next = nearest.iter().position(|near| {
             left -= near;
@@ -205,9 +202,7 @@ fn members(units: &[Vec<f64>], mut centres: Vec<Vec<f64>>) -> Vec<Vec<usize>> {
         let squares: Vec<f64> = centres.iter().map(|c| dot(c, c)).collect();
         let nearest = |unit: &Vec<f64>| {
             let each = centres.iter().zip(&squares).map(|(c, s)| distance(unit, c, 1.0 + s));
-            let best = each
-                .enumerate()
-                .fold((0, f64::INFINITY), |best, (k, d)| if d < best.1 { (k, d) } else { best });
+            let best = each.enumerate().fold((0, f64::INFINITY), |best, (k, d)| if d < best.1 { (k, d) } else { best });
             best.0
         };
         let of: Vec<usize> = units.par_iter().map(nearest).collect();

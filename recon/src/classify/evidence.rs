@@ -270,10 +270,7 @@ fn log_prior(outcomes: &[Option<usize>], unknown_prior: f64) -> Vec<f64> {
     let known = outcomes.iter().flatten().count();
     let unknown = if known < outcomes.len() { unknown_prior } else { 0.0 };
     let share = (1.0 - unknown) / known.max(1) as f64;
-    outcomes
-        .iter()
-        .map(|o| if o.is_some() { share.ln() } else { unknown_prior.ln() })
-        .collect()
+    outcomes.iter().map(|o| if o.is_some() { share.ln() } else { unknown_prior.ln() }).collect()
 }
 
 /// Turns logarithms into probabilities.

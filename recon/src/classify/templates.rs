@@ -221,9 +221,7 @@ pub(super) fn principal(covariance: DMatrix<f64>, rank: usize) -> (Vec<Vec<f64>>
     // rounding may leave a zero eigenvalue a little below zero
     let value = |k: usize| eigen.eigenvalues[k].max(0.0);
     let (kept, left) = order.split_at(rank.min(order.len()));
-    let factors = kept
-        .iter()
-        .map(|&k| eigen.eigenvectors.column(k).iter().map(|v| v * value(k).sqrt()).collect());
+    let factors = kept.iter().map(|&k| eigen.eigenvectors.column(k).iter().map(|v| v * value(k).sqrt()).collect());
     (factors.collect(), left.iter().map(|&k| value(k)).sum())
 }
 

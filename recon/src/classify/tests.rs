@@ -105,9 +105,7 @@ fn one_component_equals_its_definition() {
         let prior = Gaussian::new(c.mean.clone(), Matrix::from(&covariance)).unwrap();
         let estimator = ImageEstimator::new(vec![prior], c.noise_variance.sqrt()).unwrap();
         let mut image = vec![0.0; 9];
-        estimator
-            .estimate(&posterior, phi.view(), &y, &mut Workspace::default(), &mut image)
-            .unwrap();
+        estimator.estimate(&posterior, phi.view(), &y, &mut Workspace::default(), &mut image).unwrap();
         for (g, e) in image.iter().zip(&expected_image) {
             assert!((g - e).abs() < 1e-6 + 10.0 * tolerance, "M = {m}, rank {rank}: image {g}, expected {e}");
         }
@@ -227,9 +225,8 @@ impl PlantedWindow {
     fn new(seed: u64, m: usize, image: &[f64], amplitude: f64, noise: f64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let signs: Vec<u64> = (0..m).map(|_| rng.random()).collect();
-        let weights = signs
-            .iter()
-            .flat_map(|s| (0..image.len()).map(move |i| if s >> i & 1 == 1 { 1.0 } else { -1.0 }));
+        let weights =
+            signs.iter().flat_map(|s| (0..image.len()).map(move |i| if s >> i & 1 == 1 { 1.0 } else { -1.0 }));
         let phi = Matrix::from_rows(m, image.len(), weights.collect()).unwrap();
         let signal = |row: &[f64]| -> f64 { row.iter().zip(image).map(|(a, b)| a * b).sum() };
         let y = (0..m).map(|r| amplitude * (signal(phi.row(r)) + noise * normal(&mut rng))).collect();

@@ -743,9 +743,7 @@ mod tests {
             let y: Vec<f64> = y.iter().map(|v| v * samples).collect();
             let (mut image, mut touched) = (Vec::new(), Vec::new());
             let problem = Problem::new(MatrixView::new(6, N, &scaled).unwrap(), &y).unwrap();
-            network
-                .estimate(&problem, &mut Workspace::default(), &mut image, &mut touched)
-                .map(|_| image)
+            network.estimate(&problem, &mut Workspace::default(), &mut image, &mut touched).map(|_| image)
         };
         let one = solve(1.0, 1.0).unwrap();
         for (rows, samples) in [(0.3, 1.0), (1e-150, 1e-150), (1e150, 7.0), (1e300, 1e300)] {

@@ -405,9 +405,7 @@ mod tests {
         let chosen = choose_for_images(&task, candidates.view()).unwrap();
         let trace = |rows: &[usize]| {
             let mut picked = Matrix::zeros(rows.len(), 16);
-            rows.iter()
-                .enumerate()
-                .for_each(|(r, &k)| picked.row_mut(r).copy_from_slice(candidates.row(k)));
+            rows.iter().enumerate().for_each(|(r, &k)| picked.row_mut(r).copy_from_slice(candidates.row(k)));
             posterior_trace(&task, &picked).unwrap()
         };
         for m in 1..=5 {

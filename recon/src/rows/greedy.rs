@@ -336,10 +336,7 @@ pub fn posterior_trace(task: &RowTask<'_>, rows: &Matrix) -> Result<f64, Refusal
         return Err(other_grid(n, rows, cols));
     }
     let mut cross = vec![0.0; m * n];
-    cross
-        .par_chunks_exact_mut(n)
-        .enumerate()
-        .for_each(|(r, out)| expected.times_covariance(rows.row(r), out));
+    cross.par_chunks_exact_mut(n).enumerate().for_each(|(r, out)| expected.times_covariance(rows.row(r), out));
     let row = |r: usize| &cross[r * n..(r + 1) * n];
     let mut system = DMatrix::from_fn(m, m, |i, j| if i < j { 0.0 } else { dot(row(i), rows.row(j)) });
     // rounding of the sums is what a noise of this size is lost in

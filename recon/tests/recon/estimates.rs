@@ -114,9 +114,7 @@ fn lmmse_equals_the_explicit_formula() {
         let solution = method.recover(&Problem::new(rows.view(), &y).unwrap(), &mut Workspace::default());
         let (solution, mut x) = (solution.unwrap(), vec![0.0; 12]);
         solution.scatter(&mut x);
-        let inverse = (&a * &c * a.transpose() + deviation.powi(2) * DMatrix::identity(m, m))
-            .try_inverse()
-            .unwrap();
+        let inverse = (&a * &c * a.transpose() + deviation.powi(2) * DMatrix::identity(m, m)).try_inverse().unwrap();
         let gain = &c * a.transpose() * inverse;
         let y = DVector::from_vec(y);
         let expected = &mean + &gain * (&y - &a * &mean);

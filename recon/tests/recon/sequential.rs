@@ -258,9 +258,7 @@ fn the_filter_is_the_posterior_of_all_windows() {
             gram[(top + k, top + k)] += noise;
             y[top + k] = windows[i].2[k];
         }
-        cross
-            .view_mut((0, top), (n, a.nrows()))
-            .copy_from(&(&c * a.transpose() * correlation(i, last)));
+        cross.view_mut((0, top), (n, a.nrows())).copy_from(&(&c * a.transpose() * correlation(i, last)));
         top += a.nrows();
     }
     let inverse = gram.try_inverse().unwrap();

@@ -166,12 +166,7 @@ mod tests {
         // turned by a quarter, the other side bends
         let quarter = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
         let met = bend.unroll(&mesh, quarter);
-        let edge = met
-            .vertices
-            .iter()
-            .filter(|v| v[2] < 2.5e-3)
-            .max_by(|a, b| a[1].total_cmp(&b[1]))
-            .unwrap();
+        let edge = met.vertices.iter().filter(|v| v[2] < 2.5e-3).max_by(|a, b| a[1].total_cmp(&b[1])).unwrap();
         assert_relative_eq!(edge[2], 15e-3_f64.powi(2) / (2.0 * bend.radius_m), max_relative = 0.03);
     }
 

@@ -347,8 +347,7 @@ impl PressConfig {
         };
         written.resolve(skin, [place.row, place.col])?;
         self.rotation_deg.get_or_insert(place.rotation_rad.to_degrees());
-        self.tilt_deg
-            .get_or_insert([place.tilt_x_rad.to_degrees(), place.tilt_y_rad.to_degrees()]);
+        self.tilt_deg.get_or_insert([place.tilt_x_rad.to_degrees(), place.tilt_y_rad.to_degrees()]);
         self.check()?;
         if let Some(report) = report.filter(|report| report.lids > 0) {
             self.check_lids(report.lids)?;

@@ -99,9 +99,8 @@ impl BounceLog {
     pub(crate) fn push(&mut self, now: Sample) {
         if let (Some(bounce), Some(last)) = (&mut self.open, &self.last) {
             // the velocity is updated first, so F · (v + v′)/2 dt is exactly the change of kinetic energy
-            let power: f64 = (0..3)
-                .map(|i| last.force_n[i] * 0.5 * (last.velocity_m_per_s[i] + now.velocity_m_per_s[i]))
-                .sum();
+            let power: f64 =
+                (0..3).map(|i| last.force_n[i] * 0.5 * (last.velocity_m_per_s[i] + now.velocity_m_per_s[i])).sum();
             bounce.work_j -= power * (now.time_s - last.time_s);
             bounce.peak_force_n = bounce.peak_force_n.max(now.force_n[2]);
         }

@@ -266,11 +266,8 @@ impl PressCourse {
     pub fn of(frames: &[Frame], target_n: f64, plateau_s: [f64; 2], cell_area_m2: f64) -> Option<Self> {
         let force = |f: &Frame| f.wrench.force_n[2];
         let onset_s = frames.iter().find(|f| force(f) > 0.0)?.time_s;
-        let on: Vec<f64> = frames
-            .iter()
-            .filter(|f| (plateau_s[0]..=plateau_s[1]).contains(&f.time_s))
-            .map(force)
-            .collect();
+        let on: Vec<f64> =
+            frames.iter().filter(|f| (plateau_s[0]..=plateau_s[1]).contains(&f.time_s)).map(force).collect();
         let plateau_n = on.iter().sum::<f64>() / on.len() as f64;
         let middle_s = 0.5 * (plateau_s[0] + plateau_s[1]);
         let up = |share: f64| crossing(frames, share * plateau_n, |t| t <= middle_s, false);

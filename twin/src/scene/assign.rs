@@ -226,11 +226,7 @@ mod tests {
                 .unwrap();
         assert_eq!(config.faults[0]["taxel"].as_integer(), Some(5));
         assert_eq!(config.faults[1]["level"].as_float(), Some(0.5));
-        assert!(
-            changed(scene, &["faults.3.taxel=5"])
-                .unwrap_err()
-                .contains("(0 to 0); `faults.+` adds one")
-        );
+        assert!(changed(scene, &["faults.3.taxel=5"]).unwrap_err().contains("(0 to 0); `faults.+` adds one"));
     }
 
     #[test]

@@ -74,10 +74,7 @@ impl Summary {
             transducer: scene.config().transducer.clone(),
             readout: scene.portable().readout,
             weights: scene.config().weights.clone(),
-            sample_rate_hz: simulation
-                .first
-                .as_ref()
-                .and_then(|session| Some(session.compressive()?.sample_rate_hz())),
+            sample_rate_hz: simulation.first.as_ref().and_then(|session| Some(session.compressive()?.sample_rate_hz())),
             peak_force_n: largest(|p| p.peak_force_n),
             force_imbalance: largest(|p| p.force_imbalance),
             notes,

@@ -120,8 +120,7 @@ impl VerifyCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let verified = self.files.open(&self.folder)?.verify(self.rows, self.seed, &Bars::default())?;
-        self.common
-            .print(&verified, || format!("{} rows of {} files compared", verified.rows, verified.shards))?;
+        self.common.print(&verified, || format!("{} rows of {} files compared", verified.rows, verified.shards))?;
         match verified.differ.first() {
             None => Ok(()),
             Some((row, column)) => {

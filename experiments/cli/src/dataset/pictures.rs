@@ -114,8 +114,7 @@ impl PreviewCommand {
         let preview = Preview { name: name.clone(), of: spec.config().rows, rows };
         save_preview(&preview, &file)?;
         let report = Report { file, rows: wanted.into_iter().collect() };
-        self.common
-            .print(&report, || format!("{} rows drawn: {}", report.rows.len(), report.file.display()))
+        self.common.print(&report, || format!("{} rows drawn: {}", report.rows.len(), report.file.display()))
     }
 }
 
@@ -189,8 +188,7 @@ impl ShapesCommand {
         let shapes = drawn_shapes(&families, self.seed, self.count)?;
         save_shapes(&shapes, &self.out)?;
         let report = ShapesReport { file: self.out, shapes: shapes.iter().map(ShapeLine::of).collect() };
-        self.common
-            .print(&report, || format!("{} shapes drawn: {}", report.shapes.len(), report.file.display()))
+        self.common.print(&report, || format!("{} shapes drawn: {}", report.shapes.len(), report.file.display()))
     }
 
     /// The named families in the order of their table, each once; all without a name.

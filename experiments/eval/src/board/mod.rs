@@ -337,8 +337,7 @@ impl Run<'_> {
         };
         let press = Press::new(recording, block, &self.sessions[session].protocol);
         let each = self.slots(entries);
-        each.map(|(entry, m)| decode_us(&entry.decoders[session], &press, m, TIMED_WINDOWS))
-            .collect()
+        each.map(|(entry, m)| decode_us(&entry.decoders[session], &press, m, TIMED_WINDOWS)).collect()
     }
 }
 

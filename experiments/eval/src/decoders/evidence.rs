@@ -185,9 +185,7 @@ impl Algorithm for AtWork<'_> {
         let class = self.decide().0;
         answer.class = self.classes.named.then_some(class);
         answer.image.resize(window.phi.ncols(), 0.0);
-        self.classes
-            .images
-            .estimate(&self.posterior, window.phi, window.y, &mut self.work, &mut answer.image)?;
+        self.classes.images.estimate(&self.posterior, window.phi, window.y, &mut self.work, &mut answer.image)?;
         Ok(())
     }
 

@@ -178,9 +178,7 @@ pub fn contact_image(recording: &Recording, bounce: &RecordedBounce) -> Option<V
     let phi = DMatrix::from_row_slice(m, n, &rows);
     let y = DVector::from_iterator(
         m,
-        recording.blocks()[bounce.block].volts[bounce.start..bounce.end]
-            .iter()
-            .map(|v| v - bounce.idle),
+        recording.blocks()[bounce.block].volts[bounce.start..bounce.end].iter().map(|v| v - bounce.idle),
     );
     if y.iter().any(|v| !v.is_finite()) {
         return None;

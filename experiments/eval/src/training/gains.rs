@@ -513,11 +513,7 @@ mod tests {
         }
         let solution = model.solve(found);
         let level = gains.iter().sum::<f64>() / 400.0;
-        let z = gains
-            .iter()
-            .zip(&solution.mean)
-            .zip(&solution.sd)
-            .map(|((g, m), s)| ((g - level - m) / s).powi(2));
+        let z = gains.iter().zip(&solution.mean).zip(&solution.sd).map(|((g, m), s)| ((g - level - m) / s).powi(2));
         let chi2: f64 = z.sum();
         assert!((chi2 - 400.0).abs() < 5.0 * 800.0_f64.sqrt(), "{chi2}");
     }

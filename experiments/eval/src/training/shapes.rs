@@ -36,10 +36,7 @@ pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
         ("pitch_m", layout.pitch_m().into()),
         ("electrode_m", layout.electrode_m().into()),
     ];
-    let skin: toml::Table = skin
-        .map(|(key, value): (&str, toml::Value)| (key.to_owned(), value))
-        .into_iter()
-        .collect();
+    let skin: toml::Table = skin.map(|(key, value): (&str, toml::Value)| (key.to_owned(), value)).into_iter().collect();
     overrides.insert("rows".to_owned(), (presses as i64).into());
     overrides.insert("seed".to_owned(), ((seed >> 2) as i64).into());
     overrides.insert("skin".to_owned(), skin.into());
@@ -186,9 +183,8 @@ const OUTLINES: [Inside; 5] = [
 /// Images of random shapes on a skin of this layout, taxels × images; a function of `streams` alone.
 pub(super) fn outline_images(layout: &SkinLayout, streams: Streams) -> Matrix {
     let gain_log_sd = VelostatConfig::default().spread_log_sd;
-    let images: Vec<Vec<f64>> = (0..SHAPES as u64)
-        .map(|index| image(layout, gain_log_sd, &mut streams.rng("layout/shape", index)))
-        .collect();
+    let images: Vec<Vec<f64>> =
+        (0..SHAPES as u64).map(|index| image(layout, gain_log_sd, &mut streams.rng("layout/shape", index))).collect();
     Matrix::from_column_slices(layout.taxels(), &images)
 }
 

@@ -120,9 +120,7 @@ impl Skins {
         }
         config.skin = self.layout;
         config.transducer_parameters.insert("spread_log_sd".to_owned(), self.spread_log_sd.into());
-        config
-            .transducer_parameters
-            .insert("session_log_sd".to_owned(), self.session_log_sd.into());
+        config.transducer_parameters.insert("session_log_sd".to_owned(), self.session_log_sd.into());
         config.readout = Some(self.readout.to_owned());
         let scene = Scene::new(config, Path::new(""))?;
         let index = usize::from(object.label);

@@ -58,10 +58,8 @@ pub fn save_shapes(shapes: &[Shape], path: &Path) -> Result<(), Refusal> {
 pub(super) fn layout(shapes: &[Shape]) -> Canvas {
     let width = 2.0 * BORDER + NAMES + COLUMNS as f64 * (TILE + GAP.0) - GAP.0;
     let line = TILE + CAPTION * LINE_HEIGHT + GAP.1;
-    let lines: Vec<&[Shape]> = shapes
-        .chunk_by(|a, b| a.family == b.family)
-        .flat_map(|family| family.chunks(COLUMNS))
-        .collect();
+    let lines: Vec<&[Shape]> =
+        shapes.chunk_by(|a, b| a.family == b.family).flat_map(|family| family.chunks(COLUMNS)).collect();
     let title = format!("{} procedural shapes from below", shapes.len());
     let words = "Undersides, turned as their prints on the skin are seen from above, all to one scale. Below each: its number within \
                  the family, and its size in mm. The darkest points are the lowest, which touch the skin first.";

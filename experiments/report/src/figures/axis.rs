@@ -85,11 +85,7 @@ impl Axis {
     fn linear_ticks(&self, count: usize) -> Vec<(f64, String)> {
         let raw = (self.high - self.low) / count.max(1) as f64;
         let decade = 10_f64.powf(raw.log10().floor());
-        let step = [1.0, 2.0, 2.5, 5.0]
-            .iter()
-            .map(|m| m * decade)
-            .find(|step| *step >= raw)
-            .unwrap_or(10.0 * decade);
+        let step = [1.0, 2.0, 2.5, 5.0].iter().map(|m| m * decade).find(|step| *step >= raw).unwrap_or(10.0 * decade);
         // Half a millionth of a step of slack keeps a tick at the very end.
         let first = (self.low / step - 5e-7).ceil();
         let decimals =
@@ -113,9 +109,7 @@ impl Axis {
             _ => 0,
         };
         let mut tried = LEADS[coarsest..].iter().map(|leads| self.log_ticks_at(leads));
-        tried
-            .find(|ticks| ticks.len() >= LEAST_TICKS)
-            .unwrap_or_else(|| self.log_ticks_at(LEADS[coarsest]))
+        tried.find(|ticks| ticks.len() >= LEAST_TICKS).unwrap_or_else(|| self.log_ticks_at(LEADS[coarsest]))
     }
 
     /// Ticks at `leads` times powers of ten.

@@ -399,9 +399,7 @@ pub(crate) fn resample(rgb: &[u8], (width, height): (usize, usize), (w, h): (usi
             for v in range(y, h, height) {
                 for u in range(x, w, width) {
                     let start = (v * width + u) * 3;
-                    sum.iter_mut()
-                        .zip(&rgb[start..start + 3])
-                        .for_each(|(sum, &part)| *sum += usize::from(part));
+                    sum.iter_mut().zip(&rgb[start..start + 3]).for_each(|(sum, &part)| *sum += usize::from(part));
                     count += 1;
                 }
             }
@@ -447,9 +445,8 @@ mod tests {
         let (width, height, rgb) = paint(&canvas).unwrap();
         assert_eq!((width, height), (400, 80));
         // FNV-1a
-        let hash = rgb
-            .iter()
-            .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3));
+        let hash =
+            rgb.iter().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0000_0100_0000_01b3));
         assert_eq!(hash, 0x949b_63ad_3925_b1b5, "{hash:#x}");
     }
 }

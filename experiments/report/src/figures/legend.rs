@@ -244,11 +244,11 @@ fn candidates(place: Place, (width, height): Point, frame: &PanelFrame) -> Vec<P
                 ]
             })
             .collect(),
-        Place::Level(y) => slots(right - width - 4.0, frame.left + 4.0)
-            .flat_map(|x| [(x, y - height - 2.0), (x, y + 2.0)])
-            .collect(),
-        Place::Column(x) => slots(frame.top + 2.0, bottom - height - 2.0)
-            .flat_map(|y| [(x + 4.0, y), (x - width - 4.0, y)])
-            .collect(),
+        Place::Level(y) => {
+            slots(right - width - 4.0, frame.left + 4.0).flat_map(|x| [(x, y - height - 2.0), (x, y + 2.0)]).collect()
+        }
+        Place::Column(x) => {
+            slots(frame.top + 2.0, bottom - height - 2.0).flat_map(|y| [(x + 4.0, y), (x - width - 4.0, y)]).collect()
+        }
     }
 }

@@ -141,9 +141,8 @@ pub fn decoder_variant(name: &str, stroke: Stroke) -> u8 {
     let named = || Some(DECODERS.len() + NAMED.iter().position(|(known, _)| *known == name)?);
     let place = own.or_else(named).unwrap_or_else(|| {
         // FNV-1a: the same program has the same look in every run
-        let hash = name
-            .bytes()
-            .fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
+        let hash =
+            name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0000_0100_0000_01b3));
         DECODERS.len() + NAMED.len() + usize::try_from(hash % OTHERS.len() as u64).unwrap_or(0)
     });
     u8::try_from(place).unwrap_or(0) * STROKES + stroke as u8
@@ -159,8 +158,7 @@ pub(super) fn look(variant: u8) -> Look {
         (Rgb(r, g, b), marker)
     });
     let named = || NAMED.get(after).map(|(_, look)| *look);
-    own.or_else(named)
-        .unwrap_or_else(|| OTHERS[after.saturating_sub(NAMED.len()) % OTHERS.len()])
+    own.or_else(named).unwrap_or_else(|| OTHERS[after.saturating_sub(NAMED.len()) % OTHERS.len()])
 }
 
 /// Stroke of a variant.

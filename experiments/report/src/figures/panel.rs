@@ -91,11 +91,8 @@ pub(super) fn layout(charts: &[Chart]) -> Canvas {
 fn draw_panel(canvas: &mut Canvas, chart: &Chart, (left, top): Point, (width, height): Point) -> PanelFrame {
     let finite =
         |(x, y): &Point| x.is_finite() && y.is_finite() && (!chart.x_log || *x > 0.0) && (!chart.y_log || *y > 0.0);
-    let curves: Vec<Vec<Point>> = chart
-        .series
-        .iter()
-        .map(|series| series.points.iter().copied().filter(finite).collect())
-        .collect();
+    let curves: Vec<Vec<Point>> =
+        chart.series.iter().map(|series| series.points.iter().copied().filter(finite).collect()).collect();
     let claimed = |pick: fn(&Claim) -> Option<f64>| chart.claims.iter().chain(&chart.published).filter_map(pick);
     let stated = chart.ranges.iter().flat_map(|range| [range.from, range.to]);
     let x = Axis::new(curves.iter().flatten().map(|p| p.0).chain(claimed(|c| c.x)).chain(stated), chart.x_log, None);
@@ -271,10 +268,8 @@ fn draw_ranges(canvas: &mut Canvas, chart: &Chart, frame: &PanelFrame) {
         let lines = wrap(&range.label, RANGE_SIZE, false, 0.5 * frame.width);
         let widest = widest(lines.iter().map(String::as_str), RANGE_SIZE, false);
         let others = chart.ranges.iter().filter(|other| *other != range);
-        let before: Vec<f64> = others
-            .filter(|other| other.to <= range.from)
-            .filter_map(|other| column(frame, other.to))
-            .collect();
+        let before: Vec<f64> =
+            others.filter(|other| other.to <= range.from).filter_map(|other| column(frame, other.to)).collect();
         let free = before.iter().copied().fold(frame.left, f64::max);
         let (at, anchor) = if right - left > widest + 8.0 {
             (0.5 * (left + right), Anchor::Middle)

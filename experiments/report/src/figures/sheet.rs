@@ -177,12 +177,7 @@ pub(super) fn layout(sheet: &Sheet) -> Canvas {
 
 /// Height of a row with its captions and the gap below.
 fn row_height(row: &TileRow, grid: &SheetGrid) -> f64 {
-    let lines = row
-        .tiles
-        .iter()
-        .map(|t| wrap(t.caption(), CAPTION, false, grid.tile + GAP).len())
-        .max()
-        .unwrap_or(0);
+    let lines = row.tiles.iter().map(|t| wrap(t.caption(), CAPTION, false, grid.tile + GAP).len()).max().unwrap_or(0);
     let captions = if lines > 0 { lines as f64 * CAPTION * LINE_HEIGHT + 6.0 } else { 0.0 };
     grid.above + grid.tile + captions + GAP
 }

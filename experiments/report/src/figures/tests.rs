@@ -15,11 +15,7 @@ pub(crate) fn check_markup(text: &str, void: &[&str]) -> Result<usize, String> {
         let body = &tag[1..end];
         rest = &tag[end + 1..];
         let entities = ["amp;", "lt;", "gt;", "quot;", "#39;"];
-        if before
-            .split('&')
-            .skip(1)
-            .any(|after| !entities.iter().any(|entity| after.starts_with(entity)))
-        {
+        if before.split('&').skip(1).any(|after| !entities.iter().any(|entity| after.starts_with(entity))) {
             return Err(format!("bare & in `{before}`"));
         }
         if body.matches('"').count() % 2 != 0 || body.contains('<') {

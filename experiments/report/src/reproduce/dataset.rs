@@ -106,11 +106,8 @@ pub(super) fn simulate(seed: u64, size: &ReproductionSize, done: &(dyn Fn() + Sy
             })
         })
         .collect::<Result<Vec<_>, Refusal>>()?;
-    let scenes = LANDINGS
-        .iter()
-        .enumerate()
-        .map(|(k, &landing)| drop_scene(landing, seed, k))
-        .collect::<Result<Vec<_>, _>>()?;
+    let scenes =
+        LANDINGS.iter().enumerate().map(|(k, &landing)| drop_scene(landing, seed, k)).collect::<Result<Vec<_>, _>>()?;
     let area_m2 = scenes[0].skin().cell_area_m2();
     let twins = scenes.iter().map(Twin::new).collect::<Result<Vec<_>, _>>()?;
     let drops = twins.par_iter().map(|twin| twin.presses(0..twin.scene().repeats(), &|| ()));

@@ -249,9 +249,8 @@ impl BothSkins<'_> {
         });
         let mut panels: Vec<Chart> = panels.collect();
         let all = panels.iter().flat_map(|chart| &chart.series);
-        let highest_v = all
-            .flat_map(|s| s.points.iter().map(|p| p.1).chain(s.scatter.iter().map(|r| r.2)))
-            .fold(0.0, f64::max);
+        let highest_v =
+            all.flat_map(|s| s.points.iter().map(|p| p.1).chain(s.scatter.iter().map(|r| r.2))).fold(0.0, f64::max);
         panels.iter_mut().for_each(|chart| chart.y_range = Some((0.0, 1.05 * highest_v)));
         panels
     }

@@ -58,11 +58,8 @@ pub(super) fn latency(skin: &ScoredSkin, decoder: &TrainedDecoder) -> Result<Vec
         })
         .collect::<Result<_, Refusal>>()?;
     let share = |i: usize| hits.iter().filter(|h| h[i]).count() as f64 / hits.len().max(1) as f64;
-    let mut rows: Vec<LatencyRow> = keys
-        .iter()
-        .enumerate()
-        .map(|(i, key)| LatencyRow { accuracy: share(i), ..key.clone() })
-        .collect();
+    let mut rows: Vec<LatencyRow> =
+        keys.iter().enumerate().map(|(i, key)| LatencyRow { accuracy: share(i), ..key.clone() }).collect();
     rows.extend(raster(skin));
     Ok(rows)
 }

@@ -115,9 +115,8 @@ impl Reproduction {
         });
         let mut real = real.transpose()?;
         progress.end();
-        let common: Vec<String> = real
-            .as_ref()
-            .map_or_else(Vec::new, |r| r.compressive_objects().map(str::to_owned).collect());
+        let common: Vec<String> =
+            real.as_ref().map_or_else(Vec::new, |r| r.compressive_objects().map(str::to_owned).collect());
         twin.add_common_mean(&common);
         if let Some(real) = &mut real {
             real.add_common_mean(&common);

@@ -298,10 +298,7 @@ fn means_table(skins: &BothSkins<'_>) -> PageTable {
 
 /// How alike the raster images are.
 fn correlations_table(rows: &[CorrelationRow]) -> PageTable {
-    let table = Table::new("", rows)
-        .shown("object", |c| object_label(&c.object))
-        .shown("r", |c| c.pearson_r)
-        .digits(3);
+    let table = Table::new("", rows).shown("object", |c| object_label(&c.object)).shown("r", |c| c.pearson_r).digits(3);
     let caption = "Correlation (Pearson's r) of the twin's and the real skin's median raster images";
     PageTable::new(caption, &table, "raster_correlation.csv")
 }

@@ -183,9 +183,7 @@ pub(super) fn dictionaries(skins: &BothSkins<'_>, cols: usize) -> Sheet {
             let last = (first + ACROSS).min(dictionary.ncols());
             rows.push(TileRow {
                 label: format!("{name}atoms {}–{last}", first + 1),
-                tiles: (first..last)
-                    .map(|k| heat(&signed(&dictionary.column(k)), cols, String::new(), None))
-                    .collect(),
+                tiles: (first..last).map(|k| heat(&signed(&dictionary.column(k)), cols, String::new(), None)).collect(),
             });
         }
     };

@@ -292,9 +292,8 @@ mod tests {
         // stray events
         #[expect(clippy::cast_possible_truncation, reason = "small rows")]
         let press = |phase: f64| -> Vec<u64> {
-            let mut rows: Vec<u64> = (0..20)
-                .map(|k| (phase + 52.47 * f64::from((7 * k * k + 3 * k) % 100)).ceil() as u64)
-                .collect();
+            let mut rows: Vec<u64> =
+                (0..20).map(|k| (phase + 52.47 * f64::from((7 * k * k + 3 * k) % 100)).ceil() as u64).collect();
             rows.extend((0..10).map(|k| 97 + 577 * k * k % 5200));
             rows.sort_unstable();
             rows

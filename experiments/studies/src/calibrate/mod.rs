@@ -382,9 +382,7 @@ fn mean_contact(raster: &Recording, hold: &Range<usize>) -> Option<Vec<f64>> {
 /// Median over the presses of every taxel's image, V.
 fn middle_image(analysed: &[(usize, PressAnalysis)]) -> Vec<f64> {
     let taxels = analysed.first().map_or(0, |(_, press)| press.image.len());
-    (0..taxels)
-        .map(|k| middle(&analysed.iter().map(|(_, press)| press.image[k]).collect::<Vec<_>>()))
-        .collect()
+    (0..taxels).map(|k| middle(&analysed.iter().map(|(_, press)| press.image[k]).collect::<Vec<_>>())).collect()
 }
 
 /// Counts of all presses together, of the taxels that are loaded enough.
@@ -419,8 +417,5 @@ fn beats(analysed: &[(usize, PressAnalysis)]) -> Vec<Beat> {
 fn plateau_volts(recording: &Recording, hold: &Range<usize>, blocks: &[usize]) -> Vec<f64> {
     let per_frame = recording.measurements_per_frame();
     let range = hold.start * per_frame..hold.end * per_frame;
-    blocks
-        .iter()
-        .flat_map(|&block| recording.blocks()[block].volts[range.clone()].iter().copied())
-        .collect()
+    blocks.iter().flat_map(|&block| recording.blocks()[block].volts[range.clone()].iter().copied()).collect()
 }

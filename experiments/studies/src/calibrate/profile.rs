@@ -195,9 +195,9 @@ impl FittedReadout {
                 error_text(beat, CELL_TIMER_HZ, 0),
                 beat.value
             ),
-            (_, _, base_hz) => base_hz
-                .map(|v| format!("sample_rate_hz = {v:?}  # kept: no beat seen\n"))
-                .unwrap_or_default(),
+            (_, _, base_hz) => {
+                base_hz.map(|v| format!("sample_rate_hz = {v:?}  # kept: no beat seen\n")).unwrap_or_default()
+            }
         }
     }
 
@@ -277,8 +277,7 @@ fn span_text((low, high): (f64, f64)) -> String {
 
 /// " ± error" in units of 1/`scale`; nothing without an error.
 fn error_text(e: Estimated, scale: f64, places: usize) -> String {
-    e.standard_error
-        .map_or_else(String::new, |error| format!(" ± {:.places$}", scale * error))
+    e.standard_error.map_or_else(String::new, |error| format!(" ± {:.places$}", scale * error))
 }
 
 fn words(e: &Estimated) -> String {

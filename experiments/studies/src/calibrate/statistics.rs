@@ -113,12 +113,8 @@ const MOST_CODES: f64 = 16_777_216.0;
 
 /// Steps of the values of the given blocks; `None` when they are not on a grid, or are all equal.
 pub(super) fn steps(recording: &Recording, blocks: &[usize]) -> Option<ConverterSteps> {
-    let mut values: Vec<f64> = blocks
-        .iter()
-        .flat_map(|&block| &recording.blocks()[block].volts)
-        .copied()
-        .filter(|v| v.is_finite())
-        .collect();
+    let mut values: Vec<f64> =
+        blocks.iter().flat_map(|&block| &recording.blocks()[block].volts).copied().filter(|v| v.is_finite()).collect();
     values.sort_unstable_by(f64::total_cmp);
     values.dedup();
     let (first, last) = (*values.first()?, *values.last()?);

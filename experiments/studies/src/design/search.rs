@@ -63,9 +63,9 @@ impl DesignStudy {
         let rows = ground.layout.rows();
         let numbers: Vec<usize> = match self.wires {
             WireChoice::Exactly(wires) => vec![wires],
-            WireChoice::UpTo(most) => std::iter::successors(Some(1), |w| Some(2 * w))
-                .take_while(|w| *w <= most.min(rows))
-                .collect(),
+            WireChoice::UpTo(most) => {
+                std::iter::successors(Some(1), |w| Some(2 * w)).take_while(|w| *w <= most.min(rows)).collect()
+            }
         };
         let mut all = Vec::new();
         for wires in numbers {

@@ -53,9 +53,8 @@ impl ExploreStudy {
         progress.stage("exploring", Some(self.sides.len() * Way::ALL.len()));
         let mut rows = Vec::new();
         for &side in &self.sides {
-            let scenes: Vec<ExploreScene> = (0..self.scenes)
-                .map(|index| scene(side as usize, pressed_s, Streams::new(self.seed), index))
-                .collect();
+            let scenes: Vec<ExploreScene> =
+                (0..self.scenes).map(|index| scene(side as usize, pressed_s, Streams::new(self.seed), index)).collect();
             let Some(first) = scenes.first() else { continue };
             for wiring in wirings(&first.image_s, self.seeding, &electronics)? {
                 rows.push(self.search(side as usize, wiring, &scenes, &electronics)?);
