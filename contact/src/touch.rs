@@ -206,8 +206,8 @@ impl TouchSkin {
         self.touched_m2
     }
 
-    /// Whether a body has gone through the foam, down to the link. Its force then is that of solid polymer, which stands
-    /// for the link, and the pressure is no measured one.
+    /// Whether a body has gone through the foam, down to the link. Its force then is that of solid polymer, which
+    /// stands for the link, and the pressure is no measured one.
     pub fn bottomed(&self) -> bool {
         self.bottomed
     }

@@ -44,7 +44,8 @@ struct Arrays {
 
 #[pymethods]
 impl Mount {
-    /// `frame` is the skin's in the link's: origin, m, then the rotation matrix by rows. `bodies` are numbers of bodies of the model and their shapes; `roots` the root of every body's tree.
+    /// `frame` is the skin's in the link's: origin, m, then the rotation matrix by rows. `bodies` are numbers of bodies
+    /// of the model and their shapes; `roots` the root of every body's tree.
     #[new]
     fn new(
         py: Python<'_>,
@@ -94,9 +95,9 @@ impl Mount {
         Ok((touch, loads.collect()))
     }
 
-    /// What the skin feels, `dt` s after the last time, of bodies that the engine's contact carries. A load has the number
-    /// of its body in the model; its normal force, N; where that acts; and force and torque on the body about its
-    /// origin, all in the world's frame.
+    /// What the skin feels, `dt` s after the last time, of bodies that the engine's contact carries. A load has the
+    /// number of its body in the model; its normal force, N; where that acts; and force and torque on the body about
+    /// its origin, all in the world's frame.
     fn read(&self, py: Python<'_>, dt: f64, loads: Vec<(usize, f64, Vector, Vector, Vector)>) -> PyResult<Touch> {
         let (placed, frame, origin) = self.placed(py)?;
         let mut known = Vec::with_capacity(loads.len());

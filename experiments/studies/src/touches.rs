@@ -227,6 +227,14 @@ const OUTSIDE: f64 = 0.1;
 
 /// Mean of independent repetitions, each with its own skin, noise and touches, and its 90 % confidence interval. The
 /// band of a single one has no width. `None` without repetitions.
+///
+/// ```
+/// use spts_studies::touches::band;
+///
+/// let found = band(&[0.7, 0.8, 0.9]).expect("three repetitions");
+/// assert!((found.mean - 0.8).abs() < 1e-12 && found.low < 0.7 && found.high > 0.9);
+/// assert!(band(&[]).is_none());
+/// ```
 pub fn band(repetitions: &[f64]) -> Option<Band> {
     Sample::of(repetitions).map(|sample| sample.band(OUTSIDE))
 }
