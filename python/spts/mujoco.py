@@ -224,12 +224,12 @@ class Attachment:
                 mujoco.set_mjcb_passive(_BEFORE.pop())
 
     def draw(self, scene, most=2e4):
-        """Draws the taxels into a scene of MuJoCo's viewer or renderer (`viewer.user_scn`, `renderer.scene`), those under
-        pressure in colour.
+        """Draws the taxels into a scene of MuJoCo's viewer or renderer, those under pressure in colour.
 
         Parameters
         ----------
         scene : mujoco.MjvScene
+            `viewer.user_scn` or `renderer.scene`.
         most : float
             Pressure of the brightest colour, Pa.
         """
@@ -465,8 +465,8 @@ _SAMPLES, _MOST = 5, 100_000
 
 
 def _surface(model, data, link, pitch, meshes):
-    """Taxels on the surface of a link, in its axes: positions (n, 3), m, outward normals (n, 3) and areas (n,), m². Keeps the
-    meshes of its geoms in `meshes`.
+    """Taxels on the surface of a link, in its axes: positions (n, 3), m, outward normals (n, 3) and areas (n,), m².
+    `meshes` keeps the meshes of its geoms.
 
     Samples a fifth of the pitch apart on every geom, without those inside other geoms, are gathered by the cells of a grid
     of the pitch and by the side that they look to.

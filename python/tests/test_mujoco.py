@@ -423,8 +423,8 @@ TUBE = """
 
 @pytest.mark.parametrize("cone", ["pyramidal", "elliptic"])
 def test_sensing_changes_nothing_and_adds_up(cone):
-    """Mode "sense" at a step of 2 ms: everything moves as without a skin, bit for bit. At every step Σ p·A is the normal
-    force of MuJoCo's contact, flat or round, and the wrenches are those of that contact."""
+    """Mode "sense" at a step of 2 ms: everything moves as without a skin, bit for bit. At every step Σ p·A is the
+    normal force of MuJoCo's contact, flat or round, and the wrenches are those of that contact."""
     text = TUBE.format(cone=cone, round="round", flat="flat")
     model = mujoco.MjModel.from_xml_string(text)
     bare, data = mujoco.MjData(model), mujoco.MjData(model)
@@ -501,7 +501,7 @@ def dog():
 
 
 def test_a_dog_is_dressed_and_stands(dog):
-    """At the model's own step of 2 ms it moves as a bare one, bit for bit, and its feet feel its weight within 0.5 %."""
+    """At the model's own step of 2 ms it moves as a bare one, bit for bit; its feet feel its weight within 0.5 %."""
     model, data, robot = dog
     bare = mujoco.MjData(model)
     assert len(robot.names) == len(robot.skins) == len(robot.wires) == 9 and robot.touches == [None] * 9

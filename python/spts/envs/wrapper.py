@@ -31,45 +31,29 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         env,
         skin,
         *,
-        site=None,
-        body=None,
-        pos=(0, 0, 0),
-        quat=(1, 0, 0, 0),
-        bodies="all",
-        link_geoms=None,
-        mode="sense",
         key="tactile",
         observe="samples",
         measurements=None,
         decoder="nn_lmmse",
         wire=None,
+        **place,
     ):
         from .. import mujoco as ours
 
-        options = {
-            "site": site,
-            "body": body,
-            "pos": pos,
-            "quat": quat,
-            "bodies": bodies,
-            "link_geoms": link_geoms,
-            "mode": mode,
-        }
         tactile = {"observe": observe, "measurements": measurements, "decoder": decoder, "wire": wire}
-        gym.utils.RecordConstructorArgs.__init__(self, _disable_deepcopy=True, skin=skin, key=key, **options, **tactile)
+        gym.utils.RecordConstructorArgs.__init__(self, _disable_deepcopy=True, skin=skin, key=key, **place, **tactile)
         gym.ObservationWrapper.__init__(self, env)
         inner = env.unwrapped
         if not (hasattr(inner, "model") and hasattr(inner, "data")):
             raise ValueError(f"`env` = {inner}: it has no `model` and `data` of MuJoCo")
-        self.touch = ours.attach(inner.model, inner.data, skin, **options)
-        self._resets = False
-        self.touch.hook(self._feel if mode == "foam" else None)
-        self._tactile, self._key = Tactile(skin, **tactile), key
         spaces = env.observation_space
         own = dict(spaces.spaces) if isinstance(spaces, gym.spaces.Dict) else {"observation": spaces}
         if key in own:
             raise ValueError(f'`key` = "{key}": the environment\'s observation has that already')
+        self._tactile, self._key, self._resets = Tactile(skin, **tactile), key, False
         self.observation_space = gym.spaces.Dict({**own, key: self._tactile.space})
+        self.touch = ours.attach(inner.model, inner.data, skin, **place)
+        self.touch.hook(self._feel if self.touch.mode == "foam" else None)
 
     def reset(self, *, seed=None, options=None):
         # what the environment computes while it resets is no touch
