@@ -273,11 +273,11 @@ class Attachment:
         own, others = self._own[geoms], self._others[geoms]
         # a flex has no geom
         found = (geoms >= 0).all(axis=1) & (own[:, 0] & others[:, 1] | others[:, 0] & own[:, 1])
-        for k in np.flatnonzero(found):
+        if found.any():
             pos, rotation = self._place
             turn = self.data.xmat[self._link].reshape(3, 3)
-            at = rotation.T @ (turn.T @ (contact.pos[k] - self.data.xpos[self._link]) - pos)
-            found[k] = self.skin.covers(at)
+            places = (contact.pos[found] - self.data.xpos[self._link] - turn @ pos) @ (turn @ rotation)
+            found[found] = [self.skin.covers(place) for place in places.tolist()]
         return found
 
     def _elapsed(self):
@@ -607,9 +607,10 @@ def _take_out(attachments):
         return
     contact = data.contact
     found = np.logical_or.reduce([attachment._foamed(contact) for attachment in attachments])
-    found &= contact.exclude == 0
+    exclude = contact.exclude
+    found &= exclude == 0
     if found.any():
-        contact.exclude[found] = 1
+        exclude[found] = 1
         mujoco.mj_makeConstraint(model, data)
         if hasattr(mujoco, "mj_island"):
             mujoco.mj_island(model, data)
