@@ -2,17 +2,27 @@
 
 use crate::foam::FoamLaw;
 use nalgebra::{Matrix3, Vector3};
+use parry3d_f64::math::Vector;
 
 /// A column of foam under a body.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Column {
     /// Number of the column on its skin.
     pub(crate) index: usize,
-    /// Place across the load, m, from the load's axis.
-    pub(crate) across_m: [f64; 2],
+    /// Its end on the free surface, m, and the outward normal there.
+    pub(crate) point_m: Vector,
+    pub(crate) normal: Vector,
     pub(crate) area_m2: f64,
     /// How deep the body reaches into the column where it is, m; negative for a gap.
     pub(crate) depth_m: f64,
+    /// Place across a load, m, from the load's axis.
+    pub(crate) across_m: [f64; 2],
+}
+
+impl Column {
+    pub(crate) fn new(index: usize, point_m: Vector, normal: Vector, area_m2: f64, depth_m: f64) -> Self {
+        Self { index, point_m, normal, area_m2, depth_m, across_m: [0.0; 2] }
+    }
 }
 
 /// Largest tilt, rad, of the body in the foam against where something else holds it.
@@ -123,7 +133,10 @@ mod tests {
         let cell_m = 1e-3;
         let places =
             (-side..=side).flat_map(|i| (-side..=side).map(move |j| (f64::from(i) * cell_m, f64::from(j) * cell_m)));
-        let column = |(index, (u, v))| Column { index, across_m: [u, v], area_m2: 1e-6, depth_m: depth(u, v) };
+        let column = |(index, (u, v))| Column {
+            across_m: [u, v],
+            ..Column::new(index, Vector::new(u, v, 0.0), Vector::Z, 1e-6, depth(u, v))
+        };
         places.enumerate().map(column).collect()
     }
 
@@ -173,7 +186,7 @@ mod tests {
         let law = Foam::default().law(f64::INFINITY);
         let mut beside = grid(10, |_, _| 0.0);
         beside.iter_mut().for_each(|c| c.across_m[0] -= 0.1);
-        let mut single = vec![Column { index: 0, across_m: [0.0; 2], area_m2: 1e-4, depth_m: -1e-3 }];
+        let mut single = vec![Column::new(0, Vector::ZERO, Vector::Z, 1e-4, -1e-3)];
         for columns in [&mut beside, &mut single] {
             settle(&law, columns, 3.0);
             assert!((sums(&law, columns)[0] / 3.0 - 1.0).abs() < 1e-11);

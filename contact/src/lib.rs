@@ -32,6 +32,7 @@ pub mod mesh;
 pub mod objects;
 mod prepared;
 pub mod shapes;
+mod support;
 mod surface;
 mod table;
 mod taxels;
@@ -50,7 +51,8 @@ pub use field::{
 };
 pub use foam::Foam;
 pub use prepared::PreparedMesh;
-pub use surface::{Solid, SurfaceField, SurfacePoints, Winding};
+pub use support::Support;
+pub use surface::{Part, Primitive, Solid, SurfaceField, SurfacePoints, Winding};
 pub use table::{CONTACT_FIELDS, ContactBuild, ContactTable, build_contact, build_contact_from};
 pub use taxels::TaxelBins;
 pub use touch::{Carried, TouchBody, TouchSkin};

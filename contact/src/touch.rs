@@ -6,8 +6,10 @@ use crate::envelope::KnownBody;
 use crate::field::{ContactField as _, PosedMesh, Wrench};
 use crate::foam::{Foam, FoamLaw};
 use crate::prepared::PreparedMesh;
-use crate::surface::{Solid, SurfaceField, SurfacePoints};
+use crate::support::{self, Support};
+use crate::surface::{Part, Solid, SurfaceField, SurfacePoints};
 use crate::taxels::TaxelBins;
+use parry3d_f64::math::Vector;
 use spts_input::Refusal;
 use spts_models::{PressureMap, SkinLayout, in_range};
 
@@ -17,6 +19,18 @@ pub struct TouchBody {
     /// The mesh, body axes, m.
     pub mesh: PreparedMesh,
     solid: Solid,
+}
+
+impl TouchBody {
+    /// A body of convex parts, whose surface `mesh` stands for it on flat skins.
+    pub fn of_parts(mesh: PreparedMesh, parts: Vec<Part>) -> Self {
+        Self { solid: Solid::of_parts(parts), mesh }
+    }
+
+    /// Its convex parts; empty if it is its mesh alone.
+    pub fn parts(&self) -> &[Part] {
+        self.solid.parts()
+    }
 }
 
 impl From<PreparedMesh> for TouchBody {
@@ -36,6 +50,11 @@ pub struct Carried<'a> {
     pub normal_n: f64,
     /// Where the force acts, m.
     pub centre_m: [f64; 3],
+    /// Direction of that force, if the pressures shall add up to it as vectors: Σ p A (n · along) = F. Without it,
+    /// Σ p A = F.
+    pub along: Option<[f64; 3]>,
+    /// Thickness of what the body wears, as another skin, m.
+    pub lining_m: f64,
 }
 
 /// A skin that any number of bodies can touch at once. Input: poses and velocities. Output: pressures and wrenches.
@@ -163,9 +182,9 @@ impl TouchSkin {
         }
     }
 
-    /// Thickness of the foam, m.
-    pub fn thickness_m(&self) -> f64 {
-        self.foam.thickness_m
+    /// Its foam.
+    pub fn foam(&self) -> &Foam {
+        &self.foam
     }
 
     /// Whether a place, m, lies in the foam, or beside it within half a thickness along the normal.
@@ -212,19 +231,6 @@ impl TouchSkin {
         self.bottomed
     }
 
-    /// Upper bound of the foam's stiffness in the contact, N/m: the value under the taxel with the largest pressure is
-    /// used everywhere. The slope of p = K δ/(1 − δ/δ_m) at the pressure p is K (1 + p/(K δ_m))².
-    pub fn stiffness_n_per_m(&self) -> f64 {
-        let stiffness_pa_per_m = self.foam.stiffness_pa_per_m;
-        let share = self.pressure.max() / (stiffness_pa_per_m * self.foam.max_depth_m());
-        self.touched_m2 * stiffness_pa_per_m * (1.0 + share).powi(2).min(FoamLaw::SOLID_RATIO)
-    }
-
-    /// Damping time of the foam, s.
-    pub fn damping_s(&self) -> f64 {
-        self.foam.damping_s
-    }
-
     /// Removes everything from the skin and places `bodies` on it, each with the mesh of its [`TouchBody`]. Writes the
     /// wrench on each body about its centre of mass into `wrenches`, in the same order. A body whose pose or velocity
     /// is not finite gets a wrench of NaN and presses nothing.
@@ -247,9 +253,7 @@ impl TouchSkin {
             }
         }
     }
-}
 
-impl TouchSkin {
     /// Removes everything from the skin and reads `loads`: what it feels of bodies that something else carries. The
     /// force of each spreads over the foam as it would at balance, under the body's own shape, so that the sum of
     /// pressure × area is the sum of the forces to 1e-9 of it. Loads that are not positive, or not finite, are passed
@@ -261,20 +265,44 @@ impl TouchSkin {
         if let Surface::Curved(field) = &mut self.surface {
             field.clear();
         }
-        for load in loads {
+        for (number, load) in loads.iter().enumerate() {
             let finite = load.posed.is_finite() && load.centre_m.iter().all(|v| v.is_finite());
             if !(finite && load.normal_n > 0.0 && load.normal_n < f64::INFINITY) {
                 continue;
             }
+            let centre = Vector::from(load.centre_m);
+            let columns = &mut self.columns;
+            self.surface.columns_under(number, load.body, &load.posed, load.lining_m, self.foam.thickness_m, columns);
+            if let Some(along) = load.along {
+                columns.retain_mut(|c| {
+                    let share = c.normal.dot(Vector::from(along));
+                    c.area_m2 *= share;
+                    share > 0.05
+                });
+            }
+            if columns.is_empty() {
+                // it touches the rim
+                columns.extend(self.surface.column_at(centre));
+            }
+            let nearest = columns
+                .iter()
+                .min_by(|a, b| (a.point_m - centre).length_squared().total_cmp(&(b.point_m - centre).length_squared()));
+            let Some(up) = load.along.map(Vector::from).or(nearest.map(|c| c.normal)) else { continue };
+            let u = up.any_orthonormal_vector();
+            let v = up.cross(u);
+            for c in columns.iter_mut() {
+                c.across_m = [(c.point_m - centre).dot(u), (c.point_m - centre).dot(v)];
+            }
+            let law = self.foam.law(load.posed.stiffness_pa_per_m);
+            settle(&law, columns, load.normal_n);
             match &mut self.surface {
                 Surface::Flat(flat) => {
+                    self.bottomed |= columns.iter().any(|c| c.depth_m > self.foam.thickness_m);
                     let maps = [&mut self.pressure, &mut self.electrode_pressure];
-                    let (touched_m2, bottomed) = flat.carry(load, &self.foam, &mut self.columns, maps);
                     // two bodies in one place count twice
-                    self.touched_m2 += touched_m2;
-                    self.bottomed |= bottomed;
+                    self.touched_m2 += flat.carry(columns, &law, maps);
                 }
-                Surface::Curved(field) => field.carry(&load.body.solid, load, &mut self.columns),
+                Surface::Curved(field) => field.carry(columns, &law),
             }
         }
         if let Surface::Curved(field) = &self.surface {
@@ -283,43 +311,82 @@ impl TouchSkin {
             (self.touched_m2, self.bottomed) = (field.touched_m2(), field.bottomed());
         }
     }
+
+    /// Springs that stand for the foam under a body for one step of `step_s`, with what it wears, `lining_m` thick. Adds
+    /// them to `out`; they are about `posed`'s velocity, which is that at the end of the step as far as it is known.
+    ///
+    /// Returns the normal force, N, that the foam has at that velocity; `None` if the body is nowhere near.
+    pub fn supports(
+        &mut self,
+        body: &TouchBody,
+        posed: &PosedMesh<'_>,
+        lining_m: f64,
+        step_s: f64,
+        out: &mut Vec<Support>,
+    ) -> Option<f64> {
+        let lag_s = step_s + self.foam.damping_s;
+        // what may come into the foam in this step
+        let speed = Vector::from(posed.velocity_m_per_s).length();
+        let spin = Vector::from(posed.angular_velocity_rad_per_s).length() * body.mesh.extent_m();
+        let gap_m = (1.5 * lag_s * (speed + spin)).clamp(self.foam.thickness_m, 10.0);
+        self.surface.columns_under(0, body, posed, lining_m, gap_m, &mut self.columns);
+        if self.columns.is_empty() {
+            return None;
+        }
+        let law = self.foam.law(posed.stiffness_pa_per_m);
+        Some(support::of(&law, &self.columns, posed, lag_s, out))
+    }
+}
+
+impl Surface {
+    /// The columns under the body at place `number` of a list, and up to `gap_m` below it.
+    fn columns_under(
+        &mut self,
+        number: usize,
+        body: &TouchBody,
+        posed: &PosedMesh<'_>,
+        lining_m: f64,
+        gap_m: f64,
+        out: &mut Vec<Column>,
+    ) {
+        let gap_m = gap_m + lining_m;
+        match self {
+            Self::Flat(flat) => {
+                flat.known.resize_with(flat.known.len().max(number + 1), KnownBody::default);
+                flat.layer.swap_known(&mut flat.known[number]);
+                flat.layer.expect(&body.mesh);
+                flat.layer.columns_under(posed, &body.solid, gap_m, out);
+                flat.layer.swap_known(&mut flat.known[number]);
+            }
+            Self::Curved(field) => field.columns_under(posed, &body.solid, gap_m, out),
+        }
+        out.iter_mut().for_each(|c| c.depth_m += lining_m);
+    }
+
+    /// The column nearest to a place, m.
+    fn column_at(&mut self, place_m: Vector) -> Option<Column> {
+        match self {
+            Self::Flat(flat) => Some(flat.layer.column_at([place_m.x, place_m.y])),
+            Self::Curved(field) => field.column_at(place_m),
+        }
+    }
 }
 
 impl FlatSkin {
-    /// Adds the pressures under a body that is carried to `maps`. The area under pressure, m², and whether a body has
-    /// gone through.
-    fn carry(
-        &mut self,
-        load: &Carried<'_>,
-        foam: &Foam,
-        columns: &mut Vec<Column>,
-        maps: [&mut PressureMap; 2],
-    ) -> (f64, bool) {
-        let [x_m, y_m, _] = load.centre_m;
-        let mut known = KnownBody::default();
-        self.layer.swap_known(&mut known);
-        self.layer.expect(&load.body.mesh);
-        self.layer.columns_under(&load.posed, &load.body.solid, [x_m, y_m], columns);
-        if columns.is_empty() {
-            // it touches the rim
-            columns.push(self.layer.column_at([x_m, y_m]));
-        }
-        let law = foam.law(load.posed.stiffness_pa_per_m);
-        settle(&law, columns, load.normal_n);
-        let (mut touched, mut bottomed) = (0_usize, false);
-        for c in columns.iter() {
+    /// Adds the pressures of `columns` at their depths to `maps`. The area under pressure, m².
+    fn carry(&mut self, columns: &[Column], law: &FoamLaw, maps: [&mut PressureMap; 2]) -> f64 {
+        let mut touched = 0_usize;
+        for c in columns {
             let p = law.pressure_pa(c.depth_m);
             self.layer.pressure_pa[c.index] = p;
             touched += usize::from(p > 0.0);
-            bottomed |= c.depth_m > foam.thickness_m;
         }
         for (sum, map) in maps.into_iter().zip(self.bins.means(&self.layer.pressure_pa, Some(self.layer.patch))) {
             for (sum, p) in sum.values_mut().iter_mut().zip(map.values()) {
                 *sum += p;
             }
         }
-        self.layer.swap_known(&mut known);
-        (touched as f64 * self.cell_area_m2, bottomed)
+        touched as f64 * self.cell_area_m2
     }
 
     /// Adds the pressures under `bodies` to `maps`. The area under pressure, m², and whether a body has gone through.
@@ -333,7 +400,7 @@ impl FlatSkin {
         self.known.resize_with(bodies.len().max(self.known.len()), KnownBody::default);
         let (mut cells, mut bottomed) = (0_usize, false);
         for ((body, posed), known) in bodies.iter().zip(&mut self.known) {
-            if posed.is_finite() && body.solid.is_apart(posed, self.bounds_m) {
+            if posed.is_finite() && body.solid.standing(posed).is_apart(self.bounds_m) {
                 wrenches.push(Wrench::NONE);
                 continue;
             }

@@ -12,8 +12,9 @@ The skin's frame is the site's, or a place on a body: z outward, the free surfac
 
 Two modes. In mode "sense" MuJoCo's own contact moves everything, as without a skin, and the skin spreads the normal force
 of that contact over the foam: the sum of pressure × area is that force, at any step. In mode "foam" the foam itself
-carries the bodies, where there is foam, in place of MuJoCo's contact: it gives way and bounces as foam does, and needs a
-short step. Everywhere else, for other data and for copies, MuJoCo's contact stays; the model is not changed.
+carries the bodies, where there is foam, in place of MuJoCo's contact: it gives way and bounces as foam does. Its law is
+implicit, and solved by MuJoCo together with all other constraints, so that it is stable at the model's own step. Everywhere
+else, for other data and for copies, MuJoCo's contact stays; the model is not changed.
 """
 
 from __future__ import annotations
@@ -27,9 +28,12 @@ import numpy as np
 
 from ._spts import Body, Mount, Skin, Wire
 
-# Courant-like number of a foam and the mass on it above which the step is called too long. With semi-implicit steps the
-# two are stable as long as k dt²/m + 2 c dt/m < 4.
-_LONG = 1.0
+# Stiffness of foam along its surface, relative to that across it: G/(K h) of an open foam with Poisson's ratio 0.25. With
+# a pyramidal cone MuJoCo solves for one stiffness alone, and it is μ²/2.
+_SHEAR = 0.4
+# Most times that a step is solved anew with the foam's law about another velocity, and the share of a force that may be
+# off before: what is left is of the order of its square.
+_TRIALS, _OFF = 12, 0.05
 
 
 def attach(
@@ -94,10 +98,13 @@ class Attachment:
         if mode not in ("sense", "foam"):
             raise ValueError(f'`mode` = "{mode}"; valid: "sense", "foam"')
         self.mode = mode
-        if mode == "foam" and model.opt.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0):
-            raise ValueError(
-                "`model.opt.enableflags` has `sleep`: foam does not wake what sleeps; clear it, or let the bodies stay awake"
-            )
+        if mode == "foam":
+            if model.opt.enableflags & getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0):
+                raise ValueError(
+                    "`model.opt.enableflags` has `sleep`: foam does not wake what sleeps; clear it, or let the bodies stay awake"
+                )
+            if model.opt.disableflags & (mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT):
+                raise ValueError("`model.opt.disableflags` turns contact off, and with it foam; use mode \"sense\"")
         pos, quat = (np.asarray(v, np.float64) for v in (pos, quat))
         if pos.shape != (3,) or quat.shape != (4,) or not (np.isfinite(pos).all() and np.linalg.norm(quat) > 1e-9):
             raise ValueError(
@@ -137,14 +144,16 @@ class Attachment:
         self._own, self._others = own, others
         frame = (*pos.tolist(), *rotation.tolist())
         self._mount = Mount(skin, link, frame, list(self.bodies.items()), model.body_rootid.tolist(), _Arrays(data))
-        # what a load moves at the least: inverse masses of the body and of the link add up
-        inverse = model.body_invweight0[:, 0]
-        self._mass = min(1.0 / max(inverse[b] + inverse[link], 1e-12) for b in self.bodies)
         self._link, self._place = link, (pos, rotation.reshape(3, 3))
+        # geoms that stand for the link and the bodies in contacts
+        self._geoms = {body: _a_geom(model, body, others) for body in self.bodies}
+        self._link_geom = _a_geom(model, link, own)
+        if mode == "foam" and None in (self._link_geom, *self._geoms.values()):
+            raise ValueError(f'body "{model.body(link).name}" or one of `bodies` has no geom, which foam needs; give it one')
         self._last = self._failed = None
-        self._warned = False
         self._felt_at = None
         self._each = None
+        self._group = None
         # time since the last touch in mode "sense", when nothing touches any more
         self._idle = 0.0
         # whether every look is at the present moment of the data
@@ -157,7 +166,10 @@ class Attachment:
             failed, self._failed = self._failed, None
             raise failed
         if self._follows and self.data.time != self._felt_at:
-            _read([self], self._elapsed())
+            elapsed = self._elapsed()
+            (self._group or self._alone()).read(elapsed)
+        if self.data._address in _HOOKED and mujoco.get_mjcb_control() is not _control and self in _hooked(self.data):
+            raise RuntimeError("another `mjcb_control` has been set after `hook()`: set it before, or use `step`")
         if self._idle > 0.0:
             # nothing has touched it for that long
             self._last = self._mount.read(self._idle, [])
@@ -178,6 +190,7 @@ class Attachment:
     def reset(self):
         """Takes every body off the skin and begins its time anew, as after `mujoco.mj_resetData`."""
         self.skin.reset()
+        self._mount.release()
         self._last = self._felt_at = None
         self._idle = 0.0
 
@@ -190,8 +203,8 @@ class Attachment:
         each : callable, optional
             Called with every touch, in mode "foam".
 
-        In mode "sense", `last` then is what the skin feels at the present moment of the data. In mode "foam" the forces go
-        into `qfrc_passive` by MuJoCo's callback `mjcb_passive`, for this data alone; one that is set already is called
+        In mode "sense", `last` then is what the skin feels at the present moment of the data. In mode "foam" the foam
+        comes into every step by MuJoCo's callback `mjcb_control`, for this data alone; one that is set already is called
         first.
         """
         if self.mode == "sense":
@@ -201,27 +214,28 @@ class Attachment:
                 )
             self._follows = True
             return
-        off = self.model.opt.disableflags
-        if all(off & flag for flag in _PASSIVE_OFF):
-            raise ValueError("`model.opt.disableflags` turns passive forces off, and with them the skin; use `step`")
+        if self.model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION:
+            raise ValueError("`model.opt.disableflags` turns actuation off, and with it `mjcb_control`; use `step`")
         if not _HOOKED:
-            _BEFORE.append(mujoco.get_mjcb_passive())
-            mujoco.set_mjcb_passive(_passive)
-        hooked = _HOOKED.setdefault(self.data._address, [])
+            _BEFORE.append(mujoco.get_mjcb_control())
+            mujoco.set_mjcb_control(_control)
+        hooked = _hooked(self.data)
         if self not in hooked:
-            hooked.append(self)
+            _HOOKED[self.data._address] = _Group([*hooked, self])
         self._each = each
 
     def detach(self):
         """Ends the skin: MuJoCo's contact acts everywhere again, and `hook` has ended."""
         self._follows = False
-        hooked = _HOOKED.get(self.data._address, [])
+        hooked = _hooked(self.data)
         if self in hooked:
             hooked.remove(self)
-            if not hooked:
+            if hooked:
+                _HOOKED[self.data._address] = _Group(hooked)
+            else:
                 del _HOOKED[self.data._address]
             if not _HOOKED:
-                mujoco.set_mjcb_passive(_BEFORE.pop())
+                mujoco.set_mjcb_control(_BEFORE.pop())
 
     def draw(self, scene, most=2e4):
         """Draws the taxels into a scene of MuJoCo's viewer or renderer, those under pressure in colour.
@@ -263,22 +277,19 @@ class Attachment:
     def __exit__(self, *_):
         self.detach()
 
-    def _apply(self, dt):
-        self._last = self._mount.apply(dt)
-        self._warn(dt)
+    def __reduce_ex__(self, protocol):
+        raise TypeError("an attachment is on one data and does not copy: copy the skin, and attach that to the other data")
 
-    def _foamed(self, contact):
-        """Which contacts are between the link and the bodies, where there is foam: (contacts,) of bool."""
-        geoms = contact.geom
-        own, others = self._own[geoms], self._others[geoms]
-        # a flex has no geom
-        found = (geoms >= 0).all(axis=1) & (own[:, 0] & others[:, 1] | others[:, 0] & own[:, 1])
-        if found.any():
-            pos, rotation = self._place
-            turn = self.data.xmat[self._link].reshape(3, 3)
-            places = (contact.pos[found] - self.data.xpos[self._link] - turn @ pos) @ (turn @ rotation)
-            found[found] = [self.skin.covers(place) for place in places.tolist()]
-        return found
+    def _alone(self):
+        self._group = _Group([self])
+        return self._group
+
+    def _covers(self, places):
+        """Which places in the world, (n, 3), lie in the foam."""
+        pos, rotation = self._place
+        turn = self.data.xmat[self._link].reshape(3, 3)
+        places = (places - self.data.xpos[self._link] - turn @ pos) @ (turn @ rotation)
+        return [self.skin.covers(place) for place in places.tolist()]
 
     def _elapsed(self):
         """Time since the last touch, s. It runs only when the data's does: `mj_forward` repeats a moment."""
@@ -290,29 +301,256 @@ class Attachment:
         self._felt_at = time
         return 0.0 if before is None else time - before
 
-    def _passive(self):
-        """Adds the forces to `qfrc_passive`."""
-        data = self.data
-        self._last, loads = self._mount.loads(self._elapsed())
-        for body, load in loads:
-            mujoco.mj_applyFT(self.model, data, load[:3], load[3:], data.xipos[body], body, data.qfrc_passive)
-        if self._each is not None:
-            self._each(self._last)
-        self._warn(self.model.opt.timestep)
 
-    def _warn(self, dt):
-        if not self._warned and self._last.area > 0.0:
-            stiffness, damping = self._mount.stiffness
-            number = (stiffness * dt + 2.0 * damping) * dt / self._mass
-            if number > _LONG:
-                self._warned = True
-                longest = (math.sqrt(damping**2 + _LONG * stiffness * self._mass) - damping) / stiffness
-                warnings.warn(
-                    f"`model.opt.timestep` = {dt:g} s is long for the foam: {stiffness:.3g} N/m and {damping:.3g} N s/m on "
-                    f"{self._mass:.3g} kg need {longest:.2g} s or less",
-                    RuntimeWarning,
-                    stacklevel=5,
-                )
+def _a_geom(model, body, among):
+    """A geom of `body`, or of what is welded to it, for contacts; one of `among` if there is one, (geoms,) of bool."""
+    weld = model.body_weldid
+    for geoms in (among & (model.geom_bodyid == body), model.geom_bodyid == body, weld[model.geom_bodyid] == weld[body]):
+        found = np.flatnonzero(geoms)
+        if len(found):
+            return int(found[0])
+    return None
+
+
+class _Group:
+    """Skins that step together, on one model and data."""
+
+    def __init__(self, attachments):
+        model, data = attachments[0].model, attachments[0].data
+        if any(a.model is not model or a.data is not data for a in attachments):
+            raise ValueError("`attachments` are of several models or data; one step moves one of them")
+        self.model, self.data, self.attachments = model, data, attachments
+        self._own = np.stack([a._own for a in attachments])
+        self._others = np.stack([a._others for a in attachments])
+        self.foams = [k for k, a in enumerate(attachments) if a.mode == "foam"]
+        # foam on foam: two layers, one behind the other, which one of the two skins carries
+        self._worn = {k: [] for k in range(len(attachments))}
+        self._passed = {k: [] for k in range(len(attachments))}
+        for k in self.foams:
+            for other in self.foams:
+                a, b = attachments[k], attachments[other]
+                if b._link in a.bodies and a._link in b.bodies:
+                    self._worn[k].append((b._link, b.skin.thickness, b.skin.foam[0]))
+                    if k > other:
+                        self._passed[k].append(b._link)
+        # contacts that stand for foam from this number on; of each its skin, its body, and its frame
+        self._first, self._springs = 0, []
+        self._force = np.empty(6)
+        self._contact = _blank()
+
+    def step(self):
+        model, data = self.model, self.data
+        if not self.foams or all(self.attachments[k] in _hooked(data) for k in self.foams):
+            mujoco.mj_step(model, data)
+        elif model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+            raise ValueError(
+                "`model.opt.integrator` = RK4; valid: Euler, implicit, implicitfast; with RK4 use `hook()` and `mj_step`"
+            )
+        else:
+            mujoco.mj_step1(model, data)
+            self.press()
+            mujoco.mj_step2(model, data)
+            self._hold(model.opt.timestep)
+        self.read(model.opt.timestep)
+
+    def _foamed(self, contact):
+        """Which contacts are between the link of a skin and its bodies, where there is foam: (skins, contacts)."""
+        geoms = contact.geom
+        one, other = geoms[:, 0], geoms[:, 1]
+        found = self._own[:, one] & self._others[:, other] | self._others[:, one] & self._own[:, other]
+        # a flex has no geom
+        found &= (one >= 0) & (other >= 0)
+        return found
+
+    def _covered(self, found, places):
+        for k in np.flatnonzero(found.any(axis=1)):
+            found[k, found[k]] = self.attachments[k]._covers(places[found[k]])
+        return found
+
+    def press(self, always=False):
+        """Puts foam in place of MuJoCo's contacts, as contacts of its own, between `mj_step1` and `mj_step2`.
+
+        The law of a contact is about the velocity at the end of the step. That is the present one where forces hardly
+        depend on it; else, and `always`, the step is tried.
+        """
+        model, data = self.model, self.data
+        dt, taken = model.opt.timestep, False
+        if data.ncon:
+            contact = data.contact
+            found = self._foamed(contact)[self.foams].any(axis=0)
+            if found.any():
+                every = self._foamed(contact)
+                every[[k for k in range(len(every)) if k not in self.foams]] = False
+                found = self._covered(every, contact.pos).any(axis=0) & (contact.exclude == 0)
+                taken = bool(found.any())
+                contact.exclude[found] = 1
+        self._first, qvel, last = data.ncon, None, {}
+        for trial in range(_TRIALS):
+            self._springs, carried, rest = [], {}, {}
+            for k in self.foams:
+                attachment = self.attachments[k]
+                rows, bodies, near = attachment._mount.supports(dt, self._passed[k], self._worn[k])
+                carried.update({(k, body): force for body, force in near})
+                for row, body in zip(rows, bodies):
+                    self._springs.append((k, body, row))
+                    rest[k, body] = rest.get((k, body), 0.0) + row[12]
+            if qvel is not None:
+                data.qvel[:] = qvel
+                mujoco.mj_comVel(model, data)
+            if self._springs or taken or trial:
+                self._put()
+            calm = all(force > 0.0 and abs(rest[key] - force) <= _OFF * force for key, force in carried.items())
+            if not always and (not carried or (trial == 0 and calm)):
+                return
+            if trial == 0:
+                mujoco.mj_fwdActuation(model, data)
+                mujoco.mj_fwdAcceleration(model, data)
+            mujoco.mj_fwdConstraint(model, data)
+            data.qacc_warmstart[:] = data.qacc
+            found = {}
+            for (k, body, _), force in zip(self._springs, self._forces()):
+                found[k, body] = found.get((k, body), 0.0) + force[0]
+
+            def settled(key, force):
+                now = found.get(key, 0.0)
+                # what was not touched may be at the end of the step
+                if force <= 0.0:
+                    return trial > 0
+                return min(abs(now - force), abs(now - last.get(key, np.inf))) <= _OFF * max(now, force)
+
+            if all(settled(key, force) for key, force in carried.items()):
+                return
+            last = found
+            qvel = data.qvel.copy()
+            data.qvel += dt * data.qacc
+            mujoco.mj_comVel(model, data)
+        data.qvel[:] = qvel
+        mujoco.mj_comVel(model, data)
+
+    def _put(self):
+        """Makes the constraints anew with a contact for every spring."""
+        model, data = self.model, self.data
+        dt, contact = model.opt.timestep, self._contact
+        elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+        data.ncon = self._first
+        for k, body, row in self._springs:
+            attachment = self.attachments[k]
+            friction = attachment.skin.foam[1]
+            contact.pos, contact.frame, contact.dist = row[:3], row[3:12], min(-row[12] / row[13], 0.0)
+            contact.geom = contact.geom1, contact.geom2 = attachment._link_geom, attachment._geoms[body]
+            contact.dim, contact.friction = (3 if friction > 0.0 else 1), (max(friction, 1e-5),) * 2 + (1e-5,) * 3
+            if mujoco.mj_addContact(model, data, contact):
+                raise RuntimeError("the data has no room for more contacts: `<size memory=…/>` of the model")
+        mujoco.mj_makeConstraint(model, data)
+        contacts, margin = data.contact, data.efc_margin
+        for number, (k, _, row) in enumerate(self._springs, self._first):
+            skin, at = self.attachments[k].skin, int(contacts.efc_address[number])
+            if at < 0:
+                continue
+            # with J v + dt J a the velocity at the end of the step: D (aref − J a) is the force of `Support`, and
+            # aref = −J v/dt − (pos − margin) with these K, B and I
+            friction, inertia = skin.foam[1], row[13] * (dt + skin.damping) * dt
+            push, pull = row[12] / inertia, row[14:16]
+            if friction <= 0.0:
+                weights, pushes = [inertia], [push]
+            elif elliptic:
+                contacts.mu[number] = friction / math.sqrt(_SHEAR)
+                weights = [inertia, _SHEAR * inertia, _SHEAR * inertia]
+                pushes = [push, *(pull / weights[1])]
+            else:
+                weights = [0.25 * inertia] * 4
+                x, y = 2.0 * pull / (friction * inertia)
+                pushes = [push + x, push - x, push + y, push - y]
+            rows = slice(at, at + len(weights))
+            data.efc_D[rows] = weights
+            data.efc_R[rows] = 1.0 / np.asarray(weights)
+            data.efc_KBIP[rows] = (1.0, 1.0 / dt, 1.0, 0.0)
+            data.efc_pos[rows] = margin[rows] - pushes
+        if hasattr(mujoco, "mj_island"):
+            mujoco.mj_island(model, data)
+        mujoco.mj_projectConstraint(model, data)
+        mujoco.mj_referenceConstraint(model, data)
+
+    def _forces(self):
+        """Forces of the springs, (springs, 3), N, along their frames."""
+        forces = np.zeros((len(self._springs), 3))
+        for number in range(len(self._springs)):
+            mujoco.mj_contactForce(self.model, self.data, self._first + number, self._force)
+            forces[number] = self._force[:3]
+        return forces
+
+    def _hold(self, elapsed):
+        """Lets friction stretch the foam by what the step was solved to."""
+        forces = self._forces()
+        for k in self.foams:
+            mine = [number for number, spring in enumerate(self._springs) if spring[0] == k]
+            attachment = self.attachments[k]
+            attachment._mount.hold(elapsed, forces[mine])
+
+    def read(self, dt):
+        """Lets the skins feel the contacts that the data has, `dt` s after the last time."""
+        model, data = self.model, self.data
+        loads = {}
+        if data.ncon:
+            contact = data.contact
+            found = self._foamed(contact) & (contact.efc_address >= 0)
+            for number, (k, _, _) in enumerate(self._springs, self._first):
+                # of the skins of one link, its own
+                same = [other for other, a in enumerate(self.attachments) if a._link == self.attachments[k]._link]
+                found[same, number] = False
+                found[k, number] = True
+            if found.any():
+                own = found[:, self._first :].copy() if self._springs else None
+                found = self._covered(found, contact.pos)
+                if own is not None:
+                    found[:, self._first :] |= own
+                geoms, places, frames = contact.geom, contact.pos, contact.frame
+                for number in np.flatnonzero(found.any(axis=0)):
+                    mujoco.mj_contactForce(model, data, number, self._force)
+                    if self._force[0] <= 0.0:
+                        continue
+                    frame, pos = frames[number].reshape(3, 3), places[number]
+                    push, twist = self._force[:3] @ frame, self._force[3:] @ frame
+                    for k in np.flatnonzero(found[:, number]):
+                        # the contact's normal points from its first geom to its second, and the force is on the second
+                        first = self._others[k, geoms[number, 0]]
+                        sign = -1.0 if first else 1.0
+                        body = int(model.geom_bodyid[geoms[number, 0 if first else 1]])
+                        along = None
+                        if self.attachments[k].mode == "foam":
+                            body = self._body_of(number, k, body)
+                            along = tuple((sign * frame[0]).tolist())
+                        about = sign * (twist + np.cross(pos - data.xpos[body], push))
+                        before = loads.setdefault(k, {}).get((body, along), (0.0, 0.0, 0.0, 0.0))
+                        more = (self._force[0], self._force[0] * pos, sign * push, about)
+                        loads[k][body, along] = tuple(a + b for a, b in zip(before, more))
+        for k, attachment in enumerate(self.attachments):
+            attachment._idle += dt
+            felt = loads.get(k)
+            if felt or attachment._last is None or attachment._last.area > 0.0:
+                found = [
+                    (body, float(normal), (at / normal).tolist(), push.tolist(), twist.tolist(), along)
+                    for (body, along), (normal, at, push, twist) in (felt or {}).items()
+                ]
+                attachment._last = attachment._mount.read(attachment._idle, found, self._worn[k])
+                attachment._idle = 0.0
+
+    def _body_of(self, number, k, body):
+        """The body of a contact for a skin: that of the spring, whose geom may be of what is welded to it."""
+        if number < self._first:
+            return body
+        owner, pressed, _ = self._springs[number - self._first]
+        return pressed if owner == k else self.attachments[owner]._link
+
+
+def _blank():
+    """A contact with nothing in it but what MuJoCo wants of all."""
+    contact = mujoco.MjContact()
+    contact.solref, contact.solimp = (-1.0, -1.0), (0.9, 0.95, 0.001, 0.5, 2.0)
+    for name in ("flex", "elem", "vert"):
+        if hasattr(contact, name):
+            setattr(contact, name, (-1, -1))
+    return contact
 
 
 def dress(
@@ -416,6 +654,7 @@ class Dress:
         #: Names of the links.
         self.names = names
         self.model, self.data = attachments[0].model, attachments[0].data
+        self._group = _Group(attachments)
 
     @property
     def skins(self):
@@ -435,8 +674,8 @@ class Dress:
     def step(self, steps=1):
         """Steps the model, in place of `mujoco.mj_step`; what every link feels."""
         for _ in range(steps):
-            touches = step(*self.attachments)
-        return touches
+            self._group.step()
+        return self.touches
 
     def draw(self, scene, most=2e4):
         """Draws all taxels; as `Attachment.draw`."""
@@ -569,52 +808,37 @@ def _inside(model, data, geom, places):
     return np.zeros(len(places), bool)
 
 
-# Skins that every step feels, by the address of their data, and the callback that was set before them.
+# Skins in mode "foam" that every step feels, by the address of their data, and the callback that was set before them.
 _HOOKED, _BEFORE = {}, []
-_PASSIVE_OFF = [
-    getattr(mujoco.mjtDisableBit, name)
-    for name in ("mjDSBL_PASSIVE", "mjDSBL_SPRING", "mjDSBL_DAMPER")
-    if hasattr(mujoco.mjtDisableBit, name)
-]
+
+
+def _hooked(data):
+    group = _HOOKED.get(data._address)
+    return [] if group is None else list(group.attachments)
 
 
 # By addresses: MuJoCo also calls it for models that it is compiling, which have no object in Python.
 @ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-def _passive(model, data):
-    hooked = _HOOKED.get(data, ())
+def _control(model, data):
+    group = _HOOKED.get(data)
     before = _BEFORE[-1] if _BEFORE else None
     if isinstance(before, ctypes._CFuncPtr):
         before(model, data)
-    elif before is not None and hooked:
-        before(hooked[0].model, hooked[0].data)
-    if hooked:
-        try:
-            _take_out(hooked)
-        except Exception as error:
-            hooked[0]._failed = error
-    for attachment in hooked:
-        try:
-            attachment._passive()
-        except Exception as error:
-            # a step of others cannot raise it
-            attachment._failed = error
-
-
-def _take_out(attachments):
-    """Takes MuJoCo's contacts out of this step where there is foam. Computes the constraints again without them."""
-    model, data = attachments[0].model, attachments[0].data
-    if data.ncon == 0:
+    elif before is not None and group is not None:
+        before(group.model, group.data)
+    if group is None:
         return
-    contact = data.contact
-    found = np.logical_or.reduce([attachment._foamed(contact) for attachment in attachments])
-    exclude = contact.exclude
-    found &= exclude == 0
-    if found.any():
-        exclude[found] = 1
-        mujoco.mj_makeConstraint(model, data)
-        if hasattr(mujoco, "mj_island"):
-            mujoco.mj_island(model, data)
-        mujoco.mj_projectConstraint(model, data)
+    try:
+        elapsed = [attachment._elapsed() for attachment in group.attachments]
+        group.press(always=True)
+        group._hold(max(elapsed))
+        group.read(max(elapsed))
+        for attachment in group.attachments:
+            if attachment._each is not None:
+                attachment._each(attachment._last)
+    except Exception as error:
+        # a step of others cannot raise it
+        group.attachments[0]._failed = error
 
 
 def step(*attachments):
@@ -630,62 +854,11 @@ def step(*attachments):
     list of spts.Touch
         What each feels, in the order of `attachments`.
     """
-    model, data = attachments[0].model, attachments[0].data
-    if any(a.model is not model or a.data is not data for a in attachments):
-        raise ValueError("`attachments` are of several models or data; one step moves one of them")
-    foams = [attachment for attachment in attachments if attachment.mode == "foam"]
-    if not foams:
-        mujoco.mj_step(model, data)
-    elif model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
-        raise ValueError(
-            "`model.opt.integrator` = RK4; valid: Euler, implicit, implicitfast; with RK4 use `hook()` and `mj_step`"
-        )
-    else:
-        mujoco.mj_step1(model, data)
-        _take_out(foams)
-        mujoco.mj_referenceConstraint(model, data)
-        done = []
-        try:
-            for attachment in foams:
-                attachment._apply(model.opt.timestep)
-                done.append(attachment)
-            mujoco.mj_step2(model, data)
-        finally:
-            for attachment in reversed(done):
-                attachment._mount.restore()
-    _read([attachment for attachment in attachments if attachment.mode == "sense"], model.opt.timestep)
+    group = attachments[0]._group
+    if group is None or len(group.attachments) != len(attachments) or any(a is not b for a, b in zip(group.attachments, attachments)):
+        group = attachments[0]._group = _Group(list(attachments))
+    group.step()
     return [attachment.last for attachment in attachments]
-
-
-def _read(attachments, dt):
-    """Lets skins in mode "sense" feel the forces of MuJoCo's contact that the data has, `dt` s after the last time."""
-    if not attachments:
-        return
-    model, data = attachments[0].model, attachments[0].data
-    contact, ncon = data.contact, data.ncon
-    geoms, force = contact.geom if ncon else np.empty((0, 2), int), np.empty(6)
-    places, frames, acts = (contact.pos, contact.frame, contact.efc_address >= 0) if ncon else ((), (), ())
-    for attachment in attachments:
-        loads = {}
-        for k in np.flatnonzero(attachment._foamed(contact) & acts) if ncon else ():
-            mujoco.mj_contactForce(model, data, k, force)
-            # the contact's normal points from its first geom to its second, and the force is on the second
-            first = attachment._others[geoms[k, 0]]
-            body, sign = int(model.geom_bodyid[geoms[k, 0 if first else 1]]), -1.0 if first else 1.0
-            frame, pos = frames[k].reshape(3, 3), places[k]
-            push = sign * (force[:3] @ frame)
-            twist = sign * (force[3:] @ frame) + np.cross(pos - data.xpos[body], push)
-            normal, at, pushed, twisted = loads.get(body, (0.0, 0.0, 0.0, 0.0))
-            loads[body] = normal + force[0], at + force[0] * pos, pushed + push, twisted + twist
-        found = [
-            (body, float(normal), (at / normal).tolist(), push.tolist(), twist.tolist())
-            for body, (normal, at, push, twist) in loads.items()
-            if normal > 0.0
-        ]
-        attachment._idle += dt
-        if found or attachment._last is None or attachment._last.area > 0.0:
-            attachment._last = attachment._mount.read(attachment._idle, found)
-            attachment._idle = 0.0
 
 
 def body_of(model, body):
@@ -707,7 +880,8 @@ def body_of(model, body):
 def _body(model, body, meshes):
     """As `body_of`; `meshes` holds those of geoms that are known."""
     geoms = np.flatnonzero(model.geom_bodyid == body)
-    parts = [meshes[g] if g in meshes else _mesh(model, g) for g in (_colliding(model, geoms) or geoms)]
+    geoms = _colliding(model, geoms) or geoms.tolist()
+    parts = [meshes[g] if g in meshes else _mesh(model, g) for g in geoms]
     if not parts:
         raise ValueError(f'body "{model.body(body).name}" has no geom; give its shape: bodies={{name: spts.Body}}')
     vertices, faces, first = [], [], 0
@@ -715,7 +889,20 @@ def _body(model, body, meshes):
         vertices.append(points)
         faces.append(triangles + first)
         first += len(points)
-    return Body.from_vertices(np.concatenate(vertices), np.concatenate(faces))
+    shapes = [_shape(model, geom) for geom in geoms]
+    shapes = shapes if all(shapes) else []
+    return Body.from_vertices(np.concatenate(vertices), np.concatenate(faces), parts=shapes)
+
+
+def _shape(model, geom):
+    """A geom as a part of a `spts.Body`; None for what has no closed form."""
+    kind = mujoco.mjtGeom(int(model.geom_type[geom])).name[7:].lower()
+    if kind not in ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box"):
+        return None
+    rotation = np.empty(9)
+    mujoco.mju_quat2Mat(rotation, model.geom_quat[geom])
+    size = np.zeros(3) if kind == "plane" else model.geom_size[geom]
+    return kind, size.tolist(), model.geom_pos[geom].tolist(), rotation.tolist()
 
 
 def _of_geom(model, name):
@@ -825,7 +1012,7 @@ class _Arrays:
     """The arrays of an mjData that a mount reads and writes."""
 
     def __init__(self, data):
-        for name in ("xpos", "xmat", "xipos", "cvel", "subtree_com", "xfrc_applied"):
+        for name in ("xpos", "xmat", "cvel", "subtree_com"):
             setattr(self, name, getattr(data, name))
 
 

@@ -9,7 +9,7 @@ use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use spts::contact::mesh::{TriMesh, cuboid, load, revolve, sphere};
-use spts::contact::{PreparedMesh, TouchBody};
+use spts::contact::{Part, PreparedMesh, Primitive, TouchBody};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ffi::CString;
 use std::path::PathBuf;
@@ -46,12 +46,20 @@ fn cap(radius_m: f64, z_m: f64) -> impl DoubleEndedIterator<Item = [f64; 2]> {
 }
 
 impl Body {
-    fn new(mesh: TriMesh, stiffness: Option<f64>) -> PyResult<Self> {
+    fn new(mesh: TriMesh, parts: Vec<Part>, stiffness: Option<f64>) -> PyResult<Self> {
         let stiffness_pa_per_m = stiffness.unwrap_or(f64::INFINITY);
         if !(1e4..=f64::INFINITY).contains(&stiffness_pa_per_m) {
             bail!("`stiffness` = {stiffness_pa_per_m} is outside [1e4, inf] Pa/m");
         }
-        Ok(Self { body: PreparedMesh::from(mesh).into(), stiffness_pa_per_m })
+        let mesh = PreparedMesh::from(mesh);
+        let body = if parts.is_empty() { mesh.into() } else { TouchBody::of_parts(mesh, parts) };
+        Ok(Self { body, stiffness_pa_per_m })
+    }
+
+    /// One convex shape in its own axes, with the mesh that stands for it on flat skins.
+    fn shaped(mesh: TriMesh, shape: Primitive, stiffness: Option<f64>) -> PyResult<Self> {
+        let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        Self::new(mesh, vec![Part { shape, rotation, position_m: [0.0; 3] }], stiffness)
     }
 }
 
@@ -69,16 +77,21 @@ impl Body {
             let note = CString::new(note)?;
             PyErr::warn(py, &py.get_type::<PyUserWarning>(), &note, 1)?;
         }
-        Self::new(mesh, stiffness)
+        Self::new(mesh, Vec::new(), stiffness)
     }
 
     /// Body from `vertices` (V, 3) in metres and `faces` (F, 3), counter-clockwise seen from outside.
+    ///
+    /// `parts` are the convex shapes that it is made of, if they are known: (kind, size (3,), position (3,), rotation
+    /// matrix (9,)), with the kinds and sizes of MuJoCo's geoms. On skins that are not flat they press in place of the
+    /// mesh.
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, stiffness = None))]
+    #[pyo3(signature = (vertices, faces, stiffness = None, parts = Vec::new()))]
     fn from_vertices(
         vertices: PyArrayLike2<'_, f64, AllowTypeChange>,
         faces: PyArrayLike2<'_, i64, AllowTypeChange>,
         stiffness: Option<f64>,
+        parts: Vec<PartIn>,
     ) -> PyResult<Self> {
         let vertices = triples("vertices", &vertices)?;
         if faces.shape()[1] != 3 || faces.shape()[0] == 0 || vertices.is_empty() {
@@ -105,7 +118,8 @@ impl Body {
         if mesh.volume_m3() < 0.0 {
             bail!("`faces` run clockwise seen from outside: swap two of their columns");
         }
-        Self::new(mesh, stiffness)
+        let parts = parts.into_iter().map(part).collect::<PyResult<_>>()?;
+        Self::new(mesh, parts, stiffness)
     }
 
     /// Ball of `radius` metres, its origin in its middle.
@@ -115,7 +129,7 @@ impl Body {
         in_metres("radius", radius)?;
         let ball = sphere(radius, RINGS, SEGMENTS).translated([0.0, 0.0, -radius]);
         let wider = (4.0 / 3.0 * PI * radius.powi(3) / ball.volume_m3()).cbrt();
-        Self::new(ball.scaled([wider; 3]), stiffness)
+        Self::shaped(ball.scaled([wider; 3]), Primitive::Ellipsoid([radius; 3]), stiffness)
     }
 
     /// Box with sides of `size` metres along its axes, its origin in its middle.
@@ -125,7 +139,8 @@ impl Body {
         for side in size {
             in_metres("size", side)?;
         }
-        Self::new(cuboid(size).translated([0.0, 0.0, -0.5 * size[2]]), stiffness)
+        let mesh = cuboid(size).translated([0.0, 0.0, -0.5 * size[2]]);
+        Self::shaped(mesh, Primitive::Cuboid(size.map(|side| 0.5 * side)), stiffness)
     }
 
     /// Cylinder of `radius` and `length` metres along z, its origin in its middle.
@@ -135,7 +150,8 @@ impl Body {
         in_metres("radius", radius)?;
         in_metres("length", length)?;
         let wall = [[0.0, -0.5], [1.0, -0.5], [1.0, 0.5], [0.0, 0.5]].map(|[r, z]| [r * radius, z * length]);
-        Self::new(round(&wall, PI * radius * radius * length), stiffness)
+        let mesh = round(&wall, PI * radius * radius * length);
+        Self::shaped(mesh, Primitive::Cylinder(radius, 0.5 * length), stiffness)
     }
 
     /// Capsule along z: a cylinder of `radius` and `length` metres with half balls on its ends, its origin in its
@@ -150,7 +166,8 @@ impl Body {
         let tip = half_m + radius;
         let profile = [[0.0, -tip]].into_iter().chain(lower).chain(cap(radius, half_m)).chain([[0.0, tip]]);
         let volume = PI * radius * radius * (length + 4.0 / 3.0 * radius);
-        Self::new(round(&profile.collect::<Vec<_>>(), volume), stiffness)
+        let mesh = round(&profile.collect::<Vec<_>>(), volume);
+        Self::shaped(mesh, Primitive::Capsule(radius, half_m), stiffness)
     }
 
     /// Vertices (V, 3), m, and faces (F, 3), counter-clockwise seen from outside.
@@ -171,7 +188,8 @@ impl Body {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let py = slf.py();
         let (body, (vertices, faces)) = (slf.get(), slf.get().mesh(py)?);
-        let arguments = (vertices, faces, body.stiffness_pa_per_m).into_pyobject(py)?;
+        let parts: Vec<PartIn> = body.body.parts().iter().map(part_out).collect();
+        let arguments = (vertices, faces, body.stiffness_pa_per_m, parts).into_pyobject(py)?;
         Ok((slf.get_type().getattr("from_vertices")?, arguments))
     }
 
@@ -184,6 +202,38 @@ impl Body {
     fn __repr__(&self) -> String {
         format!("<spts.Body of {} triangles>", self.triangles())
     }
+}
+
+/// Kind, size, position and rotation matrix of a convex part.
+type PartIn = (String, [f64; 3], [f64; 3], [f64; 9]);
+
+fn part((kind, [x, y, z], position_m, turn): PartIn) -> PyResult<Part> {
+    let shape = match kind.as_str() {
+        "sphere" => Primitive::Ellipsoid([x; 3]),
+        "ellipsoid" => Primitive::Ellipsoid([x, y, z]),
+        "box" => Primitive::Cuboid([x, y, z]),
+        "cylinder" => Primitive::Cylinder(x, y),
+        "capsule" => Primitive::Capsule(x, y),
+        "plane" => Primitive::HalfSpace,
+        _ => bail!("`parts`: \"{kind}\"; valid: sphere, ellipsoid, box, cylinder, capsule, plane"),
+    };
+    let rotation = std::array::from_fn(|i| std::array::from_fn(|j| turn[3 * i + j]));
+    if !([x, y, z].iter().chain(&position_m).chain(&turn).all(|v| v.is_finite()) && x.min(y).min(z) >= 0.0) {
+        bail!("`parts`: a {kind} has sizes {:?} at {position_m:?}; finite numbers are needed", [x, y, z]);
+    }
+    Ok(Part { shape, rotation, position_m })
+}
+
+fn part_out(part: &Part) -> PartIn {
+    let (kind, size) = match part.shape {
+        Primitive::Ellipsoid(half_m) => ("ellipsoid", half_m),
+        Primitive::Cuboid(half_m) => ("box", half_m),
+        Primitive::Cylinder(radius_m, half_m) => ("cylinder", [radius_m, half_m, 0.0]),
+        Primitive::Capsule(radius_m, half_m) => ("capsule", [radius_m, half_m, 0.0]),
+        Primitive::HalfSpace => ("plane", [0.0; 3]),
+    };
+    let turn = std::array::from_fn(|k| part.rotation[k / 3][k % 3]);
+    (kind.to_owned(), size, part.position_m, turn)
 }
 
 fn in_metres(name: &str, value: f64) -> PyResult<()> {

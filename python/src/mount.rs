@@ -1,21 +1,19 @@
 //! A skin on a link of somebody's MuJoCo model, by the arrays of its data.
 
-use crate::args::Array1;
+use crate::args::Array2;
 use crate::body::Body;
 use crate::common::refuse;
-use crate::skin::{Placed, Skin, Touch};
-use numpy::{PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
+use crate::skin::{Load, Placed, Skin, Touch};
+use numpy::{IntoPyArray as _, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
-use spts::contact::Wrench;
+use spts::contact::{Support, Wrench};
 use std::sync::{Mutex, PoisonError};
 
 type Vector = [f64; 3];
 type Rotation = [Vector; 3];
-/// Force and torque on bodies, by their numbers.
-type Loads = Vec<(usize, [f64; 6])>;
 
-/// A skin on a link, and the bodies that may touch it. It reads and writes the arrays of an `mjData`, whatever MuJoCo
-/// they come from.
+/// A skin on a link, and the bodies that may touch it. It reads the arrays of an `mjData`, whatever MuJoCo they come
+/// from.
 #[pyclass(frozen, module = "spts")]
 pub(crate) struct Mount {
     skin: Py<Skin>,
@@ -27,8 +25,7 @@ pub(crate) struct Mount {
     /// Root of the tree of every body.
     roots: Vec<usize>,
     arrays: Arrays,
-    /// Rows of `xfrc_applied` as they were before `apply`.
-    before: Mutex<Vec<(usize, [f64; 6])>>,
+    friction: Mutex<Friction>,
 }
 
 /// Arrays of `mjData`, which stay where they are as long as it lives.
@@ -36,11 +33,43 @@ pub(crate) struct Mount {
 struct Arrays {
     xpos: Py<PyArray2<f64>>,
     xmat: Py<PyArray2<f64>>,
-    xipos: Py<PyArray2<f64>>,
     cvel: Py<PyArray2<f64>>,
     subtree_com: Py<PyArray2<f64>>,
-    xfrc_applied: Py<PyArray2<f64>>,
 }
+
+/// What friction holds, and the supports of the present step.
+#[derive(Default)]
+struct Friction {
+    held: Vec<Held>,
+    supports: Vec<Sheared>,
+}
+
+/// Friction between the foam and one side of a body, as the force of its stretched surface.
+#[derive(Clone, Copy)]
+struct Held {
+    body: usize,
+    /// Direction in which that side is pushed.
+    normal: Vector,
+    /// Force on the body, N, in the skin's frame.
+    shear_n: Vector,
+    /// Moment about the normal, N m.
+    torsion_nm: f64,
+}
+
+/// A support, with what friction holds there at first.
+#[derive(Clone, Copy)]
+struct Sheared {
+    body: usize,
+    support: Support,
+    shear_n: Vector,
+}
+
+/// A load on a skin: number of the body; normal force, N, and where it acts; force and torque on the body about its
+/// origin; and, in mode "foam", the direction of the normal force. All in the world's frame.
+type LoadIn = (usize, f64, Vector, Vector, Vector, Option<Vector>);
+
+/// What a body wears: its number, the thickness of its foam, m, and its stiffness, Pa/m.
+type Lining = (usize, f64, f64);
 
 #[pymethods]
 impl Mount {
@@ -58,9 +87,8 @@ impl Mount {
     ) -> PyResult<Self> {
         let arrays: Arrays = data.extract()?;
         let count = roots.len();
-        let body_arrays =
-            [&arrays.xpos, &arrays.xmat, &arrays.xipos, &arrays.cvel, &arrays.subtree_com, &arrays.xfrc_applied];
-        let fits = body_arrays.iter().zip([3, 9, 3, 6, 3, 6]).all(|(a, cols)| a.bind(py).shape() == [count, cols]);
+        let body_arrays = [&arrays.xpos, &arrays.xmat, &arrays.cvel, &arrays.subtree_com];
+        let fits = body_arrays.iter().zip([3, 9, 6, 3]).all(|(a, cols)| a.bind(py).shape() == [count, cols]);
         let numbers = bodies.iter().map(|(body, _)| *body).chain([link]).chain(roots.iter().copied());
         if !fits || numbers.max().is_some_and(|most| most >= count) {
             bail!("`data` is not of this model");
@@ -68,95 +96,162 @@ impl Mount {
         let (bodies, shapes) = bodies.into_iter().unzip();
         let [x, y, z, turn @ ..] = frame;
         let place = ([x, y, z], std::array::from_fn(|i| std::array::from_fn(|j| turn[3 * i + j])));
-        Ok(Self { skin, link, place, bodies, shapes, roots, arrays, before: Mutex::default() })
+        Ok(Self { skin, link, place, bodies, shapes, roots, arrays, friction: Mutex::default() })
     }
 
-    /// Lets the bodies touch the skin, `dt` s after the last time, and adds the wrenches to `xfrc_applied`: on every
-    /// body, and the opposite on the skin's link.
-    fn apply(&self, py: Python<'_>, dt: f64) -> PyResult<Touch> {
-        let (touch, loads) = self.felt(py, dt)?;
-        let mut before = self.before.lock().unwrap_or_else(PoisonError::into_inner);
-        before.clear();
-        let mut applied = self.arrays.xfrc_applied.bind(py).try_readwrite().map_err(refuse)?;
-        let mut applied = applied.as_array_mut();
-        for (body, load) in loads {
-            let mut row = applied.row_mut(body);
-            before.push((body, std::array::from_fn(|k| row[k])));
-            row.iter_mut().zip(load).for_each(|(sum, v)| *sum += v);
-        }
-        Ok(touch)
-    }
-
-    /// Lets the bodies touch the skin, `dt` s after the last time; the touch, and for every body and the skin's link
-    /// its number, and force and torque about its centre of mass in the world's frame (6,).
-    fn loads<'py>(&self, py: Python<'py>, dt: f64) -> PyResult<(Touch, Vec<(usize, Array1<'py>)>)> {
-        let (touch, loads) = self.felt(py, dt)?;
-        let loads = loads.into_iter().map(|(body, load)| (body, PyArray1::from_slice(py, &load)));
-        Ok((touch, loads.collect()))
-    }
-
-    /// What the skin feels, `dt` s after the last time, of bodies that the engine's contact carries. A load has the
-    /// number of its body in the model; its normal force, N; where that acts; and force and torque on the body about
-    /// its origin, all in the world's frame.
-    fn read(&self, py: Python<'_>, dt: f64, loads: Vec<(usize, f64, Vector, Vector, Vector)>) -> PyResult<Touch> {
+    /// The foam under all bodies but those of `passed`, for a step of `step` s, as springs for the engine, about the
+    /// velocities that the data has. `lined` are bodies that wear foam themselves.
+    ///
+    /// Returns an array (n, 16): place, m, frame by rows (normal on the body, and two tangents), force on a body that
+    /// does not move, N, stiffness, N/m, and friction that is held along the tangents, N; then the body of every spring;
+    /// and the normal force, N, of every body that is near.
+    #[pyo3(signature = (step, passed = Vec::new(), lined = Vec::new()))]
+    fn supports<'py>(
+        &self,
+        py: Python<'py>,
+        step: f64,
+        passed: Vec<usize>,
+        lined: Vec<Lining>,
+    ) -> PyResult<(Array2<'py>, Vec<usize>, Vec<(usize, f64)>)> {
         let (placed, frame, origin) = self.placed(py)?;
-        let mut known = Vec::with_capacity(loads.len());
-        for (body, normal_n, centre, force, torque) in loads {
-            let Some(at) = self.bodies.iter().position(|known| *known == body) else {
-                bail!("body {body} is none of those that may touch the skin");
-            };
-            let wrench = Wrench { force_n: into(&frame, force), torque_nm: into(&frame, torque) };
-            known.push((at, normal_n, into(&frame, minus(centre, origin)), wrench));
+        let (mut supports, mut carried) = (Vec::new(), Vec::new());
+        for ((body, shape), placed) in self.bodies.iter().zip(&self.shapes).zip(&placed) {
+            if passed.contains(body) {
+                continue;
+            }
+            if !placed.is_finite() {
+                bail!("body {body} has a pose or velocity that is not finite");
+            }
+            let lining = lined.iter().find(|(lined, ..)| lined == body).map_or((0.0, f64::INFINITY), |l| (l.1, l.2));
+            let mut found = Vec::new();
+            if let Some(force_n) = self.skin.get().supports(py, shape.get(), placed, lining, step, &mut found) {
+                carried.push((*body, force_n));
+                supports.extend(found.into_iter().map(|support| Sheared { body: *body, support, shear_n: [0.0; 3] }));
+            }
         }
-        self.skin.get().carried(py, &self.shapes, &placed, dt, &known)
+        let mut friction = self.friction.lock().unwrap_or_else(PoisonError::into_inner);
+        share(&friction.held, &mut supports);
+        let mut rows = Vec::with_capacity(16 * supports.len());
+        for s in &supports {
+            let axes = tangents(s.support.normal);
+            rows.extend(plus(origin, turned(&frame, s.support.place_m)));
+            rows.extend(axes.map(|axis| turned(&frame, axis)).into_iter().flatten());
+            rows.extend([s.support.force_n, s.support.stiffness_n_per_m]);
+            rows.extend([dot(s.shear_n, axes[1]), dot(s.shear_n, axes[2])]);
+        }
+        let bodies = supports.iter().map(|s| s.body).collect();
+        let rows = rows.into_pyarray(py).reshape([supports.len(), 16])?;
+        friction.supports = supports;
+        Ok((rows, bodies, carried))
     }
 
-    /// Puts the rows of `xfrc_applied` back to what they were before `apply`.
-    fn restore(&self, py: Python<'_>) -> PyResult<()> {
-        let mut before = self.before.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut applied = self.arrays.xfrc_applied.bind(py).try_readwrite().map_err(refuse)?;
-        let mut applied = applied.as_array_mut();
-        // the last first: a body may be there twice
-        for (body, old) in before.drain(..).rev() {
-            applied.row_mut(body).iter_mut().zip(old).for_each(|(v, old)| *v = old);
+    /// Tells what the engine made of the supports: forces on the bodies (n, 3), N, along the rows of each one's frame.
+    /// The surface of the foam stretches by its share of them in a step of `step` s.
+    fn hold(&self, step: f64, forces: PyReadonlyArray2<'_, f64>) -> PyResult<()> {
+        let mut state = self.friction.lock().unwrap_or_else(PoisonError::into_inner);
+        let forces = forces.as_array();
+        if forces.shape() != [state.supports.len(), 3] {
+            bail!("`forces` has shape {:?}; ({}, 3) is needed", forces.shape(), state.supports.len());
         }
+        let (damping, (_, friction)) = (self.skin.get().damping(), self.skin.get().foam());
+        let stretch = if step > 0.0 { step / (step + damping) } else { 0.0 };
+        let supports = std::mem::take(&mut state.supports);
+        let mut held: Vec<Held> = Vec::new();
+        for side in supports.iter().zip(forces.rows()).collect::<Vec<_>>().chunk_by(|(a, _), (b, _)| together(a, b)) {
+            let middle = middle(side.iter().map(|(s, _)| s.support.place_m));
+            let (body, normal) = (side[0].0.body, side[0].0.support.normal);
+            let mut sum = Held { body, normal, shear_n: [0.0; 3], torsion_nm: 0.0 };
+            for (s, force) in side {
+                let [_, x, y] = tangents(normal);
+                let now = plus(scaled(x, force[1]), scaled(y, force[2]));
+                let mut shear = plus(s.shear_n, scaled(minus(now, s.shear_n), stretch));
+                let (most, length) = (friction * force[0].max(0.0), dot(shear, shear).sqrt());
+                if length > most {
+                    shear = scaled(shear, most / length);
+                }
+                sum.shear_n = plus(sum.shear_n, shear);
+                sum.torsion_nm += dot(normal, cross(minus(s.support.place_m, middle), shear));
+            }
+            held.push(sum);
+        }
+        state.held = held;
         Ok(())
     }
 
-    /// Stiffness and damping of the foam where it is touched, N/m and N s/m.
-    #[getter]
-    fn stiffness(&self) -> [f64; 2] {
-        self.skin.get().stiffness()
+    /// Forgets what friction holds.
+    fn release(&self) {
+        *self.friction.lock().unwrap_or_else(PoisonError::into_inner) = Friction::default();
+    }
+
+    /// What the skin feels, `dt` s after the last time, of `loads` that the engine's contacts are. `lined` are bodies
+    /// that wear foam themselves.
+    #[pyo3(signature = (dt, loads, lined = Vec::new()))]
+    fn read(&self, py: Python<'_>, dt: f64, loads: Vec<LoadIn>, lined: Vec<Lining>) -> PyResult<Touch> {
+        let (placed, frame, origin) = self.placed(py)?;
+        let mut known = Vec::with_capacity(loads.len());
+        for (body, normal_n, centre, force, torque, along) in loads {
+            let Some(at) = self.bodies.iter().position(|known| *known == body) else {
+                bail!("body {body} is none of those that may touch the skin");
+            };
+            let lining = lined.iter().find(|(lined, ..)| *lined == body).map_or((0.0, f64::INFINITY), |l| (l.1, l.2));
+            known.push(Load {
+                body: at,
+                normal_n,
+                centre_m: into(&frame, minus(centre, origin)),
+                wrench: Wrench { force_n: into(&frame, force), torque_nm: into(&frame, torque) },
+                along: along.map(|along| into(&frame, along)),
+                lining,
+            });
+        }
+        self.skin.get().carried(py, &self.shapes, &placed, dt, &known)
     }
 }
 
-impl Mount {
-    /// The touch, and the load on every body and on the link about its centre of mass, world's frame.
-    fn felt(&self, py: Python<'_>, dt: f64) -> PyResult<(Touch, Loads)> {
-        let (placed, frame, _) = self.placed(py)?;
-        let (touch, wrenches) = self.skin.get().touched(py, &self.shapes, &placed, dt)?;
-        let xipos = read(py, &self.arrays.xipos)?;
-        let xpos = read(py, &self.arrays.xpos)?;
-        let mut loads = Vec::with_capacity(self.bodies.len() + 1);
-        let (link_com, mut reaction) = (row(&xipos, self.link), [0.0; 6]);
-        for (body, wrench) in self.bodies.iter().zip(&wrenches) {
-            let force = turned(&frame, wrench.force_n);
-            let about_origin = turned(&frame, wrench.torque_nm);
-            if !force.iter().chain(&about_origin).all(|v| v.is_finite()) {
-                bail!("body {body} has a pose or velocity that is not finite");
-            }
-            let at = row(&xpos, *body);
-            let about = |centre: Vector| plus(about_origin, cross(minus(at, centre), force));
-            loads.push((*body, joined(force, about(row(&xipos, *body)))));
-            let torque = about(link_com);
-            for (sum, v) in reaction.iter_mut().zip(joined(force, torque)) {
-                *sum -= v;
-            }
-        }
-        loads.push((self.link, reaction));
-        Ok((touch, loads))
-    }
+/// Whether two supports are of the same side of a body.
+fn together(a: &Sheared, b: &Sheared) -> bool {
+    a.body == b.body && a.support.normal == b.support.normal
+}
 
+/// Shares what friction holds among `supports`: of each side, as their normal forces have it.
+fn share(held: &[Held], supports: &mut [Sheared]) {
+    let mut left = held.to_vec();
+    for side in supports.chunk_by_mut(|a, b| together(a, b)) {
+        let (body, normal) = (side[0].body, side[0].support.normal);
+        let near = |h: &Held| h.body == body && dot(h.normal, normal) > 0.7;
+        let best = left.iter().enumerate().filter(|(_, h)| near(h));
+        let best = best.max_by(|(_, a), (_, b)| dot(a.normal, normal).total_cmp(&dot(b.normal, normal)));
+        let Some(held) = best.map(|(k, _)| k).map(|k| left.swap_remove(k)) else { continue };
+        let sum: f64 = side.iter().map(|s| s.support.force_n.max(0.0)).sum();
+        if sum <= 0.0 {
+            continue;
+        }
+        let weight = |s: &Sheared| s.support.force_n.max(0.0) / sum;
+        let middle = side.iter().fold([0.0; 3], |at, s| plus(at, scaled(s.support.place_m, weight(s))));
+        let arm = |s: &Sheared| minus(s.support.place_m, middle);
+        let polar: f64 = side.iter().map(|s| weight(s) * dot(arm(s), arm(s))).sum();
+        // along the plane that the side has now
+        let shear = minus(held.shear_n, scaled(normal, dot(held.shear_n, normal)));
+        for s in side {
+            let around = if polar > 0.0 { held.torsion_nm / polar } else { 0.0 };
+            s.shear_n = scaled(plus(shear, scaled(cross(normal, arm(s)), around)), weight(s));
+        }
+    }
+}
+
+fn middle(places: impl ExactSizeIterator<Item = Vector>) -> Vector {
+    let count = places.len() as f64;
+    scaled(places.fold([0.0; 3], plus), 1.0 / count)
+}
+
+/// `normal` and two axes across it, of length 1.
+fn tangents(normal: Vector) -> Rotation {
+    let axis = if normal[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let x = minus(axis, scaled(normal, dot(axis, normal)));
+    let x = scaled(x, 1.0 / dot(x, x).sqrt());
+    [normal, x, cross(normal, x)]
+}
+
+impl Mount {
     /// The bodies in the skin's frame, and how that frame is turned and where it is in the world's.
     fn placed(&self, py: Python<'_>) -> PyResult<(Vec<Placed>, Rotation, Vector)> {
         let a = &self.arrays;
@@ -227,6 +322,10 @@ fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-fn joined(a: Vector, b: Vector) -> [f64; 6] {
-    [a[0], a[1], a[2], b[0], b[1], b[2]]
+fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn scaled(a: Vector, by: f64) -> Vector {
+    a.map(|v| v * by)
 }

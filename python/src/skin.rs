@@ -6,7 +6,7 @@ use crate::common::refuse;
 use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use spts::contact::{Carried, Foam, PosedMesh, SurfacePoints, TouchBody, TouchSkin, Winding, Wrench};
+use spts::contact::{Carried, Foam, PosedMesh, Support, SurfacePoints, TouchBody, TouchSkin, Winding, Wrench};
 use spts::{PressureMap, SkinLayout};
 use std::f64::consts::TAU;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -243,7 +243,21 @@ impl Skin {
     /// Thickness of the foam, m.
     #[getter]
     fn thickness(&self) -> f64 {
-        self.locked().skin.thickness_m()
+        self.locked().skin.foam().thickness_m
+    }
+
+    /// Initial stiffness of the foam, Pa/m, and its friction coefficient.
+    #[getter]
+    pub(crate) fn foam(&self) -> (f64, f64) {
+        let state = self.locked();
+        let foam = state.skin.foam();
+        (foam.stiffness_pa_per_m, foam.friction)
+    }
+
+    /// Damping time of the foam, s.
+    #[getter]
+    pub(crate) fn damping(&self) -> f64 {
+        self.locked().skin.foam().damping_s
     }
 
     /// Whether `place` (3,), m, in the skin's frame, lies in the foam or within half a thickness of it.
@@ -338,29 +352,49 @@ impl Skin {
         })
     }
 
-    /// What the skin feels of `bodies` that something else carries: each load has the number of its body, its normal
-    /// force, N, where it acts, m, and the wrench on the body about its origin, in the skin's frame.
+    /// What the skin feels of `bodies` that something else carries.
     pub(crate) fn carried(
         &self,
         py: Python<'_>,
         bodies: &[Py<Body>],
         placed: &[Placed],
         dt: f64,
-        loads: &[(usize, f64, [f64; 3], Wrench)],
+        loads: &[Load],
     ) -> PyResult<Touch> {
         let felt = self.felt(py, bodies, placed, dt, |skin, posed| {
-            let carried = loads.iter().map(|(body, normal_n, centre_m, _)| {
-                let (body, posed) = posed[*body];
-                Carried { body, posed, normal_n: *normal_n, centre_m: *centre_m }
-            });
-            skin.read(&carried.collect::<Vec<_>>());
             let mut wrenches = vec![Wrench::NONE; posed.len()];
-            for (body, _, _, wrench) in loads {
-                wrenches[*body] = *wrench;
-            }
+            let carried = loads.iter().map(|load| {
+                let (body, mut posed) = posed[load.body];
+                let sum = &mut wrenches[load.body];
+                let (forces, torques) = (sum.force_n.iter_mut(), sum.torque_nm.iter_mut());
+                forces.zip(load.wrench.force_n).chain(torques.zip(load.wrench.torque_nm)).for_each(|(s, v)| *s += v);
+                let (lining_m, lining_pa_per_m) = load.lining;
+                posed.stiffness_pa_per_m = in_series(posed.stiffness_pa_per_m, lining_pa_per_m);
+                Carried { body, posed, normal_n: load.normal_n, centre_m: load.centre_m, along: load.along, lining_m }
+            });
+            let carried: Vec<_> = carried.collect();
+            skin.read(&carried);
             wrenches
         });
         Ok(felt?.0)
+    }
+
+    /// Springs that stand for the foam under a body for a step of `step_s`, with what it wears: how thick, m, and how
+    /// stiff, Pa/m. The foam's force at the velocity of `placed`, N; `None` if the body is nowhere near.
+    pub(crate) fn supports(
+        &self,
+        py: Python<'_>,
+        body: &Body,
+        placed: &Placed,
+        (lining_m, lining_pa_per_m): (f64, f64),
+        step_s: f64,
+        out: &mut Vec<Support>,
+    ) -> Option<f64> {
+        py.detach(|| {
+            let mut posed = placed.of(body);
+            posed.stiffness_pa_per_m = in_series(posed.stiffness_pa_per_m, lining_pa_per_m);
+            self.locked().skin.supports(&body.body, &posed, lining_m, step_s, out)
+        })
     }
 
     /// What the skin feels, and the wrenches, as `act` makes and returns them.
@@ -377,17 +411,7 @@ impl Skin {
         }
         let pairs: Vec<_> = bodies.iter().map(Py::get).zip(placed).collect();
         let (wrenches, values, felt, [area, time], (number, bottomed)) = py.detach(|| {
-            let posed = pairs.iter().map(|(body, placed)| {
-                let posed = PosedMesh {
-                    rotation: placed.rotation,
-                    velocity_m_per_s: placed.velocity_m_per_s,
-                    angular_velocity_rad_per_s: placed.spin_rad_per_s,
-                    stiffness_pa_per_m: body.stiffness_pa_per_m,
-                    ..PosedMesh::at_rest(&body.body.mesh, placed.position_m)
-                };
-                (&body.body, posed)
-            });
-            let posed: Vec<_> = posed.collect();
+            let posed: Vec<_> = pairs.iter().map(|(body, placed)| (&body.body, placed.of(body))).collect();
             let mut state = self.locked();
             let wrenches = act(&mut state.skin, &posed);
             state.touches += 1;
@@ -417,13 +441,6 @@ impl Skin {
 
     fn of(skin: TouchSkin) -> Self {
         Self { id: NEXT.fetch_add(1, Ordering::Relaxed), state: Mutex::new(State { skin, touches: 0, time_s: 0.0 }) }
-    }
-
-    /// Stiffness and damping of the foam where it is touched, N/m and N s/m.
-    pub(crate) fn stiffness(&self) -> [f64; 2] {
-        let state = self.locked();
-        let stiffness = state.skin.stiffness_n_per_m();
-        [stiffness, stiffness * state.skin.damping_s()]
     }
 
     /// Skin at `points`; a taxel's electrode has the usual share of a square of their mean area.
@@ -480,6 +497,42 @@ pub(crate) struct Placed {
     /// Velocity of its origin.
     pub(crate) velocity_m_per_s: [f64; 3],
     pub(crate) spin_rad_per_s: [f64; 3],
+}
+
+impl Placed {
+    pub(crate) fn is_finite(&self) -> bool {
+        let vectors = [self.position_m, self.velocity_m_per_s, self.spin_rad_per_s];
+        self.rotation.iter().chain(&vectors).flatten().all(|v| v.is_finite())
+    }
+
+    fn of<'a>(&self, body: &'a Body) -> PosedMesh<'a> {
+        PosedMesh {
+            rotation: self.rotation,
+            velocity_m_per_s: self.velocity_m_per_s,
+            angular_velocity_rad_per_s: self.spin_rad_per_s,
+            stiffness_pa_per_m: body.stiffness_pa_per_m,
+            ..PosedMesh::at_rest(&body.body.mesh, self.position_m)
+        }
+    }
+}
+
+/// A load on a skin, in its frame.
+pub(crate) struct Load {
+    /// Place of the body in the list.
+    pub(crate) body: usize,
+    /// Normal force, N, and where it acts, m.
+    pub(crate) normal_n: f64,
+    pub(crate) centre_m: [f64; 3],
+    /// On the body, about its origin.
+    pub(crate) wrench: Wrench,
+    pub(crate) along: Option<[f64; 3]>,
+    /// Thickness, m, and stiffness, Pa/m, of the foam that the body wears.
+    pub(crate) lining: (f64, f64),
+}
+
+/// Stiffness of two springs one behind the other.
+fn in_series(a: f64, b: f64) -> f64 {
+    1.0 / (1.0 / a + 1.0 / b)
 }
 
 /// The foam of a curved skin; what is not given is the default.

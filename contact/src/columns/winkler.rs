@@ -94,26 +94,18 @@ impl WinklerLayer {
         Response { wrench, pressure_pa: &self.pressure_pa, patch: Some(self.patch) }
     }
 
-    /// The columns under a body and up to a thickness below it, places from `axis_m`. Clears the last pressure.
-    pub(crate) fn columns_under(
-        &mut self,
-        body: &PosedMesh<'_>,
-        solid: &Solid,
-        axis_m: [f64; 2],
-        out: &mut Vec<Column>,
-    ) {
+    /// The columns under a body and up to `gap_m` below it. Clears the last pressure.
+    pub(crate) fn columns_under(&mut self, body: &PosedMesh<'_>, solid: &Solid, gap_m: f64, out: &mut Vec<Column>) {
         self.clear();
         out.clear();
         let h = self.config.thickness_m;
         // lower by the gap, so that the map of what is below the surface has it
         let mut lower = *body;
-        lower.position_m[2] -= h;
+        lower.position_m[2] -= gap_m;
         self.patch = self.envelope.rasterise(&lower);
-        let [x, y, z] = body.rotation.map(Vector::from);
-        let origin = Vector::from(body.position_m);
-        let into_body = |v: Vector| x * v.x + y * v.y + z * v.z;
-        let front = |[x_m, y_m]: [f64; 2]| solid.front_m(into_body(Vector::new(x_m, y_m, -h) - origin), z, h, h);
-        self.envelope.deeper_than(2.0 * h, |place| front(place).map_or(0.0, |depth_m| depth_m + h));
+        let standing = solid.standing(body);
+        let front = |[x_m, y_m]: [f64; 2]| standing.front_m(Vector::new(x_m, y_m, -h), Vector::Z, h, gap_m);
+        self.envelope.deeper_than(h + gap_m, |place| front(place).map_or(0.0, |depth_m| depth_m + gap_m));
         let [_, width] = self.envelope.shape();
         let area_m2 = self.envelope.cell_m().powi(2);
         for (row, line) in (self.patch.rows[0]..).zip(self.patch.lines(width)) {
@@ -121,8 +113,8 @@ impl WinklerLayer {
             for index in line {
                 let depth_m = self.envelope.depth_m()[index];
                 if depth_m > 0.0 {
-                    let across_m = [self.x_m[index % width] - axis_m[0], y_m - axis_m[1]];
-                    out.push(Column { index, across_m, area_m2, depth_m: depth_m - h });
+                    let point_m = Vector::new(self.x_m[index % width], y_m, 0.0);
+                    out.push(Column::new(index, point_m, Vector::Z, area_m2, depth_m - gap_m));
                 }
             }
         }
@@ -137,7 +129,8 @@ impl WinklerLayer {
         let number = |at_m: f64, count: usize| (at_m / cell_m).round().clamp(0.0, count as f64 - 1.0) as usize;
         let (row, col) = (number(first_y_m - y_m, rows), number(x_m - first_x_m, cols));
         self.patch = Patch { rows: [row, row + 1], cols: [col, col + 1] };
-        Column { index: row * cols + col, across_m: [0.0; 2], area_m2: cell_m * cell_m, depth_m: 0.0 }
+        let [x_m, y_m] = self.envelope.centre_m(row, col);
+        Column::new(row * cols + col, Vector::new(x_m, y_m, 0.0), Vector::Z, cell_m * cell_m, 0.0)
     }
 
     /// Presses `body` into the cleared layer.
@@ -146,10 +139,8 @@ impl WinklerLayer {
         self.patch = self.envelope.rasterise(body);
         let c = &self.config;
         if let Some(solid) = solid {
-            let [x, y, z] = body.rotation.map(Vector::from);
-            let (origin, h) = (Vector::from(body.position_m), c.thickness_m);
-            let into_body = |v: Vector| x * v.x + y * v.y + z * v.z;
-            let at = |[x_m, y_m]: [f64; 2]| solid.depth_m(into_body(Vector::new(x_m, y_m, -h) - origin), z, h);
+            let (standing, h) = (solid.standing(body), c.thickness_m);
+            let at = |[x_m, y_m]: [f64; 2]| standing.depth_m(Vector::new(x_m, y_m, -h), Vector::Z, h);
             self.bottomed = self.envelope.deeper_than(h, at);
         }
         let law = c.law(body.stiffness_pa_per_m);

@@ -1,10 +1,10 @@
 //! Foam on a surface of any shape.
 
-use super::points::{Solid, SurfacePoints};
-use crate::balance::{Column, settle};
+use super::points::SurfacePoints;
+use super::solid::Solid;
+use crate::balance::Column;
 use crate::field::{PosedMesh, Wrench};
-use crate::foam::Foam;
-use crate::touch::Carried;
+use crate::foam::{Foam, FoamLaw};
 use crate::traction::velocity_at;
 use parry3d_f64::math::Vector;
 use spts_input::Refusal;
@@ -101,37 +101,40 @@ impl SurfaceField {
         self.bottomed = false;
     }
 
-    /// Spreads `load` of a carried body over the columns under it, in addition to all pressures since
-    /// [`SurfaceField::clear`].
-    pub(crate) fn carry(&mut self, solid: &Solid, load: &Carried<'_>, columns: &mut Vec<Column>) {
-        let (body, h) = (&load.posed, self.config.thickness_m);
-        let law = self.config.law(body.stiffness_pa_per_m);
-        let [x, y, z] = body.rotation.map(Vector::from);
-        let into_body = |v: Vector| x * v.x + y * v.y + z * v.z;
-        let (origin, centre) = (Vector::from(body.position_m), Vector::from(load.centre_m));
-        let points = || self.points.positions_m.iter().zip(&self.points.normals);
-        let away = |point: &[f64; 3]| (Vector::from(*point) - centre).length_squared();
-        let nearest = points().enumerate().min_by(|(_, a), (_, b)| away(a.0).total_cmp(&away(b.0)));
-        let Some((nearest, (_, up))) = nearest else { return };
-        let up = Vector::from(*up);
-        let [u, v] = [up.any_orthonormal_vector(), up.cross(up.any_orthonormal_vector())];
-        columns.clear();
-        for (index, (point, normal)) in points().enumerate() {
+    /// The columns under a body and up to `gap_m` below it, along their normals.
+    pub(crate) fn columns_under(&self, body: &PosedMesh<'_>, solid: &Solid, gap_m: f64, out: &mut Vec<Column>) {
+        out.clear();
+        let (standing, h) = (solid.standing(body), self.config.thickness_m);
+        if standing.is_apart([self.bounds_m[0].map(|v| v - gap_m), self.bounds_m[1].map(|v| v + gap_m)]) {
+            return;
+        }
+        let (middle, radius_m) = standing.ball_m();
+        let near_m2 = (radius_m + h + gap_m).powi(2);
+        let points = self.points.positions_m.iter().zip(&self.points.normals);
+        for (index, (point, normal)) in points.enumerate() {
             let (point, normal) = (Vector::from(*point), Vector::from(*normal));
-            let base = point - normal * h;
-            if let Some(depth_m) = solid.front_m(into_body(base - origin), into_body(normal), h, h) {
-                let across_m = [(point - centre).dot(u), (point - centre).dot(v)];
-                columns.push(Column { index, across_m, area_m2: self.points.areas_m2[index], depth_m });
+            if (point - middle).length_squared() > near_m2 {
+                continue;
+            }
+            if let Some(depth_m) = standing.front_m(point - normal * h, normal, h, gap_m) {
+                out.push(Column::new(index, point, normal, self.points.areas_m2[index], depth_m));
             }
         }
-        if columns.is_empty() {
-            // it touches the rim
-            let area_m2 = self.points.areas_m2[nearest];
-            columns.push(Column { index: nearest, across_m: [0.0; 2], area_m2, depth_m: 0.0 });
-        }
-        settle(&law, columns, load.normal_n);
+    }
+
+    /// The column nearest to a place, m.
+    pub(crate) fn column_at(&self, place_m: Vector) -> Option<Column> {
+        let away = |point: &[f64; 3]| (Vector::from(*point) - place_m).length_squared();
+        let points = self.points.positions_m.iter().enumerate();
+        let (index, point) = points.min_by(|(_, a), (_, b)| away(a).total_cmp(&away(b)))?;
+        let normal = Vector::from(self.points.normals[index]);
+        Some(Column::new(index, Vector::from(*point), normal, self.points.areas_m2[index], 0.0))
+    }
+
+    /// Adds the pressures of `columns` at their depths to those since [`SurfaceField::clear`].
+    pub(crate) fn carry(&mut self, columns: &[Column], law: &FoamLaw) {
         for c in columns {
-            self.bottomed |= c.depth_m > h;
+            self.bottomed |= c.depth_m > self.config.thickness_m;
             self.pressure_pa[c.index] += law.pressure_pa(c.depth_m);
         }
     }
@@ -143,22 +146,20 @@ impl SurfaceField {
         if !body.is_finite() {
             return Wrench::UNKNOWN;
         }
-        if solid.is_apart(body, self.bounds_m) {
+        let standing = solid.standing(body);
+        if standing.is_apart(self.bounds_m) {
             return Wrench::NONE;
         }
         let c = &self.config;
         let law = c.law(body.stiffness_pa_per_m);
         let regular = c.friction_speed_m_per_s * c.friction_speed_m_per_s;
         let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
-        let [x, y, z] = body.rotation.map(Vector::from);
-        let into_body = |v: Vector| x * v.x + y * v.y + z * v.z;
-        let (origin, centre) = (Vector::from(body.position_m), Vector::from(body.centre_of_mass_m));
+        let centre = Vector::from(body.centre_of_mass_m);
         let points = self.points.positions_m.iter().zip(&self.points.normals);
         let loads = self.points.areas_m2.iter().zip(&mut self.pressure_pa);
         for ((point, normal), (area, pressure_pa)) in points.zip(loads) {
             let (point, normal) = (Vector::from(*point), Vector::from(*normal));
-            let base = point - normal * c.thickness_m;
-            let depth_m = solid.depth_m(into_body(base - origin), into_body(normal), c.thickness_m);
+            let depth_m = standing.depth_m(point - normal * c.thickness_m, normal, c.thickness_m);
             if depth_m <= 0.0 {
                 continue;
             }

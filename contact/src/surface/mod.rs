@@ -2,8 +2,10 @@
 
 mod field;
 mod points;
+mod solid;
 #[cfg(test)]
 mod tests;
 
 pub use field::SurfaceField;
-pub use points::{Solid, SurfacePoints, Winding};
+pub use points::{SurfacePoints, Winding};
+pub use solid::{Part, Primitive, Solid};

@@ -1,10 +1,10 @@
 //! The curved field against the flat one, a closed form, and boxes cut by hand.
 
-use super::{Solid, SurfaceField, SurfacePoints, Winding};
+use super::{Part, Primitive, Solid, SurfaceField, SurfacePoints, Winding};
 use crate::columns::WinklerLayer;
 use crate::field::{ContactField as _, PosedMesh};
 use crate::foam::Foam;
-use crate::mesh::{TriMesh, cuboid, sphere};
+use crate::mesh::{TriMesh, cuboid, cylinder, revolve, sphere};
 use crate::objects::OBJECTS;
 use crate::prepared::PreparedMesh;
 use crate::touch::{TouchBody, TouchSkin};
@@ -128,7 +128,9 @@ proptest! {
         place in prop::array::uniform3(-0.015..0.015_f64),
         seed in 0..1000_u32,
     ) {
-        let solid = Solid::new(&centred(half));
+        let mesh = centred(half);
+        let solid = Solid::new(&mesh);
+        let standing = solid.standing(&PosedMesh::at_rest(&mesh, [0.0; 3]));
         let rotation = Rotation3::from_euler_angles(angles[0], angles[1], angles[2]);
         let (place, reach_m) = (Vector3::from(place), 0.012);
         for k in 0..50 {
@@ -140,7 +142,7 @@ proptest! {
             let (from, along) = (rotation.inverse() * (start - place), rotation.inverse() * direction);
             let depth = |from: Vector3<f64>, along: Vector3<f64>| {
                 let array = |v: Vector3<f64>| parry3d_f64::math::Vector::new(v.x, v.y, v.z);
-                solid.depth_m(array(from), array(along), reach_m)
+                standing.depth_m(array(from), array(along), reach_m)
             };
             let wanted = |half| match inside(half, from, along * reach_m) {
                 None => 0.0,
@@ -153,6 +155,68 @@ proptest! {
             let near = |grow: f64| (found - wanted(half.map(|h| h + grow))).abs() < 1e-6;
             prop_assert!((found - wanted(half)).abs() < 1e-12 || near(1e-7) || near(-1e-7), "{found} {}", wanted(half));
         }
+    }
+}
+
+/// Chords of convex parts against rays on fine meshes of the same shapes, one by one and as a union of two, in columns
+/// that look in all directions from all places: the same depth and gap within the mesh's error.
+#[test]
+fn chords_are_those_of_meshes() {
+    let upright = |mesh: TriMesh, down_m: f64| mesh.translated([0.0, 0.0, -down_m]);
+    let ball = upright(sphere(0.01, 256, 512), 0.01);
+    let can = upright(cylinder(0.008, 0.03, 1024), 0.015);
+    let pill = {
+        let cap = |k: u32| {
+            let (sin, cos) = (f64::from(k) / 128.0 * 0.25 * TAU).sin_cos();
+            [0.007 * cos, 0.011 + 0.007 * sin]
+        };
+        let lower = (0..128).rev().map(cap).map(|[r, z]| [r, -z]);
+        let profile = [[0.0, -0.018]].into_iter().chain(lower).chain((0..128).map(cap)).chain([[0.0, 0.018]]);
+        revolve(&profile.collect::<Vec<_>>(), 512)
+    };
+    let floor = upright(cuboid([2.0, 2.0, 1.0]), 1.0);
+    let egg = ball.clone().scaled([1.0, 0.5, 2.0]);
+    let part =
+        |shape, position_m| Part { shape, rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], position_m };
+    let cases = [
+        (ball.clone(), vec![part(Primitive::Ellipsoid([0.01; 3]), [0.0; 3])]),
+        (egg, vec![part(Primitive::Ellipsoid([0.01, 0.005, 0.02]), [0.0; 3])]),
+        (centred([0.01, 0.02, 0.03]), vec![part(Primitive::Cuboid([0.01, 0.02, 0.03]), [0.0; 3])]),
+        (can, vec![part(Primitive::Cylinder(0.008, 0.015), [0.0; 3])]),
+        (pill, vec![part(Primitive::Capsule(0.007, 0.011), [0.0; 3])]),
+        (floor, vec![part(Primitive::HalfSpace, [0.0; 3])]),
+        (
+            ball.clone().translated([-0.02, 0.0, 0.0]).merged(&ball.clone().translated([0.02, 0.0, 0.0])),
+            vec![
+                part(Primitive::Ellipsoid([0.01; 3]), [-0.02, 0.0, 0.0]),
+                part(Primitive::Ellipsoid([0.01; 3]), [0.02, 0.0, 0.0]),
+            ],
+        ),
+    ];
+    for (number, (mesh, parts)) in cases.into_iter().enumerate() {
+        let (fine, exact) = (Solid::new(&mesh), Solid::of_parts(parts));
+        let turn = Rotation3::from_euler_angles(0.3, -0.7, 1.1);
+        let rotation = std::array::from_fn(|i| std::array::from_fn(|j| turn[(i, j)]));
+        let body = PosedMesh { rotation, ..PosedMesh::at_rest(&mesh, [0.001, -0.002, 0.003]) };
+        let (fine, exact) = (fine.standing(&body), exact.standing(&body));
+        let (mut met, mut odd) = (0, 0);
+        for k in 0..20_000 {
+            let [a, b, c, d, e] =
+                [0.618_034, 0.754_878, 0.569_840, 0.819_173, 0.671_044].map(|s| (f64::from(k) * s).fract());
+            let z = 2.0 * d - 1.0;
+            let flat = (1.0 - z * z).sqrt();
+            let outward = parry3d_f64::math::Vector::new(flat * (TAU * e).cos(), flat * (TAU * e).sin(), z);
+            let base = parry3d_f64::math::Vector::new(a - 0.5, b - 0.5, c - 0.5) * 0.06;
+            let [one, other] = [&fine, &exact].map(|s| s.front_m(base, outward, 0.006, 0.004));
+            met += usize::from(one.is_some());
+            // beside an edge, and where as much of a body lies on either side of the base, one may see what the other
+            // does not
+            odd += usize::from(match (one, other) {
+                (Some(one), Some(other)) => (one - other).abs() > 2e-5,
+                (one, other) => one.is_some() != other.is_some(),
+            });
+        }
+        assert!(met > 200 && odd <= met / 100, "{number}: {odd} of {met}");
     }
 }
 

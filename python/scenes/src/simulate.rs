@@ -35,8 +35,7 @@ fn simulated(request: &Request, step: &(dyn Fn() + Sync), out: PathBuf) -> Resul
         }
         Ok(())
     });
-    done.and_then(|_| writer.finish())
-        .map_err(|error| folder.unstaged(error))?;
+    done.and_then(|_| writer.finish()).map_err(|error| folder.unstaged(error))?;
     folder.commit()?;
     Ok(prepared.notes)
 }

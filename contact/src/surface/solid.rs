@@ -1,0 +1,441 @@
+//! Rays and what they meet: meshes, and shapes whose chords have a closed form.
+
+use crate::field::PosedMesh;
+use crate::mesh::TriMesh;
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::Vector;
+use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhLeafCost};
+
+/// Share of a triangle by which rays beside it count as hits, so that none passes between two triangles.
+const SLACK: f64 = 1e-9;
+
+/// Triangles seen under a smaller sine than this are passed over: the faces beside them are met.
+const EDGE_ON: f64 = 1e-9;
+
+/// A body as columns of foam see it, in its own axes: a mesh, or convex parts.
+#[derive(Debug, Clone)]
+pub struct Solid {
+    form: Form,
+    /// Lower and upper corner of the box around it, m.
+    low_m: Vector,
+    high_m: Vector,
+}
+
+#[derive(Debug, Clone)]
+enum Form {
+    Mesh(Mesh),
+    Parts(Vec<Part>),
+}
+
+/// The triangles of a mesh in a hierarchy of bounding boxes.
+#[derive(Debug, Clone)]
+struct Mesh {
+    triangles: Vec<Triangle>,
+    boxes: Bvh,
+    /// Whether the mesh is closed and its triangles face outwards, so that it has an inside.
+    closed: bool,
+}
+
+/// First corner, the two edges from it, and the product of their lengths.
+#[derive(Debug, Clone, Copy)]
+struct Triangle {
+    corner_m: Vector,
+    edges_m: [Vector; 2],
+    size_m2: f64,
+}
+
+/// Where a ray meets a mesh first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Hit {
+    /// Distance from the start of the ray, m.
+    pub(super) distance_m: f64,
+    /// Whether the ray enters the body there, judged by the order of the triangle's corners.
+    enters: bool,
+}
+
+impl BvhLeafCost for Hit {
+    fn cost(&self) -> f64 {
+        self.distance_m
+    }
+}
+
+/// A convex shape around the origin of its axes, whose chords have a closed form. Lengths in m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Primitive {
+    /// Half axes along x, y and z; a ball has three that are equal.
+    Ellipsoid([f64; 3]),
+    /// Half sides along x, y and z.
+    Cuboid([f64; 3]),
+    /// Radius, and half the length along z.
+    Cylinder(f64, f64),
+    /// Radius, and half the length along z without the round ends.
+    Capsule(f64, f64),
+    /// All with z below 0.
+    HalfSpace,
+}
+
+/// A convex part of a body, and where it is in the body's axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Part {
+    /// Its shape.
+    pub shape: Primitive,
+    /// Rotation matrix, row-major: body = R · part + position.
+    pub rotation: [[f64; 3]; 3],
+    /// Position of its origin, m.
+    pub position_m: [f64; 3],
+}
+
+impl Primitive {
+    /// Where the line p + t d enters and leaves the shape; `None` beside it. `d` has the length 1.
+    #[inline]
+    fn chord(&self, p: Vector, d: Vector) -> Option<[f64; 2]> {
+        match *self {
+            Self::Ellipsoid(half_m) => {
+                let inverse = Vector::from(half_m).recip();
+                between(quadratic((d * inverse).length_squared(), (p * inverse).dot(d * inverse), {
+                    (p * inverse).length_squared() - 1.0
+                })?)
+            }
+            Self::Cuboid([x, y, z]) => {
+                let sides = [slab(p.x, d.x, x), slab(p.y, d.y, y), slab(p.z, d.z, z)];
+                between(sides.into_iter().fold(EVERYWHERE, both))
+            }
+            Self::Cylinder(radius_m, half_m) => {
+                between(both(round(p, d, radius_m).unwrap_or(NOWHERE), slab(p.z, d.z, half_m)))
+            }
+            Self::Capsule(radius_m, half_m) => {
+                let ball = |z: f64| {
+                    let p = Vector::new(p.x, p.y, p.z - z);
+                    quadratic(1.0, p.dot(d), p.length_squared() - radius_m * radius_m)
+                };
+                let wall = between(both(round(p, d, radius_m).unwrap_or(NOWHERE), slab(p.z, d.z, half_m)));
+                // convex: the chords of its parts are one
+                [wall, ball(half_m), ball(-half_m)]
+                    .into_iter()
+                    .flatten()
+                    .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+            }
+            Self::HalfSpace => {
+                let at = -p.z / d.z;
+                match d.z {
+                    z if z > 0.0 => Some([f64::NEG_INFINITY, at]),
+                    z if z < 0.0 => Some([at, f64::INFINITY]),
+                    _ => (p.z < 0.0).then_some(EVERYWHERE),
+                }
+            }
+        }
+    }
+
+    /// Half the sides of the box around it, m.
+    fn reach_m(&self) -> Vector {
+        match *self {
+            Self::Ellipsoid(half_m) | Self::Cuboid(half_m) => Vector::from(half_m),
+            Self::Cylinder(radius_m, half_m) => Vector::new(radius_m, radius_m, half_m),
+            Self::Capsule(radius_m, half_m) => Vector::new(radius_m, radius_m, half_m + radius_m),
+            Self::HalfSpace => Vector::splat(f64::INFINITY),
+        }
+    }
+}
+
+const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+const NOWHERE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+
+#[inline]
+fn both(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].max(b[0]), a[1].min(b[1])]
+}
+
+#[inline]
+fn between(ends: [f64; 2]) -> Option<[f64; 2]> {
+    (ends[0] < ends[1]).then_some(ends)
+}
+
+/// The roots of a t² + 2 b t + c = 0 in their order, for a > 0.
+#[inline]
+fn quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
+    let discriminant = b * b - a * c;
+    (discriminant > 0.0).then(|| {
+        // without cancellation
+        let q = -b - discriminant.sqrt().copysign(b);
+        let (one, other) = (q / a, c / q);
+        [one.min(other), one.max(other)]
+    })
+}
+
+/// The line inside an endless cylinder about z.
+#[inline]
+fn round(p: Vector, d: Vector, radius_m: f64) -> Option<[f64; 2]> {
+    let (a, c) = (d.x * d.x + d.y * d.y, p.x * p.x + p.y * p.y - radius_m * radius_m);
+    if a < 1e-24 {
+        return (c < 0.0).then_some(EVERYWHERE);
+    }
+    quadratic(a, p.x * d.x + p.y * d.y, c)
+}
+
+/// Where a coordinate p + t d lies within ± half.
+#[inline]
+fn slab(p: f64, d: f64, half_m: f64) -> [f64; 2] {
+    if d == 0.0 {
+        return if p.abs() < half_m { EVERYWHERE } else { NOWHERE };
+    }
+    let (a, b) = ((-half_m - p) / d, (half_m - p) / d);
+    [a.min(b), a.max(b)]
+}
+
+impl Part {
+    fn chord(&self, start_m: Vector, direction: Vector) -> Option<[f64; 2]> {
+        let [x, y, z] = self.rotation.map(Vector::from);
+        let away = start_m - Vector::from(self.position_m);
+        let turned = |v: Vector| x * v.x + y * v.y + z * v.z;
+        self.shape.chord(turned(away), turned(direction))
+    }
+}
+
+/// A solid where a body is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Standing<'a> {
+    solid: &'a Solid,
+    axes: [Vector; 3],
+    origin_m: Vector,
+}
+
+impl Standing<'_> {
+    /// As [`Solid::front_m`], in the axes of the pose.
+    #[inline]
+    pub(crate) fn front_m(&self, base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64) -> Option<f64> {
+        let [x, y, z] = self.axes;
+        let into = |v: Vector| x * v.x + y * v.y + z * v.z;
+        self.solid.front_m(into(base_m - self.origin_m), into(outward), thickness_m, gap_m)
+    }
+
+    /// How deep the solid reaches into a column, m; 0 where it does not touch it.
+    #[inline]
+    pub(crate) fn depth_m(&self, base_m: Vector, outward: Vector, thickness_m: f64) -> f64 {
+        self.front_m(base_m, outward, thickness_m, 0.0).unwrap_or(0.0)
+    }
+
+    /// A point that is within the returned distance of all of the body, m; infinite for what has no end.
+    pub(crate) fn ball_m(&self) -> (Vector, f64) {
+        let half = (self.solid.high_m - self.solid.low_m) * 0.5;
+        if !half.is_finite() {
+            return (Vector::ZERO, f64::INFINITY);
+        }
+        let middle = (self.solid.high_m + self.solid.low_m) * 0.5;
+        let [x, y, z] = self.axes;
+        (Vector::new(x.dot(middle), y.dot(middle), z.dot(middle)) + self.origin_m, half.length())
+    }
+
+    /// Whether the box around the body and the box between two corners have nothing in common.
+    pub(crate) fn is_apart(&self, [low_m, high_m]: [[f64; 3]; 2]) -> bool {
+        let half = (self.solid.high_m - self.solid.low_m) * 0.5;
+        if half.max_element() == f64::INFINITY {
+            return false;
+        }
+        let middle = (self.solid.high_m + self.solid.low_m) * 0.5;
+        (0..3).any(|k| {
+            let axis = self.axes[k];
+            let (at, reach) = (axis.dot(middle) + self.origin_m[k], axis.abs().dot(half));
+            at + reach < low_m[k] || at - reach > high_m[k]
+        })
+    }
+}
+
+impl Solid {
+    /// The solid of `mesh`, whose indices must be valid.
+    pub fn new(mesh: &TriMesh) -> Self {
+        let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);
+        let triangle = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(corner);
+            Triangle { corner_m: a, edges_m: [b - a, c - a], size_m2: (b - a).length() * (c - a).length() }
+        };
+        let boxed = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(corner);
+            // wider than the slack of a triangle
+            let margin = Vector::splat(4.0 * SLACK * ((b - a).length() + (c - a).length()));
+            Aabb::new(a.min(b).min(c) - margin, a.max(b).max(c) + margin)
+        };
+        let boxes: Vec<Aabb> = mesh.triangles.iter().map(boxed).collect();
+        let empty = (Vector::splat(f64::INFINITY), Vector::splat(f64::NEG_INFINITY));
+        let (low_m, high_m) = boxes.iter().fold(empty, |(low, high), b| (low.min(b.mins), high.max(b.maxs)));
+        let mesh = Mesh {
+            triangles: mesh.triangles.iter().map(triangle).collect(),
+            boxes: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
+            closed: mesh.is_solid(),
+        };
+        Self { form: Form::Mesh(mesh), low_m, high_m }
+    }
+
+    /// The union of `parts`.
+    pub fn of_parts(parts: Vec<Part>) -> Self {
+        let (mut low_m, mut high_m) = (Vector::splat(f64::INFINITY), Vector::splat(f64::NEG_INFINITY));
+        for part in &parts {
+            let (half, at) = (part.shape.reach_m(), Vector::from(part.position_m));
+            // 0 · ∞ is no number
+            let reach = part
+                .rotation
+                .map(|row| if half.x == f64::INFINITY { half.x } else { Vector::from(row).abs().dot(half) });
+            low_m = low_m.min(at - Vector::from(reach));
+            high_m = high_m.max(at + Vector::from(reach));
+        }
+        Self { form: Form::Parts(parts), low_m, high_m }
+    }
+
+    /// Its convex parts; empty for a mesh.
+    pub fn parts(&self) -> &[Part] {
+        match &self.form {
+            Form::Parts(parts) => parts,
+            Form::Mesh(_) => &[],
+        }
+    }
+
+    /// The solid where `body` is.
+    pub(crate) fn standing(&self, body: &PosedMesh<'_>) -> Standing<'_> {
+        Standing { solid: self, axes: body.rotation.map(Vector::from), origin_m: Vector::from(body.position_m) }
+    }
+
+    /// How deep the solid reaches into a column of foam, from its free surface, m, or, as a negative depth, the gap to a
+    /// solid up to `gap_m` above the surface; `None` where there is nothing.
+    ///
+    /// The column starts at `base_m`, on the link, and goes `thickness_m` along `outward` (length 1) to the free
+    /// surface. A solid with the base inside has come through the whole column if more of it lies outward of the base
+    /// than inward, along the column's line: its depth is then the thickness, and how far it goes on behind the base,
+    /// at most another thickness. Otherwise it has come from behind, and does not touch the foam.
+    #[inline]
+    fn front_m(&self, base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64) -> Option<f64> {
+        match &self.form {
+            Form::Parts(parts) => front_of_parts(parts, base_m, outward, thickness_m, gap_m),
+            Form::Mesh(mesh) => {
+                let beside = base_m.cmplt(self.low_m).any() || base_m.cmpgt(self.high_m).any();
+                mesh.front_m(base_m, outward, thickness_m, gap_m, beside)
+            }
+        }
+    }
+
+    /// How far a ray of `reach_m` goes until it meets the mesh, and the normal there, which faces the ray.
+    pub(super) fn surface(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<(f64, Vector)> {
+        let Form::Mesh(mesh) = &self.form else { return None };
+        let (leaf, hit) = mesh.nearest(start_m, direction, reach_m)?;
+        let [e, f] = mesh.triangles[leaf as usize].edges_m;
+        let normal = e.cross(f).normalize();
+        Some((hit.distance_m, if hit.enters { normal } else { -normal }))
+    }
+}
+
+/// [`Solid::front_m`] of a union of convex parts, from their chords.
+#[inline]
+fn front_of_parts(parts: &[Part], base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64) -> Option<f64> {
+    let reach_m = thickness_m + gap_m;
+    let (mut inside, mut first_m) = ([0.0_f64; 2], f64::INFINITY);
+    // chords that hang together with the base's, and the first beyond it
+    let mut pending = true;
+    while pending {
+        pending = false;
+        first_m = f64::INFINITY;
+        for part in parts {
+            let Some([enter, leave]) = part.chord(base_m, outward) else { continue };
+            if enter < inside[1].max(f64::MIN_POSITIVE) && leave > inside[0].min(-f64::MIN_POSITIVE) {
+                let grown = [inside[0].min(enter), inside[1].max(leave)];
+                pending |= parts.len() > 1 && grown != inside;
+                inside = grown;
+            } else if enter >= inside[1] && enter < first_m {
+                first_m = enter;
+            }
+        }
+    }
+    let [inward_m, outward_m] = [-inside[0], inside[1]];
+    if outward_m > 0.0 && inward_m < outward_m {
+        return Some(thickness_m + inward_m.min(thickness_m));
+    }
+    (first_m <= reach_m).then(|| thickness_m - first_m)
+}
+
+impl Mesh {
+    /// [`Solid::front_m`]; `beside` tells that the base is outside the box around the mesh.
+    fn front_m(&self, base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64, beside: bool) -> Option<f64> {
+        let (mut from_m, reach_m) = (0.0, thickness_m + gap_m);
+        while let Some(hit) = self.first(base_m + outward * from_m, outward, reach_m - from_m) {
+            let at_m = from_m + hit.distance_m;
+            if hit.enters || !self.closed {
+                return Some(thickness_m - at_m);
+            }
+            if from_m <= 0.0 && self.is_through(base_m, outward, at_m) {
+                return Some(thickness_m + self.behind_m(base_m, outward, thickness_m));
+            }
+            // past what comes from behind, to what may enter from outside
+            from_m = at_m + SLACK * thickness_m;
+        }
+        if from_m > 0.0 || beside {
+            return None;
+        }
+        // without a far side, an open mesh goes on for ever
+        let out_m = match self.first(base_m, outward, f64::INFINITY) {
+            Some(hit) if !hit.enters || !self.closed => hit.distance_m,
+            None if !self.closed => f64::INFINITY,
+            _ => return None,
+        };
+        let through = self.is_through(base_m, outward, out_m);
+        through.then(|| thickness_m + self.behind_m(base_m, outward, thickness_m))
+    }
+
+    /// Whether a solid that has `base_m` inside, and ends `out_m` outward of it, reaches less far the other way.
+    fn is_through(&self, base_m: Vector, outward: Vector, out_m: f64) -> bool {
+        let inward = self.first(base_m, -outward, f64::INFINITY);
+        inward.is_some_and(|hit| (!hit.enters || !self.closed) && hit.distance_m < out_m)
+    }
+
+    /// How far the solid goes on behind `base_m`, m, at most `most_m`.
+    fn behind_m(&self, base_m: Vector, outward: Vector, most_m: f64) -> f64 {
+        self.first(base_m, -outward, most_m).map_or(most_m, |hit| hit.distance_m)
+    }
+
+    fn first(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<Hit> {
+        self.nearest(start_m, direction, reach_m).map(|(_, hit)| hit)
+    }
+
+    fn nearest(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<(u32, Hit)> {
+        let inverse = direction.recip();
+        self.boxes.find_best(
+            reach_m,
+            |node, nearest_m| boxed(node.mins(), node.maxs(), start_m, inverse, nearest_m),
+            |leaf, _| self.triangles[leaf as usize].hit(start_m, direction),
+        )
+    }
+}
+
+impl Triangle {
+    /// T. Möller and B. Trumbore, Fast, minimum storage ray/triangle intersection, J. Graphics Tools 2 (1997) 21.
+    #[inline]
+    fn hit(&self, start_m: Vector, direction: Vector) -> Option<Hit> {
+        let [e, f] = self.edges_m;
+        let p = direction.cross(f);
+        let determinant = e.dot(p);
+        if determinant.abs() <= EDGE_ON * self.size_m2 {
+            return None;
+        }
+        let inverse = 1.0 / determinant;
+        let from_corner = start_m - self.corner_m;
+        let u = from_corner.dot(p) * inverse;
+        let q = from_corner.cross(e);
+        let v = direction.dot(q) * inverse;
+        if u < -SLACK || v < -SLACK || u + v > 1.0 + SLACK {
+            return None;
+        }
+        let distance_m = f.dot(q) * inverse;
+        (distance_m >= 0.0).then_some(Hit { distance_m, enters: determinant > 0.0 })
+    }
+}
+
+/// Distance at which a ray enters a box, if that is below `nearest_m`.
+#[inline]
+fn boxed(low_m: Vector, high_m: Vector, start_m: Vector, inverse: Vector, nearest_m: f64) -> f64 {
+    let (one, other) = ((low_m - start_m) * inverse, (high_m - start_m) * inverse);
+    let (mut enters, mut leaves) = (0.0, nearest_m);
+    for k in 0..3 {
+        let (a, b) = (one[k], other[k]);
+        // 0 · ∞, a ray in the plane of the lower side, stays in front; there every comparison is false
+        let (near, far) = if b < a { (b, a) } else { (a, b) };
+        enters = if near > enters { near } else { enters };
+        leaves = if far < leaves { far } else { leaves };
+    }
+    if enters <= leaves { enters } else { f64::MAX }
+}
