@@ -450,17 +450,22 @@ class _Group:
             # with J v + dt J a the velocity at the end of the step: D (aref − J a) is the force of `Support`, and
             # aref = −J v/dt − (pos − margin) with these K, B and I
             friction, inertia = skin.foam[1], row[13] * (dt + skin.damping) * dt
-            push, pull = row[12] / inertia, row[14:16]
+            pull = row[14:16]
             if friction <= 0.0:
-                weights, pushes = [inertia], [push]
+                weights, pushes = [inertia], [row[12] / inertia]
             elif elliptic:
                 contacts.mu[number] = friction / math.sqrt(_SHEAR)
                 weights = [inertia, _SHEAR * inertia, _SHEAR * inertia]
-                pushes = [push, *(pull / weights[1])]
+                pushes = [row[12] / inertia, *(pull / weights[1])]
             else:
+                # edges of the pyramid, of which all push as long as friction is inside it
                 weights = [0.25 * inertia] * 4
-                x, y = 2.0 * pull / (friction * inertia)
-                pushes = [push + x, push - x, push + y, push - y]
+                x, y = pull / friction
+                shrink = min(1.0, max(row[12], 0.0) / max(abs(x) + abs(y), 1e-300))
+                x, y = shrink * x, shrink * y
+                even = 0.25 * (row[12] - abs(x) - abs(y))
+                edges = even + np.maximum((x, -x, y, -y), 0.0)
+                pushes = edges / weights
             rows = slice(at, at + len(weights))
             data.efc_D[rows] = weights
             data.efc_R[rows] = 1.0 / np.asarray(weights)
