@@ -38,90 +38,128 @@ const MAX_ITERATIONS: usize = 60;
 /// potential Σ A ∫p dd − F s, by Newton's method. A load whose axis is beside all columns has none; then the body sinks
 /// without a tilt. The force is met to 1e-12 of it in either case.
 pub(crate) fn settle(law: &FoamLaw, columns: &mut [Column], force_n: f64) {
-    let sunk_m = sink(law, columns, [0.0; 2], force_n);
-    let tilts = tilt(law, columns, sunk_m, force_n).unwrap_or_default();
-    let sunk_m = sink(law, columns, tilts, force_n);
+    let bed = Bed::of(law, columns);
+    let sunk_m = bed.sink([0.0; 2], 0.0, force_n, 1e-3);
+    let state = bed.tilt(sunk_m, force_n).unwrap_or([sunk_m, 0.0, 0.0]);
+    let sunk_m = bed.sink([state[1], state[2]], state[0], force_n, TOLERANCE);
     for c in columns {
-        c.depth_m += sunk_m + tilts[0] * c.across_m[0] + tilts[1] * c.across_m[1];
+        c.depth_m += sunk_m + state[1] * c.across_m[0] + state[2] * c.across_m[1];
     }
 }
 
-/// How far the tilted body sinks until the columns carry the force, m: the force grows with it, so that Newton's steps
-/// between two bounds find it.
-fn sink(law: &FoamLaw, columns: &[Column], [a, b]: [f64; 2], force_n: f64) -> f64 {
-    let depth = |c: &Column| c.depth_m + a * c.across_m[0] + b * c.across_m[1];
-    let carried = |s: f64| {
-        columns.iter().fold((0.0, 0.0), |(force, slope), c| {
-            let (p, k) = law.pressure_and_slope(depth(c) + s);
-            (force + c.area_m2 * p, slope + c.area_m2 * k)
-        })
-    };
-    let mut low = -columns.iter().map(depth).fold(f64::NEG_INFINITY, f64::max);
-    let mut step = 1e-4;
-    let mut high = low + step;
-    while carried(high).0 < force_n && step < 1e3 {
-        low = high;
-        step *= 2.0;
-        high += step;
-    }
-    let mut s = high;
-    for _ in 0..200 {
-        let (force, slope) = carried(s);
-        let off = force - force_n;
-        if off.abs() <= TOLERANCE * force_n || high - low <= f64::EPSILON * high.abs() {
-            break;
-        }
-        if off > 0.0 {
-            high = s;
-        } else {
-            low = s;
-        }
-        let next = s - off / slope;
-        s = if next > low && next < high { next } else { 0.5 * (low + high) };
-    }
-    s
+/// Columns by their quantities, so that loops over them become vector instructions.
+struct Bed<'a> {
+    law: &'a FoamLaw,
+    depth_m: Vec<f64>,
+    u_m: Vec<f64>,
+    v_m: Vec<f64>,
+    area_m2: Vec<f64>,
 }
 
-/// The tilts at which the moments vanish; `None` if they are not small.
-fn tilt(law: &FoamLaw, columns: &[Column], sunk_m: f64, force_n: f64) -> Option<[f64; 2]> {
-    let reach_m = columns.iter().map(|c| c.across_m[0].hypot(c.across_m[1])).fold(0.0, f64::max);
-    // across in units of the reach: the three unknowns are lengths
-    let across = |c: &Column| Vector3::new(1.0, c.across_m[0] / reach_m, c.across_m[1] / reach_m);
-    let at = |state: &Vector3<f64>| {
-        let (mut gradient, mut hessian) = (Vector3::new(-force_n, 0.0, 0.0), Matrix3::zeros());
-        for c in columns {
-            let r = across(c);
-            let (p, k) = law.pressure_and_slope(c.depth_m + r.dot(state));
-            gradient += r * (c.area_m2 * p);
-            hessian += r * r.transpose() * (c.area_m2 * k);
+impl<'a> Bed<'a> {
+    fn of(law: &'a FoamLaw, columns: &[Column]) -> Self {
+        let all = |of: fn(&Column) -> f64| columns.iter().map(of).collect();
+        Self {
+            law,
+            depth_m: all(|c| c.depth_m),
+            u_m: all(|c| c.across_m[0]),
+            v_m: all(|c| c.across_m[1]),
+            area_m2: all(|c| c.area_m2),
         }
-        (gradient, hessian)
-    };
-    let mut state = Vector3::new(sunk_m, 0.0, 0.0);
-    let (mut gradient, mut hessian) = at(&state);
-    for _ in 0..MAX_ITERATIONS {
-        if gradient.amax() <= 1e-9 * force_n {
-            break;
+    }
+
+    /// Force, N, and its slope with s, N/m.
+    fn carried(&self, [a, b]: [f64; 2], s: f64) -> (f64, f64) {
+        let (mut force, mut slope) = (0.0, 0.0);
+        let places = self.u_m.iter().zip(&self.v_m);
+        for ((depth, area), (u, v)) in self.depth_m.iter().zip(&self.area_m2).zip(places) {
+            let (p, k) = self.law.pressure_and_slope(depth + (s + (a * u + b * v)));
+            force += area * p;
+            slope += area * k;
         }
-        // one row of columns does not resist a tilt about itself
-        let damped = hessian + Matrix3::from_diagonal_element(1e-9 * hessian.trace());
-        let step = -damped.cholesky()?.solve(&gradient);
-        let slope = gradient.dot(&step).abs();
-        let mut share = 1.0;
-        loop {
-            let next = at(&(state + share * step));
-            if next.0.dot(&step) <= 0.9 * slope || share < 1e-6 {
-                state += share * step;
-                (gradient, hessian) = next;
+        (force, slope)
+    }
+
+    /// How far the tilted body sinks until the columns carry the force to `tolerance` of it, m, by Newton's steps from
+    /// `from_m`: the force grows with it, and so does its slope.
+    fn sink(&self, tilts: [f64; 2], from_m: f64, force_n: f64, tolerance: f64) -> f64 {
+        let [a, b] = tilts;
+        let depths = self.depth_m.iter().zip(self.u_m.iter().zip(&self.v_m)).map(|(d, (u, v))| d + (a * u + b * v));
+        let (mut low, mut high) = (-depths.fold(f64::NEG_INFINITY, f64::max), f64::INFINITY);
+        let mut s = from_m.max(low + 1e-6);
+        for _ in 0..200 {
+            let (force, slope) = self.carried(tilts, s);
+            let off = force - force_n;
+            let narrow = high.is_finite() && high - low <= f64::EPSILON * high.abs();
+            if off.abs() <= tolerance * force_n || narrow {
                 break;
             }
-            share *= 0.5;
+            if off > 0.0 {
+                high = s;
+            } else {
+                low = s;
+            }
+            let next = s - off / slope;
+            // where few columns carry it yet, the slope is too small to go by
+            let most = if high.is_finite() { high } else { s + (s - low).max(2e-3) };
+            s = if next > low && next < most {
+                next
+            } else if high.is_finite() {
+                0.5 * (low + high)
+            } else {
+                most
+            };
         }
-        if state.yz().amax() > MAX_TILT_RAD * reach_m {
-            return None;
-        }
+        s
     }
-    (gradient.amax() <= 1e-6 * force_n).then(|| [state[1] / reach_m, state[2] / reach_m])
+
+    /// Shift and tilts at which force and moments are met; `None` if the tilts are not small.
+    fn tilt(&self, sunk_m: f64, force_n: f64) -> Option<[f64; 3]> {
+        let places = || self.u_m.iter().zip(&self.v_m);
+        let reach_m = places().map(|(u, v)| u.hypot(*v)).fold(0.0, f64::max);
+        // across in units of the reach: the three unknowns are lengths
+        let per_m = 1.0 / reach_m;
+        let at = |state: &Vector3<f64>| {
+            let (mut gradient, mut sums) = ([0.0; 3], [0.0; 6]);
+            for ((depth, area), (u, v)) in self.depth_m.iter().zip(&self.area_m2).zip(places()) {
+                let (u, v) = (u * per_m, v * per_m);
+                let (p, k) = self.law.pressure_and_slope(depth + (state.x + u * state.y + v * state.z));
+                let (p, k) = (area * p, area * k);
+                let parts = [p, p * u, p * v];
+                gradient.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+                let parts = [k, k * u, k * v, k * u * u, k * u * v, k * v * v];
+                sums.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);
+            }
+            let [one, u, v, uu, uv, vv] = sums;
+            let gradient = Vector3::new(gradient[0] - force_n, gradient[1], gradient[2]);
+            (gradient, Matrix3::new(one, u, v, u, uu, uv, v, uv, vv))
+        };
+        let mut state = Vector3::new(sunk_m, 0.0, 0.0);
+        let (mut gradient, mut hessian) = at(&state);
+        for _ in 0..MAX_ITERATIONS {
+            if gradient.amax() <= 1e-9 * force_n {
+                break;
+            }
+            // one row of columns does not resist a tilt about itself
+            let damped = hessian + Matrix3::from_diagonal_element(1e-9 * hessian.trace());
+            let step = -damped.cholesky()?.solve(&gradient);
+            let slope = gradient.dot(&step).abs();
+            let mut share = 1.0;
+            loop {
+                let next = at(&(state + share * step));
+                if next.0.dot(&step) <= 0.9 * slope || share < 1e-6 {
+                    state += share * step;
+                    (gradient, hessian) = next;
+                    break;
+                }
+                share *= 0.5;
+            }
+            if state.yz().amax() > MAX_TILT_RAD * reach_m {
+                return None;
+            }
+        }
+        (gradient.amax() <= 1e-6 * force_n).then(|| [state.x, state.y * per_m, state.z * per_m])
+    }
 }
 
 #[cfg(test)]

@@ -43,16 +43,8 @@ pub(crate) fn of(law: &FoamLaw, columns: &[Column], posed: &PosedMesh<'_>, lag_s
         let sinks_m = -lag_s * Vector::from(velocity_at(posed, arm.into())).dot(c.normal);
         let (p, slope) = law.pressure_and_slope(c.depth_m + sinks_m);
         if p > 0.0 {
-            let now_n = c.area_m2 * (p - slope * sinks_m);
-            let (now_n, stiffness) = (now_n, c.area_m2 * slope);
-            pressed.push(Pressed {
-                end_m,
-                normal: c.normal,
-                area_m2: c.area_m2,
-                force_n: c.area_m2 * p,
-                now_n,
-                stiffness,
-            });
+            let (force_n, stiffness) = (c.area_m2 * p, c.area_m2 * slope);
+            pressed.push(Pressed { end_m, normal: c.normal, area_m2: c.area_m2, force_n, stiffness });
         }
     }
     let mut total_n = 0.0;
@@ -64,7 +56,7 @@ pub(crate) fn of(law: &FoamLaw, columns: &[Column], posed: &PosedMesh<'_>, lag_s
             (hardest.normal, BESIDE)
         };
         let (side, rest): (Vec<_>, Vec<_>) = pressed.into_iter().partition(|c| c.normal.dot(axis) >= limit);
-        total_n += springs(&side, direction(&side), out);
+        total_n += springs(&side, direction(&side), posed, lag_s, out);
         pressed = rest;
     }
     total_n
@@ -78,8 +70,6 @@ struct Pressed {
     area_m2: f64,
     /// At the velocity that is expected, N.
     force_n: f64,
-    /// On a body that does not move, by the tangent of the law, N.
-    now_n: f64,
     /// N/m.
     stiffness: f64,
 }
@@ -89,7 +79,7 @@ fn direction(columns: &[Pressed]) -> Vector {
 }
 
 /// Three springs for columns that push along `normal`; their force at the expected velocity, N.
-fn springs(columns: &[Pressed], normal: Vector, out: &mut Vec<Support>) -> f64 {
+fn springs(columns: &[Pressed], normal: Vector, posed: &PosedMesh<'_>, lag_s: f64, out: &mut Vec<Support>) -> f64 {
     let (u, v) = (normal.any_orthonormal_vector(), normal.cross(normal.any_orthonormal_vector()));
     let shares = || columns.iter().map(|c| (c, c.normal.dot(normal)));
     let weights = || shares().map(|(c, share)| (c, share * share * c.stiffness));
@@ -110,26 +100,25 @@ fn springs(columns: &[Pressed], normal: Vector, out: &mut Vec<Support>) -> f64 {
     let (half, apart) = (0.5 * (uu + vv), (0.5 * (uu - vv)).hypot(uv));
     let (long_m, short_m) = ((half + apart).sqrt(), (half - apart).max(1e-6 * half).sqrt());
     let (long, short) = (u * cos + v * sin, v * cos - u * sin);
-    // moments of the forces in units of the radii of gyration: at rest, and at the expected velocity
-    let (mut sums, mut ahead) = ([0.0; 3], [0.0; 3]);
+    // moments of the forces, in units of the radii of gyration
+    let mut sums = [0.0; 3];
     for (c, share) in shares() {
         let away = c.end_m - middle;
         let at = [1.0, away.dot(long) / long_m, away.dot(short) / short_m];
-        for k in 0..3 {
-            sums[k] += share * c.now_n * at[k];
-            ahead[k] += share * c.force_n * at[k];
-        }
+        sums.iter_mut().zip(at).for_each(|(sum, at)| *sum += share * c.force_n * at);
     }
     // one of them where most of the force is
-    let first = ahead[2].atan2(ahead[1]);
+    let first = sums[2].atan2(sums[1]);
     for k in 0..3 {
         let (sin, cos) = (first + f64::from(k) * std::f64::consts::TAU / 3.0).sin_cos();
         let [x, y] = [cos, sin].map(|v| v * std::f64::consts::SQRT_2);
         let place = middle + long * (x * long_m) + short * (y * short_m);
-        let force_n = (sums[0] + sums[1] * x + sums[2] * y) / 3.0;
+        let arm = place - Vector::from(posed.centre_of_mass_m);
+        let speed = Vector::from(velocity_at(posed, arm.into())).dot(normal);
+        let force_n = (sums[0] + sums[1] * x + sums[2] * y + stiffness * lag_s * speed) / 3.0;
         out.push(Support { place_m: place.into(), normal: normal.into(), force_n, stiffness_n_per_m: stiffness / 3.0 });
     }
-    ahead[0]
+    sums[0]
 }
 
 #[cfg(test)]

@@ -327,7 +327,7 @@ impl TouchSkin {
         let lag_s = step_s + self.foam.damping_s;
         // what may come into the foam in this step
         let speed = Vector::from(posed.velocity_m_per_s).length();
-        let spin = Vector::from(posed.angular_velocity_rad_per_s).length() * body.mesh.extent_m();
+        let spin = Vector::from(posed.angular_velocity_rad_per_s).length() * body.solid.radius_m();
         let gap_m = (1.5 * lag_s * (speed + spin)).clamp(self.foam.thickness_m, 10.0);
         self.surface.columns_under(0, body, posed, lining_m, gap_m, &mut self.columns);
         if self.columns.is_empty() {

@@ -28,8 +28,7 @@ import numpy as np
 
 from ._spts import Body, Mount, Skin, Wire
 
-# Stiffness of foam along its surface, relative to that across it: G/(K h) of an open foam with Poisson's ratio 0.25. With
-# a pyramidal cone MuJoCo solves for one stiffness alone, and it is μ²/2.
+# Stiffness of foam along its surface, relative to that across it, where MuJoCo's cone is elliptic; as in mount.rs.
 _SHEAR = 0.4
 # Most times that a step is solved anew with the foam's law about another velocity, and the share of a force that may be
 # off before: what is left is of the order of its square.
@@ -172,7 +171,7 @@ class Attachment:
             raise RuntimeError("another `mjcb_control` has been set after `hook()`: set it before, or use `step`")
         if self._idle > 0.0:
             # nothing has touched it for that long
-            self._last = self._mount.read(self._idle, [])
+            self._last = self._mount.read(self._idle, [], _NO_FORCES, _NO_FORCES, _NO_FORCES, 0)
             self._idle = 0.0
         return self._last
 
@@ -335,7 +334,6 @@ class _Group:
                         self._passed[k].append(b._link)
         # contacts that stand for foam from this number on; of each its skin, its body, and its frame
         self._first, self._springs = 0, []
-        self._force = np.empty(6)
         self._contact = _blank()
 
     def step(self):
@@ -353,18 +351,18 @@ class _Group:
             self._hold(model.opt.timestep)
         self.read(model.opt.timestep)
 
-    def _foamed(self, contact):
-        """Which contacts are between the link of a skin and its bodies, where there is foam: (skins, contacts)."""
+    def _foamed(self, contact, acts):
+        """Which contacts of those that act are between the link of a skin and its bodies, where there is foam: (skins,
+        contacts) of bool."""
         geoms = contact.geom
         one, other = geoms[:, 0], geoms[:, 1]
         found = self._own[:, one] & self._others[:, other] | self._others[:, one] & self._own[:, other]
         # a flex has no geom
-        found &= (one >= 0) & (other >= 0)
-        return found
-
-    def _covered(self, found, places):
-        for k in np.flatnonzero(found.any(axis=1)):
-            found[k, found[k]] = self.attachments[k]._covers(places[found[k]])
+        found &= acts & (one >= 0) & (other >= 0)
+        if found.any():
+            places = contact.pos
+            for k in np.flatnonzero(found.any(axis=1)):
+                found[k, found[k]] = self.attachments[k]._covers(places[found[k]])
         return found
 
     def press(self, always=False):
@@ -375,21 +373,18 @@ class _Group:
         """
         model, data = self.model, self.data
         dt, taken = model.opt.timestep, False
+        elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
         if data.ncon:
             contact = data.contact
-            found = self._foamed(contact)[self.foams].any(axis=0)
-            if found.any():
-                every = self._foamed(contact)
-                every[[k for k in range(len(every)) if k not in self.foams]] = False
-                found = self._covered(every, contact.pos).any(axis=0) & (contact.exclude == 0)
-                taken = bool(found.any())
-                contact.exclude[found] = 1
+            found = self._foamed(contact, contact.exclude == 0)[self.foams].any(axis=0)
+            taken = bool(found.any())
+            contact.exclude[found] = 1
         self._first, qvel, last = data.ncon, None, {}
         for trial in range(_TRIALS):
             self._springs, carried, rest = [], {}, {}
             for k in self.foams:
                 attachment = self.attachments[k]
-                rows, bodies, near = attachment._mount.supports(dt, self._passed[k], self._worn[k])
+                rows, bodies, near = attachment._mount.supports(dt, elliptic, self._passed[k], self._worn[k])
                 carried.update({(k, body): force for body, force in near})
                 for row, body in zip(rows, bodies):
                     self._springs.append((k, body, row))
@@ -430,8 +425,7 @@ class _Group:
     def _put(self):
         """Makes the constraints anew with a contact for every spring."""
         model, data = self.model, self.data
-        dt, contact = model.opt.timestep, self._contact
-        elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+        contact = self._contact
         data.ncon = self._first
         for k, body, row in self._springs:
             attachment = self.attachments[k]
@@ -442,47 +436,37 @@ class _Group:
             if mujoco.mj_addContact(model, data, contact):
                 raise RuntimeError("the data has no room for more contacts: `<size memory=…/>` of the model")
         mujoco.mj_makeConstraint(model, data)
-        contacts, margin = data.contact, data.efc_margin
-        for number, (k, _, row) in enumerate(self._springs, self._first):
-            skin, at = self.attachments[k].skin, int(contacts.efc_address[number])
-            if at < 0:
-                continue
-            # with J v + dt J a the velocity at the end of the step: D (aref − J a) is the force of `Support`, and
-            # aref = −J v/dt − (pos − margin) with these K, B and I
-            friction, inertia = skin.foam[1], row[13] * (dt + skin.damping) * dt
-            pull = row[14:16]
-            if friction <= 0.0:
-                weights, pushes = [inertia], [row[12] / inertia]
-            elif elliptic:
-                contacts.mu[number] = friction / math.sqrt(_SHEAR)
-                weights = [inertia, _SHEAR * inertia, _SHEAR * inertia]
-                pushes = [row[12] / inertia, *(pull / weights[1])]
-            else:
-                # edges of the pyramid, of which all push as long as friction is inside it
-                weights = [0.25 * inertia] * 4
-                x, y = pull / friction
-                shrink = min(1.0, max(row[12], 0.0) / max(abs(x) + abs(y), 1e-300))
-                x, y = shrink * x, shrink * y
-                even = 0.25 * (row[12] - abs(x) - abs(y))
-                edges = even + np.maximum((x, -x, y, -y), 0.0)
-                pushes = edges / weights
-            rows = slice(at, at + len(weights))
-            data.efc_D[rows] = weights
-            data.efc_R[rows] = 1.0 / np.asarray(weights)
-            data.efc_KBIP[rows] = (1.0, 1.0 / dt, 1.0, 0.0)
-            data.efc_pos[rows] = margin[rows] - pushes
+        contacts = data.contact
+        for count in {self._rows(k) for k, _, _ in self._springs}:
+            mine = [n for n, (k, _, _) in enumerate(self._springs) if self._rows(k) == count]
+            first = contacts.efc_address[self._first :][mine]
+            values = np.array([self._springs[n][2] for n in mine])[first >= 0]
+            rows = first[first >= 0][:, None] + np.arange(count)
+            if count == 3:
+                for n in mine:
+                    contacts.mu[self._first + n] = self.attachments[self._springs[n][0]].skin.foam[1] / math.sqrt(_SHEAR)
+            weights, pushes = values[:, 14 : 14 + count], values[:, 18 : 18 + count]
+            data.efc_D[rows], data.efc_R[rows] = weights, 1.0 / weights
+            # aref = −J v/dt − (pos − margin)
+            data.efc_KBIP[rows] = (1.0, 1.0 / model.opt.timestep, 1.0, 0.0)
+            data.efc_pos[rows] = data.efc_margin[rows] - pushes
         if hasattr(mujoco, "mj_island"):
             mujoco.mj_island(model, data)
         mujoco.mj_projectConstraint(model, data)
         mujoco.mj_referenceConstraint(model, data)
 
+    def _rows(self, k):
+        """Rows of the constraint of a contact of a skin."""
+        if self.attachments[k].skin.foam[1] <= 0.0:
+            return 1
+        return 3 if self.model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC else 4
+
     def _forces(self):
         """Forces of the springs, (springs, 3), N, along their frames."""
-        forces = np.zeros((len(self._springs), 3))
-        for number in range(len(self._springs)):
-            mujoco.mj_contactForce(self.model, self.data, self._first + number, self._force)
-            forces[number] = self._force[:3]
-        return forces
+        forces = np.zeros((len(self._springs), 6))
+        for number, force in enumerate(forces, self._first):
+            mujoco.mj_contactForce(self.model, self.data, number, force)
+        return forces[:, :3]
 
     def _hold(self, elapsed):
         """Lets friction stretch the foam by what the step was solved to."""
@@ -495,57 +479,41 @@ class _Group:
     def read(self, dt):
         """Lets the skins feel the contacts that the data has, `dt` s after the last time."""
         model, data = self.model, self.data
-        loads = {}
+        loads, forces, contact = {}, _NO_FORCES, None
         if data.ncon:
             contact = data.contact
-            found = self._foamed(contact) & (contact.efc_address >= 0)
-            for number, (k, _, _) in enumerate(self._springs, self._first):
-                # of the skins of one link, its own
-                same = [other for other, a in enumerate(self.attachments) if a._link == self.attachments[k]._link]
-                found[same, number] = False
-                found[k, number] = True
-            if found.any():
-                own = found[:, self._first :].copy() if self._springs else None
-                found = self._covered(found, contact.pos)
-                if own is not None:
-                    found[:, self._first :] |= own
-                geoms, places, frames = contact.geom, contact.pos, contact.frame
-                for number in np.flatnonzero(found.any(axis=0)):
-                    mujoco.mj_contactForce(model, data, number, self._force)
-                    if self._force[0] <= 0.0:
-                        continue
-                    frame, pos = frames[number].reshape(3, 3), places[number]
-                    push, twist = self._force[:3] @ frame, self._force[3:] @ frame
-                    for k in np.flatnonzero(found[:, number]):
-                        # the contact's normal points from its first geom to its second, and the force is on the second
-                        first = self._others[k, geoms[number, 0]]
-                        sign = -1.0 if first else 1.0
-                        body = int(model.geom_bodyid[geoms[number, 0 if first else 1]])
-                        along = None
-                        if self.attachments[k].mode == "foam":
-                            body = self._body_of(number, k, body)
-                            along = tuple((sign * frame[0]).tolist())
-                        about = sign * (twist + np.cross(pos - data.xpos[body], push))
-                        before = loads.setdefault(k, {}).get((body, along), (0.0, 0.0, 0.0, 0.0))
-                        more = (self._force[0], self._force[0] * pos, sign * push, about)
-                        loads[k][body, along] = tuple(a + b for a, b in zip(before, more))
+            found = self._foamed(contact, contact.efc_address >= 0)
+            for number, (k, body, _) in enumerate(self._springs, self._first):
+                # of the skins of one link, its own; and that of the body
+                link = self.attachments[k]._link
+                found[:, number] &= [a._link != link for a in self.attachments]
+                loads.setdefault(k, []).append((number, body, 1.0))
+                for other in np.flatnonzero(found[:, number]):
+                    loads.setdefault(other, []).append((number, link, -1.0))
+            acting = np.flatnonzero(found[:, : self._first if self._springs else None].any(axis=0))
+            if len(acting) or loads:
+                geoms, forces = contact.geom, np.zeros((data.ncon, 6))
+                for number in (*acting.tolist(), *range(self._first, self._first + len(self._springs))):
+                    mujoco.mj_contactForce(model, data, number, forces[number])
+                for k, number in zip(*np.nonzero(found[:, : self._first if self._springs else None])):
+                    # the contact's normal points from its first geom to its second, and the force is on the second
+                    one, other = geoms[number]
+                    first = self._others[k, one]
+                    load = int(number), int(model.geom_bodyid[one if first else other]), -1.0 if first else 1.0
+                    loads.setdefault(k, []).append(load)
+        foamed = self._first if self._springs else data.ncon
         for k, attachment in enumerate(self.attachments):
             attachment._idle += dt
-            felt = loads.get(k)
+            felt = loads.get(k, ())
             if felt or attachment._last is None or attachment._last.area > 0.0:
-                found = [
-                    (body, float(normal), (at / normal).tolist(), push.tolist(), twist.tolist(), along)
-                    for (body, along), (normal, at, push, twist) in (felt or {}).items()
-                ]
-                attachment._last = attachment._mount.read(attachment._idle, found, self._worn[k])
+                places, frames = (contact.pos, contact.frame) if felt else (_NO_FORCES, _NO_FORCES)
+                attachment._last = attachment._mount.read(
+                    attachment._idle, felt, places, frames, forces, foamed, self._worn[k]
+                )
                 attachment._idle = 0.0
 
-    def _body_of(self, number, k, body):
-        """The body of a contact for a skin: that of the spring, whose geom may be of what is welded to it."""
-        if number < self._first:
-            return body
-        owner, pressed, _ = self._springs[number - self._first]
-        return pressed if owner == k else self.attachments[owner]._link
+
+_NO_FORCES = np.empty((0, 6))
 
 
 def _blank():

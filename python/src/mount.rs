@@ -64,10 +64,6 @@ struct Sheared {
     shear_n: Vector,
 }
 
-/// A load on a skin: number of the body; normal force, N, and where it acts; force and torque on the body about its
-/// origin; and, in mode "foam", the direction of the normal force. All in the world's frame.
-type LoadIn = (usize, f64, Vector, Vector, Vector, Option<Vector>);
-
 /// What a body wears: its number, the thickness of its foam, m, and its stiffness, Pa/m.
 type Lining = (usize, f64, f64);
 
@@ -102,14 +98,16 @@ impl Mount {
     /// The foam under all bodies but those of `passed`, for a step of `step` s, as springs for the engine, about the
     /// velocities that the data has. `lined` are bodies that wear foam themselves.
     ///
-    /// Returns an array (n, 16): place, m, frame by rows (normal on the body, and two tangents), force on a body that
-    /// does not move, N, stiffness, N/m, and friction that is held along the tangents, N; then the body of every spring;
+    /// Returns an array (n, 22): place, m; frame by rows (normal on the body, and two tangents); force on a body that does
+    /// not move, N; stiffness, N/m; and, for up to four rows of its constraint each, D and aref + J v/step: MuJoCo's force
+    /// D (aref − J a) then is that of `Support` and of friction that stretches the foam. Then the body of every spring,
     /// and the normal force, N, of every body that is near.
-    #[pyo3(signature = (step, passed = Vec::new(), lined = Vec::new()))]
+    #[pyo3(signature = (step, elliptic, passed = Vec::new(), lined = Vec::new()))]
     fn supports<'py>(
         &self,
         py: Python<'py>,
         step: f64,
+        elliptic: bool,
         passed: Vec<usize>,
         lined: Vec<Lining>,
     ) -> PyResult<(Array2<'py>, Vec<usize>, Vec<(usize, f64)>)> {
@@ -131,16 +129,25 @@ impl Mount {
         }
         let mut friction = self.friction.lock().unwrap_or_else(PoisonError::into_inner);
         share(&friction.held, &mut supports);
-        let mut rows = Vec::with_capacity(16 * supports.len());
+        let (damping, (_, coefficient)) = (self.skin.get().damping(), self.skin.get().foam());
+        let mut rows = Vec::with_capacity(22 * supports.len());
         for s in &supports {
-            let axes = tangents(s.support.normal);
-            rows.extend(plus(origin, turned(&frame, s.support.place_m)));
+            let (support, axes) = (&s.support, tangents(s.support.normal));
+            rows.extend(plus(origin, turned(&frame, support.place_m)));
             rows.extend(axes.map(|axis| turned(&frame, axis)).into_iter().flatten());
-            rows.extend([s.support.force_n, s.support.stiffness_n_per_m]);
-            rows.extend([dot(s.shear_n, axes[1]), dot(s.shear_n, axes[2])]);
+            rows.extend([support.force_n, support.stiffness_n_per_m]);
+            let inertia = support.stiffness_n_per_m * (step + damping) * step;
+            let shear = [dot(s.shear_n, axes[1]), dot(s.shear_n, axes[2])];
+            let [weights, forces] = if elliptic {
+                cone(inertia, support.force_n, shear)
+            } else {
+                pyramid(inertia, support.force_n, shear, coefficient)
+            };
+            rows.extend(weights);
+            rows.extend(std::array::from_fn::<_, 4, _>(|k| forces[k] / weights[k]));
         }
         let bodies = supports.iter().map(|s| s.body).collect();
-        let rows = rows.into_pyarray(py).reshape([supports.len(), 16])?;
+        let rows = rows.into_pyarray(py).reshape([supports.len(), 22])?;
         friction.supports = supports;
         Ok((rows, bodies, carried))
     }
@@ -183,28 +190,77 @@ impl Mount {
         *self.friction.lock().unwrap_or_else(PoisonError::into_inner) = Friction::default();
     }
 
-    /// What the skin feels, `dt` s after the last time, of `loads` that the engine's contacts are. `lined` are bodies
-    /// that wear foam themselves.
-    #[pyo3(signature = (dt, loads, lined = Vec::new()))]
-    fn read(&self, py: Python<'_>, dt: f64, loads: Vec<LoadIn>, lined: Vec<Lining>) -> PyResult<Touch> {
+    /// What the skin feels, `dt` s after the last time, of contacts of the engine. Each of `loads` is the number of a
+    /// contact, the body that it presses on the skin, and the sign with which the contact's force is on that body.
+    /// `places`, `frames` and `forces` are of all contacts: (n, 3), m, (n, 9) by rows, and (n, 6), N and N m, along those.
+    /// The pressures of contacts of number `foamed` and above are those of the foam as vectors, as `supports` has them.
+    #[pyo3(signature = (dt, loads, places, frames, forces, foamed, lined = Vec::new()))]
+    #[expect(clippy::too_many_arguments, reason = "one a thing that a contact has")]
+    fn read(
+        &self,
+        py: Python<'_>,
+        dt: f64,
+        loads: Vec<(usize, usize, f64)>,
+        places: PyReadonlyArray2<'_, f64>,
+        frames: PyReadonlyArray2<'_, f64>,
+        forces: PyReadonlyArray2<'_, f64>,
+        foamed: usize,
+        lined: Vec<Lining>,
+    ) -> PyResult<Touch> {
         let (placed, frame, origin) = self.placed(py)?;
-        let mut known = Vec::with_capacity(loads.len());
-        for (body, normal_n, centre, force, torque, along) in loads {
+        let xpos = read(py, &self.arrays.xpos)?;
+        let mut known: Vec<Load> = Vec::new();
+        for (number, body, sign) in loads {
             let Some(at) = self.bodies.iter().position(|known| *known == body) else {
                 bail!("body {body} is none of those that may touch the skin");
             };
+            let (place, axes, force) = (row(&places, number), rotation(&frames, number), row::<6>(&forces, number));
+            let normal_n = force[0];
+            if normal_n <= 0.0 {
+                continue;
+            }
+            // by the rows of the contact's frame
+            let along = |v: &[f64]| scaled(into(&axes, [v[0], v[1], v[2]]), sign);
+            let push = along(&force[..3]);
+            let twist = plus(along(&force[3..]), cross(minus(place, row(&xpos, body)), push));
+            let centre_m = into(&frame, minus(place, origin));
+            let wrench = Wrench { force_n: into(&frame, push), torque_nm: into(&frame, twist) };
+            let normal = (number >= foamed).then(|| into(&frame, scaled(axes[0], sign)));
             let lining = lined.iter().find(|(lined, ..)| *lined == body).map_or((0.0, f64::INFINITY), |l| (l.1, l.2));
-            known.push(Load {
-                body: at,
-                normal_n,
-                centre_m: into(&frame, minus(centre, origin)),
-                wrench: Wrench { force_n: into(&frame, force), torque_nm: into(&frame, torque) },
-                along: along.map(|along| into(&frame, along)),
-                lining,
-            });
+            match known.iter_mut().find(|load| load.body == at && load.along == normal) {
+                Some(load) => {
+                    let share = normal_n / (load.normal_n + normal_n);
+                    load.centre_m = plus(load.centre_m, scaled(minus(centre_m, load.centre_m), share));
+                    load.normal_n += normal_n;
+                    load.wrench.force_n = plus(load.wrench.force_n, wrench.force_n);
+                    load.wrench.torque_nm = plus(load.wrench.torque_nm, wrench.torque_nm);
+                }
+                None => known.push(Load { body: at, normal_n, centre_m, wrench, along: normal, lining }),
+            }
         }
         self.skin.get().carried(py, &self.shapes, &placed, dt, &known)
     }
+}
+
+/// Stiffness of foam along its surface, relative to that across it: G/(K h) of an open foam with Poisson's ratio 0.25.
+const SHEAR: f64 = 0.4;
+
+/// D and the force at rest, N, of the rows of a contact with an elliptic cone: normal, and two tangents.
+fn cone(inertia: f64, force_n: f64, [x, y]: [f64; 2]) -> [[f64; 4]; 2] {
+    [[inertia, SHEAR * inertia, SHEAR * inertia, 1.0], [force_n, x, y, 0.0]]
+}
+
+/// D and the force at rest, N, of the rows of a contact with a pyramidal cone: its edges, of which all push as long as
+/// friction is inside it. Along the surface that is the stiffness μ²/2.
+fn pyramid(inertia: f64, force_n: f64, shear: [f64; 2], friction: f64) -> [[f64; 4]; 2] {
+    if friction <= 0.0 {
+        return cone(inertia, force_n, shear);
+    }
+    let [x, y] = shear.map(|s| s / friction);
+    let within = (force_n.max(0.0) / (x.abs() + y.abs()).max(f64::MIN_POSITIVE)).min(1.0);
+    let (x, y) = (within * x, within * y);
+    let even = 0.25 * (force_n - x.abs() - y.abs());
+    [[0.25 * inertia; 4], [x, -x, y, -y].map(|edge| even + edge.max(0.0))]
 }
 
 /// Whether two supports are of the same side of a body.

@@ -288,6 +288,12 @@ impl Solid {
         }
     }
 
+    /// Largest distance of its box from the origin of its axes, m; 0 for what has no end.
+    pub(crate) fn radius_m(&self) -> f64 {
+        let far_m = self.low_m.abs().max(self.high_m.abs()).length();
+        if far_m.is_finite() { far_m } else { 0.0 }
+    }
+
     /// The solid where `body` is.
     pub(crate) fn standing(&self, body: &PosedMesh<'_>) -> Standing<'_> {
         Standing { solid: self, axes: body.rotation.map(Vector::from), origin_m: Vector::from(body.position_m) }

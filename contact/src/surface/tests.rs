@@ -174,7 +174,7 @@ fn chords_are_those_of_meshes() {
         let profile = [[0.0, -0.018]].into_iter().chain(lower).chain((0..128).map(cap)).chain([[0.0, 0.018]]);
         revolve(&profile.collect::<Vec<_>>(), 512)
     };
-    let floor = upright(cuboid([2.0, 2.0, 1.0]), 1.0);
+    let floor = upright(cuboid([200.0, 200.0, 100.0]), 100.0);
     let egg = ball.clone().scaled([1.0, 0.5, 2.0]);
     let part =
         |shape, position_m| Part { shape, rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], position_m };
