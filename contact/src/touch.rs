@@ -163,6 +163,19 @@ impl TouchSkin {
         }
     }
 
+    /// The foam.
+    pub fn foam(&self) -> &Foam {
+        &self.foam
+    }
+
+    /// Sample points of a skin that is not flat.
+    pub fn points(&self) -> Option<&SurfacePoints> {
+        match &self.surface {
+            Surface::Curved(field) => Some(field.points()),
+            Surface::Flat(_) => None,
+        }
+    }
+
     /// Thickness of the foam, m.
     pub fn thickness_m(&self) -> f64 {
         self.foam.thickness_m

@@ -16,7 +16,7 @@ type Loads = Vec<(usize, [f64; 6])>;
 
 /// A skin on a link, and the bodies that may touch it. It reads and writes the arrays of an `mjData`, whatever MuJoCo
 /// they come from.
-#[pyclass(frozen, module = "spts")]
+#[pyclass(frozen, module = "spts._spts")]
 pub(crate) struct Mount {
     skin: Py<Skin>,
     link: usize,

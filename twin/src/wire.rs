@@ -1,12 +1,12 @@
 //! The one wire of a skin, live: pressure in, measurements out.
 
 use crate::chain::{Chain, SkinSession, of_conductance, of_readout};
-use spts_circuit::{Constant, Mode, Readout, RecordingInfo, WeightRows};
+use spts_circuit::{Constant, Mode, Patterns, Readout, RecordingInfo, WeightRows};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, PressureMap, Snapshot};
 use spts_recon::metrics::median;
 
-/// Measurements of the untouched skin from which its output is known.
+/// Measurements of the untouched skin from which its output is known; of a pattern whole rounds.
 const IDLE: usize = 2000;
 
 /// The one wire of a skin: transducer and electronics with their state, fed with one pressure after the other.
@@ -67,7 +67,9 @@ impl Wire {
         wire.feel_each(&zeros.iter().map(|zeros| Some((zeros, 0.0))).collect::<Vec<_>>())?;
         for mode in [Mode::Compressive, Mode::Raster] {
             let mut readout = chain.readout(mode, session)?;
-            let idle = readout.measure(&mut wire.felt, IDLE).map_err(of_readout)?;
+            // whole rounds of a pattern, so that what follows begins with its first row
+            let period = readout.weights().patterns().map_or(1, Patterns::period);
+            let idle = readout.measure(&mut wire.felt, IDLE.next_multiple_of(period)).map_err(of_readout)?;
             wire.lines.push(Line { idle_v: median(&idle).unwrap_or_default(), readout });
         }
         Ok(wire)
@@ -150,7 +152,8 @@ impl Wire {
         WeightRows::new(readout.weights(), readout.row(), count)
     }
 
-    /// Median of 2000 samples of the untouched skin, taken in [`Wire::new`], V.
+    /// Median of 2000 samples of the untouched skin, taken in [`Wire::new`], V; of a pattern as many more as make whole
+    /// rounds.
     pub fn idle_v(&self, mode: Mode) -> f64 {
         self.lines[index(mode)].idle_v
     }

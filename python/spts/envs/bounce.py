@@ -68,8 +68,6 @@ class BounceEnv(gym.Env):
     ):
         import mujoco
 
-        from .. import mujoco as ours
-
         if not 0.01 <= height <= 2.0:
             raise ValueError(f"`height` = {height} is outside [0.01, 2] m")
         if not 1 <= frame_skip <= 10_000:
@@ -79,17 +77,9 @@ class BounceEnv(gym.Env):
         self.skin = Skin(10, 10, 0.015) if skin is None else skin
         self.render_mode = render_mode
         self._height, self._frame_skip = height, int(frame_skip)
-        self._mujoco = mujoco
         self.model = mujoco.MjModel.from_xml_string(_PADDLE)
         self.data = mujoco.MjData(self.model)
-        self._touch = ours.attach(
-            self.model,
-            self.data,
-            self.skin,
-            site="skin",
-            bodies={"ball": Body.sphere(_BALL_M, stiffness=_BALL_PA_PER_M)},
-            mode="foam",
-        )
+        self._attach()
         self._ball = self.model.body("ball").id
         self._tactile = Tactile(self.skin, observe, measurements, decoder, wire)
         most = np.full(6, 1e3)
@@ -98,9 +88,25 @@ class BounceEnv(gym.Env):
         )
         self.action_space = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
 
+    def _attach(self):
+        from .. import mujoco as ours
+
+        ball = Body.sphere(_BALL_M, stiffness=_BALL_PA_PER_M)
+        self._touch = ours.attach(self.model, self.data, self.skin, site="skin", bodies={"ball": ball}, mode="foam")
+
+    def __getstate__(self):
+        # a copy attaches the copied skin to its own data
+        return {name: value for name, value in vars(self).items() if name != "_touch"}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        self._attach()
+
     def reset(self, *, seed=None, options=None):
+        import mujoco
+
         super().reset(seed=seed)
-        self._mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_resetData(self.model, self.data)
         self._tactile.reset(fresh_seed(self.np_random))
         self._touch.reset()
         away = self.np_random.uniform(-0.02, 0.02, 2)
