@@ -348,6 +348,26 @@ def test_an_environment_is_made_again_from_its_spec(recwarn):
     wrapped.close()
 
 
+def test_environments_do_not_share_a_skin():
+    """Those of a vector are given one, and so are those made from one specification."""
+    skin, alone = spts.Skin(8, 8, 0.01), gym.make("spts/Press-v0", skin=spts.Skin(8, 8, 0.01))
+    envs = gym.make_vec("spts/Press-v0", num_envs=2, vectorization_mode="sync", skin=skin)
+    spec = gym.make("spts/Press-v0", skin=skin).spec
+    made = [gym.make(spec), gym.make(spec)]
+    for env in made:
+        env.reset(seed=1)
+    expected = alone.reset(seed=1)[0]["tactile"]
+    seen = [envs.reset(seed=[1, 2])[0]["tactile"][0]]
+    actions = [alone.action_space.sample() for _ in range(5)]
+    for k, action in enumerate(actions):
+        expected = alone.step(action)[0]["tactile"]
+        seen = [envs.step(np.stack([action, -action]))[0]["tactile"][0], made[0].step(action)[0]["tactile"]]
+        assert all(np.array_equal(s, expected) for s in seen)
+        if k == 2:
+            made[1].reset(seed=5)
+    assert skin.time == 0.0
+
+
 def worker(rig, depth):
     """What one of many workers does with a rig that it was sent."""
     skin, wire, ball, decoder = rig

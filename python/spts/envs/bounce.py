@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import gymnasium as gym
 import numpy as np
 
@@ -42,7 +44,7 @@ class BounceEnv(gym.Env):
     Parameters
     ----------
     skin : spts.Skin, optional
-        Flat, centred on the paddle of 180 mm; default 10 x 10 taxels of 15 mm.
+        Flat, centred on the paddle of 180 mm; default 10 x 10 taxels of 15 mm. A copy of it is used.
     height : float
         Height that the ball falls from at first, m.
     frame_skip : int
@@ -74,7 +76,8 @@ class BounceEnv(gym.Env):
             raise ValueError(f"`frame_skip` = {frame_skip} is outside [1, 10000]")
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f'`render_mode` = {render_mode}; valid: None, "rgb_array"')
-        self.skin = Skin(10, 10, 0.015) if skin is None else skin
+        # of its own: the environments of a vector are given one
+        self.skin = Skin(10, 10, 0.015) if skin is None else copy.deepcopy(skin)
         self.render_mode = render_mode
         self._height, self._frame_skip = height, int(frame_skip)
         self.model = mujoco.MjModel.from_xml_string(_PADDLE)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import gymnasium as gym
 import numpy as np
 
@@ -19,6 +21,7 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
     env : gymnasium.Env
         With `model` and `data` of MuJoCo, as all of gymnasium's and gymnasium-robotics's have.
     skin : spts.Skin
+        A copy of it is used: `touch.skin`.
     site, body, pos, quat, bodies, link_geoms, mode
         As of `spts.mujoco.attach`.
     key : str
@@ -49,7 +52,7 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         own = dict(spaces.spaces) if isinstance(spaces, gym.spaces.Dict) else {"observation": spaces}
         if key in own:
             raise ValueError(f'`key` = "{key}": the environment\'s observation has that already')
-        self._tactile, self._key, self._resets = Tactile(skin, **tactile), key, False
+        self._tactile, self._key, self._resets = Tactile(copy.deepcopy(skin), **tactile), key, False
         self.observation_space = gym.spaces.Dict({**own, key: self._tactile.space})
         self._place = place
         self._attach()
