@@ -17,6 +17,9 @@ use std::sync::{Mutex, PoisonError};
 /// Most measurements of a call, and most weights that it returns.
 const MOST: usize = 1 << 27;
 
+/// How far a level that is given may be from one of the cells: it was printed with six digits.
+const LEVEL: f64 = 1e-6;
+
 /// Most measurements between two looks at whether Ctrl-C was pressed.
 const SLICE: usize = 1 << 16;
 
@@ -558,8 +561,8 @@ fn patterns(given: &Bound<'_, PyAny>) -> PyResult<Patterns> {
     for (row, levels) in (0_u64..).zip(values.chunks_exact(taxels)) {
         for (taxel, (level, code)) in levels.iter().zip(found.row(row)).enumerate() {
             let nearest = WeightMode::Analog.code_level(*code);
-            // written with six digits
-            if !((level - nearest).abs() <= 1e-6) {
+            let off = (level - nearest).abs();
+            if off.is_nan() || off > LEVEL {
                 bail!("`rows[{row}, {taxel}]` = {level} is no level; the nearest is {nearest:.6}, of the code {code}");
             }
         }
