@@ -128,6 +128,21 @@ def test_a_skin_and_its_wire_go_on_together(how, skin, ball):
         wire2.feel(spts.Skin().touch({}, dt=1.0))
 
 
+@pytest.mark.parametrize("how", DEEP)
+def test_wires_over_several_skins(how, ball):
+    left, right = skins()["flat"], skins()["cylinder"]
+    wires = [spts.Wire([left, right], seed=3), spts.Wire((right, left), taxels=range(100, 7, -3), seed=4)]
+    wires[0].record([left.touch(poses(left, ball, 2e-3), dt=0.1), None], 100)
+    wires[1].feel([right.touch(poses(right, ball, 2e-3), dt=0.3), None])
+    others = HOWS[how](wires)
+    touches = left.touch({}, dt=0.2), right.touch(poses(right, ball, 1e-3), dt=0.2)
+    for wire, other, order in zip(wires, others, (touches, touches[::-1])):
+        for given in (order, order, [None, None]):
+            assert all(np.array_equal(a, b) for a, b in zip(wire.record(given, 50), other.record(given, 50)))
+        with pytest.raises(ValueError, match="another skin"):
+            other.feel(order[::-1])
+
+
 def test_skins_of_other_processes_are_others(skin, tmp_path):
     """Numbers of skins do not repeat from process to process."""
     script = "import spts, sys, pickle; sys.stdout.buffer.write(pickle.dumps([spts.Skin() for _ in range(20)]))"
