@@ -51,7 +51,8 @@ pub struct Profile {
     /// Seeds of the cells, one a taxel, in place of the rule. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seeds: Option<Vec<u32>>,
-    /// Codes that the cells repeat, in place of a generator's; as a text, one row a line. Default: none. A raster scan ignores patterns and seeds.
+    /// Codes that the cells repeat, in place of a generator's; as a text, one row a line. Default: none. A raster scan
+    /// ignores patterns and seeds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patterns: Option<Patterns>,
     /// Measurements a second, Hz. Range [1, 1e9].

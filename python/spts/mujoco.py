@@ -342,10 +342,10 @@ def dress(
     thickness : float
         Thickness of the foam, m. It lies on the surface of the geoms.
     wires : "link", "limb", int or None
-        "link": a wire a link. "limb": a wire a limb; the links up to the first body from the root that branches are one,
-        and those that hang on one child of that body are another. n: the taxels of all links over n wires of nearly equal
-        numbers, [1, taxels]; a link is divided only where a wire would otherwise be more than a tenth longer or shorter.
-        None: no wires.
+        "link": a wire a link. "limb": a wire a limb; the links up to the first body from the root that branches are
+        one, and those that hang on one child of that body are another. n: the taxels of all links over n wires of
+        nearly equal numbers, [1, taxels]; an end of a wire is that of a link where it moves by a tenth of a wire at
+        most. None: no wires.
     mode : str
         As of `attach`.
     readout, seed

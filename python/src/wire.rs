@@ -51,7 +51,7 @@ const SLICE: usize = 1 << 16;
 ///     several skins, the numbers go on from one to the next.
 /// rows : array (R, taxels) or str, optional
 ///     The rows of Φ, which the cells repeat, in place of seeds: levels ±1, or the levels k/127.5 − 1, k = 0, 1, … 255,
-///     of "analog" weights. A text is a file of them, as `spts design` and `spts rows` write it. Default: the profile's.
+///     of "analog" weights. A text is a file of them, as `spts design` writes it. Default: the profile's.
 ///
 /// A copy (`copy.deepcopy`, `pickle`) goes on with the same measurements as its original, and changes nothing of it.
 #[pyclass(frozen, module = "spts")]
@@ -164,9 +164,9 @@ impl Wire {
     /// Parameters
     /// ----------
     /// touch : Touch, or sequence of Touch or None
-    ///     Of this wire's skin, not before the one that it felt last. It has been on the skin since then. Of a wire over
-    ///     several skins one of each, in their order; None for a skin without a touch since then: its taxels stay as they
-    ///     are.
+    ///     Of this wire's skin, not before the one that it felt last. It has been on the skin since then. Of a wire
+    ///     over several skins one of each, in their order; None for a skin without a touch since then: its taxels stay
+    ///     as they are.
     fn feel(&self, py: Python<'_>, touch: &Bound<'_, PyAny>) -> PyResult<()> {
         let touches = self.touches(touch)?;
         py.detach(|| self.felt(&mut self.locked(), &touches))

@@ -27,8 +27,8 @@ pub struct Common {
 }
 
 impl Common {
-    /// Sets up the thread pool where a number of threads is asked for. Otherwise the first work that needs threads starts
-    /// them: a program that runs several commands in one process has only one pool.
+    /// Sets up the thread pool where a number of threads is asked for. Otherwise the first work that needs threads
+    /// starts them: a program that runs several commands in one process has only one pool.
     ///
     /// # Errors
     /// [`CliError`] when the threads cannot be started.
