@@ -36,6 +36,11 @@ fn a_design_is_simulated_and_checked() {
 
     succeeds(dir.path(), &words("simulate d/scene.toml --out s"));
     succeeds(dir.path(), &words("simulate press/T --readout d/profile.toml --contact footprint --presses 1 --out t"));
+    // its rows are those of the profile
+    let session = std::fs::read_to_string(dir.path().join("t/session.json")).unwrap();
+    let session: Value = serde_json::from_str(&session).unwrap();
+    let period = session["compressive"]["info"]["weights"]["patterns"]["period"].as_u64();
+    assert_eq!(period, design["m_per_wire"].as_u64().filter(|_| rows), "{period:?}");
 
     for seed in [2, 3] {
         let check = json(dir.path(), &format!("design check d --seed {seed} --json"));

@@ -3,10 +3,10 @@
 use crate::batch::{Batch, CellRun};
 use crate::weights::Weights;
 use rand::RngExt as _;
-use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
-use spts_models::{Streams, explain_toml, in_range};
+use spts_models::{Snapshot, Streams, explain_toml, in_range};
 
 /// Inputs of an effect that are constant during a session.
 #[derive(Debug, Clone)]
@@ -86,10 +86,16 @@ pub trait Effect: Send {
 
     /// Modifies `batch.output_v`. The batches of a block come in order and without gaps.
     fn apply(&mut self, batch: &mut Batch<'_>);
+
+    /// Saves or loads its state in this session: what it remembers of earlier measurements. By default it remembers
+    /// nothing.
+    fn exchange(&mut self, state: &mut Snapshot) {
+        let _ = state;
+    }
 }
 
 /// One fault of a profile's `[[faults]]` list.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FaultConfig {
     /// Name in [`FAULTS`](crate::FAULTS).
     pub name: String,

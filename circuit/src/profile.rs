@@ -40,7 +40,7 @@ pub enum CompressiveWeights {
 /// assert_eq!(profile.weights(Mode::Compressive, 100)?.taxels(), 100);
 /// # Ok::<(), spts_input::Refusal>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
     /// Weights of the compressive mode.
@@ -49,10 +49,11 @@ pub struct Profile {
     #[serde(default)]
     pub seeding: Seeding,
     /// Seeds of the cells, one a taxel, in place of the rule. Default: none.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seeds: Option<Vec<u32>>,
-    /// Codes that the cells repeat, in place of a generator's. Default: none. A raster scan ignores patterns and seeds.
-    #[serde(default)]
+    /// Codes that the cells repeat, in place of a generator's; as a text, one row a line. Default: none. A raster scan
+    /// ignores patterns and seeds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patterns: Option<Patterns>,
     /// Measurements a second, Hz. Range [1, 1e9].
     pub sample_rate_hz: f64,
@@ -220,5 +221,34 @@ impl Profile {
             Mode::Raster => &self.raster,
             Mode::Compressive => &self.compressive,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As it comes, and with everything that a skin adds.
+    #[test]
+    fn text_is_read_back() {
+        let fault = toml::from_str("name = \"stuck\"\ntaxel = 3\nlevel = 0.1").unwrap();
+        for (name, _) in PROFILES {
+            let plain = Profile::named(name).unwrap();
+            let seeds = Profile { seeds: Some(vec![1, 2]), faults: vec![FaultConfig::clone(&fault)], ..plain.clone() };
+            let patterns = Some(Patterns::new(2, vec![0, 255, 255, 0, 0, 0]).unwrap());
+            for profile in [Profile { patterns, ..plain.clone() }, seeds.on(&SkinLayout::default()).unwrap(), plain] {
+                let text = toml::to_string(&profile).unwrap();
+                assert_eq!(Profile::from_toml(&text).unwrap(), profile, "{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_text_of_signs_is_a_pattern() {
+        let (_, ideal) = PROFILES[0];
+        let profile = Profile::from_toml(&format!("patterns = \"\"\"\n+-+\n--+\n\"\"\"\n{ideal}")).unwrap();
+        assert_eq!(profile.weights(Mode::Compressive, 3).unwrap().patterns().map(Patterns::period), Some(2));
+        assert!(profile.weights(Mode::Compressive, 4).is_err());
+        assert!(Profile::from_toml(&format!("patterns = \"+x\"\n{ideal}")).unwrap_err().to_string().contains("+x"));
     }
 }

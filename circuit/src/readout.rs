@@ -7,7 +7,7 @@ use crate::recording::{Block, Recording, RecordingInfo};
 use crate::source::ConductanceSource;
 use crate::weights::{CellCodes, Mode, Weights};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, Streams};
+use spts_models::{SkinLayout, Snapshot, Streams};
 
 /// The readout of one skin in one mode for one session. The clock, and with it the row of the weight matrix, continues
 /// from block to block, as in the device. Noise is a function of (device, session, mode, block number).
@@ -190,6 +190,15 @@ impl Readout {
         self.engine.run(&mut self.effects, self.row, source, volts)?;
         self.row += volts.len() as u64;
         Ok(())
+    }
+
+    /// Saves or loads where it is in its session and what its effects remember, for a readout of the same profile,
+    /// mode, layout, device and session. A readout [`with_codes`](Readout::with_codes) has its cells apart.
+    pub fn exchange(&mut self, state: &mut Snapshot) {
+        state.u64(&mut self.row);
+        state.u64(&mut self.block);
+        state.flag(&mut self.continuous);
+        self.effects.iter_mut().for_each(|effect| effect.exchange(state));
     }
 
     /// Records one block of `measurements` measurements for each of `sources`, with `gap_frames` unrecorded frames

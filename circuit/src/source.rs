@@ -111,6 +111,11 @@ impl Constant {
     }
 
     /// Conductance of every taxel, S.
+    pub fn map(&self) -> &ConductanceMap {
+        &self.map
+    }
+
+    /// Conductance of every taxel, S, row by row.
     pub fn values(&self) -> &[f64] {
         self.map.values()
     }

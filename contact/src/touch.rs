@@ -187,6 +187,14 @@ impl TouchSkin {
         &self.foam
     }
 
+    /// Sample points of a skin that is not flat.
+    pub fn points(&self) -> Option<&SurfacePoints> {
+        match &self.surface {
+            Surface::Curved(field) => Some(field.points()),
+            Surface::Flat(_) => None,
+        }
+    }
+
     /// Whether a place, m, lies in the foam, or beside it within half a thickness along the normal.
     pub fn covers(&self, place_m: [f64; 3]) -> bool {
         match &self.surface {

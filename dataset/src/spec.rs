@@ -345,6 +345,7 @@ fn chain_config(config: &SpecConfig, transducer: &toml::Table, faults: &[toml::T
     Ok(ChainConfig {
         transducer: Some(transducer),
         transducer_parameters,
+        profile: None,
         readout: Some(config.readout.clone()),
         rows: config.weights.clone(),
         weights: None,

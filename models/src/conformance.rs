@@ -1,6 +1,7 @@
 //! Properties that every transducer must have.
 
 use crate::layout::{ConductanceMap, PressureMap, SkinLayout};
+use crate::snapshot::Snapshot;
 use crate::transducer::Transducer;
 
 /// Makes a fresh transducer for a skin.
@@ -30,6 +31,7 @@ const ORDER_TOLERANCE: f64 = 1e-12;
 ///   follows the pressure and never leads it.
 /// - A taxel that is not pressed and has rested does not conduct. A step of zero time repeats the last value. Negative
 ///   pressure and NaN count as zero.
+/// - What it remembers can be saved and loaded: a fresh one that loads the state goes on with the same bits.
 /// - Equal builds give equal bits. A session does not depend on earlier sessions. A fresh transducer is in session 0.
 ///
 /// ```
@@ -55,6 +57,7 @@ pub fn check_transducer(build: &dyn Fn(&SkinLayout) -> Box<dyn Transducer>) {
         }
         let more: Vec<Hold> = wave.iter().map(|(p, dt_s)| (1.5 * p + 10.0, *dt_s)).collect();
         check_order(build, &skin, name, &wave, &more);
+        check_state(build, &skin, name, &wave);
         let corners_pa: Vec<f64> = wave.iter().map(|(p, _)| *p).collect();
         check_passive(build, &skin, name, &corners_pa);
     }
@@ -100,6 +103,19 @@ fn steps(transducer: &mut dyn Transducer, skin: &SkinLayout, holds: &[Hold]) -> 
 /// Conductance of all taxels after the last of `holds`, S.
 fn end(build: Build<'_>, skin: &SkinLayout, holds: &[Hold]) -> Vec<f64> {
     run(build, skin, holds).pop().map_or_else(Vec::new, |map| map.values().to_vec())
+}
+
+fn check_state(build: Build<'_>, skin: &SkinLayout, name: &str, wave: &[Hold]) {
+    let (before, after) = wave.split_at(wave.len() / 2);
+    let (mut original, mut copy) = (build(skin), build(skin));
+    steps(original.as_mut(), skin, before);
+    let mut saving = Snapshot::saving();
+    original.exchange(&mut saving);
+    let mut loading = Snapshot::loading(saving.finish().expect("nothing to compare"));
+    copy.exchange(&mut loading);
+    loading.finish().expect("as much is loaded as was saved");
+    let same = steps(original.as_mut(), skin, after) == steps(copy.as_mut(), skin, after);
+    assert!(same, "{name}: a copy by its saved state differs");
 }
 
 fn check_extremes(build: Build<'_>, skin: &SkinLayout) {

@@ -26,6 +26,7 @@ mod conformance;
 mod gains;
 mod layout;
 mod memory;
+mod snapshot;
 mod streams;
 mod transducer;
 mod transducers;
@@ -35,6 +36,7 @@ pub use conformance::check_transducer;
 pub use gains::TaxelGains;
 pub use layout::{ConductanceMap, Grid, Pascal, PressureMap, Siemens, SkinLayout};
 pub use memory::{Conditioning, Creep, CreepConfig, CreepDecays, CreepKind, Hysteresis, HysteresisConfig, Presses};
+pub use snapshot::Snapshot;
 pub use streams::Streams;
 pub use transducer::Transducer;
 pub use transducers::{

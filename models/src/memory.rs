@@ -2,6 +2,7 @@
 //! press.
 
 use crate::check::{in_interval, in_range, within};
+use crate::snapshot::Snapshot;
 use serde::Deserialize;
 use spts_input::Refusal;
 
@@ -452,6 +453,17 @@ pub struct Presses {
     count: u32,
     pressed: bool,
     gain: f64,
+}
+
+impl Presses {
+    /// Saves or loads it.
+    pub(crate) fn exchange(&mut self, state: &mut Snapshot) {
+        let mut count = u64::from(self.count);
+        state.u64(&mut count);
+        self.count = u32::try_from(count).unwrap_or(u32::MAX);
+        state.flag(&mut self.pressed);
+        state.f64(&mut self.gain);
+    }
 }
 
 impl Conditioning {

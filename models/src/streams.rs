@@ -27,6 +27,11 @@ impl Streams {
         Self { root }
     }
 
+    /// The root seed.
+    pub(crate) fn root_mut(&mut self) -> &mut u64 {
+        &mut self.root
+    }
+
     /// The streams of item `index` for the purpose `label`, such as one session of many.
     pub fn child(self, label: &str, index: u64) -> Self {
         Self::new(self.rng(label, index).random())

@@ -1,6 +1,7 @@
 //! The interface between contact and circuit.
 
 use crate::layout::{ConductanceMap, PressureMap};
+use crate::snapshot::Snapshot;
 
 /// Turns the pressure on the taxels' electrodes into their conductance.
 ///
@@ -38,6 +39,11 @@ pub trait Transducer: Send + Sync {
     /// Starts session number `session` on the same skin: presses are forgotten, and whatever varies between sessions is
     /// drawn again. The draws depend only on the number and the skin. A fresh transducer is in session 0.
     fn start_session(&mut self, session: u64);
+
+    /// Saves or loads its state in this session: what it remembers of earlier steps. By default it remembers nothing.
+    fn exchange(&mut self, state: &mut Snapshot) {
+        let _ = state;
+    }
 
     /// A copy including its state, so that one transducer serves many sessions.
     fn boxed(&self) -> Box<dyn Transducer>;
@@ -86,6 +92,10 @@ impl Transducer for OnElectrode {
 
     fn start_session(&mut self, session: u64) {
         self.calibrated.start_session(session);
+    }
+
+    fn exchange(&mut self, state: &mut Snapshot) {
+        self.calibrated.exchange(state);
     }
 
     fn boxed(&self) -> Box<dyn Transducer> {

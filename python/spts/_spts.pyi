@@ -140,7 +140,7 @@ class Touch:
 class Wire:
     def __new__(
         cls,
-        skin: Skin,
+        skin: Skin | Sequence[Skin],
         readout: str = "as_built",
         seeds: str | Sequence[int] | None = None,
         seed: int = 0,
@@ -151,11 +151,12 @@ class Wire:
         parameters: Mapping[str, Any] | None = None,
         faults: Sequence[Mapping[str, Any]] | None = None,
         taxels: Sequence[int] | None = None,
+        rows: ArrayLike | str | None = None,
     ) -> Wire: ...
-    def feel(self, touch: Touch) -> None: ...
+    def feel(self, touch: Touch | Sequence[Touch | None]) -> None: ...
     def record(
         self,
-        touch: Touch,
+        touch: Touch | Sequence[Touch | None],
         measurements: int | None = None,
         *,
         raster: bool = False,

@@ -34,7 +34,7 @@ def specs():
 
 
 class Dataset:
-    """A data set in a folder.
+    """A data set in a folder. A copy (`copy.deepcopy`, `pickle`) reads the same folder.
 
     Parameters
     ----------
@@ -44,9 +44,18 @@ class Dataset:
     """
 
     def __init__(self, folder, files="."):
-        self._folder = DataFolder.open(os.fspath(folder), os.fspath(files))
         self.path = os.fspath(folder)
+        # a worker may stand in another folder
+        self._places = os.path.abspath(folder), os.path.abspath(files)
+        self._folder = DataFolder.open(*self._places)
         self._idle = None
+
+    def __getstate__(self):
+        return {name: value for name, value in vars(self).items() if name != "_folder"}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        self._folder = DataFolder.open(*self._places)
 
     @property
     def info(self):

@@ -30,21 +30,7 @@ def names():
     return list(_TABLE)
 
 
-class _Learned:
-    """What is kept of an estimator when it is pickled: the images and labels, from which `_build` learns again."""
-
-    def __getstate__(self):
-        state = dict(super().__getstate__())
-        state.pop("_built", None)
-        return state
-
-    def __setstate__(self, state):
-        super().__setstate__(state)
-        if "_images" in state:
-            self._build()
-
-
-class ImageDecoder(_Learned, BaseEstimator):
+class ImageDecoder(BaseEstimator):
     """Decodes windows of measurements into tactile images.
 
     Parameters
@@ -75,14 +61,10 @@ class ImageDecoder(_Learned, BaseEstimator):
         if X is not None:
             split(X, shape[0] * shape[1])
             self.n_features_in_ = np.shape(X)[1]
-        self._images = None if y is None else as_images(y, shape, "y")
-        self._labels = None if labels is None else np.asarray(labels, np.int64)
-        self._build()
+        images = None if y is None else as_images(y, shape, "y")
+        labels = None if labels is None else np.asarray(labels, np.int64)
+        self._built = Decoder(self.decoder, shape, images, labels)
         return self
-
-    def _build(self):
-        shape = (int(self.shape[0]), int(self.shape[1]))
-        self._built = Decoder(self.decoder, shape, self._images, self._labels)
 
     def predict(self, X):
         """Images (n, taxels) of windows (n, M * (1 + taxels)), in the unit of the measurements."""
@@ -136,7 +118,7 @@ class Evidence(ClassifierMixin, BaseEstimator):
         return self.classes_[np.maximum(self._decoder._decode(X)[1], 0)]
 
 
-class SparseClassifier(_Learned, ClassifierMixin, BaseEstimator):
+class SparseClassifier(ClassifierMixin, BaseEstimator):
     """Classifies images by their sparsest representation among labelled ones, as the published decoder does.
 
     Parameters
@@ -153,12 +135,8 @@ class SparseClassifier(_Learned, ClassifierMixin, BaseEstimator):
         X, y = validate_data(self, X, y, dtype=np.float64)
         check_classification_targets(y)
         self.classes_, labels = np.unique(y, return_inverse=True)
-        self._images, self._labels = np.ascontiguousarray(X), labels.astype(np.int64)
-        self._build()
+        self._built = ImageClassifier(np.ascontiguousarray(X), labels.astype(np.int64), self.sparsity)
         return self
-
-    def _build(self):
-        self._built = ImageClassifier(self._images, self._labels, self.sparsity)
 
     def predict(self, X):
         """Classes (n,) of images X (n, pixels); the first class for an image of zeros."""

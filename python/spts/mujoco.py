@@ -552,12 +552,15 @@ def dress(
         Distance between taxels, m, [1e-4, 1].
     thickness : float
         Thickness of the foam, m. It lies on the surface of the geoms.
-    wires : "link" or None
-        "link": a wire a link. None: no wires.
+    wires : "link", "limb", int or None
+        "link": a wire a link. "limb": a wire a limb; the links up to the first body from the root that branches are
+        one, and those that hang on one child of that body are another. n: the taxels of all links over n wires of
+        nearly equal numbers, [1, taxels]; an end of a wire is that of a link where it moves by a tenth of a wire at
+        most. None: no wires.
     mode : str
         As of `attach`.
     readout, seed
-        As of `spts.Wire`; the wire of link k has the seed `seed` + k.
+        As of `spts.Wire`; wire k has the seed `seed` + k.
     foam
         `stiffness`, `damping` and `friction`, as of `spts.Skin`.
 
@@ -579,8 +582,9 @@ def dress(
     """
     if not 1e-4 <= pitch <= 1.0:
         raise ValueError(f"`pitch` = {pitch} is outside [1e-4, 1] m")
-    if wires not in ("link", None):
-        raise ValueError(f'`wires` = {wires!r}; valid: "link", None')
+    counted = isinstance(wires, (int, np.integer)) and not isinstance(wires, bool)
+    if not (wires is None or counted or wires in ("link", "limb")):
+        raise ValueError(f'`wires` = {wires!r}; valid: "link", "limb", a number of wires, None')
     if isinstance(links, str):
         if links != "all":
             raise ValueError(f'`links` = "{links}"; valid: "all" or a list of bodies')
@@ -612,18 +616,70 @@ def dress(
         )
         for link, skin in zip(links, skins)
     ]
-    made = [Wire(skin, readout, seed=seed + k) for k, skin in enumerate(skins)] if wires else []
-    return Dress(attachments, made, [model.body(link).name for link in links])
+    made, wired = _wires(model, links, skins, wires, readout, seed)
+    return Dress(attachments, made, [model.body(link).name for link in links], wired)
+
+
+def _wires(model, links, skins, wires, readout, seed):
+    """Wires over the skins of links, and the numbers of the links of each; None for a wire of one touch."""
+    if wires is None:
+        return [], []
+    if isinstance(wires, str) and wires == "link":
+        return [Wire(skin, readout, seed=seed + k) for k, skin in enumerate(skins)], [None] * len(skins)
+    counts = np.array([skin.shape[0] * skin.shape[1] for skin in skins])
+    ends = np.cumsum(counts)
+    if isinstance(wires, str):
+        groups = [(limb, None) for limb in _limbs(model, links)]
+    else:
+        if not 1 <= wires <= ends[-1]:
+            raise ValueError(f"`wires` = {wires} is outside [1, {ends[-1]}], the number of taxels")
+        share = ends[-1] / wires
+        cuts = np.round(share * np.arange(1, wires)).astype(int)
+        near = ends[np.abs(ends - cuts[:, None]).argmin(axis=1)]
+        cuts = np.where(np.abs(near - cuts) <= 0.1 * share, near, cuts)
+        groups = []
+        for first, stop in zip([0, *cuts], [*cuts, ends[-1]]):
+            group = np.flatnonzero((ends > first) & (ends - counts < stop)).tolist()
+            skipped = ends[group[0]] - counts[group[0]]
+            groups.append((group, range(first - skipped, stop - skipped)))
+    made = [
+        Wire([skins[k] for k in group], readout, seed=seed + wire, taxels=taxels)
+        for wire, (group, taxels) in enumerate(groups)
+    ]
+    return made, [group for group, _ in groups]
+
+
+def _limbs(model, links):
+    """Numbers of the links of every limb, in the order of their first links."""
+    paths = []
+    for link in links:
+        path = [link]
+        while model.body_parentid[path[0]] != 0:
+            path.insert(0, int(model.body_parentid[path[0]]))
+        paths.append(path)
+    limbs = {}
+    for k, path in enumerate(paths):
+        depth = 1
+        # down the trunk: as long as all links below hang on one child
+        while len({other[depth] for other in paths if other[:depth] == path[:depth] and len(other) > depth}) == 1:
+            if len(path) == depth:
+                break
+            depth += 1
+        # the trunk of a tree goes by its root
+        limb = path[0] if len(path) <= depth else path[depth]
+        limbs.setdefault(limb, []).append(k)
+    return list(limbs.values())
 
 
 class Dress:
     """Skins on the links of a robot: what `dress` returns."""
 
-    def __init__(self, attachments, wires, names):
+    def __init__(self, attachments, wires, names, wired=()):
         #: A skin a link: what `attach` returns, in the order of the links.
         self.attachments = attachments
-        #: A wire a link, in the same order; empty without wires.
+        #: The wires: one a link in the same order, one a limb, or as many as were asked for; empty without wires.
         self.wires = wires
+        self._wired = wired
         #: Names of the links.
         self.names = names
         self.model, self.data = attachments[0].model, attachments[0].data
@@ -643,6 +699,32 @@ class Dress:
     def touches(self):
         """The last touch of every link; None before the first step."""
         return [attachment.last for attachment in self.attachments]
+
+    def record(self, measurements):
+        """Measures the last touches with every wire.
+
+        Parameters
+        ----------
+        measurements : int
+            Number of measurements of each wire, M.
+
+        Returns
+        -------
+        list of (ndarray (M,), ndarray (M, taxels))
+            As `spts.Wire.record` gives them, a pair a wire. The taxels of a wire are those of its links one after the
+            other.
+
+        Raises
+        ------
+        ValueError
+            For a robot that was dressed without wires.
+        """
+        if not self.wires:
+            raise ValueError('`wires` = None: `dress(..., wires="link")` gives wires that can be recorded')
+        # before the first step nothing has touched it
+        touches = [skin.touch({}) if last is None else last for skin, last in zip(self.skins, self.touches)]
+        felt = [touches[k] if group is None else [touches[i] for i in group] for k, group in enumerate(self._wired)]
+        return [wire.record(touch, measurements) for wire, touch in zip(self.wires, felt)]
 
     def step(self, steps=1):
         """Steps the model, in place of `mujoco.mj_step`; what every link feels."""

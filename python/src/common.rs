@@ -3,8 +3,12 @@
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 use toml::Value;
@@ -20,6 +24,18 @@ macro_rules! bail {
 /// A `ValueError` that says what `error` says.
 pub(crate) fn refuse(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
+}
+
+/// `value` as the text that pickles hold.
+#[allow(dead_code, reason = "the part with a physics engine has no use for it")]
+pub(crate) fn to_toml(value: &impl Serialize) -> PyResult<String> {
+    toml::to_string(value).map_err(refuse)
+}
+
+/// What such a text was made of.
+#[allow(dead_code, reason = "the part with a physics engine has no use for it")]
+pub(crate) fn of_toml<T: DeserializeOwned>(text: &str) -> PyResult<T> {
+    toml::from_str(text).map_err(refuse)
 }
 
 /// How deep dictionaries and lists may lie in each other.
@@ -75,6 +91,47 @@ fn value_at(field: &str, value: &Bound<'_, PyAny>, depth: usize) -> PyResult<Val
     )))
 }
 
+/// Most forks from process to process in which threads are used.
+const FORKS: usize = 8;
+/// Process that uses the threads (upper half), and the number of forks before it that did (lower half).
+static PROCESS: AtomicU64 = AtomicU64::new(0);
+/// The threads of processes after as many forks: a thread does not go along into a forked process.
+static POOLS: [OnceLock<Option<ThreadPool>>; FORKS] = [const { OnceLock::new() }; FORKS];
+
+/// Number of forks between the first process that used threads and this one.
+fn forks() -> usize {
+    let this = u64::from(std::process::id()) << 32;
+    let known = PROCESS.fetch_update(Ordering::AcqRel, Ordering::Acquire, |known| match known {
+        0 => Some(this),
+        _ if known & !u64::from(u32::MAX) == this => None,
+        _ => Some(this | ((known & u64::from(u32::MAX)) + 1)),
+    });
+    // none before the first, one more than before after a fork
+    let forks = known.map_or_else(|same| same, |before| if before == 0 { 0 } else { before + 1 });
+    usize::try_from(forks & u64::from(u32::MAX)).unwrap_or(usize::MAX)
+}
+
+/// Computes `work` on the threads of this process. Those of the process that it was forked from are not there.
+pub(crate) fn on_threads<T: Send>(work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    let Some(forked) = forks().checked_sub(1) else {
+        return Ok(work());
+    };
+    let Some(pool) = POOLS.get(forked) else {
+        let message =
+            format!("threads were used before each of {} forks, at most {FORKS}: spawn processes", forked + 1);
+        return Err(PyRuntimeError::new_err(message));
+    };
+    match pool.get_or_init(|| ThreadPoolBuilder::new().build().ok()) {
+        Some(pool) => Ok(pool.install(work)),
+        None => Err(PyRuntimeError::new_err("no threads can be started in this forked process: spawn processes")),
+    }
+}
+
+/// Computes `work` on the threads of this process, without the interpreter's lock.
+pub(crate) fn released<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
+    py.detach(|| on_threads(work))
+}
+
 /// Time between two looks at whether Ctrl-C was pressed.
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -95,7 +152,7 @@ pub(crate) fn stoppable<T: Send>(py: Python<'_>, work: impl FnOnce(&(dyn Fn() + 
                 }
             };
             let (sender, ended) = channel();
-            scope.spawn(move || sender.send(catch_unwind(AssertUnwindSafe(|| work(&step)))));
+            scope.spawn(move || sender.send(catch_unwind(AssertUnwindSafe(|| on_threads(|| work(&step))))));
             loop {
                 match ended.recv_timeout(LOOK) {
                     Ok(done) => return Some(done),
@@ -113,7 +170,7 @@ pub(crate) fn stoppable<T: Send>(py: Python<'_>, work: impl FnOnce(&(dyn Fn() + 
     });
     match (interrupted, done) {
         (Some(error), _) => Err(error),
-        (None, Some(Ok(value))) => Ok(value),
+        (None, Some(Ok(value))) => value,
         (None, Some(Err(panic))) => resume_unwind(panic),
         (None, None) => Err(PyRuntimeError::new_err("the computation ended without a result")),
     }

@@ -1,6 +1,6 @@
 //! Data sets: their folders, made and read.
 
-use crate::common::{refuse, stoppable, table};
+use crate::common::{refuse, released, stoppable, table};
 use numpy::{IntoPyArray as _, PyArray2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -9,7 +9,7 @@ use spts_dataset::{ColumnValues, Dataset, Part, Spec, columns, shard_rows};
 use std::path::PathBuf;
 
 /// The folder of a data set. `spts.Dataset` and `spts.dataset.make` are made of it.
-#[pyclass(frozen, module = "spts")]
+#[pyclass(frozen, module = "spts._spts")]
 pub(crate) struct DataFolder {
     dataset: Dataset,
 }
@@ -19,7 +19,7 @@ impl DataFolder {
     /// Opens what was begun in `folder`; files that the spec names are looked for in `files`.
     #[staticmethod]
     fn open(py: Python<'_>, folder: PathBuf, files: PathBuf) -> PyResult<Self> {
-        let dataset = py.detach(|| Dataset::open(&folder, &files)).map_err(refuse)?;
+        let dataset = released(py, || Dataset::open(&folder, &files))?.map_err(refuse)?;
         Ok(Self { dataset })
     }
 
@@ -27,24 +27,24 @@ impl DataFolder {
     #[staticmethod]
     fn begin(py: Python<'_>, spec: &str, folder: PathBuf, overrides: &Bound<'_, PyDict>) -> PyResult<Self> {
         let overrides = table("overrides", overrides)?;
-        let begun = py.detach(|| {
+        let begun = released(py, || {
             let spec = Spec::load(spec, &overrides).map_err(refuse)?;
             Dataset::begin(&folder, spec).map_err(refuse)
         });
-        Ok(Self { dataset: begun? })
+        Ok(Self { dataset: begun?? })
     }
 
     /// Makes file number `shard` unless it is there; the number of rows that were made.
     fn make(&self, py: Python<'_>, shard: u64) -> PyResult<u64> {
         let of = self.dataset.spec().shards();
         let part = Part::parse(&format!("{shard}/{of}")).map_err(refuse)?;
-        let made = py.detach(|| self.dataset.make(part, &()));
+        let made = released(py, || self.dataset.make(part, &()))?;
         Ok(made.map_err(refuse)?.rows)
     }
 
     /// Checks that every file is there and writes statistics, card and manifest; what the data set is, as JSON.
     fn finish(&self, py: Python<'_>) -> PyResult<String> {
-        let finished = py.detach(|| self.dataset.finish(&())).map_err(refuse)?;
+        let finished = released(py, || self.dataset.finish(&()))?.map_err(refuse)?;
         serde_json::to_string(&finished).map_err(refuse)
     }
 

@@ -1,9 +1,12 @@
 //! Decoders that have learned.
 
 use crate::args::Array2;
-use crate::common::refuse;
-use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use crate::common::{refuse, released};
+use numpy::{
+    IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+};
 use pyo3::prelude::*;
+use pyo3::types::{PyTuple, PyType};
 use spts::SkinLayout;
 use spts::models::Streams;
 use spts::recon::classify::{Library, Src};
@@ -35,15 +38,18 @@ const SLICE: usize = 256;
 ///     Raster images to learn from, in any unit; default random shapes on the layout.
 /// labels : ndarray (n,) of int, optional
 ///     Class of every image, from 0; default one class.
-#[pyclass(frozen, module = "spts")]
+#[pyclass(frozen, module = "spts._spts")]
 pub(crate) struct Decoder {
-    trained: Box<dyn Trained>,
+    trained: Arc<dyn Trained>,
     /// Name of the algorithm.
     #[pyo3(get)]
     name: &'static str,
     /// Rows and columns of taxels.
     #[pyo3(get)]
     shape: (usize, usize),
+    /// What it has learned from, for its copies in other processes: they learn again.
+    images: Option<Py<PyArray2<f64>>>,
+    labels: Option<Py<PyArray1<i64>>>,
 }
 
 #[pymethods]
@@ -68,22 +74,28 @@ impl Decoder {
         let learned = match &images {
             Some(images) => {
                 let images = images_in(images, taxels)?;
-                let labels = labels_in(labels, images.ncols())?;
-                py.detach(|| TrainingData::of_images(images, &labels, shape.1, Streams::new(0)))
+                let labels = labels_in(labels.as_ref(), images.ncols())?;
+                released(py, || TrainingData::of_images(images, &labels, shape.1, Streams::new(0)))?
             }
             None if spec.needs == Needs::Classes => {
                 bail!("`images`: \"{name}\" learns from raster images of named objects");
             }
             None => {
                 let layout = SkinLayout::with_pitch(shape.0, shape.1, 0.015).map_err(refuse)?;
-                py.detach(|| match spec.needs {
+                released(py, || match spec.needs {
                     Needs::Shapes => TrainingData::for_shapes(&layout, Streams::new(0)),
                     _ => TrainingData::for_layout(&layout, Streams::new(0)),
-                })
+                })?
             }
         };
         let data = learned.map_err(refuse)?;
-        Ok(Self { trained: py.detach(|| (spec.train)(&data)).map_err(refuse)?, name: spec.name, shape })
+        Ok(Self {
+            trained: released(py, || (spec.train)(&data))?.map_err(refuse)?.into(),
+            name: spec.name,
+            shape,
+            images: images.map(|images| copied(py, &images)),
+            labels: labels.map(|labels| copied(py, &labels)),
+        })
     }
 
     /// Image of one window: `phi` (M, taxels), `y` (M,) V; (rows, cols).
@@ -95,13 +107,13 @@ impl Decoder {
     ) -> PyResult<Array2<'py>> {
         let rows = self.rows_of(phi.as_array().rows().into_iter().flatten().copied(), phi.as_array().dim())?;
         let y = measured(y.as_array().iter().copied(), rows.1)?;
-        let image = py.detach(|| {
+        let image = released(py, || {
             let press = Press::on(Arc::new(PressRows::of_matrix(&rows.0)), y, 0.0);
             let window = press.window(0, rows.1).ok_or_else(|| refuse("`y` holds a value that is not finite"))?;
             let mut answer = Answer::default();
             self.trained.start().decode(&window, &mut answer).map_err(refuse)?;
             Ok::<_, PyErr>(answer.image)
-        })?;
+        })??;
         self.image_out(image)?.into_pyarray(py).reshape([self.shape.0, self.shape.1])
     }
 
@@ -130,13 +142,13 @@ impl Decoder {
                 let rows = self.rows_of(rows.iter().copied(), (m, taxels))?;
                 windows.push((rows.0, measured(y.as_array().row(k).iter().copied(), m)?));
             }
-            let answers = py.detach(|| {
+            let answers = released(py, || {
                 let presses =
                     windows.drain(..).map(|(rows, y)| Press::on(Arc::new(PressRows::of_matrix(&rows)), y, 0.0));
                 let presses: Vec<Press> = presses.collect();
                 let windows: Vec<_> = presses.iter().filter_map(|press| press.window(0, m)).collect();
                 self.trained.start().decode_all(&windows)
-            });
+            })?;
             for answer in answers.map_err(refuse)? {
                 let label = answer.class.and_then(Class::label);
                 classes.push(label.and_then(|label| i64::try_from(label).ok()).unwrap_or(NO_CLASS));
@@ -145,6 +157,27 @@ impl Decoder {
             py.check_signals()?;
         }
         Ok((images.into_pyarray(py).reshape([count, own])?, classes.into_pyarray(py)))
+    }
+
+    /// Nothing changes a decoder: a copy shares what was learned.
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        Self {
+            trained: Arc::clone(&self.trained),
+            images: self.images.as_ref().map(|images| images.clone_ref(py)),
+            labels: self.labels.as_ref().map(|labels| labels.clone_ref(py)),
+            name: self.name,
+            shape: self.shape,
+        }
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Self {
+        self.__copy__(py)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyType>, Bound<'py, PyTuple>)> {
+        let (py, own) = (slf.py(), slf.get());
+        let arguments = (own.name, own.shape, own.images.as_ref(), own.labels.as_ref()).into_pyobject(py)?;
+        Ok((slf.get_type(), arguments))
     }
 
     fn __repr__(&self) -> String {
@@ -177,6 +210,14 @@ impl Decoder {
     }
 }
 
+/// An array of our own: what others do to theirs does not show.
+fn copied<T: numpy::Element + Clone, D: numpy::ndarray::Dimension>(
+    py: Python<'_>,
+    array: &numpy::PyReadonlyArray<'_, T, D>,
+) -> Py<numpy::PyArray<T, D>> {
+    array.as_array().to_owned().into_pyarray(py).unbind()
+}
+
 /// Measurements, checked; `m` are needed.
 fn measured(values: impl ExactSizeIterator<Item = f64>, m: usize) -> PyResult<Vec<f64>> {
     if values.len() != m {
@@ -204,7 +245,7 @@ fn images_in(images: &PyReadonlyArray2<'_, f64>, taxels: usize) -> PyResult<Matr
 }
 
 /// One class an image.
-fn labels_in(labels: Option<PyReadonlyArray1<'_, i64>>, count: usize) -> PyResult<Vec<usize>> {
+fn labels_in(labels: Option<&PyReadonlyArray1<'_, i64>>, count: usize) -> PyResult<Vec<usize>> {
     let Some(labels) = labels else {
         return Ok(vec![0; count]);
     };
@@ -222,35 +263,65 @@ fn labels_in(labels: Option<PyReadonlyArray1<'_, i64>>, count: usize) -> PyResul
 /// ----------
 /// images : ndarray (n, pixels)
 /// labels : ndarray (n,) of int, from 0
-#[pyclass(frozen, module = "spts")]
-pub(crate) struct ImageClassifier(Src);
+#[pyclass(frozen, module = "spts._spts")]
+pub(crate) struct ImageClassifier {
+    learned: Arc<Src>,
+    images: Py<PyArray2<f64>>,
+    labels: Py<PyArray1<i64>>,
+    sparsity: usize,
+}
 
 #[pymethods]
 impl ImageClassifier {
     #[new]
     #[pyo3(signature = (images, labels, sparsity = Src::PUBLISHED_SPARSITY))]
-    fn new(images: PyReadonlyArray2<'_, f64>, labels: PyReadonlyArray1<'_, i64>, sparsity: usize) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        images: PyReadonlyArray2<'_, f64>,
+        labels: PyReadonlyArray1<'_, i64>,
+        sparsity: usize,
+    ) -> PyResult<Self> {
         let pixels = images.as_array().ncols();
+        let own = (copied(py, &images), copied(py, &labels));
         let images = images_in(&images, pixels)?;
-        let labels = labels_in(Some(labels), images.ncols())?;
+        let labels = labels_in(Some(&labels), images.ncols())?;
         if !(1..=1024).contains(&sparsity) {
             bail!("`sparsity` = {sparsity} is outside [1, 1024]");
         }
         let library = Library::new(&images, &labels).map_err(refuse)?;
-        Ok(Self(Src::new(library, sparsity)))
+        Ok(Self { learned: Arc::new(Src::new(library, sparsity)), images: own.0, labels: own.1, sparsity })
+    }
+
+    /// Nothing changes a classifier: a copy shares what was learned.
+    fn __copy__(&self, py: Python<'_>) -> Self {
+        Self {
+            learned: Arc::clone(&self.learned),
+            images: self.images.clone_ref(py),
+            labels: self.labels.clone_ref(py),
+            sparsity: self.sparsity,
+        }
+    }
+
+    fn __deepcopy__(&self, py: Python<'_>, _memo: &Bound<'_, PyAny>) -> Self {
+        self.__copy__(py)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyType>, Bound<'py, PyTuple>)> {
+        let own = slf.get();
+        Ok((slf.get_type(), (&own.images, &own.labels, own.sparsity).into_pyobject(slf.py())?))
     }
 
     /// Classes of `images` (n, pixels), (n,); -1 for an empty image.
     fn classify<'py>(&self, py: Python<'py>, images: PyReadonlyArray2<'_, f64>) -> PyResult<Bound<'py, PyArray1<i64>>> {
-        let images = images_in(&images, self.0.library().images().nrows())?;
-        let classes = py.detach(|| {
+        let images = images_in(&images, self.learned.library().images().nrows())?;
+        let classes = released(py, || {
             let mut work = Workspace::default();
             let classes = (0..images.ncols()).map(|k| {
-                let class = self.0.classify(&images.column(k), &mut work).map_err(refuse)?;
+                let class = self.learned.classify(&images.column(k), &mut work).map_err(refuse)?;
                 Ok(class.and_then(|c| i64::try_from(c).ok()).unwrap_or(NO_CLASS))
             });
             classes.collect::<PyResult<Vec<i64>>>()
-        });
+        })?;
         Ok(classes?.into_pyarray(py))
     }
 }

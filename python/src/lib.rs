@@ -42,8 +42,8 @@ mod _spts {
 /// Runs the command line `arguments`, the first of which is the program's name; its exit status. Ctrl-C ends the
 /// process.
 #[pyfunction]
-fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
-    py.detach(|| spts_cli::main_with(arguments))
+fn command_line(py: Python<'_>, arguments: Vec<OsString>) -> PyResult<u8> {
+    common::released(py, || spts_cli::main_with(arguments))
 }
 
 /// Names of the specs that ship.

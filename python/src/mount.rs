@@ -14,7 +14,7 @@ type Rotation = [Vector; 3];
 
 /// A skin on a link, and the bodies that may touch it. It reads the arrays of an `mjData`, whatever MuJoCo they come
 /// from.
-#[pyclass(frozen, module = "spts")]
+#[pyclass(frozen, module = "spts._spts")]
 pub(crate) struct Mount {
     skin: Py<Skin>,
     link: usize,

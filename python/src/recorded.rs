@@ -1,9 +1,10 @@
 //! Sessions: recordings of the real skin or of the twin.
 
 use crate::args::{Array1, Array2, Array3, whole};
-use crate::common::refuse;
+use crate::common::{refuse, released};
 use numpy::{IntoPyArray as _, PyArrayMethods as _};
 use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyList, PyTuple};
 use spts::circuit::Recording as Samples;
 use spts::data::SessionSet;
 use spts::session::{Event, PressFacts, Recorded, Session as Whole};
@@ -36,7 +37,7 @@ pub(crate) struct Recording {
 /// list of Session
 #[pyfunction]
 pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Session>> {
-    let set = py.detach(|| SessionSet::open(&path)).map_err(refuse)?;
+    let set = released(py, || SessionSet::open(&path))?.map_err(refuse)?;
     let sessions = set.sessions.into_iter();
     Ok(sessions.map(|session| Session { whole: Arc::new(session) }).collect())
 }
@@ -93,6 +94,40 @@ impl Session {
     #[getter]
     fn compressive(&self) -> Option<Recording> {
         self.recording(false)
+    }
+
+    /// Nothing changes a session: a copy shares its samples.
+    fn __copy__(&self) -> Self {
+        Self { whole: Arc::clone(&self.whole) }
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
+        self.__copy__()
+    }
+
+    /// A pickle holds the session's files.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let py = slf.py();
+        let folder = tempfile::tempdir()?;
+        let whole = &slf.get().whole;
+        py.detach(|| whole.write_files(folder.path())).map_err(refuse)?;
+        let files = PyList::empty(py);
+        for entry in std::fs::read_dir(folder.path())? {
+            let entry = entry?;
+            files.append((entry.file_name(), PyBytes::new(py, &std::fs::read(entry.path())?)))?;
+        }
+        Ok((slf.get_type().getattr("_restored")?, (files,).into_pyobject(py)?))
+    }
+
+    /// The session that was pickled.
+    #[staticmethod]
+    fn _restored(py: Python<'_>, files: Vec<(PathBuf, Vec<u8>)>) -> PyResult<Self> {
+        let folder = tempfile::tempdir()?;
+        for (name, bytes) in &files {
+            std::fs::write(folder.path().join(name.file_name().unwrap_or_default()), bytes)?;
+        }
+        let whole = py.detach(|| Whole::read(folder.path())).map_err(refuse)?;
+        Ok(Self { whole: Arc::new(whole) })
     }
 
     fn __repr__(&self) -> String {
@@ -228,6 +263,20 @@ impl Recording {
     #[getter]
     fn time<'py>(&self, py: Python<'py>) -> Array1<'py> {
         self.each(py, |facts| facts.time_s)
+    }
+
+    fn __copy__(&self) -> Self {
+        Self { whole: Arc::clone(&self.whole), raster: self.raster }
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
+        self.__copy__()
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let session = Session { whole: Arc::clone(&self.whole) };
+        let name = if self.raster { "raster" } else { "compressive" };
+        Ok((py.import("builtins")?.getattr("getattr")?, (session, name).into_pyobject(py)?))
     }
 
     fn __len__(&self) -> usize {

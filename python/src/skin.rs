@@ -2,13 +2,14 @@
 
 use crate::args::{Array1, Array2, PoseIn, checked_twist, one_of, triples, triples_out, whole};
 use crate::body::Body;
-use crate::common::refuse;
+use crate::common::{of_toml, refuse, to_toml};
 use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use spts::contact::{Carried, Foam, PosedMesh, Support, SurfacePoints, TouchBody, TouchSkin, Winding, Wrench};
 use spts::{PressureMap, SkinLayout};
 use std::f64::consts::TAU;
+use std::hash::{BuildHasher as _, RandomState};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -35,12 +36,16 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 ///     Damping time of the foam, s, [0, 0.02].
 /// friction : float, optional
 ///     Friction coefficient, [0, 5].
+///
+/// A copy (`copy.deepcopy`, `pickle`) is the same specimen at the same moment, and goes on apart: touching it changes
+/// nothing of the original. A wire of one feels touches of the other, too, as long as their time does not run back.
 #[pyclass(frozen, module = "spts")]
 pub(crate) struct Skin {
     id: u64,
     state: Mutex<State>,
 }
 
+#[derive(Clone)]
 struct State {
     skin: TouchSkin,
     touches: u64,
@@ -327,14 +332,73 @@ impl Skin {
         Self::curved(points, shape, surface(stiffness, thickness, damping, friction))
     }
 
+    fn __copy__(&self) -> Self {
+        Self { id: self.id, state: Mutex::new(self.locked().clone()) }
+    }
+
+    fn __deepcopy__(&self, _memo: &Bound<'_, PyAny>) -> Self {
+        self.__copy__()
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, id) = (slf.py(), slf.get().id);
+        let State { skin, touches, time_s } = slf.get().locked().clone();
+        let points = skin.points().map(|points| {
+            let normals = triples_out(py, points.normals().iter().copied())?;
+            let places = triples_out(py, points.positions_m().iter().copied())?;
+            let taxels = PyArray1::from_iter(py, points.taxel_of_points().iter().map(|k| i64::from(*k)));
+            Ok::<_, PyErr>((places, normals, PyArray1::from_slice(py, points.areas_m2()), taxels))
+        });
+        let (layout, foam) = (to_toml(skin.layout())?, to_toml(skin.foam())?);
+        let arguments = (layout, foam, points.transpose()?, id, touches, time_s).into_pyobject(py)?;
+        Ok((slf.get_type().getattr("_restored")?, arguments))
+    }
+
+    /// The skin that was pickled.
+    #[staticmethod]
+    fn _restored(
+        layout: &str,
+        foam: &str,
+        points: Option<Points<'_>>,
+        id: u64,
+        touches: u64,
+        time_s: f64,
+    ) -> PyResult<Self> {
+        let (layout, foam) = (of_toml(layout)?, of_toml(foam)?);
+        let skin = match points {
+            None => TouchSkin::flat(layout, foam),
+            Some((places, normals, areas, taxels)) => {
+                let (places, normals) = (triples("positions", &places)?, triples("normals", &normals)?);
+                let taxels =
+                    taxels.as_array().iter().map(|k| u32::try_from(*k).map_err(refuse)).collect::<PyResult<_>>()?;
+                SurfacePoints::new(places, normals.clone(), areas.as_array().to_vec(), taxels)
+                    .and_then(|points| points.with_unit_normals(normals))
+                    .and_then(|points| TouchSkin::curved(layout, points, foam))
+            }
+        };
+        Ok(Self { id, state: Mutex::new(State { skin: skin.map_err(refuse)?, touches, time_s }) })
+    }
+
     fn __repr__(&self) -> String {
         let (rows, cols) = self.shape();
         format!("<spts.Skin of {rows} x {cols} taxels>")
     }
 }
 
-/// What tells skins apart.
-static NEXT: AtomicU64 = AtomicU64::new(0);
+/// Sample points of a skin that was pickled: places, normals, areas and taxels.
+type Points<'py> = (
+    PyArrayLike2<'py, f64, AllowTypeChange>,
+    PyArrayLike2<'py, f64, AllowTypeChange>,
+    PyArrayLike1<'py, f64, AllowTypeChange>,
+    PyArrayLike1<'py, i64, AllowTypeChange>,
+);
+
+/// What tells skins apart, those of other processes too: a copy has the number of its original.
+fn new_id() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    // keys are random, but a forked process has those of its parent
+    RandomState::new().hash_one((std::process::id(), NEXT.fetch_add(1, Ordering::Relaxed)))
+}
 
 impl Skin {
     /// Puts `bodies` on the skin; what it feels, and the wrenches on them.
@@ -440,7 +504,7 @@ impl Skin {
     }
 
     fn of(skin: TouchSkin) -> Self {
-        Self { id: NEXT.fetch_add(1, Ordering::Relaxed), state: Mutex::new(State { skin, touches: 0, time_s: 0.0 }) }
+        Self { id: new_id(), state: Mutex::new(State { skin, touches: 0, time_s: 0.0 }) }
     }
 
     /// Skin at `points`; a taxel's electrode has the usual share of a square of their mean area.
@@ -488,6 +552,34 @@ pub(crate) struct Touch {
     pub(crate) felt: PressureMap,
     /// Which skin.
     pub(crate) skin: u64,
+}
+
+#[pymethods]
+impl Touch {
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, touch) = (slf.py(), slf.get());
+        let felt = PyArray1::from_slice(py, touch.felt.values());
+        let scalars = (touch.area, touch.time, touch.number, touch.bottomed, touch.skin);
+        let arguments = (touch.pressure.bind(py), touch.wrenches.bind(py), felt, scalars).into_pyobject(py)?;
+        Ok((slf.get_type().getattr("_restored")?, arguments))
+    }
+
+    /// The touch that was pickled.
+    #[staticmethod]
+    fn _restored(
+        pressure: Bound<'_, PyArray2<f64>>,
+        wrenches: Bound<'_, PyDict>,
+        felt: PyArrayLike1<'_, f64, AllowTypeChange>,
+        scalars: (f64, f64, u64, bool, u64),
+    ) -> PyResult<Self> {
+        let (area, time, number, bottomed, skin) = scalars;
+        let (felt, (rows, cols)) = (felt.as_array().to_vec(), pressure.readonly().as_array().dim());
+        if felt.len() != rows * cols {
+            bail!("a touch of {rows} x {cols} taxels with {} pressures", felt.len());
+        }
+        let felt = PressureMap::from_values(rows, cols, felt);
+        Ok(Self { pressure: pressure.unbind(), wrenches: wrenches.unbind(), area, time, number, bottomed, felt, skin })
+    }
 }
 
 /// Where a body is and how it moves, in the skin's frame.

@@ -1,13 +1,15 @@
 //! The one wire: transducer and electronics, with their state.
 
 use crate::args::{Array1, Array2, one_of, whole};
-use crate::common::{refuse, table};
+use crate::common::{of_toml, refuse, table, to_toml};
 use crate::skin::{Skin, Touch};
-use numpy::{IntoPyArray as _, PyArrayMethods as _};
+use numpy::{AllowTypeChange, IntoPyArray as _, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
-use spts::chain::RowsConfig;
-use spts::circuit::{CompressiveWeights, Seeding};
+use pyo3::types::{PyBytes, PyDict, PyList, PySequence, PyTuple};
+use serde::{Deserialize, Serialize};
+use spts::chain::{RowsConfig, SkinSession};
+use spts::circuit::{CompressiveWeights, Patterns, Profile, Seeding, WeightMode};
+use spts::models::{Snapshot, Streams};
 use spts::{Chain, ChainConfig, Mode, PressureMap, SkinLayout, Wire as Line};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
@@ -15,14 +17,19 @@ use std::sync::{Mutex, PoisonError};
 /// Most measurements of a call, and most weights that it returns.
 const MOST: usize = 1 << 27;
 
+/// How far a level that is given may be from one of the cells: it was printed with six digits.
+const LEVEL: f64 = 1e-6;
+
 /// Most measurements between two looks at whether Ctrl-C was pressed.
 const SLICE: usize = 1 << 16;
 
-/// The one wire of a skin: what its taxels conduct, and what the converter reads of their sum.
+/// The one wire of a skin, or of several: what its taxels conduct, and what the converter reads of their sum.
 ///
 /// Parameters
 /// ----------
-/// skin : Skin
+/// skin : Skin or sequence of Skin
+///     With a sequence, the taxels of the wire are those of the skins one after the other, and a touch is a sequence of
+///     one a skin.
 /// readout : str
 ///     Profile of the electronics: "ideal", "as_built", "as_published", "as_designed", or a file that ends in .toml.
 /// seeds : str or sequence of int, optional
@@ -40,14 +47,17 @@ const SLICE: usize = 1 << 16;
 /// faults : list of dict, optional
 ///     Faulty cells: `name`, `taxel` and the fault's own parameters.
 /// taxels : sequence of int, optional
-///     The taxels of the skin that are on this wire, row by row from 0; default all. Several wires share a skin.
+///     The taxels of the skin that are on this wire, row by row from 0; default all. Several wires share a skin. Of
+///     several skins, the numbers go on from one to the next.
+/// rows : array (R, taxels) or str, optional
+///     The rows of Φ, which the cells repeat, in place of seeds: levels ±1, or the levels k/127.5 − 1, k = 0, 1, … 255,
+///     of "analog" weights. A text is a file of them, as `spts design` writes it. Default: the profile's.
+///
+/// A copy (`copy.deepcopy`, `pickle`) goes on with the same measurements as its original, and changes nothing of it.
 #[pyclass(frozen, module = "spts")]
 pub(crate) struct Wire {
     state: Mutex<State>,
-    /// Which skin, by its number.
-    skin: u64,
-    /// Taxels of the skin on this wire; `None` for all of them.
-    taxels: Option<Vec<usize>>,
+    made: Made,
     /// Rows and columns of the taxels on this wire.
     #[pyo3(get)]
     shape: (usize, usize),
@@ -58,20 +68,52 @@ pub(crate) struct Wire {
 
 struct State {
     line: Line,
-    felt: PressureMap,
-    /// Time of the touch that was felt last, s, and its number.
+    skins: Vec<Felt>,
+}
+
+/// What was felt last of a skin.
+struct Felt {
+    pressure: PressureMap,
+    /// Time of the touch, s, and its number.
     time_s: f64,
     number: u64,
+}
+
+/// What a wire is made from.
+#[derive(Serialize, Deserialize)]
+struct Made {
+    /// As signed numbers of the same bits, which TOML has.
+    seed: i64,
+    session: i64,
+    transducer: String,
+    /// Whether a touch is a sequence.
+    several: bool,
+    skin: SkinLayout,
+    skins: Vec<Part>,
+    parameters: toml::Table,
+    profile: Profile,
+}
+
+/// The taxels of a skin on a wire.
+#[derive(Serialize, Deserialize)]
+struct Part {
+    /// Which skin, by the bits of its number.
+    id: i64,
+    /// Taxels of the skin, in the order of their places; `None` for all of them.
+    taxels: Option<Vec<usize>>,
+    /// Their places on the wire.
+    places: Vec<usize>,
+    layout: SkinLayout,
 }
 
 #[pymethods]
 impl Wire {
     #[new]
-    #[pyo3(signature = (skin, readout = "as_built", seeds = None, seed = 0, *, session = 0, levels = None, transducer = "velostat", parameters = None, faults = None, taxels = None))]
+    #[pyo3(signature = (skin, readout = "as_built", seeds = None, seed = 0, *, session = 0, levels = None, transducer = "velostat", parameters = None, faults = None, taxels = None, rows = None))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn new(
         py: Python<'_>,
-        skin: &Skin,
+        skin: &Bound<'_, PyAny>,
         readout: &str,
         seeds: Option<Bound<'_, PyAny>>,
         seed: i128,
@@ -81,16 +123,13 @@ impl Wire {
         parameters: Option<&Bound<'_, PyDict>>,
         faults: Option<&Bound<'_, PyList>>,
         taxels: Option<Vec<i128>>,
+        rows: Option<Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
-        let (seed, session) = (whole("seed", seed)?, whole("session", session)?);
+        let (seed, session): (u64, u64) = (whole("seed", seed)?, whole("session", session)?);
         let taxels =
             taxels.map(|taxels| taxels.into_iter().map(|k| whole("taxels", k)).collect::<PyResult<Vec<usize>>>());
-        let taxels = taxels.transpose()?;
-        let whole = skin.layout();
-        let layout = match &taxels {
-            Some(taxels) => part(&whole, taxels)?,
-            None => whole,
-        };
+        let (several, skins) = skins(skin)?;
+        let (layout, skins) = parts(several, &skins, taxels.transpose()?)?;
         let faults = faults.map(|faults| {
             let one = |(k, fault): (usize, Bound<'_, PyAny>)| {
                 let fault = fault.cast_into::<PyDict>()?;
@@ -102,45 +141,44 @@ impl Wire {
             transducer: Some(transducer.to_owned()),
             transducer_parameters: parameters.map(|p| table("parameters", p)).transpose()?.unwrap_or_default(),
             readout: Some(readout.to_owned()),
-            rows: rows(seeds, levels)?,
-            weights: None,
+            rows: rows_of(seeds, levels, rows)?,
             faults: faults.transpose()?.unwrap_or_default(),
+            ..ChainConfig::default()
         };
-        let line = py.detach(|| {
-            let chain = Chain::new(&config, &layout, seed, Path::new(""))?;
-            Ok::<_, spts::Refusal>((chain.sample_rate_hz(), Line::new(&chain, session)?))
-        });
-        let (sample_rate, line) = line.map_err(refuse)?;
-        Ok(Self {
-            state: Mutex::new(State {
-                line,
-                felt: PressureMap::zeros(layout.rows(), layout.cols()),
-                time_s: 0.0,
-                number: 0,
-            }),
-            skin: skin.id(),
-            taxels,
-            shape: (layout.rows(), layout.cols()),
-            sample_rate,
-        })
+        let chain = py.detach(|| Chain::new(&config, &layout, seed, Path::new(""))).map_err(refuse)?;
+        let made = Made {
+            seed: seed.cast_signed(),
+            session: session.cast_signed(),
+            transducer: transducer.to_owned(),
+            several,
+            skin: layout,
+            skins,
+            parameters: config.transducer_parameters,
+            profile: chain.profile().clone(),
+        };
+        Self::of(py, made, &chain)
     }
 
     /// Lets the taxels feel a touch without measuring: the transducer remembers what it felt, and for how long.
     ///
     /// Parameters
     /// ----------
-    /// touch : Touch
-    ///     Of this wire's skin, not before the one that it felt last. It has been on the skin since then.
-    fn feel(&self, py: Python<'_>, touch: &Touch) -> PyResult<()> {
-        py.detach(|| self.felt(&mut self.locked(), touch))
+    /// touch : Touch, or sequence of Touch or None
+    ///     Of this wire's skin, not before the one that it felt last. It has been on the skin since then. Of a wire
+    ///     over several skins one of each, in their order; None for a skin without a touch since then: its taxels stay
+    ///     as they are.
+    fn feel(&self, py: Python<'_>, touch: &Bound<'_, PyAny>) -> PyResult<()> {
+        let touches = self.touches(touch)?;
+        py.detach(|| self.felt(&mut self.locked(), &touches))
     }
 
     /// Measures a touch.
     ///
     /// Parameters
     /// ----------
-    /// touch : Touch
-    ///     What the skin feels now; it has been on the skin since the touch that this wire felt last.
+    /// touch : Touch, or sequence of Touch or None
+    ///     What the skin feels now; it has been on the skin since the touch that this wire felt last. Of a wire over
+    ///     several skins one of each, as for `feel`.
     /// measurements : int, optional
     ///     Number of measurements, M; default for a raster scan: one a taxel.
     /// raster : bool
@@ -160,12 +198,13 @@ impl Wire {
     fn record<'py>(
         &self,
         py: Python<'py>,
-        touch: &Touch,
+        touch: &Bound<'py, PyAny>,
         measurements: Option<i128>,
         raster: bool,
         raw: bool,
         weights: bool,
     ) -> PyResult<(Array1<'py>, Option<Array2<'py>>)> {
+        let touches = self.touches(touch)?;
         let taxels = self.shape.0 * self.shape.1;
         let count = match measurements {
             Some(count) => whole("measurements", count)?,
@@ -190,7 +229,7 @@ impl Wire {
             let ended: PyResult<()> = py.detach(|| {
                 let mut state = self.locked();
                 if !filled {
-                    self.felt(&mut state, touch)?;
+                    self.felt(&mut state, &touches)?;
                     if weights {
                         state.line.rows(mode, count).fill(&mut phi);
                     }
@@ -225,63 +264,264 @@ impl Wire {
         self.locked().line.idle_v(Mode::Compressive)
     }
 
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let (py, own) = (slf.py(), slf.get());
+        let mut saving = Snapshot::saving();
+        own.locked().exchange(&mut saving).map_err(refuse)?;
+        let words = saving.finish().map_err(refuse)?;
+        let bytes: Vec<u8> = words.into_iter().flat_map(u64::to_le_bytes).collect();
+        let arguments = (to_toml(&own.made)?, PyBytes::new(py, &bytes)).into_pyobject(py)?;
+        Ok((slf.get_type().getattr("_restored")?, arguments))
+    }
+
+    /// The wire that was pickled.
+    #[staticmethod]
+    fn _restored(py: Python<'_>, made: &str, state: &[u8]) -> PyResult<Self> {
+        let made: Made = of_toml(made)?;
+        let config = ChainConfig { profile: Some(made.profile.clone()), ..made.config() };
+        let seed = made.seed.cast_unsigned();
+        let chain = py.detach(|| Chain::new(&config, &made.skin, seed, Path::new(""))).map_err(refuse)?;
+        let wire = Self::of(py, made, &chain)?;
+        let words = state.as_chunks().0.iter().map(|bytes| u64::from_le_bytes(*bytes));
+        let mut loading = Snapshot::loading(words.collect());
+        wire.locked().exchange(&mut loading).map_err(refuse)?;
+        loading.finish().map_err(refuse)?;
+        Ok(wire)
+    }
+
     fn __repr__(&self) -> String {
         format!("<spts.Wire of {} x {} taxels>", self.shape.0, self.shape.1)
     }
 }
 
+impl Made {
+    /// The transducer, of the default readout.
+    fn config(&self) -> ChainConfig {
+        ChainConfig {
+            transducer: Some(self.transducer.clone()),
+            transducer_parameters: self.parameters.clone(),
+            ..ChainConfig::default()
+        }
+    }
+}
+
+impl State {
+    fn exchange(&mut self, state: &mut Snapshot) -> Result<(), spts::Refusal> {
+        for felt in &mut self.skins {
+            state.f64s(felt.pressure.values_mut());
+            state.f64(&mut felt.time_s);
+            state.u64(&mut felt.number);
+        }
+        self.line.exchange(state)
+    }
+}
+
 impl Wire {
+    /// The wire that `made` says, with the readout of `chain`.
+    fn of(py: Python<'_>, made: Made, chain: &Chain) -> PyResult<Self> {
+        let config = made.config();
+        let (seed, session) = (made.seed.cast_unsigned(), made.session.cast_unsigned());
+        let line = py.detach(|| {
+            let specimen = |k: usize| match k {
+                0 => Streams::new(seed),
+                // specimens of one wire differ
+                _ => Streams::new(seed).child("wire/skin", k as u64),
+            };
+            let skins = made.skins.iter().enumerate().map(|(k, part)| {
+                let session = SkinSession::new(&config, &part.layout, specimen(k), session);
+                session.map(|session| (session, part.places.clone()))
+            });
+            Line::over(skins.collect::<Result<_, _>>()?, chain, session)
+        });
+        let felt = |part: &Part| Felt {
+            pressure: PressureMap::zeros(part.layout.rows(), part.layout.cols()),
+            time_s: 0.0,
+            number: 0,
+        };
+        Ok(Self {
+            state: Mutex::new(State { line: line.map_err(refuse)?, skins: made.skins.iter().map(felt).collect() }),
+            shape: (made.skin.rows(), made.skin.cols()),
+            sample_rate: chain.sample_rate_hz(),
+            made,
+        })
+    }
+
     fn locked(&self) -> std::sync::MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Brings the transducer to the time of `touch`.
-    fn felt(&self, state: &mut State, touch: &Touch) -> PyResult<()> {
-        let felt = touch.felt.values();
-        if touch.skin != self.skin {
-            bail!("`touch` is of another skin than this wire");
+    /// One touch a skin.
+    fn touches(&self, touch: &Bound<'_, PyAny>) -> PyResult<Vec<Option<Py<Touch>>>> {
+        if !self.made.several {
+            return Ok(vec![Some(touch.cast::<Touch>()?.clone().unbind())]);
         }
-        let dt_s = touch.time - state.time_s;
-        if dt_s < 0.0 || touch.number < state.number {
+        let skins = self.made.skins.len();
+        let Ok(given) = touch.cast::<PySequence>() else {
             bail!(
-                "`touch` is of {} s; this wire has felt one of {} s: time does not run back",
-                touch.time,
-                state.time_s
+                "`touch` is a {}; this wire is over {skins} skins: a sequence of a touch a skin, or None",
+                kind(touch)
             );
+        };
+        if given.len()? != skins {
+            bail!("`touch` has {} entries; this wire is over {skins} skins: a touch a skin, or None", given.len()?);
         }
-        if touch.number == state.number {
-            return Ok(());
-        }
-        match &self.taxels {
-            Some(taxels) => {
-                let own = state.felt.values_mut().iter_mut();
-                own.zip(taxels).for_each(|(own, taxel)| *own = felt[*taxel]);
+        let one = |(k, touch): (usize, PyResult<Bound<'_, PyAny>>)| {
+            let touch = touch?;
+            let found = touch.extract::<Option<Py<Touch>>>();
+            found
+                .map_err(|_| refuse(format!("`touch[{k}]` is a {}; valid: a touch of skin {k}, or None", kind(&touch))))
+        };
+        given.try_iter()?.enumerate().map(one).collect()
+    }
+
+    /// Brings the transducer to the time of `touches`, one a skin. None is felt when one is refused.
+    fn felt(&self, state: &mut State, touches: &[Option<Py<Touch>>]) -> PyResult<()> {
+        let mut news = Vec::with_capacity(touches.len());
+        let parts = self.made.skins.iter().zip(&state.skins);
+        for (k, ((part, last), touch)) in parts.zip(touches).enumerate() {
+            let Some(touch) = touch.as_ref().map(Py::get) else {
+                news.push(None);
+                continue;
+            };
+            let name = if self.made.several { format!("`touch[{k}]`") } else { "`touch`".to_owned() };
+            if touch.skin.cast_signed() != part.id {
+                let skin = if self.made.several { format!("skin {k} of this wire") } else { "this wire".to_owned() };
+                bail!("{name} is of another skin than {skin}");
             }
-            None => state.felt.values_mut().copy_from_slice(felt),
+            let dt_s = touch.time - last.time_s;
+            if dt_s < 0.0 || touch.number < last.number {
+                bail!(
+                    "{name} is of {} s; this wire has felt one of {} s: time does not run back",
+                    touch.time,
+                    last.time_s
+                );
+            }
+            let felt = touch.felt.values();
+            let felt = match &part.taxels {
+                Some(taxels) => taxels.iter().map(|taxel| felt[*taxel]).collect(),
+                None => felt.to_vec(),
+            };
+            let pressure = PressureMap::from_values(part.layout.rows(), part.layout.cols(), felt);
+            if touch.number > last.number {
+                news.push(Some((pressure, dt_s, touch)));
+            } else if dt_s > 0.0 || pressure != last.pressure {
+                bail!(
+                    "{name} is of a copy of the skin: this wire has felt another touch of the number {}",
+                    touch.number
+                );
+            } else {
+                news.push(None);
+            }
         }
-        let State { line, felt, .. } = state;
-        line.feel(felt, dt_s).map_err(refuse)?;
-        (state.time_s, state.number) = (touch.time, touch.number);
+        let each: Vec<_> = news.iter().map(|new| new.as_ref().map(|(pressure, dt_s, _)| (pressure, *dt_s))).collect();
+        if each.iter().any(Option::is_some) {
+            state.line.feel_each(&each).map_err(refuse)?;
+        }
+        for (last, new) in state.skins.iter_mut().zip(news) {
+            if let Some((pressure, _, touch)) = new {
+                *last = Felt { pressure, time_s: touch.time, number: touch.number };
+            }
+        }
         Ok(())
     }
 }
 
-/// A wire with these taxels of `skin`: a row of them.
-fn part(skin: &SkinLayout, taxels: &[usize]) -> PyResult<SkinLayout> {
-    let count = skin.taxels();
-    let mut seen = vec![false; count];
-    for (k, taxel) in taxels.iter().enumerate() {
-        match seen.get_mut(*taxel) {
-            None => bail!("`taxels[{k}]` = {taxel} is outside [0, {}]", count - 1),
-            Some(seen) if *seen => bail!("`taxels[{k}]` = {taxel} is there twice"),
-            Some(seen) => *seen = true,
-        }
-    }
-    SkinLayout::new(1, taxels.len(), skin.pitch_m(), skin.electrode_m()).map_err(refuse)
+/// What a value is, for messages.
+fn kind(value: &Bound<'_, PyAny>) -> String {
+    value.get_type().name().map_or_else(|_| "value".to_owned(), |name| name.to_string())
 }
 
-fn rows(seeds: Option<Bound<'_, PyAny>>, levels: Option<&str>) -> PyResult<RowsConfig> {
+/// The skins, and whether they were given as a sequence.
+fn skins<'py>(skin: &Bound<'py, PyAny>) -> PyResult<(bool, Vec<Bound<'py, Skin>>)> {
+    if let Ok(skin) = skin.cast::<Skin>() {
+        return Ok((false, vec![skin.clone()]));
+    }
+    let needed = || refuse(format!("`skin` is a {}; valid: a skin, or a sequence of skins", kind(skin)));
+    let given = skin.cast::<PySequence>().map_err(|_| needed())?;
+    let mut skins: Vec<Bound<'py, Skin>> = Vec::new();
+    for (k, skin) in given.try_iter()?.enumerate() {
+        let skin = skin?;
+        let Ok(skin) = skin.cast_into::<Skin>() else {
+            bail!("`skin[{k}]` is no skin");
+        };
+        if skins.iter().any(|other| other.get().id() == skin.get().id()) {
+            bail!("`skin[{k}]` is there twice, or a copy of another: copies are one specimen");
+        }
+        skins.push(skin);
+    }
+    if skins.is_empty() {
+        bail!("`skin` is empty: one skin at least is needed");
+    }
+    Ok((true, skins))
+}
+
+/// The layout of a wire over `skins`, all of them or `taxels`, and what it has of each skin.
+fn parts(several: bool, skins: &[Bound<'_, Skin>], taxels: Option<Vec<usize>>) -> PyResult<(SkinLayout, Vec<Part>)> {
+    let layouts: Vec<SkinLayout> = skins.iter().map(|skin| skin.get().layout()).collect();
+    let id = |k: usize| skins[k].get().id().cast_signed();
+    if !several && taxels.is_none() {
+        let places = (0..layouts[0].taxels()).collect();
+        return Ok((layouts[0], vec![Part { id: id(0), taxels: None, places, layout: layouts[0] }]));
+    }
+    // the skin of every taxel, and its number there
+    let all: Vec<(usize, usize)> =
+        layouts.iter().enumerate().flat_map(|(k, layout)| (0..layout.taxels()).map(move |taxel| (k, taxel))).collect();
+    let mut seen = vec![false; all.len()];
+    let mut on_wire: Vec<(Vec<usize>, Vec<usize>)> = vec![(Vec::new(), Vec::new()); skins.len()];
+    for (place, taxel) in taxels.unwrap_or_else(|| (0..all.len()).collect()).into_iter().enumerate() {
+        match seen.get_mut(taxel) {
+            None => bail!("`taxels[{place}]` = {taxel} is outside [0, {}]", all.len() - 1),
+            Some(seen) if *seen => bail!("`taxels[{place}]` = {taxel} is there twice"),
+            Some(seen) => *seen = true,
+        }
+        let (skin, taxel) = all[taxel];
+        on_wire[skin].0.push(taxel);
+        on_wire[skin].1.push(place);
+    }
+    let mut parts = Vec::with_capacity(skins.len());
+    for (k, (taxels, places)) in on_wire.into_iter().enumerate() {
+        if several && taxels.is_empty() {
+            bail!("`taxels` has none of skin {k}: leave it out of `skin`");
+        }
+        let whole = &layouts[k];
+        let layout = SkinLayout::new(1, taxels.len(), whole.pitch_m(), whole.electrode_m()).map_err(refuse)?;
+        parts.push(Part { id: id(k), taxels: Some(taxels), places, layout });
+    }
+    Ok((joined(&parts)?, parts))
+}
+
+/// The layout of a wire with these taxels: a row of them. Its electrodes are as large as theirs on average.
+fn joined(parts: &[Part]) -> PyResult<SkinLayout> {
+    let total: usize = parts.iter().map(|part| part.layout.taxels()).sum();
+    let mean = |of: fn(&SkinLayout) -> f64| {
+        let first = of(&parts[0].layout);
+        if parts.iter().all(|part| of(&part.layout).to_bits() == first.to_bits()) {
+            return first;
+        }
+        let sum: f64 = parts.iter().map(|part| part.layout.taxels() as f64 * of(&part.layout).powi(2)).sum();
+        (sum / total as f64).sqrt()
+    };
+    let (pitch_m, electrode_m) = (mean(SkinLayout::pitch_m), mean(SkinLayout::electrode_m));
+    SkinLayout::new(1, total, pitch_m, electrode_m.min(pitch_m)).map_err(refuse)
+}
+
+/// The rows that are asked for in place of the profile's.
+fn rows_of(
+    seeds: Option<Bound<'_, PyAny>>,
+    levels: Option<&str>,
+    given: Option<Bound<'_, PyAny>>,
+) -> PyResult<RowsConfig> {
+    if seeds.is_some() && given.is_some() {
+        bail!("`seeds` and `rows`: only one of them may be given");
+    }
     let mut rows = RowsConfig::default();
+    match given {
+        None => {}
+        Some(given) => match given.extract::<String>() {
+            Ok(file) => rows.patterns_file = Some(file),
+            Err(_) => rows.patterns = Some(patterns(&given)?),
+        },
+    }
     match seeds {
         None => {}
         Some(seeds) => match seeds.extract::<String>() {
@@ -304,4 +544,28 @@ fn rows(seeds: Option<Bound<'_, PyAny>>, levels: Option<&str>) -> PyResult<RowsC
     let known = [("binary", CompressiveWeights::Binary), ("analog", CompressiveWeights::Analog)];
     rows.levels = levels.map(|levels| one_of("levels", levels, &known)).transpose()?;
     Ok(rows)
+}
+
+/// The pattern whose rows are those of an array of levels.
+fn patterns(given: &Bound<'_, PyAny>) -> PyResult<Patterns> {
+    let Ok(levels) = given.extract::<PyArrayLike2<'_, f64, AllowTypeChange>>() else {
+        bail!("`rows`: an array (R, taxels) of levels, or a file of rows, is needed");
+    };
+    let levels = levels.as_array();
+    let (count, taxels) = levels.dim();
+    if count == 0 || taxels == 0 {
+        bail!("`rows` has shape ({count}, {taxels}); (R, taxels) with R > 0 is needed");
+    }
+    let values: Vec<f64> = levels.iter().copied().collect();
+    let found = Patterns::of_levels(count, &values).map_err(refuse)?;
+    for (row, levels) in (0_u64..).zip(values.chunks_exact(taxels)) {
+        for (taxel, (level, code)) in levels.iter().zip(found.row(row)).enumerate() {
+            let nearest = WeightMode::Analog.code_level(*code);
+            let off = (level - nearest).abs();
+            if off.is_nan() || off > LEVEL {
+                bail!("`rows[{row}, {taxel}]` = {level} is no level; the nearest is {nearest:.6}, of the code {code}");
+            }
+        }
+    }
+    Ok(found)
 }

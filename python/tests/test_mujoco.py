@@ -556,6 +556,70 @@ def test_taxels_are_drawn(dog):
         robot.draw(mujoco.MjvScene(model, maxgeom=10))
 
 
+def test_a_wire_a_limb(dog):
+    model, _, each = dog
+    data = mujoco.MjData(model)
+    robot = spts.mujoco.dress(model, data, pitch=0.02, wires="limb")
+    taxels = dict(zip(each.names, (len(skin.areas) for skin in each.skins)))
+    limbs = ["trunk"], *([leg, f"{leg}_foot"] for leg in ("fl", "fr", "bl", "br"))
+    assert [w.shape for w in robot.wires] == [(1, sum(taxels[name] for name in limb)) for limb in limbs]
+    # before the first step nothing has touched it
+    assert [y.shape for y, _ in robot.record(7)] == [(7,)] * 5
+    robot.step(200)
+    found = robot.record(40)
+    assert [phi.shape for _, phi in found] == [(40, w.shape[1]) for w in robot.wires]
+    touched = [(w.conductance > 1e-9).any() for w in robot.wires]
+    assert touched == [False, True, True, True, True]
+    # a limb's taxels are those of its links one after the other
+    foot = robot.skins[robot.names.index("bl_foot")]
+    pressed = robot.touches[robot.names.index("bl_foot")].pressure.ravel() > 0.0
+    assert np.array_equal(robot.wires[3].conductance[0, -len(foot.areas) :] > 1e-9, pressed)
+    robot.detach()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 9, 40])
+def test_any_number_of_wires(dog, count):
+    model, _, each = dog
+    robot = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.02, wires=count)
+    sizes = [w.shape[1] for w in robot.wires]
+    assert len(sizes) == count and sum(sizes) == robot.taxels == each.taxels
+    share = robot.taxels / count
+    # both ends of a wire may go to the ends of a link
+    assert max(abs(n - share) for n in sizes) <= 0.2 * share + 1
+    robot.step()
+    assert [phi.shape for _, phi in robot.record(3)] == [(3, n) for n in sizes]
+    robot.detach()
+
+
+def test_wires_keep_links_whole():
+    """Four like links on two wires are two and two."""
+    links = "".join(f'<body name="{k}" pos="{k} 0 0"><freejoint/><geom size=".1"/></body>' for k in range(4))
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{links}</worldbody></mujoco>")
+    robot = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.03, wires=2)
+    counts = [len(skin.areas) for skin in robot.skins]
+    assert [w.shape[1] for w in robot.wires] == [sum(counts[:2]), sum(counts[2:])]
+    # each is a tree of its own, and a limb
+    limbs = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.03, wires="limb")
+    assert [w.shape[1] for w in limbs.wires] == counts
+    none = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.03, wires=None)
+    with pytest.raises(ValueError, match="wires"):
+        none.record(5)
+
+
+def test_limbs_leave_at_the_first_branch():
+    """An arm of three links whose last carries two fingers: the arm is one, each finger another."""
+    finger = '<body name="{0}1" pos="0 {1} .1"><joint/><geom size=".02"/><body name="{0}2" pos="0 0 .1"><joint/><geom size=".02"/></body></body>'
+    model = mujoco.MjModel.from_xml_string(f"""
+    <mujoco><worldbody><body name="base"><body name="upper" pos="0 0 .1"><joint/><geom size=".03"/>
+      <body name="lower" pos="0 0 .1"><joint/><geom size=".03"/><body name="bare" pos="0 .3 0"><joint/><geom size=".01" contype="0" conaffinity="0"/></body>
+      <body name="palm" pos="0 0 .1"><joint/><geom size=".03"/>{finger.format("l", 0.1)}{finger.format("r", -0.1)}</body></body>
+    </body></body></worldbody></mujoco>""")
+    robot = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.02, wires="limb")
+    taxels = dict(zip(robot.names, (len(skin.areas) for skin in robot.skins)))
+    limbs = ["upper", "lower", "palm"], ["l1", "l2"], ["r1", "r2"]
+    assert [w.shape[1] for w in robot.wires] == [sum(taxels[name] for name in limb) for limb in limbs]
+
+
 def test_skins_of_two_links_feel_one_force():
     """A hand of two dressed fingers closes on itself: each feels the other, with the same force."""
     model = mujoco.MjModel.from_xml_string("""
@@ -582,7 +646,10 @@ def test_what_cannot_be_dressed(dog):
         ("links", {"links": ["tail"]}),
         ("links", {"links": []}),
         ("links", {"links": "some"}),
-        ("wires", {"wires": "limb"}),
+        ("wires", {"wires": "arm"}),
+        ("wires", {"wires": 0}),
+        ("wires", {"wires": True}),
+        ("number of taxels", {"wires": 10**6}),
         ("thickness", {"thickness": -1.0}),
         ("has no geom with a surface", {"links": ["world"]}),
     ]:

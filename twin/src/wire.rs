@@ -1,12 +1,12 @@
 //! The one wire of a skin, live: pressure in, measurements out.
 
 use crate::chain::{Chain, SkinSession, of_conductance, of_readout};
-use spts_circuit::{Constant, Mode, Readout, RecordingInfo, WeightRows};
+use spts_circuit::{Constant, Mode, Patterns, Readout, RecordingInfo, WeightRows};
 use spts_input::Refusal;
-use spts_models::PressureMap;
+use spts_models::{ConductanceMap, PressureMap, Snapshot};
 use spts_recon::metrics::median;
 
-/// Measurements of the untouched skin from which its output is known.
+/// Measurements of the untouched skin from which its output is known; of a pattern whole rounds.
 const IDLE: usize = 2000;
 
 /// The one wire of a skin: transducer and electronics with their state, fed with one pressure after the other.
@@ -26,10 +26,10 @@ const IDLE: usize = 2000;
 /// # Ok::<(), spts::Refusal>(())
 /// ```
 pub struct Wire {
-    skin: SkinSession,
+    skins: Vec<(SkinSession, Vec<usize>)>,
     felt: Constant,
-    shape: [usize; 2],
-    lines: [Line; 2],
+    /// Compressive, then raster.
+    lines: Vec<Line>,
 }
 
 /// The readout in one mode.
@@ -44,18 +44,35 @@ impl Wire {
     /// # Errors
     /// [`Refusal`] if the source of the weights cannot provide them.
     pub fn new(chain: &Chain, session: u64) -> Result<Self, Refusal> {
+        let taxels = (0..chain.skin().taxels()).collect();
+        Self::over(vec![(chain.skin_session(session), taxels)], chain, session)
+    }
+
+    /// One wire over several skins, by the readout of `chain`. Each of `skins` has the place on the wire of each of its
+    /// taxels; the layout of `chain` has as many taxels as there are places.
+    ///
+    /// # Errors
+    /// As [`Wire::new`].
+    ///
+    /// # Panics
+    /// If the places are not all those of the layout.
+    pub fn over(skins: Vec<(SkinSession, Vec<usize>)>, chain: &Chain, session: u64) -> Result<Self, Refusal> {
         let layout = chain.skin();
-        let shape = [layout.rows(), layout.cols()];
-        let mut skin = chain.skin_session(session);
-        let mut felt =
-            Constant::new(skin.hold(&PressureMap::zeros(shape[0], shape[1]), 0.0)).map_err(of_conductance)?;
-        let mut line = |mode| {
+        let bare = ConductanceMap::zeros(layout.rows(), layout.cols());
+        let mut wire = Self { skins, felt: Constant::new(bare).map_err(of_conductance)?, lines: Vec::new() };
+        let zeros = wire.skins.iter().map(|(skin, _)| PressureMap::zeros(skin.shape()[0], skin.shape()[1]));
+        let zeros: Vec<PressureMap> = zeros.collect();
+        let placed: usize = wire.skins.iter().map(|(_, places)| places.len()).sum();
+        assert_eq!(placed, layout.taxels(), "one place a taxel");
+        wire.feel_each(&zeros.iter().map(|zeros| Some((zeros, 0.0))).collect::<Vec<_>>())?;
+        for mode in [Mode::Compressive, Mode::Raster] {
             let mut readout = chain.readout(mode, session)?;
-            let idle = readout.measure(&mut felt, IDLE).map_err(of_readout)?;
-            Ok::<_, Refusal>(Line { idle_v: median(&idle).unwrap_or_default(), readout })
-        };
-        let lines = [line(Mode::Compressive)?, line(Mode::Raster)?];
-        Ok(Self { skin, felt, shape, lines })
+            // whole rounds of a pattern, so that what follows begins with its first row
+            let period = readout.weights().patterns().map_or(1, Patterns::period);
+            let idle = readout.measure(&mut wire.felt, IDLE.next_multiple_of(period)).map_err(of_readout)?;
+            wire.lines.push(Line { idle_v: median(&idle).unwrap_or_default(), readout });
+        }
+        Ok(wire)
     }
 
     /// Applies `electrode_pressure` for `dt_s` seconds. It then stays until the next call.
@@ -66,9 +83,47 @@ impl Wire {
     /// # Panics
     /// If the map has another shape than the skin.
     pub fn feel(&mut self, electrode_pressure: &PressureMap, dt_s: f64) -> Result<(), Refusal> {
-        let found = [electrode_pressure.rows(), electrode_pressure.cols()];
-        assert_eq!(found, self.shape, "shape of the pressure");
-        self.felt = Constant::new(self.skin.hold(electrode_pressure, dt_s)).map_err(of_conductance)?;
+        self.feel_each(&[Some((electrode_pressure, dt_s))])
+    }
+
+    /// [`Wire::feel`] for every skin: its pressure and for how long that is applied, s. `None` leaves the taxels of a
+    /// skin as they are.
+    ///
+    /// # Errors
+    /// As [`Wire::feel`].
+    ///
+    /// # Panics
+    /// If there are more or fewer than skins, or a map has another shape than its skin.
+    pub fn feel_each(&mut self, felt: &[Option<(&PressureMap, f64)>]) -> Result<(), Refusal> {
+        assert_eq!(felt.len(), self.skins.len(), "one pressure a skin");
+        let mut conductance = self.felt.map().clone();
+        for ((skin, places), felt) in self.skins.iter_mut().zip(felt) {
+            let Some((pressure, dt_s)) = felt else {
+                continue;
+            };
+            assert_eq!([pressure.rows(), pressure.cols()], skin.shape(), "shape of the pressure");
+            for (place, g) in places.iter().zip(skin.hold(pressure, *dt_s).values()) {
+                conductance.values_mut()[*place] = *g;
+            }
+        }
+        self.felt = Constant::new(conductance).map_err(of_conductance)?;
+        Ok(())
+    }
+
+    /// Saves or loads everything that it remembers, for a wire that was made with the same arguments.
+    ///
+    /// # Errors
+    /// [`Refusal`] for a conductance that cannot be.
+    pub fn exchange(&mut self, state: &mut Snapshot) -> Result<(), Refusal> {
+        for (skin, _) in &mut self.skins {
+            skin.exchange(state);
+        }
+        let mut conductance = self.felt.map().clone();
+        state.f64s(conductance.values_mut());
+        self.felt = Constant::new(conductance).map_err(of_conductance)?;
+        for line in &mut self.lines {
+            line.readout.exchange(state);
+        }
         Ok(())
     }
 
@@ -97,7 +152,8 @@ impl Wire {
         WeightRows::new(readout.weights(), readout.row(), count)
     }
 
-    /// Median of 2000 samples of the untouched skin, taken in [`Wire::new`], V.
+    /// Median of 2000 samples of the untouched skin, taken in [`Wire::new`], V; of a pattern as many more as make whole
+    /// rounds.
     pub fn idle_v(&self, mode: Mode) -> f64 {
         self.lines[index(mode)].idle_v
     }
@@ -124,7 +180,7 @@ fn index(mode: Mode) -> usize {
 mod tests {
     use super::*;
     use crate::chain::ChainConfig;
-    use spts_models::SkinLayout;
+    use spts_models::{SkinLayout, Streams};
 
     fn wire() -> Wire {
         let chain = Chain::new(&ChainConfig::default(), &SkinLayout::default(), 3, ".".as_ref()).unwrap();
@@ -151,6 +207,45 @@ mod tests {
                 volts
             };
             assert_eq!(taken(&[400]), taken(&[1, 19, 20, 60, 300]), "{mode:?}");
+        }
+    }
+
+    /// Two skins on one wire conduct as each on its own, and a copy by the saved state goes on with the same bits.
+    #[test]
+    fn skins_share_a_wire() {
+        let config = ChainConfig::default();
+        let (small, all) = (SkinLayout::new(2, 3, 0.01, 0.005).unwrap(), SkinLayout::new(1, 12, 0.01, 0.005).unwrap());
+        let chain = Chain::new(&config, &all, 3, ".".as_ref()).unwrap();
+        let skin = |seed| SkinSession::new(&config, &small, Streams::new(seed), 0).unwrap();
+        let make = || {
+            let places = |first: usize| (0..6).map(|k| 2 * k + first).collect();
+            Wire::over(vec![(skin(3), places(0)), (skin(4), places(1))], &chain, 0).unwrap()
+        };
+        let pressure = PressureMap::from_values(2, 3, vec![2e4, 0.0, 1e4, 3e4, 0.0, 5e3]);
+        let mut wire = make();
+        wire.feel_each(&[Some((&pressure, 0.1)), None]).unwrap();
+        wire.feel_each(&[None, Some((&pressure, 0.2))]).unwrap();
+        for (seed, dt_s) in [(3, 0.1), (4, 0.2)] {
+            let alone = skin(seed).hold(&pressure, dt_s);
+            let own = wire.conductance_s().iter().skip(seed as usize - 3).step_by(2);
+            assert!(own.eq(alone.values()), "skin {seed}");
+        }
+        wire.measure(Mode::Compressive, &mut [0.0; 333]).unwrap();
+        let (mut copy, mut saving) = (make(), Snapshot::saving());
+        wire.exchange(&mut saving).unwrap();
+        let mut loading = Snapshot::loading(saving.finish().unwrap());
+        copy.exchange(&mut loading).unwrap();
+        loading.finish().unwrap();
+        for wire in [&mut wire, &mut copy] {
+            wire.feel_each(&[Some((&pressure, 0.7)), None]).unwrap();
+        }
+        for mode in [Mode::Compressive, Mode::Raster] {
+            let [goes_on, same] = [&mut wire, &mut copy].map(|wire| {
+                let mut volts = [0.0; 500];
+                wire.measure(mode, &mut volts).unwrap();
+                volts.map(f64::to_bits)
+            });
+            assert!(goes_on == same, "{mode:?}");
         }
     }
 

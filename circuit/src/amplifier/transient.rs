@@ -2,6 +2,7 @@
 
 use super::motion::{Decay, crossing};
 use super::parts::{Amplifier, BusLoad, Network, OpAmp, State};
+use spts_models::Snapshot;
 
 /// What the output does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,6 +56,11 @@ impl Transient {
     /// Output, V.
     pub fn output_v(&self) -> f64 {
         self.state.output_v
+    }
+
+    /// Saves or loads the state.
+    pub(crate) fn exchange(&mut self, state: &mut Snapshot) {
+        state.f64s([&mut self.state.sum_v, &mut self.state.output_v]);
     }
 
     /// Sets the state that the amplifier finally reaches under `load`.

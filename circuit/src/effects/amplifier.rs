@@ -7,7 +7,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
 use spts_input::Refusal;
-use spts_models::{Streams, in_range};
+use spts_models::{Snapshot, Streams, in_range};
 
 /// The output as [`Transient`] has it when it is sampled: what is left of the measurements before, slewing, rails,
 /// offset and noise come from the parts, with the feedback of the profile.
@@ -93,6 +93,9 @@ pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<d
     }))
 }
 
+/// Nothing on the bus.
+const NO_LOAD: BusLoad = BusLoad { conductance_s: 0.0, current_a: 0.0 };
+
 impl Effect for Summing {
     fn begin_block(&mut self, start: &BlockStart) {
         self.rng = self.streams.rng("amplifier", start.block);
@@ -120,5 +123,14 @@ impl Effect for Summing {
             // recordings hold the output with its sign turned
             *output_v = noise_v * normal - self.transient.output_v();
         }
+    }
+
+    fn exchange(&mut self, state: &mut Snapshot) {
+        self.transient.exchange(state);
+        state.rng(&mut self.rng);
+        let (mut loaded, mut load) = (self.load.is_some(), self.load.unwrap_or(NO_LOAD));
+        state.flag(&mut loaded);
+        state.f64s([&mut load.conductance_s, &mut load.current_a]);
+        self.load = loaded.then_some(load);
     }
 }

@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
 use spts_input::Refusal;
-use spts_models::{Streams, in_range, within};
+use spts_models::{Snapshot, Streams, in_range, within};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -145,6 +145,23 @@ impl Effect for LateUpdates {
             }
         }
     }
+
+    fn exchange(&mut self, state: &mut Snapshot) {
+        state.rng(&mut self.rng);
+        // a queue that was not begun is empty
+        let mut rows = vec![u64::MAX; self.cells.len()];
+        for Reverse((row, k)) in &self.queue {
+            rows[*k] = *row;
+        }
+        let mut begun = !self.queue.is_empty();
+        state.flag(&mut begun);
+        for (cell, row) in self.cells.iter_mut().zip(&mut rows) {
+            state.f64(&mut cell.collision);
+            state.u64(row);
+        }
+        let next = rows.into_iter().enumerate().map(|(k, row)| Reverse((row, k)));
+        self.queue = if begun { next.collect() } else { BinaryHeap::new() };
+    }
 }
 
 /// The same process as that of any weights. A cell that puts out again what it held cannot be late, so that only those
@@ -196,6 +213,10 @@ impl Effect for LateRaster {
                 }
             }
         }
+    }
+
+    fn exchange(&mut self, state: &mut Snapshot) {
+        state.streams(&mut self.block);
     }
 }
 

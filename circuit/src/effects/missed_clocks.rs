@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Binomial, Distribution as _};
 use serde::Deserialize;
 use spts_input::Refusal;
-use spts_models::{Streams, within};
+use spts_models::{Snapshot, Streams, within};
 
 /// Every cell misses an edge now and then and is from then on one measurement behind, until it is seeded again: after n
 /// edges by n·`probability` on average. The fault `skipping_clocks` is one cell that does so often; a cell with a fault
@@ -148,6 +148,11 @@ impl Effect for MissedClocks {
                 batch.change(cell.taxel(), false, |run| cell.fill(run.first_row, run.levels));
             }
         }
+    }
+
+    fn exchange(&mut self, state: &mut Snapshot) {
+        state.u64(&mut self.block);
+        state.u64(&mut self.first_row);
     }
 }
 

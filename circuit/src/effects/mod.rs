@@ -15,7 +15,7 @@ use crate::engine::Engine;
 use crate::source::Interpolated;
 use crate::weights::{Mode, Seeding, WeightMode, Weights};
 use spts_input::Refusal;
-use spts_models::{ConductanceMap, Streams, in_section};
+use spts_models::{ConductanceMap, Snapshot, Streams, in_section};
 
 /// Every effect by name, in signal order: the cells' digital timing, the summed analog signal, the converter, and the
 /// processing before publication. Faults of single cells act before all effects; see [`FAULTS`](crate::FAULTS).
@@ -106,7 +106,8 @@ pub(crate) fn rail_v(chain: &toml::Table, mode: Mode) -> Result<Option<f64>, Ref
 /// are valid for 4 taxels or more.
 ///
 /// Finite measurements from 0 to 1 MV give finite outputs. Equal sessions and blocks give equal bits. A block that does
-/// not follow directly on another does not depend on it. Batches of 1, 7 and 128 measurements give equal bits.
+/// not follow directly on another does not depend on it. Batches of 1, 7 and 128 measurements give equal bits. A fresh
+/// effect that loads the saved state of another goes on with its bits.
 ///
 /// # Panics
 /// If the effect lacks a property; the message holds the numbers.
@@ -126,6 +127,13 @@ pub fn check_effect(build: &dyn Fn(&EffectSession) -> Box<dyn Effect>) {
                     "block 5 depends on block 0 or on the batches of {batch}, {mode:?}, scale {scale_s} S"
                 );
             }
+            let (mut copy, mut saving) = ([build(&session)], Snapshot::saving());
+            effect[0].exchange(&mut saving);
+            let mut loading = Snapshot::loading(saving.finish().expect("nothing is compared while saving"));
+            copy[0].exchange(&mut loading);
+            loading.finish().expect("as much is loaded as was saved");
+            let [goes_on, same] = [&mut effect, &mut copy].map(|e| rows_of(e, &session, 6000, scale_s, 128));
+            assert!(goes_on == same, "a copy by the saved state differs, {mode:?}, scale {scale_s} S");
             for bits in first.iter().chain(&fifth) {
                 let volts = f64::from_bits(*bits);
                 assert!(volts.is_finite(), "{volts} V, {mode:?}, scale {scale_s} S");
@@ -142,14 +150,24 @@ fn block_of(
     scale_s: f64,
     batch: usize,
 ) -> Vec<u64> {
+    effect[0].begin_block(&BlockStart { block, first_row: 1000 * block, continuous: false });
+    rows_of(effect, session, 1000 * block, scale_s, batch)
+}
+
+/// The same of 1000 measurements from row `first_row` on, in the block that was begun.
+fn rows_of(
+    effect: &mut [Box<dyn Effect>; 1],
+    session: &EffectSession,
+    first_row: u64,
+    scale_s: f64,
+    batch: usize,
+) -> Vec<u64> {
     let map = |a: f64| {
         let values = vec![0.0, scale_s, 0.5 * scale_s, a * scale_s];
         ConductanceMap::from_values(2, 2, values)
     };
     let times_s = vec![0.1, 0.35, 0.8];
     let mut source = Interpolated::new(times_s, vec![map(2.0), map(0.0), map(1.0)]).expect("a valid series");
-    let first_row = 1000 * block;
-    effect[0].begin_block(&BlockStart { block, first_row, continuous: false });
     let mut volts = vec![0.0; 1000];
     Engine::new(session.weights.clone(), 1e3, 1e3)
         .with_batch(batch)

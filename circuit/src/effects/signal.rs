@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
 use spts_input::Refusal;
-use spts_models::Streams;
+use spts_models::{Snapshot, Streams};
 
 /// y += c + a·Σx: a constant, and a share of the sum of all taxels, because the two drive levels are not exactly
 /// opposite (the DAC's output does not reach 0 V) and mid-scale is not exactly neutral. In raster mode the share is the
@@ -85,6 +85,10 @@ impl Effect for Memory {
             *y += self.taps[0] * self.past_v[0] + self.taps[1] * self.past_v[1];
             self.past_v = [now_v, self.past_v[0]];
         }
+    }
+
+    fn exchange(&mut self, state: &mut Snapshot) {
+        state.f64s(&mut self.past_v);
     }
 }
 
@@ -177,5 +181,9 @@ impl Effect for Noise {
             let sd_v = if self.relative { self.sd * norm_v } else { self.sd };
             *y += sd_v * normal;
         }
+    }
+
+    fn exchange(&mut self, state: &mut Snapshot) {
+        state.rng(&mut self.rng);
     }
 }

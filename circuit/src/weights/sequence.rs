@@ -122,7 +122,8 @@ const MAX_CODES: usize = 1 << 30;
 
 /// Levels that the cells repeat: row r of the weights is row r mod `period` of the pattern.
 ///
-/// As text: `{"period": 2, "codes": [0, 255, 255, 0]}`, with the codes in row-major order.
+/// As text: `{"period": 2, "codes": [0, 255, 255, 0]}`, with the codes in row-major order, or one text in the format of
+/// [`parse_patterns`](crate::parse_patterns).
 ///
 /// ```
 /// use spts_circuit::{Patterns, WeightMode, Weights};
@@ -132,8 +133,8 @@ const MAX_CODES: usize = 1 << 30;
 /// assert_eq!([weights.level(0, 6), weights.level(1, 6), weights.level(0, 7)], [-1.0, 1.0, 1.0]);
 /// # Ok::<(), spts_input::Refusal>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(try_from = "PatternsConfig", into = "PatternsConfig")]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(into = "PatternsConfig")]
 pub struct Patterns {
     taxels: usize,
     codes: Vec<u8>,
@@ -142,7 +143,7 @@ pub struct Patterns {
 /// Text of [`Patterns`].
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct PatternsConfig {
+pub(super) struct PatternsConfig {
     period: usize,
     codes: Vec<u8>,
 }

@@ -1,7 +1,7 @@
 //! Weights, seeds and patterns as text.
 
 use super::lcg::Seeding;
-use super::sequence::{LevelSource, Patterns, WeightMode, Weights};
+use super::sequence::{LevelSource, Patterns, PatternsConfig, WeightMode, Weights};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use spts_input::Refusal;
 use std::fmt::Write as _;
@@ -225,6 +225,32 @@ fn signs(word: &str) -> Option<Vec<u8>> {
     word.chars().map(code).collect()
 }
 
+impl<'de> Deserialize<'de> for Patterns {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_any(TextOrCodes)
+    }
+}
+
+/// Reads patterns from a text, or from period and codes.
+struct TextOrCodes;
+
+impl<'de> de::Visitor<'de> for TextOrCodes {
+    type Value = Patterns;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("rows of signs as a text, or a table of `period` and `codes`")
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Patterns, E> {
+        parse_patterns(text).map_err(E::custom)
+    }
+
+    fn visit_map<A: de::MapAccess<'de>>(self, map: A) -> Result<Patterns, A::Error> {
+        let config = PatternsConfig::deserialize(de::value::MapAccessDeserializer::new(map))?;
+        Patterns::try_from(config).map_err(de::Error::custom)
+    }
+}
+
 impl Patterns {
     /// The pattern as text for [`parse_patterns`]: signs if all codes are 0 or 255, otherwise codes.
     pub fn to_text(&self) -> String {
@@ -255,7 +281,11 @@ mod tests {
         for codes in [vec![0, 255, 255, 255, 0, 0], vec![0, 1, 2, 128, 254, 255]] {
             for period in [1, 2, 3] {
                 let patterns = Patterns::new(period, codes.clone()).unwrap();
-                assert_eq!(parse_patterns(&patterns.to_text()), Ok(patterns));
+                let (text, json) = (patterns.to_text(), serde_json::to_string(&patterns).unwrap());
+                assert_eq!(parse_patterns(&text).as_ref(), Ok(&patterns));
+                assert_eq!(serde_json::from_str::<Patterns>(&json).unwrap(), patterns);
+                let json = serde_json::to_string(&text).unwrap();
+                assert_eq!(serde_json::from_str::<Patterns>(&json).unwrap(), patterns);
             }
         }
     }

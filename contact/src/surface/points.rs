@@ -119,6 +119,30 @@ impl SurfacePoints {
         self.taxel_areas_m2.len()
     }
 
+    /// The same points with `normals` of length 1, which are taken as they are: [`SurfacePoints::new`] would divide
+    /// them by their length once more.
+    ///
+    /// # Errors
+    /// [`Refusal`] for a normal of another length than 1, or more or fewer than points.
+    pub fn with_unit_normals(self, normals: Vec<[f64; 3]>) -> Result<Self, Refusal> {
+        in_range("normals", normals.len() as f64, normals.len() == self.len(), "as many as there are points")?;
+        for (i, n) in normals.iter().enumerate() {
+            let length = n.iter().map(|v| v * v).sum::<f64>().sqrt();
+            in_range(&format!("normals[{i}]"), length, (length - 1.0).abs() < 1e-9, "of length 1")?;
+        }
+        Ok(Self { normals, ..self })
+    }
+
+    /// Place of every point, m.
+    pub fn positions_m(&self) -> &[[f64; 3]] {
+        &self.positions_m
+    }
+
+    /// Taxel of every point.
+    pub fn taxel_of_points(&self) -> &[u32] {
+        &self.taxels
+    }
+
     /// Outward unit normal at every point.
     pub fn normals(&self) -> &[[f64; 3]] {
         &self.normals

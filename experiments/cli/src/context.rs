@@ -27,12 +27,15 @@ pub struct Common {
 }
 
 impl Common {
-    /// Sets up the thread pool.
+    /// Sets up the thread pool where a number of threads is asked for. Otherwise the first work that needs threads
+    /// starts them: a program that runs several commands in one process has only one pool.
     ///
     /// # Errors
     /// [`CliError`] when the threads cannot be started.
     pub fn start(&self) -> Result<(), CliError> {
-        let threads = self.threads.map_or(0, usize::from);
+        let Some(threads) = self.threads.map(usize::from) else {
+            return Ok(());
+        };
         rayon::ThreadPoolBuilder::new()
             .num_threads(threads)
             .build_global()

@@ -35,7 +35,7 @@ Objects:
 
 Files in DIR:
   design.json           the answer, as --json prints it
-  profile.toml          the readout of a wire: for --readout, and for `readout = ` in a scene
+  profile.toml          the readout of a wire, with its rows: for --readout, and for `readout = ` in a scene
   scene.toml            one press on the skin, or on the first wire's sub-array: spts simulate DIR/scene.toml
   rows.txt              the pattern of a sub-array, where rows are designed
   curves.csv            IoU and place error for every number of measurements that was tried

@@ -4,6 +4,7 @@ use crate::check::in_interval;
 use crate::gains::{Spread, TaxelGains};
 use crate::layout::{ConductanceMap, PressureMap, SkinLayout};
 use crate::memory::{Conditioning, Creep, CreepConfig, CreepDecays, Hysteresis, HysteresisConfig, Presses};
+use crate::snapshot::Snapshot;
 use crate::streams::Streams;
 use crate::transducer::{Transducer, elapsed_s, loaded_pa};
 use serde::Deserialize;
@@ -201,6 +202,15 @@ impl Transducer for Velostat {
         for k in 0..self.taxels.len() {
             self.respond(k, 0.0);
         }
+    }
+
+    fn exchange(&mut self, state: &mut Snapshot) {
+        for taxel in &mut self.taxels {
+            state.f64(&mut taxel.gain);
+            state.flag(&mut taxel.loaded);
+            taxel.presses.exchange(state);
+        }
+        state.f64s(self.plays.iter_mut().chain(&mut self.slow));
     }
 
     fn boxed(&self) -> Box<dyn Transducer> {

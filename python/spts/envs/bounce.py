@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import gymnasium as gym
 import numpy as np
 
@@ -42,7 +44,7 @@ class BounceEnv(gym.Env):
     Parameters
     ----------
     skin : spts.Skin, optional
-        Flat, centred on the paddle of 180 mm; default 10 x 10 taxels of 15 mm.
+        Flat, centred on the paddle of 180 mm; default 10 x 10 taxels of 15 mm. A copy of it is used.
     height : float
         Height that the ball falls from at first, m.
     frame_skip : int
@@ -68,28 +70,19 @@ class BounceEnv(gym.Env):
     ):
         import mujoco
 
-        from .. import mujoco as ours
-
         if not 0.01 <= height <= 2.0:
             raise ValueError(f"`height` = {height} is outside [0.01, 2] m")
         if not 1 <= frame_skip <= 10_000:
             raise ValueError(f"`frame_skip` = {frame_skip} is outside [1, 10000]")
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f'`render_mode` = {render_mode}; valid: None, "rgb_array"')
-        self.skin = Skin(10, 10, 0.015) if skin is None else skin
+        # of its own: the environments of a vector are given one
+        self.skin = Skin(10, 10, 0.015) if skin is None else copy.deepcopy(skin)
         self.render_mode = render_mode
         self._height, self._frame_skip = height, int(frame_skip)
-        self._mujoco = mujoco
         self.model = mujoco.MjModel.from_xml_string(_PADDLE)
         self.data = mujoco.MjData(self.model)
-        self._touch = ours.attach(
-            self.model,
-            self.data,
-            self.skin,
-            site="skin",
-            bodies={"ball": Body.sphere(_BALL_M, stiffness=_BALL_PA_PER_M)},
-            mode="foam",
-        )
+        self._attach()
         self._ball = self.model.body("ball").id
         self._tactile = Tactile(self.skin, observe, measurements, decoder, wire)
         most = np.full(6, 1e3)
@@ -98,9 +91,25 @@ class BounceEnv(gym.Env):
         )
         self.action_space = gym.spaces.Box(-1.0, 1.0, (3,), np.float64)
 
+    def _attach(self):
+        from .. import mujoco as ours
+
+        ball = Body.sphere(_BALL_M, stiffness=_BALL_PA_PER_M)
+        self._touch = ours.attach(self.model, self.data, self.skin, site="skin", bodies={"ball": ball}, mode="foam")
+
+    def __getstate__(self):
+        # a copy attaches the copied skin to its own data
+        return {name: value for name, value in vars(self).items() if name != "_touch"}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        self._attach()
+
     def reset(self, *, seed=None, options=None):
+        import mujoco
+
         super().reset(seed=seed)
-        self._mujoco.mj_resetData(self.model, self.data)
+        mujoco.mj_resetData(self.model, self.data)
         self._tactile.reset(fresh_seed(self.np_random))
         self._touch.reset()
         away = self.np_random.uniform(-0.02, 0.02, 2)

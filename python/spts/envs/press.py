@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import gymnasium as gym
 import numpy as np
 
@@ -25,7 +27,7 @@ class PressEnv(gym.Env):
     body : spts.Body, optional
         What is pressed; default a ball of 30 mm radius. Its z axis stays upright.
     skin : spts.Skin, optional
-        Flat; default 10 x 10 taxels of 15 mm.
+        Flat; default 10 x 10 taxels of 15 mm. A copy of it is used.
     force : (float, float)
         Range of the wanted force, N.
     speed : float
@@ -60,7 +62,8 @@ class PressEnv(gym.Env):
                 raise ValueError(f"`{name}` = {value} is outside (0, {most}]")
         if render_mode not in (None, "rgb_array"):
             raise ValueError(f'`render_mode` = {render_mode}; valid: None, "rgb_array"')
-        self.skin = Skin(10, 10, 0.015) if skin is None else skin
+        # of its own: the environments of a vector are given one
+        self.skin = Skin(10, 10, 0.015) if skin is None else copy.deepcopy(skin)
         self.body = Body.sphere(0.03) if body is None else body
         self.render_mode = render_mode
         self._tactile = Tactile(self.skin, observe, measurements, decoder, wire)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+
 import gymnasium as gym
+import numpy as np
 
 from .tactile import Tactile, fresh_seed
 
@@ -18,6 +21,7 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
     env : gymnasium.Env
         With `model` and `data` of MuJoCo, as all of gymnasium's and gymnasium-robotics's have.
     skin : spts.Skin
+        A copy of it is used: `touch.skin`.
     site, body, pos, quat, bodies, link_geoms, mode
         As of `spts.mujoco.attach`.
     key : str
@@ -38,10 +42,8 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         wire=None,
         **place,
     ):
-        from .. import mujoco as ours
-
         tactile = {"observe": observe, "measurements": measurements, "decoder": decoder, "wire": wire}
-        gym.utils.RecordConstructorArgs.__init__(self, _disable_deepcopy=True, skin=skin, key=key, **place, **tactile)
+        gym.utils.RecordConstructorArgs.__init__(self, skin=skin, key=key, **place, **tactile)
         gym.ObservationWrapper.__init__(self, env)
         inner = env.unwrapped
         if not (hasattr(inner, "model") and hasattr(inner, "data")):
@@ -50,10 +52,44 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         own = dict(spaces.spaces) if isinstance(spaces, gym.spaces.Dict) else {"observation": spaces}
         if key in own:
             raise ValueError(f'`key` = "{key}": the environment\'s observation has that already')
-        self._tactile, self._key, self._resets = Tactile(skin, **tactile), key, False
+        self._tactile, self._key, self._resets = Tactile(copy.deepcopy(skin), **tactile), key, False
         self.observation_space = gym.spaces.Dict({**own, key: self._tactile.space})
-        self.touch = ours.attach(inner.model, inner.data, skin, **place)
+        self._place = place
+        self._attach()
+
+    def _attach(self):
+        from .. import mujoco as ours
+
+        inner = self.env.unwrapped
+        self.touch = ours.attach(inner.model, inner.data, self._tactile.skin, **self._place)
         self.touch.hook(self._feel if self.touch.mode == "foam" else None)
+
+    def __getstate__(self):
+        import mujoco
+
+        # a copy attaches the copied skin to the data of the copied environment, which may be one that begins anew
+        inner, touch = self.env.unwrapped, vars(self.touch)
+        physics = np.empty(mujoco.mj_stateSize(inner.model, mujoco.mjtState.mjSTATE_INTEGRATION))
+        mujoco.mj_getState(inner.model, inner.data, physics, mujoco.mjtState.mjSTATE_INTEGRATION)
+        felt = {name: touch[name] for name in ("_last", "_felt_at", "_idle") if name in touch}
+        return {**vars(self), "touch": felt, "_moment": (physics, inner.np_random)}
+
+    def __setstate__(self, state):
+        import mujoco
+
+        state = dict(state)
+        felt, (physics, rng) = state.pop("touch"), state.pop("_moment")
+        self.__dict__.update(state)
+        inner, everything = self.env.unwrapped, mujoco.mjtState.mjSTATE_INTEGRATION
+        found = np.empty_like(physics)
+        mujoco.mj_getState(inner.model, inner.data, found, everything)
+        if not np.array_equal(found, physics):
+            mujoco.mj_setState(inner.model, inner.data, physics, everything)
+            mujoco.mj_forward(inner.model, inner.data)
+            mujoco.mj_setState(inner.model, inner.data, physics, everything)
+            inner.np_random = rng
+        self._attach()
+        vars(self.touch).update(felt)
 
     def reset(self, *, seed=None, options=None):
         # what the environment computes while it resets is no touch

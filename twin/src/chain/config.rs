@@ -21,6 +21,8 @@ pub struct ChainConfig {
     /// Readout profile: a name in [`PROFILES`](spts_circuit::PROFILES), or a file that ends in `.toml`. Default
     /// [`DEFAULT_READOUT`].
     pub readout: Option<String>,
+    /// The readout profile itself, in place of `readout`. Default: none.
+    pub profile: Option<Profile>,
     /// Seeds and levels of the cells. Default: those of the profile.
     pub rows: RowsConfig,
     /// Source of the weights, a name in [`WEIGHT_SOURCES`]. Default

@@ -10,8 +10,8 @@ use spts_circuit::{Constant, FaultConfig, Interpolated, Mode, PROFILES, Profile,
 use spts_contact::Frame;
 use spts_input::Refusal;
 use spts_models::{
-    ConductanceMap, PressureMap, REFERENCE_PA, SkinLayout, Streams, TRANSDUCERS, Transducer, build_transducer,
-    explain_toml, in_section,
+    ConductanceMap, PressureMap, REFERENCE_PA, SkinLayout, Snapshot, Streams, TRANSDUCERS, Transducer,
+    build_transducer, explain_toml, in_section,
 };
 use std::fmt;
 use std::path::Path;
@@ -59,23 +59,25 @@ impl Chain {
     /// file that cannot be used.
     pub fn new(config: &ChainConfig, skin: &SkinLayout, seed: u64, folder: &Path) -> Result<Self, Refusal> {
         let streams = Streams::new(seed);
-        let name = config.transducer.as_deref().unwrap_or(DEFAULT_TRANSDUCER);
-        let transducer = build_transducer(name, config.transducer_parameters.clone(), skin, streams);
-        let transducer = transducer.map_err(|error| refused_transducer(name, error))?;
+        let transducer = transducer(config, skin, streams)?;
         let readout = config.readout.as_deref().unwrap_or(DEFAULT_READOUT);
-        let profile_file = ProfileFile::of(readout, folder)?;
+        let profile_file = match config.profile {
+            Some(_) => None,
+            None => ProfileFile::of(readout, folder)?,
+        };
         let path = profile_file.as_ref().map(|file| file.path.as_path());
         let in_file = |error: Refusal| refused_profile(path, &error);
-        let profile = match &profile_file {
-            Some(file) => Profile::from_toml(&file.text),
-            None if PROFILES.iter().all(|(known, _)| *known != readout) => {
+        let profile = match (&config.profile, &profile_file) {
+            (Some(profile), _) => Ok(profile.clone()),
+            (None, Some(file)) => Profile::from_toml(&file.text),
+            (None, None) if PROFILES.iter().all(|(known, _)| *known != readout) => {
                 let known: Vec<&str> = PROFILES.iter().map(|(known, _)| *known).collect();
                 return Err(Refusal::new(format!(
                     "`readout` = \"{readout}\" is not a readout profile; known: {}",
                     known.join(", ")
                 )));
             }
-            None => Profile::named(readout),
+            (None, None) => Profile::named(readout),
         };
         let (profile, rows_file) = config.rows.applied(profile.map_err(in_file)?, skin, folder)?;
         profile.validate(taxels(skin)).map_err(in_file)?;
@@ -232,6 +234,13 @@ impl Chain {
     }
 }
 
+/// The transducer of `config` on the skin `skin`.
+fn transducer(config: &ChainConfig, skin: &SkinLayout, streams: Streams) -> Result<Box<dyn Transducer>, Refusal> {
+    let name = config.transducer.as_deref().unwrap_or(DEFAULT_TRANSDUCER);
+    let built = build_transducer(name, config.transducer_parameters.clone(), skin, streams);
+    built.map_err(|error| refused_transducer(name, error))
+}
+
 fn taxels(skin: &SkinLayout) -> u32 {
     u32::try_from(skin.taxels()).unwrap_or(u32::MAX)
 }
@@ -382,12 +391,37 @@ impl Clone for SkinSession {
 }
 
 impl SkinSession {
+    /// A skin with the transducer of `config`, ready for session number `session`. Equal `streams` give the same
+    /// specimen.
+    ///
+    /// # Errors
+    /// [`Refusal`] for an unknown transducer, or parameters that it refuses.
+    pub fn new(config: &ChainConfig, skin: &SkinLayout, streams: Streams, session: u64) -> Result<Self, Refusal> {
+        Ok(Self::begun(transducer(config, skin, streams)?, skin, session))
+    }
+
+    fn begun(mut transducer: Box<dyn Transducer>, skin: &SkinLayout, session: u64) -> Self {
+        transducer.start_session(session);
+        Self { transducer, rows: skin.rows(), cols: skin.cols(), pressed: false }
+    }
+
+    /// Rows and columns of taxels.
+    pub(crate) fn shape(&self) -> [usize; 2] {
+        [self.rows, self.cols]
+    }
+
     /// Conductance of every taxel, S, `hold_s` seconds after the start of a press with the constant pressure
     /// `electrode_pressure`.
     pub fn hold(&mut self, electrode_pressure: &PressureMap, hold_s: f64) -> ConductanceMap {
         let mut map = ConductanceMap::zeros(self.rows, self.cols);
         self.transducer.step(electrode_pressure, hold_s, &mut map);
         map
+    }
+
+    /// Saves or loads what the skin remembers of this session.
+    pub(crate) fn exchange(&mut self, state: &mut Snapshot) {
+        state.flag(&mut self.pressed);
+        self.transducer.exchange(state);
     }
 
     /// Lets the skin rest as long as between two presses.
@@ -459,9 +493,7 @@ impl ReadoutSession {
 impl Chain {
     /// The skin, ready for session number `session`.
     pub fn skin_session(&self, session: u64) -> SkinSession {
-        let mut transducer = self.transducer.boxed();
-        transducer.start_session(session);
-        SkinSession { transducer, rows: self.skin().rows(), cols: self.skin().cols(), pressed: false }
+        SkinSession::begun(self.transducer.boxed(), self.skin(), session)
     }
 
     /// The readout, ready to record presses of `duration_s` seconds each as `acquisition` says.

@@ -96,6 +96,7 @@ impl SceneConfig {
             transducer: self.transducer.clone(),
             transducer_parameters: self.transducer_parameters.clone(),
             readout: self.readout.clone(),
+            profile: None,
             rows: self.rows.clone(),
             weights: self.weights.clone(),
             faults: self.faults.clone(),

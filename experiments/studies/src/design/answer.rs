@@ -44,6 +44,11 @@ impl DesignStudy {
         alternatives.push(alternative(ground, what, design.wires, "raster", most, &design.wire, None));
         let (_, profile) = design.wire.profile(design.row_source == RowSource::Generator)?;
         let pattern = chosen.bench.rows.text();
+        let profile = match &pattern {
+            // before the first table of the profile
+            Some(pattern) => format!("patterns = \"\"\"\n{pattern}\"\"\"\n{profile}"),
+            None => profile,
+        };
         let scene = scene(&design);
         let mut curves: Vec<_> = others.into_iter().map(|t| t.curve).collect();
         curves.push(chosen.curve);

@@ -360,7 +360,7 @@ pub struct DesignReport {
     pub alternatives: Vec<Alternative>,
     /// IoU as a function of M for every combination that was tried.
     pub curves: Vec<DesignCurve>,
-    /// Readout profile, TOML.
+    /// Readout profile with its rows, TOML.
     #[serde(skip)]
     pub profile: String,
     /// Pattern of a sub-array, one row a line; `None` for generators.
