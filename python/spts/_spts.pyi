@@ -205,16 +205,28 @@ class Mount:
     ) -> tuple[_Floats, list[int], list[tuple[int, float]]]: ...
     def hold(self, step: float, forces: _Floats) -> None: ...
     def release(self) -> None: ...
+    def catch_up(self) -> Touch | None: ...
+
+@final
+class Mounts:
+    def __new__(
+        cls,
+        mounts: Sequence[Mount],
+        own: Sequence[Sequence[bool]],
+        others: Sequence[Sequence[bool]],
+        geom_bodies: Sequence[int],
+        worn: Sequence[Sequence[tuple[int, float, float]]],
+    ) -> Mounts: ...
+    def foamed(self, contact: Any, skins: Sequence[int]) -> list[int]: ...
     def read(
         self,
         dt: float,
-        loads: Sequence[tuple[int, int, float]],
-        places: _Floats,
-        frames: _Floats,
+        contact: Any,
         forces: _Floats,
+        elliptic: bool,
         foamed: int,
-        lined: Sequence[tuple[int, float, float]] = ...,
-    ) -> Touch: ...
+        springs: Sequence[tuple[int, int]],
+    ) -> list[tuple[int, Touch]]: ...
 
 @final
 class Session:

@@ -26,7 +26,7 @@ import warnings
 import mujoco
 import numpy as np
 
-from ._spts import Body, Mount, Skin, Wire
+from ._spts import Body, Mount, Mounts, Skin, Wire
 
 # Stiffness of foam along its surface, relative to that across it, where MuJoCo's cone is elliptic; as in mount.rs.
 _SHEAR = 0.4
@@ -153,8 +153,6 @@ class Attachment:
         self._felt_at = None
         self._each = None
         self._group = None
-        # time since the last touch in mode "sense", when nothing touches any more
-        self._idle = 0.0
         # whether every look is at the present moment of the data
         self._follows = False
 
@@ -169,10 +167,10 @@ class Attachment:
             (self._group or self._alone()).read(elapsed)
         if self.data._address in _HOOKED and mujoco.get_mjcb_control() is not _control and self in _hooked(self.data):
             raise RuntimeError("another `mjcb_control` has been set after `hook()`: set it before, or use `step`")
-        if self._idle > 0.0:
-            # nothing has touched it for that long
-            self._last = self._mount.read(self._idle, [], _NO_FORCES, _NO_FORCES, _NO_FORCES, 0)
-            self._idle = 0.0
+        # what nothing touches is not read at every step
+        idle = self._mount.catch_up()
+        if idle is not None:
+            self._last = idle
         return self._last
 
     @property
@@ -191,7 +189,6 @@ class Attachment:
         self.skin.reset()
         self._mount.release()
         self._last = self._felt_at = None
-        self._idle = 0.0
 
     def hook(self, each=None):
         """Lets every `mujoco.mj_step` of the data feel the skin, whoever calls it: environments and viewers that step
@@ -283,13 +280,6 @@ class Attachment:
         self._group = _Group([self])
         return self._group
 
-    def _covers(self, places):
-        """Which places in the world, (n, 3), lie in the foam."""
-        pos, rotation = self._place
-        turn = self.data.xmat[self._link].reshape(3, 3)
-        places = (places - self.data.xpos[self._link] - turn @ pos) @ (turn @ rotation)
-        return [self.skin.covers(place) for place in places.tolist()]
-
     def _elapsed(self):
         """Time since the last touch, s. It runs only when the data's does: `mj_forward` repeats a moment."""
         time, before = self.data.time, self._felt_at
@@ -319,8 +309,6 @@ class _Group:
         if any(a.model is not model or a.data is not data for a in attachments):
             raise ValueError("`attachments` are of several models or data; one step moves one of them")
         self.model, self.data, self.attachments = model, data, attachments
-        self._own = np.stack([a._own for a in attachments])
-        self._others = np.stack([a._others for a in attachments])
         self.foams = [k for k, a in enumerate(attachments) if a.mode == "foam"]
         # foam on foam: two layers, one behind the other, which one of the two skins carries
         self._worn = {k: [] for k in range(len(attachments))}
@@ -332,7 +320,14 @@ class _Group:
                     self._worn[k].append((b._link, b.skin.thickness, b.skin.foam[0]))
                     if k > other:
                         self._passed[k].append(b._link)
-        # contacts that stand for foam from this number on; of each its skin, its body, and its frame
+        self._mounts = Mounts(
+            [a._mount for a in attachments],
+            [a._own.tolist() for a in attachments],
+            [a._others.tolist() for a in attachments],
+            model.geom_bodyid.tolist(),
+            [self._worn[k] for k in range(len(attachments))],
+        )
+        # contacts that stand for foam from this number on; of each its skin, its body, and its row of `Mount.supports`
         self._first, self._springs = 0, []
         self._contact = _blank()
 
@@ -351,20 +346,6 @@ class _Group:
             self._hold(model.opt.timestep)
         self.read(model.opt.timestep)
 
-    def _foamed(self, contact, acts):
-        """Which contacts of those that act are between the link of a skin and its bodies, where there is foam: (skins,
-        contacts) of bool."""
-        geoms = contact.geom
-        one, other = geoms[:, 0], geoms[:, 1]
-        found = self._own[:, one] & self._others[:, other] | self._others[:, one] & self._own[:, other]
-        # a flex has no geom
-        found &= acts & (one >= 0) & (other >= 0)
-        if found.any():
-            places = contact.pos
-            for k in np.flatnonzero(found.any(axis=1)):
-                found[k, found[k]] = self.attachments[k]._covers(places[found[k]])
-        return found
-
     def press(self, always=False):
         """Puts foam in place of MuJoCo's contacts, as contacts of its own, between `mj_step1` and `mj_step2`.
 
@@ -372,13 +353,13 @@ class _Group:
         depend on it; else, and `always`, the step is tried.
         """
         model, data = self.model, self.data
-        dt, taken = model.opt.timestep, False
+        dt, taken = model.opt.timestep, []
         elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
         if data.ncon:
             contact = data.contact
-            found = self._foamed(contact, contact.exclude == 0)[self.foams].any(axis=0)
-            taken = bool(found.any())
-            contact.exclude[found] = 1
+            taken = self._mounts.foamed(contact, self.foams)
+            if taken:
+                contact.exclude[taken] = 1
         self._first, qvel, last = data.ncon, None, {}
         for trial in range(_TRIALS):
             self._springs, carried, rest = [], {}, {}
@@ -479,41 +460,11 @@ class _Group:
     def read(self, dt):
         """Lets the skins feel the contacts that the data has, `dt` s after the last time."""
         model, data = self.model, self.data
-        loads, forces, contact = {}, _NO_FORCES, None
-        if data.ncon:
-            contact = data.contact
-            found = self._foamed(contact, contact.efc_address >= 0)
-            for number, (k, body, _) in enumerate(self._springs, self._first):
-                # of the skins of one link, its own; and that of the body
-                link = self.attachments[k]._link
-                found[:, number] &= [a._link != link for a in self.attachments]
-                loads.setdefault(k, []).append((number, body, 1.0))
-                for other in np.flatnonzero(found[:, number]):
-                    loads.setdefault(other, []).append((number, link, -1.0))
-            acting = np.flatnonzero(found[:, : self._first if self._springs else None].any(axis=0))
-            if len(acting) or loads:
-                geoms, forces = contact.geom, np.zeros((data.ncon, 6))
-                for number in (*acting.tolist(), *range(self._first, self._first + len(self._springs))):
-                    mujoco.mj_contactForce(model, data, number, forces[number])
-                for k, number in zip(*np.nonzero(found[:, : self._first if self._springs else None])):
-                    # the contact's normal points from its first geom to its second, and the force is on the second
-                    one, other = geoms[number]
-                    first = self._others[k, one]
-                    load = int(number), int(model.geom_bodyid[one if first else other]), -1.0 if first else 1.0
-                    loads.setdefault(k, []).append(load)
-        foamed = self._first if self._springs else data.ncon
-        for k, attachment in enumerate(self.attachments):
-            attachment._idle += dt
-            felt = loads.get(k, ())
-            if felt or attachment._last is None or attachment._last.area > 0.0:
-                places, frames = (contact.pos, contact.frame) if felt else (_NO_FORCES, _NO_FORCES)
-                attachment._last = attachment._mount.read(
-                    attachment._idle, felt, places, frames, forces, foamed, self._worn[k]
-                )
-                attachment._idle = 0.0
-
-
-_NO_FORCES = np.empty((0, 6))
+        elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+        springs = [spring[:2] for spring in self._springs]
+        foamed = self._first if springs else data.ncon
+        for k, touch in self._mounts.read(dt, data.contact, data.efc_force, elliptic, foamed, springs):
+            self.attachments[k]._last = touch
 
 
 def _blank():

@@ -26,7 +26,7 @@ mod _spts {
     #[pymodule_export]
     use super::decode::{Decoder, ImageClassifier, decoder_table};
     #[pymodule_export]
-    use super::mount::Mount;
+    use super::mount::{Mount, Mounts};
     #[pymodule_export]
     use super::recorded::{Recording, Session, load};
     #[pymodule_export]

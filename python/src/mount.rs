@@ -4,10 +4,12 @@ use crate::args::Array2;
 use crate::body::Body;
 use crate::common::refuse;
 use crate::skin::{Load, Placed, Skin, Touch};
-use numpy::{IntoPyArray as _, PyArray2, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _};
+use numpy::{
+    IntoPyArray as _, PyArray2, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods as _,
+};
 use pyo3::prelude::*;
 use spts::contact::{Support, Wrench};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 type Vector = [f64; 3];
 type Rotation = [Vector; 3];
@@ -26,6 +28,7 @@ pub(crate) struct Mount {
     roots: Vec<usize>,
     arrays: Arrays,
     friction: Mutex<Friction>,
+    clock: Mutex<Clock>,
 }
 
 /// Arrays of `mjData`, which stay where they are as long as it lives.
@@ -92,7 +95,17 @@ impl Mount {
         let (bodies, shapes) = bodies.into_iter().unzip();
         let [x, y, z, turn @ ..] = frame;
         let place = ([x, y, z], std::array::from_fn(|i| std::array::from_fn(|j| turn[3 * i + j])));
-        Ok(Self { skin, link, place, bodies, shapes, roots, arrays, friction: Mutex::default() })
+        Ok(Self {
+            skin,
+            link,
+            place,
+            bodies,
+            shapes,
+            roots,
+            arrays,
+            friction: Mutex::default(),
+            clock: Mutex::default(),
+        })
     }
 
     /// The foam under all bodies but those of `passed`, for a step of `step` s, as springs for the engine, about the
@@ -111,18 +124,20 @@ impl Mount {
         passed: Vec<usize>,
         lined: Vec<Lining>,
     ) -> PyResult<(Array2<'py>, Vec<usize>, Vec<(usize, f64)>)> {
-        let (placed, frame, origin) = self.placed(py)?;
+        let poses = Poses::of(py, &self.arrays)?;
+        let (frame, origin) = self.frame(&poses);
         let (mut supports, mut carried) = (Vec::new(), Vec::new());
-        for ((body, shape), placed) in self.bodies.iter().zip(&self.shapes).zip(&placed) {
+        for (body, shape) in self.bodies.iter().zip(&self.shapes) {
             if passed.contains(body) {
                 continue;
             }
+            let placed = self.placed(&poses, *body);
             if !placed.is_finite() {
                 bail!("body {body} has a pose or velocity that is not finite");
             }
-            let lining = lined.iter().find(|(lined, ..)| lined == body).map_or((0.0, f64::INFINITY), |l| (l.1, l.2));
+            let lining = lining(&lined, *body);
             let mut found = Vec::new();
-            if let Some(force_n) = self.skin.get().supports(py, shape.get(), placed, lining, step, &mut found) {
+            if let Some(force_n) = self.skin.get().supports(py, shape.get(), &placed, lining, step, &mut found) {
                 carried.push((*body, force_n));
                 supports.extend(found.into_iter().map(|support| Sheared { body: *body, support, shear_n: [0.0; 3] }));
             }
@@ -185,36 +200,75 @@ impl Mount {
         Ok(())
     }
 
-    /// Forgets what friction holds.
+    /// Begins anew, with nothing touched and nothing held.
     fn release(&self) {
+        *self.clock() = Clock::default();
         *self.friction.lock().unwrap_or_else(PoisonError::into_inner) = Friction::default();
     }
 
-    /// What the skin feels, `dt` s after the last time, of contacts of the engine. Each of `loads` is the number of a
-    /// contact, the body that it presses on the skin, and the sign with which the contact's force is on that body.
-    /// `places`, `frames` and `forces` are of all contacts: (n, 3), m, (n, 9) by rows, and (n, 6), N and N m, along those.
-    /// The pressures of contacts of number `foamed` and above are those of the foam as vectors, as `supports` has them.
-    #[pyo3(signature = (dt, loads, places, frames, forces, foamed, lined = Vec::new()))]
-    #[expect(clippy::too_many_arguments, reason = "one a thing that a contact has")]
+    /// What the skin feels now if nothing has touched it since the last time; `None` if that is known already.
+    fn catch_up(&self, py: Python<'_>) -> PyResult<Option<Touch>> {
+        let idle_s = std::mem::take(&mut self.clock().idle_s);
+        (idle_s > 0.0).then(|| self.skin.get().carried(py, &self.shapes, idle_s, &[])).transpose()
+    }
+}
+
+/// When a skin was read last.
+#[derive(Default)]
+struct Clock {
+    /// Time since then, s.
+    idle_s: f64,
+    /// Whether it was touched then, and whether it has been read at all.
+    pressed: bool,
+    read: bool,
+}
+
+impl Mount {
+    fn clock(&self) -> MutexGuard<'_, Clock> {
+        self.clock.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// What the skin feels of `loads`, `dt` s after the last time; `None` as long as nothing touches it.
     fn read(
         &self,
         py: Python<'_>,
         dt: f64,
-        loads: Vec<(usize, usize, f64)>,
-        places: PyReadonlyArray2<'_, f64>,
-        frames: PyReadonlyArray2<'_, f64>,
-        forces: PyReadonlyArray2<'_, f64>,
-        foamed: usize,
-        lined: Vec<Lining>,
-    ) -> PyResult<Touch> {
-        let (placed, frame, origin) = self.placed(py)?;
-        let xpos = read(py, &self.arrays.xpos)?;
+        loads: &[(usize, usize, f64)],
+        solved: &Solved<'_>,
+        lined: &[Lining],
+    ) -> PyResult<Option<Touch>> {
+        let mut clock = self.clock();
+        clock.idle_s += dt;
+        if clock.read && !clock.pressed && loads.is_empty() {
+            return Ok(None);
+        }
+        let known = self.loads(py, loads, solved, lined)?;
+        let touch = self.skin.get().carried(py, &self.shapes, clock.idle_s, &known)?;
+        *clock = Clock { idle_s: 0.0, pressed: touch.area > 0.0, read: true };
+        Ok(Some(touch))
+    }
+
+    /// Contacts as loads in the skin's frame. Each of `loads` is the number of a contact, the body that it presses on the
+    /// skin, and the sign with which the contact's force is on that body.
+    fn loads(
+        &self,
+        py: Python<'_>,
+        loads: &[(usize, usize, f64)],
+        solved: &Solved<'_>,
+        lined: &[Lining],
+    ) -> PyResult<Vec<Load>> {
         let mut known: Vec<Load> = Vec::new();
-        for (number, body, sign) in loads {
+        if loads.is_empty() {
+            return Ok(known);
+        }
+        let poses = Poses::of(py, &self.arrays)?;
+        let (frame, origin) = self.frame(&poses);
+        for &(number, body, sign) in loads {
             let Some(at) = self.bodies.iter().position(|known| *known == body) else {
                 bail!("body {body} is none of those that may touch the skin");
             };
-            let (place, axes, force) = (row(&places, number), rotation(&frames, number), row::<6>(&forces, number));
+            let (contact, force) = (&solved.contact, solved.of(number));
+            let (place, axes): (Vector, _) = (row(&contact.pos, number), rotation(&contact.frame, number));
             let normal_n = force[0];
             if normal_n <= 0.0 {
                 continue;
@@ -222,11 +276,10 @@ impl Mount {
             // by the rows of the contact's frame
             let along = |v: &[f64]| scaled(into(&axes, [v[0], v[1], v[2]]), sign);
             let push = along(&force[..3]);
-            let twist = plus(along(&force[3..]), cross(minus(place, row(&xpos, body)), push));
+            let twist = plus(along(&force[3..]), cross(minus(place, row(&poses.xpos, body)), push));
             let centre_m = into(&frame, minus(place, origin));
             let wrench = Wrench { force_n: into(&frame, push), torque_nm: into(&frame, twist) };
-            let normal = (number >= foamed).then(|| into(&frame, scaled(axes[0], sign)));
-            let lining = lined.iter().find(|(lined, ..)| *lined == body).map_or((0.0, f64::INFINITY), |l| (l.1, l.2));
+            let normal = (number >= solved.foamed).then(|| into(&frame, scaled(axes[0], sign)));
             match known.iter_mut().find(|load| load.body == at && load.along == normal) {
                 Some(load) => {
                     let share = normal_n / (load.normal_n + normal_n);
@@ -235,10 +288,227 @@ impl Mount {
                     load.wrench.force_n = plus(load.wrench.force_n, wrench.force_n);
                     load.wrench.torque_nm = plus(load.wrench.torque_nm, wrench.torque_nm);
                 }
-                None => known.push(Load { body: at, normal_n, centre_m, wrench, along: normal, lining }),
+                None => {
+                    let (placed, lining) = (self.placed(&poses, body), lining(lined, body));
+                    known.push(Load { body: at, placed, normal_n, centre_m, wrench, along: normal, lining });
+                }
             }
         }
-        self.skin.get().carried(py, &self.shapes, &placed, dt, &known)
+        Ok(known)
+    }
+
+    /// Whether a place in the world lies in the foam.
+    fn covers(&self, py: Python<'_>, place: Vector) -> PyResult<bool> {
+        let (frame, origin) = self.frame(&Poses::of(py, &self.arrays)?);
+        Ok(self.skin.get().covers(into(&frame, minus(place, origin))))
+    }
+
+    /// How the skin's frame is turned, and where it is, in the world's.
+    fn frame(&self, poses: &Poses<'_>) -> (Rotation, Vector) {
+        let (carrier, (at, turn)) = (rotation(&poses.xmat, self.link), self.place);
+        let columns: [Vector; 3] = std::array::from_fn(|j| turned(&carrier, turn.map(|row| row[j])));
+        let origin = plus(row(&poses.xpos, self.link), turned(&carrier, at));
+        (std::array::from_fn(|i| columns.map(|column| column[i])), origin)
+    }
+
+    /// A body in the skin's frame.
+    fn placed(&self, poses: &Poses<'_>, body: usize) -> Placed {
+        let (frame, origin) = self.frame(poses);
+        // velocity of what moves with `body` at `at`: `cvel` is about the centre of mass of its tree, spin first
+        let velocity = |body: usize, at: Vector| {
+            let v: [f64; 6] = row(&poses.cvel, body);
+            let spin = [v[0], v[1], v[2]];
+            let arm = minus(at, row(&poses.subtree_com, self.roots[body]));
+            (plus([v[3], v[4], v[5]], cross(spin, arm)), spin)
+        };
+        let at = row(&poses.xpos, body);
+        let (linear, spin) = velocity(body, at);
+        let (carried, turning) = velocity(self.link, at);
+        let own = rotation(&poses.xmat, body);
+        Placed {
+            position_m: into(&frame, minus(at, origin)),
+            rotation: std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| frame[k][i] * own[k][j]).sum())),
+            velocity_m_per_s: into(&frame, minus(linear, carried)),
+            spin_rad_per_s: into(&frame, minus(spin, turning)),
+        }
+    }
+}
+
+/// The arrays of [`Arrays`], to read.
+struct Poses<'py> {
+    xpos: PyReadonlyArray2<'py, f64>,
+    xmat: PyReadonlyArray2<'py, f64>,
+    cvel: PyReadonlyArray2<'py, f64>,
+    subtree_com: PyReadonlyArray2<'py, f64>,
+}
+
+impl<'py> Poses<'py> {
+    fn of(py: Python<'py>, a: &Arrays) -> PyResult<Self> {
+        let read = |array: &Py<PyArray2<f64>>| array.bind(py).try_readonly().map_err(refuse);
+        Ok(Self {
+            xpos: read(&a.xpos)?,
+            xmat: read(&a.xmat)?,
+            cvel: read(&a.cvel)?,
+            subtree_com: read(&a.subtree_com)?,
+        })
+    }
+}
+
+fn lining(lined: &[Lining], body: usize) -> (f64, f64) {
+    lined.iter().find(|(lined, ..)| *lined == body).map_or((0.0, f64::INFINITY), |l| (l.1, l.2))
+}
+
+/// The contacts of an `mjData`, and the forces of its constraints: the arrays of those names.
+#[derive(FromPyObject)]
+struct Contacts<'py> {
+    geom: PyReadonlyArray2<'py, i32>,
+    pos: PyReadonlyArray2<'py, f64>,
+    frame: PyReadonlyArray2<'py, f64>,
+    friction: PyReadonlyArray2<'py, f64>,
+    dim: PyReadonlyArray1<'py, i32>,
+    efc_address: PyReadonlyArray1<'py, i32>,
+    exclude: PyReadonlyArray1<'py, i32>,
+}
+
+/// Skins that step together.
+#[pyclass(frozen, module = "spts._spts")]
+pub(crate) struct Mounts {
+    mounts: Vec<Py<Mount>>,
+    /// Of every geom, the skins whose links have it.
+    owners: Vec<Vec<usize>>,
+    /// Of every skin, whether it feels a geom.
+    others: Vec<Vec<bool>>,
+    geom_bodies: Vec<usize>,
+    /// What the bodies of every skin wear.
+    worn: Vec<Vec<Lining>>,
+}
+
+#[pymethods]
+impl Mounts {
+    /// `own` and `others` tell which geoms are of the link of a skin, and of the bodies that it may feel; `worn` what
+    /// those wear.
+    #[new]
+    fn new(
+        mounts: Vec<Py<Mount>>,
+        own: Vec<Vec<bool>>,
+        others: Vec<Vec<bool>>,
+        geom_bodies: Vec<usize>,
+        worn: Vec<Vec<Lining>>,
+    ) -> Self {
+        let owners = (0..geom_bodies.len()).map(|g| (0..mounts.len()).filter(|k| own[*k][g]).collect());
+        Self { owners: owners.collect(), mounts, others, geom_bodies, worn }
+    }
+
+    /// Numbers of the contacts that lie in the foam of one of `skins`, of those that are not excluded.
+    fn foamed(&self, py: Python<'_>, contact: Contacts<'_>, skins: Vec<usize>) -> PyResult<Vec<usize>> {
+        let exclude = contact.exclude.as_array();
+        let mut found = Vec::new();
+        for (number, _) in exclude.iter().enumerate().filter(|(_, exclude)| **exclude == 0) {
+            let mut any = false;
+            self.felt_by(py, &contact, number, |k, _, _| any |= skins.contains(&k))?;
+            if any {
+                found.push(number);
+            }
+        }
+        Ok(found)
+    }
+
+    /// What the skins feel of the contacts that act, `dt` s after the last time: number and touch of those that
+    /// something touches, or did so the last time. `forces` are those of all constraints. The contacts from `foamed` on
+    /// stand for foam: of each its skin, and its body.
+    #[expect(clippy::too_many_arguments, reason = "what a step has")]
+    fn read(
+        &self,
+        py: Python<'_>,
+        dt: f64,
+        contact: Contacts<'_>,
+        forces: PyReadonlyArray1<'_, f64>,
+        elliptic: bool,
+        foamed: usize,
+        springs: Vec<(usize, usize)>,
+    ) -> PyResult<Vec<(usize, Touch)>> {
+        let mut loads = vec![Vec::new(); self.mounts.len()];
+        let address = contact.efc_address.as_array();
+        let acting = |number: usize| address[number] >= 0;
+        for number in (0..foamed.min(address.len())).filter(|n| acting(*n)) {
+            self.felt_by(py, &contact, number, |k, body, sign| loads[k].push((number, body, sign)))?;
+        }
+        for (number, (k, body)) in (foamed..address.len()).zip(springs).filter(|(n, _)| acting(*n)) {
+            let link = self.mounts[k].get().link;
+            loads[k].push((number, body, 1.0));
+            // and that of the body, if it is not of the same link
+            self.felt_by(py, &contact, number, |other, _, sign| {
+                if self.mounts[other].get().link != link {
+                    loads[other].push((number, link, sign));
+                }
+            })?;
+        }
+        let solved = Solved { contact, forces, elliptic, foamed };
+        let mut felt = Vec::new();
+        for (k, mount) in self.mounts.iter().enumerate() {
+            if let Some(touch) = mount.get().read(py, dt, &loads[k], &solved, &self.worn[k])? {
+                felt.push((k, touch));
+            }
+        }
+        Ok(felt)
+    }
+}
+
+impl Mounts {
+    /// Calls `each` with every skin whose foam has the contact, the body that it feels, and the sign with which the
+    /// contact's force is on that body: the contact's normal points from its first geom to its second.
+    fn felt_by(
+        &self,
+        py: Python<'_>,
+        contact: &Contacts<'_>,
+        number: usize,
+        mut each: impl FnMut(usize, usize, f64),
+    ) -> PyResult<()> {
+        let geoms = contact.geom.as_array();
+        // a flex has no geom
+        let [Ok(one), Ok(other)] = [geoms[[number, 0]], geoms[[number, 1]]].map(usize::try_from) else { return Ok(()) };
+        for (own, pressed, sign) in [(one, other, 1.0), (other, one, -1.0)] {
+            for &k in &self.owners[own] {
+                if self.others[k][pressed] && self.mounts[k].get().covers(py, row(&contact.pos, number))? {
+                    each(k, self.geom_bodies[pressed], sign);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Contacts, and what the engine made of them.
+struct Solved<'py> {
+    contact: Contacts<'py>,
+    /// Forces of all constraints.
+    forces: PyReadonlyArray1<'py, f64>,
+    elliptic: bool,
+    /// The first contact that stands for foam.
+    foamed: usize,
+}
+
+impl Solved<'_> {
+    /// Force, N, and torque, N m, along the rows of a contact's frame.
+    fn of(&self, number: usize) -> [f64; 6] {
+        let c = &self.contact;
+        let (Ok(at), Ok(dim)) =
+            (usize::try_from(c.efc_address.as_array()[number]), usize::try_from(c.dim.as_array()[number]))
+        else {
+            return [0.0; 6];
+        };
+        let (forces, friction) = (self.forces.as_array(), c.friction.as_array());
+        let mut out = [0.0; 6];
+        if self.elliptic || dim == 1 {
+            out.iter_mut().take(dim).enumerate().for_each(|(k, f)| *f = forces[at + k]);
+            return out;
+        }
+        for k in 1..dim.min(6) {
+            let [one, other] = [forces[at + 2 * k - 2], forces[at + 2 * k - 1]];
+            out[0] += one + other;
+            out[k] = (one - other) * friction[[number, k - 1]];
+        }
+        out
     }
 }
 
@@ -305,45 +575,6 @@ fn tangents(normal: Vector) -> Rotation {
     let x = minus(axis, scaled(normal, dot(axis, normal)));
     let x = scaled(x, 1.0 / dot(x, x).sqrt());
     [normal, x, cross(normal, x)]
-}
-
-impl Mount {
-    /// The bodies in the skin's frame, and how that frame is turned and where it is in the world's.
-    fn placed(&self, py: Python<'_>) -> PyResult<(Vec<Placed>, Rotation, Vector)> {
-        let a = &self.arrays;
-        let (xpos, xmat, cvel) = (read(py, &a.xpos)?, read(py, &a.xmat)?, read(py, &a.cvel)?);
-        let centres = read(py, &a.subtree_com)?;
-        let (carrier, (at, turn)) = (rotation(&xmat, self.link), self.place);
-        let origin = plus(row(&xpos, self.link), turned(&carrier, at));
-        let columns: [Vector; 3] = std::array::from_fn(|j| turned(&carrier, turn.map(|row| row[j])));
-        let frame: Rotation = std::array::from_fn(|i| columns.map(|column| column[i]));
-        // velocity of what moves with `body` at `at`: `cvel` is about the centre of mass of its tree, spin first
-        let velocity = |body: usize, at: Vector| {
-            let v: [f64; 6] = row(&cvel, body);
-            let spin = [v[0], v[1], v[2]];
-            let arm = minus(at, row(&centres, self.roots[body]));
-            (plus([v[3], v[4], v[5]], cross(spin, arm)), spin)
-        };
-        let placed = self.bodies.iter().map(|&body| {
-            let at = row(&xpos, body);
-            let (linear, spin) = velocity(body, at);
-            let (carried, turning) = velocity(self.link, at);
-            let own = rotation(&xmat, body);
-            Placed {
-                position_m: into(&frame, minus(at, origin)),
-                rotation: std::array::from_fn(|i| {
-                    std::array::from_fn(|j| (0..3).map(|k| frame[k][i] * own[k][j]).sum())
-                }),
-                velocity_m_per_s: into(&frame, minus(linear, carried)),
-                spin_rad_per_s: into(&frame, minus(spin, turning)),
-            }
-        });
-        Ok((placed.collect(), frame, origin))
-    }
-}
-
-fn read<'py>(py: Python<'py>, array: &Py<PyArray2<f64>>) -> PyResult<PyReadonlyArray2<'py, f64>> {
-    array.bind(py).try_readonly().map_err(refuse)
 }
 
 fn row<const N: usize>(array: &PyReadonlyArray2<'_, f64>, index: usize) -> [f64; N] {

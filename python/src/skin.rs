@@ -6,12 +6,12 @@ use crate::common::{of_toml, refuse, to_toml};
 use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
-use spts::contact::{Carried, Foam, PosedMesh, Support, SurfacePoints, TouchBody, TouchSkin, Winding, Wrench};
+use spts::contact::{Carried, Foam, PosedMesh, Support, SurfacePoints, TouchSkin, Winding, Wrench};
 use spts::{PressureMap, SkinLayout};
 use std::f64::consts::TAU;
 use std::hash::{BuildHasher as _, RandomState};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// A tactile skin: taxels, and the foam on them.
 ///
@@ -209,7 +209,7 @@ impl Skin {
         {
             bail!("`twists` has {stray}, which has no pose");
         }
-        Ok(self.touched(py, &keys, &placed, dt)?.0)
+        self.touched(py, &keys, &placed, dt)
     }
 
     /// Rows and columns of taxels.
@@ -266,7 +266,7 @@ impl Skin {
     }
 
     /// Whether `place` (3,), m, in the skin's frame, lies in the foam or within half a thickness of it.
-    fn covers(&self, place: [f64; 3]) -> bool {
+    pub(crate) fn covers(&self, place: [f64; 3]) -> bool {
         self.locked().skin.covers(place)
     }
 
@@ -401,46 +401,42 @@ fn new_id() -> u64 {
 }
 
 impl Skin {
-    /// Puts `bodies` on the skin; what it feels, and the wrenches on them.
-    pub(crate) fn touched(
-        &self,
-        py: Python<'_>,
-        bodies: &[Py<Body>],
-        placed: &[Placed],
-        dt: f64,
-    ) -> PyResult<(Touch, Vec<Wrench>)> {
-        self.felt(py, bodies, placed, dt, |skin, posed| {
-            let mut wrenches: Vec<Wrench> = Vec::with_capacity(posed.len());
-            skin.touch(posed, &mut wrenches);
-            wrenches
+    /// Puts `bodies` on the skin.
+    fn touched(&self, py: Python<'_>, bodies: &[Py<Body>], placed: &[Placed], dt: f64) -> PyResult<Touch> {
+        let pairs: Vec<_> = bodies.iter().map(Py::get).zip(placed).collect();
+        self.felt(py, bodies, dt, |skin| {
+            let posed: Vec<_> = pairs.iter().map(|(body, placed)| (&body.body, placed.of(body))).collect();
+            let mut wrenches = Vec::with_capacity(posed.len());
+            skin.touch(&posed, &mut wrenches);
+            wrenches.into_iter().enumerate().collect()
         })
     }
 
-    /// What the skin feels of `bodies` that something else carries.
-    pub(crate) fn carried(
-        &self,
-        py: Python<'_>,
-        bodies: &[Py<Body>],
-        placed: &[Placed],
-        dt: f64,
-        loads: &[Load],
-    ) -> PyResult<Touch> {
-        let felt = self.felt(py, bodies, placed, dt, |skin, posed| {
-            let mut wrenches = vec![Wrench::NONE; posed.len()];
-            let carried = loads.iter().map(|load| {
-                let (body, mut posed) = posed[load.body];
-                let sum = &mut wrenches[load.body];
-                let (forces, torques) = (sum.force_n.iter_mut(), sum.torque_nm.iter_mut());
-                forces.zip(load.wrench.force_n).chain(torques.zip(load.wrench.torque_nm)).for_each(|(s, v)| *s += v);
+    /// What the skin feels of loads by those of `bodies` that something else carries.
+    pub(crate) fn carried(&self, py: Python<'_>, bodies: &[Py<Body>], dt: f64, loads: &[Load]) -> PyResult<Touch> {
+        let pressing: Vec<_> = loads.iter().map(|load| bodies[load.body].get()).collect();
+        self.felt(py, bodies, dt, |skin| {
+            let carried = loads.iter().zip(pressing).map(|(load, body)| {
                 let (lining_m, lining_pa_per_m) = load.lining;
+                let mut posed = load.placed.of(body);
                 posed.stiffness_pa_per_m = in_series(posed.stiffness_pa_per_m, lining_pa_per_m);
-                Carried { body, posed, normal_n: load.normal_n, centre_m: load.centre_m, along: load.along, lining_m }
+                let (normal_n, centre_m, along) = (load.normal_n, load.centre_m, load.along);
+                Carried { body: &body.body, posed, normal_n, centre_m, along, lining_m }
             });
-            let carried: Vec<_> = carried.collect();
-            skin.read(&carried);
+            skin.read(&carried.collect::<Vec<_>>());
+            let mut wrenches: Vec<(usize, Wrench)> = Vec::with_capacity(loads.len());
+            for load in loads {
+                match wrenches.iter_mut().find(|(body, _)| *body == load.body) {
+                    Some((_, sum)) => {
+                        let (forces, torques) = (sum.force_n.iter_mut(), sum.torque_nm.iter_mut());
+                        let more = load.wrench.force_n.into_iter().chain(load.wrench.torque_nm);
+                        forces.chain(torques).zip(more).for_each(|(sum, v)| *sum += v);
+                    }
+                    None => wrenches.push((load.body, load.wrench)),
+                }
+            }
             wrenches
-        });
-        Ok(felt?.0)
+        })
     }
 
     /// Springs that stand for the foam under a body for a step of `step_s`, with what it wears: how thick, m, and how
@@ -461,23 +457,20 @@ impl Skin {
         })
     }
 
-    /// What the skin feels, and the wrenches, as `act` makes and returns them.
+    /// What the skin feels after `act`, which returns the wrenches on those of `bodies` that have one.
     fn felt(
         &self,
         py: Python<'_>,
         bodies: &[Py<Body>],
-        placed: &[Placed],
         dt: f64,
-        act: impl FnOnce(&mut TouchSkin, &[(&TouchBody, PosedMesh<'_>)]) -> Vec<Wrench> + Send,
-    ) -> PyResult<(Touch, Vec<Wrench>)> {
+        act: impl FnOnce(&mut TouchSkin) -> Vec<(usize, Wrench)> + Send,
+    ) -> PyResult<Touch> {
         if !(0.0..=1e9).contains(&dt) {
             bail!("`dt` = {dt} is outside [0, 1e9] s");
         }
-        let pairs: Vec<_> = bodies.iter().map(Py::get).zip(placed).collect();
         let (wrenches, values, felt, [area, time], (number, bottomed)) = py.detach(|| {
-            let posed: Vec<_> = pairs.iter().map(|(body, placed)| (&body.body, placed.of(body))).collect();
             let mut state = self.locked();
-            let wrenches = act(&mut state.skin, &posed);
+            let wrenches = act(&mut state.skin);
             state.touches += 1;
             state.time_s += dt;
             let values = state.skin.pressure().values().to_vec();
@@ -485,22 +478,17 @@ impl Skin {
             let scalars = [state.skin.touched_m2(), state.time_s];
             (wrenches, values, felt, scalars, (state.touches, state.skin.bottomed()))
         });
-        let found = PyDict::new(py);
-        for (key, wrench) in bodies.iter().zip(&wrenches) {
-            let pair = [wrench.force_n, wrench.torque_nm].map(|v| PyArray1::from_slice(py, &v));
-            found.set_item(key, PyTuple::new(py, pair)?)?;
-        }
-        let touch = Touch {
+        Ok(Touch {
             pressure: values.into_pyarray(py).reshape([felt.rows(), felt.cols()])?.unbind(),
-            wrenches: found.unbind(),
+            wrenches: OnceLock::new(),
+            loads: (bodies.iter().map(|body| body.clone_ref(py)).collect(), wrenches),
             area,
             time,
             number,
             bottomed,
             felt,
             skin: self.id,
-        };
-        Ok((touch, wrenches))
+        })
     }
 
     fn of(skin: TouchSkin) -> Self {
@@ -533,12 +521,13 @@ pub(crate) struct Touch {
     /// Mean pressure over every taxel, Pa, (rows, cols).
     #[pyo3(get)]
     pressure: Py<PyArray2<f64>>,
-    /// Wrench on every body about its origin, in the skin's frame: (force (3,) N, torque (3,) N m).
-    #[pyo3(get)]
-    wrenches: Py<PyDict>,
+    /// The wrenches, once somebody has asked for them.
+    wrenches: OnceLock<Py<PyDict>>,
+    /// All bodies, and the wrenches on those that have one.
+    loads: (Vec<Py<Body>>, Vec<(usize, Wrench)>),
     /// Area that is pressed, m².
     #[pyo3(get)]
-    area: f64,
+    pub(crate) area: f64,
     /// Time of the touch, s: the sum of every `dt` up to it.
     #[pyo3(get)]
     pub(crate) time: f64,
@@ -556,11 +545,26 @@ pub(crate) struct Touch {
 
 #[pymethods]
 impl Touch {
+    /// Wrench on every body about its origin, in the skin's frame: (force (3,) N, torque (3,) N m).
+    #[getter]
+    fn wrenches<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        if let Some(known) = self.wrenches.get() {
+            return Ok(known.bind(py).clone());
+        }
+        let (found, (bodies, wrenches)) = (PyDict::new(py), &self.loads);
+        for (k, key) in bodies.iter().enumerate() {
+            let wrench = wrenches.iter().find(|(body, _)| *body == k).map_or(Wrench::NONE, |(_, wrench)| *wrench);
+            let pair = [wrench.force_n, wrench.torque_nm].map(|v| PyArray1::from_slice(py, &v));
+            found.set_item(key, PyTuple::new(py, pair)?)?;
+        }
+        Ok(self.wrenches.get_or_init(|| found.unbind()).bind(py).clone())
+    }
+
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let (py, touch) = (slf.py(), slf.get());
         let felt = PyArray1::from_slice(py, touch.felt.values());
         let scalars = (touch.area, touch.time, touch.number, touch.bottomed, touch.skin);
-        let arguments = (touch.pressure.bind(py), touch.wrenches.bind(py), felt, scalars).into_pyobject(py)?;
+        let arguments = (touch.pressure.bind(py), touch.wrenches(py)?, felt, scalars).into_pyobject(py)?;
         Ok((slf.get_type().getattr("_restored")?, arguments))
     }
 
@@ -578,11 +582,13 @@ impl Touch {
             bail!("a touch of {rows} x {cols} taxels with {} pressures", felt.len());
         }
         let felt = PressureMap::from_values(rows, cols, felt);
-        Ok(Self { pressure: pressure.unbind(), wrenches: wrenches.unbind(), area, time, number, bottomed, felt, skin })
+        let (pressure, wrenches, loads) = (pressure.unbind(), wrenches.unbind().into(), Default::default());
+        Ok(Self { pressure, wrenches, loads, area, time, number, bottomed, felt, skin })
     }
 }
 
 /// Where a body is and how it moves, in the skin's frame.
+#[derive(Clone, Copy)]
 pub(crate) struct Placed {
     pub(crate) position_m: [f64; 3],
     pub(crate) rotation: [[f64; 3]; 3],
@@ -610,8 +616,9 @@ impl Placed {
 
 /// A load on a skin, in its frame.
 pub(crate) struct Load {
-    /// Place of the body in the list.
+    /// Place of the body in the list, and where it is.
     pub(crate) body: usize,
+    pub(crate) placed: Placed,
     /// Normal force, N, and where it acts, m.
     pub(crate) normal_n: f64,
     pub(crate) centre_m: [f64; 3],
