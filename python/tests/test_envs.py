@@ -37,7 +37,7 @@ def test_a_press_can_be_solved():
             if done:
                 break
         assert done and reward > -0.6
-        assert seen["tactile"].sum() * 0.015**2 == pytest.approx(info["force"], rel=1e-6)
+        assert 1e3 * seen["tactile"].sum() * 0.015**2 == pytest.approx(info["force"], rel=1e-6)
 
 
 def test_a_ball_bounces():
@@ -55,7 +55,7 @@ def test_a_ball_bounces():
                 break
         totals.append(total)
         env.close()
-        assert most > 1e4
+        assert most > 10.0
     assert totals[1] > totals[0] >= 1
 
 
@@ -119,7 +119,7 @@ def test_any_environment_gets_a_skin(integrator, mode):
     env.reset(seed=0)
     for _ in range(150):
         seen, *_ = env.step(np.zeros(1))
-    assert seen["tactile"].sum() * 0.015**2 == pytest.approx(0.2 * 9.81, rel=1e-3)
+    assert 1e3 * seen["tactile"].sum() * 0.015**2 == pytest.approx(0.2 * 9.81, rel=1e-3)
     # a second episode, felt by a wire whose time begins anew
     env.reset(seed=1)
     env.step(np.zeros(1))

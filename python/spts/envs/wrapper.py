@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gymnasium as gym
 
+from ..decode import DEFAULT
 from .tactile import Tactile, fresh_seed
 
 
@@ -34,7 +35,7 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         key="tactile",
         observe="samples",
         measurements=None,
-        decoder="nn_lmmse",
+        decoder=DEFAULT,
         wire=None,
         **place,
     ):
