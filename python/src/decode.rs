@@ -2,6 +2,7 @@
 
 use crate::args::Array2;
 use crate::common::refuse;
+use crate::threads::on_threads;
 use numpy::{IntoPyArray as _, PyArray1, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use spts::SkinLayout;
@@ -76,14 +77,17 @@ impl Decoder {
             }
             None => {
                 let layout = SkinLayout::with_pitch(shape.0, shape.1, 0.015).map_err(refuse)?;
-                py.detach(|| match spec.needs {
-                    Needs::Shapes => TrainingData::for_shapes(&layout, Streams::new(0)),
-                    _ => TrainingData::for_layout(&layout, Streams::new(0)),
-                })
+                py.detach(|| {
+                    on_threads(|| match spec.needs {
+                        Needs::Shapes => TrainingData::for_shapes(&layout, Streams::new(0)),
+                        _ => TrainingData::for_layout(&layout, Streams::new(0)),
+                    })
+                })?
             }
         };
         let data = learned.map_err(refuse)?;
-        Ok(Self { trained: py.detach(|| (spec.train)(&data)).map_err(refuse)?, name: spec.name, shape })
+        let trained = py.detach(|| on_threads(|| (spec.train)(&data)))?;
+        Ok(Self { trained: trained.map_err(refuse)?, name: spec.name, shape })
     }
 
     /// Image of one window: `phi` (M, taxels), `y` (M,) V; (rows, cols).

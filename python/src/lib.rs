@@ -10,6 +10,7 @@ mod mount;
 mod recorded;
 mod scorer;
 mod skin;
+mod threads;
 mod wire;
 
 use pyo3::prelude::*;
@@ -37,6 +38,13 @@ mod _spts {
     use super::wire::Wire;
     #[pymodule_export]
     use super::{command_line, shipped_specs};
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+        super::threads::at_home();
+        Ok(())
+    }
 }
 
 /// Runs the command line `arguments`, the first of which is the program's name; its exit status. Ctrl-C ends the
