@@ -111,8 +111,13 @@ def learned(decoder, skin, images=None, labels=None):
     # what cannot be is refused there
     if decoder not in _TAUGHT or not 1 <= shape[0] * shape[1] <= _MOST_TAXELS:
         return _untaught(decoder, shape)
-    places, normals = _geometry(skin if isinstance(skin, Skin) else shape)
-    return _taught(decoder, shape, places.tobytes(), normals.tobytes())
+    return _taught(decoder, shape, *_key(skin if isinstance(skin, Skin) else shape))
+
+
+@functools.lru_cache(maxsize=32)
+def _key(skin):
+    """By what skins are the same to a decoder."""
+    return tuple(array.tobytes() for array in _geometry(skin))
 
 
 @functools.lru_cache(maxsize=32)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+
 import gymnasium as gym
+import numpy as np
 
 from ..decode import DEFAULT
 from .tactile import Tactile, fresh_seed
@@ -11,8 +14,9 @@ from .tactile import Tactile, fresh_seed
 class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
     """Adds a skin to an environment with a MuJoCo model: what it feels becomes a part of the observation.
 
-    The environment steps as it always does. In mode "sense" nothing of it changes; in mode "foam" the skin's forces act in
-    every step of it. Needs `mujoco`.
+    The environment steps as it always does. In mode "sense" nothing of it changes, its random numbers included; in mode
+    "foam" the skin's forces act in every step of it. An environment may have several skins: wrap it again, with another
+    `key`. The seed of `reset` is that of the skin's random numbers, too. Needs `mujoco`.
 
     Parameters
     ----------
@@ -51,9 +55,20 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         own = dict(spaces.spaces) if isinstance(spaces, gym.spaces.Dict) else {"observation": spaces}
         if key in own:
             raise ValueError(f'`key` = "{key}": the environment\'s observation has that already')
-        self._tactile, self._key, self._resets = Tactile(skin, **tactile), key, False
+        self._tactile, self._key, self._resets, self._rng = (
+            Tactile(skin, **tactile),
+            key,
+            False,
+            np.random.default_rng(),
+        )
         self.observation_space = gym.spaces.Dict({**own, key: self._tactile.space})
-        self.touch = ours.attach(inner.model, inner.data, skin, **place)
+        self._attach = functools.partial(ours.attach, skin=skin, **place)
+        self._begin()
+
+    def _begin(self):
+        """Puts the skin on the environment's model as it is now."""
+        inner = self.unwrapped
+        self.touch = self._attach(inner.model, inner.data)
         self.touch.hook(self._feel if self.touch.mode == "foam" else None)
 
     def reset(self, *, seed=None, options=None):
@@ -63,7 +78,15 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
             found, info = self.env.reset(seed=seed, options=options)
         finally:
             self._resets = False
-        self._tactile.reset(fresh_seed(self.unwrapped.np_random))
+        if seed is not None:
+            # other numbers for every skin of the environment
+            self._rng = np.random.default_rng([seed, *self._key.encode()])
+        self._tactile.reset(fresh_seed(self._rng))
+        inner = self.unwrapped
+        if inner.model is not self.touch.model or inner.data is not self.touch.data:
+            # the environment has made others
+            self.touch.detach()
+            self._begin()
         self.touch.reset()
         return self.observation(found), info
 
