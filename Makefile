@@ -53,8 +53,8 @@ PYTHON_SCENES ?= out/python-scenes
 python: wheel
 	./scripts/environment.sh "$(PYTHON)" python/requirements.txt
 	./scripts/environment.sh "$(PYTHON_SCENES)" python/scenes/requirements.txt
-	"$(PYTHON)/bin/ruff" check --quiet --config python/pyproject.toml python scripts/python_speed.py
-	"$(PYTHON)/bin/ruff" format --quiet --check --config python/pyproject.toml python/spts python/tests scripts/python_speed.py
+	"$(PYTHON)/bin/ruff" check --quiet --config python/pyproject.toml python scripts/python_*.py
+	"$(PYTHON)/bin/ruff" format --quiet --check --config python/pyproject.toml python/spts python/tests scripts/python_*.py
 	"$(PYTHON)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	"$(PYTHON_SCENES)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	"$(PYTHON)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests

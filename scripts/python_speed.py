@@ -104,7 +104,7 @@ def touches():
     wire = spts.Wire(flat)
     yield "wire.record of 20, with its rows", cost_us(lambda: wire.record(touch, 20))
     y, phi = wire.record(touch, 20)
-    yield "decode of 20, nn_lmmse", cost_us(lambda: spts.decode(phi, y, (10, 10)))
+    yield "decode of 20, mixture", cost_us(lambda: spts.decode(phi, y, flat))
 
 
 SCENE = """

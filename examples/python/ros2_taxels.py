@@ -40,7 +40,7 @@ class Taxels(Node):
         touch = self.skin.touch({self.cup: ((0.0, 0.0, height), (1.0, 0.0, 0.0, 0.0))}, dt=1.0 / RATE_HZ)
         y, phi = self.wire.record(touch, MEASUREMENTS)
         self.pressure.publish(self.image(touch.pressure))
-        self.decoded.publish(self.image(spts.decode(phi, y, shape=(10, 10), decoder="nn_lmmse")))
+        self.decoded.publish(self.image(spts.decode(phi, y, self.skin)))
 
     def image(self, taxels):
         message = Image(height=taxels.shape[0], width=taxels.shape[1], encoding="32FC1", is_bigendian=0)

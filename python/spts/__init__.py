@@ -9,7 +9,7 @@ Poses and velocities of bodies go in; what the taxels feel, and what the one wir
     wire = spts.Wire(skin, readout="as_built", seeds="mixed", seed=1)
     touch = skin.touch({ball: ((0, 0, 0.029), (1, 0, 0, 0))}, dt=0.1)
     y, phi = wire.record(touch, 20)
-    image = spts.decode(phi, y, shape=(10, 10))
+    image = spts.decode(phi, y, skin)
 
 Lengths are in metres, pressures in pascals, forces in newtons, times in seconds.
 """
@@ -17,7 +17,7 @@ Lengths are in metres, pressures in pascals, forces in newtons, times in seconds
 from . import dataset
 from ._spts import Body, Recording, Session, Skin, Touch, Wire
 from .dataset import Dataset
-from .decode import decode, windows
+from .decode import decode, prior, windows
 from .metrics import iou, support_accuracy
 from .scenes import simulate
 from .scores import Scores, score
@@ -37,6 +37,7 @@ __all__ = [
     "iou",
     "load",
     "load_all",
+    "prior",
     "score",
     "simulate",
     "support_accuracy",

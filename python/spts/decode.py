@@ -6,15 +6,132 @@ import functools
 
 import numpy as np
 
-from ._spts import Decoder
+from ._spts import Decoder, Skin, decoder_table
+
+#: The decoder that `decode`, `spts.envs` and `spts.decoders.ImageDecoder` take unless another is named: the best of those
+#: that need no recordings, or nearly, on every skin of `scripts/python_decoders.py`.
+DEFAULT = "mixture"
+
+# Decoders that learn from images without labels.
+_TAUGHT = {name for name, _, needs in decoder_table() if needs == "images"} | {"mixture"}
+# Most taxels of a decoder.
+_MOST_TAXELS = 2048
+# Half sizes of the touches of a prior: the least as a share of the pitch, the most as a share of the skin's extent.
+_LEAST, _MOST = 0.35, 0.25
+# Scatter of the gains of a skin's taxels, as standard deviation of the logarithm.
+_GAIN = 0.3
+# Values of the images that are computed at once.
+_SLICE = 200_000
+
+
+def prior(skin, count=3000, seed=0):
+    """Images of touches anywhere on a skin: what decoders learn from where nothing else is known of the objects.
+
+    Half are ellipses, half are rectangles, turned anyhow; their half sizes are log-uniform from a third of the pitch to a
+    quarter of the skin's extent. One half have even pressure, the other half are rounded. Taxels count by their places on
+    the skin and not by their numbers, so that skins from points have as good a prior as grids. The gains of the taxels
+    scatter as those of real skins.
+
+    Parameters
+    ----------
+    skin : spts.Skin or (int, int)
+        Or rows and columns of a flat grid.
+    count : int
+        Number of images, [1, 10^6].
+    seed : int
+        Of the random numbers.
+
+    Returns
+    -------
+    ndarray (count, taxels)
+        The largest taxel is near 1.
+    """
+    if not 1 <= count <= 1_000_000:
+        raise ValueError(f"`count` = {count} is outside [1, 10^6]")
+    return _touches(*_geometry(skin), count, seed)
+
+
+def _touches(places, normals, count=3000, seed=0):
+    rng, taxels = np.random.default_rng(seed), len(places)
+    pitch, extent = pitch_of(places), float(np.linalg.norm(np.ptp(places, axis=0)))
+    most = max(_MOST * extent, _LEAST * pitch)
+    images = []
+    for first in range(0, count, max(1, _SLICE // taxels)):
+        n = min(max(1, _SLICE // taxels), count - first)
+        at = rng.integers(taxels, size=n)
+        normal = normals[at]
+        # two directions of the surface, turned anyhow
+        across = np.eye(3)[np.abs(normal).argmin(axis=1)]
+        x = np.cross(normal, across)
+        x /= np.linalg.norm(x, axis=1, keepdims=True)
+        y = np.cross(normal, x)
+        cos, sin = (f(rng.uniform(0.0, 2 * np.pi, (n, 1))) for f in (np.cos, np.sin))
+        x, y = cos * x + sin * y, cos * y - sin * x
+        half = _LEAST * pitch * (most / (_LEAST * pitch)) ** rng.uniform(0.0, 1.0, (n, 2))
+        shift = pitch * rng.uniform(-0.5, 0.5, (n, 2))
+        away = places[None] - places[at][:, None]
+        # in half sizes; a taxel has a width, too
+        u = np.abs(np.einsum("ntk,nk->nt", away, x) - shift[:, :1]) / (half[:, :1] + 0.25 * pitch)
+        v = np.abs(np.einsum("ntk,nk->nt", away, y) - shift[:, 1:]) / (half[:, 1:] + 0.25 * pitch)
+        radius = np.where(rng.random((n, 1)) < 0.5, np.maximum(u, v), np.hypot(u, v))
+        image = np.clip(2.5 - 2.0 * radius, 0.0, 1.0) * (normal @ normals.T > 0.3)
+        image *= np.where(rng.random((n, 1)) < 0.5, np.clip(1.0 - 0.9 * radius**2, 0.0, 1.0), 1.0)
+        # a touch between the taxels of a sparse skin is felt by the nearest
+        image[np.arange(n), at] = np.maximum(image[np.arange(n), at], 0.1)
+        image /= image.max(axis=1, keepdims=True)
+        images.append(image * np.exp(_GAIN * rng.standard_normal((n, taxels))))
+    return np.concatenate(images)
+
+
+def _geometry(skin):
+    """Places and normals (taxels, 3) of the taxels of a skin, or of a grid with pitch 1."""
+    if isinstance(skin, Skin):
+        return skin.positions, skin.normals
+    rows, cols = skin
+    at = np.stack(np.meshgrid(np.arange(cols), -np.arange(rows), 0), axis=-1).reshape(-1, 3).astype(np.float64)
+    return at, np.tile((0.0, 0.0, 1.0), (len(at), 1))
+
+
+def pitch_of(places):
+    """Distance of a taxel from its nearest neighbour: the median over the taxels; 1 for one taxel."""
+    if len(places) < 2:
+        return 1.0
+    some = np.linspace(0, len(places) - 1, min(len(places), 256)).astype(int)
+    away = np.stack([np.linalg.norm(places - places[k], axis=1) for k in some])
+    away[np.arange(len(some)), some] = np.inf
+    return max(float(np.median(away.min(axis=1))), 1e-9)
+
+
+def learned(decoder, skin, images=None, labels=None):
+    """A decoder for a skin, or for rows and columns, that has learned from `images`; without them from `prior(skin)`, if
+    it learns from images at all."""
+    shape = skin.shape if isinstance(skin, Skin) else (int(skin[0]), int(skin[1]))
+    if images is not None:
+        return Decoder(decoder, shape, images, labels)
+    # what cannot be is refused there
+    if decoder not in _TAUGHT or not 1 <= shape[0] * shape[1] <= _MOST_TAXELS:
+        return _untaught(decoder, shape)
+    return _taught(decoder, shape, *_key(skin if isinstance(skin, Skin) else shape))
 
 
 @functools.lru_cache(maxsize=32)
-def _of_layout(decoder: str, shape: tuple[int, int]) -> Decoder:
+def _key(skin):
+    """By what skins are the same to a decoder."""
+    return tuple(array.tobytes() for array in _geometry(skin))
+
+
+@functools.lru_cache(maxsize=32)
+def _untaught(decoder, shape):
     return Decoder(decoder, shape)
 
 
-def decode(phi, y, shape, decoder="nn_lmmse", prior=None):
+@functools.lru_cache(maxsize=32)
+def _taught(decoder, shape, places, normals):
+    places, normals = (np.frombuffer(array).reshape(-1, 3) for array in (places, normals))
+    return Decoder(decoder, shape, _touches(places, normals))
+
+
+def decode(phi, y, shape, decoder=DEFAULT, prior=None):
     """Tactile image of one window of measurements.
 
     Parameters
@@ -23,25 +140,24 @@ def decode(phi, y, shape, decoder="nn_lmmse", prior=None):
         Rows of the sensing matrix, as `Wire.record` gives them.
     y : ndarray (M,)
         Measurements without the output of the untouched skin, V.
-    shape : (int, int)
-        Rows and columns of taxels.
+    shape : spts.Skin or (int, int)
+        The skin; rows and columns of taxels will do for a flat one.
     decoder : str
         One of `spts.decoders.names()`.
     prior : ndarray (n, taxels) or (n, rows, cols), optional
-        Raster images like those to come, in any unit. Default: random shapes on the layout. What is learned without a
-        prior is kept for the next call; with one, `spts.decoders` learns once.
+        Raster images like those to come, in any unit. Default: touches anywhere on the skin, `spts.prior(shape)`, for
+        decoders that learn from images. What is learned without a prior is kept for the next call; with one,
+        `spts.decoders` learns once.
 
     Returns
     -------
     ndarray (rows, cols)
-        Image, one value a taxel, in the unit of y.
+        Image, one value a taxel, in the unit of y: what the taxel alone would give with the weight 1.
     """
-    shape = (int(shape[0]), int(shape[1]))
-    if prior is None:
-        learned = _of_layout(decoder, shape)
-    else:
-        learned = Decoder(decoder, shape, as_images(prior, shape, "prior"))
-    return learned.decode(np.asarray(phi, np.float64), np.asarray(y, np.float64))
+    if prior is not None:
+        prior = as_images(prior, shape.shape if isinstance(shape, Skin) else (int(shape[0]), int(shape[1])), "prior")
+    found = learned(decoder, shape, prior)
+    return found.decode(np.asarray(phi, np.float64), np.asarray(y, np.float64))
 
 
 def windows(phi, y):

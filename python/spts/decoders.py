@@ -3,7 +3,7 @@
 A decoder takes windows of measurements, as `spts.windows` makes them, and answers images::
 
     X = spts.windows(phi, y)                    # (n, M * (1 + taxels))
-    est = spts.decoders.NnLmmse(shape=(10, 10)) # knows random shapes on the layout
+    est = spts.decoders.Mixture(shape=(10, 10)) # knows touches anywhere on the skin
     est = est.fit(X, images)                    # or images like those to come
     images = est.predict(X)                     # (n, taxels)
     est.score(X, truths)                        # mean intersection over union
@@ -18,8 +18,8 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from ._spts import Decoder, ImageClassifier, decoder_table
-from .decode import as_images, split
+from ._spts import ImageClassifier, decoder_table
+from .decode import DEFAULT, as_images, learned, split
 from .metrics import iou
 
 _TABLE = {name: (about, needs) for name, about, needs in decoder_table()}
@@ -41,7 +41,7 @@ class ImageDecoder(BaseEstimator):
         Rows and columns of taxels.
     """
 
-    def __init__(self, decoder="nn_lmmse", shape=(10, 10)):
+    def __init__(self, decoder=DEFAULT, shape=(10, 10)):
         self.decoder = decoder
         self.shape = shape
 
@@ -53,7 +53,7 @@ class ImageDecoder(BaseEstimator):
         X : ndarray (n, M * (1 + taxels)), optional
             Windows; decoders learn nothing from them.
         y : ndarray (n, taxels), optional
-            True images. Default: random shapes on the layout.
+            True images. Default: touches anywhere on a flat skin, `spts.prior(shape)`, for decoders that learn from images.
         labels : ndarray (n,) of int, optional
             Classes of the images, from 0, for decoders that learn classes.
         """
@@ -63,7 +63,7 @@ class ImageDecoder(BaseEstimator):
             self.n_features_in_ = np.shape(X)[1]
         images = None if y is None else as_images(y, shape, "y")
         labels = None if labels is None else np.asarray(labels, np.int64)
-        self._built = Decoder(self.decoder, shape, images, labels)
+        self._built = learned(self.decoder, shape, images, labels)
         return self
 
     def predict(self, X):

@@ -10,7 +10,7 @@ A live press, in a window::
         depth = 3e-3 * (k / 200)
         touch = skin.touch({ball: ((0.02, 0.0, 0.03 - depth), (1, 0, 0, 0))}, dt=0.01)
         y, phi = wire.record(touch, 20)
-        view.show(touch, y, spts.decode(phi, y, skin.shape))
+        view.show(touch, y, spts.decode(phi, y, skin))
 """
 
 from __future__ import annotations

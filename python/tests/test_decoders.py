@@ -68,7 +68,7 @@ def test_without_images_it_knows_the_layout(presses):
     X = spts.windows(phi, y)
     found = spts.decoders.NnLmmse().fit().predict(X)
     assert spts.iou(found, images).mean() > 0.4
-    assert np.array_equal(found[0].reshape(10, 10), spts.decode(phi[0], y[0], (10, 10)))
+    assert np.array_equal(found[0].reshape(10, 10), spts.decode(phi[0], y[0], (10, 10), "nn_lmmse"))
 
 
 def test_classes(presses):
@@ -95,3 +95,58 @@ def test_an_untouched_skin_can_be_decoded():
             y, phi = wire.record(nothing, 20)
             image = spts.decode(phi, y, (10, 10))
             assert np.isfinite(image).all() and image.max() < 0.5
+
+
+def ball_of_points(taxels, radius):
+    """A half ball with taxels in any order: one row, in which neighbours on the skin have any numbers."""
+    k = np.random.default_rng(0).permutation(taxels)
+    z, turn = 1.0 - (k + 0.5) / taxels, k * np.pi * (3.0 - 5.0**0.5)
+    side = np.sqrt(1.0 - z**2)
+    normals = np.stack([side * np.cos(turn), side * np.sin(turn), z], axis=1)
+    return spts.Skin.from_points(radius * normals, normals, np.full(taxels, 2 * np.pi * radius**2 / taxels))
+
+
+def test_taxels_count_by_their_places():
+    """On a skin from points the image is good where the skin is told, and poor where only the number of taxels is."""
+    skin, ball = ball_of_points(150, 0.03), spts.Body.sphere(0.2)
+    found = {"skin": [], "shape": []}
+    for seed in range(20):
+        skin.reset()
+        taxel = 7 * seed
+        place = skin.positions[taxel] + (0.2 - 0.0025) * skin.normals[taxel]
+        touch = skin.touch({ball: (place, (1.0, 0.0, 0.0, 0.0))}, dt=0.1)
+        y, phi = spts.Wire(skin, seed=seed).record(touch, 30)
+        for name, told in (("skin", skin), ("shape", skin.shape)):
+            found[name].append(spts.iou(spts.decode(phi, y, told)[None], touch.pressure[None])[0])
+    means = {name: np.mean(scores) for name, scores in found.items()}
+    assert means["skin"] > 0.6 and means["skin"] > means["shape"] + 0.2, means
+
+
+def test_the_default_is_the_best_or_nearly():
+    """What `scripts/python_decoders.py` prints at length."""
+    skin, found = spts.Skin(10, 10, 0.015), {name: [] for name in ("mixture", "nn_lmmse", "nn_lasso", "amortised")}
+    bodies = [spts.Body.sphere(0.005), spts.Body.box((0.06, 0.04, 0.02)), spts.Body.sphere(0.03)]
+    for seed in range(36):
+        rng, body = np.random.default_rng(seed), bodies[seed % 3]
+        skin.reset()
+        turn = rng.uniform(0.0, np.pi)
+        place = (*skin.positions[rng.integers(100)][:2], -body.mesh[0][:, 2].min() - 0.0015)
+        touch = skin.touch({body: (place, (np.cos(turn), 0.0, 0.0, np.sin(turn)))}, dt=0.1)
+        y, phi = spts.Wire(skin, seed=seed).record(touch, 20)
+        for name, scores in found.items():
+            scores.append(spts.iou(spts.decode(phi, y, skin, name)[None], touch.pressure[None])[0])
+    assert np.array_equal(spts.decode(phi, y, skin), spts.decode(phi, y, skin, "mixture"))
+    means = {name: np.mean(scores) for name, scores in found.items()}
+    assert max(means, key=means.get) == "mixture", means
+
+
+def test_a_prior():
+    images = spts.prior((4, 6), count=500, seed=1)
+    assert images.shape == (500, 24) and (images >= 0.0).all() and (images.max(axis=1) > 0.3).all()
+    assert np.array_equal(images, spts.prior((4, 6), count=500, seed=1))
+    # every taxel is touched now and then, and a touch is of some taxels
+    assert (images > 0.1).mean(axis=0).min() > 0.02 and 1.0 < (images > 0.1).sum(axis=1).mean() < 12.0
+    assert spts.prior((1, 1), 3).shape == (3, 1)
+    for count in (0, 10**7):
+        with pytest.raises(ValueError, match="count"):
+            spts.prior((4, 6), count)

@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 from .._spts import Body, Skin
+from ..decode import DEFAULT
 from .tactile import Tactile, fresh_seed
 
 # The tennis ball of the published experiments, and the stiffness of its surface, Pa/m.
@@ -64,7 +65,7 @@ class BounceEnv(gym.Env):
         frame_skip=100,
         observe="samples",
         measurements=None,
-        decoder="nn_lmmse",
+        decoder=DEFAULT,
         wire=None,
         render_mode=None,
     ):

@@ -8,6 +8,7 @@ import gymnasium as gym
 import numpy as np
 
 from .._spts import Body, Skin
+from ..decode import DEFAULT
 from .tactile import Tactile, fresh_seed
 
 
@@ -37,7 +38,7 @@ class PressEnv(gym.Env):
     observe, measurements, decoder, wire
         As of `spts.envs.Tactile`.
     render_mode : str, optional
-        "rgb_array": the pressure beside what is decoded.
+        "rgb_array": the pressure.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 100}
@@ -51,7 +52,7 @@ class PressEnv(gym.Env):
         dt=0.01,
         observe="samples",
         measurements=None,
-        decoder="nn_lmmse",
+        decoder=DEFAULT,
         wire=None,
         render_mode=None,
     ):

@@ -7,14 +7,16 @@ import copy
 import gymnasium as gym
 import numpy as np
 
+from ..decode import DEFAULT
 from .tactile import Tactile, fresh_seed
 
 
 class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
     """Adds a skin to an environment with a MuJoCo model: what it feels becomes a part of the observation.
 
-    The environment steps as it always does. In mode "sense" nothing of it changes; in mode "foam" the skin's forces act in
-    every step of it. Needs `mujoco`.
+    The environment steps as it always does. In mode "sense" nothing of it changes, its random numbers included; in mode
+    "foam" the skin's forces act in every step of it. An environment may have several skins: wrap it again, with another
+    `key`. The seed of `reset` is that of the skin's random numbers, too. Needs `mujoco`.
 
     Parameters
     ----------
@@ -38,7 +40,7 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         key="tactile",
         observe="samples",
         measurements=None,
-        decoder="nn_lmmse",
+        decoder=DEFAULT,
         wire=None,
         **place,
     ):
@@ -53,14 +55,16 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         if key in own:
             raise ValueError(f'`key` = "{key}": the environment\'s observation has that already')
         self._tactile, self._key, self._resets = Tactile(copy.deepcopy(skin), **tactile), key, False
+        self._rng = np.random.default_rng()
         self.observation_space = gym.spaces.Dict({**own, key: self._tactile.space})
         self._place = place
         self._attach()
 
     def _attach(self):
+        """Puts the skin on the environment's model as it is now."""
         from .. import mujoco as ours
 
-        inner = self.env.unwrapped
+        inner = self.unwrapped
         self.touch = ours.attach(inner.model, inner.data, self._tactile.skin, **self._place)
         self.touch.hook(self._feel if self.touch.mode == "foam" else None)
 
@@ -71,7 +75,7 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
         inner, touch = self.env.unwrapped, vars(self.touch)
         physics = np.empty(mujoco.mj_stateSize(inner.model, mujoco.mjtState.mjSTATE_INTEGRATION))
         mujoco.mj_getState(inner.model, inner.data, physics, mujoco.mjtState.mjSTATE_INTEGRATION)
-        felt = {name: touch[name] for name in ("_last", "_felt_at", "_idle") if name in touch}
+        felt = {name: touch[name] for name in ("_last", "_felt_at") if name in touch}
         return {**vars(self), "touch": felt, "_moment": (physics, inner.np_random)}
 
     def __setstate__(self, state):
@@ -98,7 +102,15 @@ class TactileWrapper(gym.ObservationWrapper, gym.utils.RecordConstructorArgs):
             found, info = self.env.reset(seed=seed, options=options)
         finally:
             self._resets = False
-        self._tactile.reset(fresh_seed(self.unwrapped.np_random))
+        if seed is not None:
+            # other numbers for every skin of the environment
+            self._rng = np.random.default_rng([seed, *self._key.encode()])
+        self._tactile.reset(fresh_seed(self._rng))
+        inner = self.unwrapped
+        if inner.model is not self.touch.model or inner.data is not self.touch.data:
+            # the environment has made others
+            self.touch.detach()
+            self._attach()
         self.touch.reset()
         return self.observation(found), info
 
