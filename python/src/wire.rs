@@ -145,7 +145,11 @@ impl Wire {
             faults: faults.transpose()?.unwrap_or_default(),
             ..ChainConfig::default()
         };
-        let chain = py.detach(|| Chain::new(&config, &layout, seed, Path::new(""))).map_err(refuse)?;
+        let chain = py.detach(|| Chain::new(&config, &layout, seed, Path::new("")));
+        let chain = chain.map_err(|error| {
+            // under the name that they have here
+            refuse(error.to_string().replace("`rows.patterns_file`", "`rows`").replace("`rows.patterns`", "`rows`"))
+        })?;
         let made = Made {
             seed: seed.cast_signed(),
             session: session.cast_signed(),

@@ -123,7 +123,7 @@ def test_what_no_row_is(skin):
         (r"`rows\[0, 0\]` = 0 is no level", {"rows": np.zeros((2, 100))}),
         (r"`rows\[0, 0\]` = NaN", {"rows": good * np.nan}),
         (r"`rows\[0, 0\]` = 2 ", {"rows": 2 * good}),
-        ("taxels of a row = 99; valid: 100", {"rows": good[:, :99]}),
+        ("`rows`: number of taxels of a row = 99; valid: 100", {"rows": good[:, :99]}),
         (r"shape \(0, 100\)", {"rows": good[:0]}),
         ("`rows`: an array", {"rows": 3}),
         ("`rows`: an array", {"rows": good[0]}),
