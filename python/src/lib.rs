@@ -37,7 +37,6 @@ mod _spts {
     use super::wire::Wire;
     #[pymodule_export]
     use super::{command_line, shipped_specs};
-    use pyo3::prelude::*;
 }
 
 /// Runs the command line `arguments`, the first of which is the program's name; its exit status. Ctrl-C ends the
