@@ -35,17 +35,37 @@ const BESIDE: f64 = 0.7;
 /// that is f(e₀) + f′(e₀) (e − e₀). Columns that push the same way are a linear force and stiffness over a plane, and
 /// three springs of equal stiffness have their sum, their first moments, and the second moments of the stiffness: at √2
 /// radii of gyration from its centre, 120° apart.
-pub(crate) fn of(law: &FoamLaw, columns: &[Column], posed: &PosedMesh<'_>, lag_s: f64, out: &mut Vec<Support>) -> f64 {
+///
+/// Of a body that does not touch but is within `near_m`, the first columns that it would touch have springs that push
+/// once it has come that far.
+pub(crate) fn of(
+    law: &FoamLaw,
+    columns: &[Column],
+    posed: &PosedMesh<'_>,
+    lag_s: f64,
+    near_m: f64,
+    out: &mut Vec<Support>,
+) -> f64 {
     let mut pressed: Vec<Pressed> = Vec::with_capacity(columns.len());
-    for c in columns {
+    let mut deepest_m = f64::NEG_INFINITY;
+    let after_m = |c: &Column| {
         let end_m = c.point_m - c.normal * c.depth_m;
         let arm = end_m - Vector::from(posed.centre_of_mass_m);
-        let sinks_m = -lag_s * Vector::from(velocity_at(posed, arm.into())).dot(c.normal);
-        let (p, slope) = law.pressure_and_slope(c.depth_m + sinks_m);
+        (end_m, c.depth_m - lag_s * Vector::from(velocity_at(posed, arm.into())).dot(c.normal))
+    };
+    for c in columns {
+        let (end_m, e) = after_m(c);
+        deepest_m = deepest_m.max(e);
+        let (p, slope) = law.pressure_and_slope(e);
         if p > 0.0 {
-            let (force_n, stiffness) = (c.area_m2 * p, c.area_m2 * slope);
-            pressed.push(Pressed { end_m, normal: c.normal, area_m2: c.area_m2, force_n, stiffness });
+            pressed.push(Pressed::new(c, end_m, p, slope));
         }
+    }
+    if pressed.is_empty() && deepest_m > -near_m {
+        // the first columns that would be touched, with the slope that they have then
+        let slope = law.pressure_and_slope(f64::MIN_POSITIVE).1;
+        let first = columns.iter().map(|c| (c, after_m(c))).filter(|(_, (_, e))| *e > deepest_m - 0.5 * near_m);
+        pressed.extend(first.map(|(c, (end_m, e))| Pressed::new(c, end_m, slope * e, slope)));
     }
     let mut total_n = 0.0;
     while let Some(hardest) = pressed.iter().max_by(|a, b| a.force_n.total_cmp(&b.force_n)) {
@@ -56,7 +76,7 @@ pub(crate) fn of(law: &FoamLaw, columns: &[Column], posed: &PosedMesh<'_>, lag_s
             (hardest.normal, BESIDE)
         };
         let (side, rest): (Vec<_>, Vec<_>) = pressed.into_iter().partition(|c| c.normal.dot(axis) >= limit);
-        total_n += springs(&side, direction(&side), posed, lag_s, out);
+        total_n += springs(&side, direction(&side), posed, lag_s, out).max(0.0);
         pressed = rest;
     }
     total_n
@@ -74,8 +94,16 @@ struct Pressed {
     stiffness: f64,
 }
 
+impl Pressed {
+    fn new(c: &Column, end_m: Vector, p: f64, slope: f64) -> Self {
+        let (area_m2, normal) = (c.area_m2, c.normal);
+        Self { end_m, normal, area_m2, force_n: area_m2 * p, stiffness: area_m2 * slope }
+    }
+}
+
+/// Mean direction of the columns' forces, or of what they would be.
 fn direction(columns: &[Pressed]) -> Vector {
-    columns.iter().fold(Vector::ZERO, |sum, c| sum + c.normal * c.force_n).normalize_or_zero()
+    columns.iter().fold(Vector::ZERO, |sum, c| sum + c.normal * c.force_n.abs()).normalize_or_zero()
 }
 
 /// Three springs for columns that push along `normal`; their force at the expected velocity, N.
@@ -181,7 +209,7 @@ mod tests {
             let lag_s = 2.5e-3;
             let body = posed(&mesh, velocity, spin);
             let mut springs = Vec::new();
-            let force_n = of(&law, &flat, &body, lag_s, &mut springs);
+            let force_n = of(&law, &flat, &body, lag_s, 0.0, &mut springs);
             assert_eq!(springs.len(), 3);
             let (wanted, found) = (exact(&law, &flat, &body, lag_s), of_springs(&springs, &body, lag_s));
             assert!((force_n / wanted[0].z - 1.0).abs() < 1e-12);
@@ -211,7 +239,7 @@ mod tests {
         let body = posed(&mesh, [0.0; 3], [0.0; 3]);
         let mut springs = Vec::new();
         let columns = cup(0.4);
-        of(&law, &columns, &body, 2.5e-3, &mut springs);
+        of(&law, &columns, &body, 2.5e-3, 0.0, &mut springs);
         let (wanted, found) = (exact(&law, &columns, &body, 2.5e-3), of_springs(&springs, &body, 2.5e-3));
         assert!((found[0] - wanted[0]).length() < 1e-9 * wanted[0].length(), "{found:?} {wanted:?}");
         assert!((found[1] - wanted[1]).length() < 2e-3 * wanted[0].length() * 0.03, "{found:?} {wanted:?}");
@@ -226,11 +254,14 @@ mod tests {
         let mut columns = cup(0.0);
         columns.extend(cup(std::f64::consts::PI));
         let mut springs = Vec::new();
-        let force_n = of(&law, &columns, &body, 2.5e-3, &mut springs);
+        let force_n = of(&law, &columns, &body, 2.5e-3, 0.0, &mut springs);
         assert_eq!(springs.len(), 6);
         assert!(of_springs(&springs, &body, 2.5e-3)[0].length() < 0.2 * force_n);
         springs.clear();
         let away: Vec<Column> = columns.iter().map(|c| Column { depth_m: -1e-3, ..*c }).collect();
-        assert!(of(&law, &away, &body, 2.5e-3, &mut springs) <= 0.0 && springs.is_empty());
+        assert!(of(&law, &away, &body, 2.5e-3, 0.0, &mut springs) <= 0.0 && springs.is_empty());
+        // what is near has springs that do not push yet
+        assert!(of(&law, &away, &body, 2.5e-3, 2e-3, &mut springs) <= 0.0);
+        assert!(!springs.is_empty() && springs.iter().all(|s| s.force_n < 0.0 && s.stiffness_n_per_m > 0.0));
     }
 }

@@ -96,6 +96,9 @@ enum Surface {
     Curved(Box<SurfaceField>),
 }
 
+/// Acceleration with which a body that is beside the foam may come into it within a step, m/s².
+const MOST_M_PER_S2: f64 = 200.0;
+
 /// A flat skin, and what makes the next touch fast.
 #[derive(Debug, Clone)]
 struct FlatSkin {
@@ -196,15 +199,18 @@ impl TouchSkin {
     }
 
     /// Whether a place, m, lies in the foam, or beside it within half a thickness along the normal.
-    pub fn covers(&self, place_m: [f64; 3]) -> bool {
+    ///
+    /// Where a body is pushed there, `along` tells in which direction (length 1): the foam must be able to push it so.
+    pub fn covers(&self, place_m: [f64; 3], along: Option<[f64; 3]>) -> bool {
         match &self.surface {
-            Surface::Curved(field) => field.covers(place_m),
+            Surface::Curved(field) => field.covers(place_m, along),
             Surface::Flat(_) => {
                 let [x, y, z] = place_m;
                 // what touches right on the rim is on the foam
                 let half = |n: usize| (0.5 * n as f64 + 0.05) * self.layout.pitch_m();
-                let along = (-1.5 * self.foam.thickness_m..=0.5 * self.foam.thickness_m).contains(&z);
-                x.abs() <= half(self.layout.cols()) && y.abs() <= half(self.layout.rows()) && along
+                let within = (-1.5 * self.foam.thickness_m..=0.5 * self.foam.thickness_m).contains(&z);
+                let up = along.is_none_or(|[_, _, z]| z > 0.2);
+                x.abs() <= half(self.layout.cols()) && y.abs() <= half(self.layout.rows()) && within && up
             }
         }
     }
@@ -342,7 +348,8 @@ impl TouchSkin {
             return None;
         }
         let law = self.foam.law(posed.stiffness_pa_per_m);
-        Some(support::of(&law, &self.columns, posed, lag_s, out))
+        let near_m = MOST_M_PER_S2 * step_s * step_s;
+        Some(support::of(&law, &self.columns, posed, lag_s, near_m, out))
     }
 }
 

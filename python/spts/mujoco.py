@@ -375,8 +375,9 @@ class _Group:
                 mujoco.mj_comVel(model, data)
             if self._springs or taken or trial:
                 self._put()
-            calm = all(force > 0.0 and abs(rest[key] - force) <= _OFF * force for key, force in carried.items())
-            if not always and (not carried or (trial == 0 and calm)):
+            # what does not touch has springs that may come to push, about the law's first slope
+            calm = all(abs(rest.get(key, 0.0) - force) <= _OFF * force for key, force in carried.items() if force > 0.0)
+            if not always and (not self._springs or (trial == 0 and calm)):
                 return
             if trial == 0:
                 mujoco.mj_fwdActuation(model, data)
@@ -389,10 +390,7 @@ class _Group:
 
             def settled(key, force):
                 now = found.get(key, 0.0)
-                # what was not touched may be at the end of the step
-                if force <= 0.0:
-                    return trial > 0
-                return min(abs(now - force), abs(now - last.get(key, np.inf))) <= _OFF * max(now, force)
+                return max(now, force) <= 0.0 or min(abs(now - force), abs(now - last.get(key, np.inf))) <= _OFF * max(now, force)
 
             if all(settled(key, force) for key, force in carried.items()):
                 return
@@ -536,7 +534,8 @@ def dress(
     counted = isinstance(wires, (int, np.integer)) and not isinstance(wires, bool)
     if not (wires is None or counted or wires in ("link", "limb")):
         raise ValueError(f'`wires` = {wires!r}; valid: "link", "limb", a number of wires, None')
-    if isinstance(links, str):
+    every = isinstance(links, str)
+    if every:
         if links != "all":
             raise ValueError(f'`links` = "{links}"; valid: "all" or a list of bodies')
         moving = (b for b in range(1, model.nbody) if model.body_weldid[b] != 0)
@@ -546,13 +545,24 @@ def dress(
         raise ValueError("`links` is empty: the model has no moving body with a geom that collides")
     if data.time == 0.0 and not data.xmat.any():
         mujoco.mj_kinematics(model, data)
-    shapes, skins, meshes = {}, [], {}
+    shapes, meshes, bare, dressed = {}, {}, [], []
     for link in links:
-        positions, normals, areas = _surface(model, data, link, pitch, meshes)
-        skins.append(Skin.from_points(positions + thickness * normals, normals, areas, thickness=thickness, **foam))
-        for body in _all(model, link):
+        surface, bodies = _surface(model, data, link, pitch, meshes), _all(model, link)
+        if surface is None or not bodies:
+            bare.append(model.body(link).name)
+            continue
+        positions, normals, areas = surface
+        skin = Skin.from_points(positions + thickness * normals, normals, areas, thickness=thickness, **foam)
+        dressed.append((link, skin, bodies))
+        for body in bodies:
             if body not in shapes:
                 shapes[body] = _body(model, body, meshes)
+    if bare:
+        text = f"links that lie inside others, or that nothing may touch, wear no skin: {', '.join(bare)}"
+        if not every or not dressed:
+            raise ValueError(f"`links`: {text}")
+        warnings.warn(text, stacklevel=2)
+    links, skins = [link for link, *_ in dressed], [skin for _, skin, _ in dressed]
     attachments = [
         Attachment(
             model,
@@ -561,11 +571,11 @@ def dress(
             link,
             (0, 0, 0),
             (1, 0, 0, 0),
-            bodies={body: shapes[body] for body in _all(model, link)},
+            bodies={body: shapes[body] for body in bodies},
             link_geoms=np.flatnonzero(model.geom_bodyid == link),
             mode=mode,
         )
-        for link, skin in zip(links, skins)
+        for link, skin, bodies in dressed
     ]
     made, wired = _wires(model, links, skins, wires, readout, seed)
     return Dress(attachments, made, [model.body(link).name for link in links], wired)
@@ -711,7 +721,7 @@ _SAMPLES, _MOST = 5, 100_000
 
 def _surface(model, data, link, pitch, meshes):
     """Taxels on the surface of a link, in its axes: positions (n, 3), m, outward normals (n, 3) and areas (n,), m².
-    `meshes` keeps the meshes of its geoms.
+    None where all of it lies inside other geoms. `meshes` keeps the meshes of its geoms.
 
     Samples a fifth of the pitch apart on every geom, without those inside other geoms, are gathered by the cells of a grid
     of the pitch and by the side that they look to.
@@ -737,7 +747,7 @@ def _surface(model, data, link, pitch, meshes):
         places.append(place[~inside]), normals.append(normal[~inside]), areas.append(area[~inside])
     place, normal, area = (np.concatenate(part) for part in (places, normals, areas))
     if len(place) == 0:
-        raise ValueError(f'`links`: the surface of "{name}" lies inside other geoms')
+        return None
     side = np.abs(normal).argmax(axis=1)
     side = 2 * side + (np.take_along_axis(normal, side[:, None], 1)[:, 0] > 0.0)
     key = np.concatenate([np.floor(place / pitch + 0.5).astype(np.int64), side[:, None]], axis=1)
@@ -931,6 +941,11 @@ def _all(model, link):
         {b for b in range(1, model.nbody) if weld[model.body_parentid[weld[b]]] == weld[link]} if weld[link] else set()
     )
     excluded = set(model.exclude_signature.tolist())
+    # MuJoCo lets two geoms touch if the type of one has a bit in common with the affinity of the other
+    own = _colliding(model, np.flatnonzero(_covered(model, link)))
+    types = int(np.bitwise_or.reduce(model.geom_contype[own])) if own else -1
+    affinities = int(np.bitwise_or.reduce(model.geom_conaffinity[own])) if own else -1
+    meets = (model.geom_contype & affinities != 0) | (model.geom_conaffinity & types != 0)
     bodies = []
     for body in range(model.nbody):
         # what stands still is one: a link of the world is touched by all that moves, and one that moves by the world
@@ -938,7 +953,7 @@ def _all(model, link):
             continue
         if (min(body, link) << 16) + max(body, link) in excluded:
             continue
-        if _colliding(model, np.flatnonzero(model.geom_bodyid == body)):
+        if meets[_colliding(model, np.flatnonzero(model.geom_bodyid == body))].any():
             bodies.append(body)
     return bodies
 

@@ -297,10 +297,10 @@ impl Mount {
         Ok(known)
     }
 
-    /// Whether a place in the world lies in the foam.
-    fn covers(&self, py: Python<'_>, place: Vector) -> PyResult<bool> {
+    /// Whether the foam has a place in the world where a body is pushed along a direction.
+    fn pushes(&self, py: Python<'_>, place: Vector, along: Vector) -> PyResult<bool> {
         let (frame, origin) = self.frame(&Poses::of(py, &self.arrays)?);
-        Ok(self.skin.get().covers(into(&frame, minus(place, origin))))
+        Ok(self.skin.get().pushes(into(&frame, minus(place, origin)), into(&frame, along)))
     }
 
     /// How the skin's frame is turned, and where it is, in the world's.
@@ -469,7 +469,9 @@ impl Mounts {
         let [Ok(one), Ok(other)] = [geoms[[number, 0]], geoms[[number, 1]]].map(usize::try_from) else { return Ok(()) };
         for (own, pressed, sign) in [(one, other, 1.0), (other, one, -1.0)] {
             for &k in &self.owners[own] {
-                if self.others[k][pressed] && self.mounts[k].get().covers(py, row(&contact.pos, number))? {
+                let [x, y, z, ..]: [f64; 9] = row(&contact.frame, number);
+                let along = scaled([x, y, z], sign);
+                if self.others[k][pressed] && self.mounts[k].get().pushes(py, row(&contact.pos, number), along)? {
                     each(k, self.geom_bodies[pressed], sign);
                 }
             }

@@ -266,8 +266,8 @@ impl Skin {
     }
 
     /// Whether `place` (3,), m, in the skin's frame, lies in the foam or within half a thickness of it.
-    pub(crate) fn covers(&self, place: [f64; 3]) -> bool {
-        self.locked().skin.covers(place)
+    fn covers(&self, place: [f64; 3]) -> bool {
+        self.locked().skin.covers(place, None)
     }
 
     /// Takes every body off and begins the time anew. A wire that has felt this skin stays behind: make a new one.
@@ -489,6 +489,11 @@ impl Skin {
             felt,
             skin: self.id,
         })
+    }
+
+    /// Whether the foam has a place where a body is pushed along a direction.
+    pub(crate) fn pushes(&self, place_m: [f64; 3], along: [f64; 3]) -> bool {
+        self.locked().skin.covers(place_m, Some(along))
     }
 
     fn of(skin: TouchSkin) -> Self {

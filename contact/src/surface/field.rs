@@ -83,15 +83,19 @@ impl SurfaceField {
         self.bottomed
     }
 
-    /// Whether a place, m, lies in a column of foam, or beside it within half a thickness along the normal.
-    pub(crate) fn covers(&self, place_m: [f64; 3]) -> bool {
-        let (place, h) = (Vector::from(place_m), self.config.thickness_m);
+    /// Whether a place, m, lies in a column of foam, or beside it within half a thickness along the normal; and, where a
+    /// body is pushed there, `along` (length 1), whether the foam could push it so.
+    pub(crate) fn covers(&self, place_m: [f64; 3], along: Option<[f64; 3]>) -> bool {
+        let (place, h, along) = (Vector::from(place_m), self.config.thickness_m, along.map(Vector::from));
         let points = self.points.positions_m.iter().zip(&self.points.normals).zip(&self.points.areas_m2);
         points.into_iter().any(|((point, normal), area_m2)| {
             let (away, normal) = (place - Vector::from(*point), Vector::from(*normal));
-            let along = away.dot(normal);
-            // within the side of a square of the point's area: what touches right on the rim is on the foam
-            (-1.5 * h..=0.5 * h).contains(&along) && (away - normal * along).length_squared() <= *area_m2
+            // within the side of a square of the point's area: what touches right on the rim is on the foam; between
+            // points of a round skin, the surface is off their planes
+            let (height, bend) = (away.dot(normal), along.map_or(0.0, |_| 0.5 * area_m2.sqrt()));
+            (-1.5 * h - bend..=0.5 * h + bend).contains(&height)
+                && (away - normal * height).length_squared() <= *area_m2
+                && along.is_none_or(|along| along.dot(normal) > 0.2)
         })
     }
 

@@ -182,36 +182,79 @@ fn slab(p: f64, d: f64, half_m: f64) -> [f64; 2] {
     [a.min(b), a.max(b)]
 }
 
-impl Part {
-    fn chord(&self, start_m: Vector, direction: Vector) -> Option<[f64; 2]> {
-        let [x, y, z] = self.rotation.map(Vector::from);
-        let away = start_m - Vector::from(self.position_m);
-        let turned = |v: Vector| x * v.x + y * v.y + z * v.z;
-        self.shape.chord(turned(away), turned(direction))
-    }
-}
-
 /// A solid where a body is.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(crate) struct Standing<'a> {
     solid: &'a Solid,
     axes: [Vector; 3],
     origin_m: Vector,
+    /// Its parts where they are; of each the columns of its rotation's inverse, its origin, and its reach.
+    parts: Vec<(Primitive, [Vector; 3], Vector, f64)>,
 }
 
 impl Standing<'_> {
-    /// As [`Solid::front_m`], in the axes of the pose.
+    /// How deep the solid reaches into a column of foam, from its free surface, m, or, as a negative depth, the gap to a
+    /// solid up to `gap_m` above the surface; `None` where there is nothing.
+    ///
+    /// The column starts at `base_m`, on the link, and goes `thickness_m` along `outward` (length 1) to the free
+    /// surface. A solid with the base inside has come through the whole column if more of it lies outward of the base
+    /// than inward, along the column's line: its depth is then the thickness, and how far it goes on behind the base,
+    /// at most another thickness. Otherwise it has come from behind, and does not touch the foam.
     #[inline]
     pub(crate) fn front_m(&self, base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64) -> Option<f64> {
-        let [x, y, z] = self.axes;
-        let into = |v: Vector| x * v.x + y * v.y + z * v.z;
-        self.solid.front_m(into(base_m - self.origin_m), into(outward), thickness_m, gap_m)
+        match &self.solid.form {
+            Form::Parts(_) => self.front_of_parts(base_m, outward, thickness_m, gap_m),
+            Form::Mesh(mesh) => {
+                let [x, y, z] = self.axes;
+                let into = |v: Vector| x * v.x + y * v.y + z * v.z;
+                let (base_m, outward) = (into(base_m - self.origin_m), into(outward));
+                let beside = base_m.cmplt(self.solid.low_m).any() || base_m.cmpgt(self.solid.high_m).any();
+                mesh.front_m(base_m, outward, thickness_m, gap_m, beside)
+            }
+        }
     }
 
-    /// How deep the solid reaches into a column, m; 0 where it does not touch it.
+    /// As [`Standing::front_m`] without a gap; 0 where the solid does not touch the column.
     #[inline]
     pub(crate) fn depth_m(&self, base_m: Vector, outward: Vector, thickness_m: f64) -> f64 {
         self.front_m(base_m, outward, thickness_m, 0.0).unwrap_or(0.0)
+    }
+
+    /// From the chords of the parts.
+    #[inline]
+    fn front_of_parts(&self, base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64) -> Option<f64> {
+        let reach_m = thickness_m + gap_m;
+        let (mut inside, mut first_m) = ([0.0_f64; 2], f64::INFINITY);
+        // chords that hang together with the base's, and the first beyond it
+        let mut pending = true;
+        while pending {
+            pending = false;
+            first_m = f64::INFINITY;
+            for (shape, [x, y, z], origin_m, radius_m) in &self.parts {
+                let turned = |v: Vector| *x * v.x + *y * v.y + *z * v.z;
+                let base_m = turned(base_m - *origin_m);
+                let far = match shape {
+                    Primitive::HalfSpace => base_m.z > reach_m,
+                    _ => base_m.length_squared() > (radius_m + reach_m) * (radius_m + reach_m),
+                };
+                if far {
+                    continue;
+                }
+                let Some([enter, leave]) = shape.chord(base_m, turned(outward)) else { continue };
+                if enter < inside[1].max(f64::MIN_POSITIVE) && leave > inside[0].min(-f64::MIN_POSITIVE) {
+                    let grown = [inside[0].min(enter), inside[1].max(leave)];
+                    pending |= self.parts.len() > 1 && grown != inside;
+                    inside = grown;
+                } else if enter >= inside[1] && enter < first_m {
+                    first_m = enter;
+                }
+            }
+        }
+        let [inward_m, outward_m] = [-inside[0], inside[1]];
+        if outward_m > 0.0 && inward_m < outward_m {
+            return Some(thickness_m + inward_m.min(thickness_m));
+        }
+        (first_m <= reach_m).then(|| thickness_m - first_m)
     }
 
     /// A point that is within the returned distance of all of the body, m; infinite for what has no end.
@@ -221,8 +264,7 @@ impl Standing<'_> {
             return (Vector::ZERO, f64::INFINITY);
         }
         let middle = (self.solid.high_m + self.solid.low_m) * 0.5;
-        let [x, y, z] = self.axes;
-        (Vector::new(x.dot(middle), y.dot(middle), z.dot(middle)) + self.origin_m, half.length())
+        (self.turned(middle) + self.origin_m, half.length())
     }
 
     /// Whether the box around the body and the box between two corners have nothing in common.
@@ -231,12 +273,16 @@ impl Standing<'_> {
         if half.max_element() == f64::INFINITY {
             return false;
         }
-        let middle = (self.solid.high_m + self.solid.low_m) * 0.5;
+        let middle = self.turned((self.solid.high_m + self.solid.low_m) * 0.5) + self.origin_m;
         (0..3).any(|k| {
-            let axis = self.axes[k];
-            let (at, reach) = (axis.dot(middle) + self.origin_m[k], axis.abs().dot(half));
-            at + reach < low_m[k] || at - reach > high_m[k]
+            let reach = self.axes[k].abs().dot(half);
+            middle[k] + reach < low_m[k] || middle[k] - reach > high_m[k]
         })
+    }
+
+    fn turned(&self, v: Vector) -> Vector {
+        let [x, y, z] = self.axes;
+        Vector::new(x.dot(v), y.dot(v), z.dot(v))
     }
 }
 
@@ -296,25 +342,15 @@ impl Solid {
 
     /// The solid where `body` is.
     pub(crate) fn standing(&self, body: &PosedMesh<'_>) -> Standing<'_> {
-        Standing { solid: self, axes: body.rotation.map(Vector::from), origin_m: Vector::from(body.position_m) }
-    }
-
-    /// How deep the solid reaches into a column of foam, from its free surface, m, or, as a negative depth, the gap to a
-    /// solid up to `gap_m` above the surface; `None` where there is nothing.
-    ///
-    /// The column starts at `base_m`, on the link, and goes `thickness_m` along `outward` (length 1) to the free
-    /// surface. A solid with the base inside has come through the whole column if more of it lies outward of the base
-    /// than inward, along the column's line: its depth is then the thickness, and how far it goes on behind the base,
-    /// at most another thickness. Otherwise it has come from behind, and does not touch the foam.
-    #[inline]
-    fn front_m(&self, base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64) -> Option<f64> {
-        match &self.form {
-            Form::Parts(parts) => front_of_parts(parts, base_m, outward, thickness_m, gap_m),
-            Form::Mesh(mesh) => {
-                let beside = base_m.cmplt(self.low_m).any() || base_m.cmpgt(self.high_m).any();
-                mesh.front_m(base_m, outward, thickness_m, gap_m, beside)
-            }
-        }
+        let (axes, origin_m) = (body.rotation.map(Vector::from), Vector::from(body.position_m));
+        let turned = |v: Vector| Vector::new(axes[0].dot(v), axes[1].dot(v), axes[2].dot(v));
+        let parts = self.parts().iter().map(|part| {
+            // world = R_b (R_p · part + p) + o; a row of R_b R_p is a column of its inverse
+            let columns = [0, 1, 2].map(|j| turned(Vector::from(part.rotation.map(|row| row[j]))));
+            let rows = [0, 1, 2].map(|i| Vector::new(columns[0][i], columns[1][i], columns[2][i]));
+            (part.shape, rows, turned(Vector::from(part.position_m)) + origin_m, part.shape.reach_m().length())
+        });
+        Standing { solid: self, axes, origin_m, parts: parts.collect() }
     }
 
     /// How far a ray of `reach_m` goes until it meets the mesh, and the normal there, which faces the ray.
@@ -327,36 +363,8 @@ impl Solid {
     }
 }
 
-/// [`Solid::front_m`] of a union of convex parts, from their chords.
-#[inline]
-fn front_of_parts(parts: &[Part], base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64) -> Option<f64> {
-    let reach_m = thickness_m + gap_m;
-    let (mut inside, mut first_m) = ([0.0_f64; 2], f64::INFINITY);
-    // chords that hang together with the base's, and the first beyond it
-    let mut pending = true;
-    while pending {
-        pending = false;
-        first_m = f64::INFINITY;
-        for part in parts {
-            let Some([enter, leave]) = part.chord(base_m, outward) else { continue };
-            if enter < inside[1].max(f64::MIN_POSITIVE) && leave > inside[0].min(-f64::MIN_POSITIVE) {
-                let grown = [inside[0].min(enter), inside[1].max(leave)];
-                pending |= parts.len() > 1 && grown != inside;
-                inside = grown;
-            } else if enter >= inside[1] && enter < first_m {
-                first_m = enter;
-            }
-        }
-    }
-    let [inward_m, outward_m] = [-inside[0], inside[1]];
-    if outward_m > 0.0 && inward_m < outward_m {
-        return Some(thickness_m + inward_m.min(thickness_m));
-    }
-    (first_m <= reach_m).then(|| thickness_m - first_m)
-}
-
 impl Mesh {
-    /// [`Solid::front_m`]; `beside` tells that the base is outside the box around the mesh.
+    /// [`Standing::front_m`]; `beside` tells that the base is outside the box around the mesh.
     fn front_m(&self, base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64, beside: bool) -> Option<f64> {
         let (mut from_m, reach_m) = (0.0, thickness_m + gap_m);
         while let Some(hit) = self.first(base_m + outward * from_m, outward, reach_m - from_m) {
