@@ -6,11 +6,13 @@ python scripts/python_speed.py [--json] [--leak]
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import os
 import threading
 import time
 
+import gymnasium
 import mujoco
 import numpy as np
 import spts
@@ -149,6 +151,26 @@ def steps():
         )
 
 
+def humanoids():
+    """A humanoid of gymnasium's that lies on the floor: taxels, and a step in µs: bare, in mode "sense", and in mode "foam"."""
+    path = os.path.join(os.path.dirname(gymnasium.__file__), "envs/mujoco/assets/humanoid.xml")
+    for pitch in (0.134, 0.0405, 0.01279):
+        model = mujoco.MjModel.from_xml_path(path)
+        model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        costs, datas = [], []
+        for mode in (None, "sense", "foam"):
+            data = mujoco.MjData(model)
+            robot = None if mode is None else spts.mujoco.dress(model, data, pitch=pitch, wires=None, mode=mode)
+            step = robot.step if robot else functools.partial(mujoco.mj_step, model, data)
+            for _ in range(1500):
+                step()
+            datas.append(step)
+        # by turns, so that a noisy moment is one of all
+        for _ in range(3):
+            costs.append([cost_us(step) for step in datas])
+        yield robot.taxels, np.median(costs, axis=0)
+
+
 def sums():
     """What the taxels add up to under two weights, N; MuJoCo's sensor measures depth, m."""
     for mass in (0.25, 0.5, 1.0):
@@ -215,13 +237,17 @@ def main():
     if chosen.leak:
         print(f"memory over a million touches: {leak():+.2f} MB")
         return
-    found, balance = {**dict(touches()), **dict(steps())}, list(sums())
+    found, balance, dressed = {**dict(touches()), **dict(steps())}, list(sums()), list(humanoids())
     if chosen.json:
         print(
             json.dumps(
                 {
                     "cost_us": found,
                     "two_threads": side_by_side,
+                    "humanoid_us": [
+                        {"taxels": taxels, **dict(zip(("bare", "sense", "foam"), map(float, costs)))}
+                        for taxels, costs in dressed
+                    ],
                     "weight_n": [{"weight": w, "ours": a, "mujoco": b} for w, a, b in balance],
                 },
                 indent=2,

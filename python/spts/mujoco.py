@@ -168,7 +168,7 @@ class Attachment:
         if self.data._address in _HOOKED and mujoco.get_mjcb_control() is not _control and self in _hooked(self.data):
             raise RuntimeError("another `mjcb_control` has been set after `hook()`: set it before, or use `step`")
         # what nothing touches is not read at every step
-        idle = self._mount.catch_up()
+        idle = self._mount.catch_up(self._last)
         if idle is not None:
             self._last = idle
         return self._last
@@ -350,7 +350,7 @@ class _Group:
         """Puts foam in place of MuJoCo's contacts, as contacts of its own, between `mj_step1` and `mj_step2`.
 
         The law of a contact is about the velocity at the end of the step. That is the present one where forces hardly
-        depend on it; else, and `always`, the step is tried.
+        depend on it; else the step is tried. With `always` the forces are solved for in either case.
         """
         model, data = self.model, self.data
         dt, taken = model.opt.timestep, []
@@ -359,7 +359,7 @@ class _Group:
             contact = data.contact
             taken = self._mounts.foamed(contact, self.foams)
             if taken:
-                contact.exclude[taken] = 1
+                contact.exclude[taken], contact.efc_address[taken] = 1, -1
         self._first, qvel, last = data.ncon, None, {}
         for trial in range(_TRIALS):
             self._springs, carried, rest = [], {}, {}
@@ -377,12 +377,14 @@ class _Group:
                 self._put()
             # what does not touch has springs that may come to push, about the law's first slope
             calm = all(abs(rest.get(key, 0.0) - force) <= _OFF * force for key, force in carried.items() if force > 0.0)
-            if not always and (not self._springs or (trial == 0 and calm)):
+            if not self._springs or (trial == 0 and calm and not always):
                 return
             if trial == 0:
                 mujoco.mj_fwdActuation(model, data)
                 mujoco.mj_fwdAcceleration(model, data)
             mujoco.mj_fwdConstraint(model, data)
+            if trial == 0 and calm:
+                return
             data.qacc_warmstart[:] = data.qacc
             found = {}
             for (k, body, _), force in zip(self._springs, self._forces()):

@@ -143,8 +143,8 @@ impl Mount {
             }
         }
         let mut friction = self.friction.lock().unwrap_or_else(PoisonError::into_inner);
-        share(&friction.held, &mut supports);
         let (damping, (_, coefficient)) = (self.skin.get().damping(), self.skin.get().foam());
+        share(&friction.held, coefficient, elliptic, &mut supports);
         let mut rows = Vec::with_capacity(22 * supports.len());
         for s in &supports {
             let (support, axes) = (&s.support, tangents(s.support.normal));
@@ -206,10 +206,15 @@ impl Mount {
         *self.friction.lock().unwrap_or_else(PoisonError::into_inner) = Friction::default();
     }
 
-    /// What the skin feels now if nothing has touched it since the last time; `None` if that is known already.
-    fn catch_up(&self, py: Python<'_>) -> PyResult<Option<Touch>> {
+    /// What the skin feels now if nothing has touched it since `last`; `None` if that is known already.
+    fn catch_up(&self, py: Python<'_>, last: Option<Bound<'_, Touch>>) -> PyResult<Option<Touch>> {
         let idle_s = std::mem::take(&mut self.clock().idle_s);
-        (idle_s > 0.0).then(|| self.skin.get().carried(py, &self.shapes, idle_s, &[])).transpose()
+        if idle_s <= 0.0 {
+            return Ok(None);
+        }
+        let skin = self.skin.get();
+        let idle = last.and_then(|last| skin.idle(py, idle_s, last.get()));
+        idle.map_or_else(|| skin.carried(py, &self.shapes, idle_s, &[]), Ok).map(Some)
     }
 }
 
@@ -429,7 +434,8 @@ impl Mounts {
     ) -> PyResult<Vec<(usize, Touch)>> {
         let mut loads = vec![Vec::new(); self.mounts.len()];
         let address = contact.efc_address.as_array();
-        let acting = |number: usize| address[number] >= 0;
+        let exclude = contact.exclude.as_array();
+        let acting = |number: usize| address[number] >= 0 && exclude[number] == 0;
         for number in (0..foamed.min(address.len())).filter(|n| acting(*n)) {
             self.felt_by(py, &contact, number, |k, body, sign| loads[k].push((number, body, sign)))?;
         }
@@ -540,8 +546,9 @@ fn together(a: &Sheared, b: &Sheared) -> bool {
     a.body == b.body && a.support.normal == b.support.normal
 }
 
-/// Shares what friction holds among `supports`: of each side, as their normal forces have it.
-fn share(held: &[Held], supports: &mut [Sheared]) {
+/// Shares what friction holds among `supports`: of each side, as their normal forces have it. Of the moment it is as much
+/// as the cone of every support has room for beside the force.
+fn share(held: &[Held], friction: f64, elliptic: bool, supports: &mut [Sheared]) {
     let mut left = held.to_vec();
     for side in supports.chunk_by_mut(|a, b| together(a, b)) {
         let (body, normal) = (side[0].body, side[0].support.normal);
@@ -559,10 +566,23 @@ fn share(held: &[Held], supports: &mut [Sheared]) {
         let polar: f64 = side.iter().map(|s| weight(s) * dot(arm(s), arm(s))).sum();
         // along the plane that the side has now
         let shear = minus(held.shear_n, scaled(normal, dot(held.shear_n, normal)));
-        for s in side {
-            let around = if polar > 0.0 { held.torsion_nm / polar } else { 0.0 };
-            s.shear_n = scaled(plus(shear, scaled(cross(normal, arm(s)), around)), weight(s));
+        let around = if polar > 0.0 { held.torsion_nm / polar } else { 0.0 };
+        let [_, x, y] = tangents(normal);
+        let of = |s: &Sheared, part: f64| scaled(plus(shear, scaled(cross(normal, arm(s)), part * around)), weight(s));
+        let fits = |part: f64| {
+            side.iter().all(|s| {
+                let [a, b] = [dot(of(s, part), x), dot(of(s, part), y)];
+                let length = if elliptic { a.hypot(b) } else { a.abs() + b.abs() };
+                length <= friction * s.support.force_n.max(0.0)
+            })
+        };
+        let (mut part, mut most) = if fits(1.0) { (1.0, 1.0) } else { (0.0, 1.0) };
+        while most - part > 1e-3 {
+            let middle = 0.5 * (part + most);
+            if fits(middle) { part = middle } else { most = middle }
         }
+        let shears: Vec<Vector> = side.iter().map(|s| of(s, part)).collect();
+        side.iter_mut().zip(shears).for_each(|(s, shear)| s.shear_n = shear);
     }
 }
 

@@ -11,7 +11,7 @@ use spts::{PressureMap, SkinLayout};
 use std::f64::consts::TAU;
 use std::hash::{BuildHasher as _, RandomState};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 /// A tactile skin: taxels, and the foam on them.
 ///
@@ -481,13 +481,32 @@ impl Skin {
         Ok(Touch {
             pressure: values.into_pyarray(py).reshape([felt.rows(), felt.cols()])?.unbind(),
             wrenches: OnceLock::new(),
-            loads: (bodies.iter().map(|body| body.clone_ref(py)).collect(), wrenches),
+            loads: Arc::new((bodies.iter().map(|body| body.clone_ref(py)).collect(), wrenches)),
             area,
             time,
             number,
             bottomed,
-            felt,
+            felt: Arc::new(felt),
             skin: self.id,
+        })
+    }
+
+    /// What the skin feels `dt` s after `last`, in which nothing touched it, if nothing has since.
+    pub(crate) fn idle(&self, py: Python<'_>, dt: f64, last: &Touch) -> Option<Touch> {
+        let mut state = self.locked();
+        if last.area > 0.0 || (last.skin, last.number) != (self.id, state.touches) {
+            return None;
+        }
+        state.touches += 1;
+        state.time_s += dt;
+        Some(Touch {
+            pressure: last.pressure.clone_ref(py),
+            wrenches: OnceLock::new(),
+            loads: last.loads.clone(),
+            time: state.time_s,
+            number: state.touches,
+            felt: last.felt.clone(),
+            ..*last
         })
     }
 
@@ -529,7 +548,7 @@ pub(crate) struct Touch {
     /// The wrenches, once somebody has asked for them.
     wrenches: OnceLock<Py<PyDict>>,
     /// All bodies, and the wrenches on those that have one.
-    loads: (Vec<Py<Body>>, Vec<(usize, Wrench)>),
+    loads: Arc<(Vec<Py<Body>>, Vec<(usize, Wrench)>)>,
     /// Area that is pressed, m².
     #[pyo3(get)]
     pub(crate) area: f64,
@@ -543,7 +562,7 @@ pub(crate) struct Touch {
     #[pyo3(get)]
     bottomed: bool,
     /// What the transducer feels.
-    pub(crate) felt: PressureMap,
+    pub(crate) felt: Arc<PressureMap>,
     /// Which skin.
     pub(crate) skin: u64,
 }
@@ -556,7 +575,7 @@ impl Touch {
         if let Some(known) = self.wrenches.get() {
             return Ok(known.bind(py).clone());
         }
-        let (found, (bodies, wrenches)) = (PyDict::new(py), &self.loads);
+        let (found, (bodies, wrenches)) = (PyDict::new(py), &*self.loads);
         for (k, key) in bodies.iter().enumerate() {
             let wrench = wrenches.iter().find(|(body, _)| *body == k).map_or(Wrench::NONE, |(_, wrench)| *wrench);
             let pair = [wrench.force_n, wrench.torque_nm].map(|v| PyArray1::from_slice(py, &v));
@@ -586,7 +605,7 @@ impl Touch {
         if felt.len() != rows * cols {
             bail!("a touch of {rows} x {cols} taxels with {} pressures", felt.len());
         }
-        let felt = PressureMap::from_values(rows, cols, felt);
+        let felt = Arc::new(PressureMap::from_values(rows, cols, felt));
         let (pressure, wrenches, loads) = (pressure.unbind(), wrenches.unbind().into(), Default::default());
         Ok(Self { pressure, wrenches, loads, area, time, number, bottomed, felt, skin })
     }

@@ -427,13 +427,13 @@ def into(pipe, kind, folder):
     pipe.send(work(kind, folder))
 
 
-def in_child(of, *arguments):
-    """What `work` sends from a forked process; within a minute or two, or not at all."""
+def in_child(of, *arguments, start="fork"):
+    """What `of` sends from another process; within a minute or two, or not at all."""
     here, there = multiprocessing.Pipe(duplex=False)
-    child = multiprocessing.get_context("fork").Process(target=of, args=(there, *arguments))
+    child = multiprocessing.get_context(start).Process(target=of, args=(there, *arguments))
     child.start()
     try:
-        assert here.poll(120), f"{arguments} hangs in a forked process"
+        assert here.poll(120), f"{arguments} hangs in another process"
         return here.recv()
     finally:
         child.kill()
@@ -460,10 +460,9 @@ def test_a_loader_of_forked_workers(data):
     """Workers of a loader read a data set that the parent has read."""
     expected = data.labelled("train")[1]
     for start in ("fork", "spawn"):
-        with multiprocessing.get_context(start).Pool(2) as pool:
-            found = pool.map_async(train_y, [data, data]).get(120)
+        found = [in_child(train_y, data, start=start) for _ in range(2)]
         assert all(np.array_equal(y, expected) for y in found)
 
 
-def train_y(data):
-    return data.labelled("train")[1]
+def train_y(pipe, data):
+    pipe.send(data.labelled("train")[1])

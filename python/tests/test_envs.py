@@ -119,7 +119,7 @@ def test_any_environment_gets_a_skin(integrator, mode):
     env.reset(seed=1)
     env.step(np.zeros(1))
     env.close()
-    assert mujoco.get_mjcb_passive() is None
+    assert mujoco.get_mjcb_control() is None
 
 
 def with_skin(observe="samples", mode="sense", **lift):
@@ -246,7 +246,7 @@ def test_two_skins_on_an_environment():
             assert forces[0] == pytest.approx(weight, rel=1e-2)
         env.close()
         env.close()
-        assert mujoco.get_mjcb_passive() is None
+        assert mujoco.get_mjcb_control() is None
     env = spts.envs.TactileWrapper(Lift(), spts.Skin(8, 8, 0.01), site="skin")
     with pytest.raises(ValueError, match="key"):
         spts.envs.TactileWrapper(env, spts.Skin(8, 8, 0.01), site="skin")
@@ -272,7 +272,7 @@ def test_an_environment_with_a_new_model(mode):
             seen, *_ = env.step(np.zeros(1))
         assert 1e3 * seen["tactile"].sum() * 0.015**2 == pytest.approx(0.2 * 9.81, rel=1e-2)
     env.close()
-    assert mujoco.get_mjcb_passive() is None
+    assert mujoco.get_mjcb_control() is None
 
 
 def test_an_image_is_a_pressure():

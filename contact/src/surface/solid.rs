@@ -378,7 +378,7 @@ impl Mesh {
             // past what comes from behind, to what may enter from outside
             from_m = at_m + SLACK * thickness_m;
         }
-        if from_m > 0.0 || beside {
+        if from_m > 0.0 || beside || (self.closed && !self.holds(base_m)) {
             return None;
         }
         // without a far side, an open mesh goes on for ever
@@ -389,6 +389,19 @@ impl Mesh {
         };
         let through = self.is_through(base_m, outward, out_m);
         through.then(|| thickness_m + self.behind_m(base_m, outward, thickness_m))
+    }
+
+    /// Whether a place, m, in the box around a closed mesh is inside it: by the ray to the nearest side of the box, which
+    /// meets little.
+    fn holds(&self, place_m: Vector) -> bool {
+        let root = self.boxes.root_aabb();
+        let (below, above) = (place_m - root.mins, root.maxs - place_m);
+        let (low, high) = (below.min_element(), above.min_element());
+        let (gaps, nearest, sign) = if low < high { (below, low, -1.0) } else { (above, high, 1.0) };
+        let mut direction = Vector::ZERO;
+        let axis = (0..3).find(|k| gaps[*k] <= nearest).unwrap_or(0);
+        direction[axis] = sign;
+        self.first(place_m, direction, f64::INFINITY).is_some_and(|hit| !hit.enters)
     }
 
     /// Whether a solid that has `base_m` inside, and ends `out_m` outward of it, reaches less far the other way.
