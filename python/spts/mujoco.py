@@ -103,7 +103,7 @@ class Attachment:
                     "`model.opt.enableflags` has `sleep`: foam does not wake what sleeps; clear it, or let the bodies stay awake"
                 )
             if model.opt.disableflags & (mujoco.mjtDisableBit.mjDSBL_CONSTRAINT | mujoco.mjtDisableBit.mjDSBL_CONTACT):
-                raise ValueError("`model.opt.disableflags` turns contact off, and with it foam; use mode \"sense\"")
+                raise ValueError('`model.opt.disableflags` turns contact off, and with it foam; use mode "sense"')
         pos, quat = (np.asarray(v, np.float64) for v in (pos, quat))
         if pos.shape != (3,) or quat.shape != (4,) or not (np.isfinite(pos).all() and np.linalg.norm(quat) > 1e-9):
             raise ValueError(
@@ -148,7 +148,9 @@ class Attachment:
         self._geoms = {body: _a_geom(model, body, others) for body in self.bodies}
         self._link_geom = _a_geom(model, link, own)
         if mode == "foam" and None in (self._link_geom, *self._geoms.values()):
-            raise ValueError(f'body "{model.body(link).name}" or one of `bodies` has no geom, which foam needs; give it one')
+            raise ValueError(
+                f'body "{model.body(link).name}" or one of `bodies` has no geom, which foam needs; give it one'
+            )
         self._last = self._failed = None
         self._felt_at = None
         self._each = None
@@ -274,7 +276,9 @@ class Attachment:
         self.detach()
 
     def __reduce_ex__(self, protocol):
-        raise TypeError("an attachment is on one data and does not copy: copy the skin, and attach that to the other data")
+        raise TypeError(
+            "an attachment is on one data and does not copy: copy the skin, and attach that to the other data"
+        )
 
     def _alone(self):
         self._group = _Group([self])
@@ -294,7 +298,11 @@ class Attachment:
 def _a_geom(model, body, among):
     """A geom of `body`, or of what is welded to it, for contacts; one of `among` if there is one, (geoms,) of bool."""
     weld = model.body_weldid
-    for geoms in (among & (model.geom_bodyid == body), model.geom_bodyid == body, weld[model.geom_bodyid] == weld[body]):
+    for geoms in (
+        among & (model.geom_bodyid == body),
+        model.geom_bodyid == body,
+        weld[model.geom_bodyid] == weld[body],
+    ):
         found = np.flatnonzero(geoms)
         if len(found):
             return int(found[0])
@@ -386,15 +394,10 @@ class _Group:
             if trial == 0 and calm:
                 return
             data.qacc_warmstart[:] = data.qacc
-            found = {}
+            found = dict.fromkeys(carried, 0.0)
             for (k, body, _), force in zip(self._springs, self._forces()):
-                found[k, body] = found.get((k, body), 0.0) + force[0]
-
-            def settled(key, force):
-                now = found.get(key, 0.0)
-                return max(now, force) <= 0.0 or min(abs(now - force), abs(now - last.get(key, np.inf))) <= _OFF * max(now, force)
-
-            if all(settled(key, force) for key, force in carried.items()):
+                found[k, body] += force[0]
+            if all(_settled(found[key], force, last.get(key)) for key, force in carried.items()):
                 return
             last = found
             qvel = data.qvel.copy()
@@ -425,7 +428,9 @@ class _Group:
             rows = first[first >= 0][:, None] + np.arange(count)
             if count == 3:
                 for n in mine:
-                    contacts.mu[self._first + n] = self.attachments[self._springs[n][0]].skin.foam[1] / math.sqrt(_SHEAR)
+                    contacts.mu[self._first + n] = self.attachments[self._springs[n][0]].skin.foam[1] / math.sqrt(
+                        _SHEAR
+                    )
             weights, pushes = values[:, 14 : 14 + count], values[:, 18 : 18 + count]
             data.efc_D[rows], data.efc_R[rows] = weights, 1.0 / weights
             # aref = −J v/dt − (pos − margin)
@@ -465,6 +470,12 @@ class _Group:
         foamed = self._first if springs else data.ncon
         for k, touch in self._mounts.read(dt, data.contact, data.efc_force, elliptic, foamed, springs):
             self.attachments[k]._last = touch
+
+
+def _settled(now, expected, before):
+    """Whether a force is the one that the law was taken about, or has not changed since the step was tried before."""
+    off = min(abs(now - expected), np.inf if before is None else abs(now - before))
+    return max(now, expected) <= 0.0 or off <= _OFF * max(now, expected)
 
 
 def _blank():
@@ -873,7 +884,11 @@ def step(*attachments):
         What each feels, in the order of `attachments`.
     """
     group = attachments[0]._group
-    if group is None or len(group.attachments) != len(attachments) or any(a is not b for a, b in zip(group.attachments, attachments)):
+    if (
+        group is None
+        or len(group.attachments) != len(attachments)
+        or any(a is not b for a, b in zip(group.attachments, attachments))
+    ):
         group = attachments[0]._group = _Group(list(attachments))
     group.step()
     return [attachment.last for attachment in attachments]

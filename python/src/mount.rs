@@ -67,6 +67,9 @@ struct Sheared {
     shear_n: Vector,
 }
 
+/// Bodies that are near, and the normal force of the foam on each, N.
+type Near = Vec<(usize, f64)>;
+
 /// What a body wears: its number, the thickness of its foam, m, and its stiffness, Pa/m.
 type Lining = (usize, f64, f64);
 
@@ -123,7 +126,7 @@ impl Mount {
         elliptic: bool,
         passed: Vec<usize>,
         lined: Vec<Lining>,
-    ) -> PyResult<(Array2<'py>, Vec<usize>, Vec<(usize, f64)>)> {
+    ) -> PyResult<(Array2<'py>, Vec<usize>, Near)> {
         let poses = Poses::of(py, &self.arrays)?;
         let (frame, origin) = self.frame(&poses);
         let (mut supports, mut carried) = (Vec::new(), Vec::new());
@@ -550,7 +553,7 @@ fn together(a: &Sheared, b: &Sheared) -> bool {
 /// as the cone of every support has room for beside the force.
 fn share(held: &[Held], friction: f64, elliptic: bool, supports: &mut [Sheared]) {
     let mut left = held.to_vec();
-    for side in supports.chunk_by_mut(|a, b| together(a, b)) {
+    for side in supports.chunk_by_mut(together) {
         let (body, normal) = (side[0].body, side[0].support.normal);
         let near = |h: &Held| h.body == body && dot(h.normal, normal) > 0.7;
         let best = left.iter().enumerate().filter(|(_, h)| near(h));

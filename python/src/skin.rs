@@ -539,6 +539,9 @@ impl Skin {
     }
 }
 
+/// All bodies, and the wrenches on those that have one, by their places in the list.
+type Loads = (Vec<Py<Body>>, Vec<(usize, Wrench)>);
+
 /// What the skin feels at one moment.
 #[pyclass(frozen, module = "spts")]
 pub(crate) struct Touch {
@@ -547,8 +550,7 @@ pub(crate) struct Touch {
     pressure: Py<PyArray2<f64>>,
     /// The wrenches, once somebody has asked for them.
     wrenches: OnceLock<Py<PyDict>>,
-    /// All bodies, and the wrenches on those that have one.
-    loads: Arc<(Vec<Py<Body>>, Vec<(usize, Wrench)>)>,
+    loads: Arc<Loads>,
     /// Area that is pressed, m².
     #[pyo3(get)]
     pub(crate) area: f64,

@@ -1,7 +1,6 @@
 """Skins on MuJoCo models: balance, energy, and that everything else stays as it was."""
 
 import copy
-import warnings
 
 import mujoco
 import numpy as np
@@ -247,7 +246,9 @@ def test_a_cup_between_two_fingers_does_not_creep(cone):
       <actuator><motor joint="l"/><motor joint="r"/></actuator></mujoco>""")
     data = mujoco.MjData(model)
     data.ctrl[:] = 10.0
-    skins = [spts.mujoco.attach(model, data, spts.Skin(12, 12, 0.005), site=s, bodies=["cup"], mode="foam") for s in "lr"]
+    skins = [
+        spts.mujoco.attach(model, data, spts.Skin(12, 12, 0.005), site=s, bodies=["cup"], mode="foam") for s in "lr"
+    ]
     for _ in range(250):
         spts.mujoco.step(*skins)
     model.opt.gravity[2] = -9.81
@@ -476,7 +477,7 @@ def test_a_callback_of_the_user_and_a_hook():
         mujoco.set_mjcb_control(None)
         mujoco.mj_step(model, data)
         with pytest.raises(RuntimeError, match="mjcb_control"):
-            touch.last
+            assert touch.last
         with pytest.raises(TypeError, match="attach"):
             copy.deepcopy(touch)
     finally:

@@ -242,9 +242,8 @@ impl Standing<'_> {
                 }
                 let Some([enter, leave]) = shape.chord(base_m, turned(outward)) else { continue };
                 if enter < inside[1].max(f64::MIN_POSITIVE) && leave > inside[0].min(-f64::MIN_POSITIVE) {
-                    let grown = [inside[0].min(enter), inside[1].max(leave)];
-                    pending |= self.parts.len() > 1 && grown != inside;
-                    inside = grown;
+                    pending |= self.parts.len() > 1 && (enter < inside[0] || leave > inside[1]);
+                    inside = [inside[0].min(enter), inside[1].max(leave)];
                 } else if enter >= inside[1] && enter < first_m {
                     first_m = enter;
                 }
@@ -254,7 +253,7 @@ impl Standing<'_> {
         if outward_m > 0.0 && inward_m < outward_m {
             return Some(thickness_m + inward_m.min(thickness_m));
         }
-        (first_m <= reach_m).then(|| thickness_m - first_m)
+        (first_m <= reach_m).then_some(thickness_m - first_m)
     }
 
     /// A point that is within the returned distance of all of the body, m; infinite for what has no end.
