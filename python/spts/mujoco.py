@@ -409,29 +409,38 @@ class _Group:
     def _put(self):
         """Makes the constraints anew with a contact for every spring."""
         model, data = self.model, self.data
-        contact = self._contact
-        data.ncon = self._first
-        for k, body, row in self._springs:
-            attachment = self.attachments[k]
-            friction = attachment.skin.foam[1]
-            contact.pos, contact.frame, contact.dist = row[:3], row[3:12], min(-row[12] / row[13], 0.0)
-            contact.geom = contact.geom1, contact.geom2 = attachment._link_geom, attachment._geoms[body]
-            contact.dim, contact.friction = (3 if friction > 0.0 else 1), (max(friction, 1e-5),) * 2 + (1e-5,) * 3
-            if mujoco.mj_addContact(model, data, contact):
+        first, count = self._first, len(self._springs)
+        data.ncon = first
+        for _ in self._springs:
+            if mujoco.mj_addContact(model, data, self._contact):
                 raise RuntimeError("the data has no room for more contacts: `<size memory=…/>` of the model")
+        contacts = data.contact
+        if count:
+            values = np.array([row for *_, row in self._springs])
+            skins = [self.attachments[k] for k, *_ in self._springs]
+            friction = np.array([skin.skin.foam[1] for skin in skins])
+            geoms = [(skin._link_geom, skin._geoms[body]) for skin, (_, body, _) in zip(skins, self._springs)]
+            contacts.pos[first:], contacts.frame[first:] = values[:, :3], values[:, 3:12]
+            contacts.dist[first:] = np.minimum(-values[:, 12] / values[:, 13], 0.0)
+            contacts.geom[first:] = geoms
+            contacts.geom1[first:], contacts.geom2[first:] = contacts.geom[first:].T
+            for name in ("flex", "elem", "vert"):
+                if hasattr(contacts, name):
+                    getattr(contacts, name)[first:] = -1
+            contacts.dim[first:] = np.where(friction > 0.0, 3, 1)
+            contacts.friction[first:] = 1e-5
+            contacts.friction[first:, :2] = np.maximum(friction, 1e-5)[:, None]
         mujoco.mj_makeConstraint(model, data)
         contacts = data.contact
-        for count in {self._rows(k) for k, _, _ in self._springs}:
-            mine = [n for n, (k, _, _) in enumerate(self._springs) if self._rows(k) == count]
-            first = contacts.efc_address[self._first :][mine]
-            values = np.array([self._springs[n][2] for n in mine])[first >= 0]
-            rows = first[first >= 0][:, None] + np.arange(count)
-            if count == 3:
-                for n in mine:
-                    contacts.mu[self._first + n] = self.attachments[self._springs[n][0]].skin.foam[1] / math.sqrt(
-                        _SHEAR
-                    )
-            weights, pushes = values[:, 14 : 14 + count], values[:, 18 : 18 + count]
+        elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+        if count and elliptic:
+            # MuJoCo scales the stiffness along the surface by the square of μ/mu
+            contacts.mu[first:] = np.maximum(friction, 1e-5).reshape(contacts.mu[first:].shape) / math.sqrt(_SHEAR)
+        sizes = np.where(friction > 0.0, 3 if elliptic else 4, 1) if count else ()
+        for size in set(sizes):
+            mine = (sizes == size) & (contacts.efc_address[first:] >= 0)
+            rows = contacts.efc_address[first:][mine][:, None] + np.arange(size)
+            weights, pushes = values[mine, 14 : 14 + size], values[mine, 18 : 18 + size]
             data.efc_D[rows], data.efc_R[rows] = weights, 1.0 / weights
             # aref = −J v/dt − (pos − margin)
             data.efc_KBIP[rows] = (1.0, 1.0 / model.opt.timestep, 1.0, 0.0)
@@ -440,12 +449,6 @@ class _Group:
             mujoco.mj_island(model, data)
         mujoco.mj_projectConstraint(model, data)
         mujoco.mj_referenceConstraint(model, data)
-
-    def _rows(self, k):
-        """Rows of the constraint of a contact of a skin."""
-        if self.attachments[k].skin.foam[1] <= 0.0:
-            return 1
-        return 3 if self.model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC else 4
 
     def _forces(self):
         """Forces of the springs, (springs, 3), N, along their frames."""
@@ -481,10 +484,7 @@ def _settled(now, expected, before):
 def _blank():
     """A contact with nothing in it but what MuJoCo wants of all."""
     contact = mujoco.MjContact()
-    contact.solref, contact.solimp = (-1.0, -1.0), (0.9, 0.95, 0.001, 0.5, 2.0)
-    for name in ("flex", "elem", "vert"):
-        if hasattr(contact, name):
-            setattr(contact, name, (-1, -1))
+    contact.dim, contact.solref, contact.solimp = 1, (-1.0, -1.0), (0.9, 0.95, 0.001, 0.5, 2.0)
     return contact
 
 

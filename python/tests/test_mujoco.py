@@ -761,7 +761,7 @@ def test_skins_of_two_links_feel_one_force():
     assert robot.wires == [] and sums == pytest.approx([5.0, 5.0], rel=1e-2)
     assert sums[0] == pytest.approx(sums[1], rel=1e-9)
     robot.detach()
-    # two layers, one behind the other: each feels the force that the other feels, and twice as much gives way
+    # two layers, one behind the other: each feels the force that the other feels, and more gives way
     gaps = []
     for links in (["l"], ["l", "r"]):
         data = mujoco.MjData(model)
@@ -769,13 +769,15 @@ def test_skins_of_two_links_feel_one_force():
         for _ in range(500):
             data.qfrc_applied[:] = 5.0
             touches = soft.step()
-        pushed = [np.linalg.norm(next(iter(t.wrenches.values()))[0]) for t in touches]
+        # along the slides; across them a patch of few taxels pushes a little
+        pushed = [abs(next(iter(t.wrenches.values()))[0][0]) for t in touches]
         assert pushed == pytest.approx([5.0] * len(links), rel=1e-6)
         gaps.append(np.ptp(data.xpos[1:, 0]) - 0.06)
         soft.detach()
     thick = 0.003
     assert 0.0 < gaps[0] < thick < gaps[1] < 2 * thick
-    assert (2 * thick - gaps[1]) / (thick - gaps[0]) == pytest.approx(2**0.5, rel=0.2)
+    # between balls a linear foam of half the stiffness gives way by √2 as much, one that stiffens by more
+    assert 2**0.5 < (2 * thick - gaps[1]) / (thick - gaps[0]) < 2.0
 
 
 def test_what_cannot_be_dressed(dog):
