@@ -316,11 +316,10 @@ impl TouchSkin {
                     // two bodies in one place count twice
                     self.touched_m2 += flat.carry(columns, &law, maps);
                 }
-                Surface::Curved(field) => field.carry(columns, &law),
+                Surface::Curved(field) => field.carry(columns, &law, self.pressure.values_mut()),
             }
         }
         if let Surface::Curved(field) = &self.surface {
-            field.points().means(field.pressure_pa(), self.pressure.values_mut());
             self.electrode_pressure.values_mut().copy_from_slice(self.pressure.values());
             (self.touched_m2, self.bottomed) = (field.touched_m2(), field.bottomed());
         }

@@ -8,6 +8,7 @@ use crate::foam::{Foam, FoamLaw};
 use crate::traction::velocity_at;
 use parry3d_f64::math::Vector;
 use spts_input::Refusal;
+use std::ops::Range;
 
 /// Independent columns of foam along the normals of a surface, under any number of bodies.
 ///
@@ -42,6 +43,30 @@ pub struct SurfaceField {
     bottomed: bool,
     /// Lowest and highest corner of the foam, m.
     bounds_m: [[f64; 3]; 2],
+    blocks: Vec<Block>,
+}
+
+/// Points that follow each other, most often neighbours, and a ball around them.
+#[derive(Debug, Clone)]
+struct Block {
+    points: Range<usize>,
+    centre_m: Vector,
+    radius_m: f64,
+    /// Side of a square of the largest area of a point, m.
+    side_m: f64,
+}
+
+/// Most points of a block.
+const BLOCK: usize = 32;
+
+impl Block {
+    fn of(points: Range<usize>, all: &SurfacePoints) -> Self {
+        let places = || all.positions_m[points.clone()].iter().copied().map(Vector::from);
+        let centre_m = places().fold(Vector::ZERO, |sum, p| sum + p) / points.len() as f64;
+        let radius_m = places().map(|p| (p - centre_m).length()).fold(0.0, f64::max);
+        let side_m = all.areas_m2[points.clone()].iter().copied().fold(0.0, f64::max).sqrt();
+        Self { points, centre_m, radius_m, side_m }
+    }
 }
 
 impl SurfaceField {
@@ -59,7 +84,9 @@ impl SurfaceField {
                 bounds_m[1][k] = bounds_m[1][k].max(point[k]).max(base_m);
             }
         }
-        Ok(Self { pressure_pa: vec![0.0; points.len()], bottomed: false, bounds_m, config, points })
+        let starts = (0..points.len()).step_by(BLOCK);
+        let blocks = starts.map(|first| Block::of(first..(first + BLOCK).min(points.len()), &points)).collect();
+        Ok(Self { pressure_pa: vec![0.0; points.len()], bottomed: false, bounds_m, blocks, config, points })
     }
 
     /// The sample points.
@@ -87,14 +114,19 @@ impl SurfaceField {
     /// body is pushed there, `along` (length 1), whether the foam could push it so.
     pub(crate) fn covers(&self, place_m: [f64; 3], along: Option<[f64; 3]>) -> bool {
         let (place, h, along) = (Vector::from(place_m), self.config.thickness_m, along.map(Vector::from));
-        let points = self.points.positions_m.iter().zip(&self.points.normals).zip(&self.points.areas_m2);
-        points.into_iter().any(|((point, normal), area_m2)| {
-            let (away, normal) = (place - Vector::from(*point), Vector::from(*normal));
+        let p = &self.points;
+        let near = |block: &&Block| {
+            let reach_m = block.radius_m + 2.0 * (h + block.side_m);
+            (place - block.centre_m).length_squared() <= reach_m * reach_m
+        };
+        self.blocks.iter().filter(near).flat_map(|block| block.points.clone()).any(|k| {
+            let (away, normal, area_m2) =
+                (place - Vector::from(p.positions_m[k]), Vector::from(p.normals[k]), p.areas_m2[k]);
             // within the side of a square of the point's area: what touches right on the rim is on the foam; between
             // points of a round skin, the surface is off their planes
             let (height, bend) = (away.dot(normal), along.map_or(0.0, |_| 0.5 * area_m2.sqrt()));
             (-1.5 * h - bend..=0.5 * h + bend).contains(&height)
-                && (away - normal * height).length_squared() <= *area_m2
+                && (away - normal * height).length_squared() <= area_m2
                 && along.is_none_or(|along| along.dot(normal) > 0.2)
         })
     }
@@ -112,16 +144,13 @@ impl SurfaceField {
         if standing.is_apart([self.bounds_m[0].map(|v| v - gap_m), self.bounds_m[1].map(|v| v + gap_m)]) {
             return;
         }
-        let (middle, radius_m) = standing.ball_m();
-        let near_m2 = (radius_m + h + gap_m).powi(2);
-        let points = self.points.positions_m.iter().zip(&self.points.normals);
-        for (index, (point, normal)) in points.enumerate() {
-            let (point, normal) = (Vector::from(*point), Vector::from(*normal));
-            if (point - middle).length_squared() > near_m2 {
-                continue;
-            }
-            if let Some(depth_m) = standing.front_m(point - normal * h, normal, h, gap_m) {
-                out.push(Column::new(index, point, normal, self.points.areas_m2[index], depth_m));
+        let p = &self.points;
+        for block in self.blocks.iter().filter(|block| !standing.is_far(block.centre_m, block.radius_m + h + gap_m)) {
+            for k in block.points.clone() {
+                let (point, normal) = (Vector::from(p.positions_m[k]), Vector::from(p.normals[k]));
+                if let Some(depth_m) = standing.front_m(point - normal * h, normal, h, gap_m) {
+                    out.push(Column::new(k, point, normal, p.areas_m2[k], depth_m));
+                }
             }
         }
     }
@@ -135,11 +164,15 @@ impl SurfaceField {
         Some(Column::new(index, Vector::from(*point), normal, self.points.areas_m2[index], 0.0))
     }
 
-    /// Adds the pressures of `columns` at their depths to those since [`SurfaceField::clear`].
-    pub(crate) fn carry(&mut self, columns: &[Column], law: &FoamLaw) {
+    /// Adds the pressures of `columns` at their depths to those since [`SurfaceField::clear`], and their means over the
+    /// taxels to `means`.
+    pub(crate) fn carry(&mut self, columns: &[Column], law: &FoamLaw, means: &mut [f64]) {
         for c in columns {
             self.bottomed |= c.depth_m > self.config.thickness_m;
-            self.pressure_pa[c.index] += law.pressure_pa(c.depth_m);
+            let p = law.pressure_pa(c.depth_m);
+            self.pressure_pa[c.index] += p;
+            let (taxel, area_m2) = (self.points.taxels[c.index] as usize, self.points.areas_m2[c.index]);
+            means[taxel] += p * area_m2 / self.points.taxel_areas_m2()[taxel];
         }
     }
 

@@ -256,14 +256,25 @@ impl Standing<'_> {
         (first_m <= reach_m).then_some(thickness_m - first_m)
     }
 
-    /// A point that is within the returned distance of all of the body, m; infinite for what has no end.
-    pub(crate) fn ball_m(&self) -> (Vector, f64) {
-        let half = (self.solid.high_m - self.solid.low_m) * 0.5;
-        if !half.is_finite() {
-            return (Vector::ZERO, f64::INFINITY);
+    /// Whether all of the body is farther than `reach_m` from a place, m; some bodies that are may not be told.
+    pub(crate) fn is_far(&self, place_m: Vector, reach_m: f64) -> bool {
+        match &self.solid.form {
+            Form::Parts(_) => self.parts.iter().all(|(shape, [x, y, z], origin_m, radius_m)| {
+                let away = place_m - *origin_m;
+                match shape {
+                    // the height in the part's axes
+                    Primitive::HalfSpace => x.z * away.x + y.z * away.y + z.z * away.z > reach_m,
+                    _ => away.length_squared() > (radius_m + reach_m) * (radius_m + reach_m),
+                }
+            }),
+            Form::Mesh(_) => {
+                let [x, y, z] = self.axes;
+                let away = place_m - self.origin_m;
+                let at = x * away.x + y * away.y + z * away.z;
+                let reach = Vector::splat(reach_m);
+                at.cmplt(self.solid.low_m - reach).any() || at.cmpgt(self.solid.high_m + reach).any()
+            }
         }
-        let middle = (self.solid.high_m + self.solid.low_m) * 0.5;
-        (self.turned(middle) + self.origin_m, half.length())
     }
 
     /// Whether the box around the body and the box between two corners have nothing in common.
