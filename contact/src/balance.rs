@@ -29,7 +29,7 @@ impl Column {
 const MAX_TILT_RAD: f64 = 0.2;
 /// What may be left of the force, relative to it.
 const TOLERANCE: f64 = 1e-12;
-const MAX_ITERATIONS: usize = 60;
+const MAX_ITERATIONS: usize = 25;
 
 /// Depths of `columns`, m, at which they carry `force_n`, with the resultant on the load's axis where that can be.
 ///
@@ -116,6 +116,12 @@ impl<'a> Bed<'a> {
     /// Shift and tilts at which force and moments are met; `None` if the tilts are not small.
     fn tilt(&self, sunk_m: f64, force_n: f64) -> Option<[f64; 3]> {
         let places = || self.u_m.iter().zip(&self.v_m);
+        // with all columns on one side of the axis, no tilt brings the resultant there
+        for across in [&self.u_m, &self.v_m] {
+            if across.iter().all(|a| *a > 0.0) || across.iter().all(|a| *a < 0.0) {
+                return None;
+            }
+        }
         let reach_m = places().map(|(u, v)| u.hypot(*v)).fold(0.0, f64::max);
         // across in units of the reach: the three unknowns are lengths
         let per_m = 1.0 / reach_m;
@@ -147,12 +153,15 @@ impl<'a> Bed<'a> {
             let mut share = 1.0;
             loop {
                 let next = at(&(state + share * step));
-                if next.0.dot(&step) <= 0.9 * slope || share < 1e-6 {
+                if next.0.dot(&step) <= 0.9 * slope {
                     state += share * step;
                     (gradient, hessian) = next;
                     break;
                 }
                 share *= 0.5;
+                if share < 1e-3 {
+                    return None;
+                }
             }
             if state.yz().amax() > MAX_TILT_RAD * reach_m {
                 return None;
