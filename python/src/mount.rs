@@ -305,6 +305,33 @@ impl Mount {
         Ok(known)
     }
 
+    /// Keeps those of `loads` that the foam has. Where a body lies flat, an engine puts contacts at the corners of the
+    /// surface that is shared, which may be beside the foam: one is felt if it has four fifths of the way to there from the
+    /// middle of the body's contacts.
+    fn keep_felt(&self, py: Python<'_>, solved: &Solved<'_>, loads: &mut Vec<(usize, usize, f64)>) -> PyResult<()> {
+        let contact = &solved.contact;
+        let place = |number: usize| -> Vector { row(&contact.pos, number) };
+        let mut kept = Vec::with_capacity(loads.len());
+        for &(number, body, sign) in &*loads {
+            let (at, along) = (place(number), contact.along(number, sign));
+            let mut felt = self.pushes(py, at, along)?;
+            if !felt {
+                let same = loads.iter().filter(|(_, other, _)| *other == body);
+                let (sum, middle) = same.fold((0.0, [0.0; 3]), |(sum, middle), &(other, ..)| {
+                    let force_n = solved.of(other)[0].max(0.0);
+                    (sum + force_n, plus(middle, scaled(place(other), force_n)))
+                });
+                let middle = scaled(middle, 1.0 / sum);
+                felt = sum > 0.0 && self.pushes(py, plus(middle, scaled(minus(at, middle), 0.8)), along)?;
+            }
+            if felt {
+                kept.push((number, body, sign));
+            }
+        }
+        *loads = kept;
+        Ok(())
+    }
+
     /// Whether the foam has a place in the world where a body is pushed along a direction.
     fn pushes(&self, py: Python<'_>, place: Vector, along: Vector) -> PyResult<bool> {
         let (frame, origin) = self.frame(&Poses::of(py, &self.arrays)?);
@@ -378,6 +405,14 @@ struct Contacts<'py> {
     exclude: PyReadonlyArray1<'py, i32>,
 }
 
+impl Contacts<'_> {
+    /// The normal of a contact, times `sign`.
+    fn along(&self, number: usize, sign: f64) -> Vector {
+        let [x, y, z, ..]: [f64; 9] = row(&self.frame, number);
+        scaled([x, y, z], sign)
+    }
+}
+
 /// Skins that step together.
 #[pyclass(frozen, module = "spts._spts")]
 pub(crate) struct Mounts {
@@ -436,23 +471,26 @@ impl Mounts {
         springs: Vec<(usize, usize)>,
     ) -> PyResult<Vec<(usize, Touch)>> {
         let mut loads = vec![Vec::new(); self.mounts.len()];
-        let address = contact.efc_address.as_array();
-        let exclude = contact.exclude.as_array();
-        let acting = |number: usize| address[number] >= 0 && exclude[number] == 0;
-        for number in (0..foamed.min(address.len())).filter(|n| acting(*n)) {
-            self.felt_by(py, &contact, number, |k, body, sign| loads[k].push((number, body, sign)))?;
+        let (address, exclude) = (contact.efc_address.as_array(), contact.exclude.as_array());
+        let acting: Vec<bool> =
+            address.iter().zip(exclude).map(|(address, exclude)| *address >= 0 && *exclude == 0).collect();
+        for number in (0..foamed.min(acting.len())).filter(|n| acting[*n]) {
+            self.meets(&contact, number, |k, body, sign| loads[k].push((number, body, sign)));
         }
-        for (number, (k, body)) in (foamed..address.len()).zip(springs).filter(|(n, _)| acting(*n)) {
+        let solved = Solved { contact, forces, elliptic, foamed };
+        for (mount, loads) in self.mounts.iter().zip(&mut loads) {
+            mount.get().keep_felt(py, &solved, loads)?;
+        }
+        for (number, (k, body)) in (foamed..acting.len()).zip(springs).filter(|(n, _)| acting[*n]) {
             let link = self.mounts[k].get().link;
             loads[k].push((number, body, 1.0));
             // and that of the body, if it is not of the same link
-            self.felt_by(py, &contact, number, |other, _, sign| {
+            self.felt_by(py, &solved.contact, number, |other, _, sign| {
                 if self.mounts[other].get().link != link {
                     loads[other].push((number, link, sign));
                 }
             })?;
         }
-        let solved = Solved { contact, forces, elliptic, foamed };
         let mut felt = Vec::new();
         for (k, mount) in self.mounts.iter().enumerate() {
             if let Some(touch) = mount.get().read(py, dt, &loads[k], &solved, &self.worn[k])? {
@@ -473,19 +511,26 @@ impl Mounts {
         number: usize,
         mut each: impl FnMut(usize, usize, f64),
     ) -> PyResult<()> {
-        let geoms = contact.geom.as_array();
-        // a flex has no geom
-        let [Ok(one), Ok(other)] = [geoms[[number, 0]], geoms[[number, 1]]].map(usize::try_from) else { return Ok(()) };
-        for (own, pressed, sign) in [(one, other, 1.0), (other, one, -1.0)] {
-            for &k in &self.owners[own] {
-                let [x, y, z, ..]: [f64; 9] = row(&contact.frame, number);
-                let along = scaled([x, y, z], sign);
-                if self.others[k][pressed] && self.mounts[k].get().pushes(py, row(&contact.pos, number), along)? {
-                    each(k, self.geom_bodies[pressed], sign);
-                }
+        let mut met = Vec::new();
+        self.meets(contact, number, |k, body, sign| met.push((k, body, sign)));
+        for (k, body, sign) in met {
+            if self.mounts[k].get().pushes(py, row(&contact.pos, number), contact.along(number, sign))? {
+                each(k, body, sign);
             }
         }
         Ok(())
+    }
+
+    /// As [`Mounts::felt_by`], wherever on the skin's link the contact is.
+    fn meets(&self, contact: &Contacts<'_>, number: usize, mut each: impl FnMut(usize, usize, f64)) {
+        let geoms = contact.geom.as_array();
+        // a flex has no geom
+        let [Ok(one), Ok(other)] = [geoms[[number, 0]], geoms[[number, 1]]].map(usize::try_from) else { return };
+        for (own, pressed, sign) in [(one, other, 1.0), (other, one, -1.0)] {
+            for &k in self.owners[own].iter().filter(|k| self.others[**k][pressed]) {
+                each(k, self.geom_bodies[pressed], sign);
+            }
+        }
     }
 }
 

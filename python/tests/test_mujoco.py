@@ -365,6 +365,20 @@ def test_a_foot_stands_on_any_floor(asset, floor, bodies, mode):
     assert not felt.bottomed
 
 
+def test_contacts_at_corners_beside_the_skin():
+    """MuJoCo's contacts of a sole are its corners. A skin that has nearly all of the sole feels its weight; one that has a
+    quarter of it does not, as the rim carries the foot."""
+    model = mujoco.MjModel.from_xml_string(
+        SOLE.format(asset="", floor='<geom type="plane" size="0 0 .1"/>', height=0.0205)
+    )
+    for rows, cols, share in ((7, 15, 1.0), (7, 16, 1.0), (4, 8, 0.0), (8, 8, 0.0)):
+        data = mujoco.MjData(model)
+        touch = spts.mujoco.attach(model, data, spts.Skin(rows, cols, 0.0125), site="sole")
+        felt = touch.step(3000)
+        total = felt.pressure.ravel() @ touch.skin.areas
+        assert total == pytest.approx(share * 5 * 9.81, rel=1e-3, abs=1e-9), (rows, cols)
+
+
 def test_what_presses_by_default():
     """All that collides but the link, what is welded to it, its kinematic neighbours and what the model excludes."""
     model = mujoco.MjModel.from_xml_string("""
