@@ -226,6 +226,7 @@ class Mounts:
         elliptic: bool,
         foamed: int,
         springs: Sequence[tuple[int, int]],
+        still: Sequence[tuple[int, int, Sequence[float]]],
     ) -> list[tuple[int, Touch]]: ...
 
 @final

@@ -130,6 +130,9 @@ class Attachment:
             if number == link or model.body_weldid[number] == model.body_weldid[link] != 0:
                 raise ValueError(f'`bodies`: "{name}" is a part of the skin\'s own link')
             self.bodies[number] = body_of(model, number) if shape is None else shape
+        # MuJoCo has no contact between what stands still and what is led by mocap: there the foam has its law's pressure
+        still = model.body_dofnum[model.body_weldid] == 0
+        self._led = [body for body in self.bodies if still[link] and still[body]]
         others = np.isin(model.geom_bodyid, list(self.bodies))
         if link_geoms is None:
             own = _covered(model, link) & ~others
@@ -320,7 +323,7 @@ class _Group:
         self.foams = [k for k, a in enumerate(attachments) if a.mode == "foam"]
         # foam on foam: two layers, one behind the other, which one of the two skins carries
         self._worn = {k: [] for k in range(len(attachments))}
-        self._passed = {k: [] for k in range(len(attachments))}
+        self._passed = {k: list(a._led) for k, a in enumerate(attachments)}
         for k in self.foams:
             for other in self.foams:
                 a, b = attachments[k], attachments[other]
@@ -462,8 +465,7 @@ class _Group:
         forces = self._forces()
         for k in self.foams:
             mine = [number for number, spring in enumerate(self._springs) if spring[0] == k]
-            attachment = self.attachments[k]
-            attachment._mount.hold(elapsed, forces[mine])
+            self.attachments[k]._mount.hold(elapsed, forces[mine])
 
     def read(self, dt):
         """Lets the skins feel the contacts that the data has, `dt` s after the last time."""
@@ -471,7 +473,13 @@ class _Group:
         elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
         springs = [spring[:2] for spring in self._springs]
         foamed = self._first if springs else data.ncon
-        for k, touch in self._mounts.read(dt, data.contact, data.efc_force, elliptic, foamed, springs):
+        still = []
+        for k, attachment in enumerate(self.attachments):
+            if attachment._led:
+                others = [body for body in attachment.bodies if body not in attachment._led]
+                rows, bodies, _ = attachment._mount.supports(model.opt.timestep, elliptic, others)
+                still += [(k, body, row[:14].tolist()) for row, body in zip(rows, bodies)]
+        for k, touch in self._mounts.read(dt, data.contact, data.efc_force, elliptic, foamed, springs, still):
             self.attachments[k]._last = touch
 
 

@@ -244,13 +244,14 @@ impl Mount {
         loads: &[(usize, usize, f64)],
         solved: &Solved<'_>,
         lined: &[Lining],
+        still: &[(usize, [f64; 14])],
     ) -> PyResult<Option<Touch>> {
         let mut clock = self.clock();
         clock.idle_s += dt;
-        if clock.read && !clock.pressed && loads.is_empty() {
+        if clock.read && !clock.pressed && loads.is_empty() && still.is_empty() {
             return Ok(None);
         }
-        let known = self.loads(py, loads, solved, lined)?;
+        let known = self.loads(py, loads, solved, lined, still)?;
         let touch = self.skin.get().carried(py, &self.shapes, clock.idle_s, &known)?;
         *clock = Clock { idle_s: 0.0, pressed: touch.area > 0.0, read: true };
         Ok(Some(touch))
@@ -264,19 +265,27 @@ impl Mount {
         loads: &[(usize, usize, f64)],
         solved: &Solved<'_>,
         lined: &[Lining],
+        still: &[(usize, [f64; 14])],
     ) -> PyResult<Vec<Load>> {
         let mut known: Vec<Load> = Vec::new();
-        if loads.is_empty() {
+        if loads.is_empty() && still.is_empty() {
             return Ok(known);
         }
         let poses = Poses::of(py, &self.arrays)?;
         let (frame, origin) = self.frame(&poses);
-        for &(number, body, sign) in loads {
+        let contact = &solved.contact;
+        let engine = loads.iter().map(|&(number, body, sign)| {
+            let axes = rotation(&contact.frame, number);
+            (body, row(&contact.pos, number), axes, sign, solved.of(number), number >= solved.foamed)
+        });
+        let law = still.iter().map(|(body, row)| {
+            let axes = std::array::from_fn(|i| std::array::from_fn(|j| row[3 + 3 * i + j]));
+            (*body, [row[0], row[1], row[2]], axes, 1.0, [row[12], 0.0, 0.0, 0.0, 0.0, 0.0], true)
+        });
+        for (body, place, axes, sign, force, is_foam) in engine.chain(law) {
             let Some(at) = self.bodies.iter().position(|known| *known == body) else {
                 bail!("body {body} is none of those that may touch the skin");
             };
-            let (contact, force) = (&solved.contact, solved.of(number));
-            let (place, axes): (Vector, _) = (row(&contact.pos, number), rotation(&contact.frame, number));
             let normal_n = force[0];
             if normal_n <= 0.0 {
                 continue;
@@ -287,7 +296,7 @@ impl Mount {
             let twist = plus(along(&force[3..]), cross(minus(place, row(&poses.xpos, body)), push));
             let centre_m = into(&frame, minus(place, origin));
             let wrench = Wrench { force_n: into(&frame, push), torque_nm: into(&frame, twist) };
-            let normal = (number >= solved.foamed).then(|| into(&frame, scaled(axes[0], sign)));
+            let normal = is_foam.then(|| into(&frame, scaled(axes[0], sign)));
             match known.iter_mut().find(|load| load.body == at && load.along == normal) {
                 Some(load) => {
                     let share = normal_n / (load.normal_n + normal_n);
@@ -458,7 +467,8 @@ impl Mounts {
 
     /// What the skins feel of the contacts that act, `dt` s after the last time: number and touch of those that
     /// something touches, or did so the last time. `forces` are those of all constraints. The contacts from `foamed` on
-    /// stand for foam: of each its skin, and its body.
+    /// stand for foam: of each its skin, and its body. `still` are supports that the engine does not solve for: skin, body,
+    /// and the first numbers of the row that [`Mount::supports`] gives.
     #[expect(clippy::too_many_arguments, reason = "what a step has")]
     fn read(
         &self,
@@ -469,6 +479,7 @@ impl Mounts {
         elliptic: bool,
         foamed: usize,
         springs: Vec<(usize, usize)>,
+        still: Vec<(usize, usize, [f64; 14])>,
     ) -> PyResult<Vec<(usize, Touch)>> {
         let mut loads = vec![Vec::new(); self.mounts.len()];
         let (address, exclude) = (contact.efc_address.as_array(), contact.exclude.as_array());
@@ -493,7 +504,8 @@ impl Mounts {
         }
         let mut felt = Vec::new();
         for (k, mount) in self.mounts.iter().enumerate() {
-            if let Some(touch) = mount.get().read(py, dt, &loads[k], &solved, &self.worn[k])? {
+            let still: Vec<_> = still.iter().filter(|(n, ..)| *n == k).map(|(_, body, row)| (*body, *row)).collect();
+            if let Some(touch) = mount.get().read(py, dt, &loads[k], &solved, &self.worn[k], &still)? {
                 felt.push((k, touch));
             }
         }

@@ -422,6 +422,33 @@ def test_beside_the_skin_mujoco_carries():
     assert data.body("other").xpos[2] == pytest.approx(0.21, abs=1e-3)
 
 
+@pytest.mark.parametrize("mode", ["sense", "foam"])
+@pytest.mark.parametrize("bodies", ["all", ["probe"]])
+@pytest.mark.parametrize("spring", [False, True])
+def test_a_mocap_body_presses(mode, bodies, spring):
+    """What is led presses a table that stands still by the foam's law, and one that gives by MuJoCo's solve."""
+    joint = '<joint type="slide" axis="0 0 1" stiffness="1e4" damping="50"/>' if spring else ""
+    model = mujoco.MjModel.from_xml_string(f"""
+    <mujoco><option timestep="0.002" gravity="0 0 0"/><worldbody>
+      <body name="table">{joint}<geom type="box" size=".1 .1 .02" pos="0 0 -.02" mass="1"/><site name="skin"/></body>
+      <body name="probe" mocap="true" pos="0 0 .1"><geom size=".02"/></body></worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    touch = spts.mujoco.attach(model, data, spts.Skin(10, 10, 0.01), site="skin", bodies=bodies, mode=mode)
+    assert touch.step(10).area == 0.0
+    data.mocap_pos[0] = 0.0, 0.0, 0.0185
+    felt = touch.step(300)
+    pushed = felt.wrenches[touch.bodies[model.body("probe").id]][0][2]
+    assert (felt.pressure * 1e-4).sum() == pytest.approx(pushed, rel=1e-6) and pushed > 1.0
+    if spring:
+        assert pushed == pytest.approx(-1e4 * data.qpos[0], rel=1e-3)
+    else:
+        skin, ball = spts.Skin(10, 10, 0.01), spts.Body.sphere(0.02)
+        law = skin.touch({ball: ((0.0, 0.0, 0.0185), (1.0, 0.0, 0.0, 0.0))})
+        assert pushed == pytest.approx(law.wrenches[ball][0][2], rel=1e-2)
+    data.mocap_pos[0] = 0.0, 0.0, 0.1
+    assert touch.step(100).area == 0.0
+
+
 def test_other_data_keep_their_contact():
     """The model is as it was: a copy of the data, and a second skin on it, know nothing of the first."""
     model, data = table()
