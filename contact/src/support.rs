@@ -27,14 +27,14 @@ const TOGETHER: f64 = 0.5;
 /// Columns that push apart are told apart by the hardest of them: within 45° of its normal.
 const BESIDE: f64 = 0.7;
 
-/// Adds the springs that stand for `columns` under a body with the velocity of `posed`, and returns the normal force that
-/// the columns have then, N. `lag_s` is Δt + τ.
+/// Adds the springs that stand for `columns` under a body with the velocity of `posed`, and returns the normal force
+/// that the columns have then, N. `lag_s` is Δt + τ.
 ///
-/// A column at depth δ, over which the body moves at v along its normal at the end of the step, has the pressure f(e) with
-/// e = δ − (Δt + τ) v: Euler's implicit method on a Kelvin–Voigt element. About the velocity of `posed`, where e = e₀,
-/// that is f(e₀) + f′(e₀) (e − e₀). Columns that push the same way are a linear force and stiffness over a plane, and
-/// three springs of equal stiffness have their sum, their first moments, and the second moments of the stiffness: at √2
-/// radii of gyration from its centre, 120° apart.
+/// A column at depth δ, over which the body moves at v along its normal at the end of the step, has the pressure f(e)
+/// with e = δ − (Δt + τ) v: Euler's implicit method on a Kelvin–Voigt element. About the velocity of `posed`, where
+/// e = e₀, that is f(e₀) + f′(e₀) (e − e₀). Columns that push the same way are a linear force and stiffness over a
+/// plane, and three springs of equal stiffness have their sum, their first moments, and the second moments of the
+/// stiffness: at √2 radii of gyration from its centre, 120° apart.
 ///
 /// Of a body that does not touch but is within `near_m`, the first columns that it would touch have springs that push
 /// once it has come that far.
@@ -245,7 +245,8 @@ mod tests {
         assert!((found[1] - wanted[1]).length() < 2e-3 * wanted[0].length() * 0.03, "{found:?} {wanted:?}");
     }
 
-    /// Columns on opposite sides of a link, as in a fork, push apart: three springs a side. Nothing near pushes nothing.
+    /// Columns on opposite sides of a link, as in a fork, push apart: three springs a side. Nothing near pushes
+    /// nothing.
     #[test]
     fn sides_are_told_apart() {
         let law = Foam::default().law(f64::INFINITY);

@@ -325,8 +325,9 @@ impl TouchSkin {
         }
     }
 
-    /// Springs that stand for the foam under a body for one step of `step_s`, with what it wears, `lining_m` thick. Adds
-    /// them to `out`; they are about `posed`'s velocity, which is that at the end of the step as far as it is known.
+    /// Springs that stand for the foam under a body for one step of `step_s`, with what it wears, `lining_m` thick.
+    /// Adds them to `out`; they are about `posed`'s velocity, which is that at the end of the step as far as it is
+    /// known.
     ///
     /// Returns the normal force, N, that the foam has at that velocity; `None` if the body is nowhere near.
     pub fn supports(

@@ -8,8 +8,8 @@ import numpy as np
 
 from ._spts import Decoder, Skin, decoder_table
 
-#: The decoder that `decode`, `spts.envs` and `spts.decoders.ImageDecoder` take unless another is named: the best of those
-#: that need no recordings, or nearly, on every skin of `scripts/python_decoders.py`.
+#: The decoder that `decode`, `spts.envs` and `spts.decoders.ImageDecoder` take unless another is named: the best of
+#: those that need no recordings, or nearly, on every skin of `scripts/python_decoders.py`.
 DEFAULT = "mixture"
 
 # Decoders that learn from images without labels.

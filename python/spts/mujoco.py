@@ -130,7 +130,8 @@ class Attachment:
             if number == link or model.body_weldid[number] == model.body_weldid[link] != 0:
                 raise ValueError(f'`bodies`: "{name}" is a part of the skin\'s own link')
             self.bodies[number] = body_of(model, number) if shape is None else shape
-        # MuJoCo has no contact between what stands still and what is led by mocap: there the foam has its law's pressure
+        # MuJoCo has no contact between what stands still and what is led by mocap: there the foam has its law's
+        # pressure
         still = model.body_dofnum[model.body_weldid] == 0
         self._led = [body for body in self.bodies if still[link] and still[body]]
         others = np.isin(model.geom_bodyid, list(self.bodies))

@@ -114,10 +114,10 @@ impl Mount {
     /// The foam under all bodies but those of `passed`, for a step of `step` s, as springs for the engine, about the
     /// velocities that the data has. `lined` are bodies that wear foam themselves.
     ///
-    /// Returns an array (n, 22): place, m; frame by rows (normal on the body, and two tangents); force on a body that does
-    /// not move, N; stiffness, N/m; and, for up to four rows of its constraint each, D and aref + J v/step: MuJoCo's force
-    /// D (aref − J a) then is that of `Support` and of friction that stretches the foam. Then the body of every spring,
-    /// and the normal force, N, of every body that is near.
+    /// Returns an array (n, 22): place, m; frame by rows (normal on the body, and two tangents); force on a body that
+    /// does not move, N; stiffness, N/m; and, for up to four rows of its constraint each, D and aref + J v/step:
+    /// MuJoCo's force D (aref − J a) then is that of `Support` and of friction that stretches the foam. Then the body
+    /// of every spring, and the normal force, N, of every body that is near.
     #[pyo3(signature = (step, elliptic, passed = Vec::new(), lined = Vec::new()))]
     fn supports<'py>(
         &self,
@@ -257,8 +257,8 @@ impl Mount {
         Ok(Some(touch))
     }
 
-    /// Contacts as loads in the skin's frame. Each of `loads` is the number of a contact, the body that it presses on the
-    /// skin, and the sign with which the contact's force is on that body.
+    /// Contacts as loads in the skin's frame. Each of `loads` is the number of a contact, the body that it presses on
+    /// the skin, and the sign with which the contact's force is on that body.
     fn loads(
         &self,
         py: Python<'_>,
@@ -315,8 +315,8 @@ impl Mount {
     }
 
     /// Keeps those of `loads` that the foam has. Where a body lies flat, an engine puts contacts at the corners of the
-    /// surface that is shared, which may be beside the foam: one is felt if it has four fifths of the way to there from the
-    /// middle of the body's contacts.
+    /// surface that is shared, which may be beside the foam: one is felt if it has four fifths of the way to there from
+    /// the middle of the body's contacts.
     fn keep_felt(&self, py: Python<'_>, solved: &Solved<'_>, loads: &mut Vec<(usize, usize, f64)>) -> PyResult<()> {
         let contact = &solved.contact;
         let place = |number: usize| -> Vector { row(&contact.pos, number) };
@@ -467,8 +467,8 @@ impl Mounts {
 
     /// What the skins feel of the contacts that act, `dt` s after the last time: number and touch of those that
     /// something touches, or did so the last time. `forces` are those of all constraints. The contacts from `foamed` on
-    /// stand for foam: of each its skin, and its body. `still` are supports that the engine does not solve for: skin, body,
-    /// and the first numbers of the row that [`Mount::supports`] gives.
+    /// stand for foam: of each its skin, and its body. `still` are supports that the engine does not solve for: skin,
+    /// body, and the first numbers of the row that [`Mount::supports`] gives.
     #[expect(clippy::too_many_arguments, reason = "what a step has")]
     fn read(
         &self,
@@ -606,8 +606,8 @@ fn together(a: &Sheared, b: &Sheared) -> bool {
     a.body == b.body && a.support.normal == b.support.normal
 }
 
-/// Shares what friction holds among `supports`: of each side, as their normal forces have it. Of the moment it is as much
-/// as the cone of every support has room for beside the force.
+/// Shares what friction holds among `supports`: of each side, as their normal forces have it. Of the moment it is as
+/// much as the cone of every support has room for beside the force.
 fn share(held: &[Held], friction: f64, elliptic: bool, supports: &mut [Sheared]) {
     let mut left = held.to_vec();
     for side in supports.chunk_by_mut(together) {

@@ -110,8 +110,8 @@ impl SurfaceField {
         self.bottomed
     }
 
-    /// Whether a place, m, lies in a column of foam, or beside it within half a thickness along the normal; and, where a
-    /// body is pushed there, `along` (length 1), whether the foam could push it so.
+    /// Whether a place, m, lies in a column of foam, or beside it within half a thickness along the normal; and, where
+    /// a body is pushed there, `along` (length 1), whether the foam could push it so.
     pub(crate) fn covers(&self, place_m: [f64; 3], along: Option<[f64; 3]>) -> bool {
         let (place, h, along) = (Vector::from(place_m), self.config.thickness_m, along.map(Vector::from));
         let p = &self.points;

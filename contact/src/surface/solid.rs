@@ -193,8 +193,8 @@ pub(crate) struct Standing<'a> {
 }
 
 impl Standing<'_> {
-    /// How deep the solid reaches into a column of foam, from its free surface, m, or, as a negative depth, the gap to a
-    /// solid up to `gap_m` above the surface; `None` where there is nothing.
+    /// How deep the solid reaches into a column of foam, from its free surface, m, or, as a negative depth, the gap to
+    /// a solid up to `gap_m` above the surface; `None` where there is nothing.
     ///
     /// The column starts at `base_m`, on the link, and goes `thickness_m` along `outward` (length 1) to the free
     /// surface. A solid with the base inside has come through the whole column if more of it lies outward of the base
@@ -401,8 +401,8 @@ impl Mesh {
         through.then(|| thickness_m + self.behind_m(base_m, outward, thickness_m))
     }
 
-    /// Whether a place, m, in the box around a closed mesh is inside it: by the ray to the nearest side of the box, which
-    /// meets little.
+    /// Whether a place, m, in the box around a closed mesh is inside it: by the ray to the nearest side of the box,
+    /// which meets little.
     fn holds(&self, place_m: Vector) -> bool {
         let root = self.boxes.root_aabb();
         let (below, above) = (place_m - root.mins, root.maxs - place_m);
