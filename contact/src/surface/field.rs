@@ -5,10 +5,10 @@ use super::solid::Solid;
 use crate::balance::Column;
 use crate::field::{PosedMesh, Wrench};
 use crate::foam::{Foam, FoamLaw};
+use crate::mesh::span;
 use crate::traction::velocity_at;
 use parry3d_f64::math::Vector;
 use spts_input::Refusal;
-use std::ops::Range;
 
 /// Independent columns of foam along the normals of a surface, under any number of bodies.
 ///
@@ -46,10 +46,10 @@ pub struct SurfaceField {
     blocks: Vec<Block>,
 }
 
-/// Points that follow each other, most often neighbours, and a ball around them.
+/// Neighbouring points, by their numbers, and a ball around them.
 #[derive(Debug, Clone)]
 struct Block {
-    points: Range<usize>,
+    points: Vec<usize>,
     centre_m: Vector,
     radius_m: f64,
     /// Side of a square of the largest area of a point, m.
@@ -60,11 +60,30 @@ struct Block {
 const BLOCK: usize = 32;
 
 impl Block {
-    fn of(points: Range<usize>, all: &SurfacePoints) -> Self {
-        let places = || all.positions_m[points.clone()].iter().copied().map(Vector::from);
+    /// Adds `points` in blocks to `out`: halves along the longest side of the box around them, over and over.
+    fn divide(mut points: Vec<usize>, all: &SurfacePoints, out: &mut Vec<Self>) {
+        if points.len() <= BLOCK {
+            points.sort_unstable();
+            out.push(Self::of(points, all));
+            return;
+        }
+        let [low, high] = span(points.iter().map(|k| all.positions_m[*k]));
+        let side = |k: &usize| high[*k] - low[*k];
+        let axis = (0..3).max_by(|a, b| side(a).total_cmp(&side(b))).unwrap_or(0);
+        let at = |k: &usize| all.positions_m[*k][axis];
+        // those at one place in the order of their numbers, so that it does not depend on how they are sorted
+        let half = points.len() / 2;
+        points.select_nth_unstable_by(half, |a, b| at(a).total_cmp(&at(b)).then(a.cmp(b)));
+        let upper = points.split_off(half);
+        Self::divide(points, all, out);
+        Self::divide(upper, all, out);
+    }
+
+    fn of(points: Vec<usize>, all: &SurfacePoints) -> Self {
+        let places = || points.iter().map(|k| Vector::from(all.positions_m[*k]));
         let centre_m = places().fold(Vector::ZERO, |sum, p| sum + p) / points.len() as f64;
         let radius_m = places().map(|p| (p - centre_m).length()).fold(0.0, f64::max);
-        let side_m = all.areas_m2[points.clone()].iter().copied().fold(0.0, f64::max).sqrt();
+        let side_m = points.iter().map(|k| all.areas_m2[*k]).fold(0.0, f64::max).sqrt();
         Self { points, centre_m, radius_m, side_m }
     }
 }
@@ -84,8 +103,8 @@ impl SurfaceField {
                 bounds_m[1][k] = bounds_m[1][k].max(point[k]).max(base_m);
             }
         }
-        let starts = (0..points.len()).step_by(BLOCK);
-        let blocks = starts.map(|first| Block::of(first..(first + BLOCK).min(points.len()), &points)).collect();
+        let mut blocks = Vec::new();
+        Block::divide((0..points.len()).collect(), &points, &mut blocks);
         Ok(Self { pressure_pa: vec![0.0; points.len()], bottomed: false, bounds_m, blocks, config, points })
     }
 
@@ -119,7 +138,7 @@ impl SurfaceField {
             let reach_m = block.radius_m + 2.0 * (h + block.side_m);
             (place - block.centre_m).length_squared() <= reach_m * reach_m
         };
-        self.blocks.iter().filter(near).flat_map(|block| block.points.clone()).any(|k| {
+        self.blocks.iter().filter(near).flat_map(|block| &block.points).any(|&k| {
             let (away, normal, area_m2) =
                 (place - Vector::from(p.positions_m[k]), Vector::from(p.normals[k]), p.areas_m2[k]);
             // within the side of a square of the point's area: what touches right on the rim is on the foam; between
@@ -146,7 +165,7 @@ impl SurfaceField {
         }
         let p = &self.points;
         for block in self.blocks.iter().filter(|block| !standing.is_far(block.centre_m, block.radius_m + h + gap_m)) {
-            for k in block.points.clone() {
+            for &k in &block.points {
                 let (point, normal) = (Vector::from(p.positions_m[k]), Vector::from(p.normals[k]));
                 if let Some(depth_m) = standing.front_m(point - normal * h, normal, h, gap_m) {
                     out.push(Column::new(k, point, normal, p.areas_m2[k], depth_m));
