@@ -257,6 +257,9 @@ def main():
     for what, cost in found.items():
         print(f"{what:<75} {cost:9.1f} µs")
     print(f"{'two threads, as many times faster than one':<75} {side_by_side:9.2f}")
+    print("\ntaxels of a humanoid; a step, µs: bare, in mode sense, in mode foam")
+    for taxels, costs in dressed:
+        print(f"{taxels:8} {costs[0]:8.1f} {costs[1]:8.1f} {costs[2]:8.1f}")
     print("\nweight of the can, N; sum of pressure times area, N; sum of MuJoCo's tactile sensor, mm")
     for weight, ours, theirs in balance:
         print(f"{weight:8.4f} {ours:8.4f} {1e3 * theirs:9.4f}")
