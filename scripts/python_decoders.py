@@ -1,4 +1,4 @@
-"""Which decoder of those that need no recordings is best on which skin: what `spts.decode` and `spts.envs` take by default.
+"""Which decoder of those that need no recordings is best on which skin, and so the default of `spts.decode`.
 
 python scripts/python_decoders.py [--presses N] [--skins NAME,...] [--json]
 

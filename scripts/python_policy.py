@@ -2,9 +2,10 @@
 
 python scripts/python_policy.py [--out docs/policy.png] [--seeds N] [--iterations N] [--jobs N] [--json]
 
-The task is `spts.envs.PressEnv` with a peg that sits in the hand up to 15 mm off, nobody knows where. Every policy is told
-the pose of the hand, the goal and the force on the hand, and moves the hand across the skin; the arm presses with the wanted
-force by itself. They differ in what they are told of the touch. A linear policy is trained by its natural gradient (Rajeswaran and others, 2017). The same seed gives the same numbers. Needs matplotlib.
+The task is `spts.envs.PressEnv` with a peg that sits in the hand up to 15 mm off, nobody knows where. Every policy is
+told the pose of the hand, the goal and the force on the hand, and moves the hand across the skin; the arm presses with
+the wanted force by itself. They differ in what they are told of the touch. A linear policy is trained by its natural
+gradient (Rajeswaran and others, 2017). The same seed gives the same numbers. Needs matplotlib.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ ARMS = {
 
 
 def repeating(folder):
-    """The profile `as_built` with cells that repeat M rows of random weights, so that every window has the same rows."""
+    """The profile `as_built` with cells that repeat M rows of random weights: every window has the same rows."""
     codes = 255 * np.random.default_rng(0).integers(0, 2, M * ROWS * ROWS)
     path = pathlib.Path(folder) / "repeating.toml"
     built = (ROOT / "circuit/profiles/as_built.toml").read_text()
@@ -55,9 +56,9 @@ class Grasped(gym.Wrapper):
     """`PressEnv` whose object sits in the hand anyhow: the hand's pose is seen, the object's is not. The action is the
     velocity of the hand along x and y; along z it moves by its force.
 
-    The observation is one vector: x and y of the hand, cm, its height, cm, x and y of the goal, cm, the share of the wanted
-    force that acts, 1; the same again while something is touched, else zeros; and the touch. The reward is that of
-    `PressEnv`, an error of the force counts as 2 at the most.
+    The observation is one vector: x and y of the hand, cm, its height, cm, x and y of the goal, cm, the share of the
+    wanted force that acts, 1; the same again while something is touched, else zeros; and the touch. The reward is that
+    of `PressEnv`, an error of the force counts as 2 at the most.
     """
 
     def __init__(self, arm, profile):

@@ -152,7 +152,7 @@ def steps():
 
 
 def humanoids():
-    """A humanoid of gymnasium's that lies on the floor: taxels, and a step in µs: bare, in mode "sense", and in mode "foam"."""
+    """A humanoid of gymnasium's that lies on the floor: its taxels, and a step in µs, bare and in either mode."""
     path = os.path.join(os.path.dirname(gymnasium.__file__), "envs/mujoco/assets/humanoid.xml")
     for pitch in (0.134, 0.0405, 0.01279):
         model = mujoco.MjModel.from_xml_path(path)

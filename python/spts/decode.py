@@ -103,8 +103,8 @@ def pitch_of(places):
 
 
 def learned(decoder, skin, images=None, labels=None):
-    """A decoder for a skin, or for rows and columns, that has learned from `images`; without them from `prior(skin)`, if
-    it learns from images at all."""
+    """A decoder for a skin, or for rows and columns, that has learned from `images`; without them from `prior(skin)`,
+    if it learns from images at all."""
     shape = skin.shape if isinstance(skin, Skin) else (int(skin[0]), int(skin[1]))
     if images is not None:
         return Decoder(decoder, shape, images, labels)

@@ -28,8 +28,6 @@ import numpy as np
 
 from ._spts import Body, Mount, Mounts, Skin, Wire
 
-# Stiffness of foam along its surface, relative to that across it, where MuJoCo's cone is elliptic; as in mount.rs.
-_SHEAR = 0.4
 # Most times that a step is solved anew with the foam's law about another velocity, and the share of a force that may be
 # off before: what is left is of the order of its square.
 _TRIALS, _OFF = 12, 0.05
@@ -112,6 +110,7 @@ class Attachment:
         rotation = np.empty(9)
         mujoco.mju_quat2Mat(rotation, quat / np.linalg.norm(quat))
         self.model, self.data, self.skin = model, data, skin
+        self._friction = skin.foam[1]
         if isinstance(bodies, str):
             if bodies != "all":
                 raise ValueError(
@@ -422,7 +421,7 @@ class _Group:
         if count:
             values = np.array([row for *_, row in self._springs])
             skins = [self.attachments[k] for k, *_ in self._springs]
-            friction = np.array([skin.skin.foam[1] for skin in skins])
+            friction = np.array([skin._friction for skin in skins])
             geoms = [(skin._link_geom, skin._geoms[body]) for skin, (_, body, _) in zip(skins, self._springs)]
             contacts.pos[first:], contacts.frame[first:] = values[:, :3], values[:, 3:12]
             contacts.dist[first:] = np.minimum(-values[:, 12] / values[:, 13], 0.0)
@@ -438,8 +437,9 @@ class _Group:
         contacts = data.contact
         elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
         if count and elliptic:
-            # MuJoCo scales the stiffness along the surface by the square of μ/mu
-            contacts.mu[first:] = np.maximum(friction, 1e-5).reshape(contacts.mu[first:].shape) / math.sqrt(_SHEAR)
+            # MuJoCo's cone wants the square of μ/mu as the stiffness along the surface, relative to that across it
+            mu = np.maximum(friction, 1e-5) / np.sqrt(values[:, 15] / values[:, 14])
+            contacts.mu[first:] = mu.reshape(contacts.mu[first:].shape)
         sizes = np.where(friction > 0.0, 3 if elliptic else 4, 1) if count else ()
         for size in set(sizes):
             mine = (sizes == size) & (contacts.efc_address[first:] >= 0)

@@ -17,6 +17,7 @@ import spts
 import spts.decoders
 import spts.envs
 from conftest import UPRIGHT
+from test_envs import Lift as Hand
 
 HOWS = {
     "copy": copy.copy,
@@ -285,26 +286,21 @@ MODEL = """<mujoco><option timestep="0.001"/><worldbody>
 </worldbody><actuator><position joint="lift" kp="1000" ctrlrange="-.1 .1"/></actuator></mujoco>"""
 
 
-class Lift(gym.Env):
-    """Somebody's environment, which copies as Python copies."""
+class Lift(Hand):
+    """Somebody's environment, which copies as Python copies, and draws random numbers."""
 
     def __init__(self):
-        self.model = mujoco.MjModel.from_xml_string(MODEL)
-        self.data = mujoco.MjData(self.model)
-        self.observation_space = gym.spaces.Box(-np.inf, np.inf, (self.model.nq,), np.float64)
-        self.action_space = gym.spaces.Box(-0.1, 0.1, (1,), np.float64)
+        super().__init__(text=MODEL)
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[3] += self.np_random.uniform(-0.01, 0.01)
         mujoco.mj_forward(self.model, self.data)
         return self.data.qpos.copy(), {}
 
     def step(self, action):
-        self.data.ctrl[:] = action
-        mujoco.mj_step(self.model, self.data, nstep=20)
-        return self.data.qpos.copy(), float(self.np_random.random()), False, False, {}
+        seen, _, *ends = super().step(action)
+        return seen, float(self.np_random.random()), *ends
 
 
 class BeginsAnew(Lift, gym.utils.EzPickle):

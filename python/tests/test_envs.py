@@ -86,8 +86,8 @@ HAND = """
 class Lift(gym.Env):
     """Somebody's environment: it knows nothing of skins."""
 
-    def __init__(self, integrator="implicitfast"):
-        self.model = mujoco.MjModel.from_xml_string(HAND.format(integrator=integrator))
+    def __init__(self, integrator="implicitfast", text=HAND):
+        self.model = mujoco.MjModel.from_xml_string(text.format(integrator=integrator))
         self.data = mujoco.MjData(self.model)
         self.observation_space = gym.spaces.Box(-np.inf, np.inf, (self.model.nq,), np.float64)
         self.action_space = gym.spaces.Box(-0.1, 0.1, (1,), np.float64)

@@ -366,8 +366,8 @@ def test_a_foot_stands_on_any_floor(asset, floor, bodies, mode):
 
 
 def test_contacts_at_corners_beside_the_skin():
-    """MuJoCo's contacts of a sole are its corners. A skin that has nearly all of the sole feels its weight; one that has a
-    quarter of it does not, as the rim carries the foot."""
+    """MuJoCo's contacts of a sole are its corners. A skin that has nearly all of the sole feels its weight; one that has
+    a quarter or a half of it does not, as the rim carries the foot."""
     model = mujoco.MjModel.from_xml_string(
         SOLE.format(asset="", floor='<geom type="plane" size="0 0 .1"/>', height=0.0205)
     )
@@ -670,8 +670,8 @@ def test_a_dog_is_dressed_and_stands(dog):
 
 @CONES
 def test_a_dog_stands_on_foam(cone):
-    """On foam under its feet and legs, at its own step of 2 ms, for 10 s: as high as on MuJoCo's contact but for the foam,
-    its weight within 0.5 %, and no chatter."""
+    """On foam under its feet, at its own step of 2 ms, for 10 s: as high as on MuJoCo's contact but for the foam, its
+    weight within 0.5 %, and no chatter."""
     model = mujoco.MjModel.from_xml_string(DOG.replace('timestep="0.002"', f'timestep="0.002" cone="{cone}"'))
     data, bare = mujoco.MjData(model), mujoco.MjData(model)
     feet = [f"{name}_foot" for name in ("fl", "fr", "bl", "br")]
