@@ -39,7 +39,7 @@ const MAX_ITERATIONS: usize = 25;
 /// without a tilt. The force is met to 1e-12 of it in either case.
 pub(crate) fn settle(law: &FoamLaw, columns: &mut [Column], force_n: f64) {
     let bed = Bed::of(law, columns);
-    let sunk_m = bed.sink([0.0; 2], 0.0, force_n, 1e-3);
+    let sunk_m = bed.sink([0.0; 2], 0.0, force_n, 0.05);
     let state = bed.tilt(sunk_m, force_n).unwrap_or([sunk_m, 0.0, 0.0]);
     let sunk_m = bed.sink([state[1], state[2]], state[0], force_n, TOLERANCE);
     for c in columns {
@@ -47,35 +47,28 @@ pub(crate) fn settle(law: &FoamLaw, columns: &mut [Column], force_n: f64) {
     }
 }
 
-/// Columns by their quantities, so that loops over them become vector instructions.
+/// What the balance needs of the columns: depth, m, places across the load, m, and area, m².
 struct Bed<'a> {
     law: &'a FoamLaw,
-    depth_m: Vec<f64>,
-    u_m: Vec<f64>,
-    v_m: Vec<f64>,
-    area_m2: Vec<f64>,
+    columns: Vec<[f64; 4]>,
 }
 
 impl<'a> Bed<'a> {
     fn of(law: &'a FoamLaw, columns: &[Column]) -> Self {
-        let all = |of: fn(&Column) -> f64| columns.iter().map(of).collect();
-        Self {
-            law,
-            depth_m: all(|c| c.depth_m),
-            u_m: all(|c| c.across_m[0]),
-            v_m: all(|c| c.across_m[1]),
-            area_m2: all(|c| c.area_m2),
-        }
+        let of = |c: &Column| [c.depth_m, c.across_m[0], c.across_m[1], c.area_m2];
+        Self { law, columns: columns.iter().map(of).collect() }
     }
 
     /// Force, N, and its slope with s, N/m.
     fn carried(&self, [a, b]: [f64; 2], s: f64) -> (f64, f64) {
         let (mut force, mut slope) = (0.0, 0.0);
-        let places = self.u_m.iter().zip(&self.v_m);
-        for ((depth, area), (u, v)) in self.depth_m.iter().zip(&self.area_m2).zip(places) {
-            let (p, k) = self.law.pressure_and_slope(depth + (s + (a * u + b * v)));
-            force += area * p;
-            slope += area * k;
+        for [depth, u, v, area] in &self.columns {
+            let depth = depth + (s + (a * u + b * v));
+            if depth > 0.0 {
+                let (p, k) = self.law.pressure_and_slope(depth);
+                force += area * p;
+                slope += area * k;
+            }
         }
         (force, slope)
     }
@@ -84,7 +77,7 @@ impl<'a> Bed<'a> {
     /// `from_m`: the force grows with it, and so does its slope.
     fn sink(&self, tilts: [f64; 2], from_m: f64, force_n: f64, tolerance: f64) -> f64 {
         let [a, b] = tilts;
-        let depths = self.depth_m.iter().zip(self.u_m.iter().zip(&self.v_m)).map(|(d, (u, v))| d + (a * u + b * v));
+        let depths = self.columns.iter().map(|[d, u, v, _]| d + (a * u + b * v));
         let (mut low, mut high) = (-depths.fold(f64::NEG_INFINITY, f64::max), f64::INFINITY);
         let mut s = from_m.max(low + 1e-6);
         for _ in 0..200 {
@@ -115,21 +108,23 @@ impl<'a> Bed<'a> {
 
     /// Shift and tilts at which force and moments are met; `None` if the tilts are not small.
     fn tilt(&self, sunk_m: f64, force_n: f64) -> Option<[f64; 3]> {
-        let places = || self.u_m.iter().zip(&self.v_m);
         // with all columns on one side of the axis, no tilt brings the resultant there
-        for across in [&self.u_m, &self.v_m] {
-            if across.iter().all(|a| *a > 0.0) || across.iter().all(|a| *a < 0.0) {
-                return None;
-            }
+        let all = |is: fn(&f64) -> bool, k: usize| self.columns.iter().all(|c| is(&c[k]));
+        if [1, 2].into_iter().any(|k| all(|at| *at > 0.0, k) || all(|at| *at < 0.0, k)) {
+            return None;
         }
-        let reach_m = places().map(|(u, v)| u.hypot(*v)).fold(0.0, f64::max);
+        let reach_m = self.columns.iter().map(|[_, u, v, _]| u * u + v * v).fold(0.0, f64::max).sqrt();
         // across in units of the reach: the three unknowns are lengths
         let per_m = 1.0 / reach_m;
         let at = |state: &Vector3<f64>| {
             let (mut gradient, mut sums) = ([0.0; 3], [0.0; 6]);
-            for ((depth, area), (u, v)) in self.depth_m.iter().zip(&self.area_m2).zip(places()) {
+            for [depth, u, v, area] in &self.columns {
                 let (u, v) = (u * per_m, v * per_m);
-                let (p, k) = self.law.pressure_and_slope(depth + (state.x + u * state.y + v * state.z));
+                let depth = depth + (state.x + u * state.y + v * state.z);
+                if depth <= 0.0 {
+                    continue;
+                }
+                let (p, k) = self.law.pressure_and_slope(depth);
                 let (p, k) = (area * p, area * k);
                 let parts = [p, p * u, p * v];
                 gradient.iter_mut().zip(parts).for_each(|(sum, part)| *sum += part);

@@ -231,7 +231,10 @@ impl TouchSkin {
     /// Mean pressure over every taxel's electrode, Pa, as the transducer sees it. On a curved skin it is the mean over
     /// the taxel's area.
     pub fn electrode_pressure(&self) -> &PressureMap {
-        &self.electrode_pressure
+        match self.surface {
+            Surface::Flat(_) => &self.electrode_pressure,
+            Surface::Curved(_) => &self.pressure,
+        }
     }
 
     /// Area of the skin under pressure, m².
@@ -258,10 +261,9 @@ impl TouchSkin {
                 (self.touched_m2, self.bottomed) = flat.touch(bodies, wrenches, maps);
             }
             Surface::Curved(field) => {
-                field.clear();
+                field.clear_with(self.pressure.values_mut());
                 wrenches.extend(bodies.iter().map(|(body, posed)| field.press(&body.solid, posed)));
-                field.points().means(field.pressure_pa(), self.pressure.values_mut());
-                self.electrode_pressure.values_mut().copy_from_slice(self.pressure.values());
+                field.add_means(self.pressure.values_mut());
                 self.touched_m2 = field.touched_m2();
                 self.bottomed = field.bottomed();
             }
@@ -273,11 +275,13 @@ impl TouchSkin {
     /// pressure × area is the sum of the forces to 1e-9 of it. Loads that are not positive, or not finite, are passed
     /// over.
     pub fn read(&mut self, loads: &[Carried<'_>]) {
-        self.pressure.values_mut().fill(0.0);
-        self.electrode_pressure.values_mut().fill(0.0);
         (self.touched_m2, self.bottomed) = (0.0, false);
-        if let Surface::Curved(field) = &mut self.surface {
-            field.clear();
+        match &mut self.surface {
+            Surface::Curved(field) => field.clear_with(self.pressure.values_mut()),
+            Surface::Flat(_) => {
+                self.pressure.values_mut().fill(0.0);
+                self.electrode_pressure.values_mut().fill(0.0);
+            }
         }
         for (number, load) in loads.iter().enumerate() {
             let finite = load.posed.is_finite() && load.centre_m.iter().all(|v| v.is_finite());
@@ -298,10 +302,9 @@ impl TouchSkin {
                 // it touches the rim
                 columns.extend(self.surface.column_at(centre));
             }
-            let nearest = columns
-                .iter()
-                .min_by(|a, b| (a.point_m - centre).length_squared().total_cmp(&(b.point_m - centre).length_squared()));
-            let Some(up) = load.along.map(Vector::from).or(nearest.map(|c| c.normal)) else { continue };
+            let away = |c: &Column| (c.point_m - centre).length_squared();
+            let nearest = || columns.iter().min_by(|a, b| away(a).total_cmp(&away(b))).map(|c| c.normal);
+            let Some(up) = load.along.map(Vector::from).or_else(nearest) else { continue };
             let u = up.any_orthonormal_vector();
             let v = up.cross(u);
             for c in columns.iter_mut() {
@@ -316,11 +319,11 @@ impl TouchSkin {
                     // two bodies in one place count twice
                     self.touched_m2 += flat.carry(columns, &law, maps);
                 }
-                Surface::Curved(field) => field.carry(columns, &law, self.pressure.values_mut()),
+                Surface::Curved(field) => field.carry(columns, &law),
             }
         }
         if let Surface::Curved(field) = &self.surface {
-            self.electrode_pressure.values_mut().copy_from_slice(self.pressure.values());
+            field.add_means(self.pressure.values_mut());
             (self.touched_m2, self.bottomed) = (field.touched_m2(), field.bottomed());
         }
     }

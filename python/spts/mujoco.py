@@ -32,6 +32,8 @@ from ._spts import Body, Mount, Mounts, Skin, Wire
 # off before: what is left is of the order of its square.
 _TRIALS, _OFF = 12, 0.05
 
+_ELLIPTIC = int(mujoco.mjtCone.mjCONE_ELLIPTIC)
+
 
 def attach(
     model,
@@ -158,25 +160,31 @@ class Attachment:
         self._felt_at = None
         self._each = None
         self._group = None
-        # whether every look is at the present moment of the data
-        self._follows = False
+        # whether `hook` is on
+        self._hooks = False
 
     @property
     def last(self):
         """The last touch; None before the first step. An error in a step of others is raised here."""
-        if self._failed is not None:
-            failed, self._failed = self._failed, None
-            raise failed
-        if self._follows and self.data.time != self._felt_at:
-            elapsed = self._elapsed()
-            (self._group or self._alone()).read(elapsed)
-        if self.data._address in _HOOKED and mujoco.get_mjcb_control() is not _control and self in _hooked(self.data):
-            raise RuntimeError("another `mjcb_control` has been set after `hook()`: set it before, or use `step`")
+        if self._hooks:
+            self._look()
         # what nothing touches is not read at every step
         idle = self._mount.catch_up(self._last)
         if idle is not None:
             self._last = idle
         return self._last
+
+    def _look(self):
+        """Brings what `hook` has asked for up to date."""
+        if self._failed is not None:
+            failed, self._failed = self._failed, None
+            raise failed
+        if self.mode == "sense":
+            if self._hooks and self.data.time != self._felt_at:
+                elapsed = self._elapsed()
+                (self._group or self._alone()).read(elapsed)
+        elif self in _hooked(self.data) and mujoco.get_mjcb_control() is not _control:
+            raise RuntimeError("another `mjcb_control` has been set after `hook()`: set it before, or use `step`")
 
     @property
     def pressure(self):
@@ -213,7 +221,7 @@ class Attachment:
                 raise ValueError(
                     '`each` needs mode "foam": in mode "sense" nothing is called in a step; look at `last` after it'
                 )
-            self._follows = True
+            self._hooks = True
             return
         if self.model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION:
             raise ValueError("`model.opt.disableflags` turns actuation off, and with it `mjcb_control`; use `step`")
@@ -223,11 +231,11 @@ class Attachment:
         hooked = _hooked(self.data)
         if self not in hooked:
             _HOOKED[self.data._address] = _Group([*hooked, self])
-        self._each = each
+        self._each, self._hooks = each, True
 
     def detach(self):
         """Ends the skin: MuJoCo's contact acts everywhere again, and `hook` has ended."""
-        self._follows = False
+        self._hooks = self._failed is not None
         hooked = _hooked(self.data)
         if self in hooked:
             hooked.remove(self)
@@ -322,6 +330,8 @@ class _Group:
         self.model, self.data, self.attachments = model, data, attachments
         self.foams = [k for k, a in enumerate(attachments) if a.mode == "foam"]
         # foam on foam: two layers, one behind the other, which one of the two skins carries
+        # skins that what is led by mocap presses
+        self._leading = [k for k, a in enumerate(attachments) if a._led]
         self._worn = {k: [] for k in range(len(attachments))}
         self._passed = {k: list(a._led) for k, a in enumerate(attachments)}
         for k in self.foams:
@@ -365,7 +375,7 @@ class _Group:
         """
         model, data = self.model, self.data
         dt, taken = model.opt.timestep, []
-        elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+        elliptic = self._elliptic()
         if data.ncon:
             contact = data.contact
             taken = self._mounts.foamed(contact, self.foams)
@@ -435,7 +445,7 @@ class _Group:
             contacts.friction[first:, :2] = np.maximum(friction, 1e-5)[:, None]
         mujoco.mj_makeConstraint(model, data)
         contacts = data.contact
-        elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+        elliptic = self._elliptic()
         if count and elliptic:
             # MuJoCo's cone wants the square of μ/mu as the stiffness along the surface, relative to that across it
             mu = np.maximum(friction, 1e-5) / np.sqrt(values[:, 15] / values[:, 14])
@@ -470,18 +480,20 @@ class _Group:
 
     def read(self, dt):
         """Lets the skins feel the contacts that the data has, `dt` s after the last time."""
-        model, data = self.model, self.data
-        elliptic = model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC
+        model, data, contact = self.model, self.data, self.data.contact
         springs = [spring[:2] for spring in self._springs]
         foamed = self._first if springs else data.ncon
         still = []
-        for k, attachment in enumerate(self.attachments):
-            if attachment._led:
-                others = [body for body in attachment.bodies if body not in attachment._led]
-                rows, bodies, _ = attachment._mount.supports(model.opt.timestep, elliptic, others)
-                still += [(k, body, row[:14].tolist()) for row, body in zip(rows, bodies)]
-        for k, touch in self._mounts.read(dt, data.contact, data.efc_force, elliptic, foamed, springs, still):
+        for k in self._leading:
+            attachment = self.attachments[k]
+            others = [body for body in attachment.bodies if body not in attachment._led]
+            rows, bodies, _ = attachment._mount.supports(model.opt.timestep, self._elliptic(), others)
+            still += [(k, body, row[:14].tolist()) for row, body in zip(rows, bodies)]
+        for k, touch in self._mounts.read(dt, contact, data.efc_force, self._elliptic(), foamed, springs, still):
             self.attachments[k]._last = touch
+
+    def _elliptic(self):
+        return int(self.model.opt.cone) == _ELLIPTIC
 
 
 def _settled(now, expected, before):

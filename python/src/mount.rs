@@ -4,12 +4,13 @@ use crate::args::Array2;
 use crate::body::Body;
 use crate::common::refuse;
 use crate::skin::{Load, Placed, Skin, Touch};
+use numpy::ndarray::{ArrayView1, ArrayView2};
 use numpy::{
     IntoPyArray as _, PyArray2, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods as _,
 };
 use pyo3::prelude::*;
 use spts::contact::{Support, Wrench};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 type Vector = [f64; 3];
 type Rotation = [Vector; 3];
@@ -23,7 +24,7 @@ pub(crate) struct Mount {
     /// Origin of the skin's frame in the link's, m, and how it is turned there.
     place: (Vector, Rotation),
     bodies: Vec<usize>,
-    shapes: Vec<Py<Body>>,
+    shapes: Arc<[Py<Body>]>,
     /// Root of the tree of every body.
     roots: Vec<usize>,
     arrays: Arrays,
@@ -95,7 +96,7 @@ impl Mount {
         if !fits || numbers.max().is_some_and(|most| most >= count) {
             bail!("`data` is not of this model");
         }
-        let (bodies, shapes) = bodies.into_iter().unzip();
+        let (bodies, shapes): (Vec<_>, Vec<_>) = bodies.into_iter().unzip();
         let [x, y, z, turn @ ..] = frame;
         let place = ([x, y, z], std::array::from_fn(|i| std::array::from_fn(|j| turn[3 * i + j])));
         Ok(Self {
@@ -103,7 +104,7 @@ impl Mount {
             link,
             place,
             bodies,
-            shapes,
+            shapes: shapes.into(),
             roots,
             arrays,
             friction: Mutex::default(),
@@ -127,24 +128,30 @@ impl Mount {
         passed: Vec<usize>,
         lined: Vec<Lining>,
     ) -> PyResult<(Array2<'py>, Vec<usize>, Near)> {
-        let poses = Poses::of(py, &self.arrays)?;
-        let (frame, origin) = self.frame(&poses);
         let (mut supports, mut carried) = (Vec::new(), Vec::new());
-        for (body, shape) in self.bodies.iter().zip(&self.shapes) {
-            if passed.contains(body) {
-                continue;
+        let (frame, origin) = self.arrays.look(py, |poses| {
+            let standing = self.standing(&poses);
+            for (body, shape) in self.bodies.iter().zip(&*self.shapes) {
+                if passed.contains(body) {
+                    continue;
+                }
+                let placed = self.placed(&poses, &standing, *body);
+                if !placed.is_finite() {
+                    bail!("body {body} has a pose or velocity that is not finite");
+                }
+                let lining = lining(&lined, *body);
+                let mut found = Vec::new();
+                if let Some(force_n) = self.skin.get().supports(py, shape.get(), &placed, lining, step, &mut found) {
+                    carried.push((*body, force_n));
+                    supports.extend(found.into_iter().map(|support| Sheared {
+                        body: *body,
+                        support,
+                        shear_n: [0.0; 3],
+                    }));
+                }
             }
-            let placed = self.placed(&poses, *body);
-            if !placed.is_finite() {
-                bail!("body {body} has a pose or velocity that is not finite");
-            }
-            let lining = lining(&lined, *body);
-            let mut found = Vec::new();
-            if let Some(force_n) = self.skin.get().supports(py, shape.get(), &placed, lining, step, &mut found) {
-                carried.push((*body, force_n));
-                supports.extend(found.into_iter().map(|support| Sheared { body: *body, support, shear_n: [0.0; 3] }));
-            }
-        }
+            Ok(standing)
+        })?;
         let mut friction = self.friction.lock().unwrap_or_else(PoisonError::into_inner);
         let (damping, (_, coefficient)) = (self.skin.get().damping(), self.skin.get().foam());
         share(&friction.held, coefficient, elliptic, &mut supports);
@@ -242,7 +249,7 @@ impl Mount {
         py: Python<'_>,
         dt: f64,
         loads: &[(usize, usize, f64)],
-        solved: &Solved<'_>,
+        solved: &Solved<'_, '_>,
         lined: &[Lining],
         still: &[(usize, [f64; 14])],
     ) -> PyResult<Option<Touch>> {
@@ -251,7 +258,7 @@ impl Mount {
         if clock.read && !clock.pressed && loads.is_empty() && still.is_empty() {
             return Ok(None);
         }
-        let known = self.loads(py, loads, solved, lined, still)?;
+        let known = self.loads(loads, solved, lined, still)?;
         let touch = self.skin.get().carried(py, &self.shapes, clock.idle_s, &known)?;
         *clock = Clock { idle_s: 0.0, pressed: touch.area > 0.0, read: true };
         Ok(Some(touch))
@@ -261,9 +268,8 @@ impl Mount {
     /// the skin, and the sign with which the contact's force is on that body.
     fn loads(
         &self,
-        py: Python<'_>,
         loads: &[(usize, usize, f64)],
-        solved: &Solved<'_>,
+        solved: &Solved<'_, '_>,
         lined: &[Lining],
         still: &[(usize, [f64; 14])],
     ) -> PyResult<Vec<Load>> {
@@ -271,9 +277,9 @@ impl Mount {
         if loads.is_empty() && still.is_empty() {
             return Ok(known);
         }
-        let poses = Poses::of(py, &self.arrays)?;
-        let (frame, origin) = self.frame(&poses);
-        let contact = &solved.contact;
+        let (contact, poses) = (&solved.contact, &solved.poses);
+        let standing = self.standing(poses);
+        let (frame, origin) = standing;
         let engine = loads.iter().map(|&(number, body, sign)| {
             let axes = rotation(&contact.frame, number);
             (body, row(&contact.pos, number), axes, sign, solved.of(number), number >= solved.foamed)
@@ -306,7 +312,7 @@ impl Mount {
                     load.wrench.torque_nm = plus(load.wrench.torque_nm, wrench.torque_nm);
                 }
                 None => {
-                    let (placed, lining) = (self.placed(&poses, body), lining(lined, body));
+                    let (placed, lining) = (self.placed(poses, &standing, body), lining(lined, body));
                     known.push(Load { body: at, placed, normal_n, centre_m, wrench, along: normal, lining });
                 }
             }
@@ -317,38 +323,35 @@ impl Mount {
     /// Keeps those of `loads` that the foam has. Where a body lies flat, an engine puts contacts at the corners of the
     /// surface that is shared, which may be beside the foam: one is felt if it has four fifths of the way to there from
     /// the middle of the body's contacts.
-    fn keep_felt(&self, py: Python<'_>, solved: &Solved<'_>, loads: &mut Vec<(usize, usize, f64)>) -> PyResult<()> {
-        let contact = &solved.contact;
-        let place = |number: usize| -> Vector { row(&contact.pos, number) };
-        let mut kept = Vec::with_capacity(loads.len());
-        for &(number, body, sign) in &*loads {
-            let (at, along) = (place(number), contact.along(number, sign));
-            let mut felt = self.pushes(py, at, along)?;
-            if !felt {
-                let same = loads.iter().filter(|(_, other, _)| *other == body);
-                let (sum, middle) = same.fold((0.0, [0.0; 3]), |(sum, middle), &(other, ..)| {
-                    let force_n = solved.of(other)[0].max(0.0);
-                    (sum + force_n, plus(middle, scaled(place(other), force_n)))
-                });
-                let middle = scaled(middle, 1.0 / sum);
-                felt = sum > 0.0 && self.pushes(py, plus(middle, scaled(minus(at, middle), 0.8)), along)?;
-            }
-            if felt {
-                kept.push((number, body, sign));
-            }
+    fn keep_felt(&self, solved: &Solved<'_, '_>, loads: &mut Vec<(usize, usize, f64)>) {
+        if loads.is_empty() {
+            return;
         }
-        *loads = kept;
-        Ok(())
+        let (contact, standing) = (&solved.contact, self.standing(&solved.poses));
+        let place = |number: usize| -> Vector { row(&contact.pos, number) };
+        let felt = |&(number, body, sign): &(usize, usize, f64)| {
+            let (at, along) = (place(number), contact.along(number, sign));
+            if self.pushes(&standing, at, along) {
+                return true;
+            }
+            let same = loads.iter().filter(|(_, other, _)| *other == body);
+            let (sum, middle) = same.fold((0.0, [0.0; 3]), |(sum, middle), &(other, ..)| {
+                let force_n = solved.of(other)[0].max(0.0);
+                (sum + force_n, plus(middle, scaled(place(other), force_n)))
+            });
+            let middle = scaled(middle, 1.0 / sum);
+            sum > 0.0 && self.pushes(&standing, plus(middle, scaled(minus(at, middle), 0.8)), along)
+        };
+        *loads = loads.iter().copied().filter(felt).collect();
     }
 
     /// Whether the foam has a place in the world where a body is pushed along a direction.
-    fn pushes(&self, py: Python<'_>, place: Vector, along: Vector) -> PyResult<bool> {
-        let (frame, origin) = self.frame(&Poses::of(py, &self.arrays)?);
-        Ok(self.skin.get().pushes(into(&frame, minus(place, origin)), into(&frame, along)))
+    fn pushes(&self, (frame, origin): &(Rotation, Vector), place: Vector, along: Vector) -> bool {
+        self.skin.get().pushes(into(frame, minus(place, *origin)), into(frame, along))
     }
 
     /// How the skin's frame is turned, and where it is, in the world's.
-    fn frame(&self, poses: &Poses<'_>) -> (Rotation, Vector) {
+    fn standing(&self, poses: &Poses<'_>) -> (Rotation, Vector) {
         let (carrier, (at, turn)) = (rotation(&poses.xmat, self.link), self.place);
         let columns: [Vector; 3] = std::array::from_fn(|j| turned(&carrier, turn.map(|row| row[j])));
         let origin = plus(row(&poses.xpos, self.link), turned(&carrier, at));
@@ -356,8 +359,7 @@ impl Mount {
     }
 
     /// A body in the skin's frame.
-    fn placed(&self, poses: &Poses<'_>, body: usize) -> Placed {
-        let (frame, origin) = self.frame(poses);
+    fn placed(&self, poses: &Poses<'_>, (frame, origin): &(Rotation, Vector), body: usize) -> Placed {
         // velocity of what moves with `body` at `at`: `cvel` is about the centre of mass of its tree, spin first
         let velocity = |body: usize, at: Vector| {
             let v: [f64; 6] = row(&poses.cvel, body);
@@ -370,31 +372,31 @@ impl Mount {
         let (carried, turning) = velocity(self.link, at);
         let own = rotation(&poses.xmat, body);
         Placed {
-            position_m: into(&frame, minus(at, origin)),
+            position_m: into(frame, minus(at, *origin)),
             rotation: std::array::from_fn(|i| std::array::from_fn(|j| (0..3).map(|k| frame[k][i] * own[k][j]).sum())),
-            velocity_m_per_s: into(&frame, minus(linear, carried)),
-            spin_rad_per_s: into(&frame, minus(spin, turning)),
+            velocity_m_per_s: into(frame, minus(linear, carried)),
+            spin_rad_per_s: into(frame, minus(spin, turning)),
         }
     }
 }
 
-/// The arrays of [`Arrays`], to read.
-struct Poses<'py> {
-    xpos: PyReadonlyArray2<'py, f64>,
-    xmat: PyReadonlyArray2<'py, f64>,
-    cvel: PyReadonlyArray2<'py, f64>,
-    subtree_com: PyReadonlyArray2<'py, f64>,
+/// Body poses and velocities of an `mjData`: of each array a row a body.
+#[derive(Clone, Copy)]
+struct Poses<'a> {
+    xpos: ArrayView2<'a, f64>,
+    xmat: ArrayView2<'a, f64>,
+    cvel: ArrayView2<'a, f64>,
+    subtree_com: ArrayView2<'a, f64>,
 }
 
-impl<'py> Poses<'py> {
-    fn of(py: Python<'py>, a: &Arrays) -> PyResult<Self> {
+impl Arrays {
+    /// Calls `look` with the present values.
+    fn look<T>(&self, py: Python<'_>, look: impl FnOnce(Poses<'_>) -> PyResult<T>) -> PyResult<T> {
         let read = |array: &Py<PyArray2<f64>>| array.bind(py).try_readonly().map_err(refuse);
-        Ok(Self {
-            xpos: read(&a.xpos)?,
-            xmat: read(&a.xmat)?,
-            cvel: read(&a.cvel)?,
-            subtree_com: read(&a.subtree_com)?,
-        })
+        let [xpos, xmat] = [read(&self.xpos)?, read(&self.xmat)?];
+        let [cvel, subtree_com] = [read(&self.cvel)?, read(&self.subtree_com)?];
+        let (xpos, xmat) = (xpos.as_array(), xmat.as_array());
+        look(Poses { xpos, xmat, cvel: cvel.as_array(), subtree_com: subtree_com.as_array() })
     }
 }
 
@@ -415,6 +417,31 @@ struct Contacts<'py> {
 }
 
 impl Contacts<'_> {
+    fn seen(&self) -> Seen<'_> {
+        Seen {
+            geom: self.geom.as_array(),
+            pos: self.pos.as_array(),
+            frame: self.frame.as_array(),
+            friction: self.friction.as_array(),
+            dim: self.dim.as_array(),
+            efc_address: self.efc_address.as_array(),
+            exclude: self.exclude.as_array(),
+        }
+    }
+}
+
+/// What [`Contacts`] holds.
+struct Seen<'a> {
+    geom: ArrayView2<'a, i32>,
+    pos: ArrayView2<'a, f64>,
+    frame: ArrayView2<'a, f64>,
+    friction: ArrayView2<'a, f64>,
+    dim: ArrayView1<'a, i32>,
+    efc_address: ArrayView1<'a, i32>,
+    exclude: ArrayView1<'a, i32>,
+}
+
+impl Seen<'_> {
     /// The normal of a contact, times `sign`.
     fn along(&self, number: usize, sign: f64) -> Vector {
         let [x, y, z, ..]: [f64; 9] = row(&self.frame, number);
@@ -453,16 +480,15 @@ impl Mounts {
 
     /// Numbers of the contacts that lie in the foam of one of `skins`, of those that are not excluded.
     fn foamed(&self, py: Python<'_>, contact: Contacts<'_>, skins: Vec<usize>) -> PyResult<Vec<usize>> {
-        let exclude = contact.exclude.as_array();
-        let mut found = Vec::new();
-        for (number, _) in exclude.iter().enumerate().filter(|(_, exclude)| **exclude == 0) {
-            let mut any = false;
-            self.felt_by(py, &contact, number, |k, _, _| any |= skins.contains(&k))?;
-            if any {
-                found.push(number);
-            }
-        }
-        Ok(found)
+        let contact = contact.seen();
+        self.arrays().look(py, |poses| {
+            let is_foam = |number: &usize| {
+                let mut any = false;
+                self.felt_by(&poses, &contact, *number, |k, _, _| any |= skins.contains(&k));
+                any
+            };
+            Ok((0..contact.exclude.len()).filter(|n| contact.exclude[*n] == 0).filter(is_foam).collect())
+        })
     }
 
     /// What the skins feel of the contacts that act, `dt` s after the last time: number and touch of those that
@@ -481,63 +507,63 @@ impl Mounts {
         springs: Vec<(usize, usize)>,
         still: Vec<(usize, usize, [f64; 14])>,
     ) -> PyResult<Vec<(usize, Touch)>> {
-        let mut loads = vec![Vec::new(); self.mounts.len()];
-        let (address, exclude) = (contact.efc_address.as_array(), contact.exclude.as_array());
-        let acting: Vec<bool> =
-            address.iter().zip(exclude).map(|(address, exclude)| *address >= 0 && *exclude == 0).collect();
-        for number in (0..foamed.min(acting.len())).filter(|n| acting[*n]) {
-            self.meets(&contact, number, |k, body, sign| loads[k].push((number, body, sign)));
-        }
-        let solved = Solved { contact, forces, elliptic, foamed };
-        for (mount, loads) in self.mounts.iter().zip(&mut loads) {
-            mount.get().keep_felt(py, &solved, loads)?;
-        }
-        for (number, (k, body)) in (foamed..acting.len()).zip(springs).filter(|(n, _)| acting[*n]) {
-            let link = self.mounts[k].get().link;
-            loads[k].push((number, body, 1.0));
-            // and that of the body, if it is not of the same link
-            self.felt_by(py, &solved.contact, number, |other, _, sign| {
-                if self.mounts[other].get().link != link {
-                    loads[other].push((number, link, sign));
-                }
-            })?;
-        }
-        let mut felt = Vec::new();
-        for (k, mount) in self.mounts.iter().enumerate() {
-            let still: Vec<_> = still.iter().filter(|(n, ..)| *n == k).map(|(_, body, row)| (*body, *row)).collect();
-            if let Some(touch) = mount.get().read(py, dt, &loads[k], &solved, &self.worn[k], &still)? {
-                felt.push((k, touch));
+        self.arrays().look(py, |poses| {
+            let (contact, forces) = (contact.seen(), forces.as_array());
+            let solved = Solved { contact, forces, poses, elliptic, foamed };
+            let contact = &solved.contact;
+            let mut loads = vec![Vec::new(); self.mounts.len()];
+            let acts = |number: &usize| contact.efc_address[*number] >= 0 && contact.exclude[*number] == 0;
+            let all = contact.efc_address.len();
+            for number in (0..foamed.min(all)).filter(acts) {
+                self.meets(contact, number, |k, body, sign| loads[k].push((number, body, sign)));
             }
-        }
-        Ok(felt)
+            for (mount, loads) in self.mounts.iter().zip(&mut loads) {
+                mount.get().keep_felt(&solved, loads);
+            }
+            for (number, (k, body)) in (foamed..all).zip(springs).filter(|(n, _)| acts(n)) {
+                let link = self.mounts[k].get().link;
+                loads[k].push((number, body, 1.0));
+                // and that of the body, if it is not of the same link
+                self.felt_by(&poses, contact, number, |other, _, sign| {
+                    if self.mounts[other].get().link != link {
+                        loads[other].push((number, link, sign));
+                    }
+                });
+            }
+            let mut felt = Vec::with_capacity(self.mounts.len());
+            for (k, mount) in self.mounts.iter().enumerate() {
+                let still: Vec<_> =
+                    still.iter().filter(|(n, ..)| *n == k).map(|(_, body, row)| (*body, *row)).collect();
+                if let Some(touch) = mount.get().read(py, dt, &loads[k], &solved, &self.worn[k], &still)? {
+                    felt.push((k, touch));
+                }
+            }
+            Ok(felt)
+        })
     }
 }
 
 impl Mounts {
+    /// The arrays of the data that all have.
+    fn arrays(&self) -> &Arrays {
+        &self.mounts[0].get().arrays
+    }
+
     /// Calls `each` with every skin whose foam has the contact, the body that it feels, and the sign with which the
     /// contact's force is on that body: the contact's normal points from its first geom to its second.
-    fn felt_by(
-        &self,
-        py: Python<'_>,
-        contact: &Contacts<'_>,
-        number: usize,
-        mut each: impl FnMut(usize, usize, f64),
-    ) -> PyResult<()> {
-        let mut met = Vec::new();
-        self.meets(contact, number, |k, body, sign| met.push((k, body, sign)));
-        for (k, body, sign) in met {
-            if self.mounts[k].get().pushes(py, row(&contact.pos, number), contact.along(number, sign))? {
+    fn felt_by(&self, poses: &Poses<'_>, contact: &Seen<'_>, number: usize, mut each: impl FnMut(usize, usize, f64)) {
+        self.meets(contact, number, |k, body, sign| {
+            let mount = self.mounts[k].get();
+            if mount.pushes(&mount.standing(poses), row(&contact.pos, number), contact.along(number, sign)) {
                 each(k, body, sign);
             }
-        }
-        Ok(())
+        });
     }
 
     /// As [`Mounts::felt_by`], wherever on the skin's link the contact is.
-    fn meets(&self, contact: &Contacts<'_>, number: usize, mut each: impl FnMut(usize, usize, f64)) {
-        let geoms = contact.geom.as_array();
+    fn meets(&self, contact: &Seen<'_>, number: usize, mut each: impl FnMut(usize, usize, f64)) {
         // a flex has no geom
-        let [Ok(one), Ok(other)] = [geoms[[number, 0]], geoms[[number, 1]]].map(usize::try_from) else { return };
+        let [Ok(one), Ok(other)] = [0, 1].map(|k| usize::try_from(contact.geom[[number, k]])) else { return };
         for (own, pressed, sign) in [(one, other, 1.0), (other, one, -1.0)] {
             for &k in self.owners[own].iter().filter(|k| self.others[**k][pressed]) {
                 each(k, self.geom_bodies[pressed], sign);
@@ -546,35 +572,33 @@ impl Mounts {
     }
 }
 
-/// Contacts, and what the engine made of them.
-struct Solved<'py> {
-    contact: Contacts<'py>,
+/// Contacts, what the engine made of them, and where the bodies are.
+struct Solved<'a, 'b> {
+    contact: Seen<'a>,
     /// Forces of all constraints.
-    forces: PyReadonlyArray1<'py, f64>,
+    forces: ArrayView1<'a, f64>,
+    poses: Poses<'b>,
     elliptic: bool,
     /// The first contact that stands for foam.
     foamed: usize,
 }
 
-impl Solved<'_> {
+impl Solved<'_, '_> {
     /// Force, N, and torque, N m, along the rows of a contact's frame.
     fn of(&self, number: usize) -> [f64; 6] {
         let c = &self.contact;
-        let (Ok(at), Ok(dim)) =
-            (usize::try_from(c.efc_address.as_array()[number]), usize::try_from(c.dim.as_array()[number]))
-        else {
+        let (Ok(at), Ok(dim)) = (usize::try_from(c.efc_address[number]), usize::try_from(c.dim[number])) else {
             return [0.0; 6];
         };
-        let (forces, friction) = (self.forces.as_array(), c.friction.as_array());
         let mut out = [0.0; 6];
         if self.elliptic || dim == 1 {
-            out.iter_mut().take(dim).enumerate().for_each(|(k, f)| *f = forces[at + k]);
+            out.iter_mut().take(dim).enumerate().for_each(|(k, f)| *f = self.forces[at + k]);
             return out;
         }
         for k in 1..dim.min(6) {
-            let [one, other] = [forces[at + 2 * k - 2], forces[at + 2 * k - 1]];
+            let [one, other] = [self.forces[at + 2 * k - 2], self.forces[at + 2 * k - 1]];
             out[0] += one + other;
-            out[k] = (one - other) * friction[[number, k - 1]];
+            out[k] = (one - other) * c.friction[[number, k - 1]];
         }
         out
     }
@@ -659,12 +683,11 @@ fn tangents(normal: Vector) -> Rotation {
     [normal, x, cross(normal, x)]
 }
 
-fn row<const N: usize>(array: &PyReadonlyArray2<'_, f64>, index: usize) -> [f64; N] {
-    let array = array.as_array();
+fn row<const N: usize>(array: &ArrayView2<'_, f64>, index: usize) -> [f64; N] {
     std::array::from_fn(|k| array[[index, k]])
 }
 
-fn rotation(array: &PyReadonlyArray2<'_, f64>, index: usize) -> Rotation {
+fn rotation(array: &ArrayView2<'_, f64>, index: usize) -> Rotation {
     let flat: [f64; 9] = row(array, index);
     std::array::from_fn(|i| std::array::from_fn(|j| flat[3 * i + j]))
 }

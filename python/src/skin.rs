@@ -3,6 +3,7 @@
 use crate::args::{Array1, Array2, PoseIn, checked_twist, one_of, triples, triples_out, whole};
 use crate::body::Body;
 use crate::common::{of_toml, refuse, to_toml};
+use numpy::ndarray::Array;
 use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -209,7 +210,7 @@ impl Skin {
         {
             bail!("`twists` has {stray}, which has no pose");
         }
-        self.touched(py, &keys, &placed, dt)
+        self.touched(py, &keys.into(), &placed, dt)
     }
 
     /// Rows and columns of taxels.
@@ -402,7 +403,7 @@ fn new_id() -> u64 {
 
 impl Skin {
     /// Puts `bodies` on the skin.
-    fn touched(&self, py: Python<'_>, bodies: &[Py<Body>], placed: &[Placed], dt: f64) -> PyResult<Touch> {
+    fn touched(&self, py: Python<'_>, bodies: &Arc<[Py<Body>]>, placed: &[Placed], dt: f64) -> PyResult<Touch> {
         let pairs: Vec<_> = bodies.iter().map(Py::get).zip(placed).collect();
         self.felt(py, bodies, dt, |skin| {
             let posed: Vec<_> = pairs.iter().map(|(body, placed)| (&body.body, placed.of(body))).collect();
@@ -413,7 +414,7 @@ impl Skin {
     }
 
     /// What the skin feels of loads by those of `bodies` that something else carries.
-    pub(crate) fn carried(&self, py: Python<'_>, bodies: &[Py<Body>], dt: f64, loads: &[Load]) -> PyResult<Touch> {
+    pub(crate) fn carried(&self, py: Python<'_>, bodies: &Arc<[Py<Body>]>, dt: f64, loads: &[Load]) -> PyResult<Touch> {
         let pressing: Vec<_> = loads.iter().map(|load| bodies[load.body].get()).collect();
         self.felt(py, bodies, dt, |skin| {
             let carried = loads.iter().zip(pressing).map(|(load, body)| {
@@ -461,7 +462,7 @@ impl Skin {
     fn felt(
         &self,
         py: Python<'_>,
-        bodies: &[Py<Body>],
+        bodies: &Arc<[Py<Body>]>,
         dt: f64,
         act: impl FnOnce(&mut TouchSkin) -> Vec<(usize, Wrench)> + Send,
     ) -> PyResult<Touch> {
@@ -479,9 +480,12 @@ impl Skin {
             (wrenches, values, felt, scalars, (state.touches, state.skin.bottomed()))
         });
         Ok(Touch {
-            pressure: values.into_pyarray(py).reshape([felt.rows(), felt.cols()])?.unbind(),
+            pressure: Array::from_shape_vec([felt.rows(), felt.cols()], values)
+                .map_err(refuse)?
+                .into_pyarray(py)
+                .unbind(),
             wrenches: OnceLock::new(),
-            loads: Arc::new((bodies.iter().map(|body| body.clone_ref(py)).collect(), wrenches)),
+            loads: Arc::new((bodies.clone(), wrenches)),
             area,
             time,
             number,
@@ -540,7 +544,7 @@ impl Skin {
 }
 
 /// All bodies, and the wrenches on those that have one, by their places in the list.
-type Loads = (Vec<Py<Body>>, Vec<(usize, Wrench)>);
+type Loads = (Arc<[Py<Body>]>, Vec<(usize, Wrench)>);
 
 /// What the skin feels at one moment.
 #[pyclass(frozen, module = "spts")]

@@ -1,7 +1,7 @@
 //! Foam on a surface of any shape.
 
 use super::points::SurfacePoints;
-use super::solid::Solid;
+use super::solid::{Solid, Standing};
 use crate::balance::Column;
 use crate::field::{PosedMesh, Wrench};
 use crate::foam::{Foam, FoamLaw};
@@ -9,6 +9,7 @@ use crate::mesh::span;
 use crate::traction::velocity_at;
 use parry3d_f64::math::Vector;
 use spts_input::Refusal;
+use std::ops::Range;
 
 /// Independent columns of foam along the normals of a surface, under any number of bodies.
 ///
@@ -39,52 +40,107 @@ use spts_input::Refusal;
 pub struct SurfaceField {
     config: Foam,
     points: SurfacePoints,
+    /// Pressure at every point, Pa, and the points that have one.
     pressure_pa: Vec<f64>,
+    touched: Vec<usize>,
     bottomed: bool,
     /// Lowest and highest corner of the foam, m.
     bounds_m: [[f64; 3]; 2],
-    blocks: Vec<Block>,
+    tree: Tree,
+    near: Vec<Near>,
 }
 
-/// Neighbouring points, by their numbers, and a ball around them.
+/// The columns that were near a body where it stood once, with those a little farther away: they hold as long as it has
+/// hardly moved (L. Verlet, Physical Review 159 (1967) 98).
 #[derive(Debug, Clone)]
-struct Block {
-    points: Vec<usize>,
+struct Near {
+    solid: Solid,
+    /// How the body was turned, and where the middle of the skin was in its axes, m.
+    rotation: [Vector; 3],
+    middle_m: Vector,
+    /// Distance up to which it was looked for points, m.
+    reach_m: f64,
+    /// Places of the columns in the tree.
+    columns: Vec<usize>,
+}
+
+/// Most bodies of which is known what is near.
+const KNOWN: usize = 32;
+
+/// The columns under the points of a skin, neighbours together, in a tree of balls around them.
+#[derive(Debug, Clone)]
+struct Tree {
+    columns: Vec<Column>,
+    /// Each before those below it.
+    nodes: Vec<Node>,
+}
+
+/// Neighbouring points, and a ball and a box around them.
+#[derive(Debug, Clone)]
+struct Node {
+    columns: Range<usize>,
+    /// Number of the next node that is not below this one.
+    after: usize,
     centre_m: Vector,
     radius_m: f64,
+    /// Half sides of the box, m.
+    half_m: Vector,
     /// Side of a square of the largest area of a point, m.
     side_m: f64,
 }
 
-/// Most points of a block.
-const BLOCK: usize = 32;
+/// Most points of a node without others below it.
+const LEAF: usize = 8;
 
-impl Block {
-    /// Adds `points` in blocks to `out`: halves along the longest side of the box around them, over and over.
-    fn divide(mut points: Vec<usize>, all: &SurfacePoints, out: &mut Vec<Self>) {
-        if points.len() <= BLOCK {
-            points.sort_unstable();
-            out.push(Self::of(points, all));
-            return;
-        }
-        let [low, high] = span(points.iter().map(|k| all.positions_m[*k]));
-        let side = |k: &usize| high[*k] - low[*k];
-        let axis = (0..3).max_by(|a, b| side(a).total_cmp(&side(b))).unwrap_or(0);
-        let at = |k: &usize| all.positions_m[*k][axis];
-        // those at one place in the order of their numbers, so that it does not depend on how they are sorted
-        let half = points.len() / 2;
-        points.select_nth_unstable_by(half, |a, b| at(a).total_cmp(&at(b)).then(a.cmp(b)));
-        let upper = points.split_off(half);
-        Self::divide(points, all, out);
-        Self::divide(upper, all, out);
+impl Tree {
+    fn of(points: &SurfacePoints) -> Self {
+        let column = |k: usize| {
+            let [point, normal] = [points.positions_m[k], points.normals[k]].map(Vector::from);
+            Column::new(k, point, normal, points.areas_m2[k], 0.0)
+        };
+        let mut tree = Self { columns: (0..points.len()).map(column).collect(), nodes: Vec::new() };
+        tree.divide(0..points.len());
+        tree
     }
 
-    fn of(points: Vec<usize>, all: &SurfacePoints) -> Self {
-        let places = || points.iter().map(|k| Vector::from(all.positions_m[*k]));
-        let centre_m = places().fold(Vector::ZERO, |sum, p| sum + p) / points.len() as f64;
-        let radius_m = places().map(|p| (p - centre_m).length()).fold(0.0, f64::max);
-        let side_m = points.iter().map(|k| all.areas_m2[*k]).fold(0.0, f64::max).sqrt();
-        Self { points, centre_m, radius_m, side_m }
+    /// Adds a node with these columns and, if they are many, one for either half along the longest side of the box
+    /// around them.
+    fn divide(&mut self, range: Range<usize>) {
+        let columns = &mut self.columns[range.clone()];
+        let [low, high] = span(columns.iter().map(|c| c.point_m.into())).map(Vector::from);
+        let (centre_m, half_m) = (0.5 * (low + high), 0.5 * (high - low));
+        let radius_m = columns.iter().map(|c| (c.point_m - centre_m).length()).fold(0.0, f64::max);
+        let side_m = columns.iter().map(|c| c.area_m2).fold(0.0, f64::max).sqrt();
+        let number = self.nodes.len();
+        self.nodes.push(Node { columns: range.clone(), after: number + 1, centre_m, radius_m, half_m, side_m });
+        if columns.len() <= LEAF {
+            columns.sort_unstable_by_key(|c| c.index);
+            return;
+        }
+        let axis = (0..3).max_by(|a, b| half_m[*a].total_cmp(&half_m[*b])).unwrap_or(0);
+        // those at one place in the order of their numbers, so that it does not depend on how they are sorted
+        let half = columns.len() / 2;
+        columns.select_nth_unstable_by(half, |a, b| {
+            a.point_m[axis].total_cmp(&b.point_m[axis]).then(a.index.cmp(&b.index))
+        });
+        self.divide(range.start..range.start + half);
+        self.divide(range.start + half..range.end);
+        self.nodes[number].after = self.nodes.len();
+    }
+
+    /// Calls `see` with the columns of every node that is not far and has no others below it, and the place of the first
+    /// in the tree, until it returns `true`; whether it did.
+    fn visit(&self, is_far: impl Fn(&Node) -> bool, mut see: impl FnMut(usize, &[Column]) -> bool) -> bool {
+        let mut number = 0;
+        while let Some(node) = self.nodes.get(number) {
+            number += 1;
+            if is_far(node) {
+                number = node.after;
+            } else if node.after == number && see(node.columns.start, &self.columns[node.columns.clone()]) {
+                return true;
+            }
+        }
+        false
     }
 }
 
@@ -103,9 +159,8 @@ impl SurfaceField {
                 bounds_m[1][k] = bounds_m[1][k].max(point[k]).max(base_m);
             }
         }
-        let mut blocks = Vec::new();
-        Block::divide((0..points.len()).collect(), &points, &mut blocks);
-        Ok(Self { pressure_pa: vec![0.0; points.len()], bottomed: false, bounds_m, blocks, config, points })
+        let (tree, pressure_pa) = (Tree::of(&points), vec![0.0; points.len()]);
+        Ok(Self { pressure_pa, touched: Vec::new(), bottomed: false, bounds_m, tree, near: Vec::new(), config, points })
     }
 
     /// The sample points.
@@ -120,8 +175,7 @@ impl SurfaceField {
 
     /// Area of the points under pressure, m².
     pub fn touched_m2(&self) -> f64 {
-        let pressed = self.pressure_pa.iter().zip(&self.points.areas_m2);
-        pressed.filter(|(p, _)| **p > 0.0).map(|(_, area)| area).sum()
+        self.touched.iter().map(|k| self.points.areas_m2[*k]).sum()
     }
 
     /// Whether a body has gone through the foam since [`SurfaceField::clear`].
@@ -133,65 +187,111 @@ impl SurfaceField {
     /// a body is pushed there, `along` (length 1), whether the foam could push it so.
     pub(crate) fn covers(&self, place_m: [f64; 3], along: Option<[f64; 3]>) -> bool {
         let (place, h, along) = (Vector::from(place_m), self.config.thickness_m, along.map(Vector::from));
-        let p = &self.points;
-        let near = |block: &&Block| {
-            let reach_m = block.radius_m + 2.0 * (h + block.side_m);
-            (place - block.centre_m).length_squared() <= reach_m * reach_m
+        let is_far = |node: &Node| {
+            // beside it by a side, and above by as much as below
+            let reach_m = node.radius_m + 1.5 * (h + node.side_m);
+            (place - node.centre_m).length_squared() > reach_m * reach_m
         };
-        self.blocks.iter().filter(near).flat_map(|block| &block.points).any(|&k| {
-            let (away, normal, area_m2) =
-                (place - Vector::from(p.positions_m[k]), Vector::from(p.normals[k]), p.areas_m2[k]);
-            // within the side of a square of the point's area: what touches right on the rim is on the foam; between
-            // points of a round skin, the surface is off their planes
-            let (height, bend) = (away.dot(normal), along.map_or(0.0, |_| 0.5 * area_m2.sqrt()));
-            (-1.5 * h - bend..=0.5 * h + bend).contains(&height)
-                && (away - normal * height).length_squared() <= area_m2
-                && along.is_none_or(|along| along.dot(normal) > 0.2)
+        self.tree.visit(is_far, |_, columns| {
+            columns.iter().any(|c| {
+                let (away, normal) = (place - c.point_m, c.normal);
+                // within the side of a square of the point's area: what touches right on the rim is on the foam; between
+                // points of a round skin, the surface is off their planes
+                let (height, bend) = (away.dot(normal), along.map_or(0.0, |_| 0.5 * c.area_m2.sqrt()));
+                (-1.5 * h - bend..=0.5 * h + bend).contains(&height)
+                    && (away - normal * height).length_squared() <= c.area_m2
+                    && along.is_none_or(|along| along.dot(normal) > 0.2)
+            })
         })
     }
 
     /// Removes all bodies.
     pub fn clear(&mut self) {
-        self.pressure_pa.fill(0.0);
+        self.touched.drain(..).for_each(|k| self.pressure_pa[k] = 0.0);
         self.bottomed = false;
     }
 
+    /// As [`SurfaceField::clear`], with the taxels of `means` that [`SurfaceField::add_means`] has written.
+    pub(crate) fn clear_with(&mut self, means: &mut [f64]) {
+        self.touched.iter().for_each(|k| means[self.points.taxels[*k] as usize] = 0.0);
+        self.clear();
+    }
+
+    /// Adds the mean pressure over every taxel's area to `means`.
+    pub(crate) fn add_means(&self, means: &mut [f64]) {
+        for k in &self.touched {
+            let (taxel, area_m2) = (self.points.taxels[*k] as usize, self.points.areas_m2[*k]);
+            means[taxel] += self.pressure_pa[*k] * area_m2 / self.points.taxel_areas_m2()[taxel];
+        }
+    }
+
     /// The columns under a body and up to `gap_m` below it, along their normals.
-    pub(crate) fn columns_under(&self, body: &PosedMesh<'_>, solid: &Solid, gap_m: f64, out: &mut Vec<Column>) {
+    pub(crate) fn columns_under(&mut self, body: &PosedMesh<'_>, solid: &Solid, gap_m: f64, out: &mut Vec<Column>) {
         out.clear();
         let (standing, h) = (solid.standing(body), self.config.thickness_m);
         if standing.is_apart([self.bounds_m[0].map(|v| v - gap_m), self.bounds_m[1].map(|v| v + gap_m)]) {
             return;
         }
-        let p = &self.points;
-        for block in self.blocks.iter().filter(|block| !standing.is_far(block.centre_m, block.radius_m + h + gap_m)) {
-            for &k in &block.points {
-                let (point, normal) = (Vector::from(p.positions_m[k]), Vector::from(p.normals[k]));
-                if let Some(depth_m) = standing.front_m(point - normal * h, normal, h, gap_m) {
-                    out.push(Column::new(k, point, normal, p.areas_m2[k], depth_m));
-                }
+        let near = self.near(body, &standing, h + gap_m);
+        out.extend(self.near[near].columns.iter().filter_map(|k| {
+            let c = &self.tree.columns[*k];
+            let depth_m = standing.front_m(c.point_m - c.normal * h, c.normal, h, gap_m)?;
+            Some(Column { depth_m, ..*c })
+        }));
+    }
+
+    /// Which of `self.near` has the columns whose points may be within `reach_m` of a body.
+    fn near(&mut self, body: &PosedMesh<'_>, standing: &Standing<'_>, reach_m: f64) -> usize {
+        let [low, high] = self.bounds_m.map(Vector::from);
+        let rotation = body.rotation.map(Vector::from);
+        let away = 0.5 * (low + high) - Vector::from(body.position_m);
+        let middle_m = rotation[0] * away.x + rotation[1] * away.y + rotation[2] * away.z;
+        let known = self.near.iter().position(|near| near.solid.is(standing.solid()));
+        if let Some(known) = known {
+            let near = &self.near[known];
+            // by the Frobenius norm of the difference, no point has moved farther
+            let turned: f64 = (0..3).map(|k| (rotation[k] - near.rotation[k]).length_squared()).sum();
+            let moved_m = (middle_m - near.middle_m).length() + turned.sqrt() * 0.5 * (high - low).length();
+            if moved_m + reach_m <= near.reach_m && near.reach_m <= 4.0 * reach_m {
+                return known;
             }
         }
+        let known = known.unwrap_or_else(|| {
+            if self.near.len() == KNOWN {
+                self.near.remove(0);
+            }
+            let (solid, columns) = (standing.solid().clone(), Vec::new());
+            self.near.push(Near { solid, rotation, middle_m, reach_m, columns });
+            self.near.len() - 1
+        });
+        let near = &mut self.near[known];
+        (near.rotation, near.middle_m) = (rotation, middle_m);
+        near.reach_m = reach_m + 0.3 * self.config.thickness_m;
+        near.columns.clear();
+        let reach_m = near.reach_m;
+        self.tree.visit(
+            |node| standing.is_far(node.centre_m, node.radius_m, node.half_m, reach_m),
+            |first, columns| {
+                let is_near = |c: &Column| !standing.is_far(c.point_m, 0.0, Vector::ZERO, reach_m);
+                let numbered = columns.iter().enumerate().filter(|(_, c)| is_near(c));
+                near.columns.extend(numbered.map(|(k, _)| first + k));
+                false
+            },
+        );
+        known
     }
 
     /// The column nearest to a place, m.
     pub(crate) fn column_at(&self, place_m: Vector) -> Option<Column> {
-        let away = |point: &[f64; 3]| (Vector::from(*point) - place_m).length_squared();
-        let points = self.points.positions_m.iter().enumerate();
-        let (index, point) = points.min_by(|(_, a), (_, b)| away(a).total_cmp(&away(b)))?;
-        let normal = Vector::from(self.points.normals[index]);
-        Some(Column::new(index, Vector::from(*point), normal, self.points.areas_m2[index], 0.0))
+        let away = |c: &Column| (c.point_m - place_m).length_squared();
+        self.tree.columns.iter().min_by(|a, b| away(a).total_cmp(&away(b)).then(a.index.cmp(&b.index))).copied()
     }
 
-    /// Adds the pressures of `columns` at their depths to those since [`SurfaceField::clear`], and their means over the
-    /// taxels to `means`.
-    pub(crate) fn carry(&mut self, columns: &[Column], law: &FoamLaw, means: &mut [f64]) {
+    /// Adds the pressures of `columns` at their depths to those since [`SurfaceField::clear`].
+    pub(crate) fn carry(&mut self, columns: &[Column], law: &FoamLaw) {
         for c in columns {
             self.bottomed |= c.depth_m > self.config.thickness_m;
-            let p = law.pressure_pa(c.depth_m);
-            self.pressure_pa[c.index] += p;
-            let (taxel, area_m2) = (self.points.taxels[c.index] as usize, self.points.areas_m2[c.index]);
-            means[taxel] += p * area_m2 / self.points.taxel_areas_m2()[taxel];
+            add(&mut self.pressure_pa, &mut self.touched, c.index, law.pressure_pa(c.depth_m));
         }
     }
 
@@ -206,31 +306,40 @@ impl SurfaceField {
         if standing.is_apart(self.bounds_m) {
             return Wrench::NONE;
         }
+        let near = self.near(body, &standing, self.config.thickness_m);
         let c = &self.config;
         let law = c.law(body.stiffness_pa_per_m);
         let regular = c.friction_speed_m_per_s * c.friction_speed_m_per_s;
         let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
         let centre = Vector::from(body.centre_of_mass_m);
-        let points = self.points.positions_m.iter().zip(&self.points.normals);
-        let loads = self.points.areas_m2.iter().zip(&mut self.pressure_pa);
-        for ((point, normal), (area, pressure_pa)) in points.zip(loads) {
-            let (point, normal) = (Vector::from(*point), Vector::from(*normal));
-            let depth_m = standing.depth_m(point - normal * c.thickness_m, normal, c.thickness_m);
+        for k in &self.near[near].columns {
+            let Column { index, point_m, normal, area_m2, .. } = self.tree.columns[*k];
+            let depth_m = standing.depth_m(point_m - normal * c.thickness_m, normal, c.thickness_m);
             if depth_m <= 0.0 {
                 continue;
             }
             self.bottomed |= depth_m > c.thickness_m;
-            let arm = point - normal * depth_m - centre;
+            let arm = point_m - normal * depth_m - centre;
             let velocity = Vector::from(velocity_at(body, arm.into()));
             let away = velocity.dot(normal);
             let p = law.pressure_pa(depth_m - c.damping_s * away);
             let slide = velocity - normal * away;
             let drag = -c.friction * p / (slide.length_squared() + regular).sqrt();
-            let load = (normal * p + slide * drag) * *area;
+            let load = (normal * p + slide * drag) * area_m2;
             force += load;
             torque += arm.cross(load);
-            *pressure_pa += p;
+            add(&mut self.pressure_pa, &mut self.touched, index, p);
         }
         Wrench { force_n: force.into(), torque_nm: torque.into() }
+    }
+}
+
+/// Adds `p` to the pressure of a point, and the point to those that have one.
+fn add(pressure_pa: &mut [f64], touched: &mut Vec<usize>, index: usize, p: f64) {
+    if p > 0.0 {
+        if pressure_pa[index] <= 0.0 {
+            touched.push(index);
+        }
+        pressure_pa[index] += p;
     }
 }

@@ -175,21 +175,6 @@ impl SurfacePoints {
         }
         sums
     }
-
-    /// Averages `values`, one a point, over the area of every taxel into `means`.
-    ///
-    /// # Panics
-    /// If the number of values differs from that of the points, or that of means from the taxels.
-    pub fn means(&self, values: &[f64], means: &mut [f64]) {
-        assert_eq!((values.len(), means.len()), (self.len(), self.taxels()));
-        means.fill(0.0);
-        for ((value, area), taxel) in values.iter().zip(&self.areas_m2).zip(&self.taxels) {
-            means[*taxel as usize] += value * area;
-        }
-        for (mean, area) in means.iter_mut().zip(&self.taxel_areas_m2) {
-            *mean /= area;
-        }
-    }
 }
 
 // Grids of taxels around an axis, on a cylinder or on a mesh.

@@ -5,6 +5,7 @@ use crate::mesh::TriMesh;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhLeafCost};
+use std::sync::Arc;
 
 /// Share of a triangle by which rays beside it count as hits, so that none passes between two triangles.
 const SLACK: f64 = 1e-9;
@@ -15,7 +16,7 @@ const EDGE_ON: f64 = 1e-9;
 /// A body as columns of foam see it, in its own axes: a mesh, or convex parts.
 #[derive(Debug, Clone)]
 pub struct Solid {
-    form: Form,
+    form: Arc<Form>,
     /// Lower and upper corner of the box around it, m.
     low_m: Vector,
     high_m: Vector,
@@ -126,6 +127,17 @@ impl Primitive {
         }
     }
 
+    /// Whether a place is farther from its round sides than `reach_m`.
+    #[inline]
+    fn is_off_side(&self, p: Vector, reach_m: f64) -> bool {
+        let (radius_m, square) = match *self {
+            Self::Ellipsoid([x, y, z]) => (x.max(y).max(z), p.length_squared()),
+            Self::Cylinder(radius_m, _) | Self::Capsule(radius_m, _) => (radius_m, p.x * p.x + p.y * p.y),
+            Self::Cuboid(_) | Self::HalfSpace => return false,
+        };
+        square > (radius_m + reach_m) * (radius_m + reach_m)
+    }
+
     /// Half the sides of the box around it, m.
     fn reach_m(&self) -> Vector {
         match *self {
@@ -188,11 +200,16 @@ pub(crate) struct Standing<'a> {
     solid: &'a Solid,
     axes: [Vector; 3],
     origin_m: Vector,
-    /// Its parts where they are; of each the columns of its rotation's inverse, its origin, and its reach.
-    parts: Vec<(Primitive, [Vector; 3], Vector, f64)>,
+    /// Its parts where they are; of each the columns of its rotation's inverse, its origin, and half the sides of the
+    /// box around it.
+    parts: Vec<(Primitive, [Vector; 3], Vector, Vector)>,
 }
 
 impl Standing<'_> {
+    pub(super) fn solid(&self) -> &Solid {
+        self.solid
+    }
+
     /// How deep the solid reaches into a column of foam, from its free surface, m, or, as a negative depth, the gap to
     /// a solid up to `gap_m` above the surface; `None` where there is nothing.
     ///
@@ -202,7 +219,7 @@ impl Standing<'_> {
     /// at most another thickness. Otherwise it has come from behind, and does not touch the foam.
     #[inline]
     pub(crate) fn front_m(&self, base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64) -> Option<f64> {
-        match &self.solid.form {
+        match &*self.solid.form {
             Form::Parts(_) => self.front_of_parts(base_m, outward, thickness_m, gap_m),
             Form::Mesh(mesh) => {
                 let [x, y, z] = self.axes;
@@ -230,12 +247,12 @@ impl Standing<'_> {
         while pending {
             pending = false;
             first_m = f64::INFINITY;
-            for (shape, [x, y, z], origin_m, radius_m) in &self.parts {
+            for (shape, [x, y, z], origin_m, half_m) in &self.parts {
                 let turned = |v: Vector| *x * v.x + *y * v.y + *z * v.z;
                 let base_m = turned(base_m - *origin_m);
                 let far = match shape {
                     Primitive::HalfSpace => base_m.z > reach_m,
-                    _ => base_m.length_squared() > (radius_m + reach_m) * (radius_m + reach_m),
+                    _ => base_m.abs().cmpgt(*half_m + reach_m).any() || shape.is_off_side(base_m, reach_m),
                 };
                 if far {
                     continue;
@@ -256,23 +273,29 @@ impl Standing<'_> {
         (first_m <= reach_m).then_some(thickness_m - first_m)
     }
 
-    /// Whether all of the body is farther than `reach_m` from a place, m; some bodies that are may not be told.
-    pub(crate) fn is_far(&self, place_m: Vector, reach_m: f64) -> bool {
-        match &self.solid.form {
-            Form::Parts(_) => self.parts.iter().all(|(shape, [x, y, z], origin_m, radius_m)| {
-                let away = place_m - *origin_m;
-                match shape {
-                    // the height in the part's axes
-                    Primitive::HalfSpace => x.z * away.x + y.z * away.y + z.z * away.z > reach_m,
-                    _ => away.length_squared() > (radius_m + reach_m) * (radius_m + reach_m),
+    /// Whether all of the body is farther than `reach_m` from what is both in a ball and in a box around `centre_m`; some
+    /// bodies that are may not be told. All lengths in m.
+    pub(crate) fn is_far(&self, centre_m: Vector, radius_m: f64, half_m: Vector, reach_m: f64) -> bool {
+        let turned = |[x, y, z]: &[Vector; 3], v: Vector| *x * v.x + *y * v.y + *z * v.z;
+        let is_beside = |[x, y, z]: &[Vector; 3], at: Vector, [low_m, high_m]: [Vector; 2]| {
+            let beside_m = (low_m - at).max(at - high_m) - reach_m;
+            let reach = || x.abs() * half_m.x + y.abs() * half_m.y + z.abs() * half_m.z;
+            beside_m.max_element() > 0.0 && (beside_m.max_element() > radius_m || beside_m.cmpgt(reach()).any())
+        };
+        match &*self.solid.form {
+            Form::Parts(_) => self.parts.iter().all(|(shape, axes, origin_m, half)| {
+                let away = centre_m - *origin_m;
+                if let Primitive::HalfSpace = shape {
+                    let up = Vector::new(axes[0].z, axes[1].z, axes[2].z);
+                    let height_m = up.dot(away) - reach_m;
+                    return height_m > 0.0 && (height_m > radius_m || height_m > up.abs().dot(half_m));
                 }
+                let at = turned(axes, away);
+                is_beside(axes, at, [-*half, *half]) || shape.is_off_side(at, reach_m + radius_m)
             }),
             Form::Mesh(_) => {
-                let [x, y, z] = self.axes;
-                let away = place_m - self.origin_m;
-                let at = x * away.x + y * away.y + z * away.z;
-                let reach = Vector::splat(reach_m);
-                at.cmplt(self.solid.low_m - reach).any() || at.cmpgt(self.solid.high_m + reach).any()
+                let at = turned(&self.axes, centre_m - self.origin_m);
+                is_beside(&self.axes, at, [self.solid.low_m, self.solid.high_m])
             }
         }
     }
@@ -318,7 +341,7 @@ impl Solid {
             boxes: Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes),
             closed: mesh.is_solid(),
         };
-        Self { form: Form::Mesh(mesh), low_m, high_m }
+        Self { form: Arc::new(Form::Mesh(mesh)), low_m, high_m }
     }
 
     /// The union of `parts`.
@@ -333,12 +356,17 @@ impl Solid {
             low_m = low_m.min(at - Vector::from(reach));
             high_m = high_m.max(at + Vector::from(reach));
         }
-        Self { form: Form::Parts(parts), low_m, high_m }
+        Self { form: Arc::new(Form::Parts(parts)), low_m, high_m }
+    }
+
+    /// Whether both are clones of one.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.form, &other.form)
     }
 
     /// Its convex parts; empty for a mesh.
     pub fn parts(&self) -> &[Part] {
-        match &self.form {
+        match &*self.form {
             Form::Parts(parts) => parts,
             Form::Mesh(_) => &[],
         }
@@ -358,14 +386,14 @@ impl Solid {
             // world = R_b (R_p · part + p) + o; a row of R_b R_p is a column of its inverse
             let columns = [0, 1, 2].map(|j| turned(Vector::from(part.rotation.map(|row| row[j]))));
             let rows = [0, 1, 2].map(|i| Vector::new(columns[0][i], columns[1][i], columns[2][i]));
-            (part.shape, rows, turned(Vector::from(part.position_m)) + origin_m, part.shape.reach_m().length())
+            (part.shape, rows, turned(Vector::from(part.position_m)) + origin_m, part.shape.reach_m())
         });
         Standing { solid: self, axes, origin_m, parts: parts.collect() }
     }
 
     /// How far a ray of `reach_m` goes until it meets the mesh, and the normal there, which faces the ray.
     pub(super) fn surface(&self, start_m: Vector, direction: Vector, reach_m: f64) -> Option<(f64, Vector)> {
-        let Form::Mesh(mesh) = &self.form else { return None };
+        let Form::Mesh(mesh) = &*self.form else { return None };
         let (leaf, hit) = mesh.nearest(start_m, direction, reach_m)?;
         let [e, f] = mesh.triangles[leaf as usize].edges_m;
         let normal = e.cross(f).normalize();
