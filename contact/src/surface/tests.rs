@@ -268,6 +268,51 @@ fn points_that_cannot_be_are_refused() {
     }
 }
 
+/// Bodies that creep, jump, turn and come back feel on a skin that knows where they were what they feel on a fresh one,
+/// bit for bit.
+#[test]
+fn what_was_near_before_does_not_show() {
+    let winding = Winding {
+        shape: [12, 24],
+        points_per_side: 2,
+        axis: 2,
+        centre_m: [0.0; 3],
+        arc_rad: [0.0, TAU],
+        span_m: [-0.06, 0.06],
+    };
+    let points = SurfacePoints::on_cylinder(&winding, 0.04).unwrap();
+    let fresh = || SurfaceField::new(Foam::default(), points.clone()).unwrap();
+    let mesh = cuboid([0.03, 0.03, 0.03]);
+    let part = |shape| {
+        let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        vec![Part { shape, rotation, position_m: [0.0, 0.0, 0.004] }]
+    };
+    let shapes =
+        [Primitive::Capsule(0.012, 0.03), Primitive::Cuboid([0.02, 0.01, 0.03]), Primitive::Cylinder(0.02, 0.01)];
+    let parts = shapes.into_iter().chain([Primitive::Ellipsoid([0.02, 0.015, 0.03]), Primitive::HalfSpace]);
+    let mut solids: Vec<Solid> = parts.map(|shape| Solid::of_parts(part(shape))).collect();
+    solids.push(Solid::new(&mesh));
+    let (mut used, mut felt) = (fresh(), 0);
+    for k in 0..120_u32 {
+        let t = f64::from(k);
+        // every tenth step goes far
+        let radius_m = 0.045 + 2e-3 * (0.3 * t).sin() + if k % 10 == 9 { 0.05 } else { 0.0 };
+        let angle = 0.004 * t + if k % 30 > 20 { 2.0 } else { 0.0 };
+        let turn = Rotation3::from_euler_angles(0.01 * t, 0.3, -0.02 * t);
+        for solid in &solids {
+            let at = [radius_m * angle.cos(), radius_m * angle.sin(), 1e-3 * t - 0.06];
+            let rotation = std::array::from_fn(|i| std::array::from_fn(|j| turn[(i, j)]));
+            let pose = PosedMesh { rotation, ..PosedMesh::at_rest(&mesh, at) };
+            let mut other = fresh();
+            used.clear();
+            assert_eq!(used.press(solid, &pose), other.press(solid, &pose), "step {k}");
+            assert_eq!(used.pressure_pa(), other.pressure_pa(), "step {k}");
+            felt += usize::from(used.touched_m2() > 0.0);
+        }
+    }
+    assert!(felt > 300, "{felt}");
+}
+
 /// A floor under a thin finger, ever deeper: the force never turns and never falls, on skins thicker than the finger
 /// too, and the columns that look away from the floor feel nothing.
 #[test]
