@@ -128,8 +128,8 @@ impl Tree {
         self.nodes[number].after = self.nodes.len();
     }
 
-    /// Calls `see` with the columns of every node that is not far and has no others below it, and the place of the first
-    /// in the tree, until it returns `true`; whether it did.
+    /// Calls `see` with the columns of every node that is not far and has no others below it, and the place of the
+    /// first in the tree, until it returns `true`; whether it did.
     fn visit(&self, is_far: impl Fn(&Node) -> bool, mut see: impl FnMut(usize, &[Column]) -> bool) -> bool {
         let mut number = 0;
         while let Some(node) = self.nodes.get(number) {
@@ -195,8 +195,8 @@ impl SurfaceField {
         self.tree.visit(is_far, |_, columns| {
             columns.iter().any(|c| {
                 let (away, normal) = (place - c.point_m, c.normal);
-                // within the side of a square of the point's area: what touches right on the rim is on the foam; between
-                // points of a round skin, the surface is off their planes
+                // within the side of a square of the point's area: what touches right on the rim is on the foam;
+                // between points of a round skin, the surface is off their planes
                 let (height, bend) = (away.dot(normal), along.map_or(0.0, |_| 0.5 * c.area_m2.sqrt()));
                 (-1.5 * h - bend..=0.5 * h + bend).contains(&height)
                     && (away - normal * height).length_squared() <= c.area_m2

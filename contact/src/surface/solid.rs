@@ -273,8 +273,8 @@ impl Standing<'_> {
         (first_m <= reach_m).then_some(thickness_m - first_m)
     }
 
-    /// Whether all of the body is farther than `reach_m` from what is both in a ball and in a box around `centre_m`; some
-    /// bodies that are may not be told. All lengths in m.
+    /// Whether all of the body is farther than `reach_m` from what is both in a ball and in a box around `centre_m`;
+    /// some bodies that are may not be told. All lengths in m.
     pub(crate) fn is_far(&self, centre_m: Vector, radius_m: f64, half_m: Vector, reach_m: f64) -> bool {
         let turned = |[x, y, z]: &[Vector; 3], v: Vector| *x * v.x + *y * v.y + *z * v.z;
         let is_beside = |[x, y, z]: &[Vector; 3], at: Vector, [low_m, high_m]: [Vector; 2]| {
