@@ -39,6 +39,7 @@ const MAX_ITERATIONS: usize = 25;
 /// without a tilt. The force is met to 1e-12 of it in either case.
 pub(crate) fn settle(law: &FoamLaw, columns: &mut [Column], force_n: f64) {
     let bed = Bed::of(law, columns);
+    // roughly: the tilt begins there, and meets force and moments itself
     let sunk_m = bed.sink([0.0; 2], 0.0, force_n, 0.05);
     let state = bed.tilt(sunk_m, force_n).unwrap_or([sunk_m, 0.0, 0.0]);
     let sunk_m = bed.sink([state[1], state[2]], state[0], force_n, TOLERANCE);

@@ -329,9 +329,9 @@ class _Group:
             raise ValueError("`attachments` are of several models or data; one step moves one of them")
         self.model, self.data, self.attachments = model, data, attachments
         self.foams = [k for k, a in enumerate(attachments) if a.mode == "foam"]
-        # foam on foam: two layers, one behind the other, which one of the two skins carries
-        # skins that what is led by mocap presses
+        # skins that are pressed by what mocap leads
         self._leading = [k for k, a in enumerate(attachments) if a._led]
+        # foam on foam: two layers, one behind the other, which one of the two skins carries
         self._worn = {k: [] for k in range(len(attachments))}
         self._passed = {k: list(a._led) for k, a in enumerate(attachments)}
         for k in self.foams:

@@ -32,14 +32,18 @@ pub(crate) struct Mount {
     clock: Mutex<Clock>,
 }
 
-/// Arrays of `mjData`, which stay where they are as long as it lives.
-#[derive(FromPyObject)]
-struct Arrays {
-    xpos: Py<PyArray2<f64>>,
-    xmat: Py<PyArray2<f64>>,
-    cvel: Py<PyArray2<f64>>,
-    subtree_com: Py<PyArray2<f64>>,
+/// The arrays of an `mjData` with poses and velocities of bodies, by those names: of each a row a body.
+#[derive(Clone, Copy, FromPyObject)]
+struct Bodies<T> {
+    xpos: T,
+    xmat: T,
+    cvel: T,
+    subtree_com: T,
 }
+
+/// They stay where they are as long as the data lives.
+type Arrays = Bodies<Py<PyArray2<f64>>>;
+type Poses<'a> = Bodies<ArrayView2<'a, f64>>;
 
 /// What friction holds, and the supports of the present step.
 #[derive(Default)]
@@ -277,12 +281,12 @@ impl Mount {
         if loads.is_empty() && still.is_empty() {
             return Ok(known);
         }
-        let (contact, poses) = (&solved.contact, &solved.poses);
+        let poses = &solved.poses;
         let standing = self.standing(poses);
         let (frame, origin) = standing;
         let engine = loads.iter().map(|&(number, body, sign)| {
-            let axes = rotation(&contact.frame, number);
-            (body, row(&contact.pos, number), axes, sign, solved.of(number), number >= solved.foamed)
+            let Contact { place, axes, .. } = solved.contacts[number];
+            (body, place, axes, sign, solved.of(number), number >= solved.foamed)
         });
         let law = still.iter().map(|(body, row)| {
             let axes = std::array::from_fn(|i| std::array::from_fn(|j| row[3 + 3 * i + j]));
@@ -327,17 +331,17 @@ impl Mount {
         if loads.is_empty() {
             return;
         }
-        let (contact, standing) = (&solved.contact, self.standing(&solved.poses));
-        let place = |number: usize| -> Vector { row(&contact.pos, number) };
+        let standing = self.standing(&solved.poses);
         let felt = |&(number, body, sign): &(usize, usize, f64)| {
-            let (at, along) = (place(number), contact.along(number, sign));
+            let Contact { place: at, axes: [normal, ..], .. } = solved.contacts[number];
+            let along = scaled(normal, sign);
             if self.pushes(&standing, at, along) {
                 return true;
             }
             let same = loads.iter().filter(|(_, other, _)| *other == body);
             let (sum, middle) = same.fold((0.0, [0.0; 3]), |(sum, middle), &(other, ..)| {
                 let force_n = solved.of(other)[0].max(0.0);
-                (sum + force_n, plus(middle, scaled(place(other), force_n)))
+                (sum + force_n, plus(middle, scaled(solved.contacts[other].place, force_n)))
             });
             let middle = scaled(middle, 1.0 / sum);
             sum > 0.0 && self.pushes(&standing, plus(middle, scaled(minus(at, middle), 0.8)), along)
@@ -380,23 +384,22 @@ impl Mount {
     }
 }
 
-/// Body poses and velocities of an `mjData`: of each array a row a body.
-#[derive(Clone, Copy)]
-struct Poses<'a> {
-    xpos: ArrayView2<'a, f64>,
-    xmat: ArrayView2<'a, f64>,
-    cvel: ArrayView2<'a, f64>,
-    subtree_com: ArrayView2<'a, f64>,
+impl<T> Bodies<T> {
+    fn each<'a, U>(&'a self, of: impl Fn(&'a T) -> PyResult<U>) -> PyResult<Bodies<U>> {
+        Ok(Bodies {
+            xpos: of(&self.xpos)?,
+            xmat: of(&self.xmat)?,
+            cvel: of(&self.cvel)?,
+            subtree_com: of(&self.subtree_com)?,
+        })
+    }
 }
 
 impl Arrays {
     /// Calls `look` with the present values.
     fn look<T>(&self, py: Python<'_>, look: impl FnOnce(Poses<'_>) -> PyResult<T>) -> PyResult<T> {
-        let read = |array: &Py<PyArray2<f64>>| array.bind(py).try_readonly().map_err(refuse);
-        let [xpos, xmat] = [read(&self.xpos)?, read(&self.xmat)?];
-        let [cvel, subtree_com] = [read(&self.cvel)?, read(&self.subtree_com)?];
-        let (xpos, xmat) = (xpos.as_array(), xmat.as_array());
-        look(Poses { xpos, xmat, cvel: cvel.as_array(), subtree_com: subtree_com.as_array() })
+        let read = self.each(|array| array.bind(py).try_readonly().map_err(refuse))?;
+        look(read.each(|array| Ok(array.as_array()))?)
     }
 }
 
@@ -417,36 +420,36 @@ struct Contacts<'py> {
 }
 
 impl Contacts<'_> {
-    fn seen(&self) -> Seen<'_> {
-        Seen {
-            geom: self.geom.as_array(),
-            pos: self.pos.as_array(),
-            frame: self.frame.as_array(),
-            friction: self.friction.as_array(),
-            dim: self.dim.as_array(),
-            efc_address: self.efc_address.as_array(),
-            exclude: self.exclude.as_array(),
-        }
+    fn all(&self) -> Vec<Contact> {
+        let [pos, frame, friction] = [&self.pos, &self.frame, &self.friction].map(|array| array.as_array());
+        let [dim, address, exclude] = [&self.dim, &self.efc_address, &self.exclude].map(|array| array.as_array());
+        let geom = self.geom.as_array();
+        let contact = |k: usize| Contact {
+            geoms: row(&geom, k),
+            place: row(&pos, k),
+            axes: rotation(&frame, k),
+            friction: row(&friction, k),
+            dim: usize::try_from(dim[k]).unwrap_or(0),
+            first: usize::try_from(address[k]).ok(),
+            excluded: exclude[k] != 0,
+        };
+        (0..address.len()).map(contact).collect()
     }
 }
 
-/// What [`Contacts`] holds.
-struct Seen<'a> {
-    geom: ArrayView2<'a, i32>,
-    pos: ArrayView2<'a, f64>,
-    frame: ArrayView2<'a, f64>,
-    friction: ArrayView2<'a, f64>,
-    dim: ArrayView1<'a, i32>,
-    efc_address: ArrayView1<'a, i32>,
-    exclude: ArrayView1<'a, i32>,
-}
-
-impl Seen<'_> {
-    /// The normal of a contact, times `sign`.
-    fn along(&self, number: usize, sign: f64) -> Vector {
-        let [x, y, z, ..]: [f64; 9] = row(&self.frame, number);
-        scaled([x, y, z], sign)
-    }
+/// A contact of an `mjData`.
+struct Contact {
+    geoms: [i32; 2],
+    /// m.
+    place: Vector,
+    /// The normal, from the first geom to the second, and two tangents.
+    axes: Rotation,
+    friction: [f64; 5],
+    /// Degrees of freedom in which the constraint acts.
+    dim: usize,
+    /// Its first row in the constraints, if it has any.
+    first: Option<usize>,
+    excluded: bool,
 }
 
 /// Skins that step together.
@@ -480,14 +483,14 @@ impl Mounts {
 
     /// Numbers of the contacts that lie in the foam of one of `skins`, of those that are not excluded.
     fn foamed(&self, py: Python<'_>, contact: Contacts<'_>, skins: Vec<usize>) -> PyResult<Vec<usize>> {
-        let contact = contact.seen();
+        let contacts = contact.all();
         self.arrays().look(py, |poses| {
             let is_foam = |number: &usize| {
                 let mut any = false;
-                self.felt_by(&poses, &contact, *number, |k, _, _| any |= skins.contains(&k));
+                self.felt_by(&poses, &contacts[*number], |k, _, _| any |= skins.contains(&k));
                 any
             };
-            Ok((0..contact.exclude.len()).filter(|n| contact.exclude[*n] == 0).filter(is_foam).collect())
+            Ok((0..contacts.len()).filter(|n| !contacts[*n].excluded).filter(is_foam).collect())
         })
     }
 
@@ -508,23 +511,21 @@ impl Mounts {
         still: Vec<(usize, usize, [f64; 14])>,
     ) -> PyResult<Vec<(usize, Touch)>> {
         self.arrays().look(py, |poses| {
-            let (contact, forces) = (contact.seen(), forces.as_array());
-            let solved = Solved { contact, forces, poses, elliptic, foamed };
-            let contact = &solved.contact;
+            let solved = Solved { contacts: contact.all(), forces: forces.as_array(), poses, elliptic, foamed };
+            let contacts = &solved.contacts;
             let mut loads = vec![Vec::new(); self.mounts.len()];
-            let acts = |number: &usize| contact.efc_address[*number] >= 0 && contact.exclude[*number] == 0;
-            let all = contact.efc_address.len();
-            for number in (0..foamed.min(all)).filter(acts) {
-                self.meets(contact, number, |k, body, sign| loads[k].push((number, body, sign)));
+            let acts = |number: &usize| contacts[*number].first.is_some() && !contacts[*number].excluded;
+            for number in (0..foamed.min(contacts.len())).filter(acts) {
+                self.meets(&contacts[number], |k, body, sign| loads[k].push((number, body, sign)));
             }
             for (mount, loads) in self.mounts.iter().zip(&mut loads) {
                 mount.get().keep_felt(&solved, loads);
             }
-            for (number, (k, body)) in (foamed..all).zip(springs).filter(|(n, _)| acts(n)) {
+            for (number, (k, body)) in (foamed..contacts.len()).zip(springs).filter(|(n, _)| acts(n)) {
                 let link = self.mounts[k].get().link;
                 loads[k].push((number, body, 1.0));
                 // and that of the body, if it is not of the same link
-                self.felt_by(&poses, contact, number, |other, _, sign| {
+                self.felt_by(&poses, &contacts[number], |other, _, sign| {
                     if self.mounts[other].get().link != link {
                         loads[other].push((number, link, sign));
                     }
@@ -551,19 +552,19 @@ impl Mounts {
 
     /// Calls `each` with every skin whose foam has the contact, the body that it feels, and the sign with which the
     /// contact's force is on that body: the contact's normal points from its first geom to its second.
-    fn felt_by(&self, poses: &Poses<'_>, contact: &Seen<'_>, number: usize, mut each: impl FnMut(usize, usize, f64)) {
-        self.meets(contact, number, |k, body, sign| {
+    fn felt_by(&self, poses: &Poses<'_>, contact: &Contact, mut each: impl FnMut(usize, usize, f64)) {
+        self.meets(contact, |k, body, sign| {
             let mount = self.mounts[k].get();
-            if mount.pushes(&mount.standing(poses), row(&contact.pos, number), contact.along(number, sign)) {
+            if mount.pushes(&mount.standing(poses), contact.place, scaled(contact.axes[0], sign)) {
                 each(k, body, sign);
             }
         });
     }
 
     /// As [`Mounts::felt_by`], wherever on the skin's link the contact is.
-    fn meets(&self, contact: &Seen<'_>, number: usize, mut each: impl FnMut(usize, usize, f64)) {
+    fn meets(&self, contact: &Contact, mut each: impl FnMut(usize, usize, f64)) {
         // a flex has no geom
-        let [Ok(one), Ok(other)] = [0, 1].map(|k| usize::try_from(contact.geom[[number, k]])) else { return };
+        let [Ok(one), Ok(other)] = contact.geoms.map(usize::try_from) else { return };
         for (own, pressed, sign) in [(one, other, 1.0), (other, one, -1.0)] {
             for &k in self.owners[own].iter().filter(|k| self.others[**k][pressed]) {
                 each(k, self.geom_bodies[pressed], sign);
@@ -574,7 +575,7 @@ impl Mounts {
 
 /// Contacts, what the engine made of them, and where the bodies are.
 struct Solved<'a, 'b> {
-    contact: Seen<'a>,
+    contacts: Vec<Contact>,
     /// Forces of all constraints.
     forces: ArrayView1<'a, f64>,
     poses: Poses<'b>,
@@ -586,11 +587,8 @@ struct Solved<'a, 'b> {
 impl Solved<'_, '_> {
     /// Force, N, and torque, N m, along the rows of a contact's frame.
     fn of(&self, number: usize) -> [f64; 6] {
-        let c = &self.contact;
-        let (Ok(at), Ok(dim)) = (usize::try_from(c.efc_address[number]), usize::try_from(c.dim[number])) else {
-            return [0.0; 6];
-        };
-        let mut out = [0.0; 6];
+        let Contact { first, dim, friction, .. } = &self.contacts[number];
+        let (mut out, Some(at), dim) = ([0.0; 6], *first, *dim) else { return [0.0; 6] };
         if self.elliptic || dim == 1 {
             out.iter_mut().take(dim).enumerate().for_each(|(k, f)| *f = self.forces[at + k]);
             return out;
@@ -598,7 +596,7 @@ impl Solved<'_, '_> {
         for k in 1..dim.min(6) {
             let [one, other] = [self.forces[at + 2 * k - 2], self.forces[at + 2 * k - 1]];
             out[0] += one + other;
-            out[k] = (one - other) * c.friction[[number, k - 1]];
+            out[k] = (one - other) * friction[k - 1];
         }
         out
     }
@@ -683,7 +681,7 @@ fn tangents(normal: Vector) -> Rotation {
     [normal, x, cross(normal, x)]
 }
 
-fn row<const N: usize>(array: &ArrayView2<'_, f64>, index: usize) -> [f64; N] {
+fn row<T: Copy, const N: usize>(array: &ArrayView2<'_, T>, index: usize) -> [T; N] {
     std::array::from_fn(|k| array[[index, k]])
 }
 

@@ -1,7 +1,7 @@
 //! Foam on a surface of any shape.
 
 use super::points::SurfacePoints;
-use super::solid::{Solid, Standing};
+use super::solid::{Solid, Standing, into};
 use crate::balance::Column;
 use crate::field::{PosedMesh, Wrench};
 use crate::foam::{Foam, FoamLaw};
@@ -47,7 +47,7 @@ pub struct SurfaceField {
     /// Lowest and highest corner of the foam, m.
     bounds_m: [[f64; 3]; 2],
     tree: Tree,
-    near: Vec<Near>,
+    nearby: Vec<Near>,
 }
 
 /// The columns that were near a body where it stood once, with those a little farther away: they hold as long as it has
@@ -64,8 +64,12 @@ struct Near {
     columns: Vec<usize>,
 }
 
-/// Most bodies of which is known what is near.
+/// Most bodies of which it is known what is near; with more, the oldest is looked for again. They are found one by one.
 const KNOWN: usize = 32;
+
+/// How far a body may move before it is looked for again, in thicknesses. From .1 to 1, a step of a humanoid that lies
+/// still costs the same within the noise; what moves is looked for less often with a larger one.
+const MARGIN: f64 = 0.3;
 
 /// The columns under the points of a skin, neighbours together, in a tree of balls around them.
 #[derive(Debug, Clone)]
@@ -160,7 +164,16 @@ impl SurfaceField {
             }
         }
         let (tree, pressure_pa) = (Tree::of(&points), vec![0.0; points.len()]);
-        Ok(Self { pressure_pa, touched: Vec::new(), bottomed: false, bounds_m, tree, near: Vec::new(), config, points })
+        Ok(Self {
+            pressure_pa,
+            touched: Vec::new(),
+            bottomed: false,
+            bounds_m,
+            tree,
+            nearby: Vec::new(),
+            config,
+            points,
+        })
     }
 
     /// The sample points.
@@ -232,41 +245,41 @@ impl SurfaceField {
         if standing.is_apart([self.bounds_m[0].map(|v| v - gap_m), self.bounds_m[1].map(|v| v + gap_m)]) {
             return;
         }
-        let near = self.near(body, &standing, h + gap_m);
-        out.extend(self.near[near].columns.iter().filter_map(|k| {
-            let c = &self.tree.columns[*k];
+        let k = self.near(body, &standing, h + gap_m);
+        out.extend(self.nearby[k].columns.iter().filter_map(|place| {
+            let c = &self.tree.columns[*place];
             let depth_m = standing.front_m(c.point_m - c.normal * h, c.normal, h, gap_m)?;
             Some(Column { depth_m, ..*c })
         }));
     }
 
-    /// Which of `self.near` has the columns whose points may be within `reach_m` of a body.
+    /// Which of `self.nearby` has the columns whose points may be within `reach_m` of a body.
     fn near(&mut self, body: &PosedMesh<'_>, standing: &Standing<'_>, reach_m: f64) -> usize {
         let [low, high] = self.bounds_m.map(Vector::from);
         let rotation = body.rotation.map(Vector::from);
-        let away = 0.5 * (low + high) - Vector::from(body.position_m);
-        let middle_m = rotation[0] * away.x + rotation[1] * away.y + rotation[2] * away.z;
-        let known = self.near.iter().position(|near| near.solid.is(standing.solid()));
+        let middle_m = into(&rotation, 0.5 * (low + high) - Vector::from(body.position_m));
+        let known = self.nearby.iter().position(|near| near.solid.is(standing.solid()));
         if let Some(known) = known {
-            let near = &self.near[known];
+            let near = &self.nearby[known];
             // by the Frobenius norm of the difference, no point has moved farther
             let turned: f64 = (0..3).map(|k| (rotation[k] - near.rotation[k]).length_squared()).sum();
             let moved_m = (middle_m - near.middle_m).length() + turned.sqrt() * 0.5 * (high - low).length();
+            // a longer reach than is asked for means columns in vain
             if moved_m + reach_m <= near.reach_m && near.reach_m <= 4.0 * reach_m {
                 return known;
             }
         }
         let known = known.unwrap_or_else(|| {
-            if self.near.len() == KNOWN {
-                self.near.remove(0);
+            if self.nearby.len() == KNOWN {
+                self.nearby.remove(0);
             }
             let (solid, columns) = (standing.solid().clone(), Vec::new());
-            self.near.push(Near { solid, rotation, middle_m, reach_m, columns });
-            self.near.len() - 1
+            self.nearby.push(Near { solid, rotation, middle_m, reach_m, columns });
+            self.nearby.len() - 1
         });
-        let near = &mut self.near[known];
+        let near = &mut self.nearby[known];
         (near.rotation, near.middle_m) = (rotation, middle_m);
-        near.reach_m = reach_m + 0.3 * self.config.thickness_m;
+        near.reach_m = reach_m + MARGIN * self.config.thickness_m;
         near.columns.clear();
         let reach_m = near.reach_m;
         self.tree.visit(
@@ -306,14 +319,14 @@ impl SurfaceField {
         if standing.is_apart(self.bounds_m) {
             return Wrench::NONE;
         }
-        let near = self.near(body, &standing, self.config.thickness_m);
+        let k = self.near(body, &standing, self.config.thickness_m);
         let c = &self.config;
         let law = c.law(body.stiffness_pa_per_m);
         let regular = c.friction_speed_m_per_s * c.friction_speed_m_per_s;
         let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
         let centre = Vector::from(body.centre_of_mass_m);
-        for k in &self.near[near].columns {
-            let Column { index, point_m, normal, area_m2, .. } = self.tree.columns[*k];
+        for place in &self.nearby[k].columns {
+            let Column { index, point_m, normal, area_m2, .. } = self.tree.columns[*place];
             let depth_m = standing.depth_m(point_m - normal * c.thickness_m, normal, c.thickness_m);
             if depth_m <= 0.0 {
                 continue;

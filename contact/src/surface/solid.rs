@@ -222,9 +222,7 @@ impl Standing<'_> {
         match &*self.solid.form {
             Form::Parts(_) => self.front_of_parts(base_m, outward, thickness_m, gap_m),
             Form::Mesh(mesh) => {
-                let [x, y, z] = self.axes;
-                let into = |v: Vector| x * v.x + y * v.y + z * v.z;
-                let (base_m, outward) = (into(base_m - self.origin_m), into(outward));
+                let (base_m, outward) = (into(&self.axes, base_m - self.origin_m), into(&self.axes, outward));
                 let beside = base_m.cmplt(self.solid.low_m).any() || base_m.cmpgt(self.solid.high_m).any();
                 mesh.front_m(base_m, outward, thickness_m, gap_m, beside)
             }
@@ -247,9 +245,8 @@ impl Standing<'_> {
         while pending {
             pending = false;
             first_m = f64::INFINITY;
-            for (shape, [x, y, z], origin_m, half_m) in &self.parts {
-                let turned = |v: Vector| *x * v.x + *y * v.y + *z * v.z;
-                let base_m = turned(base_m - *origin_m);
+            for (shape, axes, origin_m, half_m) in &self.parts {
+                let base_m = into(axes, base_m - *origin_m);
                 let far = match shape {
                     Primitive::HalfSpace => base_m.z > reach_m,
                     _ => base_m.abs().cmpgt(*half_m + reach_m).any() || shape.is_off_side(base_m, reach_m),
@@ -257,7 +254,7 @@ impl Standing<'_> {
                 if far {
                     continue;
                 }
-                let Some([enter, leave]) = shape.chord(base_m, turned(outward)) else { continue };
+                let Some([enter, leave]) = shape.chord(base_m, into(axes, outward)) else { continue };
                 if enter < inside[1].max(f64::MIN_POSITIVE) && leave > inside[0].min(-f64::MIN_POSITIVE) {
                     pending |= self.parts.len() > 1 && (enter < inside[0] || leave > inside[1]);
                     inside = [inside[0].min(enter), inside[1].max(leave)];
@@ -276,7 +273,6 @@ impl Standing<'_> {
     /// Whether all of the body is farther than `reach_m` from what is both in a ball and in a box around `centre_m`;
     /// some bodies that are may not be told. All lengths in m.
     pub(crate) fn is_far(&self, centre_m: Vector, radius_m: f64, half_m: Vector, reach_m: f64) -> bool {
-        let turned = |[x, y, z]: &[Vector; 3], v: Vector| *x * v.x + *y * v.y + *z * v.z;
         let is_beside = |[x, y, z]: &[Vector; 3], at: Vector, [low_m, high_m]: [Vector; 2]| {
             let beside_m = (low_m - at).max(at - high_m) - reach_m;
             let reach = || x.abs() * half_m.x + y.abs() * half_m.y + z.abs() * half_m.z;
@@ -290,11 +286,11 @@ impl Standing<'_> {
                     let height_m = up.dot(away) - reach_m;
                     return height_m > 0.0 && (height_m > radius_m || height_m > up.abs().dot(half_m));
                 }
-                let at = turned(axes, away);
+                let at = into(axes, away);
                 is_beside(axes, at, [-*half, *half]) || shape.is_off_side(at, reach_m + radius_m)
             }),
             Form::Mesh(_) => {
-                let at = turned(&self.axes, centre_m - self.origin_m);
+                let at = into(&self.axes, centre_m - self.origin_m);
                 is_beside(&self.axes, at, [self.solid.low_m, self.solid.high_m])
             }
         }
@@ -317,6 +313,11 @@ impl Standing<'_> {
         let [x, y, z] = self.axes;
         Vector::new(x.dot(v), y.dot(v), z.dot(v))
     }
+}
+
+/// `v` by the columns of a rotation.
+pub(super) fn into([x, y, z]: &[Vector; 3], v: Vector) -> Vector {
+    *x * v.x + *y * v.y + *z * v.z
 }
 
 impl Solid {
