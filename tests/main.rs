@@ -34,6 +34,7 @@ mod priors;
 mod published;
 mod readouts;
 mod recordings;
+mod reports;
 mod reproduce;
 mod rows;
 mod score;

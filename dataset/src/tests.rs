@@ -535,6 +535,8 @@ const REFUSED: &[(&str, &[&str])] = &[
     ("[skin]\nrows = 1000\ncols = 1000\n[contact]\nmodel = \"winkler\"\ncells_per_taxel = 1",
         &["frames × taxels", "[1, 2^27]"]),
     ("[record]\ninterval_s = 1e-4", &["`record.interval_s` = 0.0001", "sample rate"]),
+    ("[record]\ninterval_s = 0.0333", &["`record.interval_s` = 0.0333", "0.03333333333333333 for 30", "whole_rate"]),
+    ("[record]\ninterval_s = 3", &["such as 1 for 1"]),
     ("[record]\ninterval_s = nan", &["`record.interval_s` = NaN"]),
     ("[skin]\nrows = 64\ncols = 64\n[record]\nwindows = 10000\ninterval_s = 0.01",
         &["record.windows × taxels", "[1, 2^24]"]),

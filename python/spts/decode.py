@@ -173,6 +173,8 @@ def windows(phi, y):
     ndarray (n, M * (1 + taxels))
         What the estimators of `spts.decoders` take as X.
     """
+    if np.iscomplexobj(phi) or np.iscomplexobj(y):
+        raise ValueError("`phi` and `y` are real; one of them is complex")
     phi, y = np.asarray(phi, np.float64), np.asarray(y, np.float64)
     if phi.ndim == 2 and y.ndim == 1:
         phi, y = phi[None], y[None]

@@ -414,6 +414,8 @@ def features(source):
         *taxels(f"{TACTILE}.conductance", "true conductance of every taxel, S", "conductance_s"),
         *taxels(f"{TACTILE}.raster", "image as the raster scan of the press has it, V", "image_v"),
         Feature(f"{TACTILE}.samples", dtype, [m], None, f"samples of the skin's one wire, {unit}", [samples]),
+        # LeRobot's policies want a camera or this key
+        Feature(ENVIRONMENT, "float32", [m], None, f"the samples once more, {unit}", [samples]),
         *([phi] if "phi" in has else []),
         one("observation.force", "normal force on the skin at this frame, N", ["contact_force_n"], "float32"),
         Feature(ACTION, "float32", [6], POSE, f"`{STATE}` of the next frame; of the last frame its own"),
@@ -429,6 +431,7 @@ def features(source):
 
 
 STATE, ACTION, TACTILE = "observation.state", "action", "observation.tactile"
+ENVIRONMENT = "observation.environment_state"
 
 
 def frame_rate(source):

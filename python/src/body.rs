@@ -1,17 +1,15 @@
 //! What touches a skin.
 
 use crate::args::{Array2, triples};
-use crate::common::refuse;
+use crate::common::{refuse, warn};
 use numpy::{
     AllowTypeChange, IntoPyArray as _, PyArray2, PyArrayLike2, PyArrayMethods as _, PyUntypedArrayMethods as _,
 };
-use pyo3::exceptions::PyUserWarning;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use spts::contact::mesh::{TriMesh, cuboid, load, revolve, sphere};
 use spts::contact::{Part, PreparedMesh, Primitive, TouchBody};
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::ffi::CString;
 use std::path::PathBuf;
 
 /// A rigid or soft body: a triangle mesh in its own axes, in metres.
@@ -74,8 +72,7 @@ impl Body {
         }
         let (mesh, report) = load(&path, scale).map_err(refuse)?;
         for note in report.notes() {
-            let note = CString::new(note)?;
-            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &note, 1)?;
+            warn(py, &note)?;
         }
         Self::new(mesh, Vec::new(), stiffness)
     }

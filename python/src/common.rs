@@ -1,11 +1,12 @@
 //! What all bindings have in common: errors, dictionaries as tables, and long calls that Ctrl-C stops.
 
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::ffi::CString;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -24,6 +25,12 @@ macro_rules! bail {
 /// A `ValueError` that says what `error` says.
 pub(crate) fn refuse(error: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(error.to_string())
+}
+
+/// Warns the caller of `note`.
+#[allow(dead_code, reason = "the part with a physics engine has no use for it")]
+pub(crate) fn warn(py: Python<'_>, note: &str) -> PyResult<()> {
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(note)?, 1)
 }
 
 /// `value` as the text that pickles hold.

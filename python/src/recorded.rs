@@ -1,7 +1,7 @@
 //! Sessions: recordings of the real skin or of the twin.
 
 use crate::args::{Array1, Array2, Array3, whole};
-use crate::common::{refuse, released};
+use crate::common::{refuse, released, warn};
 use numpy::{IntoPyArray as _, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList, PyTuple};
@@ -38,6 +38,7 @@ pub(crate) struct Recording {
 #[pyfunction]
 pub(crate) fn load(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Session>> {
     let set = released(py, || SessionSet::open(&path))?.map_err(refuse)?;
+    set.note.iter().try_for_each(|note| warn(py, note))?;
     let sessions = set.sessions.into_iter();
     Ok(sessions.map(|session| Session { whole: Arc::new(session) }).collect())
 }

@@ -1,7 +1,7 @@
 //! Scores: estimators of the user on the board, beside its own decoders, and how good images are.
 
 use crate::args::{Array1, one_of};
-use crate::common::{refuse, stoppable};
+use crate::common::{refuse, stoppable, warn};
 use numpy::{IntoPyArray as _, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use spts::Refusal;
@@ -180,13 +180,14 @@ pub(crate) fn score_sessions(
         times,
         seed,
     };
-    let board = stoppable(py, |step| {
+    let (board, note) = stoppable(py, |step| {
         let source = Source::open(&path).map_err(refuse)?;
         step();
         let ready = settings.learn(&source).map_err(refuse)?;
         step();
-        ready.score(step).map_err(refuse)
+        ready.score(step).map_err(refuse).map(|board| (board, source.note))
     })??;
+    note.iter().try_for_each(|note| warn(py, note))?;
     Ok((serde_json::to_string(&board).map_err(refuse)?, table(&board)))
 }
 

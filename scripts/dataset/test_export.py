@@ -438,10 +438,10 @@ def test_what_cannot_be_exported_is_refused(program, presses, layouts, tmp_path)
         refused("`rows_per_tar`", "[1, 10^6]", layout="webdataset", rows_per_tar=rows)
     for interval, said in [
         ("", "`record.interval_s` is not set"),
-        ("interval_s = 0.03", "`record.interval_s` = 0.03"),
-        ("interval_s = 2.0", "valid: 1/n s"),
+        ("interval_s = 0.03\nwhole_rate = false", "`record.interval_s` = 0.03"),
+        ("interval_s = 2.0\nwhole_rate = false", "valid: 1/n s"),
     ]:
-        name = f"interval-{interval[-4:].strip('= ') or 'none'}"
+        name = f"interval-{interval[:16].strip('interval_s = ') or 'none'}"
         made = program.make(name, program.spec(name, PRESSES.replace("interval_s = 0.02", interval)))
         refused(said, folder=made.folder)
     made = tmp_path / "set"

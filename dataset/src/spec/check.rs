@@ -61,6 +61,9 @@ impl Timing {
         if let Some(interval_s) = interval_s {
             let is_valid = interval_s > 0.0 && interval_s <= 10.0;
             in_range("record.interval_s", interval_s, is_valid, "(0, 10] s")?;
+            if record.whole_rate {
+                whole_rate(interval_s)?;
+            }
         }
         let before_s = record.before_s.or(before_s).unwrap_or(0.0);
         let is_valid = (0.0..=10.0).contains(&before_s);
@@ -112,6 +115,21 @@ impl Timing {
     pub(crate) fn span_s(&self) -> f64 {
         self.span() as f64 / self.rate_hz
     }
+}
+
+/// Refuses an interval that does not make a whole number of windows a second, to 1e-6, as the export to LeRobot does.
+fn whole_rate(interval_s: f64) -> Result<(), Refusal> {
+    let rate = 1.0 / interval_s;
+    let nearest = rate.round().max(1.0);
+    if (rate - nearest).abs() <= 1e-6 {
+        return Ok(());
+    }
+    Err(Refusal::new(format!(
+        "`record.interval_s` = {interval_s} makes {rate} windows a second, and LeRobot's layout needs a whole number; \
+         valid: 1/n s for whole n, such as {} for {nearest}; or set `record.whole_rate` = false, if the data set is \
+         not for LeRobot",
+        1.0 / nearest
+    )))
 }
 
 fn default_windows(config: &SpecConfig, interval_s: Option<f64>, before_s: f64) -> u64 {

@@ -335,6 +335,8 @@ pub struct RecordConfig {
     /// Time from the start of one window to the start of the next, s; at least the duration of a window, at most 10.
     /// Default: 0.02 for "course", 0.001 for "drop"; the windows of a "hold" follow each other without a gap.
     pub interval_s: Option<f64>,
+    /// Whether `interval_s` has to make a whole number of windows a second, which LeRobot's layout needs. Default true.
+    pub whole_rate: bool,
     /// Time from the start of the first window to the touch, s; [0, 10]. Not for "hold". Default: 0.1 for "course",
     /// 0.004 for "drop".
     pub before_s: Option<f64>,
@@ -385,6 +387,7 @@ impl Default for RecordConfig {
             what: RecordKind::Hold,
             windows: None,
             interval_s: None,
+            whole_rate: true,
             before_s: None,
             measurements: 20,
             labels: Label::ALL.to_vec(),

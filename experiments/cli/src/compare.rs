@@ -182,6 +182,7 @@ impl CompareCommand {
     /// What the scores need; `None`, with a note, when it is not published with the recordings.
     fn scored(&self) -> Result<Option<PublishedSkin>, CliError> {
         let source = Source::open(&self.recordings)?;
+        source.note.iter().for_each(|text| note(&format!("note: {text}")));
         let unpublished = source.published.is_none() && !source.sessions.is_empty();
         match source.published_skin() {
             Err(e) if unpublished => {

@@ -91,6 +91,7 @@ impl DecodeCommand {
         let decoders = decoders_named(&self.decoder)?;
         let network = self.weights.as_deref().map(network).transpose()?;
         let mut set = SessionSet::open(&self.session)?;
+        set.note.iter().for_each(|text| note(&format!("note: {text}")));
         let slips = follow_slips(&mut set);
         let sessions = self.chosen(&set)?;
         for session in &sessions {

@@ -140,6 +140,7 @@ impl DeviceCommand {
             }
             Some(path) => {
                 let set = SessionSet::open(path)?;
+                set.note.iter().for_each(|text| note(&format!("note: {text}")));
                 let recording = self.recording(path, &set)?;
                 let asked = self.blocks.and_then(|asked| usize::try_from(asked).ok());
                 let blocks = recording.blocks().iter().take(asked.unwrap_or(usize::MAX));

@@ -345,7 +345,7 @@ impl ScoreCommand {
             Some(scenes) => simulated_sessions(scenes, self.seed, self.quick)?,
             None => Source::open(self.recordings.as_deref().unwrap_or(Path::new("")))?,
         };
-        if let Some(text) = slips_text(&source.slips) {
+        for text in slips_text(&source.slips).iter().chain(&source.note) {
             note(&format!("note: {text}"));
         }
         Ok(source)

@@ -68,7 +68,7 @@ impl SkinRun<'_> {
 
 /// The sessions of a simulated skin as a set.
 pub fn twin_set(sessions: Vec<Session>) -> SessionSet {
-    SessionSet { root: PathBuf::from("the twin"), sessions, published: None, missing: Vec::new() }
+    SessionSet { root: PathBuf::from("the twin"), sessions, published: None, missing: Vec::new(), note: None }
 }
 
 /// `presses` presses of the object called `object`, at its place in the published recordings, on the skin that follows

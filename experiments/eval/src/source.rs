@@ -37,6 +37,8 @@ pub struct Source {
     pub labels: Labels,
     /// Slips of the recordings, which have been realigned.
     pub slips: Vec<SessionSlip>,
+    /// As [`SessionSet::note`].
+    pub note: Option<String>,
 }
 
 /// Everything on which a skin, real or simulated, is scored.
@@ -85,7 +87,7 @@ impl Source {
     pub fn new(mut set: SessionSet) -> Result<Self, Refusal> {
         let slips = follow_slips(&mut set);
         let bounces = set.drops().cloned();
-        let SessionSet { root, sessions, published, mut missing } = set;
+        let SessionSet { root, sessions, published, mut missing, note } = set;
         let simulated = sessions.iter().all(|s| s.provenance.is_some());
         let (presses, others): (Vec<Session>, Vec<Session>) =
             sessions.into_iter().partition(|s| s.event == Event::Press);
@@ -114,7 +116,8 @@ impl Source {
             let (again, shared_raster) = (same().next().is_some(), same().any(|s| s.raster == session.raster));
             scored.push(ScoredSession { again, shared_raster, ..session });
         }
-        Ok(Self { sessions: scored, root, bounces, touches, published, missing, simulated, layout, labels, slips })
+        let sessions = scored;
+        Ok(Self { sessions, root, bounces, touches, published, missing, simulated, layout, labels, slips, note })
     }
 
     /// Training data for this skin: raster presses that are not scored, with the published dictionary and library if

@@ -1,4 +1,4 @@
-//! Variables of a MATLAB v5 file. Its elements are decompressed and found first, so that nothing is converted that
+//! Variables of a MATLAB v5 file, which MATLAB's `save` writes with `-v6` or `-v7`. Its elements are decompressed and found first, so that nothing is converted that
 //! would not fit.
 
 use flate2::read::ZlibDecoder;
@@ -38,6 +38,13 @@ pub(super) fn read_mat(path: &Path, names: &[&'static str]) -> Result<MatVariabl
 /// [`Refusal`] when they are not MATLAB v5, or that variable is missing or no array of numbers.
 pub fn parse_mat(bytes: Vec<u8>, names: &[&'static str], path: &Path) -> Result<MatVariable, Refusal> {
     let refused = |problem: String| Refusal::new(problem).at(path.display());
+    if let Some(format) = other_format(&bytes) {
+        let name = names.first().copied().unwrap_or_default();
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        return Err(refused(format!(
+            "{format}; MATLAB v5 is read: load it in MATLAB or Octave, then save('{file}', '{name}', '-v7')"
+        )));
+    }
     let plain = inflate(&bytes).map_err(|reason| not_mat(path, &reason))?;
     let not_mat = |reason: String| not_mat(path, &reason);
     drop(bytes);
@@ -51,6 +58,9 @@ pub fn parse_mat(bytes: Vec<u8>, names: &[&'static str], path: &Path) -> Result<
         let class = element.class;
         return Err(refused(format!("variable `{name}` is a {class}; expected an array of numbers")));
     };
+    if element.complex {
+        return Err(refused(format!("variable `{name}` is complex; expected real numbers, such as real({name})")));
+    }
     let count = data.len() / width(kind);
     if count > MAX_VALUES {
         return Err(not_mat(format!("`{name}` holds {count} values, outside [0, {MAX_VALUES}]")));
@@ -67,6 +77,29 @@ pub fn parse_mat(bytes: Vec<u8>, names: &[&'static str], path: &Path) -> Result<
 /// The error of a file that is not in MATLAB v5 format, or is damaged.
 pub(super) fn not_mat(path: &Path, reason: &str) -> Refusal {
     Refusal::new(format!("{}: not a readable MATLAB v5 file ({reason})", path.display()))
+}
+
+/// What the file is, if it is of another format that MATLAB or Octave write.
+///
+/// Sources: MathWorks, *MAT-File Format*, "Level 5" (the last two bytes of the header tell the byte order) and "Level 4"
+/// (it begins with the number 1000 M + 10 P + T, M the byte order, P ≤ 5 the type and T ≤ 2 the kind of the matrix, and
+/// has no text); HDF5 File Format Specification, II.A: the signature is at 0, 512, or twice that over and over.
+fn other_format(file: &[u8]) -> Option<&'static str> {
+    let hdf5 = |at: usize| file.get(at..).is_some_and(|rest| rest.starts_with(b"\x89HDF\r\n\x1a\n"));
+    if hdf5(0) || (9..20).any(|k| hdf5(1 << k)) || file.starts_with(b"MATLAB 7.3") {
+        return Some("a MATLAB v7.3 file (HDF5)");
+    }
+    if file.get(126..128) == Some(b"MI") {
+        return Some("a big-endian MATLAB v5 file");
+    }
+    if file.starts_with(b"# ") || file.starts_with(b"Octave-1") {
+        return Some("a file in a format of Octave's own");
+    }
+    let first: [u8; 4] = file.get(..4)?.try_into().ok()?;
+    let is_v4 = |word: u32| word / 1000 <= 4 && word % 1000 / 100 == 0 && word % 100 / 10 <= 5 && word % 10 <= 2;
+    let has_header = file.get(126..128) == Some(b"IM");
+    let is_v4 = is_v4(u32::from_le_bytes(first)) || is_v4(u32::from_be_bytes(first));
+    (is_v4 && !has_header).then_some("a MATLAB v4 file")
 }
 
 /// Names and classes of the variables, as an error lists them.
@@ -101,7 +134,7 @@ fn inflate(file: &[u8]) -> Result<Vec<u8>, String> {
         .get(..HEADER)
         .ok_or_else(|| format!("the file ends after {} bytes; its header alone has {HEADER}", file.len()))?;
     if header[126..] != *b"IM" {
-        return Err("it does not begin with a little-endian v5 header".to_owned());
+        return Err("it does not begin with the header of one".to_owned());
     }
     let mut plain = header.to_vec();
     let mut rest = &file[HEADER..];
@@ -152,6 +185,8 @@ struct MatElement<'a> {
     shape: Vec<usize>,
     /// Type and bytes of the real parts; `None` if it is no array of numbers.
     numbers: Option<(u32, &'a [u8])>,
+    /// Whether it has imaginary parts too.
+    complex: bool,
 }
 
 /// The variables that stand in `elements`, which is what follows a file's header, without compression. What is damaged
@@ -179,6 +214,8 @@ fn matrix(bytes: &[u8]) -> Option<MatElement<'_>> {
     let mut rest = bytes.get(TAG..)?;
     let (_, flags) = part(&mut rest)?;
     let (class, numeric) = class(*flags.first()?);
+    // the byte above the class holds the flags: complex, global, logical
+    let complex = flags.get(1)? & 8 != 0;
     let (_, dimensions) = part(&mut rest)?;
     let (_, name) = part(&mut rest)?;
     let (sides, _) = dimensions.as_chunks::<4>();
@@ -188,6 +225,7 @@ fn matrix(bytes: &[u8]) -> Option<MatElement<'_>> {
         shape: sides.iter().map(|side| u32::from_le_bytes(*side) as usize).collect(),
         // with other classes the parts are elements of their own, which nothing reads
         numbers: numeric.then(|| part(&mut rest).unwrap_or_default()),
+        complex,
     })
 }
 

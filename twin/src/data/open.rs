@@ -1,6 +1,6 @@
 //! Opens recordings: a session, a folder of sessions, or the published recordings.
 
-use super::published::{Published, PublishedFiles, published_place};
+use super::published::{Published, PublishedFiles, published_place, square};
 use crate::session::{Event, SESSION_FILE, Session};
 use spts_circuit::Recording;
 use spts_input::Refusal;
@@ -33,6 +33,8 @@ pub struct SessionSet {
     pub published: Option<Published>,
     /// Parts of the published layout that this folder lacks.
     pub missing: Vec<String>,
+    /// What a user has to know about how the files were read; `None` if they can be read in one way alone.
+    pub note: Option<String>,
 }
 
 impl SessionSet {
@@ -58,7 +60,8 @@ impl SessionSet {
         find(root, DEPTH, &mut folders)?;
         if folders.is_empty() {
             let (sessions, published, missing) = PublishedFiles::open(root)?.read()?;
-            return Ok(Self { root: root.to_owned(), sessions, published, missing });
+            let note = square(&sessions);
+            return Ok(Self { root: root.to_owned(), sessions, published, missing, note });
         }
         let sessions = folders.iter().map(|folder| Session::read(folder));
         let mut sessions = sessions.collect::<Result<Vec<_>, _>>()?;
@@ -71,7 +74,7 @@ impl SessionSet {
             true => PublishedFiles::beside(root)?,
             false => None,
         };
-        Ok(Self { root: root.to_owned(), sessions, published, missing: Vec::new() })
+        Ok(Self { root: root.to_owned(), sessions, published, missing: Vec::new(), note: None })
     }
 
     /// The session called `name`.

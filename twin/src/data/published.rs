@@ -16,6 +16,22 @@ use std::path::{Path, PathBuf};
 /// The sessions of a folder, dictionary and library where they are there, and the recordings that are missing.
 pub(super) type Found = (Vec<Session>, Option<Published>, Vec<String>);
 
+/// Says of which recordings the order of taxels and frames cannot be told by their shapes.
+pub(super) fn square(sessions: &[Session]) -> Option<String> {
+    let is_square = |r: &Option<Recorded>| {
+        r.as_ref().is_some_and(|r| r.recording.blocks().iter().any(|b| b.volts.len() == TAXELS * TAXELS))
+    };
+    let found = sessions.iter().filter(|s| is_square(&s.raster) || is_square(&s.compressive));
+    let names: Vec<&str> = found.map(|s| s.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: arrays of {TAXELS} × {TAXELS} × presses are read as taxels × frames × presses; with frames first, they \
+             would look the same and the images be wrong",
+            names.join(", ")
+        )
+    })
+}
+
 /// The refusal of the folder `root`, which has no recordings.
 pub fn nothing_found(root: &Path) -> Refusal {
     let expected = "session.json, folders with one, or the published recordings (presses/NAME/NAME_raster.mat, \
