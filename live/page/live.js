@@ -57,6 +57,7 @@ function fill(select, choices, chosen) {
   const groups = new Map();
   for (const choice of choices) {
     const option = new Option(choice.label, choice.name, false, choice.name === chosen);
+    option.title = choice.about;
     const grouped = choice.group && choice.group !== "noisy";
     if (grouped && !groups.has(choice.group)) {
       const group = document.createElement("optgroup");
@@ -253,7 +254,7 @@ function takeMesh(message) {
 }
 
 function connect() {
-  socket = new WebSocket(`ws://${location.host}/socket`);
+  socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/socket`);
   socket.onmessage = (event) => {
     const message = JSON.parse(event.data);
     const takers = {

@@ -27,7 +27,7 @@ mod settings;
 mod wires;
 
 pub use object::{LiveObject, MeshUnit, Shape, Side, UploadedMesh};
-pub use server::{LiveConfig, Server};
+pub use server::{LiveConfig, Server, token};
 pub use session::{Frame, LineFrame, LiveSession, PanelFrame, Request};
 pub use settings::{FORCE_N, MEASUREMENTS, NOISE_FACTOR};
 pub use wires::Shelf;

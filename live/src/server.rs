@@ -1,7 +1,9 @@
-//! The server: pages of this machine that it served itself, each with a session of its own.
+//! The server: pages that it served itself, each with a session of its own.
 //!
-//! A name that a foreign page has resolve to 127.0.0.1 (DNS rebinding) stands in `Host`, and the page that a browser
-//! sends a request for stands in `Origin`: both have to be this server.
+//! A name that a foreign page has resolve to this server (DNS rebinding) stands in `Host`, and the page that a browser
+//! sends a request for stands in `Origin`. Without a token, both have to be 127.0.0.1 with the server's port. With one,
+//! as in a container or behind another port, `Host` may be any name, `Origin` has to be the same one, and the browser
+//! has to know the token: from the address at first, then from a cookie, which pages of other sites do not send.
 
 use crate::UPDATE_S;
 use crate::object::{LiveObject, MOST_MESH_BYTES, MeshUnit, UploadedMesh};
@@ -18,7 +20,7 @@ use axum::routing::{any, get};
 use axum::serve::ListenerExt as _;
 use serde::Serialize;
 use spts::Refusal;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::Semaphore;
@@ -41,8 +43,13 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 /// What the server begins with.
 #[derive(Debug, Clone)]
 pub struct LiveConfig {
-    /// Port on 127.0.0.1; 0 for any free one.
+    /// Address to listen at. Any but this machine's own (127.0.0.1, ::1) needs a token.
+    pub host: IpAddr,
+    /// Its port; 0 for any free one.
     pub port: u16,
+    /// What a browser has to know, 16 to 128 letters, digits, - and _; `None`: nothing, but it has to be on this machine
+    /// and ask for this port.
+    pub token: Option<String>,
     /// Which specimen of the skin it is, and its noise.
     pub seed: u64,
     /// Name of the object that a page begins with.
@@ -63,22 +70,48 @@ struct Shared {
 pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
+    guard: Guard,
     shared: Arc<Shared>,
 }
 
+/// 128 random bits of the operating system, as a token.
+///
+/// # Errors
+/// [`Refusal`] if the system has none.
+pub fn token() -> Result<String, Refusal> {
+    let mut bytes = [0; 16];
+    getrandom::fill(&mut bytes).map_err(|e| Refusal::new(format!("`--token`: no random numbers: {e}")))?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
 impl Server {
-    /// Listens on 127.0.0.1.
+    /// Listens.
     ///
     /// # Errors
-    /// [`Refusal`] for an object that is not there, or a port that is taken.
+    /// [`Refusal`] for an object that is not there, an address or port that cannot be had, an address of other machines
+    /// without a token, or a token of other length or characters.
     pub fn bind(config: &LiveConfig) -> Result<Self, Refusal> {
         LiveObject::named(&config.object)?;
-        let refused =
-            |e: std::io::Error| Refusal::new(format!("`--port` = {}: {e}; `--port 0` takes any free one", config.port));
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, config.port)).map_err(refused)?;
+        let LiveConfig { host, port, token, .. } = config;
+        let is_valid = |t: &String| {
+            (16..=128).contains(&t.len()) && t.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-' || b == b'_')
+        };
+        if token.as_ref().is_some_and(|token| !is_valid(token)) {
+            return Err(Refusal::new("`--token` is not 16 to 128 letters, digits, - and _"));
+        }
+        if token.is_none() && !host.is_loopback() {
+            return Err(Refusal::new(format!("`--host` = {host} is not of this machine alone; it needs a `--token`")));
+        }
+        let refused = |e: std::io::Error| {
+            let at = SocketAddr::new(*host, *port);
+            Refusal::new(format!("`--host` and `--port`, {at}: {e}; `--port 0` takes any free one"))
+        };
+        let listener = TcpListener::bind((*host, *port)).map_err(refused)?;
         listener.set_nonblocking(true).map_err(refused)?;
+        let address = listener.local_addr().map_err(refused)?;
         Ok(Self {
-            address: listener.local_addr().map_err(refused)?,
+            address,
+            guard: Guard { port: address.port(), token: token.clone() },
             listener,
             shared: Arc::new(Shared {
                 shelf: Arc::new(Shelf::new()),
@@ -95,6 +128,15 @@ impl Server {
         self.address
     }
 
+    /// What a browser on this machine opens.
+    pub fn url(&self) -> String {
+        let mut at = self.address;
+        if at.ip().is_unspecified() {
+            at.set_ip(if at.is_ipv4() { Ipv4Addr::LOCALHOST.into() } else { Ipv6Addr::LOCALHOST.into() });
+        }
+        self.guard.token.as_ref().map_or_else(|| format!("http://{at}/"), |token| format!("http://{at}/?token={token}"))
+    }
+
     /// Serves until the program ends.
     ///
     /// # Errors
@@ -106,7 +148,7 @@ impl Server {
         for (path, kind, text) in FILES {
             router = router.route(path, get(move || async move { ([(header::CONTENT_TYPE, kind)], text) }));
         }
-        let router = router.with_state(self.shared).layer(from_fn_with_state(self.address.port(), own_pages_only));
+        let router = router.with_state(self.shared).layer(from_fn_with_state(self.guard, own_pages_only));
         runtime.block_on(async move {
             let listener = tokio::net::TcpListener::from_std(self.listener).map_err(ended)?;
             // an update is sent at once, and does not wait for the page to take the one before
@@ -148,34 +190,82 @@ const SAFE: [(HeaderName, &str); 6] = [
     (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
 ];
 
-/// Lets requests through that are meant for the server at this port and come from its own page; an upgrade to a
-/// WebSocket has to say where it comes from.
-async fn own_pages_only(State(port): State<u16>, request: HttpRequest<Body>, next: Next) -> Response {
-    let mut response = match refusal(request.headers(), request.uri().authority().map(|a| a.as_str()), port) {
+/// Who is let in.
+#[derive(Debug, Clone)]
+struct Guard {
+    port: u16,
+    token: Option<String>,
+}
+
+/// Lets requests through that come from the server's own page and from those who may see it; an upgrade to a WebSocket
+/// has to say where it comes from.
+async fn own_pages_only(State(guard): State<Guard>, request: HttpRequest<Body>, next: Next) -> Response {
+    let authority = request.uri().authority().map(|a| a.as_str());
+    let mut response = match guard.refusal(request.headers(), request.uri().query(), authority) {
         None => next.run(request).await,
         Some(reason) => (StatusCode::FORBIDDEN, format!("{reason}\n")).into_response(),
     };
     for (name, value) in SAFE {
         response.headers_mut().insert(name, HeaderValue::from_static(value));
     }
+    if response.status().is_success()
+        && let Some(cookie) = guard.cookie()
+        && let Ok(value) = HeaderValue::from_str(&format!("{cookie}; HttpOnly; SameSite=Strict; Path=/"))
+    {
+        response.headers_mut().insert(header::SET_COOKIE, value);
+    }
     response
 }
 
-/// Why a request is refused.
-fn refusal(headers: &HeaderMap, authority: Option<&str>, port: u16) -> Option<String> {
-    let hosts: Vec<Option<&str>> = headers.get_all(header::HOST).iter().map(|v| v.to_str().ok()).collect();
-    let own_host = matches!(hosts.as_slice(), [Some(host)] if is_own(host, port));
-    if !own_host || authority.is_some_and(|authority| !is_own(authority, port)) {
-        return Some(format!("This server answers at http://127.0.0.1:{port}/ alone: the header Host is another one."));
+impl Guard {
+    /// Name and value of the cookie of those who know the token. Servers on one host have names of their own.
+    fn cookie(&self) -> Option<String> {
+        self.token.as_ref().map(|token| format!("spts_live_{}={token}", self.port))
     }
-    let origins: Vec<Option<&str>> = headers.get_all(header::ORIGIN).iter().map(|v| v.to_str().ok()).collect();
-    let own_origin = match origins.as_slice() {
-        [] => !headers.contains_key(header::UPGRADE),
-        [Some(origin)] => origin.strip_prefix("http://").is_some_and(|host| is_own(host, port)),
-        _ => false,
-    };
-    (!own_origin)
-        .then(|| "This server speaks with its own page alone: the header Origin is missing or another one.".to_owned())
+
+    /// Why a request is refused.
+    fn refusal(&self, headers: &HeaderMap, query: Option<&str>, authority: Option<&str>) -> Option<String> {
+        let all = |name| headers.get_all(name).iter().map(|v| v.to_str().ok()).collect::<Vec<Option<&str>>>();
+        let (hosts, origins) = (all(header::HOST), all(header::ORIGIN));
+        let [Some(host)] = hosts.as_slice() else {
+            return Some("The header Host is missing, or there are several.".to_owned());
+        };
+        if let Some(cookie) = self.cookie() {
+            let given =
+                query.into_iter().flat_map(|query| query.split('&')).filter_map(|part| part.strip_prefix("token="));
+            let known =
+                all(header::COOKIE).into_iter().flatten().flat_map(|line| line.split("; ")).any(|c| same(c, &cookie));
+            if !known && !given.into_iter().any(|given| self.token.as_ref().is_some_and(|token| same(given, token))) {
+                return Some("Open the address that `spts live` has printed: it has the token.".to_owned());
+            }
+        } else if !is_own(host, self.port) || authority.is_some_and(|authority| !is_own(authority, self.port)) {
+            return Some(format!(
+                "This server answers at http://127.0.0.1:{}/ alone: the header Host is another one. For other ports and \
+                 machines: `spts live --token`.",
+                self.port
+            ));
+        }
+        let is_same = |origin: &str| {
+            let of = |scheme| origin.strip_prefix(scheme);
+            match self.token {
+                Some(_) => of("http://").or_else(|| of("https://")).is_some_and(|from| from.eq_ignore_ascii_case(host)),
+                None => of("http://").is_some_and(|from| is_own(from, self.port)),
+            }
+        };
+        let own_origin = match origins.as_slice() {
+            [] => !headers.contains_key(header::UPGRADE),
+            [Some(origin)] => is_same(origin),
+            _ => false,
+        };
+        (!own_origin).then(|| {
+            "This server speaks with its own page alone: the header Origin is missing or another one.".to_owned()
+        })
+    }
+}
+
+/// Whether two texts are the same, in a time that tells nothing of where they differ.
+fn same(a: &str, b: &str) -> bool {
+    a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
 }
 
 fn is_own(host: &str, port: u16) -> bool {
@@ -394,11 +484,16 @@ mod tests {
     use super::*;
 
     fn refused(headers: &[(&str, &str)]) -> bool {
+        refused_by(None, "", headers)
+    }
+
+    fn refused_by(token: Option<&str>, query: &str, headers: &[(&str, &str)]) -> bool {
         let mut map = HeaderMap::new();
         for (name, value) in headers {
             map.append(HeaderName::from_bytes(name.as_bytes()).unwrap(), value.parse().unwrap());
         }
-        refusal(&map, None, 7117).is_some()
+        let guard = Guard { port: 7117, token: token.map(str::to_owned) };
+        guard.refusal(&map, Some(query), None).is_some()
     }
 
     #[test]
@@ -437,6 +532,29 @@ mod tests {
         ] {
             assert!(refused(&[("host", "127.0.0.1:7117"), ("origin", origin)]), "{origin:?}");
         }
+    }
+
+    #[test]
+    fn a_token_lets_in_under_any_name_and_from_its_own_page_alone() {
+        let token = "0123456789abcdef";
+        let refused = |query: &str, headers: &[(&str, &str)]| refused_by(Some(token), query, headers);
+        let (host, knows) = (("host", "robot.lan:8080"), ("cookie", "a=b; spts_live_7117=0123456789abcdef"));
+        assert!(!refused("token=0123456789abcdef", &[host]) && !refused("", &[host, knows]));
+        assert!(!refused("", &[host, knows, ("upgrade", "websocket"), ("origin", "http://robot.lan:8080")]));
+        assert!(!refused("", &[host, knows, ("upgrade", "websocket"), ("origin", "https://robot.lan:8080")]));
+        for query in ["", "token=", "token=0123456789abcdeg", "token=0123456789abcdef0", "t=0123456789abcdef"] {
+            assert!(refused(query, &[host]), "{query}");
+        }
+        for cookie in ["", "spts_live_7117=", "spts_live_7118=0123456789abcdef", "xspts_live_7117=0123456789abcdef"] {
+            assert!(refused("", &[host, ("cookie", cookie)]), "{cookie}");
+        }
+        assert!(refused("", &[host, knows, ("upgrade", "websocket")]));
+        for origin in
+            ["null", "http://evil.example", "http://robot.lan", "http://robot.lan:8080/", "ws://robot.lan:8080"]
+        {
+            assert!(refused("", &[host, knows, ("origin", origin)]), "{origin}");
+        }
+        assert!(refused("token=0123456789abcdef", &[]));
     }
 
     /// A browser that asks for port 80 does not write it.

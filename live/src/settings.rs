@@ -197,13 +197,13 @@ impl Options {
     pub(crate) fn of(skin: &SkinLayout, settings: &Settings) -> Self {
         let plain = |&(name, label): &(&'static str, &'static str)| Choice {
             name,
-            label: label.to_owned(),
-            about: String::new(),
+            label: short(label, &[": "]),
+            about: label.to_owned(),
             group: "",
         };
         let objects = pressable().map(|spec| Choice {
             name: spec.name,
-            label: spec.description.split([',', ':']).next().unwrap_or(spec.name).to_owned(),
+            label: short(spec.description, &[",", ":", " with ", " standing "]),
             about: spec.description.to_owned(),
             group: "",
         });
@@ -221,7 +221,7 @@ impl Options {
         });
         let random = Choice {
             name: RANDOM,
-            label: "random, as the cells make them".to_owned(),
+            label: "random".to_owned(),
             about: "every cell's own pseudorandom sequence of signs, different in every window".to_owned(),
             group: "",
         };
@@ -244,6 +244,12 @@ impl Options {
             usual: Usual::of(settings),
         }
     }
+}
+
+/// What of `text` a narrow list shows: what stands before the first of `ends`.
+fn short(text: &str, ends: &[&str]) -> String {
+    let end = ends.iter().filter_map(|end| text.find(end)).min().unwrap_or(text.len());
+    text[..end].to_owned()
 }
 
 /// Whether a factor on the noise changes anything.

@@ -1,9 +1,12 @@
 """`spts live` in a real browser: pressed, watched, broken, and given a mesh."""
 
+import contextlib
 import json
 import re
+import socket
 import struct
 import subprocess
+import threading
 
 import pytest
 
@@ -96,6 +99,70 @@ def test_the_page_fits(live, width, scheme):
     one = live(width, scheme)
     one.check()
     one.shoot("live")
+
+
+# the smallest part of a phone's screen that bars of its browser leave, and what is to be seen there at once
+PHONE, TOGETHER = {"width": 390, "height": 664}, ("pad", "force", "image-0", "image-1", "scores-0", "scores-1")
+# options whose text is wider than its select, without the arrow; what is hidden cuts nothing
+CUT = """() => [...document.querySelectorAll("select")].flatMap((select) => {
+  const style = getComputedStyle(select), pen = document.createElement("canvas").getContext("2d");
+  pen.font = `${style.fontWeight} ${style.fontSize} ${style.fontFamily}`;
+  const room = select.clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight) - 16;
+  return select.offsetParent === null ? [] : [...select.options].map((o) => o.text).filter((text) => pen.measureText(text).width > room);
+})"""
+
+
+def test_a_phone_shows_skin_and_images_at_once(live):
+    one = live(PHONE["width"])
+    one.page.set_viewport_size(PHONE)
+    one.page.evaluate("scrollTo(0, 0)")
+    for name in TOGETHER:
+        box = one.page.locator(f"#{name}").bounding_box()
+        assert box["y"] >= 0 and box["y"] + box["height"] <= PHONE["height"], (name, box)
+    assert one.page.locator("#pad").bounding_box()["width"] >= 200
+    one.shoot("live_phone")
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_no_text_of_a_select_is_cut(live, width):
+    assert live(width).page.evaluate(CUT) == []
+
+
+def test_a_token_lets_in_through_another_port(visit, program):
+    """As behind `ssh -L` or out of a container: the browser asks for a port that the server does not know."""
+    command = [program, "live", "--port", "0", "--token", "--threads", "1", "--json"]
+    served = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    url = json.loads(served.stdout.readline())["url"]
+    near = socket.create_server(("127.0.0.1", 0))
+    far = int(re.search(r":(\d+)/", url).group(1))
+    threading.Thread(target=forward, args=(near, far), daemon=True).start()
+    through = re.sub(r":\d+/", f":{near.getsockname()[1]}/", url)
+    try:
+        page = visit(1400).page
+        page.goto(through.split("?")[0])
+        assert "it has the token" in page.inner_text("body")
+        page.goto(through)
+        until(page, "Number(document.body.dataset.frame) > 5")
+    finally:
+        served.kill()
+        served.wait()
+        near.close()
+
+
+def forward(near, port):
+    """Hands connections on to another port."""
+
+    def copy(source, sink):
+        with contextlib.suppress(OSError):
+            while data := source.recv(65536):
+                sink.sendall(data)
+            sink.shutdown(socket.SHUT_WR)
+
+    with contextlib.suppress(OSError):
+        while True:
+            client, server = near.accept()[0], socket.create_connection(("127.0.0.1", port))
+            for pair in ((client, server), (server, client)):
+                threading.Thread(target=copy, args=pair, daemon=True).start()
 
 
 def test_the_mouse_presses(live):

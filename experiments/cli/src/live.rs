@@ -5,14 +5,16 @@ use crate::error::CliError;
 use crate::options::{pressed, seed};
 use clap::Args;
 use spts_contact::objects::ObjectSpec;
-use spts_live::{LiveConfig, Server};
+use spts_live::{LiveConfig, Server, token};
+use std::net::{IpAddr, Ipv4Addr};
 
 /// Port that is easy to keep as a bookmark.
 const PORT: u16 = 7117;
 
 /// Serves a page on which you press the skin with the mouse and see its wire and two decoded images move.
 ///
-/// The page is served to this machine alone, at http://127.0.0.1:PORT/; it needs no other program and no network.
+/// The page is served to this machine alone, at http://127.0.0.1:PORT/; it needs no other program and no network. With
+/// a token it may be seen from elsewhere: through another port, out of a container, from another machine.
 /// Choose an object, or drop a mesh file onto the page. Press it anywhere on the skin, as hard as you like. Two
 /// decoders show what they make of the wire, each at random or designed rows of the sensing matrix, from M = 5 to
 /// 100 measurements. Cells can be broken and the noise changed while it runs. There are up to 40 updates a second
@@ -22,11 +24,20 @@ const PORT: u16 = 7117;
   spts live                          then open the address that it prints
   spts live --object tennis --seed 3
   spts live --port 0                 any free port
-  ssh -L 7117:127.0.0.1:7117 HOST    shows the page of a program that runs on HOST; the port has to be the same
+  ssh -L 7117:127.0.0.1:7117 HOST    shows the page of a program that runs on HOST at the same port here
+  spts live --token                  lets pages in through any port: ssh -L 8080:127.0.0.1:7117 HOST, for example
+  spts live --host 0.0.0.0           lets other machines in, and those outside of a container; a token is made
 
 --json prints {\"url\"} on one line, and then serves. Ctrl-C ends it. docs/live.md says what each control does.")]
 pub(super) struct LiveCommand {
-    /// Port on 127.0.0.1; 0 for any free one
+    /// Address to listen at. Any but 127.0.0.1 and ::1 asks browsers for a token
+    #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
+    host: IpAddr,
+    /// Let in who knows TOKEN, 16 to 128 letters, digits, - and _, under any name and port; without TOKEN a random one
+    /// is made
+    #[arg(long, value_name = "TOKEN", num_args = 0..=1, default_missing_value = "")]
+    token: Option<String>,
+    /// Port of the address; 0 for any free one
     #[arg(long, value_name = "PORT", default_value_t = PORT)]
     port: u16,
     /// Object at the beginning: one of the seventeen that `spts simulate --list` shows, or finger
@@ -43,15 +54,20 @@ impl LiveCommand {
     /// Runs the command.
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
-        let server =
-            Server::bind(&LiveConfig { port: self.port, seed: self.seed, object: self.object.name.to_owned() })?;
-        let url = format!("http://{}/", server.address());
+        let given = self.token.or_else(|| (!self.host.is_loopback()).then(String::new));
+        let token = given.map(|given| if given.is_empty() { token() } else { Ok(given) }).transpose()?;
+        let object = self.object.name.to_owned();
+        let server = Server::bind(&LiveConfig { host: self.host, port: self.port, token, seed: self.seed, object })?;
+        let url = server.url();
         if self.common.json {
             // one line, for a script that reads a line and goes on while the page is served
             print(&serde_json::json!({ "url": url }).to_string())?;
         } else {
             print(&url)?;
             note("open this address in a browser; Ctrl-C ends it");
+            if !self.host.is_loopback() {
+                note("from elsewhere, with this machine's name or published port in it; what is sent is not encrypted");
+            }
         }
         Ok(server.run()?)
     }

@@ -2,7 +2,7 @@
 
 use spts_live::{LiveConfig, Server};
 use std::io::{Read as _, Write as _};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 use tungstenite::client::IntoClientRequest as _;
 use tungstenite::{Message, WebSocket};
@@ -11,7 +11,8 @@ use tungstenite::{Message, WebSocket};
 const PATIENCE: Duration = Duration::from_secs(60);
 
 fn server() -> SocketAddr {
-    let server = Server::bind(&LiveConfig { port: 0, seed: 1, object: "T".to_owned() });
+    let host = Ipv4Addr::LOCALHOST.into();
+    let server = Server::bind(&LiveConfig { host, port: 0, token: None, seed: 1, object: "T".to_owned() });
     let server = server.unwrap();
     let address = server.address();
     std::thread::spawn(move || server.run());
