@@ -21,7 +21,7 @@ const COARSE_SHARE: f64 = 0.125;
 impl TriMesh {
     /// A mesh of at most [`SOFT_MAX_TRIANGLES`] triangles, or of as many more as it takes to stay within
     /// [`MAX_DECIMATION_ERROR_M`] and 0.2 % of the extent, and its error, m. `None` when that saves nothing, or when
-    /// the result would not be closed and outward any more.
+    /// the result would not be closed and outward any more; of an open mesh, when it would have more open edges.
     ///
     /// Edges are collapsed in the order of their quadric error (meshoptimizer), onto vertices of the original. The
     /// error is measured, not estimated: the largest distance from any vertex of the original to the new surface, and
@@ -32,7 +32,7 @@ impl TriMesh {
             .then(|| self.simplified(COARSE_TRIANGLES, COARSE_SHARE * limit_m));
         let start = coarse.as_ref().unwrap_or(self);
         let original = Nearest::new(self);
-        let volume_m3 = self.volume_m3();
+        let (volume_m3, open_edges) = (self.volume_m3(), self.open_edges());
         // a surface that moves by at most the limit changes the volume by at most that times its area
         let most_change_m3 = limit_m * self.area_m2();
         let mut target_m = limit_m;
@@ -40,8 +40,8 @@ impl TriMesh {
             let mesh = start.simplified(SOFT_MAX_TRIANGLES, target_m);
             if mesh.triangles.is_empty()
                 || mesh.triangles.len() >= self.triangles.len()
-                || mesh.open_edges() > 0
-                || (mesh.volume_m3() - volume_m3).abs() > most_change_m3
+                || mesh.open_edges() > open_edges
+                || (open_edges == 0 && (mesh.volume_m3() - volume_m3).abs() > most_change_m3)
             {
                 return None;
             }

@@ -222,10 +222,10 @@ proptest! {
     fn damaged_files_never_panic(at in 0_usize..2000, byte in any::<u8>(), cut in 0_usize..2000, noise in prop::collection::vec(any::<u8>(), 0..200)) {
         let mesh = sphere(0.02, 4, 5);
         for (bytes, read) in [
-            (mesh.to_obj("a").into_bytes(), read_obj as fn(&[u8], f64, &str) -> _),
-            (mesh.to_glb("a"), read_glb),
-            (binary(&mesh), read_stl),
-            (text(&mesh), read_stl),
+            (mesh.to_obj("a").into_bytes(), read_obj::<f64> as fn(&[u8], f64, &str) -> _),
+            (mesh.to_glb("a"), read_glb::<f64>),
+            (binary(&mesh), read_stl::<f64>),
+            (text(&mesh), read_stl::<f64>),
         ] {
             let mut damaged = bytes;
             let at = at % damaged.len();
