@@ -867,6 +867,10 @@ pub fn checked(raw: &TriMesh, options: impl Into<MeshOptions>, file: &str) -> Re
                 let broken = if mesh.is_flat() { Broken::Sheet(mesh.sides_m()) } else { broken };
                 return Err(broken.error(scale, away_m, file));
             }
+            // which way an open surface faces says nothing about what touches
+            if mesh.volume_m3() < 0.0 {
+                mesh = mesh.flipped();
+            }
             MeshReport {
                 open_edges: mesh.open_edges(),
                 open_below_m: open_below.map(|edge| mesh.middle_m(edge)),

@@ -231,11 +231,16 @@ const FACET: [&str; 7] = ["facet", "outer", "vertex", "vertex", "vertex", "endlo
 /// Any number of solids, which become one. Normals are not read: some exporters write `nan` for those of triangles
 /// without area.
 fn text_stl(text: &str, file: &str) -> Result<TriMesh, MeshError> {
-    let (mut vertices, mut step, mut last) = (Vec::new(), 0, (0, ""));
+    let last = text.trim_end().rsplit(['\n', '\r']).next().unwrap_or_default();
+    if !last.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("endsolid")) {
+        let (line, found) = (lines(text.trim_end()).count(), start(last.trim()));
+        let why = format!("line {line}: it ends with `{found}`, not with `endsolid` (truncated?)");
+        return Err(malformed(file, why));
+    }
+    let (mut vertices, mut step) = (Vec::new(), 0);
     for (line, content) in lines(text) {
         let mut words = content.split_whitespace();
         let Some(first) = words.next() else { continue };
-        last = (line, first);
         let is = |word: &str| first.eq_ignore_ascii_case(word);
         if step == 0 && (is("solid") || is("endsolid")) {
             continue;
@@ -250,14 +255,6 @@ fn text_stl(text: &str, file: &str) -> Result<TriMesh, MeshError> {
             vertices.push(point(words, line, file)?);
         }
         step = (step + 1) % FACET.len();
-    }
-    let (line, word) = last;
-    if !word.eq_ignore_ascii_case("endsolid") {
-        let triangles = vertices.len() / 3;
-        let why =
-            format_args!("line {line}, after {triangles} triangles: it does not end with `endsolid` (truncated?)")
-                .to_string();
-        return Err(malformed(file, why));
     }
     Ok(soup(vertices))
 }

@@ -236,30 +236,33 @@ fn clip_ears(points: &[Point], mut loop_: Vec<usize>) -> Vec<[usize; 3]> {
     let mut misses = 0;
     while loop_.len() > 3 {
         let n = loop_.len();
-        let corner = [loop_[(at + n - 1) % n], loop_[at % n], loop_[(at + 1) % n]];
-        if misses > n {
+        let corner = |k: usize| [n - 1, 0, 1].map(|step| loop_[(k + step) % n]);
+        let flatness = |k: usize| {
+            let [a, b, c] = corner(k).map(|i| points[i]);
+            turn(a, b, c).abs()
+        };
+        let turns_back = |k: &usize| {
+            let [a, _, c] = corner(*k).map(|i| points[i]);
+            a == c
+        };
+        let ear = if let Some(tip) = (0..n).find(turns_back) {
+            // there and back: it has no area, and both its sides would look like those of an ear
+            tip
+        } else if misses > n {
             // no ear in a full turn: corners without area block them, or the loop is not simple
-            let flatness = |k: usize| {
-                let [a, b, c] = [n - 1, 0, 1].map(|step| points[loop_[(k + step) % n]]);
-                turn(a, b, c).abs()
-            };
-            let flattest = (0..n).min_by(|&j, &k| flatness(j).total_cmp(&flatness(k)));
-            at = flattest.unwrap_or_default();
-            let [a, b, c] = [n - 1, 0, 1].map(|step| loop_[(at + step) % n]);
-            out.push([a, b, c]);
-            loop_.remove(at);
-            misses = 0;
-            at %= loop_.len();
-        } else if is_ear(points, &loop_, corner) {
-            out.push(corner);
-            loop_.remove(at % n);
-            misses = 0;
-            // step on, so that ears come from all around and the triangles stay compact
-            at = (at + 1) % loop_.len();
+            (0..n).min_by(|&j, &k| flatness(j).total_cmp(&flatness(k))).unwrap_or_default()
+        } else if is_ear(points, &loop_, corner(at % n)) {
+            at % n
         } else {
             misses += 1;
             at = (at + 1) % n;
-        }
+            continue;
+        };
+        out.push(corner(ear));
+        loop_.remove(ear);
+        misses = 0;
+        // step on, so that ears come from all around and the triangles stay compact
+        at = (ear + 1) % loop_.len();
     }
     if let [a, b, c] = loop_[..] {
         out.push([a, b, c]);
