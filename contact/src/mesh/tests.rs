@@ -682,6 +682,16 @@ fn what_cannot_be_decimated_within_the_bound_stays_heavy() {
     assert!(report.notes().iter().any(|n| n.contains("slow contact")));
 }
 
+/// The slivers around the poles, 7 µm wide, mislead the estimate of the error.
+#[test]
+fn a_ball_of_slivers_is_decimated_from_stl_too() {
+    let ball = sphere(0.05, 300, 501);
+    let (mesh, report) = read_stl(&binary(&ball), 1.0, "ball.stl").unwrap();
+    assert_eq!(report.decimated_from, Some(299_598));
+    assert!(report.decimation_error_m.unwrap() <= MAX_DECIMATION_ERROR_M && mesh.triangles.len() < 60_000);
+    assert!((mesh.volume_m3() / 5.236e-4 - 1.0).abs() < 0.01, "{}", mesh.volume_m3());
+}
+
 /// A million triangles, bumpy so that the decimation has something to keep, as a file has them. Oracle: the underside
 /// of the original, found by trying every triangle.
 #[test]

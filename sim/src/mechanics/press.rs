@@ -422,17 +422,28 @@ impl PressConfig {
         )))
     }
 
-    /// The error of a mesh that does not meet the skin: where it is.
-    pub(in crate::mechanics) fn beside(&self, report: &MeshReport) -> Refusal {
+    /// The error of a mesh that does not meet the skin: where it is. `square_m` is the distance of the points at which
+    /// the contact is computed.
+    pub(in crate::mechanics) fn beside(&self, report: &MeshReport, square_m: f64) -> Refusal {
         let mm = |m: f64| (1e7 * m).round() / 1e4;
         let [x, y] = [0, 1].map(|k| {
             let half_m = 0.5 * report.extent_m[k];
             format!("[{}, {}]", mm(report.middle_m[k] - half_m), mm(report.middle_m[k] + half_m))
         });
         let (row, col) = (self.row.unwrap_or_default(), self.col.unwrap_or_default());
+        let thin = report.extent_m[0].min(report.extent_m[1]) < 2.0 * square_m;
+        let way = match (thin, self.centre) {
+            (true, _) => {
+                format!("it is thin for contact squares of {} mm: take more, such as `--cells 24`", mm(square_m))
+            }
+            (false, Some(true)) => {
+                "nothing of it is over the skin there: choose another `--row` and `--col`".to_owned()
+            }
+            _ => "`--centre` (`press.centre = true`) puts the middle of its footprint there".to_owned(),
+        };
         Refusal::new(format!(
             "`press.mesh`: the mesh lies beside the skin: its box is x = {x}, y = {y} mm from its origin, which is held \
-             over row {row}, column {col}; `--centre` (`press.centre = true`) puts the middle of its footprint there"
+             over row {row}, column {col}; {way}"
         ))
     }
 
