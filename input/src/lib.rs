@@ -178,8 +178,8 @@ pub fn lossy_text(bytes: &[u8]) -> Result<Cow<'_, str>, InputError> {
     }
 }
 
-/// Whether `bytes` are surely text in UTF-16: they begin with its mark, or most of their first characters have a zero in
-/// the same one of their two bytes, and none in the other.
+/// Whether `bytes` are surely text in UTF-16: they begin with its mark, or most of their first characters have a zero
+/// in the same one of their two bytes, and none in the other.
 pub fn is_utf16(bytes: &[u8]) -> bool {
     let pairs = bytes.as_chunks::<2>().0;
     let pairs = &pairs[..pairs.len().min(128)];

@@ -67,8 +67,8 @@ impl Body {
 impl Body {
     /// Body from a file that ends in .stl, .obj or .glb, times `scale` metres a unit.
     ///
-    /// `repair` says what is done with a mesh that is not closed. "strict": it is closed where that is clear, used as it
-    /// is where no hole shows from below (-z), and refused otherwise. "near_side": it is used as it is, as a shell
+    /// `repair` says what is done with a mesh that is not closed. "strict": it is closed where that is clear, used as
+    /// it is where no hole shows from below (-z), and refused otherwise. "near_side": it is used as it is, as a shell
     /// without thickness. With `centre`, its origin becomes the middle of its footprint. A warning names every repair.
     #[staticmethod]
     #[pyo3(signature = (path, scale = 1.0, stiffness = None, repair = "strict", centre = false))]

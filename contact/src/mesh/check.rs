@@ -310,8 +310,8 @@ impl TriMesh {
     /// Of triangles with the same three corners only the first is kept. Sheets of triangles that are there in both
     /// directions enclose nothing: they go altogether where that leaves every edge at their border with partners (a
     /// fin on a surface, the wall between two boxes), and are kept once where it would tear the surface. Also returns
-    /// the number of triangles dropped. Where nothing is left, the mesh is a sheet; with `or_sheet`, it then keeps one of
-    /// each.
+    /// the number of triangles dropped. Where nothing is left, the mesh is a sheet; with `or_sheet`, it then keeps one
+    /// of each.
     fn without_duplicates(&self, or_sheet: bool) -> (Self, usize) {
         let mut keyed: Vec<([u32; 3], u32)> = Vec::with_capacity(self.triangles.len());
         for (t, corners) in self.triangles.iter().enumerate() {

@@ -62,7 +62,8 @@ const PACKINGS: [(&str, &str); 3] = [
 
 /// Deepest chain of nodes that is followed; real files have a handful, a cyclic one never ends.
 const MAX_DEPTH: usize = 64;
-/// Most visits of nodes, of their primitives and of their joints: a node that many parents share is visited once for each.
+/// Most visits of nodes, of their primitives and of their joints: a node that many parents share is visited once for
+/// each.
 const MAX_VISITS: usize = 100_000;
 /// Largest description (the JSON chunk) that is read, bytes: parsed, it takes up to 200 times its size, and those of
 /// models of many parts have some 100 kB.

@@ -12,7 +12,7 @@ const MAX_TRIED: usize = 30_000_000;
 const COVERED_FRACTION: f64 = 1e-6;
 
 impl TriMesh {
-    /// An edge of one triangle that is seen from below: a body whose surface ends there may be felt beyond it. `None`
+    /// The lowest edge of one triangle that is seen from below: a body whose surface ends there may be felt beyond it. `None`
     /// if other triangles lie below all of them, so that no hole changes what touches a skin below.
     pub(super) fn edge_open_below(&self) -> Option<[u32; 2]> {
         let margin_m = COVERED_FRACTION * self.extent_m();
@@ -24,7 +24,7 @@ impl TriMesh {
         let tree = Bvh::from_leaves(BvhBuildStrategy::Binned, &boxes);
         let sides = Sides::of(self);
         let left = Cell::new(MAX_TRIED);
-        sides.edges().find_map(|edge| {
+        let shown = sides.edges().filter_map(|edge| {
             let [side] = edge else { return None };
             let [x, y, z] = self.middle_m(side.edge);
             let above = |node: &BvhNode| {
@@ -39,8 +39,9 @@ impl TriMesh {
             };
             let cost = |node: &BvhNode, best: f64| if best <= 0.0 || above(node) { f64::MAX } else { 0.0 };
             let found = tree.find_best(f64::INFINITY, cost, |t, _| covers(t).then_some(0.0));
-            (left.get() == 0 || found.is_none()).then_some(side.edge)
-        })
+            (left.get() == 0 || found.is_none()).then_some((z, side.edge))
+        });
+        shown.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, edge)| edge)
     }
 
     /// Whether `point` lies above triangle `t`, or in it.

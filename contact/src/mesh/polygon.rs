@@ -149,9 +149,9 @@ pub(super) fn triangulate(outer: &[Point], holes: &[Vec<Point>]) -> Vec<[usize; 
     clip_ears(&points, loop_)
 }
 
-/// Triangles, as indices into `outline`, that tile it, all in its direction: a fan where it is seen whole from its first
-/// corner, else by ears. Corners may be repeated or lie on a straight line, and the outline may touch itself.
-/// `may_take` says whether the ears of so many corners may be looked for.
+/// Triangles, as indices into `outline`, that tile it: a fan where all of it is seen from its first corner, else by
+/// ears. The outline runs counter-clockwise; its corners may be repeated or lie on a straight line, and it may touch
+/// itself. `may_take` says whether the ears of so many corners may be looked for.
 ///
 /// # Errors
 /// What is wrong with an outline that cannot be tiled.

@@ -1044,7 +1044,7 @@ fn glb_skins_ignore_the_node_and_follow_the_bones() {
     assert!(report.posed && report.notes()[0].contains("pose of the file"), "{:?}", report.notes());
     assert_relative_eq!(mesh.volume_m3(), 24e-6, max_relative = 1e-6);
     assert_relative_eq!(mesh.bounds().unwrap().1[0], 0.01, max_relative = 1e-6);
-    // every vertex follows the one joint, which doubles and moves by 1 m: its bytes are the first 64 of indices and such
+    // every vertex follows the one joint, which doubles: 32 bytes of joints and 32 of weights more
     let bytes = block().to_glb("a");
     let mut more = with_json(&bytes, nodes, skin);
     more =

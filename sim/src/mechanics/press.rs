@@ -143,8 +143,8 @@ pub struct PressConfig {
     /// Number of metres in a unit of the mesh file; (0, 1000], default 1, as in GLB. It is never guessed: an object 40
     /// units wide may be 40 mm, 40 cm or 40 inches wide.
     pub scale: Option<f64>,
-    /// What is done with a mesh that is not closed. `strict` (the default): it is closed where that changes nothing that
-    /// touches, pressed as it is where its holes do not show from below, and refused otherwise. `near_side`: it is
+    /// What is done with a mesh that is not closed. `strict` (the default): it is closed where that changes nothing
+    /// that touches, pressed as it is where its holes do not show from below, and refused otherwise. `near_side`: it is
     /// pressed as it is, as a shell without thickness.
     pub repair: Option<Repair>,
     /// Whether the mesh is moved so that its origin, which is held over the place, is the middle of its footprint.
