@@ -38,7 +38,7 @@ fn files_of(name: &str) -> Vec<Vec<u8>> {
 }
 
 /// Words that parsers know.
-const WORDS: &str = "v |f |facet|vertex|endsolid|glTF|JSON|'descr'|(|[|{|PK\x03\x04|null|\u{feff}|\0|\n|\"|,|:|=|\x0e\0\0\0|\x0f\0\0\0|\
+const WORDS: &str = "v |f |\\\n|#|facet|vertex|endsolid|glTF|JSON|'descr'|(|[|{|PK\x03\x04|null|\u{feff}|\0|\n|\"|,|:|=|\x0e\0\0\0|\x0f\0\0\0|\
                      \0\0\0\0";
 /// Numbers at the ends of their types.
 const NUMBERS: &str =

@@ -2,6 +2,7 @@
 
 use spts::session::{Session, read_npy};
 use spts::{Profile, Scene};
+use spts_contact::mesh::{MeshOptions, Repair};
 use std::path::Path;
 
 /// A parser that is given whatever bytes there are. What it makes of them is dropped.
@@ -27,19 +28,30 @@ const TAXELS: u32 = 100;
 /// Classes that an answer may name.
 const CLASSES: usize = 17;
 
+/// A mesh that is not closed is read all the same.
+fn as_it_is(scale: f64) -> MeshOptions {
+    MeshOptions { scale, repair: Repair::NearSide, centre: true }
+}
+
 /// A mesh in OBJ.
 pub fn obj(bytes: &[u8]) {
-    let _ = spts_contact::mesh::read_obj(bytes, 1e-3, "fuzz.obj");
+    for options in [1e-3.into(), as_it_is(1e-3)] {
+        let _ = spts_contact::mesh::read_obj(bytes, options, "fuzz.obj");
+    }
 }
 
 /// A mesh in GLB.
 pub fn glb(bytes: &[u8]) {
-    let _ = spts_contact::mesh::read_glb(bytes, 1.0, "fuzz.glb");
+    for options in [1.0.into(), as_it_is(1.0)] {
+        let _ = spts_contact::mesh::read_glb(bytes, options, "fuzz.glb");
+    }
 }
 
 /// A mesh in STL.
 pub fn stl(bytes: &[u8]) {
-    let _ = spts_contact::mesh::read_stl(bytes, 1e-3, "fuzz.stl");
+    for options in [1e-3.into(), as_it_is(1e-3)] {
+        let _ = spts_contact::mesh::read_stl(bytes, options, "fuzz.stl");
+    }
 }
 
 /// The variable `C` of a MATLAB file.

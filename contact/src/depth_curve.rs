@@ -122,7 +122,7 @@ impl DepthCurve {
                 return Err(if reached_n > 0.0 {
                     EquilibriumError::Force { reached_n, wanted_n, depth_m }
                 } else {
-                    EquilibriumError::beside(depth_m)
+                    EquilibriumError::Beside { depth_m }
                 });
             }
             deep_m = (2.0 * deep_m).min(limit_m);

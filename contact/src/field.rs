@@ -405,18 +405,19 @@ pub enum EquilibriumError {
         /// Depth at which the search ended, m.
         depth_m: f64,
     },
-    /// Any other reason: no contact at any depth, a tilt that is not small, no convergence, no answer of the contact
+    /// There is no contact at any depth.
+    #[error("the body meets nothing down to {depth_m:.4} m depth: it lies beside the skin")]
+    Beside {
+        /// Depth at which the search ended, m.
+        depth_m: f64,
+    },
+    /// Any other reason: a tilt that is not small, no convergence, no answer of the contact
     /// field, a load that is no force, an energy that is not absorbed.
     #[error(transparent)]
     Refused(#[from] Refusal),
 }
 
 impl EquilibriumError {
-    /// There is no force down to `depth_m`.
-    pub(crate) fn beside(depth_m: f64) -> Self {
-        Refusal::new(format!("the body meets nothing down to {depth_m:.4} m depth: it lies beside the skin")).into()
-    }
-
     /// The load is not a positive force.
     pub fn load(force_n: f64) -> Self {
         Refusal::new(format!("`force_n` = {force_n} is outside (0, ∞) N")).into()

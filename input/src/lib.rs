@@ -16,6 +16,7 @@ mod refusal;
 
 pub use refusal::Refusal;
 
+use std::borrow::Cow;
 use std::fs::{File, FileType, OpenOptions};
 use std::io::{self, Read as _};
 use std::path::Path;
@@ -147,10 +148,8 @@ const MARK: &[u8] = b"\xef\xbb\xbf";
 /// # Errors
 /// [`InputError::Utf16`] or [`InputError::NotUtf8`].
 pub fn text(bytes: &[u8]) -> Result<&str, InputError> {
-    // UTF-16 begins with its own mark, or has a zero in one of the first two bytes, as no text of ours has
-    if let [first, second, ..] = *bytes
-        && (matches!((first, second), (0xff, 0xfe) | (0xfe, 0xff)) || (first == 0) != (second == 0))
-    {
+    // a zero in one of the first two bytes, as no text of ours has
+    if is_utf16(bytes) || matches!(bytes, [first, second, ..] if (*first == 0) != (*second == 0)) {
         return Err(InputError::Utf16);
     }
     let plain = bytes.strip_prefix(MARK).unwrap_or(bytes);
@@ -159,6 +158,35 @@ pub fn text(bytes: &[u8]) -> Result<&str, InputError> {
         let value = bytes.get(byte).copied().unwrap_or_default();
         InputError::NotUtf8 { byte, value }
     })
+}
+
+/// As [`text`], with U+FFFD in place of what is not UTF-8: for formats whose keywords and numbers are ASCII, and whose
+/// names and comments may be in any encoding that has ASCII in it, such as Latin-1 or GBK.
+///
+/// ```
+/// assert_eq!(spts_input::lossy_text(b"o T\xFCr")?, "o T\u{fffd}r");
+/// # Ok::<(), spts_input::InputError>(())
+/// ```
+///
+/// # Errors
+/// [`InputError::Utf16`].
+pub fn lossy_text(bytes: &[u8]) -> Result<Cow<'_, str>, InputError> {
+    match text(bytes) {
+        Ok(text) => Ok(Cow::Borrowed(text)),
+        Err(InputError::NotUtf8 { .. }) => Ok(String::from_utf8_lossy(bytes.strip_prefix(MARK).unwrap_or(bytes))),
+        Err(error) => Err(error),
+    }
+}
+
+/// Whether `bytes` are surely text in UTF-16: they begin with its mark, or most of their first characters have a zero
+/// in the same one of their two bytes, and none in the other.
+pub fn is_utf16(bytes: &[u8]) -> bool {
+    let pairs = bytes.as_chunks::<2>().0;
+    let pairs = &pairs[..pairs.len().min(128)];
+    let Some(first) = pairs.first() else { return false };
+    let [high, low] = [0, 1].map(|k| pairs.iter().filter(|pair| pair[k] == 0).count());
+    let mark = matches!(first, [0xff, 0xfe] | [0xfe, 0xff]);
+    mark || (high.min(low) == 0 && 2 * high.max(low) > pairs.len())
 }
 
 fn regular(found: FileType) -> Result<(), InputError> {
@@ -197,6 +225,16 @@ mod tests {
         }
         let said = text(b"\xef\xbb\xbfab\xc3(").unwrap_err().to_string();
         assert!(said.contains("byte 5") && said.contains("0xc3"), "{said}");
+    }
+
+    #[test]
+    fn utf16_without_a_mark_is_told_by_its_zeros() {
+        let wide = |text: &str| text.encode_utf16().flat_map(u16::to_be_bytes).collect::<Vec<u8>>();
+        assert!(is_utf16(&wide("v 0 0 0\nv 1 0 0")) && is_utf16(&wide("# Kugel \u{7403}\nv 0 0 0")));
+        assert!(matches!(lossy_text(&wide("\u{7403} is a ball")), Err(InputError::Utf16)));
+        // a binary header
+        assert!(!is_utf16(&[0; 80]) && !is_utf16(b"x\0\0\0\x01\0") && !is_utf16(b"v 0 0 0") && !is_utf16(b""));
+        assert_eq!(lossy_text(b"\xef\xbb\xbfv \xe4").unwrap(), "v \u{fffd}");
     }
 
     #[test]

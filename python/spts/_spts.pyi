@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, final
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,13 @@ _Path = str | os.PathLike[str]
 @final
 class Body:
     @staticmethod
-    def from_mesh(path: _Path, scale: float = 1.0, stiffness: float | None = None) -> Body: ...
+    def from_mesh(
+        path: _Path,
+        scale: float = 1.0,
+        stiffness: float | None = None,
+        repair: Literal["strict", "near_side"] = "strict",
+        centre: bool = False,
+    ) -> Body: ...
     @staticmethod
     def from_vertices(
         vertices: ArrayLike,

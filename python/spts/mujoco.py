@@ -1030,7 +1030,9 @@ def _mesh(model, geom):
         faces = model.mesh_face[first : first + count].astype(np.int64)
         a, b, c = (vertices[faces[:, k]] for k in range(3))
         if np.einsum("ij,ij->", a, np.cross(b, c)) < 0.0:
-            # inside out: MuJoCo keeps such meshes as they are
+            # MuJoCo keeps such meshes as they are
+            name = model.mesh(mesh).name
+            warnings.warn(f'mesh "{name}" of geom {geom} is inside out; it presses as if it were turned', stacklevel=2)
             faces = faces[:, ::-1]
     elif kind == types.mjGEOM_PLANE:
         # MuJoCo's planes press without end, whatever is drawn of them

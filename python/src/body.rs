@@ -7,7 +7,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
-use spts::contact::mesh::{TriMesh, cuboid, load, revolve, sphere};
+use spts::contact::mesh::{MeshOptions, Repair, TriMesh, cuboid, load, revolve, sphere};
 use spts::contact::{Part, PreparedMesh, Primitive, TouchBody};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::PathBuf;
@@ -64,20 +64,37 @@ impl Body {
 #[pymethods]
 impl Body {
     /// Body from a file that ends in .stl, .obj or .glb, times `scale` metres a unit.
+    ///
+    /// `repair` says what is done with a mesh that is not closed. "strict": it is closed where that is clear, used as
+    /// it is where no hole shows from below (-z), and refused otherwise. "near_side": it is used as it is, as a shell
+    /// without thickness. With `centre`, its origin becomes the middle of its footprint. A warning names every repair.
     #[staticmethod]
-    #[pyo3(signature = (path, scale = 1.0, stiffness = None))]
-    fn from_mesh(py: Python<'_>, path: PathBuf, scale: f64, stiffness: Option<f64>) -> PyResult<Self> {
+    #[pyo3(signature = (path, scale = 1.0, stiffness = None, repair = "strict", centre = false))]
+    fn from_mesh(
+        py: Python<'_>,
+        path: PathBuf,
+        scale: f64,
+        stiffness: Option<f64>,
+        repair: &str,
+        centre: bool,
+    ) -> PyResult<Self> {
         if !(scale > 0.0 && scale <= 1e3) {
             bail!("`scale` = {scale} is outside (0, 1000]");
         }
-        let (mesh, report) = load(&path, scale).map_err(refuse)?;
+        let repair = match repair {
+            "strict" => Repair::Strict,
+            "near_side" => Repair::NearSide,
+            _ => bail!("`repair` = \"{repair}\"; valid: \"strict\", \"near_side\""),
+        };
+        let (mesh, report) = load(&path, MeshOptions { scale, repair, centre }).map_err(refuse)?;
         for note in report.notes() {
             warn(py, &note)?;
         }
         Self::new(mesh, Vec::new(), stiffness)
     }
 
-    /// Body from `vertices` (V, 3) in metres and `faces` (F, 3), counter-clockwise seen from outside.
+    /// Body from `vertices` (V, 3) in metres and `faces` (F, 3), counter-clockwise seen from outside. Faces that run
+    /// clockwise are turned, with a warning.
     ///
     /// `parts` are the convex shapes that it is made of, if they are known: (kind, size (3,), position (3,), rotation
     /// matrix (9,)), with the kinds and sizes of MuJoCo's geoms. On skins that are not flat they press in place of the
@@ -85,6 +102,7 @@ impl Body {
     #[staticmethod]
     #[pyo3(signature = (vertices, faces, stiffness = None, parts = Vec::new()))]
     fn from_vertices(
+        py: Python<'_>,
         vertices: PyArrayLike2<'_, f64, AllowTypeChange>,
         faces: PyArrayLike2<'_, i64, AllowTypeChange>,
         stiffness: Option<f64>,
@@ -111,9 +129,10 @@ impl Body {
             }
             triangles.push(corners);
         }
-        let mesh = TriMesh { vertices, triangles };
+        let mut mesh = TriMesh { vertices, triangles };
         if mesh.volume_m3() < 0.0 {
-            bail!("`faces` run clockwise seen from outside: swap two of their columns");
+            warn(py, "`faces` ran clockwise seen from outside; they have been turned")?;
+            mesh = mesh.flipped();
         }
         let parts = parts.into_iter().map(part).collect::<PyResult<_>>()?;
         Self::new(mesh, parts, stiffness)
@@ -199,6 +218,11 @@ impl Body {
     fn __repr__(&self) -> String {
         format!("<spts.Body of {} triangles>", self.triangles())
     }
+}
+
+/// Warns the caller.
+fn warn(py: Python<'_>, note: &str) -> PyResult<()> {
+    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(note)?, 1)
 }
 
 /// Kind, size, position and rotation matrix of a convex part.

@@ -70,7 +70,6 @@ def test_bodies(tmp_path):
         ("length", lambda: spts.Body.capsule(0.1, np.inf)),
         ("stiffness", lambda: spts.Body.sphere(0.1, stiffness=NAN)),
         ("stiffness", lambda: spts.Body.sphere(0.1, stiffness=0.0)),
-        ("clockwise", lambda: spts.Body.from_vertices(vertices, faces[:, ::-1].copy())),
         ("faces", lambda: spts.Body.from_vertices(vertices, np.zeros((0, 3), np.int64))),
         ("faces", lambda: spts.Body.from_vertices(vertices, faces + 1000)),
         ("faces", lambda: spts.Body.from_vertices(vertices, faces[:, :2].copy())),
@@ -78,6 +77,7 @@ def test_bodies(tmp_path):
         ("vertices", lambda: spts.Body.from_vertices(vertices[:, :2].copy(), faces)),
         ("none.stl", lambda: spts.Body.from_mesh(tmp_path / "none.stl")),
         ("scale", lambda: spts.Body.from_mesh(tmp_path / "none.stl", scale=NAN)),
+        ("repair", lambda: spts.Body.from_mesh(tmp_path / "none.stl", repair="far_side")),
     ]:
         with pytest.raises(ValueError, match=text):
             make()
@@ -86,6 +86,23 @@ def test_bodies(tmp_path):
     for name in ("bad.stl", "bad.txt"):
         with pytest.raises(ValueError, match=name):
             spts.Body.from_mesh(tmp_path / name)
+
+
+def test_bodies_that_are_mended(tmp_path):
+    vertices, faces = outward()
+    with pytest.warns(UserWarning, match="clockwise"):
+        turned = spts.Body.from_vertices(vertices, faces[:, ::-1].copy())
+    a, b, c = (turned.mesh[0][turned.mesh[1][:, k]] for k in range(3))
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0
+    lines = [f"v {x} {y} {z}" for x, y, z in 0.1 * vertices / np.ptp(vertices)]
+    lines += [f"f {a} {b} {c}" for a, b, c in faces[1:] + 1]
+    path = tmp_path / "open.obj"
+    path.write_text("\n".join(lines))
+    with pytest.warns(UserWarning, match="not closed"):
+        body = spts.Body.from_mesh(path, repair="near_side", centre=True)
+    assert body.triangles == len(faces) - 1
+    low, high = body.mesh[0].min(0), body.mesh[0].max(0)
+    np.testing.assert_allclose([*(low + high)[:2], low[2]], 0.0, atol=1e-12)
 
 
 def test_touches(skin, ball):

@@ -209,7 +209,7 @@ impl Footprint {
     /// bracket; the lowest one, `limit_m` below the touch, when it carries less there.
     fn height(&mut self, task: &Task<'_>, tilt_rad: [f64; 2], limit_m: f64) -> Result<f64, EquilibriumError> {
         let Some(touch_m) = self.touch_m(task, tilt_rad) else {
-            return Err(EquilibriumError::beside(limit_m));
+            return Err(EquilibriumError::Beside { depth_m: limit_m });
         };
         let state = |z: f64| Vector3::new(z, tilt_rad[0], tilt_rad[1]);
         let (mut high_m, mut depth_m) = (touch_m, FIRST_DEPTH_M);
@@ -325,7 +325,7 @@ impl QuasiStatic for Footprint {
         let drops = self.layer.envelope.map().drop_m().iter();
         let base_m = drops.copied().fold(f64::NEG_INFINITY, f64::max);
         if !base_m.is_finite() {
-            return Err(EquilibriumError::beside(limit_m));
+            return Err(EquilibriumError::Beside { depth_m: limit_m });
         }
         let task = Task { law, load, base_m, body_pa_per_m: body.stiffness_pa_per_m };
         let started = load.from.map(|seat| {

@@ -5,7 +5,8 @@ use super::tri_mesh::{
     MAX_COORDINATE_M, MAX_EXTENT_M, MAX_TRIANGLES, MAX_VERTICES, MIN_EXTENT_M, SOFT_MAX_TRIANGLES, Side, Sides,
     TriMesh, Unions, balance, cross, dot, index, span, sub,
 };
-use serde::Serialize;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
 use std::collections::BTreeMap;
 use std::fmt::Display;
@@ -25,10 +26,10 @@ pub enum MeshError {
     /// Anything but the size.
     #[error(transparent)]
     Refused(#[from] Refusal),
-    /// The size of the mesh is not plausible for an object that presses on a skin: its unit is probably not the metre.
+    /// The size of the mesh is not plausible for an object that presses on a skin: its unit is probably another.
     #[error(
         "mesh `{file}`: largest extent = {} m after scale = {} is outside [{MIN_EXTENT_M}, {MAX_EXTENT_M}] m{}",
-        short(*extent_m), short(*scale), advice(*suggestion)
+        short(*extent_m), short(*scale), advice(*extent_m / *scale)
     )]
     FarFromMetres {
         /// Path as given.
@@ -37,7 +38,7 @@ pub enum MeshError {
         extent_m: f64,
         /// Scale that was applied.
         scale: f64,
-        /// Probable unit of the file, and the scale for it; `None` if no usual unit fits.
+        /// Most probable unit of the file, and the scale for it; `None` if no usual unit fits.
         suggestion: Option<(&'static str, f64)>,
     },
 }
@@ -67,15 +68,74 @@ pub(super) fn too_large(file: &str, what: &str, found: usize, most: usize) -> Me
     refused(file, format_args!("{what} = {found} is outside [0, {most}]"))
 }
 
-/// `value` without a row of zeros.
+/// `value` to six digits, without a row of zeros.
 fn short(value: f64) -> String {
-    if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) { format!("{value:e}") } else { value.to_string() }
+    let rounded = format!("{value:.5e}").parse().unwrap_or(value);
+    if rounded != 0.0 && !(1e-3..1e6).contains(&rounded.abs()) { format!("{rounded:e}") } else { rounded.to_string() }
 }
 
-/// What to do about a wrong unit.
-fn advice(suggestion: Option<(&'static str, f64)>) -> String {
-    suggestion
-        .map_or_else(String::new, |(unit, scale)| format!("; if its unit is {unit}, use scale = {}", short(scale)))
+/// What to do about a wrong unit: the units that make an object of the size, the most probable first.
+fn advice(raw_extent: f64) -> String {
+    let mut out = String::new();
+    for (k, (unit, scale)) in fitting_units(raw_extent).into_iter().enumerate() {
+        let (size_mm, scale) = (1e3 * raw_extent * scale, short(scale));
+        out += &match k {
+            0 => format!(
+                "; if its unit is {unit}, use scale = {scale} (`--scale {scale}`), which makes it {} mm wide",
+                short(size_mm)
+            ),
+            _ => format!("; if {unit}, {scale}: {} mm", short(size_mm)),
+        };
+    }
+    out
+}
+
+/// What to do with a mesh that cannot be closed.
+const AS_IS: &str = "; to press it as it is, as a shell without thickness, use `--as-is` (in scenes and Python `repair = \
+                     \"near_side\"`)";
+
+/// What is done with a mesh that is not closed.
+///
+/// ```
+/// use spts_contact::mesh::{MeshOptions, Repair, cuboid, read_obj};
+///
+/// // a box without its underside
+/// let mut open = cuboid([0.04, 0.02, 0.01]);
+/// open.triangles.retain(|t| t.iter().any(|i| open.vertices[*i as usize][2] > 0.0));
+/// let open = open.to_obj("box");
+/// let refused = read_obj(open.as_bytes(), 1.0, "box.obj").unwrap_err();
+/// assert!(refused.to_string().contains("not closed"));
+/// let options = MeshOptions { repair: Repair::NearSide, ..MeshOptions::from(1.0) };
+/// let (_, report) = read_obj(open.as_bytes(), options, "box.obj")?;
+/// assert!(report.notes()[0].contains("not closed"));
+/// # Ok::<(), spts_contact::mesh::MeshError>(())
+/// ```
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Repair {
+    /// It is closed where that changes nothing that touches a skin below, pressed as it is where none of its holes is
+    /// seen from below, and refused otherwise.
+    #[default]
+    Strict,
+    /// It is pressed as it is: whatever of it is nearest to the skin touches, and holes are holes.
+    NearSide,
+}
+
+/// How a mesh is read.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshOptions {
+    /// Number of metres in a unit of the file.
+    pub scale: f64,
+    /// What is done if it is not closed.
+    pub repair: Repair,
+    /// Whether its origin becomes the middle of its footprint, at the height of its lowest point.
+    pub centre: bool,
+}
+
+impl From<f64> for MeshOptions {
+    fn from(scale: f64) -> Self {
+        Self { scale, repair: Repair::default(), centre: false }
+    }
 }
 
 /// What was repaired in a mesh when it was loaded, and the size of the mesh afterwards.
@@ -114,6 +174,19 @@ pub struct MeshReport {
     /// a wall goes straight up to a flat lid above the highest point of the mesh. While the mesh stands upright, walls
     /// and lid touch nothing; a tilted press of such a mesh is refused.
     pub lids: usize,
+    /// Number of edges that lack a partner or have too many, in a mesh that is pressed as it is: closed where it could
+    /// not be closed, only its side towards the skin is right. 0 for a closed mesh.
+    pub open_edges: usize,
+    /// A place on such an edge that is seen from below, m in the mesh's axes: what lies beyond it is not felt.
+    pub open_below_m: Option<[f64; 3]>,
+    /// Bytes after the last triangle of an STL file, which were left out.
+    pub appended_bytes: usize,
+    /// Points and lines of a GLB file, which were left out.
+    pub skipped_primitives: usize,
+    /// Whether bones move a mesh of a GLB file, which is read in the pose of the file.
+    pub posed: bool,
+    /// By how much the mesh was moved to have its origin in the middle of its footprint, m.
+    pub centred_by_m: Option<[f64; 3]>,
     /// Number of triangles before decimation; `None` if the mesh was not decimated.
     pub decimated_from: Option<usize>,
     /// Largest distance between the surfaces before and after decimation, m; `None` without decimation.
@@ -172,6 +245,38 @@ impl MeshReport {
             "hole in the mesh opens upward and was closed above it, where nothing touches while the mesh stands upright",
             "holes in the mesh open upward and were closed above it, where nothing touches while the mesh stands upright",
         );
+        counted(
+            self.appended_bytes,
+            "byte after the last triangle of the mesh file was left out",
+            "bytes after the last triangle of the mesh file were left out",
+        );
+        counted(
+            self.skipped_primitives,
+            "group of points or lines in the mesh file was left out",
+            "groups of points or lines in the mesh file were left out",
+        );
+        if self.posed {
+            notes.push("bones move the mesh; it is read in the pose of the file".to_owned());
+        }
+        if let Some(moved_m) = self.centred_by_m {
+            let [x, y, z] = moved_m.map(|m| 1e3 * m);
+            notes.push(format!(
+                "the mesh was moved by ({x:.1}, {y:.1}, {z:.1}) mm: its origin is the middle of its footprint now"
+            ));
+        }
+        if self.open_edges > 0 {
+            let count = self.open_edges;
+            notes.push(match self.open_below_m.map(|m| m.map(|m| 1e3 * m)) {
+                None => format!(
+                    "the mesh is not closed ({count} open edges), but none of its holes is seen from below: its underside \
+                     is pressed as it is; turned, it would press with its holes"
+                ),
+                Some([x, y, z]) => format!(
+                    "the mesh is not closed ({count} open edges) and is open towards the skin, as at ({x:.1}, {y:.1}, \
+                     {z:.1}) mm: it is pressed as a shell without thickness, and its holes press nothing"
+                ),
+            });
+        }
         if self.flipped {
             notes.push("the mesh was inside out and has been turned".to_owned());
         }
@@ -192,7 +297,7 @@ impl MeshReport {
             let [x, y, _] = self.middle_m.map(|m| 1e3 * m);
             notes.push(format!(
                 "the origin of the mesh, by which it is held and placed, lies beside it: the middle of the mesh is \
-                 ({x:.1}, {y:.1}) mm from it; move the mesh in its file, or mind the lever"
+                 ({x:.1}, {y:.1}) mm from it; mind the lever, or centre the mesh (`--centre`, `centre = true`)"
             ));
         }
         notes
@@ -205,8 +310,9 @@ impl TriMesh {
     /// Of triangles with the same three corners only the first is kept. Sheets of triangles that are there in both
     /// directions enclose nothing: they go altogether where that leaves every edge at their border with partners (a
     /// fin on a surface, the wall between two boxes), and are kept once where it would tear the surface. Also returns
-    /// the number of triangles dropped.
-    fn without_duplicates(&self) -> (Self, usize) {
+    /// the number of triangles dropped. Where nothing is left, the mesh is a sheet; with `or_sheet`, it then keeps one
+    /// of each.
+    fn without_duplicates(&self, or_sheet: bool) -> (Self, usize) {
         let mut keyed: Vec<([u32; 3], u32)> = Vec::with_capacity(self.triangles.len());
         for (t, corners) in self.triangles.iter().enumerate() {
             let mut key = *corners;
@@ -231,7 +337,10 @@ impl TriMesh {
         if any {
             let kept = keep.iter().zip(&two_sided).filter(|(k, _)| **k);
             let sheets: Vec<bool> = kept.map(|(_, &sheet)| sheet).collect();
-            out = out.without_idle_sheets(&sheets);
+            let solid = out.without_idle_sheets(&sheets);
+            if !(solid.triangles.is_empty() && or_sheet) {
+                out = solid;
+            }
         }
         let dropped = self.triangles.len() - out.triangles.len();
         (out, dropped)
@@ -286,18 +395,25 @@ const MAX_EVALUATIONS: usize = 30_000_000;
 /// Only so many of the largest bodies are asked what they contain.
 const MAX_CONTAINERS: usize = 256;
 
-/// Why a surface cannot be mended, in words with `{at}` for the place; and the place, m.
-struct Broken {
-    at_m: [f64; 3],
-    why: String,
+/// Why a surface cannot be mended.
+enum Broken {
+    /// In words with `{at}` for the place; and the place, m.
+    At { at_m: [f64; 3], why: String },
+    /// It encloses nothing; the sides of its box, m.
+    Sheet([f64; 3]),
 }
 
 impl Broken {
-    /// The error, with the place in the unit of the file.
-    fn error(&self, scale: f64, file: &str) -> MeshError {
-        let [x, y, z] = self.at_m.map(|x| x / scale);
-        let at = format!("({x:.4}, {y:.4}, {z:.4}) of the file");
-        refused(file, self.why.replace("{at}", &at))
+    /// The error, with the place in the unit of the file, in which the mesh was `away_m` from where it is.
+    fn error(&self, scale: f64, away_m: [f64; 3], file: &str) -> MeshError {
+        match self {
+            Self::Sheet(sides_m) => no_volume(file, *sides_m),
+            Self::At { at_m, why } => {
+                let [x, y, z] = [0, 1, 2].map(|k| (at_m[k] + away_m[k]) / scale);
+                let at = format!("({x:.4}, {y:.4}, {z:.4}) of the file");
+                refused(file, format_args!("{}{AS_IS}", why.replace("{at}", &at)))
+            }
+        }
     }
 }
 
@@ -309,7 +425,7 @@ fn agree(mesh: &mut TriMesh, sides: &Sides) -> Result<(Vec<u32>, usize), Broken>
         if let [a, b] = edge {
             if !unions.join(a.triangle, b.triangle, a.rising == b.rising) {
                 // on a closed path over the surface, a triangle meets itself turned over
-                return Err(Broken {
+                return Err(Broken::At {
                     at_m: mesh.middle_m(a.edge),
                     why: "the surface has one side only (noticed at {at}): it has no outside".to_owned(),
                 });
@@ -347,7 +463,7 @@ fn agree(mesh: &mut TriMesh, sides: &Sides) -> Result<(Vec<u32>, usize), Broken>
 
 fn branching(mesh: &TriMesh, edge: &[Side]) -> Broken {
     let count = edge.len();
-    Broken {
+    Broken::At {
         at_m: mesh.middle_m(edge[0].edge),
         why: format!(
             "{count} triangles meet in an edge at {{at}}, with no outside that all agree on; a solid has 2, export without \
@@ -461,7 +577,7 @@ const UPWARD_COSINE: f64 = 0.5;
 const LID_FRACTION: f64 = 0.25;
 /// Longest hole that is triangulated, in edges. The time grows with the cube; several holes may take as long as one of
 /// this length.
-const MAX_EDGES: usize = 2000;
+pub(super) const MAX_EDGES: usize = 2000;
 
 /// What was closed.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -493,7 +609,7 @@ fn close_holes(mesh: &mut TriMesh, sides: &Sides) -> Result<Closed, Broken> {
     };
     let open = |edge: [u32; 2], why: &str, mesh: &TriMesh| {
         let (found, all) = (missing.len(), sides.edges().count());
-        Broken {
+        Broken::At {
             at_m: mesh.middle_m(edge),
             why: format!("not closed: {found} of {all} edges lack a partner, one at {{at}}: {why}"),
         }
@@ -541,7 +657,7 @@ fn close_holes(mesh: &mut TriMesh, sides: &Sides) -> Result<Closed, Broken> {
 }
 
 /// n³, which is how the time to fill a hole of `edges` edges grows.
-fn cube(edges: usize) -> f64 {
+pub(super) fn cube(edges: usize) -> f64 {
     (edges as f64).powi(3)
 }
 
@@ -675,12 +791,16 @@ fn cover(mesh: &mut TriMesh, ring: &[u32], lid_m: f64) {
     append(mesh, &lid, &flat);
 }
 
+/// How many extents from the origin the middle of a mesh may be before it is moved there to be mended.
+const FAR_EXTENTS: f64 = 100.0;
 /// Vertices closer than this fraction of the extent are one vertex. f32 files carry 6e-8 of rounding per coordinate;
 /// 1e-6 is 10× what two roundings of one point can differ by, and a thousandth of the finest feature that matters.
 const WELD_FRACTION: f64 = 1e-6;
 /// Least volume as a fraction of extent³; a sheet of paper (0.1 mm × 210 mm × 297 mm) has 2.4e-4, a folded surface
 /// without inside has rounding, about 1e-7.
 const LEAST_VOLUME_FRACTION: f64 = 1e-6;
+/// An open surface no thicker than this part of its extent is a sheet: half a millimetre on 50 mm.
+const FLAT_FRACTION: f64 = 1e-2;
 
 /// Scales `raw` to metres, repairs and checks it (1 mm to 2 m across, closed, with an inside), and decimates it if it
 /// has more than [`SOFT_MAX_TRIANGLES`] triangles. `file` is the name in errors.
@@ -690,38 +810,74 @@ const LEAST_VOLUME_FRACTION: f64 = 1e-6;
 /// Holes that open upwards are closed above everything, which leaves the underside unchanged. Parts may overlap: only
 /// the underside of their union touches.
 ///
-/// These are refused: coordinates that are not finite, other sizes, larger holes that open downwards or sideways,
-/// surfaces with branches or with one side, and surfaces without an inside.
+/// A mesh that cannot be closed this way is pressed as it is if none of its holes is seen from below, or if
+/// [`Repair::NearSide`] asks for it.
+///
+/// These are refused: coordinates that are not finite, other sizes, other meshes that are not closed, and surfaces
+/// without an inside.
 ///
 /// The unit is never guessed: an object 40 units wide may be 40 mm, 40 cm or 40 inches wide, and each of these could
-/// press on a skin. The error suggests a scale that would fit.
+/// press on a skin. The error suggests scales that would fit.
 ///
 /// # Errors
 /// [`MeshError`] with the first problem.
-pub fn checked(raw: &TriMesh, scale: f64, file: &str) -> Result<(TriMesh, MeshReport), MeshError> {
+pub fn checked(raw: &TriMesh, options: impl Into<MeshOptions>, file: &str) -> Result<(TriMesh, MeshReport), MeshError> {
+    let MeshOptions { scale, repair, centre } = options.into();
     check_numbers(raw, scale, file)?;
-    let raw_extent = used_extent(raw);
+    let [low, high] = span(raw.triangles.iter().flatten().map(|&i| raw.vertices[i as usize]));
+    let raw_extent = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
     // vertices of a mesh far too small all coincide, which would hide that its scale is wrong
     if raw_extent > 0.0 && raw_extent * scale < MIN_EXTENT_M {
         return Err(far_from_metres(raw_extent * scale, raw_extent, scale, file));
     }
     let tolerance_m = WELD_FRACTION * raw_extent * scale;
-    let (mesh, joined_vertices, dropped_triangles) = raw.clone().scaled([scale; 3]).welded(tolerance_m);
-    let (mut mesh, duplicate_triangles) = mesh.without_duplicates();
+    // what is far away is mended at the origin, where its digits suffice
+    let middle = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
+    let is_far = middle.iter().any(|x| x.abs() > FAR_EXTENTS * raw_extent);
+    let away = if is_far { middle } else { [0.0; 3] };
+    let near = raw.clone().translated(away.map(|x| -x)).scaled([scale; 3]);
+    let away_m = away.map(|x| x * scale);
+    let (mesh, joined_vertices, dropped_triangles) = near.welded(tolerance_m);
+    let as_is = repair == Repair::NearSide;
+    let (mut mesh, duplicate_triangles) = mesh.without_duplicates(as_is);
     if mesh.triangles.is_empty() {
-        return Err(no_triangles(file, dropped_triangles + duplicate_triangles));
+        return Err(match duplicate_triangles {
+            0 => no_triangles(file, dropped_triangles),
+            _ => no_volume(file, [0, 1, 2].map(|k| (high[k] - low[k]) * scale)),
+        });
     }
     let extent_m = mesh.extent_m();
     if !fits(extent_m) {
-        return Err(far_from_metres(extent_m, extent_m / scale, scale, file));
+        return Err(far_from_metres(extent_m, raw_extent, scale, file));
     }
-    let mended = mend(&mut mesh).map_err(|broken| broken.error(scale, file))?;
-    let volume_m3 = mesh.volume_m3();
-    let least_m3 = LEAST_VOLUME_FRACTION * mesh.extent_m().powi(3);
-    if volume_m3 < least_m3 {
-        let why = format!("encloses {volume_m3} m³; a solid of its extent encloses at least {least_m3} m³");
-        return Err(refused(file, why));
-    }
+    let mut closed = mesh.clone();
+    let mended = mend(&mut closed).and_then(|mended| {
+        let sides_m = closed.sides_m();
+        let least_m3 = LEAST_VOLUME_FRACTION * closed.extent_m().powi(3);
+        if closed.volume_m3() < least_m3 { Err(Broken::Sheet(sides_m)) } else { Ok(mended) }
+    });
+    let mended = match mended {
+        Ok(mended) => {
+            mesh = closed;
+            mended
+        }
+        Err(broken) => {
+            let open_below = mesh.edge_open_below();
+            if !as_is && (open_below.is_some() || matches!(broken, Broken::Sheet(_))) {
+                let broken = if mesh.is_flat() { Broken::Sheet(mesh.sides_m()) } else { broken };
+                return Err(broken.error(scale, away_m, file));
+            }
+            // which way an open surface faces says nothing about what touches
+            if mesh.volume_m3() < 0.0 {
+                mesh = mesh.flipped();
+            }
+            MeshReport {
+                open_edges: mesh.open_edges(),
+                open_below_m: open_below.map(|edge| mesh.middle_m(edge)),
+                ..MeshReport::default()
+            }
+        }
+    };
     let mut report = MeshReport { joined_vertices, dropped_triangles, duplicate_triangles, ..mended };
     if mesh.triangles.len() > SOFT_MAX_TRIANGLES
         && let Some((fewer, error_m)) = mesh.decimated()
@@ -730,11 +886,21 @@ pub fn checked(raw: &TriMesh, scale: f64, file: &str) -> Result<(TriMesh, MeshRe
         report.decimation_error_m = Some(error_m);
         mesh = fewer;
     }
+    let mut move_m = away_m;
+    if centre {
+        let (low, high) = mesh.bounds().unwrap_or_default();
+        move_m = [-0.5 * (low[0] + high[0]), -0.5 * (low[1] + high[1]), -low[2]];
+        report.centred_by_m = Some([0, 1, 2].map(|k| move_m[k] - away_m[k]));
+    }
+    if move_m != [0.0; 3] {
+        mesh = mesh.translated(move_m);
+        report.open_below_m = report.open_below_m.map(|at| [0, 1, 2].map(|k| at[k] + move_m[k]));
+    }
     let (low, high) = mesh.bounds().unwrap_or_default();
     report.vertices = mesh.vertices.len();
     report.triangles = mesh.triangles.len();
     report.heavy = mesh.triangles.len() > SOFT_MAX_TRIANGLES;
-    report.extent_m = [0, 1, 2].map(|k| high[k] - low[k]);
+    report.extent_m = mesh.sides_m();
     report.middle_m = [0, 1, 2].map(|k| 0.5 * (low[k] + high[k]));
     report.volume_m3 = mesh.volume_m3();
     Ok((mesh, report))
@@ -764,6 +930,36 @@ fn mend(mesh: &mut TriMesh) -> Result<MeshReport, Broken> {
         lids: closed.lids,
         ..MeshReport::default()
     })
+}
+
+/// The error of a surface that encloses nothing.
+fn no_volume(file: &str, sides_m: [f64; 3]) -> MeshError {
+    let [x, y, z] = sides_m.map(|m| format!("{:.4e}", 1e3 * m).parse::<f64>().unwrap_or_default());
+    refused(
+        file,
+        format_args!(
+            "encloses no volume: it is a sheet of {x} × {y} × {z} mm, whatever its unit; give it a thickness where it was \
+             drawn{AS_IS}"
+        ),
+    )
+}
+
+impl TriMesh {
+    /// Sides of the box around the vertices, m.
+    fn sides_m(&self) -> [f64; 3] {
+        self.bounds().map_or([0.0; 3], |(low, high)| [0, 1, 2].map(|k| high[k] - low[k]))
+    }
+
+    /// Whether all vertices lie near one plane, in whatever direction.
+    fn is_flat(&self) -> bool {
+        let points = || self.vertices.iter().map(|v| Vector3::from(*v));
+        let mean = points().sum::<Vector3<f64>>() / self.vertices.len().max(1) as f64;
+        let spread: Matrix3<f64> = points().map(|p| (p - mean) * (p - mean).transpose()).sum();
+        let eigen = spread.symmetric_eigen();
+        let normal = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into_owned();
+        let [[low], [high]] = span(points().map(|p| [normal.dot(&(p - mean))]));
+        high - low <= FLAT_FRACTION * self.extent_m()
+    }
 }
 
 fn no_triangles(file: &str, dropped: usize) -> MeshError {
@@ -821,28 +1017,24 @@ pub(super) fn within_budget(vertices: usize, triangles: usize, file: &str) -> Re
     }
 }
 
-/// Extent of the vertices that triangles use, so that a stray vertex does not set the weld distance.
-fn used_extent(raw: &TriMesh) -> f64 {
-    let used = TriMesh {
-        vertices: raw.triangles.iter().flatten().map(|&i| raw.vertices[i as usize]).collect(),
-        triangles: Vec::new(),
-    };
-    used.extent_m()
-}
-
 /// Whether something of this extent may press on a skin.
 fn fits(extent_m: f64) -> bool {
     (MIN_EXTENT_M..=MAX_EXTENT_M).contains(&extent_m)
 }
 
-/// The error for a mesh of the wrong size, `raw_extent` in the unit of the file, with the first usual unit that fits.
-fn far_from_metres(extent_m: f64, raw_extent: f64, scale: f64, file: &str) -> MeshError {
+/// The usual units in which an object of `raw_extent` units may press on a skin, the most probable first: the one that
+/// makes its size nearest to a tenth of a metre.
+fn fitting_units(raw_extent: f64) -> Vec<(&'static str, f64)> {
     let units =
         [("metres", 1.0), ("millimetres", 1e-3), ("centimetres", 1e-2), ("inches", 25.4e-3), ("micrometres", 1e-6)];
-    MeshError::FarFromMetres {
-        file: file.to_owned(),
-        extent_m,
-        scale,
-        suggestion: units.into_iter().find(|&(_, s)| fits(raw_extent * s)),
-    }
+    let mut fitting: Vec<_> = units.into_iter().filter(|(_, scale)| fits(raw_extent * scale)).collect();
+    let distance = |scale: f64| (raw_extent * scale / 0.1).ln().abs();
+    fitting.sort_by(|(_, a), (_, b)| distance(*a).total_cmp(&distance(*b)));
+    fitting
+}
+
+/// The error for a mesh of the wrong size, `raw_extent` in the unit of the file.
+fn far_from_metres(extent_m: f64, raw_extent: f64, scale: f64, file: &str) -> MeshError {
+    let suggestion = fitting_units(raw_extent).first().copied();
+    MeshError::FarFromMetres { file: file.to_owned(), extent_m, scale, suggestion }
 }

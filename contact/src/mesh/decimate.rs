@@ -11,7 +11,7 @@ use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhNode};
 pub const MAX_DECIMATION_ERROR_M: f64 = 1e-4;
 /// The same as part of the extent, which is what holds for objects below 50 mm.
 const MAX_ERROR_FRACTION: f64 = 2e-3;
-/// Simplifications tried before the mesh is left as it is.
+/// Simplifications tried from each start before the mesh is left as it is.
 const TRIALS: usize = 6;
 /// Larger meshes are first brought down to so many triangles, from which the trials start.
 const COARSE_TRIANGLES: usize = 60_000;
@@ -21,7 +21,7 @@ const COARSE_SHARE: f64 = 0.125;
 impl TriMesh {
     /// A mesh of at most [`SOFT_MAX_TRIANGLES`] triangles, or of as many more as it takes to stay within
     /// [`MAX_DECIMATION_ERROR_M`] and 0.2 % of the extent, and its error, m. `None` when that saves nothing, or when
-    /// the result would not be closed and outward any more.
+    /// the result would not be closed and outward any more; of an open mesh, when it would have more open edges.
     ///
     /// Edges are collapsed in the order of their quadric error (meshoptimizer), onto vertices of the original. The
     /// error is measured, not estimated: the largest distance from any vertex of the original to the new surface, and
@@ -30,27 +30,30 @@ impl TriMesh {
         let limit_m = MAX_DECIMATION_ERROR_M.min(MAX_ERROR_FRACTION * self.extent_m());
         let coarse = (self.triangles.len() > 2 * COARSE_TRIANGLES)
             .then(|| self.simplified(COARSE_TRIANGLES, COARSE_SHARE * limit_m));
-        let start = coarse.as_ref().unwrap_or(self);
         let original = Nearest::new(self);
-        let volume_m3 = self.volume_m3();
+        let (volume_m3, open_edges) = (self.volume_m3(), self.open_edges());
         // a surface that moves by at most the limit changes the volume by at most that times its area
         let most_change_m3 = limit_m * self.area_m2();
-        let mut target_m = limit_m;
-        for _ in 0..TRIALS {
-            let mesh = start.simplified(SOFT_MAX_TRIANGLES, target_m);
-            if mesh.triangles.is_empty()
-                || mesh.triangles.len() >= self.triangles.len()
-                || mesh.open_edges() > 0
-                || (mesh.volume_m3() - volume_m3).abs() > most_change_m3
-            {
-                return None;
+        // the first step may already have moved slivers too far
+        for start in coarse.iter().chain([self]) {
+            let mut target_m = limit_m;
+            for _ in 0..TRIALS {
+                let mesh = start.simplified(SOFT_MAX_TRIANGLES, target_m);
+                if mesh.triangles.is_empty()
+                    || mesh.triangles.len() >= self.triangles.len()
+                    || mesh.open_edges() > open_edges
+                    || (open_edges == 0 && (mesh.volume_m3() - volume_m3).abs() > most_change_m3)
+                {
+                    break;
+                }
+                let error_m = Nearest::new(&mesh)
+                    .farthest_m(self.vertices.iter().copied())
+                    .max(original.farthest_m(mesh.samples()));
+                if error_m <= limit_m {
+                    return Some((mesh, error_m));
+                }
+                target_m *= (limit_m / error_m).clamp(0.25, 0.8);
             }
-            let error_m =
-                Nearest::new(&mesh).farthest_m(self.vertices.iter().copied()).max(original.farthest_m(mesh.samples()));
-            if error_m <= limit_m {
-                return Some((mesh, error_m));
-            }
-            target_m *= (limit_m / error_m).clamp(0.25, 0.8);
         }
         None
     }

@@ -10,13 +10,16 @@
 mod check;
 mod decimate;
 mod files;
+mod glb;
+mod near_side;
+mod obj;
 pub mod polygon;
 mod solid;
 #[cfg(test)]
 mod tests;
 mod tri_mesh;
 
-pub use check::{MeshError, MeshReport, checked};
+pub use check::{MeshError, MeshOptions, MeshReport, Repair, checked};
 pub use decimate::MAX_DECIMATION_ERROR_M;
 pub use files::{load, read_glb, read_obj, read_stl, unknown_extension};
 pub use solid::{cuboid, cylinder, extrude, extrude_recessed, revolve, revolve_ring, sphere};

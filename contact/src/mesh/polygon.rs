@@ -1,5 +1,6 @@
 //! Outlines in the plane: closed loops of points, m, counter-clockwise; the first point is not repeated at the end.
 
+use super::tri_mesh::span;
 use std::f64::consts::TAU;
 
 /// A point or direction in the plane, m.
@@ -148,6 +149,44 @@ pub(super) fn triangulate(outer: &[Point], holes: &[Vec<Point>]) -> Vec<[usize; 
     clip_ears(&points, loop_)
 }
 
+/// Triangles, as indices into `outline`, that tile it: a fan where all of it is seen from its first corner, else by
+/// ears. The outline runs counter-clockwise; its corners may be repeated or lie on a straight line, and it may touch
+/// itself. `may_take` says whether the ears of so many corners may be looked for.
+///
+/// # Errors
+/// What is wrong with an outline that cannot be tiled.
+pub(super) fn cut(outline: &[Point], may_take: impl FnOnce(usize) -> bool) -> Result<Vec<[usize; 3]>, &'static str> {
+    let n = outline.len();
+    let [low, high] = span(outline.iter().copied());
+    // rounding of coordinates a million times as far away as the outline is wide
+    let slack_m2 = 1e-9 * (high[0] - low[0]).max(high[1] - low[1]).powi(2);
+    let area = |&[a, b, c]: &[usize; 3]| 0.5 * turn(outline[a], outline[b], outline[c]);
+    let from_first = |k: usize| [outline[k][0] - outline[0][0], outline[k][1] - outline[0][1]];
+    let fan: Vec<[usize; 3]> = (2..n).map(|k| [0, k - 1, k]).collect();
+    let angle = |&[_, b, c]: &[usize; 3]| {
+        let (p, q) = (from_first(b), from_first(c));
+        (p[0] * q[1] - p[1] * q[0]).atan2(p[0] * q[0] + p[1] * q[1])
+    };
+    if fan.iter().all(|t| area(t) >= -slack_m2) && fan.iter().map(angle).sum::<f64>() < 1.01 * TAU {
+        return Ok(fan);
+    }
+    if !may_take(n) {
+        return Err("is concave, and the concave faces have more corners than can be cut; export triangles");
+    }
+    let side = |k: usize| (outline[k], outline[(k + 1) % n]);
+    let crosses = (0..n).any(|i| {
+        let (p, q) = side(i);
+        (i + 1..n).map(side).any(|(a, b)| properly_cross(p, q, a, b))
+    });
+    let triangles = triangulate(outline, &[]);
+    let missing_m2 = signed_area_m2(outline) - triangles.iter().map(area).sum::<f64>();
+    let tiled = triangles.iter().all(|t| area(t) >= -slack_m2) && missing_m2.abs() <= n as f64 * slack_m2;
+    if crosses || !tiled {
+        return Err("crosses itself, so that it has no inside; export triangles");
+    }
+    Ok(triangles)
+}
+
 fn directed(outline: &[Point], base: usize, counter_clockwise: bool) -> Vec<usize> {
     let mut indices: Vec<usize> = (base..base + outline.len()).collect();
     if (signed_area_m2(outline) > 0.0) != counter_clockwise {
@@ -197,18 +236,33 @@ fn clip_ears(points: &[Point], mut loop_: Vec<usize>) -> Vec<[usize; 3]> {
     let mut misses = 0;
     while loop_.len() > 3 {
         let n = loop_.len();
-        let corner = [loop_[(at + n - 1) % n], loop_[at % n], loop_[(at + 1) % n]];
-        // after a full fruitless turn the loop is not simple (or only slivers are left): take what is there
-        if misses > n || is_ear(points, &loop_, corner) {
-            out.push(corner);
-            loop_.remove(at % n);
-            misses = 0;
-            // step on, so that ears come from all around and the triangles stay compact
-            at = (at + 1) % loop_.len();
+        let corner = |k: usize| [n - 1, 0, 1].map(|step| loop_[(k + step) % n]);
+        let flatness = |k: usize| {
+            let [a, b, c] = corner(k).map(|i| points[i]);
+            turn(a, b, c).abs()
+        };
+        let turns_back = |k: &usize| {
+            let [a, _, c] = corner(*k).map(|i| points[i]);
+            a == c
+        };
+        let ear = if let Some(tip) = (0..n).find(turns_back) {
+            // there and back: it has no area, and both its sides would look like those of an ear
+            tip
+        } else if misses > n {
+            // no ear in a full turn: corners without area block them, or the loop is not simple
+            (0..n).min_by(|&j, &k| flatness(j).total_cmp(&flatness(k))).unwrap_or_default()
+        } else if is_ear(points, &loop_, corner(at % n)) {
+            at % n
         } else {
             misses += 1;
             at = (at + 1) % n;
-        }
+            continue;
+        };
+        out.push(corner(ear));
+        loop_.remove(ear);
+        misses = 0;
+        // step on, so that ears come from all around and the triangles stay compact
+        at = (ear + 1) % loop_.len();
     }
     if let [a, b, c] = loop_[..] {
         out.push([a, b, c]);

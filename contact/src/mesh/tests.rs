@@ -61,8 +61,8 @@ fn files_that_are_not_meshes() {
     refuses(load(&save(&directory, "plain", b"x"), 1.0), &["extension `` is not one of"]);
     let glb: &[u8] = b"glTF\x02\0\0\0\0\0\0\0";
     for (read, part) in [
-        (read_obj(b"v 1 2\nf 1 1 1\n", 1.0, "a"), "malformed: vertex 0, coordinate z = `` is not a number"),
-        (read_obj(b"v 1 2 3\nf 1 1 x/1\n", 1.0, "a"), "malformed: triangle 0: `x` is not a whole number"),
+        (read_obj(b"v 1 2\nf 1 1 1\n", 1.0, "a"), "malformed: line 1: coordinate z is missing"),
+        (read_obj(b"v 1 2 3\nf 1 1 x/1\n", 1.0, "a"), "malformed: line 2: `x/1` is not a whole number"),
         (read_obj(&[0xff, 0xfe, 0], 1.0, "a"), "malformed"),
         (read_obj(b"", 1.0, "a"), "0 triangles of non-zero size"),
         (read_glb(b"glTF", 1.0, "a"), "malformed"),
@@ -86,7 +86,7 @@ fn obj_dialects() {
 #[test]
 fn numbers_that_cannot_be() {
     let nan = read_obj(b"v 0 0 0\nv 0 nan 0\nv 0 0 1\nf 1 2 3\n", 1.0, "a.obj");
-    refuses(nan, &["vertex 1, coordinate y = NaN"]);
+    refuses(nan, &["line 2: coordinate y = `nan` is not a finite number"]);
     let mut mesh = block();
     mesh.vertices[3][2] = f64::INFINITY;
     refuses(gate(&mesh), &["vertex 3, coordinate z = inf"]);
@@ -97,7 +97,7 @@ fn numbers_that_cannot_be() {
     let glb = read_glb(&mesh.to_glb("a"), 1.0, "a");
     refuses(glb, &["triangle 2 uses vertex 8, outside [0, 8)"]);
     let obj = read_obj(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", 1.0, "a.obj");
-    refuses(obj, &["uses vertex 4, outside [1, 3]"]);
+    refuses(obj, &["line 4 uses vertex 4, outside [1, 3] or [-3, -1]"]);
     refuses(read_obj(b"v 0 0 0\nf 1 0 1\n", 1.0, "a.obj"), &["uses vertex 0"]);
     for scale in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let why = format!("mesh `x.obj`: scale = {scale} is outside (0, ∞)");
@@ -121,7 +121,7 @@ fn far_from_metres_suggests_the_scale() {
     let words = ["= 400000 m", "if its unit is micrometres, use scale = 1e-6"];
     refuses(gate(&block().scaled([1e7; 3])), &words);
     // no usual unit makes 4e10 units an object
-    let words = ["vertex 0 has x = -1e10", "[-1000000, 1000000] m"];
+    let words = ["vertex 0 has x = -1e10", "[-10000000, 10000000] m"];
     refuses(gate(&block().scaled([1e12; 3])), &words);
 }
 
@@ -192,7 +192,7 @@ fn glb_accessors_outside_the_chunk() {
         (r#""componentType":5125"#, r#""componentType":5126"#),
         (r#""count":36"#, r#""count":35"#),
         (r#""attributes":{"POSITION":0}"#, r#""attributes":{}"#),
-        (r#""indices":1"#, r#""indices":1,"mode":5"#),
+        (r#""indices":1"#, r#""indices":1,"mode":9"#),
         (r#""indices":1"#, r#""indices":9"#),
     ] {
         let broken = with_json(&bytes, old, new);
@@ -222,10 +222,10 @@ proptest! {
     fn damaged_files_never_panic(at in 0_usize..2000, byte in any::<u8>(), cut in 0_usize..2000, noise in prop::collection::vec(any::<u8>(), 0..200)) {
         let mesh = sphere(0.02, 4, 5);
         for (bytes, read) in [
-            (mesh.to_obj("a").into_bytes(), read_obj as fn(&[u8], f64, &str) -> _),
-            (mesh.to_glb("a"), read_glb),
-            (binary(&mesh), read_stl),
-            (text(&mesh), read_stl),
+            (mesh.to_obj("a").into_bytes(), read_obj::<f64> as fn(&[u8], f64, &str) -> _),
+            (mesh.to_glb("a"), read_glb::<f64>),
+            (binary(&mesh), read_stl::<f64>),
+            (text(&mesh), read_stl::<f64>),
         ] {
             let mut damaged = bytes;
             let at = at % damaged.len();
@@ -254,8 +254,8 @@ proptest! {
             mesh = mesh.merged(&block());
         }
         if let Ok((mended, report)) = checked(&mesh, 1.0, "a") {
-            prop_assert_eq!(mended.open_edges(), 0);
-            prop_assert!(mended.volume_m3() > 0.0 && report.triangles == mended.triangles.len());
+            prop_assert_eq!(mended.open_edges() == 0, report.open_edges == 0);
+            prop_assert!(report.open_edges > 0 || mended.volume_m3() > 0.0 && report.triangles == mended.triangles.len());
         }
     }
 }
@@ -327,8 +327,7 @@ fn damaged_files_say_what_is_wrong() {
     let mut more = binary.clone();
     more[80] = 13;
     says(&more, "13 triangles = 734 bytes, the file has 684");
-    let appended = [&binary[..], b"\r\n"].concat();
-    says(&appended, "684 bytes, the file has 686 (2 bytes too many");
+    says(&[&binary[..], &[7; 49], &[8; 51]].concat(), "684 bytes, the file has 784 (100 bytes too many");
     says(b"", "0 bytes");
     says(&[0; 84], "0 triangles");
     let mut solid = binary.clone();
@@ -339,11 +338,11 @@ fn damaged_files_say_what_is_wrong() {
     says(&nan, "vertex 0, coordinate y = NaN");
 
     let plain = String::from_utf8(text(&block())).unwrap();
-    says(&plain.as_bytes()[..plain.len() / 2], "endsolid");
+    says(&plain.as_bytes()[..plain.len() / 2], "truncated?");
     let broken = |old: &str, new: &str| plain.replacen(old, new, 1).into_bytes();
-    says(&broken("e-2", "e-2x"), "malformed: vertex 0, coordinate x = `-1e-2x` is not a number");
-    says(&broken("vertex -1e-2", "vertex -inf"), "coordinate x = -inf");
-    says(&broken("    endloop\n", ""), "triangle 0: `endloop` expected, found `endfacet`");
+    says(&broken("e-2", "e-2x"), "malformed: line 4: coordinate x = `-1e-2x` is not a number");
+    says(&broken("vertex -1e-2", "vertex -inf"), "line 4: coordinate x = `-inf` is not a finite number");
+    says(&broken("    endloop\n", ""), "line 7: `endloop` expected, found `endfacet`");
     says(b"solid empty\nendsolid empty\n", "0 triangles");
     // the unit of a file is never guessed
     let micrometres = self::binary(&block().scaled([1e6; 3]));
@@ -583,7 +582,7 @@ fn vertices_on_a_neighbours_edge() {
 }
 
 #[test]
-fn surfaces_without_outside_are_refused() {
+fn surfaces_without_outside() {
     // a wall inside a box: three sheets meet along its border
     let mut walled = block();
     let corner = |p: [f64; 3]| {
@@ -597,9 +596,10 @@ fn surfaces_without_outside_are_refused() {
         corner([-0.01, -0.015, 0.04]),
     ];
     walled.triangles.extend([[ends[0], ends[1], ends[2]], [ends[0], ends[2], ends[3]]]);
-    let said = gate(&walled).unwrap_err().to_string();
-    let parts = ["3 triangles meet in an edge at", "not closed"];
-    assert!(parts.iter().any(|part| said.contains(part)), "{said}");
+    // nothing of it shows from below: the underside is that of the box
+    let (mesh, report) = gate(&walled).unwrap();
+    assert_eq!((report.open_edges > 0, report.open_below_m, mesh.triangles.len()), (true, None, 14));
+    assert!(report.notes()[0].contains("none of its holes is seen from below"), "{:?}", report.notes());
     // a Möbius band
     let mut band = TriMesh::default();
     let turns = 24_u32;
@@ -682,6 +682,16 @@ fn what_cannot_be_decimated_within_the_bound_stays_heavy() {
     assert!(report.notes().iter().any(|n| n.contains("slow contact")));
 }
 
+/// The slivers around the poles, 7 µm wide, mislead the estimate of the error.
+#[test]
+fn a_ball_of_slivers_is_decimated_from_stl_too() {
+    let ball = sphere(0.05, 300, 501);
+    let (mesh, report) = read_stl(&binary(&ball), 1.0, "ball.stl").unwrap();
+    assert_eq!(report.decimated_from, Some(299_598));
+    assert!(report.decimation_error_m.unwrap() <= MAX_DECIMATION_ERROR_M && mesh.triangles.len() < 60_000);
+    assert!((mesh.volume_m3() / 5.236e-4 - 1.0).abs() < 0.01, "{}", mesh.volume_m3());
+}
+
 /// A million triangles, bumpy so that the decimation has something to keep, as a file has them. Oracle: the underside
 /// of the original, found by trying every triangle.
 #[test]
@@ -703,4 +713,413 @@ fn a_million_triangles_from_a_file() {
         let [before, after] = [&ball, &mesh].map(|mesh| mesh.underside_m([x, y]).unwrap());
         assert!((before - after).abs() <= 1.2 * error_m, "({x}, {y}): {before} {after}");
     }
+}
+
+// OBJ as people write it: one table for what is read, one for what is refused.
+
+/// A box of 40 × 60 × 20 mm by quadrangles; `#` goes behind every datum, a face goes on in the next line.
+const BOX: &str = "v 0 0 0\nv 0.04 0 0\nv 0.04 0.06 0\nv 0 0.06 0\nv 0 0 0.02\nv 0.04 0 0.02\nv 0.04 0.06 0.02\n\
+                   v 0 0.06 0.02\nf 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+
+#[test]
+fn obj_is_read_whatever_its_line_ends_and_names() {
+    let named = |name: &[u8]| [b"# ", name, b"\no ", name, b"\nmtllib ", name, b"\n", BOX.as_bytes()].concat();
+    let with = |old: &str, new: &str| BOX.replace(old, new).into_bytes();
+    for (what, text) in [
+        ("plain", BOX.as_bytes().to_vec()),
+        ("comments", with("\n", " # 7 8 9\n")),
+        ("comments at once", with("\n", "#7\n")),
+        ("CR LF", with("\n", "\r\n")),
+        ("CR", with("\n", "\r")),
+        ("no last line end", BOX.trim_end().as_bytes().to_vec()),
+        ("continued", with("f 1 4 3 2", "f 1 4 \\\n3 2")),
+        (
+            "continued, CR LF",
+            with("\n", "\r\n").iter().flat_map(|&b| if b == b' ' { b" \\\r\n ".to_vec() } else { vec![b] }).collect(),
+        ),
+        ("continued twice", with("f 1 4 3 2", "f \\\n1 4 \\  \n3 2 # end")),
+        ("comment with a backslash", with("f 1 4 3 2", "# c:\\\nf 1 4 3 2")),
+        ("path with a backslash", with("f 1 4 3 2", "mtllib c:\\\nf 1 4 3 2")),
+        ("Latin-1", named(b"W\xfcrfel")),
+        // the second byte of the last character is a backslash
+        ("GBK", named(b"\xc4\xa3\xd0\xcd \xb2\x5c")),
+        ("more numbers and slashes", with("f 1 4 3 2", "vt 0 0\nf 1// 4/1 3/1/1 2//1")),
+        ("colours and weights", with("v 0 0 0\n", "v 0 0 0 255 255 255\n").to_vec()),
+        ("faces before their vertices", {
+            let (vertices, faces) = BOX.split_once('f').unwrap();
+            format!("f{faces}{vertices}").into_bytes()
+        }),
+        ("corners repeated and in a row", with("f 1 4 3 2", "f 1 1 4 3 3 2 1")),
+        ("a face of two corners, a line, a point", with("f 1 4 3 2", "f 1 4 3 2\nf 1 2\nl 1 2\np 1")),
+    ] {
+        let (mesh, _) = read_obj(&text, 1.0, "a.obj").unwrap_or_else(|error| panic!("{what}: {error}"));
+        assert_relative_eq!(mesh.volume_m3(), 4.8e-5, max_relative = 1e-12);
+        assert_eq!(mesh.vertices.len(), 8, "{what}");
+    }
+}
+
+#[test]
+fn obj_faults_have_their_line_and_what_to_do() {
+    let wide = |little: bool, mark: &str| -> Vec<u8> {
+        let units = mark.encode_utf16().chain(BOX.encode_utf16());
+        units.flat_map(|u| if little { u.to_le_bytes() } else { u.to_be_bytes() }).collect()
+    };
+    for (text, words) in [
+        (BOX.replace("0.06", "0,06"), ["line 3", "`0,06`", "decimal points, not commas"]),
+        (BOX.replace("0.02", "2e-2m"), ["line 5", "`2e-2m`", "not a number"]),
+        (BOX.replace("v 0 0 0\n", "v 0 0\n"), ["line 1", "coordinate z", "missing"]),
+        (BOX.replace("f 2 3 7 6", "f 2 3 7 9"), ["line 12", "vertex 9", "[1, 8] or [-8, -1]"]),
+        (BOX.replace("f 2 3 7 6", "f 2 3 7 0"), ["line 12", "vertex 0", "[1, 8]"]),
+        (BOX.replace("f 2 3 7 6", "f 2 3 7 -9"), ["line 12", "vertex -9", "[-8, -1]"]),
+        (BOX.replace("f 2 3 7 6", "f 2 3 7.5 6"), ["line 12", "`7.5`", "whole number"]),
+        (BOX.replace("f 2 3 7 6", "f 2,3,7,6"), ["line 12", "`2,3,7,6`", "spaces between corners"]),
+        // the two sides of an 8
+        (BOX.replace("f 1 4 3 2", "f 1 3 4 2"), ["line 9", "4 corners", "crosses itself"]),
+    ] {
+        refuses(read_obj(text.as_bytes(), 1.0, "a.obj"), &words);
+    }
+    for (little, mark) in [(true, "\u{feff}"), (false, "\u{feff}"), (true, ""), (false, "")] {
+        refuses(read_obj(&wide(little, mark), 1.0, "a.obj"), &["UTF-16"]);
+        let stl = String::from_utf8(text(&block())).unwrap();
+        let units = mark.encode_utf16().chain(stl.encode_utf16());
+        let stl: Vec<u8> = units.flat_map(|u| if little { u.to_le_bytes() } else { u.to_be_bytes() }).collect();
+        refuses(read_stl(&stl, 1.0, "a.stl"), &["UTF-16"]);
+    }
+    let comma = String::from_utf8(text(&block())).unwrap().replace("-1e-2", "-0,01");
+    refuses(read_stl(comma.as_bytes(), 1.0, "a.stl"), &["line 4", "`-0,01`", "decimal points, not commas"]);
+}
+
+/// Prism over `outline` in the plane that `turn` makes of z = 0, with its caps as one face each.
+fn prism(outline: &[[f64; 2]], height: f64, place: impl Fn([f64; 3]) -> [f64; 3]) -> String {
+    let n = outline.len();
+    let mut out = String::new();
+    for z in [0.0, height] {
+        for [x, y] in outline {
+            let [x, y, z] = place([*x, *y, z]);
+            let _ = writeln!(out, "v {x:?} {y:?} {z:?}");
+        }
+    }
+    let list = |corners: Vec<usize>| corners.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+    let _ = writeln!(out, "f {}\nf {}", list((1..=n).rev().collect()), list((n + 1..=2 * n).collect()));
+    for k in 0..n {
+        let j = (k + 1) % n;
+        let _ = writeln!(out, "f {} {} {} {}", k + 1, j + 1, n + j + 1, n + k + 1);
+    }
+    out
+}
+
+/// Faces of every outline cover its area, in any plane and from any first corner: volume = area × height.
+#[test]
+fn concave_faces_cover_their_area() {
+    let u = vec![[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [7.0, 9.0], [7.0, 2.0], [2.0, 2.0], [2.0, 9.0], [0.0, 9.0]];
+    let arrow = vec![[0.0, 0.0], [4.0, 2.0], [0.0, 4.0], [1.0, 2.0]];
+    let star: Vec<[f64; 2]> = (0..24)
+        .map(|k| {
+            let (y, x) = (std::f64::consts::TAU * f64::from(k) / 24.0).sin_cos();
+            let r = if k % 2 == 0 { 5.0 } else { 1.5 };
+            [r * x, r * y]
+        })
+        .collect();
+    // corners on a straight line, in the notch too
+    let dotted = vec![
+        [0.0, 0.0],
+        [3.0, 0.0],
+        [6.0, 0.0],
+        [6.0, 6.0],
+        [4.0, 6.0],
+        [4.0, 4.0],
+        [4.0, 2.0],
+        [2.0, 2.0],
+        [2.0, 6.0],
+        [0.0, 6.0],
+        [0.0, 3.0],
+    ];
+    for (outline, area) in
+        [(u, 46.0), (arrow, 6.0), (star, 12.0 * 5.0 * 1.5 * (std::f64::consts::PI / 12.0).sin()), (dotted, 28.0)]
+    {
+        for first in 0..outline.len() {
+            for (turn, far) in [(0.0, 0.0), (0.7, 0.0), (1.9, 5e5)] {
+                let mut outline = outline.clone();
+                outline.rotate_left(first);
+                let (s, c) = f64::sin_cos(turn);
+                let text = prism(&outline, 2.0, |[x, y, z]| {
+                    [c * x - s * z + far, c * y - s * (s * x + c * z), s * y + c * (s * x + c * z)]
+                });
+                let (mesh, report) = read_obj(text.as_bytes(), 0.01, "a.obj").unwrap();
+                // 5e3 m of f64 have steps of 1e-12 m, of 0.04 m 2e-11
+                assert_relative_eq!(mesh.volume_m3(), 2.0 * area * 1e-6, max_relative = 1e-8);
+                assert_eq!((report.filled_holes, report.open_edges), (0, 0), "{first} {turn}");
+            }
+        }
+    }
+    // a square with a square hole, joined by a cut that the outline goes both ways
+    let ring = [
+        [0.0, 0.0],
+        [6.0, 0.0],
+        [6.0, 6.0],
+        [0.0, 6.0],
+        [0.0, 0.0],
+        [2.0, 2.0],
+        [2.0, 4.0],
+        [4.0, 4.0],
+        [4.0, 2.0],
+        [2.0, 2.0],
+    ];
+    let triangles = polygon::cut(&ring, |_| true).unwrap();
+    let area: f64 = triangles.iter().map(|&[a, b, c]| 0.5 * polygon::turn(ring[a], ring[b], ring[c])).sum();
+    assert_relative_eq!(area, 32.0, max_relative = 1e-12);
+    // two squares that touch in a corner
+    let touching = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [2.0, 1.0], [2.0, 2.0], [1.0, 2.0], [1.0, 1.0], [0.0, 1.0]];
+    let triangles = polygon::cut(&touching, |_| true).unwrap();
+    let area: f64 = triangles.iter().map(|&[a, b, c]| 0.5 * polygon::turn(touching[a], touching[b], touching[c])).sum();
+    assert_relative_eq!(area, 2.0, max_relative = 1e-12);
+    // a star drawn in one stroke goes twice around its middle
+    let pentagram: Vec<[f64; 2]> =
+        (0..5).map(|k| f64::from(2 * k) * std::f64::consts::TAU / 5.0).map(|a| [a.cos(), a.sin()]).collect();
+    assert!(polygon::cut(&pentagram, |_| true).is_err());
+    // a comb of more teeth than can be cut
+    let comb: Vec<[f64; 2]> =
+        (0..2100).map(|k| [f64::from(k), f64::from(k % 2)]).chain([[2099.0, -1.0], [0.0, -1.0]]).collect();
+    let text = prism(&comb.iter().rev().copied().collect::<Vec<_>>(), 2.0, |p| p);
+    refuses(read_obj(text.as_bytes(), 1e-4, "a.obj"), &["line 4205", "more corners than can be cut"]);
+}
+
+#[test]
+fn far_from_the_origin() {
+    let far = [500_000.0, 400_000.0, 12.0];
+    let text: String = BOX.lines().fold(String::new(), |mut out, line| {
+        let numbers: Vec<f64> = line.split(' ').skip(1).map(|word| word.parse().unwrap()).collect();
+        let _ = match line.starts_with('v') {
+            true => writeln!(out, "v {:.3} {:.3} {:.3}", numbers[0] + far[0], numbers[1] + far[1], numbers[2] + far[2]),
+            false => writeln!(out, "{line}"),
+        };
+        out
+    });
+    // half a step of f64 there is 3e-11 m, of 20 mm 1.5e-9
+    let (mesh, report) = read_obj(text.as_bytes(), 1.0, "a.obj").unwrap();
+    assert_relative_eq!(mesh.volume_m3(), 4.8e-5, max_relative = 1e-8);
+    assert!(mesh.is_solid() && report.is_off_centre());
+    let options = MeshOptions { centre: true, ..MeshOptions::from(1.0) };
+    let (mesh, report) = read_obj(text.as_bytes(), options, "a.obj").unwrap();
+    let (low, high) = mesh.bounds().unwrap();
+    for (found, expected) in low.iter().chain(&high).zip([-0.02, -0.03, 0.0, 0.02, 0.03, 0.02]) {
+        assert!((found - expected).abs() < 1e-9, "{low:?} {high:?}");
+    }
+    assert!(report.notes()[0].contains("moved by (-500000020.0, -400000030.0, -12000.0) mm"), "{:?}", report.notes());
+    // formats of f32 have steps of 31 mm there
+    let moved = block().translated(far);
+    refuses(read_stl(&binary(&moved), 1.0, "a.stl"), &["up to 500000", "steps of 6", "move it to the origin"]);
+    refuses(read_glb(&moved.to_glb("a"), 1.0, "a.glb"), &["up to 500000"]);
+    assert!(read_stl(&binary(&block().translated([1.0, 1.0, 1.0])), 1.0, "a.stl").is_ok());
+}
+
+#[test]
+fn stl_with_a_tail_or_a_wrong_count() {
+    let binary = binary(&block());
+    for tail in [&[13, 10][..], b"thirteen byte", &[0; 428], &[26; 3]] {
+        let (mesh, report) = read_stl(&[&binary, tail].concat(), 1.0, "a.stl").unwrap();
+        assert_relative_eq!(mesh.volume_m3(), 24e-6, max_relative = 2e-7);
+        assert_eq!(report.appended_bytes, tail.len());
+        assert!(report.notes()[0].contains("after the last triangle"), "{:?}", report.notes());
+    }
+    let mut none = binary.clone();
+    none[80] = 0;
+    refuses(read_stl(&none, 1.0, "a.stl"), &["declares 0 triangles", "684 bytes", "12 triangles"]);
+    // one triangle fewer than there are
+    none[80] = 11;
+    refuses(read_stl(&none, 1.0, "a.stl"), &["11 triangles = 634 bytes", "684"]);
+    let latin = [b"solid K\xf6rper\n", &text(&block())[b"solid thing\n".len()..]].concat();
+    is_the_block(&latin);
+}
+
+#[test]
+fn sheets_are_told_as_such() {
+    let sheet = |z: fn(f64) -> f64| {
+        let mut sheet = TriMesh::default();
+        for [x, y] in [[0.0, 0.0], [0.06, 0.0], [0.06, 0.04], [0.0, 0.04]] {
+            sheet.vertices.push([x, y, z(x + y)]);
+        }
+        sheet.triangles.extend([[0, 1, 2], [0, 2, 3]]);
+        sheet
+    };
+    let flat = sheet(|_| 0.0);
+    let upright = flat.clone().mapped(|[x, y, _]| [x, 0.01, y]);
+    let two_sided = |mesh: &TriMesh| mesh.clone().merged(&mesh.clone().flipped());
+    let bent = sheet(|d| d * d);
+    for mesh in
+        [flat.clone(), two_sided(&flat), sheet(|d| 4e-3 * d), upright, two_sided(&bent), flat.clone().scaled([10.0; 3])]
+    {
+        let said = refused_words(&mesh);
+        assert!(said.contains("encloses no volume") && said.contains("--as-is") && !said.contains("scale"), "{said}");
+    }
+    // the same, pressed as it is
+    let options = MeshOptions { repair: Repair::NearSide, ..MeshOptions::from(1.0) };
+    for mesh in [flat.clone(), two_sided(&flat), bent.clone(), two_sided(&bent)] {
+        let (read, report) = checked(&mesh, options, "a.stl").unwrap();
+        assert_eq!((read.triangles.len(), report.open_below_m.is_some()), (2, true));
+    }
+}
+
+fn refused_words(mesh: &TriMesh) -> String {
+    gate(mesh).unwrap_err().to_string()
+}
+
+/// Open below, it is refused with the way on; as it is, its underside is that of the shell.
+#[test]
+fn what_is_open_below_is_pressed_as_it_is_only_if_asked() {
+    let open = without(&tile(), |c| c[2] <= 0.0);
+    refuses(gate(&open), &["not closed", "`--as-is`", "repair = \"near_side\""]);
+    let options = MeshOptions { repair: Repair::NearSide, ..MeshOptions::from(1.0) };
+    let (mesh, report) = checked(&open, options, "a.stl").unwrap();
+    assert_eq!((report.open_edges, report.lids, mesh.triangles.len()), (open.open_edges(), 0, open.triangles.len()));
+    assert!(report.notes()[0].contains("is open towards the skin, as at ("), "{:?}", report.notes());
+    // inside the rim, the skin meets the top from within
+    assert_relative_eq!(mesh.underside_m([0.001, 0.002]).unwrap(), 0.01, max_relative = 1e-12);
+    // a mesh that is closed is the same either way
+    assert_eq!(checked(&tile(), options, "a.stl").unwrap().0, checked(&tile(), 1.0, "a.stl").unwrap().0);
+    // a box without a wall inside a larger one: open, and nothing of that shows
+    let inner = without(&tile(), |c| c[0] >= 0.00999).scaled([0.5; 3]).translated([0.0, 0.0, 2e-3]);
+    let nested = tile().merged(&inner);
+    let (mesh, report) = gate(&nested).unwrap();
+    assert!(report.open_edges > 0 && report.open_below_m.is_none());
+    assert_relative_eq!(mesh.underside_m([0.001, 0.002]).unwrap(), 0.0);
+}
+
+#[test]
+fn sizes_are_told_in_plausible_units() {
+    for (size, scale, words) in [
+        (60.0, 1.0, ["millimetres, use scale = 0.001 (`--scale 0.001`)", "60 mm wide"]),
+        (2.4, 1.0, ["inches, use scale = 0.0254", "60.96 mm wide"]),
+        (0.06, 1e-3, ["metres, use scale = 1", "60 mm wide"]),
+        (6e4, 1.0, ["micrometres, use scale = 1e-6", "60 mm wide"]),
+        (2.4, 1e-4, ["inches, use scale = 0.0254", "millimetres, 0.001: 2.4 mm"]),
+    ] {
+        refuses(checked(&cuboid([size; 3]), scale, "a.stl"), &words);
+    }
+}
+
+// GLB as exporters write it.
+
+/// The JSON of a box of 24 cm³ by its writer, with `old` replaced by `new`.
+fn glb(old: &str, new: &str) -> Result<(TriMesh, MeshReport), MeshError> {
+    read_glb(&with_json(&block().to_glb("a"), old, new), 1.0, "a.glb")
+}
+
+#[test]
+fn glb_extensions() {
+    let requires = |name: &str| glb(r#"{"asset""#, &format!(r#"{{"extensionsRequired":["{name}"],"asset""#));
+    for paint in [
+        "KHR_materials_variants",
+        "KHR_texture_transform",
+        "KHR_texture_basisu",
+        "EXT_texture_webp",
+        "KHR_lights_punctual",
+        "KHR_xmp_json_ld",
+        "KHR_materials_unlit",
+        "KHR_mesh_quantization",
+    ] {
+        let (mesh, _) = requires(paint).unwrap_or_else(|error| panic!("{paint}: {error}"));
+        assert_relative_eq!(mesh.volume_m3(), 24e-6, max_relative = 1e-6);
+    }
+    for (name, words) in [
+        ("KHR_draco_mesh_compression", "without Draco compression"),
+        ("EXT_meshopt_compression", "without meshopt compression"),
+        ("EXT_mesh_gpu_instancing", "may move triangles"),
+    ] {
+        refuses(requires(name), &[name, words]);
+    }
+    // packed triangles behind an extension that is only said to be used
+    let used =
+        with_json(&block().to_glb("a"), r#"{"asset""#, r#"{"extensionsUsed":["KHR_draco_mesh_compression"],"asset""#);
+    let used = with_json(&used, r#"{"bufferView":0,"componentType":5126"#, r#"{"componentType":5126"#);
+    refuses(read_glb(&used, 1.0, "a"), &["KHR_draco_mesh_compression"]);
+}
+
+#[test]
+fn glb_skins_ignore_the_node_and_follow_the_bones() {
+    let nodes = r#""nodes":[{"name":"a","mesh":0}]"#;
+    // without weights nothing moves: neither the node nor its parent counts
+    let skin = r#""skins":[{"joints":[1]}],"nodes":[{"mesh":0,"skin":0,"scale":[0.5,0.5,0.5],"translation":[0.3,0,0]},{"scale":[2,2,2]}]"#;
+    let (mesh, report) = glb(nodes, skin).unwrap();
+    assert!(report.posed && report.notes()[0].contains("pose of the file"), "{:?}", report.notes());
+    assert_relative_eq!(mesh.volume_m3(), 24e-6, max_relative = 1e-6);
+    assert_relative_eq!(mesh.bounds().unwrap().1[0], 0.01, max_relative = 1e-6);
+    // every vertex follows the one joint, which doubles: 32 bytes of joints and 32 of weights more
+    let bytes = block().to_glb("a");
+    let mut more = with_json(&bytes, nodes, skin);
+    more =
+        with_json(&more, r#""attributes":{"POSITION":0}"#, r#""attributes":{"POSITION":0,"JOINTS_0":2,"WEIGHTS_0":3}"#);
+    let base = 96 + 144;
+    let accessors = format!(
+        r#"{{"bufferView":2,"componentType":5121,"count":8,"type":"VEC4"}},{{"bufferView":3,"componentType":5121,"normalized":true,"count":8,"type":"VEC4"}}],"bufferViews":[{{"buffer":0,"byteLength":96}},{{"buffer":0,"byteOffset":96,"byteLength":144}},{{"buffer":0,"byteOffset":{base},"byteLength":32}},{{"buffer":0,"byteOffset":{},"byteLength":32}}"#,
+        base + 32
+    );
+    let json = String::from_utf8_lossy(&more).into_owned();
+    let from = json.find(r#"],"bufferViews":["#).unwrap();
+    let to = json[from + 17..].find(']').unwrap() + from + 17;
+    more = with_json(&more, &json[from..to], &format!(",{accessors}"));
+    more = with_json(&more, r#""buffers":[{"byteLength":240}"#, r#""buffers":[{"byteLength":304}"#);
+    // joints 0, and weights of 1 in the first place
+    let mut tail = vec![0_u8; 32];
+    tail.extend([255, 0, 0, 0].repeat(8));
+    let length = index(more.len() + 64);
+    more[8..12].copy_from_slice(&length.to_le_bytes());
+    let json_length = u32::from_le_bytes(more[12..16].try_into().unwrap()) as usize;
+    more[20 + json_length..][..4].copy_from_slice(&304_u32.to_le_bytes());
+    more.extend(tail);
+    let (mesh, _) = read_glb(&more, 1.0, "a").unwrap();
+    assert_relative_eq!(mesh.volume_m3(), 8.0 * 24e-6, max_relative = 1e-6);
+    refuses(read_glb(&with_json(&more, r#""joints":[1]"#, r#""joints":[]"#), 1.0, "a"), &["joint 0, outside [0, 0)"]);
+}
+
+#[test]
+fn glb_modes_and_accessors() {
+    let primitives = r#"{"attributes":{"POSITION":0},"indices":1}]"#;
+    for mode in 0..4 {
+        let beside = format!(
+            r#"{{"attributes":{{"POSITION":0}},"indices":1}},{{"attributes":{{"POSITION":0}},"mode":{mode}}}]"#
+        );
+        let (mesh, report) = glb(primitives, &beside).unwrap();
+        assert_relative_eq!(mesh.volume_m3(), 24e-6, max_relative = 1e-6);
+        assert_eq!(report.skipped_primitives, 1);
+    }
+    refuses(glb(r#""indices":1"#, r#""indices":1,"mode":1"#), &["0 triangles"]);
+    refuses(glb(r#""mesh":0}"#, r#""mesh":0,"weights":[0.5]}"#), &["morphed"]);
+    // a tetrahedron as a strip, and its cap as a fan, of positions in whole numbers with a scale
+    let corners: [[i16; 3]; 4] = [[0, 0, 0], [32767, 0, 0], [0, 32767, 0], [0, 0, 32767]];
+    let bin: Vec<u8> = corners.iter().flat_map(|p| [p[0], p[1], p[2], 0]).flat_map(i16::to_le_bytes).collect();
+    let whole = |mode: u32, order: &[u8], normalized: bool, scale: f64| {
+        let bin = [&bin[..], order, &[0; 4][..(4 - order.len() % 4) % 4]].concat();
+        let json = format!(
+            r#"{{"asset":{{"version":"2.0"}},"nodes":[{{"mesh":0,"scale":[{scale},{scale},{scale}]}}],"meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1,"mode":{mode}}}]}}],"accessors":[{{"bufferView":0,"componentType":5122,"normalized":{normalized},"count":4,"type":"VEC3"}},{{"bufferView":1,"componentType":5121,"count":{n},"type":"SCALAR"}}],"bufferViews":[{{"buffer":0,"byteLength":32,"byteStride":8}},{{"buffer":0,"byteOffset":32,"byteLength":{n}}}],"buffers":[{{"byteLength":{all}}}]}}"#,
+            n = order.len(),
+            all = bin.len()
+        );
+        let json = format!("{json:<width$}", width = json.len().next_multiple_of(4));
+        let mut out = b"glTF\x02\0\0\0".to_vec();
+        out.extend(index(28 + json.len() + bin.len()).to_le_bytes());
+        out.extend([&index(json.len()).to_le_bytes()[..], b"JSON", json.as_bytes()].concat());
+        out.extend([&index(bin.len()).to_le_bytes()[..], b"BIN\0", &bin].concat());
+        read_glb(&out, 1.0, "a")
+    };
+    // a sixth of the cube of 30 mm
+    let strip = [0, 2, 1, 3, 0, 2];
+    for (normalized, scale) in [(true, 0.03), (false, 0.03 / 32767.0)] {
+        let (mesh, _) = whole(5, &strip, normalized, scale).unwrap();
+        // the scale of a node is f32
+        assert_relative_eq!(mesh.volume_m3(), 2.7e-5 / 6.0, max_relative = 2e-7);
+    }
+    // three sides around the tip, open above: the fourth is the lid's
+    let (mesh, report) = whole(6, &[0, 2, 1, 3, 2], true, 0.03).unwrap();
+    assert!(mesh.triangles.len() >= 4 && report.lids + report.filled_holes <= 1);
+    // sparse: a vertex that is moved, and an accessor of zeros that all of its vertices change
+    let sparse = |indices: usize| {
+        format!(
+            r#""count":8,"sparse":{{"count":{indices},"indices":{{"bufferView":1,"componentType":5125}},"values":{{"bufferView":0}}}},"#
+        )
+    };
+    let (mesh, _) = glb(r#""count":8,"#, &sparse(0)).unwrap();
+    assert_relative_eq!(mesh.volume_m3(), 24e-6, max_relative = 1e-6);
+    refuses(glb(r#""count":8,"#, &sparse(9)), &["changes 9 of 8"]);
+    refuses(glb(r#""bufferView":0,"componentType":5126"#, r#""componentType":5126"#), &["0 triangles"]);
 }

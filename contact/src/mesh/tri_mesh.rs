@@ -6,8 +6,9 @@ use std::collections::HashMap;
 pub const MIN_EXTENT_M: f64 = 1e-3;
 /// Largest plausible extent, m.
 pub const MAX_EXTENT_M: f64 = 2.0;
-/// Largest credible coordinate, m: 500,000 times [`MAX_EXTENT_M`] from the origin, beyond which f32 steps are 60 mm.
-pub(super) const MAX_COORDINATE_M: f64 = 1e6;
+/// Largest credible coordinate, m: 500,000 times [`MAX_EXTENT_M`] from the origin. Maps have coordinates below 10⁷ m,
+/// of which f64 keeps nanometres.
+pub(super) const MAX_COORDINATE_M: f64 = 1e7;
 /// Size of the largest mesh file that is read, bytes. A text STL has about 250 bytes a triangle.
 pub const MAX_FILE_BYTES: u64 = 1 << 28;
 /// Most triangles of a mesh before repair, which takes about 0.5 kB a triangle; scanners export fewer.
@@ -227,8 +228,9 @@ impl TriMesh {
             }
         }
         let mut volumes_m3 = vec![0.0; self.triangles.len()];
+        let near = self.vertices.first().copied().unwrap_or_default();
         for (t, corners) in (0..).zip(&self.triangles) {
-            let [a, b, c] = corners.map(|i| self.vertices[i as usize]);
+            let [a, b, c] = corners.map(|i| sub(self.vertices[i as usize], near));
             let (first, _) = parts.find(t);
             volumes_m3[first as usize] += dot(a, cross(b, c)) / 6.0;
         }

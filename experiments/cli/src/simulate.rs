@@ -33,6 +33,7 @@ use toml::Value;
   spts simulate press/T
   spts simulate press/tape --presses 10 --force 12 --seed 3 --render
   spts simulate press --mesh cup.obj --scale 0.001 --row 4.5 --col 4.5 --rotation-deg 30
+  spts simulate press --mesh scan.stl --as-is --centre
   spts simulate bounce --height 1.0 --presses 5
   spts simulate bounce --animate
   spts simulate arm --set bend.radius_m=0.04 --set bend.strain=0.02
@@ -68,12 +69,19 @@ pub(super) struct SimulateCommand {
     list: bool,
     /// Mesh to press with (.obj, .glb or .stl) in place of NAME. The robot arm holds the mesh at the mesh's origin,
     /// with its -z side towards the skin. Small defects are repaired and large meshes are decimated, with a note. A
-    /// mesh that cannot be repaired is refused with the reason [default: none]
+    /// mesh that cannot be repaired is refused with the reason, unless none of its holes shows from below
+    /// [default: none]
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
     /// Metres per unit of the mesh file, 0.001 for millimetres; (0, 1000] [default: 1]
     #[arg(long, value_name = "S", requires = "mesh", value_parser = number)]
     scale: Option<f64>,
+    /// Press a mesh that is not closed as it is: a shell without thickness, whose holes press nothing
+    #[arg(long, requires = "mesh")]
+    as_is: bool,
+    /// Hold the mesh over the middle of its footprint in place of its origin
+    #[arg(long, requires = "mesh")]
+    centre: bool,
     /// Row of the object's origin, in taxels; row 0 is the far edge [default: the object's own place]
     #[arg(long, value_name = "ROW", value_parser = number)]
     row: Option<f64>,
@@ -188,9 +196,11 @@ impl SimulateCommand {
         const PLACE: [[&str; 2]; 2] = [["press.row", "drop.row"], ["press.col", "drop.col"]];
         let text = |value: &Option<String>| value.clone().map(Value::from);
         let number = |value: Option<f64>| value.map(Value::from);
-        let options: [(&str, &[&str], Option<Value>); 17] = [
+        let options: [(&str, &[&str], Option<Value>); 19] = [
             ("--mesh", &["press.mesh"], self.mesh.as_deref().map(path).transpose()?),
             ("--scale", &["press.scale"], number(self.scale)),
+            ("--as-is", &["press.repair"], self.as_is.then(|| "near_side".into())),
+            ("--centre", &["press.centre"], self.centre.then(|| true.into())),
             ("--row", &PLACE[0], number(self.row)),
             ("--col", &PLACE[1], number(self.col)),
             ("--rotation-deg", &["press.rotation_deg"], number(self.rotation_deg)),

@@ -3,7 +3,7 @@
 use super::timestep::BLOCK_S;
 use serde::{Deserialize, Serialize};
 use spts_contact::PreparedMesh;
-use spts_contact::mesh::{MeshReport, load};
+use spts_contact::mesh::{MeshOptions, MeshReport, Repair, load};
 use spts_contact::objects::{BALL_STIFFNESS_PA_PER_M, Placement, pressable};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, in_interval, in_range, within};
@@ -143,6 +143,13 @@ pub struct PressConfig {
     /// Number of metres in a unit of the mesh file; (0, 1000], default 1, as in GLB. It is never guessed: an object 40
     /// units wide may be 40 mm, 40 cm or 40 inches wide.
     pub scale: Option<f64>,
+    /// What is done with a mesh that is not closed. `strict` (the default): it is closed where that changes nothing
+    /// that touches, pressed as it is where its holes do not show from below, and refused otherwise. `near_side`: it is
+    /// pressed as it is, as a shell without thickness.
+    pub repair: Option<Repair>,
+    /// Whether the mesh is moved so that its origin, which is held over the place, is the middle of its footprint.
+    /// Default: false.
+    pub centre: Option<bool>,
     /// Row of the object's origin, in taxels. Default: for an object its own place, at the same distance in metres from
     /// the middle of the sheet as on the published skin; for a mesh the middle.
     pub row: Option<f64>,
@@ -198,6 +205,8 @@ impl Default for PressConfig {
             object: None,
             mesh: None,
             scale: None,
+            repair: None,
+            centre: None,
             row: None,
             col: None,
             position_m: None,
@@ -306,9 +315,14 @@ impl PressConfig {
         let (mesh, report, place) = match (&self.object, &self.mesh, given) {
             (None, None, Some(mesh)) => (mesh, None, middle(skin)),
             (Some(name), None, None) => {
-                if self.scale.is_some() {
+                let given = [
+                    ("scale", self.scale.is_some()),
+                    ("repair", self.repair.is_some()),
+                    ("centre", self.centre.is_some()),
+                ];
+                if let Some((field, _)) = given.into_iter().find(|(_, given)| *given) {
                     return Err(Refusal::new(format!(
-                        "`press.scale` is for a mesh, and `press.object` = \"{name}\" has its own size; leave the scale out"
+                        "`press.{field}` is for a mesh, and `press.object` = \"{name}\" has its own; leave `{field}` out"
                     )));
                 }
                 let Some(object) = pressable().find(|object| object.name == name) else {
@@ -322,9 +336,13 @@ impl PressConfig {
                 ((object.build)().into(), None, placement)
             }
             (None, Some(file), None) => {
-                let scale = *self.scale.get_or_insert(1.0);
-                let (mesh, report) =
-                    load(&folder.join(file), scale).map_err(|error| Refusal::new(format!("`press.mesh`: {error}")))?;
+                let options = MeshOptions {
+                    scale: *self.scale.get_or_insert(1.0),
+                    repair: self.repair.unwrap_or_default(),
+                    centre: self.centre.unwrap_or_default(),
+                };
+                let (mesh, report) = load(&folder.join(file), options)
+                    .map_err(|error| Refusal::new(format!("`press.mesh`: {error}")))?;
                 (mesh.into(), Some(report), middle(skin))
             }
             (object, mesh, given) => {
@@ -349,8 +367,13 @@ impl PressConfig {
         self.rotation_deg.get_or_insert(place.rotation_rad.to_degrees());
         self.tilt_deg.get_or_insert([place.tilt_x_rad.to_degrees(), place.tilt_y_rad.to_degrees()]);
         self.check()?;
-        if let Some(report) = report.filter(|report| report.lids > 0) {
-            self.check_lids(report.lids)?;
+        if let Some(report) = report {
+            let as_is = report.open_edges > 0 && self.repair != Some(Repair::NearSide);
+            match report.lids {
+                0 if as_is => self.check_tilt("is not closed where its underside does not show it".to_owned())?,
+                0 => {}
+                lids => self.check_tilt(format!("opens upwards ({lids} holes were closed there)"))?,
+            }
         }
         let [start_s, end_s] = self.plateau_s();
         if start_s >= end_s {
@@ -382,9 +405,9 @@ impl PressConfig {
         Ok(())
     }
 
-    /// Refuses a tilt that would press with the walls and the lid that close a mesh from above. The scatter counts with
-    /// three times its standard deviation.
-    fn check_lids(&self, lids: usize) -> Result<(), Refusal> {
+    /// Refuses a tilt that would press with the walls and the lid that close a mesh from above, or with a hole that is
+    /// not seen from below. The scatter counts with three times its standard deviation.
+    fn check_tilt(&self, why: String) -> Result<(), Refusal> {
         let [_, _, up] = self.placement().matrix();
         let leaning_deg = up[2].clamp(-1.0, 1.0).acos().to_degrees() + 3.0 * self.rotation_sd_deg;
         if leaning_deg <= MAX_LIDDED_TILT_DEG {
@@ -393,10 +416,35 @@ impl PressConfig {
         let [tilt_x_deg, tilt_y_deg] = self.tilt_deg.unwrap_or_default();
         let (mesh, sd_deg) = (self.mesh.as_deref().unwrap_or_default(), self.rotation_sd_deg);
         Err(Refusal::new(format!(
-            "`press.mesh` = \"{mesh}\" opens upwards ({lids} holes were closed there): `press.tilt_deg` = [{tilt_x_deg}, \
-             {tilt_y_deg}] and three times `press.rotation_sd_deg` = {sd_deg} tilt it by {leaning_deg:.1}°, outside [0, \
-             {MAX_LIDDED_TILT_DEG}]°, so that the closed holes would touch the skin; close the mesh, or tilt it in its file"
+            "`press.mesh` = \"{mesh}\" {why}: `press.tilt_deg` = [{tilt_x_deg}, {tilt_y_deg}] and three times \
+             `press.rotation_sd_deg` = {sd_deg} tilt it by {leaning_deg:.1}°, outside [0, {MAX_LIDDED_TILT_DEG}]°, so that \
+             its holes would touch the skin; close the mesh, or tilt it in its file"
         )))
+    }
+
+    /// The error of a mesh that does not meet the skin: where it is. `square_m` is the distance of the points at which
+    /// the contact is computed.
+    pub(in crate::mechanics) fn beside(&self, report: &MeshReport, square_m: f64) -> Refusal {
+        let mm = |m: f64| (1e7 * m).round() / 1e4;
+        let [x, y] = [0, 1].map(|k| {
+            let half_m = 0.5 * report.extent_m[k];
+            format!("[{}, {}]", mm(report.middle_m[k] - half_m), mm(report.middle_m[k] + half_m))
+        });
+        let (row, col) = (self.row.unwrap_or_default(), self.col.unwrap_or_default());
+        let thin = report.extent_m[0].min(report.extent_m[1]) < 2.0 * square_m;
+        let way = match (thin, self.centre) {
+            (true, _) => {
+                format!("it is thin for contact squares of {} mm: take more, such as `--cells 24`", mm(square_m))
+            }
+            (false, Some(true)) => {
+                "nothing of it is over the skin there: choose another `--row` and `--col`".to_owned()
+            }
+            _ => "`--centre` (`press.centre = true`) puts the middle of its footprint there".to_owned(),
+        };
+        Refusal::new(format!(
+            "`press.mesh`: the mesh lies beside the skin: its box is x = {x}, y = {y} mm from its origin, which is held \
+             over row {row}, column {col}; {way}"
+        ))
     }
 
     fn check(&self) -> Result<(), Refusal> {

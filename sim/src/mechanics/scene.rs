@@ -6,7 +6,7 @@ use super::timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, StepLimit, Timestep, impa
 use crate::fidelity::{FidelityChoice, cheapest, measured};
 use serde::{Deserialize, Serialize};
 use spts_contact::mesh::{MeshReport, TriMesh, sphere};
-use spts_contact::{ContactField, DepthCurve, Pose, PosedMesh, PreparedMesh, build_contact};
+use spts_contact::{ContactField, DepthCurve, EquilibriumError, Pose, PosedMesh, PreparedMesh, build_contact};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, in_interval, in_range};
 use std::path::Path;
@@ -446,7 +446,11 @@ impl Mechanics {
         Ok(match self.task() {
             Task::Press(press) => {
                 let curve = DepthCurve::up_to_force(field, &body, 1.25 * press.force_n);
-                curve.map_err(|error| Refusal::new(format!("`press.force_n` = {}: {error}", press.force_n)))?
+                let square_m = self.skin().pitch_m() / field.cells_per_taxel().max(1) as f64;
+                curve.map_err(|error| match (&error, self.mesh_report()) {
+                    (EquilibriumError::Beside { .. }, Some(report)) => press.beside(report, square_m),
+                    _ => Refusal::new(format!("`press.force_n` = {}: {error}", press.force_n)),
+                })?
             }
             Task::Drop(ball) => {
                 let energy_j = ball.mass_kg * GRAVITY_M_PER_S2 * ball.height_m;

@@ -123,7 +123,7 @@ fn make_room(scene: &mut Table, key: &str, value: &Value) {
     };
     match key {
         "press.mesh" => remove("press", &["object"]),
-        "press.object" => remove("press", &["mesh", "scale"]),
+        "press.object" => remove("press", &["mesh", "scale", "repair", "centre"]),
         "tolerance" => remove("contact", &OF_TOLERANCE),
         _ => {}
     }
