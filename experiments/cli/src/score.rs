@@ -9,7 +9,7 @@ use crate::options::{
 };
 use clap::Args;
 use serde::Serialize;
-use spts::output::{OutputFolder, check_writable, not_ours, write_json};
+use spts::output::{OutputFolder, check_replaceable, write_json};
 use spts::progress::Progress as _;
 use spts_contact::objects::OBJECTS;
 use spts_eval::algorithm::Contender;
@@ -483,11 +483,7 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
 
 /// Refuses to save a board where one cannot be written, and in place of a file that is no board.
 fn check_board(path: &Path) -> Result<(), CliError> {
-    check_writable(path)?;
-    if path.exists() && read_board(path).is_err() {
-        return Err(not_ours(path).into());
-    }
-    Ok(())
+    Ok(check_replaceable(path, |path| read_board(path).is_ok())?)
 }
 
 /// Largest board that is read, bytes: one of all decoders, sources and objects has less than 1 MB.

@@ -174,7 +174,6 @@ impl SampleFile {
 
     /// Writes the next block.
     fn push(&mut self, block: &Block) -> Result<(), Refusal> {
-        self.missing += block.volts.iter().filter(|v| v.is_nan()).count();
         if let Some(converter) = self.converter {
             let mark = missing_mark(&converter);
             self.codes.clear();
@@ -185,10 +184,21 @@ impl SampleFile {
             }
         }
         match &mut self.array {
-            Array::Narrow(file) => file.push(self.codes.iter().map(|code| u16::try_from(*code).unwrap_or(u16::MAX))),
-            Array::Wide(file) => file.push(self.codes.iter().copied()),
-            Array::Volts(file) => file.push(block.volts.iter().copied()),
+            Array::Narrow(file) => {
+                file.push(self.codes.iter().map(|code| u16::try_from(*code).unwrap_or(u16::MAX)))?;
+                file.flush()?;
+            }
+            Array::Wide(file) => {
+                file.push(self.codes.iter().copied())?;
+                file.flush()?;
+            }
+            Array::Volts(file) => {
+                file.push(block.volts.iter().copied())?;
+                file.flush()?;
+            }
         }
+        self.missing += block.volts.iter().filter(|v| v.is_nan()).count();
+        Ok(())
     }
 
     /// Writes volts in place of the codes so far, and from here on.
@@ -209,13 +219,13 @@ impl SampleFile {
         Ok(())
     }
 
-    /// Gives the array its name, and says what it is.
-    fn finish(self) -> Result<Samples, Refusal> {
+    /// Gives the array, which has `blocks` blocks, its name, and says what it is.
+    fn finish(self, blocks: usize) -> Result<Samples, Refusal> {
         let contents = self.contents();
         match self.array {
-            Array::Narrow(file) => file.finish()?,
-            Array::Wide(file) => file.finish()?,
-            Array::Volts(file) => file.finish()?,
+            Array::Narrow(file) => file.finish_with(blocks)?,
+            Array::Wide(file) => file.finish_with(blocks)?,
+            Array::Volts(file) => file.finish_with(blocks)?,
         }
         Ok(contents)
     }
@@ -308,11 +318,13 @@ impl SessionWriter {
     }
 
     /// The same writer, which refuses arrays that are too large to be read again.
-    fn limited(self) -> Self {
+    #[must_use]
+    pub fn limited(self) -> Self {
         Self { limited: true, ..self }
     }
 
-    /// Writes the next blocks of the recording in `mode`, which will have `blocks` blocks in all.
+    /// Writes the next blocks of the recording in `mode`, which will have at most `blocks` blocks in all. A recording
+    /// that ends earlier has those that were written.
     ///
     /// # Errors
     /// [`Refusal`] if the blocks contradict the earlier ones, or a file cannot be written.
@@ -329,10 +341,11 @@ impl SessionWriter {
         writer.push(piece)
     }
 
-    /// Completes the session. `session.json` is written last: a folder that holds it is complete.
+    /// Completes the session, with all blocks that were written whole. `session.json` is written last: a folder that
+    /// holds it is complete.
     ///
     /// # Errors
-    /// [`Refusal`] if a recording has another number of blocks than announced, or a file cannot be written.
+    /// [`Refusal`] if a file cannot be written.
     pub fn finish(mut self) -> Result<(), Refusal> {
         self.contents.raster = self.raster.map(RecordingWriter::finish).transpose()?;
         self.contents.compressive = self.compressive.map(RecordingWriter::finish).transpose()?;
@@ -415,10 +428,12 @@ impl RecordingWriter {
     }
 
     fn finish(self) -> Result<RecordedContents, Refusal> {
+        let blocks = self.contents.blocks.len();
         Ok(RecordedContents {
-            samples: self.samples.finish()?,
-            pressure_pa: self.pressure.finish()?,
-            conductance_s: self.conductance.finish()?,
+            samples: self.samples.finish(blocks)?,
+            pressure_pa: self.pressure.finish(blocks)?,
+            conductance_s: self.conductance.finish(blocks)?,
+            conditioning: self.contents.conditioning.min(blocks),
             ..self.contents
         })
     }
@@ -466,9 +481,9 @@ impl MapFile {
         }
     }
 
-    /// Gives the file its name, and gives that back.
-    fn finish(self) -> Result<Option<String>, Refusal> {
-        self.file.map(|file| file.finish().map(|()| self.name)).transpose()
+    /// Gives the file, which has `blocks` blocks, its name, and gives that back.
+    fn finish(self, blocks: usize) -> Result<Option<String>, Refusal> {
+        self.file.map(|file| file.finish_with(blocks).map(|()| self.name)).transpose()
     }
 }
 
