@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use spts::Refusal;
 use spts::output::{MANIFEST_FILE, Manifest, is_temporary, no_folder, write_new};
 use spts::progress::Progress;
+use spts::session::parse_json;
 use spts_circuit::RecordingInfo;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -252,7 +253,7 @@ fn check_head(path: &Path, needed: &Head) -> Result<(), Refusal> {
 
 fn read_head(path: &Path) -> Result<Head, Refusal> {
     let text = spts_input::read_text(path, MAX_TEXT_BYTES).map_err(failed(path))?;
-    serde_json::from_str(&text).map_err(|e| refused(path, format!("is not the head of a data set ({e})")))
+    parse_json(path, &text).map_err(|refusal| refusal.reworded(|said| format!("{said}; is not the head of a data set")))
 }
 
 /// The error of a folder that holds the data set `found`.

@@ -13,8 +13,10 @@
 //! ```
 
 mod refusal;
+mod tables;
 
 pub use refusal::Refusal;
+pub use tables::Tables;
 
 use std::fs::{File, FileType, OpenOptions};
 use std::io::{self, Read as _};

@@ -4,6 +4,7 @@
 //! sends a request for stands in `Origin`: both have to be this server.
 
 use crate::UPDATE_S;
+use crate::connections::Connections;
 use crate::object::{LiveObject, MOST_MESH_BYTES, MeshUnit, UploadedMesh};
 use crate::session::{Frame, LiveSession, Request, message};
 use crate::wires::Shelf;
@@ -15,7 +16,6 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{any, get};
-use axum::serve::ListenerExt as _;
 use serde::Serialize;
 use spts::Refusal;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
@@ -109,9 +109,7 @@ impl Server {
         let router = router.with_state(self.shared).layer(from_fn_with_state(self.address.port(), own_pages_only));
         runtime.block_on(async move {
             let listener = tokio::net::TcpListener::from_std(self.listener).map_err(ended)?;
-            // an update is sent at once, and does not wait for the page to take the one before
-            let listener = listener.tap_io(|stream| drop(stream.set_nodelay(true)));
-            axum::serve(listener, router).await.map_err(ended)
+            axum::serve(Connections::new(listener), router).await.map_err(ended)
         })
     }
 }

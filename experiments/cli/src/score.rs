@@ -11,6 +11,7 @@ use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputFolder, check_replaceable, write_json};
 use spts::progress::Progress as _;
+use spts::session::parse_json;
 use spts_contact::objects::OBJECTS;
 use spts_eval::algorithm::Contender;
 use spts_eval::anytime::{self, StopSettings};
@@ -495,7 +496,7 @@ fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
         CliError::usage(format!("{}: not a board as --save writes it: {e}", path.display()))
     };
     let text = spts_input::read_text(path, MAX_BOARD_BYTES).map_err(|e| usage(&e))?;
-    serde_json::from_str(&text).map_err(|e| usage(&e))
+    Ok(parse_json(path, &text)?)
 }
 
 /// Name of what is learned from the objects in all their poses.

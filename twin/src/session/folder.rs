@@ -2,13 +2,15 @@
 //! the file for users.
 
 use super::npy::{self, Expected, npy_bytes, read_codes, read_doubles, room};
-use super::recorded::{Event, PressFacts, PressPose, Recorded, Session, check, check_header, check_recorded, is_plain};
+use super::recorded::{
+    Event, PressFacts, PressPose, Recorded, Session, check, check_header, check_hold, check_recorded, is_plain,
+};
 use crate::output::{NpyFile, OutputFolder, check_whole, unwritable, write_bytes};
 use crate::provenance::Provenance;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use spts_circuit::{Block, Converter, Mode, Recording, RecordingInfo};
-use spts_input::Refusal;
+use spts_input::{Refusal, Tables};
 use spts_models::Grid;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -329,7 +331,9 @@ impl SessionWriter {
     /// # Errors
     /// [`Refusal`] if the blocks contradict the earlier ones, or a file cannot be written.
     pub fn push(&mut self, mode: Mode, piece: &Recorded, blocks: usize) -> Result<(), Refusal> {
-        check_recorded(mode, piece, blocks).map_err(|invalid| refused(&self.dir, &invalid))?;
+        check_recorded(mode, piece, blocks)
+            .and_then(|()| check_hold(self.contents.hold_s, &piece.recording))
+            .map_err(|invalid| refused(&self.dir, &invalid))?;
         let writer = match mode {
             Mode::Raster => &mut self.raster,
             Mode::Compressive => &mut self.compressive,
@@ -525,7 +529,7 @@ impl Session {
     pub fn read(dir: &Path) -> Result<Self, Refusal> {
         let path = dir.join(SESSION_FILE);
         let text = spts_input::read_text(&path, MAX_BYTES).map_err(Refusal::in_file(&path))?;
-        let version: Version = parse(&path, &text)?;
+        let version: Version = parse_json(&path, &text)?;
         if version.format != FORMAT {
             let found = format!("{:?}", version.format);
             return Err(outside(&path, "format", found, format!("{{{FORMAT:?}}}")));
@@ -534,7 +538,7 @@ impl Session {
             let problem = format!("`schema` = {} is not known; this program reads {SCHEMA}", version.schema);
             return Err(Refusal::new(problem).at(path.display()));
         }
-        let contents: Contents = parse(&path, &text)?;
+        let contents: Contents = parse_json(&path, &text)?;
         let files: Vec<String> = contents.files().into_iter().map(str::to_owned).collect();
         let read = |contents: Option<RecordedContents>, mode| {
             contents.map(|contents| read_recorded(dir, &path, mode, contents)).transpose()
@@ -688,10 +692,14 @@ fn outside(path: &Path, field: &str, value: impl Display, range: impl Display) -
     Refusal::range(field, value, range).at(path.display())
 }
 
-fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, Refusal> {
+/// The value that the JSON text `text` of the file at `path` describes.
+///
+/// # Errors
+/// [`Refusal`] with file and field.
+pub fn parse_json<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, Refusal> {
     let mut reader = serde_json::Deserializer::from_str(text);
     let wrong = |reason: String| Refusal::new(reason).at(path.display());
-    let parsed = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+    let parsed = serde_path_to_error::deserialize(Tables(&mut reader)).map_err(|error| {
         let field = error.path().to_string();
         match field.as_str() {
             // what is wrong is not in a field
