@@ -44,6 +44,30 @@ fn a_data_set_from_nothing() {
     assert_eq!((&info["made"], &info["digest"]), (&info["shards"], digest));
 }
 
+/// A run that a signal ends leaves whole files alone.
+#[test]
+fn a_run_that_is_stopped_leaves_no_half_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let mut child = Command::new(SPTS);
+    child.args(["dataset", "make", "random-shapes", "--rows", "200000", "--out", "set"]).current_dir(here);
+    let mut child = child.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let data = here.join("set/data");
+    let names = || -> Vec<String> {
+        let entries = std::fs::read_dir(&data).into_iter().flatten();
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    };
+    let begun = std::time::Instant::now();
+    while !names().iter().any(|name| name.ends_with(".part")) {
+        assert!(begun.elapsed() < Duration::from_secs(60), "no file was begun");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let left = names();
+    assert!(left.iter().all(|name| name.ends_with(".parquet")), "{left:?}");
+}
+
 /// A run that is killed with SIGKILL at any time goes on where it was: the digest of a run that nobody killed.
 #[test]
 fn killed_runs_go_on() {

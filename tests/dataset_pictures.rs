@@ -1,6 +1,6 @@
 //! Pictures of data sets and of shapes, as a user asks for them.
 
-use crate::command::{json, succeeds};
+use crate::command::{json, refused, succeeds};
 use serde_json::Value;
 
 /// Width and height in the header of a PNG file.
@@ -58,6 +58,31 @@ fn rows_are_drawn() {
     let usual =
         ["README.md", "croissant.json", "data", "dataset.json", "manifest.json", "spec.toml", "statistics.json"];
     assert_eq!(held, usual);
+}
+
+/// A picture takes the place of an earlier picture of this program, and of nothing else.
+#[test]
+fn pictures_replace_pictures_of_their_own_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    let shapes = |out| vec!["dataset", "shapes", "--families", "gear", "--count", "1", "--out", out];
+    succeeds(here, &shapes("own.png"));
+    succeeds(here, &shapes("own.png"));
+    let spec = succeeds(here, &["dataset", "specs", "--show", "random-shapes"]).stdout;
+    std::fs::write(here.join("my.toml"), &spec).unwrap();
+    // a picture of another program: ours without what it says of itself
+    let own = std::fs::read(here.join("own.png")).unwrap();
+    let mark = own.windows(4).position(|window| window == b"tEXt").unwrap();
+    std::fs::write(here.join("photo.png"), [&own[..mark], b"tEXX", &own[mark + 4..]].concat()).unwrap();
+    std::os::unix::fs::symlink("own.png", here.join("link.png")).unwrap();
+    let before = crate::command::files(here);
+    let preview = |out| vec!["dataset", "preview", "my.toml", "--rows", "1", "--out", out];
+    for file in ["my.toml", "photo.png", "link.png"] {
+        let said = format!("{file}: is not a result of an earlier run and is not replaced");
+        refused(here, &shapes(file), &[&said]);
+        refused(here, &preview(file), &[&said]);
+    }
+    assert!(crate::command::files(here) == before);
 }
 
 #[test]

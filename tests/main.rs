@@ -33,6 +33,7 @@ mod place;
 mod priors;
 mod published;
 mod readouts;
+mod record;
 mod recordings;
 mod reports;
 mod reproduce;

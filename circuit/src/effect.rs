@@ -3,10 +3,10 @@
 use crate::batch::{Batch, CellRun};
 use crate::weights::Weights;
 use rand::RngExt as _;
-use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
-use spts_models::{Snapshot, Streams, explain_toml, in_range};
+pub(crate) use spts_models::parsed;
+use spts_models::{Snapshot, Streams, in_range};
 
 /// Inputs of an effect that are constant during a session.
 #[derive(Debug, Clone)]
@@ -207,8 +207,3 @@ impl Span {
 
 /// Builds an effect from its parameters.
 pub type BuildEffect = fn(toml::Table, &EffectSession) -> Result<Box<dyn Effect>, Refusal>;
-
-/// Parameters of an effect from its table.
-pub(crate) fn parse<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
-    table.try_into().map_err(|e| Refusal::new(explain_toml(&e)))
-}

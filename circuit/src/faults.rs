@@ -1,7 +1,7 @@
 //! The table of faults of single cells, and the effect that applies them to the signal.
 
 use crate::batch::{Batch, CellRun};
-use crate::effect::{BuildFault, Effect, EffectSession, Fault, FaultConfig, parse};
+use crate::effect::{BuildFault, Effect, EffectSession, Fault, FaultConfig, parsed};
 use crate::effects::SkippingClocks;
 use crate::weights::WeightMode;
 use serde::Deserialize;
@@ -118,12 +118,12 @@ fn high() -> f64 {
 
 /// The cell's output stays at mid-scale, level 0, as before its first clock edge.
 fn dead(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
-    parse::<Nothing>(table)?;
+    parsed::<Nothing>(table)?;
     Ok(Box::new(Stuck { level: 0.0 }))
 }
 
 fn stuck(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
-    let stuck: Stuck = parse(table)?;
+    let stuck: Stuck = parsed(table)?;
     within("level", stuck.level, -1.0, 1.0, "[−1, 1]")?;
     Ok(Box::new(stuck))
 }
@@ -154,7 +154,7 @@ struct MisSeeded {
 }
 
 fn mis_seeded(table: toml::Table, _taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
-    let (mode, seed) = (session.weights.mode(), parse::<MisSeededConfig>(table)?.seed);
+    let (mode, seed) = (session.weights.mode(), parsed::<MisSeededConfig>(table)?.seed);
     Ok(Box::new(MisSeeded { mode, seed }))
 }
 
@@ -197,7 +197,7 @@ struct Overdriven {
 }
 
 fn overdriven(table: toml::Table, _taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
-    let config: OverdrivenConfig = parse(table)?;
+    let config: OverdrivenConfig = parsed(table)?;
     for (field, value) in [("gain", config.gain), ("carry", config.carry)] {
         within(field, value, -100.0, 100.0, "[−100, 100]")?;
     }
@@ -237,7 +237,7 @@ fn measured() -> f64 {
 }
 
 fn skipping_clocks(table: toml::Table, taxel: u32, session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
-    let config: SkippingConfig = parse(table)?;
+    let config: SkippingConfig = parsed(table)?;
     Ok(Box::new(SkippingClocks::new(session, taxel, config.probability)?))
 }
 
@@ -251,7 +251,7 @@ impl Fault for SkippingClocks {
 struct Detached;
 
 fn detached(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
-    parse::<Nothing>(table)?;
+    parsed::<Nothing>(table)?;
     Ok(Box::new(Detached))
 }
 
@@ -279,7 +279,7 @@ fn slow_loss() -> f64 {
 }
 
 fn drifting(table: toml::Table, _taxel: u32, _session: &EffectSession) -> Result<Box<dyn Fault>, Refusal> {
-    let drifting: Drifting = parse(table)?;
+    let drifting: Drifting = parsed(table)?;
     let rate = drifting.rate_per_s;
     within("rate_per_s", rate, -10.0, 10.0, "[−10, 10]")?;
     Ok(Box::new(drifting))

@@ -7,7 +7,7 @@ use crate::faults::build_faults;
 use crate::weights::{LevelSource, Mode, Patterns, Seeding, WeightMode, Weights, not_in_mode};
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, explain_toml, within};
+use spts_models::{SkinLayout, parsed_text, within};
 
 /// Every profile by name, as TOML. Each parameter has its source beside it.
 pub const PROFILES: &[(&str, &str)] = &[
@@ -101,15 +101,7 @@ impl Profile {
     /// # Errors
     /// [`Refusal`] for text that is not TOML, an unknown key, or a value of the wrong type.
     pub fn from_toml(text: &str) -> Result<Self, Refusal> {
-        toml::from_str(text).map_err(|error| {
-            // of a text that is TOML the table knows the field, which the text does not
-            let table: Option<toml::Table> = toml::from_str(text).ok();
-            let in_table = table.and_then(|table| table.try_into::<Self>().err());
-            Refusal::new(match in_table {
-                Some(error) => explain_toml(&error),
-                None => error.to_string().trim_end().to_owned(),
-            })
-        })
+        parsed_text(text)
     }
 
     /// The profile as used for a skin with this `layout`: Rf is scaled as [`Profile::feedback_scales`] says, and

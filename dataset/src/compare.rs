@@ -35,6 +35,7 @@ impl Dataset {
         let sample = self.spec().drawn_rows("verify", &[all], rows, seed);
         let per_shard = self.spec().rows_per_shard();
         let shards: BTreeSet<u64> = sample.iter().map(|row| row / per_shard).collect();
+        self.check_whole(0..self.spec().shards())?;
         progress.stage("rows compared", Some(sample.len()));
         let compared = shards.par_iter().map(|&shard| {
             let wanted: Vec<u64> = sample.range(shard_rows(self.spec(), shard)).copied().collect();

@@ -20,7 +20,6 @@ use spts::Refusal;
 use spts::output::AtomicFile;
 use std::error::Error;
 use std::fmt::Display;
-use std::fs::File;
 use std::ops::Range;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
@@ -146,7 +145,7 @@ fn properties(spec: &Spec, shard: u64, group: usize) -> Result<WriterProperties,
 /// # Errors
 /// [`Refusal`] if it is not, or cannot be read.
 pub(crate) fn check_shard(spec: &Spec, shard: u64, path: &Path) -> Result<(), Refusal> {
-    let file = File::open(path).map_err(failed(path))?;
+    let (file, _) = spts_input::open(path, u64::MAX).map_err(failed(path))?;
     let damaged =
         |e: ParquetError| refused(path, format!("is not a whole Parquet file ({e}); remove it, and it is made anew"));
     let reader = SerializedFileReader::new(file).map_err(damaged)?;
@@ -188,7 +187,7 @@ pub(crate) fn batches(
     wanted: Wanted<'_>,
     mut each: impl FnMut(&RecordBatch) -> Result<bool, Refusal>,
 ) -> Result<(), Refusal> {
-    let file = File::open(path).map_err(failed(path))?;
+    let (file, _) = spts_input::open(path, u64::MAX).map_err(failed(path))?;
     let unreadable = |e: &dyn std::fmt::Display| refused(path, format!("cannot be read: {e}"));
     let mut reader = ParquetRecordBatchReaderBuilder::try_new(file).map_err(|e| unreadable(&e))?;
     let row_bytes = reader.metadata().row_groups().iter().map(row_bytes).max();

@@ -9,7 +9,7 @@ use arrow_array::cast::AsArray as _;
 use serde::Serialize;
 use serde_json::{Value, json};
 use spts::Refusal;
-use spts::output::{Manifest, is_temporary, remove_left, write_bytes, write_json};
+use spts::output::{Manifest, is_temporary, not_ours, remove_left, unwritable, write_bytes};
 use spts::progress::Progress;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -54,11 +54,30 @@ impl Dataset {
         let at = |name: &str| -> PathBuf { self.folder().join(name) };
         let described = [HEAD_FILE, SPEC_FILE, STATISTICS_FILE, CARD_FILE, CROISSANT_FILE].map(str::to_owned);
         let listed: Vec<String> = names.iter().map(|name| format!("{DATA_FOLDER}/{name}")).collect();
-        let manifest = write_json(&at(STATISTICS_FILE), &statistics)
-            .and_then(|()| write_bytes(&at(CARD_FILE), card(spec, &statistics, bytes).as_bytes()))
-            .and_then(|()| write_json(&at(CROISSANT_FILE), &croissant(spec)))
-            .and_then(|()| Manifest::write_of(self.folder(), &[&described[..], &listed].concat(), &BTreeSet::new()))?;
+        let texts = [
+            (STATISTICS_FILE, text_of(&at(STATISTICS_FILE), &statistics)?),
+            (CARD_FILE, card(spec, &statistics, bytes)),
+            (CROISSANT_FILE, text_of(&at(CROISSANT_FILE), &croissant(spec))?),
+        ];
+        for (name, text) in &texts {
+            self.check_own(name, text)?;
+        }
+        for (name, text) in &texts {
+            write_bytes(&at(name), text.as_bytes())?;
+        }
+        let manifest = Manifest::write_of(self.folder(), &[&described[..], &listed].concat(), &BTreeSet::new())?;
         Ok(Finished { rows: statistics.rows, shards: spec.shards(), bytes, digest: manifest.digest_of(DATA_FOLDER) })
+    }
+
+    /// Refuses to write `text` in place of a file `name` that no run has written, or that was changed since.
+    fn check_own(&self, name: &str, text: &str) -> Result<(), Refusal> {
+        let path = self.folder().join(name);
+        let same = || spts_input::read(&path, text.len() as u64).is_ok_and(|found| found == text.as_bytes());
+        let listed = |manifest: Manifest| manifest.is_unchanged(self.folder(), name).unwrap_or(false);
+        match path.symlink_metadata() {
+            Ok(_) if !same() && !Manifest::read(self.folder()).is_some_and(listed) => Err(not_ours(&path)),
+            _ => Ok(()),
+        }
     }
 
     /// Checks that all files are there, whole and of this data set, and that there are no others. Returns the files
@@ -69,6 +88,7 @@ impl Dataset {
     pub(crate) fn check_files(&self, progress: &dyn Progress) -> Result<Vec<PathBuf>, Refusal> {
         let spec = self.spec();
         let names: BTreeSet<String> = (0..spec.shards()).map(|k| shard_name(k, spec.shards())).collect();
+        self.check_whole(0..spec.shards())?;
         progress.stage("files checked", usize::try_from(spec.shards()).ok());
         let mut missing = Vec::new();
         for shard in 0..spec.shards() {
@@ -98,6 +118,12 @@ impl Dataset {
         let left = all.filter(|entry| is_temporary(&entry.file_name().to_string_lossy()));
         Ok(left.map(|entry| entry.path()).collect())
     }
+}
+
+/// `value` as the JSON of the file at `path`.
+pub(crate) fn text_of(path: &Path, value: &impl Serialize) -> Result<String, Refusal> {
+    let text = serde_json::to_string_pretty(value).map_err(unwritable(path))?;
+    Ok(text + "\n")
 }
 
 /// What `folder` holds.

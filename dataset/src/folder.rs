@@ -1,12 +1,14 @@
 //! The folder of a data set, and how its files are divided among workers.
 
 use crate::file::{check_shard, failed, refused, shard_name, shard_rows, version, write_shard};
+use crate::finish::text_of;
 use crate::spec::{Spec, SpecError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts::Refusal;
-use spts::output::{Manifest, is_temporary, no_folder, write_bytes, write_json};
+use spts::output::{MANIFEST_FILE, Manifest, is_temporary, no_folder, write_new};
 use spts::progress::Progress;
+use spts::session::parse_json;
 use spts_circuit::RecordingInfo;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -102,21 +104,28 @@ impl Dataset {
         let head = Head::of(&spec);
         // looked for before the head: what another run of this data set makes has a head from then on
         let other = first_entry(folder)?;
-        if head_file.exists() {
-            let found = read_head(&head_file)?;
-            if found != head {
-                return Err(other_data_set(&head_file, &found, &head));
-            }
-        } else if let Some(other) = other {
+        let begun = head_file.symlink_metadata().is_ok();
+        check_head(&head_file, &head)?;
+        if let Some(other) = other.filter(|_| !begun) {
             let problem = "is not of a data set; choose an empty folder, or one that `spts dataset make` began";
             return Err(refused(other, problem));
         }
-        let unmade = |source| no_folder(&data, source);
-        // the same bytes whoever comes first; the head last, so that what has one has all
-        std::fs::create_dir_all(&data)
-            .map_err(unmade)
-            .and_then(|()| write_bytes(&folder.join(SPEC_FILE), spec.text().as_bytes()))
-            .and_then(|()| write_json(&head_file, &head))?;
+        std::fs::create_dir_all(folder).map_err(|source| no_folder(folder, source))?;
+        // of two runs that begin at once, the one whose spec is first has the folder
+        let spec_file = folder.join(SPEC_FILE);
+        if !write_new(&spec_file, spec.text().as_bytes())? {
+            let text = spts_input::read(&spec_file, MAX_TEXT_BYTES).map_err(failed(&spec_file))?;
+            if text != spec.text().as_bytes() {
+                check_head(&head_file, &head)?;
+                let problem = "is not the spec of this data set and is not replaced; choose another folder";
+                return Err(refused(spec_file, problem));
+            }
+        }
+        std::fs::create_dir_all(&data).map_err(|source| no_folder(&data, source))?;
+        // the head last, so that what has one has all
+        if !write_new(&head_file, text_of(&head_file, &head)?.as_bytes())? {
+            check_head(&head_file, &head)?;
+        }
         Ok(Self { folder: folder.to_owned(), spec })
     }
 
@@ -182,6 +191,7 @@ impl Dataset {
     /// [`Refusal`] if an existing file is not valid, a row cannot be made, or a file cannot be written.
     pub fn make(&self, part: Part, progress: &dyn Progress) -> Result<Made, Refusal> {
         let mut made = Made { rows: 0, shards: 0, skipped: 0 };
+        self.check_whole(part.shards(self.spec.shards()))?;
         for shard in part.shards(self.spec.shards()) {
             if self.is_made(shard)? {
                 made.skipped += 1;
@@ -203,6 +213,24 @@ impl Dataset {
         written.map(|()| made)
     }
 
+    /// Checks that those of the files `shards` that are there are as the manifest lists them, if the data set is finished.
+    pub(crate) fn check_whole(&self, shards: impl Iterator<Item = u64>) -> Result<(), Refusal> {
+        let Some(manifest) = Manifest::read(&self.folder) else { return Ok(()) };
+        for shard in shards {
+            let path = self.shard_file(shard);
+            let name = format!("{DATA_FOLDER}/{}", shard_name(shard, self.spec.shards()));
+            if path.symlink_metadata().is_ok() && !manifest.holds(&self.folder, &name).map_err(failed(&path))? {
+                let manifest = self.folder.join(MANIFEST_FILE);
+                let problem = format!(
+                    "is not the file that {} lists; remove it, and `spts dataset make` makes it again",
+                    manifest.display()
+                );
+                return Err(refused(path, problem));
+            }
+        }
+        Ok(())
+    }
+
     /// Whether file number `shard` is there, which is then whole.
     fn is_made(&self, shard: u64) -> Result<bool, Refusal> {
         let path = self.shard_file(shard);
@@ -214,9 +242,18 @@ impl Dataset {
     }
 }
 
+/// Refuses a folder whose head, if there is one, is not `needed`.
+fn check_head(path: &Path, needed: &Head) -> Result<(), Refusal> {
+    if path.symlink_metadata().is_err() {
+        return Ok(());
+    }
+    let found = read_head(path)?;
+    if found == *needed { Ok(()) } else { Err(other_data_set(path, &found, needed)) }
+}
+
 fn read_head(path: &Path) -> Result<Head, Refusal> {
     let text = spts_input::read_text(path, MAX_TEXT_BYTES).map_err(failed(path))?;
-    serde_json::from_str(&text).map_err(|e| refused(path, format!("is not the head of a data set ({e})")))
+    parse_json(path, &text).map_err(|refusal| refusal.reworded(|said| format!("{said}; is not the head of a data set")))
 }
 
 /// The error of a folder that holds the data set `found`.

@@ -61,7 +61,7 @@ impl<'a> Maker<'a> {
     pub fn row(&mut self, index: u64) -> Result<Row<'_>, Refusal> {
         let windows = self.spec.windows();
         let number = index / windows;
-        let failed = |refusal: Refusal| refusal.at(format!("row {index}"));
+        let failed = |refusal: Refusal| refusal.at(format!("data set \"{}\", row {index}", self.spec.config().name));
         if self.press.as_ref().is_none_or(|press| press.number != number) {
             self.press = None;
             self.press = Some(self.press(number).map_err(failed)?);

@@ -21,7 +21,7 @@ use spts::chain::ChainConfig;
 use spts::{Chain, Refusal};
 use spts_circuit::{Mode, RecordingInfo};
 use spts_contact::build_contact;
-use spts_models::{SkinLayout, Streams, explain_toml, in_range, in_section};
+use spts_models::{SkinLayout, Streams, in_range, in_section, parsed};
 use std::path::{Path, PathBuf};
 
 /// The specifications that ship with the library, by name, as TOML.
@@ -127,8 +127,7 @@ impl Spec {
             spts::chain::read_gains(transducer, folder)?;
         }
         let written = table.to_string();
-        let config = table.try_into().map_err(|e| Refusal::new(explain_toml(&e)))?;
-        Self::new(config, written, folder)
+        Self::new(parsed(table)?, written, folder)
     }
 
     fn new(mut config: SpecConfig, text: String, folder: &Path) -> Result<Self, SpecError> {

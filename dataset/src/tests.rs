@@ -112,6 +112,103 @@ fn what_is_not_of_the_data_set_is_refused_and_kept() {
     assert_eq!(std::fs::read_to_string(occupied.join("thesis.tex")).unwrap(), "mine");
 }
 
+/// What the user has written stays, whatever its name, and nothing else is written then.
+#[test]
+fn files_of_the_user_are_not_replaced() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("mine");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(folder.join("spec.toml"), format!("# my remarks\n{SMALL}")).unwrap();
+    let said = Dataset::begin(&folder, spec(SMALL)).unwrap_err().to_string();
+    assert!(said.contains("spec.toml: is not the spec of this data set and is not replaced"), "{said}");
+    let left: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["spec.toml"]);
+    assert!(std::fs::read_to_string(folder.join("spec.toml")).unwrap().starts_with("# my remarks"));
+    let folder = dir.path().join("set");
+    made(&folder, Part::WHOLE);
+    let dataset = Dataset::open(&folder, &folder).unwrap();
+    let card = folder.join("README.md");
+    for before in [true, false] {
+        // a card of the user before the last step, and one that the user has edited after it
+        std::fs::write(&card, "mine").unwrap();
+        let said = dataset.finish(&()).unwrap_err().to_string();
+        assert!(said.contains("README.md: is not a result of an earlier run and is not replaced"), "{said}");
+        assert_eq!(std::fs::read_to_string(&card).unwrap(), "mine");
+        assert_eq!(folder.join("statistics.json").exists(), !before, "half of the last step was done");
+        std::fs::remove_file(&card).unwrap();
+        dataset.finish(&()).unwrap();
+    }
+    // and its own card, as often as wanted
+    dataset.finish(&()).unwrap();
+}
+
+/// A file that was damaged after the data set was whole is not taken into it again.
+#[test]
+fn damage_is_not_blessed() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("set");
+    made(&folder, Part::WHOLE);
+    let dataset = Dataset::open(&folder, &folder).unwrap();
+    let digest = dataset.finish(&()).unwrap().digest;
+    let manifest = std::fs::read(folder.join("manifest.json")).unwrap();
+    let (file, second) = (dataset.shard_file(1), dataset.shard_file(2));
+    let mut bytes = std::fs::read(&file).unwrap();
+    let at = bytes.len() / 2;
+    bytes[at] ^= 1;
+    std::fs::write(&file, bytes).unwrap();
+    let errors = [
+        dataset.make(Part::WHOLE, &()).err(),
+        dataset.make(Part { worker: 1, of: 5 }, &()).err(),
+        dataset.finish(&()).err(),
+        dataset.verify(1, 0, &()).err(),
+    ];
+    for error in errors {
+        let said = error.expect("damage was taken").to_string();
+        assert!(said.contains("part-00001.parquet: is not the file that") && said.contains("remove it"), "{said}");
+    }
+    assert!(std::fs::read(folder.join("manifest.json")).unwrap() == manifest);
+    dataset.make(Part { worker: 2, of: 5 }, &()).unwrap();
+    std::fs::remove_file(&file).unwrap();
+    dataset.make(Part::WHOLE, &()).unwrap();
+    assert_eq!(dataset.finish(&()).unwrap().digest, digest);
+    // a pipe in the place of a file is not waited for
+    std::fs::remove_file(&second).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(&second).status().unwrap().success());
+    std::fs::remove_file(folder.join("manifest.json")).unwrap();
+    for error in [
+        dataset.make(Part::WHOLE, &()).err(),
+        dataset.finish(&()).err(),
+        dataset.verify(90, 0, &()).err(),
+        dataset.head(90).err(),
+        dataset.compare_with(&dataset, &()).err(),
+    ] {
+        let said = error.expect("a pipe was read").to_string();
+        assert!(said.contains("part-00002.parquet") && said.contains("a pipe, not a regular file"), "{said}");
+    }
+}
+
+/// Of two data sets that are begun at the same time in one folder, one has it, and can be made.
+#[test]
+fn one_of_two_specs_has_the_folder() {
+    let dir = tempfile::tempdir().unwrap();
+    for round in 0..100 {
+        let folder = dir.path().join(round.to_string());
+        let gate = std::sync::Barrier::new(2);
+        let begin = &|seed: u32| {
+            let spec = spec(&SMALL.replace("seed = 3", &format!("seed = {seed}")));
+            gate.wait();
+            std::thread::sleep(std::time::Duration::from_nanos(2500) * (round % 50) * (seed % 2));
+            Dataset::begin(&folder, spec).map(|_| ()).map_err(|refusal| refusal.to_string())
+        };
+        let found: Vec<_> = std::thread::scope(|scope| {
+            let runs = [3, 4].map(|seed| scope.spawn(move || begin(seed)));
+            runs.into_iter().map(|run| run.join().unwrap()).collect()
+        });
+        assert_eq!(found.iter().filter(|found| found.is_ok()).count(), 1, "{found:?}");
+        Dataset::open(&folder, &folder).unwrap();
+    }
+}
+
 /// Runs that begin one data set at the same time all find it theirs.
 #[test]
 fn many_begin_at_once() {

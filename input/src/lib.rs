@@ -13,8 +13,10 @@
 //! ```
 
 mod refusal;
+mod tables;
 
 pub use refusal::Refusal;
+pub use tables::Tables;
 
 use std::borrow::Cow;
 use std::fs::{File, FileType, OpenOptions};

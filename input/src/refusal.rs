@@ -5,6 +5,9 @@ use std::fmt::{self, Display};
 use std::path::Path;
 use std::sync::Arc;
 
+/// Most characters of a value that a refusal repeats.
+const MOST_OF_VALUE: usize = 160;
+
 /// Why something was refused, as one sentence that names the field, its value and what is valid.
 ///
 /// It is the error of everything whose cause nobody tells apart; an enum of its own has only what somebody matches.
@@ -29,6 +32,11 @@ impl Refusal {
 
     /// The value of a field that is outside its valid range, such as "[0.5, 100]".
     pub fn range(field: &str, value: impl Display, range: impl Display) -> Self {
+        let value = value.to_string();
+        let value = match value.char_indices().nth(MOST_OF_VALUE) {
+            Some((end, _)) => format!("{}…", &value[..end]),
+            None => value,
+        };
         Self::new(format!("`{field}` = {value} is outside {range}"))
     }
 

@@ -19,6 +19,7 @@
 //! # Ok::<(), spts::Refusal>(())
 //! ```
 
+mod connections;
 mod object;
 mod presser;
 mod server;

@@ -6,6 +6,7 @@
 //! has to know the token: from the address at first, then from a cookie, which pages of other sites do not send.
 
 use crate::UPDATE_S;
+use crate::connections::Connections;
 use crate::object::{LiveObject, MOST_MESH_BYTES, MeshUnit, UploadedMesh};
 use crate::session::{Frame, LiveSession, Request, message};
 use crate::wires::Shelf;
@@ -17,7 +18,6 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
 use axum::middleware::{Next, from_fn_with_state};
 use axum::response::{IntoResponse as _, Response};
 use axum::routing::{any, get};
-use axum::serve::ListenerExt as _;
 use serde::Serialize;
 use spts::Refusal;
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener};
@@ -151,9 +151,7 @@ impl Server {
         let router = router.with_state(self.shared).layer(from_fn_with_state(self.guard, own_pages_only));
         runtime.block_on(async move {
             let listener = tokio::net::TcpListener::from_std(self.listener).map_err(ended)?;
-            // an update is sent at once, and does not wait for the page to take the one before
-            let listener = listener.tap_io(|stream| drop(stream.set_nodelay(true)));
-            axum::serve(listener, router).await.map_err(ended)
+            axum::serve(Connections::new(listener), router).await.map_err(ended)
         })
     }
 }

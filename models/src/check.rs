@@ -1,7 +1,7 @@
 //! Checks of values against their ranges, and errors of TOML in the user's terms: field, value, and what is valid.
 
 use serde::de::DeserializeOwned;
-use spts_input::Refusal;
+use spts_input::{Refusal, Tables};
 use toml::de::Error;
 
 /// A number as a person would write it: without hundreds of zeros.
@@ -97,7 +97,17 @@ fn names_a_field(rest: &str) -> bool {
 /// # Errors
 /// [`Refusal`], as [`explain_toml`] says it, for an unknown key or a value of the wrong type.
 pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
-    table.try_into().map_err(|error| Refusal::new(explain_toml(&error)))
+    T::deserialize(Tables(table)).map_err(|error| Refusal::new(explain_toml(&error)))
+}
+
+/// The value that the TOML text `text` describes.
+///
+/// # Errors
+/// [`Refusal`] with the field, as [`explain_toml`] says it, or with the place in a text that is not TOML.
+pub fn parsed_text<T: DeserializeOwned>(text: &str) -> Result<T, Refusal> {
+    // the table knows the field, and the text the place
+    let table = toml::from_str(text).map_err(|error| Refusal::new(error.to_string().trim_end().replace('\n', "; ")))?;
+    parsed(table)
 }
 
 /// The message for `error`, an error about a value in a table, such as "`press.force_n` = "much": a number is needed".

@@ -1,6 +1,6 @@
 //! Known gains of the taxels of one skin.
 
-use crate::check::{explain_toml, in_interval, in_range};
+use crate::check::{in_interval, in_range, parsed_text};
 use crate::layout::SkinLayout;
 use crate::streams::Streams;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -43,7 +43,7 @@ impl TaxelGains {
     /// # Errors
     /// A message that names the key of the file that is wrong.
     pub fn from_toml(text: &str) -> Result<Self, String> {
-        let gains: Self = toml::from_str(text).map_err(|e| explain_toml(&e))?;
+        let gains: Self = parsed_text(text).map_err(|e| e.to_string())?;
         gains.check(gains.log_mean.len()).map_err(|e| e.to_string())?;
         Ok(gains)
     }

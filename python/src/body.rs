@@ -220,11 +220,6 @@ impl Body {
     }
 }
 
-/// Warns the caller.
-fn warn(py: Python<'_>, note: &str) -> PyResult<()> {
-    PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(note)?, 1)
-}
-
 /// Kind, size, position and rotation matrix of a convex part.
 type PartIn = (String, [f64; 3], [f64; 3], [f64; 9]);
 

@@ -29,6 +29,9 @@ pub struct Assignment {
     said: String,
 }
 
+/// Most parts of a key: no field lies deeper.
+const MOST_PARTS: usize = 16;
+
 impl FromStr for Assignment {
     type Err = Refusal;
 
@@ -40,6 +43,10 @@ impl FromStr for Assignment {
         let (key, value) = (key.trim(), value.trim());
         if key.split('.').any(|part| part.trim().is_empty()) {
             return Err(refused("the key is a dotted path of names, such as press.force_n"));
+        }
+        let depth = key.split('.').count();
+        if depth > MOST_PARTS {
+            return Err(refused(&format!("the key has {depth} parts, outside [1, {MOST_PARTS}]")));
         }
         let value = match toml::from_str::<Table>(&format!("value = {value}")) {
             Ok(mut table) if table.len() == 1 => table.remove("value").unwrap_or(Value::Boolean(false)),

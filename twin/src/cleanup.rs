@@ -21,6 +21,7 @@ use signal_hook::iterator::Signals;
 use std::collections::BTreeMap;
 use std::io;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -95,6 +96,35 @@ pub fn listed<T>(
     Ok((made, Entry(number)))
 }
 
+/// While it exists, the first signal that would end the program only sets it, so that work that would be lost can be
+/// completed. A second signal ends the program as ever.
+#[derive(Debug)]
+pub struct Deferred(());
+
+impl Deferred {
+    /// Begins to defer signals.
+    pub fn begin() -> Self {
+        DEFERRED.store(WAITING, Ordering::SeqCst);
+        Self(())
+    }
+
+    /// Number of the signal that has come, if one has.
+    pub fn signal(&self) -> Option<i32> {
+        Some(DEFERRED.load(Ordering::SeqCst)).filter(|signal| *signal > 0)
+    }
+}
+
+impl Drop for Deferred {
+    fn drop(&mut self) {
+        DEFERRED.store(NONE, Ordering::SeqCst);
+    }
+}
+
+/// The signal that was deferred, or whether one would be.
+static DEFERRED: AtomicI32 = AtomicI32::new(NONE);
+const NONE: i32 = -1;
+const WAITING: i32 = 0;
+
 /// Installs the handler: SIGINT, SIGTERM and SIGHUP remove everything listed and end the program with status 128 + the
 /// number of the signal. If SIGHUP is ignored, as under `nohup`, it stays ignored.
 ///
@@ -107,7 +137,10 @@ pub fn end_on_signals() -> io::Result<()> {
     }
     let mut signals = Signals::new(signals)?;
     let wait = move || {
-        if let Some(signal) = signals.forever().next() {
+        for signal in signals.forever() {
+            if DEFERRED.compare_exchange(WAITING, signal, Ordering::SeqCst, Ordering::SeqCst).is_ok() {
+                continue;
+            }
             // held to the end, so that nothing new is made any more
             let list = list();
             remove(&list);

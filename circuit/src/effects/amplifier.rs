@@ -2,7 +2,7 @@
 
 use crate::amplifier::{Amplifier, AmplifierNoise, BusLoad, Network, OpAmp, Transient};
 use crate::batch::Batch;
-use crate::effect::{BlockStart, Effect, EffectSession, Span, parse};
+use crate::effect::{BlockStart, Effect, EffectSession, Span, parsed};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
@@ -63,11 +63,11 @@ struct Summing {
 
 /// Rail of the operational amplifier, V, from the effect's parameters.
 pub(super) fn rail_v(table: toml::Table) -> Result<f64, Refusal> {
-    Ok(parse::<Config>(table)?.op_amp.rail_v)
+    Ok(parsed::<Config>(table)?.op_amp.rail_v)
 }
 
 pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
-    let c: Config = parse(table)?;
+    let c: Config = parsed(table)?;
     let period_s = 1.0 / session.sample_rate_hz;
     let sampled = (0.0..=period_s).contains(&c.sample_s);
     in_range("sample_s", c.sample_s, sampled, "[0, 1/sample_rate_hz]")?;

@@ -1,7 +1,7 @@
 //! The cells' converters from code to drive voltage.
 
 use crate::batch::{Batch, Scratch};
-use crate::effect::{Effect, EffectSession, Span, parse};
+use crate::effect::{Effect, EffectSession, Span, parsed};
 use crate::weights::{ANALOG_SCALE, FULL_SCALE, NEUTRAL, WeightMode, code_of, finalise};
 use rand::RngExt as _;
 use serde::Deserialize;
@@ -58,7 +58,7 @@ struct Dac {
 }
 
 pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
-    let c: Config = parse(table)?;
+    let c: Config = parsed(table)?;
     within("reference_v", c.reference_v, 0.5, 5.5, "[0.5, 5.5]")?;
     within("floor_v", c.floor_v, 0.0, 0.5 * c.reference_v, "[0, 0.5·reference_v]")?;
     within("dnl_lsb", c.dnl_lsb, 0.0, 1.0, "[0, 1]")?;

@@ -1,7 +1,7 @@
 //! Taxels that still have their previous level when the output is sampled.
 
 use crate::batch::Batch;
-use crate::effect::{BlockStart, Effect, EffectSession, Span, parse};
+use crate::effect::{BlockStart, Effect, EffectSession, Span, parsed};
 use crate::weights::WeightMode;
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
@@ -101,7 +101,7 @@ struct LateUpdates {
 }
 
 pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
-    let config: Config = parse(table)?;
+    let config: Config = parsed(table)?;
     let period = config.period_measurements;
     in_range("period_measurements", period, (2.0..1e9).contains(&period), "[2, 1e9)")?;
     let sd = config.period_sd_measurements;

@@ -1,7 +1,7 @@
 //! Cells that miss clock edges and then lag behind their sequences, individually or all together.
 
 use crate::batch::{Batch, CellRun};
-use crate::effect::{BlockStart, Effect, EffectSession, Span, parse};
+use crate::effect::{BlockStart, Effect, EffectSession, Span, parsed};
 use crate::weights::Weights;
 use rand::seq::index;
 use rand_chacha::ChaCha8Rng;
@@ -63,7 +63,7 @@ struct MissedClocks {
 }
 
 pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
-    let config: Config = parse(table)?;
+    let config: Config = parsed(table)?;
     let probability = config.probability.within("probability", 0.0, 1.0, "[0, 1]")?;
     within("all_probability", config.all_probability, 0.0, 1.0, "[0, 1]")?;
     for (k, place) in config.all_at.iter().enumerate() {

@@ -10,7 +10,7 @@ mod signal;
 pub(crate) use missed_clocks::SkippingClocks;
 
 use crate::converter::{Adc, Converter};
-use crate::effect::{BlockStart, BuildEffect, Effect, EffectSession, parse};
+use crate::effect::{BlockStart, BuildEffect, Effect, EffectSession, parsed};
 use crate::engine::Engine;
 use crate::source::Interpolated;
 use crate::weights::{Mode, Seeding, WeightMode, Weights};
@@ -84,7 +84,7 @@ fn of_chain<T>(
 /// # Errors
 /// [`Refusal`] for parameters that are refused.
 pub(crate) fn converter(chain: &toml::Table, mode: Mode) -> Result<Option<Converter>, Refusal> {
-    let Some(adc) = of_chain(chain, mode, "adc", parse::<Adc>)? else {
+    let Some(adc) = of_chain(chain, mode, "adc", parsed::<Adc>)? else {
         return Ok(None);
     };
     let subtract_v = of_chain(chain, mode, "clamp", output::subtract_v)?;

@@ -3,7 +3,7 @@
 
 use crate::batch::Batch;
 use crate::converter::Adc;
-use crate::effect::{Effect, EffectSession, parse};
+use crate::effect::{Effect, EffectSession, parsed};
 use serde::Deserialize;
 use spts_input::Refusal;
 use spts_models::{in_range, within};
@@ -18,7 +18,7 @@ struct Rails {
 
 /// Largest output, V, from the effect's parameters.
 pub(super) fn limit_v(table: toml::Table) -> Result<f64, Refusal> {
-    let limit_v = parse::<Rails>(table)?.limit_v;
+    let limit_v = parsed::<Rails>(table)?.limit_v;
     in_range("limit_v", limit_v, limit_v > 0.0 && limit_v <= 1e6, "(0, 1e6]")
 }
 
@@ -36,7 +36,7 @@ impl Effect for Rails {
 }
 
 pub(super) fn adc(table: toml::Table, _session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
-    Ok(Box::new(parse::<Adc>(table)?))
+    Ok(Box::new(parsed::<Adc>(table)?))
 }
 
 impl Effect for Adc {
@@ -57,7 +57,7 @@ struct Clamp {
 
 /// Constant that is subtracted, V, from the effect's parameters.
 pub(super) fn subtract_v(table: toml::Table) -> Result<f64, Refusal> {
-    let subtract_v = parse::<Clamp>(table)?.subtract_v;
+    let subtract_v = parsed::<Clamp>(table)?.subtract_v;
     within("subtract_v", subtract_v, -1e6, 1e6, "[−1e6, 1e6]")?;
     Ok(subtract_v)
 }

@@ -1,7 +1,7 @@
 //! What is added to the summed signal: offsets, a remainder of earlier measurements, and noise.
 
 use crate::batch::Batch;
-use crate::effect::{BlockStart, Effect, EffectSession, Span, parse};
+use crate::effect::{BlockStart, Effect, EffectSession, Span, parsed};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
@@ -32,7 +32,7 @@ struct DriveOffset {
 }
 
 pub(super) fn drive_offset(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
-    let c: DriveOffsetConfig = parse(table)?;
+    let c: DriveOffsetConfig = parsed(table)?;
     let rng = &mut session.streams.rng("drive-offset", 0);
     Ok(Box::new(DriveOffset {
         constant_v: c.constant_v.drawn("constant_v", [-5.0, 5.0], "[−5, 5]", rng)?,
@@ -66,7 +66,7 @@ struct Memory {
 }
 
 pub(super) fn memory(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
-    let c: MemoryConfig = parse(table)?;
+    let c: MemoryConfig = parsed(table)?;
     let rng = &mut session.streams.rng("memory", 0);
     let mut tap = |field, span: Span| span.drawn(field, [-0.4, 0.4], "[−0.4, 0.4]", rng);
     Ok(Box::new(Memory { taps: [tap("h1", c.h1)?, tap("h2", c.h2)?], past_v: [0.0; 2] }))
@@ -107,7 +107,7 @@ struct ClockPattern {
 
 pub(super) fn clock_pattern(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let rng = &mut session.streams.rng("clock-pattern", 0);
-    let span = parse::<ClockPatternConfig>(table)?.amplitude_v;
+    let span = parsed::<ClockPatternConfig>(table)?.amplitude_v;
     let amplitude_v = span.drawn("amplitude_v", [-2.0, 2.0], "[−2, 2]", rng)?;
     Ok(Box::new(ClockPattern { amplitude_v }))
 }
@@ -151,14 +151,14 @@ struct Noise {
 
 pub(super) fn contact_noise(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let rng = &mut session.streams.rng("contact-noise/session", 0);
-    let span = parse::<ContactNoiseConfig>(table)?.fraction;
+    let span = parsed::<ContactNoiseConfig>(table)?.fraction;
     let fraction = span.drawn("fraction", [0.0, 1.0], "[0, 1]", rng)?;
     Ok(Box::new(Noise::new(session, "contact-noise", fraction, true)))
 }
 
 pub(super) fn idle_noise(table: toml::Table, session: &EffectSession) -> Result<Box<dyn Effect>, Refusal> {
     let rng = &mut session.streams.rng("idle-noise/session", 0);
-    let sd_v = parse::<IdleNoiseConfig>(table)?.sd_v.drawn("sd_v", [0.0, 10.0], "[0, 10]", rng)?;
+    let sd_v = parsed::<IdleNoiseConfig>(table)?.sd_v.drawn("sd_v", [0.0, 10.0], "[0, 10]", rng)?;
     Ok(Box::new(Noise::new(session, "idle-noise", sd_v, false)))
 }
 

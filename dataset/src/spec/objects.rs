@@ -9,6 +9,7 @@ use spts_contact::mesh::load;
 use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_contact::shapes::{SHAPE_FAMILIES, ShapeRanges, build_shape};
 use spts_models::{Streams, in_range, in_section};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -224,5 +225,13 @@ fn mesh_files(config: &ObjectConfig, folder: &Path) -> Result<Vec<(String, PathB
     }
     files.sort();
     let name = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let mut named = BTreeMap::new();
+    for file in &files {
+        if let Some(other) = named.insert(name(file).to_lowercase(), file) {
+            let (first, second) = (other.display(), file.display());
+            let problem = format!("{first} and {second} would be one object, `{}`: rename one of them", name(file));
+            return Err(Refusal::new(problem).at(at).into());
+        }
+    }
     Ok(files.into_iter().map(|file| (name(&file), file)).collect())
 }

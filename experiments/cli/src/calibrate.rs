@@ -4,7 +4,7 @@ use crate::context::{Bars, Common, note};
 use crate::error::CliError;
 use crate::options::seed;
 use clap::Args;
-use spts::output::{check_writable, not_ours, write_bytes};
+use spts::output::{check_replaceable, write_bytes};
 use spts_circuit::Profile;
 use spts_eval::slips_text;
 use spts_models::TaxelGains;
@@ -108,11 +108,8 @@ impl CalibrateCommand {
         if let Some(path) = &self.out {
             check_ours(path, |text| TaxelGains::from_toml(text).is_ok())?;
             for picture in ["png", "svg"].map(|extension| path.with_extension(extension)) {
-                check_writable(&picture)?;
                 // pictures of our own stand beside gains
-                if picture.exists() && !path.exists() {
-                    return Err(not_ours(&picture).into());
-                }
+                check_replaceable(&picture, |_| path.exists())?;
             }
         }
         let study = SkinStudy { seed: self.seed };
@@ -137,10 +134,6 @@ const MAX_PROFILE_BYTES: u64 = 1 << 20;
 /// Refuses to write where no file can be written, and in place of a file that this command did not write: one whose
 /// text is not `ours`.
 fn check_ours(path: &Path, ours: impl Fn(&str) -> bool) -> Result<(), CliError> {
-    check_writable(path)?;
-    let text = spts_input::read_text(path, MAX_PROFILE_BYTES);
-    if path.exists() && !text.is_ok_and(|text| ours(&text)) {
-        return Err(not_ours(path).into());
-    }
-    Ok(())
+    let is_ours = |path: &Path| spts_input::read_text(path, MAX_PROFILE_BYTES).is_ok_and(|text| ours(&text));
+    Ok(check_replaceable(path, is_ours)?)
 }

@@ -139,7 +139,26 @@ pub fn note(text: &str) {
 
 /// Writes an error to standard error, on one line.
 pub fn note_error(text: &str) {
-    note(&format!("error: {}", one_line(text)));
+    note(&format!("error: {}", shortened(&one_line(text))));
+}
+
+/// Most characters of a word of an error, and of all of it. An error repeats what the user gave, which may be long.
+const MOST_OF_WORD: usize = 160;
+const MOST_OF_ERROR: usize = 800;
+
+/// `text` without the middle of what is too long.
+fn shortened(text: &str) -> String {
+    let cut = |text: &str, most: usize| {
+        let count = text.chars().count();
+        if count <= most {
+            return text.to_owned();
+        }
+        let start: String = text.chars().take(most / 2).collect();
+        let end: String = text.chars().skip(count - most / 4).collect();
+        format!("{start}…{end}")
+    };
+    let words: Vec<String> = text.split(' ').map(|word| cut(word, MOST_OF_WORD)).collect();
+    cut(&words.join(" "), MOST_OF_ERROR)
 }
 
 /// Progress bars on standard error, one a stage; silent when that is not a terminal.
@@ -240,6 +259,14 @@ fn acts(character: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_error_is_short() {
+        assert_eq!(shortened("`--set` a.b: no"), "`--set` a.b: no");
+        let long = shortened(&format!("`--set` {}: no", "a.".repeat(50_000)));
+        assert!(long.len() < 200 && long.starts_with("`--set` a.a.") && long.ends_with(".a.: no"), "{long}");
+        assert!(shortened(&"a b ".repeat(50_000)).len() < 900);
+    }
 
     #[test]
     fn what_a_terminal_would_act_on_is_written_out() {

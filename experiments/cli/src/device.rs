@@ -12,7 +12,7 @@ use spts::chain::RowsConfig;
 use spts::circuit::CompressiveWeights;
 use spts::data::SessionSet;
 use spts::device::{BlockSource, Played, Pressed, PressedConfig, VirtualDevice};
-use spts::{Chain, ChainConfig, Mode, Session, SkinLayout};
+use spts::{Chain, ChainConfig, Mode, Session, SkinLayout, WeightMode};
 use spts_contact::objects::ObjectSpec;
 use std::fs::File;
 use std::os::fd::OwnedFd;
@@ -162,7 +162,19 @@ impl DeviceCommand {
             Mode::Raster => Session::raster(session),
             Mode::Compressive => Session::compressive(session),
         };
-        found.ok_or_else(|| refuse(format!("has no recording for `--mode` = {}", self.mode.name())))
+        let found = found.ok_or_else(|| refuse(format!("has no recording for `--mode` = {}", self.mode.name())))?;
+        let measured = match found.weights().mode() {
+            WeightMode::Raster => DeviceMode::Raster,
+            WeightMode::Analog => DeviceMode::Analog,
+            WeightMode::Binary => DeviceMode::Binary,
+        };
+        if measured != self.mode {
+            let (wanted, measured) = (self.mode.name(), measured.name());
+            return Err(refuse(format!(
+                "`--mode` = {wanted}: the recording is {measured}; `--mode {measured}` sends it"
+            )));
+        }
+        Ok(found)
     }
 
     fn serve(&self, source: &mut dyn BlockSource, taxels: usize, blocks: Option<u64>) -> Result<(), CliError> {

@@ -13,6 +13,13 @@ pub enum CliError {
     Refused(Refusal),
     /// What was checked is not so: the command did its work, and the answer is no.
     Differs(String),
+    /// A signal ended the command, which has left its work in order.
+    Stopped {
+        /// Number of the signal.
+        signal: i32,
+        /// What is left of the work.
+        message: String,
+    },
 }
 
 impl CliError {
@@ -21,11 +28,12 @@ impl CliError {
         Self::Refused(Refusal::new(message))
     }
 
-    /// Exit status: 1 when a check says no, 2 for every error, as for a usage error.
+    /// Exit status: 1 when a check says no, 128 and the number of a signal, 2 for every error, as for a usage error.
     pub fn status(&self) -> u8 {
         match self {
             Self::Differs(_) => 1,
             Self::Refused(_) => 2,
+            Self::Stopped { signal, .. } => u8::try_from(128 + signal).unwrap_or(u8::MAX),
         }
     }
 }
@@ -33,7 +41,7 @@ impl CliError {
 impl std::fmt::Display for CliError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Differs(message) => f.write_str(message),
+            Self::Differs(message) | Self::Stopped { message, .. } => f.write_str(message),
             Self::Refused(refusal) => refusal.fmt(f),
         }
     }

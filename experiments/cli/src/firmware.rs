@@ -5,12 +5,11 @@ use crate::error::CliError;
 use crate::options::{number, whole, within};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
-use spts::output::{NpyFile, check_writable, not_ours};
+use spts::output::{NpyFile, check_replaceable};
 use spts_circuit::{Seeding, WeightMode};
 use spts_firmware::attiny412::TraceRecord;
 use spts_firmware::{Clock, PATTERN_BITS};
 use spts_studies::firmware::{CellTask, DESIGN_EDGE_HZ, EmulatedCells, image, verification_text};
-use std::fs::File;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -286,13 +285,12 @@ impl TraceCommand {
 
 /// Refuses to write an array where one cannot be written, and in place of a file that is no array.
 fn check_array(path: &Path) -> Result<(), CliError> {
-    check_writable(path)?;
-    let mut start = [0; MAGIC.len()];
-    let found = File::open(path).and_then(|mut file| file.read_exact(&mut start));
-    if path.exists() && (found.is_err() || start != *MAGIC) {
-        return Err(not_ours(path).into());
-    }
-    Ok(())
+    let is_array = |path: &Path| {
+        let mut start = [0; MAGIC.len()];
+        let found = spts_input::open(path, u64::MAX).is_ok_and(|(mut file, _)| file.read_exact(&mut start).is_ok());
+        found && start == *MAGIC
+    };
+    Ok(check_replaceable(path, is_array)?)
 }
 
 /// First bytes of every NumPy array.

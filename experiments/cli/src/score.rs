@@ -9,8 +9,9 @@ use crate::options::{
 };
 use clap::Args;
 use serde::Serialize;
-use spts::output::{OutputFolder, check_writable, not_ours, write_json};
+use spts::output::{OutputFolder, check_replaceable, write_json};
 use spts::progress::Progress as _;
+use spts::session::parse_json;
 use spts_contact::objects::OBJECTS;
 use spts_eval::algorithm::Contender;
 use spts_eval::anytime::{self, StopSettings};
@@ -483,11 +484,7 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
 
 /// Refuses to save a board where one cannot be written, and in place of a file that is no board.
 fn check_board(path: &Path) -> Result<(), CliError> {
-    check_writable(path)?;
-    if path.exists() && read_board(path).is_err() {
-        return Err(not_ours(path).into());
-    }
-    Ok(())
+    Ok(check_replaceable(path, |path| read_board(path).is_ok())?)
 }
 
 /// Largest board that is read, bytes: one of all decoders, sources and objects has less than 1 MB.
@@ -499,7 +496,7 @@ fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
         CliError::usage(format!("{}: not a board as --save writes it: {e}", path.display()))
     };
     let text = spts_input::read_text(path, MAX_BOARD_BYTES).map_err(|e| usage(&e))?;
-    serde_json::from_str(&text).map_err(|e| usage(&e))
+    Ok(parse_json(path, &text)?)
 }
 
 /// Name of what is learned from the objects in all their poses.

@@ -3,6 +3,7 @@
 use super::write_all_or_none;
 use crate::figures::{Chart, Curve, Plot, Series, Style, save_charts};
 use spts::output::{OutputFolder, write_bytes, write_json};
+use spts::session::parse_json;
 use spts_circuit::{MAX_PATTERNS_BYTES, Profile};
 use spts_eval::Table;
 use spts_input::Refusal;
@@ -62,7 +63,9 @@ pub fn read_design(path: &Path, seed: u64) -> Result<DesignCheck, Refusal> {
     let content = |name: &str, reason: String| Refusal::new(reason).at(path.join(name).display());
     let text = read("design.json", MAX_BYTES)?;
     // the file says more than the design
-    let design: Design = serde_json::from_str(&text).map_err(|e| content("design.json", e.to_string()))?;
+    let file = path.join("design.json");
+    let design: Design = parse_json(&file, &text)?;
+    design.check().map_err(|refusal| refusal.at(file.display()))?;
     let text = read("profile.toml", MAX_BYTES)?;
     let profile = Profile::from_toml(&text).map_err(|e| content("profile.toml", e.to_string()))?;
     let pattern = match design.row_source {

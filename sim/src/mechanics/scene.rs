@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use spts_contact::mesh::{MeshReport, TriMesh, sphere};
 use spts_contact::{ContactField, DepthCurve, EquilibriumError, Pose, PosedMesh, PreparedMesh, build_contact};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, in_interval, in_range};
+use spts_models::{SkinLayout, in_interval, in_range, parsed_text};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -182,6 +182,15 @@ impl Mechanics {
         }
         if let Some(bend) = &config.bend {
             bend.check()?;
+            let round_m = std::f64::consts::TAU * bend.radius_m;
+            let [along_m, _] = skin.extent_m();
+            if along_m > round_m {
+                let range = format!(
+                    "[{:.4}, 10] m: a row of {along_m} m would overlap itself",
+                    along_m / std::f64::consts::TAU
+                );
+                return Err(Refusal::range("bend.radius_m", bend.radius_m, range));
+            }
             if config.drop.is_some() {
                 return Err(Refusal::new(
                     "[bend] requires [press]: drops on a bent skin are not simulated; remove [bend]",
@@ -266,9 +275,7 @@ impl Mechanics {
     /// # Errors
     /// [`Refusal`] if the text is not TOML, or the scene is not valid.
     pub fn from_toml(text: &str, folder: &Path) -> Result<Self, Refusal> {
-        let config = toml::from_str(text)
-            .map_err(|error: toml::de::Error| Refusal::new(error.to_string().trim_end().replace('\n', "; ")))?;
-        Self::new(config, folder)
+        Self::new(parsed_text(text)?, folder)
     }
 
     /// [`MechanicsConfig::press`] with all defaults.

@@ -11,7 +11,7 @@ use spts_contact::Frame;
 use spts_input::Refusal;
 use spts_models::{
     ConductanceMap, PressureMap, REFERENCE_PA, SkinLayout, Snapshot, Streams, TRANSDUCERS, Transducer,
-    build_transducer, explain_toml, in_section,
+    build_transducer, in_section, parsed,
 };
 use std::fmt;
 use std::path::Path;
@@ -249,9 +249,9 @@ fn taxels(skin: &SkinLayout) -> u32 {
 fn with_faults(mut profile: Profile, faults: &[toml::Table], taxels: u32) -> Result<Profile, Refusal> {
     let own = profile.faults.len();
     for (index, fault) in faults.iter().enumerate() {
-        let fault = fault.clone().try_into::<FaultConfig>();
+        let fault = parsed::<FaultConfig>(fault.clone());
         let refused = |message: &str| Refusal::new(in_section(&format!("faults[{index}]"), message));
-        profile.faults.push(fault.map_err(|e| refused(&explain_toml(&e)))?);
+        profile.faults.push(fault.map_err(|e| refused(&e.to_string()))?);
         profile.validate(taxels).map_err(|error| {
             // its place in the scene, not behind the profile's own faults
             let message = error.to_string();

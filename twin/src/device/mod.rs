@@ -20,5 +20,5 @@
 mod protocol;
 mod sources;
 
-pub use protocol::{BlockSource, DeviceBlock, Host, VirtualDevice, write_block};
+pub use protocol::{BlockSource, DeviceBlock, Heard, HeardBlock, Host, VirtualDevice, write_block};
 pub use sources::{Played, Pressed, PressedConfig};

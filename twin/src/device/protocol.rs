@@ -2,9 +2,9 @@
 
 use spts_circuit::Mode;
 use spts_input::Refusal;
-use std::io::{self, BufRead as _, BufReader, Read, Write};
+use std::io::{self, Read, Write};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// What wakes the device.
 const START: u8 = b'*';
@@ -131,101 +131,275 @@ pub fn write_block(port: &mut impl Write, block: &DeviceBlock) -> io::Result<()>
     port.flush()
 }
 
-/// The error of the port, or of a device that was silent for too long.
+/// The error of the port.
 fn of_port(error: io::Error) -> Refusal {
     Refusal::from_error(error).at("serial port")
 }
 
-/// A connection to a device that has answered and is ready to be read.
-pub struct Host<P> {
-    port: BufReader<P>,
-    /// Number of blocks read so far.
-    read: usize,
+/// What a host hears of a device.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Heard {
+    /// A block.
+    Block(HeardBlock),
+    /// Why what was sent in place of a block cannot be used.
+    Unusable(String),
+    /// The caller has ended the listening.
+    Stopped,
 }
 
-/// Longest line of a greeting, bytes.
-const GREETING: u64 = 256;
+/// One block as it arrived.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct HeardBlock {
+    /// Frames since the seeds were loaded, at the end of the block.
+    pub frame_position: u64,
+    /// Codes of the converter, in order of measurement; `None` where none arrived. The last one is never sent.
+    pub codes: Vec<Option<u32>>,
+    /// What was wrong with the block, in words, if samples are missing beside the last one.
+    pub missing: Option<String>,
+}
+
+/// A host that reads a device.
+///
+/// The port has to return from a read at least every few tenths of a second, with [`io::ErrorKind::TimedOut`] when
+/// nothing has come: only then does the host wake the device again, notice that it is silent, and ask whether to stop.
+pub struct Host<'a, P> {
+    port: P,
+    /// Longest silence, and longest time until the device has answered.
+    patience: Duration,
+    stop: &'a dyn Fn() -> bool,
+    /// What has arrived behind the last whole line.
+    waiting: Vec<u8>,
+    /// Beginning of a line that is too long to be one.
+    skipped: bool,
+}
+
+/// Longest line that is read before the blocks, bytes: the rest of a block of a device that runs already.
+const GREETING: usize = 1 << 20;
 /// Most characters of an answer that an error shows.
 const SHOWN: usize = 40;
 /// Most bytes of a field, with its comma.
 const FIELD: usize = 24;
-/// Bytes at the end of a block: the last field is a space.
-const END: [&str; 2] = [" \r", " "];
+/// Most bytes that are read at once.
+const PIECE: usize = 1 << 14;
+/// Time after which a device that has not answered is woken again: a board resets when its port is opened, and its
+/// boot loader reads what is sent meanwhile.
+const AGAIN: Duration = Duration::from_secs(1);
 
-impl<P: Read + Write> Host<P> {
-    /// Wakes the device on `port`, and waits until its cells are loaded.
+/// What reading a line came to.
+enum Line {
+    Whole(String),
+    /// A line longer than any that a device sends.
+    TooLong,
+    /// None within the time.
+    None,
+    Stopped,
+}
+
+impl<'a, P: Read + Write> Host<'a, P> {
+    /// Wakes the device on `port`, and waits at most `patience` until its cells are loaded. The device is woken again
+    /// until it answers; whatever else comes before its greeting is passed over. A device that sends blocks already is
+    /// ready. Returns `None` as soon as `stop` says so.
     ///
     /// # Errors
-    /// [`Refusal`] if the device does not answer, or answers with unexpected text.
-    pub fn greet(mut port: P) -> Result<Self, Refusal> {
-        port.write_all(&[START]).and_then(|()| port.flush()).map_err(of_port)?;
-        let mut host = Self { port: BufReader::new(port), read: 0 };
-        for needed in [SENDING, SENT] {
-            let mut line = Vec::new();
-            host.port.by_ref().take(GREETING).read_until(b'\n', &mut line).map_err(of_port)?;
-            let found = String::from_utf8_lossy(&line);
-            if found.trim_end() != needed {
-                return Err(said(&found, &format!("{needed:?}")));
+    /// [`Refusal`] if the port fails, or the device does not answer in time.
+    pub fn greet(port: P, patience: Duration, stop: &'a dyn Fn() -> bool) -> Result<Option<Self>, Refusal> {
+        let mut host = Self { port, patience, stop, waiting: Vec::new(), skipped: false };
+        let (mut heard, mut loading) = (String::new(), false);
+        let end = Instant::now() + patience;
+        let gone = |error: io::Error| ended(&error, "before its greeting");
+        while Instant::now() < end {
+            host.port.write_all(&[START]).and_then(|()| host.port.flush()).map_err(gone)?;
+            let again = end.min(Instant::now() + AGAIN);
+            loop {
+                match host.line(GREETING, &|_| Instant::now() >= again).map_err(gone)? {
+                    Line::Whole(line) if line.ends_with(SENDING) => loading = true,
+                    Line::Whole(line) if line.ends_with(SENT) => return Ok(Some(host)),
+                    // the rest of a block, as the device runs already: the next line is a whole one
+                    Line::Whole(line) if is_of_block(&line) => return Ok(Some(host)),
+                    Line::Whole(line) => heard = line,
+                    Line::TooLong => {}
+                    Line::None => break,
+                    Line::Stopped => return Ok(None),
+                }
             }
         }
-        Ok(host)
+        Err(host.silent(loading, &heard))
     }
 
-    /// Reads the next block of `measurements` measurements. The device does not send the last code, so the block has
-    /// one code less.
+    /// Waits for the next block of `measurements` measurements, and reads it. A code that cannot be read or is above
+    /// `max_code` is missing, and so are codes that a short block lacks: they are taken to be its last ones.
     ///
     /// # Errors
-    /// [`Refusal`] if the port fails, the block is too short or too long, or a field is not a number.
-    pub fn block(&mut self, measurements: usize) -> Result<DeviceBlock, Refusal> {
-        let needed = measurements + 1;
-        let mut line = Vec::with_capacity(4 * needed);
-        let most = needed.saturating_mul(FIELD) as u64;
-        self.port.by_ref().take(most).read_until(b'\n', &mut line).map_err(of_port)?;
-        let text = String::from_utf8_lossy(&line);
-        let Some(text) = text.strip_suffix('\n') else {
-            let (block, fields) = (self.read, text.matches(',').count());
-            let problem = format!("the device ended in block {block}, after {fields} of {needed} fields");
-            return Err(Refusal::new(problem));
-        };
-        let fields: Vec<&str> = text.split(',').collect();
-        let [position, codes @ .., end] = fields.as_slice() else {
-            return Err(said(text, "a block: numbers with commas"));
-        };
-        if !END.contains(end) || fields.len() != needed {
-            let found = format!("{} fields that end in {end:?}", fields.len());
-            return Err(said(&found, &format!("a block of {needed} fields, the last one a space")));
+    /// [`Refusal`] if the port fails, or nothing comes for longer than the host's patience.
+    pub fn block(&mut self, measurements: usize, max_code: u32) -> Result<Heard, Refusal> {
+        let most = measurements.saturating_add(1).saturating_mul(FIELD);
+        let patience = self.patience;
+        loop {
+            let line = match self.line(most, &|quiet| quiet >= patience).map_err(|error| ended(&error, &self.part()))? {
+                Line::Whole(line) => line,
+                Line::TooLong => return Ok(Heard::Unusable(format!("more than {most} bytes without a line end"))),
+                Line::Stopped => return Ok(Heard::Stopped),
+                Line::None => {
+                    let (patience, part) = (patience.as_secs_f64(), self.part());
+                    return Err(Refusal::new(format!("nothing came for {patience} s, {part}")));
+                }
+            };
+            // a board that has reset once more
+            if !line.ends_with(SENDING) && !line.ends_with(SENT) {
+                return Ok(block_of(&line, measurements, max_code));
+            }
         }
-        let number = |field: &&str| field.parse().map_err(|_| said(field, "a code of the converter"));
-        let block = DeviceBlock {
-            frame_position: position.parse().map_err(|_| said(position, "a number of frames"))?,
-            codes: codes.iter().map(number).collect::<Result<_, _>>()?,
-        };
-        self.read += 1;
-        Ok(block)
+    }
+
+    /// How much of a block has arrived.
+    fn part(&self) -> String {
+        let fields = self.waiting.iter().filter(|byte| **byte == b',').count();
+        if fields == 0 { "before its first code".to_owned() } else { format!("after {fields} fields") }
+    }
+
+    /// The error of a device that has not greeted; `heard` is its last line.
+    fn silent(&self, loading: bool, heard: &str) -> Refusal {
+        let rest = String::from_utf8_lossy(&self.waiting);
+        let heard = if rest.is_empty() { heard } else { &rest };
+        let patience = self.patience.as_secs_f64();
+        if loading {
+            return Refusal::new(format!("the device said {SENDING:?}, and no {SENT:?} within {patience} s"));
+        }
+        if heard.is_empty() {
+            return Refusal::new(format!(
+                "the device was silent for {patience} s: check that it has power and runs the skin's program, that it \
+                 is on this port, and its speed (baud)"
+            ));
+        }
+        let heard: String = heard.chars().take(SHOWN).collect();
+        Refusal::new(format!(
+            "the device said {heard:?} and no {SENDING:?} within {patience} s: check its program and its speed (baud)"
+        ))
+    }
+
+    /// The next line that is not empty and at most `most` bytes long, without its end: `\n`, `\r`, or both. Waits until
+    /// `is_over` says so, which is told for how long nothing has come.
+    fn line(&mut self, most: usize, is_over: &dyn Fn(Duration) -> bool) -> io::Result<Line> {
+        let (mut heard, mut searched) = (Instant::now(), 0);
+        let mut piece = [0; PIECE];
+        loop {
+            if let Some(found) = self.waiting[searched..].iter().position(|byte| matches!(byte, b'\n' | b'\r')) {
+                let line: Vec<u8> = self.waiting.drain(..=searched + found).collect();
+                searched = 0;
+                if std::mem::take(&mut self.skipped) {
+                    return Ok(Line::TooLong);
+                }
+                let line = String::from_utf8_lossy(&line);
+                if line.trim().is_empty() {
+                    continue;
+                }
+                return Ok(Line::Whole(line.trim_end_matches(['\r', '\n']).to_owned()));
+            }
+            searched = self.waiting.len();
+            if searched > most {
+                (self.skipped, searched) = (true, 0);
+                self.waiting.clear();
+            }
+            if (self.stop)() {
+                return Ok(Line::Stopped);
+            }
+            if is_over(heard.elapsed()) {
+                return Ok(Line::None);
+            }
+            match self.port.read(&mut piece) {
+                Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
+                Ok(count) => {
+                    self.waiting.extend_from_slice(&piece[..count]);
+                    heard = Instant::now();
+                }
+                Err(error) => match error.kind() {
+                    io::ErrorKind::Interrupted | io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => {}
+                    _ => return Err(error),
+                },
+            }
+        }
     }
 }
 
-fn said(found: &str, needed: &str) -> Refusal {
-    let found: String = found.chars().take(SHOWN).collect();
-    Refusal::new(format!("the device said {found:?}; {needed} was expected"))
+/// Whether `line` is a block or the end of one.
+fn is_of_block(line: &str) -> bool {
+    line.contains(',') && line.bytes().all(|byte| byte.is_ascii_digit() || matches!(byte, b',' | b' '))
+}
+
+/// The error of a port that has failed in the middle of something.
+fn ended(error: &io::Error, when: &str) -> Refusal {
+    Refusal::new(format!("the device went away {when} ({error})"))
+}
+
+/// The block of `measurements` measurements that `line` is.
+fn block_of(line: &str, measurements: usize, max_code: u32) -> Heard {
+    let unusable = |found: &str, needed: &str| {
+        let found: String = found.chars().take(SHOWN).collect();
+        Heard::Unusable(format!("the device said {found:?}; {needed} was expected"))
+    };
+    let Some((position, codes)) = line.trim_end().split_once(',') else {
+        return unusable(line, "a block: numbers with commas");
+    };
+    let Ok(frame_position) = position.parse() else {
+        return unusable(position, "a number of frames");
+    };
+    let fields: Vec<&str> = codes.trim_end_matches(',').split(',').collect();
+    let sent = measurements.saturating_sub(1);
+    if fields.len() > sent {
+        let found = fields.len();
+        return Heard::Unusable(format!("{found} codes came where {sent} were expected"));
+    }
+    let read = |field: &&str| field.parse().ok().filter(|code| *code <= max_code);
+    let mut codes: Vec<Option<u32>> = fields.iter().map(read).collect();
+    let mut missing = Vec::new();
+    if let Some(first) = codes.iter().position(Option::is_none) {
+        let count = codes.iter().filter(|code| code.is_none()).count();
+        let found: String = fields[first].chars().take(SHOWN).collect();
+        missing.push(format!("{count} no code of [0, {max_code}], the first {found:?} at {first}"));
+    }
+    if fields.len() < sent {
+        missing.push(format!("{} that did not come, taken to be the last", sent - fields.len()));
+    }
+    codes.resize(measurements, None);
+    let missing = (!missing.is_empty()).then(|| format!("missing samples: {}", missing.join("; ")));
+    Heard::Block(HeardBlock { frame_position, codes, missing })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::cell::Cell;
+    use std::rc::Rc;
 
-    /// A port that says `self.0` and hears nothing.
-    struct Says(io::Cursor<Vec<u8>>);
+    /// A port that says each of its pieces after having been silent for one read, and then is gone or silent.
+    struct Says {
+        pieces: Vec<Vec<u8>>,
+        gone: bool,
+        silent: bool,
+        woken: Rc<Cell<usize>>,
+    }
 
     impl Read for Says {
         fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-            self.0.read(out)
+            self.silent = !self.silent;
+            if self.silent || (self.pieces.is_empty() && !self.gone) {
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+            let Some(piece) = self.pieces.first_mut() else { return Ok(0) };
+            let count = piece.len().min(out.len());
+            out[..count].copy_from_slice(&piece[..count]);
+            piece.drain(..count);
+            if piece.is_empty() {
+                self.pieces.remove(0);
+            }
+            Ok(count)
         }
     }
 
     impl Write for Says {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
             assert_eq!(bytes, b"*");
+            self.woken.set(self.woken.get() + 1);
             Ok(bytes.len())
         }
 
@@ -234,33 +408,97 @@ mod tests {
         }
     }
 
-    fn greeted(text: &str) -> Result<Host<Says>, Refusal> {
-        Host::greet(Says(io::Cursor::new(text.as_bytes().to_vec())))
+    const PATIENCE: Duration = Duration::from_millis(300);
+
+    fn greeted(text: &[u8], gone: bool) -> Result<Option<Host<'static, Says>>, Refusal> {
+        // in pieces of three bytes, as a slow line brings them
+        let pieces = text.chunks(3).map(<[u8]>::to_vec).collect();
+        Host::greet(Says { pieces, gone, silent: false, woken: Rc::default() }, PATIENCE, &|| false)
+    }
+
+    /// The first line of codes after the greeting `text`.
+    fn codes_after(text: &[u8]) -> (u64, Vec<Option<u32>>) {
+        let mut host = greeted(&[text, b"7,1,2, \r\n"].concat(), true).unwrap().unwrap();
+        match host.block(3, 9).unwrap() {
+            Heard::Block(HeardBlock { frame_position, codes, missing: None }) => (frame_position, codes),
+            other => panic!("{text:?}: {other:?}"),
+        }
     }
 
     #[test]
-    fn what_a_device_should_not_say_is_refused() {
-        for text in ["", "Hello\n", "Sending.\nnot yet\n", &"x".repeat(10_000)] {
-            let said = greeted(text).map(drop).unwrap_err().to_string();
-            assert!(said.starts_with("the device said "), "{text:.20}: {said}");
+    fn noise_resets_and_any_line_end_are_passed_over() {
+        for text in [
+            &b"Sending.\r\nSent!.\r\n"[..],
+            b"Sending.\nSent!.\n",
+            b"Sending.\rSent!.\r",
+            b"\xf0\x00\xffBoot v1.2\r\n\x1b[2JSendingSending.\r\nSent!.\r\n",
+            b"Sending.\r\nSent!.\r\nSending.\r\nSent!.\r\n",
+            b"Sending.\r\nBootSending.\r\nSent!.\r\n",
+            // it runs already
+            b"3,4,5,6,1,2, \r\n",
+        ] {
+            assert_eq!(codes_after(text), (7, vec![Some(1), Some(2), None]), "{:?}", String::from_utf8_lossy(text));
+        }
+    }
+
+    #[test]
+    fn a_device_that_does_not_greet_is_woken_again_and_then_refused() {
+        for (text, said) in [
+            (&b""[..], "the device was silent for 0.3 s: check that it has power"),
+            (b"Hello\n", "the device said \"Hello\" and no \"Sending.\""),
+            (b"Sending.\nnot yet\n", "the device said \"Sending.\", and no \"Sent!.\" within"),
+        ] {
+            let error = greeted(text, false).map(drop).unwrap_err().to_string();
+            assert!(error.contains(said), "{error}");
+        }
+        let gone = greeted(b"Hello\n", true).map(drop).unwrap_err().to_string();
+        assert!(gone.starts_with("the device went away before its greeting"), "{gone}");
+        let woken = Rc::new(Cell::new(0));
+        let quiet = || Says { pieces: Vec::new(), gone: false, silent: false, woken: Rc::clone(&woken) };
+        assert!(Host::greet(quiet(), Duration::from_secs(60), &|| true).unwrap().is_none());
+        woken.set(0);
+        let asked = Cell::new(0);
+        let stop = || {
+            std::thread::sleep(AGAIN * 3 / 5);
+            asked.set(asked.get() + 1);
+            asked.get() == 4
+        };
+        assert!(Host::greet(quiet(), Duration::from_secs(60), &stop).unwrap().is_none());
+        assert!((2..4).contains(&woken.get()), "woken {} times in {:?}", woken.get(), AGAIN * 12 / 5);
+    }
+
+    #[test]
+    fn what_is_wrong_in_a_block_is_missing_or_unusable_and_said() {
+        let heard = |text: &str| {
+            let text = format!("Sending.\nSent!.\n{text}");
+            greeted(text.as_bytes(), true).unwrap().unwrap().block(3, 9)
+        };
+        for (text, codes, reason) in [
+            ("7,1,2, \r\n", [Some(1), Some(2), None], ""),
+            ("7,1, \r\n", [Some(1), None, None], "1 that did not come"),
+            ("7,x,2, \r\n", [None, Some(2), None], "1 no code of [0, 9], the first \"x\" at 0"),
+            ("7,1,-2, \r\n", [Some(1), None, None], "the first \"-2\" at 1"),
+            ("7,10,2, \r\n", [None, Some(2), None], "the first \"10\" at 0"),
+            ("7, \r\n", [None, None, None], "no code"),
+        ] {
+            let Heard::Block(block) = heard(text).unwrap() else { panic!("{text}") };
+            assert_eq!((block.frame_position, &block.codes[..]), (7, &codes[..]), "{text}");
+            assert_eq!(block.missing.is_none(), reason.is_empty(), "{text}: {block:?}");
+            assert!(block.missing.unwrap_or_default().contains(reason), "{text}");
         }
         for (text, reason) in [
-            ("7,1,2, \r\n", ""),
-            ("7,1,2", "the device ended in block 0, after 2 of 4 fields"),
-            ("", "the device ended in block 0, after 0 of 4 fields"),
-            ("7,1, \r\n", "3 fields"),
-            ("7,1,2,3, \r\n", "5 fields"),
-            ("7,1,2,3\r\n", "4 fields"),
-            ("7,1,x, \r\n", "a code"),
-            ("x,1,2, \r\n", "a number of frames"),
-            ("7,1,-2, \r\n", "a code"),
-            ("\n", "a block"),
+            ("7,1,2,3, \r\n", "3 codes came where 2 were expected"),
+            ("x,1,2, \r\n", "\"x\"; a number of frames"),
+            ("hello\n", "\"hello\"; a block"),
+            (&format!("{}\n", "7".repeat(10_000)), "more than 96 bytes"),
         ] {
-            let mut host = greeted(&format!("Sending.\nSent!.\n{text}")).unwrap();
-            match host.block(3) {
-                Ok(block) => assert_eq!((block.frame_position, block.codes, reason), (7, vec![1, 2], "")),
-                Err(error) => assert!(!reason.is_empty() && error.to_string().contains(reason), "{text:?}: {error}"),
-            }
+            let Heard::Unusable(said) = heard(text).unwrap() else { panic!("{text:.20}") };
+            assert!(said.contains(reason), "{text:.20}: {said}");
         }
+        let gone = heard("7,1,2").unwrap_err().to_string();
+        assert!(gone.starts_with("the device went away after 2 fields"), "{gone}");
+        let mut silent = greeted(b"Sending.\nSent!.\n", false).unwrap().unwrap();
+        let silent = silent.block(3, 9).unwrap_err().to_string();
+        assert!(silent.starts_with("nothing came for 0.3 s, before its first code"), "{silent}");
     }
 }

@@ -5,7 +5,7 @@ use spts_input::Refusal;
 use std::cell::RefCell;
 use std::error::Error;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, Seek as _, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -91,6 +91,15 @@ impl NewFile {
     pub(super) fn sync(&self) -> io::Result<()> {
         watched(DiskOperation::Other, &self.path, || self.file.sync_all())
     }
+
+    /// Cuts the file off after `length` bytes, of which the first become `start`.
+    pub(super) fn cut(&mut self, length: u64, start: &[u8]) -> io::Result<()> {
+        watched(DiskOperation::Other, &self.path, || {
+            self.file.set_len(length)?;
+            self.file.seek(SeekFrom::Start(0))?;
+            self.file.write_all(start)
+        })
+    }
 }
 
 impl Write for NewFile {
@@ -106,6 +115,18 @@ impl Write for NewFile {
 /// Renames `from` to `to`, replacing a file or an empty folder of that name.
 pub(super) fn rename(from: &Path, to: &Path) -> io::Result<()> {
     watched(DiskOperation::Other, to, || std::fs::rename(from, to))
+}
+
+/// Gives the file `from` the name `to`, too, if nothing has it.
+pub(super) fn link(from: &Path, to: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    watched(DiskOperation::Other, to, || match std::fs::hard_link(from, to) {
+        Err(error) if error.kind() != io::ErrorKind::AlreadyExists => {
+            // a file system without links
+            Ok(renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE)?)
+        }
+        other => other,
+    })
 }
 
 /// Lets the folders `a` and `b` change their names in one step; `false` if the file system does not know how.

@@ -1,7 +1,8 @@
 //! Files that are written completely or not at all: bytes, NumPy arrays, CSV tables and JSON. Their bytes depend only
 //! on the values.
 
-use super::disk::{self, NewFile, unwritable};
+use super::disk::{self, NewFile, not_ours, unwritable};
+use crate::cleanup::{Entry, Leftover, listed};
 use npyz::WriterBuilder as _;
 use serde::Serialize;
 use spts_input::Refusal;
@@ -31,6 +32,8 @@ pub struct AtomicFile {
     buffer: BufWriter<NewFile>,
     temporary: tempfile::TempPath,
     path: PathBuf,
+    /// Lets a signal remove the unfinished file.
+    _entry: Entry,
 }
 
 impl AtomicFile {
@@ -46,13 +49,26 @@ impl AtomicFile {
         if path.file_name().is_none() {
             return Err(failed(io::ErrorKind::InvalidInput.into()));
         }
-        let made = tempfile::Builder::new()
-            .prefix(TEMPORARY[0])
-            .suffix(TEMPORARY[1])
-            .rand_bytes(RANDOM)
-            .make_in(disk::parent(path), NewFile::create);
-        let (file, temporary) = made.map_err(failed)?.into_parts();
-        Ok(Self { buffer: BufWriter::with_capacity(PIECE, file), temporary, path: path.to_owned() })
+        let make = || {
+            tempfile::Builder::new()
+                .prefix(TEMPORARY[0])
+                .suffix(TEMPORARY[1])
+                .rand_bytes(RANDOM)
+                .make_in(disk::parent(path), NewFile::create)
+        };
+        let (made, entry) = listed(make, |made| Leftover::Each(vec![made.path().to_owned()])).map_err(failed)?;
+        let (file, temporary) = made.into_parts();
+        let buffer = BufWriter::with_capacity(PIECE, file);
+        Ok(Self { buffer, temporary, path: path.to_owned(), _entry: entry })
+    }
+
+    /// Cuts the file off after `length` bytes, of which the first become `start`. What has not reached the file is lost.
+    fn cut(self, length: u64, start: &[u8]) -> Result<Self, Refusal> {
+        let failed = unwritable(&self.path);
+        // bytes that a full disk did not take would be tried again
+        let (mut file, _) = self.buffer.into_parts();
+        file.cut(length, start).map_err(failed)?;
+        Ok(Self { buffer: BufWriter::with_capacity(PIECE, file), ..self })
     }
 
     /// Waits until the bytes are on the disk, then gives the file its name.
@@ -61,13 +77,19 @@ impl AtomicFile {
     /// [`Refusal`] if the disk is full or reports an error.
     pub fn finish(mut self) -> Result<(), Refusal> {
         let failed = unwritable(&self.path);
-        self.buffer.flush().map_err(&failed)?;
-        // a full disk may only show when the data reach it
-        self.buffer.get_ref().sync().map_err(&failed)?;
+        self.sync()?;
         disk::rename(&self.temporary, &self.path).map_err(&failed)?;
         // the temporary name is gone, so there is nothing to remove
         let _ = self.temporary.keep();
         Ok(())
+    }
+
+    /// Waits until all bytes are on the disk.
+    fn sync(&mut self) -> Result<(), Refusal> {
+        let failed = unwritable(&self.path);
+        self.buffer.flush().map_err(&failed)?;
+        // a full disk may only show when the data reach it
+        self.buffer.get_ref().sync().map_err(&failed)
     }
 }
 
@@ -106,7 +128,7 @@ pub fn is_temporary(name: &str) -> bool {
 /// # Errors
 /// [`io::Error`] if the file cannot be removed.
 pub fn remove_left(path: &Path) -> io::Result<()> {
-    let left = File::open(path).is_ok_and(|file| file.try_lock().is_ok());
+    let left = spts_input::open(path, u64::MAX).is_ok_and(|(file, _)| file.try_lock().is_ok());
     if left { std::fs::remove_file(path) } else { Ok(()) }
 }
 
@@ -130,6 +152,37 @@ pub fn check_writable(path: &Path) -> Result<(), Refusal> {
 /// [`Refusal`] if the file cannot be written, or `path` is something other than a regular file.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), Refusal> {
     write_with(path, |out| out.write_all(bytes))
+}
+
+/// Writes `bytes` as `path` if nothing has this name; of two runs that try at once, one does. Returns whether it did.
+///
+/// # Errors
+/// [`Refusal`] if the file cannot be written.
+pub fn write_new(path: &Path, bytes: &[u8]) -> Result<bool, Refusal> {
+    if disk::exists(path) {
+        return Ok(false);
+    }
+    let failed = unwritable(path);
+    let mut file = AtomicFile::create(path)?;
+    file.write_all(bytes).map_err(&failed)?;
+    file.sync()?;
+    match disk::link(&file.temporary, path) {
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Ok(false),
+        other => other.map(|()| true).map_err(failed),
+    }
+}
+
+/// Checks that a single file `path` can be written, and that nothing is lost by it: whatever has this name has to be an
+/// earlier result, which `ours` tells.
+///
+/// # Errors
+/// [`Refusal`] as [`check_writable`], and for a link or a file that is not ours.
+pub fn check_replaceable(path: &Path, ours: impl FnOnce(&Path) -> bool) -> Result<(), Refusal> {
+    check_writable(path)?;
+    match path.symlink_metadata() {
+        Ok(found) if !found.is_file() || !ours(path) => Err(not_ours(path)),
+        _ => Ok(()),
+    }
 }
 
 /// A type that a NumPy array can hold.
@@ -179,7 +232,7 @@ pub struct NpyFile<T> {
     file: AtomicFile,
     shape: Vec<usize>,
     written: usize,
-    header_bytes: u64,
+    header: Vec<u8>,
     kind: PhantomData<T>,
 }
 
@@ -189,14 +242,10 @@ impl<T: NpyValue> NpyFile<T> {
     /// # Errors
     /// [`Refusal`] if the file cannot be created.
     pub fn create(path: &Path, shape: &[usize]) -> Result<Self, Refusal> {
-        let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
         let mut file = AtomicFile::create(path)?;
-        let mut header = Vec::new();
-        let kind = T::KIND.parse().map_err(unwritable(path))?;
-        let options = npyz::WriteOptions::new_header_only().dtype(npyz::DType::Plain(kind)).shape(&sides);
-        options.writer(&mut header).write_header_only().map_err(unwritable(path))?;
+        let header = npy_header::<T>(shape).map_err(unwritable(path))?;
         file.write_all(&header).map_err(unwritable(path))?;
-        Ok(Self { file, shape: shape.to_vec(), written: 0, header_bytes: header.len() as u64, kind: PhantomData })
+        Ok(Self { file, shape: shape.to_vec(), written: 0, header, kind: PhantomData })
     }
 
     /// Writes the next values.
@@ -223,12 +272,36 @@ impl<T: NpyValue> NpyFile<T> {
         self.file.finish()
     }
 
+    /// Waits until all values have left the program.
+    pub(crate) fn flush(&mut self) -> Result<(), Refusal> {
+        self.file.flush().map_err(unwritable(&self.file.path))
+    }
+
+    /// As [`NpyFile::finish`], with `entries` in place of the first side of the shape. Values behind them are dropped.
+    pub(crate) fn finish_with(mut self, entries: usize) -> Result<(), Refusal> {
+        let values: usize = self.shape.iter().skip(1).product::<usize>() * entries;
+        if self.shape.first() == Some(&entries) || values > self.written {
+            return self.finish();
+        }
+        if let Some(side) = self.shape.first_mut() {
+            *side = entries;
+        }
+        let mut header = npy_header::<T>(&self.shape).map_err(unwritable(&self.file.path))?;
+        // a header of fewer digits is as long: blanks stand before its line end
+        let blanks = self.header.len().saturating_sub(header.len());
+        let end = header.len() - 1;
+        header.splice(end..end, vec![b' '; blanks]);
+        header[8..10].copy_from_slice(&self.header[8..10]);
+        let bytes = header.len() as u64 + (values * size_of::<T>()) as u64;
+        self.file.cut(bytes, &header)?.finish()
+    }
+
     /// Hands the bytes of the values that were written so far to `each`, some thousand values at a time.
     pub(crate) fn read_back(&mut self, mut each: impl FnMut(&[u8]) -> Result<(), Refusal>) -> Result<(), Refusal> {
         let failed = unwritable(&self.file.path);
         self.file.flush().map_err(&failed)?;
         let mut file = File::open(&self.file.temporary).map_err(&failed)?;
-        file.seek(io::SeekFrom::Start(self.header_bytes)).map_err(&failed)?;
+        file.seek(io::SeekFrom::Start(self.header.len() as u64)).map_err(&failed)?;
         let (piece, mut bytes) = ((size_of::<T>() as u64) << 13, Vec::new());
         while (&file).take(piece).read_to_end(&mut bytes).map_err(&failed)? > 0 {
             each(&bytes)?;
@@ -236,6 +309,16 @@ impl<T: NpyValue> NpyFile<T> {
         }
         Ok(())
     }
+}
+
+/// Header of an array of `shape`.
+fn npy_header<T: NpyValue>(shape: &[usize]) -> io::Result<Vec<u8>> {
+    let sides: Vec<u64> = shape.iter().map(|side| *side as u64).collect();
+    let kind = T::KIND.parse().map_err(io::Error::other)?;
+    let mut header = Vec::new();
+    let options = npyz::WriteOptions::new_header_only().dtype(npyz::DType::Plain(kind)).shape(&sides);
+    options.writer(&mut header).write_header_only()?;
+    Ok(header)
 }
 
 /// Writes `values` as a NumPy array of little-endian doubles in C order.
@@ -343,6 +426,23 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), bytes, "same values, other bytes");
         let error = write_npy(&path, &[4], &values).unwrap_err().to_string();
         assert!(error.ends_with("6 values for an array of shape [4]"), "{error}");
+    }
+
+    #[test]
+    fn an_array_that_ends_early_is_a_whole_one() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.npy");
+        // headers of one length and of two
+        for (most, kept) in [(9, 2), (10_usize.pow(12), 3), (4, 4)] {
+            let mut file = NpyFile::create(&path, &[most, 2]).unwrap();
+            file.push((0_u16..9).take(2 * most.min(4) + usize::from(most > 4))).unwrap();
+            file.finish_with(kept).unwrap();
+            let bytes = std::fs::read(&path).unwrap();
+            let npy = npyz::NpyFile::new(&bytes[..]).unwrap();
+            assert_eq!(npy.shape(), [kept as u64, 2]);
+            let values: Vec<u16> = npy.into_vec().unwrap();
+            assert_eq!(values, (0..2 * u16::try_from(kept).unwrap()).collect::<Vec<_>>());
+        }
     }
 
     #[test]

@@ -11,7 +11,7 @@ use std::io::{self, Read as _};
 use std::path::{Component, Path};
 
 /// The file that lists the files that a run has written.
-pub(super) const MANIFEST_FILE: &str = "manifest.json";
+pub const MANIFEST_FILE: &str = "manifest.json";
 const FORMAT: &str = "spts-results";
 const SCHEMA: u64 = 1;
 /// Largest manifest that is read, bytes: 100,000 files.
@@ -109,13 +109,24 @@ impl Manifest {
         self.files.keys().map(String::as_str)
     }
 
+    /// Whether the file `name` of `folder` is as the run wrote it, if the manifest lists it at all.
+    ///
+    /// # Errors
+    /// [`io::Error`] if the file cannot be read.
+    pub fn holds(&self, folder: &Path, name: &str) -> io::Result<bool> {
+        Ok(!self.lists(name) || self.is_unchanged(folder, name)?)
+    }
+
     /// Whether a run has written the file `name`.
     pub(super) fn lists(&self, name: &str) -> bool {
         self.files.contains_key(name)
     }
 
     /// Whether the file `name` of `folder` is still as the run wrote it; `false` for a file that is not listed.
-    pub(super) fn is_unchanged(&self, folder: &Path, name: &str) -> io::Result<bool> {
+    ///
+    /// # Errors
+    /// [`io::Error`] if the file cannot be read.
+    pub fn is_unchanged(&self, folder: &Path, name: &str) -> io::Result<bool> {
         let path = folder.join(name);
         match self.files.get(name) {
             Some(entry) if path.symlink_metadata().is_ok_and(|found| found.is_file()) => {
@@ -142,7 +153,7 @@ pub fn check_whole(folder: &Path, names: &[&str]) -> Result<(), Refusal> {
     let below = whole.strip_prefix(above).unwrap_or(Path::new(""));
     for name in names {
         let (path, listed) = (folder.join(name), below.join(name).to_string_lossy().into_owned());
-        if manifest.lists(&listed) && !manifest.is_unchanged(above, &listed).map_err(unwritable(&path))? {
+        if !manifest.holds(above, &listed).map_err(Refusal::in_file(&path))? {
             let advice =
                 "the folder holds results of two runs, or the file was changed by hand: then delete the manifest";
             return Err(changed(&path, above, advice));

@@ -2,8 +2,8 @@
 
 use crate::chain::{ChainConfig, RowsConfig};
 use serde::{Deserialize, Serialize};
-use spts_input::Refusal;
-use spts_models::{SkinLayout, explain_toml};
+use spts_input::{Refusal, Tables};
+use spts_models::{SkinLayout, explain_toml, parsed};
 use spts_sim::mechanics::{BendConfig, DropConfig, MechanicsConfig, PressConfig, Timestep};
 
 /// A scene as written in TOML. A missing field takes its default.
@@ -136,7 +136,7 @@ impl SceneConfig {
     /// # Errors
     /// [`Refusal`] for an unknown key or a wrong value.
     pub(crate) fn from_table(table: toml::Table) -> Result<Self, Refusal> {
-        table.try_into().map_err(|error| Refusal::new(explain_toml(&error)))
+        parsed(table)
     }
 
     /// The configuration in the TOML text `text`.
@@ -144,7 +144,8 @@ impl SceneConfig {
     /// # Errors
     /// [`Refusal`], with the line.
     pub fn from_toml(text: &str) -> Result<Self, Refusal> {
-        toml::from_str(text).map_err(|error| unparsed(text, &error))
+        let read = toml::Deserializer::parse(text).and_then(|reader| Self::deserialize(Tables(reader)));
+        read.map_err(|error| unparsed(text, &error))
     }
 }
 
@@ -155,8 +156,8 @@ fn unparsed(text: &str, error: &toml::de::Error) -> Refusal {
     let line = before.matches('\n').count();
     // of a text that is TOML the table knows the field, and the text the line
     let table: Result<toml::Table, _> = toml::from_str(text);
-    let in_table = table.ok().and_then(|table| table.try_into::<SceneConfig>().err());
-    let message = explain_toml(in_table.as_ref().unwrap_or(error));
+    let in_table = table.ok().and_then(|table| SceneConfig::from_table(table).err());
+    let message = in_table.map_or_else(|| explain_toml(error), |refusal| refusal.to_string());
     let shown = text.lines().nth(line).unwrap_or_default().trim();
     let shown: String = shown.chars().take(SHOWN).collect();
     Refusal::new(format!("line {}: {message} (`{shown}`)", line + 1))

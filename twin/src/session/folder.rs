@@ -2,13 +2,15 @@
 //! the file for users.
 
 use super::npy::{self, Expected, npy_bytes, read_codes, read_doubles, room};
-use super::recorded::{Event, PressFacts, PressPose, Recorded, Session, check, check_header, check_recorded, is_plain};
+use super::recorded::{
+    Event, PressFacts, PressPose, Recorded, Session, check, check_header, check_hold, check_recorded, is_plain,
+};
 use crate::output::{NpyFile, OutputFolder, check_whole, unwritable, write_bytes};
 use crate::provenance::Provenance;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use spts_circuit::{Block, Converter, Mode, Recording, RecordingInfo};
-use spts_input::Refusal;
+use spts_input::{Refusal, Tables};
 use spts_models::Grid;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -174,7 +176,6 @@ impl SampleFile {
 
     /// Writes the next block.
     fn push(&mut self, block: &Block) -> Result<(), Refusal> {
-        self.missing += block.volts.iter().filter(|v| v.is_nan()).count();
         if let Some(converter) = self.converter {
             let mark = missing_mark(&converter);
             self.codes.clear();
@@ -185,10 +186,21 @@ impl SampleFile {
             }
         }
         match &mut self.array {
-            Array::Narrow(file) => file.push(self.codes.iter().map(|code| u16::try_from(*code).unwrap_or(u16::MAX))),
-            Array::Wide(file) => file.push(self.codes.iter().copied()),
-            Array::Volts(file) => file.push(block.volts.iter().copied()),
+            Array::Narrow(file) => {
+                file.push(self.codes.iter().map(|code| u16::try_from(*code).unwrap_or(u16::MAX)))?;
+                file.flush()?;
+            }
+            Array::Wide(file) => {
+                file.push(self.codes.iter().copied())?;
+                file.flush()?;
+            }
+            Array::Volts(file) => {
+                file.push(block.volts.iter().copied())?;
+                file.flush()?;
+            }
         }
+        self.missing += block.volts.iter().filter(|v| v.is_nan()).count();
+        Ok(())
     }
 
     /// Writes volts in place of the codes so far, and from here on.
@@ -209,13 +221,13 @@ impl SampleFile {
         Ok(())
     }
 
-    /// Gives the array its name, and says what it is.
-    fn finish(self) -> Result<Samples, Refusal> {
+    /// Gives the array, which has `blocks` blocks, its name, and says what it is.
+    fn finish(self, blocks: usize) -> Result<Samples, Refusal> {
         let contents = self.contents();
         match self.array {
-            Array::Narrow(file) => file.finish()?,
-            Array::Wide(file) => file.finish()?,
-            Array::Volts(file) => file.finish()?,
+            Array::Narrow(file) => file.finish_with(blocks)?,
+            Array::Wide(file) => file.finish_with(blocks)?,
+            Array::Volts(file) => file.finish_with(blocks)?,
         }
         Ok(contents)
     }
@@ -308,16 +320,20 @@ impl SessionWriter {
     }
 
     /// The same writer, which refuses arrays that are too large to be read again.
-    fn limited(self) -> Self {
+    #[must_use]
+    pub fn limited(self) -> Self {
         Self { limited: true, ..self }
     }
 
-    /// Writes the next blocks of the recording in `mode`, which will have `blocks` blocks in all.
+    /// Writes the next blocks of the recording in `mode`, which will have at most `blocks` blocks in all. A recording
+    /// that ends earlier has those that were written.
     ///
     /// # Errors
     /// [`Refusal`] if the blocks contradict the earlier ones, or a file cannot be written.
     pub fn push(&mut self, mode: Mode, piece: &Recorded, blocks: usize) -> Result<(), Refusal> {
-        check_recorded(mode, piece, blocks).map_err(|invalid| refused(&self.dir, &invalid))?;
+        check_recorded(mode, piece, blocks)
+            .and_then(|()| check_hold(self.contents.hold_s, &piece.recording))
+            .map_err(|invalid| refused(&self.dir, &invalid))?;
         let writer = match mode {
             Mode::Raster => &mut self.raster,
             Mode::Compressive => &mut self.compressive,
@@ -329,10 +345,11 @@ impl SessionWriter {
         writer.push(piece)
     }
 
-    /// Completes the session. `session.json` is written last: a folder that holds it is complete.
+    /// Completes the session, with all blocks that were written whole. `session.json` is written last: a folder that
+    /// holds it is complete.
     ///
     /// # Errors
-    /// [`Refusal`] if a recording has another number of blocks than announced, or a file cannot be written.
+    /// [`Refusal`] if a file cannot be written.
     pub fn finish(mut self) -> Result<(), Refusal> {
         self.contents.raster = self.raster.map(RecordingWriter::finish).transpose()?;
         self.contents.compressive = self.compressive.map(RecordingWriter::finish).transpose()?;
@@ -415,10 +432,12 @@ impl RecordingWriter {
     }
 
     fn finish(self) -> Result<RecordedContents, Refusal> {
+        let blocks = self.contents.blocks.len();
         Ok(RecordedContents {
-            samples: self.samples.finish()?,
-            pressure_pa: self.pressure.finish()?,
-            conductance_s: self.conductance.finish()?,
+            samples: self.samples.finish(blocks)?,
+            pressure_pa: self.pressure.finish(blocks)?,
+            conductance_s: self.conductance.finish(blocks)?,
+            conditioning: self.contents.conditioning.min(blocks),
             ..self.contents
         })
     }
@@ -466,9 +485,9 @@ impl MapFile {
         }
     }
 
-    /// Gives the file its name, and gives that back.
-    fn finish(self) -> Result<Option<String>, Refusal> {
-        self.file.map(|file| file.finish().map(|()| self.name)).transpose()
+    /// Gives the file, which has `blocks` blocks, its name, and gives that back.
+    fn finish(self, blocks: usize) -> Result<Option<String>, Refusal> {
+        self.file.map(|file| file.finish_with(blocks).map(|()| self.name)).transpose()
     }
 }
 
@@ -510,7 +529,7 @@ impl Session {
     pub fn read(dir: &Path) -> Result<Self, Refusal> {
         let path = dir.join(SESSION_FILE);
         let text = spts_input::read_text(&path, MAX_BYTES).map_err(Refusal::in_file(&path))?;
-        let version: Version = parse(&path, &text)?;
+        let version: Version = parse_json(&path, &text)?;
         if version.format != FORMAT {
             let found = format!("{:?}", version.format);
             return Err(outside(&path, "format", found, format!("{{{FORMAT:?}}}")));
@@ -519,7 +538,7 @@ impl Session {
             let problem = format!("`schema` = {} is not known; this program reads {SCHEMA}", version.schema);
             return Err(Refusal::new(problem).at(path.display()));
         }
-        let contents: Contents = parse(&path, &text)?;
+        let contents: Contents = parse_json(&path, &text)?;
         let files: Vec<String> = contents.files().into_iter().map(str::to_owned).collect();
         let read = |contents: Option<RecordedContents>, mode| {
             contents.map(|contents| read_recorded(dir, &path, mode, contents)).transpose()
@@ -673,10 +692,14 @@ fn outside(path: &Path, field: &str, value: impl Display, range: impl Display) -
     Refusal::range(field, value, range).at(path.display())
 }
 
-fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, Refusal> {
+/// The value that the JSON text `text` of the file at `path` describes.
+///
+/// # Errors
+/// [`Refusal`] with file and field.
+pub fn parse_json<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, Refusal> {
     let mut reader = serde_json::Deserializer::from_str(text);
     let wrong = |reason: String| Refusal::new(reason).at(path.display());
-    let parsed = serde_path_to_error::deserialize(&mut reader).map_err(|error| {
+    let parsed = serde_path_to_error::deserialize(Tables(&mut reader)).map_err(|error| {
         let field = error.path().to_string();
         match field.as_str() {
             // what is wrong is not in a field

@@ -25,7 +25,7 @@ mod recorded;
 #[cfg(test)]
 mod tests;
 
-pub use folder::{SESSION_FILE, SessionWriter};
+pub use folder::{SESSION_FILE, SessionWriter, parse_json};
 pub use npy::{MOST_SAMPLES, NpyArray, read_npy};
 pub use recorded::{Event, PressFacts, PressPose, Recorded, Session};
 #[cfg(feature = "mujoco")]

@@ -136,6 +136,7 @@ pub(super) fn check(session: &Session) -> Result<(), Refusal> {
     for (mode, recorded) in [(Mode::Raster, &session.raster), (Mode::Compressive, &session.compressive)] {
         if let Some(recorded) = recorded {
             check_recorded(mode, recorded, recorded.recording.blocks().len())?;
+            check_hold(session.hold_s, &recorded.recording)?;
         }
     }
     if let (Some(raster), Some(compressive)) = (session.raster(), session.compressive()) {
@@ -186,7 +187,43 @@ pub(super) fn check_recorded(mode: Mode, recorded: &Recorded, blocks: usize) -> 
         let range = format!("[0, {blocks}], the blocks of the recording");
         return invalid(&field, recorded.conditioning, range);
     }
+    for (k, facts) in recorded.presses.iter().enumerate() {
+        let field = |what: &str| format!("{name}.blocks[{k}].{what}");
+        let known = [("force_n", facts.force_n, FORCES), ("time_s", facts.time_s, TIMES)];
+        for (what, value, (least, most, range)) in known {
+            if let Some(value) = value.filter(|value| !(least..=most).contains(value)) {
+                return invalid(&field(what), value, range);
+            }
+        }
+        if let Some(pose) = facts.pose {
+            let length = pose.quaternion.iter().map(|part| part * part).sum::<f64>().sqrt();
+            if !(1.0 - 1e-3..=1.0 + 1e-3).contains(&length) {
+                return invalid(&field("pose.quaternion"), format!("{:?}", pose.quaternion), "those of length 1");
+            }
+            if let Some(place) = pose.position_m.iter().find(|place| !(-FARTHEST_M..=FARTHEST_M).contains(*place)) {
+                return invalid(&field("pose.position_m"), place, "[-1000, 1000] m");
+            }
+        }
+    }
     Ok(())
+}
+
+/// Valid forces and times of a block, and both as text. A time may lie before the block.
+const FORCES: (f64, f64, &str) = (0.0, 1e6, "[0, 1e6] N");
+const TIMES: (f64, f64, &str) = (-1e6, 1e6, "[-1e6, 1e6] s");
+/// Farthest place of a body, m.
+const FARTHEST_M: f64 = 1e3;
+
+/// Refuses a hold that is shorter than a frame of `recording`.
+pub(super) fn check_hold(hold_s: Option<[f64; 2]>, recording: &Recording) -> Result<(), Refusal> {
+    let frame_s = recording.measurements_per_frame() as f64 / recording.sample_rate_hz();
+    match hold_s {
+        Some([start_s, end_s]) if end_s - start_s < frame_s * (1.0 - 1e-6) => {
+            let range = format!("the spans of at least a frame, {frame_s} s");
+            invalid("hold_s", format!("[{start_s}, {end_s}]"), range)
+        }
+        _ => Ok(()),
+    }
 }
 
 fn shown(layout: &SkinLayout) -> String {

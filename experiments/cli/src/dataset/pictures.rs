@@ -7,12 +7,13 @@ use crate::options::{seed, whole};
 use clap::Args;
 use serde::Serialize;
 use spts::Refusal;
-use spts::output::check_writable;
+use spts::output::check_replaceable;
 use spts_contact::shapes::{SHAPE_FAMILIES, Shape, ShapeFamily};
 use spts_dataset::{Dataset, Label, Spec, spread_rows};
 use spts_report::dataset::{
     MOST_PREVIEW_ROWS, PREVIEW_COLUMNS, Preview, PreviewRow, drawn_shapes, save_preview, save_shapes,
 };
+use spts_report::figures::is_own_picture;
 use std::path::{Path, PathBuf};
 
 /// Draws rows of a data set: true pressure, raster image and samples of each.
@@ -100,7 +101,7 @@ impl PreviewCommand {
         };
         let name = &spec.config().name;
         let file = self.out.unwrap_or_else(|| PathBuf::from(format!("{name}-preview.png")));
-        check_writable(&file)?;
+        check_replaceable(&file, is_own_picture)?;
         let mut rows = Vec::new();
         let size = (spec.skin().rows(), spec.skin().cols());
         let each = |row| -> Result<(), Refusal> {
@@ -184,7 +185,7 @@ impl ShapesCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
         self.common.start()?;
         let families = self.chosen()?;
-        check_writable(&self.out)?;
+        check_replaceable(&self.out, is_own_picture)?;
         let shapes = drawn_shapes(&families, self.seed, self.count)?;
         save_shapes(&shapes, &self.out)?;
         let report = ShapesReport { file: self.out, shapes: shapes.iter().map(ShapeLine::of).collect() };

@@ -50,7 +50,8 @@ impl TrainedNetwork {
     /// # Errors
     /// [`Refusal`] if the file cannot be read, or holds no such network.
     pub fn open(path: &Path) -> Result<Self, Refusal> {
-        Self::parse(&spts_input::read(path, LARGEST)?, path)
+        let bytes = spts_input::read(path, LARGEST).map_err(Refusal::in_file(path))?;
+        Self::parse(&bytes, path)
     }
 
     fn parse(bytes: &[u8], path: &Path) -> Result<Self, Refusal> {
@@ -69,8 +70,8 @@ impl TrainedNetwork {
             }
             let shape = [file.count("rows")?, file.count("cols")?];
             let steps = file.count("unrolled")?;
-            let prior = file.values("prior")?;
             let taxels = shape[0].saturating_mul(shape[1]);
+            let prior = file.values("prior", &[taxels, taxels])?;
             let prior = Matrix::from_rows(taxels, taxels, prior.iter().map(|v| f64::from(*v)).collect())
                 .map_err(|e| format!("`prior`: {e}"))?;
             let step = |t: usize| -> Result<UnrolledStep, String> {
@@ -81,6 +82,10 @@ impl TrainedNetwork {
             };
             let steps: Vec<UnrolledStep> = (0..steps).map(step).collect::<Result<_, _>>()?;
             let output = file.layer("out.w", "out.b")?;
+            let (found, known) = (file.tensors.len(), 3 + 4 * steps.len());
+            if found != known {
+                return Err(format!("{found} tensors; a network with `unrolled` = {} has {known}", steps.len()));
+            }
             Ok((shape, UnrolledWeights::new(prior, file.number("noise_variance")?, steps, output)))
         };
         let (shape, weights) = read().map_err(failed)?;
@@ -123,14 +128,24 @@ impl File<'_> {
         found.ok_or_else(|| format!("`{field}` is {}, expected a whole number in [0, 10000]", self.told[field]))
     }
 
-    fn values(&self, name: &str) -> Result<Vec<f32>, String> {
+    /// The numbers of the tensor `name`, which has this shape.
+    fn values(&self, name: &str, shape: &[usize]) -> Result<Vec<f32>, String> {
         let tensor = self.tensors.tensor(name).map_err(|e| format!("`{name}`: {e}"))?;
+        if tensor.shape() != shape {
+            return Err(format!("`{name}` has the shape {:?}, expected {shape:?}", tensor.shape()));
+        }
         numbers(&tensor)
             .ok_or_else(|| format!("`{name}` has numbers of the type {:?}, expected F16 or F32", tensor.dtype()))
     }
 
+    /// A layer of inputs × outputs weights, and a bias for each output.
     fn layer(&self, weights: &str, bias: &str) -> Result<Layer, String> {
-        Ok(Layer::new(self.values(weights)?, self.values(bias)?))
+        let length = |name: &str, side: usize| -> Result<usize, String> {
+            let tensor = self.tensors.tensor(name).map_err(|e| format!("`{name}`: {e}"))?;
+            Ok(tensor.shape().get(side).copied().unwrap_or_default())
+        };
+        let (inputs, outputs) = (length(weights, 0)?, length(bias, 0)?);
+        Ok(Layer::new(self.values(weights, &[inputs, outputs])?, self.values(bias, &[outputs])?))
     }
 }
 
@@ -153,6 +168,26 @@ mod tests {
         assert_eq!(TrainedNetwork::shipped().shape, [10, 10]);
         let refused = TrainedNetwork::shipped().on([12, 20]).unwrap_err();
         assert!(refused.to_string().contains("the skin has 12 × 20"), "{refused}");
+    }
+
+    /// A transposed tensor has as many numbers, and so has a network that is said to have fewer steps.
+    #[test]
+    fn shapes_and_counts_of_weights_are_checked() {
+        for (from, to, said) in [
+            ("[450,160]", "[160,450]", "`steps.0.w1` has the shape [160, 450], expected [160, 160]"),
+            ("[148,100]", "[100,148]", "`out.w` has the shape [100, 148], expected [100, 100]"),
+            ("[100,100]", "[50,200]", "`prior` has the shape [50, 200], expected [100, 100]"),
+            ("\\\"unrolled\\\": 3", "\\\"unrolled\\\": 1", "15 tensors; a network with `unrolled` = 1 has 7"),
+        ] {
+            let header = 8 + usize::try_from(u64::from_le_bytes(SHIPPED[..8].try_into().unwrap())).unwrap();
+            let text = std::str::from_utf8(&SHIPPED[8..header]).unwrap();
+            let mut changed = text.replacen(from, to, 1);
+            assert!(changed != text, "{from} is not in {text}");
+            changed.extend(std::iter::repeat_n(' ', text.len() - changed.len()));
+            let bytes = [&SHIPPED[..8], changed.as_bytes(), &SHIPPED[header..]].concat();
+            let refused = TrainedNetwork::parse(&bytes, Path::new("w")).unwrap_err().to_string();
+            assert!(refused.contains(said), "{refused}");
+        }
     }
 
     #[test]

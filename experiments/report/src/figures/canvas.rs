@@ -14,7 +14,7 @@ use spts::output::{unwritable, write_bytes};
 use spts_eval::escape;
 use spts_input::Refusal;
 use std::fmt::Write as _;
-use std::io;
+use std::io::{self, Read as _};
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
@@ -373,8 +373,24 @@ pub fn encode_png(rgb: &[u8], width: usize, height: usize) -> io::Result<Vec<u8>
     encoder.set_color(ColorType::Rgb);
     encoder.set_deflate_compression(DeflateCompression::Level(EFFORT));
     encoder.set_filter(FILTER);
+    let [key, program] = MARK;
+    encoder.add_text_chunk(key.to_owned(), program.to_owned())?;
     encoder.write_header()?.write_image_data(rgb)?;
     Ok(bytes)
+}
+
+/// What our pictures say of themselves: keyword and text of a PNG.
+const MARK: [&str; 2] = ["Software", "spts"];
+/// Bytes at the beginning of a PNG in which the mark stands.
+const MARKED: u64 = 256;
+
+/// Whether the file at `path` is a picture that this program wrote, and that no other program has saved since.
+pub fn is_own_picture(path: &Path) -> bool {
+    let mut start = Vec::new();
+    let read =
+        spts_input::open(path, u64::MAX).is_ok_and(|(file, _)| file.take(MARKED).read_to_end(&mut start).is_ok());
+    let mark = ["tEXt", MARK[0], "\0", MARK[1]].concat();
+    read && start.windows(mark.len()).any(|window| window == mark.as_bytes())
 }
 
 /// A pixel index of a coordinate, clamped to `0..=limit`.

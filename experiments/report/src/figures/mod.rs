@@ -17,7 +17,7 @@ mod sheet;
 pub use bars::{
     Bar, BarChart, BarGroup, BarRow, Interval, IntervalChart, IntervalLine, IntervalPanel, save_bars, save_intervals,
 };
-pub use canvas::encode_png;
+pub use canvas::{encode_png, is_own_picture};
 pub use chart::{Chart, Claim, Curve, Plot, Series, StatedRange};
 pub use looks::{Stroke, Style, decoder_variant};
 pub use panel::save_charts;

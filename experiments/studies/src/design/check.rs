@@ -1,14 +1,14 @@
 //! Checks a design with other touches.
 
-use super::search::{Bench, draw, mean};
+use super::search::{Bench, TOUCHES, draw, mean};
 use super::wire::{BandRows, RowSource, bands};
-use super::{Design, DesignStudy, WireChoice};
+use super::{Design, DesignStudy, MOST_SIDE, WireChoice};
 use rand::RngExt as _;
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Profile, parse_patterns};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, Streams};
+use spts_models::{SkinLayout, Streams, within};
 use spts_recon::statistics::Band;
 
 /// A design, its files, and the seed of the check.
@@ -52,6 +52,57 @@ pub struct CheckReport {
     pub seed: u64,
 }
 
+/// Most repetitions of a design that is checked: more than any design has.
+const MOST_REPETITIONS: usize = 1000;
+/// Most measurements of a wire.
+const MOST_MEASUREMENTS: usize = 1 << 16;
+
+impl Design {
+    /// Checks that the numbers can be those of a design.
+    ///
+    /// # Errors
+    /// [`Refusal`] for the first one outside its range.
+    pub fn check(&self) -> Result<(), Refusal> {
+        let expected = &self.expected;
+        let touches = TOUCHES[usize::from(self.objects.seventeen)];
+        for (field, side) in [("rows", self.rows), ("cols", self.cols)] {
+            within(field, side as f64, 2.0, MOST_SIDE, "[2, 256]")?;
+        }
+        let counts = [
+            ("taxels", self.taxels, self.rows.saturating_mul(self.cols), self.rows.saturating_mul(self.cols)),
+            ("wires", self.wires, 1, self.rows),
+            ("m_per_wire", self.m_per_wire, 1, MOST_MEASUREMENTS),
+            ("decoder.places", self.decoder.places, 1, self.taxels),
+            ("expected.repetitions", expected.repetitions, 2, MOST_REPETITIONS),
+            ("expected.touches", expected.touches, touches, touches),
+        ];
+        for (field, value, least, most) in counts {
+            if !(least..=most).contains(&value) {
+                return Err(Refusal::range(field, value, format!("[{least}, {most}]")));
+            }
+        }
+        let period_s = self.wire.period_s;
+        if !(period_s > 0.0 && period_s <= 1.0) {
+            return Err(Refusal::range("wire.period_s", period_s, "(0, 1] s"));
+        }
+        let farthest = self.rows.max(self.cols) as f64;
+        let bands = [
+            ("expected.iou", Some(expected.iou), 1.0),
+            ("expected.place_px", Some(expected.place_px), farthest),
+            ("expected.place_mm", Some(expected.place_mm), 1e3 * farthest * self.pitch_m),
+            ("expected.class", expected.class, 1.0),
+        ];
+        for (field, band, most) in bands {
+            let Some(Band { mean, low, high }) = band else { continue };
+            if !(0.0 <= low && low <= mean && mean <= high && high <= 2.0 * most) {
+                let range = format!("0 ≤ low ≤ mean ≤ high ≤ {}", 2.0 * most);
+                return Err(Refusal::range(field, format!("{mean} ({low} to {high})"), range));
+            }
+        }
+        Ok(())
+    }
+}
+
 impl DesignCheck {
     /// Simulates the design with specimens of the skin, device parts, touches and noise other than those on which the
     /// promise is based, and with the same number of them.
@@ -62,10 +113,8 @@ impl DesignCheck {
         let design = &self.design;
         let layout = SkinLayout::new(design.rows, design.cols, design.pitch_m, design.electrode_m)?;
         let refused = |what: &str, reason: String| Refusal::new(format!("{what}: {reason}"));
+        design.check()?;
         let expected = &design.expected;
-        if design.wires == 0 || design.wires > design.rows || design.m_per_wire == 0 || expected.repetitions < 2 {
-            return Err(refused("design.json", "wires, measurements or repetitions are out of range".to_owned()));
-        }
         progress.stage("preparing", None);
         let study = DesignStudy {
             area_m: layout.extent_m(),
