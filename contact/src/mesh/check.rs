@@ -892,7 +892,7 @@ pub fn checked(raw: &TriMesh, options: impl Into<MeshOptions>, file: &str) -> Re
         move_m = [-0.5 * (low[0] + high[0]), -0.5 * (low[1] + high[1]), -low[2]];
         report.centred_by_m = Some([0, 1, 2].map(|k| move_m[k] - away_m[k]));
     }
-    if move_m != [0.0; 3] {
+    if is_far || centre {
         mesh = mesh.translated(move_m);
         report.open_below_m = report.open_below_m.map(|at| [0, 1, 2].map(|k| at[k] + move_m[k]));
     }

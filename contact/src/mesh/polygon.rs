@@ -243,7 +243,7 @@ fn clip_ears(points: &[Point], mut loop_: Vec<usize>) -> Vec<[usize; 3]> {
         };
         let turns_back = |k: &usize| {
             let [a, _, c] = corner(*k).map(|i| points[i]);
-            a == c
+            (a[0] - c[0]).hypot(a[1] - c[1]) <= 0.0
         };
         let ear = if let Some(tip) = (0..n).find(turns_back) {
             // there and back: it has no area, and both its sides would look like those of an ear
