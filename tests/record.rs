@@ -20,11 +20,12 @@ struct Device {
 
 impl Device {
     fn new() -> Self {
-        let end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        let end = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
         grantpt(&end).unwrap();
         unlockpt(&end).unwrap();
         let name = ptsname(&end, Vec::new()).unwrap();
-        let host = rustix::fs::open(name.as_c_str(), OFlags::RDWR | OFlags::NOCTTY, Mode::empty()).unwrap();
+        let host =
+            rustix::fs::open(name.as_c_str(), OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty()).unwrap();
         let mut settings = tcgetattr(&host).unwrap();
         settings.make_raw();
         tcsetattr(&host, OptionalActions::Now, &settings).unwrap();
@@ -169,7 +170,7 @@ fn bad_codes_and_short_blocks_are_missing_samples_and_said() {
     let said = said(&output);
     assert!(output.status.success(), "{said}");
     for words in [
-        "block 0: missing samples: 2 no code of [0, 1023], the first \"4x1\" at ",
+        "block 0: missing samples: 2 no code of [0, 1023], the first \"70000\" at 6",
         "block 1: missing samples: 17 that did not come, taken to be the last",
         "block 2 is left out: the device said \"what is this\"",
         "block 3 is left out: block 0 has `frame_position` = 20",

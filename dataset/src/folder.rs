@@ -213,7 +213,8 @@ impl Dataset {
         written.map(|()| made)
     }
 
-    /// Checks that those of the files `shards` that are there are as the manifest lists them, if the data set is finished.
+    /// Checks that those of the files `shards` that are there are as the manifest lists them, if the data set is
+    /// finished.
     pub(crate) fn check_whole(&self, shards: impl Iterator<Item = u64>) -> Result<(), Refusal> {
         let Some(manifest) = Manifest::read(&self.folder) else { return Ok(()) };
         for shard in shards {

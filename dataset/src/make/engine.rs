@@ -34,7 +34,7 @@ impl Moving {
                 Ok(moving) => return Ok(moving),
                 Err(last) if attempt == ATTEMPTS => {
                     return Err(Refusal::new(format!(
-                        "none of {ATTEMPTS} poses can be pressed or dropped; the last: {last}"
+                        "`pose`: none of {ATTEMPTS} poses can be pressed or dropped; the last: {last}"
                     )));
                 }
                 Err(_) => {}

@@ -168,7 +168,9 @@ impl Field {
             }
         }
         match failure {
-            Some(last) => Err(Refusal::new(format!("none of {ATTEMPTS} poses has an equilibrium; the last: {last}"))),
+            Some(last) => {
+                Err(Refusal::new(format!("`pose`: none of {ATTEMPTS} poses has an equilibrium; the last: {last}")))
+            }
             None => Ok(None),
         }
     }

@@ -60,7 +60,8 @@ pub(super) struct RecordCommand {
     /// Number of blocks at the beginning that only condition the skin and are not scored; fewer than --blocks
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<u64>(0..=MOST_BLOCKS))]
     conditioning: u64,
-    /// Number of frames at the start of every block in which nothing touches the skin; at most those before the hold, [0, 1000]
+    /// Number of frames at the start of every block in which nothing touches the skin; [0, 1000], and not beyond the
+    /// first frame of --hold
     #[arg(long, value_name = "N", default_value_t = 150, value_parser = whole::<u64>(0..=1000))]
     idle: u64,
     /// First frame of every block in which the object is held, and the frame after the last; each [0, 999]
@@ -288,7 +289,8 @@ impl RecordCommand {
         }
     }
 
-    /// Root mean square of the first frame of the hold about the mean of the idle part, V, of the samples that are there.
+    /// Root mean square of the first frame of the hold about the mean of the idle part, V, of the samples that are
+    /// there.
     fn signal_v(&self, volts: &[f64], frame: usize, first: usize) -> Option<f64> {
         let mean = |values: &mut dyn Iterator<Item = f64>| {
             let (mut sum, mut count) = (0.0, 0.0);

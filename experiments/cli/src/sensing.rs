@@ -1,6 +1,6 @@
 //! `spts sensing`: rows of the sensing matrix that are designed.
 
-use crate::context::{Bars, Common, open_folder};
+use crate::context::{Bars, Common, note, open_folder};
 use crate::error::CliError;
 use crate::options::{seed, whole, within};
 use clap::builder::PossibleValuesParser;
@@ -41,6 +41,8 @@ impl SensingCommand {
 
 /// Most rows and columns of a skin.
 const MOST: usize = 1024;
+/// Rows × taxels² beyond which a design is said to take long: half a minute or so.
+const LONG: usize = 1 << 28;
 
 /// Rows and columns of a skin.
 fn skin(text: &str) -> Result<[usize; 2], String> {
@@ -152,6 +154,12 @@ impl DesignCommand {
             fewest_flips: self.fewest_flips,
             seed: self.seed,
         };
+        let (taxels, rows) = (design.layout.taxels(), design.rows);
+        if taxels.saturating_mul(taxels).saturating_mul(rows) > LONG {
+            note(&format!(
+                "note: {rows} rows for {taxels} taxels may take minutes or hours; fewer of either take less"
+            ));
+        }
         let bars = Bars::default();
         bars.stage("designing", None);
         let report = design.run()?;

@@ -169,12 +169,14 @@ pub struct Host<'a, P> {
     stop: &'a dyn Fn() -> bool,
     /// What has arrived behind the last whole line.
     waiting: Vec<u8>,
-    /// Beginning of a line that is too long to be one.
+    /// Whether the next line is the rest of one that was too long.
     skipped: bool,
 }
 
 /// Longest line that is read before the blocks, bytes: the rest of a block of a device that runs already.
 const GREETING: usize = 1 << 20;
+/// Most lines of greetings in the place of a block.
+const GREETINGS: usize = 20;
 /// Most characters of an answer that an error shows.
 const SHOWN: usize = 40;
 /// Most bytes of a field, with its comma.
@@ -234,7 +236,7 @@ impl<'a, P: Read + Write> Host<'a, P> {
     pub fn block(&mut self, measurements: usize, max_code: u32) -> Result<Heard, Refusal> {
         let most = measurements.saturating_add(1).saturating_mul(FIELD);
         let patience = self.patience;
-        loop {
+        for _ in 0..GREETINGS {
             let line = match self.line(most, &|quiet| quiet >= patience).map_err(|error| ended(&error, &self.part()))? {
                 Line::Whole(line) => line,
                 Line::TooLong => return Ok(Heard::Unusable(format!("more than {most} bytes without a line end"))),
@@ -249,6 +251,7 @@ impl<'a, P: Read + Write> Host<'a, P> {
                 return Ok(block_of(&line, measurements, max_code));
             }
         }
+        Ok(Heard::Unusable("the device greets again and again".to_owned()))
     }
 
     /// How much of a block has arrived.
@@ -286,19 +289,17 @@ impl<'a, P: Read + Write> Host<'a, P> {
             if let Some(found) = self.waiting[searched..].iter().position(|byte| matches!(byte, b'\n' | b'\r')) {
                 let line: Vec<u8> = self.waiting.drain(..=searched + found).collect();
                 searched = 0;
-                if std::mem::take(&mut self.skipped) {
-                    return Ok(Line::TooLong);
-                }
                 let line = String::from_utf8_lossy(&line);
-                if line.trim().is_empty() {
+                if std::mem::take(&mut self.skipped) || line.trim().is_empty() {
                     continue;
                 }
                 return Ok(Line::Whole(line.trim_end_matches(['\r', '\n']).to_owned()));
             }
             searched = self.waiting.len();
             if searched > most {
-                (self.skipped, searched) = (true, 0);
+                self.skipped = true;
                 self.waiting.clear();
+                return Ok(Line::TooLong);
             }
             if (self.stop)() {
                 return Ok(Line::Stopped);
@@ -310,7 +311,10 @@ impl<'a, P: Read + Write> Host<'a, P> {
                 Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
                 Ok(count) => {
                     self.waiting.extend_from_slice(&piece[..count]);
-                    heard = Instant::now();
+                    // line ends alone say nothing
+                    if !piece[..count].trim_ascii().is_empty() {
+                        heard = Instant::now();
+                    }
                 }
                 Err(error) => match error.kind() {
                     io::ErrorKind::Interrupted | io::ErrorKind::TimedOut | io::ErrorKind::WouldBlock => {}
@@ -491,6 +495,8 @@ mod tests {
             ("x,1,2, \r\n", "\"x\"; a number of frames"),
             ("hello\n", "\"hello\"; a block"),
             (&format!("{}\n", "7".repeat(10_000)), "more than 96 bytes"),
+            (&"7".repeat(10_000), "more than 96 bytes"),
+            (&"Sending.\n".repeat(1000), "greets again and again"),
         ] {
             let Heard::Unusable(said) = heard(text).unwrap() else { panic!("{text:.20}") };
             assert!(said.contains(reason), "{text:.20}: {said}");

@@ -62,7 +62,8 @@ impl AtomicFile {
         Ok(Self { buffer, temporary, path: path.to_owned(), _entry: entry })
     }
 
-    /// Cuts the file off after `length` bytes, of which the first become `start`. What has not reached the file is lost.
+    /// Cuts the file off after `length` bytes, of which the first become `start`. What has not reached the file is
+    /// lost.
     fn cut(self, length: u64, start: &[u8]) -> Result<Self, Refusal> {
         let failed = unwritable(&self.path);
         // bytes that a full disk did not take would be tried again
