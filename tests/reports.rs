@@ -10,6 +10,8 @@ use std::path::Path;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Cases {
+    /// Words that stand for others.
+    short: BTreeMap<String, String>,
     case: Vec<Case>,
 }
 
@@ -36,9 +38,10 @@ struct Case {
 
 impl Case {
     /// What is not as it has to be.
-    fn faults(&self, folder: &Path) -> Vec<String> {
+    fn faults(&self, short: &BTreeMap<String, String>, folder: &Path) -> Vec<String> {
         let out = tempfile::tempdir().expect("a folder for results");
-        let line = self.run.replace("OUT", &out.path().join("out").to_string_lossy());
+        let line = short.iter().fold(self.run.clone(), |run, (word, long)| run.replace(word, long));
+        let line = line.replace("OUT", &out.path().join("out").to_string_lossy());
         let words = shlex::split(&line).expect("`run` is as a shell would have it");
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         let output = spts(folder, &words);
@@ -72,6 +75,6 @@ fn what_people_bring_is_read_right_or_refused_with_a_reason() {
     let text = std::fs::read_to_string(folder.join("cases.toml")).unwrap();
     let cases: Cases = toml::from_str(&text).unwrap();
     assert!(!cases.case.is_empty());
-    let faults: Vec<String> = cases.case.iter().flat_map(|case| case.faults(&folder)).collect();
+    let faults: Vec<String> = cases.case.iter().flat_map(|case| case.faults(&cases.short, &folder)).collect();
     assert!(faults.is_empty(), "{}", faults.join("\n"));
 }

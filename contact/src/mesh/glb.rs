@@ -9,7 +9,7 @@ use gltf::json::buffer::View;
 use gltf::json::mesh::{Mode, Primitive};
 use gltf::json::skin::Skin;
 use gltf::json::validation::{Checked, USize64};
-use gltf::json::{Index, Node, Root};
+use gltf::json::{Index, Node, Root, Value};
 use gltf::scene::Transform;
 use nalgebra::{Matrix4, Vector4};
 use std::borrow::Cow;
@@ -424,8 +424,30 @@ impl<'g> Elements<'g> {
                 };
                 *to = element(value);
             }
+            if !accessor.normalized {
+                self.check_span(&out)?;
+            }
         }
         Ok(out)
+    }
+
+    /// Refuses a sparse accessor whose elements are not in the span that it declares for each of their numbers, to a
+    /// thousandth of it: exporters have taken differences for values.
+    fn check_span<const N: usize>(&self, elements: &[[f64; N]]) -> Result<(), MeshError> {
+        let (glb, accessor, at) = (self.glb, self.accessor, self.at.value());
+        let bound = |declared: &Option<Value>, k: usize| declared.as_ref()?.get(k)?.as_f64();
+        for k in 0..N {
+            let (Some(low), Some(high)) = (bound(&accessor.min, k), bound(&accessor.max, k)) else { continue };
+            let margin = 1e-3 * (high - low).abs();
+            if let Some(e) = elements.iter().find(|e| !(low - margin..=high + margin).contains(&e[k])) {
+                return Err(glb.malformed(format_args!(
+                    "the sparse accessor {at} declares [{low}, {high}] for number {k} of its elements, and one has {}: \
+                     export it without sparse accessors",
+                    e[k]
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// The bytes of `count` elements of `size` bytes each.
