@@ -2,7 +2,8 @@
 
 use crate::converter::Converter;
 use crate::weights::{Mode, WeightRows, Weights};
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 use spts_input::Refusal;
 use spts_models::SkinLayout;
 use std::ops::Range;
@@ -20,7 +21,8 @@ use std::ops::Range;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordingInfo {
-    /// Layout of the recorded skin.
+    /// Layout of the recorded skin. In files `electrode_m` may be left out.
+    #[serde(deserialize_with = "told_layout")]
     pub layout: SkinLayout,
     /// Weights that the cells were meant to put out, one for each taxel. They also determine the readout: raster
     /// weights mean a raster scan.
@@ -32,6 +34,21 @@ pub struct RecordingInfo {
     /// Scale of the converter; `None` if no converter acted or its scale is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub converter: Option<Converter>,
+}
+
+/// A layout whose rows, columns and pitch are told: a recording has no usual ones.
+fn told_layout<'de, D: Deserializer<'de>>(from: D) -> Result<SkinLayout, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Told {
+        rows: usize,
+        cols: usize,
+        pitch_m: f64,
+        electrode_m: Option<f64>,
+    }
+    let Told { rows, cols, pitch_m, electrode_m } = Told::deserialize(from)?;
+    let electrode_m = electrode_m.unwrap_or(SkinLayout::usual_electrode_m(pitch_m));
+    SkinLayout::new(rows, cols, pitch_m, electrode_m).map_err(D::Error::custom)
 }
 
 impl RecordingInfo {

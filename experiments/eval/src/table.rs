@@ -71,7 +71,7 @@ pub enum Cell {
     Bool(bool),
     /// A whole number.
     Whole(i128),
-    /// A number; one that is not finite is a dash for readers.
+    /// A number; one that is not finite is [`Cell::Unknown`].
     Number(f64),
     /// Words.
     Text(String),
@@ -206,7 +206,11 @@ impl<'a, R: Copy> Table<'a, R> {
         let header: Vec<&str> = self.in_files().map(|(key, _)| key).collect();
         let mut file = CsvFile::create(path, &header)?;
         for row in &self.rows {
-            let cells: Vec<Cell> = self.in_files().map(|(_, column)| (column.value)(*row)).collect();
+            let known = |cell| match cell {
+                Cell::Number(value) if !value.is_finite() => Cell::Unknown,
+                known => known,
+            };
+            let cells: Vec<Cell> = self.in_files().map(|(_, column)| known((column.value)(*row))).collect();
             file.push(cells)?;
         }
         file.finish()
@@ -416,7 +420,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         table.write_csv(&dir.path().join("t.csv")).unwrap();
         let csv = std::fs::read_to_string(dir.path().join("t.csv")).unwrap();
-        assert_eq!(csv, "id,share,good,words\n1,0.30000000000000004,true,\"a,b\"\n2,NaN,false,\n");
+        assert_eq!(csv, "id,share,good,words\n1,0.30000000000000004,true,\"a,b\"\n2,,false,\n");
         let json = serde_json::to_string(&table).unwrap();
         let first = r#"{"id":1,"share":0.30000000000000004,"good":true,"words":"a,b"}"#;
         assert_eq!(json, format!(r#"[{first},{{"id":2,"share":null,"good":false,"words":""}}]"#));

@@ -264,6 +264,7 @@ compressive_codes.npy | gone.npy | gone.npy
 "frames": 10 | "frames": 11 | expected [1, 11, 8]
 "frame_position": 10 | "frame_position": 9 | `frame_position` = 9, outside [10, ∞)
 "rows": 2 | "rows": 3 | 12
+"rows": 2, |  | missing field `rows`
 "#,
     ) {
         assert!(text.contains(from), "{from} in {text}");
