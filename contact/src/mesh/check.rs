@@ -857,13 +857,17 @@ pub fn checked(raw: &TriMesh, options: impl Into<MeshOptions>, file: &str) -> Re
         if closed.volume_m3() < least_m3 { Err(Broken::Sheet(sides_m)) } else { Ok(mended) }
     });
     let mended = match mended {
-        Ok(mended) => {
+        // a lid is no part of a mesh that is to be pressed as it is
+        Ok(mended) if !(as_is && mended.lids > 0) => {
             mesh = closed;
             mended
         }
-        Err(broken) => {
+        unmended => {
             let open_below = mesh.edge_open_below();
-            if !as_is && (open_below.is_some() || matches!(broken, Broken::Sheet(_))) {
+            if let Err(broken) = unmended
+                && !as_is
+                && (open_below.is_some() || matches!(broken, Broken::Sheet(_)))
+            {
                 let broken = if mesh.is_flat() { Broken::Sheet(mesh.sides_m()) } else { broken };
                 return Err(broken.error(scale, away_m, file));
             }
