@@ -322,7 +322,7 @@ impl PressConfig {
                 ];
                 if let Some((field, _)) = given.into_iter().find(|(_, given)| *given) {
                     return Err(Refusal::new(format!(
-                        "`press.{field}` is for a mesh, and `press.object` = \"{name}\" has its own; leave `{field}` out"
+                        "`press.{field}` is for a mesh, and `press.object` = \"{name}\" has its own size and place; leave it out"
                     )));
                 }
                 let Some(object) = pressable().find(|object| object.name == name) else {
