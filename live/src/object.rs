@@ -147,8 +147,8 @@ const MOST_NAME: usize = 120;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum MeshUnit {
-    /// The one in which it is as large as a thing: metres for GLB, else millimetres, else the first usual one that
-    /// fits.
+    /// The one in which it is as large as a thing: metres for GLB, else millimetres, else the most plausible of the
+    /// usual ones.
     #[default]
     Guess,
     /// Millimetres.

@@ -857,13 +857,17 @@ pub fn checked(raw: &TriMesh, options: impl Into<MeshOptions>, file: &str) -> Re
         if closed.volume_m3() < least_m3 { Err(Broken::Sheet(sides_m)) } else { Ok(mended) }
     });
     let mended = match mended {
-        Ok(mended) => {
+        // a lid is no part of a mesh that is to be pressed as it is
+        Ok(mended) if !(as_is && mended.lids > 0) => {
             mesh = closed;
             mended
         }
-        Err(broken) => {
+        unmended => {
             let open_below = mesh.edge_open_below();
-            if !as_is && (open_below.is_some() || matches!(broken, Broken::Sheet(_))) {
+            if let Err(broken) = unmended
+                && !as_is
+                && (open_below.is_some() || matches!(broken, Broken::Sheet(_)))
+            {
                 let broken = if mesh.is_flat() { Broken::Sheet(mesh.sides_m()) } else { broken };
                 return Err(broken.error(scale, away_m, file));
             }
@@ -1022,14 +1026,13 @@ fn fits(extent_m: f64) -> bool {
     (MIN_EXTENT_M..=MAX_EXTENT_M).contains(&extent_m)
 }
 
-/// The usual units in which an object of `raw_extent` units may press on a skin, the most probable first: the one that
-/// makes its size nearest to a tenth of a metre.
+/// The usual units in which an object of `raw_extent` units may press on a skin, those first that make it as large as
+/// things that are held.
 fn fitting_units(raw_extent: f64) -> Vec<(&'static str, f64)> {
     let units =
-        [("metres", 1.0), ("millimetres", 1e-3), ("centimetres", 1e-2), ("inches", 25.4e-3), ("micrometres", 1e-6)];
+        [("metres", 1.0), ("millimetres", 1e-3), ("inches", 25.4e-3), ("centimetres", 1e-2), ("micrometres", 1e-6)];
     let mut fitting: Vec<_> = units.into_iter().filter(|(_, scale)| fits(raw_extent * scale)).collect();
-    let distance = |scale: f64| (raw_extent * scale / 0.1).ln().abs();
-    fitting.sort_by(|(_, a), (_, b)| distance(*a).total_cmp(&distance(*b)));
+    fitting.sort_by_key(|(_, scale)| !(0.01..=0.5).contains(&(raw_extent * scale)));
     fitting
 }
 

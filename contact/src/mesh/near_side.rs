@@ -12,8 +12,8 @@ const MAX_TRIED: usize = 30_000_000;
 const COVERED_FRACTION: f64 = 1e-6;
 
 impl TriMesh {
-    /// The lowest edge of one triangle that is seen from below: a body whose surface ends there may be felt beyond it. `None`
-    /// if other triangles lie below all of them, so that no hole changes what touches a skin below.
+    /// The lowest edge of one triangle that is seen from below: a body whose surface ends there may be felt beyond it.
+    /// `None` if other triangles lie below all such edges, so that no hole changes what touches a skin below.
     pub(super) fn edge_open_below(&self) -> Option<[u32; 2]> {
         let margin_m = COVERED_FRACTION * self.extent_m();
         let boxed = |t: usize| {

@@ -322,7 +322,7 @@ impl PressConfig {
                 ];
                 if let Some((field, _)) = given.into_iter().find(|(_, given)| *given) {
                     return Err(Refusal::new(format!(
-                        "`press.{field}` is for a mesh, and `press.object` = \"{name}\" has its own; leave `{field}` out"
+                        "`press.{field}` is for a mesh, and `press.object` = \"{name}\" has its own size and place; leave it out"
                     )));
                 }
                 let Some(object) = pressable().find(|object| object.name == name) else {
@@ -431,15 +431,14 @@ impl PressConfig {
             format!("[{}, {}]", mm(report.middle_m[k] - half_m), mm(report.middle_m[k] + half_m))
         });
         let (row, col) = (self.row.unwrap_or_default(), self.col.unwrap_or_default());
+        let off = (0..2).any(|k| report.middle_m[k].abs() > 0.5 * report.extent_m[k]);
         let thin = report.extent_m[0].min(report.extent_m[1]) < 2.0 * square_m;
-        let way = match (thin, self.centre) {
-            (true, _) => {
+        let way = match (off, thin) {
+            (true, _) => "`--centre` (`press.centre = true`) puts the middle of its footprint there".to_owned(),
+            (false, true) => {
                 format!("it is thin for contact squares of {} mm: take more, such as `--cells 24`", mm(square_m))
             }
-            (false, Some(true)) => {
-                "nothing of it is over the skin there: choose another `--row` and `--col`".to_owned()
-            }
-            _ => "`--centre` (`press.centre = true`) puts the middle of its footprint there".to_owned(),
+            (false, false) => "nothing of it is over the skin there: choose another `--row` and `--col`".to_owned(),
         };
         Refusal::new(format!(
             "`press.mesh`: the mesh lies beside the skin: its box is x = {x}, y = {y} mm from its origin, which is held \
@@ -577,7 +576,7 @@ impl DropConfig {
 #[cfg(test)]
 mod tests {
     use crate::mechanics::Mechanics;
-    use spts_contact::mesh::TriMesh;
+    use spts_contact::mesh::{TriMesh, cuboid};
 
     /// A bowl that opens upward: pressed upright and with a small tilt, refused when it leans by more than 5°, be it by
     /// two tilts that are small each or by the scatter. A closed mesh may lean as it likes.
@@ -616,6 +615,40 @@ mod tests {
             }
             assert!(press("cone", tilt_deg, sd).is_ok());
         }
+        std::fs::remove_dir_all(dir).unwrap();
+    }
+
+    /// What lies beside the skin is told with its place and the way on; what is open below is pressed if asked.
+    #[test]
+    fn a_way_on_for_meshes_beside_the_skin_and_open_ones() {
+        let dir = std::env::temp_dir().join(format!("spts-way-on-{}", std::process::id()));
+        std::fs::create_dir_all(&dir).unwrap();
+        let block = cuboid([0.04, 0.06, 0.02]);
+        let open = block.triangles.iter().filter(|t| t.iter().any(|i| block.vertices[**i as usize][2] > 0.0));
+        let open = TriMesh { vertices: block.vertices.clone(), triangles: open.copied().collect() };
+        let thin = cuboid([0.04, 0.001, 0.02]);
+        for (name, mesh) in [("far", block.clone().translated([0.5, 0.4, 3.0])), ("open", open), ("thin", thin)] {
+            std::fs::write(dir.join(format!("{name}.obj")), mesh.to_obj(name)).unwrap();
+        }
+        let press = |mesh: &str, more: &str| {
+            Mechanics::from_toml(&format!("[press]\nmesh = \"{mesh}.obj\"\nforce_n = 2.0\n{more}"), &dir)
+        };
+        for (mesh, way, words) in [
+            ("far", "centre = true", &["x = [480, 520], y = [370, 430] mm", "`--centre`"][..]),
+            ("open", "repair = \"near_side\"", &["not closed", "`--as-is`"]),
+            ("thin", "[contact]\ncells_per_taxel = 24", &["squares of 2.5 mm", "`--cells 24`"]),
+        ] {
+            let said = press(mesh, "").unwrap_err().to_string();
+            for word in words {
+                assert!(said.contains(word), "{said} lacks {word}");
+            }
+            assert!(press(mesh, way).is_ok(), "{mesh}: {:?}", press(mesh, way).err());
+        }
+        // over the place, as if it had been drawn there
+        let (low, high) = press("far", "centre = true").unwrap().mesh().bounds().unwrap();
+        assert!(low[2].abs() < 1e-9 && (low[0] + high[0]).abs() < 1e-9 && (low[1] + high[1]).abs() < 1e-9);
+        let said = Mechanics::from_toml("[press]\nobject = \"T\"\ncentre = true", &dir).unwrap_err().to_string();
+        assert!(said.contains("`press.centre` is for a mesh"), "{said}");
         std::fs::remove_dir_all(dir).unwrap();
     }
 }
