@@ -67,23 +67,22 @@ impl Faces {
     /// A face of corners such as `3/1/2`, of which only the vertex counts.
     fn push<'t>(
         &mut self,
-        words: impl Iterator<Item = &'t str>,
+        words: impl Iterator<Item = &'t str> + Clone,
         line: usize,
         seen: usize,
         file: &str,
     ) -> Result<(), MeshError> {
-        let before = self.corners.len();
+        self.triangles += words.clone().count().saturating_sub(2).max(1);
+        within_budget(0, self.triangles, file)?;
         for word in words {
             let number = word.split('/').next().unwrap_or(word);
-            within_budget(0, self.triangles + (self.corners.len() - before).saturating_sub(1), file)?;
             self.corners.push(number.parse().map_err(|_| {
                 let hint = if word.contains(',') { "; write spaces between corners, not commas" } else { "" };
                 malformed(file, format_args!("line {line}: `{}` is not a whole number{hint}", start(word)))
             })?);
         }
-        self.triangles += (self.corners.len() - before).saturating_sub(2).max(1);
         self.faces.push((line, seen, self.corners.len()));
-        within_budget(0, self.triangles, file)
+        Ok(())
     }
 
     /// Cuts the faces into triangles, now that all vertices are known.
