@@ -624,7 +624,7 @@ mod tests {
         let dir = std::env::temp_dir().join(format!("spts-way-on-{}", std::process::id()));
         std::fs::create_dir_all(&dir).unwrap();
         let block = cuboid([0.04, 0.06, 0.02]);
-        let open = block.triangles.iter().filter(|t| t.iter().any(|i| block.vertices[**i as usize][2] > 0.0));
+        let open = block.triangles.iter().filter(|t| t.iter().any(|i| block.vertices[*i as usize][2] > 0.0));
         let open = TriMesh { vertices: block.vertices.clone(), triangles: open.copied().collect() };
         let thin = cuboid([0.04, 0.001, 0.02]);
         for (name, mesh) in [("far", block.clone().translated([0.5, 0.4, 3.0])), ("open", open), ("thin", thin)] {
