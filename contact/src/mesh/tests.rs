@@ -1121,7 +1121,8 @@ fn glb_modes_and_accessors() {
     let (mesh, _) = glb(r#""count":8,"#, &sparse(0)).unwrap();
     assert_relative_eq!(mesh.volume_m3(), 24e-6, max_relative = 1e-6);
     refuses(glb(r#""count":8,"#, &sparse(9)), &["changes 9 of 8"]);
-    let declared = format!(r#""min":[0,0,0],"max":[0.001,0.001,0.001],{}"#, sparse(0));
-    refuses(glb(r#""count":8,"#, &declared), &["sparse accessor 0 declares [0, 0.001]"]);
+    // a vertex outside the span that the accessor declares
+    let declared = format!(r#"{}"type":"VEC3","min":[1,"#, sparse(0));
+    refuses(glb(r#""count":8,"type":"VEC3","min":["#, &declared), &["the sparse accessor 0 declares [1, "]);
     refuses(glb(r#""bufferView":0,"componentType":5126"#, r#""componentType":5126"#), &["0 triangles"]);
 }

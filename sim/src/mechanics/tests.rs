@@ -47,7 +47,7 @@ const BAD_SCENES: &str = r#"
 typo = 1 ; [drop] => unknown field `typo`
 [press] ; object = "T" ; force_n = -1.0 => press.force_n | -1 | [0.5, 100] N
 [press] ; object = "T" ; force_n = nan => press.force_n | NaN
-[press] ; object = "T" ; force_n = "x" => invalid type
+[press] ; object = "T" ; force_n = "x" => `press.force_n` = "x": a number is needed
 [press] ; object = "T" ; presses = 0 => press.presses | [1, 100000]
 [press] ; object = "T" ; lift_s = 0.5 => no plateau | `press.onset_s` = 0.35 | `press.onset_spread_s` = 0.015 |
     `press.rise_s` = 0.205 | from 0.786 s | `press.lift_s` = 0.5 | `press.lift_spread_s` = 0.04 | until 0.430 s

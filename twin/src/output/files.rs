@@ -279,6 +279,7 @@ impl<T: NpyValue> NpyFile<T> {
     }
 
     /// As [`NpyFile::finish`], with `entries` in place of the first side of the shape. Values behind them are dropped.
+    /// Where the disk takes no more, all of the entries have to be on it, as after a [`NpyFile::flush`].
     pub(crate) fn finish_with(mut self, entries: usize) -> Result<(), Refusal> {
         let values: usize = self.shape.iter().skip(1).product::<usize>() * entries;
         if self.shape.first() == Some(&entries) || values > self.written {
@@ -294,6 +295,8 @@ impl<T: NpyValue> NpyFile<T> {
         header.splice(end..end, vec![b' '; blanks]);
         header[8..10].copy_from_slice(&self.header[8..10]);
         let bytes = header.len() as u64 + (values * size_of::<T>()) as u64;
+        // what a full disk does not take is dropped
+        let _ = self.flush();
         self.file.cut(bytes, &header)?.finish()
     }
 
