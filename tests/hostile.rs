@@ -645,7 +645,7 @@ fn published_recordings() {
     for (content, fact) in [
         (Vec::new(), "ends after 0 bytes"),
         (truncated, "not a readable MATLAB v5 file"),
-        (hdf5, "not a readable MATLAB v5 file"),
+        (hdf5, "a MATLAB v7.3 file (HDF5)"),
         (b"a,b\n1,2\n".to_vec(), "not a readable MATLAB v5 file"),
         (of_struct, "`C` is a struct"),
         (renamed, "`D` is a struct"),

@@ -1,5 +1,5 @@
-//! Problems that people had with their own files, here and in neighbouring projects: each is an input in `tests/reports`
-//! and a case in `tests/reports/cases.toml`.
+//! Problems that people had with their own files, here and in neighbouring projects: each is an input in
+//! `tests/reports` and a case in `tests/reports/cases.toml`.
 
 use crate::command::spts;
 use serde::Deserialize;

@@ -47,8 +47,8 @@ pub struct LiveConfig {
     pub host: IpAddr,
     /// Its port; 0 for any free one.
     pub port: u16,
-    /// What a browser has to know, 16 to 128 letters, digits, - and _; `None`: nothing, but it has to be on this machine
-    /// and ask for this port.
+    /// What a browser has to know, 16 to 128 letters, digits, - and _; `None`: nothing, but it has to be on this
+    /// machine and ask for this port.
     pub token: Option<String>,
     /// Which specimen of the skin it is, and its noise.
     pub seed: u64,

@@ -64,7 +64,7 @@ typo = 1 ; [drop] => unknown field `typo`
 [press] ; object = "T" ; scale = 2.0 => press.scale | is for a mesh | "T"
 chosen_for_tolerance = nan ; [drop] => `chosen_for_tolerance` = NaN | (0, 1]
 seed = 9223372036854775809 ; [drop] => 9223372036854775809
-skin.pitch_m = 1e308 ; [press] ; object = "T" => `pitch_m` = 1e308 | [1e-6, 1] m
+skin.pitch_m = 1e308 ; [press] ; object = "T" => `skin.pitch_m` = 1e308 | [1e-6, 1] m
 [press] ; object = "T" ; position_m = [0.0, 9.0] => `press.position_m`: y = 9 is outside [-0.1425, 0.1425] m
 [drop] ; position_m = [nan, 0.0] => `drop.position_m`: x = NaN is outside [-0.1425, 0.1425] m
 [drop] ; position_share = [0.0, 2] => `drop.position_share (y)` = 2  | [-1, 1]

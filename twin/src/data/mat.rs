@@ -1,5 +1,5 @@
-//! Variables of a MATLAB v5 file, which MATLAB's `save` writes with `-v6` or `-v7`. Its elements are decompressed and found first, so that nothing is converted that
-//! would not fit.
+//! Variables of a MATLAB v5 file, which MATLAB's `save` writes with `-v6` or `-v7`. Its elements are decompressed and
+//! found first, so that nothing is converted that would not fit.
 
 use flate2::read::ZlibDecoder;
 use spts_input::Refusal;
@@ -81,9 +81,10 @@ pub(super) fn not_mat(path: &Path, reason: &str) -> Refusal {
 
 /// What the file is, if it is of another format that MATLAB or Octave write.
 ///
-/// Sources: MathWorks, *MAT-File Format*, "Level 5" (the last two bytes of the header tell the byte order) and "Level 4"
-/// (it begins with the number 1000 M + 10 P + T, M the byte order, P ≤ 5 the type and T ≤ 2 the kind of the matrix, and
-/// has no text); HDF5 File Format Specification, II.A: the signature is at 0, 512, or twice that over and over.
+/// Sources: MathWorks, *MAT-File Format*, "Level 5" (the last two bytes of the header tell the byte order) and
+/// "Level 4" (it begins with the number 1000 M + 10 P + T, M the byte order, P ≤ 5 the type and T ≤ 2 the kind of the
+/// matrix, and has no text); HDF5 File Format Specification, II.A: the signature is at 0, 512, or twice that again and
+/// again.
 fn other_format(file: &[u8]) -> Option<&'static str> {
     let hdf5 = |at: usize| file.get(at..).is_some_and(|rest| rest.starts_with(b"\x89HDF\r\n\x1a\n"));
     if hdf5(0) || (9..20).any(|k| hdf5(1 << k)) || file.starts_with(b"MATLAB 7.3") {
