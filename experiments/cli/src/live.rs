@@ -34,7 +34,7 @@ pub(super) struct LiveCommand {
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     host: IpAddr,
     /// Let in who knows TOKEN, 16 to 128 letters, digits, - and _, under any name and port; without TOKEN a random one
-    /// is made
+    /// is made [default: none at 127.0.0.1 and ::1, a random one at other addresses]
     #[arg(long, value_name = "TOKEN", num_args = 0..=1, default_missing_value = "")]
     token: Option<String>,
     /// Port of the address; 0 for any free one
