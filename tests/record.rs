@@ -109,7 +109,7 @@ fn what_came_before_the_end_is_a_session() {
         let output = child.wait_with_output().unwrap();
         let said = said(&output);
         assert_eq!(output.status.code(), Some(status), "{end}: {said}");
-        assert!(said.contains(reason) && said.contains("the 2 blocks before are in rec"), "{end}: {said}");
+        assert!(said.contains(reason) && said.contains("of the blocks before, 2 are in rec"), "{end}: {said}");
         assert!(status != 2 || said.contains("serial port /dev/pts/"), "{end}: {said}");
         assert_eq!(blocks(dir.path()), 2, "{end}");
         succeeds(dir.path(), &["decode", "rec"]);

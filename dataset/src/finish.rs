@@ -9,7 +9,7 @@ use arrow_array::cast::AsArray as _;
 use serde::Serialize;
 use serde_json::{Value, json};
 use spts::Refusal;
-use spts::output::{Manifest, is_temporary, not_ours, remove_left, unwritable, write_bytes};
+use spts::output::{Manifest, is_temporary, json_text, not_ours, remove_left, write_bytes};
 use spts::progress::Progress;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -55,9 +55,9 @@ impl Dataset {
         let described = [HEAD_FILE, SPEC_FILE, STATISTICS_FILE, CARD_FILE, CROISSANT_FILE].map(str::to_owned);
         let listed: Vec<String> = names.iter().map(|name| format!("{DATA_FOLDER}/{name}")).collect();
         let texts = [
-            (STATISTICS_FILE, text_of(&at(STATISTICS_FILE), &statistics)?),
+            (STATISTICS_FILE, json_text(&at(STATISTICS_FILE), &statistics)?),
             (CARD_FILE, card(spec, &statistics, bytes)),
-            (CROISSANT_FILE, text_of(&at(CROISSANT_FILE), &croissant(spec))?),
+            (CROISSANT_FILE, json_text(&at(CROISSANT_FILE), &croissant(spec))?),
         ];
         for (name, text) in &texts {
             self.check_own(name, text)?;
@@ -118,12 +118,6 @@ impl Dataset {
         let left = all.filter(|entry| is_temporary(&entry.file_name().to_string_lossy()));
         Ok(left.map(|entry| entry.path()).collect())
     }
-}
-
-/// `value` as the JSON of the file at `path`.
-pub(crate) fn text_of(path: &Path, value: &impl Serialize) -> Result<String, Refusal> {
-    let text = serde_json::to_string_pretty(value).map_err(unwritable(path))?;
-    Ok(text + "\n")
 }
 
 /// What `folder` holds.

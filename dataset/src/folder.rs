@@ -1,12 +1,11 @@
 //! The folder of a data set, and how its files are divided among workers.
 
 use crate::file::{check_shard, failed, refused, shard_name, shard_rows, version, write_shard};
-use crate::finish::text_of;
 use crate::spec::{Spec, SpecError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts::Refusal;
-use spts::output::{MANIFEST_FILE, Manifest, is_temporary, no_folder, write_new};
+use spts::output::{MANIFEST_FILE, Manifest, is_temporary, json_text, no_folder, write_new};
 use spts::progress::Progress;
 use spts::session::parse_json;
 use spts_circuit::RecordingInfo;
@@ -123,7 +122,7 @@ impl Dataset {
         }
         std::fs::create_dir_all(&data).map_err(|source| no_folder(&data, source))?;
         // the head last, so that what has one has all
-        if !write_new(&head_file, text_of(&head_file, &head)?.as_bytes())? {
+        if !write_new(&head_file, json_text(&head_file, &head)?.as_bytes())? {
             check_head(&head_file, &head)?;
         }
         Ok(Self { folder: folder.to_owned(), spec })

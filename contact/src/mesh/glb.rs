@@ -432,7 +432,7 @@ impl<'g> Elements<'g> {
     }
 
     /// Refuses a sparse accessor whose elements are not in the span that it declares for each of their numbers, to a
-    /// thousandth of it: exporters have taken differences for values.
+    /// thousandth of it: which of the two is meant cannot be told.
     fn check_span<const N: usize>(&self, elements: &[[f64; N]]) -> Result<(), MeshError> {
         let (glb, accessor, at) = (self.glb, self.accessor, self.at.value());
         let bound = |declared: &Option<Value>, k: usize| declared.as_ref()?.get(k)?.as_f64();

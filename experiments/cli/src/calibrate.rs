@@ -1,6 +1,6 @@
 //! `spts calibrate`: a readout profile from recordings.
 
-use crate::context::{Bars, Common, note};
+use crate::context::{Bars, Common, note, notes};
 use crate::error::CliError;
 use crate::options::seed;
 use clap::Args;
@@ -114,9 +114,7 @@ impl CalibrateCommand {
         }
         let study = SkinStudy { seed: self.seed };
         let report = study.run(&self.recordings, &Bars::default())?;
-        if let Some(text) = report.scored_text() {
-            note(&format!("note: {text}"));
-        }
+        notes(&report.scored_text());
         self.common.print(&report, || spts_report::calibrate::skin_text(&report))?;
         if let Some(path) = &self.out {
             write_bytes(path, report.toml()?.as_bytes())?;

@@ -1,6 +1,6 @@
 //! `spts compare`: the twin against recordings of its skin.
 
-use crate::context::{Bars, Common, note, open_folder};
+use crate::context::{Bars, Common, note, notes, open_folder};
 use crate::error::CliError;
 use crate::options::{seed, skin_gains};
 use clap::Args;
@@ -182,7 +182,7 @@ impl CompareCommand {
     /// What the scores need; `None`, with a note, when it is not published with the recordings.
     fn scored(&self) -> Result<Option<PublishedSkin>, CliError> {
         let source = Source::open(&self.recordings)?;
-        source.note.iter().for_each(|text| note(&format!("note: {text}")));
+        notes(&source.note);
         let unpublished = source.published.is_none() && !source.sessions.is_empty();
         match source.published_skin() {
             Err(e) if unpublished => {

@@ -137,6 +137,11 @@ pub fn note(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{}", plain(text));
 }
 
+/// Writes each of `texts` to standard error, as something that a user should know of a result.
+pub(super) fn notes<'a>(texts: impl IntoIterator<Item = &'a String>) {
+    texts.into_iter().for_each(|text| note(&format!("note: {text}")));
+}
+
 /// Writes an error to standard error, on one line.
 pub fn note_error(text: &str) {
     note(&format!("error: {}", shortened(&one_line(text))));

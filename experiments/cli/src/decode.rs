@@ -1,7 +1,7 @@
 //! `spts decode`: images, classes and places of sessions.
 
 use crate::Bars;
-use crate::context::{Common, note, open_folder, print, print_json};
+use crate::context::{Common, note, notes, open_folder, print, print_json};
 use crate::error::CliError;
 use crate::extras::{simulated_presses, write_decoded};
 use crate::options::{decoders_named, network, seed, skin_gains, sorted, whole};
@@ -91,7 +91,7 @@ impl DecodeCommand {
         let decoders = decoders_named(&self.decoder)?;
         let network = self.weights.as_deref().map(network).transpose()?;
         let mut set = SessionSet::open(&self.session)?;
-        set.note.iter().for_each(|text| note(&format!("note: {text}")));
+        notes(&set.note);
         let slips = follow_slips(&mut set);
         let sessions = self.chosen(&set)?;
         for session in &sessions {
@@ -102,7 +102,7 @@ impl DecodeCommand {
         }
         let shown = |slip: &SessionSlip| sessions.iter().any(|session| session.name == slip.session);
         let slips: Vec<SessionSlip> = slips.into_iter().filter(shown).collect();
-        slips_text(&slips).iter().for_each(|text| note(&format!("note: {text}")));
+        notes(&slips_text(&slips));
         let bars = Bars::default();
         bars.stage("learning", None);
         let training = Training::new(&set, self.skin.as_deref(), self.seed);

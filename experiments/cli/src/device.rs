@@ -1,6 +1,6 @@
 //! `spts device`: the skin on a pseudo-terminal, for host software.
 
-use crate::context::{note, print};
+use crate::context::{note, notes, print};
 use crate::error::CliError;
 use crate::options::{number, pressed, seed, whole};
 use clap::Args;
@@ -140,7 +140,7 @@ impl DeviceCommand {
             }
             Some(path) => {
                 let set = SessionSet::open(path)?;
-                set.note.iter().for_each(|text| note(&format!("note: {text}")));
+                notes(&set.note);
                 let recording = self.recording(path, &set)?;
                 let asked = self.blocks.and_then(|asked| usize::try_from(asked).ok());
                 let blocks = recording.blocks().iter().take(asked.unwrap_or(usize::MAX));

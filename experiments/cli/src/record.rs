@@ -184,7 +184,7 @@ impl RecordCommand {
             signal_v,
         };
         self.common.print(&report, || text(&report))?;
-        let kept = format!("the {blocks} blocks before are in {}", self.out.display());
+        let kept = format!("of the blocks before, {blocks} are in {}", self.out.display());
         match failed {
             Some(error) => Err(CliError::Refused(error.reworded(|problem| format!("{problem}; {kept}")))),
             None if stop() => Err(stopped(&signals, &kept)),

@@ -1,7 +1,7 @@
 //! `spts score`: decoders side by side on recordings.
 
 use crate::Bars;
-use crate::context::{Common, note, open_folder, print, progress};
+use crate::context::{Common, note, notes, open_folder, print, progress};
 use crate::error::CliError;
 use crate::extras::{simulated_presses, simulated_sessions, write_anytime, write_board, write_in_time};
 use crate::options::{
@@ -346,9 +346,7 @@ impl ScoreCommand {
             Some(scenes) => simulated_sessions(scenes, self.seed, self.quick)?,
             None => Source::open(self.recordings.as_deref().unwrap_or(Path::new("")))?,
         };
-        for text in slips_text(&source.slips).iter().chain(&source.note) {
-            note(&format!("note: {text}"));
-        }
+        notes(slips_text(&source.slips).iter().chain(&source.note));
         Ok(source)
     }
 

@@ -41,7 +41,7 @@ impl SensingCommand {
 
 /// Most rows and columns of a skin.
 const MOST: usize = 1024;
-/// Rows × taxels² beyond which a design is said to take long: half a minute or so.
+/// Rows × taxels² beyond which a design is said to take long: with 1,024 rows for 16 × 32 taxels, some ten seconds.
 const LONG: usize = 1 << 28;
 
 /// Rows and columns of a skin.

@@ -1,6 +1,6 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use crate::context::{Common, TICK, note, open_folder, progress, spinner};
+use crate::context::{Common, TICK, note, notes, open_folder, progress, spinner};
 use crate::error::CliError;
 use crate::options::{number, seed, whole};
 use clap::Args;
@@ -268,9 +268,7 @@ impl SimulateCommand {
         bar.finish_and_clear();
         let (simulation, learned) = (simulation?, learned?);
         let summary = Summary::new(&prepared, &simulation);
-        for text in &summary.notes {
-            note(&format!("note: {text}"));
-        }
+        notes(&summary.notes);
         let writing = spinner("writing");
         if !self.no_record && !decodes {
             let most = TrainingData::MOST_TAXELS;

@@ -81,10 +81,10 @@ pub(super) fn not_mat(path: &Path, reason: &str) -> Refusal {
 
 /// What the file is, if it is of another format that MATLAB or Octave write.
 ///
-/// Sources: MathWorks, *MAT-File Format*, "Level 5" (the last two bytes of the header tell the byte order) and
-/// "Level 4" (it begins with the number 1000 M + 10 P + T, M the byte order, P ≤ 5 the type and T ≤ 2 the kind of the
-/// matrix, and has no text); HDF5 File Format Specification, II.A: the signature is at 0, 512, or twice that again and
-/// again.
+/// Sources: MathWorks, *MAT-File Format*. In "Level 5", the last two bytes of the header tell the byte order. A file of
+/// "Level 4" has no header of text. It begins with the number 1000 M + 10 P + T: M is the byte order, P ≤ 5 the type,
+/// and T ≤ 2 the kind of the matrix. HDF5 File Format Specification, II.A: the signature stands at byte 0, 512, 1024,
+/// 2048, and so on.
 fn other_format(file: &[u8]) -> Option<&'static str> {
     let hdf5 = |at: usize| file.get(at..).is_some_and(|rest| rest.starts_with(b"\x89HDF\r\n\x1a\n"));
     if hdf5(0) || (9..20).any(|k| hdf5(1 << k)) || file.starts_with(b"MATLAB 7.3") {
@@ -93,7 +93,7 @@ fn other_format(file: &[u8]) -> Option<&'static str> {
     if file.get(126..128) == Some(b"MI") {
         return Some("a big-endian MATLAB v5 file");
     }
-    if file.starts_with(b"# ") || file.starts_with(b"Octave-1") {
+    if file.starts_with(b"# Created by Octave") || file.starts_with(b"Octave-1") {
         return Some("a file in a format of Octave's own");
     }
     let first: [u8; 4] = file.get(..4)?.try_into().ok()?;

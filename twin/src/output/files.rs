@@ -404,10 +404,16 @@ pub fn write_table<R: Serialize>(path: &Path, rows: &[R]) -> Result<(), Refusal>
 /// # Errors
 /// [`Refusal`] if the file cannot be written.
 pub fn write_json<T: Serialize>(path: &Path, value: &T) -> Result<(), Refusal> {
-    write_with(path, |out| {
-        serde_json::to_writer_pretty(&mut *out, value)?;
-        out.write_all(b"\n")
-    })
+    write_bytes(path, json_text(path, value)?.as_bytes())
+}
+
+/// What [`write_json`] writes. Errors name the file `path`.
+///
+/// # Errors
+/// [`Refusal`] if `value` has no JSON.
+pub fn json_text<T: Serialize>(path: &Path, value: &T) -> Result<String, Refusal> {
+    let text = serde_json::to_string_pretty(value).map_err(unwritable(path))?;
+    Ok(text + "\n")
 }
 
 #[cfg(test)]

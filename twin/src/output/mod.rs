@@ -20,8 +20,8 @@ mod manifest;
 
 pub use disk::{DiskOperation, no_folder, not_ours, unwritable, watching_disk};
 pub use files::{
-    AtomicFile, CsvFile, NpyFile, NpyValue, check_replaceable, check_writable, is_temporary, remove_left, write_bytes,
-    write_json, write_new, write_npy, write_table,
+    AtomicFile, CsvFile, NpyFile, NpyValue, check_replaceable, check_writable, is_temporary, json_text, remove_left,
+    write_bytes, write_json, write_new, write_npy, write_table,
 };
 pub use folder::OutputFolder;
 pub use manifest::{MANIFEST_FILE, Manifest, check_whole};
