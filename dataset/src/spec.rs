@@ -238,6 +238,11 @@ impl Spec {
         &self.text
     }
 
+    /// What was repaired in the mesh files that it names, with the file before each.
+    pub fn notes(&self) -> &[String] {
+        &self.choices.notes
+    }
+
     /// SHA-256 of the specification and of the files that it names. Data sets with the same value have the same rows if
     /// the same version of this library made them.
     pub fn identity(&self) -> &str {

@@ -698,6 +698,16 @@ fn mesh_files_are_part_of_a_spec() {
     assert_eq!(names, ["a", "b", "a"]);
     write("a.obj", 0.06);
     assert_ne!(read().unwrap().identity(), spec.identity());
+    // a box without its underside
+    let mut open = spts_contact::mesh::cuboid([0.04, 0.03, 0.02]);
+    open.triangles.retain(|t| t.iter().any(|i| open.vertices[*i as usize][2] > 0.0));
+    std::fs::write(meshes.join("a.obj"), open.to_obj("open")).unwrap();
+    let said = read().unwrap_err().to_string();
+    assert!(said.contains("a.obj") && said.contains("not closed"), "{said}");
+    let as_is = Spec::from_toml(text, &toml::toml! { object = { repair = "near_side" } }, dir.path()).unwrap();
+    assert!(as_is.notes()[0].contains("a.obj: ") && as_is.notes()[0].contains("not closed"), "{:?}", as_is.notes());
+    let shapes = toml::toml! { object = { from = "shapes", centre = true } };
+    assert!(Spec::from_toml("", &shapes, dir.path()).unwrap_err().to_string().contains("`object.centre` is not for"));
     std::fs::write(meshes.join("a.obj"), "v 1 2 3").unwrap();
     assert!(read().unwrap_err().to_string().contains("a.obj"));
 }

@@ -1,6 +1,6 @@
 //! Data sets: their folders, made and read.
 
-use crate::common::{refuse, released, stoppable, table};
+use crate::common::{refuse, released, stoppable, table, warn};
 use numpy::{IntoPyArray as _, PyArray2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -31,7 +31,9 @@ impl DataFolder {
             let spec = Spec::load(spec, &overrides).map_err(refuse)?;
             Dataset::begin(&folder, spec).map_err(refuse)
         });
-        Ok(Self { dataset: begun?? })
+        let dataset = begun??;
+        dataset.spec().notes().iter().try_for_each(|note| warn(py, note))?;
+        Ok(Self { dataset })
     }
 
     /// Makes file number `shard` unless it is there; the number of rows that were made.

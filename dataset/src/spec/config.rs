@@ -3,6 +3,7 @@
 use super::draw::Draw;
 use serde::Deserialize;
 use spts::chain::RowsConfig;
+use spts_contact::mesh::Repair;
 use spts_models::SkinLayout;
 use spts_sim::mechanics::DropConfig as BallConfig;
 
@@ -116,6 +117,10 @@ pub struct ObjectConfig {
     pub folder: Option<String>,
     /// Metres per unit of the mesh files; (0, 1000]. Default 1.
     pub scale: f64,
+    /// What is done with mesh files that are not closed: "strict" (default), which refuses some, or "near_side".
+    pub repair: Option<Repair>,
+    /// Whether the origin of a mesh file becomes the middle of its footprint. Default: no.
+    pub centre: Option<bool>,
     /// Number of consecutive rows with the same shape; a whole number of presses. Default about 100.
     pub rows_per_shape: Option<u64>,
     /// Number of simultaneous objects; a draw of whole numbers in [1, 3], once for every press. Default 1.
@@ -220,6 +225,8 @@ impl Default for ObjectConfig {
             names: None,
             folder: None,
             scale: 1.0,
+            repair: None,
+            centre: None,
             rows_per_shape: None,
             count: Draw::Fixed(1.0),
             size_m: None,

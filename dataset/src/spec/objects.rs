@@ -5,7 +5,7 @@ use rand::RngExt as _;
 use sha2::{Digest as _, Sha256};
 use spts::Refusal;
 use spts_contact::PreparedMesh;
-use spts_contact::mesh::load;
+use spts_contact::mesh::{MeshOptions, load};
 use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_contact::shapes::{SHAPE_FAMILIES, ShapeRanges, build_shape};
 use spts_models::{Streams, in_range, in_section};
@@ -44,6 +44,8 @@ pub(crate) struct Choices {
     entries: Vec<Choice>,
     ranges: ShapeRanges,
     source: ObjectSource,
+    /// What was repaired in mesh files.
+    pub(super) notes: Vec<String>,
 }
 
 /// One shape and what is known of it.
@@ -81,6 +83,8 @@ impl Choices {
         }
         for (field, given, of) in [
             ("folder", config.folder.is_some(), ObjectSource::Meshes),
+            ("repair", config.repair.is_some(), ObjectSource::Meshes),
+            ("centre", config.centre.is_some(), ObjectSource::Meshes),
             ("size_m", config.size_m.is_some(), ObjectSource::Shapes),
             ("relief_m", config.relief_m.is_some(), ObjectSource::Shapes),
             ("edge_m", config.edge_m.is_some(), ObjectSource::Shapes),
@@ -105,6 +109,7 @@ impl Choices {
             object: None,
             shape: None,
         };
+        let mut notes = Vec::new();
         let mut entries: Vec<Choice> = match source {
             ObjectSource::Shapes => {
                 let known: Vec<&str> = SHAPE_FAMILIES.iter().map(|family| family.name).collect();
@@ -123,9 +128,16 @@ impl Choices {
             ObjectSource::Meshes => {
                 let files = mesh_files(config, folder)?;
                 let known: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();
+                let options = MeshOptions {
+                    scale: config.scale,
+                    repair: config.repair.unwrap_or_default(),
+                    centre: config.centre.unwrap_or_default(),
+                };
                 let read = |k: usize| {
-                    let (mesh, _) =
-                        load(&files[k].1, config.scale).map_err(|error| SpecError::Mesh(Refusal::from_error(error)))?;
+                    let path = &files[k].1;
+                    let (mesh, report) =
+                        load(path, options).map_err(|error| SpecError::Mesh(Refusal::from_error(error)))?;
+                    notes.extend(report.notes().into_iter().map(|note| format!("{}: {note}", path.display())));
                     Ok(entry(known[k], mesh.into()))
                 };
                 let read = chosen(config, &known)?.into_iter().map(read);
@@ -139,7 +151,7 @@ impl Choices {
         for (place, entry) in (0..).zip(&mut entries) {
             entry.label = entry.object.map_or(place, |object| object.label.into());
         }
-        Ok(Self { entries, ranges, source })
+        Ok(Self { entries, ranges, source, notes })
     }
 
     /// Number of different objects or files, or of families.

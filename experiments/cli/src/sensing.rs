@@ -161,8 +161,7 @@ impl DesignCommand {
             ));
         }
         let bars = Bars::default();
-        bars.stage("designing", None);
-        let report = design.run()?;
+        let report = design.run(&bars)?;
         bars.end();
         write(&report, out)?;
         let text = || format!("{}rows and pictures: {}", report.text(), self.out.display());

@@ -1,6 +1,7 @@
 //! Rows of the sensing matrix, designed for a skin.
 
 use serde::Serialize;
+use spts::progress::Progress;
 use spts_circuit::{Patterns, WeightMode, Weights, seeds_of_first_window};
 use spts_eval::Source;
 use spts_eval::training::TrainingData;
@@ -102,9 +103,13 @@ impl RowDesign {
     /// # Errors
     /// [`Refusal`] for a task out of range, recordings that cannot be read, or images from which no prior can be
     /// made.
-    pub fn run(&self) -> Result<RowDesignReport, Refusal> {
+    pub fn run(&self, progress: &dyn Progress) -> Result<RowDesignReport, Refusal> {
+        progress.stage("expected images", None);
         let (expected, classes) = self.expected()?;
+        progress.stage("designing rows", Some(self.rows));
+        let row_found = || progress.step();
         let task = RowTask {
+            row_found: &row_found,
             classes: &classes,
             noise: self.noise,
             largest_sum: self.largest_sum,
@@ -112,6 +117,7 @@ impl RowDesign {
             ..RowTask::new(self.rows, &expected)
         };
         let rows = (self.designer.build)().design(&task)?;
+        progress.stage("comparing with random rows", None);
         let taxels = rows.ncols();
         let order =
             if self.fewest_flips { fewest_flips(rows.view(), &vec![1.0; taxels]) } else { (0..rows.nrows()).collect() };
@@ -254,10 +260,10 @@ mod tests {
     fn a_design_is_what_it_says() {
         for images in [DesignImages::Smooth(1.5), DesignImages::Shapes] {
             let plain = design("greedy", images.clone());
-            let report = plain.run().unwrap();
+            let report = plain.run(&()).unwrap();
             assert!(report.variance_left < 0.8 * report.variance_left_random, "{report:?}");
             let ordered = RowDesign { fewest_flips: true, ..plain };
-            let ordered = ordered.run().unwrap();
+            let ordered = ordered.run(&()).unwrap();
             assert!(ordered.flips < report.flips, "{} {}", ordered.flips, report.flips);
             assert!((ordered.variance_left - report.variance_left).abs() < 1e-9);
             let seeded = Weights::with_seeds(WeightMode::Binary, report.seeds.clone().unwrap()).unwrap();
@@ -274,9 +280,9 @@ mod tests {
     #[test]
     fn what_cannot_be_designed_is_refused() {
         let few = RowDesign { rows: 0, ..design("greedy", DesignImages::Shapes) };
-        assert!(few.run().is_err());
-        assert!(design("classes", DesignImages::Shapes).run().is_err());
+        assert!(few.run(&()).is_err());
+        assert!(design("classes", DesignImages::Shapes).run(&()).is_err());
         let nowhere = DesignImages::Recordings("nowhere".into());
-        assert!(design("greedy", nowhere).run().unwrap_err().to_string().contains("nowhere"));
+        assert!(design("greedy", nowhere).run(&()).unwrap_err().to_string().contains("nowhere"));
     }
 }

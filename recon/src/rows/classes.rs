@@ -38,6 +38,7 @@ impl DesignRows for Classes {
             let row = best_row(task, &headroom, starts, SEARCH.1, || Separation::new(&apart))?;
             apart.observe(&row);
             rows.row_mut(r).copy_from_slice(&row);
+            (task.row_found)();
         }
         Ok(rows)
     }

@@ -96,8 +96,8 @@ fn refuses(name: &str, method: &dyn DesignRows) {
         RowTask { largest_sum: Some(f64::NAN), ..task },
         RowTask { largest_sum: Some(0.0), ..task },
     ];
-    for task in bad {
-        assert!(method.design(&task).is_err(), "{name}: {task:?} was not refused");
+    for (k, task) in bad.into_iter().enumerate() {
+        assert!(method.design(&task).is_err(), "{name}: the bad task {k} was not refused");
     }
 }
 

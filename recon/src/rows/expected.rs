@@ -353,6 +353,7 @@ pub(super) fn take(
         let like = |other: &Vec<f64>| dot(other, &row).abs() >= dot(&row, &row) * (1.0 - 1e-12);
         if !kept.iter().any(like) {
             kept.push(row);
+            (task.row_found)();
         }
     }
     if kept.len() < task.rows {

@@ -45,6 +45,7 @@ impl DesignRows for Greedy {
             let row = best_row(task, &headroom, starts, SEARCH.1, || Fall::new(&covariances))?;
             covariances.observe(&row);
             rows.row_mut(r).copy_from_slice(&row);
+            (task.row_found)();
         }
         Ok(rows)
     }

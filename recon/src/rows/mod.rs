@@ -38,7 +38,7 @@ use RowNeeds::{Moments, Nothing};
 use spts_input::Refusal;
 
 /// What a designer of rows is asked for: how many rows, for which images, with which noise and limit.
-#[derive(Debug, Clone, Copy)]
+#[derive(Clone, Copy)]
 pub struct RowTask<'a> {
     /// Number of rows M: the period of a repeated pattern, at least 1.
     pub rows: usize,
@@ -54,6 +54,8 @@ pub struct RowTask<'a> {
     pub largest_sum: Option<f64>,
     /// Seed of all random numbers.
     pub seed: u64,
+    /// Called after each row that is found, for a progress bar.
+    pub row_found: &'a (dyn Fn() + Sync),
 }
 
 /// A way to choose rows of the sensing matrix for images that are expected.
@@ -83,7 +85,7 @@ impl<'a> RowTask<'a> {
 
     /// A task for `rows` rows and the images `expected`, without a limit of the sums.
     pub fn new(rows: usize, expected: &'a Expected) -> Self {
-        Self { rows, expected, classes: &[], noise: Self::NOISE, largest_sum: None, seed: 1 }
+        Self { rows, expected, classes: &[], noise: Self::NOISE, largest_sum: None, seed: 1, row_found: &|| () }
     }
 
     /// Checks all numbers; at most `most` rows, because of `reason`.

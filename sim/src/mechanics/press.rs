@@ -21,6 +21,8 @@ struct Place<'a> {
     position_m: &'a mut Option<[f64; 2]>,
     /// The same relative to the sheet's width and height.
     position_share: &'a mut Option<[f64; 2]>,
+    /// Whether it has to lie on the sheet.
+    on_sheet: bool,
 }
 
 /// How far beside the centres of the outer taxels something may be placed, m, and never less than [`REACH_TAXELS`].
@@ -44,29 +46,28 @@ impl Place<'_> {
                  `{section}.position_share`; found {found}"
             )));
         }
+        let most_px = if self.on_sheet { 0.5 } else { reach(skin) };
+        let [width_m, height_m] = skin.extent_m();
+        let most_m = |extent_m: f64| 0.5 * (extent_m - skin.pitch_m()) + most_px * skin.pitch_m();
+        let limit = if self.on_sheet { "its edge" } else { "75 mm or 5 taxels beyond the outer taxels" };
+        // as far as a row or a column may be, and its rounding; NaN is not within
+        let check = |field: String, value: f64, most: f64, unit: &str| {
+            let shown = (1e4 * most).round() / 1e4;
+            let range = format!("[-{shown}, {shown}]{unit}; the limit on this sheet is {limit}");
+            let within = value.abs() <= most * (1.0 + 1e-12);
+            within.then_some(()).ok_or_else(|| Refusal::range(&field, value, range))
+        };
         if let Some(share) = self.position_share.take() {
-            for (axis, s) in ["x", "y"].into_iter().zip(share) {
-                let field = format!("{}.position_share ({axis})", self.section);
-                in_interval(&field, s, "[-1, 1]")?;
+            for (axis, (s, extent_m)) in ["x", "y"].into_iter().zip(share.into_iter().zip([width_m, height_m])) {
+                let most = (most_m(extent_m) / extent_m).min(1.0);
+                check(format!("{}.position_share ({axis})", self.section), s, most, "")?;
             }
-            let [width_m, height_m] = skin.extent_m();
-            self.set(skin, [share[0] * width_m, share[1] * height_m]);
+            self.set(skin, [share[0] * width_m, share[1] * height_m], most_px);
         } else if let Some(position_m) = self.position_m.take() {
-            let [width_m, height_m] = skin.extent_m();
-            for ((axis, p), extent_m) in ["x", "y"].into_iter().zip(position_m).zip([width_m, height_m]) {
-                let most_m = 0.5 * (extent_m - skin.pitch_m()) + reach(skin) * skin.pitch_m();
-                // as far as a row or a column may be, and its rounding; NaN is not within
-                let within = p.abs() <= most_m * (1.0 + 1e-12);
-                if !within {
-                    let section = self.section;
-                    return Err(Refusal::new(format!(
-                        "`{section}.position_m`: {axis} = {p} is outside [{:.4}, {most_m:.4}] m; the limit is 75 mm or 5 \
-                         taxels beyond the outer taxels",
-                        -most_m
-                    )));
-                }
+            for (axis, (p, extent_m)) in ["x", "y"].into_iter().zip(position_m.into_iter().zip([width_m, height_m])) {
+                check(format!("{}.position_m ({axis})", self.section), p, most_m(extent_m), " m")?;
             }
-            self.set(skin, position_m);
+            self.set(skin, position_m, most_px);
         }
         let (row, col) = (*self.row, *self.col);
         self.row.get_or_insert(usual[0]);
@@ -75,10 +76,11 @@ impl Place<'_> {
         check_place(&format!("{}.", self.section), [row, col], skin)
     }
 
-    fn set(&mut self, skin: &SkinLayout, [x, y]: [f64; 2]) {
+    /// Sets row and column, at most `most_px` taxels beyond the outer ones.
+    fn set(&mut self, skin: &SkinLayout, [x, y]: [f64; 2], most_px: f64) {
         let [last_row, last_col] = last(skin);
-        *self.row = Some(0.5 * last_row - y / skin.pitch_m());
-        *self.col = Some(0.5 * last_col + x / skin.pitch_m());
+        *self.row = Some((0.5 * last_row - y / skin.pitch_m()).clamp(-most_px, last_row + most_px));
+        *self.col = Some((0.5 * last_col + x / skin.pitch_m()).clamp(-most_px, last_col + most_px));
     }
 }
 
@@ -362,6 +364,7 @@ impl PressConfig {
             col: &mut self.col,
             position_m: &mut self.position_m,
             position_share: &mut self.position_share,
+            on_sheet: false,
         };
         written.resolve(skin, [place.row, place.col])?;
         self.rotation_deg.get_or_insert(place.rotation_rad.to_degrees());
@@ -550,6 +553,7 @@ impl DropConfig {
             col: &mut self.col,
             position_m: &mut self.position_m,
             position_share: &mut self.position_share,
+            on_sheet: true,
         };
         written.resolve(skin, [0.5 * last_row, 0.5 * last_col])?;
         self.check([last_row, last_col])

@@ -65,9 +65,9 @@ typo = 1 ; [drop] => unknown field `typo`
 chosen_for_tolerance = nan ; [drop] => `chosen_for_tolerance` = NaN | (0, 1]
 seed = 9223372036854775809 ; [drop] => 9223372036854775809
 skin.pitch_m = 1e308 ; [press] ; object = "T" => `skin.pitch_m` = 1e308 | [1e-6, 1] m
-[press] ; object = "T" ; position_m = [0.0, 9.0] => `press.position_m`: y = 9 is outside [-0.1425, 0.1425] m
-[drop] ; position_m = [nan, 0.0] => `drop.position_m`: x = NaN is outside [-0.1425, 0.1425] m
-[drop] ; position_share = [0.0, 2] => `drop.position_share (y)` = 2  | [-1, 1]
+[press] ; object = "T" ; position_m = [0.0, 9.0] => `press.position_m (y)` = 9 is outside [-0.1425, 0.1425] m
+[drop] ; position_m = [nan, 0.0] => `drop.position_m (x)` = NaN is outside [-0.075, 0.075] m
+[drop] ; position_share = [0.0, 2] => `drop.position_share (y)` = 2  | [-0.5, 0.5]
 [drop] ; height_m = -0.1 => drop.height_m | [0.001, 5] m
 [drop] ; mass_kg = inf => drop.mass_kg | [1e-3, 50] kg
 [drop] ; mass_kg = 10.0 ; height_m = 5.0 => `drop.mass_kg` = 10 | `drop.height_m` = 5 | absorbs at most |
@@ -99,9 +99,10 @@ frame_interval_s = 1e-4 ; [press] ; object = "T" => `frame_interval_s` = 0.0001 
 not toml => TOML parse error
 [contact] ; model = "footprint" ; [drop] =>
     "footprint" needs a force and cannot stop a ball: use [press] instead of [drop]
-[press] ; object = "T" ; position_share = [0.0, nan] => `press.position_share (y)` = NaN is outside [-1, 1]
+[press] ; object = "T" ; position_share = [0.0, nan] => `press.position_share (y)` = NaN is outside [-0.95, 0.95]
 [press] ; object = "T" ; position_m = [0.0, 0.0] ; row = 3.0 => `press.position_m` and `press.position_share`; found 2
-[drop] ; position_share = [0.6, 0.0] => `drop.col`
+[drop] ; position_share = [0.6, 0.0] => `drop.position_share (x)` = 0.6 is outside [-0.5, 0.5]
+[drop] ; position_m = [0.0, 0.2] => `drop.position_m (y)` = 0.2 | [-0.075, 0.075] m
 [press] ; object = "T" ; places = [] => `press.places` = [] is empty
 skin = { rows = 500, cols = 500 } ; contact.cells_per_taxel = 64 ; [drop] => cells_per_taxel | 2^24
 skin = { pitch_m = 1e-4, electrode_m = 5e-5 } ; contact.cells_per_taxel = 1 ; [press] ; object = "rec" ; force_n = 100.0 =>

@@ -187,7 +187,12 @@ pub(super) fn check_recorded(mode: Mode, recorded: &Recorded, blocks: usize) -> 
         let range = format!("[0, {blocks}], the blocks of the recording");
         return invalid(&field, recorded.conditioning, range);
     }
+    let block_s = recording.time_s(recording.frames());
     for (k, facts) in recorded.presses.iter().enumerate() {
+        if let Some(time_s) = facts.time_s.filter(|time_s| *time_s > block_s * (1.0 + 1e-9)) {
+            let range = format!("[-1e6, {block_s}] s, the end of the block");
+            return invalid(&format!("{name}.blocks[{k}].time_s"), time_s, range);
+        }
         let field = |what: &str| format!("{name}.blocks[{k}].{what}");
         let known = [("force_n", facts.force_n, FORCES), ("time_s", facts.time_s, TIMES)];
         for (what, value, (least, most, range)) in known {
@@ -210,7 +215,7 @@ pub(super) fn check_recorded(mode: Mode, recorded: &Recorded, blocks: usize) -> 
 
 /// Valid forces and times of a block, and both as text. A time may lie before the block.
 const FORCES: (f64, f64, &str) = (0.0, 1e6, "[0, 1e6] N");
-const TIMES: (f64, f64, &str) = (-1e6, 1e6, "[-1e6, 1e6] s");
+const TIMES: (f64, f64, &str) = (-1e6, f64::MAX, "[-1e6, the end of the block] s");
 /// Farthest place of a body, m.
 const FARTHEST_M: f64 = 1e3;
 

@@ -89,8 +89,10 @@ prop_compose! {
             volts: (0..frames * per_frame).map(|_| if random() % 9 == 0 { f64::NAN } else { volts(random()) }).collect(),
         });
         let recording = Recording::new(info, made.collect()).unwrap();
+        // from before a block to its end
+        let block_s = recording.time_s(recording.frames());
         let facts = |k: usize| PressFacts {
-            time_s: Some(0.1 * k as f64),
+            time_s: Some(block_s * (1.0 - k as f64)),
             pose: Some(PressPose { position_m: [0.1, -0.3, 1.0 / 3.0], quaternion: [1.0, 0.0, 0.0, 0.0] }),
             force_n: k.is_multiple_of(2).then_some(20.0 / 3.0),
             pressure: Some(Grid::from_values(rows, cols, (0..rows * cols).map(|i| i as f64 / 3.0).collect())),

@@ -1,6 +1,6 @@
 //! `spts dataset make` and `finish`.
 
-use crate::context::{Bars, Common};
+use crate::context::{Bars, Common, notes};
 use crate::error::CliError;
 use crate::options::{seed, whole};
 use clap::Args;
@@ -119,6 +119,7 @@ impl MakeCommand {
             assignment.put_into(&mut overrides).map_err(|e| CliError::usage(format!("`--set` {e}")))?;
         }
         let spec = Spec::load(&self.spec, &overrides)?;
+        notes(spec.notes());
         let part = match &self.shard {
             Some(text) => Some(Part::parse(text)?),
             None => Part::from_environment(|name| std::env::var(name).ok(), self.shards)?,

@@ -1,7 +1,7 @@
 //! `spts dataset preview`: rows of a data set as a picture.
 
 use super::make::Files;
-use crate::context::Common;
+use crate::context::{Common, notes};
 use crate::error::CliError;
 use crate::options::{seed, whole};
 use clap::Args;
@@ -79,6 +79,7 @@ impl PreviewCommand {
             Source::Spec(Box::new(Spec::load(&self.source, &toml::Table::new())?))
         };
         let spec = source.spec();
+        notes(spec.notes());
         if !spec.config().record.labels.contains(&Label::Pressure) {
             let source = &self.source;
             return Err(CliError::usage(format!(

@@ -75,6 +75,10 @@ impl DesignStudy {
                 let tried = self.look(ground, wires, source)?;
                 reached |= tried.reached.is_some();
                 all.push(tried);
+                // what is not the best of fewer is not the best of more, and its decoder is most of the memory
+                let best = best(&all);
+                let mut others = all.iter_mut().enumerate().filter(|(k, _)| *k != best);
+                others.try_for_each(|(_, other)| other.bench.release())?;
             }
             if reached {
                 break;
@@ -269,6 +273,12 @@ impl<'a> Bench<'a> {
             profile,
             places,
         })
+    }
+
+    /// Forgets what the decoder has been prepared for, and frees its memory.
+    fn release(&mut self) -> Result<(), Refusal> {
+        self.decoder = SheetDecoder::new(self.ground.prior.clone(), SheetNoise::default(), self.rows.bands.len())?;
+        Ok(())
     }
 
     /// Taxels that are solved for with `measurements` of every wire.
