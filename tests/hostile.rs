@@ -364,7 +364,7 @@ P ; presses = 4000000000 | presses | [1, 100000]
 P ; position_m = [1.0] | `press.position_m` = a list of 1: a list of 2 is needed
 P ; position_m = [9.0, 0.0] | `press.position_m (x)` = 9 is outside [-0.1425, 0.1425] m
 P ; position_m = [0.0, nan] | `press.position_m (y)` = NaN is outside [-0.1425, 0.1425] m
-P ; position_share = [0.0, 2.0] | `press.position_share (y)` = 2 is outside [-1, 1]
+P ; position_share = [0.0, 2.0] | `press.position_share (y)` = 2 is outside [-0.95, 0.95]
 "#;
 
 #[test]
