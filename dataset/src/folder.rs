@@ -58,6 +58,9 @@ impl Head {
 pub struct Dataset {
     folder: PathBuf,
     spec: Spec,
+    /// What this run has put into the folder beside [`DATA_FOLDER`], and the folder if it is new, in the order in
+    /// which they can be removed.
+    begun: Vec<PathBuf>,
 }
 
 /// What a folder holds of a data set: what `spts dataset info` prints.
@@ -103,16 +106,20 @@ impl Dataset {
         let head = Head::of(&spec);
         // looked for before the head: what another run of this data set makes has a head from then on
         let other = first_entry(folder)?;
-        let begun = head_file.symlink_metadata().is_ok();
+        let has_head = head_file.symlink_metadata().is_ok();
         check_head(&head_file, &head)?;
-        if let Some(other) = other.filter(|_| !begun) {
+        if let Some(other) = other.filter(|_| !has_head) {
             let problem = "is not of a data set; choose an empty folder, or one that `spts dataset make` began";
             return Err(refused(other, problem));
         }
+        let is_new = folder.symlink_metadata().is_err();
         std::fs::create_dir_all(folder).map_err(|source| no_folder(folder, source))?;
         // of two runs that begin at once, the one whose spec is first has the folder
         let spec_file = folder.join(SPEC_FILE);
-        if !write_new(&spec_file, spec.text().as_bytes())? {
+        let mut begun = vec![head_file.clone()];
+        if write_new(&spec_file, spec.text().as_bytes())? {
+            begun.push(spec_file);
+        } else {
             let text = spts_input::read(&spec_file, MAX_TEXT_BYTES).map_err(failed(&spec_file))?;
             if text != spec.text().as_bytes() {
                 check_head(&head_file, &head)?;
@@ -122,10 +129,12 @@ impl Dataset {
         }
         std::fs::create_dir_all(&data).map_err(|source| no_folder(&data, source))?;
         // the head last, so that what has one has all
+        begun.extend(is_new.then(|| folder.to_owned()));
         if !write_new(&head_file, json_text(&head_file, &head)?.as_bytes())? {
             check_head(&head_file, &head)?;
+            begun.clear();
         }
-        Ok(Self { folder: folder.to_owned(), spec })
+        Ok(Self { folder: folder.to_owned(), spec, begun })
     }
 
     /// Opens the data set in `folder`. Files that its specification names are looked up in `files`.
@@ -143,13 +152,13 @@ impl Dataset {
                 let problem = format!("names a file that is not in {files} ({error}); `--files` says where it is");
                 refused(&path, problem)
             }
-            SpecError::Refused(refusal) => refusal,
+            SpecError::Refused(refusal) => refusal.at(path.display()),
         })?;
         let head = Head::of(&spec);
         if found != head {
             return Err(other_data_set(&head_file, &found, &head));
         }
-        Ok(Self { folder: folder.to_owned(), spec })
+        Ok(Self { folder: folder.to_owned(), spec, begun: Vec::new() })
     }
 
     /// The specification.
@@ -184,7 +193,8 @@ impl Dataset {
         }
     }
 
-    /// Makes the missing files of `part`, one file a thread.
+    /// Makes the missing files of `part`, one file a thread. If it fails before there is any file, what
+    /// [`Dataset::begin`] has put into the folder is removed, and another spec may have it.
     ///
     /// # Errors
     /// [`Refusal`] if an existing file is not valid, a row cannot be made, or a file cannot be written.
@@ -209,6 +219,13 @@ impl Dataset {
             write_shard(&self.spec, shard, &path, &|| progress.step())
         });
         progress.end();
+        // refused where a file of rows is, or is being written by another worker
+        if written.is_err() && !self.begun.is_empty() && std::fs::remove_dir(self.folder.join(DATA_FOLDER)).is_ok() {
+            for path in &self.begun {
+                // what stays is not in the way of this spec
+                let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
+            }
+        }
         written.map(|()| made)
     }
 
@@ -265,7 +282,7 @@ fn other_data_set(path: &Path, found: &Head, needed: &Head) -> Refusal {
         )
     } else {
         format!(
-            "another data set was begun here (\"{}\", {} rows, spec {}); choose another folder",
+            "another data set was begun here (\"{}\", {} rows, spec {}); choose another folder, or remove this one",
             found.name.escape_debug(),
             found.rows,
             found.spec_sha256.chars().take(12).collect::<String>()

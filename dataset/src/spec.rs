@@ -21,7 +21,7 @@ use spts::chain::ChainConfig;
 use spts::{Chain, Refusal};
 use spts_circuit::{Mode, RecordingInfo};
 use spts_contact::build_contact;
-use spts_models::{SkinLayout, Streams, in_range, in_section, parsed};
+use spts_models::{SkinLayout, Streams, in_range, in_section, parsed, parsed_text};
 use std::path::{Path, PathBuf};
 
 /// The specifications that ship with the library, by name, as TOML.
@@ -120,8 +120,7 @@ impl Spec {
 
     /// The same, with the files that cannot be read told apart.
     pub(crate) fn read(text: &str, overrides: &toml::Table, folder: &Path) -> Result<Self, SpecError> {
-        let mut table: toml::Table =
-            toml::from_str(text).map_err(|e| Refusal::new(e.to_string().trim_end().replace('\n', "; ")))?;
+        let mut table: toml::Table = parsed_text(text)?;
         merge(&mut table, overrides);
         if let Some(toml::Value::Table(transducer)) = table.get_mut(TRANSDUCER) {
             spts::chain::read_gains(transducer, folder)?;

@@ -112,6 +112,41 @@ fn what_is_not_of_the_data_set_is_refused_and_kept() {
     assert_eq!(std::fs::read_to_string(occupied.join("thesis.tex")).unwrap(), "mine");
 }
 
+/// A run that is refused before there is a row leaves the folder to another spec, and the user's files in it.
+#[test]
+fn a_run_without_rows_leaves_no_data_set() {
+    let dir = tempfile::tempdir().unwrap();
+    let outside = || spec(&SMALL.replace("grid = [-0.2, 0.0, 0.2]", "uniform = [-1.0, -0.9]"));
+    let refused = |folder: &Path| Dataset::begin(folder, outside()).unwrap().make(Part::WHOLE, &()).unwrap_err();
+    let new = dir.path().join("new");
+    assert!(refused(&new).to_string().contains("y_share"), "{}", refused(&new));
+    assert!(!new.exists());
+    let own = dir.path().join("own");
+    std::fs::create_dir(&own).unwrap();
+    std::fs::write(own.join("spec.toml"), outside().text()).unwrap();
+    refused(&own);
+    let left: Vec<_> = std::fs::read_dir(&own).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(left, ["spec.toml"]);
+    made(&new, Part::WHOLE);
+    // rows of a finished file stay, whatever becomes of the next
+    let file = std::fs::read_dir(new.join("data")).unwrap().next().unwrap().unwrap().path();
+    std::fs::write(&file, "torn").unwrap();
+    Dataset::begin(&new, spec(SMALL)).unwrap().make(Part::WHOLE, &()).unwrap_err();
+    assert!(file.exists() && new.join("dataset.json").exists());
+}
+
+/// A spec that was changed by hand is told with its file.
+#[test]
+fn a_broken_spec_is_told_with_its_file() {
+    let dir = tempfile::tempdir().unwrap();
+    made(dir.path(), Part::WHOLE);
+    for (text, said) in [("rows = = 3", "spec.toml: line 1: "), ("rows = 0", "spec.toml: `rows` = 0 is outside")] {
+        std::fs::write(dir.path().join("spec.toml"), text).unwrap();
+        let found = Dataset::open(dir.path(), dir.path()).unwrap_err().to_string();
+        assert!(found.contains(said), "{found}");
+    }
+}
+
 /// What the user has written stays, whatever its name, and nothing else is written then.
 #[test]
 fn files_of_the_user_are_not_replaced() {

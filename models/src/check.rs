@@ -102,13 +102,32 @@ pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
 
 /// The value that the TOML text `text` describes.
 ///
+/// ```
+/// use spts_models::{SkinLayout, parsed_text};
+///
+/// let error = parsed_text::<SkinLayout>("cols = 10\nrows = -1").unwrap_err();
+/// assert_eq!(error.to_string(), "line 2: `rows` = -1: a whole number from 0 on is needed (`rows = -1`)");
+/// ```
+///
 /// # Errors
-/// [`Refusal`] with the field, as [`explain_toml`] says it, or with the place in a text that is not TOML.
+/// [`Refusal`] with the line, and the field as [`explain_toml`] says it.
 pub fn parsed_text<T: DeserializeOwned>(text: &str) -> Result<T, Refusal> {
-    // the table knows the field, and the text the place
-    let table = toml::from_str(text).map_err(|error| Refusal::new(error.to_string().trim_end().replace('\n', "; ")))?;
-    parsed(table)
+    let read = toml::Deserializer::parse(text).and_then(|reader| T::deserialize(Tables(reader)));
+    read.map_err(|error| {
+        let start = error.span().map_or(0, |span| span.start.min(text.len()));
+        let line = text.get(..start).unwrap_or_default().matches('\n').count();
+        // of a text that is TOML the table knows the field, and the text the line
+        let table = toml::from_str(text).ok();
+        let in_table = table.and_then(|table| parsed::<T>(table).err());
+        let message = in_table.map_or_else(|| explain_toml(&error), |refusal| refusal.to_string());
+        let shown = text.lines().nth(line).unwrap_or_default().trim();
+        let shown: String = shown.chars().take(SHOWN).collect();
+        Refusal::new(format!("line {}: {message} (`{shown}`)", line + 1))
+    })
 }
+
+/// Characters of a wrong line that an error repeats: a line of any file of ours is shorter.
+const SHOWN: usize = 120;
 
 /// The message for `error`, an error about a value in a table, such as "`press.force_n` = "much": a number is needed".
 ///

@@ -235,7 +235,7 @@ def session(tmp_path_factory):
         "frames": 3,
         "conditioning": 1,
         "blocks": [
-            {"frame_position": 3 + 7 * k, "idle_frames": 1, "time_s": 0.1, "force_n": 2.5 - k} for k in range(2)
+            {"frame_position": 3 + 7 * k, "idle_frames": 1, "time_s": 1e-3, "force_n": 2.5 - k} for k in range(2)
         ],
         "samples": {"file": "volts.npy", "kind": "volts", "missing": 1},
         "pressure_pa": "force.npy",

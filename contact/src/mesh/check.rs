@@ -981,10 +981,18 @@ fn check_numbers(raw: &TriMesh, scale: f64, file: &str) -> Result<(), MeshError>
     }
     let (vertices, triangles) = (raw.vertices.len(), raw.triangles.len());
     within_budget(vertices, triangles, file)?;
+    let far = |vertex: usize, axis: char, value: f64| {
+        let (value, metres) = (short(value), short(value * scale));
+        let range = format_args!("outside [-{MAX_COORDINATE_M}, {MAX_COORDINATE_M}] m");
+        Err(refused(file, format_args!("vertex {vertex} has {axis} = {value} = {metres} m after scale, {range}")))
+    };
     for (vertex, v) in raw.vertices.iter().enumerate() {
         for (axis, &value) in ['x', 'y', 'z'].into_iter().zip(v) {
-            if !(value * scale).is_finite() {
+            if !value.is_finite() {
                 return Err(not_finite(file, vertex, axis, value));
+            }
+            if !(value * scale).is_finite() {
+                return far(vertex, axis, value);
             }
         }
     }
@@ -996,14 +1004,8 @@ fn check_numbers(raw: &TriMesh, scale: f64, file: &str) -> Result<(), MeshError>
         for &i in t {
             let vertex = i as usize;
             for (axis, value) in ['x', 'y', 'z'].into_iter().zip(raw.vertices[vertex]) {
-                let metres = value * scale;
-                if metres.abs() > MAX_COORDINATE_M {
-                    let (value, metres) = (short(value), short(metres));
-                    let why = format!(
-                        "vertex {vertex} has {axis} = {value} = {metres} m after scale, outside [-{MAX_COORDINATE_M}, \
-                         {MAX_COORDINATE_M}] m"
-                    );
-                    return Err(refused(file, why));
+                if (value * scale).abs() > MAX_COORDINATE_M {
+                    return far(vertex, axis, value);
                 }
             }
         }

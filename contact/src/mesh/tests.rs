@@ -91,6 +91,8 @@ fn numbers_that_cannot_be() {
     mesh.vertices[3][2] = f64::INFINITY;
     refuses(gate(&mesh), &["vertex 3, coordinate z = inf"]);
     assert!(read_glb(&mesh.to_glb("a"), 1.0, "a").is_err());
+    let large = read_obj(b"v 0 0 0\nv 0 1e300 0\nv 0 0 1\nf 1 2 3\n", 1e300, "a.obj");
+    refuses(large, &["vertex 1 has y = 1e300 = inf m after scale, outside"]);
     let mut mesh = block();
     mesh.triangles[2][1] = 8;
     refuses(gate(&mesh), &["mesh `x.obj`: triangle 2 uses vertex 8, outside [0, 8)"]);

@@ -3,7 +3,7 @@
 use crate::error::{CliError, one_line};
 use crate::options::whole;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use serde::Serialize;
 use spts::output::{Manifest, OutputFolder};
 use spts::progress::Progress;
@@ -11,6 +11,7 @@ use spts_input::Refusal;
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::{IsTerminal as _, Write as _};
+use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -18,13 +19,16 @@ use std::time::{Duration, Instant};
 /// Options of every command that computes.
 #[derive(Debug, Clone, Args)]
 pub struct Common {
-    /// Number of threads; results do not depend on it [default: all cores]
+    /// Number of threads, at most four a core of this machine; results do not depend on it [default: all cores]
     #[arg(long, value_name = "N", value_parser = whole::<u16>(1..=1024))]
     threads: Option<u16>,
     /// Print the numbers as JSON on standard output
     #[arg(long)]
     pub json: bool,
 }
+
+/// Most threads a core.
+const THREADS_A_CORE: usize = 4;
 
 impl Common {
     /// Sets up the thread pool where a number of threads is asked for. Otherwise the first work that needs threads
@@ -36,8 +40,14 @@ impl Common {
         let Some(threads) = self.threads.map(usize::from) else {
             return Ok(());
         };
+        // each takes memory, and more of them no less time
+        let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+        let most = THREADS_A_CORE * cores;
+        if threads > most {
+            note(&format!("note: `--threads` = {threads}: {most} are used, as this machine has {cores} cores"));
+        }
         rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
+            .num_threads(threads.min(most))
             .build_global()
             .map_err(|e| CliError::usage(format!("`--threads` = {threads}: {e}")))
     }
@@ -102,8 +112,15 @@ impl Drop for Spinner {
 /// Progress bar over `length` items on standard error; silent when that is not a terminal.
 pub(crate) fn progress(length: usize, what: &'static str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(length as u64), target());
-    if let Ok(style) = ProgressStyle::with_template("{msg:24} {bar:40} {pos}/{len} {elapsed} (left {eta})") {
-        bar.set_style(style);
+    if let Ok(style) = ProgressStyle::with_template("{msg:24} {bar:40} {pos}/{len} {elapsed} (left {left})") {
+        // before the first item there is nothing to go by
+        let left = |state: &ProgressState, out: &mut dyn std::fmt::Write| {
+            let _ = match state.pos() {
+                0 => out.write_str("?"),
+                _ => write!(out, "{:#}", HumanDuration(state.eta())),
+            };
+        };
+        bar.set_style(style.with_key("left", left));
     }
     bar.set_message(what);
     bar

@@ -68,6 +68,7 @@ pub fn refusal(error: &clap::Error) -> Option<String> {
         ErrorKind::ValueValidation => {
             let option = option_name(text(ContextKind::InvalidArg).unwrap_or_default());
             let value = text(ContextKind::InvalidValue).unwrap_or_default();
+            let value = if value.trim().is_empty() { format!("{value:?}") } else { value.to_owned() };
             let reason = error.source().map(ToString::to_string).unwrap_or_default();
             Some(format!("`{option}` = {value}{}", joined(&reason)))
         }

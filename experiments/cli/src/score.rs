@@ -490,11 +490,8 @@ const MAX_BOARD_BYTES: u64 = 1 << 25;
 
 /// The board in a file that `--save` wrote.
 fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
-    let usage = |e: &dyn std::fmt::Display| {
-        CliError::usage(format!("{}: not a board as --save writes it: {e}", path.display()))
-    };
-    let text = spts_input::read_text(path, MAX_BOARD_BYTES).map_err(|e| usage(&e))?;
-    Ok(parse_json(path, &text)?)
+    let text = spts_input::read_text(path, MAX_BOARD_BYTES).map_err(Refusal::in_file(path))?;
+    Ok(parse_json(path, &text).map_err(|refusal| refusal.reworded(|said| format!("{said}; `--save` writes boards")))?)
 }
 
 /// Name of what is learned from the objects in all their poses.

@@ -6,6 +6,7 @@ use serde::Serialize;
 use spts_circuit::amplifier::{Amplifier, Budget, Limit, Network, Setting, Skin, fewest_wires};
 use spts_circuit::{PROFILES, Profile, Seeding};
 use spts_input::Refusal;
+use spts_models::parsed_text;
 use toml::{Table, Value};
 
 /// Share of the converter's range that a fitted feedback uses: the sum is Gaussian, and scenes differ.
@@ -191,5 +192,5 @@ pub(crate) fn profile(feedback_ohm: f64, rate_hz: f64, available_s: f64, effects
 /// A shipped profile as a table.
 pub(crate) fn shipped(name: &str) -> Result<Table, Refusal> {
     let text = PROFILES.iter().find(|(known, _)| *known == name).map_or("", |(_, text)| text);
-    toml::from_str(text).map_err(|error| Refusal::from_error(error).at(name))
+    parsed_text(text).map_err(|refusal| refusal.at(name))
 }

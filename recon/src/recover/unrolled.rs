@@ -363,12 +363,13 @@ impl Layer {
                 return Err(other_count(&format!("{what} of {name}"), len, expected));
             }
         }
-        if self.weights.iter().chain(&self.bias).all(|w| w.is_finite()) {
-            Ok(())
-        } else {
-            Err(Refusal::new(format!("{what} have a number that is not finite", what = name.to_owned())))
-        }
+        if self.weights.iter().chain(&self.bias).all(|w| w.is_finite()) { Ok(()) } else { Err(not_finite(name)) }
     }
+}
+
+/// The error of what has a number that is NaN or infinite.
+fn not_finite(what: &str) -> Refusal {
+    Refusal::new(format!("{what} has a number that is not finite"))
 }
 
 /// Parameters of one step of an [`super::Unrolled`] network, by which the step corrects the image: two dense layers,
@@ -419,10 +420,7 @@ impl UnrolledWeights {
         range("taxels", n as f64, (1..=MOST_TAXELS).contains(&n) && prior.ncols() == n, "[1, 4096]")?;
         range("steps", steps.len() as f64, steps.len() <= 100, "[0, 100]")?;
         if !prior.view().values().iter().all(|v| v.is_finite()) {
-            return Err(Refusal::new(format!(
-                "{what} have a number that is not finite",
-                what = "the prior".to_owned()
-            )));
+            return Err(not_finite("the prior"));
         }
         let trace: f64 = (0..n).map(|i| prior.row(i)[i]).sum();
         let [least, most] = MOMENTS;

@@ -2,8 +2,8 @@
 
 use crate::chain::{ChainConfig, RowsConfig};
 use serde::{Deserialize, Serialize};
-use spts_input::{Refusal, Tables};
-use spts_models::{SkinLayout, explain_toml, parsed};
+use spts_input::Refusal;
+use spts_models::{SkinLayout, parsed, parsed_text};
 use spts_sim::mechanics::{BendConfig, DropConfig, MechanicsConfig, PressConfig, Timestep};
 
 /// A scene as written in TOML. A missing field takes its default.
@@ -144,24 +144,6 @@ impl SceneConfig {
     /// # Errors
     /// [`Refusal`], with the line.
     pub fn from_toml(text: &str) -> Result<Self, Refusal> {
-        let read = toml::Deserializer::parse(text).and_then(|reader| Self::deserialize(Tables(reader)));
-        read.map_err(|error| unparsed(text, &error))
+        parsed_text(text)
     }
 }
-
-/// What the TOML reader found in `text`, on one line.
-fn unparsed(text: &str, error: &toml::de::Error) -> Refusal {
-    let start = error.span().map_or(0, |span| span.start.min(text.len()));
-    let before = text.get(..start).unwrap_or_default();
-    let line = before.matches('\n').count();
-    // of a text that is TOML the table knows the field, and the text the line
-    let table: Result<toml::Table, _> = toml::from_str(text);
-    let in_table = table.ok().and_then(|table| SceneConfig::from_table(table).err());
-    let message = in_table.map_or_else(|| explain_toml(error), |refusal| refusal.to_string());
-    let shown = text.lines().nth(line).unwrap_or_default().trim();
-    let shown: String = shown.chars().take(SHOWN).collect();
-    Refusal::new(format!("line {}: {message} (`{shown}`)", line + 1))
-}
-
-/// Characters of a wrong line that an error repeats: a line of any file of ours is shorter.
-const SHOWN: usize = 120;

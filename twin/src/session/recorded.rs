@@ -118,12 +118,16 @@ impl Session {
 }
 
 /// What names of sessions are, as a user is told.
-pub(crate) const NAMES: &str = "the names of files: not empty, `.` or `..`, without `/`, `\\` and control characters";
+pub(crate) const NAMES: &str =
+    "the names of files: 1 to 200 bytes, not `.` or `..`, without `/`, `\\` and control characters";
+
+/// Longest name, bytes: files have 255, and what is made of a name is longer.
+const LONGEST_NAME: usize = 200;
 
 /// Whether `name` is the name of a file and nothing else, on any system.
 pub(crate) fn is_plain(name: &str) -> bool {
     let foreign = |c: char| c == '/' || c == '\\' || c.is_control();
-    !name.is_empty() && name != "." && name != ".." && !name.contains(foreign)
+    (1..=LONGEST_NAME).contains(&name.len()) && name != "." && name != ".." && !name.contains(foreign)
 }
 
 fn invalid<T>(field: &str, value: impl Display, range: impl Display) -> Result<T, Refusal> {
@@ -187,16 +191,17 @@ pub(super) fn check_recorded(mode: Mode, recorded: &Recorded, blocks: usize) -> 
         let range = format!("[0, {blocks}], the blocks of the recording");
         return invalid(&field, recorded.conditioning, range);
     }
-    let block_s = recording.time_s(recording.frames());
+    let end_s = recording.time_s(recording.frames());
+    let times = format!("[-1e6, {end_s}] s, the end of the block");
     for (k, facts) in recorded.presses.iter().enumerate() {
-        if let Some(time_s) = facts.time_s.filter(|time_s| *time_s > block_s * (1.0 + 1e-9)) {
-            let range = format!("[-1e6, {block_s}] s, the end of the block");
-            return invalid(&format!("{name}.blocks[{k}].time_s"), time_s, range);
-        }
         let field = |what: &str| format!("{name}.blocks[{k}].{what}");
-        let known = [("force_n", facts.force_n, FORCES), ("time_s", facts.time_s, TIMES)];
-        for (what, value, (least, most, range)) in known {
-            if let Some(value) = value.filter(|value| !(least..=most).contains(value)) {
+        let known = [
+            ("force_n", facts.force_n, 0.0..=1e6, "[0, 1e6] N"),
+            // A time may lie before the block.
+            ("time_s", facts.time_s, -1e6..=end_s * (1.0 + 1e-9), &times),
+        ];
+        for (what, value, valid, range) in known {
+            if let Some(value) = value.filter(|value| !valid.contains(value)) {
                 return invalid(&field(what), value, range);
             }
         }
@@ -213,9 +218,6 @@ pub(super) fn check_recorded(mode: Mode, recorded: &Recorded, blocks: usize) -> 
     Ok(())
 }
 
-/// Valid forces and times of a block, and both as text. A time may lie before the block.
-const FORCES: (f64, f64, &str) = (0.0, 1e6, "[0, 1e6] N");
-const TIMES: (f64, f64, &str) = (-1e6, f64::MAX, "[-1e6, the end of the block] s");
 /// Farthest place of a body, m.
 const FARTHEST_M: f64 = 1e3;
 

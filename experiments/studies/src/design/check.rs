@@ -1,14 +1,15 @@
 //! Checks a design with other touches.
 
 use super::search::{Bench, TOUCHES, draw, mean};
-use super::wire::{BandRows, RowSource, bands};
-use super::{Design, DesignStudy, MOST_SIDE, WireChoice};
+use super::wire::{AMPLIFIER, BandRows, RowSource, bands};
+use super::{DECODER, Design, DesignStudy, MOST_SIDE, WireChoice};
 use rand::RngExt as _;
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Profile, parse_patterns};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, Streams, within};
+use spts_models::{SkinLayout, Streams, in_interval, within};
+use spts_recon::rows::{DESIGNERS, designer};
 use spts_recon::statistics::Band;
 
 /// A design, its files, and the seed of the check.
@@ -58,7 +59,7 @@ const MOST_REPETITIONS: usize = 1000;
 const MOST_MEASUREMENTS: usize = 1 << 16;
 
 impl Design {
-    /// Checks that the numbers can be those of a design.
+    /// Checks that numbers and names can be those of a design, those too on which its check does not depend.
     ///
     /// # Errors
     /// [`Refusal`] for the first one outside its range.
@@ -69,9 +70,10 @@ impl Design {
             within(field, side as f64, 2.0, MOST_SIDE, "[2, 256]")?;
         }
         let counts = [
-            ("taxels", self.taxels, self.rows.saturating_mul(self.cols), self.rows.saturating_mul(self.cols)),
+            ("taxels", self.taxels, self.rows * self.cols, self.rows * self.cols),
             ("wires", self.wires, 1, self.rows),
             ("m_per_wire", self.m_per_wire, 1, MOST_MEASUREMENTS),
+            ("m", self.m, self.m_per_wire.saturating_mul(self.wires), self.m_per_wire.saturating_mul(self.wires)),
             ("decoder.places", self.decoder.places, 1, self.taxels),
             ("expected.repetitions", expected.repetitions, 2, MOST_REPETITIONS),
             ("expected.touches", expected.touches, touches, touches),
@@ -81,9 +83,46 @@ impl Design {
                 return Err(Refusal::range(field, value, format!("[{least}, {most}]")));
             }
         }
-        let period_s = self.wire.period_s;
-        if !(period_s > 0.0 && period_s <= 1.0) {
-            return Err(Refusal::range("wire.period_s", period_s, "(0, 1] s"));
+        let sizes: Vec<usize> = bands(self.rows, self.wires).iter().map(|band| band.len() * self.cols).collect();
+        if self.sub_arrays != sizes {
+            let range = format!("{{{sizes:?}}}, the bands of {} rows on {} wires", self.rows, self.wires);
+            return Err(Refusal::range("sub_arrays", format!("{:?}", self.sub_arrays), range));
+        }
+        for (field, name, known) in
+            [("wire.amplifier", &self.wire.amplifier, AMPLIFIER), ("decoder.name", &self.decoder.name, DECODER)]
+        {
+            if name != known {
+                return Err(Refusal::range(field, name, format!("{{{known}}}")));
+            }
+        }
+        if let RowSource::Designer(name) = &self.row_source
+            && designer(name).is_none()
+        {
+            let known: Vec<&str> = DESIGNERS.iter().map(|d| d.name).collect();
+            return Err(Refusal::range("row_source.designer", name, format!("{{{}}}", known.join(", "))));
+        }
+        let wire = &self.wire;
+        let electronics = [
+            ("wire.period_s", wire.period_s, "(0, 1] s"),
+            ("wire.available_s", wire.available_s, "(0, 1] s"),
+            ("wire.settle_s", wire.settle_s, "(0, 1] s"),
+            ("wire.feedback_ohm", wire.feedback_ohm, "(0, 1e9] Ω"),
+            ("wire.noise_gain", wire.noise_gain, "[1, 1e9]"),
+            ("wire.excursion_v", wire.excursion_v, "(0, 1e9] V"),
+            ("wire.range_v", wire.range_v, "(0, 1e3] V"),
+            ("wire.adc_step_v", wire.adc_step_v, "(0, 1e3] V"),
+            ("wire.steps_per_taxel", wire.steps_per_taxel, "[0, 1e9]"),
+            ("wire.adc_bits", f64::from(wire.adc_bits), "[1, 24]"),
+        ];
+        for (field, value, interval) in electronics {
+            in_interval(field, value, interval)?;
+        }
+        if (wire.rate_hz * wire.period_s - 1.0).abs() > 1e-9 {
+            let range = format!("{{{}}}, one measurement a `wire.period_s`", 1.0 / wire.period_s);
+            return Err(Refusal::range("wire.rate_hz", wire.rate_hz, range));
+        }
+        if wire.taxels != sizes[0] {
+            return Err(Refusal::range("wire.taxels", wire.taxels, format!("{{{}}}, the largest band", sizes[0])));
         }
         let farthest = self.rows.max(self.cols) as f64;
         let bands = [

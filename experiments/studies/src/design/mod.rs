@@ -148,6 +148,9 @@ impl DesignStudy {
     }
 }
 
+/// The name of [`spts_recon::matrix_free::SheetDecoder`].
+const DECODER: &str = "SheetDecoder";
+
 /// A designed skin: everything needed to simulate it again, and its expected performance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Design {

@@ -2,7 +2,7 @@
 
 use super::objects::{Classes, DesignObjects};
 use super::wire::{BandRows, RowSource, WireDesign, bands};
-use super::{DecoderDesign, Design, DesignCurve, DesignPoint, DesignStudy, Expectation, Ground, WireChoice};
+use super::{DECODER, DecoderDesign, Design, DesignCurve, DesignPoint, DesignStudy, Expectation, Ground, WireChoice};
 use crate::touches::{Touch, TouchScore, TouchWire, band};
 use crate::wiring::sums;
 use rand::RngExt as _;
@@ -481,7 +481,7 @@ impl DesignStudy {
             m_per_wire: m,
             m: m * wires,
             decoder: DecoderDesign {
-                name: "SheetDecoder".to_owned(),
+                name: DECODER.to_owned(),
                 places: tried.bench.places(m),
                 covariance_along_rows: (0..cols).map(|d| prior.covariance(0, d)).collect(),
                 covariance_along_cols: (0..rows).map(|d| prior.covariance(0, d * cols)).collect(),

@@ -66,7 +66,7 @@ pub struct WireDesign {
 }
 
 /// The name of the amplifier in the profile as_designed.
-const AMPLIFIER: &str = "TLV9362";
+pub(super) const AMPLIFIER: &str = "TLV9362";
 
 impl WireDesign {
     /// A wire of `taxels` taxels whose ΣG and ΣG², S and S², are `pressing`; `alike` if rows may add up all of a touch
