@@ -50,7 +50,7 @@ fn profiles() -> Vec<(String, Profile)> {
             .map(|(taxel, fault)| format!("[[faults]]\nname = \"{fault}\"\ntaxel = {taxel}\n"))
             .collect();
         let mut faulty = Profile::from_toml(&format!("{text}\n{list}")).unwrap();
-        faulty.seeding = Seeding::Mixed;
+        faulty.seeding = Some(Seeding::Mixed);
         for effects in [&mut faulty.compressive, &mut faulty.raster] {
             let missed = toml::from_str("probability = [0.0, 0.01]").unwrap();
             effects.insert("missed_clocks".to_owned(), toml::Value::Table(missed));

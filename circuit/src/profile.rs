@@ -45,9 +45,10 @@ pub enum CompressiveWeights {
 pub struct Profile {
     /// Weights of the compressive mode.
     pub weights: CompressiveWeights,
-    /// Rule that seeds the cells. Default: seeds are their addresses.
-    #[serde(default)]
-    pub seeding: Seeding,
+    /// Rule that seeds the cells. Default: that of [`Seeding::usual`] for the skin, and the addresses where none is
+    /// known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seeding: Option<Seeding>,
     /// Seeds of the cells, one a taxel, in place of the rule. Default: none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seeds: Option<Vec<u32>>,
@@ -102,6 +103,14 @@ impl Profile {
     /// [`Refusal`] for text that is not TOML, an unknown key, or a value of the wrong type.
     pub fn from_toml(text: &str) -> Result<Self, Refusal> {
         parsed_text(text)
+    }
+
+    /// The profile with the usual rule for a skin of this `layout`, if it says nothing of the seeds.
+    pub fn seeded(mut self, layout: &SkinLayout) -> Self {
+        if self.seeds.is_none() && self.patterns.is_none() {
+            self.seeding.get_or_insert(Seeding::usual(layout));
+        }
+        self
     }
 
     /// The profile as used for a skin with this `layout`: Rf is scaled as [`Profile::feedback_scales`] says, and
@@ -161,14 +170,15 @@ impl Profile {
     /// [`Refusal`] if `seeds` or `patterns` are not valid or have another number of taxels, or if more
     /// than one of `seeding = "mixed"`, `seeds` and `patterns` is given.
     pub fn weights(&self, mode: Mode, taxels: u32) -> Result<Weights, Refusal> {
+        let seeding = self.seeding.unwrap_or_default();
         let weight_mode = match (mode, self.weights) {
-            (Mode::Raster, _) => return Ok(Weights::new(WeightMode::Raster, self.seeding, taxels)),
+            (Mode::Raster, _) => return Ok(Weights::new(WeightMode::Raster, seeding, taxels)),
             (Mode::Compressive, CompressiveWeights::Binary) => WeightMode::Binary,
             (Mode::Compressive, CompressiveWeights::Analog) => WeightMode::Analog,
         };
         // a rule that is not the default one contradicts a list
-        let ruled = self.seeding == Seeding::Mixed || (self.seeds.is_none() && self.patterns.is_none());
-        let rule = (ruled.then_some(self.seeding), "`seeding` = \"mixed\"");
+        let ruled = seeding == Seeding::Mixed || (self.seeds.is_none() && self.patterns.is_none());
+        let rule = (ruled.then_some(seeding), "`seeding` = \"mixed\"");
         Weights::from_one(weight_mode, Some(taxels), rule, self.seeds.as_deref(), self.patterns.as_ref())
     }
 
@@ -183,9 +193,9 @@ impl Profile {
             mode @ WeightMode::Raster => return Err(not_in_mode("weights", mode)),
         };
         let (seeding, seeds, patterns) = match weights.source() {
-            LevelSource::Seeding(seeding) => (*seeding, None, None),
-            LevelSource::Seeds(seeds) => (Seeding::Address, Some(seeds.to_vec()), None),
-            LevelSource::Patterns(patterns) => (Seeding::Address, None, Some(Patterns::clone(patterns))),
+            LevelSource::Seeding(seeding) => (Some(*seeding), None, None),
+            LevelSource::Seeds(seeds) => (None, Some(seeds.to_vec()), None),
+            LevelSource::Patterns(patterns) => (None, None, Some(Patterns::clone(patterns))),
         };
         Ok(Self { weights: mode, seeding, seeds, patterns, ..self.clone() })
     }

@@ -119,7 +119,7 @@ fn a_run_without_rows_leaves_no_data_set() {
     let outside = || spec(&SMALL.replace("grid = [-0.2, 0.0, 0.2]", "uniform = [-1.0, -0.9]"));
     let refused = |folder: &Path| Dataset::begin(folder, outside()).unwrap().make(Part::WHOLE, &()).unwrap_err();
     let new = dir.path().join("new");
-    assert!(refused(&new).to_string().contains("y_share"), "{}", refused(&new));
+    assert!(refused(&new).to_string().contains("beside the skin"), "{}", refused(&new));
     assert!(!new.exists());
     let own = dir.path().join("own");
     std::fs::create_dir(&own).unwrap();

@@ -17,7 +17,7 @@ Lengths are in metres, pressures in pascals, forces in newtons, times in seconds
 from . import dataset
 from ._spts import Body, Recording, Session, Skin, Touch, Wire
 from .dataset import Dataset
-from .decode import decode, prior, windows
+from .decode import auto, decode, prior, windows
 from .metrics import iou, support_accuracy
 from .scenes import simulate
 from .scores import Scores, score
@@ -32,6 +32,7 @@ __all__ = [
     "Skin",
     "Touch",
     "Wire",
+    "auto",
     "dataset",
     "decode",
     "iou",

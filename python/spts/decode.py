@@ -6,11 +6,10 @@ import functools
 
 import numpy as np
 
-from ._spts import Decoder, Skin, decoder_table
+from ._spts import Decoder, Skin, auto_decoder, decoder_table
 
-#: The decoder that `decode`, `spts.envs` and `spts.decoders.ImageDecoder` take unless another is named: the best of
-#: those that need no recordings, or nearly, on every skin of `scripts/python_decoders.py`.
-DEFAULT = "mixture"
+#: What `decode`, `spts.envs` and `spts.decoders.ImageDecoder` take unless a decoder is named: the one of `auto(skin)`.
+DEFAULT = "auto"
 
 # Decoders that learn from images without labels.
 _TAUGHT = {name for name, _, needs in decoder_table() if needs == "images"} | {"mixture"}
@@ -102,10 +101,35 @@ def pitch_of(places):
     return max(float(np.median(away.min(axis=1))), 1e-9)
 
 
+def auto(skin):
+    """Name of the decoder that "auto" stands for on a skin: the best of those that need no recordings.
+
+    It is "tv" on grids of more than 144 taxels, and "mixture" on coarser ones and where the numbers of the taxels do not
+    tell which are neighbours (docs/decoders.md, "Which one").
+
+    Parameters
+    ----------
+    skin : spts.Skin or (int, int)
+        Or rows and columns of a flat grid.
+
+    Returns
+    -------
+    str
+    """
+    return auto_decoder(*_shape(skin))
+
+
+def _shape(skin):
+    """Rows and columns of a skin."""
+    return skin.shape if isinstance(skin, Skin) else (int(skin[0]), int(skin[1]))
+
+
 def learned(decoder, skin, images=None, labels=None):
     """A decoder for a skin, or for rows and columns, that has learned from `images`; without them from `prior(skin)`,
     if it learns from images at all."""
-    shape = skin.shape if isinstance(skin, Skin) else (int(skin[0]), int(skin[1]))
+    shape = _shape(skin)
+    if decoder == DEFAULT:
+        decoder = auto_decoder(*shape)
     if images is not None:
         return Decoder(decoder, shape, images, labels)
     # what cannot be is refused there
@@ -143,7 +167,7 @@ def decode(phi, y, shape, decoder=DEFAULT, prior=None):
     shape : spts.Skin or (int, int)
         The skin; rows and columns of taxels will do for a flat one.
     decoder : str
-        One of `spts.decoders.names()`.
+        One of `spts.decoders.names()`, or "auto", which takes `spts.auto(shape)`.
     prior : ndarray (n, taxels) or (n, rows, cols), optional
         Raster images like those to come, in any unit. Default: touches anywhere on the skin, `spts.prior(shape)`, for
         decoders that learn from images. What is learned without a prior is kept for the next call; with one,
@@ -155,7 +179,7 @@ def decode(phi, y, shape, decoder=DEFAULT, prior=None):
         Image, one value a taxel, in the unit of y: what the taxel alone would give with the weight 1.
     """
     if prior is not None:
-        prior = as_images(prior, shape.shape if isinstance(shape, Skin) else (int(shape[0]), int(shape[1])), "prior")
+        prior = as_images(prior, _shape(shape), "prior")
     found = learned(decoder, shape, prior)
     return found.decode(np.asarray(phi, np.float64), np.asarray(y, np.float64))
 

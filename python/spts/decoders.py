@@ -36,7 +36,7 @@ class ImageDecoder(BaseEstimator):
     Parameters
     ----------
     decoder : str
-        One of `names()`.
+        One of `names()`, or "auto", which takes `spts.auto(shape)`.
     shape : (int, int)
         Rows and columns of taxels.
     """

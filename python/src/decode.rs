@@ -12,7 +12,7 @@ use spts::models::Streams;
 use spts::recon::classify::{Library, Src};
 use spts::recon::{Matrix, Workspace};
 use spts_eval::algorithm::{Answer, Class, Trained};
-use spts_eval::decoders::{DECODERS, Needs, find};
+use spts_eval::decoders::{DECODERS, Needs, auto, find};
 use spts_eval::training::TrainingData;
 use spts_eval::{Press, PressRows};
 use std::sync::Arc;
@@ -324,6 +324,12 @@ impl ImageClassifier {
         })?;
         Ok(classes?.into_pyarray(py))
     }
+}
+
+/// Name of the decoder for images of anything on a skin of rows x columns of taxels.
+#[pyfunction]
+pub(crate) fn auto_decoder(rows: usize, cols: usize) -> &'static str {
+    auto([rows, cols], false).name
 }
 
 /// Name of every decoder, what it is, and what it learns from: "nothing", "dictionary", "images", "classes" or

@@ -24,7 +24,7 @@ mod _spts {
     #[pymodule_export]
     use super::dataset::DataFolder;
     #[pymodule_export]
-    use super::decode::{Decoder, ImageClassifier, decoder_table};
+    use super::decode::{Decoder, ImageClassifier, auto_decoder, decoder_table};
     #[pymodule_export]
     use super::mount::{Mount, Mounts};
     #[pymodule_export]

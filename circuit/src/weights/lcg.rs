@@ -1,6 +1,7 @@
 //! The cells' pseudorandom generator, jumps ahead, and its seeds.
 
 use serde::{Deserialize, Serialize};
+use spts_models::SkinLayout;
 
 /// Multiplier of the cells' generator.
 pub const MULTIPLIER: u32 = 1_664_525;
@@ -98,6 +99,22 @@ pub enum Seeding {
 }
 
 impl Seeding {
+    /// The rule for a skin of which nothing else is said: the addresses on the published one, which cannot do
+    /// otherwise, and the mix on any other.
+    ///
+    /// ```
+    /// use spts_circuit::Seeding;
+    /// use spts_models::SkinLayout;
+    ///
+    /// assert_eq!(Seeding::usual(&SkinLayout::default()), Seeding::Address);
+    /// assert_eq!(Seeding::usual(&SkinLayout::new(20, 20, 0.0075, 0.005)?), Seeding::Mixed);
+    /// # Ok::<(), spts_input::Refusal>(())
+    /// ```
+    pub fn usual(layout: &SkinLayout) -> Self {
+        let of = |layout: &SkinLayout| (layout.rows(), layout.cols(), layout.pitch_m().to_bits());
+        if of(layout) == of(&SkinLayout::default()) { Self::Address } else { Self::Mixed }
+    }
+
     /// Seed of taxel `taxel`.
     #[inline]
     pub fn seed(self, taxel: u32) -> u32 {

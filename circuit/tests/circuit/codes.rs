@@ -85,7 +85,7 @@ fn variants() -> Vec<Profile> {
         let faults = "[[faults]]\nname = \"mis_seeded\"\ntaxel = 1\n[[faults]]\nname = \"drifting\"\ntaxel = 2\n\
                       [[faults]]\nname = \"skipping_clocks\"\ntaxel = 0\nprobability = 0.01\n";
         let mut faulty = Profile::from_toml(&format!("{text}\n{faults}")).unwrap();
-        faulty.seeding = Seeding::Mixed;
+        faulty.seeding = Some(Seeding::Mixed);
         for effects in [&mut faulty.compressive, &mut faulty.raster] {
             let missed = toml::from_str("probability = [0.0, 0.01]").unwrap();
             effects.insert("missed_clocks".to_owned(), toml::Value::Table(missed));

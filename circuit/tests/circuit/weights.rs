@@ -171,8 +171,8 @@ fn listed_seeds_and_patterns_record_as_the_rule() {
                 let rule = bits(&readout(&generated));
                 assert!(rule == bits(&readout(&repeated)), "{name}, {taxels} taxels, {weights:?}");
                 let mut listed = generated.clone();
-                listed.seeds = Some(seeds(generated.seeding, taxels));
-                listed.seeding = Seeding::Address;
+                listed.seeds = Some(seeds(generated.seeding.unwrap_or_default(), taxels));
+                listed.seeding = None;
                 assert!(rule == bits(&readout(&listed)), "{name}, {taxels} taxels, {weights:?}");
             }
         }
@@ -213,7 +213,7 @@ fn weights_that_contradict_themselves_are_named() {
     let raster = Weights::new(WeightMode::Raster, Seeding::Address, 4);
     assert_eq!(listed.weights(Mode::Raster, 4), Ok(raster));
     assert!(listed.validate(3).is_ok());
-    listed.seeding = Seeding::Mixed;
+    listed.seeding = Some(Seeding::Mixed);
     let said = listed.validate(3).unwrap_err().to_string();
     assert!(said.contains("found: `seeding` = \"mixed\", `seeds`"), "{said}");
 }

@@ -12,7 +12,7 @@ use spts::data::SessionSet;
 use spts::progress::Progress as _;
 use spts::session::Event;
 use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow, LearnedDecoders};
-use spts_eval::decoders::short_label;
+use spts_eval::decoders::{AUTO, auto, short_label};
 use spts_eval::training::TrainingData;
 use spts_eval::{Labels, SessionSlip, Source, Table, check_session, follow_slips, slips_text, unique};
 use spts_models::{SkinLayout, Streams};
@@ -23,7 +23,8 @@ use std::path::{Path, PathBuf};
 /// SESSION is a folder with session.json, as `spts simulate` leaves one, a folder of such folders, or recordings of the
 /// real skin. Each session is decoded with its own rows of weights, whatever its layout. The decoders learn from raster
 /// presses that are not scored. Where there are none, they use a prior made for the layout: random shapes anywhere on
-/// it. Scores are given where the truth is known.
+/// it. Scores are given where the truth is known: in simulated sessions the pressure of the same press, else the raster
+/// scan of another press of the object.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts simulate press/T --out out/T && spts decode out/T
@@ -47,8 +48,9 @@ pub(super) struct DecodeCommand {
     /// Only the sessions of these names [default: all in SESSION]
     #[arg(long = "session", value_name = "NAME,...", value_delimiter = ',')]
     only: Vec<String>,
-    /// Decoders; see `spts score --list`
-    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "nn_lmmse")]
+    /// Decoders; see `spts score --list`. `auto` is the one for images of anything on this skin: `mixture`, on grids of
+    /// more than 144 taxels `tv`, and with --weights `amortised`
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = AUTO)]
     decoder: Vec<String>,
     /// Numbers of samples M that an image is decoded from; each [1, 1000000] [default: 7,20,50 on 100 taxels, and the
     /// same shares of other skins]
@@ -88,8 +90,10 @@ impl DecodeCommand {
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
         let out = open_folder(&self.out)?;
-        let decoders = decoders_named(&self.decoder)?;
         let network = self.weights.as_deref().map(network).transpose()?;
+        let choice = |layout: &SkinLayout| auto([layout.rows(), layout.cols()], network.is_some());
+        // a wrong name is told before anything is read
+        decoders_named(&self.decoder, Some(choice(&SkinLayout::default())))?;
         let mut set = SessionSet::open(&self.session)?;
         notes(&set.note);
         let slips = follow_slips(&mut set);
@@ -113,7 +117,7 @@ impl DecodeCommand {
             let Some(layout) = session.layout() else { continue };
             let taxels = layout.taxels();
             let request = DecodeRequest {
-                decoders: decoders.clone(),
+                decoders: decoders_named(&self.decoder, Some(choice(layout)))?,
                 measurements: if self.measurements.is_empty() {
                     DecodeRequest::default_measurements(taxels)
                 } else {
@@ -126,6 +130,9 @@ impl DecodeCommand {
             let learned = match learned.iter().position(|(of, _)| of == layout) {
                 Some(at) => &learned[at].1,
                 None => {
+                    if self.decoder.iter().any(|name| name == AUTO) {
+                        note(&format!("decoder: {}, by `auto` for {} taxels", choice(layout).name, layout.taxels()));
+                    }
                     let (data, labels) = training.of(layout)?;
                     learned.push((*layout, request.learn(layout, &data, labels)?));
                     &learned[learned.len() - 1].1

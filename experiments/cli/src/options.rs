@@ -5,7 +5,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use spts::chain::MAX_TOML_BYTES;
 use spts_contact::objects::{ObjectSpec, pressable};
 use spts_eval::Sensing;
-use spts_eval::decoders::{DECODERS, DecoderSpec, find};
+use spts_eval::decoders::{AUTO, DECODERS, DecoderSpec, find};
 use spts_eval::training::TrainedNetwork;
 use spts_models::{SkinLayout, TaxelGains};
 use std::fmt::Display;
@@ -99,18 +99,22 @@ pub(super) fn within(
     }
 }
 
-/// The decoders with these names; `all` stands for every one.
+/// The decoders with these names; `all` stands for every one, and `auto` for `chosen`, where there is one.
 ///
 /// # Errors
 /// [`CliError`] for a name that no decoder has.
-pub(super) fn decoders_named(names: &[String]) -> Result<Vec<&'static DecoderSpec>, CliError> {
+pub(super) fn decoders_named(
+    names: &[String],
+    chosen: Option<&'static DecoderSpec>,
+) -> Result<Vec<&'static DecoderSpec>, CliError> {
     if names.iter().any(|n| n == "all") {
         return Ok(DECODERS.iter().collect());
     }
     let one = |name: &String| {
-        find(name).ok_or_else(|| {
+        chosen.filter(|_| name == AUTO).or_else(|| find(name)).ok_or_else(|| {
             let valid: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
-            CliError::usage(format!("`--decoder` = {name:?}; valid: all, {}", valid.join(", ")))
+            let auto = if chosen.is_some() { "auto, " } else { "" };
+            CliError::usage(format!("`--decoder` = {name:?}; valid: {auto}all, {}", valid.join(", ")))
         })
     };
     let mut found: Vec<&DecoderSpec> = Vec::new();

@@ -380,7 +380,7 @@ impl ScoreCommand {
     fn settings(&self) -> Result<BoardSettings, CliError> {
         let decoders = if self.decoder.is_empty() {
             if self.in_time {
-                decoders_named(&["nn_lmmse".to_owned()])?
+                decoders_named(&["nn_lmmse".to_owned()], None)?
             } else if self.anytime {
                 DECODERS.iter().filter(|spec| spec.anytime && spec.shown).collect()
             } else if self.external.is_empty() {
@@ -391,7 +391,7 @@ impl ScoreCommand {
                 Vec::new()
             }
         } else {
-            decoders_named(&self.decoder)?
+            decoders_named(&self.decoder, None)?
         };
         let external = self.external.iter().map(|text| ExternalCommand {
             limit: Duration::from_secs_f64(self.external_timeout),

@@ -13,7 +13,7 @@ use spts_contact::mesh::MAX_FILE_BYTES;
 use spts_contact::objects::{OBJECTS, ObjectSpec, pressable};
 use spts_eval::Table;
 use spts_eval::decode::{DecodeRequest, DecodedSession, LearnedDecoders};
-use spts_eval::decoders::find;
+use spts_eval::decoders::auto;
 use spts_eval::training::TrainingData;
 use spts_models::{SkinLayout, Streams};
 use spts_report::animation::Animation;
@@ -291,7 +291,7 @@ impl SimulateCommand {
     }
 }
 
-/// What decodes a session as `spts decode` does when nothing was learned of the objects.
+/// What decodes a session as `spts decode` does unless told otherwise.
 struct Learned {
     training: TrainingData,
     request: DecodeRequest,
@@ -302,7 +302,7 @@ impl Learned {
     fn new(layout: &SkinLayout) -> Result<Self, CliError> {
         let training = TrainingData::for_layout(layout, Streams::new(1))?;
         let request = DecodeRequest {
-            decoders: find("nn_lmmse").into_iter().collect(),
+            decoders: vec![auto([layout.rows(), layout.cols()], false)],
             measurements: DecodeRequest::default_measurements(layout.taxels()),
             windows: 1,
             network: None,

@@ -193,7 +193,7 @@ impl DecodeRequest {
         let longest = self.measurements.iter().copied().max().unwrap_or(0) * self.windows;
         let blocks = begins.par_iter().enumerate().map(|(block, &(start, ref untouched))| {
             let press = untouched.press(recording, block, start..start + longest);
-            let truth = scored.truth(block);
+            let truth = own_truth(session, block).or_else(|| scored.truth(block));
             let all = |m: usize| press.windows(0..m * self.windows, m, m);
             let measured = self.measurements.iter().flat_map(|&m| all(m)).map(|(at, window)| MeasuredWindow {
                 block,
@@ -267,6 +267,14 @@ impl LearnedDecoders {
             image: answer.image,
         }
     }
+}
+
+/// The image that is known of block `block` itself: its pressure or, without one, its conductances. `None` where
+/// neither is known, and for touches under a preload, of which either is more than the touch.
+fn own_truth(session: &Session, block: usize) -> Option<Truth> {
+    let facts = session.compressive.as_ref().filter(|_| session.event != Event::Touch)?.facts(block)?;
+    let pressure = facts.pressure.as_ref().map(|map| map.values());
+    Some(Truth::of(pressure.or(facts.conductance.as_ref().map(|map| map.values()))?.to_vec()))
 }
 
 /// First measurement of the hold of every block, and the untouched skin before it. It is the first of the contact where

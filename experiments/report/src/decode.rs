@@ -4,9 +4,12 @@ use crate::figures::{Sheet, Tile, TileRow, save_sheet};
 use crate::write_all_or_none;
 use spts::Session;
 use spts::output::OutputFolder;
+use spts_circuit::{LevelSource, Seeding};
 use spts_eval::decode::{self, DecodedSession, DecodedWindow};
 use spts_eval::decoders::short_label;
+use spts_eval::unique;
 use spts_input::Refusal;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 use std::path::Path;
 
 /// Writes `windows.csv`, one `NAME.npz` a session and the picture `decoded` (.svg and .png) into the folder `out`: all
@@ -38,7 +41,12 @@ const FINE: usize = 24;
 /// [`Refusal`] when a file cannot be written.
 pub(crate) fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name: &str) -> Result<(), Refusal> {
     let mut rows = Vec::new();
-    let mut columns = vec!["pressed".to_owned(), "the wire".to_owned()];
+    let outlined = format!("pressed; outlined: above {:.0} % of the peak", 100.0 * SUPPORT_THRESHOLD);
+    let mut columns = vec![outlined, "the wire".to_owned()];
+    let rows_of: Vec<&str> = unique(decoded.iter().filter_map(|(session, _)| rows_words(session)));
+    if let [words] = rows_of[..] {
+        columns[1] = format!("the wire, {words}");
+    }
     // sessions of other skins are decoded from other numbers of measurements
     let same_m = decoded.iter().all(|(_, found)| measurements(found) == measurements(&decoded[0].1));
     let most_blocks = MOST_ROWS.div_ceil(decoded.len().max(1)).max(1);
@@ -79,11 +87,22 @@ pub(crate) fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path
     save_sheet(&sheet, folder, name)
 }
 
+/// What kind of rows of the sensing matrix a session was measured with.
+fn rows_words(session: &Session) -> Option<&'static str> {
+    Some(match session.compressive()?.weights().source() {
+        LevelSource::Seeding(Seeding::Address) => "random rows as published",
+        LevelSource::Seeding(Seeding::Mixed) => "random rows, mixed seeds",
+        LevelSource::Seeds(_) => "random rows, given seeds",
+        LevelSource::Patterns(_) => "rows of a pattern",
+    })
+}
+
 /// The true pressure, or the true image.
 fn pressed(session: &Session, found: &DecodedSession, block: usize) -> Tile {
     let facts = session.compressive.as_ref().and_then(|r| r.facts(block));
     let [rows, cols] = found.shape;
-    let heat = |values: Vec<f64>, caption: String| Tile::Heat { values, rows, cols, max: None, caption, outline: None };
+    let outline = found.truth.get(block).and_then(Option::as_ref).map(|truth| above(truth));
+    let heat = |values: Vec<f64>, caption: String| Tile::Heat { values, rows, cols, max: None, caption, outline };
     if let Some(map) = facts.and_then(|f| f.pressure.as_ref()) {
         return heat(map.values().to_vec(), format!("peak {:.0} kPa", 1e-3 * map.max()));
     }
@@ -133,10 +152,13 @@ fn image(found: &DecodedSession, row: &DecodedWindow, with_m: bool) -> Tile {
         cols,
         max: None,
         caption: words.join(", "),
-        outline: truth.map(|truth| {
-            let mut mask = Vec::new();
-            spts_recon::metrics::support(truth, spts_recon::metrics::SUPPORT_THRESHOLD, &mut mask);
-            mask
-        }),
+        outline: truth.map(|truth| above(truth)),
     }
+}
+
+/// The taxels of `image` that count as touched.
+fn above(image: &[f64]) -> Vec<bool> {
+    let mut mask = Vec::new();
+    support(image, SUPPORT_THRESHOLD, &mut mask);
+    mask
 }

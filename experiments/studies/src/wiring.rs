@@ -158,7 +158,7 @@ pub(crate) fn wirings(
             period_s,
             steps_per_taxel: feedback_ohm * electronics.skin.drive_v * electronics.skin.pressed_s
                 / electronics.adc.lsb_v(),
-            profile: Profile { seeding, ..profile },
+            profile: Profile { seeding: Some(seeding), ..profile },
         });
     }
     Ok(ways)

@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 
 from .._spts import Body, Wire
-from ..decode import DEFAULT, decode, pitch_of
+from ..decode import DEFAULT, auto, decode, pitch_of
 
 # Measurements of an observation, by default: 20 of 100 taxels, and the same share of other skins.
 _SHARE = 0.2
@@ -33,7 +33,7 @@ class Tactile:
     measurements : int, optional
         M; default a fifth of the taxels.
     decoder : str
-        Decoder of images, one of `spts.decoders.names()`; the default learns from touches anywhere on this skin.
+        Decoder of images, one of `spts.decoders.names()`; "auto" takes `spts.auto(skin)`.
     wire : dict, optional
         What `spts.Wire` takes beside the skin and the seed: `readout`, `seeds`, `transducer`, `faults` and so on; for
         "image" no `taxels`, as the image is of all.
@@ -43,7 +43,8 @@ class Tactile:
         shape, taxels = skin.shape, skin.shape[0] * skin.shape[1]
         if observe not in ("samples", "pressure", "image"):
             raise ValueError(f'`observe` = "{observe}"; valid: "samples", "pressure", "image"')
-        self.skin, self.observe, self.decoder = skin, observe, decoder
+        self.skin, self.observe = skin, observe
+        self.decoder = auto(skin) if decoder == DEFAULT else decoder
         self.measurements = max(1, round(_SHARE * taxels)) if measurements is None else int(measurements)
         if self.measurements < 1:
             raise ValueError(f"`measurements` = {measurements} is outside [1, 2^27]")
@@ -56,7 +57,7 @@ class Tactile:
             if self._options.get("taxels") is not None:
                 raise ValueError('`wire["taxels"]`: observe="image" needs all taxels on the wire')
             # what the decoder learns is kept
-            decode(np.ones((1, taxels)), np.zeros(1), skin, decoder)
+            decode(np.ones((1, taxels)), np.zeros(1), skin, self.decoder)
             self._gauge = _gauge(skin, self._options)
         self.reset(0)
 

@@ -96,7 +96,7 @@ frame_interval_s = 1e-4 ; [press] ; object = "T" => `frame_interval_s` = 0.0001 
 [contact] ; cells_per_taxel = 0 ; [drop] => contact.cells_per_taxel | [1, 64]
 [skin] ; rows = 0 ; [drop] => rows
 [skin] ; pitch_m = -1.0 ; [drop] => pitch_m
-not toml => TOML parse error
+not toml => line 1: 
 [contact] ; model = "footprint" ; [drop] =>
     "footprint" needs a force and cannot stop a ball: use [press] instead of [drop]
 [press] ; object = "T" ; position_share = [0.0, nan] => `press.position_share (y)` = NaN is outside [-0.95, 0.95]

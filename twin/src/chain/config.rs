@@ -120,7 +120,7 @@ pub fn read_gains(parameters: &mut toml::Table, folder: &Path) -> Result<(), Ref
 ///
 /// let scene = "[rows]\nseeding = \"mixed\"\nlevels = \"analog\"\n[press]\nobject = \"T\"";
 /// let scene = Scene::from_toml(scene, ".".as_ref())?;
-/// assert_eq!(scene.chain().profile().seeding, spts_circuit::Seeding::Mixed);
+/// assert_eq!(scene.chain().profile().seeding, Some(spts_circuit::Seeding::Mixed));
 /// # Ok::<(), spts::Refusal>(())
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -130,7 +130,7 @@ pub struct RowsConfig {
     /// imply.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<RowsKind>,
-    /// Rule that seeds the cells: `"address"` or `"mixed"`.
+    /// Rule that seeds the cells: `"address"` or `"mixed"`. Default: that of the profile, else [`Seeding::usual`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seeding: Option<Seeding>,
     /// Seed of every cell, row by row; each [0, 2^32).
@@ -191,7 +191,7 @@ impl RowsConfig {
         let source = self.source()?;
         let file = self.file(folder)?;
         if source.is_some() {
-            profile.seeding = self.seeding.unwrap_or_default();
+            profile.seeding = self.seeding;
             (profile.seeds, profile.patterns) = (None, None);
         }
         let in_file = || file.as_ref().map_or_else(String::new, RowsFile::source);
@@ -222,6 +222,7 @@ impl RowsConfig {
         if let Some(levels) = self.levels {
             profile.weights = levels;
         }
+        profile = profile.seeded(layout);
         if self.levels.is_some() || profile.patterns.is_some() && source.is_some() {
             let taxels = u32::try_from(layout.taxels()).unwrap_or(u32::MAX);
             let weights = profile.weights(Mode::Compressive, taxels);

@@ -159,11 +159,12 @@ impl Chain {
         self.unlike_codes.load(Ordering::Relaxed)
     }
 
-    /// The same skin with another readout profile.
+    /// The same skin with another readout profile, with the usual seeds if it says nothing of them.
     ///
     /// # Errors
     /// [`Refusal`] for a profile with an unknown effect or a value outside its range.
     pub fn with_profile(&self, profile: Profile) -> Result<Self, Refusal> {
+        let profile = profile.seeded(&self.skin);
         let valid = profile.validate(taxels(&self.skin));
         let valid = valid.and_then(|()| profile.on(&self.skin).map(drop));
         valid.map_err(|error| refused_profile(None, &error))?;

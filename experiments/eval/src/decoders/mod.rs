@@ -147,7 +147,7 @@ pub const DECODERS: &[DecoderSpec] = &[
         .about("as nn_lmmse, prior for the objects that were seen")
         .drawn(0x00_5f_45, 1),
     spec("mixture", "mixture of shapes", Shapes, false, evidence::mixture)
-        .about("thirty clusters of simulated shapes weighed by the evidence of y, non-negative taxels")
+        .about("thirty clusters of shapes, simulated and drawn, weighed by the evidence of y, non-negative taxels")
         .drawn(0x1b_9a_aa, 5),
     spec("amortised", "trained network", Network, false, amortised::train)
         .short("amortised")
@@ -166,6 +166,35 @@ pub const DECODERS: &[DecoderSpec] = &[
 /// The decoder called `name` in [`DECODERS`]; `None` if there is none.
 pub fn find(name: &str) -> Option<&'static DecoderSpec> {
     DECODERS.iter().find(|spec| spec.name == name)
+}
+
+/// Name that stands for the decoder that [`auto`] chooses.
+pub const AUTO: &str = "auto";
+
+/// Taxels of a grid above which `tv` is ahead of `mixture`, which also takes seconds to learn there.
+const COARSE: usize = 144;
+
+/// The decoder for images of anything on a skin of `shape` (rows and columns), when nothing is known of the objects:
+///
+/// 1. `amortised`, where a network for the skin is given (`own_network`);
+/// 2. `tv` on a grid of more than 144 taxels;
+/// 3. `mixture` on all others: on coarse grids, and where the numbers of taxels do not tell which are neighbours.
+///
+/// docs/decoders.md has the measurements behind the rule.
+///
+/// ```
+/// use spts_eval::decoders::auto;
+///
+/// assert_eq!((auto([10, 10], false).name, auto([32, 32], false).name), ("mixture", "tv"));
+/// assert_eq!((auto([1, 600], false).name, auto([32, 32], true).name), ("mixture", "amortised"));
+/// ```
+pub fn auto([rows, cols]: [usize; 2], own_network: bool) -> &'static DecoderSpec {
+    let name = match rows.saturating_mul(cols) {
+        _ if own_network => "amortised",
+        taxels if rows > 1 && cols > 1 && taxels > COARSE => "tv",
+        _ => "mixture",
+    };
+    find(name).unwrap_or(&DECODERS[0])
 }
 
 /// A trained algorithm, with an image classifier for algorithms that find no class themselves.
@@ -275,7 +304,7 @@ mod tests {
     fn names_are_unique_and_described() {
         for (k, spec) in DECODERS.iter().enumerate() {
             let twice = DECODERS[..k].iter().any(|before| before.name == spec.name);
-            assert!(!twice && !spec.about.is_empty(), "{}", spec.name);
+            assert!(!twice && spec.name != AUTO && !spec.about.is_empty(), "{}", spec.name);
         }
     }
 

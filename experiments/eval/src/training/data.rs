@@ -173,14 +173,17 @@ impl TrainingData {
     }
 
     /// As [`Self::for_layout`], with images of procedural shapes instead of random outlines: pressed in the simulation,
-    /// on taxels with the usual spread of gains.
+    /// on taxels with the usual spread of gains. The images that [`Self::alike`] gives have the outlines too: shapes
+    /// are pressed about the middle of the skin, outlines lie anywhere.
     ///
     /// # Errors
     /// As [`Self::for_layout`]; [`Refusal`] if no shape can be pressed on the skin.
     pub fn for_shapes(skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
         let data = Self::for_layout(skin, streams)?;
-        let alike = shape_images(skin, streams.rng("shapes", 0).random()).map_err(|e| e.at("shapes"))?;
-        Ok(Self { images: with_gains(&alike, streams), alike: Some(Arc::new(alike)), ..data })
+        let shapes = shape_images(skin, streams.rng("shapes", 0).random()).map_err(|e| e.at("shapes"))?;
+        let columns = [&shapes, &data.images].into_iter().flat_map(|of| (0..of.ncols()).map(|k| of.column(k)));
+        let alike = Matrix::from_column_slices(skin.taxels(), &columns.collect::<Vec<_>>());
+        Ok(Self { images: with_gains(&shapes, streams), alike: Some(Arc::new(alike)), ..data })
     }
 
     /// Training data from `objects`, each with its label, in all their poses, for a sheet with `cols` columns and

@@ -13,22 +13,25 @@ use std::ops::Range;
 
 /// The data set of these shapes.
 pub const SHAPES_SPEC: &str = "unseen-shapes";
-/// Presses for a sheet of 100 taxels: four hundred for each of the thirty clusters of a mixture.
-const PRESSES: u64 = 12_000;
-/// Taxels times presses are as many as on 100 taxels: moments take the square of the taxels.
-const VALUES: u64 = 100 * PRESSES;
-/// Fewest presses, on sheets of any size.
+/// Images for a sheet of 100 taxels: four hundred for each of the thirty clusters of a mixture.
+const IMAGES: u64 = 12_000;
+/// Taxels times images are as many as on 100 taxels: moments take the square of the taxels.
+const VALUES: u64 = 100 * IMAGES;
+/// Fewest images, on sheets of any size.
 const FEWEST: u64 = 1_500;
 /// Presses that one maker makes: neighbours share a shape.
 const CHUNK: u64 = 50;
 
-/// Images of a skin of this `layout` (taxels × presses) under the shapes of [`SHAPES_SPEC`], with equal gains of all
-/// taxels, each scaled to a maximum of 1. The result depends only on the layout and `seed`.
+/// Images of a skin of this `layout` (taxels × images) under the shapes of [`SHAPES_SPEC`], with equal gains of all
+/// taxels, each scaled to a maximum of 1. A press gives all the images that the symmetries of the sheet make of it:
+/// they are what the mirrored and turned shape would have given. The result depends only on the layout and `seed`.
 ///
 /// # Errors
 /// [`Refusal`] if the layout is too large.
 pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
-    let presses = (VALUES / layout.taxels().max(1) as u64).clamp(FEWEST, PRESSES);
+    let images = (VALUES / layout.taxels().max(1) as u64).clamp(FEWEST, IMAGES);
+    let symmetries = symmetries(layout.rows(), layout.cols());
+    let presses = images.div_ceil(symmetries.len() as u64);
     let mut overrides = toml::Table::new();
     let skin = [
         ("rows", (layout.rows() as i64).into()),
@@ -43,8 +46,25 @@ pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
     let spec = Spec::load(SHAPES_SPEC, &overrides)?;
     let chunks = (0..presses.div_ceil(CHUNK)).into_par_iter();
     let chunks = chunks.map(|chunk| conductances(&spec, chunk * CHUNK..((chunk + 1) * CHUNK).min(presses)));
-    let columns = chunks.collect::<Result<Vec<_>, Refusal>>()?.concat();
-    Ok(Matrix::from_column_slices(layout.taxels(), &columns))
+    let pressed = chunks.collect::<Result<Vec<_>, Refusal>>()?.concat();
+    let columns = pressed.iter().flat_map(|image| {
+        symmetries.iter().map(move |taxels| taxels.iter().map(|&taxel| image[taxel]).collect::<Vec<_>>())
+    });
+    Ok(Matrix::from_column_slices(layout.taxels(), &columns.collect::<Vec<_>>()))
+}
+
+/// The symmetries of a sheet of `rows` × `cols` taxels: for each of them, the taxel whose value every taxel takes. A
+/// sheet has those of a rectangle, and a square one also those that swap rows and columns.
+fn symmetries(rows: usize, cols: usize) -> Vec<Vec<usize>> {
+    let all = (0..if rows == cols { 8 } else { 4 }).map(|kind: usize| {
+        let flipped = |flip: usize, at: usize, of: usize| if kind & flip == 0 { at } else { of - 1 - at };
+        let of_taxel = |taxel: usize| {
+            let (row, col) = (flipped(1, taxel / cols, rows), flipped(2, taxel % cols, cols));
+            if kind & 4 == 0 { row * cols + col } else { col * cols + row }
+        };
+        (0..rows * cols).map(of_taxel).collect()
+    });
+    all.collect()
 }
 
 /// Conductances of `rows` of a data set, each as a share of its largest.
@@ -260,6 +280,19 @@ pub(super) fn blobs(layout: &SkinLayout) -> Matrix {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn symmetries_of_a_sheet() {
+        let all = symmetries(2, 3);
+        assert_eq!(all, [[0, 1, 2, 3, 4, 5], [3, 4, 5, 0, 1, 2], [2, 1, 0, 5, 4, 3], [5, 4, 3, 2, 1, 0]]);
+        // those of a square leave all distances as they are
+        let square: std::collections::BTreeSet<_> = symmetries(3, 3).into_iter().collect();
+        let distance = |a: usize, b: usize| (a / 3).abs_diff(b / 3) + (a % 3).abs_diff(b % 3);
+        assert_eq!(square.len(), 8);
+        for taxels in square {
+            assert!((0..9).all(|a| (0..9).all(|b| distance(a, b) == distance(taxels[a], taxels[b]))), "{taxels:?}");
+        }
+    }
 
     /// Every taxel of the middle is in many shapes, and the seed decides.
     #[test]

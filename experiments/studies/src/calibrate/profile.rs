@@ -10,6 +10,7 @@ use serde::Serialize;
 use spts::chain::DEFAULT_READOUT;
 use spts_circuit::{LevelSource, Profile, Seeding, Weights};
 use spts_input::Refusal;
+use spts_models::SkinLayout;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
@@ -164,7 +165,8 @@ impl FittedReadout {
         };
         let mode = weights.mode().name();
         let source = match weights.source() {
-            LevelSource::Seeding(Seeding::Address) => None,
+            // a profile of the published skin's readout leaves the rule to the skin
+            LevelSource::Seeding(Seeding::Address) if weights.taxels() == SkinLayout::default().taxels() => None,
             LevelSource::Seeding(seeding) => Some(("seeding", toml::Value::try_from(seeding)?)),
             LevelSource::Seeds(seeds) => Some(("seeds", toml::Value::try_from(seeds.to_vec())?)),
             LevelSource::Patterns(patterns) => Some(("patterns", toml::Value::try_from(patterns.as_ref())?)),

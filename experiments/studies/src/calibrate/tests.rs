@@ -70,7 +70,7 @@ fn pair(profile: &Profile) -> SessionPair {
 #[test]
 fn the_profile_and_the_replay_have_the_weights_and_the_rate_of_the_recording() {
     let mut profile = Profile::from_toml(READOUT).unwrap();
-    (profile.seeding, profile.sample_rate_hz) = (Seeding::Mixed, 50_000.0);
+    (profile.seeding, profile.sample_rate_hz) = (Some(Seeding::Mixed), 50_000.0);
     profile.compressive.remove("late_updates");
     let pair = pair(&profile);
     let found = SessionEstimates::of(&pair, &pair.compressive, &[0]).unwrap();
@@ -81,7 +81,7 @@ fn the_profile_and_the_replay_have_the_weights_and_the_rate_of_the_recording() {
     assert!(text.contains("\nsample_rate_hz = 50000.0  # kept: no beat seen\n"), "{text}");
     // a base profile seeds with the addresses: the replay's weights are those of the recording all the same
     let mut addressed = fitted;
-    addressed.seeding = Seeding::Address;
+    addressed.seeding = Some(Seeding::Address);
     let images = |block| recorded_image(&pair.compressive, block, &found, &addressed);
     let twin = replay(&pair.compressive, &[1], &images, &addressed, Streams::new(1), 0).unwrap();
     let twin = SessionEstimates::of(&pair, &twin, &[1]).unwrap();
