@@ -62,7 +62,7 @@ pub use effects::{EFFECTS, build_chain, check_effect};
 pub use faults::FAULTS;
 pub use profile::{CompressiveWeights, PROFILES, Profile};
 pub use readout::Readout;
-pub use recording::{Block, Recording, RecordingInfo, Slip};
+pub use recording::{Block, FrameUnit, Recording, RecordingInfo, Slip};
 pub use source::{ConductanceSource, Constant, Interpolated, Segment, Started};
 pub use weights::{
     CellCodes, FIRST_ADDRESS, INCREMENT, Jump, LevelSource, MAX_PATTERNS_BYTES, MAX_SEEDS_BYTES, MULTIPLIER, Mode,

@@ -34,6 +34,23 @@ pub struct RecordingInfo {
     /// Scale of the converter; `None` if no converter acted or its scale is not known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub converter: Option<Converter>,
+    /// Unit of the samples where they are frames of a skin or a simulator of any kind; `None` for volts of the wire.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<FrameUnit>,
+}
+
+/// What the numbers of frames are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FrameUnit {
+    /// Mean pressure over a taxel's area, Pa.
+    Pressure,
+    /// Conductance of a taxel, S.
+    Conductance,
+    /// Codes of a converter, which grow with the load.
+    Codes,
+    /// Any number that grows with the load.
+    Relative,
 }
 
 /// A layout whose rows, columns and pitch are told: a recording has no usual ones.
@@ -54,7 +71,7 @@ fn told_layout<'de, D: Deserializer<'de>>(from: D) -> Result<SkinLayout, D::Erro
 impl RecordingInfo {
     /// Metadata of a skin whose frames have one measurement for each taxel, without a converter.
     pub fn new(layout: SkinLayout, weights: Weights, sample_rate_hz: f64) -> Self {
-        Self { measurements_per_frame: layout.taxels(), layout, weights, sample_rate_hz, converter: None }
+        Self { measurements_per_frame: layout.taxels(), layout, weights, sample_rate_hz, converter: None, unit: None }
     }
 
     /// The readout that made the recording.

@@ -23,6 +23,7 @@ mod file;
 mod finish;
 mod folder;
 mod make;
+mod numbers;
 mod rows;
 mod spec;
 #[cfg(test)]
@@ -34,6 +35,7 @@ pub use file::{ColumnValues, shard_rows};
 pub use finish::{ColumnStatistics, Finished, Statistics};
 pub use folder::{Dataset, Info, Made, Part};
 pub use make::{Maker, Row};
+pub use numbers::{NumberColumns, numbers_of};
 pub use rows::spread_rows;
 pub use spec::{
     Draw, DropConfig, FaultsConfig, Label, NAMED_SPECS, ObjectConfig, ObjectSource, PoseConfig, PoseOrigin,

@@ -129,6 +129,8 @@ class Skin:
 
 @final
 class Touch:
+    @staticmethod
+    def from_array(skin: Skin, pressure: ArrayLike, dt: float = 0.1) -> Touch: ...
     @property
     def pressure(self) -> _Floats: ...
     @property
@@ -159,15 +161,16 @@ class Wire:
         taxels: Sequence[int] | None = None,
         rows: ArrayLike | str | None = None,
     ) -> Wire: ...
-    def feel(self, touch: Touch | Sequence[Touch | None]) -> None: ...
+    def feel(self, touch: Touch | ArrayLike | Sequence[Touch | ArrayLike | None], dt: float | None = None) -> None: ...
     def record(
         self,
-        touch: Touch | Sequence[Touch | None],
+        touch: Touch | ArrayLike | Sequence[Touch | ArrayLike | None],
         measurements: int | None = None,
         *,
         raster: bool = False,
         raw: bool = False,
         weights: bool = True,
+        dt: float | None = None,
     ) -> tuple[_Floats, _Floats]: ...
     @property
     def conductance(self) -> _Floats: ...
@@ -249,6 +252,33 @@ class Session:
     def shape(self) -> tuple[int, int] | None: ...
     @property
     def simulated(self) -> bool: ...
+    @staticmethod
+    def from_frames(
+        frames: ArrayLike,
+        rate: float,
+        unit: str = "relative",
+        *,
+        rows: int | None = None,
+        cols: int | None = None,
+        pitch: float = 0.015,
+        name: str = "frames",
+        object: str | None = None,
+        idle: int | None = None,
+        hold: tuple[float, float] | None = None,
+        cut: bool = False,
+    ) -> Session: ...
+    @property
+    def frames(self) -> _Floats | None: ...
+    def wire(
+        self,
+        readout: str = "as_built",
+        *,
+        seeds: str | Sequence[int] | None = None,
+        rows: ArrayLike | str | None = None,
+        seed: int = 1,
+        peak: float = 30e3,
+    ) -> Session: ...
+    def write(self, path: _Path) -> None: ...
     @property
     def raster(self) -> Recording | None: ...
     @property

@@ -1,15 +1,17 @@
 //! Sessions: recordings of the real skin or of the twin.
 
-use crate::args::{Array1, Array2, Array3, whole};
+use crate::args::{Array1, Array2, Array3, one_of, whole};
 use crate::common::{refuse, released, warn};
-use numpy::{IntoPyArray as _, PyArrayMethods as _};
+use crate::wire::rows_of;
+use numpy::{AllowTypeChange, IntoPyArray as _, PyArray4, PyArrayLikeDyn, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList, PyTuple};
 use spts::circuit::Recording as Samples;
-use spts::data::SessionSet;
+use spts::data::{FrameArray, FrameOptions, Frames, SessionSet, wired};
 use spts::session::{Event, PressFacts, Recorded, Session as Whole};
+use spts::{Chain, ChainConfig, FrameUnit, SkinLayout};
 use spts_eval::idle_mean;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Recordings of one object or event, and what is known of them.
@@ -95,6 +97,143 @@ impl Session {
     #[getter]
     fn compressive(&self) -> Option<Recording> {
         self.recording(false)
+    }
+
+    /// A session of frames of any skin or simulator: they are its raster recording, unchanged, and its truth.
+    ///
+    /// What is found or assumed is said as warnings: idle frames, the hold, taxels that never change.
+    ///
+    /// Parameters
+    /// ----------
+    /// frames : ndarray (presses, frames, rows, cols) or (frames, rows, cols)
+    ///     NaN marks a missing value. With `rows` and `cols`, also (frames, rows * cols).
+    /// rate : float
+    ///     Frames a second, [1e-3, 1e6] Hz.
+    /// unit : str
+    ///     "pressure", Pa; "conductance", S; "codes" of a converter, or "relative"; all grow with the load.
+    /// rows, cols : int, optional
+    ///     Taxels; default the last two dimensions.
+    /// pitch : float
+    ///     Distance of taxels, m.
+    /// name, object : str
+    ///     Name of the session, and what was pressed: its class; default the name.
+    /// idle : int, optional
+    ///     Frames at the start of every press in which nothing touches the skin; default those before the sum rises.
+    /// hold : (float, float), optional
+    ///     Span of a press in which the contact is steady, s; default where the sum stays at its largest.
+    /// cut : bool
+    ///     Make a press of every contact in the frames; what is not whole is left out.
+    #[staticmethod]
+    #[pyo3(signature = (frames, rate, unit = "relative", *, rows = None, cols = None, pitch = 0.015, name = "frames", object = None, idle = None, hold = None, cut = false))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
+    fn from_frames(
+        py: Python<'_>,
+        frames: PyArrayLikeDyn<'_, f64, AllowTypeChange>,
+        rate: f64,
+        unit: &str,
+        rows: Option<usize>,
+        cols: Option<usize>,
+        pitch: f64,
+        name: &str,
+        object: Option<String>,
+        idle: Option<usize>,
+        hold: Option<(f64, f64)>,
+        cut: bool,
+    ) -> PyResult<Self> {
+        let units = [
+            ("pressure", FrameUnit::Pressure),
+            ("conductance", FrameUnit::Conductance),
+            ("codes", FrameUnit::Codes),
+            ("relative", FrameUnit::Relative),
+        ];
+        let unit = one_of("unit", unit, &units)?;
+        let array = frames.as_array();
+        let shape = array.shape().to_vec();
+        let [.., last_rows, last_cols] = shape[..] else {
+            bail!("`frames` has shape {shape:?}; (frames, rows, cols) is needed");
+        };
+        let sheet = [rows.unwrap_or(last_rows), cols.unwrap_or(last_cols)];
+        let layout = SkinLayout::with_pitch(sheet[0], sheet[1], pitch).map_err(refuse)?;
+        let array = FrameArray { shape, values: array.iter().copied().collect(), ..FrameArray::default() };
+        let options = FrameOptions {
+            object: object.unwrap_or_else(|| name.to_owned()),
+            rate_hz: Some(rate),
+            idle,
+            hold_s: hold.map(|(start, end)| [start, end]),
+            ..FrameOptions::new(name, layout, unit)
+        };
+        let made = py.detach(|| {
+            let frames = Frames::new(array, sheet, None)?;
+            let frames = if cut { frames.cut()? } else { frames };
+            frames.session(&options)
+        });
+        // options of the command line, under the names that they have here
+        let named = |text: String| {
+            ["rate", "idle", "hold", "cut"].iter().fold(text, |text, name| text.replace(&format!("--{name}"), name))
+        };
+        let (whole, notes) = made.map_err(|error| refuse(named(error.to_string())))?;
+        notes.into_iter().try_for_each(|note| warn(py, &named(note)))?;
+        Ok(Self { whole: Arc::new(whole) })
+    }
+
+    /// The frames of the raster scan, (presses, frames, rows, cols), in their unit; None where there are none.
+    #[getter]
+    fn frames<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray4<f64>>>> {
+        if self.whole.raster.is_none() {
+            return Ok(None);
+        }
+        let frames = Frames::of_session(&self.whole).map_err(refuse)?;
+        Ok(Some(frames.values().to_vec().into_pyarray(py).reshape(frames.shape())?))
+    }
+
+    /// This session of frames as a skin with one wire would record it: a session with both recordings.
+    ///
+    /// Idle frames are subtracted. Pressures go through the transducer; conductances are taken as they are; of codes and
+    /// relative values the largest is taken for what `peak` gives. What is assumed is said as warnings.
+    ///
+    /// Parameters
+    /// ----------
+    /// readout : str
+    ///     Profile of the electronics, as for `Wire`.
+    /// seeds, rows : optional
+    ///     As for `Wire`.
+    /// seed : int
+    ///     Root of everything random.
+    /// peak : float
+    ///     Pa, [100, 1e6].
+    #[pyo3(signature = (readout = "as_built", *, seeds = None, rows = None, seed = 1, peak = 30e3))]
+    fn wire(
+        &self,
+        py: Python<'_>,
+        readout: &str,
+        seeds: Option<Bound<'_, PyAny>>,
+        rows: Option<Bound<'_, PyAny>>,
+        seed: i128,
+        peak: f64,
+    ) -> PyResult<Self> {
+        let seed = whole("seed", seed)?;
+        let config = ChainConfig {
+            readout: Some(readout.to_owned()),
+            rows: rows_of(seeds, None, rows)?,
+            ..ChainConfig::default()
+        };
+        let Some(layout) = self.whole.layout().copied() else { bail!("the session has no frames") };
+        let found = released(py, || {
+            let chain = Chain::new(&config, &layout, seed, Path::new(""))?;
+            wired(&self.whole, &chain, peak, seed)
+        })?;
+        let found = found.map_err(|error| refuse(error.to_string().replace("--peak", "peak")))?;
+        found.notes.iter().try_for_each(|note| warn(py, &note.replace("--peak", "peak")))?;
+        Ok(Self { whole: Arc::new(found.session) })
+    }
+
+    /// Writes the session into a folder, which every command reads; all of its files, or none.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        released(py, || self.whole.write(&path))?.map_err(refuse)
     }
 
     /// Nothing changes a session: a copy shares its samples.

@@ -573,8 +573,79 @@ pub(crate) struct Touch {
     pub(crate) skin: u64,
 }
 
+impl Touch {
+    /// The touch number `number` of a skin with taxels of `cell_m2`, under this pressure at the time `time`.
+    pub(crate) fn of_pressure(
+        py: Python<'_>,
+        pressure: PressureMap,
+        cell_m2: f64,
+        [time, number]: [f64; 2],
+        skin: u64,
+    ) -> PyResult<Self> {
+        let pressed = pressure.values().iter().filter(|p| **p > 0.0).count();
+        Ok(Self {
+            pressure: Array::from_shape_vec([pressure.rows(), pressure.cols()], pressure.values().to_vec())
+                .map_err(refuse)?
+                .into_pyarray(py)
+                .unbind(),
+            wrenches: OnceLock::new(),
+            loads: Arc::new((Arc::from([]), Vec::new())),
+            area: pressed as f64 * cell_m2,
+            time,
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of touches")]
+            number: number as u64,
+            bottomed: false,
+            felt: Arc::new(pressure),
+            skin,
+        })
+    }
+}
+
+/// The pressure in an array of a skin of rows x cols taxels.
+pub(crate) fn pressure_of(value: &Bound<'_, PyAny>, [rows, cols]: [usize; 2]) -> PyResult<PressureMap> {
+    let Ok(array) = value.extract::<PyArrayLike2<'_, f64, AllowTypeChange>>() else {
+        bail!("`pressure`: an array ({rows}, {cols}), Pa, is needed");
+    };
+    let array = array.as_array();
+    if array.dim() != (rows, cols) {
+        bail!("`pressure` has shape {:?}; ({rows}, {cols}) is needed", array.dim());
+    }
+    let values: Vec<f64> = array.iter().copied().collect();
+    if let Some(at) = values.iter().position(|p| !(0.0..=1e9).contains(p)) {
+        bail!("`pressure[{}, {}]` = {} is outside [0, 1e9] Pa", at / cols, at % cols, values[at]);
+    }
+    Ok(PressureMap::from_values(rows, cols, values))
+}
+
 #[pymethods]
 impl Touch {
+    /// A touch of which the pressure is known, of any origin: what `Wire.record` takes.
+    ///
+    /// The foam of the skin has no part in it, and there are no bodies. Taxels that electrodes cover in part are under
+    /// the same pressure all over.
+    ///
+    /// Parameters
+    /// ----------
+    /// skin : Skin
+    ///     Its time goes on by `dt`.
+    /// pressure : ndarray (rows, cols)
+    ///     Mean pressure over every taxel, Pa, [0, 1e9].
+    /// dt : float
+    ///     Time since the touch before, s, [0, 1e9].
+    #[staticmethod]
+    #[pyo3(signature = (skin, pressure, dt = 0.1))]
+    fn from_array(py: Python<'_>, skin: &Skin, pressure: &Bound<'_, PyAny>, dt: f64) -> PyResult<Self> {
+        if !(0.0..=1e9).contains(&dt) {
+            bail!("`dt` = {dt} is outside [0, 1e9] s");
+        }
+        let mut state = skin.locked();
+        let layout = *state.skin.layout();
+        let pressure = pressure_of(pressure, [layout.rows(), layout.cols()])?;
+        state.touches += 1;
+        state.time_s += dt;
+        Self::of_pressure(py, pressure, layout.cell_area_m2(), [state.time_s, state.touches as f64], skin.id)
+    }
+
     /// Wrench on every body about its origin, in the skin's frame: (force (3,) N, torque (3,) N m).
     #[getter]
     fn wrenches<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

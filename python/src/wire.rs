@@ -2,7 +2,7 @@
 
 use crate::args::{Array1, Array2, one_of, whole};
 use crate::common::{of_toml, refuse, table, to_toml};
-use crate::skin::{Skin, Touch};
+use crate::skin::{Skin, Touch, pressure_of};
 use numpy::{AllowTypeChange, IntoPyArray as _, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PySequence, PyTuple};
@@ -13,6 +13,9 @@ use spts::models::{Snapshot, Streams};
 use spts::{Chain, ChainConfig, Mode, PressureMap, SkinLayout, Wire as Line};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
+
+/// Time for which an array of pressures has been on the skin unless that is said, s.
+const HELD_S: f64 = 0.1;
 
 /// Most measurements of a call, and most weights that it returns.
 const MOST: usize = 1 << 27;
@@ -170,9 +173,12 @@ impl Wire {
     /// touch : Touch, or sequence of Touch or None
     ///     Of this wire's skin, not before the one that it felt last. It has been on the skin since then. Of a wire
     ///     over several skins one of each, in their order; None for a skin without a touch since then: its taxels stay
-    ///     as they are.
-    fn feel(&self, py: Python<'_>, touch: &Bound<'_, PyAny>) -> PyResult<()> {
-        let touches = self.touches(touch)?;
+    ///     as they are. An array (rows, cols), Pa, is a touch of a skin of which all taxels are on the wire.
+    /// dt : float, optional
+    ///     Time for which an array has been on the skin, s, [0, 1e9]; default 0.1. A touch has its own.
+    #[pyo3(signature = (touch, dt = None))]
+    fn feel(&self, py: Python<'_>, touch: &Bound<'_, PyAny>, dt: Option<f64>) -> PyResult<()> {
+        let touches = self.touches(touch, dt)?;
         py.detach(|| self.felt(&mut self.locked(), &touches))
     }
 
@@ -182,7 +188,7 @@ impl Wire {
     /// ----------
     /// touch : Touch, or sequence of Touch or None
     ///     What the skin feels now; it has been on the skin since the touch that this wire felt last. Of a wire over
-    ///     several skins one of each, as for `feel`.
+    ///     several skins one of each, and arrays of pressure, as for `feel`.
     /// measurements : int, optional
     ///     Number of measurements, M; default for a raster scan: one a taxel.
     /// raster : bool
@@ -191,6 +197,8 @@ impl Wire {
     ///     The output of the amplifier as it is, V, in place of its difference from the untouched skin's.
     /// weights : bool
     ///     Whether Φ is returned; without it, the second value is None.
+    /// dt : float, optional
+    ///     As for `feel`.
     ///
     /// Returns
     /// -------
@@ -198,7 +206,7 @@ impl Wire {
     ///     Output of the summing amplifier without that of the untouched skin, V.
     /// phi : ndarray (M, taxels)
     ///     The rows of the sensing matrix Φ: the weights of the cells at each measurement.
-    #[pyo3(signature = (touch, measurements = None, *, raster = false, raw = false, weights = true))]
+    #[pyo3(signature = (touch, measurements = None, *, raster = false, raw = false, weights = true, dt = None))]
     fn record<'py>(
         &self,
         py: Python<'py>,
@@ -207,8 +215,9 @@ impl Wire {
         raster: bool,
         raw: bool,
         weights: bool,
+        dt: Option<f64>,
     ) -> PyResult<(Array1<'py>, Option<Array2<'py>>)> {
-        let touches = self.touches(touch)?;
+        let touches = self.touches(touch, dt)?;
         let taxels = self.shape.0 * self.shape.1;
         let count = match measurements {
             Some(count) => whole("measurements", count)?,
@@ -355,9 +364,12 @@ impl Wire {
     }
 
     /// One touch a skin.
-    fn touches(&self, touch: &Bound<'_, PyAny>) -> PyResult<Vec<Option<Py<Touch>>>> {
+    fn touches(&self, touch: &Bound<'_, PyAny>, dt: Option<f64>) -> PyResult<Vec<Option<Py<Touch>>>> {
+        if let Some(dt) = dt.filter(|dt| !(0.0..=1e9).contains(dt)) {
+            bail!("`dt` = {dt} is outside [0, 1e9] s");
+        }
         if !self.made.several {
-            return Ok(vec![Some(touch.cast::<Touch>()?.clone().unbind())]);
+            return Ok(vec![Some(self.touch(0, touch, dt)?)]);
         }
         let skins = self.made.skins.len();
         let Ok(given) = touch.cast::<PySequence>() else {
@@ -371,11 +383,42 @@ impl Wire {
         }
         let one = |(k, touch): (usize, PyResult<Bound<'_, PyAny>>)| {
             let touch = touch?;
-            let found = touch.extract::<Option<Py<Touch>>>();
-            found
-                .map_err(|_| refuse(format!("`touch[{k}]` is a {}; valid: a touch of skin {k}, or None", kind(&touch))))
+            if touch.is_none() { Ok(None) } else { self.touch(k, &touch, dt).map(Some) }
         };
         given.try_iter()?.enumerate().map(one).collect()
+    }
+
+    /// A touch of skin number `skin`, which may be an array of pressures that has been there for `dt` s.
+    fn touch(&self, skin: usize, touch: &Bound<'_, PyAny>, dt: Option<f64>) -> PyResult<Py<Touch>> {
+        let name = if self.made.several { format!("touch[{skin}]") } else { "touch".to_owned() };
+        if let Ok(touch) = touch.cast::<Touch>() {
+            if dt.is_some() {
+                bail!("`dt` is for arrays; `{name}` has its own time");
+            }
+            return Ok(touch.clone().unbind());
+        }
+        let part = &self.made.skins[skin];
+        if !touch.hasattr("__array__")? && touch.cast::<PySequence>().is_err() {
+            let of = if self.made.several {
+                format!(" of skin {skin}, an array, or None")
+            } else {
+                " or an array".to_owned()
+            };
+            bail!("`{name}` is a {}; valid: a touch{of}", kind(touch));
+        }
+        if part.taxels.is_some() {
+            bail!(
+                "`{name}`: an array is for a wire with all taxels of its skin; `spts.Touch.from_array` makes a touch of it"
+            );
+        }
+        let pressure = pressure_of(touch, [part.layout.rows(), part.layout.cols()])?;
+        let now = {
+            let state = self.locked();
+            let last = &state.skins[skin];
+            [last.time_s + dt.unwrap_or(HELD_S), last.number as f64 + 1.0]
+        };
+        let made = Touch::of_pressure(touch.py(), pressure, part.layout.cell_area_m2(), now, part.id.cast_unsigned())?;
+        Py::new(touch.py(), made)
     }
 
     /// Brings the transducer to the time of `touches`, one a skin. None is felt when one is refused.
@@ -510,7 +553,7 @@ fn joined(parts: &[Part]) -> PyResult<SkinLayout> {
 }
 
 /// The rows that are asked for in place of the profile's.
-fn rows_of(
+pub(crate) fn rows_of(
     seeds: Option<Bound<'_, PyAny>>,
     levels: Option<&str>,
     given: Option<Bound<'_, PyAny>>,

@@ -63,7 +63,7 @@ pub use scene::Scene;
 pub use session::{PressFacts, Recorded, Session};
 pub use wire::Wire;
 
-pub use spts_circuit::{Block, Mode, Profile, Recording, RecordingInfo, Seeding, WeightMode, Weights};
+pub use spts_circuit::{Block, FrameUnit, Mode, Profile, Recording, RecordingInfo, Seeding, WeightMode, Weights};
 pub use spts_contact::{Frame, Pose, Wrench};
 pub use spts_input::Refusal;
 pub use spts_models::{ConductanceMap, PressureMap, SkinLayout};

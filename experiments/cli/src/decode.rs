@@ -181,7 +181,7 @@ impl DecodeCommand {
         };
         if chosen.is_empty() {
             return Err(CliError::usage(format!(
-                "{}: no session has a compressive recording to decode",
+                "{}: no session has a compressive recording to decode; `spts wire` records frames with one",
                 self.session.display()
             )));
         }

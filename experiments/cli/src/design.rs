@@ -2,7 +2,7 @@
 
 use crate::context::{Bars, Common, open_folder};
 use crate::error::CliError;
-use crate::options::{seed, whole, within};
+use crate::options::{length, seed, whole, with_unit, within};
 use clap::{Args, Subcommand};
 use spts_report::design::{read_design, write};
 use spts_studies::design::{DesignObjects, DesignStudy, WireChoice};
@@ -113,23 +113,6 @@ fn area(text: &str) -> Result<[f64; 2], String> {
     let side = |word: &str| word.trim().parse().ok().filter(|m| (1e-3..=10.0).contains(m));
     let found = text.split_once(['x', '×']).and_then(|(width, height)| Some([side(width)?, side(height)?]));
     found.ok_or_else(|| "is not WIDTHxHEIGHT with both in [0.001, 10] m".to_owned())
-}
-
-/// A number with one of `units`, or without.
-fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
-    for (unit, scale) in units {
-        if let Some(number) = text.strip_suffix(unit) {
-            return number.trim().parse().ok().map(|v: f64| v * scale);
-        }
-    }
-    text.parse().ok()
-}
-
-/// A length, m.
-fn length(text: &str) -> Result<f64, String> {
-    let found = with_unit(text, &[("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("µm", 1e-6), ("m", 1.0)]);
-    let range = found.filter(|m| (1e-4..=1.0).contains(m));
-    range.ok_or_else(|| "is not a length in [0.1mm, 1m], as 5mm or 0.005".to_owned())
 }
 
 /// A time, s.

@@ -23,6 +23,7 @@ mod fidelity;
 mod firmware;
 #[cfg(feature = "full")]
 mod full;
+mod import;
 #[cfg(feature = "full")]
 mod live;
 #[cfg_attr(not(feature = "full"), expect(dead_code, reason = "some belong to commands that are left out"))]
@@ -39,6 +40,8 @@ mod sensing;
 mod simulate;
 #[cfg(feature = "full")]
 mod validate;
+#[cfg(feature = "full")]
+mod wire;
 #[cfg(not(feature = "full"))]
 mod without;
 
@@ -109,6 +112,9 @@ commands! {
     Readouts(readouts::ReadoutsCommand),
     #[cfg(feature = "full")]
     Sensing(Box<sensing::SensingCommand>),
+    Import(import::ImportCommand),
+    #[cfg(feature = "full")]
+    Wire(wire::WireCommand),
     Decode(decode::DecodeCommand),
     Score(score::ScoreCommand),
     Dataset(dataset::DatasetCommand),

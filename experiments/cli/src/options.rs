@@ -29,6 +29,23 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
     text.parse().map_err(|_| "is not a number".to_owned())
 }
 
+/// A number with one of `units`, or without.
+pub(super) fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
+    for (unit, scale) in units {
+        if let Some(number) = text.strip_suffix(unit) {
+            return number.trim().parse().ok().map(|v: f64| v * scale);
+        }
+    }
+    text.parse().ok()
+}
+
+/// Parser of a length, m.
+pub(super) fn length(text: &str) -> Result<f64, String> {
+    let found = with_unit(text, &[("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("µm", 1e-6), ("m", 1.0)]);
+    let range = found.filter(|m| (1e-4..=1.0).contains(m));
+    range.ok_or_else(|| "is not a length in [0.1mm, 1m], as 5mm or 0.005".to_owned())
+}
+
 /// Parser of a seed. A seed is kept in scenes, and a TOML integer has a sign.
 pub(super) fn seed(text: &str) -> Result<u64, String> {
     let seed = text.parse().ok().filter(|seed| i64::try_from(*seed).is_ok());

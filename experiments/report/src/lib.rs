@@ -10,6 +10,7 @@ pub mod design;
 pub mod electronics;
 mod error;
 pub mod explore;
+pub mod few_wires;
 pub mod fidelity;
 pub mod figures;
 mod html;

@@ -7,6 +7,7 @@ pub mod compare;
 pub mod design;
 pub mod electronics;
 pub mod explore;
+pub mod few_wires;
 pub mod fidelity;
 pub mod firmware;
 pub mod per_object;

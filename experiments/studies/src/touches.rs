@@ -3,7 +3,7 @@
 //! A `TouchScene` defines objects and skin, and its `draw` presses the objects. A `TouchWire` measures the touches
 //! through a readout profile with any weights, and a `TouchScore` compares an image with the touch.
 
-use spts_circuit::{Constant, Mode, Profile, Readout, Weights};
+use spts_circuit::{Constant, Mode, Profile, Readout, RecordingInfo, Weights};
 use spts_dataset::{Maker, Spec};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
@@ -163,6 +163,16 @@ impl TouchWire {
     /// A wire with the given readout. Nothing is subtracted from its samples.
     pub(crate) fn of(readout: Readout) -> Self {
         Self { readout, idle_v: 0.0 }
+    }
+
+    /// Output of the untouched skin, which [`TouchWire::measure`] subtracts, V.
+    pub(crate) fn idle_v(&self) -> f64 {
+        self.idle_v
+    }
+
+    /// What is known of its samples.
+    pub(crate) fn info(&self) -> &RecordingInfo {
+        self.readout.info()
     }
 
     /// Unmodified samples of a skin with this conductance at the first rows, V. `number` determines the noise.

@@ -10,7 +10,7 @@ use std::path::Path;
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatVariable {
     /// Name.
-    pub name: &'static str,
+    pub name: String,
     /// Size along each dimension.
     pub shape: Vec<usize>,
     /// Values, first index fastest.
@@ -27,7 +27,7 @@ const MAX_VALUES: usize = 1 << 25;
 ///
 /// # Errors
 /// [`Refusal`] when the file cannot be read, is not MATLAB v5, or that variable is missing or no array of numbers.
-pub(super) fn read_mat(path: &Path, names: &[&'static str]) -> Result<MatVariable, Refusal> {
+pub(super) fn read_mat(path: &Path, names: &[&str]) -> Result<MatVariable, Refusal> {
     let bytes = spts_input::read(path, MAX_FILE_BYTES).map_err(Refusal::in_file(path))?;
     parse_mat(bytes, names, path)
 }
@@ -36,24 +36,66 @@ pub(super) fn read_mat(path: &Path, names: &[&'static str]) -> Result<MatVariabl
 ///
 /// # Errors
 /// [`Refusal`] when they are not MATLAB v5, or that variable is missing or no array of numbers.
-pub fn parse_mat(bytes: Vec<u8>, names: &[&'static str], path: &Path) -> Result<MatVariable, Refusal> {
-    let refused = |problem: String| Refusal::new(problem).at(path.display());
-    if let Some(format) = other_format(&bytes) {
-        let name = names.first().copied().unwrap_or_default();
-        let file = path.file_name().unwrap_or_default().to_string_lossy();
-        return Err(refused(format!(
-            "{format}; MATLAB v5 is read: load it in MATLAB or Octave, then save('{file}', '{name}', '-v7')"
-        )));
-    }
-    let plain = inflate(&bytes).map_err(|reason| not_mat(path, &reason))?;
-    let not_mat = |reason: String| not_mat(path, &reason);
-    drop(bytes);
+pub fn parse_mat(bytes: Vec<u8>, names: &[&str], path: &Path) -> Result<MatVariable, Refusal> {
+    let wanted = names.first().copied().unwrap_or_default();
+    let plain = unpacked(bytes, wanted, path)?;
     let found = mat_elements(&plain[HEADER..]);
-    let element_of = |name: &&'static str| Some((*name, found.iter().find(|element| element.name == *name)?));
-    let Some((name, element)) = names.iter().find_map(element_of) else {
-        let name = names.first().copied().unwrap_or_default();
-        return Err(refused(format!("no variable `{name}` (found: {})", listed(&found))));
+    let element = names.iter().find_map(|name| found.iter().find(|element| element.name == *name));
+    array(element.ok_or_else(|| missing(wanted, &found, path))?, path)
+}
+
+/// Reads an array and the first of the variables `times` from the file at `path`. The array is the one called
+/// `variable`; without a name it is the first of `usual`, or the only one with at least `least` values.
+///
+/// # Errors
+/// As for [`parse_mat`].
+pub(super) fn read_mat_array(
+    path: &Path,
+    variable: Option<&str>,
+    usual: &[&str],
+    times: &[&str],
+    least: usize,
+) -> Result<(MatVariable, Option<MatVariable>), Refusal> {
+    let bytes = spts_input::read(path, MAX_FILE_BYTES).map_err(Refusal::in_file(path))?;
+    let wanted = variable.or(usual.first().copied()).unwrap_or_default();
+    let plain = unpacked(bytes, wanted, path)?;
+    let found = mat_elements(&plain[HEADER..]);
+    let named = |name: &str| found.iter().find(|element| element.name == name);
+    let large =
+        |element: &&MatElement<'_>| element.numbers.is_some_and(|(kind, data)| data.len() / width(kind) >= least);
+    let only = || {
+        let mut large = found.iter().filter(large);
+        large.next().filter(|_| large.next().is_none())
     };
+    let element = match variable {
+        Some(name) => named(name),
+        None => usual.iter().find_map(|name| named(name)).or_else(only),
+    };
+    let array_of = array(element.ok_or_else(|| missing(wanted, &found, path))?, path)?;
+    let times = times.iter().filter(|name| **name != array_of.name).find_map(|name| named(name));
+    Ok((array_of, times.map(|element| array(element, path)).transpose()?))
+}
+
+/// The elements of the file `bytes`, without compression. `wanted` is the variable that an error speaks of.
+fn unpacked(bytes: Vec<u8>, wanted: &str, path: &Path) -> Result<Vec<u8>, Refusal> {
+    if let Some(format) = other_format(&bytes) {
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        let problem =
+            format!("{format}; MATLAB v5 is read: load it in MATLAB or Octave, then save('{file}', '{wanted}', '-v7')");
+        return Err(Refusal::new(problem).at(path.display()));
+    }
+    inflate(&bytes).map_err(|reason| not_mat(path, &reason))
+}
+
+fn missing(wanted: &str, found: &[MatElement<'_>], path: &Path) -> Refusal {
+    Refusal::new(format!("no variable `{wanted}` (found: {})", listed(found))).at(path.display())
+}
+
+/// The numbers of `element`.
+fn array(element: &MatElement<'_>, path: &Path) -> Result<MatVariable, Refusal> {
+    let refused = |problem: String| Refusal::new(problem).at(path.display());
+    let not_mat = |reason: String| not_mat(path, &reason);
+    let name = element.name.clone();
     let Some((kind, data)) = element.numbers else {
         let class = element.class;
         return Err(refused(format!("variable `{name}` is a {class}; expected an array of numbers")));

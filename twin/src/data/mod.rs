@@ -1,9 +1,14 @@
-//! Reads sessions from folders of sessions, or from the published recordings of the real skin in MATLAB files.
+//! Reads sessions from folders of sessions, from the published recordings of the real skin in MATLAB files, or from frames
+//! of any skin or simulator.
 
+mod frames;
 mod mat;
 mod open;
 mod published;
+mod wired;
 
+pub use frames::{FRAME_FILES, FrameArray, FrameOptions, Frames};
 pub use mat::{MatVariable, parse_mat};
 pub use open::SessionSet;
 pub use published::{Published, missing_file, nothing_found};
+pub use wired::{WiredFrames, wired};

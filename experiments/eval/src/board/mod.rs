@@ -174,7 +174,9 @@ pub(crate) fn no_session(source: &Source) -> Refusal {
         none if none.is_empty() => "no session of presses".to_owned(),
         each => each.join(", "),
     };
-    let problem = format!("scoring needs an object with both a raster and a compressive recording; found: {found}");
+    let problem = format!(
+        "scoring needs an object with both a raster and a compressive recording; found: {found}; `spts wire` records frames with both"
+    );
     Refusal::new(problem).at(source.root.display())
 }
 

@@ -24,6 +24,7 @@ pub use answer::counted;
 pub use check::{CheckReport, CheckedQuantity, DesignCheck};
 pub use objects::DesignObjects;
 pub use search::OUTSIDE;
+pub(crate) use wire::BandRows;
 pub use wire::{FeedbackLimit, RowSource, WireDesign};
 
 /// How many wires a designed skin may have.

@@ -171,7 +171,7 @@ impl RowSource {
     }
 
     /// All sources that are worth a look on wires of `taxels` taxels.
-    pub(super) fn candidates(taxels: usize) -> Vec<Self> {
+    pub(crate) fn candidates(taxels: usize) -> Vec<Self> {
         let designed = |name: &str| Self::Designer(name.to_owned());
         let mut sources = vec![Self::Generator, designed("cosine_signs")];
         if taxels <= GREEDY_TAXELS {
@@ -181,7 +181,7 @@ impl RowSource {
     }
 
     /// Most rows there are, for a wire of `taxels` taxels.
-    pub(super) fn most_rows(&self, taxels: usize) -> usize {
+    pub(crate) fn most_rows(&self, taxels: usize) -> usize {
         match self {
             Self::Generator => usize::MAX,
             Self::Designer(_) => PATTERN_ROWS.min(taxels),
@@ -191,13 +191,13 @@ impl RowSource {
 
 /// Rows of all wires, each of which reads a band of the skin's rows.
 #[derive(Debug, Clone)]
-pub(super) struct BandRows {
+pub(crate) struct BandRows {
     /// Columns of the skin.
     cols: usize,
     /// Rows of the skin that belong to each wire.
-    pub(super) bands: Vec<Range<usize>>,
+    pub(crate) bands: Vec<Range<usize>>,
     /// Weights of every wire.
-    pub(super) weights: Vec<Weights>,
+    pub(crate) weights: Vec<Weights>,
 }
 
 /// The skin's rows of each of `wires` wires: bands whose heights differ by one at most, the highest first.
@@ -209,7 +209,7 @@ pub(super) fn bands(rows: usize, wires: usize) -> Vec<Range<usize>> {
 
 impl BandRows {
     /// `measurements` rows of `source` for every wire; a generator has as many as are asked for.
-    pub(super) fn new(
+    pub(crate) fn new(
         source: &RowSource,
         prior: &SheetPrior,
         wires: usize,
@@ -266,7 +266,7 @@ impl BandRows {
 
     /// Measurements `range` of every wire as rows over all taxels, those of one measurement after another, with the
     /// wire of each.
-    pub(super) fn rows(&self, range: Range<usize>) -> (Vec<f64>, Vec<usize>) {
+    pub(crate) fn rows(&self, range: Range<usize>) -> (Vec<f64>, Vec<usize>) {
         let taxels = self.cols * self.bands.last().map_or(0, |band| band.end);
         let count = range.len() * self.bands.len();
         let (mut rows, mut wires) = (vec![0.0; count * taxels], Vec::with_capacity(count));

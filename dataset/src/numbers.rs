@@ -1,0 +1,103 @@
+//! Numbers in Parquet files that others have written.
+
+use crate::file::{Wanted, batches, refused};
+use arrow_array::cast::AsArray as _;
+use arrow_array::types::{
+    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, TimestampMicrosecondType,
+    TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType, UInt8Type, UInt16Type, UInt32Type,
+    UInt64Type,
+};
+use arrow_array::{Array as _, ArrayRef};
+use arrow_schema::{DataType, TimeUnit};
+use spts::Refusal;
+use std::path::Path;
+
+/// Most numbers of a file: 1 GB of doubles.
+const MOST: usize = 1 << 27;
+
+/// Columns of numbers: name, and a number a row; NaN where there is none.
+pub type NumberColumns = Vec<(String, Vec<f64>)>;
+
+/// The numbers in the columns of the Parquet file at `path`, and the names of columns that hold something else. A
+/// column of lists gives a column for each place in them. Instants are in seconds since 1970.
+///
+/// # Errors
+/// [`Refusal`] if the file is not Parquet, lists of one column differ in length, or it holds too many numbers.
+pub fn numbers_of(path: &Path) -> Result<(NumberColumns, Vec<String>), Refusal> {
+    let (mut found, mut other): (NumberColumns, Vec<String>) = (Vec::new(), Vec::new());
+    let mut count = 0;
+    batches(path, Wanted::All, |batch| {
+        let mut next = 0;
+        for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {
+            let (values, places) = match array.data_type() {
+                DataType::FixedSizeList(..) => {
+                    let lists = array.as_fixed_size_list();
+                    let places = usize::try_from(lists.value_length()).unwrap_or_default();
+                    let first = lists.value_offset_at(0);
+                    (numbers(&lists.values().slice(first, lists.len() * places)), places)
+                }
+                DataType::List(_) => {
+                    let lists = array.as_list::<i32>();
+                    let places = if lists.is_empty() { 0 } else { lists.value(0).len() };
+                    if (0..lists.len()).any(|row| lists.value(row).len() != places) {
+                        return Err(refused(path, format!("column `{}`: lists of different lengths", field.name())));
+                    }
+                    let rows = (0..lists.len()).map(|row| numbers(&lists.value(row)));
+                    (rows.collect::<Option<Vec<_>>>().map(|rows| rows.concat()), places)
+                }
+                _ => (numbers(array), 1),
+            };
+            let Some(values) = values else {
+                if !other.contains(field.name()) {
+                    other.push(field.name().clone());
+                }
+                continue;
+            };
+            count += values.len();
+            if count > MOST {
+                return Err(refused(path, format!("holds more than {MOST} numbers")));
+            }
+            for place in 0..places {
+                if found.len() == next {
+                    found.push((field.name().clone(), Vec::new()));
+                }
+                found[next].1.extend(values.iter().skip(place).step_by(places));
+                next += 1;
+            }
+        }
+        if found.len() != next || found.iter().any(|(_, column)| column.len() != found[0].1.len()) {
+            return Err(refused(path, "lists of a column differ in length".to_owned()));
+        }
+        Ok(true)
+    })?;
+    Ok((found, other))
+}
+
+/// The values of `array` if they are numbers.
+fn numbers(array: &ArrayRef) -> Option<Vec<f64>> {
+    macro_rules! of {
+        ($type:ty, $scale:expr) => {{
+            #[expect(clippy::allow_attributes, reason = "some types need no cast")]
+            #[allow(clippy::cast_lossless, clippy::unnecessary_cast, reason = "one line for all types")]
+            let values = array.as_primitive::<$type>().iter().map(|v| v.map_or(f64::NAN, |v| $scale * v as f64));
+            values.collect()
+        }};
+    }
+    Some(match array.data_type() {
+        DataType::Float64 => of!(Float64Type, 1.0),
+        DataType::Float32 => of!(Float32Type, 1.0),
+        DataType::Int8 => of!(Int8Type, 1.0),
+        DataType::Int16 => of!(Int16Type, 1.0),
+        DataType::Int32 => of!(Int32Type, 1.0),
+        DataType::Int64 => of!(Int64Type, 1.0),
+        DataType::UInt8 => of!(UInt8Type, 1.0),
+        DataType::UInt16 => of!(UInt16Type, 1.0),
+        DataType::UInt32 => of!(UInt32Type, 1.0),
+        DataType::UInt64 => of!(UInt64Type, 1.0),
+        DataType::Timestamp(TimeUnit::Second, _) => of!(TimestampSecondType, 1.0),
+        DataType::Timestamp(TimeUnit::Millisecond, _) => of!(TimestampMillisecondType, 1e-3),
+        DataType::Timestamp(TimeUnit::Microsecond, _) => of!(TimestampMicrosecondType, 1e-6),
+        DataType::Timestamp(TimeUnit::Nanosecond, _) => of!(TimestampNanosecondType, 1e-9),
+        _ => return None,
+    })
+}

@@ -1,0 +1,219 @@
+//! `spts wire`: what one wire, and a few, would show of frames of any skin.
+
+use crate::context::{Bars, Common, note, notes, open_folder};
+use crate::error::CliError;
+use crate::options::{parse_measurements, seed, whole};
+use clap::Args;
+use serde::Serialize;
+use spts::chain::{ChainConfig, DEFAULT_READOUT, RowsConfig};
+use spts::data::{SessionSet, WiredFrames, wired};
+use spts::{Chain, Seeding, Session};
+use spts_eval::decode::DecodeRequest;
+use spts_eval::training::TrainingData;
+use spts_input::Refusal;
+use spts_models::ConductanceMap;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
+use spts_report::few_wires::{FewWiresPage, ShownTouch, text};
+use spts_studies::few_wires::{FewWiresReport, FewWiresStudy};
+use std::path::{Path, PathBuf};
+
+/// Records frames of any skin as a skin with one wire would, and says what one wire and a few would show of them.
+///
+/// SESSION is a folder that `spts import` has written, or a folder of such folders; sessions of `spts simulate` will do.
+/// DIR becomes a session with both recordings, by the wire and by a scan, which `spts decode`, `spts score` and `spts
+/// calibrate` read. Of several sessions, every one has its folder in DIR.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts import glove.npy --rows 16 --cols 16 --rate 100 --out out/glove
+  spts wire out/glove --out out/glove_wire
+  spts wire out/glove --readout as_designed --wires 1,2 --measurements 20,50 --out out/glove_wire --json
+  spts decode out/glove_wire
+
+Files in DIR:
+  session.json ...             the session, or a folder each
+  wire.html                    the page: images, scores, signals
+  figures/wire.svg .png        its picture
+  tables/wire.csv              a line for each number of wires, kind of rows and number of measurements
+
+Idle frames are subtracted. Pressures go through the simulated foam's transducer; conductances are taken as they are; of
+codes and relative values the largest is taken for what --peak gives. Skins of more than 2048 taxels have no page.
+--json prints {\"decoder\", \"scan_s\", \"scan_iou\", \"touches\", \"rows\": [{\"wires\", \"rows\", \"m_per_wire\", \"m\", \"time_s\",
+\"iou\", \"worst_iou\", \"worst\", \"saturated\", \"used\", \"signal_to_noise\"}]}.")]
+pub(super) struct WireCommand {
+    /// Folder of a session of frames, or of several
+    #[arg(value_name = "SESSION")]
+    session: PathBuf,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Rows of the recording: mixed or address seeds, or a file of rows as `spts sensing design` writes it [default:
+    /// mixed, and address on the published skin]
+    #[arg(long, value_name = "SEEDS|FILE")]
+    rows: Option<String>,
+    /// Readout profile: as_built, as_published, as_designed, ideal, or FILE.toml
+    #[arg(long, value_name = "NAME|FILE.toml", default_value = DEFAULT_READOUT)]
+    readout: String,
+    /// Numbers of measurements that every wire takes for an image; each [1, 1000000] [default: 7, 20 and 50 % of the
+    /// taxels]
+    #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = parse_measurements)]
+    measurements: Vec<usize>,
+    /// Numbers of wires, each of which reads a band of whole rows of taxels; each [1, 1024] [default: 1,2,4, those that
+    /// there are rows for]
+    #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = whole::<usize>(1..=1024))]
+    wires: Vec<usize>,
+    /// Pressure that the largest value of codes and relative frames is taken for, Pa; [100, 1000000]
+    #[arg(long, value_name = "PA", value_parser = crate::options::within(100.0, 1e6, "[100, 1000000]"), default_value_t = 30e3)]
+    peak: f64,
+    /// Presses of every session that are taken, from the first [default: all]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=100_000))]
+    presses: Option<usize>,
+    /// Root of every random number
+    #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
+    seed: u64,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What `--json` prints.
+#[derive(Debug, Serialize)]
+struct Report<'a> {
+    #[serde(flatten)]
+    few: &'a FewWiresReport,
+    scan_iou: f64,
+}
+
+/// Numbers of wires that are looked at.
+const WIRES: [usize; 3] = [1, 2, 4];
+/// Touches that the picture shows.
+const SHOWN: usize = 5;
+
+impl WireCommand {
+    pub(super) fn run(&self) -> Result<(), CliError> {
+        self.common.start()?;
+        let set = SessionSet::open(&self.session)?;
+        let sessions: Vec<&Session> = set.sessions.iter().filter(|session| session.raster.is_some()).collect();
+        let Some(first) = sessions.first() else {
+            let path = self.session.display();
+            return Err(CliError::usage(format!("{path}: no session has frames; `spts import` makes one")));
+        };
+        let layout = first.layout().copied().unwrap_or_default();
+        if let Some(other) = sessions.iter().find(|session| session.layout() != Some(&layout)) {
+            let (first, other) = (&first.name, &other.name);
+            return Err(CliError::usage(format!("sessions \"{first}\" and \"{other}\" are of different skins")));
+        }
+        let folder = open_folder(&self.out)?;
+        let chain = Chain::new(&self.chain()?, &layout, self.seed, Path::new("."))?;
+        let mut touches: Vec<(String, ConductanceMap, Vec<f64>)> = Vec::new();
+        let mut said: Vec<String> = Vec::new();
+        for session in &sessions {
+            let path = |refusal: Refusal| refusal.at(&session.name);
+            let session = self.first_presses(session)?;
+            let found = wired(&session, &chain, self.peak, self.seed).map_err(path)?;
+            let out = if sessions.len() == 1 { folder.path("") } else { folder.folder(&session.name)? };
+            found.session.write_files(&out).map_err(|error| folder.unstaged(error))?;
+            touches.extend(scanned(&found));
+            said.extend(found.notes);
+        }
+        let said = spts_eval::unique(said);
+        notes(&said);
+        let taxels = layout.taxels();
+        if taxels > TrainingData::MOST_TAXELS {
+            note(&format!("note: {taxels} taxels: the page is for up to {}", TrainingData::MOST_TAXELS));
+            folder.commit()?;
+            return Ok(());
+        }
+        let study = FewWiresStudy {
+            layout,
+            touches: touches.iter().map(|(name, touch, _)| (name.clone(), touch.clone())).collect(),
+            profile: chain.profile().clone(),
+            wires: if self.wires.is_empty() {
+                WIRES.into_iter().filter(|wires| *wires <= layout.rows()).collect()
+            } else {
+                self.wires.clone()
+            },
+            measurements: if self.measurements.is_empty() {
+                DecodeRequest::default_measurements(taxels)
+            } else {
+                self.measurements.clone()
+            },
+            seed: self.seed,
+        };
+        let report = study.run(&Bars::default())?;
+        let scan_iou = touches.iter().map(|(_, touch, scan)| iou(touch, scan)).sum::<f64>() / touches.len() as f64;
+        let step = touches.len().div_ceil(SHOWN).max(1);
+        let shown = touches.iter().enumerate().step_by(step);
+        let shown = shown.map(|(index, (name, touch, scan))| ShownTouch {
+            name: name.clone(),
+            index,
+            touch: touch.clone(),
+            scan: scan.clone(),
+        });
+        let page = FewWiresPage {
+            title: if let [session] = sessions[..] {
+                session.name.clone()
+            } else {
+                format!("{} sessions", sessions.len())
+            },
+            layout,
+            readout: self.readout.clone(),
+            report: &report,
+            shown: shown.collect(),
+            scan_iou,
+            notes: said,
+        };
+        page.write(&folder).map_err(|error| folder.unstaged(error))?;
+        folder.commit()?;
+        let out = self.out.display();
+        self.common.print(&Report { few: &report, scan_iou }, || {
+            format!("{}\nsession: {out}, page: {out}/wire.html", text(&report, scan_iou))
+        })
+    }
+
+    fn chain(&self) -> Result<ChainConfig, CliError> {
+        let mut rows = RowsConfig::default();
+        match self.rows.as_deref() {
+            None => {}
+            Some("mixed") => rows.seeding = Some(Seeding::Mixed),
+            Some("address") => rows.seeding = Some(Seeding::Address),
+            Some(file) => rows.patterns_file = Some(file.to_owned()),
+        }
+        Ok(ChainConfig { readout: Some(self.readout.clone()), rows, ..ChainConfig::default() })
+    }
+
+    /// The first presses of a session.
+    fn first_presses(&self, session: &Session) -> Result<Session, CliError> {
+        let mut session = session.clone();
+        if let (Some(most), Some(raster)) = (self.presses, session.raster.as_mut()) {
+            let blocks = raster.recording.blocks().iter().take(most).cloned().collect();
+            raster.recording = raster.recording.with_blocks(blocks)?;
+            raster.presses.truncate(most);
+        }
+        Ok(session)
+    }
+}
+
+/// Name, conductances and scan of every press, in the middle of its hold.
+fn scanned(found: &WiredFrames) -> Vec<(String, ConductanceMap, Vec<f64>)> {
+    let Some(recorded) = &found.session.raster else { return Vec::new() };
+    let raster = &recorded.recording;
+    let frame_s = raster.measurements_per_frame() as f64 / raster.sample_rate_hz();
+    let image = |press: usize| {
+        let time_s = recorded.facts(press).and_then(|facts| facts.time_s).unwrap_or_default();
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the recording")]
+        let frame = ((time_s / frame_s) as usize).min(raster.frames() - 1);
+        let idle = raster.volts(press, 0);
+        raster.volts(press, frame).iter().zip(idle).map(|(v, idle)| v - idle).collect()
+    };
+    let name = |press: usize| match found.touches.len() {
+        1 => found.session.name.clone(),
+        _ => format!("{} {}", found.session.name, press + 1),
+    };
+    found.touches.iter().enumerate().map(|(press, touch)| (name(press), touch.clone(), image(press))).collect()
+}
+
+fn iou(touch: &ConductanceMap, image: &[f64]) -> f64 {
+    let (mut found, mut truth) = (Vec::new(), Vec::new());
+    support(image, SUPPORT_THRESHOLD, &mut found);
+    support(touch.values(), SUPPORT_THRESHOLD, &mut truth);
+    SupportScore::new(&found, &truth).iou
+}
