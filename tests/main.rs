@@ -23,6 +23,7 @@ mod extremes;
 mod fidelity;
 mod firmware;
 mod firmware_command;
+mod frames;
 mod hostile;
 mod in_time;
 mod mujoco_contact;

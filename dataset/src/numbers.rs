@@ -101,3 +101,37 @@ fn numbers(array: &ArrayRef) -> Option<Vec<f64>> {
         _ => return None,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use arrow_array::{Float32Array, ListArray, RecordBatch, StringArray, TimestampMillisecondArray};
+    use parquet::arrow::ArrowWriter;
+    use std::sync::Arc;
+
+    #[test]
+    fn columns_of_numbers_are_read_and_others_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.parquet");
+        let lists =
+            ListArray::from_iter_primitive::<Int32Type, _, _>([[1, 2], [3, 4]].map(|row| Some(row.map(Some).to_vec())));
+        let batch = RecordBatch::try_from_iter([
+            ("time", Arc::new(TimestampMillisecondArray::from(vec![0, 20])) as ArrayRef),
+            ("taxels", Arc::new(lists)),
+            ("force", Arc::new(Float32Array::from(vec![Some(0.5), None]))),
+            ("label", Arc::new(StringArray::from(vec!["a", "b"]))),
+        ])
+        .unwrap();
+        let mut writer = ArrowWriter::try_new(std::fs::File::create(&path).unwrap(), batch.schema(), None).unwrap();
+        writer.write(&batch).unwrap();
+        writer.close().unwrap();
+        let (columns, other) = numbers_of(&path).unwrap();
+        let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!((names, other), (vec!["time", "taxels", "taxels", "force"], vec!["label".to_owned()]));
+        assert_eq!((&columns[0].1, &columns[1].1, &columns[2].1), (&vec![0.0, 0.02], &vec![1.0, 3.0], &vec![2.0, 4.0]));
+        assert_eq!(columns[3].1[0].to_bits(), 0.5_f64.to_bits());
+        assert!(columns[3].1[1].is_nan());
+        std::fs::write(&path, "PAR1").unwrap();
+        assert!(numbers_of(&path).unwrap_err().to_string().contains("a.parquet: cannot be read"));
+    }
+}

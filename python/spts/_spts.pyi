@@ -161,10 +161,10 @@ class Wire:
         taxels: Sequence[int] | None = None,
         rows: ArrayLike | str | None = None,
     ) -> Wire: ...
-    def feel(self, touch: Touch | ArrayLike | Sequence[Touch | ArrayLike | None], dt: float | None = None) -> None: ...
+    def feel(self, touch: Touch | ArrayLike | Sequence[Touch | None], dt: float | None = None) -> None: ...
     def record(
         self,
-        touch: Touch | ArrayLike | Sequence[Touch | ArrayLike | None],
+        touch: Touch | ArrayLike | Sequence[Touch | None],
         measurements: int | None = None,
         *,
         raster: bool = False,

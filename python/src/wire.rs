@@ -173,7 +173,7 @@ impl Wire {
     /// touch : Touch, or sequence of Touch or None
     ///     Of this wire's skin, not before the one that it felt last. It has been on the skin since then. Of a wire
     ///     over several skins one of each, in their order; None for a skin without a touch since then: its taxels stay
-    ///     as they are. An array (rows, cols), Pa, is a touch of a skin of which all taxels are on the wire.
+    ///     as they are. An array (rows, cols), Pa, is a touch where the wire is over one whole skin.
     /// dt : float, optional
     ///     Time for which an array has been on the skin, s, [0, 1e9]; default 0.1. A touch has its own.
     #[pyo3(signature = (touch, dt = None))]
@@ -188,7 +188,7 @@ impl Wire {
     /// ----------
     /// touch : Touch, or sequence of Touch or None
     ///     What the skin feels now; it has been on the skin since the touch that this wire felt last. Of a wire over
-    ///     several skins one of each, and arrays of pressure, as for `feel`.
+    ///     several skins one of each, as for `feel`, which also says what an array is.
     /// measurements : int, optional
     ///     Number of measurements, M; default for a raster scan: one a taxel.
     /// raster : bool

@@ -42,7 +42,7 @@ use toml::Value;
   spts simulate press/T --fault dead:44 --fault skipping_clocks:12
   spts simulate press/T --weights firmware
   spts simulate press/T --set press.rise_s=0.5 --set transducer_parameters.temperature_c=35
-  spts simulate press/T --set skin.rows=12 --set skin.cols=20 --set skin.pitch_m=0.005 --set rows.seeding=mixed
+  spts simulate press/T --set skin.rows=12 --set skin.cols=20 --set skin.pitch_m=0.005
   spts simulate press/rec --set press.position_share=[0.2,0] --set rows.seeds_file=out/seeds/searched_seeds.txt
   spts simulate out/T/scene.toml --out out/again
 

@@ -192,7 +192,8 @@ impl WireCommand {
     }
 }
 
-/// Name, conductances and scan of every press, in the middle of its hold.
+/// Name, conductances and scan of every press, in the middle of its hold. A scan of many taxels has an offset that grows
+/// with the sum of all, as cells that are not selected do not put out 0 V exactly: its lower quartile is taken off.
 fn scanned(found: &WiredFrames) -> Vec<(String, ConductanceMap, Vec<f64>)> {
     let Some(recorded) = &found.session.raster else { return Vec::new() };
     let raster = &recorded.recording;
@@ -202,7 +203,12 @@ fn scanned(found: &WiredFrames) -> Vec<(String, ConductanceMap, Vec<f64>)> {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the recording")]
         let frame = ((time_s / frame_s) as usize).min(raster.frames() - 1);
         let idle = raster.volts(press, 0);
-        raster.volts(press, frame).iter().zip(idle).map(|(v, idle)| v - idle).collect()
+        let mut scan: Vec<f64> = raster.volts(press, frame).iter().zip(idle).map(|(v, idle)| v - idle).collect();
+        let mut sorted = scan.clone();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let offset_v = sorted[sorted.len() / 4];
+        scan.iter_mut().for_each(|v| *v -= offset_v);
+        scan
     };
     let name = |press: usize| match found.touches.len() {
         1 => found.session.name.clone(),

@@ -428,7 +428,7 @@ impl Frames {
     }
 
     /// A press for every contact in the frames: from some idle frames before its onset on, all equally long. A contact
-    /// lasts while the sum of the taxels is above the middle between its least and its largest value in the run of
+    /// lasts while the sum of the taxels is above its least value by more than 15 % of what it rises in the run of
     /// frames. Left out are contacts whose begin is not in the frames, and those shorter than half the usual one.
     ///
     /// # Errors
@@ -438,7 +438,7 @@ impl Frames {
         let mut without_begin = 0;
         for (run, sums) in self.sums().iter().enumerate() {
             let (least, most) = ends(sums);
-            let is_held = |k: &usize| sums[*k] > 0.5 * (least + most) && most > least;
+            let is_held = |k: &usize| sums[*k] > least + TOUCHED * (most - least);
             let mut at = 0;
             while at < sums.len() {
                 let idle = (at..sums.len()).take_while(|k| !is_held(k)).count();
@@ -670,6 +670,7 @@ impl Frames {
     /// What is known of a press: in the middle of its hold, the image without the idle one.
     fn facts(&self, press: usize, unit: FrameUnit, idle: Option<usize>, hold_s: [f64; 2], rate_hz: f64) -> PressFacts {
         let [start, end] = hold_s.map(|time_s| (time_s * rate_hz).round());
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the frames")]
         let (start, end) = (start as usize, (end as usize).min(self.shape[1]));
         let mut image = self.mean(press, start..end.max(start + 1));
         let untouched = idle.filter(|idle| *idle > 0).map(|idle| self.mean(press, 0..idle));
@@ -699,6 +700,8 @@ impl Frames {
 
 /// Share of its rise by which the sum of an idle frame may exceed the least.
 const IDLE_RISE: f64 = 0.1;
+/// Share of its rise above which the sum of the taxels is that of a contact.
+const TOUCHED: f64 = 0.15;
 /// Fewest frames of a contact that is cut out, and before it.
 const FEWEST_HELD: usize = 3;
 const FEWEST_IDLE: usize = 3;
@@ -792,7 +795,8 @@ mod tests {
         }
         // taxels first: taxel 5 of frame 2 of press 3 is at 5 · 7 · 4 + 2 · 4 + 3
         let turned = frames(&[2, 3, 7, 4], [2, 3]).unwrap();
-        assert_eq!(turned.values()[(3 * 7 + 2) * 6 + 5], f64::from(5 * 7 * 4 + 2 * 4 + 3));
+        let found = turned.values()[(3 * 7 + 2) * 6 + 5];
+        assert!((found - f64::from(5 * 7 * 4 + 2 * 4 + 3)).abs() < 1e-12, "{found}");
         let square = frames(&[6, 6], [2, 3]).unwrap();
         assert!(square.notes.iter().any(|note| note.contains("fits in two ways")), "{:?}", square.notes);
         let said = frames(&[7, 5], [2, 3]).unwrap_err();
@@ -898,6 +902,66 @@ mod tests {
         assert!(said.contains("time of frame 1 = 0.1 s"), "{said}");
         let many = Frames::new(array(vec![0.0, 1.0, 2.0]), [2, 3], None).unwrap();
         assert!(many.times_s().is_none() && many.notes[0].contains("3 times for 2 frames"));
+    }
+
+    /// An archive of NumPy: the frames by their usual name, with the time between them.
+    #[test]
+    fn archives() {
+        use std::io::Write as _;
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.npz");
+        let pack = |names: &[&str]| {
+            let mut archive = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
+            for name in names {
+                let array = dir.path().join("one.npy");
+                let scalar = *name == "frame_s";
+                let (shape, values) = if scalar { (vec![], vec![0.02]) } else { (vec![3, 2], vec![1.0; 6]) };
+                crate::output::write_npy(&array, &shape, &values).unwrap();
+                archive.start_file(format!("{name}.npy"), zip::write::SimpleFileOptions::default()).unwrap();
+                archive.write_all(&std::fs::read(&array).unwrap()).unwrap();
+            }
+            archive.finish().unwrap();
+        };
+        pack(&["frames", "frame_s", "other"]);
+        let found = FrameArray::read(&path, None, 2).unwrap();
+        assert_eq!((found.shape, found.rate_hz), (vec![3, 2], Some(50.0)));
+        assert_eq!(FrameArray::read(&path, Some("other"), 2).unwrap().values, [1.0; 6]);
+        let said = FrameArray::read(&path, Some("none"), 2).unwrap_err().to_string();
+        assert!(said.contains("a.npz: no array `none`? it has ") && said.contains("--variable"), "{said}");
+        pack(&["first", "second"]);
+        let said = FrameArray::read(&path, None, 2).unwrap_err().to_string();
+        assert!(said.contains("which array are the frames?"), "{said}");
+    }
+
+    /// MATLAB's arrays have the first index fastest.
+    #[test]
+    fn arrays_of_matlab() {
+        let part = |kind: u32, data: &[u8]| {
+            let length = u32::try_from(data.len()).unwrap();
+            let mut part = [&kind.to_le_bytes()[..], &length.to_le_bytes(), data].concat();
+            part.resize(part.len().next_multiple_of(8), 0);
+            part
+        };
+        let doubles = |values: &[f64]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
+        let matrix = |name: &str, shape: [i32; 2], values: &[f64]| {
+            let shape: Vec<u8> = shape.iter().flat_map(|side| side.to_le_bytes()).collect();
+            let flags = [6_u32.to_le_bytes(), [0; 4]].concat();
+            part(14, &[part(6, &flags), part(5, &shape), part(1, name.as_bytes()), part(9, &doubles(values))].concat())
+        };
+        let mut header = vec![b' '; 128];
+        header[124..].copy_from_slice(&[0, 1, b'I', b'M']);
+        let times = matrix("time_s", [3, 1], &[0.0, 0.5, 1.0]);
+        let all = matrix("touch", [3, 2], &[1.0, 2.0, 3.0, 10.0, 20.0, 30.0]);
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.mat");
+        std::fs::write(&path, [header, times, all].concat()).unwrap();
+        for variable in [None, Some("touch")] {
+            let found = FrameArray::read(&path, variable, 4).unwrap();
+            assert_eq!((found.shape, found.values), (vec![3, 2], vec![1.0, 10.0, 2.0, 20.0, 3.0, 30.0]));
+            assert_eq!(found.times_s, Some(vec![0.0, 0.5, 1.0]));
+        }
+        let said = FrameArray::read(&path, Some("none"), 4).unwrap_err().to_string();
+        assert!(said.contains("no variable `none` (found: time_s (double), touch (double))"), "{said}");
     }
 
     /// NumPy's types and orders, written by a writer of its own.
