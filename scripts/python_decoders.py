@@ -1,4 +1,4 @@
-"""Which decoder of those that need no recordings is best on which skin, and so the default of `spts.decode`.
+"""Which decoder of those that need no recordings is best on which skin, and so what `spts.auto` names.
 
 python scripts/python_decoders.py [--presses N] [--skins NAME,...] [--json]
 
@@ -16,7 +16,6 @@ import time
 
 import numpy as np
 import spts
-from spts.decode import DEFAULT
 
 DECODERS = ["nn_lasso", "nn_lmmse", "tv", "amortised", "mixture"]
 SHARES = [0.07, 0.2, 0.5]
@@ -146,7 +145,7 @@ def main():
     rows += [[name, *(f"{every[d][:, :, o].mean():.2f}" for d in everywhere)] for o, name in enumerate(OBJECTS)]
     table(["", *everywhere], rows)
     best = {d: np.mean([found[skin, d][0].mean() for skin in skins]) for d in everywhere}
-    print(f"best on average: {max(best, key=best.get)}; the default is {DEFAULT}")
+    print(f"best on average: {max(best, key=best.get)}")
 
 
 if __name__ == "__main__":

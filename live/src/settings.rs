@@ -5,7 +5,7 @@ use serde::Serialize;
 use spts::Refusal;
 use spts_circuit::{PROFILES, Profile};
 use spts_contact::objects::pressable;
-use spts_eval::decoders::{DECODERS, DecoderSpec, Needs, PUBLISHED_DECODES};
+use spts_eval::decoders::{DECODERS, DecoderSpec, Needs, PUBLISHED_DECODES, auto};
 use spts_models::{SkinLayout, in_range, within};
 use spts_recon::rows::{DESIGNERS, Designer, RowNeeds};
 use std::collections::BTreeMap;
@@ -62,11 +62,14 @@ pub(crate) struct Settings {
 }
 
 impl Settings {
-    /// What a page begins with: the published pursuit on random rows beside the network on designed ones.
+    /// What a page begins with: the published pursuit on random rows beside the decoder that [`auto`] names on designed
+    /// ones.
     pub(crate) fn usual() -> Result<Self, Refusal> {
+        let skin = SkinLayout::default();
+        let best = auto([skin.rows(), skin.cols()], false).name;
         Ok(Self {
             measurements: 20,
-            panels: [Panel::named("matched", RANDOM)?, Panel::named("amortised", "cosine_signs")?],
+            panels: [Panel::named("matched", RANDOM)?, Panel::named(best, "cosine_signs")?],
             readout: spts::chain::DEFAULT_READOUT,
             noise: 1.0,
             faults: BTreeMap::new(),

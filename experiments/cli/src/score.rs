@@ -411,12 +411,17 @@ impl ScoreCommand {
             measurements =
                 if self.in_time { IN_TIME_MEASUREMENTS.to_vec() } else { BoardSettings::MEASUREMENTS.to_vec() };
         }
+        let localisation = match (self.no_ball || self.anytime, self.measurements.is_empty() || self.in_time) {
+            (true, _) => Vec::new(),
+            (false, true) => BoardSettings::LOCALISATION.to_vec(),
+            (false, false) => sorted(measurements.clone()),
+        };
         Ok(BoardSettings {
             decoders,
             external,
             measurements: sorted(measurements),
             objects: self.object.clone(),
-            localisation: if self.no_ball || self.anytime { Vec::new() } else { BoardSettings::LOCALISATION.to_vec() },
+            localisation,
             left_out: self.left_out,
             sensing: sorted(self.sensing.clone()),
             training: Vec::new(),

@@ -87,7 +87,15 @@ impl Source {
     pub fn new(mut set: SessionSet) -> Result<Self, Refusal> {
         let slips = follow_slips(&mut set);
         let bounces = set.drops().cloned();
-        let SessionSet { root, sessions, published, mut missing, note } = set;
+        let SessionSet { root, sessions, published, mut missing, mut note } = set;
+        let dropped: Vec<&str> = sessions.iter().filter(|s| s.event == Event::Drop).map(|s| s.name.as_str()).collect();
+        if let [first, others @ ..] = &dropped[..]
+            && !others.is_empty()
+        {
+            let said =
+                format!("note: of drops those of {first:?} alone are located, not those of {}", others.join(", "));
+            note = Some(note.map_or_else(|| said.clone(), |note| format!("{note}\n{said}")));
+        }
         let simulated = sessions.iter().all(|s| s.provenance.is_some());
         let (presses, others): (Vec<Session>, Vec<Session>) =
             sessions.into_iter().partition(|s| s.event == Event::Press);

@@ -2,7 +2,7 @@
 
 use super::BoardSettings;
 use crate::algorithm::Contender;
-use crate::decoders::{DecoderSpec, Needs, TrainedDecoder};
+use crate::decoders::{DECODERS, DecoderSpec, Needs, TrainedDecoder};
 use crate::labels::Labels;
 use crate::sensing::{RowChooser, Sensing};
 use crate::session::ScoredSession;
@@ -170,7 +170,12 @@ impl<'a> Trainer<'a> {
                 }
             }
         }
-        if entries.is_empty() && !without_classes.is_empty() {
+        // a decoder that was named has an entry, or is an error; of all, and of those shown, some may be left out
+        let shown = BoardSettings::shown();
+        let begins = asked.decoders.iter().zip(&shown).filter(|(asked, shown)| asked.name == shown.name).count();
+        let unnamed = begins == shown.len() || asked.decoders.len() == DECODERS.len();
+        without_classes.retain(|name| entries.iter().all(|entry| entry.name != *name));
+        if !without_classes.is_empty() && (entries.is_empty() || !unnamed) {
             return Err(Refusal::new(format!(
                 "`--decoder` = {}: learns classes from raster presses that are not scored, but the sessions have none; \
                  record more raster presses, or use `--learn-from simulation`",
