@@ -413,7 +413,12 @@ fn readout_profiles() {
         ("ideal", "", "[raster]\nmagic = {}\n", &["magic"][..]),
         ("ideal", "drive_v = ", "drive_v = -", &["drive_v", "-4.3", "[1e-3, 1e3]"]),
         ("ideal", "sample_rate_hz = ", "sample_rate_hz = 1e9 # ", &["presses × measurements"]),
-        ("as_built", "drive_v = ", "drive_v = \"high\" # ", &["`readout.drive_v` = \"high\": a number is needed"]),
+        (
+            "as_built",
+            "drive_v = ",
+            "drive_v = \"high\" # ",
+            &["wire.toml: line ", "`drive_v` = \"high\": a number is needed"],
+        ),
         ("as_built", "bits = ", "bits = \"many\" # ", &["bits` = \"many\": "]),
         (
             "as_built",

@@ -26,24 +26,19 @@ pub type NumberColumns = Vec<(String, Vec<f64>)>;
 pub fn numbers_of(path: &Path) -> Result<(NumberColumns, Vec<String>), Refusal> {
     let (mut found, mut other): (NumberColumns, Vec<String>) = (Vec::new(), Vec::new());
     let mut count = 0;
+    let uneven =
+        |column: &str, row: usize| refused(path, format!("column `{column}`, row {row}: a list of another length"));
     batches(path, Wanted::All, |batch| {
         let mut next = 0;
         for (field, array) in batch.schema().fields().iter().zip(batch.columns()) {
             let (values, places) = match array.data_type() {
                 DataType::FixedSizeList(..) => {
                     let lists = array.as_fixed_size_list();
-                    let places = usize::try_from(lists.value_length()).unwrap_or_default();
-                    let first = lists.value_offset_at(0);
-                    (numbers(&lists.values().slice(first, lists.len() * places)), places)
+                    in_rows(lists.iter()).map_err(|row| uneven(field.name(), row))?
                 }
-                DataType::List(_) => {
-                    let lists = array.as_list::<i32>();
-                    let places = if lists.is_empty() { 0 } else { lists.value(0).len() };
-                    if (0..lists.len()).any(|row| lists.value(row).len() != places) {
-                        return Err(refused(path, format!("column `{}`: lists of different lengths", field.name())));
-                    }
-                    let rows = (0..lists.len()).map(|row| numbers(&lists.value(row)));
-                    (rows.collect::<Option<Vec<_>>>().map(|rows| rows.concat()), places)
+                DataType::List(_) => in_rows(array.as_list::<i32>().iter()).map_err(|row| uneven(field.name(), row))?,
+                DataType::LargeList(_) => {
+                    in_rows(array.as_list::<i64>().iter()).map_err(|row| uneven(field.name(), row))?
                 }
                 _ => (numbers(array), 1),
             };
@@ -66,11 +61,35 @@ pub fn numbers_of(path: &Path) -> Result<(NumberColumns, Vec<String>), Refusal> 
             }
         }
         if found.len() != next || found.iter().any(|(_, column)| column.len() != found[0].1.len()) {
-            return Err(refused(path, "lists of a column differ in length".to_owned()));
+            return Err(refused(
+                path,
+                "lists of a column are of one length in some rows, and of another in others".to_owned(),
+            ));
         }
         Ok(true)
     })?;
     Ok((found, other))
+}
+
+/// The numbers of lists, row after row, and how many there are in a row; no numbers where they are something else. A row
+/// without a list has NaN.
+///
+/// # Errors
+/// The first row with a list of another length.
+fn in_rows(lists: impl Iterator<Item = Option<ArrayRef>> + Clone) -> Result<(Option<Vec<f64>>, usize), usize> {
+    let places = lists.clone().flatten().map(|list| list.len()).next().unwrap_or(0);
+    let mut values = Vec::new();
+    for (row, list) in lists.enumerate() {
+        match list {
+            Some(list) if list.len() != places => return Err(row),
+            Some(list) => match numbers(&list) {
+                Some(own) => values.extend(own),
+                None => return Ok((None, places)),
+            },
+            None => values.extend(std::iter::repeat_n(f64::NAN, places)),
+        }
+    }
+    Ok((Some(values), places))
 }
 
 /// The values of `array` if they are numbers.

@@ -114,7 +114,12 @@ pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
 pub fn parsed_text<T: DeserializeOwned>(text: &str) -> Result<T, Refusal> {
     let read = toml::Deserializer::parse(text).and_then(|reader| T::deserialize(Tables(reader)));
     read.map_err(|error| {
-        let start = error.span().map_or(0, |span| span.start.min(text.len()));
+        // what is missing has no place
+        let Some(start) = error.span().filter(|span| span.end - span.start.min(span.end) < text.len()).map(|s| s.start)
+        else {
+            return Refusal::new(explain_toml(&error));
+        };
+        let start = start.min(text.len());
         let line = text.get(..start).unwrap_or_default().matches('\n').count();
         // of a text that is TOML the table knows the field, and the text the line
         let table = toml::from_str(text).ok();

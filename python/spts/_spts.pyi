@@ -276,6 +276,7 @@ class Session:
         seeds: str | Sequence[int] | None = None,
         rows: ArrayLike | str | None = None,
         seed: int = 1,
+        session: int = 0,
         peak: float = 30e3,
     ) -> Session: ...
     def write(self, path: _Path) -> None: ...

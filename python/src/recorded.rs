@@ -149,10 +149,14 @@ impl Session {
         let unit = one_of("unit", unit, &units)?;
         let array = frames.as_array();
         let shape = array.shape().to_vec();
-        let [.., last_rows, last_cols] = shape[..] else {
-            bail!("`frames` has shape {shape:?}; (frames, rows, cols) is needed");
+        let sheet = match (rows, cols, &shape[..]) {
+            (Some(rows), Some(cols), _) => [rows, cols],
+            (None, None, [.., _, rows, cols]) => [*rows, *cols],
+            (None, None, _) => {
+                bail!("`frames` has shape {shape:?}; (frames, rows, cols) is needed, or `rows` and `cols`");
+            }
+            _ => bail!("`rows` and `cols`: both or none of them may be given"),
         };
-        let sheet = [rows.unwrap_or(last_rows), cols.unwrap_or(last_cols)];
         let layout = SkinLayout::with_pitch(sheet[0], sheet[1], pitch).map_err(refuse)?;
         let array = FrameArray { shape, values: array.iter().copied().collect(), ..FrameArray::default() };
         let options = FrameOptions {
@@ -188,8 +192,8 @@ impl Session {
 
     /// This session of frames as a skin with one wire would record it: a session with both recordings.
     ///
-    /// Idle frames are subtracted. Pressures go through the transducer; conductances are taken as they are; of codes and
-    /// relative values the largest is taken for what `peak` gives. What is assumed is said as warnings.
+    /// Idle frames are subtracted. Pressures go through the transducer; conductances are taken as they are; of codes
+    /// and relative values the largest is taken for what `peak` gives. What is assumed is said as warnings.
     ///
     /// Parameters
     /// ----------
@@ -199,9 +203,12 @@ impl Session {
     ///     As for `Wire`.
     /// seed : int
     ///     Root of everything random.
+    /// session : int
+    ///     Number of the session, [0, 2**32): another one has other noise on the same skin.
     /// peak : float
     ///     Pa, [100, 1e6].
-    #[pyo3(signature = (readout = "as_built", *, seeds = None, rows = None, seed = 1, peak = 30e3))]
+    #[pyo3(signature = (readout = "as_built", *, seeds = None, rows = None, seed = 1, session = 0, peak = 30e3))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn wire(
         &self,
         py: Python<'_>,
@@ -209,9 +216,11 @@ impl Session {
         seeds: Option<Bound<'_, PyAny>>,
         rows: Option<Bound<'_, PyAny>>,
         seed: i128,
+        session: i128,
         peak: f64,
     ) -> PyResult<Self> {
         let seed = whole("seed", seed)?;
+        let number: u64 = u64::from(whole::<u32>("session", session)?);
         let config = ChainConfig {
             readout: Some(readout.to_owned()),
             rows: rows_of(seeds, None, rows)?,
@@ -220,7 +229,7 @@ impl Session {
         let Some(layout) = self.whole.layout().copied() else { bail!("the session has no frames") };
         let found = released(py, || {
             let chain = Chain::new(&config, &layout, seed, Path::new(""))?;
-            wired(&self.whole, &chain, peak, seed)
+            wired(&self.whole, &chain, peak, seed, number)
         })?;
         let found = found.map_err(|error| refuse(error.to_string().replace("--peak", "peak")))?;
         found.notes.iter().try_for_each(|note| warn(py, &note.replace("--peak", "peak")))?;

@@ -173,7 +173,8 @@ impl Wire {
     /// touch : Touch, or sequence of Touch or None
     ///     Of this wire's skin, not before the one that it felt last. It has been on the skin since then. Of a wire
     ///     over several skins one of each, in their order; None for a skin without a touch since then: its taxels stay
-    ///     as they are. An array (rows, cols), Pa, is a touch where the wire is over one whole skin.
+    ///     as they are. An array (rows, cols), Pa, is a touch where the wire is over one whole skin; touches
+    ///     of `Skin.touch` do not follow it, as the skin has not felt it (`Touch.from_array`).
     /// dt : float, optional
     ///     Time for which an array has been on the skin, s, [0, 1e9]; default 0.1. A touch has its own.
     #[pyo3(signature = (touch, dt = None))]
@@ -398,7 +399,9 @@ impl Wire {
             return Ok(touch.clone().unbind());
         }
         let part = &self.made.skins[skin];
-        if !touch.hasattr("__array__")? && touch.cast::<PySequence>().is_err() {
+        let is_array =
+            touch.hasattr("__array__")? || touch.is_instance_of::<PyList>() || touch.is_instance_of::<PyTuple>();
+        if !is_array {
             let of = if self.made.several {
                 format!(" of skin {skin}, an array, or None")
             } else {

@@ -47,7 +47,8 @@ def test_what_cannot_be_is_refused():
     for change, said in (
         ({"rate": 0.0}, "rate"),
         ({"unit": "kPa"}, '`unit` = "kPa"'),
-        ({"rows": 5}, "shape"),
+        ({"rows": 5}, "both or none"),
+        ({"rows": 5, "cols": 5}, "shape"),
         ({"idle": 21}, "idle"),
         ({"hold": (0.1, 0.3)}, "hold"),
         ({"pitch": -1.0}, "pitch"),
@@ -76,7 +77,7 @@ def test_a_wire_measures_an_array():
         ((np.zeros((5, 8)), 20), "shape"),
         ((np.full((6, 8), -1.0), 20), "outside"),
         ((np.full((6, 8), np.nan), 20), "NaN"),
-        (("cup", 20), "valid: a touch or an array|is needed"),
+        (("cup", 20), "`touch` is a str; valid: a touch or an array"),
     ):
         with pytest.raises(ValueError, match=said):
             wire.record(*wrong)

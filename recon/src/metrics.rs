@@ -55,6 +55,24 @@ impl SupportScore {
     }
 }
 
+impl SupportScore {
+    /// Scores the support of `image` against that of `truth`, both above [`SUPPORT_THRESHOLD`] of their largest value:
+    /// one value a taxel, in any unit.
+    ///
+    /// ```
+    /// use spts_recon::metrics::SupportScore;
+    ///
+    /// let score = SupportScore::of_images(&[0.9, 0.3, 0.1, 0.0], &[1.0, 0.1, 0.1, 0.0]);
+    /// assert!((score.iou - 0.5).abs() < 1e-15);
+    /// ```
+    pub fn of_images(image: &[f64], truth: &[f64]) -> Self {
+        let (mut found, mut touched) = (Vec::new(), Vec::new());
+        support(image, SUPPORT_THRESHOLD, &mut found);
+        support(truth, SUPPORT_THRESHOLD, &mut touched);
+        Self::new(&found, &touched)
+    }
+}
+
 /// Adds up support scores and gives their mean.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct MeanScore {

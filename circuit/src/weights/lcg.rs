@@ -99,8 +99,8 @@ pub enum Seeding {
 }
 
 impl Seeding {
-    /// The rule for a skin of which nothing else is said: the addresses on the published one, which cannot do
-    /// otherwise, and the mix on any other.
+    /// The rule for a skin of which nothing else is said: the addresses for as many taxels of the same pitch as the
+    /// published skin has, which cannot do otherwise, and the mix for any other.
     ///
     /// ```
     /// use spts_circuit::Seeding;
@@ -111,7 +111,7 @@ impl Seeding {
     /// # Ok::<(), spts_input::Refusal>(())
     /// ```
     pub fn usual(layout: &SkinLayout) -> Self {
-        let of = |layout: &SkinLayout| (layout.rows(), layout.cols(), layout.pitch_m().to_bits());
+        let of = |layout: &SkinLayout| (layout.taxels(), layout.pitch_m().to_bits());
         if of(layout) == of(&SkinLayout::default()) { Self::Address } else { Self::Mixed }
     }
 

@@ -56,11 +56,11 @@ pub(super) struct ImportCommand {
     /// Frames of a press, where a file has one press after another [default: as the shape says, else one press]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=100_000_000))]
     press_frames: Option<usize>,
-    /// Make a press of every contact in the frames, from some idle frames before its onset on; what is not whole is left
-    /// out. For one long run, and for presses that do not begin at the same time
+    /// Make a press of every contact in the frames, from some idle frames before its onset on; contacts
+    /// whose begin is not there, and short ones, are left out. For one long run, and for presses that do not begin at the same time
     #[arg(long, conflicts_with = "press_frames")]
     cut: bool,
-    /// Array of an .npz or .mat with several [default: frames, pressure, data or the only one]
+    /// Array of an .npz or .mat with several [default: the only one, or frames, pressure, data]
     #[arg(long, value_name = "NAME")]
     variable: Option<String>,
     /// Name of the session [default: that of FILE]
@@ -144,7 +144,6 @@ impl ImportCommand {
         };
         let (session, found) = frames.session(&options).map_err(in_file)?;
         assumed.extend(found);
-        notes(&assumed);
         let out = self.out.clone().unwrap_or_else(|| Path::new("out").join(&name));
         let folder = open_folder(&out)?;
         session.write_files(&folder.path("")).map_err(|error| folder.unstaged(error))?;
@@ -152,6 +151,7 @@ impl ImportCommand {
             spts::output::write_npy(&folder.path("frame_time_s.npy"), &[times_s.len()], times_s)?;
         }
         folder.commit()?;
+        notes(&assumed);
         let [presses, count, rows, cols] = frames.shape();
         let raster = session.raster();
         let report = Report {

@@ -2,26 +2,27 @@
 
 use crate::context::{Bars, Common, note, notes, open_folder};
 use crate::error::CliError;
-use crate::options::{parse_measurements, seed, whole};
+use crate::options::{parse_measurements, seed, sorted, whole};
 use clap::Args;
 use serde::Serialize;
 use spts::chain::{ChainConfig, DEFAULT_READOUT, RowsConfig};
 use spts::data::{SessionSet, WiredFrames, wired};
+use spts::session::Event;
 use spts::{Chain, Seeding, Session};
 use spts_eval::decode::DecodeRequest;
 use spts_eval::training::TrainingData;
 use spts_input::Refusal;
 use spts_models::ConductanceMap;
-use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
+use spts_recon::metrics::SupportScore;
 use spts_report::few_wires::{FewWiresPage, ShownTouch, text};
 use spts_studies::few_wires::{FewWiresReport, FewWiresStudy};
 use std::path::{Path, PathBuf};
 
 /// Records frames of any skin as a skin with one wire would, and says what one wire and a few would show of them.
 ///
-/// SESSION is a folder that `spts import` has written, or a folder of such folders; sessions of `spts simulate` will do.
-/// DIR becomes a session with both recordings, by the wire and by a scan, which `spts decode`, `spts score` and `spts
-/// calibrate` read. Of several sessions, every one has its folder in DIR.
+/// SESSION is a folder that `spts import` has written, or a folder of such folders; sessions of `spts simulate` will
+/// do. DIR becomes a session with both recordings, by the wire and by a scan, which `spts decode`, `spts score` and
+/// `spts calibrate` read. Of several sessions, every one has its folder in DIR.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts import glove.npy --rows 16 --cols 16 --rate 100 --out out/glove
@@ -37,7 +38,7 @@ Files in DIR:
 
 Idle frames are subtracted. Pressures go through the simulated foam's transducer; conductances are taken as they are; of
 codes and relative values the largest is taken for what --peak gives. Skins of more than 2048 taxels have no page.
---json prints {\"decoder\", \"scan_s\", \"scan_iou\", \"touches\", \"rows\": [{\"wires\", \"rows\", \"m_per_wire\", \"m\", \"time_s\",
+--json prints {\"decoder\", \"scan_s\", \"scan_iou\", \"touches\", \"left_out\", \"rows\": [{\"wires\", \"rows\", \"m_per_wire\", \"m\", \"time_s\",
 \"iou\", \"worst_iou\", \"worst\", \"saturated\", \"used\", \"signal_to_noise\"}]}.")]
 pub(super) struct WireCommand {
     /// Folder of a session of frames, or of several
@@ -79,11 +80,13 @@ pub(super) struct WireCommand {
 struct Report<'a> {
     #[serde(flatten)]
     few: &'a FewWiresReport,
-    scan_iou: f64,
+    scan_iou: Option<f64>,
 }
 
 /// Numbers of wires that are looked at.
 const WIRES: [usize; 3] = [1, 2, 4];
+/// Names in the results folder that no session may have there.
+const RESERVED: [&str; 4] = ["figures", "tables", "wire.html", "manifest.json"];
 /// Touches that the picture shows.
 const SHOWN: usize = 5;
 
@@ -91,7 +94,10 @@ impl WireCommand {
     pub(super) fn run(&self) -> Result<(), CliError> {
         self.common.start()?;
         let set = SessionSet::open(&self.session)?;
-        let sessions: Vec<&Session> = set.sessions.iter().filter(|session| session.raster.is_some()).collect();
+        notes(&set.note);
+        let framed = |session: &&Session| session.raster.is_some() && session.event == Event::Press;
+        let sessions: Vec<&Session> = set.sessions.iter().filter(framed).collect();
+        let others: Vec<&str> = set.sessions.iter().filter(|s| !framed(s)).map(|s| s.name.as_str()).collect();
         let Some(first) = sessions.first() else {
             let path = self.session.display();
             return Err(CliError::usage(format!("{path}: no session has frames; `spts import` makes one")));
@@ -101,14 +107,21 @@ impl WireCommand {
             let (first, other) = (&first.name, &other.name);
             return Err(CliError::usage(format!("sessions \"{first}\" and \"{other}\" are of different skins")));
         }
+        if !others.is_empty() {
+            note(&format!("note: sessions without frames of presses are left out: {}", others.join(", ")));
+        }
+        if let Some(taken) = sessions.iter().map(|s| s.name.as_str()).find(|name| RESERVED.contains(name)) {
+            let message = format!("session {taken:?}: the name is that of a file beside the sessions");
+            return Err(CliError::usage(format!("{message}; spts import --name gives another")));
+        }
         let folder = open_folder(&self.out)?;
         let chain = Chain::new(&self.chain()?, &layout, self.seed, Path::new("."))?;
         let mut touches: Vec<(String, ConductanceMap, Vec<f64>)> = Vec::new();
         let mut said: Vec<String> = Vec::new();
-        for session in &sessions {
+        for (number, session) in (0..).zip(&sessions) {
             let path = |refusal: Refusal| refusal.at(&session.name);
             let session = self.first_presses(session)?;
-            let found = wired(&session, &chain, self.peak, self.seed).map_err(path)?;
+            let found = wired(&session, &chain, self.peak, self.seed, number).map_err(path)?;
             let out = if sessions.len() == 1 { folder.path("") } else { folder.folder(&session.name)? };
             found.session.write_files(&out).map_err(|error| folder.unstaged(error))?;
             touches.extend(scanned(&found));
@@ -120,7 +133,9 @@ impl WireCommand {
         if taxels > TrainingData::MOST_TAXELS {
             note(&format!("note: {taxels} taxels: the page is for up to {}", TrainingData::MOST_TAXELS));
             folder.commit()?;
-            return Ok(());
+            let few = FewWiresReport { touches: touches.len(), ..FewWiresReport::default() };
+            let out = self.out.display();
+            return self.common.print(&Report { few: &few, scan_iou: None }, || format!("session: {out}"));
         }
         let study = FewWiresStudy {
             layout,
@@ -129,17 +144,23 @@ impl WireCommand {
             wires: if self.wires.is_empty() {
                 WIRES.into_iter().filter(|wires| *wires <= layout.rows()).collect()
             } else {
-                self.wires.clone()
+                sorted(self.wires.clone())
             },
             measurements: if self.measurements.is_empty() {
                 DecodeRequest::default_measurements(taxels)
             } else {
-                self.measurements.clone()
+                sorted(self.measurements.clone())
             },
             seed: self.seed,
         };
         let report = study.run(&Bars::default())?;
-        let scan_iou = touches.iter().map(|(_, touch, scan)| iou(touch, scan)).sum::<f64>() / touches.len() as f64;
+        if !(report.left_out.is_empty() || self.wires.is_empty() && self.measurements.is_empty()) {
+            let why = "more measurements than taxels, or than the 64 rows of a pattern";
+            note(&format!("note: left out, {why}: {}", report.left_out.join(", ")));
+        }
+        let scan_iou =
+            touches.iter().map(|(_, touch, scan)| SupportScore::of_images(scan, touch.values()).iou).sum::<f64>()
+                / touches.len() as f64;
         let step = touches.len().div_ceil(SHOWN).max(1);
         let shown = touches.iter().enumerate().step_by(step);
         let shown = shown.map(|(index, (name, touch, scan))| ShownTouch {
@@ -164,7 +185,7 @@ impl WireCommand {
         page.write(&folder).map_err(|error| folder.unstaged(error))?;
         folder.commit()?;
         let out = self.out.display();
-        self.common.print(&Report { few: &report, scan_iou }, || {
+        self.common.print(&Report { few: &report, scan_iou: Some(scan_iou) }, || {
             format!("{}\nsession: {out}, page: {out}/wire.html", text(&report, scan_iou))
         })
     }
@@ -175,6 +196,9 @@ impl WireCommand {
             None => {}
             Some("mixed") => rows.seeding = Some(Seeding::Mixed),
             Some("address") => rows.seeding = Some(Seeding::Address),
+            Some(file) if !Path::new(file).exists() => {
+                return Err(CliError::usage(format!("`--rows` = {file}: valid: mixed, address, or a file of rows")));
+            }
             Some(file) => rows.patterns_file = Some(file.to_owned()),
         }
         Ok(ChainConfig { readout: Some(self.readout.clone()), rows, ..ChainConfig::default() })
@@ -192,8 +216,8 @@ impl WireCommand {
     }
 }
 
-/// Name, conductances and scan of every press, in the middle of its hold. A scan of many taxels has an offset that grows
-/// with the sum of all, as cells that are not selected do not put out 0 V exactly: its lower quartile is taken off.
+/// Name, conductances and scan of every press, in the middle of its hold. A scan of many taxels has an offset that
+/// grows with the sum of all, as cells that are not selected do not put out 0 V exactly: its lower quartile is taken off.
 fn scanned(found: &WiredFrames) -> Vec<(String, ConductanceMap, Vec<f64>)> {
     let Some(recorded) = &found.session.raster else { return Vec::new() };
     let raster = &recorded.recording;
@@ -202,8 +226,11 @@ fn scanned(found: &WiredFrames) -> Vec<(String, ConductanceMap, Vec<f64>)> {
         let time_s = recorded.facts(press).and_then(|facts| facts.time_s).unwrap_or_default();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the recording")]
         let frame = ((time_s / frame_s) as usize).min(raster.frames() - 1);
-        let idle = raster.volts(press, 0);
-        let mut scan: Vec<f64> = raster.volts(press, frame).iter().zip(idle).map(|(v, idle)| v - idle).collect();
+        let idle = 0..raster.blocks()[press].idle_frames.unwrap_or(0).max(1).min(raster.frames());
+        let count = idle.len() as f64;
+        let untouched = |taxel: usize| idle.clone().map(|frame| raster.volts(press, frame)[taxel]).sum::<f64>() / count;
+        let above = |(taxel, v): (usize, &f64)| v - untouched(taxel);
+        let mut scan: Vec<f64> = raster.volts(press, frame).iter().enumerate().map(above).collect();
         let mut sorted = scan.clone();
         sorted.sort_unstable_by(f64::total_cmp);
         let offset_v = sorted[sorted.len() / 4];
@@ -215,11 +242,4 @@ fn scanned(found: &WiredFrames) -> Vec<(String, ConductanceMap, Vec<f64>)> {
         _ => format!("{} {}", found.session.name, press + 1),
     };
     found.touches.iter().enumerate().map(|(press, touch)| (name(press), touch.clone(), image(press))).collect()
-}
-
-fn iou(touch: &ConductanceMap, image: &[f64]) -> f64 {
-    let (mut found, mut truth) = (Vec::new(), Vec::new());
-    support(image, SUPPORT_THRESHOLD, &mut found);
-    support(touch.values(), SUPPORT_THRESHOLD, &mut truth);
-    SupportScore::new(&found, &truth).iou
 }

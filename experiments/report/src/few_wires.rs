@@ -95,6 +95,7 @@ impl FewWiresPage<'_> {
             outline,
         };
         let rows = self.shown.iter().map(|shown| {
+            let iou = |image: &[f64]| SupportScore::of_images(image, shown.touch.values()).iou;
             let mut mask = Vec::new();
             support(shown.touch.values(), SUPPORT_THRESHOLD, &mut mask);
             let mut tiles = vec![
@@ -103,11 +104,11 @@ impl FewWiresPage<'_> {
                     format!("peak {:.0} µS", 1e6 * shown.touch.max()),
                     Some(mask.clone()),
                 ),
-                heat(shown.scan.clone(), format!("IoU {:.2}", iou(&mask, &shown.scan)), Some(mask.clone())),
+                heat(shown.scan.clone(), format!("IoU {:.2}", iou(&shown.scan)), Some(mask.clone())),
             ];
             tiles.extend(columns.iter().map(|row| {
                 let image = row.images.get(shown.index).cloned().unwrap_or_default();
-                let caption = format!("IoU {:.2}", iou(&mask, &image));
+                let caption = format!("IoU {:.2}", iou(&image));
                 heat(image, caption, Some(mask.clone()))
             }));
             TileRow { label: shown.name.clone(), tiles }
@@ -205,13 +206,6 @@ pub fn text(report: &FewWiresReport, scan_iou: f64) -> String {
         short_label(report.decoder),
         1e3 * report.scan_s
     )
-}
-
-/// Intersection over union of the taxels that stand out in `image` with those touched.
-fn iou(touched: &[bool], image: &[f64]) -> f64 {
-    let mut found = Vec::new();
-    support(image, SUPPORT_THRESHOLD, &mut found);
-    SupportScore::new(&found, touched).iou
 }
 
 fn wire_word(wires: usize) -> &'static str {

@@ -14,7 +14,7 @@ use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 use spts_recon::Matrix;
 use spts_recon::matrix_free::SheetPrior;
-use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
+use spts_recon::metrics::SupportScore;
 use std::sync::Arc;
 
 /// Touches, and the wires that are to read them.
@@ -65,7 +65,7 @@ pub struct FewWires {
 }
 
 /// Results of a study.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct FewWiresReport {
     /// Decoder of all images.
     pub decoder: &'static str,
@@ -73,6 +73,9 @@ pub struct FewWiresReport {
     pub scan_s: f64,
     /// Number of touches.
     pub touches: usize,
+    /// What was asked for and cannot be: more measurements than taxels, or than rows of a pattern. As "wires ×
+    /// measurements rows".
+    pub left_out: Vec<String>,
     /// By wires, then rows, then measurements.
     pub rows: Vec<FewWires>,
 }
@@ -107,16 +110,30 @@ impl FewWiresStudy {
         }
         progress.stage("learning", None);
         let spec = auto([layout.rows(), layout.cols()], false);
-        let data = TrainingData::for_shapes(layout, Streams::new(self.seed))?;
+        let streams = Streams::new(self.seed);
+        let data = if spec.needs.shapes() {
+            TrainingData::for_shapes(layout, streams)?
+        } else {
+            TrainingData::for_layout(layout, streams)?
+        };
         let trained = (spec.train)(&data)?;
-        let mut benches = Vec::new();
+        let (mut benches, mut left_out) = (Vec::new(), Vec::new());
         for &wires in &self.wires {
             let taxels = layout.rows().div_ceil(wires) * layout.cols();
             for source in RowSource::candidates(taxels) {
                 let most = source.most_rows(taxels);
-                let counts = self.measurements.iter().copied().filter(|m| *m <= most && m * wires <= layout.taxels());
-                benches.extend(counts.map(|m| (wires, source.clone(), m)));
+                for &m in &self.measurements {
+                    if m <= most && m.saturating_mul(wires) <= layout.taxels() {
+                        benches.push((wires, source.clone(), m));
+                    } else {
+                        left_out.push(format!("{wires} × {m} {}", source.name()));
+                    }
+                }
             }
+        }
+        if benches.is_empty() {
+            let range = format!("[1, {}] on one wire, and in all at most as many", layout.taxels());
+            return Err(Refusal::range("--measurements", format!("{:?}", self.measurements), range));
         }
         progress.stage("decoding", Some(benches.len()));
         let rows = benches.into_iter().map(|(wires, source, m)| {
@@ -130,6 +147,7 @@ impl FewWiresStudy {
             decoder: spec.name,
             scan_s: layout.taxels() as f64 / self.profile.sample_rate_hz,
             touches: self.touches.len(),
+            left_out,
             rows,
         })
     }
@@ -159,7 +177,12 @@ impl FewWiresStudy {
             Ok(answer.image)
         });
         let images = images.collect::<Result<Vec<Vec<f64>>, Refusal>>()?;
-        let scores: Vec<f64> = self.touches.iter().zip(&images).map(|((_, touch), image)| iou(touch, image)).collect();
+        let scores: Vec<f64> = self
+            .touches
+            .iter()
+            .zip(&images)
+            .map(|((_, touch), image)| SupportScore::of_images(image, touch.values()).iou)
+            .collect();
         let worst = (0..scores.len()).min_by(|a, b| scores[*a].total_cmp(&scores[*b]));
         Ok(FewWires {
             wires,
@@ -218,14 +241,6 @@ impl FewWiresStudy {
     }
 }
 
-/// Intersection over union of an image with a touch.
-fn iou(touch: &ConductanceMap, image: &[f64]) -> f64 {
-    let (mut found, mut truth) = (Vec::new(), Vec::new());
-    support(image, SUPPORT_THRESHOLD, &mut found);
-    support(touch.values(), SUPPORT_THRESHOLD, &mut truth);
-    SupportScore::new(&found, &truth).iou
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -246,8 +261,8 @@ mod tests {
         }
     }
 
-    /// With as many measurements as taxels nearly everything is seen; rows of two wires are the rows of their bands, and
-    /// what a wire cannot take, such as 99 rows of a pattern of 64, is left out.
+    /// With as many measurements as taxels nearly everything is seen. What a wire cannot take, such as 99 rows of a
+    /// pattern of 64, is left out.
     #[test]
     fn touches_are_seen() {
         let report = study(vec![1, 2]).run(&()).unwrap();

@@ -274,7 +274,11 @@ fn refused_transducer(name: &str, error: Refusal) -> Refusal {
 
 /// What is wrong with the readout profile, which is in the file `path` unless it goes by a name.
 fn refused_profile(path: Option<&Path>, error: &Refusal) -> Refusal {
-    let refusal = Refusal::new(in_section("readout", &error.to_string()));
+    let refusal = match path {
+        // a line of the file says more than the section of the scene
+        Some(_) if error.to_string().starts_with("line ") => error.clone(),
+        _ => Refusal::new(in_section("readout", &error.to_string())),
+    };
     match path {
         Some(path) => refusal.at(path.display()),
         None => refusal,

@@ -1,8 +1,8 @@
-//! Frames of any skin or simulator: what every taxel shows, time after time. They come from a file or an array and make a
-//! session with a raster recording.
+//! Frames of any skin or simulator: what every taxel shows, time after time. They come from a file or an array and
+//! make a session with a raster recording.
 
 use super::mat::read_mat_array;
-use crate::session::{Event, PressFacts, Recorded, Session};
+use crate::session::{Event, NAMES, PressFacts, Recorded, Session, is_plain};
 use npyz::{DType, NpyFile, Order, TypeChar};
 use spts_circuit::{Block, FrameUnit, Recording, RecordingInfo, Seeding, WeightMode, Weights};
 use spts_input::Refusal;
@@ -17,7 +17,7 @@ const MOST_VALUES: usize = 1 << 27;
 const MOST_TEXT_BYTES: u64 = 1 << 30;
 /// Largest binary file, bytes.
 const MOST_BYTES: u64 = 1 << 31;
-/// Names of arrays of frames and of their times or interval, s, as people call them. The first that is there is taken.
+/// Names of arrays of frames and of their times or interval, s, as people call them.
 const FRAME_NAMES: [&str; 6] = ["frames", "pressure", "pressures", "data", "tactile", "values"];
 const TIME_NAMES: [&str; 5] = ["time_s", "time", "times", "timestamp", "t"];
 const INTERVAL_NAMES: [&str; 3] = ["frame_s", "dt", "dt_s"];
@@ -144,7 +144,9 @@ impl FrameArray {
             }
         }
         let (frames, columns) = (kept.first().map_or(0, Vec::len), kept.len());
-        let values = (0..frames).flat_map(|k| kept.iter().map(move |column| column[k])).collect();
+        let values = (0..frames)
+            .flat_map(|k| kept.iter().map(move |column| column.get(k).copied().unwrap_or(f64::NAN)))
+            .collect();
         Self { shape: vec![frames, columns], values, times_s, ..Self::default() }
     }
 }
@@ -254,37 +256,39 @@ fn c_order(shape: &[usize], values: &[f64]) -> (Vec<usize>, Vec<f64>) {
 
 /// Numbers as text: a frame a line, or a line of taxels a line; with or without a header, with any usual separator.
 fn table(text: &str, taxels: usize) -> Result<FrameArray, Refusal> {
-    let lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim()));
-    let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).peekable();
-    let Some((_, first)) = lines.peek().copied() else {
+    // tabs at the ends are missing values
+    let lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim_matches([' ', '\r'])));
+    let mut lines = lines.filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#')).peekable();
+    let Some((first_line, first)) = lines.peek().copied() else {
         return Err(Refusal::new("holds no numbers"));
     };
     let separator = [';', '\t', ','].into_iter().find(|mark| first.contains(*mark));
+    // some writers end every line with a separator
+    let ended = separator.filter(|mark| first.ends_with(*mark));
     let fields = |line: &str| -> Vec<String> {
         let trimmed = |field: &str| field.trim().trim_matches('"').trim().to_owned();
+        let line = ended.and_then(|mark| line.strip_suffix(mark)).unwrap_or(line);
         match separator {
-            Some(mark) => line.trim_end_matches(mark).split(mark).map(trimmed).collect(),
+            Some(mark) => line.split(mark).map(trimmed).collect(),
             None => line.split_whitespace().map(trimmed).collect(),
         }
     };
-    let number = |field: &str| match field.to_lowercase().as_str() {
-        "" | "nan" | "na" | "null" | "none" => Some(f64::NAN),
-        _ => field.parse::<f64>().ok(),
-    };
+    let mut notes = Vec::new();
     let header = fields(first);
-    let names = header.iter().any(|field| !field.is_empty() && number(field).is_none() && !is_decimal_comma(field));
+    let names = is_header(&header);
     if names {
         lines.next();
     }
-    let (mut rows, mut columns) = (Vec::new(), 0);
+    let (mut rows, mut columns) = (Vec::new(), if names { header.len() } else { 0 });
     for (number_of, line) in lines {
         let at = |problem: String| Refusal::new(format!("line {number_of}: {problem}"));
         let row = fields(line);
-        if rows.is_empty() {
+        if columns == 0 {
             columns = row.len();
         }
         if row.len() != columns {
-            return Err(at(format!("{} values; {columns} are in the lines before", row.len())));
+            let before = if names && rows.is_empty() { "names are in the header" } else { "are in the lines before" };
+            return Err(at(format!("{} values; {columns} {before}", row.len())));
         }
         for field in &row {
             let Some(value) = number(field) else {
@@ -304,20 +308,27 @@ fn table(text: &str, taxels: usize) -> Result<FrameArray, Refusal> {
             }
         }
     }
-    if columns == 0 {
+    if rows.is_empty() {
         return Err(Refusal::new("holds no numbers"));
     }
-    let mut notes = Vec::new();
+    let first_column = || rows.chunks_exact(columns).map(|row| row[0]);
     let named = header.iter().position(|name| names && time_scale(name).is_some());
     let scale = named.and_then(|at| time_scale(&header[at])).unwrap_or(1.0);
+    let mut is_time = named.is_some();
     let at = named.or_else(|| {
-        let ascends = rows.len() >= 2 * columns && rows.chunks_exact(columns).is_sorted_by(|a, b| a[0] < b[0]);
+        let ascends = rows.len() >= 2 * columns && first_column().is_sorted_by(|a, b| a < b);
+        let counts = first_column().is_sorted_by(|a, b| (b - a - 1.0).abs() < 1e-9);
         (columns == taxels + 1 && ascends).then(|| {
-            notes.push(format!("{columns} columns: the first one, which ascends, is taken for time, s"));
+            is_time = !counts;
+            let taken = if counts { "counts the frames, is left out" } else { "ascends, is taken for time, s" };
+            notes.push(format!("{columns} columns: the first one, which {taken}"));
             0
         })
     });
-    let times_s = at.map(|at| rows.chunks_exact(columns).map(|row| scale * row[at]).collect());
+    if names && named.is_none() {
+        notes.push(format!("line {first_line} is taken for a header"));
+    }
+    let times_s = at.filter(|_| is_time).map(|at| rows.chunks_exact(columns).map(|row| scale * row[at]).collect());
     let values: Vec<f64> = match at {
         None => rows,
         Some(at) => {
@@ -330,6 +341,26 @@ fn table(text: &str, taxels: usize) -> Result<FrameArray, Refusal> {
     Ok(FrameArray { shape: vec![values.len() / columns.max(1), columns], values, times_s, rate_hz: None, notes })
 }
 
+/// The number in a field; NaN for an empty one.
+fn number(field: &str) -> Option<f64> {
+    match field.to_lowercase().as_str() {
+        "" | "nan" | "na" | "null" | "none" => Some(f64::NAN),
+        _ => field.parse::<f64>().ok(),
+    }
+}
+
+/// Whether the fields of a first line are names: words and at most the numbers of columns, in order.
+fn is_header(fields: &[String]) -> bool {
+    let numbers: Vec<f64> = fields.iter().filter(|f| !f.is_empty()).filter_map(|f| number(f)).collect();
+    let words = fields.iter().filter(|f| number(f).is_none() && !is_decimal_comma(f)).count();
+    let counted = |from: f64| numbers.iter().zip(0..).all(|(v, k)| (v - from - f64::from(k)).abs() < 1e-9);
+    let unnamed = fields.iter().any(String::is_empty);
+    match numbers.len() {
+        0 => words > 0,
+        _ => (words > 0 || unnamed) && (counted(0.0) || counted(1.0)) && numbers.len() > 1,
+    }
+}
+
 /// Whether a field is a number with a decimal comma, or the two halves of several.
 fn is_decimal_comma(field: &str) -> bool {
     let digits = |text: &str| !text.is_empty() && text.chars().all(|c| c.is_ascii_digit());
@@ -340,6 +371,57 @@ fn is_decimal_comma(field: &str) -> bool {
         || field.split_once(',').is_some_and(of_one)
 }
 
+/// Where the taxels are among the dimensions of an array, and the sizes of the others.
+enum TaxelOrder {
+    /// Last: (presses, frames, taxels).
+    Behind(Vec<usize>),
+    /// First: (taxels, frames, presses).
+    Before(Vec<usize>),
+    /// Two dimensions, of which the first has the rows of all frames one below the other.
+    Stacked(usize),
+}
+
+/// The order of an array of this `shape` for a `sheet` of rows and columns, and whether it fits in another way too.
+fn order_of(shape: &[usize], sheet: &[usize], [rows, cols]: [usize; 2]) -> Option<(TaxelOrder, bool)> {
+    let flat = [rows * cols];
+    let most = |outer: &&[usize]| outer.len() <= 2;
+    let behind = shape.strip_suffix(sheet).or_else(|| shape.strip_suffix(&flat)).filter(most);
+    let before = shape.strip_prefix(sheet).or_else(|| shape.strip_prefix(&flat)).filter(most);
+    let before = before.filter(|outer| !outer.is_empty() && *outer != [1]);
+    let stacked = match shape {
+        [lines, columns] if *columns == cols && rows > 1 && lines % rows == 0 && *lines > rows => Some(lines / rows),
+        _ => None,
+    };
+    match (behind, stacked, before) {
+        (Some(outer), _, before) => Some((TaxelOrder::Behind(outer.to_vec()), before.is_some())),
+        (None, Some(frames), before) => Some((TaxelOrder::Stacked(frames), before.is_some())),
+        (None, None, before) => Some((TaxelOrder::Before(before?.to_vec()), false)),
+    }
+}
+
+impl TaxelOrder {
+    /// Sizes of the other dimensions, presses before frames, and the values with the taxels last.
+    fn sorted(self, values: Vec<f64>, taxels: usize) -> (Vec<usize>, Vec<f64>) {
+        match self {
+            Self::Behind(outer) => (outer, values),
+            Self::Stacked(frames) => (vec![frames], values),
+            Self::Before(outer) => {
+                let count: usize = outer.iter().product();
+                let of = |frame: usize| (0..taxels).map(move |taxel| taxel * count + frame);
+                let order: Vec<usize> = match outer[..] {
+                    [frames, presses] => (0..presses).flat_map(|p| (0..frames).map(move |f| f * presses + p)).collect(),
+                    _ => (0..count).collect(),
+                };
+                let sorted = order.into_iter().flat_map(of).map(|at| values[at]).collect();
+                (outer.into_iter().rev().collect(), sorted)
+            }
+        }
+    }
+}
+
+/// Most rows and columns of taxels.
+const MOST_SIDE: usize = 1 << 16;
+
 impl Frames {
     /// Frames of a sheet of rows × cols taxels from `array`, of a shape like (presses, frames, rows, cols), (frames,
     /// rows, cols), (frames, rows · cols), or with rows and cols in front, as MATLAB's users have them. `press_frames`
@@ -349,55 +431,47 @@ impl Frames {
     /// [`Refusal`] if the shape does not fit the sheet, or a value is infinite.
     pub fn new(array: FrameArray, [rows, cols]: [usize; 2], press_frames: Option<usize>) -> Result<Self, Refusal> {
         let FrameArray { shape, values, times_s, rate_hz, mut notes } = array;
+        for (field, side) in [("rows", rows), ("cols", cols)] {
+            if !(1..=MOST_SIDE).contains(&side) {
+                return Err(Refusal::range(field, side, format!("[1, {MOST_SIDE}]")));
+            }
+        }
         let taxels = rows * cols;
+        let count = shape.iter().try_fold(1_usize, |n, side| n.checked_mul(*side));
+        if count != Some(values.len()) {
+            return Err(Refusal::new(format!("shape {shape:?} is not that of {} values", values.len())));
+        }
         if let Some(at) = values.iter().position(|v| v.is_infinite()) {
             return Err(Refusal::new(format!("value {at} = {} is not finite", values[at])));
         }
-        let sides: Vec<usize> = shape.iter().copied().filter(|side| *side != 1).collect();
+        if values.is_empty() {
+            return Err(Refusal::new("holds no frames"));
+        }
+        let needed = format!("(frames, {rows}, {cols}), (presses, frames, {rows}, {cols}) or (frames, {taxels})");
+        let unfit = format!("shape {shape:?} is not that of frames of {rows} × {cols} taxels: {needed}");
+        let squeezed: Vec<usize> = shape.iter().copied().filter(|side| *side != 1).collect();
         let sheet: Vec<usize> = [rows, cols].into_iter().filter(|side| *side != 1).collect();
-        let refused = || {
-            let needed = format!("(frames, {rows}, {cols}), (presses, frames, {rows}, {cols}) or (frames, {taxels})");
-            Err(Refusal::new(format!("shape {shape:?} is not that of frames of {rows} × {cols} taxels: {needed}")))
+        // as it is, before sides of 1 are left out
+        let (order, others) = order_of(&shape, &[rows, cols], [rows, cols])
+            .or_else(|| order_of(&squeezed, &sheet, [rows, cols]))
+            .ok_or_else(|| Refusal::new(unfit.clone()))?;
+        let taken = match &order {
+            TaxelOrder::Behind(_) => "the first dimension is taken for the frames",
+            TaxelOrder::Stacked(_) => "every frame is taken for as many lines as there are rows",
+            TaxelOrder::Before(_) => "the last dimension is taken for the frames",
         };
-        let behind = sides.strip_suffix(&sheet[..]).or_else(|| sides.strip_suffix(&[taxels]));
-        let before = sides.strip_prefix(&sheet[..]).or_else(|| sides.strip_prefix(&[taxels]));
-        let (outer, values) = match (behind, before) {
-            (Some(outer), before) => {
-                if before.is_some_and(|outer| !outer.is_empty()) {
-                    notes
-                        .push(format!("shape {shape:?} fits in two ways: the first dimension is taken for the frames"));
-                }
-                (outer.to_vec(), values)
-            }
-            (None, Some(outer)) => {
-                // taxels in front: (rows, cols, frames) becomes (frames, rows, cols), and presses come before frames
-                let count: usize = outer.iter().product();
-                let of = |frame: usize| (0..taxels).map(move |taxel| taxel * count + frame);
-                let turned: Vec<usize> = match outer {
-                    [frames, presses] => {
-                        (0..*presses).flat_map(|p| (0..*frames).map(move |f| f * presses + p)).collect()
-                    }
-                    _ => (0..count).collect(),
-                };
-                let turned_values = turned.into_iter().flat_map(of).map(|at| values[at]).collect();
-                (outer.iter().rev().copied().collect(), turned_values)
-            }
-            // lines of taxels below one another
-            (None, None) if matches!(sides[..], [lines, columns] if columns == cols && lines % rows == 0) => {
-                notes.push(format!("{cols} columns: every {rows} lines are taken for a frame"));
-                (vec![values.len() / taxels], values)
-            }
-            _ => return refused(),
-        };
+        match &order {
+            _ if others => notes.push(format!("shape {shape:?} fits in two ways: {taken}")),
+            TaxelOrder::Stacked(_) => notes.push(format!("{cols} columns: {taken}")),
+            _ => {}
+        }
+        let (outer, values) = order.sorted(values, taxels);
         let (mut presses, mut frames) = match outer[..] {
             [] => (1, 1),
             [frames] => (1, frames),
             [presses, frames] => (presses, frames),
-            _ => return refused(),
+            _ => return Err(Refusal::new(unfit)),
         };
-        if values.is_empty() {
-            return Err(Refusal::new("holds no frames"));
-        }
         if let Some(each) = press_frames {
             let all = presses * frames;
             if each == 0 || !all.is_multiple_of(each) {
@@ -411,18 +485,17 @@ impl Frames {
             if !fits {
                 notes.push(format!("{} times for {frames} frames: they are left out", times.len()));
             }
-            fits && frames > 1
+            fits
         });
-        let times_s = times_s.map(|times| times[..frames].to_vec());
-        if let Some(times) = &times_s
-            && let Some(at) =
-                times.windows(2).position(|pair| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater))
-        {
-            let (before, after) = (times[at], times[at + 1]);
-            return Err(Refusal::new(format!(
-                "time of frame {} = {after} s is not behind that before, {before} s",
-                at + 1
-            )));
+        for (press, times) in times_s.iter().flat_map(|times| times.chunks(frames)).enumerate() {
+            if let Some(at) = times
+                .windows(2)
+                .position(|pair| !matches!(pair[0].partial_cmp(&pair[1]), Some(std::cmp::Ordering::Less)))
+            {
+                let (frame, before, after) = (at + 1, times[at], times[at + 1]);
+                let problem = format!("time of frame {frame} = {after} s is not behind that before, {before} s");
+                return Err(Refusal::new(format!("press {press}: {problem}")));
+            }
         }
         Ok(Self { shape: [presses, frames, rows, cols], values, times_s, rate_hz, notes })
     }
@@ -470,9 +543,10 @@ impl Frames {
         let (count, left_out) = (contacts.len(), found + without_begin - contacts.len());
         let cut = format!("from {idle} frames before its onset to {held} frames behind it");
         notes.push(format!("{count} contacts, each {cut}; left out, as not whole: {left_out}"));
-        let times_s = self.times_s.as_ref().and_then(|times| {
-            let own = times.get(..idle + held)?;
-            Some(own.iter().map(|time_s| time_s - own[0]).collect())
+        let times_s = self.times_s.as_ref().map(|times| {
+            // one time a frame of every run, or those of all runs
+            let run = if times.len() == self.shape[1] { 0 } else { self.shape[1] };
+            contacts.iter().flat_map(|c| times[c.run * run + c.start - idle..][..idle + held].iter().copied()).collect()
         });
         Ok(Self { shape: [count, idle + held, rows, cols], values, times_s, rate_hz: self.rate_hz, notes })
     }
@@ -487,7 +561,7 @@ impl Frames {
         &self.values
     }
 
-    /// Time of every frame of the first press, s; `None` if it is not known.
+    /// Time of every frame, s: press after press, or once for all; `None` if it is not known.
     pub fn times_s(&self) -> Option<&[f64]> {
         self.times_s.as_deref()
     }
@@ -522,6 +596,9 @@ impl Frames {
     pub fn session(&self, options: &FrameOptions) -> Result<(Session, Vec<String>), Refusal> {
         let FrameOptions { layout, unit, .. } = options;
         let [presses, frames, rows, cols] = self.shape;
+        if !is_plain(&options.name) {
+            return Err(Refusal::range("name", format!("{:?}", options.name), NAMES));
+        }
         if [layout.rows(), layout.cols()] != [rows, cols] {
             return Err(Refusal::new(format!("frames of {rows} × {cols} taxels are not those of the layout")));
         }
@@ -538,9 +615,10 @@ impl Frames {
         let hold_s = match options.hold_s {
             Some([start_s, end_s]) => {
                 let most_s = frames as f64 / rate_hz;
-                let valid = 0.0 <= start_s && start_s < end_s && end_s <= most_s * (1.0 + 1e-9);
-                if !valid {
-                    let range = format!("the spans within [0, {most_s}] s");
+                let least_s = 1.0 / rate_hz;
+                let long = end_s - start_s >= least_s * (1.0 - 1e-6);
+                if !(0.0 <= start_s && long && end_s <= most_s * (1.0 + 1e-9)) {
+                    let range = format!("the spans of at least a frame, {least_s} s, within [0, {most_s}] s");
                     return Err(Refusal::range("--hold", format!("{start_s}:{end_s}"), range));
                 }
                 [start_s, end_s]
@@ -558,7 +636,12 @@ impl Frames {
             volts: self.press(press).flatten().copied().collect(),
         };
         let recording = Recording::new(info, (0..presses).map(block).collect())?;
-        let facts = (0..presses).map(|press| self.facts(press, *unit, idle, hold_s, rate_hz)).collect();
+        let facts = (0..presses).map(|press| self.facts(press, *unit, idle, hold_s, rate_hz));
+        let facts: Vec<PressFacts> = facts.collect();
+        let known = facts.iter().filter(|f| f.pressure.is_some() || f.conductance.is_some()).count();
+        if known < presses && matches!(unit, FrameUnit::Pressure | FrameUnit::Conductance) {
+            notes.push(format!("{} presses have taxels without any value in their hold", presses - known));
+        }
         let session = Session {
             object: options.object.clone(),
             hold_s: Some(hold_s),
@@ -569,27 +652,31 @@ impl Frames {
     }
 
     fn rate(&self, options: &FrameOptions, notes: &mut Vec<String>) -> Result<f64, Refusal> {
-        let by_times = self.times_s.as_ref().map(|times| {
-            let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        let steps = |times: &Vec<f64>| -> Vec<f64> {
+            times.chunks(self.shape[1]).flat_map(|times| times.windows(2).map(|pair| pair[1] - pair[0])).collect()
+        };
+        let steps = self.times_s.as_ref().map(steps).filter(|steps| !steps.is_empty());
+        let by_times = steps.map(|steps| {
             let step_s = median(&steps).unwrap_or(f64::NAN);
             let longest = steps.iter().copied().fold(0.0, f64::max);
-            if longest > 1.5 * step_s {
-                notes.push(format!(
-                    "frames are {step_s:.4} s apart, and up to {longest:.4} s: they are taken to be evenly spaced"
-                ));
+            let shortest = steps.iter().copied().fold(f64::INFINITY, f64::min);
+            if longest > 1.5 * step_s || shortest < 0.5 * step_s {
+                let spread = format!("{shortest:.4} to {longest:.4} s");
+                notes.push(format!("frames are {step_s:.4} s apart, but {spread}: they are taken to be evenly spaced"));
             }
             1.0 / step_s
         });
+        let named = if options.rate_hz.is_some() { "--rate" } else { "frames a second of the file" };
         let Some(rate_hz) = options.rate_hz.or(by_times).or(self.rate_hz) else {
             return Err(Refusal::new("`--rate` is missing: the file does not say how many frames a second it has"));
         };
-        in_interval("--rate", rate_hz, "[1e-3, 1e6] Hz")?;
+        in_interval(named, rate_hz, "[1e-3, 1e6] Hz")?;
         Ok(rate_hz)
     }
 
-    /// Sum of every frame, press by press; missing values count as nothing.
+    /// Sum of every frame, press by press; a missing value counts as the mean of the others.
     fn sums(&self) -> Vec<Vec<f64>> {
-        let of = |frame: &[f64]| frame.iter().filter(|v| v.is_finite()).sum();
+        let of = |frame: &[f64]| frame.len() as f64 * mean_of(frame.iter().copied()).unwrap_or(0.0);
         (0..self.shape[0]).map(|press| self.press(press).map(of).collect()).collect()
     }
 
@@ -600,7 +687,11 @@ impl Frames {
             sums.iter().take_while(|sum| **sum <= least + IDLE_RISE * (most - least)).count()
         };
         let found = sums.iter().map(of).min().unwrap_or(0);
-        if found == 0 || found == self.shape[1] {
+        if found == self.shape[1] {
+            notes.push("the frames of a press do not differ: nothing touches the skin there".to_owned());
+            return None;
+        }
+        if found == 0 {
             let why = "presses do not begin untouched: nothing is subtracted";
             notes.push(format!("{why}; --cut makes a press of every contact, --idle first:N names idle frames"));
             return None;
@@ -687,15 +778,18 @@ impl Frames {
         PressFacts { time_s: Some(0.5 * (hold_s[0] + hold_s[1])), pressure, conductance, ..PressFacts::default() }
     }
 
-    /// Mean of some frames of a press.
+    /// Mean of some frames of a press; NaN for a taxel that is missing in all of them.
     fn mean(&self, press: usize, frames: std::ops::Range<usize>) -> Vec<f64> {
-        let mut sum = vec![0.0; self.taxels()];
-        let count = frames.len().max(1) as f64;
-        for frame in self.press(press).skip(frames.start).take(frames.len()) {
-            sum.iter_mut().zip(frame).for_each(|(sum, v)| *sum += v / count);
-        }
-        sum
+        let frames: Vec<&[f64]> = self.press(press).skip(frames.start).take(frames.len()).collect();
+        let of = |taxel: usize| mean_of(frames.iter().map(|frame| frame[taxel])).unwrap_or(f64::NAN);
+        (0..self.taxels()).map(of).collect()
     }
+}
+
+/// Mean of the values that are not missing; `None` if all are.
+fn mean_of(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (sum, count) = values.filter(|v| v.is_finite()).fold((0.0, 0_usize), |(sum, count), v| (sum + v, count + 1));
+    (count > 0).then(|| sum / count as f64)
 }
 
 /// Share of its rise by which the sum of an idle frame may exceed the least.
@@ -761,7 +855,7 @@ mod tests {
             let finite = |v: &f64| if v.is_infinite() { f64::NAN } else { *v };
             let values: Vec<f64> = bits.iter().map(finite).take(presses * count * rows * cols).collect();
             let array = FrameArray { shape: vec![presses, count, rows, cols], values, ..FrameArray::default() };
-            let made = Frames::new(array.clone(), [rows, cols], Some(count)).unwrap();
+            let made = Frames::new(array.clone(), [rows, cols], None).unwrap();
             let unit = [FrameUnit::Pressure, FrameUnit::Conductance, FrameUnit::Codes, FrameUnit::Relative][unit];
             let (session, _) = made.session(&FrameOptions { hold_s: Some([0.0, 0.01]), ..options(unit, [rows, cols]) }).unwrap();
             let dir = tempfile::tempdir().unwrap();
@@ -787,6 +881,9 @@ mod tests {
             (&[6, 7], [2, 3], Some([1, 7, 2, 3])),
             (&[2, 3, 7, 4], [2, 3], Some([4, 7, 2, 3])),
             (&[14, 3], [2, 3], Some([1, 7, 2, 3])),
+            (&[6, 3], [2, 3], Some([1, 3, 2, 3])),
+            (&[5, 1, 2, 3], [2, 3], Some([5, 1, 2, 3])),
+            (&[9, 1, 1], [1, 1], Some([1, 9, 1, 1])),
             (&[7, 1, 6], [1, 6], Some([1, 7, 1, 6])),
             (&[7, 5], [2, 3], None),
             (&[2, 2, 7, 2, 3], [2, 3], None),
@@ -797,8 +894,14 @@ mod tests {
         let turned = frames(&[2, 3, 7, 4], [2, 3]).unwrap();
         let found = turned.values()[(3 * 7 + 2) * 6 + 5];
         assert!((found - f64::from(5 * 7 * 4 + 2 * 4 + 3)).abs() < 1e-12, "{found}");
+        // lines below one another are in the order of the file
+        let stacked = frames(&[6, 3], [2, 3]).unwrap();
+        assert!(stacked.values().is_sorted() && stacked.notes[0].contains("fits in two ways"), "{stacked:?}");
         let square = frames(&[6, 6], [2, 3]).unwrap();
         assert!(square.notes.iter().any(|note| note.contains("fits in two ways")), "{:?}", square.notes);
+        let short = FrameArray { shape: vec![2, 6], values: vec![0.0; 6], ..FrameArray::default() };
+        assert!(Frames::new(short, [2, 3], None).unwrap_err().to_string().contains("not that of 6 values"));
+        assert!(frames(&[2, 6], [0, 3]).unwrap_err().contains("`rows` = 0"));
         let said = frames(&[7, 5], [2, 3]).unwrap_err();
         assert!(said.contains("shape [7, 5]") && said.contains("(frames, 6)"), "{said}");
     }
@@ -812,10 +915,18 @@ mod tests {
             "1\t2.5\n3\t-4\n",
             "1 2.5\n  3   -4\n",
             "a,b\n1,2.5\n3,-4\n",
-            "# remark\n\"a\",\"b\"\n1,2.5,\n3,-4,\n",
+            "# remark\n\"a\",\"b\",\n1,2.5,\n3,-4,\n",
+            "index,0,1\n0,1,2.5\n1,3,-4\n",
         ] {
-            assert_eq!(of(text, 2).unwrap(), plain, "{text:?}");
+            let found = of(text, 2).unwrap();
+            assert_eq!(
+                (found.shape, found.values, found.times_s),
+                (plain.shape.clone(), plain.values.clone(), None),
+                "{text:?}"
+            );
         }
+        // a tab at the end is a missing value
+        assert!(of("1\t2\n3\t\n", 2).unwrap().values[3].is_nan());
         let timed = FrameArray { times_s: Some(vec![0.0, 0.02]), ..plain.clone() };
         for text in ["time_ms,a,b\n0,1,2.5\n20,3,-4\n", "a,b,Time (s)\n1,2.5,0\n3,-4,0.02\n"] {
             assert_eq!(of(text, 2).unwrap(), timed, "{text:?}");
@@ -828,6 +939,8 @@ mod tests {
             ("1,5 2,5\n3,5 4,5\n", "has a decimal comma"),
             ("1,2\n3\n", "line 2: 1 values; 2 are in the lines before"),
             ("1,2\n3,x\n", "line 2: `x` is not a number"),
+            ("1,x,3\n4,5,6\n", "line 1: `x` is not a number"),
+            ("a,b,time\n4,5\n", "line 2: 2 values; 3 names are in the header"),
             ("1,2\n3,inf\n", "line 2: `inf` is not finite"),
             ("a,b\n", "holds no numbers"),
             ("", "holds no numbers"),
@@ -860,13 +973,16 @@ mod tests {
     #[test]
     fn what_is_found_in_frames() {
         let course = [0.0, 0.0, 0.0, 2.0, 9.0, 10.0, 10.0, 9.8, 3.0, 0.0];
-        let taxel = |k: usize, load: f64| match k {
-            0 => 0.0,
-            1 => 12.0,
-            _ => load + 0.1 * k as f64,
+        let frames_of = |course: &[f64]| {
+            let taxel = |k: usize, load: f64| match k {
+                0 => 0.0,
+                1 => 12.0,
+                _ => load + 0.1 * k as f64,
+            };
+            let values = course.iter().flat_map(|load| (0..6).map(|k| taxel(k, *load))).collect();
+            FrameArray { shape: vec![course.len(), 2, 3], values, ..FrameArray::default() }
         };
-        let values = course.iter().flat_map(|load| (0..6).map(|k| taxel(k, *load))).collect();
-        let array = FrameArray { shape: vec![10, 2, 3], values, ..FrameArray::default() };
+        let array = frames_of(&course);
         let (session, notes) =
             Frames::new(array, [2, 3], None).unwrap().session(&options(FrameUnit::Pressure, [2, 3])).unwrap();
         let block = &session.raster().unwrap().blocks()[0];
@@ -874,6 +990,13 @@ mod tests {
         for said in ["dead: (0, 0)", "stuck: (0, 1)", "idle: the first 3 frames", "hold: 0.040 to 0.080 s"] {
             assert!(notes.iter().any(|note| note.contains(said)), "{said}: {notes:?}");
         }
+        // a missing value moves nothing
+        let mut missing = frames_of(&course);
+        missing.values[5 * 6 + 3] = f64::NAN;
+        let (again, _) =
+            Frames::new(missing, [2, 3], None).unwrap().session(&options(FrameUnit::Pressure, [2, 3])).unwrap();
+        assert_eq!(again.hold_s, session.hold_s);
+        assert!(again.raster.unwrap().presses[0].pressure.is_some());
         // the mean of the hold without the idle frames
         let pressure = session.raster.unwrap().presses[0].pressure.clone().unwrap();
         assert!((pressure.values()[2] - 9.7).abs() < 1e-12 && pressure.values()[1] == 0.0, "{pressure:?}");
@@ -889,6 +1012,8 @@ mod tests {
             (FrameOptions { rate_hz: Some(f64::NAN), ..options.clone() }, "`--rate` = NaN is outside"),
             (FrameOptions { idle: Some(8), ..options.clone() }, "`--idle` = first:8 is outside [0, 7]"),
             (FrameOptions { hold_s: Some([0.0, 0.2]), ..options.clone() }, "`--hold` = 0:0.2 is outside"),
+            (FrameOptions { hold_s: Some([0.02, 0.021]), ..options.clone() }, "of at least a frame"),
+            (FrameOptions { name: "a/b".to_owned(), ..options.clone() }, "`name` = \"a/b\""),
         ] {
             assert!(told(&options).contains(said), "{said}: {}", told(&options));
         }

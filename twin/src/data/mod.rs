@@ -1,5 +1,5 @@
-//! Reads sessions from folders of sessions, from the published recordings of the real skin in MATLAB files, or from frames
-//! of any skin or simulator.
+//! Reads sessions from folders of sessions, from the published recordings of the real skin in MATLAB files, or from
+//! frames of any skin or simulator.
 
 mod frames;
 mod mat;

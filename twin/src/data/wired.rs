@@ -2,14 +2,15 @@
 
 use super::frames::Frames;
 use crate::chain::{Acquisition, Chain, SkinSession, of_conductance};
-use crate::provenance::{Provenance, hash_text};
-use crate::session::{PressFacts, Recorded, Session};
+use crate::provenance::{Provenance, combined_hash, hash_text};
+use crate::session::{Event, PressFacts, Recorded, Session};
 use spts_circuit::{FrameUnit, Interpolated, Mode};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, PressureMap, within};
 use spts_recon::metrics::median;
 
-/// Time in which nothing touches the skin before the frames of a press, s, and how long the first of them takes to come.
+/// Time in which nothing touches the skin before the frames of a press, s, and the last part of it, in which the first
+/// frame comes.
 const IDLE_S: f64 = 0.25;
 const RISE_S: f64 = 1e-3;
 /// Maps before the first frame: the untouched skin at the begin and at the end of that time.
@@ -45,7 +46,7 @@ enum Law {
 }
 
 /// Records the frames of `frames`, a session with a raster scan, by the wire and by the scan of `chain`, whose random
-/// numbers have the root `seed`.
+/// numbers have the root `seed`. `number` tells sessions of one skin apart: each has noise of its own.
 ///
 /// Every press begins with 0.25 s without a touch. Its idle frames are subtracted; what is then below 0 counts as no
 /// touch, and a missing value as the one before. Pressures go through the transducer of the chain. Conductances are
@@ -54,8 +55,11 @@ enum Law {
 ///
 /// # Errors
 /// [`Refusal`] if there are no frames, they are of another layout than the chain, or they are too long to record.
-pub fn wired(frames: &Session, chain: &Chain, peak_pa: f64, seed: u64) -> Result<WiredFrames, Refusal> {
+pub fn wired(frames: &Session, chain: &Chain, peak_pa: f64, seed: u64, number: u64) -> Result<WiredFrames, Refusal> {
     within("--peak", peak_pa, 100.0, 1e6, "[100, 1e6] Pa")?;
+    if frames.event != Event::Press {
+        return Err(Refusal::new("is no session of presses: frames of held contacts are needed"));
+    }
     let values = Frames::of_session(frames)?;
     let Some(raster) = frames.raster() else { return Err(Refusal::new("has no frames: `raster` is null")) };
     let layout = chain.skin();
@@ -115,13 +119,16 @@ pub fn wired(frames: &Session, chain: &Chain, peak_pa: f64, seed: u64) -> Result
         let recording = chain.record_sources(&mut sources, duration_s, &Acquisition::presses(mode, number))?;
         Ok((Recorded { presses, ..Recorded::new(recording) }, touches))
     };
-    let (scanned, compressive) = rayon::join(|| record(Mode::Raster, 0), || record(Mode::Compressive, 1));
-    let (compressive, touches) = compressive?;
-    let hash = hash_text(&values.values().iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
+    let sessions = [2 * number, 2 * number + 1];
+    let scanned = record(Mode::Raster, sessions[0])?.0;
+    let (compressive, touches) = record(Mode::Compressive, sessions[1])?;
+    let blocks = values.values().chunks(count * rows * cols);
+    let hashes = blocks.map(|block| hash_text(&block.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>()));
+    let hash = combined_hash(&hashes.collect::<Vec<_>>());
     let session = Session {
         object: frames.object.clone(),
         hold_s: Some(hold_s.map(|time_s| time_s + IDLE_S)),
-        raster: Some(scanned?.0),
+        raster: Some(scanned),
         compressive: Some(compressive),
         provenance: Some(Provenance::new(seed, hash)),
         ..Session::new(&frames.name, frames.event)
@@ -136,7 +143,7 @@ fn check_length(presses: usize, samples: f64) -> Result<(), Refusal> {
     }
     let most = (MOST_SAMPLES / samples).floor();
     Err(Refusal::new(format!(
-        "{presses} presses of {samples:.0} samples each are more than {MOST_SAMPLES:.0}: --presses {most:.0} fits"
+        "{presses} presses of {samples:.0} samples each are more than {MOST_SAMPLES:.0}; {most:.0} such presses fit"
     )))
 }
 
@@ -146,7 +153,7 @@ fn courses(session: &Session, frames: &Frames, notes: &mut Vec<String>) -> Vec<C
     let taxels = rows * cols;
     let blocks = session.raster().map_or(&[][..], |raster| raster.blocks());
     if blocks.iter().any(|block| block.idle_frames.unwrap_or(0) == 0) {
-        notes.push("no idle frames are known: nothing is subtracted (spts import --idle first:N)".to_owned());
+        notes.push("the session names no idle frames: nothing is subtracted".to_owned());
     }
     let course = |press: usize| {
         let own = &frames.values()[press * count * taxels..][..count * taxels];

@@ -174,13 +174,14 @@ impl TrainingData {
 
     /// As [`Self::for_layout`], with images of procedural shapes instead of random outlines: pressed in the simulation,
     /// on taxels with the usual spread of gains. The images that [`Self::alike`] gives have the outlines too: shapes
-    /// are pressed about the middle of the skin, outlines lie anywhere.
+    /// are pressed about the middle of the skin, outlines lie anywhere. A skin that is too small for the shapes has
+    /// outlines alone.
     ///
     /// # Errors
-    /// As [`Self::for_layout`]; [`Refusal`] if no shape can be pressed on the skin.
+    /// As [`Self::for_layout`].
     pub fn for_shapes(skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
         let data = Self::for_layout(skin, streams)?;
-        let shapes = shape_images(skin, streams.rng("shapes", 0).random()).map_err(|e| e.at("shapes"))?;
+        let Ok(shapes) = shape_images(skin, streams.rng("shapes", 0).random()) else { return Ok(data) };
         let columns = [&shapes, &data.images].into_iter().flat_map(|of| (0..of.ncols()).map(|k| of.column(k)));
         let alike = Matrix::from_column_slices(skin.taxels(), &columns.collect::<Vec<_>>());
         Ok(Self { images: with_gains(&shapes, streams), alike: Some(Arc::new(alike)), ..data })

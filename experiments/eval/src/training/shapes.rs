@@ -19,6 +19,8 @@ const IMAGES: u64 = 12_000;
 const VALUES: u64 = 100 * IMAGES;
 /// Fewest images, on sheets of any size.
 const FEWEST: u64 = 1_500;
+/// One in so many presses has to touch the skin.
+const LEAST_PRESSED: u64 = 4;
 /// Presses that one maker makes: neighbours share a shape.
 const CHUNK: u64 = 50;
 
@@ -27,7 +29,7 @@ const CHUNK: u64 = 50;
 /// they are what the mirrored and turned shape would have given. The result depends only on the layout and `seed`.
 ///
 /// # Errors
-/// [`Refusal`] if the layout is too large.
+/// [`Refusal`] if the layout is too large, or too small for the shapes to touch it.
 pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
     let images = (VALUES / layout.taxels().max(1) as u64).clamp(FEWEST, IMAGES);
     let symmetries = symmetries(layout.rows(), layout.cols());
@@ -45,8 +47,16 @@ pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
     overrides.insert("skin".to_owned(), skin.into());
     let spec = Spec::load(SHAPES_SPEC, &overrides)?;
     let chunks = (0..presses.div_ceil(CHUNK)).into_par_iter();
-    let chunks = chunks.map(|chunk| conductances(&spec, chunk * CHUNK..((chunk + 1) * CHUNK).min(presses)));
-    let pressed = chunks.collect::<Result<Vec<_>, Refusal>>()?.concat();
+    // what lies beside a small skin is no image of it
+    let pressed_in = |chunk: u64| {
+        let mut maker = Maker::new(&spec);
+        let rows = chunk * CHUNK..((chunk + 1) * CHUNK).min(presses);
+        rows.filter_map(|row| scaled(&mut maker, row).ok()).collect::<Vec<_>>()
+    };
+    let pressed = chunks.map(pressed_in).collect::<Vec<_>>().concat();
+    if (pressed.len() as u64) < presses / LEAST_PRESSED {
+        return Err(Refusal::new(format!("{} of {presses} shapes touch the skin: it is too small", pressed.len())));
+    }
     let columns = pressed.iter().flat_map(|image| {
         symmetries.iter().map(move |taxels| taxels.iter().map(|&taxel| image[taxel]).collect::<Vec<_>>())
     });
@@ -62,21 +72,30 @@ fn symmetries(rows: usize, cols: usize) -> Vec<Vec<usize>> {
             let (row, col) = (flipped(1, taxel / cols, rows), flipped(2, taxel % cols, cols));
             if kind & 4 == 0 { row * cols + col } else { col * cols + row }
         };
-        (0..rows * cols).map(of_taxel).collect()
+        (0..rows * cols).map(of_taxel).collect::<Vec<_>>()
     });
-    all.collect()
+    // a line of taxels has fewer
+    let mut found: Vec<Vec<usize>> = Vec::new();
+    all.for_each(|taxels| {
+        if !found.contains(&taxels) {
+            found.push(taxels);
+        }
+    });
+    found
 }
 
 /// Conductances of `rows` of a data set, each as a share of its largest.
 fn conductances(spec: &Spec, rows: Range<u64>) -> Result<Vec<Vec<f64>>, Refusal> {
     let mut maker = Maker::new(spec);
-    let scaled = |row| {
-        let made = maker.row(row)?;
-        let image = made.conductance().values();
-        let peak = image.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-        Ok(image.iter().map(|v| v / peak).collect())
-    };
-    rows.map(scaled).collect()
+    rows.map(|row| scaled(&mut maker, row)).collect()
+}
+
+/// Conductances of row `row` as a share of their largest.
+fn scaled(maker: &mut Maker<'_>, row: u64) -> Result<Vec<f64>, Refusal> {
+    let made = maker.row(row)?;
+    let image = made.conductance().values();
+    let peak = image.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    Ok(image.iter().map(|v| v / peak).collect())
 }
 
 /// How accurately the pose of an object is known: its place to half a taxel and its rotation to 15°, as read by eye;
