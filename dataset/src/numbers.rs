@@ -71,8 +71,8 @@ pub fn numbers_of(path: &Path) -> Result<(NumberColumns, Vec<String>), Refusal> 
     Ok((found, other))
 }
 
-/// The numbers of lists, row after row, and how many there are in a row; no numbers where they are something else. A row
-/// without a list has NaN.
+/// The numbers of lists, row after row, and how many there are in a row; no numbers where they are something else. A
+/// row without a list has NaN.
 ///
 /// # Errors
 /// The first row with a list of another length.

@@ -114,17 +114,18 @@ pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
 pub fn parsed_text<T: DeserializeOwned>(text: &str) -> Result<T, Refusal> {
     let read = toml::Deserializer::parse(text).and_then(|reader| T::deserialize(Tables(reader)));
     read.map_err(|error| {
-        // what is missing has no place
-        let Some(start) = error.span().filter(|span| span.end - span.start.min(span.end) < text.len()).map(|s| s.start)
-        else {
-            return Refusal::new(explain_toml(&error));
-        };
-        let start = start.min(text.len());
-        let line = text.get(..start).unwrap_or_default().matches('\n').count();
         // of a text that is TOML the table knows the field, and the text the line
         let table = toml::from_str(text).ok();
         let in_table = table.and_then(|table| parsed::<T>(table).err());
+        let span = error.span().unwrap_or_default();
+        // what is missing has no place
+        let placed = in_table.is_none() || !span.is_empty() && span.end - span.start < text.trim_end().len();
         let message = in_table.map_or_else(|| explain_toml(&error), |refusal| refusal.to_string());
+        if !placed {
+            return Refusal::new(message);
+        }
+        let start = span.start.min(text.len());
+        let line = text.get(..start).unwrap_or_default().matches('\n').count();
         let shown = text.lines().nth(line).unwrap_or_default().trim();
         let shown: String = shown.chars().take(SHOWN).collect();
         Refusal::new(format!("line {}: {message} (`{shown}`)", line + 1))

@@ -56,8 +56,8 @@ pub(super) struct ImportCommand {
     /// Frames of a press, where a file has one press after another [default: as the shape says, else one press]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=100_000_000))]
     press_frames: Option<usize>,
-    /// Make a press of every contact in the frames, from some idle frames before its onset on; contacts
-    /// whose begin is not there, and short ones, are left out. For one long run, and for presses that do not begin at the same time
+    /// Make a press of every contact in the frames, from some idle frames before its onset on; contacts whose begin is
+    /// not there, and short ones, are left out. For one long run, and for presses that do not begin at the same time
     #[arg(long, conflicts_with = "press_frames")]
     cut: bool,
     /// Array of an .npz or .mat with several [default: the only one, or frames, pressure, data]

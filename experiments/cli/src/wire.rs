@@ -38,8 +38,8 @@ Files in DIR:
 
 Idle frames are subtracted. Pressures go through the simulated foam's transducer; conductances are taken as they are; of
 codes and relative values the largest is taken for what --peak gives. Skins of more than 2048 taxels have no page.
---json prints {\"decoder\", \"scan_s\", \"scan_iou\", \"touches\", \"left_out\", \"rows\": [{\"wires\", \"rows\", \"m_per_wire\", \"m\", \"time_s\",
-\"iou\", \"worst_iou\", \"worst\", \"saturated\", \"used\", \"signal_to_noise\"}]}.")]
+--json prints {\"decoder\", \"scan_s\", \"scan_iou\", \"touches\", \"left_out\", \"rows\": [{\"wires\", \"rows\",
+\"m_per_wire\", \"m\", \"time_s\", \"iou\", \"worst_iou\", \"worst\", \"saturated\", \"used\", \"signal_to_noise\"}]}.")]
 pub(super) struct WireCommand {
     /// Folder of a session of frames, or of several
     #[arg(value_name = "SESSION")]
@@ -217,7 +217,8 @@ impl WireCommand {
 }
 
 /// Name, conductances and scan of every press, in the middle of its hold. A scan of many taxels has an offset that
-/// grows with the sum of all, as cells that are not selected do not put out 0 V exactly: its lower quartile is taken off.
+/// grows with the sum of all, as cells that are not selected do not put out 0 V exactly: its lower quartile is taken
+/// off.
 fn scanned(found: &WiredFrames) -> Vec<(String, ConductanceMap, Vec<f64>)> {
     let Some(recorded) = &found.session.raster else { return Vec::new() };
     let raster = &recorded.recording;
