@@ -28,5 +28,4 @@ mod tests;
 pub use folder::{SESSION_FILE, SessionWriter, parse_json};
 pub use npy::{MOST_SAMPLES, NpyArray, read_npy};
 pub use recorded::{Event, PressFacts, PressPose, Recorded, Session};
-#[cfg(feature = "mujoco")]
 pub(crate) use recorded::{NAMES, is_plain};
