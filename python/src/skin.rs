@@ -601,18 +601,18 @@ impl Touch {
     }
 }
 
-/// The pressure in an array of a skin of rows x cols taxels.
-pub(crate) fn pressure_of(value: &Bound<'_, PyAny>, [rows, cols]: [usize; 2]) -> PyResult<PressureMap> {
+/// The pressure in an array of a skin of rows x cols taxels, which an error calls `name`.
+pub(crate) fn pressure_of(name: &str, value: &Bound<'_, PyAny>, [rows, cols]: [usize; 2]) -> PyResult<PressureMap> {
     let Ok(array) = value.extract::<PyArrayLike2<'_, f64, AllowTypeChange>>() else {
-        bail!("`pressure`: an array ({rows}, {cols}), Pa, is needed");
+        bail!("`{name}`: a touch or an array ({rows}, {cols}), Pa, is needed");
     };
     let array = array.as_array();
     if array.dim() != (rows, cols) {
-        bail!("`pressure` has shape {:?}; ({rows}, {cols}) is needed", array.dim());
+        bail!("`{name}` has shape {:?}; ({rows}, {cols}) is needed", array.dim());
     }
     let values: Vec<f64> = array.iter().copied().collect();
     if let Some(at) = values.iter().position(|p| !(0.0..=1e9).contains(p)) {
-        bail!("`pressure[{}, {}]` = {} is outside [0, 1e9] Pa", at / cols, at % cols, values[at]);
+        bail!("`{name}[{}, {}]` = {} is outside [0, 1e9] Pa", at / cols, at % cols, values[at]);
     }
     Ok(PressureMap::from_values(rows, cols, values))
 }
@@ -640,7 +640,7 @@ impl Touch {
         }
         let mut state = skin.locked();
         let layout = *state.skin.layout();
-        let pressure = pressure_of(pressure, [layout.rows(), layout.cols()])?;
+        let pressure = pressure_of("pressure", pressure, [layout.rows(), layout.cols()])?;
         state.touches += 1;
         state.time_s += dt;
         Self::of_pressure(py, pressure, layout.cell_area_m2(), [state.time_s, state.touches as f64], skin.id)

@@ -414,7 +414,7 @@ impl Wire {
                 "`{name}`: an array is for a wire with all taxels of its skin; `spts.Touch.from_array` makes a touch of it"
             );
         }
-        let pressure = pressure_of(touch, [part.layout.rows(), part.layout.cols()])?;
+        let pressure = pressure_of(&name, touch, [part.layout.rows(), part.layout.cols()])?;
         let now = {
             let state = self.locked();
             let last = &state.skins[skin];
