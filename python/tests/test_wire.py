@@ -196,7 +196,7 @@ def test_what_does_not_fit_a_wire_over_skins(ball):
         (ValueError, r"`touch\[1\]` is a str", lambda: wire.feel([left, "b"])),
         (ValueError, "over 2 skins", lambda: wire.feel(left)),
         (ValueError, "`touch`: a touch or an array", lambda: single.feel([left])),
-        (TypeError, "Touch", lambda: single.feel(None)),
+        (ValueError, "`touch` is a NoneType; valid: a touch or an array", lambda: single.feel(None)),
         (ValueError, r"`skin\[1\]` is there twice", lambda: spts.Wire([a, a])),
         (ValueError, r"`skin\[1\]` is no skin", lambda: spts.Wire([a, ball])),
         (ValueError, "`skin` is a Body", lambda: spts.Wire(ball)),
