@@ -19,7 +19,7 @@ fn score_of(board: &Value, decoder: &str, m: u64, left_out: bool, sensing: &str,
 fn chosen_rows_see_more_of_the_real_skin() {
     let dir = tempfile::tempdir().unwrap();
     let arguments =
-        "--decoder nn_lmmse,evidence --sensing random,chosen --left-out --measurements 5,13,20,25 --no-times";
+        "--decoder nn_lmmse,evidence --sensing random,chosen --left-out --measurements 5,7,13,20,25 --no-times";
     let Some(board) = score(dir.path(), &words(arguments)) else {
         return;
     };
