@@ -126,7 +126,7 @@ fn external_programs_are_scored_or_named() {
 #[ignore = "three minutes on every window of fifty presses"]
 fn the_best_decoders_on_the_real_skin() {
     let dir = tempfile::tempdir().unwrap();
-    let decoders = words("--decoder nn_lasso,nn_lmmse,evidence --left-out --measurements 7,13,20,25");
+    let decoders = words("--decoder nn_lasso,nn_lmmse,evidence --left-out --measurements 7,10,13,15,20,25");
     let Some(board) = score(dir.path(), &decoders) else {
         return;
     };
