@@ -142,7 +142,7 @@ pub(super) struct ScoreCommand {
     #[arg(long, value_name = "P,...", value_delimiter = ',', requires = "anytime", value_parser = number)]
     confidence: Vec<f64>,
     /// Numbers of samples M in a window; each [1, 10000]; with --anytime the largest is the most that a window takes
-    /// [default: 5,7,10,13,20,25,50,100; with --in-time 5,7,10,20]
+    /// [default: 5,7,10,13,20,25,50,100; with --in-time 5,7,10,20; for places 5,7,10,15,20,25]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=10_000))]
     measurements: Vec<u32>,
     /// Objects that are scored [default: all with a compressive session]

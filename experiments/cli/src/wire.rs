@@ -7,7 +7,7 @@ use clap::Args;
 use serde::Serialize;
 use spts::chain::{ChainConfig, DEFAULT_READOUT, RowsConfig};
 use spts::data::{SessionSet, WiredFrames, wired};
-use spts::session::Event;
+use spts::session::{Event, Recorded};
 use spts::{Chain, Seeding, Session};
 use spts_eval::decode::DecodeRequest;
 use spts_eval::training::TrainingData;
@@ -16,6 +16,7 @@ use spts_models::ConductanceMap;
 use spts_recon::metrics::SupportScore;
 use spts_report::few_wires::{FewWiresPage, ShownTouch, text};
 use spts_studies::few_wires::{FewWiresReport, FewWiresStudy};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// Records frames of any skin as a skin with one wire would, and says what one wire and a few would show of them.
@@ -205,14 +206,19 @@ impl WireCommand {
     }
 
     /// The first presses of a session.
-    fn first_presses(&self, session: &Session) -> Result<Session, CliError> {
-        let mut session = session.clone();
-        if let (Some(most), Some(raster)) = (self.presses, session.raster.as_mut()) {
-            let blocks = raster.recording.blocks().iter().take(most).cloned().collect();
-            raster.recording = raster.recording.with_blocks(blocks)?;
-            raster.presses.truncate(most);
-        }
-        Ok(session)
+    fn first_presses<'a>(&self, session: &'a Session) -> Result<Cow<'a, Session>, CliError> {
+        let (Some(most), Some(raster)) = (self.presses, &session.raster) else {
+            return Ok(Cow::Borrowed(session));
+        };
+        let blocks = raster.recording.blocks().iter().take(most).cloned().collect();
+        let presses = raster.presses.iter().take(most).cloned().collect();
+        let raster = Recorded { recording: raster.recording.with_blocks(blocks)?, presses, ..*raster };
+        Ok(Cow::Owned(Session {
+            object: session.object.clone(),
+            hold_s: session.hold_s,
+            raster: Some(raster),
+            ..Session::new(&session.name, session.event)
+        }))
     }
 }
 

@@ -63,15 +63,17 @@ pub fn wired(frames: &Session, chain: &Chain, peak_pa: f64, seed: u64, number: u
     let values = Frames::of_session(frames)?;
     let Some(raster) = frames.raster() else { return Err(Refusal::new("has no frames: `raster` is null")) };
     let layout = chain.skin();
-    let [presses, count, rows, cols] = values.shape();
+    let [blocks, count, rows, cols] = values.shape();
+    // blocks that condition the skin are no presses
+    let first = frames.raster.as_ref().map_or(0, |recorded| recorded.conditioning).min(blocks - 1);
     if [layout.rows(), layout.cols()] != [rows, cols] {
         return Err(Refusal::new(format!("frames of {rows} × {cols} taxels are not those of the skin")));
     }
     let frame_s = raster.measurements_per_frame() as f64 / raster.sample_rate_hz();
     let duration_s = IDLE_S + count as f64 * frame_s;
-    check_length(presses, duration_s * chain.sample_rate_hz())?;
+    check_length(blocks - first, duration_s * chain.sample_rate_hz())?;
     let mut notes = Vec::new();
-    let courses = courses(frames, &values, &mut notes);
+    let courses = courses(frames, &values, first, &mut notes);
     let largest = courses.iter().flat_map(|course| &course.values).copied().fold(0.0, f64::max);
     if largest <= 0.0 {
         return Err(Refusal::new("nothing touches the skin: no frame is above the idle ones"));
@@ -147,8 +149,8 @@ fn check_length(presses: usize, samples: f64) -> Result<(), Refusal> {
     )))
 }
 
-/// The frames of every press without its mean idle frame.
-fn courses(session: &Session, frames: &Frames, notes: &mut Vec<String>) -> Vec<Course> {
+/// The frames of every press from number `first` on, without its mean idle frame.
+fn courses(session: &Session, frames: &Frames, first: usize, notes: &mut Vec<String>) -> Vec<Course> {
     let [presses, count, rows, cols] = frames.shape();
     let taxels = rows * cols;
     let blocks = session.raster().map_or(&[][..], |raster| raster.blocks());
@@ -175,7 +177,7 @@ fn courses(session: &Session, frames: &Frames, notes: &mut Vec<String>) -> Vec<C
         }
         Course { values }
     };
-    (0..presses).map(course).collect()
+    (first..presses).map(course).collect()
 }
 
 impl Course {
