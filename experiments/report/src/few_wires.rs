@@ -191,7 +191,7 @@ pub fn table(report: &FewWiresReport) -> Table<'_, &FewWires> {
         .column("worst", "which", |r| r.worst.as_str())
         .column("saturated", "saturated", |r| r.saturated)
         .digits(3)
-        .column("used", "largest sample, share of the range", |r| r.used)
+        .column("used", "range used", |r| r.used)
         .digits(2)
         .column("signal_to_noise", "signal to noise", |r| r.signal_to_noise)
         .digits(1)
