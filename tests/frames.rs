@@ -7,7 +7,7 @@ use spts::{Session, session::read_npy};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Two presses of 12 × 12 taxels, 30 frames each, as a table with times: a block of 4 × 3 taxels at another place each.
+/// Two presses of 12 × 12 taxels, 30 frames each, as a table with times: a block of 4 × 3 taxels, elsewhere each time.
 fn table() -> String {
     let mut text = String::from("time_ms");
     for taxel in 0..144 {

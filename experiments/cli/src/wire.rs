@@ -2,7 +2,7 @@
 
 use crate::context::{Bars, Common, note, notes, open_folder};
 use crate::error::CliError;
-use crate::options::{parse_measurements, seed, sorted, whole};
+use crate::options::{parse_measurements, seed, sorted, whole, within};
 use clap::Args;
 use serde::Serialize;
 use spts::chain::{ChainConfig, DEFAULT_READOUT, RowsConfig};
@@ -64,7 +64,7 @@ pub(super) struct WireCommand {
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = whole::<usize>(1..=1024))]
     wires: Vec<usize>,
     /// Pressure that the largest value of codes and relative frames is taken for, Pa; [100, 1000000]
-    #[arg(long, value_name = "PA", value_parser = crate::options::within(100.0, 1e6, "[100, 1000000]"), default_value_t = 30e3)]
+    #[arg(long, value_name = "PA", value_parser = within(100.0, 1e6, "[100, 1000000]"), default_value_t = 30e3)]
     peak: f64,
     /// Presses of every session that are taken, from the first [default: all]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=100_000))]

@@ -133,7 +133,8 @@ impl FewWiresPage<'_> {
             value: format!("IoU {:.2}", row.iou),
             others: vec![("a scan of all taxels".to_owned(), format!("{:.2}", self.scan_iou))],
             note: format!(
-                "with {} measurements in {:.2} ms; a scan takes {:.2} ms",
+                "worst touch {:.2}; with {} measurements in {:.2} ms; a scan takes {:.2} ms",
+                row.worst_iou,
                 row.m,
                 1e3 * row.time_s,
                 1e3 * report.scan_s

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Mode, Profile};
-use spts_eval::algorithm::Answer;
+use spts_eval::algorithm::{Algorithm, Answer, Trained};
 use spts_eval::decoders::{DecoderSpec, auto};
 use spts_eval::training::TrainingData;
 use spts_eval::{Press, PressRows};
@@ -158,7 +158,7 @@ impl FewWiresStudy {
         source: &RowSource,
         m_per_wire: usize,
         spec: &DecoderSpec,
-        trained: &dyn spts_eval::algorithm::Trained,
+        trained: &dyn Trained,
     ) -> Result<FewWires, Refusal> {
         let prior = SheetPrior::smooth([self.layout.rows(), self.layout.cols()], SMOOTH)?;
         let rows = BandRows::new(source, &prior, wires, m_per_wire, self.seed)?;
@@ -166,16 +166,18 @@ impl FewWiresStudy {
         let m = m_per_wire * wires;
         let phi = Arc::new(PressRows::of_matrix(&Matrix::from_rows(m, self.layout.taxels(), phi)?));
         let measured = self.measured(&rows, m_per_wire)?;
-        let images = measured.volts.into_par_iter().map(|volts| {
+        let decode = |algorithm: &mut Box<dyn Algorithm + '_>, volts| {
             let press = Press::on(Arc::clone(&phi), volts, 0.0);
             let mut answer = Answer::default();
             if let Some(window) = press.window(0, m) {
-                let decoded = trained.start().decode(&window, &mut answer);
+                let decoded = algorithm.decode(&window, &mut answer);
                 decoded.map_err(|e| Refusal::from_error(e).at(spec.name))?;
             }
             answer.image.resize(self.layout.taxels(), 0.0);
             Ok(answer.image)
-        });
+        };
+        // one decoder a thread, with its workspace
+        let images = measured.volts.into_par_iter().map_init(|| trained.start(), decode);
         let images = images.collect::<Result<Vec<Vec<f64>>, Refusal>>()?;
         let scores: Vec<f64> = self
             .touches
