@@ -80,6 +80,70 @@ fn frames_become_a_session_and_a_wire_records_it() {
     assert_eq!([names(&dir.path().join("both/mine")), names(&dir.path().join("both/other"))], [1, 1]);
 }
 
+/// A .mat file of version 5 with one array of doubles, whose first index is the fastest.
+fn mat(name: &str, shape: [i32; 4], values: &[f64]) -> Vec<u8> {
+    let part = |kind: u32, data: &[u8]| {
+        let mut part = [&kind.to_le_bytes()[..], &u32::try_from(data.len()).unwrap().to_le_bytes(), data].concat();
+        part.resize(part.len().next_multiple_of(8), 0);
+        part
+    };
+    let shape: Vec<u8> = shape.iter().flat_map(|side| side.to_le_bytes()).collect();
+    let values: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let flags = [6_u32.to_le_bytes(), [0; 4]].concat();
+    let array = [part(6, &flags), part(5, &shape), part(1, name.as_bytes()), part(9, &values)].concat();
+    let mut header = vec![b' '; 128];
+    header[124..].copy_from_slice(&[0, 1, b'I', b'M']);
+    [header, part(14, &array)].concat()
+}
+
+/// Four objects of six presses each in MATLAB's order, rows × cols × frames × presses: what the frames say of the skin,
+/// what a wire shows of objects that it has not seen, and the gains of the taxels under known pressures.
+#[test]
+fn several_objects_are_recognised_and_their_pressures_give_gains() {
+    let dir = tempfile::tempdir().unwrap();
+    const SIDE: usize = 8;
+    for (name, [height, width]) in [("bar", [2, 6]), ("pad", [4, 4]), ("dot", [2, 2]), ("post", [6, 2])] {
+        let load = |row: usize, col: usize, frame: usize, press: usize| {
+            let on = frame >= 8 && (1..=height).contains(&row) && (1..=width).contains(&col);
+            if on { 2e4 * (1.0 + 0.1 * press as f64 + 0.01 * frame as f64) } else { 0.0 }
+        };
+        let all = (0..6).flat_map(|p| (0..30).flat_map(move |f| (0..SIDE * SIDE).map(move |k| (p, f, k))));
+        let values: Vec<f64> = all.map(|(p, f, k)| load(k % SIDE, k / SIDE, f, p)).collect();
+        std::fs::write(dir.path().join(format!("{name}.mat")), mat("pressure", [8, 8, 30, 6], &values)).unwrap();
+        let import =
+            format!("import {name}.mat --rows 8 --cols 8 --unit pressure --rate 50 --pitch 1cm --out all/{name}");
+        succeeds(dir.path(), &words(&import));
+    }
+    let found = json(dir.path(), &words("wire all --wires 1 --measurements 32 --out w --json"));
+    assert_eq!((&found["objects"], &found["touches"]), (&4.into(), &24.into()));
+    let row = &found["rows"][0];
+    assert!(row["classes"].as_f64().unwrap() > 0.8 && row["left_out_iou"].as_f64().unwrap() > 0.3, "{row}");
+    assert!(found["scan_classes"].as_f64().unwrap() > 0.9 && found["again_iou"] == 1.0, "{found}");
+    let frames = &found["frames"];
+    let [bar, conditioning] = [&frames["objects"][0], &frames["laws"][1]];
+    assert_eq!((&bar["object"], &bar["presses"], &bar["touched"]), (&"bar".into(), &6.into(), &12.into()));
+    assert!(bar["repeatability"].as_f64().unwrap() > 0.999 && bar["drift"].as_f64().unwrap() > 0.05, "{bar}");
+    assert_eq!((&conditioning["law"], &conditioning["objects"]), (&"conditioning".into(), &serde_json::json!([2, 2])));
+    for name in ["tables/frames.csv", "tables/laws.csv", "tables/wire.csv", "bar/session.json"] {
+        assert!(dir.path().join("w").join(name).exists(), "{name}");
+    }
+    succeeds(dir.path(), &words("decode w --measurements 32 --out d"));
+    succeeds(dir.path(), &words("score w --decoder tv --measurements 32 --no-times --out c"));
+    succeeds(dir.path(), &words("calibrate w --out readout.toml"));
+    succeeds(dir.path(), &words("calibrate w --skin --out gains.toml"));
+    // the gains that are found rise and fall with those of the simulated skin
+    let session = Session::read(&dir.path().join("w/pad")).unwrap();
+    let facts = &session.raster.as_ref().unwrap().presses[0];
+    let gains: toml::Table = std::fs::read_to_string(dir.path().join("gains.toml")).unwrap().parse().unwrap();
+    let logs: Vec<f64> = gains["log_mean"].as_array().unwrap().iter().map(|v| v.as_float().unwrap()).collect();
+    let pressed: Vec<usize> =
+        (0..SIDE * SIDE).filter(|k| facts.pressure.as_ref().unwrap().values()[*k] > 0.0).collect();
+    let truth: Vec<f64> = pressed.iter().map(|k| facts.conductance.as_ref().unwrap().values()[*k].ln()).collect();
+    let own: Vec<f64> = pressed.iter().map(|k| logs[*k]).collect();
+    let r = spts::recon::metrics::pearson(&truth, &own).unwrap();
+    assert!(r > 0.8, "{r}: {truth:?} {own:?}");
+}
+
 #[test]
 fn what_is_no_frames_is_refused() {
     let dir = tempfile::tempdir().unwrap();

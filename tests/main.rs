@@ -41,6 +41,7 @@ mod reproduce;
 mod rows;
 mod score;
 mod setup;
+mod silences;
 mod simulation_only;
 mod style;
 mod unseen;

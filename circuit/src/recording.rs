@@ -53,6 +53,16 @@ pub enum FrameUnit {
     Relative,
 }
 
+impl FrameUnit {
+    /// All units and the names by which files and options know them.
+    pub const ALL: [(&str, Self); 4] = [
+        ("pressure", Self::Pressure),
+        ("conductance", Self::Conductance),
+        ("codes", Self::Codes),
+        ("relative", Self::Relative),
+    ];
+}
+
 /// A layout whose rows, columns and pitch are told: a recording has no usual ones.
 fn told_layout<'de, D: Deserializer<'de>>(from: D) -> Result<SkinLayout, D::Error> {
     #[derive(Deserialize)]

@@ -102,6 +102,8 @@ const PHI: Option<Length> = Some(|spec| spec.config().record.measurements * spec
 const ALWAYS: Has = |_| true;
 const RASTER: Has = |spec| spec.config().record.raster;
 const DROPS: Has = Spec::drops;
+/// Contacts that are simulated: frames say nothing of where and how hard an object is pressed.
+const POSED: Has = |spec| spec.frame_law().is_none();
 const SHAPES: Has = |spec| spec.config().object.from == ObjectSource::Shapes;
 
 /// Columns of a press and its window.
@@ -123,8 +125,8 @@ const ROW_COLUMNS: &[RowColumn] = &[
     ("time_s", Kind::F32, ONE, "s", "time from the touch to the first measurement, below 0 before it", ALWAYS,
         |r, s| s.number(r.time_s())),
     ("contact_force_n", Kind::F32, ONE, "N", "normal force on the skin in this window: what the pressure adds up to",
-        ALWAYS, |r, s| s.number(r.contact_force_n())),
-    ("over_edge", Kind::Bool, ONE, "", "whether a part of an object lies beside the sheet", ALWAYS,
+        Spec::knows_pressure, |r, s| s.number(r.contact_force_n())),
+    ("over_edge", Kind::Bool, ONE, "", "whether a part of an object lies beside the sheet", POSED,
         |r, s| s.flags(&[(0..r.objects()).any(|k| r.object(k).is_some_and(|object| object.touch.over_edge))])),
     ("saturated", Kind::I32, ONE, "", "samples of y at an end of the converter or at a rail", ALWAYS,
         |r, s| s.integer(r.saturated()[0] as u64)),
@@ -160,21 +162,21 @@ const OBJECT_COLUMNS: &[ObjectColumn] = &[
     ("label", Kind::I32, "", "class: the object's label, or the place in the list of families or files", ALWAYS,
         |o, s| s.signed(o.choice.label.into())),
     ("shape", Kind::I64, "", "number of the shape", ALWAYS, |o, s| s.integer(o.number)),
-    ("x_m", Kind::F32, "m", "place of its origin from the middle of the sheet, to large columns", ALWAYS,
+    ("x_m", Kind::F32, "m", "place of its origin from the middle of the sheet, to large columns", POSED,
         |o, s| s.number(o.touch.position_m[0])),
-    ("y_m", Kind::F32, "m", "the same to small rows", ALWAYS, |o, s| s.number(o.touch.position_m[1])),
-    ("height_m", Kind::F32, "m", "height of its origin over the skin's free surface", ALWAYS,
+    ("y_m", Kind::F32, "m", "the same to small rows", POSED, |o, s| s.number(o.touch.position_m[1])),
+    ("height_m", Kind::F32, "m", "height of its origin over the skin's free surface", POSED,
         |o, s| s.number(o.height_m)),
-    ("rotation_deg", Kind::F32, "°", "rotation about the skin's normal, counter-clockwise from above", ALWAYS,
+    ("rotation_deg", Kind::F32, "°", "rotation about the skin's normal, counter-clockwise from above", POSED,
         |o, s| s.number(o.touch.rotation_deg)),
-    ("tilt_x_deg", Kind::F32, "°", "tilt about the skin's x axis at which it is held", ALWAYS,
+    ("tilt_x_deg", Kind::F32, "°", "tilt about the skin's x axis at which it is held", POSED,
         |o, s| s.number(o.touch.tilt_deg[0])),
-    ("tilt_y_deg", Kind::F32, "°", "tilt about the skin's y axis at which it is held", ALWAYS,
+    ("tilt_y_deg", Kind::F32, "°", "tilt about the skin's y axis at which it is held", POSED,
         |o, s| s.number(o.touch.tilt_deg[1])),
-    ("force_n", Kind::F32, "N", "normal force on it: the plateau of a course, 0 of a drop", ALWAYS,
+    ("force_n", Kind::F32, "N", "normal force on it: the plateau of a course, 0 of a drop", POSED,
         |o, s| s.number(o.touch.force_n)),
     ("poses_refused", Kind::I32, "", "poses that were drawn before and tip over, miss the skin or meet another object",
-        ALWAYS, |o, s| s.integer(o.touch.refused)),
+        POSED, |o, s| s.integer(o.touch.refused)),
     ("size_x_m", Kind::F32, "m", "extent of the shape along its own x", SHAPES,
         |o, s| s.maybe(o.choice.shape.map(|f| f.size_m[0]))),
     ("size_y_m", Kind::F32, "m", "extent of the shape along its own y", SHAPES,

@@ -230,12 +230,13 @@ pub(crate) fn card(spec: &Spec, statistics: &Statistics, bytes: u64) -> String {
     let config = spec.config();
     let size = SIZES.iter().find(|(most, _)| statistics.rows < *most).map_or("", |(_, size)| size);
     let skin = spec.skin();
-    let (contact, _) = spec.contact();
+    let contact = if spec.frame_law().is_some() { "as the frames have it" } else { spec.contact().0 };
     let objects = match config.object.from {
         ObjectSource::Shapes => "procedural shapes",
         ObjectSource::Objects => "the seventeen objects of the published recordings",
         ObjectSource::Meshes => "mesh files",
         ObjectSource::Ball => "a ball that falls",
+        ObjectSource::Frames => "frames of a skin or simulator, press by press",
     };
     let mut text = format!(
         "---\nlicense: cc-by-4.0\npretty_name: {name}\nsize_categories:\n- {size}\ntags:\n- tactile\n- robotics\n- simulation\n- \

@@ -88,6 +88,11 @@ impl<'a> Maker<'a> {
             self.skin = Some(Skin::new(spec, skin_number)?);
         }
         let group = row / spec.rows_per_shape();
+        if let Some(law) = spec.frame_law() {
+            let (choice, _) = self.shape(0, group)?;
+            let Some(frames) = choice.frames.clone() else { unreachable!("every choice of frames is a press") };
+            return Press::of_frames(spec, self.skin_made(), number, (&frames, law));
+        }
         if spec.is_moving() {
             let (choice, _) = self.shape(0, group)?;
             let moving = Moving::new(spec, choice, spec.streams(), number)?;
@@ -252,7 +257,11 @@ impl<'a> Row<'a> {
 
 /// The split of press number `press`, whose first shape has the number `shape`: `train`, `validation` or `test`.
 fn split(spec: &Spec, press: u64, shape: u64) -> &'static str {
+    let of_frames = spec.frame_law().is_some();
     let number = match spec.split_by() {
+        // a press of frames comes again, with other noise
+        SplitBy::Press if of_frames => shape % spec.choices().count(),
+        SplitBy::Object if of_frames => u64::try_from(spec.choices().label(shape)).unwrap_or_default(),
         SplitBy::Press => press,
         // every number is another procedural shape; a mesh file or an object comes again
         SplitBy::Object if spec.choices().are_procedural() => shape,

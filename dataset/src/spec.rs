@@ -3,6 +3,7 @@
 mod check;
 mod config;
 mod draw;
+mod frames;
 mod objects;
 
 pub(crate) use check::Timing;
@@ -12,12 +13,15 @@ pub use config::{
 };
 pub use draw::Draw;
 pub(crate) use draw::whole;
+pub(crate) use frames::FramePress;
 pub(crate) use objects::{Choice, Choices, SpecError};
 
-use check::{check_draws, check_faults, check_frames, check_moving, check_name};
+use check::{check_draws, check_faults, check_frames, check_lasts, check_moving, check_name};
 use draw::{Template, is_draw};
+use frames::FrameSource;
 use sha2::{Digest as _, Sha256};
 use spts::chain::ChainConfig;
+use spts::data::FrameLaw;
 use spts::{Chain, Refusal};
 use spts_circuit::{Mode, RecordingInfo};
 use spts_contact::build_contact;
@@ -38,6 +42,8 @@ pub const NAMED_SPECS: &[(&str, &str)] = &[
 
 /// Most rows of a data set.
 const MOST_ROWS: u64 = 1_000_000_000_000;
+/// Pressure that the largest value of frames without a unit is taken for, Pa.
+const PEAK_PA: f64 = 30e3;
 /// Most rows of a file.
 const MOST_SHARD_ROWS: u64 = 1_000_000;
 /// Default rows of a file, least and most, and the share of all rows that it is.
@@ -76,6 +82,8 @@ pub struct Spec {
     timing: Timing,
     /// Whether contacts are simulated in time.
     moving: bool,
+    /// Frames: whether they are pressures, and how they become conductances.
+    frames: Option<(bool, FrameLaw)>,
     rows_per_shard: u64,
     rows_per_shape: u64,
     rows_per_skin: u64,
@@ -125,17 +133,34 @@ impl Spec {
         if let Some(toml::Value::Table(transducer)) = table.get_mut(TRANSDUCER) {
             spts::chain::read_gains(transducer, folder)?;
         }
+        let frames = FrameSource::open(&table, folder)?;
+        if let Some(frames) = &frames {
+            frames.fill(&mut table);
+        }
         let written = table.to_string();
-        Self::new(parsed(table)?, written, folder)
+        Self::new(parsed(table)?, written, folder, frames.as_ref())
     }
 
-    fn new(mut config: SpecConfig, text: String, folder: &Path) -> Result<Self, SpecError> {
+    fn new(
+        mut config: SpecConfig,
+        text: String,
+        folder: &Path,
+        frames: Option<&FrameSource>,
+    ) -> Result<Self, SpecError> {
         check_name(&config.name)?;
+        let lasts_s = frames.map(FrameSource::lasts_s);
+        let timing = Timing::of(&config, lasts_s.map(|[_, frames_s]| frames_s))?;
+        let windows = timing.windows;
+        let mut choices = Choices::new(&config.object, config.pose.about, folder, frames)?;
+        if let Some(frames) = frames {
+            frames.check(&config)?;
+            if !frames.rows_given {
+                config.rows = choices.count() * windows;
+            }
+        }
         let rows = (1..=MOST_ROWS).contains(&config.rows);
         in_range("rows", config.rows as f64, rows, "[1, 10^12]")?;
         in_range("seed", config.seed as f64, i64::try_from(config.seed).is_ok(), "[0, 2^63)")?;
-        let timing = Timing::of(&config)?;
-        let windows = timing.windows;
         let s = &config.skin;
         let electrode_m = s.electrode_m.unwrap_or(SkinLayout::usual_electrode_m(s.pitch_m));
         let skin = SkinLayout::new(s.rows, s.cols, s.pitch_m, electrode_m);
@@ -151,8 +176,7 @@ impl Spec {
             );
             return Err(Refusal::new(problem).into());
         }
-        let moving = timing.what != RecordKind::Hold || !balances;
-        let choices = Choices::new(&config.object, config.pose.about, folder)?;
+        let moving = timing.what != RecordKind::Hold || !balances || frames.is_some();
         let transducer = Template::new(config.transducer.clone());
         let by_default = config.rows.div_ceil(SHARDS).clamp(SHARD_ROWS[0], SHARD_ROWS[1]);
         let by_default = by_default.next_multiple_of(windows);
@@ -160,7 +184,7 @@ impl Spec {
         let valid = (1..=MOST_SHARD_ROWS).contains(&rows_per_shard);
         in_range("rows_per_shard", rows_per_shard as f64, valid, "[1, 10^6]")?;
         let shared = |rows: Option<u64>| rows.unwrap_or_else(|| SHARED_ROWS.next_multiple_of(windows));
-        let rows_per_shape = shared(config.object.rows_per_shape);
+        let rows_per_shape = shared(config.object.rows_per_shape.or(frames.map(|_| windows)));
         let rows_per_skin = shared(config.skin.rows_per_skin);
         for (field, count) in [
             ("rows_per_shard", rows_per_shard),
@@ -173,7 +197,7 @@ impl Spec {
             }
         }
         check_draws(&config, &skin, &timing, moving)?;
-        if moving {
+        if moving && frames.is_none() {
             check_moving(&config)?;
         }
         check_faults(&config)?;
@@ -191,13 +215,24 @@ impl Spec {
         chain_of(most)?;
         let chain = chain_of(least)?;
         let timing = timing.at_rate(chain.sample_rate_hz())?;
-        if moving {
-            check_frames(&config, &skin, &timing)?;
+        match lasts_s {
+            Some(lasts_s) => check_lasts(&timing, lasts_s)?,
+            None if moving => check_frames(&config, &skin, &timing)?,
+            None => {}
         }
+        let law =
+            frames.map(|frames| frames.law(&chain, config.object.peak_pa.unwrap_or(PEAK_PA)).map(|l| (frames, l)));
+        let law = law.transpose()?.map(|(frames, (law, said))| {
+            choices.notes.extend(said);
+            (frames.are_pressures(), law)
+        });
         let wire = chain.readout(Mode::Compressive, 0)?;
         let mut identity = Sha256::new();
         identity.update(text.as_bytes());
         choices.digest(&mut identity);
+        if let Some(frames) = frames {
+            frames.digest(&mut identity);
+        }
         let files = [chain.profile_file().map(|f| &f.text), chain.rows_file().map(|f| &f.text)];
         for text in files.into_iter().flatten() {
             identity.update(text.as_bytes());
@@ -211,6 +246,7 @@ impl Spec {
             recording: wire.info().clone(),
             timing,
             moving,
+            frames: law,
             rows_per_shard,
             rows_per_shape,
             rows_per_skin,
@@ -303,6 +339,16 @@ impl Spec {
     /// Whether what is pressed is followed in time, step by step or frame by frame, and not only balanced.
     pub(crate) fn is_moving(&self) -> bool {
         self.moving
+    }
+
+    /// How frames become conductances; `None` for objects that are simulated.
+    pub(crate) fn frame_law(&self) -> Option<FrameLaw> {
+        self.frames.map(|(_, law)| law)
+    }
+
+    /// Whether the pressure on the skin is known.
+    pub(crate) fn knows_pressure(&self) -> bool {
+        self.frames.is_none_or(|(are_pressures, _)| are_pressures)
     }
 
     /// Number of files.

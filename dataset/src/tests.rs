@@ -746,3 +746,97 @@ fn mesh_files_are_part_of_a_spec() {
     std::fs::write(meshes.join("a.obj"), "v 1 2 3").unwrap();
     assert!(read().unwrap_err().to_string().contains("a.obj"));
 }
+
+/// Two objects as frames of 3 × 4 taxels, 100 a second, pressed three and two times. Press k of the first loads taxel 5
+/// with 10 k kPa, those of the second taxels 6 and 7.
+fn frames(dir: &Path, unit: spts::FrameUnit) {
+    use spts::data::{FrameArray, FrameOptions, Frames};
+    for (name, presses, loaded) in [("one", 3, 5..6), ("two", 2, 6..8)] {
+        let value = |press: usize, frame: usize, taxel: usize| {
+            let on = (10..50).contains(&frame) && loaded.contains(&taxel);
+            if on { 1e4 * (press + 1) as f64 } else { 0.0 }
+        };
+        let values = (0..presses).flat_map(|p| (0..60).flat_map(move |f| (0..12).map(move |t| (p, f, t))));
+        let values = values.map(|(p, f, t)| value(p, f, t)).collect();
+        let array = FrameArray { shape: vec![presses, 60, 3, 4], values, ..FrameArray::default() };
+        let layout = spts::SkinLayout::with_pitch(3, 4, 0.01).unwrap();
+        let options = FrameOptions { rate_hz: Some(100.0), idle: Some(10), ..FrameOptions::new(name, layout, unit) };
+        let (session, _) = Frames::new(array, [3, 4], None).unwrap().session(&options).unwrap();
+        session.write(&dir.join("frames").join(name)).unwrap();
+    }
+}
+
+const OF_FRAMES: &str = "[object]\nfrom = \"frames\"\nfolder = \"frames\"\n[record]\nmeasurements = 5\n";
+
+#[test]
+fn frames_are_presses() {
+    let dir = tempfile::tempdir().unwrap();
+    frames(dir.path(), spts::FrameUnit::Pressure);
+    let read = |text: &str, set: toml::Table| Spec::from_toml(text, &set, dir.path());
+    let spec = read(OF_FRAMES, toml::Table::new()).unwrap();
+    // a row for every press: the first of every object, then the second
+    assert_eq!((spec.config().rows, spec.skin().taxels(), spec.skin().pitch_m()), (5, 12, 0.01));
+    let mut maker = Maker::new(&spec);
+    let mut seen = Vec::new();
+    for k in 0..5 {
+        let row = maker.row(k).unwrap();
+        let pressure = row.pressure().values();
+        let loaded: Vec<usize> = (0..12).filter(|taxel| pressure[*taxel] > 0.0).collect();
+        assert!(loaded.iter().all(|taxel| row.conductance().values()[*taxel] > 1e-5), "{k}");
+        let force_n: f64 = pressure.iter().map(|p| p * 1e-4).sum();
+        assert!((row.contact_force_n() - force_n).abs() < 1e-12, "{k}");
+        seen.push((row.name().to_string(), pressure[loaded[0]], loaded));
+    }
+    let press = |name: &str, pa: f64, loaded: &[usize]| (name.to_owned(), pa, loaded.to_vec());
+    let expected =
+        [press("one", 1e4, &[5]), press("two", 1e4, &[6, 7]), press("one", 2e4, &[5]), press("two", 2e4, &[6, 7])];
+    assert_eq!(seen[..4], expected);
+    assert_eq!(seen[4], press("one", 3e4, &[5]));
+    let names = |spec: &Spec| crate::columns(spec).into_iter().map(|column| column.name).collect::<Vec<_>>();
+    let pressures = names(&spec);
+    assert!(pressures.contains(&"pressure_pa".to_owned()) && !pressures.contains(&"force_n".to_owned()));
+    // more rows: the presses come again, each in one split
+    let many = read(OF_FRAMES, toml::toml! { rows = 50 }).unwrap();
+    let mut maker = Maker::new(&many);
+    let splits: Vec<&str> = (0..50).map(|k| maker.row(k).unwrap().split()).collect();
+    assert!((5..50).all(|k| splits[k] == splits[k - 5]), "{splits:?}");
+    // the course of a press: nothing before the touch
+    let course = toml::toml! { record = { what = "course", before_s = 0.05, interval_s = 0.01 } };
+    let course = read(OF_FRAMES, course).unwrap();
+    assert_eq!(course.windows(), 55);
+    let mut maker = Maker::new(&course);
+    let load = |row: crate::Row<'_>| row.pressure().values()[5];
+    let loads = [0, 3, 10, 54].map(|k| load(maker.row(k).unwrap()));
+    assert_eq!(loads, [0.0, 0.0, 1e4, 0.0]);
+
+    let other = dir.path().join("codes");
+    std::fs::create_dir(&other).unwrap();
+    frames(&other, spts::FrameUnit::Codes);
+    let read = |text: &str, set: toml::Table| Spec::from_toml(text, &set, &other);
+    let codes = read(OF_FRAMES, toml::Table::new()).unwrap();
+    let there = names(&codes);
+    for gone in ["pressure_pa", "contact_force_n", "x_m", "over_edge"] {
+        assert!(!there.contains(&gone.to_owned()), "{gone}");
+    }
+    assert!(codes.notes().iter().any(|note| note.contains("object.peak_pa says otherwise")), "{:?}", codes.notes());
+    // one scale for all presses
+    let mut maker = Maker::new(&codes);
+    let peaks = [0, 4].map(|k| maker.row(k).unwrap().conductance().max());
+    assert!((peaks[1] / peaks[0] - 3.0).abs() < 1e-12, "{peaks:?}");
+    for (set, said) in [
+        (toml::toml! { press = { force_n = 5 } }, "`[press]` is not for `object.from` = \"frames\""),
+        (toml::toml! { pose = { x_m = 0.01 } }, "`[pose]` is not for"),
+        (toml::toml! { contact = { model = "layer" } }, "`[contact]` is not for"),
+        (toml::toml! { object = { names = ["three"] } }, "`object.names` = \"three\"; known: one, two"),
+        (toml::toml! { object = { peak_pa = 1.0 } }, "`object.peak_pa` = 1 is outside [100, 1e6] Pa"),
+        (toml::toml! { object = { size_m = [0.1, 0.2] } }, "`object.size_m` is not for"),
+        (toml::toml! { skin = { rows = 4 } }, "`skin` = 4 × 4 taxels; the frames have 3 × 4"),
+        (toml::toml! { record = { labels = ["pressure"] } }, "\"pressure\", which is not known of these frames"),
+        (toml::toml! { record = { windows = 9000 } }, "and the hold of the frames lasts 0.4"),
+    ] {
+        let found = read(OF_FRAMES, set).unwrap_err().to_string();
+        assert!(found.contains(said), "{said}: {found}");
+    }
+    let missing = read("[object]\nfrom = \"frames\"", toml::Table::new()).unwrap_err().to_string();
+    assert!(missing.contains("`object.folder` is needed"), "{missing}");
+}

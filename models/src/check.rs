@@ -73,6 +73,34 @@ fn holds(interval: &str, value: f64) -> Option<bool> {
     Some(above && if closed { value <= high } else { value < high })
 }
 
+/// Checks that so many bytes of memory are free for `what`, such as "a prior of 65,536 × 65,536 taxels". Where the system
+/// does not say how much is free, nothing is checked.
+///
+/// ```
+/// use spts_models::fits_memory;
+///
+/// assert!(fits_memory("an image", 800.0).is_ok());
+/// let error = fits_memory("a prior of 1e8 taxels", 1e17).map_err(|e| e.to_string());
+/// # if cfg!(target_os = "linux") {
+/// assert!(error.unwrap_err().starts_with("a prior of 1e8 taxels takes 100000000.0 GB of memory, and"));
+/// # }
+/// ```
+///
+/// # Errors
+/// [`Refusal`] with both sizes if there is less.
+pub fn fits_memory(what: &str, bytes: f64) -> Result<(), Refusal> {
+    let said = std::fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let line = said.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
+    let Some(free) = line.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse::<f64>().ok()) else {
+        return Ok(());
+    };
+    let free = 1024.0 * free;
+    if bytes <= free {
+        return Ok(());
+    }
+    Err(Refusal::new(format!("{what} takes {:.1} GB of memory, and {:.1} GB are free", 1e-9 * bytes, 1e-9 * free)))
+}
+
 /// Names the section of a TOML file in an error about one of its keys. `message` is the error as the section's reader
 /// gives it; the result is one line.
 ///

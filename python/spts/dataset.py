@@ -5,6 +5,7 @@
     data = spts.dataset.make("random-shapes", "out/shapes", rows=10_000)
     phi, y, images, names, presses = data.labelled("train")
     force = data["contact_force_n"]
+    mine = spts.dataset.make(frames="out/frames")                   # from frames of any skin
 
 `pandas`, `polars`, DuckDB, Hugging Face `datasets` and whatever else reads Parquet read the files in `data/` too.
 """
@@ -174,17 +175,23 @@ class Dataset:
         return f"<spts.Dataset {info['name']}: {info['rows']} rows, {info['made']} of {info['shards']} files>"
 
 
-def make(spec, folder=None, *, rows=None, seed=None, set=None, engine="threads", workers=None, progress=None):
+def make(
+    spec=None, folder=None, *, frames=None, rows=None, seed=None, set=None, engine="threads", workers=None, progress=None
+):
     """Makes a data set, or goes on with one; files that are there are kept. Ctrl-C stops it after the files under way.
 
     Whoever makes it, and in whatever order, the bytes are the same.
 
     Parameters
     ----------
-    spec : str or os.PathLike
-        A TOML file, or one of `specs()`.
+    spec : str or os.PathLike, optional
+        A TOML file, or one of `specs()`. Without one there have to be `frames`.
     folder : str or os.PathLike, optional
-        Default out/dataset/NAME.
+        Default out/dataset/NAME; of frames alone out/dataset/frames.
+    frames : str, os.PathLike, Session or sequence of Session, optional
+        Frames of any skin, in place of simulated objects: a folder of sessions as `spts import` and `Session.write`
+        write them, or sessions themselves, which are then written to FOLDER_frames and have to stay there. One row for
+        every press, unless `rows` says otherwise.
     rows, seed : int, optional
         In place of the spec's.
     set : dict, optional
@@ -201,15 +208,21 @@ def make(spec, folder=None, *, rows=None, seed=None, set=None, engine="threads",
     -------
     Dataset
     """
-    spec = os.fspath(spec)
+    if spec is None and frames is None:
+        raise TypeError("`spec` or `frames` is needed")
+    spec = "" if spec is None else os.fspath(spec)
+    if folder is None:
+        name = os.path.splitext(os.path.basename(spec))[0] or "frames"
+        folder = os.path.join("out", "dataset", name)
+    folder = os.path.abspath(os.fspath(folder))
     overrides = {}
+    if frames is not None:
+        _put(overrides, "object", {"from": "frames", "folder": _written(frames, folder + "_frames")})
+        if not spec:
+            _put(overrides, "name", "frames")
     for key, value in {**(set or {}), "rows": rows, "seed": seed}.items():
         if value is not None:
             _put(overrides, key, value)
-    if folder is None:
-        name = os.path.splitext(os.path.basename(spec))[0]
-        folder = os.path.join("out", "dataset", name)
-    folder = os.path.abspath(os.fspath(folder))
     begun = _begin(spec, folder, overrides)
     shards = json.loads(begun.info())["shards"]
     bar = _Bar(shards, sys.stderr.isatty() if progress is None else progress)
@@ -221,6 +234,16 @@ def make(spec, folder=None, *, rows=None, seed=None, set=None, engine="threads",
     engines[engine](begun, (spec, folder, overrides), shards, workers, bar)
     begun.finish()
     return Dataset(folder, os.path.dirname(os.path.abspath(spec)) if os.path.exists(spec) else ".")
+
+
+def _written(frames, folder):
+    """The folder of the sessions `frames`, which are written to `folder` if they are in none."""
+    if isinstance(frames, (str, os.PathLike)):
+        return os.path.abspath(os.fspath(frames))
+    sessions = [frames] if hasattr(frames, "write") else list(frames)
+    for session in sessions:
+        session.write(os.path.join(folder, session.name))
+    return folder
 
 
 def _put(table, key, value):

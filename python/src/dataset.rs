@@ -23,12 +23,17 @@ impl DataFolder {
         Ok(Self { dataset })
     }
 
-    /// Begins the data set of `spec`, a file or a name, in `folder`, or goes on with it; `overrides` are other values.
+    /// Begins the data set of `spec`, a file or a name, in `folder`, or goes on with it; `overrides` are other values. An
+    /// empty `spec` has defaults alone.
     #[staticmethod]
     fn begin(py: Python<'_>, spec: &str, folder: PathBuf, overrides: &Bound<'_, PyDict>) -> PyResult<Self> {
         let overrides = table("overrides", overrides)?;
         let begun = released(py, || {
-            let spec = Spec::load(spec, &overrides).map_err(refuse)?;
+            let spec = match spec {
+                "" => Spec::from_toml("", &overrides, ".".as_ref()),
+                name => Spec::load(name, &overrides),
+            };
+            let spec = spec.map_err(refuse)?;
             Dataset::begin(&folder, spec).map_err(refuse)
         });
         let dataset = begun??;

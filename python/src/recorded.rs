@@ -140,13 +140,7 @@ impl Session {
         hold: Option<(f64, f64)>,
         cut: bool,
     ) -> PyResult<Self> {
-        let units = [
-            ("pressure", FrameUnit::Pressure),
-            ("conductance", FrameUnit::Conductance),
-            ("codes", FrameUnit::Codes),
-            ("relative", FrameUnit::Relative),
-        ];
-        let unit = one_of("unit", unit, &units)?;
+        let unit = one_of("unit", unit, &FrameUnit::ALL)?;
         let array = frames.as_array();
         let shape = array.shape().to_vec();
         let sheet = match (rows, cols, &shape[..]) {
@@ -229,7 +223,7 @@ impl Session {
         let Some(layout) = self.whole.layout().copied() else { bail!("the session has no frames") };
         let found = released(py, || {
             let chain = Chain::new(&config, &layout, seed, Path::new(""))?;
-            wired(&self.whole, &chain, peak, seed, number)
+            wired(&self.whole, &chain, (peak, None), seed, number)
         })?;
         let found = found.map_err(|error| refuse(error.to_string().replace("--peak", "peak")))?;
         found.notes.iter().try_for_each(|note| warn(py, &note.replace("--peak", "peak")))?;

@@ -39,6 +39,11 @@ pub struct SignTables<T> {
 }
 
 impl<T: TableFloat> SignTables<T> {
+    /// How many numbers the tables of a dictionary of N × K have.
+    pub fn entries(nrows: usize, ncols: usize) -> f64 {
+        (nrows.div_ceil(GROUP) * ENTRIES) as f64 * ncols as f64
+    }
+
     /// Tables of `dictionary` (N × K).
     pub fn new(dictionary: MatrixView<'_>) -> Self {
         let (nrows, ncols) = (dictionary.nrows(), dictionary.ncols());

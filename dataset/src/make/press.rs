@@ -1,12 +1,13 @@
 //! The skin of a press, and the recordings of one press or drop on it.
 
 use super::touch::{Held, Moving, Touch, sum};
-use crate::spec::{RecordKind, Spec, whole};
+use crate::spec::{FramePress, RecordKind, Spec, whole};
 use rand::RngExt as _;
 use rand::seq::{IndexedRandom as _, index::sample};
 use spts::chain::SkinSession;
+use spts::data::{Courses, FrameLaw};
 use spts::{Chain, Refusal};
-use spts_circuit::{ConductanceSource, Constant, FAULTS, Mode, Readout};
+use spts_circuit::{ConductanceSource, Constant, FAULTS, Interpolated, Mode, Readout};
 use spts_models::{ConductanceMap, PressureMap};
 
 /// Bits of a specimen's seed, so that a double holds it.
@@ -167,32 +168,71 @@ impl Press {
             RecordKind::Hold => spec.config().press.hold_s.value(spec.streams(), "press.hold_s", number),
             RecordKind::Course | RecordKind::Drop => -timing.before_s,
         };
-        let half_s = 0.5 * spec.config().record.measurements as f64 / timing.rate_hz;
-        let (mut states, mut volts) = (Vec::new(), Vec::new());
-        for window in 0..block.parts() {
-            let time_s = moving.touch_s + start_s + timing.row_of(window) as f64 / timing.rate_hz;
-            let mut source = conductance.starting_at(time_s);
-            let (samples, image) = block.record(spec, skin, window, &mut source)?;
-            volts.extend(samples);
-            // the truth of a window is that of its middle
-            let (pressure, height_m) = moving.at(time_s + half_s);
-            states.push(State {
-                pressure,
-                conductance: conductance.at(time_s + half_s),
-                image,
-                heights_m: vec![height_m],
-            });
-        }
-        Ok(Self {
-            number,
-            touches: vec![moving.touch],
-            states,
-            volts,
-            first_row: block.first_row,
-            start_s,
-            presses_before: before,
-        })
+        let windows = followed(spec, skin, &block, moving.touch_s + start_s, &mut conductance, |time_s| {
+            let (pressure, height_m) = moving.at(time_s);
+            (pressure, vec![height_m])
+        });
+        let (states, volts) = windows?;
+        let first_row = block.first_row;
+        Ok(Self { number, touches: vec![moving.touch], states, volts, first_row, start_s, presses_before: before })
     }
+
+    /// Press number `number`, in which the skin shows `frames`, whose values become conductances by `law`.
+    pub(super) fn of_frames(
+        spec: &Spec,
+        skin: &mut Skin,
+        number: u64,
+        (frames, law): (&FramePress, FrameLaw),
+    ) -> Result<Self, Refusal> {
+        let FramePress { courses, press } = frames;
+        let timing = spec.timing();
+        let before = presses_before(spec, number);
+        let mut sheet = skin.fresh.clone();
+        for _press in 0..before {
+            courses.played(*press, &mut sheet, law);
+        }
+        let mut conductance = courses.played(*press, &mut sheet, law).source()?;
+        let block = Block::of(spec, number);
+        let start_s = match timing.what {
+            RecordKind::Hold => courses.since_touch_s(courses.hold().start),
+            RecordKind::Course | RecordKind::Drop => -timing.before_s,
+        };
+        let [rows, cols] = [spec.skin().rows(), spec.skin().cols()];
+        let touch_s = Courses::LEAD_S + courses.touch() as f64 * courses.frame_s();
+        let windows = followed(spec, skin, &block, touch_s + start_s, &mut conductance, |time_s| {
+            let pressure = courses.pressure_at(*press, time_s - Courses::LEAD_S);
+            let unknown = || PressureMap::from_values(rows, cols, vec![f64::NAN; rows * cols]);
+            (pressure.unwrap_or_else(unknown), vec![f64::NAN])
+        });
+        let (states, volts) = windows?;
+        let first_row = block.first_row;
+        Ok(Self { number, touches: vec![Touch::UNKNOWN], states, volts, first_row, start_s, presses_before: before })
+    }
+}
+
+/// States and samples of the windows of `block`, the first from `start_s` on, while the skin conducts as `conductance`
+/// says; `truth` gives the pressure and the heights of the objects at a time.
+fn followed(
+    spec: &Spec,
+    skin: &mut Skin,
+    block: &Block,
+    start_s: f64,
+    conductance: &mut Interpolated,
+    truth: impl Fn(f64) -> (PressureMap, Vec<f64>),
+) -> Result<(Vec<State>, Vec<f64>), Refusal> {
+    let timing = spec.timing();
+    let half_s = 0.5 * spec.config().record.measurements as f64 / timing.rate_hz;
+    let (mut states, mut volts) = (Vec::new(), Vec::new());
+    for window in 0..block.parts() {
+        let time_s = start_s + timing.row_of(window) as f64 / timing.rate_hz;
+        let mut source = conductance.starting_at(time_s);
+        let (samples, image) = block.record(spec, skin, window, &mut source)?;
+        volts.extend(samples);
+        // the truth of a window is that of its middle
+        let (pressure, heights_m) = truth(time_s + half_s);
+        states.push(State { pressure, conductance: conductance.at(time_s + half_s), image, heights_m });
+    }
+    Ok((states, volts))
 }
 
 fn presses_before(spec: &Spec, number: u64) -> usize {

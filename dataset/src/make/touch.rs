@@ -39,6 +39,18 @@ pub(crate) struct Ball {
 }
 
 impl Touch {
+    /// That of frames, which do not say where and how hard something was pressed.
+    pub(super) const UNKNOWN: Self = Self {
+        position_m: [f64::NAN; 2],
+        rotation_deg: f64::NAN,
+        tilt_deg: [f64::NAN; 2],
+        force_n: f64::NAN,
+        stiffness_pa_per_m: f64::NAN,
+        refused: 0,
+        over_edge: false,
+        ball: None,
+    };
+
     /// What is drawn from `streams` for press number `press` of `choice`.
     pub(super) fn draw(spec: &Spec, choice: &Choice, streams: Streams, press: u64) -> Self {
         let config = spec.config();

@@ -44,8 +44,8 @@ pub(crate) struct Timing {
 }
 
 impl Timing {
-    /// The timing of `config`, of which the rate is not known yet.
-    pub(super) fn of(config: &SpecConfig) -> Result<Self, Refusal> {
+    /// The timing of `config`, of which the rate is not known yet. Frames go on for `frames_s` after the touch, s.
+    pub(super) fn of(config: &SpecConfig, frames_s: Option<f64>) -> Result<Self, Refusal> {
         let record = &config.record;
         let [interval_s, before_s] = match record.what {
             RecordKind::Hold => [None, None],
@@ -68,7 +68,7 @@ impl Timing {
         let before_s = record.before_s.or(before_s).unwrap_or(0.0);
         let is_valid = (0.0..=10.0).contains(&before_s);
         in_range("record.before_s", before_s, is_valid, "[0, 10] s")?;
-        let windows = record.windows.unwrap_or_else(|| default_windows(config, interval_s, before_s));
+        let windows = record.windows.unwrap_or_else(|| default_windows(config, interval_s, before_s, frames_s));
         let is_valid = (1..=MOST_WINDOWS).contains(&windows);
         in_range("record.windows", windows as f64, is_valid, "[1, 10000]")?;
         Ok(Self {
@@ -132,8 +132,11 @@ fn whole_rate(interval_s: f64) -> Result<(), Refusal> {
     )))
 }
 
-fn default_windows(config: &SpecConfig, interval_s: Option<f64>, before_s: f64) -> u64 {
+fn default_windows(config: &SpecConfig, interval_s: Option<f64>, before_s: f64, frames_s: Option<f64>) -> u64 {
     match (config.record.what, interval_s) {
+        (RecordKind::Course, Some(interval_s)) if frames_s.is_some() => {
+            whole(((before_s + frames_s.unwrap_or(0.0)) / interval_s).floor().max(1.0)) as u64
+        }
         (RecordKind::Course, Some(interval_s)) => {
             let [_, hold_s] = config.press.hold_s.range();
             let [_, fall_s] = config.press.fall_s.range();
@@ -314,4 +317,17 @@ pub(super) fn check_frames(c: &SpecConfig, skin: &SkinLayout, timing: &Timing) -
     let is_valid = values <= MOST_FRAME_VALUES;
     in_range("frames × taxels", values.ceil(), is_valid, "[1, 2^27]")?;
     Ok(())
+}
+
+/// Checks that the windows lie within frames whose hold lasts `hold_s` and which go on for `frames_s` after the touch.
+pub(super) fn check_lasts(timing: &Timing, [hold_s, frames_s]: [f64; 2]) -> Result<(), Refusal> {
+    let (span_s, most_s, of) = match timing.what {
+        RecordKind::Hold => (timing.span_s(), hold_s, "the hold of the frames lasts"),
+        _ => (timing.span_s() - timing.before_s, frames_s, "the frames go on after the touch for"),
+    };
+    if span_s <= most_s {
+        return Ok(());
+    }
+    let windows = timing.windows;
+    Err(Refusal::new(format!("`record.windows` = {windows} take {span_s:.4} s, and {of} {most_s:.4} s")))
 }

@@ -19,7 +19,7 @@ pub struct SpecConfig {
     pub name: String,
     /// Description in a sentence or two, for the data set's card. Default: none.
     pub description: String,
-    /// Number of rows; [1, 10^12]. Default 1000.
+    /// Number of rows; [1, 10^12]. Default 1000; of frames one for every press and window.
     pub rows: u64,
     /// Number of rows in a file; [1, 10^6], a whole number of presses. Default: a sixteenth of all rows, but at least
     /// 100 and at most 10,000.
@@ -111,17 +111,21 @@ impl Default for SplitConfig {
 pub struct ObjectConfig {
     /// Source of the objects. Default: procedural shapes.
     pub from: ObjectSource,
-    /// Names of the objects, families or mesh files to use. Default: all of the source; mesh files in order of name.
+    /// Names of the objects, families, mesh files or objects of frames to use. Default: all of the source; mesh files in order of name.
     pub names: Option<Vec<String>>,
-    /// Folder with mesh files (`.obj`, `.glb`, `.stl`), relative to the specification. Only for `from = "meshes"`.
+    /// Folder with mesh files (`.obj`, `.glb`, `.stl`), or with sessions of frames, relative to the specification. Only
+    /// for `from = "meshes"` and `"frames"`.
     pub folder: Option<String>,
+    /// Pressure that the largest value of frames in codes or relative units is taken for, Pa; [100, 10^6]. Only for
+    /// `from = "frames"`. Default 30,000.
+    pub peak_pa: Option<f64>,
     /// Metres per unit of the mesh files; (0, 1000]. Default 1.
     pub scale: f64,
     /// What is done with mesh files that are not closed: "strict" (default), which refuses some, or "near_side".
     pub repair: Option<Repair>,
     /// Whether the origin of a mesh file becomes the middle of its footprint. Default: no.
     pub centre: Option<bool>,
-    /// Number of consecutive rows with the same shape; a whole number of presses. Default about 100.
+    /// Number of consecutive rows with the same shape; a whole number of presses. Default about 100; of frames one press.
     pub rows_per_shape: Option<u64>,
     /// Number of simultaneous objects; a draw of whole numbers in [1, 3], once for every press. Default 1.
     pub count: Draw,
@@ -145,6 +149,8 @@ pub enum ObjectSource {
     Meshes,
     /// A ball, for drops only.
     Ball,
+    /// Presses of sessions of frames, in turn: anybody's array or simulator, as `spts import` reads it.
+    Frames,
 }
 
 /// Section `[pose]`. All values are draws, and they add up.
@@ -224,6 +230,7 @@ impl Default for ObjectConfig {
             from: ObjectSource::Shapes,
             names: None,
             folder: None,
+            peak_pa: None,
             scale: 1.0,
             repair: None,
             centre: None,

@@ -1,6 +1,7 @@
 //! The objects of a data set: from shape number to mesh.
 
 use super::config::{ObjectConfig, ObjectSource, PoseOrigin};
+use super::frames::{FramePress, FrameSource};
 use rand::RngExt as _;
 use sha2::{Digest as _, Sha256};
 use spts::Refusal;
@@ -61,6 +62,8 @@ pub(crate) struct Choice {
     pub(crate) object: Option<&'static ObjectSpec>,
     /// Parameters of a procedural shape.
     pub(crate) shape: Option<ShapeFacts>,
+    /// The press of frames, if it is one.
+    pub(crate) frames: Option<FramePress>,
 }
 
 /// Parameters of a procedural shape.
@@ -74,7 +77,12 @@ pub(crate) struct ShapeFacts {
 }
 
 impl Choices {
-    pub(super) fn new(config: &ObjectConfig, about: PoseOrigin, folder: &Path) -> Result<Self, SpecError> {
+    pub(super) fn new(
+        config: &ObjectConfig,
+        about: PoseOrigin,
+        folder: &Path,
+        frames: Option<&FrameSource>,
+    ) -> Result<Self, SpecError> {
         let source = config.from;
         if about == PoseOrigin::Placement && source != ObjectSource::Objects {
             let problem =
@@ -82,7 +90,8 @@ impl Choices {
             return Err(Refusal::new(problem).into());
         }
         for (field, given, of) in [
-            ("folder", config.folder.is_some(), ObjectSource::Meshes),
+            ("folder", config.folder.is_some() && frames.is_none(), ObjectSource::Meshes),
+            ("peak_pa", config.peak_pa.is_some(), ObjectSource::Frames),
             ("repair", config.repair.is_some(), ObjectSource::Meshes),
             ("centre", config.centre.is_some(), ObjectSource::Meshes),
             ("size_m", config.size_m.is_some(), ObjectSource::Shapes),
@@ -108,6 +117,7 @@ impl Choices {
             mesh,
             object: None,
             shape: None,
+            frames: None,
         };
         let mut notes = Vec::new();
         let mut entries: Vec<Choice> = match source {
@@ -147,8 +157,24 @@ impl Choices {
                 chosen(config, &[BALL])?;
                 vec![entry(BALL, PreparedMesh::default())]
             }
+            ObjectSource::Frames => {
+                let presses = frames.map(|frames| frames.presses(config.names.as_deref())).transpose()?;
+                let press = |(name, frames): (Arc<str>, FramePress)| Choice {
+                    frames: Some(frames),
+                    ..entry(&name, PreparedMesh::default())
+                };
+                notes.extend(frames.iter().flat_map(|frames| frames.notes.iter().cloned()));
+                presses.unwrap_or_default().into_iter().map(press).collect()
+            }
         };
-        for (place, entry) in (0..).zip(&mut entries) {
+        let mut names: Vec<Arc<str>> = Vec::new();
+        for entry in &mut entries {
+            // presses of frames share the names of their objects
+            let place = names.iter().position(|name| *name == entry.name).unwrap_or(names.len());
+            if place == names.len() {
+                names.push(Arc::clone(&entry.name));
+            }
+            let place = i32::try_from(place).unwrap_or(i32::MAX);
             entry.label = entry.object.map_or(place, |object| object.label.into());
         }
         Ok(Self { entries, ranges, source, notes })
@@ -157,6 +183,11 @@ impl Choices {
     /// Number of different objects or files, or of families.
     pub(crate) fn count(&self) -> u64 {
         self.entries.len() as u64
+    }
+
+    /// Class label of shape number `number`.
+    pub(crate) fn label(&self, number: u64) -> i32 {
+        self.entries[usize::try_from(number % self.count()).unwrap_or_default()].label
     }
 
     /// Whether every number is another shape.

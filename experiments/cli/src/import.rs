@@ -3,7 +3,7 @@
 use crate::context::{Common, notes, open_folder};
 use crate::error::CliError;
 use crate::options::{length, whole, within};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde::Serialize;
 use spts::data::{FrameArray, FrameOptions, Frames};
 use spts::{FrameUnit, SkinLayout};
@@ -44,8 +44,8 @@ pub(super) struct ImportCommand {
     rate: Option<f64>,
     /// What the values are: pressure in Pa, conductance in S, codes of a converter, or relative ones; all grow with the
     /// load
-    #[arg(long, value_enum, value_name = "UNIT", default_value_t = Unit::Relative)]
-    unit: Unit,
+    #[arg(long, value_name = "pressure|conductance|codes|relative", default_value = "relative", value_parser = unit)]
+    unit: FrameUnit,
     /// Frames at the start of every press in which nothing touches the skin, as first:N; first:0 for none [default:
     /// those before the sum of the taxels rises]
     #[arg(long, value_name = "first:N", value_parser = idle)]
@@ -76,13 +76,12 @@ pub(super) struct ImportCommand {
     common: Common,
 }
 
-/// Units of frames, as an option.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Unit {
-    Pressure,
-    Conductance,
-    Codes,
-    Relative,
+fn unit(text: &str) -> Result<FrameUnit, String> {
+    let known = FrameUnit::ALL.into_iter().find(|(name, _)| *name == text);
+    known.map(|(_, unit)| unit).ok_or_else(|| {
+        let names = FrameUnit::ALL.map(|(name, _)| name).join(", ");
+        format!("is not one of {names}")
+    })
 }
 
 fn idle(text: &str) -> Result<usize, String> {
@@ -129,18 +128,12 @@ impl ImportCommand {
         let frames = frames.and_then(|frames| if self.cut { frames.cut() } else { Ok(frames) }).map_err(in_file)?;
         let stem = self.file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let name = self.name.clone().unwrap_or(stem);
-        let unit = match self.unit {
-            Unit::Pressure => FrameUnit::Pressure,
-            Unit::Conductance => FrameUnit::Conductance,
-            Unit::Codes => FrameUnit::Codes,
-            Unit::Relative => FrameUnit::Relative,
-        };
         let options = FrameOptions {
             object: self.object.clone().unwrap_or_else(|| name.clone()),
             rate_hz: self.rate,
             idle: self.idle,
             hold_s: self.hold,
-            ..FrameOptions::new(&name, layout, unit)
+            ..FrameOptions::new(&name, layout, self.unit)
         };
         let (session, found) = frames.session(&options).map_err(in_file)?;
         assumed.extend(found);
@@ -160,7 +153,7 @@ impl ImportCommand {
             rows,
             cols,
             rate_hz: raster.map_or(f64::NAN, |r| r.sample_rate_hz() / r.measurements_per_frame() as f64),
-            unit,
+            unit: self.unit,
             idle_frames: raster.and_then(|r| r.blocks().first()).and_then(|block| block.idle_frames),
             hold_s: session.hold_s,
             session: out,

@@ -6,16 +6,16 @@ use crate::options::{parse_measurements, seed, sorted, whole, within};
 use clap::Args;
 use serde::Serialize;
 use spts::chain::{ChainConfig, DEFAULT_READOUT, RowsConfig};
-use spts::data::{SessionSet, WiredFrames, wired};
+use spts::data::{Courses, SessionSet, WiredFrames, wired};
 use spts::session::{Event, Recorded};
 use spts::{Chain, Seeding, Session};
 use spts_eval::decode::DecodeRequest;
 use spts_eval::training::TrainingData;
 use spts_input::Refusal;
 use spts_models::ConductanceMap;
-use spts_recon::metrics::SupportScore;
-use spts_report::few_wires::{FewWiresPage, ShownTouch, text};
-use spts_studies::few_wires::{FewWiresReport, FewWiresStudy};
+use spts_report::few_wires::{FewWiresPage, text};
+use spts_studies::few_wires::{FewWiresReport, FewWiresStudy, Touched};
+use spts_studies::frames::{FramesReport, frames_report};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -36,11 +36,15 @@ Files in DIR:
   wire.html                    the page: images, scores, signals
   figures/wire.svg .png        its picture
   tables/wire.csv              a line for each number of wires, kind of rows and number of measurements
+  tables/frames.csv laws.csv   how presses repeat and drift, object by object; how far the transducer's laws hold
 
 Idle frames are subtracted. Pressures go through the simulated foam's transducer; conductances are taken as they are; of
 codes and relative values the largest is taken for what --peak gives. Skins of more than 2048 taxels have no page.
---json prints {\"decoder\", \"scan_s\", \"scan_iou\", \"touches\", \"left_out\", \"rows\": [{\"wires\", \"rows\",
-\"m_per_wire\", \"m\", \"time_s\", \"iou\", \"worst_iou\", \"worst\", \"saturated\", \"used\", \"signal_to_noise\"}]}.")]
+Of three objects or more that are pressed twice, every other touch teaches two decoders, which are asked for the rest:
+one learns from the other objects alone (IoU, left out), and one recognises objects (recognised).
+--json prints {\"decoder\", \"scan_s\", \"scan_iou\", \"scan_classes\", \"again_iou\", \"touches\", \"objects\", \"left_out\",
+\"rows\": [{\"wires\", \"rows\", \"m_per_wire\", \"m\", \"time_s\", \"iou\", \"worst_iou\", \"worst\", \"left_out_iou\", \"classes\",
+\"saturated\", \"used\", \"signal_to_noise\"}], \"frames\": {\"objects\", \"laws\"}}.")]
 pub(super) struct WireCommand {
     /// Folder of a session of frames, or of several
     #[arg(value_name = "SESSION")]
@@ -63,7 +67,7 @@ pub(super) struct WireCommand {
     /// there are rows for]
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = whole::<usize>(1..=1024))]
     wires: Vec<usize>,
-    /// Pressure that the largest value of codes and relative frames is taken for, Pa; [100, 1000000]
+    /// Pressure that the largest value of codes and relative frames, of all sessions, is taken for, Pa; [100, 1000000]
     #[arg(long, value_name = "PA", value_parser = within(100.0, 1e6, "[100, 1000000]"), default_value_t = 30e3)]
     peak: f64,
     /// Presses of every session that are taken, from the first [default: all]
@@ -81,15 +85,13 @@ pub(super) struct WireCommand {
 struct Report<'a> {
     #[serde(flatten)]
     few: &'a FewWiresReport,
-    scan_iou: Option<f64>,
+    frames: &'a FramesReport,
 }
 
 /// Numbers of wires that are looked at.
 const WIRES: [usize; 3] = [1, 2, 4];
 /// Names in the results folder that no session may have there.
 const RESERVED: [&str; 4] = ["figures", "tables", "wire.html", "manifest.json"];
-/// Touches that the picture shows.
-const SHOWN: usize = 5;
 
 impl WireCommand {
     pub(super) fn run(&self) -> Result<(), CliError> {
@@ -117,12 +119,19 @@ impl WireCommand {
         }
         let folder = open_folder(&self.out)?;
         let chain = Chain::new(&self.chain()?, &layout, self.seed, Path::new("."))?;
-        let mut touches: Vec<(String, ConductanceMap, Vec<f64>)> = Vec::new();
+        let mut touches: Vec<Touched> = Vec::new();
         let mut said: Vec<String> = Vec::new();
-        for (number, session) in (0..).zip(&sessions) {
+        let firsts = sessions.iter().map(|session| self.first_presses(session));
+        let firsts = firsts.collect::<Result<Vec<_>, CliError>>()?;
+        // one skin: what is the largest value of one session is no more in another
+        let largest = firsts.iter().map(|session| {
+            let courses = Courses::of(session).map_err(|e| e.at(&session.name));
+            Ok(courses?.largest())
+        });
+        let largest = largest.collect::<Result<Vec<f64>, Refusal>>()?.into_iter().fold(0.0, f64::max);
+        for (number, session) in (0..).zip(&firsts) {
             let path = |refusal: Refusal| refusal.at(&session.name);
-            let session = self.first_presses(session)?;
-            let found = wired(&session, &chain, self.peak, self.seed, number).map_err(path)?;
+            let found = wired(session, &chain, (self.peak, Some(largest)), self.seed, number).map_err(path)?;
             let out = if sessions.len() == 1 { folder.path("") } else { folder.folder(&session.name)? };
             found.session.write_files(&out).map_err(|error| folder.unstaged(error))?;
             touches.extend(scanned(&found));
@@ -130,17 +139,18 @@ impl WireCommand {
         }
         let said = spts_eval::unique(said);
         notes(&said);
+        let frames = frames_report(&sessions)?;
         let taxels = layout.taxels();
         if taxels > TrainingData::MOST_TAXELS {
             note(&format!("note: {taxels} taxels: the page is for up to {}", TrainingData::MOST_TAXELS));
             folder.commit()?;
             let few = FewWiresReport { touches: touches.len(), ..FewWiresReport::default() };
             let out = self.out.display();
-            return self.common.print(&Report { few: &few, scan_iou: None }, || format!("session: {out}"));
+            return self.common.print(&Report { few: &few, frames: &frames }, || format!("session: {out}"));
         }
         let study = FewWiresStudy {
             layout,
-            touches: touches.iter().map(|(name, touch, _)| (name.clone(), touch.clone())).collect(),
+            touches,
             profile: chain.profile().clone(),
             wires: if self.wires.is_empty() {
                 WIRES.into_iter().filter(|wires| *wires <= layout.rows()).collect()
@@ -159,17 +169,6 @@ impl WireCommand {
             let why = "more measurements than taxels, or than the 64 rows of a pattern";
             note(&format!("note: left out, {why}: {}", report.left_out.join(", ")));
         }
-        let scan_iou =
-            touches.iter().map(|(_, touch, scan)| SupportScore::of_images(scan, touch.values()).iou).sum::<f64>()
-                / touches.len() as f64;
-        let step = touches.len().div_ceil(SHOWN).max(1);
-        let shown = touches.iter().enumerate().step_by(step);
-        let shown = shown.map(|(index, (name, touch, scan))| ShownTouch {
-            name: name.clone(),
-            index,
-            touch: touch.clone(),
-            scan: scan.clone(),
-        });
         let page = FewWiresPage {
             title: if let [session] = sessions[..] {
                 session.name.clone()
@@ -179,15 +178,15 @@ impl WireCommand {
             layout,
             readout: self.readout.clone(),
             report: &report,
-            shown: shown.collect(),
-            scan_iou,
+            frames: &frames,
+            touches: &study.touches,
             notes: said,
         };
         page.write(&folder).map_err(|error| folder.unstaged(error))?;
         folder.commit()?;
         let out = self.out.display();
-        self.common.print(&Report { few: &report, scan_iou: Some(scan_iou) }, || {
-            format!("{}\nsession: {out}, page: {out}/wire.html", text(&report, scan_iou))
+        self.common.print(&Report { few: &report, frames: &frames }, || {
+            format!("{}\nsession: {out}, page: {out}/wire.html", text(&report, &frames))
         })
     }
 
@@ -225,7 +224,7 @@ impl WireCommand {
 /// Name, conductances and scan of every press, in the middle of its hold. A scan of many taxels has an offset that
 /// grows with the sum of all, as cells that are not selected do not put out 0 V exactly: its lower quartile is taken
 /// off.
-fn scanned(found: &WiredFrames) -> Vec<(String, ConductanceMap, Vec<f64>)> {
+fn scanned(found: &WiredFrames) -> Vec<Touched> {
     let Some(recorded) = &found.session.raster else { return Vec::new() };
     let raster = &recorded.recording;
     let frame_s = raster.measurements_per_frame() as f64 / raster.sample_rate_hz();
@@ -248,5 +247,11 @@ fn scanned(found: &WiredFrames) -> Vec<(String, ConductanceMap, Vec<f64>)> {
         1 => found.session.name.clone(),
         _ => format!("{} {}", found.session.name, press + 1),
     };
-    found.touches.iter().enumerate().map(|(press, touch)| (name(press), touch.clone(), image(press))).collect()
+    let touched = |(press, touch): (usize, &ConductanceMap)| Touched {
+        name: name(press),
+        object: found.session.object.clone(),
+        conductance: touch.clone(),
+        scan: image(press),
+    };
+    found.touches.iter().enumerate().map(touched).collect()
 }

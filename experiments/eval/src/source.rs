@@ -92,8 +92,7 @@ impl Source {
         if let [first, others @ ..] = &dropped[..]
             && !others.is_empty()
         {
-            let said =
-                format!("note: of drops those of {first:?} alone are located, not those of {}", others.join(", "));
+            let said = format!("of drops those of {first:?} alone are located, not those of {}", others.join(", "));
             note = Some(note.map_or_else(|| said.clone(), |note| format!("{note}\n{said}")));
         }
         let simulated = sessions.iter().all(|s| s.provenance.is_some());

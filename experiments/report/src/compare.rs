@@ -104,7 +104,7 @@ pub fn json<'a>(report: &'a CompareReport, objects: Option<&'a PerObjectReport>)
 /// Statistics and distances of the curves, or what was predicted, as text tables.
 pub fn text(report: &CompareReport) -> String {
     if !report.predicted.is_empty() {
-        let inside = report.predicted.iter().filter(|row| row.of.inside()).count();
+        let inside = report.predicted.iter().filter(|row| row.of.inside() == Some(true)).count();
         return format!("{}inside: {inside} of {}", predicted(report).text(), report.predicted.len());
     }
     let mut out = statistics(report.all_statistics()).text();

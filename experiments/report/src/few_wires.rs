@@ -7,22 +7,10 @@ use spts_eval::Table;
 use spts_eval::decoders::short_label;
 use spts_eval::unique;
 use spts_input::Refusal;
-use spts_models::{ConductanceMap, SkinLayout};
-use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore, support};
-use spts_studies::few_wires::{FewWires, FewWiresReport};
-
-/// A touch that is shown: its name, what the frames have, and what a scan of the same skin has.
-#[derive(Debug, Clone)]
-pub struct ShownTouch {
-    /// Name.
-    pub name: String,
-    /// Number of the touch in the report.
-    pub index: usize,
-    /// Conductance of every taxel, S.
-    pub touch: ConductanceMap,
-    /// The scan, V.
-    pub scan: Vec<f64>,
-}
+use spts_models::SkinLayout;
+use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
+use spts_studies::few_wires::{FewWires, FewWiresReport, Touched};
+use spts_studies::frames::{FramesReport, LawCheck, ObjectFrames};
 
 /// What a page is made from.
 #[derive(Debug, Clone)]
@@ -35,10 +23,10 @@ pub struct FewWiresPage<'a> {
     pub readout: String,
     /// Results.
     pub report: &'a FewWiresReport,
-    /// The touches that are shown.
-    pub shown: Vec<ShownTouch>,
-    /// Mean IoU of the scan with the frames.
-    pub scan_iou: f64,
+    /// What the frames say of the skin.
+    pub frames: &'a FramesReport,
+    /// The touches.
+    pub touches: &'a [Touched],
     /// What was assumed.
     pub notes: Vec<String>,
 }
@@ -49,15 +37,21 @@ const TILE_PX: usize = 120;
 const RANDOM: &str = "random";
 /// Columns of images that the picture has at most beside the touch and the scan.
 const MOST_COLUMNS: usize = 6;
+/// Touches that the picture shows.
+const SHOWN: usize = 5;
 
 impl FewWiresPage<'_> {
-    /// Writes `wire.html`, `figures/wire.svg`, `figures/wire.png` and `tables/wire.csv` into the folder `out`.
+    /// Writes `wire.html`, `figures/wire.svg`, `figures/wire.png`, and `wire.csv`, `frames.csv` and `laws.csv` in
+    /// `tables/` into the folder `out`.
     ///
     /// # Errors
     /// [`Refusal`] when a file cannot be written.
     pub fn write(&self, out: &OutputFolder) -> Result<(), Refusal> {
         save_sheet(&self.sheet(), &out.folder("figures")?, "wire")?;
-        table(self.report).write_csv(&out.folder("tables")?.join("wire.csv"))?;
+        let tables = out.folder("tables")?;
+        table(self.report).write_csv(&tables.join("wire.csv"))?;
+        objects(self.frames).write_csv(&tables.join("frames.csv"))?;
+        laws(self.frames).write_csv(&tables.join("laws.csv"))?;
         write_bytes(&out.path("wire.html"), html(&self.page()).as_bytes())
     }
 
@@ -94,23 +88,18 @@ impl FewWiresPage<'_> {
             caption,
             outline,
         };
-        let rows = self.shown.iter().map(|shown| {
-            let iou = |image: &[f64]| SupportScore::of_images(image, shown.touch.values()).iou;
+        let step = self.touches.len().div_ceil(SHOWN).max(1);
+        let rows = self.touches.iter().enumerate().step_by(step).map(|(index, shown)| {
+            let touch = shown.conductance.values();
             let mut mask = Vec::new();
-            support(shown.touch.values(), SUPPORT_THRESHOLD, &mut mask);
-            let mut tiles = vec![
-                heat(
-                    shown.touch.values().to_vec(),
-                    format!("peak {:.0} µS", 1e6 * shown.touch.max()),
-                    Some(mask.clone()),
-                ),
-                heat(shown.scan.clone(), format!("IoU {:.2}", iou(&shown.scan)), Some(mask.clone())),
-            ];
-            tiles.extend(columns.iter().map(|row| {
-                let image = row.images.get(shown.index).cloned().unwrap_or_default();
-                let caption = format!("IoU {:.2}", iou(&image));
+            support(touch, SUPPORT_THRESHOLD, &mut mask);
+            let peak = format!("peak {:.0} µS", 1e6 * shown.conductance.max());
+            let of = |image: Vec<f64>| {
+                let caption = format!("IoU {:.2}", shown.iou_of(&image));
                 heat(image, caption, Some(mask.clone()))
-            }));
+            };
+            let mut tiles = vec![heat(touch.to_vec(), peak, Some(mask.clone())), of(shown.scan.clone())];
+            tiles.extend(columns.iter().map(|row| of(row.images.get(index).cloned().unwrap_or_default())));
             TileRow { label: shown.name.clone(), tiles }
         });
         let touched = format!("the touch; outlined: above {:.0} % of its peak", 100.0 * SUPPORT_THRESHOLD);
@@ -131,7 +120,7 @@ impl FewWiresPage<'_> {
             label: format!("{} {}", row.wires, wire_word(row.wires)),
             of: format!("{} rows", row.rows),
             value: format!("IoU {:.2}", row.iou),
-            others: vec![("a scan of all taxels".to_owned(), format!("{:.2}", self.scan_iou))],
+            others: vec![("a scan of all taxels".to_owned(), format!("{:.2}", report.scan_iou))],
             note: format!(
                 "worst touch {:.2}; with {} measurements in {:.2} ms; a scan takes {:.2} ms",
                 row.worst_iou,
@@ -166,11 +155,25 @@ impl FewWiresPage<'_> {
             figures: vec![figure],
             tables: vec![PageTable::new("Images and signals", &table(report), "wire")],
         };
+        let mut tables = vec![PageTable::new("Presses", &objects(self.frames), "frames")];
+        if !self.frames.laws.is_empty() {
+            tables.push(PageTable::new("Laws of the simulated transducer", &laws(self.frames), "laws"));
+        }
+        let frames = Section {
+            id: "frames".to_owned(),
+            title: "What the frames say".to_owned(),
+            lead: format!(
+                "How well the presses of an object repeat, and how far they drift while they are held. {}",
+                ceiling(report)
+            ),
+            figures: Vec::new(),
+            tables,
+        };
         Page {
             title: format!("{}: one wire and a few", self.title),
             summary,
             cards: cards.collect(),
-            sections: vec![section],
+            sections: vec![section, frames],
             ..Page::default()
         }
     }
@@ -190,6 +193,10 @@ pub fn table(report: &FewWiresReport) -> Table<'_, &FewWires> {
         .column("worst_iou", "worst touch", |r| r.worst_iou)
         .digits(2)
         .column("worst", "which", |r| r.worst.as_str())
+        .column("left_out_iou", "IoU, left out", |r| r.left_out_iou)
+        .digits(2)
+        .column("classes", "recognised", |r| r.classes)
+        .digits(2)
         .column("saturated", "saturated", |r| r.saturated)
         .digits(3)
         .column("used", "range used", |r| r.used)
@@ -198,14 +205,72 @@ pub fn table(report: &FewWiresReport) -> Table<'_, &FewWires> {
         .digits(1)
 }
 
-/// The table as text, with what it is of.
-pub fn text(report: &FewWiresReport, scan_iou: f64) -> String {
+/// The presses of every object.
+fn objects(report: &FramesReport) -> Table<'_, &ObjectFrames> {
+    Table::new("frames", &report.objects)
+        .column("object", "object", |o| o.object.as_str())
+        .column("presses", "presses", |o| o.presses)
+        .column("touched", "taxels", |o| o.touched)
+        .column("repeatability", "images alike, r", |o| o.repeatability)
+        .digits(4)
+        .column("spread", "sums differ by", |o| o.spread)
+        .unit("%", 100.0)
+        .digits(1)
+        .column("drift", "drift of the hold", |o| o.drift)
+        .unit("%", 100.0)
+        .digits(1)
+}
+
+/// How far the laws of the simulated transducer hold.
+fn laws(report: &FramesReport) -> Table<'_, &LawCheck> {
+    Table::new("laws", &report.laws)
+        .column("law", "law", |l| l.law)
+        .column("fitted", "fitted", |l| l.fitted)
+        .digits(3)
+        .column("twin", "simulation's", |l| l.twin)
+        .digits(3)
+        .file("fitted_on", |l| l.objects[0])
+        .file("held_against", |l| l.objects[1])
+        .shown("objects, fitted and others", |l| format!("{} and {}", l.objects[0], l.objects[1]))
+        .column("without", "error without the law", |l| l.without)
+        .unit("%", 100.0)
+        .digits(2)
+        .column("with_fitted", "with the fitted value", |l| l.with_fitted)
+        .unit("%", 100.0)
+        .digits(2)
+        .column("with_twin", "with the simulation's", |l| l.with_twin)
+        .unit("%", 100.0)
+        .digits(2)
+        .column("worst", "worst object", |l| l.worst.0.as_str())
+        .column("worst_error", "its error", |l| l.worst.1)
+        .unit("%", 100.0)
+        .digits(2)
+}
+
+/// What a scan and another press of the same object have.
+fn ceiling(report: &FewWiresReport) -> String {
+    let again = report.again_iou.map(|iou| format!("; another press of the same object has {iou:.2}"));
+    let classes = report.scan_classes.map(|share| format!(", {share:.2} of its images are recognised"));
     format!(
-        "{}{} touches, decoder {}; a scan of all taxels takes {:.2} ms: IoU {scan_iou:.2}",
+        "A scan of all taxels takes {:.2} ms and has an IoU of {:.2}{}{}.",
+        1e3 * report.scan_s,
+        report.scan_iou,
+        classes.unwrap_or_default(),
+        again.unwrap_or_default()
+    )
+}
+
+/// The tables as text, with what they are of.
+pub fn text(report: &FewWiresReport, frames: &FramesReport) -> String {
+    let laws = if frames.laws.is_empty() { String::new() } else { format!("{}\n", laws(frames).text()) };
+    format!(
+        "{}\n{laws}{}{} touches of {}, decoder {}. {}",
+        objects(frames).text(),
         table(report).text(),
         report.touches,
+        if report.objects == 1 { "one object".to_owned() } else { format!("{} objects", report.objects) },
         short_label(report.decoder),
-        1e3 * report.scan_s
+        ceiling(report)
     )
 }
 

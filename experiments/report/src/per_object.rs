@@ -33,9 +33,18 @@ pub(crate) fn banded<'a, R: Copy + 'a>(
         .shown("90 % band", move |row| format!("{:.digits$} – {:.digits$}", of(row).low, of(row).high))
 }
 
-/// Adds whether the real value lies in the band.
+/// Adds whether the real value lies in the band; nothing is said of a band without a width.
 pub(crate) fn marked<'a, R: Copy + 'a>(table: Table<'a, R>, of: impl Fn(R) -> Banded + Copy + 'a) -> Table<'a, R> {
-    table.named("inside", "", move |row| of(row).inside(), |inside| if inside { "" } else { "outside" })
+    table.named(
+        "inside",
+        "",
+        move |row| of(row).inside(),
+        |inside| match inside {
+            Some(true) => "",
+            Some(false) => "outside",
+            None => "twins are equal",
+        },
+    )
 }
 
 /// What is written as JSON.

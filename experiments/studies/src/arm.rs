@@ -5,7 +5,7 @@
 //! number of such taxels show whether the twin's preload is like the real one. The size of a touch, and how accurately
 //! it is located, show whether the rest is.
 
-use crate::compare::{Banded, UNLIMITED};
+use crate::compare::{Banded, POSITIVE, SHARE, UNLIMITED};
 use rand::RngExt as _;
 use rayon::prelude::*;
 use spts::data::SessionSet;
@@ -96,9 +96,9 @@ impl ArmStudy<'_> {
         });
         let twins = twins.collect::<Result<Vec<[f64; STATISTICS.len()]>, Refusal>>()?;
         progress.end();
-        let bands = STATISTICS.iter().enumerate().filter_map(|(k, &(statistic, unit))| {
+        let bands = STATISTICS.iter().enumerate().filter_map(|(k, &(statistic, unit, limits))| {
             let twins: Vec<f64> = twins.iter().map(|twin| twin[k]).collect();
-            let of = Banded::of(real[k], &twins, UNLIMITED)?;
+            let of = Banded::of(real[k], &twins, limits)?;
             Some(ArmBand { statistic, unit, of })
         });
         Ok(ArmReport { session, touches, skins: self.skins, statistics: bands.collect() })
@@ -137,23 +137,23 @@ const LOADED_V: f64 = 0.1;
 /// Numbers of measurements for locating touches.
 const MEASUREMENTS: [usize; 3] = [7, 10, 25];
 
-/// Label and unit of every statistic that is compared.
+/// Label, unit and limits of every statistic that is compared.
 ///
 /// Means over the blocks, without a touch: number of taxels above [`LOADED_V`], sum of the image, its largest taxel,
 /// and the correlation of the images of consecutive blocks. Medians over the touches: share of the sum at rest that the
 /// loaded taxels lose, largest taxel minus the preload, and its share in the sum of squares. Means over the windows:
 /// distance of the located from the touched taxel, for each of [`MEASUREMENTS`].
-const STATISTICS: [(&str, &str); 10] = [
-    ("loaded taxels at rest", ""),
-    ("sum at rest", "V"),
-    ("largest taxel at rest", "V"),
-    ("rest, block to block", "r"),
-    ("rest, lost in a touch", "share"),
-    ("touch, largest taxel", "V"),
-    ("touch in one taxel", "share"),
-    ("located at M = 7", "px"),
-    ("located at M = 10", "px"),
-    ("located at M = 25", "px"),
+const STATISTICS: [(&str, &str, [f64; 2]); 10] = [
+    ("loaded taxels at rest", "", POSITIVE),
+    ("sum at rest", "V", UNLIMITED),
+    ("largest taxel at rest", "V", UNLIMITED),
+    ("rest, block to block", "r", [-1.0, 1.0]),
+    ("rest, lost in a touch", "share", UNLIMITED),
+    ("touch, largest taxel", "V", UNLIMITED),
+    ("touch in one taxel", "share", SHARE),
+    ("located at M = 7", "px", POSITIVE),
+    ("located at M = 10", "px", POSITIVE),
+    ("located at M = 25", "px", POSITIVE),
 ];
 
 /// Number of touches in `recording`, whose blocks must begin without one, and every statistic of [`STATISTICS`]; `None`

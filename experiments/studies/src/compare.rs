@@ -51,14 +51,18 @@ impl Banded {
         self.twin - self.real
     }
 
-    /// Whether the real value lies in the band.
-    pub fn inside(&self) -> bool {
-        (self.low..=self.high).contains(&self.real)
+    /// Whether the real value lies in the band; `None` for another value than that of all twins, which are equal: how
+    /// far a further twin may lie from them is not known then.
+    pub fn inside(&self) -> Option<bool> {
+        let inside = (self.low..=self.high).contains(&self.real);
+        (inside || self.low < self.high).then_some(inside)
     }
 }
 
-/// Limits of a band of values that have none.
+/// Limits of a band of values that have none, of values that are not negative, and of shares.
 pub(crate) const UNLIMITED: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+pub(crate) const POSITIVE: [f64; 2] = [0.0, f64::INFINITY];
+pub(crate) const SHARE: [f64; 2] = [0.0, 1.0];
 
 /// Estimates of one session of the real skin and of the twin, and the twin's recording.
 #[derive(Debug, Clone)]
@@ -295,15 +299,15 @@ impl Allowed {
     }
 }
 
-/// Numbers that are compared, the tolerance, and its words.
-const COMPARED: [(&str, Allowed, &str); 7] = [
-    ("residual", Allowed::Share(0.15), "15 %"),
-    ("h1", Allowed::Difference(0.01), "0.01"),
-    ("h2", Allowed::Difference(0.01), "0.01"),
-    ("outliers_5sd", Allowed::Factor(1.5), "factor 1.5"),
-    ("late_per_flip", Allowed::Share(0.30), "30 %"),
-    ("idle_noise", Allowed::Share(0.20), "20 %"),
-    ("kurtosis", Allowed::Factor(2.0), "factor 2"),
+/// Numbers that are compared, the tolerance, its words, and the limits of the number.
+const COMPARED: [(&str, Allowed, &str, [f64; 2]); 7] = [
+    ("residual", Allowed::Share(0.15), "15 %", POSITIVE),
+    ("h1", Allowed::Difference(0.01), "0.01", UNLIMITED),
+    ("h2", Allowed::Difference(0.01), "0.01", UNLIMITED),
+    ("outliers_5sd", Allowed::Factor(1.5), "factor 1.5", SHARE),
+    ("late_per_flip", Allowed::Share(0.30), "30 %", SHARE),
+    ("idle_noise", Allowed::Share(0.20), "20 %", POSITIVE),
+    ("kurtosis", Allowed::Factor(2.0), "factor 2", UNLIMITED),
 ];
 
 /// Rounding of a step that is found as a range over a whole number: relative.
@@ -341,7 +345,7 @@ impl ComparedSession {
 
     /// Statistics that must agree.
     fn statistics(&self) -> Vec<Statistic> {
-        let compared = COMPARED.iter().filter_map(|&(name, allowed, words)| {
+        let compared = COMPARED.iter().filter_map(|&(name, allowed, words, _)| {
             let numbers = self.numbers(name)?;
             let ok = allowed.holds(numbers[0].value, numbers[1].value);
             Some(self.statistic(name, numbers, words, Some(ok)))
@@ -501,7 +505,7 @@ pub struct PredictedStatistic {
 /// Numbers of every session, each beside the band of its twins; `done` is called after every twin.
 ///
 /// # Errors
-/// [`Refusal`] when a session cannot be fitted, or with one session and no profile.
+/// [`Refusal`] when a session cannot be fitted, or with fewer than three sessions and no profile.
 fn predicted_statistics(
     pairs: &[SessionPair],
     asked: &Prediction,
@@ -518,10 +522,12 @@ fn predicted_statistics(
     for (pair, fitted) in pairs.iter().zip(&sessions) {
         let profile = match &asked.profile {
             Some(profile) => profile.clone(),
-            None if sessions.len() < 2 => {
+            None if sessions.len() < 3 => {
                 return Err(Refusal::new(format!(
-                    "{} compressive: the only session, and no other to fit a profile to; name a profile",
-                    pair.session
+                    "{} compressive: sessions beside it: {}; valid: two or more, to fit the spans of a profile to; or name \
+                     a profile",
+                    pair.session,
+                    sessions.len() - 1
                 )));
             }
             None => {
@@ -537,10 +543,10 @@ fn predicted_statistics(
             estimated(pair, &recording, &blocks)
         });
         let twins = twins.collect::<Result<Vec<_>, Refusal>>()?;
-        rows.extend(COMPARED.iter().filter_map(|&(name, ..)| {
+        rows.extend(COMPARED.iter().filter_map(|&(name, _, _, limits)| {
             let value = |session: &SessionEstimates| Some(session.value(name)).filter(|v| v.is_finite());
             let drawn: Vec<f64> = twins.iter().filter_map(value).collect();
-            let of = Banded::of(value(&real)?, &drawn, UNLIMITED).filter(|_| drawn.len() > 1)?;
+            let of = Banded::of(value(&real)?, &drawn, limits).filter(|_| drawn.len() > 1)?;
             let session = pair.session.clone();
             Some(PredictedStatistic { session, name, of })
         }));
@@ -669,6 +675,13 @@ mod tests {
         assert!(Allowed::Factor(1.5).holds(0.01, 0.0149) && !Allowed::Factor(1.5).holds(0.01, 0.0066));
         assert!(!Allowed::Factor(2.0).holds(0.0, 0.0), "nothing is not a factor of nothing");
         assert!(Allowed::Difference(0.01).holds(-0.02, -0.012) && !Allowed::Difference(0.01).holds(0.0, f64::NAN));
+        // a value beside a band without a width has no verdict
+        let band = |real, twins: &[f64]| Banded::of(real, twins, SHARE).unwrap();
+        assert_eq!(band(0.9, &[1.0, 1.0, 1.0]).inside(), None);
+        assert_eq!(band(1.0, &[1.0, 1.0, 1.0]).inside(), Some(true));
+        let wide = band(0.2, &[0.1, 0.5, 0.3]);
+        assert_eq!((wide.inside(), wide.low), (Some(true), 0.0));
+        assert_eq!(band(0.0, &[0.8, 0.81, 0.79]).inside(), Some(false));
         // quantiles 1 V apart at most, over a range of 10 V
         assert!((quantile_gap(&[-5.0, 0.0, 5.0], &[-4.0, 0.5, 5.0]) - 0.1).abs() < 1e-15);
     }

@@ -6,24 +6,38 @@ use rayon::prelude::*;
 use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Mode, Profile};
-use spts_eval::algorithm::{Algorithm, Answer, Trained};
-use spts_eval::decoders::{DecoderSpec, auto};
+use spts_eval::algorithm::{Algorithm, Answer, Class, Trained};
+use spts_eval::decoders::{DecoderSpec, auto, find};
 use spts_eval::training::TrainingData;
-use spts_eval::{Press, PressRows};
+use spts_eval::{Press, PressRows, unique};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 use spts_recon::Matrix;
 use spts_recon::matrix_free::SheetPrior;
 use spts_recon::metrics::SupportScore;
+use spts_recon::statistics::mean;
 use std::sync::Arc;
+
+/// One touch: what the frames have of it, and what a scan has.
+#[derive(Debug, Clone)]
+pub struct Touched {
+    /// Name.
+    pub name: String,
+    /// What was pressed.
+    pub object: String,
+    /// Conductance of every taxel above that of the untouched skin, S.
+    pub conductance: ConductanceMap,
+    /// A scan of all taxels, V; without the output of the untouched skin.
+    pub scan: Vec<f64>,
+}
 
 /// Touches, and the wires that are to read them.
 #[derive(Debug, Clone)]
 pub struct FewWiresStudy {
     /// The skin.
     pub layout: SkinLayout,
-    /// Name and conductances of every touch, S, above those of the untouched skin.
-    pub touches: Vec<(String, ConductanceMap)>,
+    /// The touches, object by object.
+    pub touches: Vec<Touched>,
     /// Readout profile of every wire.
     pub profile: Profile,
     /// Numbers of wires; each reads a band of whole rows of the skin.
@@ -53,6 +67,11 @@ pub struct FewWires {
     pub worst_iou: f64,
     /// Name of the worst touch.
     pub worst: String,
+    /// Mean IoU by a decoder that has learned from every other touch of the other objects, over the remaining touches;
+    /// `None` for fewer than [`FEWEST_OBJECTS`] objects of two touches.
+    pub left_out_iou: Option<f64>,
+    /// Share of the remaining touches whose object is recognised by what the others of all objects look like.
+    pub classes: Option<f64>,
     /// Share of samples at an end of the amplifier's or the converter's range.
     pub saturated: f64,
     /// Largest sample of a touch as a share of that range; `None` for a readout without one.
@@ -73,6 +92,14 @@ pub struct FewWiresReport {
     pub scan_s: f64,
     /// Number of touches.
     pub touches: usize,
+    /// Number of objects.
+    pub objects: usize,
+    /// Mean IoU of the scan with the touch.
+    pub scan_iou: f64,
+    /// As [`FewWires::classes`], of the scan.
+    pub scan_classes: Option<f64>,
+    /// Mean IoU of a touch with the one before of the same object; `None` without two touches of one.
+    pub again_iou: Option<f64>,
     /// What was asked for and cannot be: more measurements than taxels, or than rows of a pattern. As "wires ×
     /// measurements rows".
     pub left_out: Vec<String>,
@@ -86,6 +113,100 @@ const IDLE: usize = 200;
 const IDLE_NUMBER: u64 = 1 << 30;
 /// Length over which the images that rows are designed for are smooth, taxels.
 const SMOOTH: f64 = 1.0;
+
+/// Fewest objects of which every other touch teaches decoders, which are asked for the others.
+pub const FEWEST_OBJECTS: usize = 3;
+
+/// Decoders that have learned from every other touch of the objects.
+struct Taught {
+    /// Number of the object of every touch.
+    object: Vec<usize>,
+    /// Whether a touch was learned from.
+    seen: Vec<bool>,
+    /// Of every object an image decoder that has learned from the others.
+    others: Vec<Box<dyn Trained>>,
+    /// Classes from 0, in order of the objects.
+    classes: Box<dyn Trained>,
+}
+
+/// Decoder of objects that were left out, and that of classes.
+const LEFT_OUT: &str = "nn_lmmse";
+const CLASSES: &str = "evidence";
+
+impl Taught {
+    /// Learns from `touches` on a sheet of `cols` columns, whose images are `volts_per_siemens` times their
+    /// conductances; `None` without [`FEWEST_OBJECTS`] objects of two touches each.
+    fn new(
+        touches: &[Touched],
+        cols: usize,
+        volts_per_siemens: f64,
+        streams: Streams,
+    ) -> Result<Option<Self>, Refusal> {
+        let names = unique(touches.iter().map(|touch| touch.object.as_str()));
+        let number = |touch: &Touched| names.iter().position(|name| *name == touch.object).unwrap_or_default();
+        let object: Vec<usize> = touches.iter().map(number).collect();
+        let before = |k: usize| object[..k].iter().filter(|other| **other == object[k]).count();
+        let seen: Vec<bool> = (0..touches.len()).map(|k| before(k) % 2 == 0).collect();
+        let all_pressed_again = (0..names.len()).all(|own| (0..touches.len()).any(|k| object[k] == own && !seen[k]));
+        if names.len() < FEWEST_OBJECTS || !all_pressed_again {
+            return Ok(None);
+        }
+        let (Some(images), Some(classes)) = (find(LEFT_OUT), find(CLASSES)) else { return Ok(None) };
+        let data = |is_wanted: &dyn Fn(usize) -> bool| {
+            let wanted: Vec<usize> = (0..touches.len()).filter(|&k| seen[k] && is_wanted(object[k])).collect();
+            let volts = |&k: &usize| touches[k].conductance.values().iter().map(|g| volts_per_siemens * g).collect();
+            let columns: Vec<Vec<f64>> = wanted.iter().map(volts).collect();
+            let labels: Vec<usize> = wanted.iter().map(|&k| object[k]).collect();
+            let taxels = columns.first().map_or(0, Vec::len);
+            TrainingData::of_images(Matrix::from_column_slices(taxels, &columns), &labels, cols, streams)
+        };
+        let others = (0..names.len()).into_par_iter().map(|own| (images.train)(&data(&|object| object != own)?));
+        let others = others.collect::<Result<Vec<_>, Refusal>>()?;
+        let classes = (classes.train)(&data(&|_| true)?)?;
+        Ok(Some(Self { object, seen, others, classes }))
+    }
+
+    /// Mean IoU of objects that were left out, where an image is wanted, and share of right classes, over the touches
+    /// that were not learned from. `presses` are the measurements of all touches.
+    fn scores(
+        &self,
+        touches: &[Touched],
+        presses: &[Press],
+        images: bool,
+    ) -> Result<(Option<f64>, Option<f64>), Refusal> {
+        let unseen: Vec<usize> = (0..presses.len()).filter(|k| !self.seen[*k]).collect();
+        let score = |&k: &usize| -> Result<(f64, f64), Refusal> {
+            let (own, touch) = (self.object[k], &touches[k]);
+            let class = answer(&mut *self.classes.start(), &presses[k], CLASSES)?.class.and_then(Class::label);
+            let iou = if images {
+                let image = answer(&mut *self.others[own].start(), &presses[k], LEFT_OUT)?.image;
+                SupportScore::of_images(&image, touch.conductance.values()).iou
+            } else {
+                0.0
+            };
+            Ok((iou, f64::from(u8::from(class == Some(own)))))
+        };
+        let scores = unseen.par_iter().map(score).collect::<Result<Vec<_>, Refusal>>()?;
+        let mean = |of: fn(&(f64, f64)) -> f64| Some(scores.iter().map(of).sum::<f64>() / scores.len() as f64);
+        Ok((mean(|s| s.0).filter(|_| images), mean(|s| s.1)))
+    }
+}
+
+impl Touched {
+    /// IoU of an image with the touch.
+    pub fn iou_of(&self, image: &[f64]) -> f64 {
+        SupportScore::of_images(image, self.conductance.values()).iou
+    }
+}
+
+/// What `algorithm`, called `name`, makes of all measurements of `press`.
+fn answer(algorithm: &mut dyn Algorithm, press: &Press, name: &str) -> Result<Answer, Refusal> {
+    let mut answer = Answer::default();
+    for (_, window) in press.windows(0..press.len(), press.len(), press.len()) {
+        algorithm.decode(&window, &mut answer).map_err(|e| Refusal::from_error(e).at(name))?;
+    }
+    Ok(answer)
+}
 
 /// Samples of a bench: touch by touch, and what they say of the electronics.
 struct Measured {
@@ -135,9 +256,11 @@ impl FewWiresStudy {
             let range = format!("[1, {}] on one wire, and in all at most as many", layout.taxels());
             return Err(Refusal::range("--measurements", format!("{:?}", self.measurements), range));
         }
+        let volts_per_siemens = self.profile.volts_per_siemens();
+        let taught = Taught::new(&self.touches, layout.cols(), volts_per_siemens, streams)?;
         progress.stage("decoding", Some(benches.len()));
         let rows = benches.into_iter().map(|(wires, source, m)| {
-            let row = self.bench(wires, &source, m, spec, &*trained);
+            let row = self.bench(wires, &source, m, spec, (&*trained, taught.as_ref()));
             progress.step();
             row
         });
@@ -147,9 +270,29 @@ impl FewWiresStudy {
             decoder: spec.name,
             scan_s: layout.taxels() as f64 / self.profile.sample_rate_hz,
             touches: self.touches.len(),
+            objects: unique(self.touches.iter().map(|touch| touch.object.as_str())).len(),
+            scan_iou: mean(self.touches.iter().map(|touch| touch.iou_of(&touch.scan))).unwrap_or(0.0),
+            scan_classes: self.scanned_classes(taught.as_ref())?,
+            again_iou: mean(
+                self.touches
+                    .windows(2)
+                    .filter(|pair| pair[0].object == pair[1].object)
+                    .map(|pair| pair[1].iou_of(pair[0].conductance.values())),
+            ),
             left_out,
             rows,
         })
+    }
+
+    /// Share of the scans that are recognised.
+    fn scanned_classes(&self, taught: Option<&Taught>) -> Result<Option<f64>, Refusal> {
+        let Some(taught) = taught else { return Ok(None) };
+        let taxels = self.layout.taxels();
+        let mut one_each = Matrix::zeros(taxels, taxels);
+        (0..taxels).for_each(|taxel| one_each.row_mut(taxel)[taxel] = 1.0);
+        let rows = Arc::new(PressRows::of_matrix(&one_each));
+        let scans = self.touches.iter().map(|touch| Press::on(Arc::clone(&rows), touch.scan.clone(), 0.0));
+        Ok(taught.scores(&self.touches, &scans.collect::<Vec<_>>(), false)?.1)
     }
 
     fn bench(
@@ -158,7 +301,7 @@ impl FewWiresStudy {
         source: &RowSource,
         m_per_wire: usize,
         spec: &DecoderSpec,
-        trained: &dyn Trained,
+        (trained, taught): (&dyn Trained, Option<&Taught>),
     ) -> Result<FewWires, Refusal> {
         let prior = SheetPrior::smooth([self.layout.rows(), self.layout.cols()], SMOOTH)?;
         let rows = BandRows::new(source, &prior, wires, m_per_wire, self.seed)?;
@@ -166,25 +309,21 @@ impl FewWiresStudy {
         let m = m_per_wire * wires;
         let phi = Arc::new(PressRows::of_matrix(&Matrix::from_rows(m, self.layout.taxels(), phi)?));
         let measured = self.measured(&rows, m_per_wire)?;
-        let decode = |algorithm: &mut Box<dyn Algorithm + '_>, volts| {
-            let press = Press::on(Arc::clone(&phi), volts, 0.0);
-            let mut answer = Answer::default();
-            if let Some(window) = press.window(0, m) {
-                let decoded = algorithm.decode(&window, &mut answer);
-                decoded.map_err(|e| Refusal::from_error(e).at(spec.name))?;
-            }
-            answer.image.resize(self.layout.taxels(), 0.0);
-            Ok(answer.image)
+        let presses = measured.volts.into_iter().map(|volts| Press::on(Arc::clone(&phi), volts, 0.0));
+        let presses: Vec<Press> = presses.collect();
+        let decode = |algorithm: &mut Box<dyn Algorithm + '_>, press: &Press| {
+            let mut image = answer(&mut **algorithm, press, spec.name)?.image;
+            image.resize(self.layout.taxels(), 0.0);
+            Ok(image)
         };
         // one decoder a thread, with its workspace
-        let images = measured.volts.into_par_iter().map_init(|| trained.start(), decode);
+        let images = presses.par_iter().map_init(|| trained.start(), decode);
         let images = images.collect::<Result<Vec<Vec<f64>>, Refusal>>()?;
-        let scores: Vec<f64> = self
-            .touches
-            .iter()
-            .zip(&images)
-            .map(|((_, touch), image)| SupportScore::of_images(image, touch.values()).iou)
-            .collect();
+        let (left_out_iou, classes) = match taught {
+            Some(taught) => taught.scores(&self.touches, &presses, true)?,
+            None => (None, None),
+        };
+        let scores: Vec<f64> = self.touches.iter().zip(&images).map(|(touch, image)| touch.iou_of(image)).collect();
         let worst = (0..scores.len()).min_by(|a, b| scores[*a].total_cmp(&scores[*b]));
         Ok(FewWires {
             wires,
@@ -192,9 +331,11 @@ impl FewWiresStudy {
             m_per_wire,
             m,
             time_s: m_per_wire as f64 / self.profile.sample_rate_hz,
-            iou: scores.iter().sum::<f64>() / scores.len().max(1) as f64,
+            iou: mean(scores.iter().copied()).unwrap_or(0.0),
+            left_out_iou,
+            classes,
             worst_iou: worst.map_or(0.0, |k| scores[k]),
-            worst: worst.map_or_else(String::new, |k| self.touches[k].0.clone()),
+            worst: worst.map_or_else(String::new, |k| self.touches[k].name.clone()),
             saturated: measured.saturated,
             used: measured.used,
             signal_to_noise: measured.signal_to_noise,
@@ -221,8 +362,8 @@ impl FewWiresStudy {
             let bare = ConductanceMap::zeros(band.len(), cols);
             let idle = line.measure(bare, IDLE_NUMBER, IDLE)?;
             noise += idle.iter().map(|v| v * v).sum::<f64>() / (IDLE * wires) as f64;
-            for ((number, (_, touch)), volts) in (0..).zip(&self.touches).zip(&mut volts) {
-                let own = touch.values()[band.start * cols..band.end * cols].to_vec();
+            for ((number, touch), volts) in (0..).zip(&self.touches).zip(&mut volts) {
+                let own = touch.conductance.values()[band.start * cols..band.end * cols].to_vec();
                 let samples = line.measure(ConductanceMap::from_values(band.len(), cols, own), number, m_per_wire)?;
                 let raw: Vec<f64> = samples.iter().map(|v| v + line.idle_v()).collect();
                 largest = raw.iter().fold(largest, |largest, v| largest.max(v.abs()));
@@ -253,9 +394,13 @@ mod tests {
             let on = |k: usize| (first..first + 3).contains(&(k / 10)) && (4..7).contains(&(k % 10));
             ConductanceMap::from_values(10, 10, (0..100).map(|k| if on(k) { 1e-4 } else { 0.0 }).collect())
         };
+        let touched = |name: &str, conductance: ConductanceMap| {
+            let (name, object, scan) = (name.to_owned(), "block".to_owned(), conductance.values().to_vec());
+            Touched { name, object, conductance, scan }
+        };
         FewWiresStudy {
             layout,
-            touches: vec![("high".to_owned(), block(1)), ("low".to_owned(), block(6))],
+            touches: vec![touched("high", block(1)), touched("low", block(6))],
             profile: Profile::named("ideal").unwrap(),
             wires,
             measurements: vec![25, 50, 99],
@@ -277,8 +422,32 @@ mod tests {
         assert_eq!(two.iter().map(|r| (r.0, r.1)).collect::<Vec<_>>(), [(25, 50), (50, 100)]);
         assert_eq!(of(1, "cosine_signs").iter().map(|r| r.0).collect::<Vec<_>>(), [25, 50]);
         assert!(one[2].2 > 0.95 && two[1].2 > 0.95, "{one:?} {two:?}");
-        assert!(report.rows.iter().all(|r| r.saturated == 0.0 && r.worst_iou <= r.iou));
+        assert!(report.rows.iter().all(|r| r.saturated == 0.0 && r.worst_iou <= r.iou && r.classes.is_none()));
+        assert_eq!((report.objects, report.scan_iou, report.again_iou), (1, 1.0, Some(0.0)));
         assert_eq!(report, study(vec![1, 2]).run(&()).unwrap());
+        // three objects of two touches each: all are known by then, and each by what the others look like
+        let one = study(vec![1]);
+        let places = ["high", "low", "both"].into_iter().flat_map(|object| {
+            let block = match object {
+                "high" => one.touches[0].conductance.clone(),
+                "low" => one.touches[1].conductance.clone(),
+                _ => {
+                    let pairs = one.touches[0].conductance.values().iter().zip(one.touches[1].conductance.values());
+                    ConductanceMap::from_values(10, 10, pairs.map(|(a, b)| a + b).collect())
+                }
+            };
+            let touch = Touched {
+                object: object.to_owned(),
+                scan: block.values().to_vec(),
+                conductance: block,
+                ..one.touches[0].clone()
+            };
+            [touch.clone(), touch]
+        });
+        let taught = FewWiresStudy { touches: places.collect(), ..study(vec![1]) }.run(&()).unwrap();
+        assert_eq!((taught.objects, taught.again_iou, taught.scan_classes), (3, Some(1.0), Some(1.0)));
+        assert!(taught.rows.iter().all(|r| r.classes == Some(1.0)), "{:?}", taught.rows);
+        assert!(taught.rows.iter().any(|r| r.left_out_iou > Some(0.9)), "{:?}", taught.rows);
         let refused = study(vec![11]).run(&()).unwrap_err().to_string();
         assert!(refused.contains("`--wires` = 11 is outside [1, 10]"), "{refused}");
     }

@@ -10,6 +10,7 @@ pub mod explore;
 pub mod few_wires;
 pub mod fidelity;
 pub mod firmware;
+pub mod frames;
 pub mod per_object;
 pub mod readouts;
 pub mod sensing;

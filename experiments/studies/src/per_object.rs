@@ -6,7 +6,7 @@
 //! and skin is the mean over objects of |twin − real|.
 
 use crate::calibrate::{SessionEstimates, SessionPair, read};
-use crate::compare::{Banded, readout_refused};
+use crate::compare::{Banded, SHARE, readout_refused};
 use rayon::prelude::*;
 use serde::Serialize;
 use spts::chain::DEFAULT_READOUT;
@@ -230,7 +230,7 @@ fn bands(images: ReadoutImages, real: &[(ObjectScore, f64)], skins: &[Vec<(Objec
     let band = |(score, real): &(ObjectScore, f64)| {
         let same = |skin: &Vec<(ObjectScore, f64)>| skin.iter().find(|(of, _)| of == score).map(|(_, value)| *value);
         let skins: Vec<f64> = skins.iter().map(same).collect::<Option<_>>()?;
-        Some(ObjectBand { images, score: score.clone(), of: Banded::of(*real, &skins, [0.0, 1.0])?, skins })
+        Some(ObjectBand { images, score: score.clone(), of: Banded::of(*real, &skins, SHARE)?, skins })
     };
     real.iter().filter_map(band).collect()
 }
@@ -243,7 +243,8 @@ fn distances(bands: &[ObjectBand]) -> Vec<ScoreDistance> {
     let distance = |(images, decoder, m, score)| {
         let of: Vec<&ObjectBand> = bands.iter().filter(|b| key(b) == (images, decoder, m, score)).collect();
         let mean = |get: &dyn Fn(&ObjectBand) -> f64| of.iter().map(|b| get(b)).sum::<f64>() / of.len() as f64;
-        let outside: Vec<&str> = of.iter().filter(|b| !b.of.inside()).map(|b| b.score.object.as_str()).collect();
+        let outside: Vec<&str> =
+            of.iter().filter(|b| b.of.inside() == Some(false)).map(|b| b.score.object.as_str()).collect();
         ScoreDistance {
             images,
             decoder: decoder.to_owned(),
@@ -484,7 +485,8 @@ mod tests {
     #[test]
     fn a_real_skin_like_the_twin_s_lies_within_the_band() {
         let skins = [0.4, 0.6, 0.4, 0.6].map(|v| vec![score("brain", v)]);
-        let within = |real: f64| bands(ReadoutImages::Twin, &[score("brain", real)], &skins)[0].of.inside();
+        let within =
+            |real: f64| bands(ReadoutImages::Twin, &[score("brain", real)], &skins)[0].of.inside() == Some(true);
         assert!(within(0.5) && within(0.79) && !within(0.81) && !within(0.19));
     }
 

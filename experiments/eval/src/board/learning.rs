@@ -123,7 +123,8 @@ impl<'a> Trainer<'a> {
                         TrainingSource::Published | TrainingSource::Raster if self.layout_only => LAYOUT,
                         source => source.name(),
                     };
-                    let nothing_known = learned_from == LAYOUT || learned_from == SHAPES;
+                    let own = matches!(source, TrainingSource::Published | TrainingSource::Raster);
+                    let nothing_known = learned_from == LAYOUT || learned_from == SHAPES || own && self.layout_only;
                     if nothing_known && needs == Needs::Classes {
                         if !without_classes.contains(&name) {
                             without_classes.push(name);

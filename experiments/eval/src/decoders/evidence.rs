@@ -28,6 +28,9 @@ const UNKNOWN_PRIOR: f64 = 0.01;
 /// of other simulated skins they classify .946 at M = 20, eight .926, thirty .947, and the model without gains .886.
 const OTHER_SKIN_RANK: usize = 20;
 
+/// Matrices of taxels × taxels that a component is learned with: its covariance, and what its eigenvectors take.
+const SQUARES: f64 = 3.0;
+
 struct Classes {
     classifier: EvidenceClassifier,
     images: ImageEstimator,
@@ -52,6 +55,7 @@ const APART: f64 = 0.99;
 const SOLVED: usize = 2;
 
 pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    data.fits_squares("covariances", SQUARES)?;
     if let Some((images, labels)) = data.posed() {
         return posed(images, labels);
     }
@@ -69,6 +73,7 @@ pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
 
 /// A mixture of clusters of procedural shapes: images alone, weighted by the evidence given y.
 pub(super) fn mixture(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    data.fits_squares("covariances", SQUARES)?;
     let clusters = Clusters::with_wide(&SHAPES, data.alike(), APART, &mut ChaCha8Rng::seed_from_u64(SEED));
     let clusters = clusters.map_err(|e| e.at("templates"))?;
     let images = ImageEstimator::non_negative(clusters.priors, SHAPES.noise, SOLVED).map_err(|e| e.at("parameter"))?;

@@ -8,7 +8,7 @@ use crate::session::ScoredSession;
 use rand::RngExt as _;
 use rand::seq::SliceRandom as _;
 use spts_input::Refusal;
-use spts_models::{SkinLayout, Streams, TaxelGains};
+use spts_models::{SkinLayout, Streams, TaxelGains, fits_memory};
 use spts_recon::classify::{Library, Src};
 use spts_recon::dictionary::{Ksvd, Selection, select, shifted};
 use spts_recon::recover::{Gaussian, ImagePrior, Unrolled};
@@ -18,6 +18,9 @@ use std::sync::{Arc, OnceLock};
 
 /// Of so many poses one is in the library of the classifier by images.
 const POSES_OF_A_LIBRARY: usize = 30;
+
+/// Matrices of taxels × taxels that a Gaussian prior is learned with: moments, covariance and its factor and inverse.
+const PRIOR_SQUARES: f64 = 4.0;
 
 /// Dictionary, library, templates and images for priors.
 ///
@@ -262,8 +265,20 @@ impl TrainingData {
         let candidates = self.candidates.as_ref().clone();
         let atoms = learn_dictionary(candidates, &(Selection::default(), Ksvd::default()), self.streams)
             .map_err(|e| e.at("dictionary"))?;
+        let entries = SignTables::<f64>::entries(atoms.nrows(), atoms.ncols());
+        let what = format!("tables of a dictionary of {} images of {} taxels", atoms.ncols(), atoms.nrows());
+        fits_memory(&what, 8.0 * entries)?;
         let learned = Arc::new(Dictionary::new(atoms));
         Ok(Arc::clone(self.dictionary.get_or_init(|| learned)))
+    }
+
+    /// Checks that there is memory for `what` with so many matrices of taxels × taxels.
+    ///
+    /// # Errors
+    /// [`Refusal`] with the size if there is none.
+    pub(crate) fn fits_squares(&self, what: &str, matrices: f64) -> Result<(), Refusal> {
+        let taxels = self.images.nrows();
+        fits_memory(&format!("{what} of {taxels} × {taxels} taxels"), 8.0 * matrices * (taxels as f64).powi(2))
     }
 
     /// A prior of the images, cleaned and shifted as `how` says.
@@ -271,6 +286,7 @@ impl TrainingData {
     /// # Errors
     /// [`Refusal`].
     pub fn prior(&self, how: ImagePrior) -> Result<Arc<Gaussian>, Refusal> {
+        self.fits_squares("a prior", PRIOR_SQUARES)?;
         let how = if self.random_shapes {
             ImagePrior { reach: 0, stay: 1.0, threshold: 0.0, ..ImagePrior::UNSEEN }
         } else {
@@ -412,4 +428,24 @@ pub(super) fn learn_dictionary(
     candidates.shuffle(&mut streams.rng("training", 0));
     let chosen: Vec<Vec<f64>> = select(&candidates, selection).into_iter().map(|i| candidates[i].clone()).collect();
     ksvd.learn(&chosen, &mut streams.rng("ksvd", 0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 400,000 taxels: a prior would take terabytes.
+    #[test]
+    fn what_does_not_fit_is_told_by_its_size() {
+        let images = Matrix::from_column_slices(400_000, &[vec![1.0; 400_000]]);
+        let data = TrainingData::of_images(images, &[1], 400, Streams::new(1)).unwrap();
+        let said = |of: Result<(), Refusal>| of.unwrap_err().to_string();
+        let prior = said(data.prior(ImagePrior::SEEN).map(drop));
+        assert!(prior.starts_with("a prior of 400000 × 400000 taxels takes 5120.0 GB of memory, and "), "{prior}");
+        for spec in ["evidence", "mixture", "nn_lmmse"] {
+            let spec = crate::decoders::find(spec).unwrap();
+            let error = said((spec.train)(&data).map(drop));
+            assert!(error.contains("GB of memory, and "), "{}: {error}", spec.name);
+        }
+    }
 }

@@ -1,19 +1,28 @@
-//! Estimates the gains of a skin's taxels from raster presses of objects that the simulation knows.
+//! Estimates the gains of a skin's taxels from raster presses of objects that the simulation knows, or under known
+//! pressures.
 
 use super::statistics::middle;
 use super::{CalibrationStudy, SessionEstimates, read};
 use serde::Serialize;
+use spts::chain::{ChainConfig, SkinSession};
+use spts::data::SessionSet;
 use spts::progress::Progress;
+use spts::session::Event;
+use spts_contact::objects::OBJECTS;
 use spts_eval::training::{BAND_SD, GainCheck, SkinGains, Skins, TrainingPresses, templates};
 use spts_eval::{ScoredSession, Source};
 use spts_input::Refusal;
-use spts_models::{TaxelGains, VelostatConfig};
+use spts_models::{Streams, TaxelGains, VelostatConfig};
+use spts_recon::Matrix;
 use spts_recon::classify::Library;
+use spts_recon::statistics::mean;
 use std::path::Path;
 
 /// First and last press of a compressive session that tell what its mounting changes: none that is scored where there
 /// are fifteen or more.
 const MOUNTED_PRESSES: (usize, usize) = (1, 5);
+/// Time for which a pressure that is known has acted, s: creep is over for the most part.
+const PRESSED_S: f64 = 0.5;
 /// Simulated presses of every object: they differ by the arm's repeatability alone.
 const PRESSES: usize = 4;
 
@@ -65,7 +74,8 @@ impl SkinStudy {
     /// Fits the gains to the recordings in `root`. Scored raster presses are used only if there are no others.
     ///
     /// # Errors
-    /// [`Refusal`] if the recordings are not usable, or the simulation knows none of their objects.
+    /// [`Refusal`] if the recordings are not usable, or neither the simulation knows one of their objects nor the
+    /// sessions have pressures.
     pub fn run(&self, root: &Path, progress: &dyn Progress) -> Result<SkinReport, Refusal> {
         let source = Source::open(root)?;
         if source.sessions.iter().all(|s| s.raster.is_none()) {
@@ -77,13 +87,20 @@ impl SkinStudy {
         let mountings = mountings(root, progress)?;
         let logs: Vec<f64> = mountings.iter().map(|m| m.log_sd).collect();
         let mounting_log_sd = if logs.is_empty() { VelostatConfig::default().session_log_sd } else { middle(&logs) };
-        let skins = Skins { skins: PRESSES, ..Skins::median(source.layout) };
-        progress.stage("simulating presses", Some(PRESSES * spts_contact::objects::OBJECTS.len()));
-        let simulated = skins.press(self.seed, &|| progress.step());
-        progress.end();
-        let simulated = images(&simulated.map_err(unknown_gains)?, &|_| true)?;
+        let known = known_pressures(root, &source)?;
+        let is_known = |s: &ScoredSession| s.raster.is_none() || known.iter().any(|known| known.label == s.label);
+        let simulated = if source.sessions.iter().all(is_known) {
+            Vec::new()
+        } else {
+            let skins = Skins { skins: PRESSES, ..Skins::median(source.layout) };
+            progress.stage("simulating presses", Some(PRESSES * OBJECTS.len()));
+            let simulated = skins.press(self.seed, &|| progress.step());
+            progress.end();
+            simulated.map_err(unknown_gains)?
+        };
+        let simulated = with_known(&simulated, &known, source.layout.taxels())?;
         let estimate = |used: &dyn Fn(&ScoredSession) -> bool| -> Result<SkinGains, Refusal> {
-            let skin = images(&source.sessions, used)?;
+            let skin = without_offsets(&images(&source.sessions, used)?, &known)?;
             SkinGains::estimate(&skin, &simulated, mounting_log_sd).map_err(unknown_gains)
         };
         let mut objects = Vec::new();
@@ -108,6 +125,68 @@ impl SkinStudy {
             objects,
         })
     }
+}
+
+/// An object whose pressures are known.
+struct Known {
+    label: usize,
+    /// Sum over its presses of the conductances at gain 1, S.
+    image: Vec<f64>,
+    /// Mean output of taxels without a pressure in the raster scans, V: cells that are not selected do not put out 0 V
+    /// exactly, which adds the same to every taxel.
+    offset_v: f64,
+}
+
+/// The objects that the simulation does not know, but whose pressures the sessions in `root` have.
+fn known_pressures(root: &Path, source: &Source) -> Result<Vec<Known>, Refusal> {
+    let median = [("spread_log_sd".to_owned(), 0.0.into()), ("session_log_sd".to_owned(), 0.0.into())];
+    let config = ChainConfig { transducer_parameters: median.into_iter().collect(), ..ChainConfig::default() };
+    let mut known: Vec<Known> = Vec::new();
+    for session in SessionSet::open(root)?.sessions.iter().filter(|session| session.event == Event::Press) {
+        let is_simulated = OBJECTS.iter().any(|object| object.name == session.object);
+        let scored = source.sessions.iter().find(|scored| scored.name == session.name);
+        let (Some(scored), Some(raster), false) = (scored, &session.raster, is_simulated) else { continue };
+        let mut skin = SkinSession::new(&config, &source.layout, Streams::new(0), 0)?;
+        let mut image = vec![0.0; source.layout.taxels()];
+        let mut offsets_v = Vec::new();
+        for (press, facts) in raster.presses.iter().enumerate().skip(raster.conditioning) {
+            let Some(pressure) = &facts.pressure else { continue };
+            let conductance = skin.hold(pressure, PRESSED_S);
+            skin.rest();
+            image.iter_mut().zip(conductance.values()).for_each(|(total, g)| *total += g);
+            let hold = &scored.raster_protocol;
+            let frames = hold.first_frame..(hold.first_frame + hold.frames).min(raster.recording.frames());
+            let volts = frames.flat_map(|frame| raster.recording.volts(press, frame).iter().zip(pressure.values()));
+            offsets_v.extend(volts.filter(|(_, p)| **p <= 0.0).map(|(v, _)| *v));
+        }
+        if image.iter().any(|g| *g > 0.0) && !known.iter().any(|known| known.label == scored.label) {
+            known.push(Known { label: scored.label, image, offset_v: mean(&offsets_v).unwrap_or(0.0) });
+        }
+    }
+    Ok(known)
+}
+
+/// The images of the `simulated` sessions and the `known` ones, of `taxels` taxels each.
+fn with_known(simulated: &[ScoredSession], known: &[Known], taxels: usize) -> Result<Library, Refusal> {
+    let mut labels: Vec<usize> = known.iter().map(|known| known.label).collect();
+    let mut columns: Vec<Vec<f64>> = known.iter().map(|known| known.image.clone()).collect();
+    if !simulated.is_empty() {
+        let library = images(simulated, &|_| true)?;
+        labels.extend(library.labels());
+        columns.extend((0..library.labels().len()).map(|k| library.images().column(k)));
+    }
+    Library::new(&Matrix::from_column_slices(taxels, &columns), &labels).map_err(unknown_gains)
+}
+
+/// The images without the offsets of the objects whose pressures are known.
+fn without_offsets(images: &Library, known: &[Known]) -> Result<Library, Refusal> {
+    let column = |(k, label): (usize, &usize)| {
+        let offset_v = known.iter().find(|known| known.label == *label).map_or(0.0, |known| known.offset_v);
+        images.images().column(k).iter().map(|v| (v - offset_v).max(0.0)).collect()
+    };
+    let columns: Vec<Vec<f64>> = images.labels().iter().enumerate().map(column).collect();
+    let matrix = Matrix::from_column_slices(images.images().nrows(), &columns);
+    Library::new(&matrix, images.labels()).map_err(unknown_gains)
 }
 
 fn unknown_gains(error: impl std::error::Error + Send + Sync + 'static) -> Refusal {
