@@ -100,3 +100,22 @@ def test_auto():
     image[3:6, 4:9] = 1.0
     named = spts.decode(phi, phi @ image.ravel(), (12, 12), decoder=spts.auto((12, 12)))
     assert np.array_equal(spts.decode(phi, phi @ image.ravel(), (12, 12)), named)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_frames_make_a_data_set(tmp_path):
+    sessions = [
+        spts.Session.from_frames(movie(3) * (k + 1), 100, "pressure", pitch=0.01, name=name, idle=5)
+        for k, name in enumerate(["one", "two"])
+    ]
+    data = spts.dataset.make(frames=sessions, folder=tmp_path / "set", set={"record.measurements": 12})
+    assert len(data) == 6 and data.shape == (6, 8) and list(data["object"][:2]) == ["one", "two"]
+    pressure = data["pressure_pa"].reshape(6, 6, 8)
+    assert np.allclose(pressure[1], movie(3)[0, 10] * 2) and np.allclose(pressure[2], movie(3)[1, 10])
+    assert (tmp_path / "set_frames" / "two" / "session.json").exists()
+    again = spts.dataset.make(frames=tmp_path / "set_frames", folder=tmp_path / "more", rows=18)
+    assert len(again) == 18 and np.array_equal(again["pressure_pa"][:6], data["pressure_pa"])
+    with pytest.raises(TypeError, match="`spec` or `frames`"):
+        spts.dataset.make()
+    with pytest.raises(ValueError, match="nowhere"):
+        spts.dataset.make(frames=tmp_path / "nowhere", folder=tmp_path / "none")

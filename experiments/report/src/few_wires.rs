@@ -8,7 +8,7 @@ use spts_eval::decoders::short_label;
 use spts_eval::unique;
 use spts_input::Refusal;
 use spts_models::SkinLayout;
-use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
+use spts_recon::metrics::{SUPPORT_THRESHOLD, median, support};
 use spts_studies::few_wires::{FewWires, FewWiresReport, Touched};
 use spts_studies::frames::{FramesReport, LawCheck, ObjectFrames};
 
@@ -163,7 +163,8 @@ impl FewWiresPage<'_> {
             id: "frames".to_owned(),
             title: "What the frames say".to_owned(),
             lead: format!(
-                "How well the presses of an object repeat, and how far they drift while they are held. {}",
+                "How well the presses of an object repeat, and how far they drift while they are held. {} {}",
+                medians(self.frames),
                 ceiling(report)
             ),
             figures: Vec::new(),
@@ -247,6 +248,18 @@ fn laws(report: &FramesReport) -> Table<'_, &LawCheck> {
         .digits(2)
 }
 
+/// The medians over the objects of what their presses have.
+fn medians(report: &FramesReport) -> String {
+    let of = |get: fn(&ObjectFrames) -> Option<f64>| median(&report.objects.iter().filter_map(get).collect::<Vec<_>>());
+    let said = [
+        of(|o| o.repeatability).map(|r| format!("images alike r = {r:.4}")),
+        of(|o| o.spread).map(|spread| format!("sums differ by {:.1} %", 100.0 * spread)),
+        of(|o| o.drift).map(|drift| format!("drift of the hold {:.1} %", 100.0 * drift)),
+    ];
+    let said = said.into_iter().flatten().collect::<Vec<_>>().join(", ");
+    if said.is_empty() { String::new() } else { format!("Medians of the objects: {said}.") }
+}
+
 /// What a scan and another press of the same object have.
 fn ceiling(report: &FewWiresReport) -> String {
     let again = report.again_iou.map(|iou| format!("; another press of the same object has {iou:.2}"));
@@ -264,8 +277,9 @@ fn ceiling(report: &FewWiresReport) -> String {
 pub fn text(report: &FewWiresReport, frames: &FramesReport) -> String {
     let laws = if frames.laws.is_empty() { String::new() } else { format!("{}\n", laws(frames).text()) };
     format!(
-        "{}\n{laws}{}{} touches of {}, decoder {}. {}",
+        "{}{}\n\n{laws}{}{} touches of {}, decoder {}. {}",
         objects(frames).text(),
+        medians(frames),
         table(report).text(),
         report.touches,
         if report.objects == 1 { "one object".to_owned() } else { format!("{} objects", report.objects) },
