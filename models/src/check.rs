@@ -73,8 +73,8 @@ fn holds(interval: &str, value: f64) -> Option<bool> {
     Some(above && if closed { value <= high } else { value < high })
 }
 
-/// Checks that so many bytes of memory are free for `what`, such as "a prior of 65,536 × 65,536 taxels". Where the system
-/// does not say how much is free, nothing is checked.
+/// Checks that so many bytes of memory are free for `what`, such as "a prior of 65,536 × 65,536 taxels". Where the
+/// system does not say how much is free, nothing is checked.
 ///
 /// ```
 /// use spts_models::fits_memory;

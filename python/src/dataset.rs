@@ -23,8 +23,8 @@ impl DataFolder {
         Ok(Self { dataset })
     }
 
-    /// Begins the data set of `spec`, a file or a name, in `folder`, or goes on with it; `overrides` are other values. An
-    /// empty `spec` has defaults alone.
+    /// Begins the data set of `spec`, a file or a name, in `folder`, or goes on with it; `overrides` are other values.
+    /// An empty `spec` has defaults alone.
     #[staticmethod]
     fn begin(py: Python<'_>, spec: &str, folder: PathBuf, overrides: &Bound<'_, PyDict>) -> PyResult<Self> {
         let overrides = table("overrides", overrides)?;

@@ -17,8 +17,8 @@ use spts_eval::training::TrainingData;
 use spts_eval::{Press, PressRows};
 use std::sync::Arc;
 
-/// Most taxels of a decoder that keeps matrices of taxels x taxels.
-const MOST_TAXELS: usize = TrainingData::MOST_TAXELS;
+/// Most taxels of a skin.
+const MOST_TAXELS: usize = 1 << 20;
 
 /// Class of a window that is of none.
 const NO_CLASS: i64 = -1;

@@ -111,7 +111,8 @@ impl Default for SplitConfig {
 pub struct ObjectConfig {
     /// Source of the objects. Default: procedural shapes.
     pub from: ObjectSource,
-    /// Names of the objects, families, mesh files or objects of frames to use. Default: all of the source; mesh files in order of name.
+    /// Names of the objects, families, mesh files or objects of frames to use. Default: all of the source; mesh files
+    /// in order of name.
     pub names: Option<Vec<String>>,
     /// Folder with mesh files (`.obj`, `.glb`, `.stl`), or with sessions of frames, relative to the specification. Only
     /// for `from = "meshes"` and `"frames"`.
@@ -125,7 +126,8 @@ pub struct ObjectConfig {
     pub repair: Option<Repair>,
     /// Whether the origin of a mesh file becomes the middle of its footprint. Default: no.
     pub centre: Option<bool>,
-    /// Number of consecutive rows with the same shape; a whole number of presses. Default about 100; of frames one press.
+    /// Number of consecutive rows with the same shape; a whole number of presses. Default about 100; of frames one
+    /// press.
     pub rows_per_shape: Option<u64>,
     /// Number of simultaneous objects; a draw of whole numbers in [1, 3], once for every press. Default 1.
     pub count: Draw,

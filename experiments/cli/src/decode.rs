@@ -23,8 +23,8 @@ use std::path::{Path, PathBuf};
 /// SESSION is a folder with session.json, as `spts simulate` leaves one, a folder of such folders, or recordings of the
 /// real skin. Each session is decoded with its own rows of weights, whatever its layout. The decoders learn from raster
 /// presses that are not scored. Where there are none, they use a prior made for the layout: random shapes anywhere on
-/// it. Scores are given where the truth is known: the pressure or conductance of the same press, else the raster
-/// scan of another press of the object.
+/// it. Scores are given where the truth is known: the conductances of the same press, else the raster scan of another
+/// press of the object.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts simulate press/T --out out/T && spts decode out/T

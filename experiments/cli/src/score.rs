@@ -18,10 +18,11 @@ use spts_eval::anytime::{self, StopSettings};
 use spts_eval::board::{
     BoardSettings, Difference, Regression, ScoreBoard, TrainedBoard, differences, regressions, table,
 };
-use spts_eval::decoders::{DECODERS, no_confidence, not_in_time};
+use spts_eval::decode::DecodeRequest;
+use spts_eval::decoders::{DECODERS, auto, no_confidence, not_in_time};
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::{
-    CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainedNetwork, TrainingSource,
+    CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainedNetwork, TrainingData, TrainingSource,
     simulated_gain_sd,
 };
 use spts_eval::{ScoredSession, Sensing, Source, in_time, slips_text};
@@ -34,8 +35,9 @@ use std::time::Duration;
 /// Scores decoders side by side on recordings of a skin.
 ///
 /// Every decoder sees the same windows of M consecutive measurements of the scored presses, and is scored against the
-/// same true image. If a session has fewer than 15 presses, all are scored. Of a longer session, ten presses are
-/// scored; those before them condition the skin.
+/// same true image: the conductances of the press where a simulation knows them, else a raster scan of another press.
+/// If a session has fewer than 15 presses, all are scored. Of a longer session, ten presses are scored; those before
+/// them condition the skin.
 ///
 /// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes
 /// of 20 windows, and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in
@@ -365,6 +367,19 @@ impl ScoreCommand {
     /// The same without decoders that nobody named and that have no weights for the skin.
     fn fitting(&self, mut settings: BoardSettings, scored: &Source) -> BoardSettings {
         let layout = &scored.layout;
+        let taxels = layout.taxels();
+        if taxels > TrainingData::MOST_TAXELS && !scored.learns() && self.decoder.is_empty() {
+            let auto = auto([layout.rows(), layout.cols()], self.weights.is_some());
+            settings.decoders.retain(|spec| spec.name == "empty");
+            settings.decoders.push(auto);
+            note(&format!(
+                "note: {taxels} taxels and nothing to learn from: {} is scored, beside an empty image",
+                auto.name
+            ));
+        }
+        if taxels > TrainingData::MOST_TAXELS && self.measurements.is_empty() {
+            settings.measurements = DecodeRequest::default_measurements(taxels);
+        }
         let fits = TrainedNetwork::shipped().on([layout.rows(), layout.cols()]);
         if let (true, None, Err(error)) = (self.decoder.is_empty(), &self.weights, fits) {
             let before = settings.decoders.len();

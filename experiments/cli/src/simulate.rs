@@ -271,10 +271,12 @@ impl SimulateCommand {
         notes(&summary.notes);
         let writing = spinner("writing");
         if !self.no_record && !decodes {
-            let most = TrainingData::MOST_TAXELS;
             note(&format!(
-                "note: a skin of more than {MOST_DECODED} taxels is not decoded here; `spts decode` takes up to {most}"
+                "note: a skin of more than {MOST_DECODED} taxels is not decoded here; `spts decode` does it"
             ));
+        }
+        if let Some(scan) = simulation.first.as_ref().and_then(long_scan) {
+            note(&scan);
         }
         let decoded = match simulation.first.as_ref().zip(learned.as_ref()) {
             Some((session, learned)) => learned.decoded(session)?,
@@ -289,6 +291,20 @@ impl SimulateCommand {
         let text = || format!("{}\n{}: {}", summary.table(), out.display(), names.join(", "));
         self.common.print(&summary, text)
     }
+}
+
+/// What is to be said of a session in which a scan of all taxels takes longer than the object is held.
+fn long_scan(session: &Session) -> Option<String> {
+    let raster = session.raster()?;
+    let scan_s = raster.measurements_per_frame() as f64 / raster.sample_rate_hz();
+    let held_s = session.hold_s.map(|[start_s, end_s]| end_s - start_s)?;
+    (scan_s > held_s).then(|| {
+        format!(
+            "note: a scan of {} taxels takes {scan_s:.2} s, and the hold lasts {held_s:.2} s: no scan shows it alone; press.lift_s \
+             and press.duration_s make it longer",
+            raster.taxels()
+        )
+    })
 }
 
 /// What decodes a session as `spts decode` does unless told otherwise.

@@ -88,8 +88,10 @@ pub trait Algorithm {
     /// [`DecodeError::External`] only.
     fn decode_all(&mut self, windows: &[Window<'_>]) -> Result<Vec<Answer>, DecodeError> {
         let mut answers = vec![Answer::default(); windows.len()];
+        let mut rows = Vec::new();
         for (window, answer) in windows.iter().zip(&mut answers) {
-            match self.decode(window, answer) {
+            let window = if self.takes_bits() { *window } else { window.with_rows(&mut rows) };
+            match self.decode(&window, answer) {
                 Err(error @ DecodeError::External(_)) => return Err(error),
                 Err(_) => {
                     *answer =
@@ -99,6 +101,11 @@ pub trait Algorithm {
             }
         }
         Ok(answers)
+    }
+
+    /// Whether rows as bits will do, so that windows of large skins need no rows of numbers.
+    fn takes_bits(&self) -> bool {
+        false
     }
 
     /// Whether windows are decoded in batches, so that the time of a single one has no meaning.

@@ -109,7 +109,7 @@ pub struct MeasuredWindow {
     pub window: usize,
     /// Number of measurements.
     pub m: usize,
-    /// Rows of weights, M × taxels.
+    /// Rows of weights, M × taxels; empty for many measurements of a large skin.
     pub phi: Vec<f64>,
     /// Output of the summing amplifier minus that of the untouched skin, V.
     pub y: Vec<f64>,
@@ -136,10 +136,11 @@ pub(crate) fn untrained(decoder: &str, error: Refusal) -> Refusal {
 }
 
 impl DecodeRequest {
-    /// Default numbers of measurements for a skin of `taxels` taxels: 7, 20 and 50 for 100 taxels, and the same shares
-    /// of other numbers.
+    /// Default numbers of measurements for a skin of `taxels` taxels: 7, 20 and 50 % of them, and 1, 2 and 5 % of more
+    /// than 2,048.
     pub fn default_measurements(taxels: usize) -> Vec<usize> {
-        let mut shares: Vec<usize> = [7, 20, 50].map(|m| (m * taxels).div_ceil(100)).to_vec();
+        let percent = if taxels > TrainingData::MOST_TAXELS { [1, 2, 5] } else { [7, 20, 50] };
+        let mut shares: Vec<usize> = percent.map(|m| (m * taxels).div_ceil(100)).to_vec();
         shares.dedup();
         shares
     }
@@ -193,7 +194,7 @@ impl DecodeRequest {
         let longest = self.measurements.iter().copied().max().unwrap_or(0) * self.windows;
         let blocks = begins.par_iter().enumerate().map(|(block, &(start, ref untouched))| {
             let press = untouched.press(recording, block, start..start + longest);
-            let truth = own_truth(session, block).or_else(|| scored.truth(block));
+            let truth = scored.truth(block);
             let all = |m: usize| press.windows(0..m * self.windows, m, m);
             let measured = self.measurements.iter().flat_map(|&m| all(m)).map(|(at, window)| MeasuredWindow {
                 block,
@@ -269,18 +270,10 @@ impl LearnedDecoders {
     }
 }
 
-/// The image that is known of block `block` itself: its pressure or, without one, its conductances. `None` where
-/// neither is known, and for touches under a preload, of which either is more than the touch.
-fn own_truth(session: &Session, block: usize) -> Option<Truth> {
-    let facts = session.compressive.as_ref().filter(|_| session.event != Event::Touch)?.facts(block)?;
-    let pressure = facts.pressure.as_ref().map(|map| map.values());
-    Some(Truth::of(pressure.or(facts.conductance.as_ref().map(|map| map.values()))?.to_vec()))
-}
-
 /// First measurement of the hold of every block, and the untouched skin before it. It is the first of the contact where
 /// something fell on the skin, or touched one that is under preload.
 fn begins(session: &Session, recording: &Recording, scored: &ScoredSession) -> Vec<(usize, Untouched)> {
-    let hold = scored.protocol.first_frame * recording.measurements_per_frame();
+    let hold = scored.protocol.measurements(recording).start;
     let (mut contacts, mut touches) = (Vec::new(), Vec::new());
     match session.event {
         Event::Drop => contacts = find_bounces(recording),
@@ -325,7 +318,8 @@ pub fn write(decoded: &[(&Session, DecodedSession)], out: &mut OutputFolder) -> 
     Ok(())
 }
 
-/// Writes the archive `path`. For every M: `phi_mM` (windows × M × taxels), `y_mM` (windows × M, V), `block_mM` and
+/// Writes the archive `path`. For every M: `phi_mM` (windows × M × taxels; left out where it is not kept as numbers),
+/// `y_mM` (windows × M, V), `block_mM` and
 /// `window_mM`, and for every decoder `image_DECODER_mM` (windows × rows × cols). `truth` is blocks × rows × cols, NaN
 /// where none is known.
 ///
@@ -342,7 +336,10 @@ fn write_arrays(path: &Path, session: &DecodedSession) -> Result<(), Refusal> {
         let n = windows.len();
         let column = |of: fn(&MeasuredWindow) -> usize| windows.iter().map(|w| of(w) as f64).collect();
         let values = |of: fn(&MeasuredWindow) -> &[f64]| windows.iter().flat_map(|w| of(w)).copied().collect();
-        arrays.push((format!("phi_m{m}"), vec![n, m, taxels], values(|w| &w.phi)));
+        let phi: Vec<f64> = values(|w| &w.phi);
+        if phi.len() == n * m * taxels {
+            arrays.push((format!("phi_m{m}"), vec![n, m, taxels], phi));
+        }
         arrays.push((format!("y_m{m}"), vec![n, m], values(|w| &w.y)));
         arrays.push((format!("block_m{m}"), vec![n], column(|w| w.block)));
         arrays.push((format!("window_m{m}"), vec![n], column(|w| w.window)));

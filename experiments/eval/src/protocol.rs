@@ -42,6 +42,8 @@ pub struct Protocol {
     pub first_frame: usize,
     /// Number of frames scored.
     pub frames: usize,
+    /// First measurement scored and one beyond the last, where frames are too long to tell the hold from the rest.
+    pub span: Option<[usize; 2]>,
     /// Distance between the starts of windows for the support scores, frames.
     pub support_stride: usize,
     /// Largest number of windows of a press for the classification scores; they follow each other without a gap.
@@ -59,6 +61,7 @@ impl Default for Protocol {
             presses: 10,
             first_frame: 500,
             frames: 200,
+            span: None,
             support_stride: 10,
             max_windows: 300,
             vote: 20,
@@ -85,6 +88,9 @@ impl Protocol {
         };
         let first = first.min(frames - 1);
         let end = end.clamp(first + 1, frames);
+        let span = hold_s.map(|hold_s| hold_s.map(|time_s| measurement_at(recording, time_s)));
+        // a scan is made of whole frames
+        let coarse = recording.mode() == Mode::Compressive && end - first < FEWEST_FRAMES;
         let few = blocks < FEW_PRESSES && (recording.mode() == Mode::Compressive || recorded.conditioning == 0);
         let all = few || blocks <= recorded.conditioning;
         let first_press = if all { 0 } else { recorded.conditioning };
@@ -93,6 +99,7 @@ impl Protocol {
             presses: if all { blocks } else { published.presses },
             first_frame: first,
             frames: end - first,
+            span: span.filter(|[start, end]| coarse && start < end),
             support_stride: in_frames(published.support_stride * PUBLISHED_TAXELS),
             truth: (
                 published.truth.0.max(first_press).min(blocks - 1),
@@ -100,6 +107,14 @@ impl Protocol {
             ),
             ..published
         }
+    }
+
+    /// The scored measurements of a block of `recording`.
+    pub fn measurements(&self, recording: &Recording) -> Range<usize> {
+        let per_frame = recording.measurements_per_frame();
+        let first = self.first_frame.min(recording.frames());
+        let end = (first + self.frames).min(recording.frames());
+        self.span.map_or(first * per_frame..end * per_frame, |[start, end]| start..end)
     }
 
     /// The scored presses of `recording`.
@@ -110,9 +125,20 @@ impl Protocol {
 
     /// Number of classification windows of `m` measurements in a press; only complete votes count.
     pub fn windows(&self, m: usize, measurements_per_frame: usize) -> usize {
-        let fitting = self.frames * measurements_per_frame / m.max(1);
+        let all = self.span.map_or(self.frames * measurements_per_frame, |[start, end]| end - start);
+        let fitting = all / m.max(1);
         fitting.min(self.max_windows) / self.vote * self.vote
     }
+}
+
+/// Fewest frames of a hold that tell it from the rest of a press.
+const FEWEST_FRAMES: usize = 10;
+
+/// Measurement of `recording` at `time_s` since the start of a block.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a block")]
+fn measurement_at(recording: &Recording, time_s: f64) -> usize {
+    let most = (recording.frames() * recording.measurements_per_frame()) as f64;
+    (time_s * recording.sample_rate_hz()).round().clamp(0.0, most) as usize
 }
 
 /// Frame of `recording` at `time_s` since the start of a block.

@@ -162,7 +162,7 @@ impl<'a> Scorer<'a> {
         tally.failed += answers.iter().filter(|a| a.failed).count();
         let decisions: Vec<Option<usize>> = answers.iter().map(|a| self.class(a)).collect();
         tally.decisions(&decisions, label, vote);
-        let groups = windows.chunks_exact(vote.max(1));
+        let groups = windows.chunks_exact(vote.max(1)).take_while(|group| group.iter().all(Window::has_rows));
         let summed: Option<Vec<Option<usize>>> =
             groups.map(|group| self.algorithm.sum(group).map(Class::label)).collect();
         tally.summed(&summed.unwrap_or_default(), label);
@@ -187,9 +187,11 @@ pub fn decode_us(decoder: &TrainedDecoder, press: &Press, m: usize, most: usize)
     }
     let mut answer = Answer::default();
     let mut times = Vec::with_capacity(windows.len());
+    let mut rows = Vec::new();
     for window in &windows {
+        let window = if algorithm.takes_bits() { *window } else { window.with_rows(&mut rows) };
         let begin = Instant::now();
-        let outcome = algorithm.decode(black_box(window), &mut answer);
+        let outcome = algorithm.decode(black_box(&window), &mut answer);
         let elapsed = begin.elapsed();
         black_box(&answer);
         match outcome {

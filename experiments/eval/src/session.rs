@@ -56,13 +56,14 @@ impl ScoredSession {
         }
     }
 
-    /// Ground truth of block `block` of the compressive recording: the raster scan of the object or, without one, the
-    /// image known from the simulation. `None` if there is neither.
+    /// Ground truth of block `block` of the compressive recording: the conductances if a simulation knows them, else
+    /// the raster scan of the object. `None` if there is neither.
     pub fn truth(&self, block: usize) -> Option<Truth> {
-        if let Some(raster) = self.raster.as_ref().filter(|_| self.held) {
-            return Some(Truth::new(raster, &self.raster_protocol));
+        if let Some(Some(conductances)) = self.simulated.get(block) {
+            return Some(Truth::of(conductances.clone()));
         }
-        Some(Truth::of(self.simulated.get(block)?.clone()?))
+        let raster = self.raster.as_ref().filter(|_| self.held)?;
+        Some(Truth::new(raster, &self.raster_protocol))
     }
 
     /// Name in score tables: the object's; for a further session of the same object, the session's own.

@@ -127,6 +127,11 @@ impl Source {
         Ok(Self { sessions, root, bounces, touches, published, missing, simulated, layout, labels, slips, note })
     }
 
+    /// Whether there are raster presses that are not scored, to learn from.
+    pub fn learns(&self) -> bool {
+        self.sessions.iter().filter_map(TrainingPresses::unscored).any(|presses| !presses.is_empty())
+    }
+
     /// Training data for this skin: raster presses that are not scored, with the published dictionary and library if
     /// they exist, and the names of the classes. Without such presses, it is a prior made for the layout, without
     /// classes.

@@ -8,13 +8,17 @@ use spts_recon::{Matrix, MatrixView};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Rows of weights of consecutive measurements. Presses recorded at the same rows share them.
+/// Rows of weights of consecutive measurements. Presses recorded at the same rows share them. Of many rows of ±1 on a
+/// large skin the bits alone are kept.
 #[derive(Debug, Clone)]
 pub struct PressRows {
     taxels: usize,
     phi: Vec<f64>,
     signs: Option<Vec<u64>>,
 }
+
+/// Most weights that are kept as numbers where bits will do: 1 GB.
+const MOST_NUMBERS: usize = 1 << 27;
 
 /// Consecutive measurements of one press, or of one contact of a ball, with their rows of weights.
 ///
@@ -41,7 +45,7 @@ pub struct Press {
 /// The M samples that are decoded together, with their rows of the sensing matrix.
 #[derive(Debug, Clone, Copy)]
 pub struct Window<'a> {
-    /// Rows of weights, M × taxels.
+    /// Rows of weights, M × taxels; 0 × taxels where they are kept as bits alone ([`Window::with_rows`]).
     pub phi: MatrixView<'a>,
     /// The rows as bits, if all weights are ±1: [`WeightRows::sign_bits`].
     pub signs: Option<&'a [u64]>,
@@ -62,13 +66,33 @@ impl<'a> Window<'a> {
         (0..self.y.len()).map(|k| self.part(k..k + 1))
     }
 
+    /// Whether the rows are there as numbers.
+    pub fn has_rows(&self) -> bool {
+        self.phi.nrows() == self.y.len()
+    }
+
+    /// The window with its rows as numbers, which are formed in `rows` if only their bits are kept.
+    pub fn with_rows<'b>(&self, rows: &'b mut Vec<f64>) -> Window<'b>
+    where
+        'a: 'b,
+    {
+        let (Some(signs), false) = (self.signs, self.has_rows()) else { return *self };
+        let taxels = self.phi.ncols();
+        rows.clear();
+        for row in signs.chunks_exact(taxels.div_ceil(64).max(1)) {
+            rows.extend((0..taxels).map(|k| if row[k / 64] >> (k % 64) & 1 == 1 { 1.0 } else { -1.0 }));
+        }
+        // as many numbers as rows times taxels
+        Window { phi: MatrixView::new(self.y.len(), taxels, rows).unwrap_or(self.phi), ..*self }
+    }
+
     fn part(&self, range: Range<usize>) -> Self {
         let taxels = self.phi.ncols();
         let words = taxels.div_ceil(64);
-        let phi = &self.phi.values()[range.start * taxels..range.end * taxels];
+        let phi = self.phi.values().get(range.start * taxels..range.end * taxels);
         Self {
             // as many numbers as rows times taxels
-            phi: MatrixView::new(range.len(), taxels, phi).unwrap_or(self.phi),
+            phi: phi.and_then(|phi| MatrixView::new(range.len(), taxels, phi).ok()).unwrap_or(self.phi),
             signs: self.signs.map(|signs| &signs[range.start * words..range.end * words]),
             volts: &self.volts[range.clone()],
             y: &self.y[range],
@@ -79,7 +103,14 @@ impl<'a> Window<'a> {
 impl PressRows {
     /// The weights of `rows`.
     pub fn new(rows: WeightRows<'_>) -> Self {
-        Self { taxels: rows.taxels(), phi: rows.to_vec(), signs: rows.sign_bits() }
+        let signs = rows.sign_bits();
+        let large = signs.is_some() && rows.len().saturating_mul(rows.taxels()) > MOST_NUMBERS;
+        Self { taxels: rows.taxels(), phi: if large { Vec::new() } else { rows.to_vec() }, signs }
+    }
+
+    /// The rows in `range` as numbers: none of them where bits alone are kept.
+    fn numbers(&self, range: Range<usize>) -> &[f64] {
+        self.phi.get(range.start * self.taxels..range.end * self.taxels).unwrap_or_default()
     }
 
     /// The weights in `phi`, measurements × taxels.
@@ -92,7 +123,7 @@ impl PressRows {
     /// The rows with the numbers `indices`, in this order.
     fn picked(&self, indices: &[usize]) -> Self {
         let words = self.taxels.div_ceil(64);
-        let rows = indices.iter().flat_map(|&k| &self.phi[k * self.taxels..(k + 1) * self.taxels]);
+        let rows = indices.iter().flat_map(|&k| self.numbers(k..k + 1));
         let signs = self.signs.as_ref().map(|signs| {
             let rows = indices.iter().flat_map(|&k| &signs[k * words..(k + 1) * words]);
             rows.copied().collect()
@@ -101,7 +132,11 @@ impl PressRows {
     }
 
     /// The weights with taxel k renumbered as `to(k)`.
+    ///
+    /// # Panics
+    /// If the rows are kept as bits alone.
     pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
+        assert!(self.signs.as_ref().is_none_or(Vec::is_empty) || !self.phi.is_empty(), "rows as bits are not renamed");
         let mut phi = vec![0.0; self.phi.len()];
         let taxels = self.taxels.max(1);
         for (new, old) in phi.chunks_exact_mut(taxels).zip(self.phi.chunks_exact(taxels)) {
@@ -127,10 +162,7 @@ fn sign_bits(phi: &[f64], taxels: usize) -> Vec<u64> {
 impl Press {
     /// Scored frames of block `block` of `recording`.
     pub fn new(recording: &Recording, block: usize, protocol: &Protocol) -> Self {
-        let per_frame = recording.measurements_per_frame();
-        let first = protocol.first_frame.min(recording.frames());
-        let end = (first + protocol.frames).min(recording.frames());
-        Untouched::of(recording, block).press(recording, block, first * per_frame..end * per_frame)
+        Untouched::of(recording, block).press(recording, block, protocol.measurements(recording))
     }
 
     /// Measurements `range` of block `block` of `recording`. The output of the untouched skin is `idle_v`, V.
@@ -176,10 +208,10 @@ impl Press {
         let y = self.y.get(start..start + m)?;
         let taxels = self.rows.taxels;
         let words = taxels.div_ceil(64);
-        let phi = &self.rows.phi[start * taxels..(start + m) * taxels];
+        let phi = self.rows.numbers(start..start + m);
         y.iter().all(|v| v.is_finite()).then_some(())?;
         Some(Window {
-            phi: MatrixView::new(m, taxels, phi).ok()?,
+            phi: MatrixView::new(phi.len() / taxels.max(1), taxels, phi).ok()?,
             signs: self.rows.signs.as_ref().map(|s| &s[start * words..(start + m) * words]),
             volts: &self.volts[start..start + m],
             y,
@@ -303,6 +335,22 @@ mod tests {
         let third = window.samples().nth(2).unwrap();
         assert_eq!((third.y, third.signs, third.phi.values()), (&[-1.5][..], Some(&[1][..]), phi.row(2)));
         assert_eq!(window.samples().count(), 3);
+    }
+
+    /// Rows that are kept as bits alone are formed again.
+    #[test]
+    fn rows_come_back_from_their_bits() {
+        let values: Vec<f64> = (0..3 * 70).map(|k| if k * k % 7 < 3 { 1.0 } else { -1.0 }).collect();
+        let dense = PressRows::of_matrix(&Matrix::from_rows(3, 70, values.clone()).unwrap());
+        let bits = PressRows { phi: Vec::new(), ..dense };
+        let press = Press::on(Arc::new(bits), vec![1.0, 2.0, 3.0], 0.0);
+        let window = press.window(0, 3).unwrap();
+        assert_eq!((window.phi.nrows(), window.phi.ncols(), window.has_rows()), (0, 70, false));
+        let mut rows = Vec::new();
+        assert_eq!(window.with_rows(&mut rows).phi.values(), values);
+        let last = window.samples().nth(2).unwrap();
+        assert_eq!(last.with_rows(&mut rows).phi.values(), &values[140..]);
+        assert_eq!(press.picked(&[1]).window(0, 1).unwrap().with_rows(&mut rows).phi.values(), &values[70..140]);
     }
 
     #[test]

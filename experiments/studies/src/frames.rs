@@ -31,8 +31,8 @@ pub struct ObjectFrames {
 /// squares over objects, of shares of the signal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LawCheck {
-    /// `creep`: the signal of a hold grows by this share a decade of time since the touch. `conditioning`: it grows from
-    /// press to press by this share for each unit of the logarithm of the press's number.
+    /// `creep`: the signal of a hold grows by this share a decade of time since the touch. `conditioning`: it grows
+    /// from press to press by this share for each unit of the logarithm of the press's number.
     pub law: &'static str,
     /// Value that fits the objects that are learned from.
     pub fitted: f64,

@@ -17,8 +17,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod patches;
 mod pursuit;
 mod sheet;
 
+pub use patches::{OnSheet, Patches, Rows};
 pub use pursuit::{Descent, Found, RegionPursuit};
 pub use sheet::{SheetDecoder, SheetNoise, SheetPrior};

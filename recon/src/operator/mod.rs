@@ -14,8 +14,10 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bits;
 mod sign;
 
+pub use bits::SignRows;
 pub use sign::{SignGenerator, SignOperator};
 
 use crate::kernels::{self, dot, norm};

@@ -198,11 +198,11 @@ impl Frames {
         Ok(Self { shape: [presses, frames, rows, cols], values, times_s, rate_hz, idle: None, notes })
     }
 
-    /// A press for every contact in the frames: from some idle frames before its onset on, all equally long. The sums of
-    /// the taxels in a run of frames have two levels, without and with a touch. A contact begins where the sum leaves
-    /// the lower one by more than 15 % of the difference and reaches half of it, and ends below a quarter. Left out are
-    /// contacts whose begin is not in the frames, those shorter than half the usual one, and runs in which the levels
-    /// differ by less than a quarter of what they usually do.
+    /// A press for every contact in the frames: from some idle frames before its onset on, all equally long. The sums
+    /// of the taxels in a run of frames have two levels, without and with a touch. A contact begins where the sum
+    /// leaves the lower one by more than 15 % of the difference and reaches half of it, and ends below a quarter. Left
+    /// out are contacts whose begin is not in the frames, those shorter than half the usual one, and runs in which the
+    /// levels differ by less than a quarter of what they usually do.
     ///
     /// # Errors
     /// [`Refusal`] if there is no whole contact.

@@ -70,8 +70,8 @@ pub struct PlayedPress {
 ///
 /// Every press begins with 0.25 s without a touch. Its idle frames are subtracted; what is then below 0 counts as no
 /// touch, and a missing value as the one before. Pressures go through the transducer of the chain. Conductances are
-/// taken as they are. Codes and relative values are scaled as [`Courses::law`] says, by `peak`: the pressure, Pa, and the
-/// value that it stands for, the largest one of the session if `None`.
+/// taken as they are. Codes and relative values are scaled as [`Courses::law`] says, by `peak`: the pressure, Pa, and
+/// the value that it stands for, the largest one of the session if `None`.
 ///
 /// # Errors
 /// [`Refusal`] if there are no frames, they are of another layout than the chain, or they are too long to record.
@@ -267,7 +267,8 @@ impl Courses {
         self.are_pressures().then(|| PressureMap::from_values(rows, cols, self.frame(press, frame).to_vec()))
     }
 
-    /// The pressure `time_s` after the begin of the frames, on a straight line between the frames; `None` in another unit.
+    /// The pressure `time_s` after the begin of the frames, on a straight line between the frames; `None` in another
+    /// unit.
     pub fn pressure_at(&self, press: usize, time_s: f64) -> Option<PressureMap> {
         let last = (self.shape[1] - 1) as f64;
         let at = (time_s / self.frame_s).clamp(0.0, last);

@@ -218,15 +218,18 @@ pub(super) fn check_recorded(mode: Mode, recorded: &Recorded, blocks: usize) -> 
     Ok(())
 }
 
+/// Least hold where a frame takes longer, s.
+const LEAST_HOLD_S: f64 = 0.01;
 /// Farthest place of a body, m.
 const FARTHEST_M: f64 = 1e3;
 
-/// Refuses a hold that is shorter than a frame of `recording`.
+/// Refuses a hold in which nothing of `recording` is measured. A frame of a large skin may take longer than a hold.
 pub(super) fn check_hold(hold_s: Option<[f64; 2]>, recording: &Recording) -> Result<(), Refusal> {
     let frame_s = recording.measurements_per_frame() as f64 / recording.sample_rate_hz();
+    let least_s = frame_s.min(LEAST_HOLD_S);
     match hold_s {
-        Some([start_s, end_s]) if end_s - start_s < frame_s * (1.0 - 1e-6) => {
-            let range = format!("the spans of at least a frame, {frame_s} s");
+        Some([start_s, end_s]) if end_s - start_s < least_s * (1.0 - 1e-6) => {
+            let range = format!("the spans of at least a frame or {LEAST_HOLD_S} s, {least_s} s");
             invalid("hold_s", format!("[{start_s}, {end_s}]"), range)
         }
         _ => Ok(()),

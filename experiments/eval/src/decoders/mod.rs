@@ -4,6 +4,7 @@ mod amortised;
 mod baselines;
 mod evidence;
 mod image;
+mod patches;
 
 pub use image::quarter;
 
@@ -157,6 +158,9 @@ pub const DECODERS: &[DecoderSpec] = &[
     spec("tv", "total variation", Nothing, false, image::tv)
         .about("total variation with non-negative taxels")
         .drawn(0x4a_4a_4a, 4),
+    spec("patches", "patches", Nothing, false, patches::patches).about(
+        "patches of a few taxels, or total variation on coarser cells, whichever predicts a ninth of y; for any size",
+    ),
     spec("evidence", "evidence", Classes, true, evidence::train)
         .about("Gaussian classes weighed by the evidence of y; the image is the posterior mean")
         .anytime()
@@ -177,8 +181,9 @@ const COARSE: usize = 144;
 /// The decoder for images of anything on a skin of `shape` (rows and columns), when nothing is known of the objects:
 ///
 /// 1. `amortised`, where a network for the skin is given (`own_network`);
-/// 2. `tv` on a grid of more than 144 taxels;
-/// 3. `mixture` on all others: on coarse grids, and where the numbers of taxels do not tell which are neighbours.
+/// 2. `patches` on skins of more than 2,048 taxels, where the others take seconds and gigabytes;
+/// 3. `tv` on a grid of more than 144 taxels;
+/// 4. `mixture` on all others: on coarse grids, and where the numbers of taxels do not tell which are neighbours.
 ///
 /// docs/decoders.md has the measurements behind the rule.
 ///
@@ -187,10 +192,12 @@ const COARSE: usize = 144;
 ///
 /// assert_eq!((auto([10, 10], false).name, auto([32, 32], false).name), ("mixture", "tv"));
 /// assert_eq!((auto([1, 600], false).name, auto([32, 32], true).name), ("mixture", "amortised"));
+/// assert_eq!(auto([100, 100], false).name, "patches");
 /// ```
 pub fn auto([rows, cols]: [usize; 2], own_network: bool) -> &'static DecoderSpec {
     let name = match rows.saturating_mul(cols) {
         _ if own_network => "amortised",
+        taxels if taxels > TrainingData::MOST_TAXELS => "patches",
         taxels if rows > 1 && cols > 1 && taxels > COARSE => "tv",
         _ => "mixture",
     };

@@ -50,6 +50,8 @@ pub struct TrainingData {
     pub gain_sd: Vec<f64>,
     /// Whether the images show random shapes, which already lie anywhere.
     random_shapes: bool,
+    /// Whether there is nothing to learn from.
+    bare: bool,
     /// The same images with equal gains of all taxels, if a simulation knows them.
     alike: Option<Arc<Matrix>>,
     /// Labels of these images, if they show named objects in many poses.
@@ -62,7 +64,8 @@ pub struct TrainingData {
 }
 
 impl TrainingData {
-    /// Largest number of taxels of a skin without recordings: the sign tables of its dictionary take 1 GiB.
+    /// Largest number of taxels of a skin without recordings for which images are made to learn from: the sign tables
+    /// of its dictionary take 1 GiB.
     pub const MOST_TAXELS: usize = 2048;
 
     /// Training data from `training`, for a sheet with `cols` columns. The dictionary is learned with `streams` on
@@ -94,6 +97,7 @@ impl TrainingData {
             images,
             gain_sd: Vec::new(),
             random_shapes: false,
+            bare: false,
             alike: None,
             posed: None,
             network: None,
@@ -153,16 +157,16 @@ impl TrainingData {
     }
 
     /// Training data for a skin of this layout without any recording: images of random shapes for priors, a dictionary
-    /// of blobs, and no classes.
+    /// of blobs, and no classes. Of more than [`TrainingData::MOST_TAXELS`] nothing can be learned: there are no
+    /// images, and decoders that need some are refused.
     ///
     /// # Errors
-    /// [`Refusal`] for more than [`TrainingData::MOST_TAXELS`], or if the images are not usable.
+    /// [`Refusal`] if the images are not usable.
     pub fn for_layout(skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
-        let (taxels, most) = (skin.taxels(), Self::MOST_TAXELS);
-        if taxels > most {
-            let message =
-                format!("taxels = {taxels} is outside [1, {most}]: the decoders keep matrices of taxels × taxels");
-            return Err(Refusal::new(message));
+        if skin.taxels() > Self::MOST_TAXELS {
+            let one = Matrix::from_column_slices(skin.taxels(), &[vec![1.0; skin.taxels()]]);
+            let library = Library::new(&one, &[0]).map_err(|e| e.at("library"))?;
+            return Ok(Self { bare: true, ..Self::of_library(library, one, skin.cols(), streams) });
         }
         let images = outline_images(skin, streams);
         let mean: Vec<f64> = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
@@ -184,6 +188,7 @@ impl TrainingData {
     /// As [`Self::for_layout`].
     pub fn for_shapes(skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
         let data = Self::for_layout(skin, streams)?;
+        data.check_learned()?;
         let Ok(shapes) = shape_images(skin, streams.rng("shapes", 0).random()) else { return Ok(data) };
         let columns = [&shapes, &data.images].into_iter().flat_map(|of| (0..of.ncols()).map(|k| of.column(k)));
         let alike = Matrix::from_column_slices(skin.taxels(), &columns.collect::<Vec<_>>());
@@ -262,6 +267,7 @@ impl TrainingData {
         if let Some(dictionary) = self.dictionary.get() {
             return Ok(Arc::clone(dictionary));
         }
+        self.check_learned()?;
         let candidates = self.candidates.as_ref().clone();
         let atoms = learn_dictionary(candidates, &(Selection::default(), Ksvd::default()), self.streams)
             .map_err(|e| e.at("dictionary"))?;
@@ -270,6 +276,18 @@ impl TrainingData {
         fits_memory(&what, 8.0 * entries)?;
         let learned = Arc::new(Dictionary::new(atoms));
         Ok(Arc::clone(self.dictionary.get_or_init(|| learned)))
+    }
+
+    /// Refuses a skin that nothing can be learned for.
+    fn check_learned(&self) -> Result<(), Refusal> {
+        if !self.bare {
+            return Ok(());
+        }
+        let (taxels, most) = (self.images.nrows(), Self::MOST_TAXELS);
+        Err(Refusal::new(format!(
+            "taxels = {taxels} is outside [1, {most}], for which images can be made to learn from; valid for any number: \
+             patches, tv, empty; or scan fifteen presses to learn from"
+        )))
     }
 
     /// Checks that there is memory for `what` with so many matrices of taxels × taxels.
@@ -286,6 +304,7 @@ impl TrainingData {
     /// # Errors
     /// [`Refusal`].
     pub fn prior(&self, how: ImagePrior) -> Result<Arc<Gaussian>, Refusal> {
+        self.check_learned()?;
         self.fits_squares("a prior", PRIOR_SQUARES)?;
         let how = if self.random_shapes {
             ImagePrior { reach: 0, stay: 1.0, threshold: 0.0, ..ImagePrior::UNSEEN }

@@ -1,0 +1,42 @@
+//! Contacts on skins of any size, by rows as bits.
+
+use crate::algorithm::{Algorithm, Answer, DecodeError, Trained};
+use crate::training::TrainingData;
+use crate::windows::Window;
+use spts_input::Refusal;
+use spts_recon::matrix_free;
+use spts_recon::operator::SignRows;
+
+/// Nothing is learned.
+#[derive(Debug, Clone)]
+struct OnSheet {
+    sheet: matrix_free::OnSheet,
+}
+
+/// Cells of a coarser grid at most.
+const CELLS: usize = 2500;
+
+pub(super) fn patches(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    Ok(Box::new(OnSheet { sheet: matrix_free::OnSheet::new(data.shape[0], data.shape[1], CELLS) }))
+}
+
+impl Trained for OnSheet {
+    fn start(&self) -> Box<dyn Algorithm + '_> {
+        Box::new(self.clone())
+    }
+}
+
+impl Algorithm for OnSheet {
+    fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
+        answer.class = None;
+        answer.image = match window.signs {
+            Some(signs) => self.sheet.recover(SignRows::new(signs, window.phi.ncols()), window.y)?,
+            None => self.sheet.recover(window.phi, window.y)?,
+        };
+        Ok(())
+    }
+
+    fn takes_bits(&self) -> bool {
+        true
+    }
+}
