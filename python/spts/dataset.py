@@ -241,6 +241,11 @@ def _written(frames, folder):
     if isinstance(frames, (str, os.PathLike)):
         return os.path.abspath(os.fspath(frames))
     sessions = [frames] if hasattr(frames, "write") else list(frames)
+    names = [session.name for session in sessions]
+    if len(set(names)) < len(names):
+        raise ValueError(f"`frames`: sessions with one name replace each other: {sorted(names)}")
+    if foreign := sorted(set(os.listdir(folder) if os.path.isdir(folder) else []) - set(names)):
+        raise ValueError(f"`frames`: {folder} holds other sessions: {foreign}; remove them")
     for session in sessions:
         session.write(os.path.join(folder, session.name))
     return folder
@@ -248,6 +253,10 @@ def _written(frames, folder):
 
 def _put(table, key, value):
     """Puts a value at a dotted key."""
+    if isinstance(value, dict) and isinstance(table.get(key), dict):
+        for inner, own in value.items():
+            _put(table[key], inner, own)
+        return
     *path, last = key.split(".")
     for part in path:
         table = table.setdefault(part, {})

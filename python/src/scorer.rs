@@ -80,8 +80,9 @@ impl Algorithm for Asked<'_> {
         let (count, m, taxels) = (windows.len(), first.y.len(), first.phi.ncols());
         let mut phi = Vec::with_capacity(count * m * taxels);
         let mut y = Vec::with_capacity(count * m);
+        let mut rows = Vec::new();
         for window in windows {
-            phi.extend_from_slice(window.phi.values());
+            phi.extend_from_slice(window.with_rows(&mut rows).phi.values());
             y.extend_from_slice(window.y);
         }
         let found = Python::attach(|py| {

@@ -54,7 +54,7 @@ impl Timing {
         };
         if record.what == RecordKind::Hold && record.before_s.is_some() {
             return Err(Refusal::new(
-                "`record.before_s` is not for `record.what` = \"hold\", which begins `press.hold_s` after the touch",
+                "`record.before_s` is not for `record.what` = \"hold\", which begins in the hold",
             ));
         }
         let interval_s = record.interval_s.or(interval_s);
@@ -135,7 +135,8 @@ fn whole_rate(interval_s: f64) -> Result<(), Refusal> {
 fn default_windows(config: &SpecConfig, interval_s: Option<f64>, before_s: f64, frames_s: Option<f64>) -> u64 {
     match (config.record.what, interval_s) {
         (RecordKind::Course, Some(interval_s)) if frames_s.is_some() => {
-            whole(((before_s + frames_s.unwrap_or(0.0)) / interval_s).floor().max(1.0)) as u64
+            // a rounding of the quotient must not cost the last one
+            whole(((before_s + frames_s.unwrap_or(0.0)) / interval_s + 1e-9).floor().max(1.0)) as u64
         }
         (RecordKind::Course, Some(interval_s)) => {
             let [_, hold_s] = config.press.hold_s.range();
@@ -325,7 +326,7 @@ pub(super) fn check_lasts(timing: &Timing, [hold_s, frames_s]: [f64; 2]) -> Resu
         RecordKind::Hold => (timing.span_s(), hold_s, "the hold of the frames lasts"),
         _ => (timing.span_s() - timing.before_s, frames_s, "the frames go on after the touch for"),
     };
-    if span_s <= most_s {
+    if span_s <= most_s * (1.0 + 1e-9) {
         return Ok(());
     }
     let windows = timing.windows;

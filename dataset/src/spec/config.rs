@@ -389,7 +389,7 @@ impl Label {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RecordKind {
-    /// While the object is held: from `press.hold_s` after the touch on.
+    /// While the object is held: from `press.hold_s` after the touch on; of frames from the begin of their hold on.
     Hold,
     /// During the whole press: from before the touch, through rise, plateau and fall of the force.
     Course,

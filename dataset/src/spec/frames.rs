@@ -59,9 +59,8 @@ impl FrameSource {
             sessions.push((Arc::from(session.object.as_str()), Arc::new(courses)));
         }
         let layout = layout.ok_or_else(|| failed(Refusal::new("no session has frames of presses")))?;
-        let are_pressures = |own: &(Arc<str>, Arc<Courses>)| own.1.are_pressures();
-        if sessions.iter().any(are_pressures) && !sessions.iter().all(are_pressures) {
-            return Err(failed(Refusal::new("some sessions have pressures and some have not")));
+        if sessions.windows(2).any(|pair| pair[0].1.unit() != pair[1].1.unit()) {
+            return Err(failed(Refusal::new("the sessions are in different units")));
         }
         Ok(Some(Self { layout, sessions, rows_given: table.contains_key("rows"), notes }))
     }
@@ -179,7 +178,9 @@ impl FrameSource {
     pub(super) fn digest(&self, digest: &mut Sha256) {
         for (object, courses) in &self.sessions {
             digest.update(object.as_bytes());
-            digest.update(courses.frame_s().to_le_bytes());
+            let hold = courses.hold();
+            let facts = format!("{:?} {} {hold:?} {}", courses.unit(), courses.frame_s(), courses.touch());
+            digest.update(facts.as_bytes());
             courses.values().iter().for_each(|v| digest.update(v.to_le_bytes()));
         }
     }

@@ -35,7 +35,8 @@ use std::path::{Path, PathBuf};
 Files in DIR:
   decoded.png decoded.svg    pressure, the trace of the wire, the image at each M
   windows.csv                one line a window
-  SESSION.npz                for every M: phi_mM, y_mM, block_mM, window_mM and image_DECODER_mM; truth
+  SESSION.npz                for every M: phi_mM, y_mM, block_mM, window_mM and image_DECODER_mM; truth; of many rows of
+                             more than 2048 taxels phi_mM is left out
 
 --json prints {\"rows\": [{\"session\", \"block\", \"window\", \"decoder\", \"m\", \"start\", \"support\", \"iou\", \"correlation\",
 \"label\", \"label_true\", \"place\"}, ...]}, one entry a window; all numbers count from 0, and scores are null where no truth
@@ -49,11 +50,11 @@ pub(super) struct DecodeCommand {
     #[arg(long = "session", value_name = "NAME,...", value_delimiter = ',')]
     only: Vec<String>,
     /// Decoders; see `spts score --list`. `auto` is the one for images of anything on this skin: `mixture`, on grids of
-    /// more than 144 taxels `tv`, and with --weights `amortised`
+    /// more than 144 taxels `tv`, of more than 2048 `patches`, and with --weights `amortised`
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = AUTO)]
     decoder: Vec<String>,
-    /// Numbers of samples M that an image is decoded from; each [1, 1000000] [default: 7,20,50 on 100 taxels, and the
-    /// same shares of other skins]
+    /// Numbers of samples M that an image is decoded from; each [1, 1000000] [default: 7, 20 and 50 % of the taxels,
+    /// and 1, 2 and 5 % of more than 2048]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=1_000_000))]
     measurements: Vec<u32>,
     /// Number of windows of M samples to decode in each block (press or drop), one after the other from the beginning

@@ -102,7 +102,7 @@ pub(super) struct ScoreCommand {
     recordings: Option<PathBuf>,
     /// Score sessions that the twin simulates now, instead of recordings: of the named scenes (press/NAME, or files
     /// that end in .toml, of any layout), or of five objects when none is named. Six presses of each are scored, or as
-    /// many as the scene file says with `press.presses`; eight more are scanned, to learn from and as the truth
+    /// many as the scene file says with `press.presses`; eight more are scanned, to learn from
     /// [default: score RECORDINGS]
     #[arg(long, value_name = "SCENE", num_args = 0..)]
     twin: Option<Vec<String>>,
@@ -144,7 +144,8 @@ pub(super) struct ScoreCommand {
     #[arg(long, value_name = "P,...", value_delimiter = ',', requires = "anytime", value_parser = number)]
     confidence: Vec<f64>,
     /// Numbers of samples M in a window; each [1, 10000]; with --anytime the largest is the most that a window takes
-    /// [default: 5,7,10,13,20,25,50,100; with --in-time 5,7,10,20; for places 5,7,10,15,20,25]
+    /// [default: 5,7,10,13,20,25,50,100, and 1, 2 and 5 % of more than 2048 taxels; with --in-time 5,7,10,20; for
+    /// places 5,7,10,15,20,25]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=10_000))]
     measurements: Vec<u32>,
     /// Objects that are scored [default: all with a compressive session]
@@ -368,7 +369,12 @@ impl ScoreCommand {
     fn fitting(&self, mut settings: BoardSettings, scored: &Source) -> BoardSettings {
         let layout = &scored.layout;
         let taxels = layout.taxels();
-        if taxels > TrainingData::MOST_TAXELS && !scored.learns() && self.decoder.is_empty() {
+        if taxels > TrainingData::MOST_TAXELS && !scored.learns() && scored.bounces.is_some() && !self.no_ball {
+            note("note: places of the ball are left out: their locators learn from scans, of which there are none");
+        }
+        let usual = !self.anytime && !self.in_time;
+        let unnamed = self.decoder.is_empty() && self.external.is_empty() && self.learn_from == [PUBLISHED];
+        if taxels > TrainingData::MOST_TAXELS && !scored.learns() && usual && unnamed {
             let auto = auto([layout.rows(), layout.cols()], self.weights.is_some());
             settings.decoders.retain(|spec| spec.name == "empty");
             settings.decoders.push(auto);
@@ -377,7 +383,7 @@ impl ScoreCommand {
                 auto.name
             ));
         }
-        if taxels > TrainingData::MOST_TAXELS && self.measurements.is_empty() {
+        if taxels > TrainingData::MOST_TAXELS && self.measurements.is_empty() && usual {
             settings.measurements = DecodeRequest::default_measurements(taxels);
         }
         let fits = TrainedNetwork::shipped().on([layout.rows(), layout.cols()]);

@@ -70,7 +70,8 @@ pub(super) struct WireCommand {
     /// Pressure that the largest value of codes and relative frames, of all sessions, is taken for, Pa; [100, 1000000]
     #[arg(long, value_name = "PA", value_parser = within(100.0, 1e6, "[100, 1000000]"), default_value_t = 30e3)]
     peak: f64,
-    /// Presses of every session that are taken, from the first [default: all]
+    /// Presses of every session that are recorded, from the first; how they repeat and drift is told of all [default:
+    /// all]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=100_000))]
     presses: Option<usize>,
     /// Root of every random number
@@ -110,6 +111,13 @@ impl WireCommand {
             let (first, other) = (&first.name, &other.name);
             return Err(CliError::usage(format!("sessions \"{first}\" and \"{other}\" are of different skins")));
         }
+        let unit = |session: &Session| session.raster().and_then(|raster| raster.info().unit);
+        if let Some(other) = sessions.iter().find(|session| unit(session) != unit(first)) {
+            let (first, other) = (&first.name, &other.name);
+            return Err(CliError::usage(format!(
+                "sessions \"{first}\" and \"{other}\" have frames in different units"
+            )));
+        }
         if !others.is_empty() {
             note(&format!("note: sessions without frames of presses are left out: {}", others.join(", ")));
         }
@@ -144,7 +152,8 @@ impl WireCommand {
         if taxels > TrainingData::MOST_TAXELS {
             note(&format!("note: {taxels} taxels: the page is for up to {}", TrainingData::MOST_TAXELS));
             folder.commit()?;
-            let few = FewWiresReport { touches: touches.len(), ..FewWiresReport::default() };
+            let objects = spts_eval::unique(touches.iter().map(|touch| touch.object.as_str())).len();
+            let few = FewWiresReport { touches: touches.len(), objects, ..FewWiresReport::default() };
             let out = self.out.display();
             return self.common.print(&Report { few: &few, frames: &frames }, || format!("session: {out}"));
         }

@@ -176,6 +176,7 @@ impl TrainedBoard<'_> {
         let Some(press) = ScoredPress::new(scored, block) else {
             return Ok(Vec::new());
         };
+        let press = press.with_numbers()?;
         let entries = stopped.iter().map(|stopped| stopped.entry);
         let classes = |entry: &Entry| {
             let same = stopped.iter().find(|stopped| std::ptr::eq(stopped.entry, entry));

@@ -203,6 +203,7 @@ fn follow(contact: &FollowedContact, decoder: &TrainedDecoder, m: usize, cols: u
     let taxels = prior.mean().len();
     let mut image = TrackedImage::new(prior, motion(contact.rate_hz, contact.idle_noise_v))?;
     let mut scorer = Scorer::new(decoder);
+    let mut rows = Vec::new();
     let mut followed = Followed::new();
     // windows follow each other, one of them from the touch on
     let mut start = contact.touch % m;
@@ -228,7 +229,7 @@ fn follow(contact: &FollowedContact, decoder: &TrainedDecoder, m: usize, cols: u
             continue;
         }
         if let Some(window) = contact.press.window(start, m) {
-            image.observe((start + m - last) as f64, window.phi, window.y)?;
+            image.observe((start + m - last) as f64, window.with_rows(&mut rows).phi, window.y)?;
             last = start + m;
         }
         start += m;
@@ -516,6 +517,7 @@ pub fn followed_images(
     let mut image = TrackedImage::new(prior, motion(rate_hz, noise_v))?;
     let (every, most) = pace(ends.len(), m, recording.taxels());
     let (mut taken, mut window) = (from, first..first);
+    let mut rows = Vec::new();
     let mut images = Vec::with_capacity(ends.len());
     for (k, &end) in ends.iter().enumerate() {
         if k % every == 0 {
@@ -527,7 +529,7 @@ pub fn followed_images(
                     continue;
                 };
                 let elapsed = (stop - taken) as f64;
-                image.observe(elapsed, samples.phi, samples.y)?;
+                image.observe(elapsed, samples.with_rows(&mut rows).phi, samples.y)?;
                 (taken, window) = (stop, start..stop);
             }
         }

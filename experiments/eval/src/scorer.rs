@@ -51,10 +51,24 @@ impl<'a> ScoredPress<'a> {
     /// [`Refusal`] when the rows have another number of taxels than what the chooser knows.
     pub(crate) fn chosen(&self, chooser: &RowChooser, most: usize, classes: bool) -> Result<Self, Refusal> {
         let measured = match &self.measured {
-            Measured::Recorded(press) => Measured::Chosen(chooser.windows(press, most, classes)?),
+            Measured::Recorded(press) => {
+                check_numbers(press)?;
+                Measured::Chosen(chooser.windows(press, most, classes)?)
+            }
             Measured::Chosen(windows) => Measured::Chosen(windows.clone()),
         };
         Ok(Self { measured, truth: self.truth.clone(), ..*self })
+    }
+
+    /// The press, if its rows are there as numbers.
+    ///
+    /// # Errors
+    /// [`Refusal`] if they are kept as bits alone.
+    pub(crate) fn with_numbers(self) -> Result<Self, Refusal> {
+        if let Measured::Recorded(press) = &self.measured {
+            check_numbers(press)?;
+        }
+        Ok(self)
     }
 
     /// The true contact.
@@ -94,6 +108,15 @@ impl<'a> ScoredPress<'a> {
             Measured::Chosen([_, classes]) => classes.iter().filter_map(|press| press.window(0, m)).collect(),
         }
     }
+}
+
+/// Refuses a press whose rows are kept as bits alone, for what needs them as numbers.
+pub(crate) fn check_numbers(press: &Press) -> Result<(), Refusal> {
+    if press.window(0, 1).is_none_or(|window| window.has_rows()) {
+        return Ok(());
+    }
+    let rows = press.len();
+    Err(Refusal::new(format!("{rows} rows of a skin of so many taxels are not kept as numbers, which are needed here")))
 }
 
 /// A trained decoder at work in one thread, with the classifier for images of decoders that name no class.
@@ -162,9 +185,12 @@ impl<'a> Scorer<'a> {
         tally.failed += answers.iter().filter(|a| a.failed).count();
         let decisions: Vec<Option<usize>> = answers.iter().map(|a| self.class(a)).collect();
         tally.decisions(&decisions, label, vote);
-        let groups = windows.chunks_exact(vote.max(1)).take_while(|group| group.iter().all(Window::has_rows));
-        let summed: Option<Vec<Option<usize>>> =
-            groups.map(|group| self.algorithm.sum(group).map(Class::label)).collect();
+        let groups = windows.chunks_exact(vote.max(1)).map(|group| {
+            let mut rows = vec![Vec::new(); group.len()];
+            let group: Vec<Window<'_>> = group.iter().zip(&mut rows).map(|(w, rows)| w.with_rows(rows)).collect();
+            self.algorithm.sum(&group).map(Class::label)
+        });
+        let summed: Option<Vec<Option<usize>>> = groups.collect();
         tally.summed(&summed.unwrap_or_default(), label);
         Ok(())
     }

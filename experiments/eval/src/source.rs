@@ -2,6 +2,7 @@
 
 use crate::alignment::{SessionSlip, follow_slips};
 use crate::labels::Labels;
+use crate::protocol::Truth;
 use crate::session::ScoredSession;
 use crate::training::{Learned, SHIFT_REACH, TrainingData, TrainingPresses};
 use spts::Refusal;
@@ -127,6 +128,13 @@ impl Source {
         Ok(Self { sessions, root, bounces, touches, published, missing, simulated, layout, labels, slips, note })
     }
 
+    /// The same, scored against raster scans as recordings of the real skin are, and not against what a simulation
+    /// knows.
+    pub fn against_scans(mut self) -> Self {
+        self.sessions.iter_mut().for_each(|session| session.simulated.clear());
+        self
+    }
+
     /// Whether there are raster presses that are not scored, to learn from.
     pub fn learns(&self) -> bool {
         self.sessions.iter().filter_map(TrainingPresses::unscored).any(|presses| !presses.is_empty())
@@ -236,9 +244,10 @@ pub fn check_session(root: &Path, session: &Session, layout: &SkinLayout) -> Res
                 let needed = "finite samples in the frame that is the truth".to_owned();
                 return refuse(mode, "samples", value, needed);
             }
-            let truth = scored.truth(0).map_or_else(Vec::new, |truth| truth.image);
+            let truth = Truth::new(recording, protocol).image;
             let peak = truth.iter().copied().fold(0.0, f64::max);
-            if !(peak > 0.0 && peak.is_finite()) {
+            let is_truth = scored.simulated.iter().all(Option::is_none);
+            if is_truth && !(peak > 0.0 && peak.is_finite()) {
                 let needed = "a contact above 0 V".to_owned();
                 return refuse(mode, "peak of the true image, V", peak.to_string(), needed);
             }

@@ -2,6 +2,7 @@
 
 use crate::chunk::{Chunk, converter_step_v};
 use crate::protocol::Protocol;
+use crate::training::TrainingData;
 use spts_circuit::{Mode, Recording, WeightRows};
 use spts_recon::metrics::median;
 use spts_recon::{Matrix, MatrixView};
@@ -104,7 +105,9 @@ impl PressRows {
     /// The weights of `rows`.
     pub fn new(rows: WeightRows<'_>) -> Self {
         let signs = rows.sign_bits();
-        let large = signs.is_some() && rows.len().saturating_mul(rows.taxels()) > MOST_NUMBERS;
+        let large =
+            rows.taxels() > TrainingData::MOST_TAXELS && rows.len().saturating_mul(rows.taxels()) > MOST_NUMBERS;
+        let large = large && signs.is_some();
         Self { taxels: rows.taxels(), phi: if large { Vec::new() } else { rows.to_vec() }, signs }
     }
 

@@ -105,7 +105,8 @@ pub fn json<'a>(report: &'a CompareReport, objects: Option<&'a PerObjectReport>)
 pub fn text(report: &CompareReport) -> String {
     if !report.predicted.is_empty() {
         let inside = report.predicted.iter().filter(|row| row.of.inside() == Some(true)).count();
-        return format!("{}inside: {inside} of {}", predicted(report).text(), report.predicted.len());
+        let judged = report.predicted.iter().filter(|row| row.of.inside().is_some()).count();
+        return format!("{}inside: {inside} of {judged}", predicted(report).text());
     }
     let mut out = statistics(report.all_statistics()).text();
     if !report.distances().is_empty() {

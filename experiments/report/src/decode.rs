@@ -109,7 +109,10 @@ fn pressed(session: &Session, found: &DecodedSession, block: usize) -> Tile {
     match found.truth.get(block).and_then(Option::as_ref) {
         Some(truth) => {
             let peak = truth.iter().copied().fold(0.0, f64::max);
-            heat(truth.clone(), format!("raster scan, peak {peak:.2} V"))
+            match facts.and_then(|f| f.conductance.as_ref()) {
+                Some(_) => heat(truth.clone(), format!("peak {:.0} µS", 1e6 * peak)),
+                None => heat(truth.clone(), format!("raster scan, peak {peak:.2} V")),
+            }
         }
         None => Tile::Text("not known".to_owned()),
     }

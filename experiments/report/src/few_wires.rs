@@ -120,7 +120,7 @@ impl FewWiresPage<'_> {
             label: format!("{} {}", row.wires, wire_word(row.wires)),
             of: format!("{} rows", row.rows),
             value: format!("IoU {:.2}", row.iou),
-            others: vec![("a scan of all taxels".to_owned(), format!("{:.2}", report.scan_iou))],
+            others: vec![("a scan of all taxels".to_owned(), format!("{:.2}", report.scan_iou.unwrap_or(0.0)))],
             note: format!(
                 "worst touch {:.2}; with {} measurements in {:.2} ms; a scan takes {:.2} ms",
                 row.worst_iou,
@@ -267,7 +267,7 @@ fn ceiling(report: &FewWiresReport) -> String {
     format!(
         "A scan of all taxels takes {:.2} ms and has an IoU of {:.2}{}{}.",
         1e3 * report.scan_s,
-        report.scan_iou,
+        report.scan_iou.unwrap_or(0.0),
         classes.unwrap_or_default(),
         again.unwrap_or_default()
     )

@@ -94,8 +94,8 @@ pub struct FewWiresReport {
     pub touches: usize,
     /// Number of objects.
     pub objects: usize,
-    /// Mean IoU of the scan with the touch.
-    pub scan_iou: f64,
+    /// Mean IoU of the scan with the touch; `None` without a comparison.
+    pub scan_iou: Option<f64>,
     /// As [`FewWires::classes`], of the scan.
     pub scan_classes: Option<f64>,
     /// Mean IoU of a touch with the one before of the same object; `None` without two touches of one.
@@ -271,7 +271,7 @@ impl FewWiresStudy {
             scan_s: layout.taxels() as f64 / self.profile.sample_rate_hz,
             touches: self.touches.len(),
             objects: unique(self.touches.iter().map(|touch| touch.object.as_str())).len(),
-            scan_iou: mean(self.touches.iter().map(|touch| touch.iou_of(&touch.scan))).unwrap_or(0.0),
+            scan_iou: mean(self.touches.iter().map(|touch| touch.iou_of(&touch.scan))),
             scan_classes: self.scanned_classes(taught.as_ref())?,
             again_iou: mean(
                 self.touches
@@ -423,7 +423,7 @@ mod tests {
         assert_eq!(of(1, "cosine_signs").iter().map(|r| r.0).collect::<Vec<_>>(), [25, 50]);
         assert!(one[2].2 > 0.95 && two[1].2 > 0.95, "{one:?} {two:?}");
         assert!(report.rows.iter().all(|r| r.saturated == 0.0 && r.worst_iou <= r.iou && r.classes.is_none()));
-        assert_eq!((report.objects, report.scan_iou, report.again_iou), (1, 1.0, Some(0.0)));
+        assert_eq!((report.objects, report.scan_iou, report.again_iou), (1, Some(1.0), Some(0.0)));
         assert_eq!(report, study(vec![1, 2]).run(&()).unwrap());
         // three objects of two touches each: all are known by then, and each by what the others look like
         let one = study(vec![1]);

@@ -102,6 +102,8 @@ pub fn frames_report(sessions: &[&Session]) -> Result<FramesReport, Refusal> {
             drift: median(&drifts),
         });
         let times = presses.iter().zip(&signals).filter_map(|(press, signal)| press.since_touch(signal));
+        // a press that is touched at the end of the hold alone, or hardly at all, has no course
+        let times = times.filter(|xy| xy.len() >= FEWEST_POINTS && xy.iter().all(|(_, y)| *y > 0.0));
         creep.push(Points { object: object.to_owned(), xy: mean_course(&times.collect::<Vec<_>>()) });
         let numbered = sums.iter().zip(1_u32..).map(|(sum, k)| (f64::from(k).ln(), *sum)).collect();
         conditioning.push(Points { object: object.to_owned(), xy: of_mean(numbered) });

@@ -88,7 +88,7 @@ impl PerObjectStudy<'_> {
         let done = || progress.step();
         let presses = OBJECTS.len() * SCANNED + objects.len() * SCORED;
         of(ReadoutImages::Twin, "pressing simulated skins", presses, &|seed| {
-            Source::new(twin(seed, &objects, true, &done)?)
+            Ok(Source::new(twin(seed, &objects, true, &done)?)?.against_scans())
         })?;
         if self.causes {
             of(ReadoutImages::TwinWithSkinGains, "with the skin's gains", presses, &|seed| {

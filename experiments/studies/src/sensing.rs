@@ -170,6 +170,8 @@ impl RowDesign {
             DesignImages::Recordings(path) => {
                 let source = Source::open(path)?;
                 let (data, _) = source.training(streams)?;
+                // refuses a skin of too many taxels, before anything is formed for it
+                data.prior(ImagePrior::UNSEEN)?;
                 let classes = TemplateModel::new(data.shape[1]).classes(&data.templates);
                 (data, classes?)
             }

@@ -100,6 +100,9 @@ impl OnSheet {
         if phi.ncols() != rows * cols {
             return Err(other_columns(phi.ncols(), rows * cols));
         }
+        if y.len() < 2 * KEPT_BACK {
+            return self.patches.recover(phi, y);
+        }
         let seen = y.len() - y.len() / KEPT_BACK;
         let cells = phi.cells([rows, cols], self.side);
         // total variation that does not converge is no candidate

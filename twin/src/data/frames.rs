@@ -202,7 +202,7 @@ impl Frames {
     /// of the taxels in a run of frames have two levels, without and with a touch. A contact begins where the sum
     /// leaves the lower one by more than 15 % of the difference and reaches half of it, and ends below a quarter. Left
     /// out are contacts whose begin is not in the frames, those shorter than half the usual one, and runs in which the
-    /// levels differ by less than a quarter of what they usually do.
+    /// levels differ by less than a quarter of what they do at most.
     ///
     /// # Errors
     /// [`Refusal`] if there is no whole contact.
@@ -211,14 +211,16 @@ impl Frames {
         let mut without_begin = 0;
         let sums = self.sums();
         let rises: Vec<f64> = sums.iter().map(|sums| levels(sums)).map(|[low, high]| high - low).collect();
-        let usual = median(&rises).unwrap_or(0.0);
-        for (run, sums) in sums.iter().enumerate().filter(|(run, _)| rises[*run] > LEAST_RISE * usual) {
+        let most = rises.iter().copied().fold(0.0, f64::max);
+        let without_touch = rises.iter().filter(|rise| **rise <= LEAST_RISE * most).count();
+        for (run, sums) in sums.iter().enumerate().filter(|(run, _)| rises[*run] > LEAST_RISE * most) {
             let [low, high] = levels(sums);
             let above = |share: f64| move |k: &usize| sums[*k] > low + share * (high - low);
             let mut at = 0;
             while let Some(reached) = (at..sums.len()).find(above(REACHED)) {
                 let rising = (at..reached).rev().take_while(above(TOUCHED)).count();
-                let (start, idle) = (reached - rising, reached - rising - at);
+                let start = reached - rising;
+                let idle = (at..start).rev().take_while(|k| !above(TOUCHED)(k)).count();
                 let held = rising + (reached..sums.len()).take_while(above(LEFT)).count();
                 if idle == 0 {
                     without_begin += 1;
@@ -246,6 +248,9 @@ impl Frames {
         let (count, left_out) = (contacts.len(), found + without_begin - contacts.len());
         let cut = format!("from {idle} frames before its onset to {held} frames behind it");
         notes.push(format!("{count} contacts, each {cut}; left out, as not whole: {left_out}"));
+        if without_touch > 0 {
+            notes.push(format!("runs of frames in which nothing touches the skin: {without_touch}"));
+        }
         let times_s = self.times_s.as_ref().map(|times| {
             // one time a frame of every run, or those of all runs
             let run = if times.len() == self.shape[1] { 0 } else { self.shape[1] };
@@ -507,7 +512,7 @@ const IDLE_RISE: f64 = 0.1;
 const TOUCHED: f64 = 0.15;
 const REACHED: f64 = 0.5;
 const LEFT: f64 = 0.25;
-/// Least rise of a run with a contact, as a share of the usual one.
+/// Least rise of a run with a contact, as a share of the largest one.
 const LEAST_RISE: f64 = 0.25;
 /// Fewest frames of a contact that is cut out, and before it.
 const FEWEST_HELD: usize = 3;
@@ -546,13 +551,14 @@ fn found_hold(sums: &[Vec<f64>], frames: usize, rate_hz: f64, notes: &mut Vec<St
     let mean: Vec<f64> = (0..frames).map(|k| sums.iter().map(|s| s[k]).sum::<f64>() / sums.len() as f64).collect();
     let (least, most) = ends(&mean);
     let held = |k: &usize| mean[*k] >= least + HELD * (most - least);
-    let (mut hold, mut at) = (0..1, 0);
+    let (mut hold, mut at) = (0..0, 0);
     while let Some(start) = (at..frames).find(held) {
         at = start + (start..frames).take_while(held).count();
-        if at - start > hold.len() || hold.start == 0 {
+        if at - start > hold.len() {
             hold = start..at;
         }
     }
+    let hold = if hold.is_empty() { 0..1 } else { hold };
     let hold_s = [hold.start, hold.end].map(|k| k as f64 / rate_hz);
     notes.push(format!(
         "hold: {:.3} to {:.3} s of every press, where the sum of the taxels stays at its largest; --hold says otherwise",

@@ -256,6 +256,11 @@ impl Courses {
         (frame as f64 - self.touch as f64) * self.frame_s
     }
 
+    /// Unit of the frames.
+    pub fn unit(&self) -> Option<FrameUnit> {
+        self.unit
+    }
+
     /// Whether the frames are pressures.
     pub fn are_pressures(&self) -> bool {
         self.unit == Some(FrameUnit::Pressure)

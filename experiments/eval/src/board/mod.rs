@@ -21,7 +21,7 @@ use crate::sensing::{RowChooser, Sensing};
 use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::tally::{Scores, Tally, intervals, mean, pool};
-use crate::training::{TrainedNetwork, TrainingSource};
+use crate::training::{TrainedNetwork, TrainingData, TrainingSource};
 pub(crate) use learning::Entry;
 use learning::Trainer;
 use rayon::prelude::*;
@@ -145,7 +145,9 @@ impl BoardSettings {
         if !sessions.is_empty() {
             let mut trainer = Trainer::new(source, self);
             entries = trainer.entries(&sessions)?;
-            if touches || places && source.bounces.is_some() {
+            // locators learn, which nothing can on a large skin without scans
+            let large = source.layout.taxels() > TrainingData::MOST_TAXELS && !source.learns();
+            if (touches || places && source.bounces.is_some()) && !large {
                 dictionary = Some(trainer.dictionary()?);
             }
         }

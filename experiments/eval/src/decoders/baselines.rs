@@ -18,6 +18,7 @@ pub(super) fn empty(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
 
 /// Mean of the library, in which all objects have as many images.
 pub(super) fn mean_image(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    data.check_learned()?;
     let images = data.library.images();
     let image = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
     Ok(Box::new(Constant { image }))
@@ -44,6 +45,7 @@ struct Correlate {
 }
 
 pub(super) fn correlate(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    data.check_learned()?;
     Ok(Box::new(Correlate {
         templates: Dictionary::new(data.templates.images().clone()),
         labels: data.templates.labels().to_vec(),

@@ -55,6 +55,7 @@ const APART: f64 = 0.99;
 const SOLVED: usize = 2;
 
 pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    data.check_learned()?;
     data.fits_squares("covariances", SQUARES)?;
     if let Some((images, labels)) = data.posed() {
         return posed(images, labels);

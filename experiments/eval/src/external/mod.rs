@@ -162,7 +162,9 @@ impl Stream {
             None | Some(Event::InputClosed) => {}
             Some(event) => return Err(self.unexpected(&event, deadline)),
         }
-        let rows = window.phi.values().chunks_exact(window.phi.ncols());
+        let mut numbers = Vec::new();
+        let rows = window.with_rows(&mut numbers).phi;
+        let rows = rows.values().chunks_exact(rows.ncols());
         let phi = if window.signs.is_some() {
             json!(rows.map(signs).collect::<Vec<_>>())
         } else {

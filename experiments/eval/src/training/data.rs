@@ -279,7 +279,10 @@ impl TrainingData {
     }
 
     /// Refuses a skin that nothing can be learned for.
-    fn check_learned(&self) -> Result<(), Refusal> {
+    ///
+    /// # Errors
+    /// [`Refusal`] with what is valid.
+    pub(crate) fn check_learned(&self) -> Result<(), Refusal> {
         if !self.bare {
             return Ok(());
         }
@@ -455,6 +458,7 @@ mod tests {
 
     /// 400,000 taxels: a prior would take terabytes.
     #[test]
+    #[cfg(target_os = "linux")]
     fn what_does_not_fit_is_told_by_its_size() {
         let images = Matrix::from_column_slices(400_000, &[vec![1.0; 400_000]]);
         let data = TrainingData::of_images(images, &[1], 400, Streams::new(1)).unwrap();

@@ -292,7 +292,8 @@ fn draw_panel(canvas: &mut Canvas, panel: &IntervalPanel, (left, top): Point, he
         };
         let y = top + ROW * (k as f64 + 0.5);
         draw_band(canvas, (low, y), (high - low).max(2.0), middle);
-        let inside = (i.low..=i.high).contains(&i.mark);
+        // nothing is said of a band without a width
+        let inside = (i.low..=i.high).contains(&i.mark) || i.low >= i.high;
         draw_marker(canvas, (mark, y), if inside { Style::Real } else { Style::Raster }, 0);
     }
 }

@@ -141,6 +141,8 @@ impl Reproduction {
         let scored = |object: &dataset::SimulatedObject| ScoredSession {
             protocol: size.protocol,
             raster_protocol: size.raster_protocol,
+            // against a scan, as the real skin
+            simulated: Vec::new(),
             ..ScoredSession::new(object.session.clone(), object.label)
         };
         let sessions: Vec<ScoredSession> = dataset.objects.iter().map(scored).collect();

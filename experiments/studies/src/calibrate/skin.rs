@@ -109,7 +109,7 @@ impl SkinStudy {
             let Ok(others) = estimate(&|s| s.object != session.object) else {
                 continue;
             };
-            let own = images(&source.sessions, &|s| s.object == session.object)?;
+            let own = without_offsets(&images(&source.sessions, &|s| s.object == session.object)?, &known)?;
             let Some(k) = simulated.labels().iter().position(|l| *l == session.label) else {
                 continue;
             };
@@ -146,6 +146,13 @@ fn known_pressures(root: &Path, source: &Source) -> Result<Vec<Known>, Refusal> 
         let is_simulated = OBJECTS.iter().any(|object| object.name == session.object);
         let scored = source.sessions.iter().find(|scored| scored.name == session.name);
         let (Some(scored), Some(raster), false) = (scored, &session.raster, is_simulated) else { continue };
+        if raster.recording.info().unit.is_some() {
+            return Err(Refusal::new(format!(
+                "session {:?}: frames of another skin, which no readout has measured; `spts wire` records them",
+                session.name
+            ))
+            .at(root.display()));
+        }
         let mut skin = SkinSession::new(&config, &source.layout, Streams::new(0), 0)?;
         let mut image = vec![0.0; source.layout.taxels()];
         let mut offsets_v = Vec::new();
@@ -157,10 +164,17 @@ fn known_pressures(root: &Path, source: &Source) -> Result<Vec<Known>, Refusal> 
             let hold = &scored.raster_protocol;
             let frames = hold.first_frame..(hold.first_frame + hold.frames).min(raster.recording.frames());
             let volts = frames.flat_map(|frame| raster.recording.volts(press, frame).iter().zip(pressure.values()));
-            offsets_v.extend(volts.filter(|(_, p)| **p <= 0.0).map(|(v, _)| *v));
+            offsets_v.extend(volts.filter(|(v, p)| **p <= 0.0 && v.is_finite()).map(|(v, _)| *v));
         }
-        if image.iter().any(|g| *g > 0.0) && !known.iter().any(|known| known.label == scored.label) {
-            known.push(Known { label: scored.label, image, offset_v: mean(&offsets_v).unwrap_or(0.0) });
+        let offset_v = mean(&offsets_v).unwrap_or(0.0);
+        match known.iter_mut().find(|known| known.label == scored.label) {
+            // several sessions of one object: the mean of all their presses
+            Some(before) => {
+                before.image.iter_mut().zip(&image).for_each(|(total, g)| *total += g);
+                before.offset_v = 0.5 * (before.offset_v + offset_v);
+            }
+            None if image.iter().any(|g| *g > 0.0) => known.push(Known { label: scored.label, image, offset_v }),
+            None => {}
         }
     }
     Ok(known)
