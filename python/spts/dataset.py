@@ -176,7 +176,16 @@ class Dataset:
 
 
 def make(
-    spec=None, folder=None, *, frames=None, rows=None, seed=None, set=None, engine="threads", workers=None, progress=None
+    spec=None,
+    folder=None,
+    *,
+    frames=None,
+    rows=None,
+    seed=None,
+    set=None,
+    engine="threads",
+    workers=None,
+    progress=None,
 ):
     """Makes a data set, or goes on with one; files that are there are kept. Ctrl-C stops it after the files under way.
 
