@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
   spts decode recordings/ --skin my_skin.toml --decoder evidence
 
 Files in DIR:
-  decoded.png decoded.svg    pressure, the trace of the wire, the image at each M
+  decoded.png decoded.svg    what the taxels conduct, the trace of the wire, the image at each M
   windows.csv                one line a window
   SESSION.npz                for every M: phi_mM, y_mM, block_mM, window_mM and image_DECODER_mM; truth; of many rows of
                              more than 2048 taxels phi_mM is left out

@@ -57,7 +57,7 @@ Files in DIR (N presses, F frames, the skin's rows R and columns C):
                              electrode
   conductance_s.npy          N x F x R x C: what the readout sees, S
   session.json               the recordings as a session, with raster_*.npy and compressive_*.npy: see docs/session.md
-  decoded.png decoded.svg    pressure, the trace of the wire, images decoded from it at three M
+  decoded.png decoded.svg    what the taxels conduct, the trace of the wire, images decoded from it at three M
   pressure.png               the pressure at the instant of the largest force; with --render scene.png, scene_close.png
   animation.gif              with --animate: the first press in motion, beside the image decoded from the wire
 A drop has frames of its own: time_s_000.npy, pressure_pa_000.npy (F x R x C) and so on.")]

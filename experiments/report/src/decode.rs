@@ -34,14 +34,14 @@ const TILE_PX: usize = 120;
 const FINE_TILE_PX: usize = 200;
 const FINE: usize = 24;
 
-/// Writes `NAME.svg` and `NAME.png` into `folder`: a row for each of the first blocks, with the pressure, or the true
-/// image where that is not known, the trace of the wire, and the images at each M with the true support outlined.
+/// Writes `NAME.svg` and `NAME.png` into `folder`: a row for each of the first blocks, with the true image, the trace of
+/// the wire, and the images at each M with the true support outlined.
 ///
 /// # Errors
 /// [`Refusal`] when a file cannot be written.
 pub(crate) fn save_picture(decoded: &[(&Session, DecodedSession)], folder: &Path, name: &str) -> Result<(), Refusal> {
     let mut rows = Vec::new();
-    let outlined = format!("pressed; outlined: above {:.0} % of the peak", 100.0 * SUPPORT_THRESHOLD);
+    let outlined = format!("what the taxels conduct; outlined: above {:.0} % of the peak", 100.0 * SUPPORT_THRESHOLD);
     let mut columns = vec![outlined, "the wire".to_owned()];
     let rows_of: Vec<&str> = unique(decoded.iter().filter_map(|(session, _)| rows_words(session)));
     if let [words] = rows_of[..] {
@@ -97,20 +97,21 @@ fn rows_words(session: &Session) -> Option<&'static str> {
     })
 }
 
-/// The true pressure, or the true image.
+/// The true image.
 fn pressed(session: &Session, found: &DecodedSession, block: usize) -> Tile {
     let facts = session.compressive.as_ref().and_then(|r| r.facts(block));
     let [rows, cols] = found.shape;
     let outline = found.truth.get(block).and_then(Option::as_ref).map(|truth| above(truth));
     let heat = |values: Vec<f64>, caption: String| Tile::Heat { values, rows, cols, max: None, caption, outline };
-    if let Some(map) = facts.and_then(|f| f.pressure.as_ref()) {
-        return heat(map.values().to_vec(), format!("peak {:.0} kPa", 1e-3 * map.max()));
-    }
     match found.truth.get(block).and_then(Option::as_ref) {
         Some(truth) => {
             let peak = truth.iter().copied().fold(0.0, f64::max);
+            let pressure = facts.and_then(|f| f.pressure.as_ref());
             match facts.and_then(|f| f.conductance.as_ref()) {
-                Some(_) => heat(truth.clone(), format!("peak {:.0} µS", 1e6 * peak)),
+                Some(_) => {
+                    let of = pressure.map_or_else(String::new, |map| format!(" at {:.0} kPa", 1e-3 * map.max()));
+                    heat(truth.clone(), format!("peak {:.0} µS{of}", 1e6 * peak))
+                }
                 None => heat(truth.clone(), format!("raster scan, peak {peak:.2} V")),
             }
         }
