@@ -388,6 +388,12 @@ impl FewWiresStudy {
 mod tests {
     use super::*;
 
+    /// What an ideal scan has of these conductances.
+    fn volts(conductance: &ConductanceMap) -> Vec<f64> {
+        let volts_per_siemens = Profile::named("ideal").unwrap().volts_per_siemens();
+        conductance.values().iter().map(|g| volts_per_siemens * g).collect()
+    }
+
     fn study(wires: Vec<usize>) -> FewWiresStudy {
         let layout = SkinLayout::default();
         let block = |first: usize| {
@@ -395,8 +401,8 @@ mod tests {
             ConductanceMap::from_values(10, 10, (0..100).map(|k| if on(k) { 1e-4 } else { 0.0 }).collect())
         };
         let touched = |name: &str, conductance: ConductanceMap| {
-            let (name, object, scan) = (name.to_owned(), "block".to_owned(), conductance.values().to_vec());
-            Touched { name, object, conductance, scan }
+            let (name, object) = (name.to_owned(), "block".to_owned());
+            Touched { name, object, scan: volts(&conductance), conductance }
         };
         FewWiresStudy {
             layout,
@@ -438,7 +444,7 @@ mod tests {
             };
             let touch = Touched {
                 object: object.to_owned(),
-                scan: block.values().to_vec(),
+                scan: volts(&block),
                 conductance: block,
                 ..one.touches[0].clone()
             };

@@ -274,7 +274,8 @@ mod tests {
         assert_eq!((creep.law, creep.objects), ("creep", [2, 2]));
         // a share of the mean over the hold, in which the signal is below that of a second after the touch
         assert!((0.1..0.12).contains(&creep.fitted), "{creep:?}");
-        assert!(creep.with_fitted < 1e-6 && creep.without > 5e-3 && creep.with_twin > creep.with_fitted, "{creep:?}");
+        // the touch is seen a frame, .01 s, after it begins: .1·log10(1 − .01/t) from .11 s on
+        assert!(creep.with_fitted < 5e-4 && creep.without > 5e-3 && creep.with_twin > 5e-3, "{creep:?}");
         assert!((0.045..0.05).contains(&conditioning.fitted) && conditioning.with_fitted < 1e-6, "{conditioning:?}");
         let few = frames_report(&all[..2].iter().collect::<Vec<_>>()).unwrap();
         assert!(few.laws.is_empty() && few.objects.len() == 2);
