@@ -34,8 +34,8 @@ const TILE_PX: usize = 120;
 const FINE_TILE_PX: usize = 200;
 const FINE: usize = 24;
 
-/// Writes `NAME.svg` and `NAME.png` into `folder`: a row for each of the first blocks, with the true image, the trace of
-/// the wire, and the images at each M with the true support outlined.
+/// Writes `NAME.svg` and `NAME.png` into `folder`: a row for each of the first blocks, with the true image, the trace
+/// of the wire, and the images at each M with the true support outlined.
 ///
 /// # Errors
 /// [`Refusal`] when a file cannot be written.
