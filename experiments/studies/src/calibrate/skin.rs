@@ -135,6 +135,8 @@ struct Known {
     /// Mean output of taxels without a pressure in the raster scans, V: cells that are not selected do not put out 0 V
     /// exactly, which adds the same to every taxel.
     offset_v: f64,
+    /// Number of samples that this is the mean of.
+    samples: f64,
 }
 
 /// The objects that the simulation does not know, but whose pressures the sessions in `root` have.
@@ -166,14 +168,18 @@ fn known_pressures(root: &Path, source: &Source) -> Result<Vec<Known>, Refusal> 
             let volts = frames.flat_map(|frame| raster.recording.volts(press, frame).iter().zip(pressure.values()));
             offsets_v.extend(volts.filter(|(v, p)| **p <= 0.0 && v.is_finite()).map(|(v, _)| *v));
         }
-        let offset_v = mean(&offsets_v).unwrap_or(0.0);
+        let (offset_v, samples) = (mean(&offsets_v).unwrap_or(0.0), offsets_v.len() as f64);
         match known.iter_mut().find(|known| known.label == scored.label) {
             // several sessions of one object: the mean of all their presses
             Some(before) => {
                 before.image.iter_mut().zip(&image).for_each(|(total, g)| *total += g);
-                before.offset_v = 0.5 * (before.offset_v + offset_v);
+                let all = before.samples + samples;
+                before.offset_v += samples / all.max(1.0) * (offset_v - before.offset_v);
+                before.samples = all;
             }
-            None if image.iter().any(|g| *g > 0.0) => known.push(Known { label: scored.label, image, offset_v }),
+            None if image.iter().any(|g| *g > 0.0) => {
+                known.push(Known { label: scored.label, image, offset_v, samples })
+            }
             None => {}
         }
     }
