@@ -54,6 +54,7 @@ mod readout;
 mod recording;
 mod source;
 mod weights;
+mod wires;
 
 pub use batch::{Batch, CellRun};
 pub use converter::{Adc, CodeScale, Converter, ConverterConfig};
@@ -69,3 +70,4 @@ pub use weights::{
     Patterns, Seeding, WeightMode, WeightRows, Weights, check_codes, parse_patterns, parse_seeds,
     seeds_of_first_window,
 };
+pub use wires::{WireConfig, Wires};

@@ -5,6 +5,7 @@ use crate::effect::{Effect, EffectSession, FaultConfig};
 use crate::effects::{build_chain, converter, rail_v};
 use crate::faults::build_faults;
 use crate::weights::{LevelSource, Mode, Patterns, Seeding, WeightMode, Weights, not_in_mode};
+use crate::wires::{WireConfig, Wires};
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, parsed_text, within};
@@ -56,7 +57,7 @@ pub struct Profile {
     /// ignores patterns and seeds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub patterns: Option<Patterns>,
-    /// Measurements a second, Hz. Range [1, 1e9].
+    /// Clock edges a second, Hz. Range [1, 1e9]. At each of them every wire is measured once.
     pub sample_rate_hz: f64,
     /// Vd: drive voltage of a taxel at level 1, V. Range [1e-3, 1e3].
     pub drive_v: f64,
@@ -68,6 +69,9 @@ pub struct Profile {
     /// number of taxels, because the necessary range grows with the number of pressed ones.
     #[serde(default = "scales")]
     pub feedback_scales: bool,
+    /// Wires of the skin, all with the values above; see [`WireConfig`]. Default: none said, which is one wire.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub wires: Vec<WireConfig>,
     /// Faulty cells, in both modes. Default: none.
     #[serde(default)]
     pub faults: Vec<FaultConfig>,
@@ -117,8 +121,9 @@ impl Profile {
     /// `feedback_scales` of the result is off. At 10 mm nothing changes, to the bit.
     ///
     /// # Errors
-    /// [`Refusal`] if the scaled Rf is outside [1e-3, 1e9] Ω.
+    /// [`Refusal`] if the scaled Rf is outside [1e-3, 1e9] Ω, or the wires are not those of such a skin.
     pub fn on(&self, layout: &SkinLayout) -> Result<Self, Refusal> {
+        Wires::new(&self.wires, layout)?;
         let scale = if self.feedback_scales { layout.relative_area() } else { 1.0 };
         let feedback_ohm = self.feedback_ohm / scale;
         let field = "feedback_ohm / (electrode_m / 10 mm)²";
@@ -164,7 +169,7 @@ impl Profile {
         self.feedback_ohm * self.drive_v
     }
 
-    /// The weights of `taxels` taxels in `mode`.
+    /// The weights of `taxels` taxels in `mode`, as if on one wire.
     ///
     /// # Errors
     /// [`Refusal`] if `seeds` or `patterns` are not valid or have another number of taxels, or if more

@@ -1,11 +1,12 @@
-//! The device: clock, cells, summing amplifier and converter, from a source of conductance to volts.
+//! The device: clock, cells, summing amplifiers and converters, from a source of conductance to volts.
 
-use crate::effect::{BlockStart, Effect, EffectSession};
+use crate::effect::{BlockStart, Effect, EffectSession, FaultConfig};
 use crate::engine::Engine;
 use crate::profile::Profile;
 use crate::recording::{Block, Recording, RecordingInfo};
-use crate::source::ConductanceSource;
-use crate::weights::{CellCodes, Mode, Weights};
+use crate::source::{ConductanceSource, Segment};
+use crate::weights::{CellCodes, Mode, WeightMode, Weights};
+use crate::wires::Wires;
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Snapshot, Streams};
 
@@ -23,14 +24,24 @@ use spts_models::{SkinLayout, Snapshot, Streams};
 /// assert_eq!((block.volts.len(), block.frame_position), (200, 2));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// With several wires ([`Profile::wires`]) each has its own amplifier and converter, with parts and noise of their own.
+/// Samples are in the order of [`Weights::wired`]; those of a raster scan are in the order of taxels, although the wires
+/// are scanned at once.
 pub struct Readout {
     info: RecordingInfo,
-    engine: Engine,
-    effects: Vec<Box<dyn Effect>>,
+    lines: Vec<Line>,
     /// Row of the next measurement.
     row: u64,
     block: u64,
     continuous: bool,
+}
+
+/// One wire with its cells, amplifier and converter.
+struct Line {
+    engine: Engine,
+    effects: Vec<Box<dyn Effect>>,
+    volts: Vec<f64>,
 }
 
 impl Readout {
@@ -51,51 +62,43 @@ impl Readout {
         let taxels = u32::try_from(layout.taxels()).unwrap_or(u32::MAX);
         let profile = &profile.on(layout)?;
         profile.validate(taxels)?;
-        let label = match mode {
-            Mode::Raster => "readout/raster",
-            Mode::Compressive => "readout/compressive",
-        };
-        let weights = profile.weights(mode, taxels)?;
+        let weights = profile.weights(mode, taxels)?.wired(Wires::new(&profile.wires, layout)?)?;
+        let lines = (0..weights.wire_count()).map(|wire| Line::new(profile, &weights, wire, device, session));
+        let lines: Vec<Line> = lines.collect::<Result<_, _>>()?;
+        let rates_hz = lines.iter().map(|line| line.engine.sample_rate_hz());
         let info = RecordingInfo {
             converter: profile.converter(mode)?,
-            ..RecordingInfo::new(*layout, weights.clone(), profile.sample_rate_hz)
+            ..RecordingInfo::new(*layout, weights, rates_hz.sum())
         };
-        let session = EffectSession {
-            device: device.child("readout/device", 0),
-            streams: device.child("session", session).child(label, 0),
-            weights: weights.clone(),
-            feedback_ohm: profile.feedback_ohm,
-            sample_rate_hz: profile.sample_rate_hz,
-        };
-        Ok(Self {
-            info,
-            engine: Engine::new(weights, profile.volts_per_siemens(), profile.sample_rate_hz),
-            effects: profile.effects(mode, &session)?,
-            row: 0,
-            block: 0,
-            continuous: true,
-        })
+        Ok(Self { info, lines, row: 0, block: 0, continuous: true })
     }
 
-    /// The same readout with cells that put out `codes` in place of the generator's formula. If the codes equal the
-    /// formula's, the recording is the same bit for bit. Effects and faults act on them as on the generator's levels.
-    /// Where a fault determines the level of a cell, or an effect makes the cell miss an edge, the formula's level
-    /// replaces the code.
+    /// The same readout with cells that put out given codes in place of the generator's formula: `cells` makes those
+    /// of a wire from its weights. If the codes equal the formula's, the recording is the same bit for bit. Effects and
+    /// faults act on them as on the generator's levels. Where a fault determines the level of a cell, or an effect
+    /// makes the cell miss an edge, the formula's level replaces the code.
     ///
     /// # Errors
-    /// [`Refusal`] if the number of cells differs from that of taxels.
-    pub fn with_codes(self, codes: Box<dyn CellCodes>) -> Result<Self, Refusal> {
-        let (cells, taxels) = (codes.taxels(), self.measurements_per_frame());
-        if cells != taxels {
-            let readout = format!("the readout has {taxels} taxels");
-            return Err(Refusal::new(format!("the codes are those of {cells} cells; {readout}")));
-        }
-        Ok(Self { engine: self.engine.with_codes(codes), ..self })
+    /// Those of `cells`, and [`Refusal`] if the number of cells differs from that of taxels.
+    pub fn with_codes(
+        self,
+        mut cells: impl FnMut(&Weights) -> Result<Box<dyn CellCodes>, Refusal>,
+    ) -> Result<Self, Refusal> {
+        let lines = self.lines.into_iter().map(|line| {
+            let codes = cells(line.engine.weights())?;
+            let (cells, taxels) = (codes.taxels(), line.engine.weights().taxels());
+            if cells != taxels {
+                let readout = format!("the readout has {taxels} taxels");
+                return Err(Refusal::new(format!("the codes are those of {cells} cells; {readout}")));
+            }
+            Ok(Line { engine: line.engine.with_codes(codes), ..line })
+        });
+        Ok(Self { lines: lines.collect::<Result<_, _>>()?, ..self })
     }
 
     /// Weights that the cells are meant to put out.
     pub fn weights(&self) -> &Weights {
-        self.engine.weights()
+        &self.info.weights
     }
 
     /// Metadata of its recordings.
@@ -105,12 +108,12 @@ impl Readout {
 
     /// Number of measurements in a frame.
     pub fn measurements_per_frame(&self) -> usize {
-        self.engine.weights().taxels()
+        self.info.measurements_per_frame
     }
 
-    /// Number of measurements a second, Hz.
+    /// Number of measurements a second, of all wires together, Hz.
     pub fn sample_rate_hz(&self) -> f64 {
-        self.engine.sample_rate_hz()
+        self.info.sample_rate_hz
     }
 
     /// Runs the clock for `frames` frames without recording, as the device does between presses (about 57 frames).
@@ -163,9 +166,10 @@ impl Readout {
 
     /// Starts the next block; the following calls of [`Readout::go_on`] measure in it.
     pub fn begin(&mut self) {
-        let start = BlockStart { block: self.block, first_row: self.row, continuous: self.continuous };
-        for effect in &mut self.effects {
-            effect.begin_block(&start);
+        for (wire, line) in self.lines.iter_mut().enumerate() {
+            let first_row = self.info.weights.before(wire, self.row);
+            let start = BlockStart { block: self.block, first_row, continuous: self.continuous };
+            line.effects.iter_mut().for_each(|effect| effect.begin_block(&start));
         }
         self.block += 1;
         self.continuous = true;
@@ -182,13 +186,35 @@ impl Readout {
     /// # Errors
     /// As [`Readout::measure`].
     pub fn go_on(&mut self, source: &mut dyn ConductanceSource, volts: &mut [f64]) -> Result<(), Refusal> {
-        let taxels = self.measurements_per_frame();
+        let taxels = self.info.layout.taxels();
         if source.taxels() != taxels {
             let found = source.taxels();
             return Err(Refusal::new(format!("the source has {found} taxels; the readout {taxels}")));
         }
-        self.engine.run(&mut self.effects, self.row, source, volts)?;
-        self.row += volts.len() as u64;
+        let (weights, end) = (&self.info.weights, self.row + volts.len() as u64);
+        let Some(wires) = weights.wires() else {
+            let Line { engine, effects, .. } = &mut self.lines[0];
+            engine.run(effects, self.row, source, volts)?;
+            self.row = end;
+            return Ok(());
+        };
+        for (wire, line) in self.lines.iter_mut().enumerate() {
+            let (first, last) = (weights.before(wire, self.row), weights.before(wire, end));
+            #[expect(clippy::cast_possible_truncation, reason = "no more than in `volts`")]
+            line.volts.resize((last - first) as usize, 0.0);
+            let mut own = OnWire { source, taxels: wires.taxels(wire), from_s: Vec::new(), to_s: Vec::new() };
+            line.engine.run(&mut line.effects, first, &mut own, &mut line.volts)?;
+        }
+        let mut own: Vec<_> = self.lines.iter().map(|line| line.volts.iter()).collect();
+        for (row, out) in (self.row..).zip(volts) {
+            #[expect(clippy::cast_possible_truncation, reason = "less than the taxels or the wires")]
+            let wire = match weights.mode() {
+                WeightMode::Raster => wires.of((row % taxels as u64) as usize),
+                _ => (row % wires.count() as u64) as usize,
+            };
+            *out = own[wire].next().copied().unwrap_or(f64::NAN);
+        }
+        self.row = end;
         Ok(())
     }
 
@@ -198,7 +224,7 @@ impl Readout {
         state.u64(&mut self.row);
         state.u64(&mut self.block);
         state.flag(&mut self.continuous);
-        self.effects.iter_mut().for_each(|effect| effect.exchange(state));
+        self.lines.iter_mut().flat_map(|line| &mut line.effects).for_each(|effect| effect.exchange(state));
     }
 
     /// Records one block of `measurements` measurements for each of `sources`, with `gap_frames` unrecorded frames
@@ -226,6 +252,76 @@ impl Readout {
     /// [`Refusal`] if the blocks do not fit together.
     pub fn recording(&self, blocks: Vec<Block>) -> Result<Recording, Refusal> {
         Recording::new(self.info.clone(), blocks)
+    }
+}
+
+impl Line {
+    /// Wire number `wire` of a skin with these `weights` and this `profile`, which is scaled for it. A wire with fewer
+    /// taxels than another takes as long for a raster scan.
+    fn new(
+        profile: &Profile,
+        weights: &Weights,
+        wire: usize,
+        device: Streams,
+        session: u64,
+    ) -> Result<Self, Refusal> {
+        let (mode, own) = (weights.mode().readout(), weights.of_wire(wire));
+        let label = match mode {
+            Mode::Raster => "readout/raster",
+            Mode::Compressive => "readout/compressive",
+        };
+        let mut profile = profile.clone();
+        let (mut device, mut sample_rate_hz) = (device, profile.sample_rate_hz);
+        if let Some(wires) = weights.wires() {
+            device = device.child("wire", wire as u64);
+            let place = |taxel: u32| wires.taxels(wire).binary_search(&taxel).ok();
+            let faults = profile.faults.into_iter().filter_map(|fault| {
+                let taxel = u32::try_from(place(fault.taxel)?).ok()?;
+                Some(FaultConfig { taxel, ..fault })
+            });
+            profile.faults = faults.collect();
+            if mode == Mode::Raster {
+                sample_rate_hz *= own.taxels() as f64 / wires.most_taxels() as f64;
+            }
+        }
+        let session = EffectSession {
+            device: device.child("readout/device", 0),
+            streams: device.child("session", session).child(label, 0),
+            weights: own.clone(),
+            feedback_ohm: profile.feedback_ohm,
+            sample_rate_hz,
+        };
+        let effects = profile.effects(mode, &session)?;
+        let engine = Engine::new(own, profile.volts_per_siemens(), sample_rate_hz);
+        Ok(Self { engine, effects, volts: Vec::new() })
+    }
+}
+
+/// What one wire sees of a source.
+struct OnWire<'a> {
+    source: &'a mut dyn ConductanceSource,
+    taxels: &'a [u32],
+    from_s: Vec<f64>,
+    to_s: Vec<f64>,
+}
+
+impl ConductanceSource for OnWire<'_> {
+    fn taxels(&self) -> usize {
+        self.taxels.len()
+    }
+
+    fn segment(&mut self, time_s: f64) -> Segment<'_> {
+        let segment = self.source.segment(time_s);
+        let own = |all: &[f64], own: &mut Vec<f64>| {
+            own.clear();
+            own.extend(self.taxels.iter().map_while(|taxel| all.get(*taxel as usize)));
+        };
+        own(segment.conductance_s, &mut self.from_s);
+        let end_conductance_s = segment.end_conductance_s.map(|all| {
+            own(all, &mut self.to_s);
+            &self.to_s[..]
+        });
+        Segment { conductance_s: &self.from_s, end_conductance_s, ..segment }
     }
 }
 
@@ -299,11 +395,10 @@ mod tests {
             let volts = |batch: usize| {
                 let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(8), 0).unwrap();
                 let engine =
-                    Engine::new(readout.engine.weights().clone(), profile.volts_per_siemens(), profile.sample_rate_hz);
-                readout.engine = engine.with_batch(batch);
+                    Engine::new(readout.weights().clone(), profile.volts_per_siemens(), profile.sample_rate_hz);
+                readout.lines[0].engine = engine.with_batch(batch);
                 if !in_order {
-                    let cells = OutOfOrder(readout.engine.weights().clone());
-                    readout = readout.with_codes(Box::new(cells)).unwrap();
+                    readout = readout.with_codes(|weights| Ok(Box::new(OutOfOrder(weights.clone())))).unwrap();
                 }
                 let recording = readout.record(&mut [press(), press()], 2000, 57).unwrap();
                 let bits = |block: &Block| block.volts.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
@@ -313,6 +408,67 @@ mod tests {
             for batch in [1, 7, 64] {
                 assert!(volts(batch) == whole, "{mode:?}, in order {in_order}: batches of {batch} differ");
             }
+        }
+    }
+
+    fn volts(profile: &Profile, mode: Mode, pieces: &[usize]) -> Vec<f64> {
+        let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(8), 0).unwrap();
+        let (mut press, mut volts) = (press(), Vec::new());
+        readout.begin();
+        for piece in pieces {
+            let start_s = volts.len() as f64 / readout.sample_rate_hz();
+            let mut more = vec![0.0; *piece];
+            readout.go_on(&mut press.starting_at(start_s), &mut more).unwrap();
+            volts.extend(more);
+        }
+        volts
+    }
+
+    /// On ideal wires every sample is Φx, whatever the wires; and one that is said to be one wire is as if nothing was.
+    #[test]
+    fn several_wires_add_up_their_own_taxels() {
+        let ideal = Profile::named("ideal").unwrap();
+        let held = ConductanceMap::from_values(10, 10, (0..100).map(|k| 1e-6 * f64::from(k % 13)).collect());
+        for wires in ["bands = 3", "round_robin = 8", "blocks = [2, 5]", "bands = 100"] {
+            let entry = toml::from_str(wires).unwrap();
+            let profile = Profile { wires: vec![entry], ..ideal.clone() };
+            for mode in [Mode::Raster, Mode::Compressive] {
+                let mut readout = Readout::new(&profile, mode, &SkinLayout::default(), Streams::new(8), 0).unwrap();
+                readout.seek_row(0, 1234);
+                let mut source = crate::Constant::new(held.clone()).unwrap();
+                let volts = readout.measure(&mut source, 217).unwrap();
+                let mut sums = vec![0.0; 217];
+                readout.weights().weighted_sums(1234, held.values(), &mut sums);
+                for (v, sum) in volts.iter().zip(&sums) {
+                    let expected = sum * profile.volts_per_siemens();
+                    // sums of at most 100 terms of 0.06 V, rounded
+                    assert!((v - expected).abs() < 1e-13, "{wires}, {mode:?}: {v} {expected}");
+                }
+            }
+        }
+        let one = Profile { wires: vec![crate::WireConfig::bands(1)], ..ideal.clone() };
+        for mode in [Mode::Raster, Mode::Compressive] {
+            assert_eq!(volts(&one, mode, &[1000]), volts(&ideal, mode, &[1000]));
+        }
+    }
+
+    /// Each wire of a skin as built has the time of the clock's edges, and the cut into calls does not show.
+    #[test]
+    fn wires_are_clocked_together() {
+        let text = "seeding = \"mixed\"\nweights = \"binary\"\nsample_rate_hz = 64300\ndrive_v = 4.3\nfeedback_ohm = 1000\n\
+                    [[wires]]\nround_robin = 4\n[[faults]]\nname = \"dead\"\ntaxel = 41\n[compressive.idle_noise]\nsd_v = 0.02\n\
+                    [raster.idle_noise]\nsd_v = 0.02\n";
+        let profile = Profile::from_toml(text).unwrap();
+        for mode in [Mode::Raster, Mode::Compressive] {
+            let readout = Readout::new(&profile, mode, &SkinLayout::default(), Streams::new(8), 0).unwrap();
+            assert!((readout.sample_rate_hz() - 4.0 * 64_300.0).abs() < 1e-6, "25 taxels on each of four wires");
+            let whole = volts(&profile, mode, &[1200]);
+            let pieces = volts(&profile, mode, &[400, 400, 400]);
+            // time 0 of a piece is that of its first sample: an interpolated conductance is rounded
+            assert!(whole.iter().zip(&pieces).all(|(a, b)| (a - b).abs() < 1e-9), "{mode:?}");
+            // neighbouring wires have noise of their own
+            let [a, b] = [0, 1].map(|k| whole[k..].iter().step_by(4).take(5).map(|v| v.to_bits()).collect::<Vec<_>>());
+            assert_ne!(a, b);
         }
     }
 }

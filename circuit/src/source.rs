@@ -66,7 +66,7 @@ pub trait ConductanceSource {
     fn taxels(&self) -> usize;
 
     /// The segment that contains `time_s`, in seconds since the start of the block. The readout requests times in
-    /// increasing order.
+    /// increasing order; of a skin on several wires for one wire after the other.
     fn segment(&mut self, time_s: f64) -> Segment<'_>;
 }
 

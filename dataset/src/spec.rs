@@ -399,6 +399,7 @@ fn chain_config(config: &SpecConfig, transducer: &toml::Table, faults: &[toml::T
         rows: config.weights.clone(),
         weights: None,
         faults: faults.to_vec(),
+        wires: Vec::new(),
     })
 }
 

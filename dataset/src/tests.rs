@@ -636,7 +636,7 @@ const REFUSED: &[(&str, &[&str])] = &[
     ("[record]\nmeasurements = 1000000\nphi = true", &["record.measurements × taxels", "[1, 2^22]"]),
     ("[record]\nlabels = [\"image\"]", &["`record.labels`", "`pressure`"]),
     ("[transducer]\nexponent = { uniform = [0.4, 9.0] }", &["`transducer.exponent` = 9", "[0.05, 2]"]),
-    ("[object]\ncount = 4", &["`object.count` = 4", "[1, 3]"]),
+    ("[object]\ncount = 11", &["`object.count` = 11", "[1, 10]"]),
     ("[object]\nfrom = \"clouds\"", &["clouds"]),
     ("[object]\nnames = [\"cloud\"]", &["`object.names` = \"cloud\"", "known: plate"]),
     ("[object]\nnames = []", &["`object.names` = []"]),

@@ -58,6 +58,10 @@ impl Wire {
     /// If the places are not all those of the layout.
     pub fn over(skins: Vec<(SkinSession, Vec<usize>)>, chain: &Chain, session: u64) -> Result<Self, Refusal> {
         let layout = chain.skin();
+        if chain.wires() > 1 {
+            let wires = chain.wires();
+            return Err(Refusal::new(format!("`wires`: the skin has {wires}; what is read live is one wire")));
+        }
         let bare = ConductanceMap::zeros(layout.rows(), layout.cols());
         let mut wire = Self { skins, felt: Constant::new(bare).map_err(of_conductance)?, lines: Vec::new() };
         let zeros = wire.skins.iter().map(|(skin, _)| PressureMap::zeros(skin.shape()[0], skin.shape()[1]));

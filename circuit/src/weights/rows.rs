@@ -424,6 +424,20 @@ impl Weights {
             out.fill(0.0);
             return;
         }
+        if let Some(wires) = self.wires().filter(|_| self.mode() != WeightMode::Raster) {
+            // every wire has each of its samples `count` places after the last
+            let count = wires.count();
+            for wire in 0..count {
+                let own: Vec<f64> = wires.taxels(wire).iter().map(|k| values[*k as usize]).collect();
+                let first = self.before(wire, first_row);
+                #[expect(clippy::cast_possible_truncation, reason = "less than the number of wires")]
+                let start = (first * count as u64 + wire as u64 - first_row) as usize;
+                let mut sums = vec![0.0; out.len().saturating_sub(start).div_ceil(count)];
+                self.of_wire(wire).weighted_sums(first, &own, &mut sums);
+                out.iter_mut().skip(start).step_by(count).zip(&sums).for_each(|(out, sum)| *out = *sum);
+            }
+            return;
+        }
         let (mut rows, mut sums) = (Rows::new(self.clone()), Sums::default());
         for (out, first_row) in out.chunks_mut(RUN).zip((first_row..).step_by(RUN)) {
             rows.go_to(first_row, out.len());

@@ -1,6 +1,7 @@
 //! Drive levels of every taxel at every measurement: modes, codes, patterns, and the rows of the weight matrix.
 
 use super::lcg::{ANALOG_SCALE, Jump, Seeding, Seeds, analog, binary};
+use crate::wires::Wires;
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
 use std::collections::BTreeMap;
@@ -296,17 +297,22 @@ const MAX_SEEDS: usize = 1 << 24;
 /// ```
 ///
 /// `generator` may be omitted. `taxels` may be given together with a list and is then checked.
+///
+/// On several wires ([`Weights::wired`]) rows count samples and not clock edges: at every edge each wire gives one
+/// sample, so that row r is that of wire r mod W at edge ⌊r/W⌋, with the levels of its own taxels and 0 elsewhere. A
+/// raster scan has a row for every taxel in any case.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Weights {
     mode: WeightMode,
     source: LevelSource,
     taxels: u32,
+    wires: Option<Wires>,
 }
 
 impl Weights {
     /// Weights of `taxels` taxels whose generators are seeded by a rule.
     pub fn new(mode: WeightMode, seeding: Seeding, taxels: u32) -> Self {
-        Self { mode, source: LevelSource::Seeding(seeding), taxels }
+        Self { mode, source: LevelSource::Seeding(seeding), taxels, wires: None }
     }
 
     /// Weights with one generator seed for each taxel.
@@ -320,7 +326,7 @@ impl Weights {
         }
         match u32::try_from(seeds.len()) {
             Ok(taxels) if (1..=MAX_SEEDS).contains(&seeds.len()) => {
-                Ok(Self { mode, source: LevelSource::Seeds(seeds), taxels })
+                Ok(Self { mode, source: LevelSource::Seeds(seeds), taxels, wires: None })
             }
             _ => Err(wrong_length(field, seeds.len(), MAX_SEEDS)),
         }
@@ -333,7 +339,88 @@ impl Weights {
     pub fn with_patterns(mode: WeightMode, patterns: Patterns) -> Result<Self, Refusal> {
         patterns.check(mode)?;
         let taxels = u32::try_from(patterns.taxels()).unwrap_or(u32::MAX);
-        Ok(Self { mode, source: LevelSource::Patterns(Arc::new(patterns)), taxels })
+        Ok(Self { mode, source: LevelSource::Patterns(Arc::new(patterns)), taxels, wires: None })
+    }
+
+    /// The same levels with the taxels on `wires`; `None` for one wire.
+    ///
+    /// ```
+    /// use spts_circuit::{Seeding, WeightMode, Weights, WireConfig, Wires};
+    /// use spts_models::SkinLayout;
+    ///
+    /// let one = Weights::new(WeightMode::Binary, Seeding::Mixed, 100);
+    /// let bands = Wires::new(&[WireConfig::bands(2)], &SkinLayout::default())?;
+    /// let two = one.clone().wired(bands)?;
+    /// // the second sample at the fourth clock edge is of the second wire
+    /// assert_eq!((two.level(20, 7), two.level(70, 7)), (0.0, one.level(70, 3)));
+    /// # Ok::<(), spts_input::Refusal>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Refusal`] for wires of another number of taxels.
+    pub fn wired(self, wires: Option<Wires>) -> Result<Self, Refusal> {
+        match wires.as_ref().map(|wires| wires.all().len()) {
+            Some(found) if found != self.taxels() => {
+                Err(Refusal::new(format!("`wires` is for {found} taxels; expected {}", self.taxels)))
+            }
+            _ => Ok(Self { wires, ..self }),
+        }
+    }
+
+    /// The wires, if there are several.
+    pub fn wires(&self) -> Option<&Wires> {
+        self.wires.as_ref()
+    }
+
+    /// Number of wires.
+    pub fn wire_count(&self) -> usize {
+        self.wires.as_ref().map_or(1, Wires::count)
+    }
+
+    /// Weights of the taxels of one wire alone, a row for each of its samples. Those of the only wire are all.
+    ///
+    /// # Panics
+    /// If there is no such wire.
+    pub fn of_wire(&self, wire: usize) -> Self {
+        let Some(wires) = &self.wires else {
+            return self.clone();
+        };
+        let own = wires.taxels(wire);
+        let source = match (self.mode, &self.source) {
+            (WeightMode::Raster, source) => source.clone(),
+            (_, LevelSource::Seeding(seeding)) => LevelSource::Seeds(own.iter().map(|k| seeding.seed(*k)).collect()),
+            (_, LevelSource::Seeds(seeds)) => LevelSource::Seeds(own.iter().map(|k| seeds[*k as usize]).collect()),
+            (_, LevelSource::Patterns(patterns)) => {
+                let rows = (0..patterns.period() as u64).map(|row| patterns.row(row));
+                let codes = rows.flat_map(|row| own.iter().map(|k| row[*k as usize])).collect();
+                LevelSource::Patterns(Arc::new(Patterns { taxels: own.len(), codes }))
+            }
+        };
+        Self { mode: self.mode, source, taxels: u32::try_from(own.len()).unwrap_or(u32::MAX), wires: None }
+    }
+
+    /// Wire and clock edge of the sample `row`.
+    fn sample(&self, row: u64) -> (usize, u64) {
+        let count = self.wire_count() as u64;
+        (usize::try_from(row % count).unwrap_or(0), row / count)
+    }
+
+    /// Wires of the compressive rows, if there are several.
+    fn woven(&self) -> Option<&Wires> {
+        self.wires.as_ref().filter(|_| self.mode != WeightMode::Raster)
+    }
+
+    /// How many of the samples before `row` are of `wire`.
+    pub(crate) fn before(&self, wire: usize, row: u64) -> u64 {
+        match (&self.wires, self.mode) {
+            (None, _) => row,
+            (Some(wires), WeightMode::Raster) => {
+                let (own, taxels) = (wires.taxels(wire), u64::from(self.taxels));
+                let within = row % taxels;
+                row / taxels * own.len() as u64 + own.partition_point(|k| u64::from(*k) < within) as u64
+            }
+            (Some(wires), _) => (row + (wires.count() - 1 - wire) as u64) / wires.count() as u64,
+        }
     }
 
     /// Number of taxels: the length of a row, and the period of the raster.
@@ -376,6 +463,14 @@ impl Weights {
     /// # Panics
     /// If the levels come from a list or a pattern without such a taxel.
     pub fn level(&self, taxel: u32, row: u64) -> f64 {
+        let mut row = row;
+        if let Some(wires) = self.woven() {
+            let (wire, edge) = self.sample(row);
+            if wires.of(taxel as usize) != wire {
+                return 0.0;
+            }
+            row = edge;
+        }
         match (self.mode, &self.source) {
             (WeightMode::Raster, _) => f64::from(row.checked_rem(u64::from(self.taxels)) == Some(u64::from(taxel))),
             (mode, LevelSource::Patterns(patterns)) => mode.code_level(patterns.row(row)[taxel as usize]),
@@ -386,7 +481,7 @@ impl Weights {
 
     /// Writes the levels of `taxel` at as many consecutive rows as `out` holds, starting with `first_row`.
     pub(crate) fn fill_levels(&self, taxel: u32, first_row: u64, out: &mut [f64]) {
-        let (Some(seeds), WeightMode::Analog | WeightMode::Binary) = (self.seeds(), self.mode) else {
+        let (Some(seeds), WeightMode::Analog | WeightMode::Binary, None) = (self.seeds(), self.mode, &self.wires) else {
             for (out, row) in out.iter_mut().zip(first_row..) {
                 *out = self.level(taxel, row);
             }
@@ -411,6 +506,9 @@ impl Weights {
             self.taxels
         );
         let taxels = self.taxels().max(1);
+        if let Some(wires) = self.woven() {
+            return self.fill_woven(wires, first_row, out);
+        }
         if let (Some(seeds), WeightMode::Analog | WeightMode::Binary) = (self.seeds(), self.mode) {
             let jump = Jump::new(first_row);
             let mut states: Vec<u32> = (0..self.taxels()).map(|k| jump.apply(seeds.seed(k))).collect();
@@ -434,6 +532,21 @@ impl Weights {
                     }
                 }
             }
+        }
+    }
+
+    /// Fills `out` with rows of several wires: the levels of all taxels at a clock edge, of which every wire has its own.
+    fn fill_woven(&self, wires: &Wires, first_row: u64, out: &mut [f64]) {
+        let all = Self { wires: None, ..self.clone() };
+        let (mut levels, mut at) = (vec![0.0; self.taxels()], None);
+        for (row, out) in (first_row..).zip(out.chunks_exact_mut(self.taxels().max(1))) {
+            let (wire, edge) = self.sample(row);
+            if at != Some(edge) {
+                all.fill_rows(edge, &mut levels);
+                at = Some(edge);
+            }
+            let own = wires.all().iter().zip(&levels);
+            out.iter_mut().zip(own).for_each(|(out, (of, level))| *out = if usize::from(*of) == wire { *level } else { 0.0 });
         }
     }
 
@@ -499,6 +612,11 @@ impl<'a> WeightRows<'a> {
         self.first_row
     }
 
+    /// Wire of a row, counted from the first; 0 of a raster scan, whose rows are of single taxels.
+    pub fn wire(&self, row: usize) -> usize {
+        self.weights.woven().map_or(0, |_| self.weights.sample(self.first_row + row as u64).0)
+    }
+
     /// Number of rows.
     pub fn len(&self) -> usize {
         self.len
@@ -549,8 +667,9 @@ impl<'a> WeightRows<'a> {
         rows
     }
 
-    /// Packed signs of binary weights, ⌈taxels/64⌉ words a row: bit k of a row is set if taxel k has the weight +1.
-    /// `None` if the weights are not binary.
+    /// Packed signs of binary weights, ⌈taxels/64⌉ words a row: bit k of a row is set if taxel k has the weight +1. On
+    /// several wires the bits of taxels on another wire than the row's are not set; their weights are 0, and
+    /// [`WeightRows::wire`] says which. `None` if the weights are not binary.
     pub fn sign_bits(&self) -> Option<Vec<u64>> {
         (self.weights.mode() == WeightMode::Binary).then(|| {
             let word = |levels: &[f64]| levels.iter().rev().fold(0, |word, w| word << 1 | u64::from(*w > 0.0));
@@ -652,6 +771,55 @@ mod tests {
                 assert_eq!(code_of(mode.code_level(code)), code, "{mode:?}");
             }
         }
+    }
+
+    /// Every way to ask for the rows of three wires gives the same, and each wire's own rows are those of its taxels.
+    #[test]
+    fn several_wires_are_woven() {
+        let layout = spts_models::SkinLayout::new(5, 4, 5e-3, 3e-3).unwrap();
+        let config = crate::WireConfig { round_robin: Some(3), ..Default::default() };
+        let wires = Wires::new(&[config], &layout).unwrap();
+        let patterns = Patterns::new(2, (0..40).map(|k| if k * k % 7 < 3 { 255 } else { 0 }).collect()).unwrap();
+        let seeds: Vec<u32> = (0..20).map(|k| k * 77 + 5).collect();
+        for weights in [
+            Weights::new(WeightMode::Binary, Seeding::Mixed, 20),
+            Weights::new(WeightMode::Analog, Seeding::Address, 20),
+            Weights::new(WeightMode::Raster, Seeding::Address, 20),
+            Weights::with_seeds(WeightMode::Binary, seeds).unwrap(),
+            Weights::with_patterns(WeightMode::Binary, patterns).unwrap(),
+        ] {
+            let weights = weights.wired(wires.clone()).unwrap();
+            let wires = weights.wires().unwrap();
+            let (first, len) = (100, 47);
+            let rows = WeightRows::new(&weights, first, len);
+            let phi = rows.to_vec();
+            let values: Vec<f64> = (0..20).map(|k| f64::from(k).cos()).collect();
+            let mut sums = vec![0.0; len];
+            weights.weighted_sums(first, &values, &mut sums);
+            let mut seen = [0, 1, 2].map(|wire| weights.before(wire, first));
+            for (i, (row, sum)) in phi.chunks(20).zip(&sums).enumerate() {
+                let at = first + i as u64;
+                let expected: f64 = row.iter().zip(&values).map(|(w, v)| w * v).sum();
+                assert!((sum - expected).abs() < 1e-12);
+                let raster = weights.mode() == WeightMode::Raster;
+                let wire = if raster { wires.of(at as usize % 20) } else { (at % 3) as usize };
+                assert!(raster || rows.wire(i) == wire);
+                let own = weights.of_wire(wire);
+                for k in 0..20_u32 {
+                    let place = wires.taxels(wire).iter().position(|own| *own == k);
+                    let level = place.map_or(0.0, |place| own.level(place as u32, seen[wire]));
+                    assert_eq!(row[k as usize].to_bits(), level.to_bits(), "{:?}, row {at}, taxel {k}", weights.mode());
+                    assert_eq!(weights.level(k, at).to_bits(), level.to_bits());
+                }
+                seen[wire] += 1;
+            }
+            assert_eq!(seen, [0, 1, 2].map(|wire| weights.before(wire, first + len as u64)));
+            let Some(bits) = rows.sign_bits() else { continue };
+            for (i, row) in phi.chunks(20).enumerate() {
+                assert!(row.iter().enumerate().all(|(k, w)| (bits[i] >> k & 1 == 1) == (*w > 0.0)));
+            }
+        }
+        assert!(Weights::new(WeightMode::Binary, Seeding::Mixed, 21).wired(wires).is_err());
     }
 
     const DEVICE: [WeightMode; 3] = [WeightMode::Raster, WeightMode::Analog, WeightMode::Binary];

@@ -2,6 +2,7 @@
 
 use super::lcg::Seeding;
 use super::sequence::{LevelSource, Patterns, PatternsConfig, WeightMode, Weights};
+use crate::wires::Wires;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use spts_input::Refusal;
 use std::fmt::Write as _;
@@ -21,6 +22,8 @@ struct WeightsConfig {
     seeds: Option<Vec<u32>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     patterns: Option<Patterns>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    wires: Option<Wires>,
 }
 
 /// The generators that cells have.
@@ -40,6 +43,7 @@ impl From<&Weights> for WeightsConfig {
             seeding: None,
             seeds: None,
             patterns: None,
+            wires: weights.wires().cloned(),
         };
         match weights.source() {
             LevelSource::Seeding(seeding) => {
@@ -59,13 +63,13 @@ impl From<&Weights> for WeightsConfig {
 impl TryFrom<WeightsConfig> for Weights {
     type Error = Refusal;
     fn try_from(config: WeightsConfig) -> Result<Self, Refusal> {
-        let WeightsConfig { mode, taxels, generator, seeding, seeds, patterns } = config;
+        let WeightsConfig { mode, taxels, generator, seeding, seeds, patterns, wires } = config;
         if generator.is_some() && patterns.is_some() {
             return Err(one_source("`generator`, `patterns`"));
         }
         let raster = mode == WeightMode::Raster && seeds.is_none() && patterns.is_none();
         let seeding = seeding.or(raster.then_some(Seeding::Address));
-        Self::from_one(mode, taxels, (seeding, "`seeding`"), seeds.as_deref(), patterns.as_ref())
+        Self::from_one(mode, taxels, (seeding, "`seeding`"), seeds.as_deref(), patterns.as_ref())?.wired(wires)
     }
 }
 

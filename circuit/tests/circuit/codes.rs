@@ -3,7 +3,7 @@
 use crate::effects::assert_close;
 use crate::readout::{press_v, profile, skin, start, strip};
 use spts_circuit::{
-    Block, CellCodes, CompressiveWeights, Interpolated, Jump, Mode, PROFILES, Profile, Readout, Seeding, WeightMode,
+    Block, CellCodes, CompressiveWeights, Interpolated, Jump, Mode, PROFILES, Profile, Readout, Seeding, WeightMode, Weights,
 };
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, Streams};
@@ -108,7 +108,7 @@ fn sound_cells_do_not_show() {
         for mode in [Mode::Raster, Mode::Compressive] {
             for taxels in [3, 6, 100, 131] {
                 let readout = || Readout::new(&profile, mode, &strip(taxels), Streams::new(8), 1).unwrap();
-                let cells = sound_cells(&profile, mode, taxels);
+                let cells = |_: &Weights| Ok(sound_cells(&profile, mode, taxels));
                 let with_cells = record(&mut readout().with_codes(cells).unwrap(), taxels as usize);
                 let without = record(&mut readout(), taxels as usize);
                 assert!(with_cells == without, "{taxels} taxels, {mode:?}: {profile:?}");
@@ -139,8 +139,7 @@ fn any_codes_give_their_sums() {
         let weights = quiet.weights(mode, 100).unwrap();
         let y = |profile: &Profile, code: fn(u64, u32) -> u8| {
             let readout = start(profile, mode, 3);
-            let cells = Box::new(Cells { taxels: 100, code });
-            let mut readout = readout.with_codes(cells).unwrap();
+            let mut readout = readout.with_codes(|_| Ok(Box::new(Cells { taxels: 100, code }))).unwrap();
             readout.acquire(&mut skin(&x), 2000).unwrap().volts
         };
         for code in [any_code as fn(u64, u32) -> u8, |_, _| 126, |_, taxel| if taxel == 50 { 255 } else { 0 }] {
@@ -192,7 +191,7 @@ fn cells_out_of_order_are_the_faults() {
                 "mis_seeded" if taxel == 41 => sound(weights, 2, 100, row, taxel),
                 _ => sound(weights, taxel + 8, 100, row, taxel),
             };
-            let cells = Box::new(Cells { taxels: 100, code });
+            let cells = |_: &Weights| Ok(Box::new(Cells { taxels: 100, code }) as Box<dyn CellCodes>);
             let by_cells = readout(&analog).with_codes(cells).unwrap().acquire(&mut skin(&press_v()), 5000).unwrap();
             let by_fault = readout(&faulty).acquire(&mut skin(&press_v()), 5000).unwrap();
             for (a, b) in by_cells.volts.iter().zip(&by_fault.volts) {
@@ -222,10 +221,10 @@ impl CellCodes for Tired {
 #[test]
 fn codes_that_cannot_be_had_are_an_error() {
     let readout = |taxels| Readout::new(&profile(""), Mode::Compressive, &strip(taxels), Streams::new(0), 0).unwrap();
-    let refused = readout(99).with_codes(Box::new(Tired)).map(drop).unwrap_err();
+    let refused = readout(99).with_codes(|_| Ok(Box::new(Tired))).map(drop).unwrap_err();
     let expected = "the codes are those of 100 cells; the readout has 99 taxels";
     assert_eq!(refused.to_string(), expected);
-    let mut readout = readout(100).with_codes(Box::new(Tired)).unwrap();
+    let mut readout = readout(100).with_codes(|_| Ok(Box::new(Tired))).unwrap();
     assert!(readout.acquire(&mut skin(&press_v()), 200).is_ok());
     let error = readout.acquire(&mut skin(&press_v()), 200).unwrap_err();
     assert!(error.to_string().starts_with("cells: no codes from row 2"), "{error}");

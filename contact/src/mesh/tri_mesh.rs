@@ -294,8 +294,7 @@ impl TriMesh {
     }
 
     /// Joins both meshes into one. They share no vertices (see [`TriMesh::welded`]).
-    #[cfg(test)]
-    pub(crate) fn merged(mut self, other: &TriMesh) -> Self {
+    pub fn merged(mut self, other: &TriMesh) -> Self {
         let base = index(self.vertices.len());
         self.vertices.extend_from_slice(&other.vertices);
         self.triangles.extend(other.triangles.iter().map(|t| t.map(|i| i.saturating_add(base))));

@@ -188,7 +188,7 @@ pub(super) fn check_draws(c: &SpecConfig, skin: &SkinLayout, timing: &Timing, mo
     }
     let before = &c.skin.presses_before;
     within(&[
-        ("object.count", &c.object.count, 1.0, 3.0, "[1, 3]"),
+        ("object.count", &c.object.count, 1.0, 10.0, "[1, 10]"),
         ("skin.presses_before", before, 0.0, 1000.0, "[0, 1000]"),
     ])?;
     if let Some(seed) = &c.skin.seed {

@@ -129,7 +129,7 @@ pub struct ObjectConfig {
     /// Number of consecutive rows with the same shape; a whole number of presses. Default about 100; of frames one
     /// press.
     pub rows_per_shape: Option<u64>,
-    /// Number of simultaneous objects; a draw of whole numbers in [1, 3], once for every press. Default 1.
+    /// Number of simultaneous objects; a draw of whole numbers in [1, 10], once for every press. Default 1.
     pub count: Draw,
     /// Smallest and largest extent of a procedural shape, m. Default 20 to 90 mm.
     pub size_m: Option<[f64; 2]>,

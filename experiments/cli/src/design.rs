@@ -31,13 +31,13 @@ Objects:
   large        procedural shapes of 40 to 90 mm
   DATASET      the name of a data set's spec (spts dataset specs), a spec file ending in .toml, or a folder that `spts
                dataset make` has written. Its sections [object] and [pose] say what is pressed: shapes or the seventeen
-               objects, their sizes and their places. Single objects only, no meshes and no balls
+               objects, their sizes, their places and how many at once. No meshes and no balls
 
 Files in DIR:
   design.json           the answer, as --json prints it
-  profile.toml          the readout of a wire, with its rows: for --readout, and for `readout = ` in a scene
-  scene.toml            one press on the skin, or on the first wire's sub-array: spts simulate DIR/scene.toml
-  rows.txt              the pattern of a sub-array, where rows are designed
+  profile.toml          the readout of all wires, with its rows: for --readout, and for `readout = ` in a scene
+  scene.toml            one press on the skin, with all of its wires: spts simulate DIR/scene.toml
+  rows.txt              the pattern of all taxels, where rows are designed
   curves.csv            IoU and place error for every number of measurements that was tried
   figures/design.png    IoU and place error against time, the target, the latency and the design; design.svg the same"
 )]
@@ -79,6 +79,9 @@ struct NewDesign {
     /// What is pressed: small, large or DATASET, see below
     #[arg(long, value_name = "OBJECTS", default_value = "small")]
     objects: String,
+    /// Number of objects that are pressed at once; [1, 10] [default: that of a DATASET, else 1]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=10))]
+    contacts: Option<usize>,
     /// Root of every random number
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
@@ -144,7 +147,7 @@ impl NewDesign {
             latency_s,
             iou: self.iou,
             wires: self.wires.map_or(WireChoice::UpTo(self.most_wires), WireChoice::Exactly),
-            objects: DesignObjects::named(&self.objects)?,
+            objects: DesignObjects::named(&self.objects)?.at_once(self.contacts),
             seed: self.seed,
         };
         study.layout()?;

@@ -1,5 +1,6 @@
 //! Consecutive measurements of a block, and images fitted to them.
 
+use crate::windows::compressive_wires;
 use spts_circuit::{Recording, WeightRows};
 
 /// Steps of the conjugate gradients. L rows of N = L/4 random signs have a condition number of 9, so that a step halves
@@ -43,8 +44,8 @@ pub(crate) struct Fit {
     pub(crate) rows: i64,
     /// Image, V.
     pub(crate) image: Vec<f64>,
-    /// Output without load on any taxel, V.
-    pub(crate) offset_v: f64,
+    /// Output of every wire without load on any taxel, V.
+    pub(crate) offsets_v: Vec<f64>,
     /// Root mean square of the residual divided by that of the output.
     pub(crate) residual: f64,
 }
@@ -107,8 +108,9 @@ impl<'a> Chunk<'a> {
     /// Least squares for an image and a constant, by conjugate gradients, if the chunk lags by `rows`; `None` before
     /// the first row of all or without output.
     pub(crate) fn fit(&self, rows: i64) -> Option<Fit> {
-        let taxels = self.recording.taxels();
-        let mut phi = self.rows(rows, 0)?.to_vec();
+        let (taxels, wires) = (self.recording.taxels(), compressive_wires(self.recording));
+        let rows_of = self.rows(rows, 0)?;
+        let mut phi = rows_of.to_vec();
         if self.energy <= 0.0 {
             return None;
         }
@@ -116,22 +118,25 @@ impl<'a> Chunk<'a> {
             row.fill(0.0);
         }
         let weight = |lost: &bool| if *lost { 0.0 } else { 1.0 };
-        // entry `taxels` of an image is the constant
+        // after the taxels, an image has the constant of every wire
+        let constant: Vec<usize> = (0..self.y.len()).map(|i| taxels + rows_of.wire(i)).collect();
         let apply = |image: &[f64], out: &mut [f64]| {
-            for ((out, row), lost) in out.iter_mut().zip(phi.chunks_exact(taxels)).zip(&self.lost) {
-                *out = dot(row, image) + weight(lost) * image[taxels];
+            let rows = phi.chunks_exact(taxels).zip(&constant);
+            for ((out, (row, constant)), lost) in out.iter_mut().zip(rows).zip(&self.lost) {
+                *out = dot(row, image) + weight(lost) * image[*constant];
             }
         };
         let adjoint = |y: &[f64], out: &mut [f64]| {
             out.fill(0.0);
-            for ((y, row), lost) in y.iter().zip(phi.chunks_exact(taxels)).zip(&self.lost) {
+            let rows = phi.chunks_exact(taxels).zip(&constant);
+            for ((y, (row, constant)), lost) in y.iter().zip(rows).zip(&self.lost) {
                 out.iter_mut().zip(row).for_each(|(out, w)| *out += w * y);
-                out[taxels] += weight(lost) * y;
+                out[*constant] += weight(lost) * y;
             }
         };
-        let mut image = vec![0.0; taxels + 1];
+        let mut image = vec![0.0; taxels + wires];
         let mut left = self.y.clone();
-        let mut gradient = vec![0.0; taxels + 1];
+        let mut gradient = vec![0.0; taxels + wires];
         let mut step = vec![0.0; self.y.len()];
         adjoint(&left, &mut gradient);
         let mut direction = gradient.clone();
@@ -151,10 +156,10 @@ impl<'a> Chunk<'a> {
             direction.iter_mut().zip(&gradient).for_each(|(d, g)| *d = g + keep * *d);
             square = next;
         }
-        let offset_v = self.mean_v + image[taxels];
+        let offsets_v = image[taxels..].iter().map(|constant| self.mean_v + constant).collect();
         image.truncate(taxels);
         let residual = (dot(&left, &left) / self.energy).sqrt();
-        residual.is_finite().then_some(Fit { rows, image, offset_v, residual })
+        residual.is_finite().then_some(Fit { rows, image, offsets_v, residual })
     }
 }
 

@@ -358,7 +358,7 @@ fn drop(recording: &Recording, bounce: &RecordedBounce, cols: usize) -> Option<F
             centre: Some(centre),
         })
     });
-    let untouched = Untouched { offset_v: bounce.idle, image: None };
+    let untouched = Untouched { offsets_v: vec![bounce.idle], image: None };
     Some(FollowedContact {
         moments: moments.collect(),
         press: untouched.press(recording, bounce.block, first..bounce.end),

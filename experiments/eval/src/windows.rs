@@ -3,8 +3,9 @@
 use crate::chunk::{Chunk, converter_step_v};
 use crate::protocol::Protocol;
 use crate::training::TrainingData;
-use spts_circuit::{Mode, Recording, WeightRows};
+use spts_circuit::{Mode, Recording, WeightRows, Wires};
 use spts_recon::metrics::median;
+use spts_recon::operator::SignRows;
 use spts_recon::{Matrix, MatrixView};
 use std::ops::Range;
 use std::sync::Arc;
@@ -16,6 +17,10 @@ pub struct PressRows {
     taxels: usize,
     phi: Vec<f64>,
     signs: Option<Vec<u64>>,
+    /// Wire of every row; empty for one wire.
+    wires: Vec<u16>,
+    /// Taxels of every wire as bits; empty for one wire.
+    masks: Vec<u64>,
 }
 
 /// Most weights that are kept as numbers where bits will do: 1 GB.
@@ -48,8 +53,13 @@ pub struct Press {
 pub struct Window<'a> {
     /// Rows of weights, M × taxels; 0 × taxels where they are kept as bits alone ([`Window::with_rows`]).
     pub phi: MatrixView<'a>,
-    /// The rows as bits, if all weights are ±1: [`WeightRows::sign_bits`].
+    /// The rows as bits, if all weights are ±1: [`WeightRows::sign_bits`]. Rows of several wires have zeros, and are in
+    /// [`Window::bits`].
     pub signs: Option<&'a [u64]>,
+    /// The rows as bits, if all weights of a row's own wire are ±1.
+    pub bits: Option<SignRows<'a>>,
+    /// Wire of every row; empty for one wire.
+    pub wires: &'a [u16],
     /// Output of the summing amplifier, V.
     pub volts: &'a [f64],
     /// Output minus the mean output of the untouched skin, V.
@@ -77,12 +87,10 @@ impl<'a> Window<'a> {
     where
         'a: 'b,
     {
-        let (Some(signs), false) = (self.signs, self.has_rows()) else { return *self };
+        let (Some(bits), false) = (self.bits, self.has_rows()) else { return *self };
         let taxels = self.phi.ncols();
-        rows.clear();
-        for row in signs.chunks_exact(taxels.div_ceil(64).max(1)) {
-            rows.extend((0..taxels).map(|k| if row[k / 64] >> (k % 64) & 1 == 1 { 1.0 } else { -1.0 }));
-        }
+        rows.resize(self.y.len() * taxels, 0.0);
+        bits.fill(rows);
         // as many numbers as rows times taxels
         Window { phi: MatrixView::new(self.y.len(), taxels, rows).unwrap_or(self.phi), ..*self }
     }
@@ -95,6 +103,8 @@ impl<'a> Window<'a> {
             // as many numbers as rows times taxels
             phi: phi.and_then(|phi| MatrixView::new(range.len(), taxels, phi).ok()).unwrap_or(self.phi),
             signs: self.signs.map(|signs| &signs[range.start * words..range.end * words]),
+            bits: self.bits.map(|bits| bits.part(range.clone())),
+            wires: self.wires.get(range.clone()).unwrap_or_default(),
             volts: &self.volts[range.clone()],
             y: &self.y[range],
         }
@@ -108,7 +118,15 @@ impl PressRows {
         let large =
             rows.taxels() > TrainingData::MOST_TAXELS && rows.len().saturating_mul(rows.taxels()) > MOST_NUMBERS;
         let large = large && signs.is_some();
-        Self { taxels: rows.taxels(), phi: if large { Vec::new() } else { rows.to_vec() }, signs }
+        let wires = rows.weights().wires().filter(|_| rows.weights().mode().readout() == Mode::Compressive);
+        Self {
+            taxels: rows.taxels(),
+            phi: if large { Vec::new() } else { rows.to_vec() },
+            signs,
+            #[expect(clippy::cast_possible_truncation, reason = "a skin has fewer wires")]
+            wires: wires.map_or_else(Vec::new, |_| (0..rows.len()).map(|row| rows.wire(row) as u16).collect()),
+            masks: wires.map_or_else(Vec::new, masks),
+        }
     }
 
     /// The rows in `range` as numbers: none of them where bits alone are kept.
@@ -120,7 +138,8 @@ impl PressRows {
     pub fn of_matrix(phi: &Matrix) -> Self {
         let (taxels, values) = (phi.ncols(), phi.view().values());
         let binary = values.iter().all(|w| w.abs().to_bits() == 1.0_f64.to_bits());
-        Self { taxels, phi: values.to_vec(), signs: binary.then(|| sign_bits(values, taxels)) }
+        let signs = binary.then(|| sign_bits(values, taxels));
+        Self { taxels, phi: values.to_vec(), signs, wires: Vec::new(), masks: Vec::new() }
     }
 
     /// The rows with the numbers `indices`, in this order.
@@ -131,22 +150,34 @@ impl PressRows {
             let rows = indices.iter().flat_map(|&k| &signs[k * words..(k + 1) * words]);
             rows.copied().collect()
         });
-        Self { taxels: self.taxels, phi: rows.copied().collect(), signs }
+        let wires = indices.iter().filter_map(|&k| self.wires.get(k).copied()).collect();
+        Self { taxels: self.taxels, phi: rows.copied().collect(), signs, wires, masks: self.masks.clone() }
     }
 
     /// The weights with taxel k renumbered as `to(k)`.
     ///
     /// # Panics
-    /// If the rows are kept as bits alone.
+    /// If the rows are kept as bits alone, or are of several wires.
     pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
+        assert!(self.wires.is_empty(), "rows of several wires are not renamed");
         assert!(self.signs.as_ref().is_none_or(Vec::is_empty) || !self.phi.is_empty(), "rows as bits are not renamed");
         let mut phi = vec![0.0; self.phi.len()];
         let taxels = self.taxels.max(1);
         for (new, old) in phi.chunks_exact_mut(taxels).zip(self.phi.chunks_exact(taxels)) {
             old.iter().enumerate().for_each(|(k, w)| new[to(k)] = *w);
         }
-        Self { taxels: self.taxels, signs: self.signs.is_some().then(|| sign_bits(&phi, self.taxels)), phi }
+        Self { signs: self.signs.is_some().then(|| sign_bits(&phi, self.taxels)), phi, ..self.clone() }
     }
+}
+
+/// Taxels of every wire as bits, ⌈taxels/64⌉ words each.
+fn masks(wires: &Wires) -> Vec<u64> {
+    let words = wires.all().len().div_ceil(64);
+    let mut masks = vec![0; wires.count() * words];
+    for (k, wire) in wires.all().iter().enumerate() {
+        masks[usize::from(*wire) * words + k / 64] |= 1 << (k % 64);
+    }
+    masks
 }
 
 /// Signs of weights of ±1, ⌈taxels/64⌉ words a row.
@@ -170,7 +201,7 @@ impl Press {
 
     /// Measurements `range` of block `block` of `recording`. The output of the untouched skin is `idle_v`, V.
     pub fn within(recording: &Recording, block: usize, range: Range<usize>, idle_v: f64) -> Self {
-        let untouched = Untouched { offset_v: idle_v, image: None };
+        let untouched = Untouched { offsets_v: vec![idle_v], image: None };
         untouched.press(recording, block, range)
     }
 
@@ -213,9 +244,14 @@ impl Press {
         let words = taxels.div_ceil(64);
         let phi = self.rows.numbers(start..start + m);
         y.iter().all(|v| v.is_finite()).then_some(())?;
+        let signs = self.rows.signs.as_ref().map(|s| &s[start * words..(start + m) * words]);
+        let wires = self.rows.wires.get(start..start + m).unwrap_or_default();
+        let bits = signs.map(|signs| SignRows::new(signs, taxels));
         Some(Window {
             phi: MatrixView::new(phi.len() / taxels.max(1), taxels, phi).ok()?,
-            signs: self.rows.signs.as_ref().map(|s| &s[start * words..(start + m) * words]),
+            signs: signs.filter(|_| wires.is_empty()),
+            bits: if wires.is_empty() { bits } else { bits.map(|bits| bits.on_wires(wires, &self.rows.masks)) },
+            wires,
             volts: &self.volts[start..start + m],
             y,
         })
@@ -230,20 +266,42 @@ impl Press {
 }
 
 /// Mean of the idle frames at the start of a block, V; the median of the whole block if the idle frames are not known
-/// or all lost. Lost samples are ignored.
+/// or all lost. Lost samples are ignored. Of several wires the mean of [`idle_means`].
 pub fn idle_mean(recording: &Recording, block: usize) -> f64 {
+    let means = idle_means(recording, block);
+    means.iter().sum::<f64>() / means.len() as f64
+}
+
+/// Mean output of every untouched wire; see [`idle_mean`].
+pub fn idle_means(recording: &Recording, block: usize) -> Vec<f64> {
+    let wires = compressive_wires(recording);
+    let first = recording.rows(block, 0..0).wire(0);
     let block = &recording.blocks()[block];
     let end = block.idle_frames.unwrap_or(0) * recording.measurements_per_frame();
-    let (mut sum, mut count) = (0.0, 0.0);
-    for v in block.volts[..end].iter().filter(|v| v.is_finite()) {
-        sum += v;
-        count += 1.0;
-    }
-    if count > 0.0 {
-        return sum / count;
-    }
-    let finite: Vec<f64> = block.volts.iter().copied().filter(|v| v.is_finite()).collect();
-    median(&finite).unwrap_or(0.0)
+    let mean = |wire: usize| {
+        let own = |volts: &'_ [f64]| {
+            // samples of the wires in turn, from the first one's on
+            let skipped = (wire + wires - first) % wires;
+            let own = volts.iter().skip(skipped).step_by(wires).copied();
+            own.filter(|v| v.is_finite()).collect::<Vec<f64>>()
+        };
+        let idle = own(&block.volts[..end]);
+        if idle.is_empty() {
+            return median(&own(&block.volts)).unwrap_or(0.0);
+        }
+        let (mut sum, mut count) = (0.0, 0.0);
+        for v in &idle {
+            sum += v;
+            count += 1.0;
+        }
+        sum / count
+    };
+    (0..wires).map(mean).collect()
+}
+
+/// Wires whose samples follow one another in `recording`.
+pub(crate) fn compressive_wires(recording: &Recording) -> usize {
+    if recording.mode() == Mode::Compressive { recording.weights().wire_count() } else { 1 }
 }
 
 /// A skin whose idle output has a standard deviation of more steps of the converter than this may be under preload.
@@ -262,8 +320,8 @@ const LEAST_PER_TAXEL: usize = 4;
 /// and gives sums like those of a touch; they are subtracted measurement by measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Untouched {
-    /// Output without load on any taxel, V.
-    pub offset_v: f64,
+    /// Output without load on any taxel, V: of every wire, or one for all.
+    pub offsets_v: Vec<f64>,
     /// Image of the preload, V; `None` for a flat skin.
     pub image: Option<Vec<f64>>,
 }
@@ -277,7 +335,7 @@ impl Untouched {
 
     /// The untouched skin, from the first `frames` frames of the block.
     pub(crate) fn in_frames(recording: &Recording, block: usize, frames: usize) -> Self {
-        let flat = || Self { offset_v: idle_mean(recording, block), image: None };
+        let flat = || Self { offsets_v: idle_means(recording, block), image: None };
         let taxels = recording.taxels();
         let idle = (frames * recording.measurements_per_frame()).min(MEASUREMENTS_PER_TAXEL * taxels);
         if recording.mode() != Mode::Compressive || idle < LEAST_PER_TAXEL * taxels {
@@ -292,19 +350,20 @@ impl Untouched {
             return flat();
         }
         let fit = chunk.fit(0).filter(|fit| fit.residual.powi(2) < 1.0 - EXPLAINED);
-        fit.map_or_else(flat, |fit| Self { offset_v: fit.offset_v, image: Some(fit.image) })
+        fit.map_or_else(flat, |fit| Self { offsets_v: fit.offsets_v, image: Some(fit.image) })
     }
 
     /// Measurements `range` of block `block` minus the output of the untouched skin, V.
     pub fn without(&self, recording: &Recording, block: usize, range: Range<usize>) -> Vec<f64> {
+        let rows = recording.rows(block, range.clone());
         let volts = recording.blocks()[block].volts[range.clone()].iter();
+        let offset_v = |k: usize| self.offsets_v.get(rows.wire(k)).or(self.offsets_v.first()).copied().unwrap_or(0.0);
         let Some(image) = &self.image else {
-            return volts.map(|v| v - self.offset_v).collect();
+            return volts.enumerate().map(|(k, v)| v - offset_v(k)).collect();
         };
         let mut sums = vec![0.0; range.len()];
-        let first_row = recording.rows(block, range).first_row();
-        recording.weights().weighted_sums(first_row, image, &mut sums);
-        volts.zip(sums).map(|(v, sum)| v - self.offset_v - sum).collect()
+        recording.weights().weighted_sums(rows.first_row(), image, &mut sums);
+        volts.zip(sums).enumerate().map(|(k, (v, sum))| v - offset_v(k) - sum).collect()
     }
 
     /// Measurements `range` of block `block` as a press whose [`y`](crate::Window::y) is free of the untouched skin's
@@ -427,7 +486,7 @@ mod tests {
         let recording = touched(0.0);
         let untouched = Untouched::of(&recording, 0);
         assert_eq!(untouched.image, None);
-        assert_eq!(untouched.offset_v.to_bits(), idle_mean(&recording, 0).to_bits());
+        assert_eq!(untouched.offsets_v, [idle_mean(&recording, 0)]);
         let y = untouched.without(&recording, 0, 500..510);
         let expected = recording.blocks()[0].volts[500..510].iter().map(|v| v - idle_mean(&recording, 0));
         assert!(y.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()));

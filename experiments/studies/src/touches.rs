@@ -39,6 +39,8 @@ pub(crate) struct TouchScene {
     /// Whether objects keep their published places and rotations, at the same distance in metres from the middle of any
     /// sheet. Only for [`TouchObjects::Objects`].
     pub placed: bool,
+    /// Objects that are pressed at once.
+    pub contacts: usize,
     /// Number of touches.
     pub touches: usize,
     /// Seed of all random numbers: touches, and the specimen of the skin.
@@ -63,7 +65,7 @@ pub struct Touch {
 impl TouchScene {
     /// A scene with `touches` touches of `objects` on a skin.
     pub(crate) fn new(layout: SkinLayout, objects: TouchObjects, touches: usize, seed: u64) -> Self {
-        Self { layout, objects, size_m: None, placed: false, touches, seed, specimen: None }
+        Self { layout, objects, size_m: None, placed: false, contacts: 1, touches, seed, specimen: None }
     }
 
     /// Presses all touches. The result depends only on the scene.
@@ -112,10 +114,11 @@ impl TouchScene {
                 -x, -y
             )
         };
+        let contacts = self.contacts;
         let (touches, seed, specimen) = (self.touches, self.seed >> 1, self.specimen.unwrap_or(self.seed) % (1 << 53));
         format!(
             "rows = {touches}\nseed = {seed}\nreadout = \"ideal\"\n\
-             [object]\nfrom = \"{from}\"\nrows_per_shape = 1\n{size}\
+             [object]\nfrom = \"{from}\"\nrows_per_shape = 1\ncount = {contacts}\n{size}\
              [pose]\nabout = \"{about}\"\n{pose}\
              tilt_x_deg = {{ normal = [0.0, 0.3] }}\ntilt_y_deg = {{ normal = [0.0, 0.3] }}\n\
              [press]\nforce_n = {{ log_uniform = [5.0, 40.0] }}\nhold_s = {{ uniform = [0.3, 1.0] }}\n\
@@ -152,7 +155,7 @@ impl TouchWire {
         layout: &SkinLayout,
         device: Streams,
     ) -> Result<Self, Refusal> {
-        let profile = profile.with_weights(weights)?;
+        let profile = Profile { wires: Vec::new(), ..profile.with_weights(weights)? };
         let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0)?;
         let mut untouched = Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols()))?;
         readout.seek_row(IDLE_BLOCK, 0);

@@ -4,7 +4,7 @@ use super::RegionPursuit;
 use crate::checks::other_columns;
 use crate::kernels::{dot, norm};
 use crate::matrix::{Matrix, MatrixView};
-use crate::operator::{Centred, LinearOperator as _, SelectColumns, SignRows, centre};
+use crate::operator::{Centred, LinearOperator as _, SelectColumns, SignRows, centre_by_wire};
 use crate::problem::{Problem, Recover as _, Workspace};
 use crate::recover::{Penalty, Stopping, Tv};
 use rayon::prelude::*;
@@ -28,7 +28,7 @@ use std::ops::Range;
 /// let mut y = vec![0.0; 240];
 /// phi.apply(&image, &mut y);
 /// y.iter_mut().for_each(|y| *y += 5.0);
-/// let found = Patches::new(40, 40).recover(phi, &y)?;
+/// let found = Patches::new(40, 40).recover(phi, &y, &[])?;
 /// assert!((0..1600).all(|k| (found[k] - image[k]).abs() < 0.1));
 /// # Ok::<(), spts_input::Refusal>(())
 /// ```
@@ -64,7 +64,7 @@ const SWEEPS: usize = 100;
 /// let image: Vec<f64> = (0..3600).map(|k| if k % 60 < 30 { 1.0 } else { 0.0 }).collect();
 /// let mut y = vec![0.0; 200];
 /// phi.apply(&image, &mut y);
-/// let found = OnSheet::new(60, 60, 900).recover(phi.view(), &y)?;
+/// let found = OnSheet::new(60, 60, 900).recover(phi.view(), &y, &[])?;
 /// let off = (0..3600).filter(|k| (found[*k] - image[*k]).abs() > 0.3).count();
 /// assert!(off < 36, "{off}");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -91,46 +91,51 @@ impl OnSheet {
         Self { patches: Patches::new(rows, cols), side: (1..).find(fits).unwrap_or(1) }
     }
 
-    /// The image of `y`, one value a taxel, in the unit of `y` over that of Φ.
+    /// The image of `y`, one value a taxel, in the unit of `y` over that of Φ. `wires` has the wire of every measurement,
+    /// or nothing for one wire.
     ///
     /// # Errors
     /// As [`RegionPursuit::recover`].
-    pub fn recover<A: Rows>(&self, phi: A, y: &[f64]) -> Result<Vec<f64>, Refusal> {
+    pub fn recover<A: Rows>(&self, phi: A, y: &[f64], wires: &[u16]) -> Result<Vec<f64>, Refusal> {
         let Patches { rows, cols } = self.patches;
         if phi.ncols() != rows * cols {
             return Err(other_columns(phi.ncols(), rows * cols));
         }
         if y.len() < 2 * KEPT_BACK {
-            return self.patches.recover(phi, y);
+            return self.patches.recover(phi, y, wires);
         }
         let seen = y.len() - y.len() / KEPT_BACK;
+        let (first, last) = match wires {
+            [] => (wires, wires),
+            _ => wires.split_at(seen),
+        };
         let cells = phi.cells([rows, cols], self.side);
         // total variation that does not converge is no candidate
-        let Ok(seen_on_cells) = self.on_cells(cells.view().rows(0, seen), &y[..seen]) else {
-            return self.patches.recover(phi, y);
+        let Ok(seen_on_cells) = self.on_cells(cells.view().rows(0, seen), &y[..seen], first) else {
+            return self.patches.recover(phi, y, wires);
         };
-        let seen_as_patches = self.patches.recover(phi.rows(0..seen), &y[..seen])?;
+        let seen_as_patches = self.patches.recover(phi.rows(0..seen), &y[..seen], first)?;
         let missed = |image: &[f64]| {
             let mut rest = vec![0.0; y.len() - seen];
             phi.rows(seen..y.len()).apply(image, &mut rest);
             rest.iter_mut().zip(&y[seen..]).for_each(|(sum, y)| *sum -= y);
-            centre(&mut rest);
+            centre_by_wire(&mut rest, last);
             norm(&rest)
         };
         if missed(&seen_on_cells) < missed(&seen_as_patches) {
-            return Ok(self.on_cells(cells.view(), y).unwrap_or(seen_on_cells));
+            return Ok(self.on_cells(cells.view(), y, wires).unwrap_or(seen_on_cells));
         }
-        self.patches.recover(phi, y)
+        self.patches.recover(phi, y, wires)
     }
 
     /// The image of small total variation on the cells, whose sums are `cells`, measurements × cells.
-    fn on_cells(&self, cells: MatrixView<'_>, y: &[f64]) -> Result<Vec<f64>, Refusal> {
+    fn on_cells(&self, cells: MatrixView<'_>, y: &[f64], wires: &[u16]) -> Result<Vec<f64>, Refusal> {
         let Patches { rows, cols } = self.patches;
         let [down, across] = [rows, cols].map(|side| side.div_ceil(self.side));
         let mut sums = Matrix::from_rows(cells.nrows(), cells.ncols(), cells.values().to_vec())?;
-        without_means(&mut sums);
+        without_means(&mut sums, wires);
         let mut centred = y.to_vec();
-        centre(&mut centred);
+        centre_by_wire(&mut centred, wires);
         let mut tv = Tv::new(down, across, VARIATION)?;
         tv.stopping = STOPPING;
         let found = tv.recover(&Problem::new(sums.view(), &centred)?, &mut Workspace::default())?;
@@ -186,8 +191,7 @@ impl Rows for SignRows<'_> {
         let count: usize = shape.map(|n| n.div_ceil(side)).iter().product();
         let mut sums = vec![0.0; self.nrows() * count];
         sums.par_chunks_exact_mut(count.max(1)).enumerate().for_each(|(r, out)| {
-            let row = self.row(r);
-            add_cells(shape, side, |k| if row[k / 64] >> (k % 64) & 1 == 1 { 1.0 } else { -1.0 }, out);
+            add_cells(shape, side, |k| self.weight(r, k), out);
         });
         // as many numbers as rows times cells
         Matrix::from_rows(self.nrows(), count, sums).unwrap_or_else(|_| Matrix::zeros(self.nrows(), count))
@@ -200,11 +204,12 @@ impl Patches {
         Self { rows, cols }
     }
 
-    /// The image of `y`, one value a taxel, in the unit of `y` over that of Φ.
+    /// The image of `y`, one value a taxel, in the unit of `y` over that of Φ. `wires` has the wire of every measurement,
+    /// or nothing for one wire.
     ///
     /// # Errors
     /// As [`RegionPursuit::recover`].
-    pub fn recover<A>(&self, phi: A, y: &[f64]) -> Result<Vec<f64>, Refusal>
+    pub fn recover<A>(&self, phi: A, y: &[f64], wires: &[u16]) -> Result<Vec<f64>, Refusal>
     where
         A: SelectColumns<Selected = Matrix> + Copy,
     {
@@ -214,11 +219,11 @@ impl Patches {
         }
         let pursuit = RegionPursuit { max_rounds: MAX_ROUNDS, ..RegionPursuit::new(self.rows, self.cols) };
         let mut centred = y.to_vec();
-        centre(&mut centred);
-        let mut image = pursuit.recover(&Centred::new(phi), &centred, None)?.image;
+        centre_by_wire(&mut centred, wires);
+        let mut image = pursuit.recover(&Centred::by_wire(phi, wires), &centred, None)?.image;
         if let Some(taxels) = contact_taxels(&image, y.len()) {
             let mut columns = phi.select_columns(&taxels);
-            without_means(&mut columns);
+            without_means(&mut columns, wires);
             let start: Vec<f64> = taxels.iter().map(|k| image[*k]).collect();
             image.fill(0.0);
             for (k, v) in taxels.iter().zip(non_negative(&columns, &centred, &start)) {
@@ -229,12 +234,18 @@ impl Patches {
     }
 }
 
-/// Takes the mean off every column.
-fn without_means(columns: &mut Matrix) {
-    let (rows, sums) = (columns.nrows(), columns.column_sums());
-    for r in 0..rows {
-        let row = columns.row_mut(r);
-        row.iter_mut().zip(&sums).for_each(|(v, sum)| *v -= sum / rows as f64);
+/// Takes the mean off every column, wire by wire.
+fn without_means(columns: &mut Matrix, wires: &[u16]) {
+    let count = wires.iter().max().map_or(1, |wire| usize::from(*wire) + 1);
+    let wire = |r: usize| wires.get(r).map_or(0, |wire| usize::from(*wire));
+    let (mut sums, mut numbers) = (Matrix::zeros(count, columns.ncols()), vec![0.0; count]);
+    for r in 0..columns.nrows() {
+        sums.row_mut(wire(r)).iter_mut().zip(columns.row(r)).for_each(|(sum, v)| *sum += v);
+        numbers[wire(r)] += 1.0;
+    }
+    for r in 0..columns.nrows() {
+        let (sums, number) = (sums.row(wire(r)), numbers[wire(r)]);
+        columns.row_mut(r).iter_mut().zip(sums).for_each(|(v, sum)| *v -= sum / number);
     }
 }
 

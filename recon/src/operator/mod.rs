@@ -201,15 +201,24 @@ impl SelectColumns for MatrixView<'_> {
 /// assert!(y.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
+///
+/// Measurements of several wires are centred wire by wire ([`Centred::by_wire`]): each has an offset of its own.
 #[derive(Debug, Clone)]
 pub struct Centred<A> {
     inner: A,
+    /// Wire of every measurement; empty for one wire.
+    wires: Vec<u16>,
 }
 
 impl<A> Centred<A> {
     /// The operator that applies `inner`, and subtracts from every measurement the mean of all measurements.
     pub fn new(inner: A) -> Self {
-        Self { inner }
+        Self { inner, wires: Vec::new() }
+    }
+
+    /// The same with a mean for each wire; `wires` has the wire of every measurement, or nothing for one wire.
+    pub fn by_wire(inner: A, wires: &[u16]) -> Self {
+        Self { inner, wires: wires.to_vec() }
     }
 
     /// The operator without the subtraction.
@@ -224,6 +233,24 @@ pub fn centre(y: &mut [f64]) {
     y.iter_mut().for_each(|v| *v -= mean);
 }
 
+/// Subtracts from `y` the mean of every wire; `wires` has the wire of every measurement, or nothing for one wire.
+pub fn centre_by_wire(y: &mut [f64], wires: &[u16]) {
+    if wires.is_empty() {
+        return centre(y);
+    }
+    let count = wires.iter().max().map_or(0, |wire| usize::from(*wire) + 1);
+    let mut sums = vec![(0.0, 0.0); count];
+    for (v, wire) in y.iter().zip(wires) {
+        let (sum, number) = &mut sums[usize::from(*wire)];
+        *sum += v;
+        *number += 1.0;
+    }
+    y.iter_mut().zip(wires).for_each(|(v, wire)| {
+        let (sum, number) = sums[usize::from(*wire)];
+        *v -= sum / number;
+    });
+}
+
 impl<A: LinearOperator> LinearOperator for Centred<A> {
     fn nrows(&self) -> usize {
         self.inner.nrows()
@@ -235,13 +262,13 @@ impl<A: LinearOperator> LinearOperator for Centred<A> {
 
     fn apply(&self, x: &[f64], y: &mut [f64]) {
         self.inner.apply(x, y);
-        centre(y);
+        centre_by_wire(y, &self.wires);
     }
 
     fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
         check_shape(self, x, y);
         let mut y = y.to_vec();
-        centre(&mut y);
+        centre_by_wire(&mut y, &self.wires);
         self.inner.apply_adjoint(&y, x);
     }
 }
@@ -250,13 +277,13 @@ impl<A: SelectColumns> SelectColumns for Centred<A> {
     type Selected = Centred<A::Selected>;
 
     fn select_columns(&self, columns: &[usize]) -> Self::Selected {
-        Centred::new(self.inner.select_columns(columns))
+        Centred::by_wire(self.inner.select_columns(columns), &self.wires)
     }
 
     /// That of the centred `r`.
     fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
         let mut r = r.to_vec();
-        centre(&mut r);
+        centre_by_wire(&mut r, &self.wires);
         self.inner.chance_variance(&r, variance);
     }
 }

@@ -3,8 +3,8 @@
 use super::timestep::BLOCK_S;
 use serde::{Deserialize, Serialize};
 use spts_contact::PreparedMesh;
-use spts_contact::mesh::{MeshOptions, MeshReport, Repair, load};
-use spts_contact::objects::{BALL_STIFFNESS_PA_PER_M, Placement, pressable};
+use spts_contact::mesh::{MeshOptions, MeshReport, Repair, TriMesh, load};
+use spts_contact::objects::{BALL_STIFFNESS_PA_PER_M, ObjectSpec, Placement, pressable};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, in_interval, in_range, within};
 use std::path::Path;
@@ -12,8 +12,8 @@ use std::path::Path;
 /// A place as a scene writes it; at most one of the three ways is used.
 #[derive(Debug)]
 struct Place<'a> {
-    /// `press` or `drop`.
-    section: &'static str,
+    /// `press`, `drop`, or an entry of `press.objects`.
+    section: &'a str,
     /// Row and column, taxels.
     row: &'a mut Option<f64>,
     col: &'a mut Option<f64>,
@@ -140,6 +140,11 @@ fn of_published([row, col]: [f64; 2], skin: &SkinLayout) -> [f64; 2] {
 pub struct PressConfig {
     /// Name of one of the seventeen objects, or `finger` for a fingertip. Either this or `mesh`.
     pub object: Option<String>,
+    /// Objects that are pressed together, in place of `object` and `mesh`; see [`PressedObject`]. They hang from one
+    /// plate, touch at the same time and share the force. `row` and `col` are then those of the sheet's middle, and
+    /// move all of them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub objects: Vec<PressedObject>,
     /// Mesh file (`.obj`, `.glb` or `.stl`), relative to the scene file. Either this or `object`.
     pub mesh: Option<String>,
     /// Number of metres in a unit of the mesh file; (0, 1000], default 1, as in GLB. It is never guessed: an object 40
@@ -205,6 +210,7 @@ impl Default for PressConfig {
     fn default() -> Self {
         Self {
             object: None,
+            objects: Vec::new(),
             mesh: None,
             scale: None,
             repair: None,
@@ -315,6 +321,7 @@ impl PressConfig {
             in_interval("press.scale", scale, "(0, 1000]")?;
         }
         let (mesh, report, place) = match (&self.object, &self.mesh, given) {
+            (None, None, None) if !self.objects.is_empty() => (self.together(skin)?, None, middle(skin)),
             (None, None, Some(mesh)) => (mesh, None, middle(skin)),
             (Some(name), None, None) => {
                 let given = [
@@ -327,11 +334,7 @@ impl PressConfig {
                         "`press.{field}` is for a mesh, and `press.object` = \"{name}\" has its own size and place; leave it out"
                     )));
                 }
-                let Some(object) = pressable().find(|object| object.name == name) else {
-                    let known: Vec<_> = pressable().map(|object| object.name).collect();
-                    let known = known.join(", ");
-                    return Err(Refusal::new(format!("`press.object` = \"{name}\" is not one of {known}")));
-                };
+                let object = named("press.object", name)?;
                 self.stiffness_pa_per_m = self.stiffness_pa_per_m.or(object.stiffness_pa_per_m);
                 let [row, col] = of_published([object.placement.row, object.placement.col], skin);
                 let placement = Placement { row, col, ..object.placement };
@@ -350,10 +353,13 @@ impl PressConfig {
             (object, mesh, given) => {
                 let found = [object.is_some(), mesh.is_some(), given.is_some()];
                 let found = found.into_iter().filter(|named| *named).count();
-                let choices = "`press.object` and `press.mesh`";
+                let choices = "`press.object` and `press.mesh`, or `press.objects`,";
                 return Err(Refusal::new(format!("exactly one of {choices} is needed, found {found}")));
             }
         };
+        if !self.objects.is_empty() && (self.object.is_some() || self.mesh.is_some()) {
+            return Err(Refusal::new("`press.objects` has all that is pressed: leave out `press.object` and `press.mesh`"));
+        }
         for [row, col] in self.places.iter().flatten() {
             check_place("press.places: ", [Some(*row), Some(*col)], skin)?;
         }
@@ -388,6 +394,43 @@ impl PressConfig {
             )));
         }
         Ok((mesh, report))
+    }
+
+    /// All of `objects` as one body whose origin is over the middle of the sheet.
+    fn together(&mut self, skin: &SkinLayout) -> Result<PreparedMesh, Refusal> {
+        if self.objects.len() > MOST_OBJECTS {
+            let found = self.objects.len();
+            return Err(Refusal::new(format!("`press.objects` has {found} entries; valid: [1, {MOST_OBJECTS}]")));
+        }
+        let (mut all, mut stiffnesses) = (TriMesh::default(), Vec::new());
+        for (index, entry) in self.objects.iter_mut().enumerate() {
+            let section = format!("press.objects[{index}]");
+            let object = named(&format!("{section}.object"), &entry.object)?;
+            stiffnesses.push(object.stiffness_pa_per_m);
+            let written = Place {
+                section: &section,
+                row: &mut entry.row,
+                col: &mut entry.col,
+                position_m: &mut entry.position_m,
+                position_share: &mut entry.position_share,
+                on_sheet: false,
+            };
+            written.resolve(skin, of_published([object.placement.row, object.placement.col], skin))?;
+            let rotation_deg = *entry.rotation_deg.get_or_insert(object.placement.rotation_rad.to_degrees());
+            in_interval(&format!("{section}.rotation_deg"), rotation_deg, "[-360, 360]")?;
+            let placement = Placement { rotation_rad: rotation_deg.to_radians(), ..object.placement };
+            let [x, y] = skin.position_m(entry.row.unwrap_or_default(), entry.col.unwrap_or_default());
+            let mesh = (object.build)().rotated(placement.matrix()).grounded();
+            all = all.merged(&mesh.translated([x, y, 0.0]));
+        }
+        let same = stiffnesses.windows(2).all(|pair| pair[0] == pair[1]);
+        if self.stiffness_pa_per_m.is_none() && !same {
+            return Err(Refusal::new(
+                "`press.objects` have different stiffnesses of their own: give `press.stiffness_pa_per_m` for all of them",
+            ));
+        }
+        self.stiffness_pa_per_m = self.stiffness_pa_per_m.or(stiffnesses[0]);
+        Ok(all.into())
     }
 
     /// Makes the first of `places` the place that is written as `row` and `col`; a saved scene has both.
@@ -473,6 +516,45 @@ impl PressConfig {
         check("position_sd_m", self.position_sd_m, "[0, 0.01] m")?;
         check("rotation_sd_deg", self.rotation_sd_deg, "[0, 5]")
     }
+}
+
+/// One of several objects that are pressed together: an entry of `[[press.objects]]`.
+///
+/// ```
+/// use spts_sim::Mechanics;
+///
+/// let two = "[press]\n[[press.objects]]\nobject = \"T\"\nposition_m = [-0.03, 0.0]\n\
+///            [[press.objects]]\nobject = \"square\"\nposition_m = [0.03, 0.0]\n";
+/// let scene = Mechanics::from_toml(two, ".".as_ref())?;
+/// assert!(scene.mesh().bounds().is_some_and(|(low, high)| high[0] - low[0] > 0.06));
+/// # Ok::<(), spts_input::Refusal>(())
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PressedObject {
+    /// Name of one of the seventeen objects, or `finger`. Meshes that are pressed together go into one file.
+    pub object: String,
+    /// Row of the object's origin, in taxels. Default: as for [`PressConfig::row`].
+    pub row: Option<f64>,
+    /// Column of the object's origin, in taxels. Default: as for [`PressConfig::col`].
+    pub col: Option<f64>,
+    /// Replaces `row` and `col`: position (x, y) relative to the middle of the sheet, m.
+    pub position_m: Option<[f64; 2]>,
+    /// Replaces `row` and `col`: the position relative to the sheet's width and height.
+    pub position_share: Option<[f64; 2]>,
+    /// Rotation about the skin's normal, degrees; [−360, 360]. Default: that of its published place.
+    pub rotation_deg: Option<f64>,
+}
+
+/// Most objects that are pressed together.
+const MOST_OBJECTS: usize = 100;
+
+/// The object that `field` names.
+fn named(field: &str, name: &str) -> Result<&'static ObjectSpec, Refusal> {
+    pressable().find(|object| object.name == name).ok_or_else(|| {
+        let known: Vec<_> = pressable().map(|object| object.name).collect();
+        Refusal::new(format!("`{field}` = \"{name}\" is not one of {}", known.join(", ")))
+    })
 }
 
 /// Upright in the middle of the sheet.

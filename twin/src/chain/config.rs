@@ -1,7 +1,7 @@
 //! Transducer, readout, rows and weights as a scene writes them, and the files that it names.
 
 use serde::{Deserialize, Serialize};
-use spts_circuit::{CompressiveWeights, Mode, Patterns, Profile, Seeding, parse_patterns, parse_seeds};
+use spts_circuit::{CompressiveWeights, Mode, Patterns, Profile, Seeding, WireConfig, parse_patterns, parse_seeds};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, TaxelGains, in_section};
 use std::path::{Path, PathBuf};
@@ -30,6 +30,8 @@ pub struct ChainConfig {
     pub weights: Option<String>,
     /// Faulty cells, added to those of the profile: `name`, `taxel` and the fault's parameters. Default: none.
     pub faults: Vec<toml::Table>,
+    /// Wires, in place of those of the profile. Default: none said.
+    pub wires: Vec<WireConfig>,
 }
 
 /// Transducer of a scene that names none.

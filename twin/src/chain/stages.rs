@@ -6,7 +6,7 @@ use super::config::{
     ChainConfig, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS, ProfileFile, RowsFile, WeightSource,
 };
 use crate::session::{PressFacts, PressPose};
-use spts_circuit::{Constant, FaultConfig, Interpolated, Mode, PROFILES, Profile, Readout, Recording};
+use spts_circuit::{Constant, FaultConfig, Interpolated, Mode, PROFILES, Profile, Readout, Recording, Wires};
 use spts_contact::Frame;
 use spts_input::Refusal;
 use spts_models::{
@@ -37,6 +37,8 @@ pub struct Chain {
     rows_file: Option<RowsFile>,
     weights: WeightSource,
     skin: SkinLayout,
+    /// Number of wires.
+    wires: usize,
     streams: Streams,
     /// Number of codes of emulated cells that differ from those of fault-free cells.
     unlike_codes: Arc<AtomicU64>,
@@ -79,10 +81,15 @@ impl Chain {
             }
             (None, None) => Profile::named(readout),
         };
-        let (profile, rows_file) = config.rows.applied(profile.map_err(in_file)?, skin, folder)?;
+        let (mut profile, rows_file) = config.rows.applied(profile.map_err(in_file)?, skin, folder)?;
+        if !config.wires.is_empty() {
+            Wires::new(&config.wires, skin)?;
+            profile.wires.clone_from(&config.wires);
+        }
         profile.validate(taxels(skin)).map_err(in_file)?;
         profile.on(skin).map_err(in_file)?;
         let chain = Self {
+            wires: wires(&profile, skin).map_err(in_file)?,
             transducer: transducer.into(),
             profile: with_faults(profile, &config.faults, taxels(skin))?,
             profile_file,
@@ -96,9 +103,14 @@ impl Chain {
         Ok(chain)
     }
 
-    /// Number of measurements a second, Hz.
+    /// Number of compressive measurements a second, of all wires together, Hz.
     pub fn sample_rate_hz(&self) -> f64 {
-        self.profile.sample_rate_hz
+        self.profile.sample_rate_hz * self.wires as f64
+    }
+
+    /// Number of wires.
+    pub fn wires(&self) -> usize {
+        self.wires
     }
 
     /// The file from which the readout profile was read; `None` for a profile by name.
@@ -131,7 +143,12 @@ impl Chain {
             WeightSource::Model => Ok(()),
             WeightSource::Firmware => {
                 let weights = self.profile.weights(mode, taxels(&self.skin)).map_err(of_readout)?;
-                FirmwareCells::check(&weights, self.profile.sample_rate_hz).map_err(of_cells)
+                let wires = Wires::new(&self.profile.wires, &self.skin).map_err(of_readout)?;
+                let weights = weights.wired(wires).map_err(of_readout)?;
+                (0..weights.wire_count()).try_for_each(|wire| {
+                    let own = weights.of_wire(wire);
+                    FirmwareCells::check(&own, self.profile.sample_rate_hz).map_err(of_cells)
+                })
             }
         }
     }
@@ -145,10 +162,10 @@ impl Chain {
         match self.weights {
             WeightSource::Model => Ok(readout),
             WeightSource::Firmware => {
-                let weights = self.profile.weights(mode, taxels(&self.skin)).map_err(of_readout)?;
-                let cells = FirmwareCells::new(&weights, self.profile.sample_rate_hz).map_err(of_cells)?;
-                let cells = cells.counting(Arc::clone(&self.unlike_codes));
-                readout.with_codes(Box::new(cells)).map_err(of_readout)
+                readout.with_codes(|weights| {
+                    let cells = FirmwareCells::new(weights, self.profile.sample_rate_hz).map_err(of_cells)?;
+                    Ok(Box::new(cells.counting(Arc::clone(&self.unlike_codes))))
+                })
             }
         }
     }
@@ -168,7 +185,8 @@ impl Chain {
         let valid = profile.validate(taxels(&self.skin));
         let valid = valid.and_then(|()| profile.on(&self.skin).map(drop));
         valid.map_err(|error| refused_profile(None, &error))?;
-        Ok(Self { profile, profile_file: None, rows_file: None, ..self.clone() })
+        let wires = wires(&profile, &self.skin)?;
+        Ok(Self { profile, wires, profile_file: None, rows_file: None, ..self.clone() })
     }
 
     /// The same skin with `transducer`, a transducer of your own. The transducer starts as on a fresh skin, and its
@@ -240,6 +258,11 @@ fn transducer(config: &ChainConfig, skin: &SkinLayout, streams: Streams) -> Resu
     let name = config.transducer.as_deref().unwrap_or(DEFAULT_TRANSDUCER);
     let built = build_transducer(name, config.transducer_parameters.clone(), skin, streams);
     built.map_err(|error| refused_transducer(name, error))
+}
+
+/// Number of wires of a skin with this `profile`.
+fn wires(profile: &Profile, skin: &SkinLayout) -> Result<usize, Refusal> {
+    Ok(Wires::new(&profile.wires, skin)?.map_or(1, |wires| wires.count()))
 }
 
 fn taxels(skin: &SkinLayout) -> u32 {
@@ -608,7 +631,8 @@ impl Chain {
         let (_, median_s, _) = values.select_nth_unstable_by(skin.taxels() / 2, f64::total_cmp);
         let conductance = ConductanceMap::from_values(1, 1, vec![*median_s]);
         let one = SkinLayout::new(1, 1, skin.pitch_m(), skin.electrode_m()).unwrap_or_default();
-        let profile = Profile { seeds: None, patterns: None, faults: Vec::new(), ..self.profile().clone() };
+        let profile =
+            Profile { seeds: None, patterns: None, faults: Vec::new(), wires: Vec::new(), ..self.profile().clone() };
         let mut readout = Readout::new(&profile, Mode::Compressive, &one, self.streams, 0).map_err(of_readout)?;
         let mut pressed = Constant::new(conductance).map_err(of_conductance)?;
         let volts = readout.measure(&mut pressed, MEASUREMENTS).map_err(of_readout)?;

@@ -122,8 +122,8 @@ fn make_room(scene: &mut Table, key: &str, value: &Value) {
         }
     };
     match key {
-        "press.mesh" => remove("press", &["object"]),
-        "press.object" => remove("press", &["mesh", "scale", "repair", "centre"]),
+        "press.mesh" => remove("press", &["object", "objects"]),
+        "press.object" => remove("press", &["objects", "mesh", "scale", "repair", "centre"]),
         "tolerance" => remove("contact", &OF_TOLERANCE),
         _ => {}
     }

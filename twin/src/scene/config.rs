@@ -2,6 +2,7 @@
 
 use crate::chain::{ChainConfig, RowsConfig};
 use serde::{Deserialize, Serialize};
+use spts_circuit::WireConfig;
 use spts_input::Refusal;
 use spts_models::{SkinLayout, parsed, parsed_text};
 use spts_sim::mechanics::{BendConfig, DropConfig, MechanicsConfig, PressConfig, Timestep};
@@ -58,6 +59,10 @@ pub struct SceneConfig {
     /// Faulty cells, in addition to those of the profile.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<toml::Table>,
+    /// Wires of the skin, in place of those of the profile; see [`WireConfig`](spts_circuit::WireConfig). Default: those
+    /// of the profile, else one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub wires: Vec<WireConfig>,
     /// The skin.
     pub skin: SkinLayout,
     /// Contact model (`model`) and its parameters.
@@ -100,6 +105,7 @@ impl SceneConfig {
             rows: self.rows.clone(),
             weights: self.weights.clone(),
             faults: self.faults.clone(),
+            wires: self.wires.clone(),
         }
     }
 }

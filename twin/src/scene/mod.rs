@@ -258,5 +258,9 @@ fn default_name(config: &SceneConfig) -> String {
         let stem = Path::new(file).file_stem().unwrap_or_default();
         stem.to_string_lossy().into_owned()
     });
-    press.object.clone().or(mesh).unwrap_or_default()
+    let several = || match press.objects.len() {
+        count @ 0..=3 => press.objects[..count].iter().map(|entry| entry.object.as_str()).collect::<Vec<_>>().join("-"),
+        count => format!("{count}-objects"),
+    };
+    press.object.clone().or(mesh).unwrap_or_else(several)
 }

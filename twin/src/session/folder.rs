@@ -15,8 +15,9 @@ use spts_models::Grid;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-/// Version of the schema of `session.json` that is written, and the only one that is read.
-const SCHEMA: u64 = 1;
+/// Versions of the schema of `session.json` that are read: of one wire, and of several. The first that can hold a session
+/// is written.
+const SCHEMAS: [u64; 2] = [1, 2];
 /// The file that makes a folder a session.
 pub const SESSION_FILE: &str = "session.json";
 
@@ -65,11 +66,20 @@ struct RecordedContents {
     conductance_s: Option<String>,
 }
 
+impl RecordedContents {
+    fn has_wires(&self) -> bool {
+        self.info.weights.wires().is_some()
+    }
+}
+
 impl Contents {
+    fn recorded(&self) -> impl Iterator<Item = &RecordedContents> {
+        [&self.raster, &self.compressive].into_iter().flatten()
+    }
+
     /// Names of the files that make the session.
     fn files(&self) -> Vec<&str> {
-        let recorded = [&self.raster, &self.compressive].into_iter().flatten();
-        let arrays = recorded.flat_map(|recorded| {
+        let arrays = self.recorded().flat_map(|recorded| {
             let maps = [&recorded.pressure_pa, &recorded.conductance_s].into_iter().flatten();
             maps.chain([&recorded.samples.file]).map(String::as_str)
         });
@@ -304,7 +314,7 @@ impl SessionWriter {
             dir: dir.to_owned(),
             contents: Contents {
                 format: FORMAT.to_owned(),
-                schema: SCHEMA,
+                schema: SCHEMAS[0],
                 name: session.name.clone(),
                 object: session.object.clone(),
                 event: session.event,
@@ -354,6 +364,9 @@ impl SessionWriter {
         self.contents.raster = self.raster.map(RecordingWriter::finish).transpose()?;
         self.contents.compressive = self.compressive.map(RecordingWriter::finish).transpose()?;
         let path = self.dir.join(SESSION_FILE);
+        if self.contents.recorded().any(RecordedContents::has_wires) {
+            self.contents.schema = SCHEMAS[1];
+        }
         let text = serde_json::to_string_pretty(&self.contents).map_err(unwritable(&path))?;
         let text = text + "\n";
         if self.limited {
@@ -534,8 +547,9 @@ impl Session {
             let found = format!("{:?}", version.format);
             return Err(outside(&path, "format", found, format!("{{{FORMAT:?}}}")));
         }
-        if version.schema != SCHEMA {
-            let problem = format!("`schema` = {} is not known; this program reads {SCHEMA}", version.schema);
+        if !SCHEMAS.contains(&version.schema) {
+            let [one, several] = SCHEMAS;
+            let problem = format!("`schema` = {} is not known; this program reads {one} and {several}", version.schema);
             return Err(Refusal::new(problem).at(path.display()));
         }
         let contents: Contents = parse_json(&path, &text)?;

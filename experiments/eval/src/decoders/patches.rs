@@ -5,7 +5,6 @@ use crate::training::TrainingData;
 use crate::windows::Window;
 use spts_input::Refusal;
 use spts_recon::matrix_free;
-use spts_recon::operator::SignRows;
 
 /// Nothing is learned.
 #[derive(Debug, Clone)]
@@ -29,9 +28,9 @@ impl Trained for OnSheet {
 impl Algorithm for OnSheet {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
         answer.class = None;
-        answer.image = match window.signs {
-            Some(signs) => self.sheet.recover(SignRows::new(signs, window.phi.ncols()), window.y)?,
-            None => self.sheet.recover(window.phi, window.y)?,
+        answer.image = match window.bits {
+            Some(bits) => self.sheet.recover(bits, window.y, window.wires)?,
+            None => self.sheet.recover(window.phi, window.y, window.wires)?,
         };
         Ok(())
     }

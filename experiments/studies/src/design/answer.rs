@@ -4,8 +4,10 @@ use super::search::{Tried, draw, mean};
 use super::wire::{FeedbackLimit, RowSource, WireDesign};
 use super::{Alternative, Binding, CostDrivers, Design, DesignReport, DesignStudy, Ground, LatencyParts, WireChoice};
 use crate::sensing::load_s;
+use spts_circuit::WireConfig;
 use spts_firmware::{FIRST_ADDRESS, LAST_BUS_ADDRESS, Pattern};
 use spts_input::Refusal;
+use toml::Value;
 
 /// Multiplications a second of the estimate of the decoder's time: one core, one lane.
 const PRODUCTS_PER_S: f64 = 1e9;
@@ -42,13 +44,17 @@ impl DesignStudy {
         let most = design.sub_arrays.iter().copied().max().unwrap_or_default();
         let what = "a scan of every taxel, without a decoder";
         alternatives.push(alternative(ground, what, design.wires, "raster", most, &design.wire, None));
-        let (_, profile) = design.wire.profile(design.row_source == RowSource::Generator)?;
+        let (_, mut profile) = design.wire.profile(design.row_source == RowSource::Generator)?;
         let pattern = chosen.bench.rows.text();
-        let profile = match &pattern {
-            // before the first table of the profile
-            Some(pattern) => format!("patterns = \"\"\"\n{pattern}\"\"\"\n{profile}"),
-            None => profile,
-        };
+        if let Some(pattern) = &pattern {
+            profile.insert("patterns".to_owned(), pattern.clone().into());
+        }
+        if design.wires > 1 {
+            let bands = WireConfig::bands(design.wires);
+            let bands = Value::try_from(bands).map_err(|e| Refusal::from_error(e).at("wires"))?;
+            profile.insert("wires".to_owned(), vec![bands].into());
+        }
+        let profile = toml::to_string(&profile).map_err(|e| Refusal::from_error(e).at("profile"))?;
         let scene = scene(&design);
         let mut curves: Vec<_> = others.into_iter().map(|t| t.curve).collect();
         curves.push(chosen.curve);
@@ -230,25 +236,57 @@ fn cost(design: &Design) -> CostDrivers {
     }
 }
 
-/// A scene of one press on the design's first sub-array, for `spts simulate`.
+/// A scene of one press on the design's skin with all of its wires, for `spts simulate`.
 fn scene(design: &Design) -> String {
-    let rows = design.sub_arrays.first().copied().unwrap_or_default() / design.cols.max(1);
-    let of = if design.wires > 1 {
-        format!("The sub-array of the first of {} wires: a session is of one wire.", design.wires)
-    } else {
-        "The whole skin, on its one wire.".to_owned()
-    };
+    let rows = design.rows;
+    let of = format!("The whole skin, on its {}.", counted(design.wires, "wire"));
     let source = match &design.row_source {
         RowSource::Generator => "kind = \"generator\"\nseeding = \"mixed\"",
         RowSource::Designer(_) => "kind = \"pattern\"\npatterns_file = \"rows.txt\"",
     };
     format!(
         "# {of}\nname = \"design\"\nseed = {}\nreadout = \"profile.toml\"\n\n[skin]\nrows = {rows}\ncols = {}\npitch_m = {:e}\n\
-         electrode_m = {:e}\n\n[rows]\n{source}\n\n[contact]\nmodel = \"footprint\"\n\n[press]\nobject = \"eraser\"\n\
-         position_share = [0.0, 0.0]\nforce_n = 10.0\npresses = 1\n",
-        design.seed, design.cols, design.pitch_m, design.electrode_m
+         electrode_m = {:e}\n\n[rows]\n{source}\n\n[contact]\nmodel = \"footprint\"\n\n[press]\nforce_n = {:.1}\npresses = 1\n{}",
+        design.seed,
+        design.cols,
+        design.pitch_m,
+        design.electrode_m,
+        FORCE_N * design.objects.contacts as f64,
+        pressed(design)
     )
 }
+
+/// Force on each object of the scene, N.
+const FORCE_N: f64 = 10.0;
+/// Objects lie within this share of the sheet's width and height, from the middle to both sides.
+const WITHIN: f64 = 0.35;
+
+/// The objects of the scene, as entries of `press.objects`: as many as the design is for, spread over the sheet. The
+/// ball's contact is small, and the eraser's is large; where the sheet is no larger than the eraser, it is the ball.
+fn pressed(design: &Design) -> String {
+    let side_m = design.rows.min(design.cols) as f64 * design.pitch_m;
+    let large = design.objects.size_m[1] > SMALL_M && side_m > ERASER_M;
+    let name = if large { "eraser" } else { "tennis" };
+    let count = design.objects.contacts as f64;
+    // on a spiral whose points are as far apart as they can be; a single one is in the middle
+    let place = |k: usize| {
+        let radius = if count > 1.0 { WITHIN * ((k as f64 + 0.5) / count).sqrt() * std::f64::consts::SQRT_2 } else { 0.0 };
+        let (y, x) = (GOLDEN_RAD * k as f64).sin_cos();
+        [x, y].map(|v| (radius * v).clamp(-WITHIN, WITHIN))
+    };
+    let entry = |k: usize| {
+        let [x, y] = place(k);
+        format!("\n[[press.objects]]\nobject = \"{name}\"\nposition_share = [{x:.3}, {y:.3}]\n")
+    };
+    (0..design.objects.contacts).map(entry).collect()
+}
+
+/// Largest extent of small objects, m.
+const SMALL_M: f64 = 0.05;
+/// Longer side of the eraser, m.
+const ERASER_M: f64 = 0.087;
+/// The golden angle, π(3 − √5).
+const GOLDEN_RAD: f64 = 2.399_963_229_728_653;
 
 /// "1 wire", "2 wires".
 pub fn counted(count: usize, what: &str) -> String {

@@ -171,7 +171,7 @@ impl DesignCheck {
             }
             (RowSource::Designer(_), Some(text)) => {
                 let bands = bands(design.rows, design.wires);
-                let taxels = bands.first().map_or(0, std::ops::Range::len) * design.cols;
+                let taxels = design.rows * design.cols;
                 let pattern = parse_patterns(text).map_err(|e| refused("rows.txt", e.to_string()))?;
                 let (found, wanted) = ((pattern.period(), pattern.taxels()), (design.m_per_wire, taxels));
                 if found != wanted {

@@ -18,7 +18,7 @@ const USUAL_SIZES_M: [f64; 2] = [0.02, 0.09];
 /// Those of the seventeen objects, about.
 const OBJECT_SIZES_M: [f64; 2] = [0.03, 0.1];
 
-/// The objects for which a skin is designed: single objects, pressed with 5 to 40 N and held still.
+/// The objects for which a skin is designed: one or several at once, pressed with 5 to 40 N and held still.
 ///
 /// ```
 /// use spts_studies::design::DesignObjects;
@@ -39,6 +39,14 @@ pub struct DesignObjects {
     pub placed: bool,
     /// Smallest and largest extent over the skin, m.
     pub size_m: [f64; 2],
+    /// Number of them that are pressed at once; they do not overlap. 1 to 10.
+    #[serde(default = "one")]
+    pub contacts: usize,
+}
+
+/// Default of [`DesignObjects::contacts`].
+fn one() -> usize {
+    1
 }
 
 impl DesignObjects {
@@ -49,10 +57,9 @@ impl DesignObjects {
     /// places are used. Its skin, forces, readout and numbers are not.
     ///
     /// # Errors
-    /// [`Refusal`] for a specification that cannot be read, or has meshes, balls or several simultaneous
-    /// objects.
+    /// [`Refusal`] for a specification that cannot be read, or has meshes or balls.
     pub fn named(name: &str) -> Result<Self, Refusal> {
-        let shapes = |size_m| Self { name: name.to_owned(), seventeen: false, placed: false, size_m };
+        let shapes = |size_m| Self { name: name.to_owned(), seventeen: false, placed: false, size_m, contacts: 1 };
         if let Some((_, size_m)) = SIZES_M.iter().find(|(known, _)| *known == name) {
             return Ok(shapes(*size_m));
         }
@@ -65,19 +72,27 @@ impl DesignObjects {
         let file = if path.is_dir() { path.join("spec.toml").to_string_lossy().into_owned() } else { name.to_owned() };
         let spec = Spec::load(&file, &toml::Table::new()).map_err(|e| refused(e.to_string()))?;
         let (object, pose) = (&spec.config().object, &spec.config().pose);
-        if spec.drops() || spec.most_objects() > 1 {
-            return Err(refused("a design is for presses of one object at a time".to_owned()));
+        if spec.drops() {
+            return Err(refused("a design is for presses".to_owned()));
         }
+        let contacts = spec.most_objects();
         match object.from {
-            ObjectSource::Shapes => Ok(shapes(object.size_m.unwrap_or(USUAL_SIZES_M))),
+            ObjectSource::Shapes => Ok(Self { contacts, ..shapes(object.size_m.unwrap_or(USUAL_SIZES_M)) }),
             ObjectSource::Objects => Ok(Self {
                 name: name.to_owned(),
                 seventeen: true,
                 placed: pose.about == PoseOrigin::Placement && pose.rotation_deg.is_fixed(),
                 size_m: OBJECT_SIZES_M,
+                contacts,
             }),
             _ => Err(refused("meshes and balls cannot be drawn for a design".to_owned())),
         }
+    }
+
+    /// So many of them at once; `None` leaves their number.
+    #[must_use]
+    pub fn at_once(self, contacts: Option<usize>) -> Self {
+        Self { contacts: contacts.unwrap_or(self.contacts), ..self }
     }
 
     /// `touches` of them on a skin of their own.
@@ -86,15 +101,16 @@ impl DesignObjects {
         TouchScene {
             size_m: (!self.seventeen).then_some(self.size_m),
             placed: self.placed,
+            contacts: self.contacts,
             ..TouchScene::new(*layout, objects, touches, seed)
         }
     }
 
-    /// Taxels that one of them may cover, with a margin for the edges: that many are solved for.
+    /// Taxels that those pressed at once may cover, with a margin for the edges: that many are solved for.
     pub(super) fn places(&self, layout: &SkinLayout) -> usize {
         let side = 1.1 * self.size_m[1] / layout.pitch_m() + 2.0;
         #[expect(clippy::cast_possible_truncation, reason = "float to integer casts saturate")]
-        let most = (side * side).ceil() as usize;
+        let most = (self.contacts as f64 * side * side).ceil() as usize;
         most.clamp(LEAST_PLACES, MOST_PLACES).min(layout.taxels())
     }
 }
@@ -187,7 +203,7 @@ mod tests {
         assert!(placed.seventeen && placed.placed);
         let sized = write("rows = 10\n[object]\nfrom = \"shapes\"\nsize_m = [0.01, 0.03]").unwrap();
         assert_eq!(sized.size_m.map(f64::to_bits), [0.01, 0.03].map(f64::to_bits));
-        for refused in ["large-skin", "drops", "nothing", "missing.toml"] {
+        for refused in ["drops", "nothing", "missing.toml"] {
             let error = DesignObjects::named(refused).unwrap_err().to_string();
             assert!(error.contains("`objects`") && error.contains("valid: small, large"), "{error}");
         }

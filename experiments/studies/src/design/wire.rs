@@ -6,9 +6,11 @@ use serde::{Deserialize, Serialize};
 use spts_circuit::amplifier::{Budget, Setting};
 use spts_circuit::{Patterns, Profile, Seeding, WeightMode, Weights};
 use spts_input::Refusal;
+use spts_models::parsed;
 use spts_recon::matrix_free::SheetPrior;
 use spts_recon::rows::{Expected, RowTask, designer};
 use std::ops::Range;
+use toml::Table;
 
 /// Share of the range that the sums of the touches use that were drawn: others press harder.
 const HEADROOM: f64 = 0.7;
@@ -132,17 +134,16 @@ impl WireDesign {
 
     /// Readout profile of the wire, and its TOML: as_designed with this feedback and clock. What the parts do not
     /// explain is as the recordings of the device show it: contact noise, late updates and idle noise of as_built.
-    pub(super) fn profile(&self, mixed: bool) -> Result<(Profile, String), Refusal> {
+    pub(super) fn profile(&self, mixed: bool) -> Result<(Profile, Table), Refusal> {
         let effects = ["late_updates", "contact_noise", "idle_noise"];
         let mut table = profile(self.feedback_ohm, self.rate_hz, self.available_s, &effects)?;
         table.insert("feedback_scales".to_owned(), false.into());
         if mixed {
             table.insert("seeding".to_owned(), "mixed".into());
         }
-        let text = toml::to_string(&table).map_err(|e| Refusal::from_error(e).at("profile"))?;
-        let profile = Profile::from_toml(&text)?;
+        let profile: Profile = parsed(table.clone())?;
         profile.validate(1)?;
-        Ok((profile, text))
+        Ok((profile, table))
     }
 }
 
@@ -219,8 +220,8 @@ impl BandRows {
         let [rows, cols] = prior.shape();
         let bands = bands(rows, wires);
         let RowSource::Designer(name) = source else {
-            return Self::of(bands, cols, |taxels| {
-                let taxels = u32::try_from(taxels).map_err(|e| Refusal::from_error(e).at("taxels of a wire"))?;
+            return Self::of(bands, cols, |band| {
+                let taxels = u32::try_from(band.len() * cols).map_err(|e| Refusal::from_error(e).at("taxels of a wire"))?;
                 Ok(Weights::new(WeightMode::Binary, Seeding::Mixed, taxels))
             });
         };
@@ -229,39 +230,40 @@ impl BandRows {
         let task = RowTask { seed, ..RowTask::new(measurements, &expected) };
         let found = designer(name).ok_or_else(|| Refusal::new(format!("rows: no designer {name:?}")))?;
         let matrix = (found.build)().design(&task)?;
-        let codes = matrix.view().values().iter();
-        let codes = codes.map(|v| if *v > 0.0 { u8::MAX } else { 0 }).collect();
-        Self::pattern(&Patterns::new(matrix.nrows(), codes)?, bands, cols)
+        // every wire has the pattern of the highest band; one that is a row lower has its first taxels
+        let codes = (0..matrix.nrows()).flat_map(|row| {
+            let matrix = &matrix;
+            let own = move |band: &Range<usize>| matrix.row(row)[..band.len() * cols].iter();
+            bands.iter().flat_map(own).map(|v| if *v > 0.0 { u8::MAX } else { 0 })
+        });
+        Self::pattern(&Patterns::new(matrix.nrows(), codes.collect())?, bands.clone(), cols)
     }
 
-    /// Every wire with the same pattern, that of the highest band; a band that is a row lower has its first taxels.
+    /// Every wire with its taxels' part of the skin's `pattern`.
     pub(super) fn pattern(pattern: &Patterns, bands: Vec<Range<usize>>, cols: usize) -> Result<Self, Refusal> {
-        Self::of(bands, cols, |taxels| {
-            let rows = (0..pattern.period() as u64).flat_map(|row| {
-                let codes = pattern.row(row);
-                codes[..codes.len().min(taxels)].to_vec()
-            });
-            let patterns = Patterns::new(pattern.period(), rows.collect())?;
+        Self::of(bands, cols, |band| {
+            let own = |row: u64| pattern.row(row)[band.start * cols..band.end * cols].to_vec();
+            let patterns = Patterns::new(pattern.period(), (0..pattern.period() as u64).flat_map(own).collect())?;
             Weights::with_patterns(WeightMode::Binary, patterns)
         })
     }
 
-    /// Every wire with the weights of its number of taxels.
+    /// Every wire with the weights of its band.
     fn of(
         bands: Vec<Range<usize>>,
         cols: usize,
-        weights: impl Fn(usize) -> Result<Weights, Refusal>,
+        weights: impl Fn(&Range<usize>) -> Result<Weights, Refusal>,
     ) -> Result<Self, Refusal> {
-        Ok(Self {
-            cols,
-            weights: bands.iter().map(|band| weights(band.len() * cols)).collect::<Result<_, _>>()?,
-            bands,
-        })
+        Ok(Self { cols, weights: bands.iter().map(weights).collect::<Result<_, _>>()?, bands })
     }
 
-    /// The pattern of the highest band, if it is one.
+    /// The rows of the whole skin as patterns, if they are any: every taxel with its level on its own wire.
     pub(super) fn text(&self) -> Option<String> {
-        self.weights.first()?.patterns().map(Patterns::to_text)
+        let patterns: Option<Vec<&Patterns>> = self.weights.iter().map(Weights::patterns).collect();
+        let patterns = patterns?;
+        let period = patterns.first()?.period();
+        let codes = (0..period as u64).flat_map(|row| patterns.iter().flat_map(move |own| own.row(row)).copied());
+        Some(Patterns::new(period, codes.collect()).ok()?.to_text())
     }
 
     /// Measurements `range` of every wire as rows over all taxels, those of one measurement after another, with the

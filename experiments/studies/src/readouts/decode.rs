@@ -84,7 +84,7 @@ impl WireReadout for FewRows {
         let read = |(k, &count): (usize, &usize)| {
             let (phi, first) = (self.rows.view().rows(0, count), &samples[..count]);
             let image = match &self.decoder {
-                Decoder::Patches => Patches::new(self.shape[0], self.shape[1]).recover(phi, first)?,
+                Decoder::Patches => Patches::new(self.shape[0], self.shape[1]).recover(phi, first, &[])?,
                 // three quarters as many as measurements, as in `spts design`, and no more than any touch covers
                 Decoder::Sheet(sheet) => sheet.non_negative(first, (3 * count / 4).clamp(4, MOST_PLACES))?,
                 Decoder::Gaussian(each) => {

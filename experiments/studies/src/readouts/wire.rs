@@ -162,7 +162,7 @@ impl WireSession<'_> {
         self.frame(measurements, |session| {
             let profile = Profile { weights: CompressiveWeights::Binary, ..session.profile.clone() };
             let readout = Readout::new(&profile, Mode::Compressive, &session.skin.layout, session.device, 0)?;
-            readout.with_codes(Box::new(rows.clone()))
+            readout.with_codes(|_| Ok(Box::new(rows.clone())))
         })
     }
 
@@ -198,7 +198,7 @@ impl WireSession<'_> {
             // the cells that transmit, whatever their places
             let layout = SkinLayout::new(1, chips.taxels(), published.pitch_m(), published.electrode_m())?;
             let readout = Readout::new(&self.profile, Mode::Raster, &layout, self.device, 0)?;
-            Ok(TouchWire::of(readout.with_codes(Box::new(chips.clone()))?))
+            Ok(TouchWire::of(readout.with_codes(|_| Ok(Box::new(chips.clone())))?))
         };
         let silent = Patterns::new(1, vec![NEUTRAL])?;
         let idle = line(&silent)?.volts(ConductanceMap::zeros(1, 1), IDLE_BLOCK, IDLE_MEASUREMENTS)?;
