@@ -1,16 +1,44 @@
 """Press, record, decode and score skins of growing size: CPU time, memory and IoU, as docs/skins.md shows it.
 
-python scripts/large.py [SIDE ...]        (needs `spts`, the command; sides of the skins in taxels)
+python scripts/large.py [--wires N] [SIDE ...]     (needs `spts`, the command; sides of the skins in taxels)
+
+Balls are pressed with 10 N each: one up to 1,024 taxels, five at once on larger skins. Nothing is learned.
 """
 
+import argparse
 import json
+import math
 import os
 import subprocess
-import sys
 import tempfile
 
-EXTENT_M = 0.15
-SIDES = [32, 64, 100]
+SIDES = [10, 32, 64, 100, 256, 480]
+GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
+
+
+def scene(side, wires):
+    """The scene of a skin: pitch 15 mm as published for the smallest, else 5 mm."""
+    balls = 1 if side <= 32 else 5
+    text = f"""
+readout = "as_built"
+[[wires]]
+bands = {wires}
+[skin]
+rows = {side}
+cols = {side}
+pitch_m = {0.015 if side <= 10 else 0.005}
+[contact]
+model = "footprint"
+[press]
+presses = 1
+force_n = {10 * balls}
+"""
+    for ball in range(balls):
+        share = 0.35 * math.sqrt(2 * (ball + 0.5) / balls) if balls > 1 else 0.0
+        place = [share * math.cos(GOLDEN_RAD * ball), share * math.sin(GOLDEN_RAD * ball)]
+        place = [round(min(0.35, max(-0.35, at)), 3) for at in place]
+        text += f'[[press.objects]]\nobject = "tennis"\nposition_share = {place}\n'
+    return text
 
 
 def spts(*arguments, folder):
@@ -27,15 +55,18 @@ def spts(*arguments, folder):
 
 
 def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--wires", type=int, default=1, help="wires of every skin [default: 1]")
+    parser.add_argument("sides", type=int, nargs="*", default=SIDES, help="taxels along a side")
+    asked = parser.parse_args()
     print("| taxels | M | press, s | decode, s | score, s | largest memory, MB | IoU |\n|---|---|---|---|---|---|---|")
-    for side in [int(text) for text in sys.argv[1:]] or SIDES:
+    points = []
+    for side in asked.sides:
         taxels, few = side * side, -(-side * side // 20)
-        settings = [f"skin.rows={side}", f"skin.cols={side}", f"skin.pitch_m={EXTENT_M / side!r}", "press.lift_s=2.0"]
-        settings += ["press.duration_s=2.3", "readout=as_built"]
-        settings = [text for setting in settings for text in ("--set", setting)]
         with tempfile.TemporaryDirectory() as folder:
-            scene = ["simulate", "press/T", "--contact", "footprint", "--presses", "1", *settings, "--out", "s"]
-            _, press, held = spts(*scene, folder=folder)
+            with open(os.path.join(folder, "scene.toml"), "w") as file:
+                file.write(scene(side, asked.wires))
+            _, press, held = spts("simulate", "scene.toml", "--out", "s", folder=folder)
             options = ["--measurements", str(few)]
             text, decode, decoding = spts(
                 "decode", "s", *options, "--decoder", "auto", "--json", "--out", "d", folder=folder
@@ -49,6 +80,12 @@ def main():
                 f"| {taxels:,} | {few:,} | {press:.1f} | {decode:.1f} | {score:.1f} | {most:.0f} | {iou:.2f} |",
                 flush=True,
             )
+            points.append((math.log(taxels), math.log(press + decode + score)))
+    large = [point for point in points if point[0] > math.log(1000)]
+    if len(large) > 2:
+        mean = [sum(point[k] for point in large) / len(large) for k in range(2)]
+        slope = sum((x - mean[0]) * (y - mean[1]) for x, y in large) / sum((x - mean[0]) ** 2 for x, _ in large)
+        print(f"time grows as taxels^{slope:.2f} from 1,024 taxels on")
 
 
 if __name__ == "__main__":

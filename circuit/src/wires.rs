@@ -141,6 +141,16 @@ impl Wires {
         &self.taxels[wire]
     }
 
+    /// Taxels of every wire as bits, ⌈taxels/64⌉ words each: bit k is set if taxel k is on it.
+    pub fn masks(&self) -> Vec<u64> {
+        let words = self.of.len().div_ceil(64);
+        let mut masks = vec![0; self.count() * words];
+        for (k, wire) in self.of.iter().enumerate() {
+            masks[usize::from(*wire) * words + k / 64] |= 1 << (k % 64);
+        }
+        masks
+    }
+
     /// Taxels of the wire that has the most.
     pub fn most_taxels(&self) -> usize {
         self.taxels.iter().map(Vec::len).max().unwrap_or(0)

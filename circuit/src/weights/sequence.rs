@@ -572,9 +572,6 @@ fn generate(states: &mut [u32], out: &mut [f64], level: impl Fn(u32) -> f64) {
     }
 }
 
-/// Rows that are written at a time where each is needed but once.
-const PIECE: usize = 64;
-
 /// Consecutive rows of the weight matrix Φ, one for each measurement. No row is stored; the matrix of a large skin can
 /// be filled piece by piece with [`WeightRows::chunks`].
 ///
@@ -671,16 +668,62 @@ impl<'a> WeightRows<'a> {
     /// several wires the bits of taxels on another wire than the row's are not set; their weights are 0, and
     /// [`WeightRows::wire`] says which. `None` if the weights are not binary.
     pub fn sign_bits(&self) -> Option<Vec<u64>> {
-        (self.weights.mode() == WeightMode::Binary).then(|| {
-            let word = |levels: &[f64]| levels.iter().rev().fold(0, |word, w| word << 1 | u64::from(*w > 0.0));
-            let mut bits = Vec::new();
-            for piece in self.chunks(PIECE) {
-                for row in piece.to_vec().chunks_exact(self.taxels().max(1)) {
-                    bits.extend(row.chunks(64).map(word));
-                }
+        if self.weights.mode() != WeightMode::Binary {
+            return None;
+        }
+        let words = self.taxels().div_ceil(WORD);
+        let wires = self.weights.wires();
+        let masks = wires.map_or_else(Vec::new, Wires::masks);
+        let mut bits = Vec::with_capacity(self.len * words);
+        let (mut edges, mut at) = (Edges::new(self.weights, self.weights.sample(self.first_row).1), None);
+        for row in (self.first_row..).take(self.len) {
+            let (wire, edge) = self.weights.sample(row);
+            if at != Some(edge) {
+                edges.next();
+                at = Some(edge);
             }
-            bits
-        })
+            match masks.get(wire * words..(wire + 1) * words) {
+                Some(mask) => bits.extend(edges.bits.iter().zip(mask).map(|(bits, mask)| bits & mask)),
+                None => bits.extend_from_slice(&edges.bits),
+            }
+        }
+        Some(bits)
+    }
+}
+
+/// Bits of a word.
+const WORD: usize = u64::BITS as usize;
+
+/// Signs of all taxels at one clock edge after another.
+struct Edges<'a> {
+    weights: &'a Weights,
+    /// States of the generators; empty for patterns.
+    states: Vec<u32>,
+    /// The next edge.
+    edge: u64,
+    /// Signs at the edge before it, as in [`WeightRows::sign_bits`].
+    bits: Vec<u64>,
+}
+
+impl<'a> Edges<'a> {
+    fn new(weights: &'a Weights, edge: u64) -> Self {
+        let jump = Jump::new(edge);
+        let states = weights.seeds().map(|seeds| (0..weights.taxels()).map(|k| jump.apply(seeds.seed(k))).collect());
+        Self { weights, states: states.unwrap_or_default(), edge, bits: vec![0; weights.taxels().div_ceil(WORD)] }
+    }
+
+    fn next(&mut self) {
+        if let Some(patterns) = self.weights.patterns() {
+            for (word, codes) in self.bits.iter_mut().zip(patterns.row(self.edge).chunks(WORD)) {
+                *word = codes.iter().rev().fold(0, |word, code| word << 1 | u64::from(*code == FULL_SCALE));
+            }
+        }
+        for (word, states) in self.bits.iter_mut().zip(self.states.chunks_mut(WORD)) {
+            // the sign is the top bit of the state
+            states.iter_mut().for_each(|state| *state = Jump::ONE.apply(*state));
+            *word = states.iter().rev().fold(0, |word, state| word << 1 | u64::from(state >> 31));
+        }
+        self.edge += 1;
     }
 }
 

@@ -143,10 +143,10 @@ pub(super) struct ScoreCommand {
     /// Wanted confidences, each in (0.5, 1) [default: 0.8,0.9,0.95,0.99 for classes; 0.6,0.7,0.8 for images]
     #[arg(long, value_name = "P,...", value_delimiter = ',', requires = "anytime", value_parser = number)]
     confidence: Vec<f64>,
-    /// Numbers of samples M in a window; each [1, 10000]; with --anytime the largest is the most that a window takes
+    /// Numbers of samples M in a window; each [1, 1000000]; with --anytime the largest is the most that a window takes
     /// [default: 5,7,10,13,20,25,50,100, and 1, 2 and 5 % of more than 2048 taxels; with --in-time 5,7,10,20; for
     /// places 5,7,10,15,20,25]
-    #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=10_000))]
+    #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = whole::<u32>(1..=1_000_000))]
     measurements: Vec<u32>,
     /// Objects that are scored [default: all with a compressive session]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]

@@ -190,7 +190,7 @@ impl DecodeRequest {
                 }
             }
         }
-        let layout = recording.layout();
+        let (layout, taxels) = (recording.layout(), recording.taxels());
         let longest = self.measurements.iter().copied().max().unwrap_or(0) * self.windows;
         let blocks = begins.par_iter().enumerate().map(|(block, &(start, ref untouched))| {
             let press = untouched.press(recording, block, start..start + longest);
@@ -200,7 +200,8 @@ impl DecodeRequest {
                 block,
                 window: at / window.y.len(),
                 m: window.y.len(),
-                phi: window.phi.values().to_vec(),
+                // those of large skins would fill the disk; they follow from the session
+                phi: if taxels > TrainingData::MOST_TAXELS { Vec::new() } else { window.phi.values().to_vec() },
                 y: window.y.to_vec(),
             });
             let measured: Vec<MeasuredWindow> = measured.collect();

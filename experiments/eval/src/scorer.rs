@@ -6,12 +6,15 @@ use crate::protocol::{Protocol, Truth};
 use crate::sensing::RowChooser;
 use crate::session::ScoredSession;
 use crate::tally::Tally;
-use crate::windows::{Press, Window};
+use crate::training::TrainingData;
+use crate::windows::{Press, Untouched, Window};
+use spts_circuit::Recording;
 use spts_input::Refusal;
 use spts_recon::Workspace;
 use spts_recon::classify::Src;
 use spts_recon::metrics::median;
 use std::hint::black_box;
+use std::ops::Range;
 use std::time::Instant;
 
 /// A press, and what is scored of it.
@@ -30,15 +33,36 @@ enum Measured {
     Recorded(Press),
     /// Windows that start with the first measurement, one set for images and one for classes.
     Chosen([Vec<Press>; 2]),
+    /// Windows that are spread over the press of a large skin; they start with the first measurement.
+    Few(Vec<Press>),
+}
+
+/// Of skins of more than so many taxels, few windows are scored: their rows are not formed for the whole press.
+const MANY_TAXELS: usize = TrainingData::MOST_TAXELS;
+/// Windows times taxels of such a press, and the windows at least and at most.
+const FEW: (usize, [usize; 2]) = (200_000, [2, 20]);
+
+/// Windows of `most` measurements, spread over `range` of a block.
+fn few(recording: &Recording, block: usize, range: Range<usize>, most: usize) -> Vec<Press> {
+    let untouched = Untouched::of(recording, block);
+    let most = most.min(range.len());
+    let count = (FEW.0 / recording.taxels()).clamp(FEW.1[0], FEW.1[1]).min(range.len() / most.max(1)).max(1);
+    let start = |k: usize| range.start + (range.len() - most) * k / (count - 1).max(1);
+    (0..count).map(|k| untouched.press(recording, block, start(k)..start(k) + most)).collect()
 }
 
 impl<'a> ScoredPress<'a> {
-    /// Block `block` of the compressive recording of `session`; `None` without that recording or a true image.
-    pub(crate) fn new(session: &'a ScoredSession, block: usize) -> Option<Self> {
+    /// Block `block` of the compressive recording of `session`, for windows of up to `most` measurements; `None` without
+    /// that recording or a true image.
+    pub(crate) fn new(session: &'a ScoredSession, block: usize, most: usize) -> Option<Self> {
         let recording = session.compressive.as_ref()?;
+        let range = session.protocol.measurements(recording);
         Some(Self {
             truth: session.truth(block)?,
-            measured: Measured::Recorded(Press::new(recording, block, &session.protocol)),
+            measured: match recording.taxels() > MANY_TAXELS {
+                true => Measured::Few(few(recording, block, range, most)),
+                false => Measured::Recorded(Press::new(recording, block, &session.protocol)),
+            },
             protocol: &session.protocol,
             measurements_per_frame: recording.measurements_per_frame(),
         })
@@ -56,6 +80,10 @@ impl<'a> ScoredPress<'a> {
                 Measured::Chosen(chooser.windows(press, most, classes)?)
             }
             Measured::Chosen(windows) => Measured::Chosen(windows.clone()),
+            Measured::Few(_) => {
+                let problem = format!("rows are chosen on skins of at most {MANY_TAXELS} taxels");
+                return Err(Refusal::new(problem));
+            }
         };
         Ok(Self { measured, truth: self.truth.clone(), ..*self })
     }
@@ -65,8 +93,10 @@ impl<'a> ScoredPress<'a> {
     /// # Errors
     /// [`Refusal`] if they are kept as bits alone.
     pub(crate) fn with_numbers(self) -> Result<Self, Refusal> {
-        if let Measured::Recorded(press) = &self.measured {
-            check_numbers(press)?;
+        match &self.measured {
+            Measured::Recorded(press) => check_numbers(press)?,
+            Measured::Few(presses) => presses.iter().try_for_each(check_numbers)?,
+            Measured::Chosen(_) => {}
         }
         Ok(self)
     }
@@ -84,6 +114,7 @@ impl<'a> ScoredPress<'a> {
                 press.windows(0..press.len(), m, stride).map(|(_, w)| w).collect()
             }
             Measured::Chosen([images, _]) => images.iter().filter_map(|press| press.window(0, m)).collect(),
+            Measured::Few(presses) => presses.iter().filter_map(|press| press.window(0, m)).collect(),
         }
     }
 
@@ -94,7 +125,7 @@ impl<'a> ScoredPress<'a> {
                 let windows = press.windows(0..press.len(), m, m).map(|(_, w)| w);
                 windows.take(self.protocol.max_windows).collect()
             }
-            Measured::Chosen(_) => self.class_windows(m),
+            Measured::Chosen(_) | Measured::Few(_) => self.class_windows(m),
         }
     }
 
@@ -106,6 +137,16 @@ impl<'a> ScoredPress<'a> {
                 press.windows(0..count * m, m, m).map(|(_, w)| w).collect()
             }
             Measured::Chosen([_, classes]) => classes.iter().filter_map(|press| press.window(0, m)).collect(),
+            Measured::Few(_) => self.image_windows(m),
+        }
+    }
+
+    /// A press whose windows may be timed.
+    pub(crate) fn first(&self) -> Option<&Press> {
+        match &self.measured {
+            Measured::Recorded(press) => Some(press),
+            Measured::Chosen([images, _]) => images.first(),
+            Measured::Few(presses) => presses.first(),
         }
     }
 }
@@ -196,6 +237,10 @@ impl<'a> Scorer<'a> {
     }
 }
 
+/// Windows that are timed at least, and the time after which no more are begun, s.
+const FEWEST_TIMED: usize = 3;
+const TIMING_S: f64 = 1.0;
+
 /// Median time from a window to its answer, µs, on this thread, over up to `most` windows of the press, including Φ·D;
 /// the mean for algorithms that decode in batches. `None` if the press is shorter than one window.
 ///
@@ -214,7 +259,11 @@ pub fn decode_us(decoder: &TrainedDecoder, press: &Press, m: usize, most: usize)
     let mut answer = Answer::default();
     let mut times = Vec::with_capacity(windows.len());
     let mut rows = Vec::new();
+    let all = Instant::now();
     for window in &windows {
+        if times.len() >= FEWEST_TIMED && all.elapsed().as_secs_f64() > TIMING_S {
+            break;
+        }
         let window = if algorithm.takes_bits() { *window } else { window.with_rows(&mut rows) };
         let begin = Instant::now();
         let outcome = algorithm.decode(black_box(&window), &mut answer);

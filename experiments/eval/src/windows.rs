@@ -10,8 +10,8 @@ use spts_recon::{Matrix, MatrixView};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Rows of weights of consecutive measurements. Presses recorded at the same rows share them. Of many rows of ±1 on a
-/// large skin the bits alone are kept.
+/// Rows of weights of consecutive measurements. Presses recorded at the same rows share them. Of rows of ±1 on a skin of
+/// more than 2,048 taxels the bits alone are kept.
 #[derive(Debug, Clone)]
 pub struct PressRows {
     taxels: usize,
@@ -22,9 +22,6 @@ pub struct PressRows {
     /// Taxels of every wire as bits; empty for one wire.
     masks: Vec<u64>,
 }
-
-/// Most weights that are kept as numbers where bits will do: 1 GB.
-const MOST_NUMBERS: usize = 1 << 27;
 
 /// Consecutive measurements of one press, or of one contact of a ball, with their rows of weights.
 ///
@@ -115,9 +112,7 @@ impl PressRows {
     /// The weights of `rows`.
     pub fn new(rows: WeightRows<'_>) -> Self {
         let signs = rows.sign_bits();
-        let large =
-            rows.taxels() > TrainingData::MOST_TAXELS && rows.len().saturating_mul(rows.taxels()) > MOST_NUMBERS;
-        let large = large && signs.is_some();
+        let large = rows.taxels() > TrainingData::MOST_TAXELS && signs.is_some();
         let wires = rows.weights().wires().filter(|_| rows.weights().mode().readout() == Mode::Compressive);
         Self {
             taxels: rows.taxels(),
@@ -125,7 +120,7 @@ impl PressRows {
             signs,
             #[expect(clippy::cast_possible_truncation, reason = "a skin has fewer wires")]
             wires: wires.map_or_else(Vec::new, |_| (0..rows.len()).map(|row| rows.wire(row) as u16).collect()),
-            masks: wires.map_or_else(Vec::new, masks),
+            masks: wires.map_or_else(Vec::new, Wires::masks),
         }
     }
 
@@ -168,16 +163,6 @@ impl PressRows {
         }
         Self { signs: self.signs.is_some().then(|| sign_bits(&phi, self.taxels)), phi, ..self.clone() }
     }
-}
-
-/// Taxels of every wire as bits, ⌈taxels/64⌉ words each.
-fn masks(wires: &Wires) -> Vec<u64> {
-    let words = wires.all().len().div_ceil(64);
-    let mut masks = vec![0; wires.count() * words];
-    for (k, wire) in wires.all().iter().enumerate() {
-        masks[usize::from(*wire) * words + k / 64] |= 1 << (k % 64);
-    }
-    masks
 }
 
 /// Signs of weights of ±1, ⌈taxels/64⌉ words a row.

@@ -50,8 +50,8 @@ const MOST_TAXELS: usize = 2048;
 const SWEEPS: usize = 100;
 
 /// Finds contacts of any size on a large skin: as [`Patches`], or as an image of small total variation ([`Tv`]) on
-/// square cells of several taxels. One measurement in nine is kept back; what predicts them better is used. An offset
-/// that all measurements share is left out.
+/// square cells of several taxels. One measurement in nine is kept back; what predicts them better is used, and cells are
+/// not looked at where patches predict half of them. An offset that all measurements share is left out.
 ///
 /// ```
 /// use spts_recon::Matrix;
@@ -76,6 +76,8 @@ pub struct OnSheet {
     side: usize,
 }
 
+/// Patches are taken without a look at cells where they leave less than this share of what is kept back.
+const EXPLAINED: f64 = 0.5;
 /// One measurement in so many is kept back.
 const KEPT_BACK: usize = 9;
 /// Weight of the total variation, as a share of the largest correlation.
@@ -109,11 +111,6 @@ impl OnSheet {
             [] => (wires, wires),
             _ => wires.split_at(seen),
         };
-        let cells = phi.cells([rows, cols], self.side);
-        // total variation that does not converge is no candidate
-        let Ok(seen_on_cells) = self.on_cells(cells.view().rows(0, seen), &y[..seen], first) else {
-            return self.patches.recover(phi, y, wires);
-        };
         let seen_as_patches = self.patches.recover(phi.rows(0..seen), &y[..seen], first)?;
         let missed = |image: &[f64]| {
             let mut rest = vec![0.0; y.len() - seen];
@@ -122,7 +119,16 @@ impl OnSheet {
             centre_by_wire(&mut rest, last);
             norm(&rest)
         };
-        if missed(&seen_on_cells) < missed(&seen_as_patches) {
+        let missed_by_patches = missed(&seen_as_patches);
+        if missed_by_patches < EXPLAINED * missed(&vec![0.0; rows * cols]) {
+            return self.patches.recover(phi, y, wires);
+        }
+        let cells = phi.cells([rows, cols], self.side);
+        // total variation that does not converge is no candidate
+        let Ok(seen_on_cells) = self.on_cells(cells.view().rows(0, seen), &y[..seen], first) else {
+            return self.patches.recover(phi, y, wires);
+        };
+        if missed(&seen_on_cells) < missed_by_patches {
             return Ok(self.on_cells(cells.view(), y, wires).unwrap_or(seen_on_cells));
         }
         self.patches.recover(phi, y, wires)

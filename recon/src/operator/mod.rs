@@ -137,7 +137,7 @@ impl LinearOperator for MatrixView<'_> {
 
     fn apply(&self, x: &[f64], y: &mut [f64]) {
         for (out, row) in y.iter_mut().zip(self.values().chunks_exact(x.len().max(1))) {
-            *out = row.iter().zip(x).map(|(a, b)| a * b).sum();
+            *out = dot(row, x);
         }
     }
 

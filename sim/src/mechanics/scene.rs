@@ -128,6 +128,18 @@ pub enum Task<'a> {
 
 /// Longest time between the frames of a press, s: ten frames a second still show its ramps.
 const LONGEST_FRAME_INTERVAL_S: f64 = 0.1;
+/// Time between the frames of a press where no other is asked for, s: the least and the most.
+const USUAL_INTERVAL_S: [f64; 2] = [2e-3, 2e-2];
+/// Frames times taxels of a press from which on its frames are further apart than the least: 67 MB a map.
+const USUAL_VALUES: f64 = (1_u64 << 23) as f64;
+
+/// Time between the frames of a press of `duration_s` on a skin of so many taxels, s: on large skins as long as their
+/// number allows.
+fn usual_interval_s(duration_s: f64, taxels: usize) -> f64 {
+    let [least_s, most_s] = USUAL_INTERVAL_S;
+    (duration_s * taxels as f64 / USUAL_VALUES).clamp(least_s, most_s)
+}
+
 /// What `frame_interval_s` may be, for errors.
 const FRAME_INTERVAL_RANGE: &str = "[timestep_s, 0.1] s for a press, [timestep_s, 2e-4] s for a drop";
 
@@ -207,7 +219,8 @@ impl Mechanics {
                         None => mesh,
                         Some(bend) => bend.unroll(&mesh, press.placement().matrix()).into(),
                     };
-                    ((mesh, report), 5e-4, 2e-3, LONGEST_FRAME_INTERVAL_S)
+                    let interval_s = usual_interval_s(press.duration_s, skin.taxels());
+                    ((mesh, report), 5e-4, interval_s, LONGEST_FRAME_INTERVAL_S)
                 }
                 (None, Some(ball)) => {
                     ball.resolve(&skin)?;

@@ -243,7 +243,7 @@ impl Run<'_> {
         let slots = entries.len() * self.measurements.len();
         self.each_press(slots, done, |session, block| {
             let scored = self.sessions[session];
-            let Some(press) = ScoredPress::new(scored, block) else {
+            let Some(press) = ScoredPress::new(scored, block, self.most()) else {
                 return Ok(Vec::new());
             };
             let classes = |entry: &Entry| entry.knows_classes;
@@ -336,12 +336,12 @@ impl Run<'_> {
         let Some(&(session, block)) = self.presses().first() else {
             return Ok(Vec::new());
         };
-        let Some(recording) = &self.sessions[session].compressive else {
+        let scored = ScoredPress::new(self.sessions[session], block, self.most());
+        let Some(press) = scored.as_ref().and_then(ScoredPress::first) else {
             return Ok(Vec::new());
         };
-        let press = Press::new(recording, block, &self.sessions[session].protocol);
         let each = self.slots(entries);
-        each.map(|(entry, m)| decode_us(&entry.decoders[session], &press, m, TIMED_WINDOWS)).collect()
+        each.map(|(entry, m)| decode_us(&entry.decoders[session], press, m, TIMED_WINDOWS)).collect()
     }
 }
 

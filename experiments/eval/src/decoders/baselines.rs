@@ -36,6 +36,10 @@ impl Algorithm for Constant {
         answer.class = Some(Class::Unknown);
         Ok(())
     }
+
+    fn takes_bits(&self) -> bool {
+        true
+    }
 }
 
 /// Takes the class c with the largest yᵀ Φ t_c / ‖Φ t_c‖, and its mean image t_c for the contact.
