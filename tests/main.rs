@@ -46,3 +46,4 @@ mod simulation_only;
 mod style;
 mod unseen;
 mod weights;
+mod wires;

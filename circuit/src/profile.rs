@@ -187,7 +187,7 @@ impl Profile {
         Weights::from_one(weight_mode, Some(taxels), rule, self.seeds.as_deref(), self.patterns.as_ref())
     }
 
-    /// The profile with `weights` in its compressive mode, replacing earlier ones.
+    /// The profile with `weights` in its compressive mode and with their wires, replacing earlier ones.
     ///
     /// # Errors
     /// [`Refusal`] for raster weights.
@@ -202,7 +202,8 @@ impl Profile {
             LevelSource::Seeds(seeds) => (None, Some(seeds.to_vec()), None),
             LevelSource::Patterns(patterns) => (None, None, Some(Patterns::clone(patterns))),
         };
-        Ok(Self { weights: mode, seeding, seeds, patterns, ..self.clone() })
+        let wires = weights.wires().map_or_else(Vec::new, Wires::entries);
+        Ok(Self { weights: mode, seeding, seeds, patterns, wires, ..self.clone() })
     }
 
     /// Scale of the converter of `mode`; `None` if the profile has no converter in this mode.

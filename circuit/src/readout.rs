@@ -258,13 +258,7 @@ impl Readout {
 impl Line {
     /// Wire number `wire` of a skin with these `weights` and this `profile`, which is scaled for it. A wire with fewer
     /// taxels than another takes as long for a raster scan.
-    fn new(
-        profile: &Profile,
-        weights: &Weights,
-        wire: usize,
-        device: Streams,
-        session: u64,
-    ) -> Result<Self, Refusal> {
+    fn new(profile: &Profile, weights: &Weights, wire: usize, device: Streams, session: u64) -> Result<Self, Refusal> {
         let (mode, own) = (weights.mode().readout(), weights.of_wire(wire));
         let label = match mode {
             Mode::Raster => "readout/raster",

@@ -115,6 +115,15 @@ impl Wires {
         Ok((count > 1).then(|| Self { of, taxels: taxels.into() }))
     }
 
+    /// The same as entries of `[[wires]]`.
+    pub fn entries(&self) -> Vec<WireConfig> {
+        let entry = |own: &Vec<u32>| WireConfig {
+            taxels: Some(own.iter().map(|k| *k as usize).collect()),
+            ..WireConfig::default()
+        };
+        self.taxels.iter().map(entry).collect()
+    }
+
     /// Number of wires.
     pub fn count(&self) -> usize {
         self.taxels.len()
@@ -184,9 +193,7 @@ impl WireConfig {
             }
             (None, Some([down, across]), None, false, None) => {
                 let (down, across) = (number("blocks[0]", down, rows)?, number("blocks[1]", across, cols)?);
-                all(down * across, &|taxel| {
-                    part(taxel / cols, rows, down) * across + part(taxel % cols, cols, across)
-                })
+                all(down * across, &|taxel| part(taxel / cols, rows, down) * across + part(taxel % cols, cols, across))
             }
             (None, None, Some(wires), false, None) => {
                 let wires = number("round_robin", wires, taxels)?;
@@ -276,7 +283,10 @@ mod tests {
             ("blocks = [2, 2]", "001100112233"),
             ("round_robin = 3", "012012012012"),
             ("rows = [0, 1]\n[[wires]]\nrows = [2, 2]", "000000001111"),
-            ("rows = [1, 2]\ncols = [0, 1]\n[[wires]]\nrows = [0, 0]\n[[wires]]\nrows = [1, 2]\ncols = [2, 3]", "111100220022"),
+            (
+                "rows = [1, 2]\ncols = [0, 1]\n[[wires]]\nrows = [0, 0]\n[[wires]]\nrows = [1, 2]\ncols = [2, 3]",
+                "111100220022",
+            ),
             ("taxels = [0, 11]\n[[wires]]\ntaxels = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]", "011111111110"),
         ] {
             let found = wires(&format!("[[wires]]\n{text}"), 3, 4).unwrap().unwrap();
@@ -284,6 +294,8 @@ mod tests {
             assert_eq!(shown, expected, "{text}");
             let json = serde_json::to_string(&found).unwrap();
             assert_eq!(serde_json::from_str::<Wires>(&json).unwrap(), found, "{json}");
+            let again = Wires::new(&found.entries(), &SkinLayout::new(3, 4, 5e-3, 3e-3).unwrap());
+            assert_eq!(again.unwrap().unwrap(), found);
             for wire in 0..found.count() {
                 assert!(found.taxels(wire).iter().all(|k| found.of(*k as usize) == wire));
             }

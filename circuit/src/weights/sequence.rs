@@ -481,7 +481,8 @@ impl Weights {
 
     /// Writes the levels of `taxel` at as many consecutive rows as `out` holds, starting with `first_row`.
     pub(crate) fn fill_levels(&self, taxel: u32, first_row: u64, out: &mut [f64]) {
-        let (Some(seeds), WeightMode::Analog | WeightMode::Binary, None) = (self.seeds(), self.mode, &self.wires) else {
+        let (Some(seeds), WeightMode::Analog | WeightMode::Binary, None) = (self.seeds(), self.mode, &self.wires)
+        else {
             for (out, row) in out.iter_mut().zip(first_row..) {
                 *out = self.level(taxel, row);
             }
@@ -546,7 +547,9 @@ impl Weights {
                 at = Some(edge);
             }
             let own = wires.all().iter().zip(&levels);
-            out.iter_mut().zip(own).for_each(|(out, (of, level))| *out = if usize::from(*of) == wire { *level } else { 0.0 });
+            out.iter_mut()
+                .zip(own)
+                .for_each(|(out, (of, level))| *out = if usize::from(*of) == wire { *level } else { 0.0 });
         }
     }
 

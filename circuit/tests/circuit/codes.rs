@@ -3,7 +3,8 @@
 use crate::effects::assert_close;
 use crate::readout::{press_v, profile, skin, start, strip};
 use spts_circuit::{
-    Block, CellCodes, CompressiveWeights, Interpolated, Jump, Mode, PROFILES, Profile, Readout, Seeding, WeightMode, Weights,
+    Block, CellCodes, CompressiveWeights, Interpolated, Jump, Mode, PROFILES, Profile, Readout, Seeding, WeightMode,
+    Weights,
 };
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, Streams};

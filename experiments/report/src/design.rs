@@ -129,7 +129,12 @@ pub fn text(report: &DesignReport) -> String {
     line("rows", rows);
     line("measurements", format!("M = {}{each_wire}", d.m));
     let (decoder, places, memory) = (&d.decoder.name, d.decoder.places, bytes(d.decoder.bytes));
-    line("decoder", format!("{decoder}: separable Gaussian prior, non-negative on {places} taxels at most; {memory}"));
+    let how = if decoder == "SheetDecoder" {
+        format!("separable Gaussian prior, non-negative on {places} taxels at most")
+    } else {
+        "contacts as patches, nothing learned; as `spts decode` has it".to_owned()
+    };
+    line("decoder", format!("{decoder}: {how}; {memory}"));
     line("expected IoU", promise(&e.iou, 3));
     line("expected place", format!("{} taxels", promise(&e.place_px, 2)));
     line("", format!("{} mm", promise(&e.place_mm, 2)));

@@ -305,9 +305,8 @@ impl FewWiresStudy {
     ) -> Result<FewWires, Refusal> {
         let prior = SheetPrior::smooth([self.layout.rows(), self.layout.cols()], SMOOTH)?;
         let rows = BandRows::new(source, &prior, wires, m_per_wire, self.seed)?;
-        let (phi, _) = rows.rows(0..m_per_wire);
         let m = m_per_wire * wires;
-        let phi = Arc::new(PressRows::of_matrix(&Matrix::from_rows(m, self.layout.taxels(), phi)?));
+        let phi = Arc::new(PressRows::new(rows.rows(0..m_per_wire)));
         let measured = self.measured(&rows, m_per_wire)?;
         let presses = measured.volts.into_iter().map(|volts| Press::on(Arc::clone(&phi), volts, 0.0));
         let presses: Vec<Press> = presses.collect();
@@ -345,34 +344,28 @@ impl FewWiresStudy {
 
     /// Samples of all touches: by measurement, then by wire.
     fn measured(&self, rows: &BandRows, m_per_wire: usize) -> Result<Measured, Refusal> {
-        let (layout, wires) = (&self.layout, rows.bands.len());
-        let cols = layout.cols();
-        let mut volts = vec![vec![0.0; wires * m_per_wire]; self.touches.len()];
+        let (layout, wires) = (&self.layout, rows.wires());
         let rail_v = self.profile.rail_v(Mode::Compressive)?;
         let converter = self.profile.converter(Mode::Compressive)?;
         let end_v = converter.map(|c| c.volts(0).abs().max(c.volts(c.max_code()).abs()));
         let range = rail_v.into_iter().chain(end_v).reduce(f64::min);
         let (mut saturated, mut largest) = (0, 0.0_f64);
-        let (mut noise, mut signal) = (0.0, 0.0);
-        for (wire, (band, weights)) in rows.bands.iter().zip(&rows.weights).enumerate() {
-            let part = SkinLayout::new(band.len(), cols, layout.pitch_m(), layout.electrode_m())?;
-            let device = Streams::new(self.seed).child("few-wires/wire", wire as u64);
-            let mut line = TouchWire::new(&self.profile, weights, &part, device)?;
-            let info = line.info().clone();
-            let bare = ConductanceMap::zeros(band.len(), cols);
-            let idle = line.measure(bare, IDLE_NUMBER, IDLE)?;
-            noise += idle.iter().map(|v| v * v).sum::<f64>() / (IDLE * wires) as f64;
-            for ((number, touch), volts) in (0..).zip(&self.touches).zip(&mut volts) {
-                let own = touch.conductance.values()[band.start * cols..band.end * cols].to_vec();
-                let samples = line.measure(ConductanceMap::from_values(band.len(), cols, own), number, m_per_wire)?;
-                let raw: Vec<f64> = samples.iter().map(|v| v + line.idle_v()).collect();
-                largest = raw.iter().fold(largest, |largest, v| largest.max(v.abs()));
-                saturated += info.saturated(&raw, rail_v);
-                for (k, v) in samples.into_iter().enumerate() {
-                    signal += v * v / (volts.len() * self.touches.len()) as f64;
-                    volts[k * wires + wire] = v;
-                }
-            }
+        let mut signal = 0.0;
+        let device = Streams::new(self.seed).child("few-wires/wire", 0);
+        let mut line = TouchWire::new(&self.profile, &rows.weights, layout, device)?;
+        let info = line.info().clone();
+        let bare = ConductanceMap::zeros(layout.rows(), layout.cols());
+        let idle = line.measure(bare, IDLE_NUMBER, IDLE * wires)?;
+        let noise = idle.iter().map(|v| v * v).sum::<f64>() / idle.len() as f64;
+        let mut volts = Vec::with_capacity(self.touches.len());
+        for (number, touch) in (0..).zip(&self.touches) {
+            let samples = line.measure(touch.conductance.clone(), number, wires * m_per_wire)?;
+            let idle_v = line.idle_v().iter().cycle();
+            let raw: Vec<f64> = samples.iter().zip(idle_v).map(|(v, idle_v)| v + idle_v).collect();
+            largest = raw.iter().fold(largest, |largest, v| largest.max(v.abs()));
+            saturated += info.saturated(&raw, rail_v);
+            signal += samples.iter().map(|v| v * v).sum::<f64>() / (samples.len() * self.touches.len()) as f64;
+            volts.push(samples);
         }
         let samples = volts.iter().map(Vec::len).sum::<usize>().max(1);
         Ok(Measured {

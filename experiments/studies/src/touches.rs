@@ -137,10 +137,11 @@ const IDLE_MEASUREMENTS: usize = 1000;
 /// Block of the untouched skin; touches have numbers far below.
 const IDLE_BLOCK: u64 = 1 << 40;
 
-/// The wire of a skin: a readout with its device's parts, and the noise of one session.
+/// The wires of a skin: a readout with its device's parts, and the noise of one session.
 pub(crate) struct TouchWire {
     readout: Readout,
-    idle_v: f64,
+    /// Output of every untouched wire, V.
+    idle_v: Vec<f64>,
 }
 
 impl TouchWire {
@@ -155,22 +156,24 @@ impl TouchWire {
         layout: &SkinLayout,
         device: Streams,
     ) -> Result<Self, Refusal> {
-        let profile = Profile { wires: Vec::new(), ..profile.with_weights(weights)? };
+        let profile = profile.with_weights(weights)?;
         let mut readout = Readout::new(&profile, Mode::Compressive, layout, device, 0)?;
         let mut untouched = Constant::new(ConductanceMap::zeros(layout.rows(), layout.cols()))?;
         readout.seek_row(IDLE_BLOCK, 0);
-        let idle = readout.measure(&mut untouched, IDLE_MEASUREMENTS)?;
-        Ok(Self { readout, idle_v: idle.iter().sum::<f64>() / IDLE_MEASUREMENTS as f64 })
+        let wires = weights.wire_count();
+        let idle = readout.measure(&mut untouched, IDLE_MEASUREMENTS * wires)?;
+        let mean = |wire: usize| idle.iter().skip(wire).step_by(wires).sum::<f64>() / IDLE_MEASUREMENTS as f64;
+        Ok(Self { readout, idle_v: (0..wires).map(mean).collect() })
     }
 
     /// A wire with the given readout. Nothing is subtracted from its samples.
     pub(crate) fn of(readout: Readout) -> Self {
-        Self { readout, idle_v: 0.0 }
+        Self { readout, idle_v: vec![0.0] }
     }
 
-    /// Output of the untouched skin, which [`TouchWire::measure`] subtracts, V.
-    pub(crate) fn idle_v(&self) -> f64 {
-        self.idle_v
+    /// Output of every untouched wire, which [`TouchWire::measure`] subtracts, V.
+    pub(crate) fn idle_v(&self) -> &[f64] {
+        &self.idle_v
     }
 
     /// What is known of its samples.
@@ -204,7 +207,7 @@ impl TouchWire {
         measurements: usize,
     ) -> Result<Vec<f64>, Refusal> {
         let mut volts = self.volts(conductance_s, number, measurements)?;
-        volts.iter_mut().for_each(|v| *v -= self.idle_v);
+        volts.iter_mut().zip(self.idle_v.iter().cycle()).for_each(|(v, idle_v)| *v -= idle_v);
         Ok(volts)
     }
 }

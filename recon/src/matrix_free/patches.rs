@@ -72,14 +72,16 @@ const SWEEPS: usize = 100;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OnSheet {
     patches: Patches,
-    /// Side of a cell, taxels.
-    side: usize,
+    /// Cells at most.
+    cells: usize,
 }
 
 /// Patches are taken without a look at cells where they leave less than this share of what is kept back.
 const EXPLAINED: f64 = 0.5;
 /// One measurement in so many is kept back.
 const KEPT_BACK: usize = 9;
+/// Most cells for each measurement: more are not told apart.
+const CELLS_A_MEASUREMENT: usize = 4;
 /// Weight of the total variation, as a share of the largest correlation.
 const VARIATION: Penalty = Penalty::Relative(0.02);
 
@@ -87,10 +89,19 @@ const VARIATION: Penalty = Penalty::Relative(0.02);
 const STOPPING: Stopping = Stopping { tol: 1e-4, max_iter: 20_000 };
 
 impl OnSheet {
+    /// Cells that are usual: more take long, and show no more where patches fail.
+    pub const CELLS: usize = 2500;
+
     /// Images of `rows` × `cols` taxels, with cells of so many taxels that there are at most `cells` of them.
     pub fn new(rows: usize, cols: usize, cells: usize) -> Self {
-        let fits = |side: &usize| rows.div_ceil(*side) * cols.div_ceil(*side) <= cells.max(1);
-        Self { patches: Patches::new(rows, cols), side: (1..).find(fits).unwrap_or(1) }
+        Self { patches: Patches::new(rows, cols), cells }
+    }
+
+    /// Side of a cell, taxels, for so many measurements.
+    fn side(&self, measurements: usize) -> usize {
+        let Patches { rows, cols } = self.patches;
+        let most = self.cells.min(CELLS_A_MEASUREMENT * measurements).max(1);
+        (1..).find(|side| rows.div_ceil(*side) * cols.div_ceil(*side) <= most).unwrap_or(1)
     }
 
     /// The image of `y`, one value a taxel, in the unit of `y` over that of Φ. `wires` has the wire of every measurement,
@@ -119,25 +130,26 @@ impl OnSheet {
             centre_by_wire(&mut rest, last);
             norm(&rest)
         };
+        let side = self.side(y.len());
         let missed_by_patches = missed(&seen_as_patches);
         if missed_by_patches < EXPLAINED * missed(&vec![0.0; rows * cols]) {
             return self.patches.recover(phi, y, wires);
         }
-        let cells = phi.cells([rows, cols], self.side);
+        let cells = phi.cells([rows, cols], side);
         // total variation that does not converge is no candidate
-        let Ok(seen_on_cells) = self.on_cells(cells.view().rows(0, seen), &y[..seen], first) else {
+        let Ok(seen_on_cells) = self.on_cells(side, cells.view().rows(0, seen), &y[..seen], first) else {
             return self.patches.recover(phi, y, wires);
         };
         if missed(&seen_on_cells) < missed_by_patches {
-            return Ok(self.on_cells(cells.view(), y, wires).unwrap_or(seen_on_cells));
+            return Ok(self.on_cells(side, cells.view(), y, wires).unwrap_or(seen_on_cells));
         }
         self.patches.recover(phi, y, wires)
     }
 
     /// The image of small total variation on the cells, whose sums are `cells`, measurements × cells.
-    fn on_cells(&self, cells: MatrixView<'_>, y: &[f64], wires: &[u16]) -> Result<Vec<f64>, Refusal> {
+    fn on_cells(&self, side: usize, cells: MatrixView<'_>, y: &[f64], wires: &[u16]) -> Result<Vec<f64>, Refusal> {
         let Patches { rows, cols } = self.patches;
-        let [down, across] = [rows, cols].map(|side| side.div_ceil(self.side));
+        let [down, across] = [rows, cols].map(|n| n.div_ceil(side));
         let mut sums = Matrix::from_rows(cells.nrows(), cells.ncols(), cells.values().to_vec())?;
         without_means(&mut sums, wires);
         let mut centred = y.to_vec();
@@ -147,7 +159,7 @@ impl OnSheet {
         let found = tv.recover(&Problem::new(sums.view(), &centred)?, &mut Workspace::default())?;
         let mut image = vec![0.0; down * across];
         found.scatter(&mut image);
-        let cell = |k: usize| k / cols / self.side * across + k % cols / self.side;
+        let cell = |k: usize| k / cols / side * across + k % cols / side;
         Ok((0..rows * cols).map(|k| image[cell(k)]).collect())
     }
 }

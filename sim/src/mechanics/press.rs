@@ -358,7 +358,9 @@ impl PressConfig {
             }
         };
         if !self.objects.is_empty() && (self.object.is_some() || self.mesh.is_some()) {
-            return Err(Refusal::new("`press.objects` has all that is pressed: leave out `press.object` and `press.mesh`"));
+            return Err(Refusal::new(
+                "`press.objects` has all that is pressed: leave out `press.object` and `press.mesh`",
+            ));
         }
         for [row, col] in self.places.iter().flatten() {
             check_place("press.places: ", [Some(*row), Some(*col)], skin)?;

@@ -161,12 +161,10 @@ impl Chain {
         let readout = Readout::new(&self.profile, mode, &self.skin, self.streams, session).map_err(of_readout)?;
         match self.weights {
             WeightSource::Model => Ok(readout),
-            WeightSource::Firmware => {
-                readout.with_codes(|weights| {
-                    let cells = FirmwareCells::new(weights, self.profile.sample_rate_hz).map_err(of_cells)?;
-                    Ok(Box::new(cells.counting(Arc::clone(&self.unlike_codes))))
-                })
-            }
+            WeightSource::Firmware => readout.with_codes(|weights| {
+                let cells = FirmwareCells::new(weights, self.profile.sample_rate_hz).map_err(of_cells)?;
+                Ok(Box::new(cells.counting(Arc::clone(&self.unlike_codes))))
+            }),
         }
     }
 

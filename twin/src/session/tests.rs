@@ -256,7 +256,7 @@ fn what_is_wrong_is_named() {
     let text = std::fs::read_to_string(&path).unwrap();
     for (from, to, expected) in cases(
         r#"
-"schema": 1 | "schema": 999 | `schema` = 999 is not known; this program reads 1
+"schema": 1 | "schema": 999 | `schema` = 999 is not known; this program reads 1 and 2
 "spts-session" | "other" | `format` = "other"
 "name" | "nam" | nam
 "hold_s": null | "hold_s": [2, 1] | `hold_s` = [2, 1]

@@ -53,6 +53,7 @@ impl Prepared {
     /// What touches the skin: the name of the object, `mesh`, or `ball`.
     pub fn body(&self) -> &str {
         match self.scene.task() {
+            Task::Press(press) if !press.objects.is_empty() => self.scene.name(),
             Task::Press(press) => press.object.as_deref().unwrap_or("mesh"),
             Task::Drop(_) => "ball",
         }

@@ -10,6 +10,9 @@ use spts_circuit::Mode;
 use spts_contact::mesh::MeshReport;
 use std::fmt::Write as _;
 
+/// Time between the frames of a press on all but large skins, s.
+const USUAL_INTERVAL_S: f64 = 2e-3;
+
 /// Summary of a whole run. It is the same for the same scene, on any number of threads.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
@@ -25,7 +28,11 @@ pub struct Summary {
     pub readout: Option<String>,
     /// Source of the weights.
     pub weights: Option<String>,
-    /// Measurements a second of the recordings, Hz.
+    /// Wires of the skin.
+    pub wires: usize,
+    /// Time between the frames of the contact, s; in a drop while the ball is near the skin.
+    pub frame_interval_s: f64,
+    /// Measurements a second of the recordings, of all wires together, Hz.
     pub sample_rate_hz: Option<f64>,
     /// Largest force of all presses, N.
     pub peak_force_n: f64,
@@ -74,6 +81,8 @@ impl Summary {
             transducer: scene.config().transducer.clone(),
             readout: scene.portable().readout,
             weights: scene.config().weights.clone(),
+            wires: scene.chain().wires(),
+            frame_interval_s: scene.mechanics().frame_interval_s(),
             sample_rate_hz: simulation.first.as_ref().and_then(|session| Some(session.compressive()?.sample_rate_hz())),
             peak_force_n: largest(|p| p.peak_force_n),
             force_imbalance: largest(|p| p.force_imbalance),
@@ -87,12 +96,19 @@ impl Summary {
     /// The summary as text.
     pub fn table(&self) -> String {
         let mut out = format!(
-            "{} {} of {}, seed {}, scene {}\n",
+            "{} {} of {}, seed {}, scene {}{}{}\n",
             self.presses.len(),
             plural(self.task, self.presses.len()),
             self.body,
             self.provenance.seed,
-            self.provenance.scene_hash
+            self.provenance.scene_hash,
+            if self.wires > 1 { format!(", {} wires", self.wires) } else { String::new() },
+            match self.frame_interval_s {
+                seconds if self.task == "press" && seconds > USUAL_INTERVAL_S => {
+                    format!(", a frame every {seconds:.3} s")
+                }
+                _ => String::new(),
+            }
         );
         if self.task == "press" {
             out.push_str("press   peak    plateau  error   rise   overshoot  fall   pressure  imbalance\n");

@@ -12,11 +12,10 @@ struct OnSheet {
     sheet: matrix_free::OnSheet,
 }
 
-/// Cells of a coarser grid at most.
-const CELLS: usize = 2500;
-
 pub(super) fn patches(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
-    Ok(Box::new(OnSheet { sheet: matrix_free::OnSheet::new(data.shape[0], data.shape[1], CELLS) }))
+    Ok(Box::new(OnSheet {
+        sheet: matrix_free::OnSheet::new(data.shape[0], data.shape[1], matrix_free::OnSheet::CELLS),
+    }))
 }
 
 impl Trained for OnSheet {

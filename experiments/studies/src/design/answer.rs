@@ -270,7 +270,8 @@ fn pressed(design: &Design) -> String {
     let count = design.objects.contacts as f64;
     // on a spiral whose points are as far apart as they can be; a single one is in the middle
     let place = |k: usize| {
-        let radius = if count > 1.0 { WITHIN * ((k as f64 + 0.5) / count).sqrt() * std::f64::consts::SQRT_2 } else { 0.0 };
+        let radius =
+            if count > 1.0 { WITHIN * ((k as f64 + 0.5) / count).sqrt() * std::f64::consts::SQRT_2 } else { 0.0 };
         let (y, x) = (GOLDEN_RAD * k as f64).sin_cos();
         [x, y].map(|v| (radius * v).clamp(-WITHIN, WITHIN))
     };

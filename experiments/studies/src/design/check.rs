@@ -2,7 +2,7 @@
 
 use super::search::{Bench, TOUCHES, draw, mean};
 use super::wire::{AMPLIFIER, BandRows, RowSource, bands};
-use super::{DECODER, Design, DesignStudy, MOST_SIDE, WireChoice};
+use super::{Design, DesignStudy, MOST_SIDE, WireChoice, decoder_name};
 use rand::RngExt as _;
 use serde::Serialize;
 use spts::progress::Progress;
@@ -88,9 +88,10 @@ impl Design {
             let range = format!("{{{sizes:?}}}, the bands of {} rows on {} wires", self.rows, self.wires);
             return Err(Refusal::range("sub_arrays", format!("{:?}", self.sub_arrays), range));
         }
-        for (field, name, known) in
-            [("wire.amplifier", &self.wire.amplifier, AMPLIFIER), ("decoder.name", &self.decoder.name, DECODER)]
-        {
+        for (field, name, known) in [
+            ("wire.amplifier", &self.wire.amplifier, AMPLIFIER),
+            ("decoder.name", &self.decoder.name, decoder_name(self.taxels)),
+        ] {
             if name != known {
                 return Err(Refusal::range(field, name, format!("{{{known}}}")));
             }
@@ -170,7 +171,6 @@ impl DesignCheck {
                 BandRows::new(&design.row_source, &ground.prior, design.wires, design.m_per_wire, design.seed)?
             }
             (RowSource::Designer(_), Some(text)) => {
-                let bands = bands(design.rows, design.wires);
                 let taxels = design.rows * design.cols;
                 let pattern = parse_patterns(text).map_err(|e| refused("rows.txt", e.to_string()))?;
                 let (found, wanted) = ((pattern.period(), pattern.taxels()), (design.m_per_wire, taxels));
@@ -179,7 +179,7 @@ impl DesignCheck {
                         format!("{} rows of {} taxels; the design has {} of {}", found.0, found.1, wanted.0, wanted.1);
                     return Err(refused("rows.txt", reason));
                 }
-                BandRows::pattern(&pattern, bands, design.cols)?
+                BandRows::pattern(pattern, [design.rows, design.cols], design.wires)?
             }
             (RowSource::Designer(_), None) => {
                 return Err(refused("rows.txt", "the pattern of the design is missing".to_owned()));

@@ -9,6 +9,7 @@ use crate::touches::Touch;
 use search::{best, draw};
 use serde::{Deserialize, Serialize};
 use spts::progress::Progress;
+use spts_eval::training::TrainingData;
 use spts_input::Refusal;
 use spts_models::{SkinLayout, within};
 use spts_recon::matrix_free::SheetPrior;
@@ -149,8 +150,16 @@ impl DesignStudy {
     }
 }
 
-/// The name of [`spts_recon::matrix_free::SheetDecoder`].
-const DECODER: &str = "SheetDecoder";
+/// The decoder of a skin with so many taxels: [`spts_recon::matrix_free::SheetDecoder`], or on large skins the decoder
+/// `patches` of sessions, [`spts_recon::matrix_free::OnSheet`].
+fn decoder_name(taxels: usize) -> &'static str {
+    if is_large(taxels) { "patches" } else { "SheetDecoder" }
+}
+
+/// Whether a skin is too large for a decoder with a covariance.
+fn is_large(taxels: usize) -> bool {
+    taxels > TrainingData::MOST_TAXELS
+}
 
 /// A designed skin: everything needed to simulate it again, and its expected performance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -2,22 +2,26 @@
 
 use super::objects::{Classes, DesignObjects};
 use super::wire::{BandRows, RowSource, WireDesign, bands};
-use super::{DECODER, DecoderDesign, Design, DesignCurve, DesignPoint, DesignStudy, Expectation, Ground, WireChoice};
+use super::{DecoderDesign, Design, DesignCurve, DesignPoint, DesignStudy, Expectation, Ground, WireChoice};
+use super::{decoder_name, is_large};
 use crate::touches::{Touch, TouchScore, TouchWire, band};
 use crate::wiring::sums;
 use rand::RngExt as _;
 use rayon::prelude::*;
-use spts_circuit::Profile;
+use spts_circuit::{Profile, Wires};
 use spts_input::Refusal;
-use spts_models::{ConductanceMap, SkinLayout, Streams};
-use spts_recon::matrix_free::{SheetDecoder, SheetNoise};
+use spts_models::{SkinLayout, Streams};
+use spts_recon::matrix_free::{OnSheet, Patches, SheetDecoder, SheetNoise};
 use spts_recon::metrics::median;
+use spts_recon::operator::SignRows;
 use spts_recon::statistics::{self, Band, Sample};
 
 /// Fewest measurements of a wire that are looked at.
 const FEWEST: usize = 6;
 /// Most measurements of all wires that a decoder is prepared for, and most numbers that it may hold.
 const MOST: (usize, usize) = (1024, 40_000_000);
+/// On large skins no more measurements are looked at than one for so many taxels.
+const MOST_SHARE: usize = 4;
 /// Ratio of the numbers of measurements that are looked at, one after another.
 const STEP: f64 = std::f64::consts::SQRT_2;
 /// Halvings between the last number that does not do and the first that does.
@@ -112,7 +116,10 @@ impl DesignStudy {
                 wire.rate_hz
             )));
         }
-        let held = MOST.0.min(MOST.1 / (2 * layout.taxels())) / wires;
+        let held = match is_large(layout.taxels()) {
+            true => layout.taxels() / MOST_SHARE,
+            false => MOST.0.min(MOST.1 / (2 * layout.taxels())),
+        } / wires;
         let most = in_time.min(source.most_rows(taxels)).min(taxels).min(held).max(1);
         Ok(Wired { wire, profile, most, by_latency: most == in_time })
     }
@@ -127,7 +134,10 @@ impl DesignStudy {
         measurements: usize,
     ) -> Result<Bench<'a>, Refusal> {
         let rows = BandRows::new(source, &ground.prior, wires, measurements, self.seed)?;
-        Bench::new(ground, rows, wired.profile.clone(), self.objects.places(&ground.layout))
+        let mut bench = Bench::new(ground, rows, wired.profile.clone(), self.objects.places(&ground.layout))?;
+        let small = self.objects.size_m[1] <= PATCH_TAXELS * self.pitch_m;
+        bench.decoder = BenchDecoder::new(ground, &bench.rows, small)?;
+        Ok(bench)
     }
 
     /// Raises M until the IoU is reached or there is no more.
@@ -253,9 +263,69 @@ pub(super) struct Bench<'a> {
     ground: &'a Ground,
     pub(super) rows: BandRows,
     profile: Profile,
-    decoder: SheetDecoder,
+    decoder: BenchDecoder,
     places: usize,
 }
+
+/// Largest extent of an object that patches show, taxels: for such ones the search and the alternatives do without
+/// cells; what is promised has them.
+const PATCH_TAXELS: f64 = 12.0;
+
+/// What decodes, and what it has of the rows.
+enum BenchDecoder {
+    Sheet(SheetDecoder),
+    /// The signs of the rows, the wire of each, and the taxels of the wires as bits; whether patches alone will do.
+    Large {
+        small: bool,
+        sheet: OnSheet,
+        patches: Patches,
+        signs: Vec<u64>,
+        wires: Vec<u16>,
+        masks: Vec<u64>,
+    },
+}
+
+impl BenchDecoder {
+    fn new(ground: &Ground, rows: &BandRows, small: bool) -> Result<Self, Refusal> {
+        let [height, width] = [ground.layout.rows(), ground.layout.cols()];
+        if !is_large(height * width) {
+            let prior = ground.prior.clone();
+            return Ok(Self::Sheet(SheetDecoder::new(prior, SheetNoise::default(), rows.wires())?));
+        }
+        Ok(Self::Large {
+            small,
+            patches: Patches::new(height, width),
+            sheet: OnSheet::new(height, width, OnSheet::CELLS),
+            signs: Vec::new(),
+            wires: Vec::new(),
+            masks: rows.weights.wires().map_or_else(Vec::new, Wires::masks),
+        })
+    }
+
+    /// The image of the measurements `volts`, on at most `places` taxels where it is solved for taxels.
+    fn image(&self, volts: &[f64], places: usize, taxels: usize) -> Result<Vec<f64>, Refusal> {
+        match self {
+            Self::Sheet(decoder) => decoder.non_negative(volts, places),
+            Self::Large { small, sheet, patches, signs, wires, masks } => {
+                let rows = SignRows::new(signs, taxels).part(0..volts.len());
+                let wires = wires.get(..volts.len()).unwrap_or_default();
+                let rows = if wires.is_empty() { rows } else { rows.on_wires(wires, masks) };
+                if *small { patches.recover(rows, volts, wires) } else { sheet.recover(rows, volts, wires) }
+            }
+        }
+    }
+
+    /// Bytes and multiplications with `m` measurements of `taxels` taxels.
+    fn cost(&self, m: usize, taxels: usize, places: usize) -> (usize, usize) {
+        match self {
+            Self::Sheet(decoder) => (decoder.bytes(m), decoder.products(m, places)),
+            Self::Large { .. } => (m * taxels / 8, PASSES * m * taxels),
+        }
+    }
+}
+
+/// Products with all rows that a recovery by patches takes, about: two of three rounds, and one for the rest.
+const PASSES: usize = 8;
 
 /// Taxels that are solved for with M measurements of a wire: this share of M. With as many taxels as measurements,
 /// noise is fitted. The share is interpolated: M/2, M and 3M/2 were compared, on 48 touches of each of a few skins.
@@ -266,18 +336,12 @@ const FEWEST_PLACES: usize = 4;
 impl<'a> Bench<'a> {
     /// A design with these rows and this readout, whose decoder solves for at most `places` taxels.
     pub(super) fn new(ground: &'a Ground, rows: BandRows, profile: Profile, places: usize) -> Result<Self, Refusal> {
-        Ok(Self {
-            decoder: SheetDecoder::new(ground.prior.clone(), SheetNoise::default(), rows.bands.len())?,
-            ground,
-            rows,
-            profile,
-            places,
-        })
+        Ok(Self { decoder: BenchDecoder::new(ground, &rows, false)?, ground, rows, profile, places })
     }
 
     /// Forgets what the decoder has been prepared for, and frees its memory.
     fn release(&mut self) -> Result<(), Refusal> {
-        self.decoder = SheetDecoder::new(self.ground.prior.clone(), SheetNoise::default(), self.rows.bands.len())?;
+        self.decoder = BenchDecoder::new(self.ground, &self.rows, false)?;
         Ok(())
     }
 
@@ -290,10 +354,26 @@ impl<'a> Bench<'a> {
 
     /// Gets the decoder ready for `measurements` of every wire.
     pub(super) fn prepare(&mut self, measurements: usize) -> Result<(), Refusal> {
-        let done = self.decoder.measurements() / self.rows.bands.len();
-        if measurements > done {
-            let (rows, wires) = self.rows.rows(done..measurements);
-            self.decoder.extend(&rows, &wires)?;
+        match &mut self.decoder {
+            BenchDecoder::Sheet(decoder) => {
+                let done = decoder.measurements() / self.rows.wires();
+                if measurements > done {
+                    let rows = self.rows.rows(done..measurements);
+                    let wires: Vec<usize> = (0..rows.len()).map(|row| rows.wire(row)).collect();
+                    decoder.extend(&rows.to_vec(), &wires)?;
+                }
+            }
+            BenchDecoder::Large { signs, wires, .. } => {
+                let rows = self.rows.rows(0..measurements);
+                let words = rows.taxels().div_ceil(64);
+                if signs.len() < rows.len() * words {
+                    *signs = rows.sign_bits().unwrap_or_default();
+                    if self.rows.wires() > 1 {
+                        #[expect(clippy::cast_possible_truncation, reason = "a skin has fewer wires")]
+                        wires.splice(.., (0..rows.len()).map(|row| rows.wire(row) as u16));
+                    }
+                }
+            }
         }
         Ok(())
     }
@@ -305,22 +385,12 @@ impl<'a> Bench<'a> {
         measurements: usize,
     ) -> Result<Vec<Repetition>, Refusal> {
         let one = |(touches, streams): (Vec<Touch>, Streams)| -> Result<Repetition, Refusal> {
-            let (skin, wires) = (&self.ground.layout, self.rows.bands.len());
-            let cols = skin.cols();
-            let mut volts = vec![vec![0.0; wires * measurements]; touches.len()];
-            for (wire, (band, weights)) in self.rows.bands.iter().zip(&self.rows.weights).enumerate() {
-                let layout = SkinLayout::new(band.len(), cols, skin.pitch_m(), skin.electrode_m())?;
-                let device = streams.child("design/wire", wire as u64);
-                let mut line = TouchWire::new(&self.profile, weights, &layout, device)?;
-                for ((number, touch), volts) in (0..).zip(&touches).zip(&mut volts) {
-                    let own = touch.conductance_s.values()[band.start * cols..band.end * cols].to_vec();
-                    let part = ConductanceMap::from_values(band.len(), cols, own);
-                    let samples = line.measure(part, number, measurements)?;
-                    for (k, v) in samples.into_iter().enumerate() {
-                        volts[k * wires + wire] = v;
-                    }
-                }
-            }
+            let device = streams.child("design/wire", 0);
+            let mut line = TouchWire::new(&self.profile, &self.rows.weights, &self.ground.layout, device)?;
+            let count = measurements * self.rows.wires();
+            let each = (0..).zip(&touches);
+            let volts = each.map(|(number, touch)| line.measure(touch.conductance_s.clone(), number, count));
+            let volts = volts.collect::<Result<_, _>>()?;
             Ok(Repetition { touches, volts })
         };
         drawn.into_par_iter().map(one).collect()
@@ -333,16 +403,16 @@ impl<'a> Bench<'a> {
         measurements: usize,
         classes: Option<&Classes>,
     ) -> Result<Vec<RepetitionScore>, Refusal> {
-        let count = measurements * self.rows.bands.len();
+        let count = measurements * self.rows.wires();
         let places = self.places(measurements);
-        let rows = classes.map(|classes| classes.rows(&self.rows.rows(0..measurements).0));
+        let rows = classes.map(|classes| classes.rows(&self.rows.rows(0..measurements).to_vec()));
         let touches: Vec<(usize, &Touch, &[f64])> = repetitions
             .iter()
             .enumerate()
             .flat_map(|(r, rep)| rep.touches.iter().zip(&rep.volts).map(move |(t, v)| (r, t, &v[..count])))
             .collect();
         let one = |(r, touch, volts): (usize, &Touch, &[f64])| -> Result<_, Refusal> {
-            let image = self.decoder.non_negative(volts, places)?;
+            let image = self.decoder.image(volts, places, self.ground.layout.taxels())?;
             let right = match (classes, &rows) {
                 (Some(classes), Some(rows)) => Some(classes.is_right(rows, volts, &touch.name)?),
                 _ => None,
@@ -399,6 +469,10 @@ impl DesignStudy {
                 RowSource::Designer(_) => BandRows::new(&tried.curve.rows, &ground.prior, wires, m, self.seed)?,
             };
             tried.bench.rows = rows;
+            // with the decoder that sessions have
+            if tried.curve.rows != RowSource::Generator || is_large(ground.layout.taxels()) {
+                tried.bench.release()?;
+            }
             tried.bench.prepare(m)?;
             let label = PROMISES[usize::min(raise, PROMISES.len() - 1)];
             let drawn = draw(&self.objects, &ground.layout, label, self.seed, PROMISED)?;
@@ -465,7 +539,8 @@ impl DesignStudy {
     fn design(&self, ground: &Ground, tried: &Tried<'_>, m: usize, expected: Expectation) -> Design {
         let layout = &ground.layout;
         let (rows, cols, wires) = (layout.rows(), layout.cols(), tried.curve.wires);
-        let decoder = &tried.bench.decoder;
+        let places = tried.bench.places(m);
+        let (bytes, products) = tried.bench.decoder.cost(m * wires, layout.taxels(), places);
         let prior = &ground.prior;
         Design {
             rows,
@@ -475,18 +550,18 @@ impl DesignStudy {
             electrode_m: layout.electrode_m(),
             objects: self.objects.clone(),
             wires,
-            sub_arrays: tried.bench.rows.bands.iter().map(|band| band.len() * cols).collect(),
+            sub_arrays: bands(rows, wires).iter().map(|band| band.len() * cols).collect(),
             wire: tried.wired.wire.clone(),
             row_source: tried.curve.rows.clone(),
             m_per_wire: m,
             m: m * wires,
             decoder: DecoderDesign {
-                name: DECODER.to_owned(),
-                places: tried.bench.places(m),
+                name: decoder_name(layout.taxels()).to_owned(),
+                places,
                 covariance_along_rows: (0..cols).map(|d| prior.covariance(0, d)).collect(),
                 covariance_along_cols: (0..rows).map(|d| prior.covariance(0, d * cols)).collect(),
-                bytes: decoder.bytes(m * wires),
-                products: decoder.products(m * wires, tried.bench.places(m)),
+                bytes,
+                products,
             },
             expected,
             seed: self.seed,

@@ -4,9 +4,9 @@ use crate::electronics::ElectronicsStudy;
 use crate::wiring::{amplifier, bisected, pressed_skin, profile};
 use serde::{Deserialize, Serialize};
 use spts_circuit::amplifier::{Budget, Setting};
-use spts_circuit::{Patterns, Profile, Seeding, WeightMode, Weights};
+use spts_circuit::{Patterns, Profile, Seeding, WeightMode, WeightRows, Weights, WireConfig, Wires};
 use spts_input::Refusal;
-use spts_models::parsed;
+use spts_models::{SkinLayout, parsed};
 use spts_recon::matrix_free::SheetPrior;
 use spts_recon::rows::{Expected, RowTask, designer};
 use std::ops::Range;
@@ -190,15 +190,11 @@ impl RowSource {
     }
 }
 
-/// Rows of all wires, each of which reads a band of the skin's rows.
+/// Rows of a skin whose wires each read a band of its rows.
 #[derive(Debug, Clone)]
 pub(crate) struct BandRows {
-    /// Columns of the skin.
-    cols: usize,
-    /// Rows of the skin that belong to each wire.
-    pub(crate) bands: Vec<Range<usize>>,
-    /// Weights of every wire.
-    pub(crate) weights: Vec<Weights>,
+    /// Weights of all taxels on their wires.
+    pub(crate) weights: Weights,
 }
 
 /// The skin's rows of each of `wires` wires: bands whose heights differ by one at most, the highest first.
@@ -218,70 +214,47 @@ impl BandRows {
         seed: u64,
     ) -> Result<Self, Refusal> {
         let [rows, cols] = prior.shape();
-        let bands = bands(rows, wires);
         let RowSource::Designer(name) = source else {
-            return Self::of(bands, cols, |band| {
-                let taxels = u32::try_from(band.len() * cols).map_err(|e| Refusal::from_error(e).at("taxels of a wire"))?;
-                Ok(Weights::new(WeightMode::Binary, Seeding::Mixed, taxels))
-            });
+            let taxels = u32::try_from(rows * cols).map_err(|e| Refusal::from_error(e).at("taxels"))?;
+            return Self::on_bands(Weights::new(WeightMode::Binary, Seeding::Mixed, taxels), [rows, cols], wires);
         };
+        let bands = bands(rows, wires);
         let height = bands.first().map_or(0, Range::len);
         let expected = Expected::smooth([height, cols], length(prior))?;
         let task = RowTask { seed, ..RowTask::new(measurements, &expected) };
         let found = designer(name).ok_or_else(|| Refusal::new(format!("rows: no designer {name:?}")))?;
-        let matrix = (found.build)().design(&task)?;
+        let matrix = &(found.build)().design(&task)?;
         // every wire has the pattern of the highest band; one that is a row lower has its first taxels
         let codes = (0..matrix.nrows()).flat_map(|row| {
-            let matrix = &matrix;
             let own = move |band: &Range<usize>| matrix.row(row)[..band.len() * cols].iter();
             bands.iter().flat_map(own).map(|v| if *v > 0.0 { u8::MAX } else { 0 })
         });
-        Self::pattern(&Patterns::new(matrix.nrows(), codes.collect())?, bands.clone(), cols)
+        Self::pattern(Patterns::new(matrix.nrows(), codes.collect())?, [rows, cols], wires)
     }
 
-    /// Every wire with its taxels' part of the skin's `pattern`.
-    pub(super) fn pattern(pattern: &Patterns, bands: Vec<Range<usize>>, cols: usize) -> Result<Self, Refusal> {
-        Self::of(bands, cols, |band| {
-            let own = |row: u64| pattern.row(row)[band.start * cols..band.end * cols].to_vec();
-            let patterns = Patterns::new(pattern.period(), (0..pattern.period() as u64).flat_map(own).collect())?;
-            Weights::with_patterns(WeightMode::Binary, patterns)
-        })
+    /// The skin's `pattern`, on so many wires.
+    pub(super) fn pattern(pattern: Patterns, shape: [usize; 2], wires: usize) -> Result<Self, Refusal> {
+        Self::on_bands(Weights::with_patterns(WeightMode::Binary, pattern)?, shape, wires)
     }
 
-    /// Every wire with the weights of its band.
-    fn of(
-        bands: Vec<Range<usize>>,
-        cols: usize,
-        weights: impl Fn(&Range<usize>) -> Result<Weights, Refusal>,
-    ) -> Result<Self, Refusal> {
-        Ok(Self { cols, weights: bands.iter().map(weights).collect::<Result<_, _>>()?, bands })
+    fn on_bands(weights: Weights, [rows, cols]: [usize; 2], wires: usize) -> Result<Self, Refusal> {
+        let layout = SkinLayout::with_pitch(rows, cols, SkinLayout::default().pitch_m())?;
+        Ok(Self { weights: weights.wired(Wires::new(&[WireConfig::bands(wires)], &layout)?)? })
     }
 
-    /// The rows of the whole skin as patterns, if they are any: every taxel with its level on its own wire.
+    /// Number of wires.
+    pub(crate) fn wires(&self) -> usize {
+        self.weights.wire_count()
+    }
+
+    /// The pattern of the skin, if it is one.
     pub(super) fn text(&self) -> Option<String> {
-        let patterns: Option<Vec<&Patterns>> = self.weights.iter().map(Weights::patterns).collect();
-        let patterns = patterns?;
-        let period = patterns.first()?.period();
-        let codes = (0..period as u64).flat_map(|row| patterns.iter().flat_map(move |own| own.row(row)).copied());
-        Some(Patterns::new(period, codes.collect()).ok()?.to_text())
+        self.weights.patterns().map(Patterns::to_text)
     }
 
-    /// Measurements `range` of every wire as rows over all taxels, those of one measurement after another, with the
-    /// wire of each.
-    pub(crate) fn rows(&self, range: Range<usize>) -> (Vec<f64>, Vec<usize>) {
-        let taxels = self.cols * self.bands.last().map_or(0, |band| band.end);
-        let count = range.len() * self.bands.len();
-        let (mut rows, mut wires) = (vec![0.0; count * taxels], Vec::with_capacity(count));
-        let mut out = rows.chunks_exact_mut(taxels.max(1));
-        for measurement in range {
-            for (wire, (band, weights)) in self.bands.iter().zip(&self.weights).enumerate() {
-                if let Some(row) = out.next() {
-                    weights.fill_rows(measurement as u64, &mut row[band.start * self.cols..band.end * self.cols]);
-                }
-                wires.push(wire);
-            }
-        }
-        (rows, wires)
+    /// Measurements `range` of every wire, those of one measurement after another.
+    pub(crate) fn rows(&self, range: Range<usize>) -> WeightRows<'_> {
+        WeightRows::new(&self.weights, (range.start * self.wires()) as u64, range.len() * self.wires())
     }
 }
 
@@ -354,18 +327,18 @@ mod tests {
         let prior = SheetPrior::smooth([5, 4], 1.0).unwrap();
         for source in RowSource::candidates(8) {
             let rows = BandRows::new(&source, &prior, 2, 6, 1).unwrap();
-            let (values, wires) = rows.rows(2..4);
-            assert_eq!(wires, [0, 1, 0, 1]);
-            for (row, wire) in values.chunks(20).zip(wires) {
+            let found = rows.rows(2..4);
+            assert_eq!((0..found.len()).map(|row| found.wire(row)).collect::<Vec<_>>(), [0, 1, 0, 1]);
+            for (number, row) in found.to_vec().chunks(20).enumerate() {
                 for (k, v) in row.iter().enumerate() {
-                    let own = (k / 4 < 3) == (wire == 0);
+                    let own = (k / 4 < 3) == (number % 2 == 0);
                     assert!((v.abs() - if own { 1.0 } else { 0.0 }).abs() < 1e-15);
                 }
             }
-            let mut first = vec![0.0; 12];
-            rows.weights[0].fill_rows(2, &mut first);
-            assert_eq!(values[..12], first);
             assert_eq!(rows.text().is_some(), source != RowSource::Generator);
+            // the shorter band has the first taxels of the higher one's pattern
+            let row = found.to_vec();
+            assert!(source == RowSource::Generator || row[..8] == row[20 + 12..40]);
         }
     }
 
