@@ -180,7 +180,7 @@ impl WireConfig {
         };
         let number = |field: &str, wires: usize, most: usize| match wires {
             wires if (1..=most.min(MAX_WIRES)).contains(&wires) => Ok(wires),
-            wires => Err(Refusal::range(field, wires, &format!("[1, {}]", most.min(MAX_WIRES)))),
+            wires => Err(Refusal::range(field, wires, format!("[1, {}]", most.min(MAX_WIRES)))),
         };
         let one_wire = self.rows.is_some() || self.cols.is_some();
         match (self.bands, self.blocks, self.round_robin, one_wire, &self.taxels) {
@@ -214,7 +214,7 @@ impl WireConfig {
             }
             (None, None, None, false, Some(list)) => {
                 if let Some(taxel) = list.iter().find(|taxel| **taxel >= taxels) {
-                    return Err(Refusal::range("taxels", taxel, &format!("[0, {}]", taxels - 1)));
+                    return Err(Refusal::range("taxels", taxel, format!("[0, {}]", taxels - 1)));
                 }
                 if list.is_empty() {
                     return Err(Refusal::new("`taxels` is empty: a wire has at least one"));

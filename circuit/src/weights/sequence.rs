@@ -848,12 +848,14 @@ mod tests {
                 let expected: f64 = row.iter().zip(&values).map(|(w, v)| w * v).sum();
                 assert!((sum - expected).abs() < 1e-12);
                 let raster = weights.mode() == WeightMode::Raster;
-                let wire = if raster { wires.of(at as usize % 20) } else { (at % 3) as usize };
+                let place = usize::try_from(at).unwrap();
+                let wire = if raster { wires.of(place % 20) } else { place % 3 };
                 assert!(raster || rows.wire(i) == wire);
                 let own = weights.of_wire(wire);
                 for k in 0..20_u32 {
-                    let place = wires.taxels(wire).iter().position(|own| *own == k);
-                    let level = place.map_or(0.0, |place| own.level(place as u32, seen[wire]));
+                    let mut places = (0_u32..).zip(wires.taxels(wire));
+                    let place = places.find(|(_, own)| **own == k);
+                    let level = place.map_or(0.0, |(place, _)| own.level(place, seen[wire]));
                     assert_eq!(row[k as usize].to_bits(), level.to_bits(), "{:?}, row {at}, taxel {k}", weights.mode());
                     assert_eq!(weights.level(k, at).to_bits(), level.to_bits());
                 }

@@ -90,7 +90,7 @@ impl Design {
         }
         for (field, name, known) in [
             ("wire.amplifier", &self.wire.amplifier, AMPLIFIER),
-            ("decoder.name", &self.decoder.name, decoder_name(self.taxels)),
+            ("decoder.name", &self.decoder.name, decoder_name(self.taxels, self.objects.contacts)),
         ] {
             if name != known {
                 return Err(Refusal::range(field, name, format!("{{{known}}}")));

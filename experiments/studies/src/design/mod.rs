@@ -83,6 +83,14 @@ pub(super) struct Ground {
     pub(super) electronics: ElectronicsStudy,
     pub(super) prior: SheetPrior,
     pub(super) learned: Vec<Touch>,
+    /// Objects that are pressed at once.
+    pub(super) contacts: usize,
+}
+
+impl Ground {
+    fn by_patches(&self) -> bool {
+        by_patches(self.layout.taxels(), self.contacts)
+    }
 }
 
 impl DesignStudy {
@@ -146,19 +154,21 @@ impl DesignStudy {
             electronics: ElectronicsStudy::as_designed()?,
             prior: SheetPrior::like(images, [layout.rows(), layout.cols()])?,
             learned,
+            contacts: self.objects.contacts,
         })
     }
 }
 
-/// The decoder of a skin with so many taxels: [`spts_recon::matrix_free::SheetDecoder`], or on large skins the decoder
-/// `patches` of sessions, [`spts_recon::matrix_free::OnSheet`].
-fn decoder_name(taxels: usize) -> &'static str {
-    if is_large(taxels) { "patches" } else { "SheetDecoder" }
+/// The decoder of a skin with so many taxels under so many contacts at once.
+fn decoder_name(taxels: usize, contacts: usize) -> &'static str {
+    if by_patches(taxels, contacts) { "patches" } else { "SheetDecoder" }
 }
 
-/// Whether a skin is too large for a decoder with a covariance.
-fn is_large(taxels: usize) -> bool {
-    taxels > TrainingData::MOST_TAXELS
+/// Whether the decoder is `patches` of sessions, [`spts_recon::matrix_free::OnSheet`], and not
+/// [`spts_recon::matrix_free::SheetDecoder`]: of several contacts on a large skin the latter has too few taxels to solve
+/// for, and of a single one it needs far fewer measurements.
+fn by_patches(taxels: usize, contacts: usize) -> bool {
+    contacts > 1 && taxels > TrainingData::MOST_TAXELS
 }
 
 /// A designed skin: everything needed to simulate it again, and its expected performance.

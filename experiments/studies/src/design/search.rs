@@ -1,9 +1,9 @@
 //! The search for rows and wires: more and more measurements, until the images are as good as wanted.
 
+use super::decoder_name;
 use super::objects::{Classes, DesignObjects};
 use super::wire::{BandRows, RowSource, WireDesign, bands};
 use super::{DecoderDesign, Design, DesignCurve, DesignPoint, DesignStudy, Expectation, Ground, WireChoice};
-use super::{decoder_name, is_large};
 use crate::touches::{Touch, TouchScore, TouchWire, band};
 use crate::wiring::sums;
 use rand::RngExt as _;
@@ -116,7 +116,7 @@ impl DesignStudy {
                 wire.rate_hz
             )));
         }
-        let held = match is_large(layout.taxels()) {
+        let held = match ground.by_patches() {
             true => layout.taxels() / MOST_SHARE,
             false => MOST.0.min(MOST.1 / (2 * layout.taxels())),
         } / wires;
@@ -288,7 +288,7 @@ enum BenchDecoder {
 impl BenchDecoder {
     fn new(ground: &Ground, rows: &BandRows, small: bool) -> Result<Self, Refusal> {
         let [height, width] = [ground.layout.rows(), ground.layout.cols()];
-        if !is_large(height * width) {
+        if !ground.by_patches() {
             let prior = ground.prior.clone();
             return Ok(Self::Sheet(SheetDecoder::new(prior, SheetNoise::default(), rows.wires())?));
         }
@@ -470,7 +470,7 @@ impl DesignStudy {
             };
             tried.bench.rows = rows;
             // with the decoder that sessions have
-            if tried.curve.rows != RowSource::Generator || is_large(ground.layout.taxels()) {
+            if tried.curve.rows != RowSource::Generator || ground.by_patches() {
                 tried.bench.release()?;
             }
             tried.bench.prepare(m)?;
@@ -556,7 +556,7 @@ impl DesignStudy {
             m_per_wire: m,
             m: m * wires,
             decoder: DecoderDesign {
-                name: decoder_name(layout.taxels()).to_owned(),
+                name: decoder_name(layout.taxels(), ground.contacts).to_owned(),
                 places,
                 covariance_along_rows: (0..cols).map(|d| prior.covariance(0, d)).collect(),
                 covariance_along_cols: (0..rows).map(|d| prior.covariance(0, d * cols)).collect(),
@@ -615,6 +615,7 @@ mod tests {
                         electronics: ElectronicsStudy::as_designed().unwrap(),
                         prior: SheetPrior::like(images.iter().map(|t| t.conductance_s.values()), [8, 8]).unwrap(),
                         learned: Vec::new(),
+                        contacts: 1,
                     };
                     let rows = BandRows::new(&RowSource::Generator, &ground.prior, wires, 64, 1).unwrap();
                     let ideal = Profile::named("ideal").unwrap();
