@@ -121,7 +121,7 @@ decode d --measurements 0 | `--measurements` = 0 is outside the whole numbers in
 decode d --windows 0 | `--windows` = 0 is outside the whole numbers in [1, 100000]
 decode d --seed x | `--seed` = x is outside the whole numbers in [0, 2^63)
 validate d --measurements 1001 | `--measurements` = 1001 is outside the whole numbers in [1, 1000]
-score d --measurements 10001 | `--measurements` = 10001 is outside the whole numbers in [1, 10000]
+score d --measurements 1000001 | `--measurements` = 1000001 is outside the whole numbers in [1, 1000000]
 score d --against b --tolerance 2 | `--tolerance` = 2 is outside [0, 1]
 score d --seed 18446744073709551615 | `--seed` = 18446744073709551615 is outside the whole numbers in [0, 2^63)
 score d --quick | `--quick`: recordings have the presses they have

@@ -26,8 +26,8 @@ use spts_models::{SkinLayout, Snapshot, Streams};
 /// ```
 ///
 /// With several wires ([`Profile::wires`]) each has its own amplifier and converter, with parts and noise of their own.
-/// Samples are in the order of [`Weights::wired`]; those of a raster scan are in the order of taxels, although the wires
-/// are scanned at once.
+/// Samples are in the order of [`Weights::wired`]; those of a raster scan are in the order of taxels, although the
+/// wires are scanned at once.
 pub struct Readout {
     info: RecordingInfo,
     lines: Vec<Line>,

@@ -536,7 +536,8 @@ impl Weights {
         }
     }
 
-    /// Fills `out` with rows of several wires: the levels of all taxels at a clock edge, of which every wire has its own.
+    /// Fills `out` with rows of several wires: the levels of all taxels at a clock edge, of which every wire has its
+    /// own.
     fn fill_woven(&self, wires: &Wires, first_row: u64, out: &mut [f64]) {
         let all = Self { wires: None, ..self.clone() };
         let (mut levels, mut at) = (vec![0.0; self.taxels()], None);

@@ -49,8 +49,8 @@ pub struct SessionSlip {
 }
 
 /// The slips of `recording`, in order of block and measurement; empty if there are none. If a block lags at its first
-/// contact, the lag is assumed from its first measurement on. Raster scans, skins of more than 1024 taxels or on several
-/// wires, and blocks shorter than a chunk are not checked.
+/// contact, the lag is assumed from its first measurement on. Raster scans, skins of more than 1024 taxels or on
+/// several wires, and blocks shorter than a chunk are not checked.
 pub fn find_slips(recording: &Recording) -> Vec<Slip> {
     let wires = recording.weights().wire_count();
     if recording.mode() != Mode::Compressive || recording.taxels() > MOST_TAXELS || wires > 1 {

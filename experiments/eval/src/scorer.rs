@@ -52,8 +52,8 @@ fn few(recording: &Recording, block: usize, range: Range<usize>, most: usize) ->
 }
 
 impl<'a> ScoredPress<'a> {
-    /// Block `block` of the compressive recording of `session`, for windows of up to `most` measurements; `None` without
-    /// that recording or a true image.
+    /// Block `block` of the compressive recording of `session`, for windows of up to `most` measurements; `None`
+    /// without that recording or a true image.
     pub(crate) fn new(session: &'a ScoredSession, block: usize, most: usize) -> Option<Self> {
         let recording = session.compressive.as_ref()?;
         let range = session.protocol.measurements(recording);

@@ -10,8 +10,8 @@ use spts_recon::{Matrix, MatrixView};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Rows of weights of consecutive measurements. Presses recorded at the same rows share them. Of rows of ±1 on a skin of
-/// more than 2,048 taxels the bits alone are kept.
+/// Rows of weights of consecutive measurements. Presses recorded at the same rows share them. Of rows of ±1 on a skin
+/// of more than 2,048 taxels the bits alone are kept.
 #[derive(Debug, Clone)]
 pub struct PressRows {
     taxels: usize,

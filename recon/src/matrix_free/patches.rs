@@ -50,8 +50,8 @@ const MOST_TAXELS: usize = 2048;
 const SWEEPS: usize = 100;
 
 /// Finds contacts of any size on a large skin: as [`Patches`], or as an image of small total variation ([`Tv`]) on
-/// square cells of several taxels. One measurement in nine is kept back; what predicts them better is used, and cells are
-/// not looked at where patches predict half of them. An offset that all measurements share is left out.
+/// square cells of several taxels. One measurement in nine is kept back; what predicts them better is used, and cells
+/// are not looked at where patches predict half of them. An offset that all measurements share is left out.
 ///
 /// ```
 /// use spts_recon::Matrix;
@@ -104,8 +104,8 @@ impl OnSheet {
         (1..).find(|side| rows.div_ceil(*side) * cols.div_ceil(*side) <= most).unwrap_or(1)
     }
 
-    /// The image of `y`, one value a taxel, in the unit of `y` over that of Φ. `wires` has the wire of every measurement,
-    /// or nothing for one wire.
+    /// The image of `y`, one value a taxel, in the unit of `y` over that of Φ. `wires` has the wire of every
+    /// measurement, or nothing for one wire.
     ///
     /// # Errors
     /// As [`RegionPursuit::recover`].
@@ -222,8 +222,8 @@ impl Patches {
         Self { rows, cols }
     }
 
-    /// The image of `y`, one value a taxel, in the unit of `y` over that of Φ. `wires` has the wire of every measurement,
-    /// or nothing for one wire.
+    /// The image of `y`, one value a taxel, in the unit of `y` over that of Φ. `wires` has the wire of every
+    /// measurement, or nothing for one wire.
     ///
     /// # Errors
     /// As [`RegionPursuit::recover`].

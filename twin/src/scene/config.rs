@@ -59,8 +59,8 @@ pub struct SceneConfig {
     /// Faulty cells, in addition to those of the profile.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub faults: Vec<toml::Table>,
-    /// Wires of the skin, in place of those of the profile; see [`WireConfig`](spts_circuit::WireConfig). Default: those
-    /// of the profile, else one.
+    /// Wires of the skin, in place of those of the profile; see [`WireConfig`](spts_circuit::WireConfig). Default:
+    /// those of the profile, else one.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub wires: Vec<WireConfig>,
     /// The skin.

@@ -15,8 +15,8 @@ use spts_models::Grid;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
-/// Versions of the schema of `session.json` that are read: of one wire, and of several. The first that can hold a session
-/// is written.
+/// Versions of the schema of `session.json` that are read: of one wire, and of several. The first that can hold a
+/// session is written.
 const SCHEMAS: [u64; 2] = [1, 2];
 /// The file that makes a folder a session.
 pub const SESSION_FILE: &str = "session.json";

@@ -165,8 +165,8 @@ fn decoder_name(taxels: usize, contacts: usize) -> &'static str {
 }
 
 /// Whether the decoder is `patches` of sessions, [`spts_recon::matrix_free::OnSheet`], and not
-/// [`spts_recon::matrix_free::SheetDecoder`]: of several contacts on a large skin the latter has too few taxels to solve
-/// for, and of a single one it needs far fewer measurements.
+/// [`spts_recon::matrix_free::SheetDecoder`]: of several contacts on a large skin the latter has too few taxels to
+/// solve for, and of a single one it needs far fewer measurements.
 fn by_patches(taxels: usize, contacts: usize) -> bool {
     contacts > 1 && taxels > TrainingData::MOST_TAXELS
 }
