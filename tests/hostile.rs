@@ -163,7 +163,7 @@ simulate press/T --force -5 | force_n | -5 | [0.5, 100] N
 simulate press/T --force NaN | force_n | NaN | [0.5, 100] N
 simulate press/T --row 99 | press.row | 99 | rows + 4
 simulate press/T --presses 0 | presses | 0 | [1, 100000]
-simulate press/T --cells 1 --set skin.rows=1000 --set skin.cols=1000 --set skin.pitch_m=0.001 --set rows.seeding=mixed | presses × frames × taxels
+simulate press/T --cells 1 --set skin.rows=1400 --set skin.cols=1400 --set skin.pitch_m=0.001 --set rows.seeding=mixed | presses × frames × taxels
 simulate press/T --height 1 | --height | 1 | only a ball
 simulate bounce --height 1e9 | drop.height_m | 1000000000 | [0.001, 5] m
 simulate bounce --force 5 | --force | 5

@@ -9,6 +9,7 @@ use spts_circuit::{Interpolated, Mode};
 use spts_contact::Frame;
 use spts_contact::objects::FINGER;
 use spts_input::Refusal;
+use spts_models::fits_memory;
 use spts_sim::World;
 use spts_sim::world::{Bounce, PressCourse};
 use std::ops::Range;
@@ -38,6 +39,8 @@ const RASTER_SESSION: u64 = 0;
 const COMPRESSIVE_SESSION: u64 = 1;
 /// Most values of one kind that are kept at once: 1 GiB.
 const MOST_VALUES: usize = 1 << 27;
+/// Values of a taxel in a frame that are kept at once: two pressures and the conductances of two sessions.
+const MAPS: f64 = 4.0;
 /// Values of one kind that are simulated together at most: 256 MiB.
 const MOST_TOGETHER: f64 = (1_u64 << 25) as f64;
 
@@ -179,18 +182,19 @@ impl Twin {
     /// Checks that the frames of `presses` presses can be kept.
     fn check_frames(&self, presses: usize) -> Result<(), Refusal> {
         let rate_hz = 1.0 / self.scene.mechanics().frame_interval_s();
-        self.check_size(presses, rate_hz, self.scene.skin().taxels(), "presses × frames × taxels")
+        let values = self.check_size(presses, rate_hz, self.scene.skin().taxels(), "presses × frames × taxels")?;
+        fits_memory(&format!("presses × frames × taxels = {values}"), MAPS * 8.0 * values as f64)
     }
 
-    /// Checks that `presses` presses with `values` values at `rate_hz` instants a second can be kept.
-    fn check_size(&self, presses: usize, rate_hz: f64, values: usize, what: &'static str) -> Result<(), Refusal> {
+    /// The number of values of `presses` presses with `values` values at `rate_hz` instants a second, if they can be kept.
+    fn check_size(&self, presses: usize, rate_hz: f64, values: usize, what: &'static str) -> Result<usize, Refusal> {
         #[expect(clippy::cast_possible_truncation, reason = "at most 60 s at 1 GHz")]
         let instants = (self.scene.duration_s() * rate_hz).ceil() as usize;
         let values = instants.saturating_mul(presses).saturating_mul(values);
         if values > MOST_VALUES {
             return Err(Refusal::new(format!("{what} = {values} is outside [1, {MOST_VALUES}]")));
         }
-        Ok(())
+        Ok(values)
     }
 }
 
