@@ -186,7 +186,8 @@ impl Twin {
         fits_memory(&format!("presses × frames × taxels = {values}"), MAPS * 8.0 * values as f64)
     }
 
-    /// The number of values of `presses` presses with `values` values at `rate_hz` instants a second, if they can be kept.
+    /// The number of values of `presses` presses with `values` values at `rate_hz` instants a second, if they can be
+    /// kept.
     fn check_size(&self, presses: usize, rate_hz: f64, values: usize, what: &'static str) -> Result<usize, Refusal> {
         #[expect(clippy::cast_possible_truncation, reason = "at most 60 s at 1 GHz")]
         let instants = (self.scene.duration_s() * rate_hz).ceil() as usize;
