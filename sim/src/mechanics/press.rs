@@ -357,9 +357,10 @@ impl PressConfig {
                 return Err(Refusal::new(format!("exactly one of {choices} is needed, found {found}")));
             }
         };
-        if !self.objects.is_empty() && (self.object.is_some() || self.mesh.is_some()) {
+        let of_mesh = self.scale.is_some() || self.repair.is_some() || self.centre.is_some();
+        if !self.objects.is_empty() && (self.object.is_some() || self.mesh.is_some() || of_mesh) {
             return Err(Refusal::new(
-                "`press.objects` has all that is pressed: leave out `press.object` and `press.mesh`",
+                "`press.objects` has all that is pressed: leave out `press.object`, `press.mesh` and what belongs to a mesh",
             ));
         }
         for [row, col] in self.places.iter().flatten() {
