@@ -527,7 +527,7 @@ impl PressConfig {
 /// use spts_sim::Mechanics;
 ///
 /// let two = "[press]\n[[press.objects]]\nobject = \"T\"\nposition_m = [-0.03, 0.0]\n\
-///            [[press.objects]]\nobject = \"square\"\nposition_m = [0.03, 0.0]\n";
+///            [[press.objects]]\nobject = \"rec\"\nposition_m = [0.03, 0.0]\n";
 /// let scene = Mechanics::from_toml(two, ".".as_ref())?;
 /// assert!(scene.mesh().bounds().is_some_and(|(low, high)| high[0] - low[0] > 0.06));
 /// # Ok::<(), spts_input::Refusal>(())
