@@ -148,6 +148,41 @@ fn several_objects_share_the_force() {
     );
 }
 
+/// Drops on several wires are scored with their places, also on a skin whose rows are kept as bits.
+#[test]
+fn drops_on_several_wires_have_places() {
+    let dir = tempfile::tempdir().unwrap();
+    let here = dir.path();
+    for (side, pitch_m) in [(10, 0.015), (50, 0.003)] {
+        let scene = format!(
+            "[[wires]]\nbands = 2\n[skin]\nrows = {side}\ncols = {side}\npitch_m = {pitch_m}\n[drop]\ndrops = 2\n"
+        );
+        std::fs::write(here.join("drop.toml"), scene).unwrap();
+        succeeds(here, &["simulate", "drop.toml", "--out", "all/drop"]);
+        let press = format!(
+            "[[wires]]\nbands = 2\n[skin]\nrows = {side}\ncols = {side}\npitch_m = {pitch_m}\n[contact]\n\
+             model = \"footprint\"\n[press]\nobject = \"tennis\"\npresses = 2\n"
+        );
+        std::fs::write(here.join("press.toml"), press).unwrap();
+        succeeds(here, &["simulate", "press.toml", "--out", "all/press"]);
+        succeeds(here, &["score", "all", "--measurements", "60", "--no-times", "--out", "c"]);
+        std::fs::remove_dir_all(here.join("all")).unwrap();
+    }
+}
+
+/// Another object takes the place of several: nothing of theirs stays.
+#[test]
+fn an_object_takes_the_place_of_several() {
+    let saved = "[press]\npresses = 1\n[[press.objects]]\nobject = \"tennis\"\n";
+    let saved = Scene::from_toml(saved, Path::new("")).unwrap().to_toml().unwrap();
+    let assignment: spts::scene::Assignment = "press.object=T".parse().unwrap();
+    let mut table = toml::from_str(&saved).unwrap();
+    assignment.apply(&mut table).unwrap();
+    let changed = Scene::from_toml(&toml::to_string(&table).unwrap(), Path::new("")).unwrap();
+    let fresh = Scene::from_toml("[press]\nobject = \"T\"\npresses = 1\n", Path::new("")).unwrap();
+    assert_eq!(changed.to_toml().unwrap(), fresh.to_toml().unwrap());
+}
+
 /// What cannot be is named.
 #[test]
 fn wirings_that_cannot_be_are_refused() {

@@ -163,6 +163,9 @@ impl DeviceCommand {
             Mode::Compressive => Session::compressive(session),
         };
         let found = found.ok_or_else(|| refuse(format!("has no recording for `--mode` = {}", self.mode.name())))?;
+        if found.weights().wire_count() > 1 {
+            return Err(refuse("is of several wires; a device has one".to_owned()));
+        }
         let measured = match found.weights().mode() {
             WeightMode::Raster => DeviceMode::Raster,
             WeightMode::Analog => DeviceMode::Analog,

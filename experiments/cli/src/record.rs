@@ -99,6 +99,12 @@ impl RecordCommand {
         let chain = self.mode.chain(&self.readout, 0)?;
         let readout = chain.readout(self.mode.readout(), 0)?;
         let info = readout.info().clone();
+        if info.weights.wire_count() > 1 {
+            return Err(CliError::usage(format!(
+                "`--readout` = {:?} has several wires; a device has one",
+                self.readout
+            )));
+        }
         let converter = info
             .converter
             .ok_or_else(|| CliError::usage(format!("`--readout` = {:?} has no converter", self.readout)))?;

@@ -5,7 +5,7 @@ use crate::protocol::Protocol;
 use crate::training::TrainingData;
 use spts_circuit::{Mode, Recording, WeightRows, Wires};
 use spts_recon::metrics::median;
-use spts_recon::operator::SignRows;
+use spts_recon::operator::{LinearOperator as _, SignRows};
 use spts_recon::{Matrix, MatrixView};
 use std::ops::Range;
 use std::sync::Arc;
@@ -149,19 +149,29 @@ impl PressRows {
         Self { taxels: self.taxels, phi: rows.copied().collect(), signs, wires, masks: self.masks.clone() }
     }
 
-    /// The weights with taxel k renumbered as `to(k)`.
-    ///
-    /// # Panics
-    /// If the rows are kept as bits alone, or are of several wires.
+    /// The rows in `range` as bits, if all weights of a row's own wire are ±1.
+    fn bits(&self, range: Range<usize>) -> Option<SignRows<'_>> {
+        let words = self.taxels.div_ceil(64);
+        let bits = SignRows::new(&self.signs.as_ref()?[range.start * words..range.end * words], self.taxels);
+        Some(if self.wires.is_empty() { bits } else { bits.on_wires(&self.wires[range], &self.masks) })
+    }
+
+    /// The weights with taxel k renumbered as `to(k)`, as numbers.
     pub fn renamed(&self, to: impl Fn(usize) -> usize) -> Self {
-        assert!(self.wires.is_empty(), "rows of several wires are not renamed");
-        assert!(self.signs.as_ref().is_none_or(Vec::is_empty) || !self.phi.is_empty(), "rows as bits are not renamed");
-        let mut phi = vec![0.0; self.phi.len()];
-        let taxels = self.taxels.max(1);
-        for (new, old) in phi.chunks_exact_mut(taxels).zip(self.phi.chunks_exact(taxels)) {
+        let mut old = self.phi.clone();
+        let rows = self.signs.as_ref().map_or(0, |signs| signs.len() / self.taxels.div_ceil(64).max(1));
+        if let Some(bits) = self.bits(0..rows).filter(|_| old.is_empty()) {
+            old.resize(bits.nrows() * self.taxels, 0.0);
+            bits.fill(&mut old);
+        }
+        let (mut phi, taxels) = (vec![0.0; old.len()], self.taxels.max(1));
+        for (new, old) in phi.chunks_exact_mut(taxels).zip(old.chunks_exact(taxels)) {
             old.iter().enumerate().for_each(|(k, w)| new[to(k)] = *w);
         }
-        Self { signs: self.signs.is_some().then(|| sign_bits(&phi, self.taxels)), phi, ..self.clone() }
+        // taxels of a wire are elsewhere now
+        let one_wire = self.signs.is_some() && self.wires.is_empty();
+        let signs = one_wire.then(|| sign_bits(&phi, self.taxels));
+        Self { taxels: self.taxels, phi, signs, wires: self.wires.clone(), masks: Vec::new() }
     }
 }
 
@@ -230,12 +240,12 @@ impl Press {
         let phi = self.rows.numbers(start..start + m);
         y.iter().all(|v| v.is_finite()).then_some(())?;
         let signs = self.rows.signs.as_ref().map(|s| &s[start * words..(start + m) * words]);
+        let bits = self.rows.bits(start..start + m);
         let wires = self.rows.wires.get(start..start + m).unwrap_or_default();
-        let bits = signs.map(|signs| SignRows::new(signs, taxels));
         Some(Window {
             phi: MatrixView::new(phi.len() / taxels.max(1), taxels, phi).ok()?,
             signs: signs.filter(|_| wires.is_empty()),
-            bits: if wires.is_empty() { bits } else { bits.map(|bits| bits.on_wires(wires, &self.rows.masks)) },
+            bits,
             wires,
             volts: &self.volts[start..start + m],
             y,
@@ -398,6 +408,24 @@ mod tests {
         let last = window.samples().nth(2).unwrap();
         assert_eq!(last.with_rows(&mut rows).phi.values(), &values[140..]);
         assert_eq!(press.picked(&[1]).window(0, 1).unwrap().with_rows(&mut rows).phi.values(), &values[70..140]);
+    }
+
+    /// Rows that are kept as bits are renumbered as numbers, of one wire and of two.
+    #[test]
+    fn taxels_are_renumbered_however_rows_are_kept() {
+        let layout = SkinLayout::with_pitch(10, 7, 5e-3).unwrap();
+        for entries in [Vec::new(), vec![spts_circuit::WireConfig::bands(2)]] {
+            let wires = Wires::new(&entries, &layout).unwrap();
+            let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, 70).wired(wires).unwrap();
+            let rows = WeightRows::new(&weights, 5, 6);
+            let bits = PressRows { phi: Vec::new(), ..PressRows::new(rows) };
+            let renamed = bits.renamed(|k| (k + 3) % 70);
+            let expected = |k: usize| rows.to_vec()[k / 70 * 70 + (k % 70 + 67) % 70];
+            assert!((0..6 * 70).all(|k| renamed.phi[k].to_bits() == expected(k).to_bits()));
+            assert_eq!(renamed.signs.is_some(), entries.is_empty());
+            let press = Press::on(Arc::new(bits), vec![0.0; 6], 0.0);
+            assert_eq!(press.window(0, 6).unwrap().with_rows(&mut Vec::new()).phi.values(), rows.to_vec());
+        }
     }
 
     #[test]

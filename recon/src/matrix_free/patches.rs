@@ -4,7 +4,7 @@ use super::RegionPursuit;
 use crate::checks::other_columns;
 use crate::kernels::{dot, norm};
 use crate::matrix::{Matrix, MatrixView};
-use crate::operator::{Centred, LinearOperator as _, SelectColumns, SignRows, centre_by_wire};
+use crate::operator::{Centred, LinearOperator as _, SelectColumns, SignRows, centre_by_wire, mean_share};
 use crate::problem::{Problem, Recover as _, Workspace};
 use crate::recover::{Penalty, Stopping, Tv};
 use rayon::prelude::*;
@@ -263,7 +263,8 @@ fn without_means(columns: &mut Matrix, wires: &[u16]) {
     }
     for r in 0..columns.nrows() {
         let (sums, number) = (sums.row(wire(r)), numbers[wire(r)]);
-        columns.row_mut(r).iter_mut().zip(sums).for_each(|(v, sum)| *v -= sum / number);
+        let share = if wires.is_empty() { 1.0 / number } else { mean_share(number) };
+        columns.row_mut(r).iter_mut().zip(sums).for_each(|(v, sum)| *v -= sum * share);
     }
 }
 

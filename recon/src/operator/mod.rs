@@ -233,7 +233,16 @@ pub fn centre(y: &mut [f64]) {
     y.iter_mut().for_each(|v| *v -= mean);
 }
 
-/// Subtracts from `y` the mean of every wire; `wires` has the wire of every measurement, or nothing for one wire.
+/// Fewest measurements of a wire whose mean is taken off: of fewer too little would be left.
+const FEWEST_OF_A_WIRE: f64 = 4.0;
+
+/// Share of a wire's sum that is taken off each of its `number` measurements.
+pub(crate) fn mean_share(number: f64) -> f64 {
+    if number < FEWEST_OF_A_WIRE { 0.0 } else { 1.0 / number }
+}
+
+/// Subtracts from `y` the mean of every wire that has four measurements at least; `wires` has the wire of every
+/// measurement, or nothing for one wire.
 pub fn centre_by_wire(y: &mut [f64], wires: &[u16]) {
     if wires.is_empty() {
         return centre(y);
@@ -247,7 +256,7 @@ pub fn centre_by_wire(y: &mut [f64], wires: &[u16]) {
     }
     y.iter_mut().zip(wires).for_each(|(v, wire)| {
         let (sum, number) = sums[usize::from(*wire)];
-        *v -= sum / number;
+        *v -= sum * mean_share(number);
     });
 }
 
@@ -490,6 +499,14 @@ mod tests {
         centre(&mut with);
         // sums of three numbers below 11
         assert!(y.iter().zip(&with).all(|(a, b)| (a - b).abs() < 1e-14));
+    }
+
+    /// By hand: wire 0 has the mean 4, wire 1 a single measurement, which is left.
+    #[test]
+    fn wires_are_centred_apart() {
+        let mut y = [1.0, 3.0, 5.0, 7.0, 9.0];
+        centre_by_wire(&mut y, &[0, 0, 0, 0, 1]);
+        assert!(y.iter().zip([-3.0, -1.0, 1.0, 3.0, 9.0]).all(|(a, b)| (a - b).abs() < 1e-15));
     }
 
     fn parts() -> SubArrays<Matrix> {

@@ -111,7 +111,7 @@ fn forget_usual_electrode(scene: &mut Table) {
 
 /// Removes from `scene` what cannot stand beside the new `value` of `key`.
 fn make_room(scene: &mut Table, key: &str, value: &Value) {
-    if ["press.object", "press.mesh"].contains(&key) {
+    if ["press.object", "press.mesh", "press.objects"].contains(&key) {
         forget_object(scene);
     }
     let mut remove = |section: &str, keys: &[&str]| {
@@ -123,6 +123,7 @@ fn make_room(scene: &mut Table, key: &str, value: &Value) {
     };
     match key {
         "press.mesh" => remove("press", &["object", "objects"]),
+        "press.objects" => remove("press", &["object", "mesh", "scale", "repair", "centre"]),
         "press.object" => remove("press", &["objects", "mesh", "scale", "repair", "centre"]),
         "tolerance" => remove("contact", &OF_TOLERANCE),
         _ => {}
@@ -157,13 +158,13 @@ fn make_room(scene: &mut Table, key: &str, value: &Value) {
 /// Removes from `scene` what it has of its object alone, as a saved scene has it written out: every field of the press
 /// that has the value which it would have without being written, such as the object's place, and its name.
 fn forget_object(scene: &mut Table) {
-    let Some(object) = scene.get("press").and_then(|press| press.get("object")).cloned() else {
+    let press = scene.get("press");
+    let written = |key: &'static str| Some((key.to_owned(), press?.get(key)?.clone()));
+    let Some(object) = written("object").or_else(|| written("objects")) else {
         return;
     };
     let mut alone: Table =
-        [("press".to_owned(), Value::Table([("object".to_owned(), object.clone())].into_iter().collect()))]
-            .into_iter()
-            .collect();
+        [("press".to_owned(), Value::Table([object.clone()].into_iter().collect()))].into_iter().collect();
     alone.extend(scene.get("skin").map(|skin| ("skin".to_owned(), skin.clone())));
     // of an object that does not exist nothing is known
     let Ok(config) = alone.try_into::<SceneConfig>() else {
@@ -176,9 +177,9 @@ fn forget_object(scene: &mut Table) {
         return;
     };
     if let Some(Value::Table(press)) = scene.get_mut("press") {
-        press.retain(|key, value| key == "object" || own.get(key) != Some(value));
+        press.retain(|key, value| *key == object.0 || own.get(key) != Some(value));
     }
-    if scene.get("name") == Some(&object) {
+    if scene.get("name").and_then(Value::as_str) == Some(&super::default_name(&config)) {
         scene.remove("name");
     }
 }

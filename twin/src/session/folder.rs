@@ -553,6 +553,10 @@ impl Session {
             return Err(Refusal::new(problem).at(path.display()));
         }
         let contents: Contents = parse_json(&path, &text)?;
+        if version.schema == SCHEMAS[0] && contents.recorded().any(RecordedContents::has_wires) {
+            let needed = format!("{{{}}}, which has `wires`", SCHEMAS[1]);
+            return Err(outside(&path, "schema", version.schema, needed));
+        }
         let files: Vec<String> = contents.files().into_iter().map(str::to_owned).collect();
         let read = |contents: Option<RecordedContents>, mode| {
             contents.map(|contents| read_recorded(dir, &path, mode, contents)).transpose()

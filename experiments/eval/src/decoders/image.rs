@@ -177,6 +177,9 @@ impl Algorithm for AtWork<'_> {
     fn decode(&mut self, window: &Window<'_>, answer: &mut Answer) -> Result<(), DecodeError> {
         let m = window.y.len();
         let decoder = self.decoder;
+        if decoder.weights == Weights::Script && !window.wires.is_empty() {
+            return Err(Refusal::new("the published script is for one wire").into());
+        }
         if let Unknowns::Atoms(dictionary) = &decoder.unknowns {
             self.project(window, dictionary);
         }

@@ -85,6 +85,10 @@ pub fn read(root: &Path) -> Result<Vec<SessionPair>, Refusal> {
             let (value, needed) = (format!("{:?}", mode.name()), format!("{:?}", WeightMode::Binary.name()));
             return Err(unfit("weights.mode", value, needed));
         }
+        let wires = compressive.weights().wire_count();
+        if wires > 1 {
+            return Err(unfit("wires", wires.to_string(), "one wire".to_owned()));
+        }
         let held = held_frames(recorded, session.hold_s).unwrap_or_default();
         if held.len() < WINDOW_FRAMES {
             let value = format!("{} frames of {}", held.len(), compressive.frames());
