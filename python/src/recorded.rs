@@ -10,7 +10,7 @@ use spts::circuit::Recording as Samples;
 use spts::data::{FrameArray, FrameOptions, Frames, SessionSet, wired};
 use spts::session::{Event, PressFacts, Recorded, Session as Whole};
 use spts::{Chain, ChainConfig, FrameUnit, SkinLayout};
-use spts_eval::idle_mean;
+use spts_eval::{Untouched, idle_mean, idle_means};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -312,7 +312,7 @@ impl Recording {
         all.into_pyarray(py).reshape([blocks.len(), blocks[0].volts.len()])
     }
 
-    /// Output of the untouched skin before each block, V, (blocks,).
+    /// Output of the untouched skin before each block, V, (blocks,); of several wires their mean.
     #[getter]
     fn idle<'py>(&self, py: Python<'py>) -> Array1<'py> {
         let samples = self.samples();
@@ -377,8 +377,8 @@ impl Recording {
             bail!("`measurements` = {measurements} and `count` = {count}: at least 1 is needed of both");
         }
         let samples = self.samples();
-        let idle_v = idle_mean(samples, block);
-        let y: Vec<f64> = samples.blocks()[block].volts[first..first + total].iter().map(|v| v - idle_v).collect();
+        let untouched = Untouched { offsets_v: idle_means(samples, block), image: None };
+        let y = untouched.without(samples, block, first..first + total);
         let rows = samples.rows(block, first..first + total);
         let phi = rows.to_vec().into_pyarray(py).reshape([count, measurements, rows.taxels()])?;
         Ok((phi, y.into_pyarray(py).reshape([count, measurements])?))

@@ -35,8 +35,8 @@ use std::path::{Path, PathBuf};
 Files in DIR:
   decoded.png decoded.svg    what the taxels conduct, the trace of the wire, the image at each M
   windows.csv                one line a window
-  SESSION.npz                for every M: phi_mM, y_mM, block_mM, window_mM and image_DECODER_mM; truth; of many rows of
-                             more than 2048 taxels phi_mM is left out
+  SESSION.npz                for every M: phi_mM, y_mM, block_mM, window_mM and image_DECODER_mM; truth; on a skin of
+                             more than 2048 taxels without phi_mM
 
 --json prints {\"rows\": [{\"session\", \"block\", \"window\", \"decoder\", \"m\", \"start\", \"support\", \"iou\", \"correlation\",
 \"label\", \"label_true\", \"place\"}, ...]}, one entry a window; all numbers count from 0, and scores are null where no truth
