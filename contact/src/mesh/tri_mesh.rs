@@ -293,7 +293,7 @@ impl TriMesh {
         self
     }
 
-    /// Joins both meshes into one. They share no vertices (see [`TriMesh::welded`]).
+    /// Joins both meshes into one. They share no vertices (see `TriMesh::welded`).
     pub fn merged(mut self, other: &TriMesh) -> Self {
         let base = index(self.vertices.len());
         self.vertices.extend_from_slice(&other.vertices);
