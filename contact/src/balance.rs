@@ -13,6 +13,8 @@ pub(crate) struct Column {
     pub(crate) point_m: Vector,
     pub(crate) normal: Vector,
     pub(crate) area_m2: f64,
+    /// Its share of the skin's column with this number.
+    pub(crate) share: f64,
     /// How deep the body reaches into the column where it is, m; negative for a gap.
     pub(crate) depth_m: f64,
     /// Place across a load, m, from the load's axis.
@@ -21,7 +23,7 @@ pub(crate) struct Column {
 
 impl Column {
     pub(crate) fn new(index: usize, point_m: Vector, normal: Vector, area_m2: f64, depth_m: f64) -> Self {
-        Self { index, point_m, normal, area_m2, depth_m, across_m: [0.0; 2] }
+        Self { index, point_m, normal, area_m2, share: 1.0, depth_m, across_m: [0.0; 2] }
     }
 }
 

@@ -107,8 +107,6 @@ struct FlatSkin {
     /// Lowest and highest corner of the foam, m.
     bounds_m: [[f64; 3]; 2],
     cell_area_m2: f64,
-    /// Squares along a row of the grid.
-    width: usize,
     /// What the layer knows of the body at each place of the list: one that only moves up and down is not rasterised
     /// again.
     known: Vec<KnownBody>,
@@ -131,7 +129,6 @@ impl TouchSkin {
             layer: WinklerLayer::new(foam, &layout)?,
             bins: TaxelBins::new(&layout, cells),
             cell_area_m2: cell_m * cell_m,
-            width: layout.cols() * cells,
             known: Vec::new(),
             pressed: vec![0; layout.taxels() * cells * cells],
             touches: 0,
@@ -393,18 +390,18 @@ impl Surface {
 impl FlatSkin {
     /// Adds the pressures of `columns` at their depths to `maps`. The area under pressure, m².
     fn carry(&mut self, columns: &[Column], law: &FoamLaw, maps: [&mut PressureMap; 2]) -> f64 {
-        let mut touched = 0_usize;
+        let mut touched = 0.0;
         for c in columns {
             let p = law.pressure_pa(c.depth_m);
-            self.layer.pressure_pa[c.index] = p;
-            touched += usize::from(p > 0.0);
+            self.layer.pressure_pa[c.index] += c.share * p;
+            touched += if p > 0.0 { c.share } else { 0.0 };
         }
         for (sum, map) in maps.into_iter().zip(self.bins.means(&self.layer.pressure_pa, Some(self.layer.patch))) {
             for (sum, p) in sum.values_mut().iter_mut().zip(map.values()) {
                 *sum += p;
             }
         }
-        touched as f64 * self.cell_area_m2
+        touched * self.cell_area_m2
     }
 
     /// Adds the pressures under `bodies` to `maps`. The area under pressure, m², and whether a body has gone through.
@@ -416,7 +413,7 @@ impl FlatSkin {
     ) -> (f64, bool) {
         self.touches += 1;
         self.known.resize_with(bodies.len().max(self.known.len()), KnownBody::default);
-        let (mut cells, mut bottomed) = (0_usize, false);
+        let (mut cells, mut bottomed) = (0.0, false);
         for ((body, posed), known) in bodies.iter().zip(&mut self.known) {
             if posed.is_finite() && body.solid.standing(posed).is_apart(self.bounds_m) {
                 wrenches.push(Wrench::NONE);
@@ -431,17 +428,14 @@ impl FlatSkin {
                     *sum += p;
                 }
             }
-            for line in answer.patch.unwrap_or_default().lines(self.width) {
-                for (p, last) in answer.pressure_pa[line.clone()].iter().zip(&mut self.pressed[line]) {
-                    let is_new = *p > 0.0 && *last != self.touches;
-                    cells += usize::from(is_new);
-                    *last = if is_new { self.touches } else { *last };
-                }
-            }
+            cells += self.layer.pressed_cells(|index| {
+                let last = std::mem::replace(&mut self.pressed[index], self.touches);
+                last != self.touches
+            });
             bottomed |= self.layer.bottomed;
             self.layer.swap_known(known);
         }
-        (cells as f64 * self.cell_area_m2, bottomed)
+        (cells * self.cell_area_m2, bottomed)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Quasi-static contact: the pose in which the columns carry a load, without time steps.
 
-use super::winkler::{MAX_CELLS, WinklerLayer};
+use super::winkler::{MAX_CELLS, Shares, WinklerLayer};
 use crate::field::{
     Balance, ContactField, EquilibriumError, Holder, Load, Patch, PosedMesh, QuasiStatic, Response, Seat, Wrench,
     depth_limit_m,
@@ -57,6 +57,7 @@ impl Row {
         base_m: f64,
         [height_m, turn_rad]: [f64; 2],
         drop_m: &[f64],
+        shares: Shares<'_>,
         law: impl Fn(usize, f64) -> (f64, f64),
     ) {
         let cells = self.pressure_pa.iter_mut().zip(&mut self.slope_pa_per_m);
@@ -64,6 +65,10 @@ impl Row {
             let depth_m = (drop_m - base_m) - height_m + turn_rad * arm_m;
             (*p, *s) = law(k, depth_m);
         }
+        shares.fill([&mut self.pressure_pa, &mut self.slope_pa_per_m], |k, drop_m| {
+            let (p, s) = law(k, (drop_m - base_m) - height_m + turn_rad * self.arm_m[k]);
+            [p, s]
+        });
     }
 }
 
@@ -159,12 +164,14 @@ impl Footprint {
             let height_m = state[0] + state[1] * ry;
             let start = i * width + patch.cols[0];
             let seat = [height_m, state[2]];
+            let line = start..start + drops.len();
+            let shares = Shares { parts: self.layer.envelope.map_parts(&line), first: start };
             match &self.layer.preload {
-                None => row.press(task.base_m, seat, drops, |_, depth_m| task.law.pressure_and_slope(depth_m)),
+                None => row.press(task.base_m, seat, drops, shares, |_, depth_m| task.law.pressure_and_slope(depth_m)),
                 Some(preload) => {
-                    let preload = preload.row(start..start + drops.len(), task.body_pa_per_m);
+                    let preload = preload.row(line, task.body_pa_per_m);
                     let law = |k, depth_m| preload.pressure_and_slope(k, &task.law, depth_m);
-                    row.press(task.base_m, seat, drops, law);
+                    row.press(task.base_m, seat, drops, shares, law);
                 }
             }
             let (p, s) = (&row.pressure_pa, &row.slope_pa_per_m);

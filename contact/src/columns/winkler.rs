@@ -1,7 +1,7 @@
 //! Independent columns of foam with damping, densification and friction.
 
 use crate::balance::Column;
-use crate::envelope::{Envelope, KnownBody};
+use crate::envelope::{Envelope, KnownBody, Part, split_cell};
 use crate::field::{ContactField, Patch, PosedMesh, Response, Wrench};
 use crate::foam::{Foam, FoamLaw, Most};
 use crate::prepared::PreparedMesh;
@@ -76,6 +76,12 @@ impl WinklerLayer {
         self.envelope.swap_known(known);
     }
 
+    /// Whether a rim of the last body goes through a cell.
+    #[cfg(test)]
+    pub(crate) fn has_parts(&self, cell: usize) -> bool {
+        self.envelope.has_parts(cell)
+    }
+
     /// Clears the last pressure.
     pub(super) fn clear(&mut self) {
         let [_, width] = self.envelope.shape();
@@ -110,14 +116,39 @@ impl WinklerLayer {
         let area_m2 = self.envelope.cell_m().powi(2);
         for (row, line) in (self.patch.rows[0]..).zip(self.patch.lines(width)) {
             let [_, y_m] = self.envelope.centre_m(row, 0);
+            let mut parts = self.envelope.parts(&line);
             for index in line {
+                let own = split_cell(&mut parts, index);
+                for part in own.iter().filter(|part| part.depth_m > 0.0) {
+                    let [x_m, y_m] = self.envelope.place_m(part);
+                    let point_m = Vector::new(x_m, y_m, 0.0);
+                    let whole = Column::new(index, point_m, Vector::Z, part.share * area_m2, part.depth_m - gap_m);
+                    out.push(Column { share: part.share, ..whole });
+                }
                 let depth_m = self.envelope.depth_m()[index];
-                if depth_m > 0.0 {
+                if own.is_empty() && depth_m > 0.0 {
                     let point_m = Vector::new(self.x_m[index % width], y_m, 0.0);
                     out.push(Column::new(index, point_m, Vector::Z, area_m2, depth_m - gap_m));
                 }
             }
         }
+    }
+
+    /// The area under pressure of the cells that `is_new` of their number, in cells: what a cell's parts have of it.
+    pub(crate) fn pressed_cells(&self, mut is_new: impl FnMut(usize) -> bool) -> f64 {
+        let [_, width] = self.envelope.shape();
+        let mut cells = 0.0;
+        for line in self.patch.lines(width) {
+            let mut parts = self.envelope.parts(&line);
+            for index in line {
+                let own = split_cell(&mut parts, index);
+                if self.pressure_pa[index] > 0.0 && is_new(index) {
+                    let under = own.iter().filter(|part| part.depth_m > 0.0);
+                    cells += if own.is_empty() { 1.0 } else { under.map(|part| part.share).sum() };
+                }
+            }
+        }
+        cells
     }
 
     /// The column nearest to a place, which becomes the only one of the cleared layer.
@@ -154,13 +185,15 @@ impl WinklerLayer {
             let [_, y_m] = self.envelope.centre_m(row, 0);
             let depth_m = &self.envelope.depth_m()[line.clone()];
             let p = &mut self.pressure_pa[line.clone()];
+            let parts = self.envelope.parts(&line);
+            let shares = Shares { parts, first: line.start };
             let preload = self.preload.as_ref();
             let preload = preload.map(|preload| preload.row(line, body.stiffness_pa_per_m));
             match preload {
-                None => press(c.damping_s, body, y_m, [x_m, depth_m], |_, d| law.pressure_pa(d), p),
+                None => press(c.damping_s, body, y_m, [x_m, depth_m], shares, |_, d| law.pressure_pa(d), p),
                 Some(row) => {
                     let of = |k, d| row.pressure_and_slope(k, &law, d).0;
-                    press(c.damping_s, body, y_m, [x_m, depth_m], of, p);
+                    press(c.damping_s, body, y_m, [x_m, depth_m], shares, of, p);
                 }
             }
             tractions.add(y_m, x_m, depth_m, p, [tx, ty]);
@@ -172,6 +205,29 @@ impl WinklerLayer {
 /// Most fine cells a layer may have.
 pub(super) const MAX_CELLS: Most = (16_777_216.0, "[1, 2^24]");
 
+/// Parts of the cells of a row that begins with the cell `first`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shares<'a> {
+    pub(super) parts: &'a [Part],
+    pub(super) first: usize,
+}
+
+impl Shares<'_> {
+    /// Every cell that has parts gets the sum of what `of` gives for them and their places in the row, each with its
+    /// share.
+    #[inline]
+    pub(super) fn fill<const N: usize>(self, mut out: [&mut [f64]; N], of: impl Fn(usize, f64) -> [f64; N]) {
+        for parts in self.parts.chunk_by(|p, q| p.cell == q.cell) {
+            let k = parts[0].cell - self.first;
+            let mut sums = [0.0; N];
+            for part in parts {
+                sums.iter_mut().zip(of(k, part.depth_m)).for_each(|(sum, value)| *sum += part.share * value);
+            }
+            out.iter_mut().zip(sums).for_each(|(out, sum)| out[k] = sum);
+        }
+    }
+}
+
 /// Pressure on a row of cells at `y_m`: the law `pressure_of` of cell k at δ + τ δ′ where the body is below the
 /// surface.
 #[inline]
@@ -180,6 +236,7 @@ fn press(
     body: &PosedMesh<'_>,
     y_m: f64,
     [x_m, depth_m]: [&[f64]; 2],
+    shares: Shares<'_>,
     pressure_of: impl Fn(usize, f64) -> f64,
     pressure_pa: &mut [f64],
 ) {
@@ -190,6 +247,10 @@ fn press(
         let loaded_m = depth + (sink_m + slope * x);
         *p = pressure_of(k, if depth > 0.0 { loaded_m } else { 0.0 });
     }
+    shares.fill([pressure_pa], |k, depth| {
+        let loaded_m = depth + (sink_m + slope * x_m[k]);
+        [pressure_of(k, if depth > 0.0 { loaded_m } else { 0.0 })]
+    });
 }
 
 impl ContactField for WinklerLayer {

@@ -225,6 +225,10 @@ pub(crate) struct System {
     pub(crate) stiffness_pa_per_m: f64,
     /// Reciprocal of a cell's own coefficient, Pa/m.
     unit_pa_per_m: f64,
+    /// What single cells have of compliance besides, m/Pa, or none.
+    own_m_per_pa: Vec<f64>,
+    /// By what the inverse is scaled on both sides for it: (1 + own / coefficient)^−½, or none.
+    scale: Vec<f64>,
     input: Vec<f32>,
     output: Vec<f32>,
 }
@@ -265,14 +269,28 @@ impl System {
             inverse,
             stiffness_pa_per_m,
             unit_pa_per_m: scale,
+            own_m_per_pa: Vec::new(),
+            scale: Vec::new(),
             input: vec![0.0; cells],
             output: vec![0.0; cells],
         }
     }
 
+    /// Gives single cells a compliance besides the body's: one number a cell, m/Pa, or none at all.
+    pub(crate) fn set_own(&mut self, own_m_per_pa: impl Iterator<Item = f64>) {
+        self.own_m_per_pa.clear();
+        self.own_m_per_pa.extend(own_m_per_pa);
+        self.scale.clear();
+        let unit = self.unit_pa_per_m;
+        self.scale.extend(self.own_m_per_pa.iter().map(|own| (1.0 + own * unit).sqrt().recip()));
+    }
+
     /// displacement = C pressure.
     pub(crate) fn displace(&mut self, pressure: &[f64], displacement: &mut [f64]) {
         self.elastic.apply(pressure, displacement);
+        for ((u, p), own) in displacement.iter_mut().zip(pressure).zip(&self.own_m_per_pa) {
+            *u += own * p;
+        }
     }
 
     /// direction = mask · C⁻¹ residual.
@@ -284,10 +302,16 @@ impl System {
         for (to, from) in self.input.iter_mut().zip(residual) {
             *to = (from * inverse) as f32;
         }
+        for (to, scale) in self.input.iter_mut().zip(&self.scale) {
+            *to *= *scale as f32;
+        }
         let scale = largest * self.unit_pa_per_m;
         self.inverse.apply(&self.input, &mut self.output);
         for ((to, from), inside) in direction.iter_mut().zip(&self.output).zip(mask) {
             *to = f64::from(*from) * inside * scale;
+        }
+        for (to, scale) in direction.iter_mut().zip(&self.scale) {
+            *to *= scale;
         }
     }
 }

@@ -4,7 +4,7 @@
 use super::influence::{ElasticKernel, modulus_of_confined_pa};
 use super::solver::ElasticSolver;
 use crate::columns::WinklerLayer;
-use crate::envelope::Envelope;
+use crate::envelope::{Envelope, Part, split_cell};
 use crate::field::{ContactField, Patch, PosedMesh, Response, Wrench};
 use crate::foam::{Foam, Most, check_cells, parameter};
 use crate::prepared::PreparedMesh;
@@ -166,6 +166,8 @@ pub struct ElasticField {
     bulge: f64,
     patch: Patch,
     target_m: Vec<f64>,
+    /// Cells of the patch that are under the body in part, and their share.
+    shares: Vec<(usize, f64)>,
     /// On the patch, then on the whole skin.
     patch_pa: Vec<f64>,
     pressure_pa: Vec<f64>,
@@ -207,6 +209,7 @@ impl ElasticField {
             solver,
             patch: Patch::default(),
             target_m: Vec::new(),
+            shares: Vec::new(),
             patch_pa: Vec::new(),
             pressure_pa: vec![0.0; rows * cols],
             envelope,
@@ -279,7 +282,7 @@ impl ElasticField {
         self.aim(body, margin_m, shift_m);
         let body_m_per_pa = 1.0 / body.stiffness_pa_per_m;
         self.solver.set_series(body_m_per_pa);
-        if !self.solver.sink(self.patch, &self.target_m, c.tolerance).converged {
+        if !self.solver.sink_shares(self.patch, &self.target_m, &self.shares, c.tolerance).converged {
             let bound = c.tolerance;
             return self
                 .fail(format!("the elastic contact problem does not converge to `contact.tolerance` = {bound:e}"));
@@ -289,8 +292,11 @@ impl ElasticField {
         if c.densification == Some(true) {
             let law = c.foam().law(body.stiffness_pa_per_m);
             let m_per_pa = 1.0 / c.stiffness_pa_per_m + body_m_per_pa;
-            for p in &mut self.patch_pa {
-                *p = law.pressure_pa(*p * m_per_pa);
+            let mean = |p: f64, share: f64| share * law.pressure_pa(p / share * m_per_pa);
+            let mut shares = self.shares.iter().peekable();
+            for (cell, p) in self.patch_pa.iter_mut().enumerate() {
+                let share = shares.next_if(|(at, _)| *at == cell).map_or(1.0, |(_, share)| *share);
+                *p = mean(*p, share);
             }
         }
         Some(self.patch_pa.iter().sum::<f64>() * self.envelope.cell_m() * self.envelope.cell_m())
@@ -320,9 +326,17 @@ impl ElasticField {
         let width = self.envelope.shape()[1];
         let (com, tau_s) = (body.centre_of_mass_m, self.config.damping_s);
         self.target_m.clear();
-        for row in self.patch.rows[0]..self.patch.rows[1] {
-            for col in self.patch.cols[0]..self.patch.cols[1] {
-                let lowered_m = self.envelope.depth_m()[row * width + col];
+        self.shares.clear();
+        for (row, line) in (self.patch.rows[0]..).zip(self.patch.lines(width)) {
+            let mut parts = self.envelope.parts(&line);
+            for (col, cell) in (self.patch.cols[0]..).zip(line) {
+                let mut lowered_m = self.envelope.depth_m()[cell];
+                let own = split_cell(&mut parts, cell);
+                if !own.is_empty() {
+                    let (share, depth_m) = deepest(own, self.envelope.cell_m());
+                    self.shares.push((self.target_m.len(), share));
+                    lowered_m = depth_m;
+                }
                 if lowered_m <= 0.0 {
                     self.target_m.push(f64::NEG_INFINITY);
                     continue;
@@ -423,6 +437,15 @@ impl ElasticField {
             "no depth found at which the elastic skin carries {force_n:e} N; the last one carries {reached_n:e} N"
         ))
     }
+}
+
+/// Share and mean depth, m, of the parts of a cell that are less than a cell above the deepest: what is higher does not
+/// touch a surface that follows the deepest.
+fn deepest(parts: &[Part], cell_m: f64) -> (f64, f64) {
+    let deepest_m = parts.iter().map(|part| part.depth_m).fold(f64::NEG_INFINITY, f64::max);
+    let near = parts.iter().filter(|part| part.depth_m > deepest_m - cell_m);
+    let [share, moment] = near.fold([0.0; 2], |sum, p| [sum[0] + p.share, sum[1] + p.share * p.depth_m]);
+    (share.min(1.0), moment / share)
 }
 
 impl ContactField for ElasticField {

@@ -107,6 +107,8 @@ pub(crate) struct Level {
     pub(crate) cell_m: f64,
     influence: Arc<Influence>,
     series_m_per_pa: f64,
+    /// See [`Level::set_shares`]: one number a cell of the patch, or none.
+    own_m_per_pa: Vec<f64>,
     /// Ordered by use; the most recent one is last.
     systems: Vec<System>,
     fields: Fields,
@@ -125,6 +127,7 @@ impl Level {
             cell_m,
             influence,
             series_m_per_pa: 0.0,
+            own_m_per_pa: Vec::new(),
             systems: Vec::new(),
             fields: Fields::default(),
             target: Vec::new(),
@@ -148,17 +151,41 @@ impl Level {
         self.influence.bulge()
     }
 
-    fn system(&mut self, planners: &mut Planners, shape: [usize; 2]) -> usize {
+    /// Makes the system of a window of a patch `cols` wide the last one.
+    fn system(&mut self, planners: &mut Planners, cols: usize, window: Patch) {
+        let shape = window.shape();
         if let Some(index) = self.systems.iter().position(|s| s.shape == shape) {
             self.systems[index..].rotate_left(1);
-            return self.systems.len() - 1;
+        } else {
+            if self.systems.len() >= KEPT {
+                self.systems.remove(0);
+            }
+            self.systems.push(System::new(planners, &self.influence, shape, self.series_m_per_pa));
         }
-        if self.systems.len() >= KEPT {
-            self.systems.remove(0);
+        let own = &self.own_m_per_pa;
+        if let Some(system) = self.systems.last_mut() {
+            system.set_own(window.lines(cols).flat_map(|line| own.get(line).unwrap_or_default()).copied());
         }
-        let system = System::new(planners, &self.influence, shape, self.series_m_per_pa);
-        self.systems.push(system);
-        self.systems.len() - 1
+    }
+
+    /// Compliance that single cells of a patch have besides, for the share of them that is under the body.
+    ///
+    /// On a share c of a cell of side a the pressure p stands for p/c on a square of side √c a, whose own compliance is
+    /// C(√c a) with C(s) = 1/(1/(α s) + K): α s at the middle of a square on a half-space, α = 4 ln(1 + √2)/(π E*)
+    /// (K. L. Johnson, *Contact Mechanics* (1985), §3.3), and 1/K on a wide one on a layer.
+    pub(crate) fn set_shares(&mut self, kernel: &ElasticKernel, cells: usize, shares: &[(usize, f64)]) {
+        self.own_m_per_pa.clear();
+        if shares.is_empty() {
+            return;
+        }
+        self.own_m_per_pa.resize(cells, 0.0);
+        let per_m = 4.0 * (1.0 + std::f64::consts::SQRT_2).ln() / std::f64::consts::PI;
+        let square_m_per_pa = per_m * kernel.inverse_reduced_modulus_per_pa() * self.cell_m;
+        let (unit, wide) = (self.influence.at(0, 0), kernel.uniform_stiffness_pa_per_m() * square_m_per_pa);
+        for &(cell, share) in shares {
+            let growth = (1.0 + wide) / (share.sqrt() + share * wide);
+            self.own_m_per_pa[cell] = unit * (growth - 1.0) + self.series_m_per_pa * (1.0 / share - 1.0);
+        }
     }
 
     /// Solves on `window` of the patch, starting from `pressure` (and a contact set of its positive cells, or, where it
@@ -171,8 +198,8 @@ impl Level {
         goal: Goal,
         stop: Stop,
     ) -> Outcome {
-        let index = self.system(planners, window.shape());
-        let f = &mut self.fields;
+        self.system(planners, cols, window);
+        let (Some(system), f) = (self.systems.last_mut(), &mut self.fields) else { return Outcome::default() };
         f.resize(window.height() * window.width());
         window.cut(&self.target, cols, &mut f.target);
         window.cut(&self.pressure, cols, &mut f.pressure);
@@ -181,7 +208,7 @@ impl Level {
             *inside = if target.is_finite() && (!started || *p > 0.0) { 1.0 } else { 0.0 };
             *p *= *inside;
         }
-        let outcome = pcg::solve(&mut self.systems[index], f, goal, stop);
+        let outcome = pcg::solve(system, f, goal, stop);
         self.pressure.fill(0.0);
         window.paste(&f.pressure, &mut self.pressure, cols);
         self.displacement.clear();
@@ -194,11 +221,11 @@ impl Level {
     /// Completes the displacement on `window`, at the price of a convolution.
     pub(crate) fn complete(&mut self, planners: &mut Planners, cols: usize, window: Patch) {
         if self.known != window {
-            let index = self.system(planners, window.shape());
-            let f = &mut self.fields;
+            self.system(planners, cols, window);
+            let (Some(system), f) = (self.systems.last_mut(), &mut self.fields) else { return };
             f.resize(window.height() * window.width());
             window.cut(&self.pressure, cols, &mut f.pressure);
-            self.systems[index].displace(&f.pressure, &mut f.displacement);
+            system.displace(&f.pressure, &mut f.displacement);
             window.paste(&f.displacement, &mut self.displacement, cols);
             self.known = window;
         }
@@ -452,6 +479,7 @@ fn finite_dot(pressure: &[f64], target: &[f64]) -> f64 {
 /// assert!(outcome.converged && (outcome.approach_m / hertz_m - 1.0).abs() < 5e-3);
 /// ```
 pub struct ElasticSolver {
+    kernel: ElasticKernel,
     shape: [usize; 2],
     planners: Planners,
     levels: Vec<Level>,
@@ -472,7 +500,7 @@ impl ElasticSolver {
     pub fn new(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
         let tables = tables(kernel, shape, cell_m);
         let levels = tables.iter().map(|(influence, side_m)| Level::new(Arc::clone(influence), *side_m)).collect();
-        Self { shape, planners: Planners::new(), levels, memory: Memory::default() }
+        Self { kernel, shape, planners: Planners::new(), levels, memory: Memory::default() }
     }
 
     /// Rise of the surface beside a wide load relative to the depression under it; see [`Influence::bulge`].
@@ -515,6 +543,18 @@ impl ElasticSolver {
     /// # Panics
     /// If `target_m` does not have one value for each square of the patch.
     pub fn sink(&mut self, patch: Patch, target_m: &[f64], tolerance: f64) -> Outcome {
+        self.sink_shares(patch, target_m, &[], tolerance)
+    }
+
+    /// As [`ElasticSolver::sink`], with the share of some squares of the patch that is under the body; the pressure is
+    /// the mean over the square.
+    pub(crate) fn sink_shares(
+        &mut self,
+        patch: Patch,
+        target_m: &[f64],
+        shares: &[(usize, f64)],
+        tolerance: f64,
+    ) -> Outcome {
         let shape = patch.shape();
         assert_eq!(target_m.len(), shape[0] * shape[1], "one displacement a cell of the patch");
         let fits = (0..2).all(|i| (1..=self.shape[i]).contains(&shape[i]));
@@ -525,6 +565,7 @@ impl ElasticSolver {
         let top = &mut self.levels[0];
         top.target.clear();
         top.target.extend_from_slice(target_m);
+        top.set_shares(&self.kernel, target_m.len(), shares);
         let warm = self.memory.start(patch, target_m, &mut top.pressure);
         let mut outcome = if warm {
             self.on_window(0, shape, Patch::whole(shape), None, tolerance)
@@ -573,6 +614,7 @@ impl ElasticSolver {
             return self.free(height_m.len(), false);
         }
         let top = &mut self.levels[0];
+        top.set_shares(&self.kernel, height_m.len(), &[]);
         top.target.clear();
         top.target.extend(height_m.iter().map(|h| -h));
         self.nested(0, self.shape, Some(force_n), tolerance)

@@ -3,15 +3,21 @@
 use crate::field::{Patch, PosedMesh};
 use crate::mesh::TriMesh;
 use crate::prepared::{BLOCK, Block, PreparedMesh};
+use parts::Parts;
+pub(crate) use parts::{Part, split_cell};
 use raster::{Cells, Raster, least};
 use spts_models::SkinLayout;
+use std::ops::Range;
 
+mod parts;
 mod raster;
 #[cfg(test)]
 mod tests;
 
 /// Depth below the skin's free surface, sampled at the centres of fine cells: the deepest point of the mesh above each
-/// centre, exact for the triangle mesh. Holes and concave undersides need no special care.
+/// centre, exact for the triangle mesh. Holes and concave undersides need no special care. Cells in which the surface
+/// ends, or turns within less than a cell, have parts instead ([`Part`]): a cell that a body covers in part counts in
+/// part, and what lies between the centres is not missed.
 ///
 /// Heights are taken relative to the body's origin and its own height is added last. A body that comes again with the
 /// same rotation and place (bit for bit) therefore gets the very same depths from a map kept of it, which is made at
@@ -20,6 +26,8 @@ mod tests;
 pub(crate) struct Envelope {
     raster: Raster,
     depth_m: Vec<f64>,
+    /// Parts below the surface, in the order of cells.
+    parts: Vec<Part>,
     touched: Patch,
     known: KnownBody,
 }
@@ -28,6 +36,8 @@ pub(crate) struct Envelope {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct KnownBody {
     blocks: Blocks,
+    /// Those of the last stand that was looked at without a map.
+    parts: Parts,
     stand: Stand,
     map: HeightMap,
 }
@@ -43,6 +53,7 @@ impl Envelope {
         Self {
             depth_m: vec![0.0; raster.rows * raster.cols],
             raster,
+            parts: Vec::new(),
             touched: Patch::default(),
             known: KnownBody::default(),
         }
@@ -63,9 +74,26 @@ impl Envelope {
         self.raster.centre_m(row, col)
     }
 
-    /// Depth below the free surface, m, row-major; 0 where nothing dips below it.
+    /// Depth below the free surface, m, row-major; 0 where nothing dips below it. Of a cell with parts it is that of the
+    /// deepest.
     pub(crate) fn depth_m(&self) -> &[f64] {
         &self.depth_m
+    }
+
+    /// The parts below the free surface of the cells of a line, cell by cell.
+    pub(crate) fn parts(&self, line: &Range<usize>) -> &[Part] {
+        within(&self.parts, line)
+    }
+
+    /// Whether the last body without a map has a rim in a cell.
+    #[cfg(test)]
+    pub(crate) fn has_parts(&self, cell: usize) -> bool {
+        self.known.parts.marked().contains(&cell)
+    }
+
+    /// Where a part is, (x, y), m.
+    pub(crate) fn place_m(&self, part: &Part) -> [f64; 2] {
+        self.raster.place_m(part.place)
     }
 
     /// Rasterises the parts of `body` below z = 0 and returns the cells that may have a depth. Only the cells of the
@@ -76,6 +104,7 @@ impl Envelope {
             self.depth_m[line].fill(0.0);
         }
         self.touched = Patch::default();
+        self.parts.clear();
         self.take(body);
         let (level_m, stand) = (-body.position_m[2], stand(body));
         let again = self.known.stand == stand;
@@ -84,7 +113,7 @@ impl Envelope {
             let depth_m = level_m - self.known.blocks.lowest_m(up);
             if depth_m > 0.0 {
                 let reach_m = level_m + depth_m.max(REACH_M);
-                self.known.map.make(&self.raster, &mut self.known.blocks, body, reach_m);
+                self.known.make_map(&self.raster, body, reach_m);
             }
         }
         self.known.stand = stand;
@@ -99,9 +128,29 @@ impl Envelope {
         self.touched
     }
 
-    /// Replaces every depth beyond `thickness_m` by `depth_m` of the cell's centre (x, y), m; whether one is left.
+    /// Cells with parts have the depth of the deepest.
+    fn place_parts(&mut self) {
+        for part in &self.parts {
+            self.depth_m[part.cell] = 0.0;
+        }
+        let cols = self.raster.cols;
+        for part in &self.parts {
+            let depth_m = &mut self.depth_m[part.cell];
+            *depth_m = depth_m.max(part.depth_m);
+            let (row, col) = (part.cell / cols, part.cell % cols);
+            self.touched.include(Patch { rows: [row, row + 1], cols: [col, col + 1] });
+        }
+    }
+
+    /// Replaces every depth beyond `thickness_m` by `depth_m` of the cell's centre, or the part's, (x, y), m; whether
+    /// one is left.
     pub(crate) fn deeper_than(&mut self, thickness_m: f64, depth_m: impl Fn([f64; 2]) -> f64) -> bool {
         let mut deeper = false;
+        for part in &mut self.parts {
+            if part.depth_m > thickness_m {
+                part.depth_m = depth_m(self.raster.place_m(part.place));
+            }
+        }
         for (row, line) in (self.touched.rows[0]..).zip(self.touched.lines(self.raster.cols)) {
             for (col, depth) in (self.touched.cols[0]..).zip(&mut self.depth_m[line]) {
                 if *depth > thickness_m {
@@ -110,20 +159,26 @@ impl Envelope {
                 }
             }
         }
-        deeper
+        self.place_parts();
+        deeper || self.parts.iter().any(|part| part.depth_m > thickness_m)
     }
 
     /// Makes [`Envelope::map`] the map of the whole underside of `body`, whatever its height, unless it is already.
     pub(crate) fn make_map(&mut self, body: &PosedMesh<'_>) {
         self.take(body);
         if !self.known.map.serves(&stand(body), f64::INFINITY) {
-            self.known.map.make(&self.raster, &mut self.known.blocks, body, f64::INFINITY);
+            self.known.make_map(&self.raster, body, f64::INFINITY);
         }
     }
 
     /// The map made last.
     pub(crate) fn map(&self) -> &HeightMap {
         &self.known.map
+    }
+
+    /// The parts of the map's cells in a line, with depths below the body's origin.
+    pub(crate) fn map_parts(&self, line: &Range<usize>) -> &[Part] {
+        within(&self.known.map.parts.list, line)
     }
 
     /// Makes the mesh of `body` the present one. With another mesh the map goes.
@@ -148,13 +203,24 @@ impl Envelope {
 
     /// Adds every triangle that dips below `level_m` above the origin.
     fn add_below(&mut self, body: &PosedMesh<'_>, level_m: f64) {
+        let KnownBody { blocks, parts, .. } = &mut self.known;
         let mut cells = Cells { values: &mut self.depth_m, origin: [0, 0], stride: self.raster.cols, level_m };
         let (raster, touched) = (&self.raster, &mut self.touched);
-        self.known.blocks.below(raster, body, level_m, |corners| {
-            if let Some(patch) = raster.add(&mut cells, corners) {
+        let reach_m = blocks.begin(parts, raster, body, level_m);
+        blocks.below(raster, body, reach_m, |corners, low_m| {
+            parts.add(raster, corners);
+            if low_m < level_m
+                && let Some(patch) = raster.add(&mut cells, corners)
+            {
                 touched.include(patch);
             }
         });
+        parts.finish();
+        for cell in parts.marked() {
+            self.depth_m[*cell] = 0.0;
+        }
+        self.parts.extend(below(&parts.list, level_m));
+        self.place_parts();
     }
 
     /// Depths out of the map for an origin `level_m` below the free surface.
@@ -174,10 +240,27 @@ impl Envelope {
             self.touched
                 .include(Patch { rows: [row, row + 1], cols: [patch.cols[0] + first, patch.cols[0] + last + 1] });
         }
+        self.parts.extend(below(&self.known.map.parts.list, level_m));
     }
 }
 
+/// The parts that lie below a level above the body's origin, by their depths below it.
+fn below(parts: &[Part], level_m: f64) -> impl Iterator<Item = Part> {
+    let lowered = parts.iter().map(move |part| Part { depth_m: level_m + part.depth_m, ..*part });
+    lowered.filter(|part| part.depth_m > 0.0)
+}
+
+/// The parts of the cells of a line.
+fn within<'a>(parts: &'a [Part], line: &Range<usize>) -> &'a [Part] {
+    let first = parts.partition_point(|part| part.cell < line.start);
+    let count = parts[first..].partition_point(|part| part.cell < line.end);
+    &parts[first..first + count]
+}
+
 // A mesh divided into blocks of neighbouring triangles, so that whole blocks above the skin can be skipped.
+
+/// A rim whose surface turns on a radius below this many cells is too sharp for samples at the cells' centres.
+const FINE: f64 = 0.5;
 
 /// Round-off of a block's lowest height, m: a block this close is looked at.
 const MARGIN_M: f64 = 1e-12;
@@ -215,13 +298,44 @@ impl Blocks {
         blocks.map(|b| b.lowest_m(up)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Calls `each` with the corners, (column, row, height above the body's origin in m), of every triangle that dips
-    /// below `level_m` above the origin and may be the lowest somewhere.
+    /// Height of the lowest point above the body's origin, m; infinite without one.
+    fn lowest_point_m(&self, up: [f64; 3]) -> f64 {
+        let (mut lowest_m, sorted) = (f64::INFINITY, self.mesh.sorted());
+        for block in &sorted.blocks {
+            if block.lowest_m(up) < lowest_m {
+                let heights = sorted.points_m[block.points.clone()].iter().map(|p| dot(up, p));
+                lowest_m = heights.fold(lowest_m, f64::min);
+            }
+        }
+        lowest_m
+    }
+
+    /// Begins the `parts` of `body` below `level_m` above its origin, with the cells through which its rims go. Returns
+    /// the level below which triangles belong to them.
+    fn begin(&self, parts: &mut Parts, raster: &Raster, body: &PosedMesh<'_>, level_m: f64) -> f64 {
+        parts.forget();
+        let [_, _, up] = body.rotation;
+        let lowest_m = self.lowest_point_m(up);
+        if lowest_m < level_m {
+            let to_cells = ToCells::of(raster, body);
+            let sorted = self.mesh.sorted();
+            for block in sorted.blocks.iter().filter(|block| block.lowest_m(up) < level_m) {
+                for rim in &sorted.rims[block.rims.clone()] {
+                    if rim.radius_m < FINE * raster.cell_m {
+                        parts.mark(raster, rim.ends_m.map(|p| to_cells.place(&p)));
+                    }
+                }
+            }
+        }
+        parts.begin(raster, lowest_m, level_m)
+    }
+
+    /// Calls `each` with the corners, (column, row, height above the body's origin in m), and the lowest height of every
+    /// triangle that dips below `level_m` above the origin and may be the lowest somewhere.
     #[inline]
-    fn below(&mut self, raster: &Raster, body: &PosedMesh<'_>, level_m: f64, mut each: impl FnMut([[f64; 3]; 3])) {
-        let ([x, y, up], [px, py, _], per_m) = (body.rotation, body.position_m, 1.0 / raster.cell_m);
-        let (u, v) = (x.map(|x| x * per_m), y.map(|y| -y * per_m));
-        let [u0, v0] = raster.cells([px, py]);
+    fn below(&mut self, raster: &Raster, body: &PosedMesh<'_>, level_m: f64, mut each: impl FnMut([[f64; 3]; 3], f64)) {
+        let [_, _, up] = body.rotation;
+        let to_cells = ToCells::of(raster, body);
         let sorted = self.mesh.sorted();
         for block in &sorted.blocks {
             // not ≥: a pose that is not a number is not passed over
@@ -229,18 +343,39 @@ impl Blocks {
                 continue;
             }
             for (corner, p) in self.corners.iter_mut().zip(&sorted.points_m[block.points.clone()]) {
-                *corner = [dot(u, p) + u0, dot(v, p) + v0, dot(up, p)];
+                *corner = to_cells.place(p);
             }
             for &[i, j, k] in &sorted.triangles[block.triangles.clone()] {
                 let corners = [i, j, k].map(|i| self.corners[i as usize]);
                 if sorted.solid && faces_up(corners) {
                     continue;
                 }
-                if least([corners[0][2], corners[1][2], corners[2][2]]) < level_m {
-                    each(corners);
+                let low_m = least([corners[0][2], corners[1][2], corners[2][2]]);
+                if low_m < level_m {
+                    each(corners, low_m);
                 }
             }
         }
+    }
+}
+
+/// Points of a body in the coordinates of a grid: column, row, and height above the body's origin in m.
+struct ToCells {
+    u: [f64; 3],
+    v: [f64; 3],
+    up: [f64; 3],
+    origin: [f64; 2],
+}
+
+impl ToCells {
+    fn of(raster: &Raster, body: &PosedMesh<'_>) -> Self {
+        let ([x, y, up], [px, py, _], per_m) = (body.rotation, body.position_m, 1.0 / raster.cell_m);
+        Self { u: x.map(|x| x * per_m), v: y.map(|y| -y * per_m), up, origin: raster.cells([px, py]) }
+    }
+
+    #[inline]
+    fn place(&self, p: &[f64; 3]) -> [f64; 3] {
+        [dot(self.u, p) + self.origin[0], dot(self.v, p) + self.origin[1], dot(self.up, p)]
     }
 }
 
@@ -281,6 +416,7 @@ pub(crate) struct HeightMap {
     reach_m: f64,
     patch: Patch,
     drop_m: Vec<f64>,
+    parts: Parts,
     /// Scratch: triangles over cells, with the cells of their boxes.
     triangles: Vec<(Patch, [[f64; 3]; 3])>,
 }
@@ -292,7 +428,52 @@ impl Default for HeightMap {
             reach_m: f64::NEG_INFINITY,
             patch: Patch::default(),
             drop_m: Vec::new(),
+            parts: Parts::default(),
             triangles: Vec::new(),
+        }
+    }
+}
+
+impl KnownBody {
+    /// Makes the map of `body`, whose mesh this is, below `reach_m` above its origin.
+    fn make_map(&mut self, raster: &Raster, body: &PosedMesh<'_>, reach_m: f64) {
+        let (blocks, map) = (&mut self.blocks, &mut self.map);
+        let parts = &mut map.parts;
+        (map.stand, map.reach_m, map.patch) = (stand(body), reach_m, Patch::default());
+        map.triangles.clear();
+        let parts_reach_m = blocks.begin(parts, raster, body, reach_m);
+        blocks.below(raster, body, parts_reach_m, |corners, low_m| {
+            parts.add(raster, corners);
+            if low_m < reach_m
+                && let Some(span) = raster.span(corners)
+            {
+                map.patch.include(span);
+                map.triangles.push((span, corners));
+            }
+        });
+        parts.finish();
+        let place = |cell: usize| [cell / raster.cols, cell % raster.cols];
+        for [row, col] in parts.list.iter().map(|part| place(part.cell)) {
+            map.patch.include(Patch { rows: [row, row + 1], cols: [col, col + 1] });
+        }
+        let (patch, width) = (map.patch, map.patch.width());
+        map.drop_m.clear();
+        map.drop_m.resize(patch.height() * width, f64::NEG_INFINITY);
+        let origin = [patch.rows[0], patch.cols[0]];
+        let mut cells = Cells { values: &mut map.drop_m, origin, stride: width, level_m: 0.0 };
+        for (span, corners) in &map.triangles {
+            raster.fill(&mut cells, *span, *corners);
+        }
+        let number = |[row, col]: [usize; 2]| (row - patch.rows[0]) * width + col - patch.cols[0];
+        let holds = |[row, col]: [usize; 2]| {
+            (patch.rows[0]..patch.rows[1]).contains(&row) && (patch.cols[0]..patch.cols[1]).contains(&col)
+        };
+        for at in parts.marked().iter().map(|cell| place(*cell)).filter(|at| holds(*at)) {
+            map.drop_m[number(at)] = f64::NEG_INFINITY;
+        }
+        for part in &parts.list {
+            let drop_m = &mut map.drop_m[number(place(part.cell))];
+            *drop_m = drop_m.max(part.depth_m);
         }
     }
 }
@@ -301,29 +482,6 @@ impl HeightMap {
     /// Whether this is the map at `stand`, complete below `level_m`.
     fn serves(&self, stand: &Stand, level_m: f64) -> bool {
         level_m <= self.reach_m && self.stand == *stand
-    }
-
-    /// Makes it the map of `body`, whose mesh is in `blocks`, below `reach_m` above its origin.
-    fn make(&mut self, raster: &Raster, blocks: &mut Blocks, body: &PosedMesh<'_>, reach_m: f64) {
-        (self.stand, self.reach_m, self.patch) = (stand(body), reach_m, Patch::default());
-        self.triangles.clear();
-        blocks.below(raster, body, reach_m, |corners| {
-            if let Some(span) = raster.span(corners) {
-                self.patch.include(span);
-                self.triangles.push((span, corners));
-            }
-        });
-        self.drop_m.clear();
-        self.drop_m.resize(self.patch.height() * self.patch.width(), f64::NEG_INFINITY);
-        let mut cells = Cells {
-            values: &mut self.drop_m,
-            origin: [self.patch.rows[0], self.patch.cols[0]],
-            stride: self.patch.width(),
-            level_m: 0.0,
-        };
-        for (span, corners) in &self.triangles {
-            raster.fill(&mut cells, *span, *corners);
-        }
     }
 
     /// The cells it covers.

@@ -15,7 +15,7 @@ pub(super) struct Raster {
     first_m: [f64; 2],
     /// Tolerance outside an edge up to which a centre counts as inside, as distance × length (twice an area, cells²),
     /// so that no centre falls between two triangles through round-off.
-    slack: f64,
+    pub(super) slack: f64,
 }
 
 /// Values on a rectangle of cells; each keeps the largest it gets.
@@ -58,6 +58,11 @@ impl Raster {
     /// Centre (x, y) of a cell, m.
     pub(super) fn centre_m(&self, row: usize, col: usize) -> [f64; 2] {
         [self.first_m[0] + col as f64 * self.cell_m, self.first_m[1] - row as f64 * self.cell_m]
+    }
+
+    /// World (x, y) of a place in cells, m.
+    pub(super) fn place_m(&self, [u, v]: [f64; 2]) -> [f64; 2] {
+        [self.first_m[0] + u * self.cell_m, self.first_m[1] - v * self.cell_m]
     }
 
     /// World (x, y), m, in cells.
@@ -226,13 +231,13 @@ pub(super) fn least([a, b, c]: [f64; 3]) -> f64 {
 }
 
 #[inline]
-fn most([a, b, c]: [f64; 3]) -> f64 {
+pub(super) fn most([a, b, c]: [f64; 3]) -> f64 {
     let ab = if a > b { a } else { b };
     if ab > c { ab } else { c }
 }
 
 /// Twice the signed area of the triangle (a, b, p), cells².
 #[inline]
-fn cross(a: [f64; 3], b: [f64; 3], p: [f64; 2]) -> f64 {
+pub(super) fn cross(a: [f64; 3], b: [f64; 3], p: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
 }

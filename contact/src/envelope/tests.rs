@@ -1,14 +1,16 @@
 //! The rasterised envelope against every triangle of arbitrary meshes, and against itself when a pose comes again.
 
-use super::Envelope;
+use super::{Envelope, Part};
 use crate::field::PosedMesh;
 use crate::mesh::polygon::{Point, circle, rectangle};
 use crate::mesh::{TriMesh, cuboid, cylinder, extrude, extrude_recessed, revolve_ring, sphere};
 use crate::objects::OBJECTS;
+use approx::assert_relative_eq;
 use nalgebra::{Rotation3, Unit, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use spts_models::SkinLayout;
+use std::f64::consts::TAU;
 
 /// A solid is seen by its lower side alone, a surface that is open or inside out by all of it: the same depths, since
 /// the sides that are left out are never the lowest.
@@ -119,7 +121,8 @@ const ROUND_OFF_M: f64 = 1e-12;
 const NEAR_M: f64 = 1e-9;
 
 /// At every centre the depth is that of the surface: where the brute force is the same all around the centre, to
-/// round-off; on edges and walls between the deepest point of the neighbourhood and the point itself.
+/// round-off; on edges and walls between the deepest point of the neighbourhood and the point itself. Over a cell with
+/// parts, ∫ depth dA is that of the surface.
 fn check(mesh: &TriMesh, rotation: [[f64; 3]; 3], position_m: [f64; 3], cells: usize) -> Result<(), TestCaseError> {
     let body = PosedMesh { rotation, ..PosedMesh::at_rest(mesh, position_m) };
     let mut envelope = Envelope::new(&SkinLayout::default(), cells);
@@ -130,16 +133,25 @@ fn check(mesh: &TriMesh, rotation: [[f64; 3]; 3], position_m: [f64; 3], cells: u
     for row in 0..rows {
         for col in 0..cols {
             let centre = envelope.centre_m(row, col);
-            let found = moving[row * cols + col];
+            let cell = row * cols + col;
+            let found = moving[cell];
+            let inside = (patch.rows[0]..patch.rows[1]).contains(&row) && (patch.cols[0]..patch.cols[1]).contains(&col);
+            prop_assert!(found <= 0.0 || inside);
             let depth = |z: Option<f64>| z.map_or(0.0, |z| (-z).max(0.0));
+            let parts = envelope.parts(&(cell..cell + 1));
+            if !parts.is_empty() {
+                parts_check(&world, envelope.cell_m(), centre, parts)?;
+                continue;
+            }
+            if envelope.has_parts(cell) {
+                continue;
+            }
             let exact = depth(world.underside_m(centre));
             let most = depth(lowest_near_m(&world, centre, NEAR_M));
             prop_assert!(
                 found >= exact - ROUND_OFF_M - 1e-6 * (most - exact) && found <= most + ROUND_OFF_M,
                 "({row}, {col}): {found:e}, brute force {exact:e} to {most:e}"
             );
-            let inside = (patch.rows[0]..patch.rows[1]).contains(&row) && (patch.cols[0]..patch.cols[1]).contains(&col);
-            prop_assert!(found <= 0.0 || inside);
         }
     }
     // the same pose again comes out of the height map, at the same height and at others
@@ -154,8 +166,58 @@ fn check(mesh: &TriMesh, rotation: [[f64; 3]; 3], position_m: [f64; 3], cells: u
             let inside = (patch.rows[0]..patch.rows[1]).contains(&row) && (patch.cols[0]..patch.cols[1]).contains(&col);
             prop_assert!(*a <= 0.0 || inside);
         }
+        let all = 0..rows * cols;
+        prop_assert!(envelope.parts(&all) == fresh.parts(&all));
     }
     Ok(())
+}
+
+/// ∫ depth dA over a cell by its parts against samples of the surface, as a mean over the cell: samples miss the border
+/// of what is under the body by half their distance, at two borders; a part, a quarter of a cell high, that reaches
+/// above the skin counts with its mean; and layers that lie above each other in part count as if they did not.
+fn parts_check(world: &TriMesh, cell_m: f64, [x, y]: Point, parts: &[Part]) -> Result<(), TestCaseError> {
+    const SIDE: u32 = 12;
+    let at = |i: u32| cell_m * ((f64::from(i) + 0.5) / f64::from(SIDE) - 0.5);
+    let (mut sum_m, mut deepest_m) = (0.0, 0.0_f64);
+    for (i, j) in (0..SIDE).flat_map(|i| (0..SIDE).map(move |j| (i, j))) {
+        let depth_m = world.underside_m([x + at(i), y + at(j)]).map_or(0.0, |z| (-z).max(0.0));
+        sum_m += depth_m / f64::from(SIDE * SIDE);
+        deepest_m = deepest_m.max(depth_m);
+    }
+    let found_m: f64 = parts.iter().map(|part| part.share * part.depth_m).sum();
+    deepest_m = parts.iter().map(|part| part.depth_m).fold(deepest_m, f64::max);
+    let most_m = 0.15 * deepest_m + cell_m / 32.0;
+    prop_assert!((found_m - sum_m).abs() < most_m, "{found_m:e} by parts, {sum_m:e} by samples: {parts:?}");
+    Ok(())
+}
+
+/// A pin smaller than a cell, a blade thinner than one and a block, flat and upright, have their own area under them
+/// wherever they are: the parts sum to it, to round-off.
+#[test]
+fn shares_sum_to_the_area() {
+    let skin = SkinLayout::default();
+    let bodies = [
+        (cylinder(0.5e-3, 0.02, 48), 24.0 * (TAU / 48.0).sin() * 0.25e-6),
+        (cuboid([1e-3, 60e-3, 10e-3]), 60e-6),
+        (cuboid([40e-3, 40e-3, 10e-3]), 1.6e-3),
+    ];
+    for (mesh, area_m2) in bodies {
+        let low_m = mesh.bounds().unwrap().0[2];
+        for k in 0..40_u8 {
+            let mut envelope = Envelope::new(&skin, 4);
+            let (x, y) = (1e-4 * f64::from(k), 0.37e-4 * f64::from(k));
+            envelope.rasterise(&PosedMesh::at_rest(&mesh, [x, y, -low_m - 1e-3]));
+            let [rows, cols] = envelope.shape();
+            let mut cells = 0.0;
+            for cell in 0..rows * cols {
+                let parts = envelope.parts(&(cell..cell + 1));
+                let whole = if envelope.depth_m()[cell] > 0.0 { 1.0 } else { 0.0 };
+                cells += if parts.is_empty() { whole } else { parts.iter().map(|part| part.share).sum() };
+                assert!(parts.iter().all(|part| (part.depth_m - 1e-3).abs() < ROUND_OFF_M), "{area_m2} {parts:?}");
+            }
+            assert_relative_eq!(cells * envelope.cell_m().powi(2), area_m2, max_relative = 1e-9);
+        }
+    }
 }
 
 fn any_mesh(kind: usize, a: f64, b: f64) -> TriMesh {

@@ -23,5 +23,5 @@ pub use check::{MeshError, MeshOptions, MeshReport, Repair, checked};
 pub use decimate::MAX_DECIMATION_ERROR_M;
 pub use files::{load, read_glb, read_obj, read_stl, unknown_extension};
 pub use solid::{cuboid, cylinder, extrude, extrude_recessed, revolve, revolve_ring, sphere};
-pub(crate) use tri_mesh::span;
 pub use tri_mesh::{MAX_EXTENT_M, MAX_FILE_BYTES, MIN_EXTENT_M, SOFT_MAX_TRIANGLES, TriMesh};
+pub(crate) use tri_mesh::{Rim, span};

@@ -63,6 +63,18 @@ impl Side {
     }
 }
 
+/// An edge at which a surface turns or ends.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Rim {
+    pub(crate) ends_m: [[f64; 3]; 2],
+    /// Radius of the turn, m; 0 where the surface ends or turns by more than [`Rim::SHARP_RAD`].
+    pub(crate) radius_m: f64,
+}
+
+impl Rim {
+    const SHARP_RAD: f64 = 0.25 * std::f64::consts::PI;
+}
+
 /// All sides, those on one edge next to each other, in the order of their triangles.
 pub(super) struct Sides(Vec<Side>);
 
@@ -236,6 +248,40 @@ impl TriMesh {
         }
         let mut firsts = (0..).zip(&volumes_m3).filter(|(t, _)| parts.find(*t).0 == *t);
         firsts.all(|(_, volume_m3)| *volume_m3 > 0.0)
+    }
+
+    /// The edges at which the surface turns or ends, each with the number of one of its triangles, in their order.
+    pub(crate) fn rims(&self) -> Vec<(u32, Rim)> {
+        let sides = Sides::of(self);
+        let point = |i: u32| self.vertices[i as usize];
+        // vector along the normal, of twice the triangle's area
+        let normal = |t: u32| {
+            let [a, b, c] = self.triangles[t as usize].map(point);
+            cross(sub(b, a), sub(c, a))
+        };
+        let mut rims: Vec<_> = sides
+            .edges()
+            .filter_map(|edge| {
+                let ends_m = edge[0].edge.map(point);
+                let radius_m = match edge {
+                    [one, other] => {
+                        let (n, m) = (normal(one.triangle), normal(other.triangle));
+                        let (across, along) = (dot(cross(n, m), cross(n, m)).sqrt(), dot(n, m));
+                        let turn = across.atan2(if one.rising == other.rising { -along } else { along });
+                        let length_m = dot(sub(ends_m[0], ends_m[1]), sub(ends_m[0], ends_m[1])).sqrt();
+                        // heights of both triangles over the edge: the way on which the surface turns
+                        let way_m = 0.5 * (dot(n, n).sqrt() + dot(m, m).sqrt()) / length_m;
+                        let folded = turn >= Rim::SHARP_RAD || dot(n, n) <= 0.0 || dot(m, m) <= 0.0;
+                        if folded { 0.0 } else { way_m / turn }
+                    }
+                    _ => 0.0,
+                };
+                // a flat edge has no radius; one without a length is no edge
+                (radius_m < f64::INFINITY).then_some((edge[0].triangle, Rim { ends_m, radius_m }))
+            })
+            .collect();
+        rims.sort_by_key(|(triangle, _)| *triangle);
+        rims
     }
 
     /// Number of edges without a partner in the opposite direction: 0 for a closed, consistently oriented surface.

@@ -15,8 +15,8 @@ use proptest::test_runner::RngSeed;
 use spts_models::SkinLayout;
 use std::f64::consts::{PI, TAU};
 
-/// On a flat skin it is `winkler`: same points, same law, so the same pressures and wrench but for round-off, for all
-/// objects, turned, tilted and moving. Depths are good to 1e-15 m of some mm; a cell on a silhouette, within 1e-9 m of
+/// On a flat skin it is `winkler`: same points, same law, so the same pressures but for round-off, for all objects,
+/// turned, tilted and moving, on cells without a rim; and the same wrench for a ball, which has none. Depths are good to 1e-15 m of some mm; a cell on a silhouette, within 1e-9 m of
 /// it, may fall on either side: none does at these poses.
 #[test]
 fn a_flat_skin_is_winkler() {
@@ -24,8 +24,8 @@ fn a_flat_skin_is_winkler() {
     let points = SurfacePoints::flat(&skin, 6).unwrap();
     let mut curved = SurfaceField::new(Foam::default(), points).unwrap();
     let mut flat = WinklerLayer::new(Foam::default(), &skin).unwrap();
-    for (object, k) in OBJECTS.iter().zip(1_u8..) {
-        let mesh = (object.build)();
+    let objects = OBJECTS.iter().map(|object| (object.name, (object.build)()));
+    for ((name, mesh), k) in objects.chain([("ball", sphere(0.03, 24, 48))]).zip(1_u8..) {
         let turn = f64::from(k);
         let rotation = Rotation3::from_euler_angles(0.01, -0.015, turn);
         let body = PosedMesh {
@@ -46,14 +46,26 @@ fn a_flat_skin_is_winkler() {
         let wrench = curved.press(&Solid::new(&mesh), &body);
         let wanted = flat.respond(&body);
         let most_pa = wanted.pressure_pa.iter().copied().fold(0.0, f64::max);
-        assert!(most_pa > 1e3, "{}", object.name);
-        for (found, wanted) in curved.pressure_pa().iter().zip(wanted.pressure_pa) {
-            assert!((found - wanted).abs() < 1e-9 * most_pa, "{}: {found} {wanted}", object.name);
+        assert!(most_pa > 1e3, "{name}");
+        let (size_n, wanted_pa) = (wanted.wrench.force_n[2], wanted.pressure_pa.to_vec());
+        let wanted = wanted.wrench;
+        let mut alike = 0;
+        for (cell, (found, wanted)) in curved.pressure_pa().iter().zip(wanted_pa).enumerate() {
+            if flat.has_parts(cell) {
+                continue;
+            }
+            assert!((found - wanted).abs() < 1e-9 * most_pa, "{name}: {found} {wanted}");
+            alike += usize::from(wanted > 0.0);
         }
-        let size_n = wanted.wrench.force_n[2];
+        // the rest is rims
+        assert!((wrench.force_n[2] - size_n).abs() < 0.1 * size_n, "{name}");
+        if name != "ball" {
+            continue;
+        }
+        assert!(alike > 30);
         for i in 0..3 {
-            assert!((wrench.force_n[i] - wanted.wrench.force_n[i]).abs() < 1e-10 * size_n);
-            assert!((wrench.torque_nm[i] - wanted.wrench.torque_nm[i]).abs() < 1e-10 * size_n);
+            assert!((wrench.force_n[i] - wanted.force_n[i]).abs() < 1e-10 * size_n);
+            assert!((wrench.torque_nm[i] - wanted.torque_nm[i]).abs() < 1e-10 * size_n);
         }
     }
 }

@@ -1,0 +1,318 @@
+//! Cells that a body covers in part, or whose surface turns within the cell.
+
+use super::raster::{Raster, cross, least, most};
+
+/// Part of a cell under a body.
+///
+/// Where the surface is smooth, its height at a cell's centre stands for the cell. At the rims of a body it does not:
+/// there a cell has parts, each with its share of the cell's area and its mean height. The sum of share × pressure over
+/// the parts is the cell's mean pressure, so the pressure map moves smoothly with the body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Part {
+    /// Row × columns + column.
+    pub(crate) cell: usize,
+    /// Share of the cell's area; those of a cell sum to at most 1.
+    pub(crate) share: f64,
+    /// How far the part lies below the level from which depths count, m.
+    pub(crate) depth_m: f64,
+    /// Its centroid, (column, row) in cells.
+    pub(super) place: [f64; 2],
+}
+
+/// Takes the parts of a cell off the front of those of a line.
+pub(crate) fn split_cell<'a>(parts: &mut &'a [Part], cell: usize) -> &'a [Part] {
+    let count = parts.iter().take_while(|part| part.cell == cell).count();
+    let (own, rest) = parts.split_at(count);
+    *parts = rest;
+    own
+}
+
+/// The parts of a body at a stand.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Parts {
+    /// Cells that have parts, in order.
+    marked: Vec<usize>,
+    /// Height of the lowest point, m, from which bins of heights count, and the height of an even bin.
+    lowest_m: f64,
+    bin_m: f64,
+    pieces: Vec<Piece>,
+    /// In the order of cells, the lowest of each first; depths are below the body's origin.
+    pub(super) list: Vec<Part>,
+}
+
+/// What a triangle has of a cell in one bin of heights: area, and integrals of height, column and row over it.
+#[derive(Debug, Clone, Copy)]
+struct Piece {
+    cell: usize,
+    bin: u32,
+    order: u32,
+    sums: [f64; 4],
+}
+
+/// Heights are told apart by bins. The lowest is 2⁻¹² of a cell high; from there on each is as high as all before it up
+/// to a quarter of a cell; then they are even, and from 16 cells on, where no foam reaches, as high as all before again.
+const EVEN_BIN: f64 = 0.25;
+const LOWER_BINS: u32 = 10;
+const EVEN_BINS: u32 = 64;
+/// Parts smaller than this share of a cell are round-off.
+const LEAST_SHARE: f64 = 1e-9;
+/// Corners of a triangle that is cut by the four sides of a cell and by a height.
+const MOST_CORNERS: usize = 9;
+
+impl Parts {
+    /// Begins with the cells that the surface turns in, for a body whose lowest point is at `lowest_m`. Returns how high
+    /// a triangle may begin and still belong to a part below `level_m`.
+    pub(super) fn begin(&mut self, raster: &Raster, lowest_m: f64, level_m: f64) -> f64 {
+        self.marked.sort_unstable();
+        self.marked.dedup();
+        self.pieces.clear();
+        self.list.clear();
+        (self.lowest_m, self.bin_m) = (lowest_m, EVEN_BIN * raster.cell_m);
+        if self.marked.is_empty() || !level_m.is_finite() {
+            return level_m;
+        }
+        lowest_m + self.top_m(self.bin(level_m - lowest_m))
+    }
+
+    pub(super) fn forget(&mut self) {
+        self.marked.clear();
+        self.list.clear();
+    }
+
+    /// The cells that have parts.
+    pub(super) fn marked(&self) -> &[usize] {
+        &self.marked
+    }
+
+    /// Marks the cells through which an edge goes. Ends are (u, v, height).
+    pub(super) fn mark(&mut self, raster: &Raster, [a, b]: [[f64; 3]; 2]) {
+        let (a, b) = if a[1] <= b[1] { (a, b) } else { (b, a) };
+        let rows = cells_between(a[1], b[1], raster.rows);
+        let slope = (b[0] - a[0]) / (b[1] - a[1]);
+        for row in rows {
+            let at = |v: f64| {
+                let u = a[0] + (v - a[1]) * slope;
+                // a level edge has no slope
+                if u.is_finite() { u.clamp(a[0].min(b[0]), a[0].max(b[0])) } else { f64::NAN }
+            };
+            let (first, last) = (at((row as f64 - 0.5).max(a[1])), at((row as f64 + 0.5).min(b[1])));
+            let [first, last] = if first.is_nan() || last.is_nan() { [a[0], b[0]] } else { [first, last] };
+            let cols = cells_between(first.min(last), first.max(last), raster.cols);
+            self.marked.extend(cols.map(|col| row * raster.cols + col));
+        }
+    }
+
+    /// Adds what a triangle has of the marked cells. Corners are (u, v, height).
+    pub(super) fn add(&mut self, raster: &Raster, corners: [[f64; 3]; 3]) {
+        let area = cross(corners[0], corners[1], [corners[2][0], corners[2][1]]);
+        if self.marked.is_empty() || area.abs() <= raster.slack {
+            return;
+        }
+        let [a, b, c] = if area > 0.0 { corners } else { [corners[0], corners[2], corners[1]] };
+        let span = |k: usize, count| cells_between(least([a[k], b[k], c[k]]), most([a[k], b[k], c[k]]), count);
+        let (rows, cols) = (span(1, raster.rows), span(0, raster.cols));
+        let (Some(first), Some(last)) = (rows.clone().next(), rows.clone().last()) else { return };
+        let from = self.marked.partition_point(|cell| *cell < first * raster.cols);
+        let edges = [(b, c), (c, a), (a, b)];
+        let by_col = edges.map(|(from, to)| from[1] - to[1]);
+        let by_row = edges.map(|(from, to)| to[0] - from[0]);
+        let reach = [0, 1, 2].map(|k| 0.5 * (by_col[k].abs() + by_row[k].abs()));
+        let scale = 1.0 / area.abs();
+        let rise = [b[2] - a[2], c[2] - a[2]];
+        let slope = [by_col, by_row].map(|by| (by[1] * rise[0] + by[2] * rise[1]) * scale);
+        for k in from..self.marked.len() {
+            let cell = self.marked[k];
+            let (row, col) = (cell / raster.cols, cell % raster.cols);
+            if row > last {
+                break;
+            }
+            if !cols.contains(&col) {
+                continue;
+            }
+            let p = [col as f64, row as f64];
+            let w = edges.map(|(from, to)| cross(from, to, p));
+            if (0..3).any(|k| w[k] <= -reach[k]) {
+                continue;
+            }
+            let height_m = a[2] + (w[1] * rise[0] + w[2] * rise[1]) * scale;
+            let whole = (0..3).all(|k| w[k] >= reach[k]);
+            let half_m = 0.5 * (slope[0].abs() + slope[1].abs());
+            let bins = [-half_m, half_m].map(|off| self.bin(height_m + off - self.lowest_m));
+            if whole && bins[0] == bins[1] {
+                self.push(cell, bins[0], [1.0, height_m, p[0], p[1]]);
+                continue;
+            }
+            let mut polygon = Polygon::from([a, b, c]);
+            for (axis, at) in [(0, p[0]), (1, p[1])] {
+                polygon = polygon.below(axis, 1.0, at + 0.5).below(axis, -1.0, 0.5 - at);
+            }
+            self.cut(cell, polygon);
+        }
+    }
+
+    /// Cuts a polygon of a cell at the borders of the bins.
+    fn cut(&mut self, cell: usize, polygon: Polygon) {
+        let heights = polygon.corners().iter().map(|p| p[2]);
+        let (low_m, high_m) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
+        if low_m > high_m {
+            return;
+        }
+        let (mut bin, last) = (self.bin(low_m - self.lowest_m), self.bin(high_m - self.lowest_m));
+        let mut before = [0.0; 4];
+        loop {
+            let below = if bin >= last {
+                polygon.sums()
+            } else {
+                polygon.below(2, 1.0, self.lowest_m + self.top_m(bin)).sums()
+            };
+            let sums = [0, 1, 2, 3].map(|k| below[k] - before[k]);
+            if sums[0] > LEAST_SHARE * LEAST_SHARE {
+                self.push(cell, bin, sums);
+            }
+            if bin >= last {
+                return;
+            }
+            (before, bin) = (below, bin + 1);
+        }
+    }
+
+    fn push(&mut self, cell: usize, bin: u32, sums: [f64; 4]) {
+        let order = u32::try_from(self.pieces.len()).unwrap_or(u32::MAX);
+        self.pieces.push(Piece { cell, bin, order, sums });
+    }
+
+    /// The bin of a height above the lowest point.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number from 1 to 64")]
+    fn bin(&self, above_m: f64) -> u32 {
+        // ⌊log₂⌋ of a number from 1 on
+        let log = |x: f64| u32::try_from(x.to_bits() >> 52).unwrap_or(0).saturating_sub(1023);
+        let at = above_m / self.bin_m;
+        let lower = at * f64::from(LOWER_BINS).exp2();
+        if lower < 1.0 {
+            0
+        } else if at < 1.0 {
+            1 + log(lower)
+        } else if at < f64::from(EVEN_BINS) {
+            LOWER_BINS + at as u32
+        } else {
+            LOWER_BINS + EVEN_BINS + log(at / f64::from(EVEN_BINS))
+        }
+    }
+
+    /// Upper border of a bin above the lowest point, m.
+    fn top_m(&self, bin: u32) -> f64 {
+        let even = bin.saturating_sub(LOWER_BINS);
+        let lower = f64::from(bin.min(LOWER_BINS)) - f64::from(LOWER_BINS);
+        let upper = f64::from(even.saturating_sub(EVEN_BINS - 1));
+        let at = if even == 0 { lower.exp2() } else { f64::from((even + 1).min(EVEN_BINS)) * upper.exp2() };
+        at * self.bin_m
+    }
+
+    /// Joins the pieces to parts. Where layers of a body lie above each other, the lowest count first.
+    pub(super) fn finish(&mut self) {
+        self.pieces.sort_unstable_by(|p, q| {
+            let mean_m = |p: &Piece| p.sums[1] / p.sums[0];
+            let heights = || mean_m(p).total_cmp(&mean_m(q));
+            (p.cell, p.bin).cmp(&(q.cell, q.bin)).then_with(heights).then(p.order.cmp(&q.order))
+        });
+        let mut left = 1.0;
+        for pieces in self.pieces.chunk_by(|p, q| (p.cell, p.bin) == (q.cell, q.bin)) {
+            let cell = pieces[0].cell;
+            if self.list.last().is_none_or(|part| part.cell != cell) {
+                left = 1.0;
+            }
+            let mut sums = [0.0; 4];
+            for piece in pieces {
+                let own = piece.sums[0].min(left);
+                left -= own;
+                let kept = own / piece.sums[0];
+                sums = [0, 1, 2, 3].map(|k| sums[k] + kept * piece.sums[k]);
+            }
+            let [share, height, u, v] = sums;
+            if share > LEAST_SHARE {
+                self.list.push(Part { cell, share, depth_m: -height / share, place: [u / share, v / share] });
+            }
+        }
+    }
+}
+
+/// Cells of `0..count` that the closed interval between two coordinates meets, of which centres are whole numbers.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "both ends are cut to the grid")]
+fn cells_between(low: f64, high: f64, count: usize) -> std::ops::Range<usize> {
+    // not finite: none
+    if !(low <= high && low < count as f64 && high > -1.0) {
+        return 0..0;
+    }
+    let first = (low + 0.5 - BORDER).max(0.0) as usize;
+    let end = (high + 1.5 + BORDER).clamp(0.0, count as f64) as usize;
+    first.min(count)..end
+}
+
+/// A point this near to the border of a cell, in cells, counts for both sides.
+const BORDER: f64 = 1e-9;
+
+/// A polygon with few corners.
+#[derive(Clone, Copy)]
+struct Polygon {
+    corners: [[f64; 3]; MOST_CORNERS],
+    count: usize,
+}
+
+impl From<[[f64; 3]; 3]> for Polygon {
+    fn from(triangle: [[f64; 3]; 3]) -> Self {
+        let mut corners = [[0.0; 3]; MOST_CORNERS];
+        corners[..3].copy_from_slice(&triangle);
+        Self { corners, count: 3 }
+    }
+}
+
+impl Polygon {
+    fn corners(&self) -> &[[f64; 3]] {
+        &self.corners[..self.count]
+    }
+
+    /// The part where `sign` × the coordinate `axis` is at most `bound` (I. E. Sutherland and G. W. Hodgman,
+    /// Communications of the ACM 17 (1974) 32).
+    fn below(&self, axis: usize, sign: f64, bound: f64) -> Self {
+        let mut out = Self { corners: [[0.0; 3]; MOST_CORNERS], count: 0 };
+        let Some(&last) = self.corners().last() else { return out };
+        let over = |p: &[f64; 3]| sign * p[axis] - bound;
+        let (mut before, mut before_over) = (last, over(&last));
+        for &p in self.corners() {
+            let here = over(&p);
+            if (before_over < 0.0 && here > 0.0) || (before_over > 0.0 && here < 0.0) {
+                let share = before_over / (before_over - here);
+                out.push([0, 1, 2].map(|k| before[k] + share * (p[k] - before[k])));
+            }
+            if here <= 0.0 {
+                out.push(p);
+            }
+            (before, before_over) = (p, here);
+        }
+        out
+    }
+
+    fn push(&mut self, p: [f64; 3]) {
+        // a convex polygon cut by five lines has no more
+        if self.count < MOST_CORNERS {
+            self.corners[self.count] = p;
+            self.count += 1;
+        }
+    }
+
+    /// Area, and integrals of height, u and v over it.
+    fn sums(&self) -> [f64; 4] {
+        let mut sums = [0.0; 4];
+        let [a, rest @ ..] = self.corners() else { return sums };
+        for pair in rest.windows(2) {
+            let (b, c) = (pair[0], pair[1]);
+            let area = 0.5 * cross(*a, b, [c[0], c[1]]);
+            let third = area / 3.0;
+            sums[0] += area;
+            for (sum, k) in sums[1..].iter_mut().zip([2, 0, 1]) {
+                *sum += third * (a[k] + b[k] + c[k]);
+            }
+        }
+        sums
+    }
+}
